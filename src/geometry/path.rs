@@ -1,0 +1,211 @@
+//! Paths: polylines dense enough to be read as smooth curves.
+//!
+//! A path carries station, heading and curvature at each vertex. Between vertices the position is a
+//! chord with the heading interpolated; makers sample so densely that the chord is within a
+//! millimetre of the curve (see `road`), so nobody downstream needs the curve itself.
+
+use super::pose::Pose;
+use super::pose::Vec2;
+use super::pose::wrap_angle;
+
+/// A vertex of a [`Path`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PathPoint {
+    /// Distance from the beginning, along the path, m.
+    pub station_m: f64,
+    pub position: Vec2,
+    pub heading_rad: f64,
+    /// 1/m, positive to the left.
+    pub curvature_per_m: f64,
+}
+
+/// Where a point lies beside a path.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Projection {
+    /// m along the path, within `[0, length]`.
+    pub station_m: f64,
+    /// m to the left of the path.
+    pub offset_m: f64,
+    /// Distance to the nearest point of the path, m; larger than `|offset_m|` beyond the ends.
+    pub distance_m: f64,
+}
+
+/// A directed curve: at least two vertices, stations strictly rising from 0.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Path {
+    points: Vec<PathPoint>,
+}
+
+impl Path {
+    /// A path through points that already know their heading and curvature.
+    ///
+    /// Stations are measured anew as chord lengths from 0; points closer than 1 µm to their
+    /// predecessor are dropped. `None` if fewer than two remain.
+    pub fn new(samples: impl IntoIterator<Item = (Vec2, f64, f64)>) -> Option<Path> {
+        let mut points: Vec<PathPoint> = Vec::new();
+        for (position, heading_rad, curvature_per_m) in samples {
+            let station_m = match points.last() {
+                None => 0.0,
+                Some(last) => {
+                    let chord_m = (position - last.position).norm();
+                    if chord_m < 1e-6 {
+                        continue;
+                    }
+                    last.station_m + chord_m
+                }
+            };
+            points.push(PathPoint { station_m, position, heading_rad, curvature_per_m });
+        }
+        (points.len() >= 2).then_some(Path { points })
+    }
+
+    /// A straight path. `None` if the ends coincide.
+    pub fn line(from: Vec2, to: Vec2) -> Option<Path> {
+        let delta = to - from;
+        let heading_rad = libm::atan2(delta.y, delta.x);
+        Path::new([(from, heading_rad, 0.0), (to, heading_rad, 0.0)])
+    }
+
+    pub fn points(&self) -> &[PathPoint] {
+        &self.points
+    }
+
+    pub fn length_m(&self) -> f64 {
+        self.points[self.points.len() - 1].station_m
+    }
+
+    /// The pose at a station; beyond the ends the path goes on straight.
+    pub fn pose_at(&self, station_m: f64) -> Pose {
+        let (index, fraction) = self.locate(station_m);
+        let (a, b) = (&self.points[index], &self.points[index + 1]);
+        let turn_rad = wrap_angle(b.heading_rad - a.heading_rad) * fraction.clamp(0.0, 1.0);
+        Pose {
+            position: a.position + (b.position - a.position) * fraction,
+            heading_rad: wrap_angle(a.heading_rad + turn_rad),
+        }
+    }
+
+    /// 1/m, positive to the left; 0 beyond the ends.
+    pub fn curvature_at(&self, station_m: f64) -> f64 {
+        let (index, fraction) = self.locate(station_m);
+        if !(0.0..=1.0).contains(&fraction) {
+            return 0.0;
+        }
+        let (a, b) = (&self.points[index], &self.points[index + 1]);
+        a.curvature_per_m + (b.curvature_per_m - a.curvature_per_m) * fraction
+    }
+
+    /// The nearest point of the whole path. Of equals, the first.
+    pub fn project(&self, point: Vec2) -> Projection {
+        self.project_segments(point, 0, self.points.len() - 1)
+    }
+
+    /// The nearest point among stations within `reach_m` of `near_m`: quicker, and does not jump
+    /// to another branch where the path passes near itself.
+    pub fn project_near(&self, point: Vec2, near_m: f64, reach_m: f64) -> Projection {
+        let first = self.segment(near_m - reach_m);
+        let last = self.segment(near_m + reach_m) + 1;
+        self.project_segments(point, first, last)
+    }
+
+    /// The part between two stations, clamped to the path. `None` if it is shorter than 1 µm.
+    pub fn part(&self, from_m: f64, to_m: f64) -> Option<Path> {
+        let (from_m, to_m) = (from_m.max(0.0), to_m.min(self.length_m()));
+        let end = |station_m: f64| {
+            let pose = self.pose_at(station_m);
+            (pose.position, pose.heading_rad, self.curvature_at(station_m))
+        };
+        if to_m - from_m < 1e-6 {
+            return None;
+        }
+        let inner = self.points.iter().filter(|p| p.station_m > from_m + 1e-6 && p.station_m < to_m - 1e-6);
+        Path::new(
+            core::iter::once(end(from_m))
+                .chain(inner.map(|p| (p.position, p.heading_rad, p.curvature_per_m)))
+                .chain(core::iter::once(end(to_m))),
+        )
+    }
+
+    /// This path followed by others; each is expected to begin where the one before ends.
+    pub fn join<'a>(paths: impl IntoIterator<Item = &'a Path>) -> Option<Path> {
+        let points = paths.into_iter().flat_map(|path| &path.points);
+        Path::new(points.map(|p| (p.position, p.heading_rad, p.curvature_per_m)))
+    }
+
+    fn project_segments(&self, point: Vec2, first: usize, last: usize) -> Projection {
+        let mut best = Projection { station_m: 0.0, offset_m: 0.0, distance_m: f64::INFINITY };
+        for pair in self.points[first..=last].windows(2) {
+            let (a, b) = (&pair[0], &pair[1]);
+            let chord = b.position - a.position;
+            let length_m = b.station_m - a.station_m;
+            let fraction = ((point - a.position).dot(&chord) / (length_m * length_m)).clamp(0.0, 1.0);
+            let delta = point - (a.position + chord * fraction);
+            let distance_m = delta.norm();
+            if distance_m < best.distance_m {
+                best = Projection {
+                    station_m: a.station_m + fraction * length_m,
+                    offset_m: (chord.x * delta.y - chord.y * delta.x) / length_m,
+                    distance_m,
+                };
+            }
+        }
+        best
+    }
+
+    /// Index of the segment that holds a station, clamped to the ends.
+    fn segment(&self, station_m: f64) -> usize {
+        let after = self.points.partition_point(|p| p.station_m <= station_m);
+        after.clamp(1, self.points.len() - 1) - 1
+    }
+
+    /// Segment and fraction of it; the fraction leaves `[0, 1]` beyond the ends.
+    fn locate(&self, station_m: f64) -> (usize, f64) {
+        let index = self.segment(station_m);
+        let (a, b) = (&self.points[index], &self.points[index + 1]);
+        (index, (station_m - a.station_m) / (b.station_m - a.station_m))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn quarter_circle(radius_m: f64, steps: usize) -> Path {
+        Path::new((0..=steps).map(|i| {
+            let angle = core::f64::consts::FRAC_PI_2 * i as f64 / steps as f64;
+            let position = Vec2::new(radius_m * libm::sin(angle), radius_m * (1.0 - libm::cos(angle)));
+            (position, angle, 1.0 / radius_m)
+        }))
+        .expect("more than two points")
+    }
+
+    #[test]
+    fn poses_and_projections_agree() {
+        let path = quarter_circle(10.0, 200);
+        for i in 0..=40 {
+            let station_m = path.length_m() * f64::from(i) / 40.0;
+            let beside = path.pose_at(station_m).offset(0.0, 1.5).position;
+            let found = path.project(beside);
+            assert!((found.station_m - station_m).abs() < 0.05, "{found:?} at {station_m}");
+            assert!((found.offset_m - 1.5).abs() < 1e-3, "{found:?}");
+            let near = path.project_near(beside, station_m, 2.0);
+            assert_eq!(near, found);
+        }
+    }
+
+    #[test]
+    fn beyond_the_ends_a_path_is_straight() {
+        let path = Path::line(Vec2::new(0.0, 0.0), Vec2::new(10.0, 0.0)).expect("a line");
+        assert_eq!(path.pose_at(12.0).position, Vec2::new(12.0, 0.0));
+        assert_eq!(path.pose_at(-2.0).position, Vec2::new(-2.0, 0.0));
+        assert!(Path::line(Vec2::new(1.0, 1.0), Vec2::new(1.0, 1.0)).is_none());
+    }
+
+    #[test]
+    fn a_part_keeps_the_ends() {
+        let path = quarter_circle(10.0, 50);
+        let part = path.part(3.0, 9.0).expect("six metres");
+        assert!((part.length_m() - 6.0).abs() < 1e-9);
+        assert!((part.pose_at(0.0).position - path.pose_at(3.0).position).norm() < 1e-9);
+    }
+}

@@ -1,0 +1,9 @@
+//! avastra: a language in which people say what may happen around a self-driving car, and the
+//! machinery that finds out which of it makes the car crash.
+//!
+//! The modules stand in reading order, and each may use only those above it; `tests/it/layers.rs`
+//! keeps it so. `ARCHITECTURE.md` has the picture.
+
+pub mod units;
+pub mod rng;
+pub mod geometry;

@@ -1,0 +1,107 @@
+//! Randomness: one seed, one named stream per consumer.
+//!
+//! Every consumer draws from a stream of its own, so that a new draw in one place shifts no other
+//! and a replay needs nothing but the seed. The generator is named (ChaCha8), because `StdRng` may
+//! change between releases, and the draws are written here, because the distributions of `rand` may
+//! change too: a draw is part of the file format.
+
+use rand::Rng as _;
+use rand::SeedableRng;
+
+/// The one generator of avastra.
+pub type Rng = rand_chacha::ChaCha8Rng;
+
+/// Who draws. The discriminant is part of every replay: never renumber, only add.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(u64)]
+pub enum Stream {
+    /// Seeds of single episodes, derived from the seed of a run.
+    Episode = 1,
+    /// Initial state of an episode: time of day, phase of the signals.
+    Reset = 2,
+    /// The `any` parameters of an action row.
+    Draw = 3,
+    /// The agent's choice among rows.
+    Exploration = 4,
+    /// Localisation error of the driving system.
+    Localization = 5,
+    /// Perception error of the driving system.
+    Perception = 6,
+    /// Choices of other road users, for example which way to turn.
+    Traffic = 7,
+}
+
+/// The stream of one consumer; `index` tells apart its uses, for example the step number.
+pub fn stream(seed: u64, stream: Stream, index: u64) -> Rng {
+    let mut key = [0_u8; 32];
+    key[0..8].copy_from_slice(&seed.to_le_bytes());
+    key[8..16].copy_from_slice(&(stream as u64).to_le_bytes());
+    key[16..24].copy_from_slice(&index.to_le_bytes());
+    key[24..32].copy_from_slice(b"avastra1");
+    Rng::from_seed(key)
+}
+
+/// A seed for a child, for example one episode of a run.
+pub fn child_seed(seed: u64, consumer: Stream, index: u64) -> u64 {
+    stream(seed, consumer, index).next_u64()
+}
+
+/// Uniform in `[0, 1)`, from 53 bits.
+pub fn unit(rng: &mut Rng) -> f64 {
+    (rng.next_u64() >> 11) as f64 * (1.0 / 9_007_199_254_740_992.0)
+}
+
+/// Uniform in `[low, high)`; `low` if the range is empty.
+pub fn between(rng: &mut Rng, low: f64, high: f64) -> f64 {
+    low + (high - low).max(0.0) * unit(rng)
+}
+
+/// Uniform in `0..count`, without modulo bias (Lemire). `count` must be positive.
+pub fn below(rng: &mut Rng, count: u32) -> u32 {
+    assert!(count > 0, "a draw needs at least one choice");
+    let threshold = count.wrapping_neg() % count;
+    loop {
+        let product = u64::from(rng.next_u32()) * u64::from(count);
+        if product as u32 >= threshold {
+            return (product >> 32) as u32;
+        }
+    }
+}
+
+/// Standard normal, by Box–Muller; each call uses two draws and keeps one value.
+pub fn normal(rng: &mut Rng) -> f64 {
+    let radius = libm::sqrt(-2.0 * libm::log(1.0 - unit(rng)));
+    radius * libm::cos(core::f64::consts::TAU * unit(rng))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn streams_are_golden() {
+        let mut rng = stream(7, Stream::Draw, 3);
+        assert_eq!(rng.next_u64(), stream(7, Stream::Draw, 3).next_u64());
+        assert_ne!(stream(7, Stream::Draw, 3).next_u64(), stream(7, Stream::Draw, 4).next_u64());
+        assert_ne!(stream(7, Stream::Draw, 3).next_u64(), stream(7, Stream::Reset, 3).next_u64());
+    }
+
+    #[test]
+    fn below_stays_below_and_reaches_all() {
+        let mut rng = stream(1, Stream::Draw, 0);
+        let mut seen = [0_u32; 6];
+        for _ in 0..6000 {
+            seen[below(&mut rng, 6) as usize] += 1;
+        }
+        assert!(seen.iter().all(|&n| (850..1150).contains(&n)), "{seen:?}");
+    }
+
+    #[test]
+    fn normal_has_unit_variance() {
+        let mut rng = stream(1, Stream::Draw, 0);
+        let draws: Vec<f64> = (0..20_000).map(|_| normal(&mut rng)).collect();
+        let mean = draws.iter().sum::<f64>() / draws.len() as f64;
+        let variance = draws.iter().map(|x| (x - mean) * (x - mean)).sum::<f64>() / draws.len() as f64;
+        assert!(mean.abs() < 0.02 && (variance - 1.0).abs() < 0.03, "{mean} {variance}");
+    }
+}

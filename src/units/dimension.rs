@@ -1,0 +1,98 @@
+//! Dimensions: what a quantity measures, as exponents of metre, second and radian.
+
+use core::fmt;
+
+/// `m^metres · s^seconds · rad^radians`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
+pub struct Dimension {
+    pub metres: i8,
+    pub seconds: i8,
+    pub radians: i8,
+}
+
+impl Dimension {
+    pub const RATIO: Dimension = Dimension::of(0, 0, 0);
+    pub const LENGTH: Dimension = Dimension::of(1, 0, 0);
+    pub const DURATION: Dimension = Dimension::of(0, 1, 0);
+    pub const SPEED: Dimension = Dimension::of(1, -1, 0);
+    pub const ACCEL: Dimension = Dimension::of(1, -2, 0);
+    pub const ANGLE: Dimension = Dimension::of(0, 0, 1);
+
+    /// The dimensions that have a type name in the language, with it and their SI unit.
+    pub const NAMED: &'static [(Dimension, &'static str, &'static str)] = &[
+        (Dimension::RATIO, "Ratio", ""),
+        (Dimension::LENGTH, "Length", "m"),
+        (Dimension::DURATION, "Duration", "s"),
+        (Dimension::SPEED, "Speed", "m/s"),
+        (Dimension::ACCEL, "Accel", "m/s^2"),
+        (Dimension::ANGLE, "Angle", "rad"),
+    ];
+
+    const fn of(metres: i8, seconds: i8, radians: i8) -> Dimension {
+        Dimension { metres, seconds, radians }
+    }
+
+    /// The dimension with that type name.
+    pub fn from_name(name: &str) -> Option<Dimension> {
+        Dimension::NAMED.iter().find(|(_, word, _)| *word == name).map(|(dimension, _, _)| *dimension)
+    }
+
+    /// Of a product; `None` beyond exponents of ±127.
+    pub fn times(self, other: Dimension) -> Option<Dimension> {
+        Some(Dimension {
+            metres: self.metres.checked_add(other.metres)?,
+            seconds: self.seconds.checked_add(other.seconds)?,
+            radians: self.radians.checked_add(other.radians)?,
+        })
+    }
+
+    /// Of a quotient; `None` beyond exponents of ±127.
+    pub fn per(self, other: Dimension) -> Option<Dimension> {
+        Some(Dimension {
+            metres: self.metres.checked_sub(other.metres)?,
+            seconds: self.seconds.checked_sub(other.seconds)?,
+            radians: self.radians.checked_sub(other.radians)?,
+        })
+    }
+
+    /// SI unit in the spelling of the language: `m/s^2`, empty for a ratio.
+    pub fn si_unit(self) -> String {
+        if let Some((_, _, unit)) = Dimension::NAMED.iter().find(|(dimension, _, _)| *dimension == self) {
+            return (*unit).to_owned();
+        }
+        let powers = [(self.metres, "m"), (self.seconds, "s"), (self.radians, "rad")];
+        let factor = |(power, base): (i8, &str)| match power {
+            1 => base.to_owned(),
+            _ => format!("{base}^{power}"),
+        };
+        powers.into_iter().filter(|(power, _)| *power != 0).map(factor).collect::<Vec<_>>().join("·")
+    }
+}
+
+impl fmt::Display for Dimension {
+    /// The type name where there is one, `m^2·s^-1` otherwise.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match Dimension::NAMED.iter().find(|(dimension, _, _)| dimension == self) {
+            Some((_, name, _)) => f.write_str(name),
+            None => f.write_str(&self.si_unit()),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn speed_times_duration_is_length() {
+        assert_eq!(Dimension::SPEED.times(Dimension::DURATION), Some(Dimension::LENGTH));
+        assert_eq!(Dimension::LENGTH.per(Dimension::DURATION), Some(Dimension::SPEED));
+    }
+
+    #[test]
+    fn odd_dimensions_have_a_spelling() {
+        let area_rate = Dimension::SPEED.times(Dimension::LENGTH).unwrap();
+        assert_eq!(area_rate.to_string(), "m^2·s^-1");
+        assert_eq!(Dimension::ACCEL.to_string(), "Accel");
+    }
+}
