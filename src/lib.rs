@@ -7,3 +7,4 @@
 pub mod units;
 pub mod rng;
 pub mod geometry;
+pub mod road;

@@ -1,0 +1,205 @@
+//! Centre lines of lanes: the exact offset curve of a reference line, sampled.
+
+use crate::geometry::Path;
+use crate::geometry::Vec2;
+use crate::geometry::wrap_angle;
+
+use super::opendrive::RoadElement;
+use super::opendrive::SectionElement;
+
+/// Chords stay this near to the curve, m; half of what the rest may rely on.
+const CHORD_ERROR_M: f64 = 5e-4;
+
+/// Longest chord where anything bends or widens, m.
+const CHORD_M_MAX: f64 = 1.0;
+
+/// Before a jump in curvature the last vertex stands so far ahead of it, m: linear interpolation of
+/// curvature between two vertices would otherwise smear the jump over the whole straight.
+const JUMP_M: f64 = 0.05;
+
+/// No lane of a real road needs as many vertices.
+const SAMPLES_MAX: usize = 500_000;
+
+/// Longer than any lane, m: roads are at most a tenth of this.
+const LANE_M_MAX: f64 = 1e6;
+
+/// Farther from the origin than any map in metres (UTM northings reach 1e7).
+const COORDINATE_M_MAX: f64 = 1e8;
+
+/// A lane of one section, sampled in driving direction.
+pub struct CentreLine {
+    pub path: Path,
+    /// Width at each vertex, m.
+    pub widths_m: Vec<f64>,
+    /// Station of the road's reference line at each vertex, m.
+    pub road_stations_m: Vec<f64>,
+    /// Whether the lane folds up somewhere, because it lies beyond the centre of a bend.
+    pub folded: bool,
+}
+
+#[derive(Clone, Copy)]
+struct Sample {
+    s_m: f64,
+    position: Vec2,
+    heading_rad: f64,
+    curvature_per_m: f64,
+    width_m: f64,
+    folded: bool,
+}
+
+/// Why a lane has no centre line.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum NoCentreLine {
+    /// The section is too short to hold one.
+    Short,
+    /// Its polynomials or curves leave what a road can be.
+    Wild,
+}
+
+/// Samples the centre of a lane of a section.
+///
+/// # Errors
+/// If there is nothing to sample, or no end of it.
+pub fn centre_line(
+    road: &RoadElement,
+    section: &SectionElement,
+    lane: i32,
+) -> Result<CentreLine, NoCentreLine> {
+    let mut breaks_m: Vec<f64> = road.reference.beginnings().chain(road.lane_offset.beginnings()).collect();
+    for element in section.lanes.iter().filter(|element| element.id.signum() == lane.signum()) {
+        let within = element.widths.beginnings().chain(element.borders.beginnings());
+        breaks_m.extend(within.map(|begin_m| section.begin_m + begin_m));
+    }
+    breaks_m.retain(|at_m| *at_m > section.begin_m + 1e-6 && *at_m < section.end_m - 1e-6);
+    breaks_m.extend([section.begin_m, section.end_m]);
+    breaks_m.sort_by(f64::total_cmp);
+    breaks_m.dedup_by(|a, b| (*a - *b).abs() < 1e-6);
+
+    let curve = Curve { road, section, lane };
+    let mut samples: Vec<Sample> = Vec::new();
+    for (i, piece) in breaks_m.windows(2).enumerate() {
+        let (begin_m, limit_m) = (piece[0], piece[1]);
+        // A hair before its end a piece still follows its own polynomials.
+        let mut end_m = limit_m - 1e-7;
+        if i + 2 < breaks_m.len() {
+            let jump = curve.at(limit_m).curvature_per_m - curve.at(end_m).curvature_per_m;
+            if jump.abs() > 1e-6 && limit_m - begin_m > 2.0 * JUMP_M {
+                end_m = limit_m - JUMP_M;
+            }
+        }
+        curve.sample(curve.at(begin_m), curve.at(end_m), &mut samples);
+    }
+    let tame = |sample: &Sample| {
+        let numbers = [sample.heading_rad, sample.curvature_per_m, sample.width_m];
+        let finite = numbers.iter().all(|number| number.is_finite());
+        finite && sample.position.iter().all(|part| part.abs() < COORDINATE_M_MAX)
+    };
+    if samples.len() > SAMPLES_MAX || !samples.iter().all(tame) {
+        return Err(NoCentreLine::Wild);
+    }
+    // Path drops points that coincide; widths and stations must stay in step with it.
+    samples.dedup_by(|b, a| (b.position - a.position).norm() < 1e-5);
+    if !road.runs_along(lane) {
+        samples.reverse();
+        for sample in &mut samples {
+            sample.heading_rad += core::f64::consts::PI;
+            sample.curvature_per_m = -sample.curvature_per_m;
+        }
+    }
+    let points = samples.iter().map(|p| (p.position, wrap_angle(p.heading_rad), p.curvature_per_m));
+    let path = Path::new(points).ok_or(NoCentreLine::Short)?;
+    debug_assert_eq!(path.points().len(), samples.len());
+    if path.length_m() > LANE_M_MAX {
+        return Err(NoCentreLine::Wild);
+    }
+    Ok(CentreLine {
+        path,
+        widths_m: samples.iter().map(|sample| sample.width_m.max(0.0)).collect(),
+        road_stations_m: samples.iter().map(|sample| sample.s_m).collect(),
+        folded: samples.iter().any(|sample| sample.folded),
+    })
+}
+
+/// A lane's centre as a function of the road's station.
+struct Curve<'a> {
+    road: &'a RoadElement,
+    section: &'a SectionElement,
+    lane: i32,
+}
+
+impl Curve<'_> {
+    /// The offset curve `R + t N` of the reference line `R`: with `T' = k N` and `N' = -k T` its
+    /// derivatives are `(1 - k t) T + t' N` and `-(k' t + 2 k t') T + ((1 - k t) k + t'') N`.
+    fn at(&self, s_m: f64) -> Sample {
+        let reference = self.road.reference.at(s_m);
+        let (t, width) = self.road.lane_at(self.section, self.lane, s_m);
+        let (k, k_rate) = (reference.curvature_per_m, reference.curvature_rate_per_m2);
+        let (ahead, aside) = (1.0 - k * t.value, t.first);
+        let (ahead_rate, aside_rate) =
+            (-(k_rate * t.value + 2.0 * k * t.first), (1.0 - k * t.value) * k + t.second);
+        let speed = libm::sqrt(ahead * ahead + aside * aside);
+        let folded = ahead < 1e-3;
+        let curvature_per_m =
+            if folded { 0.0 } else { (ahead * aside_rate - aside * ahead_rate) / (speed * speed * speed) };
+        let heading_rad = reference.heading_rad + if folded { 0.0 } else { libm::atan2(aside, ahead) };
+        let (sin, cos) = libm::sincos(reference.heading_rad);
+        Sample {
+            s_m,
+            position: reference.position + Vec2::new(-sin, cos) * t.value,
+            heading_rad,
+            curvature_per_m,
+            width_m: width.value,
+            folded,
+        }
+    }
+
+    /// Appends both ends and whatever is needed in between.
+    fn sample(&self, begin: Sample, end: Sample, samples: &mut Vec<Sample>) {
+        samples.push(begin);
+        let steps = if self.is_straight(begin, end) {
+            1
+        } else {
+            ((end.s_m - begin.s_m) / CHORD_M_MAX).ceil().max(1.0) as usize
+        };
+        let mut from = begin;
+        for i in 1..=steps {
+            let fraction = i as f64 / steps as f64;
+            let to = if i == steps { end } else { self.at(begin.s_m + (end.s_m - begin.s_m) * fraction) };
+            self.refine(from, to, 12, samples);
+            samples.push(to);
+            from = to;
+        }
+    }
+
+    /// Appends points strictly between two until the chords are near enough.
+    fn refine(&self, begin: Sample, end: Sample, depth: u32, samples: &mut Vec<Sample>) {
+        if depth == 0 || samples.len() > SAMPLES_MAX || self.deviation_m(begin, end) < CHORD_ERROR_M {
+            return;
+        }
+        let middle = self.at((begin.s_m + end.s_m) / 2.0);
+        self.refine(begin, middle, depth - 1, samples);
+        samples.push(middle);
+        self.refine(middle, end, depth - 1, samples);
+    }
+
+    fn is_straight(&self, begin: Sample, end: Sample) -> bool {
+        let same_heading = |other: Sample| (other.heading_rad - begin.heading_rad).abs() < 1e-9;
+        let middle = self.at((begin.s_m + end.s_m) / 2.0);
+        same_heading(middle) && same_heading(end) && self.deviation_m(begin, end) < 1e-6
+    }
+
+    /// How far the curve leaves the chord, or the width its linear interpolation, m.
+    fn deviation_m(&self, begin: Sample, end: Sample) -> f64 {
+        let chord = end.position - begin.position;
+        let length_m = chord.norm().max(1e-9);
+        let mut deviation_m: f64 = 0.0;
+        for fraction in [0.25, 0.5, 0.75] {
+            let between = self.at(begin.s_m + (end.s_m - begin.s_m) * fraction);
+            let delta = between.position - begin.position;
+            let width_m = begin.width_m + (end.width_m - begin.width_m) * fraction;
+            let aside_m = (chord.x * delta.y - chord.y * delta.x).abs() / length_m;
+            deviation_m = deviation_m.max(aside_m).max((between.width_m - width_m).abs());
+        }
+        deviation_m
+    }
+}

@@ -1,0 +1,179 @@
+//! Where other lanes cross or join a route inside junctions, and where it meets crosswalks.
+
+use crate::geometry::Path;
+use crate::geometry::PathPoint;
+use crate::geometry::Vec2;
+use crate::geometry::wrap_angle;
+
+use super::map::LaneIndex;
+use super::map::RoadMap;
+use super::route::Conflict;
+use super::route::RouteLane;
+
+/// A lane that joins the route does so where the centre lines have come this near, m.
+const MERGE_M: f64 = 1.5;
+
+/// Two crossings of one lane nearer than this are one, m.
+const SAME_CROSSING_M: f64 = 1.0;
+
+/// All conflicts of a route, by rising station.
+pub fn conflicts(map: &RoadMap, lanes: &[RouteLane], path: &Path) -> Vec<Conflict> {
+    let mut all = Vec::new();
+    for (i, here) in lanes.iter().enumerate() {
+        let Some(junction) = map.lane(here.lane).junction else { continue };
+        let Some(inside) = path.part(here.from_m, here.to_m) else { continue };
+        let begin_m = here.from_m.max(0.0);
+        let next = lanes.get(i + 1).map(|next| next.lane);
+        for other in map.junctions[junction].lanes.iter().copied() {
+            let on_route = lanes.iter().any(|lane| lane.lane == other);
+            if on_route || diverges(map, here.lane, other) {
+                continue;
+            }
+            let joins = next.is_some_and(|next| map.lane(other).successors.contains(&next));
+            let found = if joins {
+                merge(&inside, &map.lane(other).centre).into_iter().collect()
+            } else {
+                crossings(&inside, &map.lane(other).centre)
+            };
+            all.extend(found.into_iter().map(|(station_m, lane_station_m)| Conflict {
+                station_m: station_m + begin_m,
+                lane: other,
+                lane_station_m,
+                angle_rad: wrap_angle(
+                    map.lane(other).centre.pose_at(lane_station_m).heading_rad
+                        - inside.pose_at(station_m).heading_rad,
+                ),
+            }));
+        }
+    }
+    all.sort_by(|a, b| a.station_m.total_cmp(&b.station_m).then(a.lane.cmp(&b.lane)));
+    all
+}
+
+/// Whether two lanes leave the same lane: whoever is on the other comes from behind the ego vehicle,
+/// or drives ahead of it, and follows its own way.
+fn diverges(map: &RoadMap, here: LaneIndex, other: LaneIndex) -> bool {
+    map.lane(other).predecessors.iter().any(|from| map.lane(here).predecessors.contains(from))
+}
+
+/// First point of a lane from which on it is within [`MERGE_M`] of the route: (route, lane), m.
+fn merge(route: &Path, lane: &Path) -> Option<(f64, f64)> {
+    let near = |point: &PathPoint| (route.project(point.position), point.station_m);
+    let mut first = None;
+    for (projection, lane_station_m) in dense(lane).iter().map(near).rev() {
+        if projection.distance_m > MERGE_M {
+            break;
+        }
+        first = Some((projection.station_m, lane_station_m));
+    }
+    first
+}
+
+/// The vertices of a path, with more where they are more than half a metre apart.
+fn dense(path: &Path) -> Vec<PathPoint> {
+    let mut points = Vec::new();
+    for pair in path.points().windows(2) {
+        let steps = ((pair[1].station_m - pair[0].station_m) / 0.5).ceil().max(1.0);
+        for i in 0..steps as u32 {
+            let fraction = f64::from(i) / steps;
+            points.push(PathPoint {
+                station_m: pair[0].station_m + (pair[1].station_m - pair[0].station_m) * fraction,
+                position: pair[0].position + (pair[1].position - pair[0].position) * fraction,
+                ..pair[0]
+            });
+        }
+    }
+    points.extend(path.points().last());
+    points
+}
+
+/// Where two paths cross: (station on the first, station on the second), m.
+fn crossings(a: &Path, b: &Path) -> Vec<(f64, f64)> {
+    let mut found: Vec<(f64, f64)> = Vec::new();
+    for p in a.points().windows(2) {
+        for q in b.points().windows(2) {
+            let Some((x, y)) = segment_crossing(p[0].position, p[1].position, q[0].position, q[1].position)
+            else {
+                continue;
+            };
+            let station_a_m = p[0].station_m + (p[1].station_m - p[0].station_m) * x;
+            let station_b_m = q[0].station_m + (q[1].station_m - q[0].station_m) * y;
+            if found.iter().all(|(known_m, _)| (known_m - station_a_m).abs() > SAME_CROSSING_M) {
+                found.push((station_a_m, station_b_m));
+            }
+        }
+    }
+    found
+}
+
+/// Fractions along two segments at which they cross; `None` also if they are parallel.
+fn segment_crossing(a: Vec2, b: Vec2, c: Vec2, d: Vec2) -> Option<(f64, f64)> {
+    let (p, q, delta) = (b - a, d - c, c - a);
+    let cross = p.x * q.y - p.y * q.x;
+    if cross.abs() < 1e-12 {
+        return None;
+    }
+    let x = (delta.x * q.y - delta.y * q.x) / cross;
+    let y = (delta.x * p.y - delta.y * p.x) / cross;
+    ((0.0..=1.0).contains(&x) && (0.0..=1.0).contains(&y)).then_some((x, y))
+}
+
+/// Between which stations a path runs inside a polygon, m.
+pub fn spans_inside(path: &Path, outline: &[Vec2]) -> Vec<(f64, f64)> {
+    let edges = || outline.iter().zip(outline.iter().cycle().skip(1));
+    let mut cuts_m = vec![0.0, path.length_m()];
+    for pair in path.points().windows(2) {
+        for (c, d) in edges() {
+            if let Some((x, _)) = segment_crossing(pair[0].position, pair[1].position, *c, *d) {
+                cuts_m.push(pair[0].station_m + (pair[1].station_m - pair[0].station_m) * x);
+            }
+        }
+    }
+    cuts_m.sort_by(f64::total_cmp);
+    let mut spans: Vec<(f64, f64)> = Vec::new();
+    for pair in cuts_m.windows(2) {
+        let middle = path.pose_at((pair[0] + pair[1]) / 2.0).position;
+        if pair[1] - pair[0] < 1e-6 || !holds(outline, middle) {
+            continue;
+        }
+        match spans.last_mut() {
+            Some(last) if pair[0] - last.1 < 1e-6 => last.1 = pair[1],
+            _ => spans.push((pair[0], pair[1])),
+        }
+    }
+    spans
+}
+
+/// Whether a polygon holds a point (even-odd rule).
+fn holds(outline: &[Vec2], point: Vec2) -> bool {
+    let edges = outline.iter().zip(outline.iter().cycle().skip(1));
+    let crossed = edges.filter(|(a, b)| {
+        (a.y > point.y) != (b.y > point.y) && point.x < a.x + (b.x - a.x) * (point.y - a.y) / (b.y - a.y)
+    });
+    crossed.count() % 2 == 1
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn paths_cross_where_they_do() {
+        let east = Path::line(Vec2::new(0.0, 0.0), Vec2::new(10.0, 0.0)).unwrap();
+        let north = Path::line(Vec2::new(4.0, -3.0), Vec2::new(4.0, 3.0)).unwrap();
+        assert_eq!(crossings(&east, &north), [(4.0, 3.0)]);
+        let beside = Path::line(Vec2::new(0.0, 1.0), Vec2::new(10.0, 1.0)).unwrap();
+        assert!(crossings(&east, &beside).is_empty());
+        assert_eq!(merge(&east, &beside), Some((0.0, 0.0)));
+    }
+
+    #[test]
+    fn a_path_is_inside_a_polygon_between_its_edges() {
+        let east = Path::line(Vec2::new(0.0, 0.0), Vec2::new(10.0, 0.0)).unwrap();
+        let corners = [(2.0, -1.0), (5.0, -1.0), (5.0, 1.0), (2.0, 1.0)];
+        let square: Vec<Vec2> = corners.iter().map(|(x, y)| Vec2::new(*x, *y)).collect();
+        assert_eq!(spans_inside(&east, &square), [(2.0, 5.0)]);
+        let around: Vec<Vec2> = square.iter().map(|corner| corner * 10.0 - Vec2::new(30.0, 0.0)).collect();
+        assert_eq!(spans_inside(&east, &around), [(0.0, 10.0)]);
+    }
+}

@@ -1,0 +1,405 @@
+//! From OpenDRIVE elements to the lane graph: lanes, their links, neighbours and limits.
+
+use std::collections::BTreeMap;
+
+use crate::geometry::Path;
+use crate::geometry::wrap_angle;
+
+use super::centre_line::CentreLine;
+use super::centre_line::NoCentreLine;
+use super::centre_line::centre_line;
+use super::index::LaneGrid;
+use super::map::Junction;
+use super::map::Lane;
+use super::map::LaneIndex;
+use super::map::LaneKey;
+use super::map::Neighbour;
+use super::map::RoadError;
+use super::map::RoadMap;
+use super::map::Turn;
+use super::opendrive::Contact;
+use super::opendrive::Document;
+use super::opendrive::RoadElement;
+use super::opendrive::RoadLink;
+use super::opendrive::SectionElement;
+use super::signals::add_crosswalks;
+use super::signals::add_signals;
+
+/// Where a file states no limit: 50 km/h, the usual one in towns.
+const LIMIT_MPS_DEFAULT: f64 = 50.0 / 3.6;
+
+/// Below this change of heading a connection is straight (survey conventions).
+const STRAIGHT_RAD_MAX: f64 = 30.0 * core::f64::consts::PI / 180.0;
+
+/// Above this change of heading a connection is a U-turn (survey conventions).
+const U_TURN_RAD_MIN: f64 = 150.0 * core::f64::consts::PI / 180.0;
+
+/// Builds the map of a file.
+pub fn build(document: &Document) -> Result<RoadMap, RoadError> {
+    let mut builder = Builder::new(document)?;
+    builder.add_lanes()?;
+    builder.link_sections();
+    builder.link_roads()?;
+    builder.link_junctions()?;
+    builder.set_neighbours();
+    add_signals(&mut builder)?;
+    add_crosswalks(&mut builder);
+    let mut map = builder.map;
+    for lane in &mut map.lanes {
+        lane.successors.sort();
+        lane.predecessors.sort();
+        lane.stop_lines.sort_by(|a, b| a.station_m.total_cmp(&b.station_m));
+    }
+    for index in 0..map.lanes.len() {
+        if let Some(junction) = map.lanes[index].junction {
+            map.junctions[junction].lanes.push(LaneIndex(index));
+        }
+    }
+    map.grid = LaneGrid::new(&map.lanes);
+    Ok(map)
+}
+
+/// A map in the making.
+pub struct Builder<'a> {
+    pub document: &'a Document,
+    pub map: RoadMap,
+    /// Index in `document.roads`.
+    pub roads: BTreeMap<&'a str, usize>,
+    /// Index in `map.junctions` and in `document.junctions`.
+    pub junctions: BTreeMap<&'a str, usize>,
+    /// By road index, section and lane id.
+    lanes: BTreeMap<(usize, usize, i32), LaneIndex>,
+}
+
+impl<'a> Builder<'a> {
+    fn new(document: &'a Document) -> Result<Builder<'a>, RoadError> {
+        let mut roads = BTreeMap::new();
+        for (index, road) in document.roads.iter().enumerate() {
+            if roads.insert(road.id.as_str(), index).is_some() {
+                return Err(wrong(road.line, format!("a second road has the id `{}`", road.id)));
+            }
+        }
+        let junctions = document.junctions.iter().enumerate().map(|(i, junction)| (junction.id.as_str(), i));
+        let map = RoadMap {
+            name: document.name.clone(),
+            lanes: Vec::new(),
+            signals: Vec::new(),
+            junctions: document
+                .junctions
+                .iter()
+                .map(|junction| Junction {
+                    id: junction.id.clone(),
+                    name: junction.name.clone(),
+                    lanes: Vec::new(),
+                    groups: junction.controllers.len(),
+                })
+                .collect(),
+            crosswalks: Vec::new(),
+            warnings: document.warnings.clone(),
+            grid: LaneGrid::default(),
+        };
+        Ok(Builder { document, map, roads, junctions: junctions.collect(), lanes: BTreeMap::new() })
+    }
+
+    pub fn warn(&mut self, line: u32, message: impl AsRef<str>) {
+        self.map.warnings.push(format!("line {line}: {}", message.as_ref()));
+    }
+
+    pub fn lane_index(&self, road: usize, section: usize, lane: i32) -> Option<LaneIndex> {
+        self.lanes.get(&(road, section, lane)).copied()
+    }
+
+    fn add_lanes(&mut self) -> Result<(), RoadError> {
+        let document = self.document;
+        let mut limitless = 0;
+        for (road_index, road) in document.roads.iter().enumerate() {
+            let junction = match &road.junction {
+                None => None,
+                Some(id) => Some(*self.junctions.get(id.as_str()).ok_or_else(|| {
+                    wrong(
+                        road.line,
+                        format!("road `{}` lies in junction `{id}`, which does not exist", road.id),
+                    )
+                })?),
+            };
+            for (section_index, section) in road.sections.iter().enumerate() {
+                for element in section.lanes.iter().filter(|element| element.driving) {
+                    let at = format!("lane {} of road `{}` at s {}", element.id, road.id, section.begin_m);
+                    let centre = match centre_line(road, section, element.id) {
+                        Ok(centre) => centre,
+                        Err(NoCentreLine::Short) => {
+                            self.warn(element.line, format!("ignored {at}: it has no length"));
+                            continue;
+                        }
+                        Err(NoCentreLine::Wild) => {
+                            let message = format!("{at} is no road: look at its widths, offsets and curves");
+                            return Err(wrong(element.line, message));
+                        }
+                    };
+                    if centre.folded {
+                        self.warn(element.line, format!("{at} folds up in a bend"));
+                    }
+                    let limit_mps = speed_limit_mps(road, section, element.id);
+                    limitless += usize::from(limit_mps.is_none());
+                    let key = LaneKey { road: road.id.clone(), section: section_index, lane: element.id };
+                    let index = LaneIndex(self.map.lanes.len());
+                    self.lanes.insert((road_index, section_index, element.id), index);
+                    let limit_mps = limit_mps.unwrap_or(LIMIT_MPS_DEFAULT);
+                    self.map.lanes.push(new_lane(key, centre, limit_mps, junction));
+                }
+            }
+        }
+        if self.map.lanes.is_empty() {
+            return Err(wrong(1, "the map has no lane of type `driving`"));
+        }
+        if limitless > 0 {
+            self.map.warnings.push(format!("{limitless} lanes state no speed limit; 50 km/h is taken"));
+        }
+        Ok(())
+    }
+
+    fn link_sections(&mut self) {
+        for (road_index, road) in self.document.roads.iter().enumerate() {
+            for (section, pair) in road.sections.windows(2).enumerate() {
+                let here = |lane| End { road: road_index, section, lane, contact: Contact::End };
+                let there =
+                    |lane| End { road: road_index, section: section + 1, lane, contact: Contact::Start };
+                for lane in &pair[0].lanes {
+                    for next in &lane.successors {
+                        self.link(here(lane.id), there(*next), lane.line);
+                    }
+                }
+                for lane in &pair[1].lanes {
+                    for previous in &lane.predecessors {
+                        self.link(here(*previous), there(lane.id), lane.line);
+                    }
+                }
+            }
+        }
+    }
+
+    fn link_roads(&mut self) -> Result<(), RoadError> {
+        for (road_index, road) in self.document.roads.iter().enumerate() {
+            for (contact, link) in [(Contact::Start, &road.predecessor), (Contact::End, &road.successor)] {
+                let (id, other_contact, line) = match link {
+                    None => continue,
+                    Some(RoadLink::Junction { id, .. }) if self.junctions.contains_key(id.as_str()) => {
+                        continue;
+                    }
+                    Some(RoadLink::Junction { id, line }) => {
+                        let message =
+                            format!("road `{}` leads to junction `{id}`, which does not exist", road.id);
+                        return Err(wrong(*line, message));
+                    }
+                    Some(RoadLink::Road { id, contact, line }) => (id, *contact, *line),
+                };
+                let other = *self.roads.get(id.as_str()).ok_or_else(|| {
+                    wrong(line, format!("road `{}` leads to road `{id}`, which does not exist", road.id))
+                })?;
+                let section = end_section(road, contact);
+                for lane in &road.sections[section].lanes {
+                    let linked = match contact {
+                        Contact::Start => &lane.predecessors,
+                        Contact::End => &lane.successors,
+                    };
+                    for other_lane in linked {
+                        let here = End { road: road_index, section, lane: lane.id, contact };
+                        self.link(here, self.end(other, *other_lane, other_contact), lane.line);
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn link_junctions(&mut self) -> Result<(), RoadError> {
+        for junction in &self.document.junctions {
+            for connection in &junction.connections {
+                let road = |id: &str| {
+                    self.roads.get(id).copied().ok_or_else(|| {
+                        let message =
+                            format!("junction `{}` connects road `{id}`, which does not exist", junction.id);
+                        wrong(connection.line, message)
+                    })
+                };
+                let incoming = road(&connection.incoming_road)?;
+                let connecting = road(&connection.connecting_road)?;
+                let contact = self.contact_at(incoming, &junction.id, connecting, connection.contact);
+                for (from, to) in &connection.lane_links {
+                    let from = self.end(incoming, *from, contact);
+                    let to = self.end(connecting, *to, connection.contact);
+                    self.link(from, to, connection.line);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// The end of a road that touches a junction; if both do, the one nearer to the connecting road.
+    fn contact_at(&self, incoming: usize, junction: &str, connecting: usize, contact: Contact) -> Contact {
+        let road = &self.document.roads[incoming];
+        let touches =
+            |link: &Option<RoadLink>| matches!(link, Some(RoadLink::Junction { id, .. }) if id == junction);
+        match (touches(&road.predecessor), touches(&road.successor)) {
+            (true, false) => return Contact::Start,
+            (false, true) => return Contact::End,
+            _ => {}
+        }
+        let at = |road: &RoadElement, contact| match contact {
+            Contact::Start => road.reference.at(0.0).position,
+            Contact::End => road.reference.at(road.length_m).position,
+        };
+        let meeting = at(&self.document.roads[connecting], contact);
+        let distance = |contact| (at(road, contact) - meeting).norm();
+        if distance(Contact::Start) < distance(Contact::End) { Contact::Start } else { Contact::End }
+    }
+
+    fn end(&self, road: usize, lane: i32, contact: Contact) -> End {
+        End { road, section: end_section(&self.document.roads[road], contact), lane, contact }
+    }
+
+    /// Joins two lane ends that meet. The direction of traffic says which of them leads into the other.
+    fn link(&mut self, a: End, b: End, line: u32) {
+        let roads = &self.document.roads;
+        for end in [a, b] {
+            let road = &roads[end.road];
+            if end.lane != 0 && road.sections[end.section].lane(end.lane).is_none() {
+                let message = format!(
+                    "ignored a link to lane {} of road `{}`, which does not exist",
+                    end.lane, road.id
+                );
+                self.warn(line, message);
+                return;
+            }
+        }
+        let lane = |end: End| self.lane_index(end.road, end.section, end.lane);
+        let (Some(index_a), Some(index_b)) = (lane(a), lane(b)) else {
+            // One of them is no driving lane: a parking or a turning bay begins or ends here.
+            return;
+        };
+        let leaves = |end: End| roads[end.road].runs_along(end.lane) == (end.contact == Contact::End);
+        let (from, to) = match (leaves(a), leaves(b)) {
+            (true, false) => (index_a, index_b),
+            (false, true) => (index_b, index_a),
+            _ => {
+                let message = format!(
+                    "ignored a link between lane {} of road `{}` and lane {} of road `{}`: their traffic meets head on",
+                    a.lane, roads[a.road].id, b.lane, roads[b.road].id
+                );
+                self.warn(line, message);
+                return;
+            }
+        };
+        if !self.map.lanes[from.0].successors.contains(&to) {
+            self.map.lanes[from.0].successors.push(to);
+            self.map.lanes[to.0].predecessors.push(from);
+        }
+    }
+
+    fn set_neighbours(&mut self) {
+        for (road_index, road) in self.document.roads.iter().enumerate() {
+            for (section_index, section) in road.sections.iter().enumerate() {
+                // From left to right along the reference line.
+                let lanes: Vec<(i32, LaneIndex)> = section
+                    .lanes
+                    .iter()
+                    .filter_map(|lane| Some((lane.id, self.lane_index(road_index, section_index, lane.id)?)))
+                    .collect();
+                for pair in lanes.windows(2) {
+                    let ((left, left_index), (right, right_index)) = (pair[0], pair[1]);
+                    let same_direction = road.runs_along(left) == road.runs_along(right);
+                    let gap_m = gap_m(road, section, left, right);
+                    let neighbour = |lane| Some(Neighbour { lane, same_direction, gap_m });
+                    let of_left = &mut self.map.lanes[left_index.0];
+                    if road.runs_along(left) {
+                        of_left.right = neighbour(right_index);
+                    } else {
+                        of_left.left = neighbour(right_index);
+                    }
+                    let of_right = &mut self.map.lanes[right_index.0];
+                    if road.runs_along(right) {
+                        of_right.left = neighbour(left_index);
+                    } else {
+                        of_right.right = neighbour(left_index);
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// An end of a lane.
+#[derive(Clone, Copy)]
+struct End {
+    road: usize,
+    section: usize,
+    lane: i32,
+    contact: Contact,
+}
+
+/// An error at a line of the file.
+pub fn wrong(line: u32, message: impl Into<String>) -> RoadError {
+    RoadError::Map { line, message: message.into() }
+}
+
+fn end_section(road: &RoadElement, contact: Contact) -> usize {
+    match contact {
+        Contact::Start => 0,
+        Contact::End => road.sections.len() - 1,
+    }
+}
+
+fn new_lane(key: LaneKey, centre: CentreLine, speed_limit_mps: f64, junction: Option<usize>) -> Lane {
+    Lane {
+        key,
+        turn: if junction.is_some() { turn(&centre.path) } else { Turn::Straight },
+        centre: centre.path,
+        widths_m: centre.widths_m,
+        speed_limit_mps,
+        successors: Vec::new(),
+        predecessors: Vec::new(),
+        left: None,
+        right: None,
+        junction,
+        stop_lines: Vec::new(),
+        road_stations_m: centre.road_stations_m,
+    }
+}
+
+/// The turn of a whole path, from the sum of its heading changes.
+fn turn(path: &Path) -> Turn {
+    let pairs = path.points().windows(2);
+    let change_rad: f64 = pairs.map(|pair| wrap_angle(pair[1].heading_rad - pair[0].heading_rad)).sum();
+    match change_rad {
+        _ if change_rad.abs() < STRAIGHT_RAD_MAX => Turn::Straight,
+        _ if change_rad.abs() > U_TURN_RAD_MIN => Turn::UTurn,
+        _ if change_rad > 0.0 => Turn::Left,
+        _ => Turn::Right,
+    }
+}
+
+/// The lowest limit that holds anywhere on a lane of a section; its own before the road's.
+fn speed_limit_mps(road: &RoadElement, section: &SectionElement, lane: i32) -> Option<f64> {
+    let own = &section.lane(lane)?.speeds;
+    lowest_limit(own, 0.0, section.end_m - section.begin_m)
+        .or_else(|| lowest_limit(&road.speeds, section.begin_m, section.end_m))
+}
+
+fn lowest_limit(records: &[(f64, Option<f64>)], from_m: f64, to_m: f64) -> Option<f64> {
+    let holds = records.iter().enumerate().filter(|(i, (begin_m, _))| {
+        let end_m = records.get(i + 1).map_or(f64::INFINITY, |next| next.0);
+        *begin_m < to_m && end_m > from_m
+    });
+    holds.filter_map(|(_, (_, limit))| *limit).min_by(f64::total_cmp)
+}
+
+/// Width of what lies between two lanes in the middle of a section, m.
+fn gap_m(road: &RoadElement, section: &SectionElement, left: i32, right: i32) -> f64 {
+    let middle_m = (section.begin_m + section.end_m) / 2.0;
+    let (left_centre, left_width) = road.lane_at(section, left, middle_m);
+    let (right_centre, right_width) = road.lane_at(section, right, middle_m);
+    let pitch_m = left_centre.value - right_centre.value;
+    let gap_m = pitch_m - (left_width.value + right_width.value) / 2.0;
+    // Rounding leaves hairs between lanes that share a line.
+    if gap_m > 1e-6 { gap_m } else { 0.0 }
+}

@@ -1,0 +1,97 @@
+//! A grid over the plane that finds the lanes near a point.
+
+use std::collections::BTreeMap;
+
+use crate::geometry::Path;
+use crate::geometry::Projection;
+use crate::geometry::Vec2;
+
+use super::map::Lane;
+use super::map::LaneIndex;
+
+/// Side of a cell, m.
+const CELL_M: f64 = 8.0;
+
+/// Lanes are entered by stretches of this length, m.
+const STRETCH_M: f64 = 4.0;
+
+/// Which stretches of which lanes touch which cell.
+#[derive(Debug, Clone, Default)]
+pub struct LaneGrid {
+    cells: BTreeMap<(i64, i64), Vec<Stretch>>,
+    /// Half the width of the widest lane, m.
+    half_width_m: f64,
+    lanes: usize,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Stretch {
+    lane: LaneIndex,
+    from_m: f64,
+    to_m: f64,
+}
+
+impl LaneGrid {
+    pub fn new(lanes: &[Lane]) -> LaneGrid {
+        let widths_m = lanes.iter().flat_map(|lane| &lane.widths_m);
+        let widest_m = widths_m.copied().fold(0.0, f64::max);
+        let mut grid = LaneGrid { cells: BTreeMap::new(), half_width_m: widest_m / 2.0, lanes: lanes.len() };
+        for (index, lane) in lanes.iter().enumerate() {
+            let stretches = (lane.centre.length_m() / STRETCH_M).ceil().max(1.0);
+            let step_m = lane.centre.length_m() / stretches;
+            for i in 0..stretches as u32 {
+                let from_m = step_m * f64::from(i);
+                grid.insert(&lane.centre, Stretch { lane: LaneIndex(index), from_m, to_m: from_m + step_m });
+            }
+        }
+        grid
+    }
+
+    fn insert(&mut self, path: &Path, stretch: Stretch) {
+        let (a, b) = (path.pose_at(stretch.from_m).position, path.pose_at(stretch.to_m).position);
+        // A curve of this length bulges by less than half of it.
+        let margin = Vec2::new(STRETCH_M, STRETCH_M) / 2.0;
+        let (low, high) = (cell(a.inf(&b) - margin), cell(a.sup(&b) + margin));
+        for x in low.0..=high.0 {
+            for y in low.1..=high.1 {
+                let entries = self.cells.entry((x, y)).or_default();
+                match entries.last_mut() {
+                    Some(last) if last.lane == stretch.lane && last.to_m >= stretch.from_m - 1e-9 => {
+                        last.to_m = stretch.to_m;
+                    }
+                    _ => entries.push(stretch),
+                }
+            }
+        }
+    }
+
+    /// The nearest point of each lane whose centre comes within `reach_m` and half a lane width of a
+    /// point, by rising index; a few lanes that are farther away may be among them.
+    pub fn near(&self, lanes: &[Lane], point: Vec2, reach_m: f64) -> Vec<(LaneIndex, Projection)> {
+        let radius_m = reach_m.max(0.0) + self.half_width_m;
+        let margin = Vec2::new(radius_m, radius_m);
+        let (low, high) = (cell(point - margin), cell(point + margin));
+        let cells = (high.0 - low.0 + 1).saturating_mul(high.1 - low.1 + 1);
+        if cells as f64 > self.lanes as f64 * 64.0 {
+            let all = lanes.iter().enumerate();
+            return all.map(|(index, lane)| (LaneIndex(index), lane.centre.project(point))).collect();
+        }
+        let mut found: BTreeMap<LaneIndex, Projection> = BTreeMap::new();
+        for x in low.0..=high.0 {
+            for stretch in (low.1..=high.1).filter_map(|y| self.cells.get(&(x, y))).flatten() {
+                let (middle_m, half_m) =
+                    ((stretch.from_m + stretch.to_m) / 2.0, (stretch.to_m - stretch.from_m) / 2.0);
+                let projection = lanes[stretch.lane.0].centre.project_near(point, middle_m, half_m);
+                let best = found.entry(stretch.lane).or_insert(projection);
+                if projection.distance_m < best.distance_m {
+                    *best = projection;
+                }
+            }
+        }
+        found.into_iter().collect()
+    }
+}
+
+fn cell(point: Vec2) -> (i64, i64) {
+    ((point.x / CELL_M).floor() as i64, (point.y / CELL_M).floor() as i64)
+}

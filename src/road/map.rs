@@ -1,0 +1,249 @@
+//! The lane graph, and how places on it are named and found.
+
+use std::collections::BTreeSet;
+
+use crate::geometry::Path;
+use crate::geometry::Vec2;
+use crate::geometry::wrap_angle;
+
+use super::graph;
+use super::index::LaneGrid;
+use super::opendrive;
+
+/// Index of a lane in [`RoadMap::lanes`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub struct LaneIndex(pub usize);
+
+/// The name of a lane in its OpenDRIVE file.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+pub struct LaneKey {
+    pub road: String,
+    /// Index of the lane section within the road.
+    pub section: usize,
+    /// OpenDRIVE's lane id: negative to the right of the reference line.
+    pub lane: i32,
+}
+
+/// A point on a lane.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LanePlace {
+    pub lane: LaneIndex,
+    /// m from the lane's beginning, in its driving direction.
+    pub station_m: f64,
+    /// m to the left of its centre.
+    pub offset_m: f64,
+}
+
+/// A driving lane of one lane section. Its path runs in the direction of traffic.
+#[derive(Debug, Clone)]
+pub struct Lane {
+    pub key: LaneKey,
+    pub centre: Path,
+    /// Width at each vertex of `centre`, m.
+    pub widths_m: Vec<f64>,
+    /// m/s.
+    pub speed_limit_mps: f64,
+    pub successors: Vec<LaneIndex>,
+    pub predecessors: Vec<LaneIndex>,
+    /// Next driving lane to the left, in the same or the opposite direction, however wide the gap.
+    pub left: Option<Neighbour>,
+    pub right: Option<Neighbour>,
+    /// Index in [`RoadMap::junctions`], if the lane runs inside one.
+    pub junction: Option<usize>,
+    pub turn: Turn,
+    /// Stop lines on this lane, by rising station.
+    pub stop_lines: Vec<StopLine>,
+    /// Station of the road's reference line at each vertex of `centre`, m: rising or falling.
+    pub(super) road_stations_m: Vec<f64>,
+}
+
+/// The lane beside a lane.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Neighbour {
+    pub lane: LaneIndex,
+    pub same_direction: bool,
+    /// Width of whatever lies between the two lanes (a median), m; 0 where they share a line.
+    pub gap_m: f64,
+}
+
+/// What a lane does inside a junction; `Straight` everywhere else.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Turn {
+    Straight,
+    Left,
+    Right,
+    UTurn,
+}
+
+/// Where a lane must stop for a signal.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct StopLine {
+    pub station_m: f64,
+    /// Index in [`RoadMap::signals`].
+    pub signal: usize,
+}
+
+/// A set of lights. All lights of one group show the same colour.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Signal {
+    pub id: String,
+    pub position: Vec2,
+    /// Index in [`RoadMap::junctions`].
+    pub junction: Option<usize>,
+    /// Position of its controller in the junction's cycle, from 0.
+    pub group: usize,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub struct Junction {
+    pub id: String,
+    pub name: String,
+    /// The connecting lanes inside.
+    pub lanes: Vec<LaneIndex>,
+    /// Number of signal groups in its cycle; 0 if it has no signals.
+    pub groups: usize,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub struct Crosswalk {
+    pub id: String,
+    /// Corners, in order.
+    pub outline: Vec<Vec2>,
+}
+
+/// A whole map.
+#[derive(Debug, Clone)]
+pub struct RoadMap {
+    pub name: String,
+    pub lanes: Vec<Lane>,
+    pub signals: Vec<Signal>,
+    pub junctions: Vec<Junction>,
+    pub crosswalks: Vec<Crosswalk>,
+    /// What was read but not understood, in words; each is worth a look.
+    pub warnings: Vec<String>,
+    pub(super) grid: LaneGrid,
+}
+
+/// Why a map or a route cannot be had.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum RoadError {
+    #[error("line {line}: {message}")]
+    Map { line: u32, message: String },
+    #[error("{message}")]
+    Route { message: String },
+}
+
+impl RoadMap {
+    /// Reads an OpenDRIVE file (1.4 to 1.8).
+    ///
+    /// # Errors
+    /// What is wrong with the file and in which line of it.
+    pub fn from_opendrive(name: &str, text: &str) -> Result<RoadMap, RoadError> {
+        graph::build(&opendrive::read(name, text)?)
+    }
+
+    pub fn lane(&self, index: LaneIndex) -> &Lane {
+        &self.lanes[index.0]
+    }
+
+    /// The place named by an OpenDRIVE road, lane and station (`s` along the road's reference line).
+    ///
+    /// # Errors
+    /// Which of the three does not exist.
+    pub fn place(&self, road: &str, lane: i32, s_m: f64) -> Result<LanePlace, RoadError> {
+        let missing = |message: String| RoadError::Route { message };
+        let on_road = || self.lanes.iter().enumerate().filter(|(_, candidate)| candidate.key.road == road);
+        if on_road().next().is_none() {
+            let roads: BTreeSet<&str> = self.lanes.iter().map(|lane| lane.key.road.as_str()).collect();
+            return Err(missing(format!("no driving lane on a road `{road}`; there are {}", listed(roads))));
+        }
+        let in_lane = || on_road().filter(|(_, candidate)| candidate.key.lane == lane);
+        if in_lane().next().is_none() {
+            let lanes: BTreeSet<i32> = on_road().map(|(_, candidate)| candidate.key.lane).collect();
+            return Err(missing(format!(
+                "road `{road}` has no driving lane {lane}; it has {}",
+                listed(lanes)
+            )));
+        }
+        // Where two sections meet, the one that begins there.
+        let held = in_lane().rfind(|(_, candidate)| {
+            let (from_m, to_m) = candidate.road_range_m();
+            (from_m - 1e-3..=to_m + 1e-3).contains(&s_m)
+        });
+        let Some((index, candidate)) = held else {
+            let ranges = in_lane().map(|(_, candidate)| {
+                let (from_m, to_m) = candidate.road_range_m();
+                format!("{from_m:.1} to {to_m:.1} m")
+            });
+            let ranges = listed(ranges);
+            return Err(missing(format!(
+                "lane {lane} of road `{road}` is not there at {s_m} m; it reaches from {ranges}"
+            )));
+        };
+        Ok(LanePlace { lane: LaneIndex(index), station_m: candidate.station_of(s_m), offset_m: 0.0 })
+    }
+
+    /// The nearest lane within `reach_m`, its own width included; among equals the one whose heading
+    /// fits `heading_rad` best.
+    ///
+    /// All lanes whose surface holds the point are equals. There a metre off the centre weighs as much
+    /// as a tenth of a radian: inside a junction lanes lie over each other, and of two that lead the
+    /// same way the one nearer to its centre is meant.
+    pub fn nearest(&self, point: Vec2, heading_rad: f64, reach_m: f64) -> Option<LanePlace> {
+        let mut best: Option<(f64, f64, LanePlace)> = None;
+        for (index, projection) in self.grid.near(&self.lanes, point, reach_m) {
+            let lane = self.lane(index);
+            let beyond_m = (projection.distance_m - lane.width_at(projection.station_m) / 2.0).max(0.0);
+            if beyond_m > reach_m {
+                continue;
+            }
+            let lane_heading_rad = lane.centre.pose_at(projection.station_m).heading_rad;
+            let turn_rad = wrap_angle(lane_heading_rad - heading_rad).abs();
+            let misfit = turn_rad + MISFIT_RAD_PER_M * projection.distance_m;
+            if best.is_none_or(|(best_m, best_misfit, _)| {
+                beyond_m < best_m - 1e-9 || (beyond_m < best_m + 1e-9 && misfit < best_misfit)
+            }) {
+                let (station_m, offset_m) = (projection.station_m, projection.offset_m);
+                best = Some((beyond_m, misfit, LanePlace { lane: index, station_m, offset_m }));
+            }
+        }
+        best.map(|(_, _, place)| place)
+    }
+}
+
+/// How much a metre beside the centre of a lane weighs against a turn, rad.
+const MISFIT_RAD_PER_M: f64 = 0.1;
+
+impl Lane {
+    /// Width at a station, clamped to the lane, m.
+    pub fn width_at(&self, station_m: f64) -> f64 {
+        let points = self.centre.points();
+        let after = points.partition_point(|point| point.station_m <= station_m).clamp(1, points.len() - 1);
+        let (a, b) = (&points[after - 1], &points[after]);
+        let fraction = ((station_m - a.station_m) / (b.station_m - a.station_m)).clamp(0.0, 1.0);
+        self.widths_m[after - 1] + (self.widths_m[after] - self.widths_m[after - 1]) * fraction
+    }
+
+    /// The lane's own station beside a station of the road's reference line, clamped to the lane, m.
+    pub fn station_of(&self, s_m: f64) -> f64 {
+        let stations_m = &self.road_stations_m;
+        let rising = stations_m[0] < stations_m[stations_m.len() - 1];
+        let after = stations_m.partition_point(|at_m| if rising { *at_m <= s_m } else { *at_m >= s_m });
+        let after = after.clamp(1, stations_m.len() - 1);
+        let (from_m, to_m) = (stations_m[after - 1], stations_m[after]);
+        let fraction = ((s_m - from_m) / (to_m - from_m)).clamp(0.0, 1.0);
+        let (a, b) = (&self.centre.points()[after - 1], &self.centre.points()[after]);
+        a.station_m + (b.station_m - a.station_m) * fraction
+    }
+
+    /// Between which stations of the road's reference line the lane lies, m.
+    fn road_range_m(&self) -> (f64, f64) {
+        let (first_m, last_m) =
+            (self.road_stations_m[0], self.road_stations_m[self.road_stations_m.len() - 1]);
+        (first_m.min(last_m), first_m.max(last_m))
+    }
+}
+
+fn listed(items: impl IntoIterator<Item = impl ToString>) -> String {
+    items.into_iter().map(|item| item.to_string()).collect::<Vec<_>>().join(", ")
+}

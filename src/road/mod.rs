@@ -1,0 +1,31 @@
+//! Roads: an OpenDRIVE map as a graph of driving lanes, and routes through it.
+//!
+//! No vehicles here, and no time: signals have a place, not a colour.
+
+mod centre_line;
+mod conflict;
+mod graph;
+mod index;
+mod map;
+mod opendrive;
+mod route;
+mod signals;
+#[cfg(test)]
+mod tests;
+
+pub use map::Crosswalk;
+pub use map::Junction;
+pub use map::Lane;
+pub use map::LaneIndex;
+pub use map::LaneKey;
+pub use map::LanePlace;
+pub use map::Neighbour;
+pub use map::RoadError;
+pub use map::RoadMap;
+pub use map::Signal;
+pub use map::StopLine;
+pub use map::Turn;
+pub use route::Conflict;
+pub use route::Route;
+pub use route::RouteLane;
+pub use route::RouteStopLine;

@@ -1,0 +1,102 @@
+//! Piecewise cubic polynomials along a road: widths, borders and lane offsets.
+
+use core::ops::Add;
+use core::ops::Mul;
+use core::ops::Sub;
+
+/// A function value with its first and second derivative by the station.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Jet {
+    pub value: f64,
+    pub first: f64,
+    pub second: f64,
+}
+
+impl Add for Jet {
+    type Output = Jet;
+
+    fn add(self, other: Jet) -> Jet {
+        Jet {
+            value: self.value + other.value,
+            first: self.first + other.first,
+            second: self.second + other.second,
+        }
+    }
+}
+
+impl Sub for Jet {
+    type Output = Jet;
+
+    fn sub(self, other: Jet) -> Jet {
+        self + other * -1.0
+    }
+}
+
+impl Mul<f64> for Jet {
+    type Output = Jet;
+
+    fn mul(self, factor: f64) -> Jet {
+        Jet { value: self.value * factor, first: self.first * factor, second: self.second * factor }
+    }
+}
+
+/// `a + b x + c x² + d x³` with `x` the distance from `begin_m`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Cubic {
+    pub begin_m: f64,
+    pub a: f64,
+    pub b: f64,
+    pub c: f64,
+    pub d: f64,
+}
+
+/// Cubics by rising beginning; each holds until the next begins, the first also before itself.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Cubics(Vec<Cubic>);
+
+impl Cubics {
+    pub fn new(mut pieces: Vec<Cubic>) -> Cubics {
+        // A stable sort: of two that begin at one place the later in the file wins.
+        pieces.sort_by(|x, y| x.begin_m.total_cmp(&y.begin_m));
+        Cubics(pieces)
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+
+    pub fn beginnings(&self) -> impl Iterator<Item = f64> {
+        self.0.iter().map(|piece| piece.begin_m)
+    }
+
+    /// 0 if there are no pieces.
+    pub fn at(&self, station_m: f64) -> Jet {
+        let after = self.0.partition_point(|piece| piece.begin_m <= station_m);
+        let Some(piece) = self.0.get(after.max(1) - 1) else {
+            return Jet::default();
+        };
+        let Cubic { begin_m, a, b, c, d } = *piece;
+        let x = station_m - begin_m;
+        Jet {
+            value: a + x * (b + x * (c + x * d)),
+            first: b + x * (2.0 * c + x * 3.0 * d),
+            second: 2.0 * c + x * 6.0 * d,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_piece_holds_until_the_next() {
+        let pieces = Cubics::new(vec![
+            Cubic { begin_m: 10.0, a: 5.0, b: 0.0, c: 1.0, d: 2.0 },
+            Cubic { begin_m: 0.0, a: 3.0, b: 0.5, c: 0.0, d: 0.0 },
+        ]);
+        assert_eq!(pieces.at(4.0), Jet { value: 5.0, first: 0.5, second: 0.0 });
+        assert_eq!(pieces.at(12.0), Jet { value: 25.0, first: 28.0, second: 26.0 });
+        assert_eq!(Cubics::default().at(1.0), Jet::default());
+    }
+}

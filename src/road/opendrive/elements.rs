@@ -1,0 +1,175 @@
+//! What is read of an OpenDRIVE file, still in its own terms.
+
+use super::cubic::Cubics;
+use super::cubic::Jet;
+use super::geometry::ReferenceLine;
+
+/// A whole file.
+#[derive(Debug, Clone)]
+pub struct Document {
+    pub name: String,
+    pub roads: Vec<RoadElement>,
+    pub junctions: Vec<JunctionElement>,
+    pub controllers: Vec<ControllerElement>,
+    pub warnings: Vec<String>,
+}
+
+#[derive(Debug, Clone)]
+pub struct RoadElement {
+    pub id: String,
+    pub line: u32,
+    pub length_m: f64,
+    /// Id of the junction the road lies in.
+    pub junction: Option<String>,
+    /// Whether traffic keeps left: lanes with positive ids then run along the reference line.
+    pub left_hand: bool,
+    pub predecessor: Option<RoadLink>,
+    pub successor: Option<RoadLink>,
+    /// Station from which a speed limit holds, m, and the limit, m/s; `None` where it ends.
+    pub speeds: Vec<(f64, Option<f64>)>,
+    pub reference: ReferenceLine,
+    pub lane_offset: Cubics,
+    pub sections: Vec<SectionElement>,
+    pub signals: Vec<SignalElement>,
+    pub objects: Vec<ObjectElement>,
+}
+
+/// What a road's beginning or end touches.
+#[derive(Debug, Clone, PartialEq)]
+pub enum RoadLink {
+    Road { id: String, contact: Contact, line: u32 },
+    Junction { id: String, line: u32 },
+}
+
+/// An end of a road.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Contact {
+    Start,
+    End,
+}
+
+#[derive(Debug, Clone)]
+pub struct SectionElement {
+    pub begin_m: f64,
+    pub end_m: f64,
+    /// By falling id: from left to right. The centre lane (id 0) is left out.
+    pub lanes: Vec<LaneElement>,
+}
+
+#[derive(Debug, Clone)]
+pub struct LaneElement {
+    pub id: i32,
+    pub line: u32,
+    /// Whether its type is `driving`.
+    pub driving: bool,
+    /// Over the distance from the section's beginning.
+    pub widths: Cubics,
+    pub borders: Cubics,
+    pub predecessors: Vec<i32>,
+    pub successors: Vec<i32>,
+    /// As in [`RoadElement::speeds`], from the section's beginning.
+    pub speeds: Vec<(f64, Option<f64>)>,
+}
+
+#[derive(Debug, Clone)]
+pub struct SignalElement {
+    pub id: String,
+    pub line: u32,
+    pub s_m: f64,
+    pub t_m: f64,
+    /// The light itself, or a further place for the light with this id.
+    pub reference: bool,
+    pub pedestrian: bool,
+    pub orientation: Orientation,
+    /// Inclusive ranges of lane ids; empty means all.
+    pub validity: Vec<(i32, i32)>,
+}
+
+/// For traffic in which direction of the reference line a signal holds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Orientation {
+    Along,
+    Against,
+    Both,
+}
+
+/// A crosswalk.
+#[derive(Debug, Clone)]
+pub struct ObjectElement {
+    pub id: String,
+    pub s_m: f64,
+    pub t_m: f64,
+    pub heading_rad: f64,
+    pub outline: Outline,
+}
+
+#[derive(Debug, Clone)]
+pub enum Outline {
+    /// Corners in the object's own frame: ahead, left, m.
+    Local(Vec<(f64, f64)>),
+    /// Corners along the road: station, left of the reference line, m.
+    Road(Vec<(f64, f64)>),
+}
+
+#[derive(Debug, Clone)]
+pub struct JunctionElement {
+    pub id: String,
+    pub name: String,
+    pub connections: Vec<ConnectionElement>,
+    /// Ids of its controllers, in order, with their lines.
+    pub controllers: Vec<(String, u32)>,
+}
+
+#[derive(Debug, Clone)]
+pub struct ConnectionElement {
+    pub line: u32,
+    pub incoming_road: String,
+    pub connecting_road: String,
+    pub contact: Contact,
+    /// From lane (incoming road), to lane (connecting road).
+    pub lane_links: Vec<(i32, i32)>,
+}
+
+#[derive(Debug, Clone)]
+pub struct ControllerElement {
+    pub id: String,
+    /// Ids of the signals it switches, with their lines.
+    pub signals: Vec<(String, u32)>,
+}
+
+impl RoadElement {
+    /// Index of the section that holds a station.
+    pub fn section_at(&self, s_m: f64) -> usize {
+        self.sections.partition_point(|section| section.begin_m <= s_m).max(1) - 1
+    }
+
+    /// Whether the traffic of a lane runs along the reference line.
+    pub fn runs_along(&self, lane: i32) -> bool {
+        (lane < 0) != self.left_hand
+    }
+
+    /// Centre (m left of the reference line) and width of a lane of a section, at a station.
+    pub fn lane_at(&self, section: &SectionElement, lane: i32, s_m: f64) -> (Jet, Jet) {
+        let zero = self.lane_offset.at(s_m);
+        let distance_m = s_m - section.begin_m;
+        let side = f64::from(lane.signum());
+        let mut inner = zero;
+        let mut outer = zero;
+        for id in 1..=lane.abs() {
+            inner = outer;
+            let Some(element) = section.lane(id * lane.signum()) else { continue };
+            outer = if element.widths.is_empty() && !element.borders.is_empty() {
+                zero + element.borders.at(distance_m)
+            } else {
+                inner + element.widths.at(distance_m) * side
+            };
+        }
+        ((inner + outer) * 0.5, (outer - inner) * side)
+    }
+}
+
+impl SectionElement {
+    pub fn lane(&self, id: i32) -> Option<&LaneElement> {
+        self.lanes.iter().find(|lane| lane.id == id)
+    }
+}

@@ -1,0 +1,282 @@
+//! Reference lines: lines, arcs, spirals and parametric cubics, with exact heading and curvature.
+
+use crate::geometry::Vec2;
+use crate::geometry::unit_vector;
+
+/// A chain of curves over the road's station.
+#[derive(Debug, Clone)]
+pub struct ReferenceLine {
+    pieces: Vec<Piece>,
+}
+
+/// A point of a reference line.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ReferencePoint {
+    pub position: Vec2,
+    pub heading_rad: f64,
+    /// 1/m, positive to the left.
+    pub curvature_per_m: f64,
+    /// Derivative of the curvature by the station, 1/m².
+    pub curvature_rate_per_m2: f64,
+}
+
+#[derive(Debug, Clone)]
+pub struct Piece {
+    pub begin_m: f64,
+    pub length_m: f64,
+    pub origin: Vec2,
+    pub heading_rad: f64,
+    pub shape: Shape,
+}
+
+#[derive(Debug, Clone)]
+pub enum Shape {
+    Line,
+    Arc {
+        curvature_per_m: f64,
+    },
+    Spiral {
+        begin_per_m: f64,
+        end_per_m: f64,
+    },
+    /// `u(p)`, `v(p)` in the frame of the piece's beginning.
+    Cubic {
+        u: [f64; 4],
+        v: [f64; 4],
+        /// Arc lengths at equal steps of `p`, from 0; the last is the whole length.
+        lengths_m: Vec<f64>,
+        p_max: f64,
+    },
+}
+
+/// Steps of the arc length table of a parametric cubic.
+const CUBIC_STEPS: u32 = 64;
+
+/// Abscissae and weights of the five-point Gauss-Legendre rule on `[-1, 1]`.
+const GAUSS: [(f64, f64); 5] = [
+    (0.0, 0.568_888_888_888_888_9),
+    (0.538_469_310_105_683_1, 0.478_628_670_499_366_5),
+    (-0.538_469_310_105_683_1, 0.478_628_670_499_366_5),
+    (0.906_179_845_938_664, 0.236_926_885_056_189_1),
+    (-0.906_179_845_938_664, 0.236_926_885_056_189_1),
+];
+
+impl ReferenceLine {
+    /// From at least one piece, by rising beginning.
+    pub fn new(pieces: Vec<Piece>) -> Option<ReferenceLine> {
+        (!pieces.is_empty()).then_some(ReferenceLine { pieces })
+    }
+
+    pub fn beginnings(&self) -> impl Iterator<Item = f64> {
+        self.pieces.iter().map(|piece| piece.begin_m)
+    }
+
+    /// Beyond its ends the line goes on straight.
+    pub fn at(&self, s_m: f64) -> ReferencePoint {
+        let after = self.pieces.partition_point(|piece| piece.begin_m <= s_m);
+        let piece = &self.pieces[after.max(1) - 1];
+        piece.at(s_m - piece.begin_m)
+    }
+
+    /// Largest distance between the end of a piece and the beginning of the next, m, and the station.
+    pub fn largest_gap(&self) -> (f64, f64) {
+        let mut largest = (0.0, 0.0);
+        for pair in self.pieces.windows(2) {
+            let end = pair[0].at(pair[1].begin_m - pair[0].begin_m).position;
+            let gap_m = (end - pair[1].origin).norm();
+            if gap_m > largest.0 {
+                largest = (gap_m, pair[1].begin_m);
+            }
+        }
+        largest
+    }
+}
+
+impl Shape {
+    /// A parametric cubic with `p` from 0 to `p_max`. `None` if it stands still somewhere.
+    pub fn cubic(u: [f64; 4], v: [f64; 4], p_max: f64) -> Option<Shape> {
+        let mut lengths_m = vec![0.0];
+        let step = p_max / f64::from(CUBIC_STEPS);
+        let mut length_m = 0.0;
+        for i in 0..CUBIC_STEPS {
+            let from = step * f64::from(i);
+            length_m += quadrature(from, from + step, |p| {
+                let (du, dv) = (derivative(&u, p), derivative(&v, p));
+                libm::sqrt(du * du + dv * dv)
+            });
+            lengths_m.push(length_m);
+        }
+        let rising = lengths_m.windows(2).all(|pair| pair[1] > pair[0]);
+        (rising && length_m.is_finite()).then_some(Shape::Cubic { u, v, lengths_m, p_max })
+    }
+}
+
+impl Piece {
+    /// Beyond its ends a piece goes on straight.
+    fn at(&self, distance_m: f64) -> ReferencePoint {
+        let beyond_m = distance_m - distance_m.clamp(0.0, self.length_m);
+        if beyond_m.abs() < 1e-6 {
+            return self.within(distance_m);
+        }
+        let end = self.within(distance_m - beyond_m);
+        ReferencePoint {
+            position: end.position + unit_vector(end.heading_rad) * beyond_m,
+            curvature_per_m: 0.0,
+            curvature_rate_per_m2: 0.0,
+            ..end
+        }
+    }
+
+    fn within(&self, distance_m: f64) -> ReferencePoint {
+        let forward = unit_vector(self.heading_rad);
+        let left = Vec2::new(-forward.y, forward.x);
+        let local = match &self.shape {
+            Shape::Line => local_point(distance_m, 0.0, 0.0, 0.0, 0.0),
+            Shape::Arc { curvature_per_m } => arc(*curvature_per_m, distance_m),
+            Shape::Spiral { begin_per_m, end_per_m } => {
+                spiral(*begin_per_m, (end_per_m - begin_per_m) / self.length_m, distance_m)
+            }
+            Shape::Cubic { u, v, lengths_m, p_max } => {
+                // OpenDRIVE counts stations as arc lengths; where the stated length disagrees with the
+                // curve's own, the station is stretched so that the curve ends where it says.
+                let whole_m = lengths_m[lengths_m.len() - 1];
+                cubic(u, v, parameter_at(u, v, lengths_m, *p_max, distance_m / self.length_m * whole_m))
+            }
+        };
+        ReferencePoint {
+            position: self.origin + forward * local.position.x + left * local.position.y,
+            heading_rad: self.heading_rad + local.heading_rad,
+            ..local
+        }
+    }
+}
+
+fn local_point(x_m: f64, y_m: f64, heading_rad: f64, curvature_per_m: f64, rate: f64) -> ReferencePoint {
+    ReferencePoint {
+        position: Vec2::new(x_m, y_m),
+        heading_rad,
+        curvature_per_m,
+        curvature_rate_per_m2: rate,
+    }
+}
+
+fn arc(curvature_per_m: f64, distance_m: f64) -> ReferencePoint {
+    let turn_rad = curvature_per_m * distance_m;
+    if turn_rad.abs() < 1e-9 {
+        return local_point(distance_m, turn_rad * distance_m / 2.0, turn_rad, curvature_per_m, 0.0);
+    }
+    let (sin, cos) = libm::sincos(turn_rad);
+    local_point(sin / curvature_per_m, (1.0 - cos) / curvature_per_m, turn_rad, curvature_per_m, 0.0)
+}
+
+/// A clothoid by quadrature: below 1e-9 m of error, as no step turns by more than a quarter radian.
+fn spiral(begin_per_m: f64, rate_per_m2: f64, distance_m: f64) -> ReferencePoint {
+    let heading_at = |s: f64| s * (begin_per_m + s * rate_per_m2 / 2.0);
+    let end_per_m = begin_per_m + rate_per_m2 * distance_m;
+    let sharpest_per_m = begin_per_m.abs().max(end_per_m.abs());
+    let steps = (distance_m.abs() * sharpest_per_m * 4.0).ceil().clamp(1.0, 100_000.0);
+    let step_m = distance_m / steps;
+    let (mut x_m, mut y_m) = (0.0, 0.0);
+    for i in 0..steps as u32 {
+        let from_m = step_m * f64::from(i);
+        x_m += quadrature(from_m, from_m + step_m, |s| libm::cos(heading_at(s)));
+        y_m += quadrature(from_m, from_m + step_m, |s| libm::sin(heading_at(s)));
+    }
+    local_point(x_m, y_m, heading_at(distance_m), end_per_m, rate_per_m2)
+}
+
+fn cubic(u: &[f64; 4], v: &[f64; 4], p: f64) -> ReferencePoint {
+    let (du, dv) = (derivative(u, p), derivative(v, p));
+    let (ddu, ddv) = (2.0 * u[2] + 6.0 * u[3] * p, 2.0 * v[2] + 6.0 * v[3] * p);
+    let (dddu, dddv) = (6.0 * u[3], 6.0 * v[3]);
+    let speed = libm::sqrt(du * du + dv * dv).max(1e-9);
+    let cross = du * ddv - dv * ddu;
+    let cubed = speed * speed * speed;
+    let rate =
+        (du * dddv - dv * dddu) / cubed - 3.0 * cross * (du * ddu + dv * ddv) / (cubed * speed * speed);
+    local_point(value(u, p), value(v, p), libm::atan2(dv, du), cross / cubed, rate / speed)
+}
+
+/// The parameter at an arc length; beyond the ends it goes on at the rate of the last step.
+fn parameter_at(u: &[f64; 4], v: &[f64; 4], lengths_m: &[f64], p_max: f64, length_m: f64) -> f64 {
+    let after = lengths_m.partition_point(|at_m| *at_m <= length_m);
+    let index = after.clamp(1, lengths_m.len() - 1) - 1;
+    let step = p_max / (lengths_m.len() - 1) as f64;
+    let begin = step * index as f64;
+    let fraction = (length_m - lengths_m[index]) / (lengths_m[index + 1] - lengths_m[index]);
+    let mut p = begin + step * fraction;
+    if !(0.0..=1.0).contains(&fraction) {
+        return p;
+    }
+    let speed = |p: f64| {
+        let (du, dv) = (derivative(u, p), derivative(v, p));
+        libm::sqrt(du * du + dv * dv)
+    };
+    // Newton's method; the table makes the first guess good to a thousandth.
+    for _ in 0..4 {
+        let excess_m = lengths_m[index] + quadrature(begin, p, speed) - length_m;
+        p = (p - excess_m / speed(p).max(1e-9)).clamp(begin, begin + step);
+    }
+    p
+}
+
+fn value(c: &[f64; 4], p: f64) -> f64 {
+    c[0] + p * (c[1] + p * (c[2] + p * c[3]))
+}
+
+fn derivative(c: &[f64; 4], p: f64) -> f64 {
+    c[1] + p * (2.0 * c[2] + p * 3.0 * c[3])
+}
+
+fn quadrature(from: f64, to: f64, function: impl Fn(f64) -> f64) -> f64 {
+    let (middle, half) = ((from + to) / 2.0, (to - from) / 2.0);
+    GAUSS.iter().map(|(at, weight)| weight * function(middle + half * at)).sum::<f64>() * half
+}
+
+#[cfg(test)]
+mod tests {
+    use core::f64::consts::FRAC_PI_2;
+
+    use super::*;
+
+    fn piece(length_m: f64, shape: Shape) -> Piece {
+        Piece { begin_m: 0.0, length_m, origin: Vec2::new(0.0, 0.0), heading_rad: 0.0, shape }
+    }
+
+    /// Fresnel integrals at 1 (Abramowitz and Stegun, table 7.7): C = 0.7798934, S = 0.4382591.
+    #[test]
+    fn a_spiral_is_the_fresnel_integral() {
+        let end_per_m = core::f64::consts::PI;
+        let end = piece(1.0, Shape::Spiral { begin_per_m: 0.0, end_per_m }).at(1.0);
+        assert!((end.position - Vec2::new(0.779_893_400_4, 0.438_259_147_4)).norm() < 1e-9, "{end:?}");
+        assert!((end.heading_rad - FRAC_PI_2).abs() < 1e-12);
+    }
+
+    #[test]
+    fn derivatives_agree_with_differences() {
+        let shapes = [
+            Shape::Line,
+            Shape::Arc { curvature_per_m: -0.2 },
+            Shape::Spiral { begin_per_m: 0.1, end_per_m: -0.3 },
+            Shape::cubic([0.0, 12.0, 1.0, -2.0], [0.0, 0.0, 5.0, -1.0], 1.0).unwrap(),
+            Shape::cubic([0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 0.01, 0.002], 10.0).unwrap(),
+        ];
+        for shape in shapes {
+            let length_m = match &shape {
+                Shape::Cubic { lengths_m, .. } => *lengths_m.last().unwrap(),
+                _ => 10.0,
+            };
+            let curve = piece(length_m, shape);
+            for i in 1..20 {
+                let (s, h) = (length_m * f64::from(i) / 20.0, 1e-4);
+                let (a, b, c) = (curve.at(s - h), curve.at(s), curve.at(s + h));
+                let tangent = (c.position - a.position) / (2.0 * h);
+                assert!((tangent - unit_vector(b.heading_rad)).norm() < 1e-6, "{curve:?} at {s}");
+                let curvature = (c.heading_rad - a.heading_rad) / (2.0 * h);
+                assert!((curvature - b.curvature_per_m).abs() < 1e-5, "{curve:?} at {s}");
+                let rate = (c.curvature_per_m - a.curvature_per_m) / (2.0 * h);
+                assert!((rate - b.curvature_rate_per_m2).abs() < 1e-4, "{curve:?} at {s}");
+            }
+        }
+    }
+}

@@ -1,0 +1,20 @@
+//! Reading OpenDRIVE (ASAM, 1.4 to 1.8): an XML text becomes typed elements that know their line.
+//!
+//! Left out on purpose: elevation, superelevation, lateral profiles, road marks, surfaces, railroads
+//! and everything that does not say where a vehicle may drive, must stop or may be crossed.
+
+mod cubic;
+mod elements;
+mod geometry;
+mod read;
+mod xml;
+
+pub use elements::Contact;
+pub use elements::Document;
+pub use elements::Orientation;
+pub use elements::Outline;
+pub use elements::RoadElement;
+pub use elements::RoadLink;
+pub use elements::SectionElement;
+pub use elements::SignalElement;
+pub use read::read;

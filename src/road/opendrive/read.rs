@@ -1,0 +1,475 @@
+//! From XML to elements. Each function reads one kind of element and says what it lacks.
+
+use std::collections::BTreeMap;
+
+use crate::geometry::Vec2;
+use crate::road::RoadError;
+
+use super::cubic::Cubic;
+use super::cubic::Cubics;
+use super::elements::ConnectionElement;
+use super::elements::Contact;
+use super::elements::ControllerElement;
+use super::elements::Document;
+use super::elements::JunctionElement;
+use super::elements::LaneElement;
+use super::elements::ObjectElement;
+use super::elements::Orientation;
+use super::elements::Outline;
+use super::elements::RoadElement;
+use super::elements::RoadLink;
+use super::elements::SectionElement;
+use super::elements::SignalElement;
+use super::geometry::Piece;
+use super::geometry::ReferenceLine;
+use super::geometry::Shape;
+use super::xml::Element;
+use super::xml::Lines;
+use super::xml::wrong;
+
+/// Longer than any road; keeps the sampling of lanes within bounds.
+const ROAD_M_MAX: f64 = 100_000.0;
+
+/// More lanes than any road has to one side.
+const LANES_MAX: i32 = 100;
+
+/// One curve may turn so far, rad; a real one turns by a few.
+const TURN_RAD_MAX: f64 = 200.0;
+
+/// Reads a whole file.
+///
+/// # Errors
+/// The first thing that is wrong, with its line.
+pub fn read(name: &str, text: &str) -> Result<Document, RoadError> {
+    if text.trim().is_empty() {
+        return Err(wrong(1, "the file is empty; an OpenDRIVE map is expected"));
+    }
+    let document = roxmltree::Document::parse(text)
+        .map_err(|error| wrong(error.pos().row, format!("this is not well-formed XML: {error}")))?;
+    let lines = Lines::new(text);
+    let root = Element::new(document.root_element(), &lines);
+    if root.name() != "OpenDRIVE" {
+        return Err(root.wrong(format!("the root element is `{}`; `OpenDRIVE` is expected", root.name())));
+    }
+    let mut reader = Reader { warnings: Vec::new(), ignored: BTreeMap::new() };
+    let header_name = root.child("header").and_then(|header| header.attribute("name")).unwrap_or("");
+    let roads: Vec<_> = root.children("road").map(|road| reader.road(road)).collect::<Result<_, _>>()?;
+    if roads.is_empty() {
+        return Err(root.wrong("the map holds no `road`"));
+    }
+    let junctions = root.children("junction").map(junction).collect::<Result<_, _>>()?;
+    let controllers = root.children("controller").map(controller).collect::<Result<_, _>>()?;
+    let mut warnings = reader.warnings;
+    warnings
+        .extend(reader.ignored.into_iter().map(|(what, times)| format!("ignored {what} ({times} times)")));
+    Ok(Document {
+        name: if header_name.is_empty() { name.to_owned() } else { header_name.to_owned() },
+        roads,
+        junctions,
+        controllers,
+        warnings,
+    })
+}
+
+/// Collects what is not understood on the way.
+struct Reader {
+    warnings: Vec<String>,
+    /// What was left out, and how often.
+    ignored: BTreeMap<String, usize>,
+}
+
+impl Reader {
+    fn warn(&mut self, element: Element, message: impl AsRef<str>) {
+        self.warnings.push(format!("line {}: {}", element.line(), message.as_ref()));
+    }
+
+    fn ignore(&mut self, what: String) {
+        *self.ignored.entry(what).or_default() += 1;
+    }
+
+    fn road(&mut self, road: Element) -> Result<RoadElement, RoadError> {
+        let id = road.text("id")?.to_owned();
+        let length_m = road.number("length")?;
+        if !(length_m > 0.0 && length_m <= ROAD_M_MAX) {
+            return Err(road.wrong(format!(
+                "road `{id}` is {length_m} m long; more than 0 and at most {ROAD_M_MAX} m is expected"
+            )));
+        }
+        let junction = road.attribute("junction").filter(|id| !id.is_empty() && *id != "-1");
+        let link = |name: &str| match road.child("link").and_then(|link| link.child(name)) {
+            Some(link) => road_link(link).map(Some),
+            None => Ok(None),
+        };
+        let (predecessor, successor) = (link("predecessor")?, link("successor")?);
+        let mut speeds = Vec::new();
+        for kind in road.children("type") {
+            let limit = kind.child("speed").map(|speed| self.speed(speed)).transpose()?;
+            speeds.push((kind.number_or("s", 0.0)?, limit.flatten()));
+        }
+        let lanes =
+            road.child("lanes").ok_or_else(|| road.wrong(format!("road `{id}` lacks its `lanes`")))?;
+        Ok(RoadElement {
+            line: road.line(),
+            junction: junction.map(str::to_owned),
+            left_hand: road.attribute("rule") == Some("LHT"),
+            predecessor,
+            successor,
+            speeds,
+            reference: self.reference_line(road, &id, length_m)?,
+            lane_offset: cubics(lanes.children("laneOffset"), "s")?,
+            sections: self.sections(lanes, &id, length_m)?,
+            signals: self.signals(road)?,
+            objects: self.crosswalks(road)?,
+            id,
+            length_m,
+        })
+    }
+
+    fn reference_line(&mut self, road: Element, id: &str, length_m: f64) -> Result<ReferenceLine, RoadError> {
+        let plan =
+            road.child("planView").ok_or_else(|| road.wrong(format!("road `{id}` lacks its `planView`")))?;
+        let mut pieces: Vec<Piece> = Vec::new();
+        for geometry in plan.children("geometry") {
+            if geometry.number("length")? < 1e-9 {
+                // Some tools write empty curves; they hold nothing.
+                continue;
+            }
+            pieces.push(piece(geometry)?);
+        }
+        pieces.sort_by(|a, b| a.begin_m.total_cmp(&b.begin_m));
+        let end_m = pieces.last().map_or(0.0, |last| last.begin_m + last.length_m);
+        let reference = ReferenceLine::new(pieces)
+            .ok_or_else(|| plan.wrong(format!("road `{id}` has no `geometry` of any length")))?;
+        if (end_m - length_m).abs() > 0.1 {
+            self.warn(road, format!("road `{id}` is {length_m} m long, but its curves end at {end_m:.3} m"));
+        }
+        let (gap_m, at_m) = reference.largest_gap();
+        if gap_m > 0.05 {
+            self.warn(plan, format!("the curves of road `{id}` leave a gap of {gap_m:.3} m at s {at_m:.3}"));
+        }
+        Ok(reference)
+    }
+
+    fn sections(
+        &mut self,
+        lanes: Element,
+        id: &str,
+        length_m: f64,
+    ) -> Result<Vec<SectionElement>, RoadError> {
+        let mut sections: Vec<SectionElement> = Vec::new();
+        for section in lanes.children("laneSection") {
+            let begin_m = section.number("s")?;
+            if begin_m < 0.0 || begin_m > length_m {
+                let message = format!("a lane section begins at {begin_m} m, beyond the ends of road `{id}`");
+                return Err(section.wrong(message));
+            }
+            if sections.last().is_some_and(|last| begin_m <= last.begin_m) {
+                return Err(section.wrong(format!("lane sections of road `{id}` must stand by rising `s`")));
+            }
+            let mut all = Vec::new();
+            for side in section.elements().filter(|side| matches!(side.name(), "left" | "right")) {
+                for lane in side.children("lane") {
+                    all.push(self.lane(lane)?);
+                }
+            }
+            all.sort_by_key(|lane| -lane.id);
+            if let Some(pair) = all.windows(2).find(|pair| pair[0].id == pair[1].id) {
+                let message = format!("lane {} stands twice in a section of road `{id}`", pair[1].id);
+                return Err(wrong(pair[1].line, message));
+            }
+            if let Some(last) = sections.last_mut() {
+                last.end_m = begin_m;
+            }
+            sections.push(SectionElement { begin_m, end_m: length_m, lanes: all });
+        }
+        if sections.is_empty() {
+            return Err(lanes.wrong(format!("road `{id}` has no `laneSection`")));
+        }
+        Ok(sections)
+    }
+
+    fn lane(&mut self, lane: Element) -> Result<LaneElement, RoadError> {
+        let id = lane.integer("id")?;
+        if id == 0 || id.abs() > LANES_MAX {
+            return Err(lane.wrong(format!("a lane beside the reference line cannot have the id {id}")));
+        }
+        let linked = |name: &str| -> Result<Vec<i32>, RoadError> {
+            let links = lane.child("link").into_iter().flat_map(|link| link.children(name));
+            links.map(|link| link.integer("id")).collect()
+        };
+        let mut speeds = Vec::new();
+        for speed in lane.children("speed") {
+            speeds.push((speed.number_or("sOffset", 0.0)?, self.speed(speed)?));
+        }
+        let driving = lane.attribute("type") == Some("driving");
+        let widths = cubics(lane.children("width"), "sOffset")?;
+        let borders = cubics(lane.children("border"), "sOffset")?;
+        if driving && widths.is_empty() && borders.is_empty() {
+            return Err(lane.wrong(format!("lane {id} has neither `width` nor `border`")));
+        }
+        Ok(LaneElement {
+            id,
+            line: lane.line(),
+            driving,
+            widths,
+            borders,
+            predecessors: linked("predecessor")?,
+            successors: linked("successor")?,
+            speeds,
+        })
+    }
+
+    /// A limit in m/s; `None` for `no limit` and `undefined`.
+    fn speed(&mut self, speed: Element) -> Result<Option<f64>, RoadError> {
+        if matches!(speed.attribute("max"), Some("no limit" | "undefined")) {
+            return Ok(None);
+        }
+        let factor = match speed.attribute("unit").unwrap_or("m/s") {
+            "m/s" => 1.0,
+            "km/h" => 1.0 / 3.6,
+            "mph" => 0.447_04,
+            unit => {
+                let message = format!("unknown unit of speed `{unit}`; write m/s, km/h or mph");
+                return Err(speed.wrong(message));
+            }
+        };
+        let limit_mps = speed.number("max")? * factor;
+        if limit_mps <= 0.0 {
+            // Some tools write 0 or -1 for "none".
+            self.warn(speed, format!("ignored a speed limit of {limit_mps} m/s"));
+            return Ok(None);
+        }
+        Ok(Some(limit_mps))
+    }
+
+    fn signals(&mut self, road: Element) -> Result<Vec<SignalElement>, RoadError> {
+        let mut all = Vec::new();
+        for signal in road.child("signals").into_iter().flat_map(Element::elements) {
+            let reference = match signal.name() {
+                "signal" => false,
+                "signalReference" => true,
+                name => {
+                    self.ignore(format!("`{name}` among signals"));
+                    continue;
+                }
+            };
+            let kind = signal.attribute("type").unwrap_or("");
+            if !reference && !matches!(kind, "1000001" | "1000002") {
+                self.ignore(format!("signals of type `{kind}`"));
+                continue;
+            }
+            let validity = signal.children("validity");
+            all.push(SignalElement {
+                id: signal.text("id")?.to_owned(),
+                line: signal.line(),
+                s_m: signal.number("s")?,
+                t_m: signal.number_or("t", 0.0)?,
+                reference,
+                pedestrian: kind == "1000002",
+                orientation: match signal.attribute("orientation") {
+                    Some("+") => Orientation::Along,
+                    Some("-") => Orientation::Against,
+                    _ => Orientation::Both,
+                },
+                validity: validity
+                    .map(|range| {
+                        let (from, to) = (range.integer("fromLane")?, range.integer("toLane")?);
+                        Ok((from.min(to), from.max(to)))
+                    })
+                    .collect::<Result<_, _>>()?,
+            });
+        }
+        Ok(all)
+    }
+
+    fn crosswalks(&mut self, road: Element) -> Result<Vec<ObjectElement>, RoadError> {
+        let mut all = Vec::new();
+        for object in road.child("objects").into_iter().flat_map(|objects| objects.children("object")) {
+            let kind = object.attribute("type").unwrap_or("");
+            if kind != "crosswalk" {
+                self.ignore(format!("objects of type `{kind}`"));
+                continue;
+            }
+            let Some(outline) = outline(object)? else {
+                self.warn(object, "ignored a crosswalk without an outline of three corners");
+                continue;
+            };
+            all.push(ObjectElement {
+                id: object.text("id")?.to_owned(),
+                s_m: object.number("s")?,
+                t_m: object.number_or("t", 0.0)?,
+                heading_rad: object.number_or("hdg", 0.0)?,
+                outline,
+            });
+        }
+        Ok(all)
+    }
+}
+
+fn piece(geometry: Element) -> Result<Piece, RoadError> {
+    let length_m = geometry.number("length")?;
+    let shape = match geometry.elements().find(|shape| shape.name() != "userData") {
+        None => return Err(geometry.wrong("`geometry` lacks its shape, such as `line` or `arc`")),
+        Some(shape) => match shape.name() {
+            "line" => Shape::Line,
+            "arc" => Shape::Arc { curvature_per_m: curvature(shape, "curvature", length_m)? },
+            "spiral" => Shape::Spiral {
+                begin_per_m: curvature(shape, "curvStart", length_m)?,
+                end_per_m: curvature(shape, "curvEnd", length_m)?,
+            },
+            "paramPoly3" => {
+                let p_max = if shape.attribute("pRange") == Some("arcLength") { length_m } else { 1.0 };
+                let u = [shape.number("aU")?, shape.number("bU")?, shape.number("cU")?, shape.number("dU")?];
+                let v = [shape.number("aV")?, shape.number("bV")?, shape.number("cV")?, shape.number("dV")?];
+                cubic_shape(shape, u, v, p_max, length_m)?
+            }
+            "poly3" => {
+                let v = [shape.number("a")?, shape.number("b")?, shape.number("c")?, shape.number("d")?];
+                poly3(shape, v, length_m)?
+            }
+            name => return Err(shape.wrong(format!("unknown geometry `{name}`"))),
+        },
+    };
+    Ok(Piece {
+        begin_m: geometry.number("s")?,
+        length_m,
+        origin: Vec2::new(geometry.number("x")?, geometry.number("y")?),
+        heading_rad: geometry.number("hdg")?,
+        shape,
+    })
+}
+
+fn curvature(shape: Element, name: &str, length_m: f64) -> Result<f64, RoadError> {
+    let per_m = shape.number(name)?;
+    if (per_m * length_m).abs() > TURN_RAD_MAX {
+        return Err(shape.wrong(format!("a curvature of {per_m} 1/m over {length_m} m is no road")));
+    }
+    Ok(per_m)
+}
+
+fn cubic_shape(
+    shape: Element,
+    u: [f64; 4],
+    v: [f64; 4],
+    p_max: f64,
+    length_m: f64,
+) -> Result<Shape, RoadError> {
+    let cubic = Shape::cubic(u, v, p_max).ok_or_else(|| shape.wrong("this curve has no direction"))?;
+    let Shape::Cubic { lengths_m, .. } = &cubic else { return Ok(cubic) };
+    let own_m = lengths_m[lengths_m.len() - 1];
+    if own_m > 2.0 * length_m || own_m < 0.5 * length_m {
+        let message = format!("this curve is {own_m:.3} m long, but its geometry says {length_m} m");
+        return Err(shape.wrong(message));
+    }
+    Ok(cubic)
+}
+
+/// `v(u)`, where `u` runs until the curve has its length: found by bisection, as `u` is not given.
+fn poly3(shape: Element, v: [f64; 4], length_m: f64) -> Result<Shape, RoadError> {
+    let (mut low, mut high) = (0.0, length_m);
+    for _ in 0..60 {
+        let middle = (low + high) / 2.0;
+        match Shape::cubic([0.0, 1.0, 0.0, 0.0], v, middle) {
+            Some(Shape::Cubic { lengths_m, .. }) if lengths_m[lengths_m.len() - 1] < length_m => low = middle,
+            Some(_) => high = middle,
+            None => return Err(shape.wrong("this curve has no direction")),
+        }
+    }
+    cubic_shape(shape, [0.0, 1.0, 0.0, 0.0], v, high, length_m)
+}
+
+fn cubics<'a, 'input: 'a>(
+    records: impl Iterator<Item = Element<'a, 'input>>,
+    begin: &str,
+) -> Result<Cubics, RoadError> {
+    let pieces = records.map(|record| {
+        Ok(Cubic {
+            begin_m: record.number_or(begin, 0.0)?,
+            a: record.number("a")?,
+            b: record.number_or("b", 0.0)?,
+            c: record.number_or("c", 0.0)?,
+            d: record.number_or("d", 0.0)?,
+        })
+    });
+    pieces.collect::<Result<_, _>>().map(Cubics::new)
+}
+
+fn outline(object: Element) -> Result<Option<Outline>, RoadError> {
+    // Since 1.5 an object may have several outlines; before, one without the wrapper.
+    let wrapper = object.child("outlines").unwrap_or(object);
+    let Some(outline) = wrapper.child("outline") else {
+        let (length_m, width_m) = (object.number_or("length", 0.0)?, object.number_or("width", 0.0)?);
+        let (u, v) = (length_m / 2.0, width_m / 2.0);
+        let corners = vec![(-u, -v), (u, -v), (u, v), (-u, v)];
+        return Ok((u > 0.0 && v > 0.0).then_some(Outline::Local(corners)));
+    };
+    let corners =
+        |name: &'static str, x: &'static str, y: &'static str| -> Result<Vec<(f64, f64)>, RoadError> {
+            outline.children(name).map(|corner| Ok((corner.number(x)?, corner.number(y)?))).collect()
+        };
+    let local = corners("cornerLocal", "u", "v")?;
+    if local.len() >= 3 {
+        return Ok(Some(Outline::Local(local)));
+    }
+    let along = corners("cornerRoad", "s", "t")?;
+    Ok((along.len() >= 3).then_some(Outline::Road(along)))
+}
+
+fn road_link(link: Element) -> Result<RoadLink, RoadError> {
+    let (id, line) = (link.text("elementId")?.to_owned(), link.line());
+    match link.attribute("elementType").unwrap_or("road") {
+        "junction" => Ok(RoadLink::Junction { id, line }),
+        "road" => Ok(RoadLink::Road { id, contact: contact(link)?, line }),
+        other => {
+            Err(link.wrong(format!("unknown `elementType` `{other}`; `road` or `junction` is expected")))
+        }
+    }
+}
+
+fn contact(element: Element) -> Result<Contact, RoadError> {
+    match element.text("contactPoint")? {
+        "start" => Ok(Contact::Start),
+        "end" => Ok(Contact::End),
+        other => {
+            Err(element.wrong(format!("unknown `contactPoint` `{other}`; `start` or `end` is expected")))
+        }
+    }
+}
+
+fn junction(junction: Element) -> Result<JunctionElement, RoadError> {
+    let connections = junction.children("connection").map(|connection| {
+        let links = connection.children("laneLink");
+        Ok(ConnectionElement {
+            line: connection.line(),
+            incoming_road: connection.text("incomingRoad")?.to_owned(),
+            connecting_road: match connection.attribute("connectingRoad") {
+                Some(road) => road.to_owned(),
+                // Direct junctions (1.7) link roads without one in between.
+                None => connection.text("linkedRoad")?.to_owned(),
+            },
+            contact: contact(connection)?,
+            lane_links: links
+                .map(|link| Ok((link.integer("from")?, link.integer("to")?)))
+                .collect::<Result<_, _>>()?,
+        })
+    });
+    let controllers = junction.children("controller");
+    Ok(JunctionElement {
+        id: junction.text("id")?.to_owned(),
+        name: junction.attribute("name").unwrap_or("").to_owned(),
+        connections: connections.collect::<Result<_, _>>()?,
+        controllers: controllers
+            .map(|entry| Ok((entry.text("id")?.to_owned(), entry.line())))
+            .collect::<Result<_, _>>()?,
+    })
+}
+
+fn controller(controller: Element) -> Result<ControllerElement, RoadError> {
+    let controls = controller.children("control");
+    Ok(ControllerElement {
+        id: controller.text("id")?.to_owned(),
+        signals: controls
+            .map(|control| Ok((control.text("signalId")?.to_owned(), control.line())))
+            .collect::<Result<_, _>>()?,
+    })
+}

@@ -1,0 +1,4 @@
+//! Tests of the whole module: the authored map against its survey, and reading made-up files.
+
+mod corner;
+mod reading;

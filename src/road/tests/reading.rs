@@ -1,0 +1,308 @@
+//! Made-up OpenDRIVE files: each feature once, and what is wrong with broken ones.
+
+use proptest::prelude::*;
+
+use crate::geometry::Vec2;
+use crate::geometry::unit_vector;
+use crate::geometry::wrap_angle;
+use crate::road::Lane;
+use crate::road::RoadError;
+use crate::road::RoadMap;
+use crate::road::Route;
+
+const CORNER: &str = include_str!("../../../scenarios/roads/corner.xodr");
+
+const LINE_100: &str = r#"<geometry s="0" x="0" y="0" hdg="0" length="100"><line/></geometry>"#;
+const TWO_LANES: &str = r#"<laneSection s="0">
+    <left><lane id="1" type="driving"><width sOffset="0" a="3" b="0" c="0" d="0"/></lane></left>
+    <center><lane id="0" type="none"/></center>
+    <right><lane id="-1" type="driving"><width sOffset="0" a="4" b="0" c="0" d="0"/></lane></right>
+</laneSection>"#;
+
+/// A map of one road, 100 m long.
+fn one_road(attributes: &str, head: &str, geometry: &str, lanes: &str, tail: &str) -> String {
+    format!(
+        r#"<OpenDRIVE><header name="made up"/><road id="1" length="100" junction="-1" {attributes}>{head}
+        <planView>{geometry}</planView><lanes>{lanes}</lanes>{tail}</road></OpenDRIVE>"#
+    )
+}
+
+fn read(text: &str) -> RoadMap {
+    RoadMap::from_opendrive("test", text).unwrap()
+}
+
+fn lane(map: &RoadMap, section: usize, id: i32) -> &Lane {
+    let of = |lane: &&Lane| lane.key.section == section && lane.key.lane == id;
+    map.lanes.iter().find(of).unwrap()
+}
+
+#[test]
+fn traffic_keeps_right_unless_the_road_says_left() {
+    for (rule, along) in [("", -1), (r#"rule="RHT""#, -1), (r#"rule="LHT""#, 1)] {
+        let map = read(&one_road(rule, "", LINE_100, TWO_LANES, ""));
+        assert!(lane(&map, 0, along).centre.pose_at(0.0).heading_rad.abs() < 1e-12);
+        let against = lane(&map, 0, -along);
+        assert!((against.centre.pose_at(0.0).heading_rad.abs() - core::f64::consts::PI).abs() < 1e-12);
+        assert_eq!(against.centre.points().len(), 2, "a straight needs no more than its ends");
+        // Where traffic keeps left, oncoming traffic is on the right.
+        let beside = if along < 0 { against.left } else { against.right };
+        let neighbour = beside.unwrap();
+        assert!(!neighbour.same_direction && neighbour.gap_m == 0.0);
+    }
+}
+
+#[test]
+fn limits_are_read_in_all_units_and_lanes_may_have_their_own() {
+    for (unit, expected_mps) in [("m/s", 36.0), ("km/h", 10.0), ("mph", 16.093_44)] {
+        let kind = format!(r#"<type s="0" type="town"><speed max="36" unit="{unit}"/></type>"#);
+        let map = read(&one_road("", &kind, LINE_100, TWO_LANES, ""));
+        assert!((lane(&map, 0, 1).speed_limit_mps - expected_mps).abs() < 1e-9);
+    }
+    let own =
+        TWO_LANES.replace("</lane></right>", r#"<speed sOffset="0" max="7" unit="m/s"/></lane></right>"#);
+    let map = read(&one_road("", "", LINE_100, &own, ""));
+    assert_eq!(lane(&map, 0, -1).speed_limit_mps, 7.0);
+    assert_eq!(lane(&map, 0, 1).speed_limit_mps, 50.0 / 3.6);
+    assert!(map.warnings.iter().any(|warning| warning.contains("no speed limit")), "{:?}", map.warnings);
+}
+
+#[test]
+fn a_median_is_a_gap_and_other_lanes_are_left_out() {
+    let lanes = r#"<laneSection s="0">
+        <left><lane id="2" type="driving"><width a="3"/></lane><lane id="1" type="median"><width a="2"/></lane></left>
+        <right><lane id="-1" type="driving"><border a="-3"/></lane><lane id="-2" type="sidewalk"><width a="2"/></lane></right>
+    </laneSection>"#;
+    let map = read(&one_road("", "", LINE_100, lanes, ""));
+    assert_eq!(map.lanes.len(), 2);
+    let right = lane(&map, 0, -1);
+    assert!((right.left.unwrap().gap_m - 2.0).abs() < 1e-9);
+    assert_eq!(right.right, None);
+    assert!((right.width_at(50.0) - 3.0).abs() < 1e-9);
+    assert!((right.centre.pose_at(0.0).position.y + 1.5).abs() < 1e-9);
+}
+
+#[test]
+fn sections_join_lanes_and_a_lane_that_appears_has_no_predecessor() {
+    let lanes = r#"<laneOffset s="0" a="0.5" b="0" c="0" d="0"/>
+        <laneSection s="0"><right><lane id="-1" type="driving"><link><successor id="-1"/></link><width a="3"/></lane></right></laneSection>
+        <laneSection s="40"><right>
+            <lane id="-1" type="driving"><link><predecessor id="-1"/></link><width a="3"/></lane>
+            <lane id="-2" type="driving"><width a="0" b="0" c="0.0025" d="-0.00004166666667"/></lane>
+        </right></laneSection>"#;
+    let map = read(&one_road("", "", LINE_100, lanes, ""));
+    assert_eq!(map.warnings.len(), 1, "only the missing limits: {:?}", map.warnings);
+    let first = lane(&map, 0, -1);
+    assert_eq!(first.successors.len(), 1);
+    assert_eq!(map.lane(first.successors[0]).key.section, 1);
+    assert!((first.centre.pose_at(0.0).position.y + 1.0).abs() < 1e-9, "the lane offset moves it");
+    assert!(lane(&map, 1, -2).predecessors.is_empty());
+    let place = map.place("1", -1, 60.0).unwrap();
+    assert!((place.station_m - 20.0).abs() < 1e-6);
+    let route = Route::find(&map, map.place("1", -1, 10.0).unwrap(), place).unwrap();
+    assert!((route.goal_m - 50.0).abs() < 1e-6);
+    assert!((route.path.length_m() - 90.0).abs() < 1e-6);
+    assert!((route.lanes[1].from_m - 30.0).abs() < 1e-6);
+}
+
+#[test]
+fn lights_stop_the_lanes_they_are_meant_for() {
+    let lanes = r#"<laneSection s="0"><left><lane id="1" type="driving"><width a="3"/></lane></left><right>
+        <lane id="-1" type="driving"><width a="3"/></lane><lane id="-2" type="driving"><width a="3"/></lane></right></laneSection>"#;
+    let tail = r#"<signals>
+        <signal id="a" s="90" t="-5" orientation="+" type="1000001"><validity fromLane="-1" toLane="-1"/></signal>
+        <signal id="b" s="10" t="5" orientation="-" type="1000001"/>
+        <signal id="c" s="10" t="5" orientation="-" type="206"/></signals>"#;
+    let map = read(&one_road("", "", LINE_100, lanes, tail));
+    assert_eq!(map.signals.len(), 2);
+    assert_eq!(lane(&map, 0, -1).stop_lines.len(), 1);
+    assert!((lane(&map, 0, -1).stop_lines[0].station_m - 90.0).abs() < 1e-6);
+    assert!(lane(&map, 0, -2).stop_lines.is_empty());
+    assert!((lane(&map, 0, 1).stop_lines[0].station_m - 90.0).abs() < 1e-6, "counted in driving direction");
+    assert!(map.warnings.iter().any(|warning| warning.contains("type `206`")), "{:?}", map.warnings);
+}
+
+#[test]
+fn crosswalks_have_corners_in_either_frame() {
+    let tail = r#"<objects>
+        <object type="crosswalk" id="local" s="50" t="0" hdg="1.5707963267948966"><outlines><outline>
+            <cornerLocal u="-4" v="-1"/><cornerLocal u="4" v="-1"/><cornerLocal u="4" v="1"/></outline></outlines></object>
+        <object type="crosswalk" id="road" s="50" t="0"><outline>
+            <cornerRoad s="49" t="-4"/><cornerRoad s="51" t="-4"/><cornerRoad s="51" t="4"/></outline></object>
+        <object type="crosswalk" id="box" s="50" t="0" length="2" width="8"/>
+        <object type="crosswalk" id="nothing" s="50" t="0"/></objects>"#;
+    let map = read(&one_road("", "", LINE_100, TWO_LANES, tail));
+    let ids: Vec<_> = map.crosswalks.iter().map(|crosswalk| crosswalk.id.as_str()).collect();
+    assert_eq!(ids, ["local", "road", "box"]);
+    assert!((map.crosswalks[0].outline[0] - Vec2::new(51.0, -4.0)).norm() < 1e-9);
+    assert!((map.crosswalks[1].outline[2] - Vec2::new(51.0, 4.0)).norm() < 1e-9);
+    assert!((map.crosswalks[2].outline[0] - Vec2::new(49.0, -4.0)).norm() < 1e-9);
+    let route =
+        Route::find(&map, map.place("1", -1, 0.0).unwrap(), map.place("1", -1, 99.0).unwrap()).unwrap();
+    assert_eq!(route.crosswalks_m.len(), 3);
+}
+
+/// The end of each curve, from textbook formulas: a quarter of a circle, a parabola, and the clothoid
+/// through its series `x = L - L⁵/(40 A⁴)`, `y = L³/(6 A²) - L⁷/(336 A⁶)` with `A² = L R`.
+#[test]
+fn curves_end_where_they_should() {
+    let quarter = core::f64::consts::FRAC_PI_2 / 100.0;
+    let radius_m = 1.0 / quarter;
+    // L = 100 m and R = 1000 m.
+    let clothoid = (99.975, 1.0 / 0.6 - 0.1 / 336.0);
+    let cases = [
+        (format!(r#"<arc curvature="{quarter}"/>"#), (radius_m, radius_m), 1e-9),
+        (r#"<spiral curvStart="0" curvEnd="0.001"/>"#.to_owned(), clothoid, 1e-5),
+        (r#"<paramPoly3 pRange="normalized" aU="0" bU="100" cU="0" dU="0" aV="0" bV="0" cV="2" dV="0"/>"#.to_owned(), (100.0, 2.0), 1e-9),
+        (r#"<paramPoly3 pRange="arcLength" aU="0" bU="1" cU="0" dU="0" aV="0" bV="0" cV="0.0002" dV="0"/>"#.to_owned(), (100.0, 2.0), 1e-9),
+    ];
+    for (shape, (x, y), tolerance_m) in cases {
+        let geometry = format!(r#"<geometry s="0" x="0" y="0" hdg="0" length="100">{shape}</geometry>"#);
+        let lanes = r#"<laneOffset s="0" a="1.5"/><laneSection s="0"><right><lane id="-1" type="driving"><width a="3"/></lane></right></laneSection>"#;
+        let map = read(&one_road("", "", &geometry, lanes, ""));
+        let centre = &map.lanes[0].centre;
+        let end = centre.points().last().unwrap();
+        assert!((end.position - Vec2::new(x, y)).norm() < tolerance_m + 2e-7, "{shape}: {end:?}");
+    }
+    let poly3 =
+        r#"<geometry s="0" x="0" y="0" hdg="0" length="100"><poly3 a="0" b="0" c="0.001" d="0"/></geometry>"#;
+    let map = read(&one_road("", "", poly3, TWO_LANES, ""));
+    assert!(map.lanes.iter().all(|lane| lane.centre.length_m() > 99.0), "{:?}", map.warnings);
+}
+
+/// Half way between two vertices the exact curve is within a millimetre, and headings and curvatures
+/// are those of the path itself: an S of spirals, with a lane that widens.
+#[test]
+fn sampled_centres_are_the_curves() {
+    let geometry = r#"<geometry s="0" x="0" y="0" hdg="0" length="40"><spiral curvStart="0" curvEnd="0.1"/></geometry>
+        <geometry s="40" x="26.703874" y="19.952474" hdg="2" length="60"><spiral curvStart="0.1" curvEnd="-0.1"/></geometry>"#;
+    let lanes = r#"<laneSection s="0"><right>
+        <lane id="-1" type="driving"><width a="3" b="0" c="0.0009" d="-0.000006"/></lane>
+        <lane id="-2" type="driving"><width a="3"/></lane></right></laneSection>"#;
+    let map = read(&one_road("", "", geometry, lanes, ""));
+    for lane in &map.lanes {
+        let points = lane.centre.points();
+        for triple in points.windows(3) {
+            let [a, b, c] = triple else { unreachable!() };
+            let (before_m, after_m) = (b.station_m - a.station_m, c.station_m - b.station_m);
+            if before_m < 0.01 || after_m < 0.01 {
+                continue;
+            }
+            let mean = |p: &crate::geometry::PathPoint, q: &crate::geometry::PathPoint| {
+                p.heading_rad + wrap_angle(q.heading_rad - p.heading_rad) / 2.0
+            };
+            let chord = (c.position - b.position).normalize();
+            assert!((chord - unit_vector(mean(b, c))).norm() < 2e-3, "{b:?} {c:?}");
+            let turned = wrap_angle(mean(b, c) - mean(a, b)) / ((before_m + after_m) / 2.0);
+            assert!((turned - b.curvature_per_m).abs() < 5e-3, "{turned} against {b:?}");
+            // Height of the arc over the chord.
+            assert!(b.curvature_per_m.abs() * after_m * after_m / 8.0 < 1e-3, "{b:?}");
+        }
+    }
+}
+
+#[test]
+fn what_is_wrong_is_said_with_its_line() {
+    let road = |attributes: &str| {
+        format!(
+            "<OpenDRIVE>\n<road {attributes}>\n<planView>{LINE_100}</planView>\n<lanes>{TWO_LANES}</lanes></road></OpenDRIVE>"
+        )
+    };
+    let link = |link: &str| one_road("", &format!("<link>\n{link}</link>"), LINE_100, TWO_LANES, "");
+    let nested = "<a>".repeat(50_000);
+    let cases = [
+        (String::new(), 1, "the file is empty"),
+        ("hello".to_owned(), 1, "not well-formed XML"),
+        ("\u{0}\u{1}".to_owned(), 1, "not well-formed XML"),
+        (nested, 1, "not well-formed XML"),
+        ("<svg/>".to_owned(), 1, "the root element is `svg`"),
+        ("<OpenDRIVE/>".to_owned(), 1, "no `road`"),
+        (road(r#"length="100""#), 2, "`road` lacks its `id`"),
+        (road(r#"id="1" length="NaN""#), 2, "no number a road can have"),
+        (road(r#"id="1" length="long""#), 2, "`length` of `road` is `long`"),
+        (road(r#"id="1" length="-3""#), 2, "is -3 m long"),
+        (road(r#"id="1" length="100" junction="7""#), 2, "junction `7`, which does not exist"),
+        (
+            link(r#"<successor elementType="road" elementId="9" contactPoint="start"/>"#),
+            2,
+            "leads to road `9`",
+        ),
+        (link(r#"<successor elementType="junction" elementId="9"/>"#), 2, "leads to junction `9`"),
+        (link(r#"<successor elementType="road" elementId="1"/>"#), 2, "lacks its `contactPoint`"),
+        (one_road("", "", "", TWO_LANES, ""), 2, "no `geometry`"),
+        (
+            one_road("", "", "<geometry s='0' x='0' y='0' hdg='0' length='100'/>", TWO_LANES, ""),
+            2,
+            "lacks its shape",
+        ),
+        (one_road("", "", LINE_100, "", ""), 2, "no `laneSection`"),
+        (
+            one_road("", "", LINE_100, &TWO_LANES.replace("driving", "sidewalk"), ""),
+            1,
+            "no lane of type `driving`",
+        ),
+        (
+            one_road("", "", LINE_100, &TWO_LANES.replace(r#"a="3" b="0""#, r#"a="3" b="999999""#), ""),
+            3,
+            "is no road",
+        ),
+    ];
+    for (text, expected_line, part) in cases {
+        let start: String = text.chars().take(200).collect();
+        let Err(RoadError::Map { line, message }) = RoadMap::from_opendrive("test", &text) else {
+            panic!("no error for {start}")
+        };
+        assert!(message.contains(part), "`{message}` for {start}");
+        assert_eq!(line, expected_line, "`{message}` for {start}");
+    }
+}
+
+fn all_finite(map: &RoadMap) -> bool {
+    map.lanes.iter().all(|lane| {
+        let finite = |point: &crate::geometry::PathPoint| {
+            let numbers = [point.station_m, point.heading_rad, point.curvature_per_m];
+            numbers.iter().all(|number| number.is_finite())
+                && point.position.iter().all(|part| part.is_finite())
+        };
+        lane.centre.points().iter().all(finite) && lane.widths_m.iter().all(|width| width.is_finite())
+    })
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(48))]
+
+    /// Whatever is changed in a file, reading it ends with a map of finite numbers or an error.
+    #[test]
+    fn a_damaged_file_does_no_harm(
+        damages in prop::collection::vec((0.0..1.0_f64, 0_usize..9), 1..4),
+    ) {
+        let mut text = CORNER.to_owned();
+        for (place, kind) in damages {
+            let from = (place * text.len() as f64) as usize;
+            let values: Vec<_> = text.match_indices("=\"").map(|(at, _)| at + 2).filter(|at| *at > from).collect();
+            let Some(begin) = values.first().copied() else { continue };
+            let Some(length) = text[begin..].find('"') else { continue };
+            let new = ["", "NaN", "1e308", "-1e9", "1e9", "0", "-7", "x", "1e-300"][kind];
+            text.replace_range(begin..begin + length, new);
+        }
+        if let Ok(map) = RoadMap::from_opendrive("damaged", &text) {
+            prop_assert!(all_finite(&map));
+            let _ = map.nearest(Vec2::new(0.0, 0.0), 0.0, 1e6);
+            if let (Ok(start), Ok(goal)) = (map.place("1", -1, 10.0), map.place("5", -3, 10.0)) {
+                let _ = Route::find(&map, start, goal);
+            }
+        }
+    }
+
+    /// A file that ends too early, or begins too late, is an error or a smaller map.
+    #[test]
+    fn a_cut_file_does_no_harm(from in 0.0..1.0_f64, to in 0.0..1.0_f64) {
+        let bytes = CORNER.as_bytes();
+        let (low, high) = (from.min(to) * bytes.len() as f64, from.max(to) * bytes.len() as f64);
+        let part = String::from_utf8_lossy(&bytes[low as usize..high as usize]);
+        prop_assert!(RoadMap::from_opendrive("cut", &part).is_err());
+        let hole = format!("{}{}", String::from_utf8_lossy(&bytes[..low as usize]), String::from_utf8_lossy(&bytes[high as usize..]));
+        if let Ok(map) = RoadMap::from_opendrive("hole", &hole) {
+            prop_assert!(all_finite(&map));
+        }
+    }
+}
