@@ -8,3 +8,4 @@ pub mod units;
 pub mod rng;
 pub mod geometry;
 pub mod road;
+pub mod syntax;

@@ -1,0 +1,630 @@
+//! What a file says, as its author wrote it: the tree between text and meaning.
+//!
+//! Every node carries the bytes it came from, so that later stages can point at them. Nothing is
+//! resolved here: names are spellings, numbers keep their digits, units are words. Comments other
+//! than documentation are not in the tree; `format` takes them from the source.
+
+use serde::Serialize;
+
+/// Which file of [`Sources`](super::Sources) a span points into.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
+pub struct FileId(pub u32);
+
+/// A range of bytes of one file. Nodes that were built instead of read have [`Span::NONE`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
+pub struct Span {
+    pub file: FileId,
+    /// First byte.
+    pub start: usize,
+    /// One past the last byte.
+    pub end: usize,
+}
+
+impl Span {
+    /// The span of what was never text.
+    pub const NONE: Span = Span { file: FileId(0), start: 0, end: 0 };
+
+    pub fn new(file: FileId, start: usize, end: usize) -> Self {
+        Span { file, start, end }
+    }
+
+    /// From the start of `self` to the end of `last`, which must be in the same file.
+    pub fn to(self, last: Span) -> Span {
+        Span { end: last.end, ..self }
+    }
+}
+
+/// A name or a word, as it was spelt.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Name {
+    pub text: String,
+    #[serde(skip)]
+    pub span: Span,
+}
+
+impl Name {
+    pub fn new(text: impl Into<String>, span: Span) -> Self {
+        Name { text: text.into(), span }
+    }
+
+    /// A name that was built instead of read.
+    pub fn built(text: impl Into<String>) -> Self {
+        Name::new(text, Span::NONE)
+    }
+}
+
+/// A text literal; escapes are resolved.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Text {
+    pub value: String,
+    #[serde(skip)]
+    pub span: Span,
+}
+
+impl Text {
+    pub fn new(value: impl Into<String>, span: Span) -> Self {
+        Text { value: value.into(), span }
+    }
+}
+
+/// A number with its unit, for example `12.50 m/s`.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Number {
+    /// The digits exactly as written, without a sign: `12`, `0.50`, `1e-9`. Never converted here.
+    pub digits: String,
+    /// Any word, `%` included; the checker knows which words are units.
+    pub unit: Option<Name>,
+    #[serde(skip)]
+    pub span: Span,
+}
+
+/// One line of documentation, without its marker.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Doc {
+    pub text: String,
+    #[serde(skip)]
+    pub span: Span,
+}
+
+/// One file.
+#[derive(Debug, Clone, PartialEq, Serialize, Default)]
+pub struct File {
+    /// Its `//!` lines.
+    pub docs: Vec<Doc>,
+    /// As declared; `language` and `use` are items like the others.
+    pub items: Vec<Item>,
+    #[serde(skip)]
+    pub span: Span,
+}
+
+/// One declaration with the `///` lines before it.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Item {
+    pub docs: Vec<Doc>,
+    pub kind: ItemKind,
+    /// From its first keyword to its last character; documentation excluded.
+    #[serde(skip)]
+    pub span: Span,
+}
+
+/// What is declared.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub enum ItemKind {
+    Language(Number),
+    Use(Use),
+    Enum(Enum),
+    State(State),
+    Let(Let),
+    Fn(Fn),
+    Action(Action),
+    Group(Group),
+    Rule(Rule),
+    Road(Block),
+    Episode(Vec<Field>),
+    Reward(Vec<Case>),
+    Verdict(Verdict),
+    Expect(Expect),
+    Scenario(Scenario),
+    Policy(Policy),
+}
+
+impl ItemKind {
+    /// The keyword that begins it.
+    pub fn keyword(&self) -> &'static str {
+        match self {
+            ItemKind::Language(_) => "language",
+            ItemKind::Use(_) => "use",
+            ItemKind::Enum(_) => "enum",
+            ItemKind::State(_) => "state",
+            ItemKind::Let(_) => "let",
+            ItemKind::Fn(_) => "fn",
+            ItemKind::Action(_) => "action",
+            ItemKind::Group(_) => "group",
+            ItemKind::Rule(_) => "rule",
+            ItemKind::Road(_) => "road",
+            ItemKind::Episode(_) => "episode",
+            ItemKind::Reward(_) => "reward",
+            ItemKind::Verdict(_) => "verdict",
+            ItemKind::Expect(_) => "expect",
+            ItemKind::Scenario(_) => "scenario",
+            ItemKind::Policy(_) => "policy",
+        }
+    }
+
+    /// What the declaration is called, if it has a name.
+    pub fn name(&self) -> Option<&Name> {
+        match self {
+            ItemKind::Enum(item) => Some(&item.name),
+            ItemKind::State(item) => Some(&item.name),
+            ItemKind::Let(item) => Some(&item.name),
+            ItemKind::Fn(item) => Some(&item.name),
+            ItemKind::Action(item) => Some(&item.name),
+            ItemKind::Group(item) => Some(&item.name),
+            ItemKind::Rule(item) => Some(&item.name),
+            ItemKind::Road(item) => Some(&item.name),
+            ItemKind::Verdict(item) => Some(&item.name),
+            ItemKind::Scenario(item) => Some(&item.name),
+            ItemKind::Policy(item) => Some(&item.name),
+            ItemKind::Language(_)
+            | ItemKind::Use(_)
+            | ItemKind::Episode(_)
+            | ItemKind::Reward(_)
+            | ItemKind::Expect(_) => None,
+        }
+    }
+}
+
+/// `use "roads.ava" digest "sha256:…"`.
+///
+/// The digest covers the used file with everything that it uses itself, and the maps of all roads
+/// declared there. It is the SHA-256 hash of one line for each of these files, sorted by name: the
+/// digest of its bytes, a space, its name, a line feed. Names are as the files name each other,
+/// resolved against the folder of the used file, so that it does not matter where that folder is.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Use {
+    pub path: Text,
+    pub digest: Option<Text>,
+}
+
+/// `enum Level = None < Light < High` or `enum Side = Left | Right`. Never empty.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Enum {
+    pub name: Name,
+    /// Whether `<` stood between the variants. A lone variant is not ordered.
+    pub ordered: bool,
+    pub variants: Vec<Name>,
+}
+
+/// `state sky: Sky -> Level = None`.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct State {
+    pub name: Name,
+    pub ty: Type,
+    pub initial: Initial,
+}
+
+/// What a state is when an episode begins.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[expect(clippy::large_enum_variant, reason = "a file has a handful, and a box would burden every reader")]
+pub enum Initial {
+    /// Drawn.
+    Any,
+    Value(Expr),
+}
+
+/// `Time`, `Length`, or the map `Sky -> Level`.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Type {
+    pub kind: TypeKind,
+    #[serde(skip)]
+    pub span: Span,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub enum TypeKind {
+    Named(Name),
+    Map { key: Name, value: Name },
+}
+
+/// `let weight_size = 1.0`.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Let {
+    pub name: Name,
+    pub value: Expr,
+}
+
+/// `fn lead(v: Speed) -> Length = v * 0.5 s`.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Fn {
+    pub name: Name,
+    pub params: Vec<FnParam>,
+    pub result: Type,
+    pub body: Expr,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct FnParam {
+    pub name: Name,
+    pub ty: Type,
+}
+
+/// `action name(each a: A, any b: B in lo .. hi) { effects }`.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Action {
+    pub name: Name,
+    pub params: Vec<ActionParam>,
+    pub effects: Vec<Effect>,
+}
+
+/// One parameter of an action.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ActionParam {
+    pub mode: ParamMode,
+    pub name: Name,
+    pub ty: Type,
+    /// `in` what follows: a range or a list. Either mode may have it.
+    pub within: Option<Expr>,
+    /// `where` what follows. Either mode may have it.
+    pub condition: Option<Expr>,
+    #[serde(skip)]
+    pub span: Span,
+}
+
+/// How a parameter gets its value.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub enum ParamMode {
+    /// An axis of the action table.
+    Each,
+    /// Drawn when the action runs.
+    Any,
+}
+
+/// One change of the world.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Effect {
+    pub kind: EffectKind,
+    #[serde(skip)]
+    pub span: Span,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub enum EffectKind {
+    /// `set sky = None`, `set sky[what] = how`.
+    Set { state: Name, key: Option<Expr>, value: Expr },
+    /// `spawn vehicle ahead distance { speed: speed }`.
+    Spawn { body: Expr, place: Place, distance: Expr, fields: Vec<Field> },
+}
+
+/// On which side of the ego vehicle, along its route.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub enum Place {
+    Ahead,
+    Behind,
+}
+
+/// `group vehicles = drive_ahead, overtake`.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Group {
+    pub name: Name,
+    pub members: Vec<Name>,
+}
+
+/// A named constraint.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Rule {
+    /// Off unless asked for.
+    pub optional: bool,
+    pub name: Name,
+    pub body: RuleBody,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub enum RuleBody {
+    /// `on a, b: condition`. Without `on` it holds for every action: `on` is empty.
+    Holds { on: Vec<Name>, condition: Expr },
+    /// `on state { A -> A | B }`.
+    Moves { state: Name, moves: Vec<Move> },
+}
+
+/// `Noon -> Noon | Night`.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Move {
+    pub from: Name,
+    pub to: Vec<Name>,
+    #[serde(skip)]
+    pub span: Span,
+}
+
+/// `name { field: value … }`.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Block {
+    pub name: Name,
+    pub fields: Vec<Field>,
+}
+
+/// `field: value`. Any word may name a field.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Field {
+    pub name: Name,
+    pub value: Expr,
+    #[serde(skip)]
+    pub span: Span,
+}
+
+/// A line of `reward`: `condition => value`; `_` has no condition.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Case {
+    pub condition: Option<Expr>,
+    pub value: Expr,
+    #[serde(skip)]
+    pub span: Span,
+}
+
+/// `verdict counted: collision and not repeated`.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Verdict {
+    pub name: Name,
+    pub condition: Expr,
+}
+
+/// A claim that somebody will check: `expect count(actions) == 45`, `expect collision with npc#2 at 14.22 s`.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Expect {
+    pub claim: Expr,
+    /// `with`, `at` and `by`, in the order in which they stand.
+    pub clauses: Vec<Clause>,
+    #[serde(skip)]
+    pub span: Span,
+}
+
+/// `with npc#2`, `at 14.22 s`, `by [cc, fsm]`.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Clause {
+    pub kind: ClauseKind,
+    pub value: Expr,
+    #[serde(skip)]
+    pub span: Span,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub enum ClauseKind {
+    With,
+    At,
+    By,
+}
+
+/// One concrete timeline.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Scenario {
+    pub name: Name,
+    /// Where it came from; may be empty.
+    pub origin: Vec<Field>,
+    pub road: Name,
+    /// The states at the start; may be empty.
+    pub start: Vec<Field>,
+    pub steps: Vec<Step>,
+    pub expects: Vec<Expect>,
+}
+
+/// `2: drive_ahead(lane: Left) with { speed: 11.25 m/s }`.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Step {
+    pub number: Number,
+    pub action: Call,
+    /// The drawn parameters.
+    pub drawn: Vec<Field>,
+    #[serde(skip)]
+    pub span: Span,
+}
+
+/// `name(arguments)`.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Call {
+    pub name: Name,
+    pub args: Vec<Arg>,
+    #[serde(skip)]
+    pub span: Span,
+}
+
+/// `value` or `name: value`.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Arg {
+    pub name: Option<Name>,
+    pub value: Expr,
+}
+
+/// What an agent learned.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Policy {
+    pub name: Name,
+    pub origin: Vec<Field>,
+    /// The exact face; empty if the file has none.
+    pub net: Vec<Field>,
+    /// What the readable face says of itself: fidelity, regret, return, number of states.
+    pub claims: Vec<Field>,
+    /// The readable face: the first line that applies acts. Empty if the file has none.
+    pub rules: Vec<PolicyLine>,
+}
+
+/// `when condition => action(arguments)`; `_` has no condition.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct PolicyLine {
+    pub condition: Option<Expr>,
+    pub action: Call,
+    #[serde(skip)]
+    pub span: Span,
+}
+
+/// An expression. Parentheses are not kept: the printer puts them where they are needed.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Expr {
+    pub kind: ExprKind,
+    #[serde(skip)]
+    pub span: Span,
+}
+
+impl Expr {
+    /// An expression that was built instead of read.
+    pub fn built(kind: ExprKind) -> Self {
+        Expr { kind, span: Span::NONE }
+    }
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub enum ExprKind {
+    Number(Number),
+    Text(String),
+    Bool(bool),
+    /// A variable, a parameter, a variant, a state: whatever the checker finds.
+    Name(String),
+    Unary {
+        op: UnaryOp,
+        operand: Box<Expr>,
+    },
+    Binary {
+        op: BinaryOp,
+        #[serde(skip)]
+        op_span: Span,
+        left: Box<Expr>,
+        right: Box<Expr>,
+    },
+    /// `road.limit`.
+    Field {
+        base: Box<Expr>,
+        field: Name,
+    },
+    /// `sky[Rain]`.
+    Index {
+        base: Box<Expr>,
+        index: Box<Expr>,
+    },
+    /// `gap(mode, size, v)`.
+    Call(Call),
+    /// `[a, b]`.
+    List(Vec<Expr>),
+    /// `{ Rain: High, Fog: None }`.
+    Record(Vec<Field>),
+    /// `lo .. hi`, both ends included.
+    Range {
+        low: Box<Expr>,
+        high: Box<Expr>,
+    },
+    Match {
+        subject: Box<Expr>,
+        arms: Vec<Arm>,
+    },
+    /// `lane 7/-1 at 80 m`: a point of an OpenDRIVE map.
+    LanePoint {
+        /// The road's id: a number or, quoted in the source, any text.
+        road: Text,
+        /// Lane id with its sign.
+        lane: Name,
+        station: Number,
+    },
+    /// `npc#2`: the second road user to appear.
+    Numbered {
+        name: Name,
+        number: String,
+    },
+}
+
+/// `A | B => value`.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Arm {
+    /// Empty for `_`, which takes the rest.
+    pub patterns: Vec<Name>,
+    pub value: Expr,
+    #[serde(skip)]
+    pub span: Span,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub enum UnaryOp {
+    Not,
+    Negate,
+}
+
+impl UnaryOp {
+    pub fn symbol(self) -> &'static str {
+        match self {
+            UnaryOp::Not => "not",
+            UnaryOp::Negate => "-",
+        }
+    }
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub enum BinaryOp {
+    Implies,
+    Or,
+    And,
+    Equal,
+    NotEqual,
+    Less,
+    LessEqual,
+    Greater,
+    GreaterEqual,
+    /// Membership in a list, a range or `road.lanes`.
+    In,
+    Add,
+    Subtract,
+    Multiply,
+    Divide,
+}
+
+impl BinaryOp {
+    pub const ALL: [BinaryOp; 14] = [
+        BinaryOp::Implies,
+        BinaryOp::Or,
+        BinaryOp::And,
+        BinaryOp::Equal,
+        BinaryOp::NotEqual,
+        BinaryOp::Less,
+        BinaryOp::LessEqual,
+        BinaryOp::Greater,
+        BinaryOp::GreaterEqual,
+        BinaryOp::In,
+        BinaryOp::Add,
+        BinaryOp::Subtract,
+        BinaryOp::Multiply,
+        BinaryOp::Divide,
+    ];
+
+    pub fn symbol(self) -> &'static str {
+        match self {
+            BinaryOp::Implies => "implies",
+            BinaryOp::Or => "or",
+            BinaryOp::And => "and",
+            BinaryOp::Equal => "==",
+            BinaryOp::NotEqual => "!=",
+            BinaryOp::Less => "<",
+            BinaryOp::LessEqual => "<=",
+            BinaryOp::Greater => ">",
+            BinaryOp::GreaterEqual => ">=",
+            BinaryOp::In => "in",
+            BinaryOp::Add => "+",
+            BinaryOp::Subtract => "-",
+            BinaryOp::Multiply => "*",
+            BinaryOp::Divide => "/",
+        }
+    }
+
+    /// How tightly it binds: larger binds tighter.
+    pub fn precedence(self) -> u8 {
+        match self {
+            BinaryOp::Implies => 1,
+            BinaryOp::Or => 2,
+            BinaryOp::And => 3,
+            // 4 is `not`.
+            BinaryOp::Equal
+            | BinaryOp::NotEqual
+            | BinaryOp::Less
+            | BinaryOp::LessEqual
+            | BinaryOp::Greater
+            | BinaryOp::GreaterEqual
+            | BinaryOp::In => 5,
+            BinaryOp::Add | BinaryOp::Subtract => 6,
+            BinaryOp::Multiply | BinaryOp::Divide => 7,
+        }
+    }
+}

@@ -1,0 +1,429 @@
+//! From pest's pairs to declarations. Expressions are next door.
+//!
+//! The grammar guarantees the shape of every pair, so a missing part is our mistake and not the
+//! author's: `expect` says which rule promises it.
+
+use std::cell::Cell;
+
+use pest::iterators::Pair;
+
+use crate::syntax::Diagnostic;
+use crate::syntax::ast::Action;
+use crate::syntax::ast::ActionParam;
+use crate::syntax::ast::Block;
+use crate::syntax::ast::Case;
+use crate::syntax::ast::Clause;
+use crate::syntax::ast::ClauseKind;
+use crate::syntax::ast::Effect;
+use crate::syntax::ast::EffectKind;
+use crate::syntax::ast::Enum;
+use crate::syntax::ast::Expect;
+use crate::syntax::ast::Expr;
+use crate::syntax::ast::Field;
+use crate::syntax::ast::FileId;
+use crate::syntax::ast::Fn;
+use crate::syntax::ast::FnParam;
+use crate::syntax::ast::Group;
+use crate::syntax::ast::Initial;
+use crate::syntax::ast::ItemKind;
+use crate::syntax::ast::Let;
+use crate::syntax::ast::Move;
+use crate::syntax::ast::Name;
+use crate::syntax::ast::Number;
+use crate::syntax::ast::ParamMode;
+use crate::syntax::ast::Place;
+use crate::syntax::ast::Policy;
+use crate::syntax::ast::PolicyLine;
+use crate::syntax::ast::Rule as NamedRule;
+use crate::syntax::ast::RuleBody;
+use crate::syntax::ast::Scenario;
+use crate::syntax::ast::Span;
+use crate::syntax::ast::State;
+use crate::syntax::ast::Step;
+use crate::syntax::ast::Text;
+use crate::syntax::ast::Type;
+use crate::syntax::ast::TypeKind;
+use crate::syntax::ast::Use;
+use crate::syntax::ast::Verdict;
+use crate::syntax::code;
+use crate::syntax::grammar::Rule;
+use crate::syntax::grammar::is_plain_terminal;
+
+/// A node, or the mistake that keeps its whole declaration out of the tree.
+pub type Built<T> = Result<T, Box<Diagnostic>>;
+
+/// Builds the tree of one declaration.
+pub struct Builder {
+    pub file: FileId,
+    /// Operators between the declaration and the expression under construction: with the depth of
+    /// brackets, what bounds the height of the tree.
+    pub operators_above: Cell<usize>,
+}
+
+/// The parts of a pair that carry meaning, in order.
+pub struct Parts<'i>(std::iter::Peekable<std::vec::IntoIter<Pair<'i, Rule>>>);
+
+impl<'i> Parts<'i> {
+    pub fn of(pair: Pair<'i, Rule>) -> Self {
+        let parts: Vec<_> = pair.into_inner().filter(|part| !is_plain_terminal(part.as_rule())).collect();
+        Parts(parts.into_iter().peekable())
+    }
+
+    /// The next part, if it is of this rule.
+    pub fn take(&mut self, rule: Rule) -> Option<Pair<'i, Rule>> {
+        self.0.next_if(|part| part.as_rule() == rule)
+    }
+
+    pub fn next(&mut self) -> Pair<'i, Rule> {
+        self.0.next().expect("the grammar promises this part")
+    }
+
+    /// All parts that are left.
+    pub fn rest(self) -> impl Iterator<Item = Pair<'i, Rule>> {
+        self.0
+    }
+}
+
+impl Builder {
+    pub fn new(file: FileId) -> Self {
+        Builder { file, operators_above: Cell::new(0) }
+    }
+
+    pub fn span(&self, pair: &Pair<'_, Rule>) -> Span {
+        Span::new(self.file, pair.as_span().start(), end_of(pair))
+    }
+
+    pub fn name(&self, pair: Pair<'_, Rule>) -> Name {
+        let span = self.span(&pair);
+        Name::new(pair.as_str(), span)
+    }
+
+    pub fn number(&self, pair: Pair<'_, Rule>) -> Number {
+        let span = self.span(&pair);
+        if pair.as_rule() == Rule::integer {
+            return Number { digits: pair.as_str().to_owned(), unit: None, span };
+        }
+        let mut parts = Parts::of(pair);
+        let digits = parts.next().as_str().to_owned();
+        let unit = parts.take(Rule::unit).map(|unit| self.name(unit));
+        Number { digits, unit, span }
+    }
+
+    /// The value of a text literal.
+    pub fn text(&self, pair: Pair<'_, Rule>) -> Built<Text> {
+        let span = self.span(&pair);
+        let quoted = pair.as_str();
+        let inside = &quoted[1..quoted.len() - 1];
+        match unescape(inside) {
+            Ok(value) => Ok(Text::new(value, span)),
+            Err(at) => {
+                let start = span.start + 1 + at;
+                let width = inside[at..].chars().take(2).map(char::len_utf8).sum::<usize>();
+                Err(Box::new(
+                    Diagnostic::error(code::TEXT, "unknown escape in a text")
+                        .at(Span::new(self.file, start, start + width), "")
+                        .help("escapes are `\\\"`, `\\\\`, `\\n`, `\\t` and `\\u{…}` with a code point in hexadecimal"),
+                ))
+            }
+        }
+    }
+
+    /// What an `item` declares.
+    pub fn item(&self, pair: Pair<'_, Rule>) -> Built<ItemKind> {
+        let declaration = pair.into_inner().next().expect("an item is one declaration");
+        let rule = declaration.as_rule();
+        let span = self.span(&declaration);
+        let mut parts = Parts::of(declaration);
+        Ok(match rule {
+            Rule::language => ItemKind::Language(self.number(parts.next())),
+            Rule::use_file => {
+                let path = self.text(parts.next())?;
+                let digest = parts.take(Rule::text).map(|digest| self.text(digest)).transpose()?;
+                ItemKind::Use(Use { path, digest })
+            }
+            Rule::enumeration => ItemKind::Enum(self.enumeration(parts)),
+            Rule::state => {
+                let name = self.name(parts.next());
+                let ty = self.type_name(parts.next());
+                let initial = match parts.take(Rule::drawn_initially) {
+                    Some(_) => Initial::Any,
+                    None => Initial::Value(self.expression(parts.next())?),
+                };
+                ItemKind::State(State { name, ty, initial })
+            }
+            Rule::constant => {
+                let name = self.name(parts.next());
+                ItemKind::Let(Let { name, value: self.expression(parts.next())? })
+            }
+            Rule::function => ItemKind::Fn(self.function(parts)?),
+            Rule::action => ItemKind::Action(self.action(parts)?),
+            Rule::group => {
+                let name = self.name(parts.next());
+                ItemKind::Group(Group { name, members: self.names(parts.next()) })
+            }
+            Rule::named_rule => ItemKind::Rule(self.rule(parts, span)?),
+            Rule::road => {
+                let name = self.name(parts.next());
+                ItemKind::Road(Block { name, fields: self.fields(parts.next())? })
+            }
+            Rule::episode => ItemKind::Episode(self.fields(parts.next())?),
+            Rule::reward => {
+                ItemKind::Reward(parts.rest().map(|case| self.reward_case(case)).collect::<Built<_>>()?)
+            }
+            Rule::verdict => {
+                let name = self.name(parts.next());
+                ItemKind::Verdict(Verdict { name, condition: self.expression(parts.next())? })
+            }
+            Rule::expect => ItemKind::Expect(self.expect(parts, span)?),
+            Rule::scenario => ItemKind::Scenario(self.scenario(parts)?),
+            Rule::policy => ItemKind::Policy(self.policy(parts)?),
+            other => unreachable!("an item is never `{other:?}`"),
+        })
+    }
+
+    fn names(&self, pair: Pair<'_, Rule>) -> Vec<Name> {
+        Parts::of(pair).rest().map(|name| self.name(name)).collect()
+    }
+
+    fn type_name(&self, pair: Pair<'_, Rule>) -> Type {
+        let span = self.span(&pair);
+        let mut names = Parts::of(pair);
+        let first = self.name(names.next());
+        let kind = match names.take(Rule::name) {
+            None => TypeKind::Named(first),
+            Some(value) => TypeKind::Map { key: first, value: self.name(value) },
+        };
+        Type { kind, span }
+    }
+
+    fn enumeration(&self, mut parts: Parts<'_>) -> Enum {
+        let name = self.name(parts.next());
+        let mut variants = vec![self.name(parts.next())];
+        let mut ordered = false;
+        for more in parts.rest() {
+            ordered = more.as_rule() == Rule::ordered;
+            variants.extend(self.names(more));
+        }
+        Enum { name, ordered, variants }
+    }
+
+    fn function(&self, mut parts: Parts<'_>) -> Built<Fn> {
+        let name = self.name(parts.next());
+        let mut params = Vec::new();
+        while let Some(param) = parts.take(Rule::function_param) {
+            let mut param = Parts::of(param);
+            params.push(FnParam { name: self.name(param.next()), ty: self.type_name(param.next()) });
+        }
+        let result = self.type_name(parts.next());
+        Ok(Fn { name, params, result, body: self.expression(parts.next())? })
+    }
+
+    fn action(&self, mut parts: Parts<'_>) -> Built<Action> {
+        let name = self.name(parts.next());
+        let mut params = Vec::new();
+        while let Some(param) = parts.take(Rule::action_param) {
+            params.push(self.action_param(param)?);
+        }
+        let effects = parts.rest().map(|effect| self.effect(effect)).collect::<Built<_>>()?;
+        Ok(Action { name, params, effects })
+    }
+
+    fn action_param(&self, pair: Pair<'_, Rule>) -> Built<ActionParam> {
+        let span = self.span(&pair);
+        let mut parts = Parts::of(pair);
+        let mode = match parts.next().as_rule() {
+            Rule::kw_each => ParamMode::Each,
+            _ => ParamMode::Any,
+        };
+        let name = self.name(parts.next());
+        let ty = self.type_name(parts.next());
+        let within = parts.take(Rule::within).map(|within| self.only_expression(within)).transpose()?;
+        let condition = parts.take(Rule::condition).map(|when| self.only_expression(when)).transpose()?;
+        Ok(ActionParam { mode, name, ty, within, condition, span })
+    }
+
+    /// The expression of a pair that holds nothing else.
+    fn only_expression(&self, pair: Pair<'_, Rule>) -> Built<Expr> {
+        self.expression(Parts::of(pair).next())
+    }
+
+    fn effect(&self, pair: Pair<'_, Rule>) -> Built<Effect> {
+        let span = self.span(&pair);
+        let effect = pair.into_inner().next().expect("an effect is `set` or `spawn`");
+        let sets = effect.as_rule() == Rule::set;
+        let mut parts = Parts::of(effect);
+        let kind = if sets {
+            let state = self.name(parts.next());
+            let key = parts.take(Rule::key).map(|key| self.only_expression(key)).transpose()?;
+            EffectKind::Set { state, key, value: self.expression(parts.next())? }
+        } else {
+            let body = self.expression(parts.next())?;
+            let place = match parts.next().as_rule() {
+                Rule::kw_ahead => Place::Ahead,
+                _ => Place::Behind,
+            };
+            let distance = self.expression(parts.next())?;
+            EffectKind::Spawn { body, place, distance, fields: self.fields(parts.next())? }
+        };
+        Ok(Effect { kind, span })
+    }
+
+    fn rule(&self, mut parts: Parts<'_>, span: Span) -> Built<NamedRule> {
+        let optional = parts.take(Rule::kw_optional).is_some();
+        let name = self.name(parts.next());
+        let on = parts.take(Rule::targets).map_or_else(Vec::new, |targets| {
+            Parts::of(targets).rest().flat_map(|names| self.names(names)).collect()
+        });
+        let body = parts.next();
+        if body.as_rule() == Rule::holds {
+            let condition = self.only_expression(body)?;
+            return Ok(NamedRule { optional, name, body: RuleBody::Holds { on, condition } });
+        }
+        let [state] = <[Name; 1]>::try_from(on).map_err(|on| {
+            let place = on.get(1).map_or(Span { end: name.span.end, ..span }, |second| second.span);
+            Box::new(
+                Diagnostic::error(code::MOVES, "transitions are about exactly one state")
+                    .at(place, "")
+                    .help(format!("write `rule {} on time {{ Noon -> Night }}`", name.text)),
+            )
+        })?;
+        let moves = Parts::of(body).rest().map(|transition| {
+            let span = self.span(&transition);
+            let mut names = self.names(transition).into_iter();
+            let from = names.next().expect("a transition begins with a name");
+            Move { from, to: names.collect(), span }
+        });
+        let moves = moves.collect();
+        Ok(NamedRule { optional, name, body: RuleBody::Moves { state, moves } })
+    }
+
+    fn reward_case(&self, pair: Pair<'_, Rule>) -> Built<Case> {
+        let span = self.span(&pair);
+        let mut parts = Parts::of(pair);
+        let condition = match parts.take(Rule::otherwise) {
+            Some(_) => None,
+            None => Some(self.expression(parts.next())?),
+        };
+        Ok(Case { condition, value: self.expression(parts.next())?, span })
+    }
+
+    fn expect(&self, mut parts: Parts<'_>, span: Span) -> Built<Expect> {
+        let claim = self.expression(parts.next())?;
+        let clauses = parts.rest().map(|clause| self.clause(clause)).collect::<Built<_>>()?;
+        Ok(Expect { claim, clauses, span })
+    }
+
+    fn clause(&self, pair: Pair<'_, Rule>) -> Built<Clause> {
+        let span = self.span(&pair);
+        let mut parts = Parts::of(pair);
+        let kind = match parts.next().as_rule() {
+            Rule::kw_with => ClauseKind::With,
+            Rule::kw_at => ClauseKind::At,
+            _ => ClauseKind::By,
+        };
+        Ok(Clause { kind, value: self.expression(parts.next())?, span })
+    }
+
+    pub fn fields(&self, pair: Pair<'_, Rule>) -> Built<Vec<Field>> {
+        Parts::of(pair).rest().map(|field| self.field(field)).collect()
+    }
+
+    fn field(&self, pair: Pair<'_, Rule>) -> Built<Field> {
+        let span = self.span(&pair);
+        let mut parts = Parts::of(pair);
+        let name = self.name(parts.next());
+        Ok(Field { name, value: self.expression(parts.next())?, span })
+    }
+
+    /// The fields of a block that may be absent, like `origin { … }`.
+    fn section(&self, parts: &mut Parts<'_>, rule: Rule) -> Built<Vec<Field>> {
+        parts.take(rule).map_or(Ok(Vec::new()), |section| self.fields(Parts::of(section).next()))
+    }
+
+    fn scenario(&self, mut parts: Parts<'_>) -> Built<Scenario> {
+        let name = self.name(parts.next());
+        let origin = self.section(&mut parts, Rule::origin)?;
+        let road = self.name(Parts::of(parts.next()).next());
+        let start = self.section(&mut parts, Rule::start)?;
+        let steps = Parts::of(parts.next()).rest().map(|step| self.step(step)).collect::<Built<_>>()?;
+        let expects = parts.rest().map(|expect| {
+            let span = self.span(&expect);
+            self.expect(Parts::of(expect), span)
+        });
+        let expects = expects.collect::<Built<_>>()?;
+        Ok(Scenario { name, origin, road, start, steps, expects })
+    }
+
+    fn step(&self, pair: Pair<'_, Rule>) -> Built<Step> {
+        let span = self.span(&pair);
+        let mut parts = Parts::of(pair);
+        let number = self.number(parts.next());
+        let action = self.call(parts.next())?;
+        let drawn = parts.take(Rule::drawn).map_or(Ok(Vec::new()), |drawn| {
+            // `with` is kept by the grammar's other users, so it stands before the fields here too.
+            let fields = drawn.into_inner().find(|part| part.as_rule() == Rule::fields);
+            self.fields(fields.expect("`with` has fields"))
+        })?;
+        Ok(Step { number, action, drawn, span })
+    }
+
+    fn policy(&self, mut parts: Parts<'_>) -> Built<Policy> {
+        let name = self.name(parts.next());
+        let origin = self.section(&mut parts, Rule::origin)?;
+        let net = self.section(&mut parts, Rule::net)?;
+        let claims = self.section(&mut parts, Rule::claims)?;
+        let rules = parts.take(Rule::policy_rules).map_or(Ok(Vec::new()), |rules| {
+            Parts::of(rules).rest().map(|line| self.policy_line(line)).collect()
+        })?;
+        Ok(Policy { name, origin, net, claims, rules })
+    }
+
+    fn policy_line(&self, pair: Pair<'_, Rule>) -> Built<PolicyLine> {
+        let span = self.span(&pair);
+        let mut parts = Parts::of(pair);
+        let condition = match parts.take(Rule::otherwise) {
+            Some(_) => None,
+            None => Some(self.expression(parts.next())?),
+        };
+        Ok(PolicyLine { condition, action: self.call(parts.next())?, span })
+    }
+}
+
+/// Where the last token of a pair ends.
+///
+/// A rule that ends in something optional that is absent keeps the blanks and comments it had skipped
+/// in front of it, so pest's own end may lie far behind. Every rule that is not a token ends in one.
+pub fn end_of(pair: &Pair<'_, Rule>) -> usize {
+    let mut last = pair.clone();
+    while let Some(inner) = last.clone().into_inner().next_back() {
+        last = inner;
+    }
+    last.as_span().end()
+}
+
+/// Resolves escapes; the error is the byte at which an unknown one begins.
+fn unescape(inside: &str) -> Result<String, usize> {
+    let mut value = String::with_capacity(inside.len());
+    let mut characters = inside.char_indices();
+    while let Some((at, character)) = characters.next() {
+        if character != '\\' {
+            value.push(character);
+            continue;
+        }
+        match characters.next().map(|(_, escape)| escape) {
+            Some('"') => value.push('"'),
+            Some('\\') => value.push('\\'),
+            Some('n') => value.push('\n'),
+            Some('t') => value.push('\t'),
+            Some('u') => {
+                let digits = characters.as_str().strip_prefix('{').and_then(|rest| rest.split_once('}'));
+                let (digits, _) = digits.ok_or(at)?;
+                let number = u32::from_str_radix(digits, 16).map_err(|_| at)?;
+                value.push(char::from_u32(number).ok_or(at)?);
+                characters.nth(digits.len() + 1);
+            }
+            _ => return Err(at),
+        }
+    }
+    Ok(value)
+}

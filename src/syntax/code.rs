@@ -1,0 +1,24 @@
+//! The codes of mistakes in the syntax. Never reused, never renumbered.
+
+/// Something else was expected.
+pub const SYNTAX: &str = "AV0001";
+/// No declaration begins with this word.
+pub const DECLARATION: &str = "AV0002";
+/// Nested too deeply.
+pub const DEPTH: &str = "AV0003";
+/// A bracket that is never closed.
+pub const UNCLOSED: &str = "AV0004";
+/// `language` is missing, late or repeated.
+pub const LANGUAGE: &str = "AV0005";
+/// Written for a version that this compiler does not know.
+pub const VERSION: &str = "AV0006";
+/// A character that reverses the text around it.
+pub const BIDI: &str = "AV0007";
+/// A character without a meaning.
+pub const CHARACTER: &str = "AV0008";
+/// A text literal that does not end, or with an unknown escape.
+pub const TEXT: &str = "AV0009";
+/// `a < b < c`.
+pub const CHAIN: &str = "AV0010";
+/// A rule with transitions that is not on exactly one state.
+pub const MOVES: &str = "AV0011";

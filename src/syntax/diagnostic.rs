@@ -1,0 +1,346 @@
+//! What a compiler says to an author: a code, a message, the places it is about, and what to do.
+//!
+//! Every stage that reads source text reports through these types; only this file knows how they
+//! are drawn. Codes are never reused or renumbered. When to stop and what to exit with is the
+//! caller's business.
+
+use annotate_snippets::Annotation;
+use annotate_snippets::AnnotationKind;
+use annotate_snippets::Group;
+use annotate_snippets::Level;
+use annotate_snippets::Origin;
+use annotate_snippets::Renderer;
+use annotate_snippets::Snippet;
+use serde::Serialize;
+
+use crate::syntax::ast::FileId;
+use crate::syntax::ast::Span;
+
+/// How bad it is. Errors stop a compilation.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Severity {
+    Error,
+    Warning,
+    Note,
+}
+
+/// A place that a diagnostic is about, and what is to be said there.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Label {
+    pub span: Span,
+    /// May be empty: the place is then only underlined.
+    pub text: String,
+    /// Where the mistake is, as opposed to what it clashes with.
+    pub primary: bool,
+}
+
+/// One mistake, or one thing worth knowing.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Diagnostic {
+    /// `AV0001` and so on; see `avastra explain`.
+    pub code: &'static str,
+    pub severity: Severity,
+    /// Lower case, no full stop, the author's words in backticks.
+    pub message: String,
+    pub labels: Vec<Label>,
+    /// Facts that belong to no place.
+    pub notes: Vec<String>,
+    /// What to do about it.
+    pub help: Option<String>,
+}
+
+impl Diagnostic {
+    pub fn error(code: &'static str, message: impl Into<String>) -> Self {
+        Diagnostic::new(code, Severity::Error, message)
+    }
+
+    pub fn warning(code: &'static str, message: impl Into<String>) -> Self {
+        Diagnostic::new(code, Severity::Warning, message)
+    }
+
+    fn new(code: &'static str, severity: Severity, message: impl Into<String>) -> Self {
+        Diagnostic {
+            code,
+            severity,
+            message: message.into(),
+            labels: Vec::new(),
+            notes: Vec::new(),
+            help: None,
+        }
+    }
+
+    /// Adds a place where the mistake is.
+    pub fn at(mut self, span: Span, text: impl Into<String>) -> Self {
+        self.labels.push(Label { span, text: text.into(), primary: true });
+        self
+    }
+
+    /// Adds a place that explains the mistake.
+    pub fn beside(mut self, span: Span, text: impl Into<String>) -> Self {
+        self.labels.push(Label { span, text: text.into(), primary: false });
+        self
+    }
+
+    pub fn note(mut self, note: impl Into<String>) -> Self {
+        self.notes.push(note.into());
+        self
+    }
+
+    pub fn help(mut self, help: impl Into<String>) -> Self {
+        self.help = Some(help.into());
+        self
+    }
+
+    pub fn is_error(&self) -> bool {
+        self.severity == Severity::Error
+    }
+
+    /// The place to sort by and to show first: its first primary label, else its first label.
+    pub fn place(&self) -> Option<Span> {
+        let primary = self.labels.iter().find(|label| label.primary);
+        primary.or(self.labels.first()).map(|label| label.span)
+    }
+}
+
+/// The texts that spans point into.
+#[derive(Debug, Clone, Default)]
+pub struct Sources {
+    files: Vec<(String, String)>,
+}
+
+impl Sources {
+    pub fn new() -> Self {
+        Sources::default()
+    }
+
+    /// Keeps a text under the name by which diagnostics call it.
+    pub fn add(&mut self, name: impl Into<String>, text: impl Into<String>) -> FileId {
+        let id = u32::try_from(self.files.len()).expect("fewer than four thousand million files");
+        self.files.push((name.into(), text.into()));
+        FileId(id)
+    }
+
+    /// The name under which the file was added; empty for an unknown file.
+    pub fn name(&self, file: FileId) -> &str {
+        self.files.get(file.0 as usize).map_or("", |(name, _)| name)
+    }
+
+    /// The text of the file; empty for an unknown file.
+    pub fn text(&self, file: FileId) -> &str {
+        self.files.get(file.0 as usize).map_or("", |(_, text)| text)
+    }
+
+    /// Line and column of a byte, both from 1; columns count characters.
+    pub fn line_column(&self, file: FileId, offset: usize) -> (usize, usize) {
+        let text = self.text(file);
+        let before = &text[..floor_boundary(text, offset)];
+        let line_start = before.rfind('\n').map_or(0, |newline| newline + 1);
+        let line = before.bytes().filter(|byte| *byte == b'\n').count() + 1;
+        (line, before[line_start..].chars().count() + 1)
+    }
+}
+
+/// How a diagnostic is drawn for people.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Style {
+    /// With colours, for a terminal.
+    Human,
+    /// Without.
+    Plain,
+}
+
+/// Width at which long source lines are cut, in characters.
+const WIDTH: usize = 140;
+
+/// Draws one diagnostic, without a line break at its end.
+pub fn render(diagnostic: &Diagnostic, sources: &Sources, style: Style) -> String {
+    let level = match diagnostic.severity {
+        Severity::Error => Level::ERROR,
+        Severity::Warning => Level::WARNING,
+        Severity::Note => Level::NOTE,
+    };
+    let title = level.primary_title(diagnostic.message.as_str()).id(diagnostic.code);
+    let mut group = Group::with_title(title);
+    for file in files_in_order(diagnostic) {
+        group = match snippet(diagnostic, sources, file) {
+            Some(snippet) => group.element(snippet),
+            None => group.element(Origin::path(sources.name(file))),
+        };
+    }
+    for note in &diagnostic.notes {
+        group = group.element(Level::NOTE.no_name().message(note.as_str()));
+    }
+    if let Some(help) = &diagnostic.help {
+        group = group.element(Level::HELP.message(help.as_str()));
+    }
+    let renderer = match style {
+        Style::Human => Renderer::styled(),
+        Style::Plain => Renderer::plain(),
+    };
+    renderer.term_width(WIDTH).render(&[group])
+}
+
+/// The files that a diagnostic names: the one with the mistake first.
+fn files_in_order(diagnostic: &Diagnostic) -> Vec<FileId> {
+    let mut files: Vec<FileId> = diagnostic.place().map(|span| span.file).into_iter().collect();
+    for label in &diagnostic.labels {
+        if !files.contains(&label.span.file) {
+            files.push(label.span.file);
+        }
+    }
+    files
+}
+
+/// The lines of one file that its labels touch; `None` where there is no text to show.
+fn snippet<'a>(
+    diagnostic: &'a Diagnostic,
+    sources: &'a Sources,
+    file: FileId,
+) -> Option<Snippet<'a, Annotation<'a>>> {
+    let text = sources.text(file);
+    if text.is_empty() {
+        return None;
+    }
+    let labels = || diagnostic.labels.iter().filter(|label| label.span.file == file);
+    let first = floor_boundary(text, labels().map(|label| label.span.start).min()?);
+    let last = floor_boundary(text, labels().map(|label| label.span.end).max()?).max(first);
+    // Only the lines in question are handed over, so that a mistake costs no more in a long file.
+    let start = text[..first].rfind('\n').map_or(0, |newline| newline + 1);
+    let end = text[last..].find('\n').map_or(text.len(), |newline| last + newline);
+    let line = text[..start].bytes().filter(|byte| *byte == b'\n').count() + 1;
+    let annotations = labels().map(|label| {
+        let from = floor_boundary(text, label.span.start);
+        let to = floor_boundary(text, label.span.end).max(from);
+        let kind = if label.primary { AnnotationKind::Primary } else { AnnotationKind::Context };
+        let annotation = kind.span(from - start..to - start);
+        if label.text.is_empty() { annotation } else { annotation.label(label.text.as_str()) }
+    });
+    let snippet = Snippet::source(&text[start..end]).line_start(line).path(sources.name(file));
+    Some(snippet.annotations(annotations))
+}
+
+/// The nearest character boundary at or before `offset`.
+fn floor_boundary(text: &str, offset: usize) -> usize {
+    text.floor_char_boundary(offset.min(text.len()))
+}
+
+/// A diagnostic as data: what `--format json` prints. Its fields are public and stable.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct DiagnosticRecord {
+    pub code: &'static str,
+    pub severity: Severity,
+    pub message: String,
+    pub labels: Vec<LabelRecord>,
+    pub notes: Vec<String>,
+    pub help: Option<String>,
+}
+
+/// A place as data. Lines and columns count from 1, columns in characters, bytes from 0.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct LabelRecord {
+    pub file: String,
+    pub line: usize,
+    pub column: usize,
+    pub end_line: usize,
+    pub end_column: usize,
+    pub start_byte: usize,
+    pub end_byte: usize,
+    pub text: String,
+    pub primary: bool,
+}
+
+/// The same diagnostic as data.
+pub fn record(diagnostic: &Diagnostic, sources: &Sources) -> DiagnosticRecord {
+    let labels = diagnostic.labels.iter().map(|label| {
+        let (line, column) = sources.line_column(label.span.file, label.span.start);
+        let (end_line, end_column) = sources.line_column(label.span.file, label.span.end);
+        LabelRecord {
+            file: sources.name(label.span.file).to_owned(),
+            line,
+            column,
+            end_line,
+            end_column,
+            start_byte: label.span.start,
+            end_byte: label.span.end,
+            text: label.text.clone(),
+            primary: label.primary,
+        }
+    });
+    DiagnosticRecord {
+        code: diagnostic.code,
+        severity: diagnostic.severity,
+        message: diagnostic.message.clone(),
+        labels: labels.collect(),
+        notes: diagnostic.notes.clone(),
+        help: diagnostic.help.clone(),
+    }
+}
+
+/// The candidate that the author may have meant by `word`, if one is near enough.
+pub fn nearest<'a>(word: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+    // A third of the word may be wrong: more, and the guess is noise.
+    let distance_max = (word.chars().count() / 3).max(1);
+    candidates
+        .into_iter()
+        .map(|candidate| (strsim::damerau_levenshtein(word, candidate), candidate))
+        .filter(|(distance, candidate)| *distance <= distance_max && *candidate != word)
+        .min_by_key(|(distance, _)| *distance)
+        .map(|(_, candidate)| candidate)
+}
+
+/// A list of the author's words: `` `a`, `b` and `c` ``.
+pub fn listed<S: AsRef<str>>(words: &[S]) -> String {
+    let quoted: Vec<String> = words.iter().map(|word| format!("`{}`", word.as_ref())).collect();
+    enumerated(&quoted, "and")
+}
+
+/// `a, b or c`, with that conjunction.
+pub(super) fn enumerated(words: &[String], conjunction: &str) -> String {
+    match words {
+        [] => String::new(),
+        [only] => only.clone(),
+        [most @ .., last] => format!("{} {conjunction} {last}", most.join(", ")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn shows_places_notes_and_help() {
+        let mut sources = Sources::new();
+        let file = sources.add("a.ava", "language 1\nlet x = 12 m + 3 s\n");
+        let diagnostic = Diagnostic::error("AV0201", "a length and a duration cannot be added")
+            .at(Span::new(file, 24, 25), "here")
+            .beside(Span::new(file, 19, 23), "a length")
+            .note("units are types")
+            .help("divide one by a speed");
+        let plain = render(&diagnostic, &sources, Style::Plain);
+        assert!(plain.starts_with("error[AV0201]: a length and a duration cannot be added\n"), "{plain}");
+        assert!(plain.contains("a.ava:2:14"), "{plain}");
+        assert!(plain.contains("= units are types"), "{plain}");
+        assert!(plain.contains("= help: divide one by a speed"), "{plain}");
+        assert!(render(&diagnostic, &sources, Style::Human).contains('\u{1b}'));
+        let data = record(&diagnostic, &sources);
+        assert_eq!((data.labels[0].line, data.labels[0].column), (2, 14));
+    }
+
+    #[test]
+    fn bad_spans_draw_something() {
+        let mut sources = Sources::new();
+        let file = sources.add("ä.ava", "äöü");
+        for span in [Span::new(file, 1, 3), Span::new(file, 90, 7), Span::new(FileId(9), 0, 4), Span::NONE] {
+            let diagnostic = Diagnostic::warning("AV0001", "odd").at(span, "x");
+            assert!(render(&diagnostic, &sources, Style::Plain).contains("odd"));
+            record(&diagnostic, &sources);
+        }
+    }
+
+    #[test]
+    fn suggests_only_what_is_near() {
+        assert_eq!(nearest("acton", ["action", "road"]), Some("action"));
+        assert_eq!(nearest("zebra", ["action", "road"]), None);
+    }
+}

@@ -1,0 +1,231 @@
+//! From pest's flat expressions to trees: precedence, associativity, and how high a tree may grow.
+
+use pest::iterators::Pair;
+
+use crate::syntax::DEPTH_MAX;
+use crate::syntax::Diagnostic;
+use crate::syntax::ast::Arg;
+use crate::syntax::ast::Arm;
+use crate::syntax::ast::BinaryOp;
+use crate::syntax::ast::Call;
+use crate::syntax::ast::Expr;
+use crate::syntax::ast::ExprKind;
+use crate::syntax::ast::Span;
+use crate::syntax::ast::Text;
+use crate::syntax::ast::UnaryOp;
+use crate::syntax::build::Builder;
+use crate::syntax::build::Built;
+use crate::syntax::build::Parts;
+use crate::syntax::code;
+use crate::syntax::grammar::Rule;
+
+/// Binding strength of what is not a [`BinaryOp`]; see [`BinaryOp::precedence`].
+pub const NOT_PRECEDENCE: u8 = 8;
+/// `lo .. hi` binds looser than sums and tighter than comparisons.
+pub const RANGE_PRECEDENCE: u8 = 11;
+/// Unary minus binds tighter than every infix operator.
+pub const NEGATE_PRECEDENCE: u8 = 16;
+
+/// Twice [`BinaryOp::precedence`], which leaves room between the levels for the rest.
+pub fn strength(op: BinaryOp) -> u8 {
+    2 * op.precedence()
+}
+
+/// An infix operator of the grammar.
+#[derive(Clone, Copy)]
+enum Infix {
+    Binary(BinaryOp),
+    Range,
+}
+
+impl Infix {
+    fn strength(self) -> u8 {
+        match self {
+            Infix::Binary(op) => strength(op),
+            Infix::Range => RANGE_PRECEDENCE,
+        }
+    }
+}
+
+/// The flat form, read from the left.
+type Tokens<'i> = std::iter::Peekable<std::vec::IntoIter<Pair<'i, Rule>>>;
+
+impl Builder {
+    pub fn expression(&self, pair: Pair<'_, Rule>) -> Built<Expr> {
+        let span = self.span(&pair);
+        let tokens: Vec<_> = pair.into_inner().collect();
+        let operators = tokens.iter().filter(|token| token.as_rule() != Rule::operand).count();
+        self.below(operators, span, || self.climb(&mut tokens.into_iter().peekable(), 0))
+    }
+
+    /// Builds something under that many operators. A chain makes a tree as high as it is long, and
+    /// every later stage walks trees by recursion: so chains are bounded like brackets.
+    fn below<T>(&self, operators: usize, span: Span, build: impl FnOnce() -> Built<T>) -> Built<T> {
+        let above = self.operators_above.get();
+        if above + operators > DEPTH_MAX {
+            let message = format!("an expression with more than {DEPTH_MAX} operators in one another");
+            return Err(Box::new(
+                Diagnostic::error(code::DEPTH, message)
+                    .at(span, "")
+                    .help("give a part of it a name, with `let` or `fn`"),
+            ));
+        }
+        self.operators_above.set(above + operators);
+        let built = build();
+        self.operators_above.set(above);
+        built
+    }
+
+    /// Precedence climbing: everything that binds at least as tightly as `least`.
+    fn climb(&self, tokens: &mut Tokens<'_>, least: u8) -> Built<Expr> {
+        let mut left = self.prefixed(tokens)?;
+        while let Some(token) = tokens.peek() {
+            let (op_span, op) = (self.span(token), infix(token));
+            if op.strength() < least {
+                break;
+            }
+            tokens.next();
+            // `implies` groups to the right, everything else to the left.
+            let right_groups = matches!(op, Infix::Binary(BinaryOp::Implies));
+            let right = self.climb(tokens, op.strength() + u8::from(!right_groups))?;
+            if op.strength() == strength(BinaryOp::Equal) || op.strength() == RANGE_PRECEDENCE {
+                self.refuse_chain(op, tokens.peek())?;
+            }
+            let span = left.span.to(right.span);
+            let (left_box, right_box) = (Box::new(left), Box::new(right));
+            let kind = match op {
+                Infix::Range => ExprKind::Range { low: left_box, high: right_box },
+                Infix::Binary(op) => ExprKind::Binary { op, op_span, left: left_box, right: right_box },
+            };
+            left = Expr { kind, span };
+        }
+        Ok(left)
+    }
+
+    /// `a < b < c` means something to an author and nothing to a compiler.
+    fn refuse_chain(&self, op: Infix, next: Option<&Pair<'_, Rule>>) -> Built<()> {
+        let Some(next) = next.filter(|next| infix(next).strength() == op.strength()) else {
+            return Ok(());
+        };
+        let (message, help) = match op {
+            Infix::Range => ("a range has two ends", "write `low .. high`"),
+            Infix::Binary(_) => ("comparisons do not chain", "write `a < b and b < c`"),
+        };
+        Err(Box::new(Diagnostic::error(code::CHAIN, message).at(self.span(next), "second one").help(help)))
+    }
+
+    fn prefixed(&self, tokens: &mut Tokens<'_>) -> Built<Expr> {
+        let token = tokens.next().expect("the grammar promises an operand");
+        if token.as_rule() == Rule::operand {
+            return self.operand(token);
+        }
+        let start = self.span(&token);
+        let (op, least) = if token.as_str() == "-" {
+            (UnaryOp::Negate, NEGATE_PRECEDENCE)
+        } else {
+            (UnaryOp::Not, NOT_PRECEDENCE)
+        };
+        let operand = self.climb(tokens, least)?;
+        let span = start.to(operand.span);
+        Ok(Expr { kind: ExprKind::Unary { op, operand: Box::new(operand) }, span })
+    }
+
+    fn operand(&self, pair: Pair<'_, Rule>) -> Built<Expr> {
+        let outer = self.span(&pair);
+        let parts: Vec<_> = pair.into_inner().collect();
+        self.below(parts.len() - 1, outer, || {
+            let mut parts = parts.into_iter();
+            let atom = self.atom(parts.next().expect("an operand begins with an atom"))?;
+            parts.try_fold(atom, |base, part| {
+                let span = outer.to(self.span(&part));
+                let accesses_field = part.as_rule() == Rule::field_access;
+                let inner = Parts::of(part).next();
+                let base = Box::new(base);
+                let kind = if accesses_field {
+                    ExprKind::Field { base, field: self.name(inner) }
+                } else {
+                    ExprKind::Index { base, index: Box::new(self.expression(inner)?) }
+                };
+                Ok(Expr { kind, span })
+            })
+        })
+    }
+
+    fn atom(&self, pair: Pair<'_, Rule>) -> Built<Expr> {
+        let span = self.span(&pair);
+        let kind = match pair.as_rule() {
+            Rule::number => ExprKind::Number(self.number(pair)),
+            Rule::text => ExprKind::Text(self.text(pair)?.value),
+            Rule::boolean => ExprKind::Bool(pair.as_str() == "true"),
+            Rule::name => ExprKind::Name(pair.as_str().to_owned()),
+            Rule::parenthesised => return self.expression(Parts::of(pair).next()),
+            Rule::list => ExprKind::List(
+                Parts::of(pair).rest().map(|item| self.expression(item)).collect::<Built<_>>()?,
+            ),
+            Rule::record => ExprKind::Record(self.fields(Parts::of(pair).next())?),
+            Rule::call => ExprKind::Call(self.call(pair)?),
+            Rule::match_expression => self.match_expression(pair)?,
+            Rule::lane_point => self.lane_point(pair)?,
+            Rule::numbered => {
+                let mut parts = Parts::of(pair);
+                let name = self.name(parts.next());
+                ExprKind::Numbered { name, number: parts.next().as_str().to_owned() }
+            }
+            other => unreachable!("an atom is never `{other:?}`"),
+        };
+        Ok(Expr { kind, span })
+    }
+
+    pub fn call(&self, pair: Pair<'_, Rule>) -> Built<Call> {
+        let span = self.span(&pair);
+        let mut parts = Parts::of(pair);
+        let name = self.name(parts.next());
+        let arguments = Parts::of(parts.next()).rest().map(|argument| {
+            let mut argument = Parts::of(argument);
+            let name = argument.take(Rule::argument_name).map(|name| self.name(Parts::of(name).next()));
+            Ok(Arg { name, value: self.expression(argument.next())? })
+        });
+        Ok(Call { name, args: arguments.collect::<Built<_>>()?, span })
+    }
+
+    fn match_expression(&self, pair: Pair<'_, Rule>) -> Built<ExprKind> {
+        let mut parts = Parts::of(pair);
+        let subject = Box::new(self.expression(parts.next())?);
+        let arms = parts.rest().map(|arm| {
+            let span = self.span(&arm);
+            let mut parts = Parts::of(arm);
+            let mut patterns = Vec::new();
+            if parts.take(Rule::otherwise).is_none() {
+                while let Some(pattern) = parts.take(Rule::pattern) {
+                    patterns.push(self.name(pattern));
+                }
+            }
+            Ok(Arm { patterns, value: self.expression(parts.next())?, span })
+        });
+        Ok(ExprKind::Match { subject, arms: arms.collect::<Built<_>>()? })
+    }
+
+    fn lane_point(&self, pair: Pair<'_, Rule>) -> Built<ExprKind> {
+        let mut parts = Parts::of(pair);
+        let road = match parts.take(Rule::text) {
+            Some(quoted) => self.text(quoted)?,
+            None => {
+                let road = parts.next();
+                Text::new(road.as_str(), self.span(&road))
+            }
+        };
+        let lane = self.name(parts.next());
+        // The keyword `at` is a part, because clauses need it to be one.
+        parts.next();
+        Ok(ExprKind::LanePoint { road, lane, station: self.number(parts.next()) })
+    }
+}
+
+/// The operator of an `infix` pair.
+fn infix(pair: &Pair<'_, Rule>) -> Infix {
+    let symbol = pair.as_str();
+    match BinaryOp::ALL.into_iter().find(|op| op.symbol() == symbol) {
+        Some(op) => Infix::Binary(op),
+        None => Infix::Range,
+    }
+}

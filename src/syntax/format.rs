@@ -1,0 +1,62 @@
+//! One style for every file, without options, and never at the cost of what the file says.
+
+use crate::syntax::Diagnostic;
+use crate::syntax::ast::File;
+use crate::syntax::ast::FileId;
+use crate::syntax::parse;
+use crate::syntax::print::print_with;
+use crate::syntax::scan::Comment;
+use crate::syntax::scan::scan;
+
+/// Why a text was not formatted.
+#[derive(Debug, thiserror::Error)]
+pub enum FormatError {
+    /// It must be repaired first.
+    #[error("the file has mistakes in its syntax")]
+    Syntax(Vec<Diagnostic>),
+    /// Our own mistake, caught before it could do harm.
+    #[error("formatting would change what the file says, so it is left as it is; please report this")]
+    Meaning,
+}
+
+/// The same text in the one style. Formatting again changes nothing.
+///
+/// # Errors
+/// [`FormatError::Syntax`] with diagnostics for `file`, if the text does not parse.
+/// [`FormatError::Meaning`] if the result would read back to another tree or lose a comment.
+pub fn format(file: FileId, text: &str) -> Result<String, FormatError> {
+    let (tree, found) = parse(file, text);
+    if found.iter().any(Diagnostic::is_error) {
+        return Err(FormatError::Syntax(found));
+    }
+    let comments = loose_comments(&tree, text);
+    let formatted = print_with(&tree, text, &comments);
+    let (again, mistakes) = parse(file, &formatted);
+    let kept = comment_texts(&loose_comments(&again, &formatted), &formatted);
+    if !mistakes.is_empty() || !same_meaning(&tree, &again) || comment_texts(&comments, text) != kept {
+        return Err(FormatError::Meaning);
+    }
+    Ok(formatted)
+}
+
+/// Whether two trees say the same, wherever in a text they say it.
+pub fn same_meaning(one: &File, other: &File) -> bool {
+    // Spans are left out when a tree is serialised, and nothing else is.
+    let data = |file: &File| serde_json::to_value(file).expect("a tree has no maps with odd keys");
+    data(one) == data(other)
+}
+
+/// The comments that are not documentation in the tree.
+fn loose_comments(tree: &File, text: &str) -> Vec<Comment> {
+    let item_docs = tree.items.iter().flat_map(|item| &item.docs);
+    let mut docs: Vec<usize> = tree.docs.iter().chain(item_docs).map(|doc| doc.span.start).collect();
+    docs.sort_unstable();
+    let is_doc = |comment: &Comment| docs.binary_search(&comment.start).is_ok();
+    scan(FileId::default(), text).comments.into_iter().filter(|comment| !is_doc(comment)).collect()
+}
+
+fn comment_texts<'a>(comments: &[Comment], text: &'a str) -> Vec<&'a str> {
+    let mut texts: Vec<&str> = comments.iter().map(|comment| &text[comment.start..comment.end]).collect();
+    texts.sort_unstable();
+    texts
+}

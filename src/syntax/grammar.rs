@@ -1,0 +1,157 @@
+//! The parser that pest makes of `grammar/ava.pest`, and the author's words for its rules.
+//!
+//! `Rule` is seen by `parse`, `build` and `expression` and by nothing outside `syntax`.
+
+/// Generated from the grammar.
+#[derive(pest_derive::Parser)]
+#[grammar = "../grammar/ava.pest"]
+pub struct AvaParser;
+
+/// What an author calls a rule, in a sentence that begins "expected …". `None` for rules that are
+/// possible in so many places that naming them would not help.
+pub fn words(rule: Rule) -> Option<&'static str> {
+    Some(match rule {
+        Rule::item | Rule::declaration_keyword | Rule::next_declaration => "a declaration",
+        Rule::expression | Rule::operand | Rule::prefix => "an expression",
+        Rule::name | Rule::names => "a name",
+        Rule::argument | Rule::argument_name => "an argument",
+        Rule::pattern | Rule::arm => "a variant or `_`",
+        Rule::integer => "a whole number",
+        Rule::number | Rule::digits => "a number",
+        Rule::text => "a text in `\"`",
+        Rule::lane_id => "a lane id",
+        Rule::type_name => "a type",
+        Rule::function_param => "a parameter",
+        Rule::action_param => "a parameter like `each to: Time`",
+        Rule::effect | Rule::set | Rule::spawn => "an effect like `set time = to`",
+        Rule::transition => "a transition like `Noon -> Night`",
+        Rule::field | Rule::field_name => "a field like `speed: 5 m/s`",
+        Rule::fields | Rule::open_brace => "`{`",
+        Rule::moves => "`{`",
+        Rule::holds | Rule::colon => "`:`",
+        Rule::reward_case => "a case like `collision => 1`",
+        Rule::policy_line => "a line like `when condition => action()`",
+        Rule::step => "a step like `0: action()`",
+        Rule::call => "an action like `name()`",
+        Rule::arguments => "`(`",
+        Rule::otherwise => "`_`",
+        Rule::comma => "`,`",
+        Rule::equals => "`=`",
+        Rule::arrow => "`->`",
+        Rule::fat_arrow => "`=>`",
+        Rule::bar | Rule::unordered => "`|`",
+        Rule::less | Rule::ordered => "`<`",
+        Rule::slash => "`/`",
+        Rule::close_brace => "`}`",
+        Rule::open_paren => "`(`",
+        Rule::close_paren => "`)`",
+        Rule::open_bracket | Rule::key => "`[`",
+        Rule::close_bracket => "`]`",
+        Rule::kw_digest => "`digest`",
+        Rule::kw_rule => "`rule`",
+        Rule::kw_each => "`each`",
+        Rule::kw_any | Rule::drawn_initially => "`any`",
+        Rule::kw_in | Rule::within => "`in`",
+        Rule::kw_where | Rule::condition => "`where`",
+        Rule::kw_set => "`set`",
+        Rule::kw_spawn => "`spawn`",
+        Rule::kw_ahead => "`ahead`",
+        Rule::kw_behind => "`behind`",
+        Rule::kw_on | Rule::targets => "`on`",
+        Rule::kw_road | Rule::on_road => "`road: name`",
+        Rule::kw_at => "`at`",
+        Rule::kw_with | Rule::drawn => "`with`",
+        Rule::kw_by => "`by`",
+        Rule::clause => "`with`, `at` or `by`",
+        Rule::kw_expect | Rule::expect => "`expect`",
+        Rule::kw_origin | Rule::origin => "`origin`",
+        Rule::kw_start | Rule::start => "`start`",
+        Rule::kw_steps | Rule::steps => "`steps`",
+        Rule::kw_net | Rule::net => "`net`",
+        Rule::kw_claims | Rule::claims => "`claims`",
+        Rule::kw_rules | Rule::policy_rules => "`rules`",
+        Rule::kw_when => "`when`",
+        _ => return None,
+    })
+}
+
+/// Whether the rule continues an expression: expected after every one, and therefore only worth
+/// saying where nothing else is.
+pub fn continues_expression(rule: Rule) -> bool {
+    matches!(
+        rule,
+        Rule::infix
+            | Rule::unit
+            | Rule::index
+            | Rule::field_access
+            | Rule::arguments
+            | Rule::op_implies
+            | Rule::op_or
+            | Rule::op_and
+            | Rule::op_in
+            | Rule::op_equal
+            | Rule::op_not_equal
+            | Rule::op_less_equal
+            | Rule::op_less
+            | Rule::op_greater_equal
+            | Rule::op_greater
+            | Rule::op_range
+            | Rule::op_add
+            | Rule::op_subtract
+            | Rule::op_multiply
+            | Rule::op_divide
+    )
+}
+
+/// Whether the rule is a mark or keyword that the tree does not keep: which one it was follows from
+/// the rule that holds it.
+pub fn is_plain_terminal(rule: Rule) -> bool {
+    matches!(
+        rule,
+        Rule::colon
+            | Rule::comma
+            | Rule::equals
+            | Rule::arrow
+            | Rule::fat_arrow
+            | Rule::bar
+            | Rule::less
+            | Rule::slash
+            | Rule::open_brace
+            | Rule::close_brace
+            | Rule::open_paren
+            | Rule::close_paren
+            | Rule::open_bracket
+            | Rule::close_bracket
+            | Rule::kw_language
+            | Rule::kw_use
+            | Rule::kw_digest
+            | Rule::kw_enum
+            | Rule::kw_state
+            | Rule::kw_let
+            | Rule::kw_fn
+            | Rule::kw_action
+            | Rule::kw_in
+            | Rule::kw_where
+            | Rule::kw_set
+            | Rule::kw_spawn
+            | Rule::kw_group
+            | Rule::kw_rule
+            | Rule::kw_on
+            | Rule::kw_road
+            | Rule::kw_episode
+            | Rule::kw_reward
+            | Rule::kw_verdict
+            | Rule::kw_expect
+            | Rule::kw_scenario
+            | Rule::kw_origin
+            | Rule::kw_start
+            | Rule::kw_steps
+            | Rule::kw_policy
+            | Rule::kw_net
+            | Rule::kw_claims
+            | Rule::kw_rules
+            | Rule::kw_when
+            | Rule::kw_match
+            | Rule::kw_lane
+    )
+}

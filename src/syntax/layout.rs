@@ -1,0 +1,169 @@
+//! Where lines break: documents that stay on one line if they fit, after Wadler's "A prettier printer".
+//!
+//! Knows nothing of the language; `print` makes the documents.
+
+/// A line is broken rather than longer than this, in characters.
+pub const WIDTH: usize = 110;
+/// Blanks of one level.
+pub const INDENT: usize = 2;
+
+/// A piece of text that may be laid out in two ways.
+#[derive(Debug, Clone)]
+pub enum Layout {
+    Text(String),
+    /// A blank, or a line break in a broken group.
+    Line,
+    /// Nothing, or a line break in a broken group.
+    Break,
+    /// Nothing, or this text in a broken group.
+    IfBroken(&'static str),
+    /// This text, or nothing in a broken group.
+    IfFlat(&'static str),
+    /// One after the other.
+    Row(Vec<Layout>),
+    /// One level deeper.
+    Nest(Box<Layout>),
+    /// On one line if it fits; otherwise every `Line` and `Break` directly in it breaks.
+    Group(Box<Layout>),
+}
+
+impl Layout {
+    pub fn text(text: impl Into<String>) -> Self {
+        Layout::Text(text.into())
+    }
+
+    pub fn row(parts: impl IntoIterator<Item = Layout>) -> Self {
+        Layout::Row(parts.into_iter().collect())
+    }
+
+    pub fn group(parts: impl IntoIterator<Item = Layout>) -> Self {
+        Layout::Group(Box::new(Layout::row(parts)))
+    }
+
+    pub fn nest(parts: impl IntoIterator<Item = Layout>) -> Self {
+        Layout::Nest(Box::new(Layout::row(parts)))
+    }
+
+    /// `open item, item close`, or one item a line with a comma after each.
+    pub fn listed(open: &str, items: impl IntoIterator<Item = Layout>, close: &str) -> Self {
+        let mut inside = Vec::new();
+        for item in items {
+            if !inside.is_empty() {
+                inside.extend([Layout::text(","), Layout::Line]);
+            }
+            inside.push(item);
+        }
+        if inside.is_empty() {
+            return Layout::text(format!("{open}{close}"));
+        }
+        inside.insert(0, Layout::Break);
+        inside.push(Layout::IfBroken(","));
+        Layout::group([Layout::text(open), Layout::nest(inside), Layout::Break, Layout::text(close)])
+    }
+
+    /// The text on one line, however long.
+    pub fn flat(&self) -> String {
+        let mut out = String::new();
+        lay_out(self, &mut out, 0, 0, usize::MAX);
+        out
+    }
+
+    /// The text, when it begins in this column of a line that is indented so far.
+    pub fn render(&self, indent: usize, column: usize) -> String {
+        let mut out = String::new();
+        lay_out(self, &mut out, indent, column, WIDTH);
+        out
+    }
+}
+
+/// Lays out with an explicit stack of what is still to come: indentation, whether broken, and what.
+fn lay_out(layout: &Layout, out: &mut String, indent: usize, column: usize, width: usize) {
+    let mut column = column;
+    let mut todo = vec![(indent, false, layout)];
+    while let Some((indent, broken, next)) = todo.pop() {
+        match next {
+            Layout::Text(text) => {
+                out.push_str(text);
+                column += text.chars().count();
+            }
+            Layout::Line | Layout::Break if broken => {
+                out.push('\n');
+                out.extend(std::iter::repeat_n(' ', indent));
+                column = indent;
+            }
+            Layout::Line => {
+                out.push(' ');
+                column += 1;
+            }
+            Layout::IfBroken(text) if broken => out.push_str(text),
+            Layout::IfFlat(text) if !broken => {
+                out.push_str(text);
+                column += text.len();
+            }
+            Layout::Break | Layout::IfBroken(_) | Layout::IfFlat(_) => {}
+            Layout::Row(parts) => todo.extend(parts.iter().rev().map(|part| (indent, broken, part))),
+            Layout::Nest(inside) => todo.push((indent + INDENT, broken, inside)),
+            Layout::Group(inside) => {
+                let room = width.saturating_sub(column);
+                let breaks = width != usize::MAX && !fits(inside, &todo, room);
+                todo.push((indent, breaks, inside));
+            }
+        }
+    }
+}
+
+/// Whether a group laid flat, with what follows it up to where a line may end, takes no more than `room`.
+fn fits(inside: &Layout, after: &[(usize, bool, &Layout)], room: usize) -> bool {
+    let mut left = room;
+    let mut todo = vec![(false, inside)];
+    let mut after = after.iter().rev();
+    // Groups that follow may break by themselves later, so their first line break ends the line.
+    let mut groups_break = false;
+    loop {
+        let Some((broken, next)) = todo.pop() else {
+            let Some((_, broken, next)) = after.next() else { return true };
+            todo.push((*broken, *next));
+            groups_break = true;
+            continue;
+        };
+        let taken = match next {
+            Layout::Text(text) => text.chars().count(),
+            Layout::Line | Layout::Break if broken => return true,
+            Layout::Line => 1,
+            Layout::IfBroken(text) if broken => text.len(),
+            Layout::IfFlat(text) if !broken => text.len(),
+            Layout::Break | Layout::IfBroken(_) | Layout::IfFlat(_) => 0,
+            Layout::Row(parts) => {
+                todo.extend(parts.iter().rev().map(|part| (broken, part)));
+                0
+            }
+            Layout::Nest(inside) => {
+                todo.push((broken, inside));
+                0
+            }
+            Layout::Group(inside) => {
+                todo.push((groups_break, inside));
+                0
+            }
+        };
+        match left.checked_sub(taken) {
+            Some(rest) => left = rest,
+            None => return false,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn breaks_only_what_does_not_fit() {
+        let item = || Layout::text("x".repeat(30));
+        assert_eq!(Layout::listed("[", [item(), item()], "]").render(0, 0).lines().count(), 1);
+        let long = Layout::listed("[", [item(), item(), item(), item()], "]").render(0, 0);
+        assert_eq!(long.lines().count(), 6);
+        assert!(long.ends_with(",\n]"));
+        assert_eq!(Layout::listed("(", [], ")").render(0, 0), "()");
+    }
+}

@@ -1,0 +1,39 @@
+//! Text to tree and back: the grammar, `parse`, `format`, and diagnostics.
+//!
+//! Nothing here knows what a name means, and nothing outside knows what the grammar looks like.
+
+pub mod ast;
+mod build;
+pub mod code;
+mod diagnostic;
+mod expression;
+mod format;
+mod grammar;
+mod layout;
+mod parse;
+mod print;
+mod print_expression;
+mod scan;
+
+pub use diagnostic::Diagnostic;
+pub use diagnostic::DiagnosticRecord;
+pub use diagnostic::Label;
+pub use diagnostic::LabelRecord;
+pub use diagnostic::Severity;
+pub use diagnostic::Sources;
+pub use diagnostic::Style;
+pub use diagnostic::listed;
+pub use diagnostic::nearest;
+pub use diagnostic::record;
+pub use diagnostic::render;
+pub use format::FormatError;
+pub use format::format;
+pub use format::same_meaning;
+pub use parse::DEPTH_MAX;
+pub use parse::LANGUAGE;
+pub use parse::parse;
+pub use print::print;
+pub use print::print_expr;
+
+#[cfg(test)]
+mod tests;

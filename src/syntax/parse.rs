@@ -1,0 +1,356 @@
+//! From text to tree, with as many mistakes reported as can be told apart.
+//!
+//! pest stops at the first mistake. So a text that fails is read again with a rule that sets aside
+//! what it cannot read, up to the next line that begins a declaration, and each slice set aside
+//! is then read by itself for its own message. What could be read is in the tree all the same.
+
+use pest::Parser;
+use pest::error::ErrorVariant;
+use pest::error::InputLocation;
+use pest::iterators::Pair;
+
+use crate::syntax::Diagnostic;
+use crate::syntax::ast::Doc;
+use crate::syntax::ast::File;
+use crate::syntax::ast::FileId;
+use crate::syntax::ast::Item;
+use crate::syntax::ast::ItemKind;
+use crate::syntax::ast::Span;
+use crate::syntax::build::Builder;
+use crate::syntax::build::end_of;
+use crate::syntax::code;
+use crate::syntax::diagnostic::enumerated;
+use crate::syntax::grammar::AvaParser;
+use crate::syntax::grammar::Rule;
+use crate::syntax::grammar::continues_expression;
+use crate::syntax::grammar::words;
+use crate::syntax::nearest;
+use crate::syntax::scan::Comment;
+use crate::syntax::scan::Scan;
+use crate::syntax::scan::scan;
+
+/// Brackets and operators within one another, at most.
+pub const DEPTH_MAX: usize = 64;
+
+/// The version of the language that this compiler reads.
+pub const LANGUAGE: u64 = 1;
+
+/// Mistakes reported for one file, at most: more help nobody.
+const DIAGNOSTICS_MAX: usize = 100;
+
+/// Every word that begins a declaration.
+const DECLARATIONS: [&str; 17] = [
+    "language", "use", "enum", "state", "let", "fn", "action", "group", "optional", "rule", "road",
+    "episode", "reward", "verdict", "expect", "scenario", "policy",
+];
+
+/// Words that begin something inside a declaration.
+const CLAUSES: [&str; 22] = [
+    "each", "any", "where", "set", "spawn", "ahead", "behind", "digest", "origin", "start", "steps",
+    "expect", "with", "claims", "net", "rules", "when", "match", "implies", "and", "not", "rule",
+];
+
+/// Reads a text. The tree holds what could be read; it is whole if no diagnostic is an error.
+///
+/// Never panics, whatever the text, and takes time in proportion to its length.
+pub fn parse(file: FileId, text: &str) -> (File, Vec<Diagnostic>) {
+    let scanned = scan(file, text);
+    if scanned.too_deep {
+        return (File { span: Span::new(file, 0, text.len()), ..File::default() }, sorted(scanned.problems));
+    }
+    let reader = Reader { file, text, scan: &scanned };
+    let (tree, mistakes) = reader.read();
+    let version = reader.check_version(&tree, mistakes.is_empty() && scanned.problems.is_empty());
+    if let Some(newer) = version.iter().find(|found| found.code == code::VERSION) {
+        // Whatever else looks wrong may be right in that version.
+        return (tree, vec![newer.clone()]);
+    }
+    let found = scanned.problems.into_iter().chain(mistakes).chain(version).collect();
+    (tree, sorted(found))
+}
+
+/// In the order of the text, without more of them than anybody reads.
+fn sorted(mut found: Vec<Diagnostic>) -> Vec<Diagnostic> {
+    found.sort_by_key(Diagnostic::place);
+    let more = found.len().saturating_sub(DIAGNOSTICS_MAX);
+    found.truncate(DIAGNOSTICS_MAX);
+    if let (Some(last), true) = (found.last_mut(), more > 0) {
+        last.notes.push(format!("{more} more mistakes in this file are not shown"));
+    }
+    found
+}
+
+struct Reader<'a> {
+    file: FileId,
+    text: &'a str,
+    scan: &'a Scan,
+}
+
+impl Reader<'_> {
+    fn read(&self) -> (File, Vec<Diagnostic>) {
+        let pairs =
+            AvaParser::parse(Rule::file, self.text).or_else(|_| AvaParser::parse(Rule::recovered, self.text));
+        let Some(whole) = pairs.ok().and_then(|mut pairs| pairs.next()) else {
+            // Unreachable by the grammar, which recovers from everything; but the promise not to
+            // panic is worth more than the proof.
+            let mistake = Diagnostic::error(code::SYNTAX, "the file cannot be read");
+            return (File::default(), vec![mistake.at(Span::new(self.file, 0, self.text.len()), "")]);
+        };
+        let mut items: Vec<Item> = Vec::new();
+        let mut mistakes = Vec::new();
+        let mut previous = (0, 0);
+        for part in whole.into_inner() {
+            let span = (part.as_span().start(), end_of(&part));
+            match part.as_rule() {
+                Rule::item => match self.item(part, previous.1) {
+                    Ok(item) => items.push(item),
+                    Err(mistake) => mistakes.push(*mistake),
+                },
+                Rule::skipped => mistakes.extend(self.explain(span.0, span.1, previous)),
+                _ => {}
+            }
+            previous = span;
+        }
+        let first = items.first().map_or(self.text.len(), |item| item.span.start);
+        let docs = self.docs(0, first, Comment::is_file_doc);
+        (File { docs, items, span: Span::new(self.file, 0, self.text.len()) }, mistakes)
+    }
+
+    fn item(&self, pair: Pair<'_, Rule>, previous_end: usize) -> Result<Item, Box<Diagnostic>> {
+        let builder = Builder::new(self.file);
+        let span = builder.span(&pair);
+        let docs = self.docs(previous_end, span.start, Comment::is_item_doc);
+        Ok(Item { docs, kind: builder.item(pair)?, span })
+    }
+
+    /// The documentation between two bytes.
+    fn docs(&self, from: usize, to: usize, is_doc: impl Fn(&Comment, &str) -> bool) -> Vec<Doc> {
+        let first = self.scan.comments.partition_point(|comment| comment.start < from);
+        let between = self.scan.comments[first..].iter().take_while(|comment| comment.start < to);
+        let docs = between.filter(|comment| is_doc(comment, self.text)).map(|comment| {
+            let marked = &self.text[comment.start + "///".len()..comment.end];
+            let text = marked.strip_prefix(' ').unwrap_or(marked).to_owned();
+            Doc { text, span: Span::new(self.file, comment.start, comment.end) }
+        });
+        docs.collect()
+    }
+
+    /// What is wrong with a slice that was set aside after the good declaration `previous`.
+    fn explain(&self, start: usize, end: usize, previous: (usize, usize)) -> Option<Diagnostic> {
+        let starts_before = |problem: &Diagnostic| problem.place().is_some_and(|place| place.start < start);
+        let next_problem = self.scan.problems.get(self.scan.problems.partition_point(starts_before));
+        if next_problem.and_then(Diagnostic::place).is_some_and(|place| place.start <= end) {
+            // Already said, and better than the grammar could.
+            return None;
+        }
+        let (start, found) = self.token_after(start);
+        if start >= end {
+            return None;
+        }
+        if DECLARATIONS.contains(&found) {
+            let (at, expected) = self.failure(start, end);
+            return Some(self.expected(at, expected, (start, end)));
+        }
+        // What came before may have ended too early: `f(1 2)` reads as far as `f`.
+        let (at, expected) = self.failure(previous.0, end);
+        if at > start {
+            return Some(self.expected(at, expected, (previous.0, end)));
+        }
+        let expected = if at == start { expected } else { "a declaration".to_owned() };
+        let span = Span::new(self.file, start, start + found.len());
+        Some(self.not_a_declaration(found, span, previous.1, &expected))
+    }
+
+    /// Where the reading of one declaration fails, and what was expected there.
+    fn failure(&self, start: usize, end: usize) -> (usize, String) {
+        match AvaParser::parse(Rule::lone_item, &self.text[start..end]) {
+            // It can be read by itself, so what follows it is to blame; point at its end.
+            Ok(_) => (end, "a declaration".to_owned()),
+            Err(error) => {
+                let (InputLocation::Pos(at) | InputLocation::Span((at, _))) = error.location;
+                let expected = match error.variant {
+                    ErrorVariant::ParsingError { positives, .. } => in_words(&positives),
+                    ErrorVariant::CustomError { message } => message,
+                };
+                (start + at, expected)
+            }
+        }
+    }
+
+    /// A word or mark where the next declaration could begin, or the last one, which ended at
+    /// `previous_end`, go on with what was `expected`.
+    fn not_a_declaration(&self, found: &str, span: Span, previous_end: usize, expected: &str) -> Diagnostic {
+        let is_word = found.starts_with(|first: char| first.is_ascii_alphabetic() || first == '_');
+        let continues_line = !self.text[previous_end..span.start].contains('\n') && previous_end > 0;
+        if continues_line {
+            let expected = expected.replace(" or ", ", ");
+            let message = format!("expected {expected} or the next line, found `{found}`");
+            return Diagnostic::error(code::SYNTAX, message).at(span, "unexpected");
+        }
+        if !is_word {
+            return Diagnostic::error(code::SYNTAX, format!("expected a declaration, found `{found}`"))
+                .at(span, "unexpected");
+        }
+        let unknown = Diagnostic::error(code::DECLARATION, format!("no declaration begins with `{found}`"));
+        match nearest(found, DECLARATIONS) {
+            Some(meant) => unknown.at(span, "unknown declaration").help(format!("did you mean `{meant}`?")),
+            None => unknown.at(span, "unknown declaration").note(format!(
+                "declarations begin with {}",
+                enumerated(&DECLARATIONS.map(|word| format!("`{word}`")), "or")
+            )),
+        }
+    }
+
+    /// Something else was expected at a byte of a slice.
+    fn expected(&self, at: usize, expected: String, (start, end): (usize, usize)) -> Diagnostic {
+        let (token_start, found) = self.token_after(at);
+        let at_end = token_start >= end;
+        let before_end = self.scan.unclosed.partition_point(|opener| opener.start < end);
+        let opener = self.scan.unclosed[..before_end].last().filter(|opener| opener.start >= start);
+        if let (true, Some(opener)) = (at_end, opener) {
+            let bracket = &self.text[opener.start..opener.end];
+            let before = self.end_of_token_before(token_start);
+            return Diagnostic::error(code::UNCLOSED, format!("`{bracket}` is never closed"))
+                .at(*opener, "opened here")
+                .beside(Span::new(self.file, before, before), format!("expected {expected}"));
+        }
+        let before = self.end_of_token_before(token_start);
+        if at_end || self.text[before..token_start].contains('\n') {
+            // The next line is innocent: what is missing is missing here.
+            return Diagnostic::error(code::SYNTAX, format!("expected {expected}"))
+                .at(Span::new(self.file, before, before), "here");
+        }
+        let wants_name = expected.contains("a name");
+        let mistake = Diagnostic::error(code::SYNTAX, format!("expected {expected}, found `{found}`"))
+            .at(Span::new(self.file, token_start, token_start + found.len()), "unexpected");
+        if wants_name && found.starts_with(|first: char| first.is_ascii_alphabetic()) {
+            return mistake.help(format!("`{found}` is a word of the language; choose another name"));
+        }
+        // Short words are near to too many others.
+        match nearest(found, CLAUSES).filter(|_| found.len() > 2 && !CLAUSES.contains(&found)) {
+            Some(meant) => mistake.help(format!("did you mean `{meant}`?")),
+            None => mistake,
+        }
+    }
+
+    /// The first token at or after a byte, and where it begins. Empty at the end of the text.
+    fn token_after(&self, from: usize) -> (usize, &str) {
+        let mut at = from;
+        let mut next = self.scan.comments.partition_point(|comment| comment.end <= at);
+        loop {
+            let rest = &self.text[at..];
+            at += rest.len() - rest.trim_start().len();
+            match self.scan.comments.get(next) {
+                Some(comment) if comment.start <= at => {
+                    at = comment.end.max(at);
+                    next += 1;
+                }
+                _ => break,
+            }
+        }
+        let rest = &self.text[at..];
+        let word =
+            rest.find(|next: char| !(next.is_ascii_alphanumeric() || next == '_')).unwrap_or(rest.len());
+        // What a message quotes should fit on a line.
+        let len = match word {
+            0 => ["==", "!=", "<=", ">=", "=>", "->", ".."]
+                .iter()
+                .find(|mark| rest.starts_with(**mark))
+                .map_or_else(|| rest.chars().next().map_or(0, char::len_utf8), |mark| mark.len()),
+            _ => word.min(40),
+        };
+        (at, &rest[..len])
+    }
+
+    /// The end of the last token before a byte.
+    fn end_of_token_before(&self, at: usize) -> usize {
+        let mut end = at;
+        let mut comments =
+            self.scan.comments[..self.scan.comments.partition_point(|comment| comment.start < at)].iter();
+        let mut last = comments.next_back();
+        loop {
+            end = self.text[..end].trim_end().len();
+            match last {
+                Some(comment) if comment.end >= end && comment.start < end => {
+                    end = comment.start;
+                    last = comments.next_back();
+                }
+                _ => return end,
+            }
+        }
+    }
+
+    /// `language` must come first, once, and be known. `sound` says that nothing else is wrong:
+    /// only then is it certain that the line is missing and not merely unreadable.
+    fn check_version(&self, tree: &File, sound: bool) -> Vec<Diagnostic> {
+        let mut declared = tree.items.iter().filter_map(|item| match &item.kind {
+            ItemKind::Language(number) => Some((item.span, number)),
+            _ => None,
+        });
+        let Some((span, number)) = declared.next() else {
+            if !sound {
+                return Vec::new();
+            }
+            let (start, found) = self.token_after(0);
+            let message =
+                if found.is_empty() { "the file is empty" } else { "the file does not say its language" };
+            return vec![
+                Diagnostic::error(code::LANGUAGE, message)
+                    .at(Span::new(self.file, start, start + found.len()), "expected `language 1` here")
+                    .help("begin the file with `language 1`"),
+            ];
+        };
+        let mut found = Vec::new();
+        let version: Option<u64> = number.digits.parse().ok();
+        if version.is_none_or(|version| version > LANGUAGE) {
+            let message = format!(
+                "the file is written in language {}, which is newer than this compiler",
+                number.digits
+            );
+            found.push(
+                Diagnostic::error(code::VERSION, message)
+                    .at(number.span, format!("this compiler reads language {LANGUAGE}"))
+                    .help("use a newer avastra"),
+            );
+        } else if version == Some(0) {
+            found.push(
+                Diagnostic::error(code::VERSION, "there is no language 0")
+                    .at(number.span, "")
+                    .help(format!("write `language {LANGUAGE}`")),
+            );
+        }
+        if tree.items.first().is_some_and(|first| first.span != span) {
+            found.push(
+                Diagnostic::error(code::LANGUAGE, "`language` must come before every other declaration")
+                    .at(span, "move it to the top"),
+            );
+        }
+        found.extend(declared.map(|(again, _)| {
+            Diagnostic::error(code::LANGUAGE, "`language` is declared twice")
+                .at(again, "again")
+                .beside(span, "first here")
+        }));
+        found
+    }
+}
+
+/// What was expected, in the author's words.
+fn in_words(rules: &[Rule]) -> String {
+    let mut expected: Vec<String> = Vec::new();
+    for rule in rules.iter().filter(|rule| !continues_expression(**rule)) {
+        if let Some(word) = words(*rule)
+            && !expected.iter().any(|known| known == word)
+        {
+            expected.push(word.to_owned());
+        }
+    }
+    if !expected.is_empty() {
+        return enumerated(&expected, "or");
+    }
+    let only = match rules {
+        [only] => words(*only),
+        _ => None,
+    };
+    let continues = rules.iter().any(|rule| continues_expression(*rule));
+    only.unwrap_or(if continues { "an operator" } else { "a declaration" }).to_owned()
+}

@@ -1,0 +1,633 @@
+//! Trees as text, in the one style there is. Comments are woven in when there is a source.
+//!
+//! The unit of work is the *entry*: whatever begins a line of its own, like a declaration, a
+//! parameter, an effect, a field, an arm or a step. Comments that stand before an entry stay before
+//! it, a comment at the end of its line stays there, and a comment in the middle of an entry moves
+//! before it. One blank line between entries is kept; more are not.
+
+use crate::syntax::ast::Action;
+use crate::syntax::ast::ActionParam;
+use crate::syntax::ast::ClauseKind;
+use crate::syntax::ast::Doc;
+use crate::syntax::ast::Effect;
+use crate::syntax::ast::EffectKind;
+use crate::syntax::ast::Expect;
+use crate::syntax::ast::Expr;
+use crate::syntax::ast::ExprKind;
+use crate::syntax::ast::Field;
+use crate::syntax::ast::File;
+use crate::syntax::ast::Initial;
+use crate::syntax::ast::Item;
+use crate::syntax::ast::ItemKind;
+use crate::syntax::ast::Name;
+use crate::syntax::ast::ParamMode;
+use crate::syntax::ast::Place;
+use crate::syntax::ast::Policy;
+use crate::syntax::ast::PolicyLine;
+use crate::syntax::ast::Rule;
+use crate::syntax::ast::RuleBody;
+use crate::syntax::ast::Scenario;
+use crate::syntax::ast::Span;
+use crate::syntax::ast::Step;
+use crate::syntax::ast::Type;
+use crate::syntax::ast::TypeKind;
+use crate::syntax::layout::INDENT;
+use crate::syntax::layout::Layout;
+use crate::syntax::layout::WIDTH;
+use crate::syntax::print_expression::call;
+use crate::syntax::print_expression::expression;
+use crate::syntax::print_expression::expression_on_new_line;
+use crate::syntax::print_expression::field;
+use crate::syntax::print_expression::fields;
+use crate::syntax::print_expression::number;
+use crate::syntax::print_expression::patterns;
+use crate::syntax::print_expression::quoted;
+use crate::syntax::scan::Comment;
+
+/// The text of a tree that was built, not read: documentation is in the tree, other comments do not
+/// exist. What it prints reads back to the same tree.
+pub fn print(file: &File) -> String {
+    print_with(file, "", &[])
+}
+
+/// An expression in one line.
+pub fn print_expr(expr: &Expr) -> String {
+    expression(expr).flat()
+}
+
+/// The text of a tree that was read from `source`, with those of its comments that are not in the
+/// tree, in the order of the source.
+pub fn print_with(file: &File, source: &str, comments: &[Comment]) -> String {
+    let mut printer =
+        Printer { out: String::new(), level: 0, source, comments, limit: source.len(), opened: true };
+    printer.file(file);
+    printer.out
+}
+
+struct Printer<'a> {
+    out: String,
+    level: usize,
+    /// Empty if the tree was built.
+    source: &'a str,
+    /// Those not yet printed.
+    comments: &'a [Comment],
+    /// Where the entry around the present one ends in the source: a comment behind that is not its.
+    limit: usize,
+    /// Whether a block has just been opened: no blank line follows.
+    opened: bool,
+}
+
+impl Printer<'_> {
+    fn file(&mut self, file: &File) {
+        self.docs("//!", &file.docs);
+        for (index, item) in file.items.iter().enumerate() {
+            let previous = index.checked_sub(1).map(|previous| &file.items[previous]);
+            self.item(item, previous);
+        }
+        self.comments_before(usize::MAX);
+        if !self.out.is_empty() {
+            self.out.push('\n');
+        }
+    }
+
+    /// Begins a line for what stands at `start` in the source.
+    fn line(&mut self, start: usize) {
+        let blank = !self.opened && self.blank_line_before(start);
+        self.plain_line(blank);
+    }
+
+    fn plain_line(&mut self, blank_before: bool) {
+        if !self.out.is_empty() {
+            self.out.push_str(if blank_before { "\n\n" } else { "\n" });
+        }
+        self.out.extend(std::iter::repeat_n(' ', self.level * INDENT));
+        self.opened = false;
+    }
+
+    fn blank_line_before(&self, start: usize) -> bool {
+        let before = self.source.get(..start).unwrap_or_default();
+        let gap = &before[before.trim_end().len()..];
+        gap.bytes().filter(|byte| *byte == b'\n').count() > 1
+    }
+
+    /// Prints the comments that begin before a place in the source, each on its own line.
+    fn comments_before(&mut self, end: usize) {
+        while let Some((comment, later)) = self.comments.split_first().filter(|(next, _)| next.start < end) {
+            self.comments = later;
+            self.line(comment.start);
+            self.out.push_str(&self.source[comment.start..comment.end]);
+        }
+    }
+
+    /// Whether a comment stands between two places in the source.
+    fn comment_between(&self, start: usize, end: usize) -> bool {
+        self.comments.iter().take_while(|comment| comment.start < end).any(|comment| comment.start >= start)
+    }
+
+    /// Prints the comment that ends the line on which an entry ended.
+    fn trailing_comment(&mut self, end: usize) {
+        let Some((comment, later)) = self.comments.split_first() else { return };
+        let same_line = comment.start >= end
+            && comment.start < self.limit
+            && !self.source[end..comment.start].contains('\n');
+        if same_line {
+            self.comments = later;
+            self.out.push(' ');
+            self.out.push_str(&self.source[comment.start..comment.end]);
+        }
+    }
+
+    /// An entry that is printed as a whole.
+    fn entry(&mut self, span: Span, layout: &Layout) {
+        self.comments_before(span.end);
+        self.line(span.start);
+        self.put(layout);
+        self.trailing_comment(span.end);
+    }
+
+    /// An entry that holds entries; `print` writes it, beginning on a new line.
+    fn entry_of_entries(&mut self, span: Span, print: impl FnOnce(&mut Self)) {
+        self.comments_before(span.start);
+        self.line(span.start);
+        print(self);
+        self.trailing_comment(span.end);
+    }
+
+    /// Entries in braces, one a line; the opening brace is printed. `end` is where they end in the
+    /// source: comments up to there belong inside.
+    fn block(&mut self, end: usize, entries: impl FnOnce(&mut Self)) {
+        let limit = std::mem::replace(&mut self.limit, end);
+        self.out.push('{');
+        self.level += 1;
+        self.opened = true;
+        entries(self);
+        self.opened = false;
+        self.comments_before(end);
+        self.level -= 1;
+        self.limit = limit;
+        self.plain_line(false);
+        self.out.push('}');
+    }
+
+    /// Lays something out from where the line has got to.
+    fn put(&mut self, layout: &Layout) {
+        let text = layout.render(self.level * INDENT, self.column());
+        self.out.push_str(&text);
+    }
+
+    fn column(&self) -> usize {
+        let line = self.out.rfind('\n').map_or(0, |newline| newline + 1);
+        self.out[line..].chars().count()
+    }
+
+    /// Whether so much more fits on the line.
+    fn fits(&self, layout: &Layout) -> bool {
+        self.column() + layout.flat().chars().count() <= WIDTH
+    }
+
+    fn docs(&mut self, marker: &str, docs: &[Doc]) {
+        for doc in docs {
+            self.line(doc.span.start);
+            let text = format!("{marker} {}", doc.text);
+            self.out.push_str(text.trim_end());
+        }
+    }
+
+    fn item(&mut self, item: &Item, previous: Option<&Item>) {
+        // A declaration that was built stands apart from its neighbours, unless both are short and
+        // of a kind.
+        let short = |item: &Item| item.docs.is_empty() && one_line(&item.kind);
+        let together = |previous: &Item| {
+            short(previous) && short(item) && previous.kind.keyword() == item.kind.keyword()
+                || matches!((&previous.kind, &item.kind), (ItemKind::Language(_), ItemKind::Use(_)))
+        };
+        let apart = self.source.is_empty() && previous.is_some_and(|previous| !together(previous));
+        if apart {
+            self.out.push('\n');
+        }
+        let whole = one_line(&item.kind) && !self.is_annotated_list(&item.kind, item.span);
+        self.comments_before(if whole { item.span.end } else { item.span.start });
+        self.docs("///", &item.docs);
+        self.line(item.span.start);
+        self.declaration(&item.kind, item.span);
+        self.trailing_comment(item.span.end);
+    }
+
+    fn declaration(&mut self, kind: &ItemKind, span: Span) {
+        match kind {
+            ItemKind::Language(version) => self.words(&format!("language {}", number(version))),
+            ItemKind::Use(used) => {
+                self.words(&format!("use {}", quoted(&used.path.value)));
+                if let Some(digest) = &used.digest {
+                    self.words(&format!(" digest {}", quoted(&digest.value)));
+                }
+            }
+            ItemKind::Enum(item) => {
+                let separator = if item.ordered { "<" } else { "|" };
+                let head = format!("enum {} =", item.name.text);
+                self.list(&head, separator, &item.variants, span);
+            }
+            ItemKind::State(item) => {
+                self.words(&format!("state {}: {} =", item.name.text, type_text(&item.ty)));
+                match &item.initial {
+                    Initial::Any => self.words(" any"),
+                    Initial::Value(value) => self.value(value),
+                }
+            }
+            ItemKind::Let(item) => {
+                self.words(&format!("let {} =", item.name.text));
+                self.value(&item.value);
+            }
+            ItemKind::Fn(item) => {
+                let params = item.params.iter();
+                let params = params
+                    .map(|param| Layout::text(format!("{}: {}", param.name.text, type_text(&param.ty))));
+                self.words(&format!("fn {}", item.name.text));
+                self.put(&Layout::row([
+                    Layout::listed("(", params, ")"),
+                    Layout::text(format!(" -> {} =", type_text(&item.result))),
+                ]));
+                self.value(&item.body);
+            }
+            ItemKind::Action(item) => self.action(item, span),
+            ItemKind::Group(item) => {
+                let head = format!("group {} =", item.name.text);
+                self.list(&head, ",", &item.members, span);
+            }
+            ItemKind::Rule(item) => self.rule(item, span),
+            ItemKind::Road(item) => {
+                self.words(&format!("road {} ", item.name.text));
+                self.field_lines(&item.fields, span.end);
+            }
+            ItemKind::Episode(entries) => {
+                self.words("episode ");
+                self.field_lines(entries, span.end);
+            }
+            ItemKind::Reward(cases) => {
+                self.words("reward ");
+                self.block(span.end, |printer| {
+                    for case in cases {
+                        let condition =
+                            case.condition.as_ref().map_or(Layout::text("_"), expression_on_new_line);
+                        let layout = [condition, Layout::text(" => "), expression(&case.value)];
+                        printer.entry(case.span, &Layout::row(layout));
+                    }
+                });
+            }
+            ItemKind::Verdict(item) => {
+                self.words(&format!("verdict {}:", item.name.text));
+                self.value(&item.condition);
+            }
+            ItemKind::Expect(item) => self.put(&expect(item)),
+            ItemKind::Scenario(item) => self.scenario(item, span),
+            ItemKind::Policy(item) => self.policy(item, span),
+        }
+    }
+
+    /// Whether the names of an `enum` or a `group` carry comments, so that each needs its own line.
+    fn is_annotated_list(&self, kind: &ItemKind, span: Span) -> bool {
+        matches!(kind, ItemKind::Enum(_) | ItemKind::Group(_)) && self.comment_between(span.start, span.end)
+    }
+
+    /// `head A | B`: on one line if it fits and nothing is said about the names one by one.
+    fn list(&mut self, head: &str, separator: &str, names: &[Name], span: Span) {
+        if !self.comment_between(span.start, span.end) {
+            return self.put(&separated(head, separator, names));
+        }
+        self.words(head);
+        self.level += 1;
+        self.opened = true;
+        for (index, name) in names.iter().enumerate() {
+            let last = index + 1 == names.len();
+            let text = match separator {
+                "," if last => name.text.clone(),
+                "," => format!("{},", name.text),
+                _ if index == 0 => name.text.clone(),
+                _ => format!("{separator} {}", name.text),
+            };
+            self.comments_before(name.span.end);
+            self.line(name.span.start);
+            self.words(&text);
+            if !last {
+                self.trailing_comment(name.span.end);
+            }
+        }
+        self.level -= 1;
+    }
+
+    fn words(&mut self, words: &str) {
+        self.out.push_str(words);
+    }
+
+    /// What follows `=` or `:` of a declaration: `match` opens its arms there, anything else goes
+    /// to the next line if it must.
+    fn value(&mut self, value: &Expr) {
+        if let ExprKind::Match { .. } = &value.kind {
+            self.words(" ");
+            return self.arms(value);
+        }
+        self.put(&Layout::group([Layout::nest([Layout::Line, expression(value)])]));
+    }
+
+    fn arms(&mut self, value: &Expr) {
+        let ExprKind::Match { subject, arms } = &value.kind else {
+            return self.put(&expression(value));
+        };
+        self.words("match ");
+        self.put(&expression(subject));
+        self.words(" ");
+        self.block(value.span.end, |printer| {
+            for arm in arms {
+                printer.entry_of_entries(arm.span, |printer| {
+                    printer.words(&format!("{} => ", patterns(arm)));
+                    printer.arms(&arm.value);
+                });
+            }
+        });
+    }
+
+    fn action(&mut self, item: &Action, span: Span) {
+        self.words(&format!("action {}", item.name.text));
+        let params = || item.params.iter().map(param);
+        let head = Layout::row([Layout::listed("(", params(), ")"), Layout::text(" ")]);
+        let body_start = item.params.last().map_or(span.start, |last| last.span.end);
+        let commented = self.comment_between(span.start, body_start);
+        let only_sets = match item.effects.as_slice() {
+            [only] if matches!(only.kind, EffectKind::Set { .. }) => Some(only),
+            _ => None,
+        };
+        if let (Some(only), false) = (only_sets, self.comment_between(span.start, span.end)) {
+            let layout = [head.clone(), Layout::text("{ "), effect(only), Layout::text(" }")];
+            let layout = Layout::row(layout);
+            if self.fits(&layout) {
+                return self.words(&layout.flat());
+            }
+        }
+        let brace = Layout::row([head.clone(), Layout::text("{")]);
+        if !commented && self.fits(&brace) {
+            self.words(&head.flat());
+        } else {
+            self.params(&item.params, body_start);
+        }
+        self.block(span.end, |printer| {
+            for step in &item.effects {
+                match &step.kind {
+                    EffectKind::Set { state, key, value } if matches!(value.kind, ExprKind::Match { .. }) => {
+                        printer.entry_of_entries(step.span, |printer| {
+                            printer.put(&assigned(state, key.as_ref()));
+                            printer.value(value);
+                        });
+                    }
+                    _ => printer.entry(step.span, &effect(step)),
+                }
+            }
+        });
+    }
+
+    /// Parameters, one a line.
+    fn params(&mut self, params: &[ActionParam], end: usize) {
+        let limit = std::mem::replace(&mut self.limit, self.source.len());
+        self.words("(");
+        self.level += 1;
+        self.opened = true;
+        for each in params {
+            self.entry_with_comma(each.span, &param(each));
+        }
+        self.opened = false;
+        self.comments_before(end);
+        self.level -= 1;
+        self.limit = limit;
+        self.plain_line(false);
+        self.words(") ");
+    }
+
+    fn entry_with_comma(&mut self, span: Span, layout: &Layout) {
+        self.comments_before(span.end);
+        self.line(span.start);
+        self.put(layout);
+        self.words(",");
+        self.trailing_comment(span.end);
+    }
+
+    fn rule(&mut self, item: &Rule, span: Span) {
+        if item.optional {
+            self.words("optional ");
+        }
+        self.words(&format!("rule {}", item.name.text));
+        match &item.body {
+            RuleBody::Holds { on, condition } => {
+                if !on.is_empty() {
+                    self.words(&format!(" on {}", names(on)));
+                }
+                self.words(":");
+                self.value(condition);
+            }
+            RuleBody::Moves { state, moves } => {
+                self.words(&format!(" on {} ", state.text));
+                self.block(span.end, |printer| {
+                    for step in moves {
+                        let to = step.to.iter().map(|name| name.text.as_str()).collect::<Vec<_>>();
+                        let layout = Layout::text(format!("{} -> {}", step.from.text, to.join(" | ")));
+                        printer.entry(step.span, &layout);
+                    }
+                });
+            }
+        }
+    }
+
+    /// `{`, one field a line, `}`.
+    fn field_lines(&mut self, entries: &[Field], end: usize) {
+        self.block(end, |printer| {
+            for entry in entries {
+                printer.entry(entry.span, &field(entry));
+            }
+        });
+    }
+
+    /// `origin { … }` in a block: on one line if it fits, absent if it is empty.
+    fn section(&mut self, keyword: &str, entries: &[Field]) {
+        let (Some(first), Some(last)) = (entries.first(), entries.last()) else { return };
+        let (start, end) = (first.span.start, last.span.end);
+        // Those before the first field end up above the section, also from inside the field.
+        self.comments_before(first.span.end);
+        self.plain_line(false);
+        self.words(&format!("{keyword} "));
+        let layout = fields(entries);
+        if !self.comment_between(start, end) && self.fits(&layout) {
+            self.words(&layout.flat());
+            self.trailing_comment(end);
+        } else {
+            self.field_lines(entries, end);
+        }
+    }
+
+    fn scenario(&mut self, item: &Scenario, span: Span) {
+        self.words(&format!("scenario {} ", item.name.text));
+        self.block(span.end, |printer| {
+            printer.section("origin", &item.origin);
+            printer.comments_before(item.road.span.end);
+            printer.plain_line(false);
+            printer.words(&format!("road: {}", item.road.text));
+            printer.trailing_comment(item.road.span.end);
+            printer.section("start", &item.start);
+            printer.plain_line(false);
+            printer.words("steps ");
+            if item.steps.is_empty() {
+                printer.words("{}");
+            } else {
+                let end = item.steps.last().map_or(0, |last| last.span.end);
+                printer.block(end, |printer| {
+                    for each in &item.steps {
+                        printer.entry(each.span, &step(each));
+                    }
+                });
+            }
+            for each in &item.expects {
+                printer.entry(each.span, &expect(each));
+            }
+        });
+    }
+
+    fn policy(&mut self, item: &Policy, span: Span) {
+        self.words(&format!("policy {} ", item.name.text));
+        self.block(span.end, |printer| {
+            printer.section("origin", &item.origin);
+            printer.section("net", &item.net);
+            printer.section("claims", &item.claims);
+            if item.rules.is_empty() {
+                return;
+            }
+            printer.plain_line(false);
+            printer.words("rules ");
+            let end = item.rules.last().map_or(0, |last| last.span.end);
+            printer.block(end, |printer| {
+                for each in &item.rules {
+                    printer.entry(each.span, &policy_line(each));
+                }
+            });
+        });
+    }
+}
+
+/// Whether a declaration holds no entries of its own.
+fn one_line(kind: &ItemKind) -> bool {
+    let plain = |value: &Expr| !matches!(value.kind, ExprKind::Match { .. });
+    match kind {
+        ItemKind::Language(_) | ItemKind::Use(_) | ItemKind::Enum(_) | ItemKind::Group(_) => true,
+        ItemKind::State(item) => match &item.initial {
+            Initial::Any => true,
+            Initial::Value(value) => plain(value),
+        },
+        ItemKind::Let(item) => plain(&item.value),
+        ItemKind::Fn(item) => plain(&item.body),
+        ItemKind::Rule(item) => {
+            matches!(&item.body, RuleBody::Holds { condition, .. } if plain(condition))
+        }
+        ItemKind::Verdict(item) => plain(&item.condition),
+        ItemKind::Expect(_) => true,
+        ItemKind::Action(_)
+        | ItemKind::Road(_)
+        | ItemKind::Episode(_)
+        | ItemKind::Reward(_)
+        | ItemKind::Scenario(_)
+        | ItemKind::Policy(_) => false,
+    }
+}
+
+fn names(names: &[Name]) -> String {
+    names.iter().map(|name| name.text.as_str()).collect::<Vec<_>>().join(", ")
+}
+
+/// `head A | B`, or one name a line.
+fn separated(head: &str, separator: &str, names: &[Name]) -> Layout {
+    let mut inside = Vec::new();
+    for (index, name) in names.iter().enumerate() {
+        match (index, separator) {
+            (0, _) => inside.push(Layout::Line),
+            (_, ",") => inside.extend([Layout::text(","), Layout::Line]),
+            _ => inside.extend([Layout::Line, Layout::text(format!("{separator} "))]),
+        }
+        inside.push(Layout::text(&name.text));
+    }
+    Layout::group([Layout::text(head), Layout::nest(inside)])
+}
+
+fn type_text(ty: &Type) -> String {
+    match &ty.kind {
+        TypeKind::Named(name) => name.text.clone(),
+        TypeKind::Map { key, value } => format!("{} -> {}", key.text, value.text),
+    }
+}
+
+fn param(param: &ActionParam) -> Layout {
+    let mode = match param.mode {
+        ParamMode::Each => "each",
+        ParamMode::Any => "any",
+    };
+    let mut parts = vec![Layout::text(format!("{mode} {}: {}", param.name.text, type_text(&param.ty)))];
+    for (word, value) in [("in", &param.within), ("where", &param.condition)] {
+        if let Some(value) = value {
+            parts.extend([Layout::text(format!(" {word} ")), expression(value)]);
+        }
+    }
+    Layout::Row(parts)
+}
+
+/// `set state[key] =`.
+fn assigned(state: &Name, key: Option<&Expr>) -> Layout {
+    let key = key.map_or(Layout::Row(Vec::new()), |key| {
+        Layout::row([Layout::text("["), expression(key), Layout::text("]")])
+    });
+    Layout::row([Layout::text(format!("set {}", state.text)), key, Layout::text(" =")])
+}
+
+fn effect(effect: &Effect) -> Layout {
+    match &effect.kind {
+        EffectKind::Set { state, key, value } => {
+            Layout::group([assigned(state, key.as_ref()), Layout::nest([Layout::Line, expression(value)])])
+        }
+        EffectKind::Spawn { body, place, distance, fields: entries } => {
+            let place = match place {
+                Place::Ahead => " ahead ",
+                Place::Behind => " behind ",
+            };
+            Layout::row([
+                Layout::text("spawn "),
+                expression(body),
+                Layout::text(place),
+                expression(distance),
+                Layout::text(" "),
+                fields(entries),
+            ])
+        }
+    }
+}
+
+fn expect(expect: &Expect) -> Layout {
+    let mut parts = vec![Layout::text("expect "), expression(&expect.claim)];
+    for clause in &expect.clauses {
+        let word = match clause.kind {
+            ClauseKind::With => " with ",
+            ClauseKind::At => " at ",
+            ClauseKind::By => " by ",
+        };
+        parts.extend([Layout::text(word), expression(&clause.value)]);
+    }
+    Layout::Row(parts)
+}
+
+fn step(step: &Step) -> Layout {
+    let mut parts = vec![Layout::text(format!("{}: ", number(&step.number))), call(&step.action)];
+    if !step.drawn.is_empty() {
+        parts.extend([Layout::text(" with "), fields(&step.drawn)]);
+    }
+    Layout::Row(parts)
+}
+
+fn policy_line(line: &PolicyLine) -> Layout {
+    let condition = match &line.condition {
+        None => Layout::text("_"),
+        Some(condition) => Layout::row([Layout::text("when "), expression(condition)]),
+    };
+    Layout::row([condition, Layout::text(" => "), call(&line.action)])
+}

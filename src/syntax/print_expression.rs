@@ -1,0 +1,203 @@
+//! Expressions as text: parentheses where precedence needs them, and nowhere else.
+
+use crate::syntax::ast::Arg;
+use crate::syntax::ast::Arm;
+use crate::syntax::ast::BinaryOp;
+use crate::syntax::ast::Call;
+use crate::syntax::ast::Expr;
+use crate::syntax::ast::ExprKind;
+use crate::syntax::ast::Field;
+use crate::syntax::ast::Number;
+use crate::syntax::ast::UnaryOp;
+use crate::syntax::expression::NEGATE_PRECEDENCE;
+use crate::syntax::expression::NOT_PRECEDENCE;
+use crate::syntax::expression::RANGE_PRECEDENCE;
+use crate::syntax::expression::strength;
+use crate::syntax::layout::Layout;
+
+/// Binding strength of what needs no parentheses anywhere but before `.` and `[`.
+const OPERAND: u8 = u8::MAX - 1;
+/// Binding strength of what may stand before `.` and `[`.
+const BASE: u8 = u8::MAX;
+
+/// An expression wherever any expression may stand.
+pub fn expression(expr: &Expr) -> Layout {
+    within(expr, 0)
+}
+
+/// An expression where only those that bind at least so tightly go without parentheses.
+fn within(expr: &Expr, least: u8) -> Layout {
+    let bare = bare(expr);
+    if binding(expr) < least { Layout::row([Layout::text("("), bare, Layout::text(")")]) } else { bare }
+}
+
+fn binding(expr: &Expr) -> u8 {
+    match &expr.kind {
+        ExprKind::Binary { op, .. } => strength(*op),
+        ExprKind::Range { .. } => RANGE_PRECEDENCE,
+        ExprKind::Unary { op: UnaryOp::Not, .. } => NOT_PRECEDENCE,
+        ExprKind::Unary { op: UnaryOp::Negate, .. } => NEGATE_PRECEDENCE,
+        // `12 m.x` and `lane 1/1 at 2 m[0]` would read as something else.
+        ExprKind::Number(_) | ExprKind::LanePoint { .. } | ExprKind::Numbered { .. } => OPERAND,
+        _ => BASE,
+    }
+}
+
+fn bare(expr: &Expr) -> Layout {
+    match &expr.kind {
+        ExprKind::Number(value) => Layout::text(number(value)),
+        ExprKind::Text(value) => Layout::text(quoted(value)),
+        ExprKind::Bool(value) => Layout::text(value.to_string()),
+        ExprKind::Name(name) => Layout::text(name),
+        ExprKind::Unary { op: UnaryOp::Not, operand } => {
+            Layout::row([Layout::text("not "), within(operand, NOT_PRECEDENCE)])
+        }
+        ExprKind::Unary { op: UnaryOp::Negate, operand } => {
+            Layout::row([Layout::text("-"), within(operand, NEGATE_PRECEDENCE)])
+        }
+        ExprKind::Binary { op, left, right, .. } => binary(*op, left, right),
+        ExprKind::Range { low, high } => Layout::row([
+            within(low, RANGE_PRECEDENCE + 1),
+            Layout::text(" .. "),
+            within(high, RANGE_PRECEDENCE + 1),
+        ]),
+        ExprKind::Field { base, field } => {
+            Layout::row([within(base, BASE), Layout::text(format!(".{}", field.text))])
+        }
+        ExprKind::Index { base, index } => {
+            Layout::row([within(base, BASE), Layout::text("["), expression(index), Layout::text("]")])
+        }
+        ExprKind::Call(inner) => call(inner),
+        ExprKind::List(items) => Layout::listed("[", items.iter().map(expression), "]"),
+        ExprKind::Record(entries) => fields(entries),
+        ExprKind::Match { subject, arms } => {
+            let mut parts = vec![Layout::text("match "), expression(subject), Layout::text(" ")];
+            parts.push(braced(arms.iter().map(arm)));
+            Layout::row(parts)
+        }
+        ExprKind::LanePoint { road, lane, station } => {
+            let is_number = !road.value.is_empty() && road.value.bytes().all(|byte| byte.is_ascii_digit());
+            let road = if is_number { road.value.clone() } else { quoted(&road.value) };
+            Layout::text(format!("lane {road}/{} at {}", lane.text, number(station)))
+        }
+        ExprKind::Numbered { name, number } => Layout::text(format!("{}#{number}", name.text)),
+    }
+}
+
+/// A chain of operators of one strength breaks before each of them, or not at all.
+fn binary(op: BinaryOp, left: &Expr, right: &Expr) -> Layout {
+    let level = strength(op);
+    let compares = level == strength(BinaryOp::Equal);
+    // `implies` groups to the right, comparisons not at all, the rest to the left.
+    let groups_right = op == BinaryOp::Implies;
+    let left_least = level + u8::from(groups_right || compares);
+    let right_least = level + u8::from(!groups_right);
+    if compares {
+        return Layout::row([
+            within(left, left_least),
+            Layout::text(format!(" {} ", op.symbol())),
+            within(right, right_least),
+        ]);
+    }
+    let mut rest = vec![Layout::Line, Layout::text(format!("{} ", op.symbol())), within(right, right_least)];
+    let mut first = left;
+    while let ExprKind::Binary { op: earlier, left, right, .. } = &first.kind {
+        if groups_right || strength(*earlier) != level {
+            break;
+        }
+        let link = [Layout::Line, Layout::text(format!("{} ", earlier.symbol())), within(right, right_least)];
+        rest.splice(0..0, link);
+        first = left;
+    }
+    Layout::group([within(first, left_least), Layout::nest(rest)])
+}
+
+pub fn call(call: &Call) -> Layout {
+    let args = call.args.iter().map(argument);
+    Layout::row([Layout::text(&call.name.text), Layout::listed("(", args, ")")])
+}
+
+fn argument(arg: &Arg) -> Layout {
+    match &arg.name {
+        None => expression(&arg.value),
+        Some(name) => Layout::row([Layout::text(format!("{}: ", name.text)), expression(&arg.value)]),
+    }
+}
+
+/// `{ a: 1, b: 2 }`, or one entry a line without commas.
+pub fn fields(entries: &[Field]) -> Layout {
+    braced(entries.iter().map(field))
+}
+
+pub fn field(field: &Field) -> Layout {
+    Layout::row([Layout::text(format!("{}: ", field.name.text)), expression(&field.value)])
+}
+
+fn braced(entries: impl Iterator<Item = Layout>) -> Layout {
+    let mut inside = Vec::new();
+    for entry in entries {
+        if !inside.is_empty() {
+            inside.push(Layout::IfFlat(","));
+        }
+        inside.extend([Layout::Line, entry]);
+    }
+    if inside.is_empty() {
+        return Layout::text("{}");
+    }
+    Layout::group([Layout::text("{"), Layout::nest(inside), Layout::Line, Layout::text("}")])
+}
+
+fn arm(arm: &Arm) -> Layout {
+    Layout::row([Layout::text(format!("{} => ", patterns(arm))), expression(&arm.value)])
+}
+
+/// `A | B`, or `_` for the rest.
+pub fn patterns(arm: &Arm) -> String {
+    if arm.patterns.is_empty() {
+        return "_".to_owned();
+    }
+    arm.patterns.iter().map(|pattern| pattern.text.as_str()).collect::<Vec<_>>().join(" | ")
+}
+
+pub fn number(number: &Number) -> String {
+    match &number.unit {
+        Some(unit) => format!("{} {}", number.digits, unit.text),
+        None => number.digits.clone(),
+    }
+}
+
+/// A text literal that reads back to `value`.
+pub fn quoted(value: &str) -> String {
+    let mut out = String::from("\"");
+    for character in value.chars() {
+        match character {
+            '"' => out.push_str("\\\""),
+            '\\' => out.push_str("\\\\"),
+            '\n' => out.push_str("\\n"),
+            '\t' => out.push_str("\\t"),
+            // Whatever could change how the line looks is spelt out.
+            '\u{200e}' | '\u{200f}' | '\u{061c}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}' => {
+                out.push_str(&format!("\\u{{{:x}}}", u32::from(character)));
+            }
+            _ if character.is_control() => out.push_str(&format!("\\u{{{:x}}}", u32::from(character))),
+            _ => out.push(character),
+        }
+    }
+    out.push('"');
+    out
+}
+
+/// Whether the text of the expression begins with a minus, which would continue the line before it.
+pub fn begins_with_minus(expr: &Expr) -> bool {
+    match &expr.kind {
+        ExprKind::Unary { op: UnaryOp::Negate, .. } => true,
+        ExprKind::Binary { op, left, .. } => binding(left) >= strength(*op) && begins_with_minus(left),
+        ExprKind::Range { low, .. } => begins_with_minus(low),
+        _ => false,
+    }
+}
+
+/// An expression where the line before it could be continued by a minus.
+pub fn expression_on_new_line(expr: &Expr) -> Layout {
+    if begins_with_minus(expr) { within(expr, BASE) } else { expression(expr) }
+}

@@ -1,0 +1,266 @@
+//! One pass over a text before the grammar sees it: comments, brackets, and characters that have
+//! no business there.
+//!
+//! The grammar recurses only through brackets, so their depth, which is measured here, bounds its
+//! stack whatever the input. Texts and comments are skipped by the same rules as in `ava.pest`.
+
+use crate::syntax::DEPTH_MAX;
+use crate::syntax::Diagnostic;
+use crate::syntax::ast::FileId;
+use crate::syntax::ast::Span;
+use crate::syntax::code;
+
+/// A `//` comment, markers included, up to but without the line break.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Comment {
+    pub start: usize,
+    pub end: usize,
+    /// Whether nothing but blanks stands before it on its line.
+    pub own_line: bool,
+}
+
+impl Comment {
+    /// `///` on a line of its own; `////` is a plain comment.
+    pub fn is_item_doc(&self, text: &str) -> bool {
+        let comment = &text[self.start..self.end];
+        self.own_line && comment.starts_with("///") && !comment.starts_with("////")
+    }
+
+    /// `//!` on a line of its own.
+    pub fn is_file_doc(&self, text: &str) -> bool {
+        self.own_line && text[self.start..self.end].starts_with("//!")
+    }
+}
+
+/// What one pass finds.
+#[derive(Debug, Default)]
+pub struct Scan {
+    /// In the order of the text.
+    pub comments: Vec<Comment>,
+    /// Openers that are never closed, in the order of the text.
+    pub unclosed: Vec<Span>,
+    /// Mistakes that are certain without a grammar, in the order of the text.
+    pub problems: Vec<Diagnostic>,
+    /// Whether some bracket is deeper than [`DEPTH_MAX`]: the grammar must not see the text.
+    pub too_deep: bool,
+}
+
+/// Scans a whole text. Linear in its length.
+pub fn scan(file: FileId, text: &str) -> Scan {
+    let mut scanner =
+        Scanner { file, text, at: 0, line_blank: true, open: Vec::new(), found: Scan::default() };
+    while scanner.at < text.len() {
+        scanner.step();
+    }
+    let Scanner { open, mut found, .. } = scanner;
+    found.unclosed.extend(open.into_iter().map(|(_, span)| span));
+    found.unclosed.sort_unstable();
+    found
+}
+
+struct Scanner<'a> {
+    file: FileId,
+    text: &'a str,
+    at: usize,
+    /// Whether the line has held nothing but blanks so far.
+    line_blank: bool,
+    open: Vec<(char, Span)>,
+    found: Scan,
+}
+
+impl Scanner<'_> {
+    fn step(&mut self) {
+        let rest = &self.text[self.at..];
+        let next = rest.chars().next().expect("the scanner stands before the end");
+        let start = self.at;
+        match next {
+            '\n' => {
+                self.line_blank = true;
+                self.at += 1;
+                return;
+            }
+            ' ' | '\t' | '\r' => {
+                self.at += 1;
+                return;
+            }
+            // A byte order mark is harmless at the very beginning.
+            '\u{feff}' if start == 0 => {
+                self.at += next.len_utf8();
+                return;
+            }
+            '/' if rest.starts_with("//") => {
+                self.comment();
+                return;
+            }
+            '"' => self.quoted(),
+            '(' | '[' | '{' => {
+                self.at += 1;
+                self.opens(next, self.span(start));
+            }
+            ')' | ']' | '}' => {
+                self.at += 1;
+                self.closes(next);
+            }
+            _ if next.is_ascii() && !next.is_ascii_control() => self.at += 1,
+            _ => self.invalid(),
+        }
+        self.line_blank = false;
+    }
+
+    fn span(&self, start: usize) -> Span {
+        Span::new(self.file, start, self.at)
+    }
+
+    fn comment(&mut self) {
+        let start = self.at;
+        self.at = self.text[start..].find('\n').map_or(self.text.len(), |newline| start + newline);
+        let end = start + self.text[start..self.at].trim_end().len();
+        self.found.comments.push(Comment { start, end, own_line: self.line_blank });
+        self.hidden_characters(start);
+    }
+
+    fn quoted(&mut self) {
+        let start = self.at;
+        let mut escaped = false;
+        for (offset, character) in self.text[start + 1..].char_indices() {
+            match character {
+                '\n' => {
+                    self.at = start + 1 + offset;
+                    return self.unclosed_text(start);
+                }
+                '"' if !escaped => {
+                    self.at = start + 1 + offset + 1;
+                    return self.hidden_characters(start);
+                }
+                _ => escaped = character == '\\' && !escaped,
+            }
+        }
+        self.at = self.text.len();
+        self.unclosed_text(start);
+    }
+
+    fn unclosed_text(&mut self, start: usize) {
+        let span = Span::new(self.file, start, start + self.text[start..self.at].trim_end().len());
+        self.found.problems.push(
+            Diagnostic::error(code::TEXT, "text without a closing `\"`")
+                .at(span, "begins here and must end on the same line"),
+        );
+    }
+
+    fn opens(&mut self, bracket: char, span: Span) {
+        self.open.push((bracket, span));
+        if self.open.len() > DEPTH_MAX && !self.found.too_deep {
+            self.found.too_deep = true;
+            self.found.problems.push(
+                Diagnostic::error(code::DEPTH, format!("nested deeper than {DEPTH_MAX} brackets"))
+                    .at(span, "one too many")
+                    .help("give a part of it a name, with `let` or `fn`"),
+            );
+        }
+    }
+
+    /// A closer that fits an open bracket closes it and what was forgotten inside it; one that fits
+    /// none is left to the grammar.
+    fn closes(&mut self, bracket: char) {
+        let opener = match bracket {
+            ')' => '(',
+            ']' => '[',
+            _ => '{',
+        };
+        // Only the innermost few are looked at, so that hostile input stays linear.
+        let innermost = self.open.iter().rev().take(DEPTH_MAX);
+        if let Some(back) = innermost.map(|(open, _)| *open).position(|open| open == opener) {
+            let keep = self.open.len() - 1 - back;
+            let forgotten = self.open.drain(keep..).skip(1).map(|(_, span)| span);
+            self.found.unclosed.extend(forgotten);
+        }
+    }
+
+    /// Characters that make a text look like what it is not: bidirectional overrides and the like.
+    fn hidden_characters(&mut self, start: usize) {
+        for (offset, character) in self.text[start..self.at].char_indices() {
+            if is_bidi(character) {
+                let at = start + offset;
+                let span = Span::new(self.file, at, at + character.len_utf8());
+                self.found.problems.push(bidi(character, span));
+            }
+        }
+    }
+
+    /// A run of characters that mean nothing outside comments and texts.
+    fn invalid(&mut self) {
+        let start = self.at;
+        let rest = &self.text[start..];
+        let first = rest.chars().next().expect("the caller has seen it");
+        if is_bidi(first) {
+            self.at += first.len_utf8();
+            let problem = bidi(first, self.span(start));
+            self.found.problems.push(problem);
+            return;
+        }
+        let meant = meant(first);
+        let run = |character: &char| {
+            !is_bidi(*character)
+                && (!character.is_ascii() || character.is_ascii_control())
+                && !matches!(character, '\n' | '\t' | '\r')
+        };
+        // A sign with a known counterpart stands alone, so that the advice fits it.
+        let taken = if meant.is_some() { 1 } else { usize::MAX };
+        self.at += rest.chars().take_while(run).take(taken).map(char::len_utf8).sum::<usize>();
+        let span = self.span(start);
+        let what = if self.text[start..self.at].chars().any(char::is_control) {
+            format!("control character U+{:04X}", u32::from(first))
+        } else {
+            format!("`{}` has no meaning here", &self.text[start..self.at])
+        };
+        let problem = Diagnostic::error(code::CHARACTER, what)
+            .at(span, format!("U+{:04X}", u32::from(first)))
+            .note("names are made of ASCII letters, digits and `_`; comments and texts may hold anything");
+        let problem = match meant {
+            Some(meant) => problem.help(format!("write `{meant}`")),
+            None => problem,
+        };
+        self.found.problems.push(problem);
+    }
+}
+
+fn is_bidi(character: char) -> bool {
+    matches!(character, '\u{200e}' | '\u{200f}' | '\u{061c}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
+}
+
+fn bidi(character: char, span: Span) -> Diagnostic {
+    let code_point = u32::from(character);
+    Diagnostic::error(
+        code::BIDI,
+        format!("invisible character U+{code_point:04X} reverses the text around it"),
+    )
+    .at(span, "")
+    .note("what such a line shows is not what it says")
+    .help("delete the character")
+}
+
+/// What an author meant by a sign that a word processor made prettier.
+fn meant(character: char) -> Option<&'static str> {
+    Some(match character {
+        '“' | '”' | '„' | '«' | '»' => "\"",
+        '–' | '—' | '−' | '‐' | '‑' => "-",
+        '×' | '·' => "*",
+        '÷' => "/",
+        '≤' => "<=",
+        '≥' => ">=",
+        '≠' => "!=",
+        '→' => "->",
+        '⇒' => "=>",
+        '…' => "..",
+        '¬' => "not",
+        '∧' => "and",
+        '∨' => "or",
+        '∈' => "in",
+        '²' => "^2",
+        '°' => "deg",
+        '\u{a0}' => " ",
+        '；' | '，' => ",",
+        '：' => ":",
+        _ => return None,
+    })
+}

@@ -1,0 +1,388 @@
+//! Mistakes, hostile inputs and round trips: what the parser says, that it always says something,
+//! and that the printer loses nothing.
+
+use proptest::prelude::*;
+
+use crate::syntax::DEPTH_MAX;
+use crate::syntax::FormatError;
+use crate::syntax::Sources;
+use crate::syntax::Style;
+use crate::syntax::ast::Arg;
+use crate::syntax::ast::Arm;
+use crate::syntax::ast::BinaryOp;
+use crate::syntax::ast::Call;
+use crate::syntax::ast::Case;
+use crate::syntax::ast::Expr;
+use crate::syntax::ast::ExprKind;
+use crate::syntax::ast::Field;
+use crate::syntax::ast::File;
+use crate::syntax::ast::FileId;
+use crate::syntax::ast::Item;
+use crate::syntax::ast::ItemKind;
+use crate::syntax::ast::Let;
+use crate::syntax::ast::Name;
+use crate::syntax::ast::Number;
+use crate::syntax::ast::Scenario;
+use crate::syntax::ast::Span;
+use crate::syntax::ast::Step;
+use crate::syntax::ast::Text;
+use crate::syntax::ast::UnaryOp;
+use crate::syntax::ast::Verdict;
+use crate::syntax::format;
+use crate::syntax::parse;
+use crate::syntax::print;
+use crate::syntax::render;
+use crate::syntax::same_meaning;
+
+const AVASTRA: &str = include_str!("../../scenarios/avastra45.ava");
+const DEEP_COLLISION: &str = include_str!("../../scenarios/deepcollision52.ava");
+const ROADS: &str = include_str!("../../scenarios/roads.ava");
+
+const EMITTED: &str = r#"//! Emitted by `avastra run`; replay with `avastra replay FILE`.
+language 1
+use "../avastra45.ava" digest "sha256:9c1f04d2"
+
+/// BoxTruck cuts in from the left at night, in heavy rain, 20.6 m ahead.
+scenario corner_0007 {
+  origin { seed: 7, episode: 412, policy: "corner_v3", ads: "modular", engine: "plane/1" }
+  road: corner
+  start { time: Noon, sky: { Rain: High, Fog: None } }
+  steps {
+    0: set_time(to: Night)
+    1: rain(how: High) // wets the road
+    2: drive_ahead(lane: Left, mode: Near, then: Change) with {
+      vehicle: BoxTruck
+      colour: Red
+      speed: 11.25 m/s
+      distance: 20.625 m
+    }
+  }
+  expect collision with npc#2 at 14.22 s
+  expect avoidable by [cc, fsm]
+  expect cause == perception
+  expect proc == [0.0, 0.12, 1.0]
+  expect minimal
+  expect trace == "sha256:77aa"
+}
+
+policy corner_v3 {
+  origin { seed: 3, episodes: 750, roads: [corner], kept: 612, agent: "ddqn" }
+  net { inputs: features_v1, layers: [26, 256, 256, 45], weights: "corner_v3.f32" }
+  claims { fidelity: 0.913, regret: 0.021, return: 0.97, states: 20000 }
+  rules {
+    when dist_nearest <= 14.5 m and time == Night => drive_ahead(Left, Near, Change) // 3120 states
+    when ego_speed > 8.25 m/s and sky[Rain] < High => rain(High)
+    _ => pedestrian(Right)
+  }
+}
+"#;
+
+fn tree(text: &str) -> File {
+    let (tree, found) = parse(FileId(0), text);
+    assert!(found.is_empty(), "{}", rendered(text));
+    tree
+}
+
+fn rendered(text: &str) -> String {
+    let mut sources = Sources::new();
+    let file = sources.add("a.ava", text);
+    let (_, found) = parse(file, text);
+    let drawn = found.iter().map(|diagnostic| render(diagnostic, &sources, Style::Plain));
+    drawn.collect::<Vec<_>>().join("\n\n")
+}
+
+/// The codes of the mistakes in a text with its lines, for example `AV0001:2`.
+fn codes(text: &str) -> Vec<String> {
+    let mut sources = Sources::new();
+    let file = sources.add("a.ava", text);
+    let (_, found) = parse(file, text);
+    let code = |place: Option<Span>| place.map_or(0, |place| sources.line_column(file, place.start).0);
+    found.iter().map(|diagnostic| format!("{}:{}", diagnostic.code, code(diagnostic.place()))).collect()
+}
+
+#[test]
+fn our_own_files_are_sound_and_formatted() {
+    for text in [AVASTRA, DEEP_COLLISION, ROADS, EMITTED] {
+        assert_eq!(rendered(text), "");
+        assert_eq!(format(FileId(0), text).unwrap(), text);
+        assert!(same_meaning(&tree(&print(&tree(text))), &tree(text)));
+    }
+}
+
+#[test]
+fn independent_mistakes_are_reported_apart() {
+    let text = "language 1\nlet x 1\nacton a() {}\nrule r on a, b speed <= 3\nlet ok = 1\n";
+    assert_eq!(codes(text), ["AV0001:2", "AV0002:3", "AV0001:4"]);
+    let (tree, _) = parse(FileId(0), text);
+    assert_eq!(tree.items.len(), 2, "what can be read is kept");
+}
+
+#[test]
+fn a_missing_end_is_reported_where_it_is_missing() {
+    assert_eq!(
+        codes("language 1\nlet x = a +\n\nlet y = ((1)\nlet z = f(1 2)\n"),
+        ["AV0001:2", "AV0004:4", "AV0001:5"]
+    );
+    assert_eq!(codes("language 1\naction a() {\n  set x = 1\n\nlet y = 2\n"), ["AV0004:2"]);
+    assert_eq!(codes("language 1\nenum E =\nenum F = A < B | C\n"), ["AV0001:2", "AV0001:3"]);
+}
+
+#[test]
+fn each_mistake_has_its_code() {
+    let cases = [
+        ("", "AV0005:1"),
+        ("// nothing\n", "AV0005:2"),
+        ("let x = 1\n", "AV0005:1"),
+        ("let x = 1\nlanguage 1\n", "AV0005:2"),
+        ("language 1\nlanguage 1\n", "AV0005:2"),
+        ("language 2\nfrobnicate {{{\n", "AV0006:1"),
+        ("language 1\nlet x = \"abc\n", "AV0009:2"),
+        ("language 1\nlet x = \"a\\q\"\n", "AV0009:2"),
+        ("language 1\nlet x = 2 ≤ 3\n", "AV0008:2"),
+        ("language 1\n// \u{202e}\n", "AV0007:2"),
+        ("language 1\nlet x = 1 < 2 < 3\n", "AV0010:2"),
+        ("language 1\nrule m on a, b { A -> B }\n", "AV0011:2"),
+        ("language 1\nlet let = 1\n", "AV0001:2"),
+    ];
+    for (text, code) in cases {
+        assert_eq!(codes(text), [code], "{text}");
+    }
+}
+
+#[test]
+fn depth_is_bounded_alike_everywhere() {
+    let nested = |depth: usize| format!("language 1\nlet x = {}1{}\n", "(".repeat(depth), ")".repeat(depth));
+    assert!(codes(&nested(DEPTH_MAX)).is_empty());
+    assert_eq!(codes(&nested(DEPTH_MAX + 1)), ["AV0003:2"]);
+    for text in [
+        nested(100_000),
+        format!("language 1\nlet x = {}1\n", "- ".repeat(100_000)),
+        format!("language 1\nlet x = {}1\n", "not ".repeat(100_000)),
+        format!("language 1\nlet x = 1{}\n", " + 1".repeat(100_000)),
+        format!("language 1\nlet x = 1{}\n", " implies 1".repeat(100_000)),
+        format!("language 1\nlet x = a{}\n", ".a".repeat(100_000)),
+        format!("language 1\nlet x = a{}\n", "[a]".repeat(100_000)),
+    ] {
+        assert_eq!(codes(&text), ["AV0003:2"]);
+    }
+    let opened = format!("language 1\nlet x = {}", "f([{a: ".repeat(100_000));
+    assert_eq!(codes(&opened), ["AV0003:2"]);
+    let unfinished = format!("language 1\nlet x = {}", "f({a: -(".repeat(21));
+    assert_eq!(codes(&unfinished), ["AV0004:2"]);
+    // The deepest that is allowed, with everything in it, must fit the stack of a thread.
+    let mixed = format!("language 1\nlet x = {}1{}\n", "f({a: -(".repeat(21), ")})".repeat(21));
+    assert!(codes(&mixed).is_empty());
+    assert!(format(FileId(0), &mixed).is_ok());
+}
+
+#[test]
+fn long_lines_and_many_mistakes_are_no_trouble() {
+    let long = format!("language 1\nlet x = \"{}\"\n", "x".repeat(1 << 20));
+    assert!(codes(&long).is_empty());
+    let wrong = format!("language 1\nlet x = {}\n", "x ".repeat(1 << 19));
+    assert_eq!(codes(&wrong), ["AV0001:2"]);
+    assert!(!rendered(&wrong).is_empty());
+    let odd = format!("language 1\n{}", "let ( = } \u{e9}\nlet x = (\n".repeat(20_000));
+    assert_eq!(codes(&odd).len(), 100);
+    let many = format!("language 1\n{}", "lett x = 1\n".repeat(20_000));
+    assert_eq!(codes(&many).len(), 100);
+}
+
+#[test]
+fn every_prefix_of_a_file_is_read_to_its_end() {
+    for text in [AVASTRA, EMITTED] {
+        for (end, _) in text.char_indices() {
+            let (_, found) = parse(FileId(0), &text[..end]);
+            assert!(found.len() <= 2, "{}", rendered(&text[..end]));
+        }
+    }
+}
+
+#[test]
+fn comments_stay_with_their_neighbours() {
+    let text = "// licence\n\n\n//! file\nlanguage 1 // one\n\n\n// about e\n/// doc of e\nenum E = A // a\n | B // b\naction a( // head\n  each x: E, // x\n  // y\n) { // body\n  set t = x // set\n  // last\n} // end\nlet y = [ // list\n 1, // first\n 2 ]\nreward { a => 1 // ra\n  (-b) => 2 /// rb\n}\n/// dangling\n";
+    let once = format(FileId(0), text).unwrap();
+    for word in [
+        "licence", "one", "about e", "// a\n", "// b\n", "head", "// x", "// y", "body", "set\n", "last",
+        "end", "list", "first", "ra", "rb", "dangling",
+    ] {
+        assert!(once.contains(word), "`{word}` lost in\n{once}");
+    }
+    assert_eq!(format(FileId(0), &once).unwrap(), once);
+}
+
+#[test]
+fn names_may_be_annotated_one_by_one() {
+    let text = "language 1\nenum E =\n  /// first\n  A // a\n  // second\n  | B\ngroup g =\n  a, // one\n  b // two\n";
+    assert_eq!(format(FileId(0), text).unwrap(), text);
+}
+
+#[test]
+fn foreign_line_ends_are_unified() {
+    let text = "//! a\r\nlanguage 1\r\n/// b\r\nlet x = 1 // c\r\n";
+    assert_eq!(format(FileId(0), text).unwrap(), text.replace('\r', ""));
+}
+
+#[test]
+fn what_has_mistakes_is_not_formatted() {
+    assert!(matches!(format(FileId(0), "language 1\nlet x\n"), Err(FormatError::Syntax(_))));
+}
+
+fn name() -> impl Strategy<Value = Name> {
+    prop_oneof![
+        "[a-zA-Z][a-z_0-9]{0,6}",
+        Just("lane".to_owned()),
+        Just("road".to_owned()),
+        Just("at".to_owned()),
+        Just("set".to_owned())
+    ]
+    .prop_filter("not a reserved word", |word| {
+        let text = format!("language 1\nlet {word} = {word}\n");
+        parse(FileId(0), &text).1.is_empty()
+    })
+    .prop_map(Name::built)
+}
+
+fn number() -> impl Strategy<Value = Number> {
+    let unit =
+        prop_oneof![Just(None), Just(Some("m")), Just(Some("m/s^2")), Just(Some("%")), Just(Some("e3"))];
+    ("[0-9]{1,3}(\\.[0-9]{1,3})?(e-[0-9])?", unit).prop_map(|(digits, unit)| Number {
+        digits,
+        unit: unit.map(Name::built),
+        span: Span::NONE,
+    })
+}
+
+fn expr() -> impl Strategy<Value = Expr> {
+    let leaf = prop_oneof![
+        number().prop_map(ExprKind::Number),
+        name().prop_map(|name| ExprKind::Name(name.text)),
+        any::<bool>().prop_map(ExprKind::Bool),
+        "\\PC{0,5}[\"\\\\\n\t]?".prop_map(ExprKind::Text),
+        (name(), 0..9u8).prop_map(|(name, number)| ExprKind::Numbered { name, number: number.to_string() }),
+        ("[0-9a-z]{0,3}", -3..3i8, number()).prop_map(|(road, lane, station)| ExprKind::LanePoint {
+            road: Text::new(road, Span::NONE),
+            lane: Name::built(lane.to_string()),
+            station,
+        }),
+    ];
+    leaf.prop_map(Expr::built).prop_recursive(4, 24, 3, |inner| {
+        let boxed = || inner.clone().prop_map(Box::new);
+        let entry = (name(), inner.clone()).prop_map(|(name, value)| Field { name, value, span: Span::NONE });
+        let arg = (proptest::option::of(name()), inner.clone()).prop_map(|(name, value)| Arg { name, value });
+        let arm = (prop::collection::vec(name(), 0..3), inner.clone()).prop_map(|(patterns, value)| Arm {
+            patterns,
+            value,
+            span: Span::NONE,
+        });
+        prop_oneof![
+            (any::<bool>(), boxed()).prop_map(|(not, operand)| ExprKind::Unary {
+                op: if not { UnaryOp::Not } else { UnaryOp::Negate },
+                operand
+            }),
+            (prop::sample::select(&BinaryOp::ALL[..]), boxed(), boxed())
+                .prop_map(|(op, left, right)| { ExprKind::Binary { op, op_span: Span::NONE, left, right } }),
+            (boxed(), boxed()).prop_map(|(low, high)| ExprKind::Range { low, high }),
+            (boxed(), name()).prop_map(|(base, field)| ExprKind::Field { base, field }),
+            (boxed(), boxed()).prop_map(|(base, index)| ExprKind::Index { base, index }),
+            prop::collection::vec(inner.clone(), 0..3).prop_map(ExprKind::List),
+            prop::collection::vec(entry, 0..3).prop_map(ExprKind::Record),
+            (name(), prop::collection::vec(arg, 0..3)).prop_map(|(name, args)| ExprKind::Call(Call {
+                name,
+                args,
+                span: Span::NONE
+            })),
+            (boxed(), prop::collection::vec(arm, 0..3))
+                .prop_map(|(subject, arms)| ExprKind::Match { subject, arms }),
+        ]
+        .prop_map(Expr::built)
+    })
+}
+
+fn item() -> impl Strategy<Value = ItemKind> {
+    let case = (proptest::option::of(expr()), expr()).prop_map(|(condition, value)| Case {
+        condition,
+        value,
+        span: Span::NONE,
+    });
+    let entry = || (name(), expr()).prop_map(|(name, value)| Field { name, value, span: Span::NONE });
+    let entries = || prop::collection::vec(entry(), 0..3);
+    let scenario =
+        (name(), name(), entries(), entries(), entries()).prop_map(|(name, road, origin, start, drawn)| {
+            let args =
+                start.iter().map(|entry| Arg { name: Some(entry.name.clone()), value: entry.value.clone() });
+            let action = Call { name: name.clone(), args: args.collect(), span: Span::NONE };
+            let number = Number { digits: "0".to_owned(), unit: None, span: Span::NONE };
+            let steps = vec![Step { number, action, drawn, span: Span::NONE }];
+            ItemKind::Scenario(Scenario { name, origin, road, start, steps, expects: Vec::new() })
+        });
+    prop_oneof![
+        (name(), expr()).prop_map(|(name, value)| ItemKind::Let(Let { name, value })),
+        (name(), expr()).prop_map(|(name, condition)| ItemKind::Verdict(Verdict { name, condition })),
+        prop::collection::vec(case, 0..4).prop_map(ItemKind::Reward),
+        entries().prop_map(ItemKind::Episode),
+        scenario,
+    ]
+}
+
+fn file_of(kinds: Vec<ItemKind>) -> File {
+    let version = Number { digits: "1".to_owned(), unit: None, span: Span::NONE };
+    let kinds = std::iter::once(ItemKind::Language(version)).chain(kinds);
+    let items = kinds.map(|kind| Item { docs: Vec::new(), kind, span: Span::NONE }).collect();
+    File { items, ..File::default() }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(192))]
+
+    #[test]
+    fn what_is_printed_reads_back(kinds in prop::collection::vec(item(), 0..4)) {
+        let built = file_of(kinds);
+        let text = print(&built);
+        let (read, found) = parse(FileId(0), &text);
+        prop_assert!(found.is_empty(), "{}\n{}", text, rendered(&text));
+        prop_assert!(same_meaning(&built, &read), "{}", text);
+        let formatted = format(FileId(0), &text).unwrap();
+        prop_assert_eq!(format(FileId(0), &formatted).unwrap(), formatted);
+    }
+
+    /// A comment wherever a blank is, however odd the place.
+    #[test]
+    fn comments_survive_anywhere(places in prop::collection::vec(0..4000usize, 1..6), which in 0..2usize) {
+        let mut text = [AVASTRA, EMITTED][which].to_owned();
+        for (count, place) in places.into_iter().enumerate() {
+            let blanks: Vec<usize> = text.match_indices([' ', '\n']).map(|(at, _)| at).collect();
+            let at = blanks[place % blanks.len()];
+            let mut changed = text.clone();
+            changed.insert_str(at, &format!(" // note {count}\n"));
+            // Inside a text, a documentation line or between a number and its unit it says something else.
+            let (tree, found) = parse(FileId(0), &changed);
+            let (before, _) = parse(FileId(0), &text);
+            if found.is_empty() && same_meaning(&tree, &before) {
+                text = changed;
+            }
+        }
+        let once = format(FileId(0), &text).unwrap();
+        prop_assert_eq!(format(FileId(0), &once).unwrap(), once);
+    }
+
+    #[test]
+    fn any_bytes_are_read_to_their_end(bytes in prop::collection::vec(any::<u8>(), 0..400)) {
+        let text = String::from_utf8_lossy(&bytes);
+        rendered(&text);
+        rendered(&format!("language 1\n{text}"));
+    }
+
+    /// Words of the language in any order reach farther into the grammar than bytes do.
+    #[test]
+    fn any_words_are_read_to_their_end(words in prop::collection::vec(prop::sample::select(&WORDS[..]), 0..60)) {
+        rendered(&format!("language 1\n{}", words.join(" ")));
+        rendered(&words.join(""));
+    }
+}
+
+const WORDS: [&str; 40] = [
+    "action", "a", "(", ")", "{", "}", "[", "]", ":", ",", "=", "==", "=>", "->", "|", "<", "..", "-", "+",
+    "not", "and", "implies", "in", "match", "_", "each", "any", "set", "spawn", "ahead", "rule", "on", "12",
+    "m", "\"t\"", "\n", "\nlet", "// c\n", "lane", "scenario",
+];
