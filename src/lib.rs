@@ -9,3 +9,4 @@ pub mod rng;
 pub mod geometry;
 pub mod road;
 pub mod syntax;
+pub mod model;

@@ -1,0 +1,234 @@
+//! The checker: declarations in, a sound [`Space`] or diagnostics out.
+//!
+//! It goes on after a mistake, so that one run shows them all: what is broken becomes `None`, and
+//! whatever depends on it stays silent.
+
+mod action;
+mod declaration;
+mod expect;
+mod expression;
+mod names;
+mod road;
+mod rule;
+mod scenario;
+mod scenario_value;
+mod settings;
+
+pub(super) use road::Maps;
+pub use scenario::scenario;
+
+use std::path::PathBuf;
+
+use crate::model::check::names::Names;
+use crate::model::code;
+use crate::model::enclose::Known;
+use crate::model::enclose::Values;
+use crate::model::enclose::enclose;
+use crate::model::expr::Expr;
+use crate::model::expr::ExprKind;
+use crate::model::limits;
+use crate::model::reach;
+use crate::model::space::ActionDef;
+use crate::model::space::EnumDef;
+use crate::model::space::FnDef;
+use crate::model::space::GroupDef;
+use crate::model::space::Space;
+use crate::model::space::StateDef;
+use crate::model::value::EnumIndex;
+use crate::model::value::Type;
+use crate::model::value::Value;
+use crate::syntax::Diagnostic;
+use crate::syntax::ast;
+use crate::syntax::ast::ItemKind;
+use crate::syntax::ast::Span;
+use crate::units::Rational;
+
+/// Where the parameters, the result and the header of a function are.
+type Signature = (Vec<(String, Type)>, Type, Span);
+
+/// What is known so far.
+#[derive(Default)]
+pub(super) struct Checker {
+    diagnostics: Vec<Diagnostic>,
+    enum_names: Names,
+    enums: Vec<EnumDef>,
+    states: Vec<StateDef>,
+    /// Constants are folded: each is a literal. `None` is one that is broken.
+    constants: Vec<(String, Option<Expr>)>,
+    function_names: Names,
+    /// `None` is a function with a broken header.
+    signatures: Vec<Option<Signature>>,
+    functions: Vec<FnDef>,
+    action_names: Names,
+    actions: Vec<Option<ActionDef>>,
+    groups: Vec<GroupDef>,
+    /// Number of rows of each action, where its axes are sound.
+    row_counts: Vec<Option<u64>>,
+}
+
+/// What the reader of files knows about the root of a space.
+pub(super) struct Root {
+    pub path: PathBuf,
+    pub digest: String,
+    pub docs: Vec<String>,
+}
+
+/// Checks the declarations of a space: those of all its files, imports first.
+pub(super) fn space(
+    root: Root,
+    items: &[&ast::Item],
+    maps: &mut dyn Maps,
+) -> (Option<Space>, Vec<Diagnostic>) {
+    let mut checker = Checker::default();
+    checker.declare_enums(items);
+    checker.declare_constants(items);
+    checker.declare_functions(items);
+    checker.declare_states(items);
+    checker.declare_actions(items);
+    checker.declare_groups(items);
+    let rules = checker.rules(items);
+    let reward = checker.reward(items);
+    let verdicts = checker.verdicts(items);
+    let (episode, road_names) = checker.episode(items);
+    let roads = checker.roads(items, road_names, maps);
+    checker.count_rows();
+
+    // What was broken is missing, and indices would be off: without errors nothing is missing.
+    if checker.has_errors() {
+        checker.look_at_expects(items);
+        return (None, checker.finish());
+    }
+    let mut space = Space {
+        path: root.path,
+        digest: root.digest,
+        docs: root.docs,
+        enums: core::mem::take(&mut checker.enums),
+        states: core::mem::take(&mut checker.states),
+        functions: core::mem::take(&mut checker.functions),
+        actions: core::mem::take(&mut checker.actions).into_iter().flatten().collect(),
+        groups: core::mem::take(&mut checker.groups),
+        rules,
+        episode,
+        reward,
+        verdicts,
+        expects: Vec::new(),
+        roads,
+        rows: Vec::new(),
+    };
+    space.rows = reach::rows(&space);
+    checker.diagnostics.extend(reach::report(&space));
+    checker.diagnostics.extend(limits::report(&space));
+    space.expects = checker.expects(items, &space);
+    let sound = !checker.has_errors();
+    (sound.then_some(space), checker.finish())
+}
+
+impl Checker {
+    fn report(&mut self, diagnostic: Diagnostic) {
+        self.diagnostics.push(diagnostic);
+    }
+
+    fn has_errors(&self) -> bool {
+        self.diagnostics.iter().any(Diagnostic::is_error)
+    }
+
+    /// The diagnostics in reading order; a rule over several actions says the same thing once.
+    fn finish(self) -> Vec<Diagnostic> {
+        let mut kept: Vec<Diagnostic> = Vec::new();
+        for diagnostic in self.diagnostics {
+            if !kept.contains(&diagnostic) {
+                kept.push(diagnostic);
+            }
+        }
+        kept.sort_by_key(Diagnostic::place);
+        kept
+    }
+
+    /// The type of that name.
+    fn named_type(&mut self, name: &ast::Name) -> Option<Type> {
+        let builtin = match name.text.as_str() {
+            "Bool" => Some(Type::Bool),
+            "Int" => Some(Type::Int),
+            other => crate::units::Dimension::from_name(other).map(Type::Quantity),
+        };
+        let found = builtin.or(self.enum_names.get(&name.text).map(|index| Type::Enum(EnumIndex(index))));
+        if found.is_none() {
+            let builtin = ["Bool", "Int", "Length", "Duration", "Speed", "Accel", "Angle", "Ratio"];
+            let error = names::unknown(
+                "type",
+                &name.text,
+                name.span,
+                builtin.into_iter().chain(self.enum_names.all()),
+            );
+            self.report(error);
+        }
+        found
+    }
+
+    fn plain_type(&mut self, ty: &ast::Type) -> Option<Type> {
+        match &ty.kind {
+            ast::TypeKind::Named(name) => self.named_type(name),
+            ast::TypeKind::Map { .. } => {
+                let error = Diagnostic::error(code::TYPE_MISMATCH, "only a state can be a map");
+                self.report(error.at(ty.span, "a map"));
+                None
+            }
+        }
+    }
+
+    /// The value of an expression that names nothing but constants, functions and literals.
+    fn fold(&mut self, expr: &Expr) -> Option<ExprKind> {
+        let calls = expr.any(|kind| matches!(kind, ExprKind::Call(..)));
+        if calls && self.functions.len() != self.signatures.len() {
+            // A broken function was reported where it stands.
+            return None;
+        }
+        let known = Known { functions: &self.functions, locals: &[], cells: &[], road: None };
+        let folded = match enclose(expr, &known) {
+            Values::Number(interval) => interval.single().map(ExprKind::Number),
+            Values::Variants(set) => match expr.ty {
+                Type::Enum(of) if set.is_power_of_two() => {
+                    Some(ExprKind::Variant(of, set.trailing_zeros() as usize))
+                }
+                _ => None,
+            },
+            Values::Truth { may_hold, may_fail } if may_hold != may_fail => Some(ExprKind::Bool(may_hold)),
+            Values::Truth { .. } => None,
+        };
+        if folded.is_none() {
+            let error = Diagnostic::error(code::NUMBER, "the value cannot be computed exactly");
+            self.report(error.at(expr.span, "too large, or a division by 0"));
+        }
+        folded
+    }
+
+    /// The same for a number.
+    fn fold_number(&mut self, expr: &Expr) -> Option<Rational> {
+        match self.fold(expr)? {
+            ExprKind::Number(value) => Some(value),
+            _ => None,
+        }
+    }
+}
+
+/// The literal as a value at run time.
+fn literal(kind: &ExprKind) -> Option<Value> {
+    match kind {
+        ExprKind::Bool(truth) => Some(Value::Bool(*truth)),
+        ExprKind::Number(number) => Some(Value::Number(number.to_f64())),
+        ExprKind::Variant(of, index) => Some(Value::Variant(*of, *index)),
+        _ => None,
+    }
+}
+
+/// The declarations of one kind, with their documentation.
+fn each<'a, T: 'a>(
+    items: &'a [&'a ast::Item],
+    pick: impl Fn(&'a ItemKind) -> Option<&'a T> + 'a,
+) -> impl Iterator<Item = (&'a ast::Item, &'a T)> {
+    items.iter().filter_map(move |item| pick(&item.kind).map(|found| (*item, found)))
+}
+
+fn docs(item: &ast::Item) -> Vec<String> {
+    item.docs.iter().map(|doc| doc.text.clone()).collect()
+}

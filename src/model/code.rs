@@ -1,0 +1,113 @@
+//! The codes of mistakes in meaning. Never reused, never renumbered.
+
+// Names and files.
+
+/// A name that is declared nowhere.
+pub const UNKNOWN: &str = "AV0101";
+/// Declared twice.
+pub const DUPLICATE: &str = "AV0102";
+/// A variant of several enums, and nothing tells which.
+pub const AMBIGUOUS: &str = "AV0103";
+/// Exists, but cannot be used in this place.
+pub const NOT_HERE: &str = "AV0104";
+/// Functions that call each other in a circle.
+pub const RECURSION: &str = "AV0105";
+/// A file that cannot be read, or a map that cannot be understood.
+pub const UNREADABLE: &str = "AV0106";
+/// A function that comes to too many operations.
+pub const TOO_LARGE: &str = "AV0107";
+/// A place that a map does not have, or no way between two.
+pub const NO_ROUTE: &str = "AV0108";
+/// Files that use each other in a circle.
+pub const IMPORT_CYCLE: &str = "AV0109";
+/// An imported file that is not the one that was meant.
+pub const DIGEST: &str = "AV0110";
+
+// Types and units.
+
+/// Two dimensions where one is needed.
+pub const UNIT_MISMATCH: &str = "AV0201";
+/// Two types where one is needed.
+pub const TYPE_MISMATCH: &str = "AV0202";
+/// No unit of that spelling.
+pub const UNKNOWN_UNIT: &str = "AV0203";
+/// `<` between things that have no order.
+pub const UNORDERED: &str = "AV0204";
+/// Cases that are not covered.
+pub const NOT_EXHAUSTIVE: &str = "AV0205";
+/// A case that never gets its turn.
+pub const NEVER_REACHED: &str = "AV0206";
+/// A number that cannot be held exactly.
+pub const NUMBER: &str = "AV0207";
+/// An enum with too many variants.
+pub const TOO_MANY_VARIANTS: &str = "AV0208";
+/// A setting out of its range.
+pub const SETTING: &str = "AV0209";
+/// An episode that is to stop for an unknown reason.
+pub const STOP: &str = "AV0210";
+/// Arguments that are too many or too few.
+pub const ARGUMENTS: &str = "AV0211";
+
+// Actions.
+
+/// A parameter without an end of values.
+pub const INFINITE: &str = "AV0301";
+/// A table that is too long to be made.
+pub const TOO_MANY_ROWS: &str = "AV0302";
+/// A range, a list or a `where` that leaves nothing.
+pub const EMPTY: &str = "AV0304";
+/// An action without an effect.
+pub const NO_EFFECT: &str = "AV0305";
+/// A field that is missing.
+pub const MISSING_FIELD: &str = "AV0306";
+/// An effect or a rule on a state that is not declared.
+pub const UNKNOWN_STATE: &str = "AV0307";
+/// A word that the engine does not know.
+pub const NOT_A_WORD: &str = "AV0308";
+/// A road user that cannot do what it is told.
+pub const IMPOSSIBLE_SPAWN: &str = "AV0309";
+/// A spawn whose speed or distance may lie out of bounds.
+pub const OUT_OF_BOUNDS: &str = "AV0310";
+
+// Rules.
+
+/// A row that can run on no road.
+pub const DEAD: &str = "AV0401";
+/// Rows that cannot run on some road.
+pub const MASKED: &str = "AV0402";
+/// A rule that names a parameter which its action lacks.
+pub const LACKING_PARAMETER: &str = "AV0405";
+/// A rule about spawns on an action that has none.
+pub const NO_SPAWN: &str = "AV0406";
+/// A rule that would never be enforced.
+pub const BINDS_NOTHING: &str = "AV0407";
+/// A value that a transition rule does not lead out of.
+pub const DEADLOCK: &str = "AV0501";
+/// A value that a transition rule does not lead to.
+pub const UNREACHABLE: &str = "AV0502";
+
+// Scenarios.
+
+/// A call that no row of the table answers to.
+pub const NO_SUCH_ROW: &str = "AV0601";
+/// Steps that are out of order.
+pub const STEP_ORDER: &str = "AV0602";
+/// A drawn value that is missing.
+pub const NOT_DRAWN: &str = "AV0603";
+/// A drawn value out of its range.
+pub const OUT_OF_RANGE: &str = "AV0604";
+/// A step that breaks a transition rule.
+pub const BROKEN_RULE: &str = "AV0605";
+/// A start that leaves a state open.
+pub const OPEN_START: &str = "AV0606";
+/// A claim that nobody can check.
+pub const UNKNOWN_CLAIM: &str = "AV0607";
+/// A file with no scenario, or with two.
+pub const ONE_SCENARIO: &str = "AV0608";
+
+// Static claims.
+
+/// A claim that is false.
+pub const FALSE_CLAIM: &str = "AV0801";
+/// A claim that cannot be made of a space.
+pub const NOT_STATIC: &str = "AV0802";

@@ -1,0 +1,188 @@
+//! The one evaluator of expressions: what a rule, a function or a verdict is worth in f64.
+//!
+//! Total: the checker has seen to names and types, functions cannot recurse, and a division by 0
+//! gives infinity or NaN, which satisfies no comparison but `!=`.
+
+use crate::model::expr::Arithmetic;
+use crate::model::expr::Comparison;
+use crate::model::expr::Expr;
+use crate::model::expr::ExprKind;
+use crate::model::expr::Fact;
+use crate::model::space::COUNTED;
+use crate::model::space::FnDef;
+use crate::model::space::RoadFacts;
+use crate::model::space::Space;
+use crate::model::space::WordExpr;
+use crate::model::value::Memory;
+use crate::model::value::Value;
+use crate::model::vocabulary::LaneChoice;
+
+/// Numbers that differ by less than this part of the larger one are `==`: it forgives the digits
+/// that a person rounds away, not a distance that anybody could measure.
+const EQUAL_PART: f64 = 1e-9;
+
+/// What an expression may look at. What its place in the file does not offer stays at the default.
+#[derive(Debug, Clone, Copy)]
+pub struct Facts<'a> {
+    /// The parameters of the action or function around it.
+    pub locals: &'a [Value],
+    pub memory: &'a Memory,
+    pub road: Option<&'a RoadFacts>,
+    /// `(spawn_gap, safety_gap)`, m.
+    pub gaps_m: (f64, f64),
+    pub outcome: OutcomeFacts,
+}
+
+/// What verdicts and rewards may look at.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct OutcomeFacts {
+    /// The ego vehicle touched something.
+    pub collision: bool,
+    /// It had touched the same thing before.
+    pub repeated: bool,
+    /// The thing appeared too late for anybody.
+    pub sudden: bool,
+    /// The thing ran into the ego vehicle's side or rear.
+    pub struck: bool,
+    /// Collision probability of the step, in `[0, 1]`.
+    pub proc: f64,
+}
+
+impl<'a> Facts<'a> {
+    pub fn new(locals: &'a [Value], memory: &'a Memory) -> Facts<'a> {
+        let outcome = OutcomeFacts::default();
+        Facts { locals, memory, road: None, gaps_m: (f64::NAN, f64::NAN), outcome }
+    }
+}
+
+/// The value of an expression.
+pub fn evaluate(expr: &Expr, functions: &[FnDef], facts: &Facts<'_>) -> Value {
+    let value = |expr: &Expr| evaluate(expr, functions, facts);
+    match &expr.kind {
+        ExprKind::Bool(truth) => Value::Bool(*truth),
+        ExprKind::Number(number) => Value::Number(number.to_f64()),
+        ExprKind::Variant(of, index) => Value::Variant(*of, *index),
+        ExprKind::Local(index) => facts.locals[*index],
+        ExprKind::Cell(cell) => facts.memory.cells[*cell],
+        ExprKind::CellAt(first, key) => facts.memory.cells[first + value(key).variant()],
+        ExprKind::Fact(fact) => fact_value(*fact, facts),
+        ExprKind::Call(function, arguments) => {
+            let locals: Vec<Value> = arguments.iter().map(value).collect();
+            evaluate(&functions[*function].body, functions, &Facts { locals: &locals, ..*facts })
+        }
+        ExprKind::Not(inner) => Value::Bool(!value(inner).truth()),
+        ExprKind::Negate(inner) => Value::Number(-value(inner).number()),
+        ExprKind::Arithmetic(op, left, right) => {
+            Value::Number(arithmetic(*op, value(left).number(), value(right).number()))
+        }
+        ExprKind::Compare(op, left, right) => Value::Bool(compare(*op, value(left), value(right))),
+        ExprKind::And(left, right) => Value::Bool(value(left).truth() && value(right).truth()),
+        ExprKind::Or(left, right) => Value::Bool(value(left).truth() || value(right).truth()),
+        ExprKind::Implies(left, right) => Value::Bool(!value(left).truth() || value(right).truth()),
+        ExprKind::InRange(inner, low, high) => {
+            let inner = value(inner);
+            let above = compare(Comparison::GreaterEqual, inner, value(low));
+            Value::Bool(above && compare(Comparison::LessEqual, inner, value(high)))
+        }
+        ExprKind::InList(inner, list) => {
+            let inner = value(inner);
+            Value::Bool(list.iter().any(|item| compare(Comparison::Equal, inner, value(item))))
+        }
+        ExprKind::InLanes(inner, lanes) => Value::Bool(has_lane(facts, lanes[value(inner).variant()])),
+        ExprKind::Match { subject, arm_of, arms } => value(&arms[arm_of[value(subject).variant()]]),
+    }
+}
+
+fn fact_value(fact: Fact, facts: &Facts<'_>) -> Value {
+    match fact {
+        Fact::RoadLimit => Value::Number(facts.road.map_or(f64::NAN, |road| road.limit_mps)),
+        Fact::SpawnGap => Value::Number(facts.gaps_m.0),
+        Fact::SafetyGap => Value::Number(facts.gaps_m.1),
+        Fact::Proc => Value::Number(facts.outcome.proc),
+        Fact::Collision => Value::Bool(facts.outcome.collision),
+        Fact::Repeated => Value::Bool(facts.outcome.repeated),
+        Fact::Sudden => Value::Bool(facts.outcome.sudden),
+        Fact::Struck => Value::Bool(facts.outcome.struck),
+    }
+}
+
+fn has_lane(facts: &Facts<'_>, lane: LaneChoice) -> bool {
+    facts.road.is_some_and(|road| road.has_lane(lane))
+}
+
+fn arithmetic(op: Arithmetic, left: f64, right: f64) -> f64 {
+    match op {
+        Arithmetic::Add => left + right,
+        Arithmetic::Subtract => left - right,
+        Arithmetic::Multiply => left * right,
+        Arithmetic::Divide => left / right,
+    }
+}
+
+/// Numbers by size, variants by position, truth values by equality.
+pub(crate) fn compare(op: Comparison, left: Value, right: Value) -> bool {
+    match (left, right) {
+        (Value::Number(left), Value::Number(right)) => compare_numbers(op, left, right),
+        (Value::Variant(_, left), Value::Variant(_, right)) => compare_positions(op, left, right),
+        (left, right) => compare_positions(op, usize::from(left.truth()), usize::from(right.truth())),
+    }
+}
+
+fn compare_numbers(op: Comparison, left: f64, right: f64) -> bool {
+    let equal = (left - right).abs() <= EQUAL_PART * left.abs().max(right.abs()) || left == right;
+    match op {
+        Comparison::Equal => equal,
+        Comparison::NotEqual => !equal,
+        Comparison::Less => left < right,
+        Comparison::LessEqual => left <= right,
+        Comparison::Greater => left > right,
+        Comparison::GreaterEqual => left >= right,
+    }
+}
+
+fn compare_positions(op: Comparison, left: usize, right: usize) -> bool {
+    match op {
+        Comparison::Equal => left == right,
+        Comparison::NotEqual => left != right,
+        Comparison::Less => left < right,
+        Comparison::LessEqual => left <= right,
+        Comparison::Greater => left > right,
+        Comparison::GreaterEqual => left >= right,
+    }
+}
+
+impl<W: Copy> WordExpr<W> {
+    /// The word that the expression comes to.
+    pub fn word(&self, functions: &[FnDef], facts: &Facts<'_>) -> W {
+        match self {
+            WordExpr::Fixed(word) => *word,
+            WordExpr::Of(expr, words) => words[evaluate(expr, functions, facts).variant()],
+        }
+    }
+}
+
+impl Space {
+    /// Reward of a step: the value of the first case that applies; 0 if none does.
+    pub fn reward(&self, outcome: OutcomeFacts) -> f64 {
+        let memory = Memory::default();
+        let facts = Facts { outcome, ..Facts::new(&[], &memory) };
+        let applies = |condition: &Option<Expr>| {
+            condition.as_ref().is_none_or(|c| evaluate(c, &self.functions, &facts).truth())
+        };
+        let case = self.reward.iter().find(|case| applies(&case.condition));
+        case.map_or(0.0, |case| evaluate(&case.value, &self.functions, &facts).number())
+    }
+
+    /// Whether a collision passes the verdict of that name; `None` if there is no such verdict.
+    pub fn verdict(&self, name: &str, outcome: OutcomeFacts) -> Option<bool> {
+        let memory = Memory::default();
+        let facts = Facts { outcome, ..Facts::new(&[], &memory) };
+        let verdict = self.verdicts.iter().find(|verdict| verdict.name == name)?;
+        Some(evaluate(&verdict.condition, &self.functions, &facts).truth())
+    }
+
+    /// Whether a collision counts: the verdict [`COUNTED`].
+    pub fn counts(&self, outcome: OutcomeFacts) -> bool {
+        self.verdict(COUNTED, outcome).expect("the checker adds the verdict where the author has none")
+    }
+}

@@ -1,0 +1,172 @@
+//! Typed expressions: names are resolved, units are gone (all numbers are SI), every type fits.
+
+use crate::model::value::EnumIndex;
+use crate::model::value::Type;
+use crate::model::vocabulary::LaneChoice;
+use crate::syntax::ast::Span;
+use crate::units::Rational;
+
+/// An expression with its type and the place where it was written.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Expr {
+    pub kind: ExprKind,
+    pub ty: Type,
+    pub span: Span,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub enum ExprKind {
+    Bool(bool),
+    Number(Rational),
+    Variant(EnumIndex, usize),
+    /// A parameter of the function or action around it, by position.
+    Local(usize),
+    /// A cell of the memory that is known by position.
+    Cell(usize),
+    /// A map in the memory: its first cell and the key.
+    CellAt(usize, Box<Expr>),
+    Fact(Fact),
+    /// A function by its index in `Space::functions`.
+    Call(usize, Vec<Expr>),
+    Not(Box<Expr>),
+    Negate(Box<Expr>),
+    Arithmetic(Arithmetic, Box<Expr>, Box<Expr>),
+    /// Numbers, or variants of one ordered enum.
+    Compare(Comparison, Box<Expr>, Box<Expr>),
+    And(Box<Expr>, Box<Expr>),
+    Or(Box<Expr>, Box<Expr>),
+    Implies(Box<Expr>, Box<Expr>),
+    /// Both ends included.
+    InRange(Box<Expr>, Box<Expr>, Box<Expr>),
+    InList(Box<Expr>, Vec<Expr>),
+    /// Membership in `road.lanes`; the table turns variants of the expression's enum into lanes.
+    InLanes(Box<Expr>, Vec<LaneChoice>),
+    /// The arm for each variant of the subject's enum is `arms[arm_of[variant]]`.
+    Match {
+        subject: Box<Expr>,
+        arm_of: Vec<usize>,
+        arms: Vec<Expr>,
+    },
+}
+
+/// What an expression may ask about the world.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Fact {
+    /// `road.limit`: the lowest speed limit along the route, m/s.
+    RoadLimit,
+    /// `spawn_gap`: distance between the ego vehicle and the newcomer, m.
+    SpawnGap,
+    /// `safety_gap`: gap that a careful driver would need there, m.
+    SafetyGap,
+    /// `proc`: collision probability of the step, in `[0, 1]`.
+    Proc,
+    /// `collision`: the ego vehicle touched something.
+    Collision,
+    /// `repeated`: it had touched the same thing before.
+    Repeated,
+    /// `sudden`: the thing appeared too late for anybody.
+    Sudden,
+    /// `struck`: the thing ran into the ego vehicle's side or rear.
+    Struck,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Arithmetic {
+    Add,
+    Subtract,
+    Multiply,
+    Divide,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Comparison {
+    Equal,
+    NotEqual,
+    Less,
+    LessEqual,
+    Greater,
+    GreaterEqual,
+}
+
+impl Comparison {
+    /// The same comparison read from right to left.
+    pub fn mirrored(self) -> Comparison {
+        match self {
+            Comparison::Equal => Comparison::Equal,
+            Comparison::NotEqual => Comparison::NotEqual,
+            Comparison::Less => Comparison::Greater,
+            Comparison::LessEqual => Comparison::GreaterEqual,
+            Comparison::Greater => Comparison::Less,
+            Comparison::GreaterEqual => Comparison::LessEqual,
+        }
+    }
+
+    pub fn symbol(self) -> &'static str {
+        match self {
+            Comparison::Equal => "==",
+            Comparison::NotEqual => "!=",
+            Comparison::Less => "<",
+            Comparison::LessEqual => "<=",
+            Comparison::Greater => ">",
+            Comparison::GreaterEqual => ">=",
+        }
+    }
+}
+
+impl Expr {
+    /// Calls `visit` for this expression and everything inside it; bodies of called functions are
+    /// not entered, because they know nothing but their arguments.
+    pub fn walk(&self, visit: &mut dyn FnMut(&Expr)) {
+        visit(self);
+        match &self.kind {
+            ExprKind::Bool(_)
+            | ExprKind::Number(_)
+            | ExprKind::Variant(..)
+            | ExprKind::Local(_)
+            | ExprKind::Cell(_)
+            | ExprKind::Fact(_) => {}
+            ExprKind::CellAt(_, inner)
+            | ExprKind::Not(inner)
+            | ExprKind::Negate(inner)
+            | ExprKind::InLanes(inner, _) => inner.walk(visit),
+            ExprKind::Call(_, arguments) => arguments.iter().for_each(|argument| argument.walk(visit)),
+            ExprKind::Arithmetic(_, left, right)
+            | ExprKind::Compare(_, left, right)
+            | ExprKind::And(left, right)
+            | ExprKind::Or(left, right)
+            | ExprKind::Implies(left, right) => {
+                left.walk(visit);
+                right.walk(visit);
+            }
+            ExprKind::InRange(value, low, high) => {
+                value.walk(visit);
+                low.walk(visit);
+                high.walk(visit);
+            }
+            ExprKind::InList(value, list) => {
+                value.walk(visit);
+                list.iter().for_each(|item| item.walk(visit));
+            }
+            ExprKind::Match { subject, arms, .. } => {
+                subject.walk(visit);
+                arms.iter().for_each(|arm| arm.walk(visit));
+            }
+        }
+    }
+
+    /// Whether the expression or a part of it passes the test.
+    pub fn any(&self, mut test: impl FnMut(&ExprKind) -> bool) -> bool {
+        let mut found = false;
+        self.walk(&mut |expr| found |= test(&expr.kind));
+        found
+    }
+
+    /// Whether it asks about a spawn, which is known only once the world has been asked.
+    pub fn needs_survey(&self) -> bool {
+        self.any(|kind| matches!(kind, ExprKind::Fact(Fact::SpawnGap | Fact::SafetyGap)))
+    }
+
+    pub fn reads_memory(&self) -> bool {
+        self.any(|kind| matches!(kind, ExprKind::Cell(_) | ExprKind::CellAt(..)))
+    }
+}

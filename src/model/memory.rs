@@ -1,0 +1,155 @@
+//! How the memory begins and how actions change it.
+
+use crate::model::enclose::Known;
+use crate::model::enclose::Values;
+use crate::model::enclose::enclose;
+use crate::model::eval::Facts;
+use crate::model::eval::evaluate;
+use crate::model::interval::Interval;
+use crate::model::space::EffectDef;
+use crate::model::space::Initial;
+use crate::model::space::RuleBody;
+use crate::model::space::RuleDef;
+use crate::model::space::SetDef;
+use crate::model::space::Space;
+use crate::model::space::StateDef;
+use crate::model::space::StateMeaning;
+use crate::model::value::Memory;
+use crate::model::value::Type;
+use crate::model::value::Value;
+use crate::model::vocabulary::Level;
+use crate::model::vocabulary::TimeOfDay;
+use crate::rng;
+use crate::rng::Rng;
+use crate::rng::Stream;
+
+impl Space {
+    /// The memory at the beginning of an episode; what is `any` is drawn from [`Stream::Reset`].
+    pub fn initial_memory(&self, seed: u64) -> Memory {
+        let mut rng = rng::stream(seed, Stream::Reset, 0);
+        let mut memory = Memory::default();
+        for state in &self.states {
+            for _ in 0..state.cells {
+                let value = match &state.initial {
+                    Initial::Any => self.draw(state.ty, &mut rng),
+                    Initial::Value(expr) => {
+                        evaluate(expr, &self.functions, &Facts::new(&[], &Memory::default()))
+                    }
+                };
+                memory.cells.push(value);
+            }
+        }
+        memory
+    }
+
+    /// A state by name.
+    pub fn state(&self, name: &str) -> Option<&StateDef> {
+        self.states.iter().find(|state| state.name == name)
+    }
+
+    /// What the memory says of the world: time of day, and levels of rain, fog and wetness. Noon and
+    /// a clear sky where the space has no such state.
+    pub fn weather(&self, memory: &Memory) -> (TimeOfDay, [Level; 3]) {
+        let (mut time, mut sky) = (TimeOfDay::Noon, [Level::None; 3]);
+        for state in &self.states {
+            let cells = &memory.cells[state.first_cell..][..state.cells];
+            match &state.meaning {
+                StateMeaning::Private => {}
+                StateMeaning::Time(words) => time = words[cells[0].variant()],
+                StateMeaning::Sky(phenomena, levels) => {
+                    for (phenomenon, cell) in phenomena.iter().zip(cells) {
+                        sky[*phenomenon as usize] = levels[cell.variant()];
+                    }
+                }
+            }
+        }
+        (time, sky)
+    }
+
+    /// The memory after an action with these parameter values.
+    pub(crate) fn memory_after(&self, action: usize, locals: &[Value], before: &Memory) -> Memory {
+        let mut after = before.clone();
+        for effect in &self.actions[action].effects {
+            let EffectDef::Set(set) = effect else { continue };
+            let SetDef { state, key, value, .. } = &**set;
+            let facts = Facts::new(locals, &after);
+            let value = evaluate(value, &self.functions, &facts);
+            let key = key.as_ref().map(|key| evaluate(key, &self.functions, &facts).variant());
+            let state = &self.states[*state];
+            match key {
+                Some(key) => after.cells[state.first_cell + key] = value,
+                None => after.cells[state.first_cell..][..state.cells].fill(value),
+            }
+        }
+        after
+    }
+
+    /// Why a transition rule does not allow the step from one memory to the next; `None` if it does,
+    /// or is no transition rule.
+    pub(crate) fn forbidden_move(&self, rule: &RuleDef, before: &Memory, after: &Memory) -> Option<String> {
+        let RuleBody::Moves { state, allowed, .. } = &rule.body else { return None };
+        let state = &self.states[*state];
+        let (from, to) = (before.cells[state.first_cell], after.cells[state.first_cell]);
+        if allowed[from.variant()][to.variant()] {
+            return None;
+        }
+        let (from, to) = (self.show(from, state.ty), self.show(to, state.ty));
+        Some(format!("`{}` may not move from {from} to {to}", state.name))
+    }
+
+    /// [`Space::memory_after`] for sets of values.
+    pub(crate) fn cells_after(&self, action: usize, locals: &[Values], before: &[Values]) -> Vec<Values> {
+        let mut after = before.to_vec();
+        for effect in &self.actions[action].effects {
+            let EffectDef::Set(set) = effect else { continue };
+            let SetDef { state, key, value, .. } = &**set;
+            let known = Known { functions: &self.functions, locals, cells: &after, road: None };
+            let value = enclose(value, &known);
+            let key = key.as_ref().map(|key| enclose(key, &known));
+            let state = &self.states[*state];
+            let cells = &mut after[state.first_cell..][..state.cells];
+            match key {
+                None => cells.fill(value),
+                Some(Values::Variants(set)) if set.is_power_of_two() => {
+                    cells[set.trailing_zeros() as usize] = value;
+                }
+                Some(Values::Variants(set)) => {
+                    let hit = cells.iter_mut().enumerate().filter(|(key, _)| set >> key & 1 == 1);
+                    hit.for_each(|(_, cell)| *cell = cell.union(value));
+                }
+                Some(Values::Truth { .. } | Values::Number(_)) => {}
+            }
+        }
+        after
+    }
+
+    /// Every value of every cell.
+    pub(crate) fn cells_unknown(&self) -> Vec<Values> {
+        let unknown = |state: &StateDef| core::iter::repeat_n(self.all_values(state.ty), state.cells);
+        self.states.iter().flat_map(unknown).collect()
+    }
+
+    /// Every value of a type.
+    pub(crate) fn all_values(&self, ty: Type) -> Values {
+        match ty {
+            Type::Bool => Values::UNKNOWN_TRUTH,
+            Type::Int | Type::Quantity(_) => Values::Number(Interval::ALL),
+            Type::Enum(of) => {
+                let count = self.enums[of.0].variants.len();
+                Values::Variants(u128::MAX >> (128 - count))
+            }
+        }
+    }
+
+    /// The checker allows `any` states only for finite types.
+    fn draw(&self, ty: Type, rng: &mut Rng) -> Value {
+        match ty {
+            Type::Bool => Value::Bool(rng::below(rng, 2) == 1),
+            Type::Enum(of) => {
+                let count = self.enums[of.0].variants.len() as u32;
+                Value::Variant(of, rng::below(rng, count) as usize)
+            }
+            Type::Int | Type::Quantity(_) => Value::Number(0.0),
+        }
+    }
+}

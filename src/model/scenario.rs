@@ -1,0 +1,94 @@
+//! The typed form of an emitted scenario: one concrete timeline and what it claims.
+
+use core::fmt;
+use std::sync::Arc;
+
+use crate::model::value::Memory;
+use crate::model::value::Value;
+
+/// One timeline over a space.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Scenario {
+    pub name: String,
+    pub docs: Vec<String>,
+    pub origin: Origin,
+    /// Index in `Space::roads`.
+    pub road: usize,
+    pub start: ScenarioStart,
+    pub steps: Vec<ScenarioStep>,
+    pub claims: Vec<Claim>,
+}
+
+/// Where a scenario came from. Every field may be missing in a file written by hand.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Origin {
+    pub seed: Option<u64>,
+    pub episode: Option<u64>,
+    pub policy: Option<String>,
+    pub ads: Option<String>,
+    pub engine: Option<String>,
+    /// Rules that were asked for (`--with`) and switched off (`--without`).
+    pub with: Vec<String>,
+    pub without: Vec<String>,
+}
+
+/// How the episode begins.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ScenarioStart {
+    /// Every state variable: as the `start` block says, else as the space declares.
+    pub memory: Memory,
+    /// `signal_phase`, s; 0 if not given.
+    pub signal_phase_s: f64,
+    /// `traffic_seed`: seed of the choices of other road users.
+    pub traffic_seed: Option<u64>,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub struct ScenarioStep {
+    /// Number of the step, from 0.
+    pub number: u64,
+    /// Index of the row in the action table; `None` is `wait()`, a step without an action.
+    pub row: Option<usize>,
+    /// Values of the action's drawn (`any`) parameters, as declared.
+    pub drawn: Vec<(Arc<str>, Value)>,
+}
+
+/// What a scenario says will happen.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Claim {
+    /// `expect collision with npc#2 at 14.22 s`.
+    Collision { obstacle: Option<u32>, time_s: Option<Figure> },
+    /// `expect proc == [0.0, 0.12]`: ProC of each step.
+    Proc(Vec<Figure>),
+    /// `expect trace == "sha256:…"`.
+    Trace(String),
+    /// `expect counted with npc#2`: the named verdict holds of the collision.
+    Verdict { name: String, obstacle: Option<u32> },
+    /// `expect end == arrived`: one of [`ENDS`].
+    End(String),
+}
+
+/// How an episode may end, in the words of `expect end == …`.
+pub const ENDS: [&str; 4] = ["arrived", "stalled", "limit", "script"];
+
+/// A number with the precision to which it was written, SI.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Figure {
+    pub value: f64,
+    pub decimals: usize,
+}
+
+impl Figure {
+    /// Whether a number, rounded to the same precision, is this figure.
+    pub fn rounds(&self, found: f64) -> bool {
+        let as_written = |value: f64| format!("{value:.*}", self.decimals);
+        // Minus zero is zero.
+        as_written(found + 0.0) == as_written(self.value + 0.0)
+    }
+}
+
+impl fmt::Display for Figure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{:.*}", self.decimals, self.value)
+    }
+}

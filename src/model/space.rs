@@ -1,0 +1,306 @@
+//! The checked space: what may happen around the car. If a [`Space`] exists, it is sound: every name
+//! resolves, every type fits, every rule can be enforced.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use crate::model::expr::Expr;
+use crate::model::row::Row;
+use crate::model::value::EnumIndex;
+use crate::model::value::Type;
+use crate::model::value::Value;
+use crate::model::vocabulary::Body;
+use crate::model::vocabulary::Colour;
+use crate::model::vocabulary::LaneChoice;
+use crate::model::vocabulary::Level;
+use crate::model::vocabulary::Phenomenon;
+use crate::model::vocabulary::Side;
+use crate::model::vocabulary::Then;
+use crate::model::vocabulary::TimeOfDay;
+use crate::model::vocabulary::Verb;
+use crate::road::LanePlace;
+use crate::road::RoadMap;
+use crate::road::Route;
+use crate::syntax::ast::Span;
+use crate::units::Rational;
+
+/// Name of the verdict that decides which collisions count. Every space has it: the checker adds the
+/// paper's where the author declares none.
+pub const COUNTED: &str = "counted";
+
+/// A whole space.
+#[derive(Debug, Clone)]
+pub struct Space {
+    /// Path of the root file, as given.
+    pub path: PathBuf,
+    /// Digest of the root file with everything that it uses, maps included: see
+    /// [`Use::digest`](crate::syntax::ast::Use).
+    pub digest: String,
+    /// Documentation of the root file.
+    pub docs: Vec<String>,
+    pub enums: Vec<EnumDef>,
+    pub states: Vec<StateDef>,
+    pub functions: Vec<FnDef>,
+    pub actions: Vec<ActionDef>,
+    pub groups: Vec<GroupDef>,
+    pub rules: Vec<RuleDef>,
+    pub episode: EpisodeDef,
+    /// First match counts.
+    pub reward: Vec<RewardCase>,
+    /// As declared; one of them is [`COUNTED`].
+    pub verdicts: Vec<VerdictDef>,
+    pub expects: Vec<ExpectDef>,
+    /// The roads of `episode.roads`, in that order; every declared road if there is no `episode`.
+    pub roads: Vec<Road>,
+    /// The action table: actions as declared, axes left to right, the last varying fastest.
+    pub rows: Vec<Row>,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub struct EnumDef {
+    pub name: String,
+    pub docs: Vec<String>,
+    pub variants: Vec<String>,
+    /// Whether `<` compares its variants.
+    pub ordered: bool,
+    pub span: Span,
+}
+
+/// A state variable.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StateDef {
+    pub name: String,
+    pub docs: Vec<String>,
+    /// The enum of its keys, if it is a map.
+    pub key: Option<EnumIndex>,
+    /// Type of a cell.
+    pub ty: Type,
+    /// Position of its first cell in [`Memory`](super::Memory).
+    pub first_cell: usize,
+    /// 1, or the number of keys.
+    pub cells: usize,
+    pub initial: Initial,
+    /// What it is in the world, if anything.
+    pub meaning: StateMeaning,
+    pub span: Span,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub enum Initial {
+    /// Drawn at reset, each cell by itself.
+    Any,
+    /// The same for every cell.
+    Value(Expr),
+}
+
+/// What a state variable means to the world. The tables turn variants into words of the engine.
+#[derive(Debug, Clone, PartialEq)]
+pub enum StateMeaning {
+    /// The space's own bookkeeping.
+    Private,
+    /// `time`.
+    Time(Vec<TimeOfDay>),
+    /// `sky`: phenomenon of each key, level of each variant.
+    Sky(Vec<Phenomenon>, Vec<Level>),
+}
+
+/// A pure function; its parameters are the locals of its body.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FnDef {
+    pub name: String,
+    pub parameters: Vec<(String, Type)>,
+    pub result: Type,
+    pub body: Expr,
+    pub span: Span,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub struct ActionDef {
+    pub name: String,
+    pub docs: Vec<String>,
+    /// `each` and `any` ones, as declared. They are the locals of the action's expressions.
+    pub parameters: Vec<Parameter>,
+    pub effects: Vec<EffectDef>,
+    pub span: Span,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub struct Parameter {
+    pub name: Arc<str>,
+    pub ty: Type,
+    /// `each` (an axis of the table) as opposed to `any` (drawn).
+    pub axis: bool,
+    pub domain: Domain,
+    /// `where`: may name the parameters before it.
+    pub condition: Option<Expr>,
+    pub span: Span,
+}
+
+/// The values that a parameter may have.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Domain {
+    /// In this order.
+    Values(Vec<Value>),
+    /// Both ends included, SI.
+    Range(Rational, Rational),
+}
+
+impl Domain {
+    /// Whether the value is one of these.
+    pub fn holds(&self, value: Value) -> bool {
+        match self {
+            Domain::Values(values) => values.contains(&value),
+            Domain::Range(low, high) => (low.to_f64()..=high.to_f64()).contains(&value.number()),
+        }
+    }
+
+    /// The ends of a range in SI; infinite for a list.
+    pub fn ends(&self) -> (f64, f64) {
+        match self {
+            Domain::Values(_) => (f64::NEG_INFINITY, f64::INFINITY),
+            Domain::Range(low, high) => (low.to_f64(), high.to_f64()),
+        }
+    }
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub enum EffectDef {
+    Set(Box<SetDef>),
+    Spawn(Box<SpawnDef>),
+}
+
+/// How a state changes: all its cells, or the one of a key.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SetDef {
+    /// Index in `Space::states`.
+    pub state: usize,
+    pub key: Option<Expr>,
+    pub value: Expr,
+    pub span: Span,
+}
+
+/// How a spawn request is made from an action's parameters.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SpawnDef {
+    pub body: WordExpr<Body>,
+    pub colour: WordExpr<Colour>,
+    pub verb: WordExpr<Verb>,
+    pub lane: WordExpr<LaneChoice>,
+    pub side: WordExpr<Side>,
+    pub then: WordExpr<Then>,
+    /// m/s.
+    pub speed: Expr,
+    /// m.
+    pub distance: Expr,
+    /// Whether it was written `behind`; the verb decides where that is.
+    pub behind: bool,
+    pub span: Span,
+}
+
+/// A word of the engine, fixed or from a value of one of the author's enums.
+#[derive(Debug, Clone, PartialEq)]
+pub enum WordExpr<W> {
+    Fixed(W),
+    /// The word for each variant of the expression's enum.
+    Of(Expr, Vec<W>),
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub struct GroupDef {
+    pub name: String,
+    pub docs: Vec<String>,
+    /// Indices of actions.
+    pub actions: Vec<usize>,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub struct RuleDef {
+    pub name: String,
+    pub docs: Vec<String>,
+    /// Off unless asked for.
+    pub optional: bool,
+    pub body: RuleBody,
+    pub span: Span,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub enum RuleBody {
+    /// A condition, compiled once for every action that it binds. State in it is the state after
+    /// the action.
+    Holds(Vec<RuleBinding>),
+    /// `allowed[from][to]` for a state variable; binds the actions that set it.
+    Moves { state: usize, allowed: Vec<Vec<bool>>, actions: Vec<usize> },
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub struct RuleBinding {
+    pub action: usize,
+    pub condition: Expr,
+}
+
+/// How episodes run.
+#[derive(Debug, Clone, PartialEq)]
+pub struct EpisodeDef {
+    /// The observation period (OTP), s. Default: the paper's 6 s.
+    pub step_s: f64,
+    /// Whether arrival at the goal ends an episode. Default: yes.
+    pub stop_arrived: bool,
+    /// Steps without progress that end an episode. Default: none does.
+    pub stalled_steps: Option<u32>,
+    /// Steps after which an episode is cut off. Default: 20.
+    pub step_limit: u32,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub struct RewardCase {
+    /// `None` is `_`.
+    pub condition: Option<Expr>,
+    pub value: Expr,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub struct VerdictDef {
+    pub name: String,
+    pub docs: Vec<String>,
+    pub condition: Expr,
+}
+
+/// A static claim that held when the space was checked, as written.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ExpectDef {
+    pub text: String,
+    pub span: Span,
+}
+
+/// A road with its map and the ego vehicle's way through it.
+#[derive(Debug, Clone)]
+pub struct Road {
+    pub name: String,
+    pub docs: Vec<String>,
+    /// The map's path as resolved from the file that names it.
+    pub map_path: PathBuf,
+    pub map: Arc<RoadMap>,
+    pub start: LanePlace,
+    pub goal: LanePlace,
+    pub route: Route,
+    pub facts: RoadFacts,
+    pub span: Span,
+}
+
+/// What rules may ask about a road.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RoadFacts {
+    /// The lowest limit of the route's lanes: a drawn speed must be legal on the whole of it, SI.
+    pub limit: Rational,
+    /// The same, m/s.
+    pub limit_mps: f64,
+    /// Which lanes in the ego vehicle's direction exist somewhere along the route, by
+    /// [`LaneChoice`] in its order: left, current, right.
+    pub lanes: [bool; 3],
+}
+
+impl RoadFacts {
+    pub fn has_lane(&self, lane: LaneChoice) -> bool {
+        self.lanes[lane as usize]
+    }
+}
