@@ -10,3 +10,4 @@ pub mod geometry;
 pub mod road;
 pub mod syntax;
 pub mod model;
+pub mod action;

@@ -1,0 +1,95 @@
+//! The audit: for every rule, which rows it binds and where it is enforced. No rule is ignored.
+
+use core::fmt;
+
+use crate::action::table::ActionTable;
+use crate::model::Reach;
+use crate::model::RuleBody;
+
+/// Every rule of a space.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct Audit {
+    pub rules: Vec<RuleAudit>,
+}
+
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct RuleAudit {
+    pub name: String,
+    pub optional: bool,
+    /// Rows that it binds.
+    pub rows: Vec<usize>,
+    /// Rows that it helps to mask, on any road.
+    pub masks: Vec<usize>,
+    /// Numeric parameters whose range it cuts before they are drawn.
+    pub cuts: Vec<String>,
+    pub enforced: Enforcement,
+}
+
+/// Where a rule has its last word. Masks and cuts only spare vain draws.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Enforcement {
+    /// On every complete draw.
+    Draw,
+    /// On every draw, once the world has been asked where the spawn would be.
+    Survey,
+    /// On the step from one state to the next.
+    Transition,
+}
+
+/// Looks every rule up.
+pub fn audit(table: &ActionTable) -> Audit {
+    let space = table.space();
+    let rules = space.rules.iter().enumerate().map(|(index, rule)| {
+        let bound = table.rows().iter().filter(|row| row.rules.contains(&index));
+        let helps = |reach: &Reach| matches!(reach, Reach::Dead { rules, .. } if rules.contains(&index));
+        let masks = table.rows().iter().filter(|row| row.roads.iter().any(helps));
+        let enforced = match &rule.body {
+            RuleBody::Moves { .. } => Enforcement::Transition,
+            RuleBody::Holds(bindings) if bindings.iter().any(|binding| binding.condition.needs_survey()) => {
+                Enforcement::Survey
+            }
+            RuleBody::Holds(_) => Enforcement::Draw,
+        };
+        let mut cuts: Vec<String> = Vec::new();
+        for (action, bounds) in table.bounds.iter().enumerate() {
+            for bound in bounds.iter().filter(|bound| bound.rule == Some(index) && bound.is_known_early()) {
+                let parameter = &space.actions[action].parameters[bound.local];
+                if !parameter.axis && !cuts.contains(&parameter.name.to_string()) {
+                    cuts.push(parameter.name.to_string());
+                }
+            }
+        }
+        RuleAudit {
+            name: rule.name.clone(),
+            optional: rule.optional,
+            rows: bound.map(|row| row.index).collect(),
+            masks: masks.map(|row| row.index).collect(),
+            cuts,
+            enforced,
+        }
+    });
+    Audit { rules: rules.collect() }
+}
+
+impl fmt::Display for Audit {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let width = self.rules.iter().map(|rule| rule.name.chars().count()).max().unwrap_or(0);
+        for rule in &self.rules {
+            let enforced = match rule.enforced {
+                Enforcement::Draw => "every draw",
+                Enforcement::Survey => "every draw, in the world",
+                Enforcement::Transition => "every transition",
+            };
+            write!(f, "{:width$}  binds {:>3} rows, enforced on {enforced}", rule.name, rule.rows.len())?;
+            if !rule.cuts.is_empty() {
+                write!(f, ", cuts {}", rule.cuts.join(", "))?;
+            }
+            if !rule.masks.is_empty() {
+                write!(f, ", masks {} rows", rule.masks.len())?;
+            }
+            writeln!(f, "{}", if rule.optional { " (optional)" } else { "" })?;
+        }
+        Ok(())
+    }
+}

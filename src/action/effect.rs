@@ -1,0 +1,56 @@
+//! What a row does to the world once its parameters are drawn.
+
+use crate::model::vocabulary::Body;
+use crate::model::vocabulary::Colour;
+use crate::model::vocabulary::LaneChoice;
+use crate::model::vocabulary::Level;
+use crate::model::vocabulary::Phenomenon;
+use crate::model::vocabulary::Side;
+use crate::model::vocabulary::Then;
+use crate::model::vocabulary::TimeOfDay;
+use crate::model::vocabulary::Verb;
+
+/// One change of the world. A row has one or more, applied in order.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Effect {
+    Time(TimeOfDay),
+    /// Sets one phenomenon and leaves the others.
+    Sky(Phenomenon, Level),
+    Spawn(SpawnRequest),
+}
+
+/// A road user that is to appear.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SpawnRequest {
+    pub body: Body,
+    pub colour: Colour,
+    pub verb: Verb,
+    /// Lane of `DriveAhead` and `Overtake`; ignored by the other verbs.
+    pub lane: LaneChoice,
+    /// Where `CrossRoad` and `Walk` come from; ignored by the other verbs.
+    pub side: Side,
+    pub then: Then,
+    /// Cruising speed, m/s.
+    pub speed_mps: f64,
+    /// Gap to the ego vehicle along its route, m; behind it for `Overtake`. What exactly lies at
+    /// that distance is the verb's business: see `sim::placement`.
+    pub distance_m: f64,
+}
+
+/// What a rule may ask about a spawn before it happens.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SpawnFacts {
+    /// Distance between the outlines of the ego vehicle and the newcomer, m.
+    pub spawn_gap_m: f64,
+    /// Gap that a careful and competent driver would need there, m; 0 if they do not approach.
+    pub safety_gap_m: f64,
+}
+
+/// The side of the world that the action table may see.
+pub trait Surroundings {
+    /// Where a spawn would put its road user, in numbers; or why it cannot, in words.
+    ///
+    /// # Errors
+    /// A reason that completes "cannot spawn: …", for example `no lane on the left`.
+    fn survey(&self, request: &SpawnRequest) -> Result<SpawnFacts, String>;
+}

@@ -1,0 +1,105 @@
+//! The action table of a space: what each row would do now, or which rule says no.
+
+use std::sync::Arc;
+
+use crate::action::Effect;
+use crate::action::Surroundings;
+use crate::action::draw::Judge;
+use crate::action::rules::ActiveRules;
+use crate::model::Bound;
+use crate::model::Memory;
+use crate::model::Road;
+use crate::model::Row;
+use crate::model::Space;
+use crate::model::Value;
+use crate::model::bounds;
+
+/// The rows that an agent chooses from.
+#[derive(Debug, Clone)]
+pub struct ActionTable {
+    space: Arc<Space>,
+    /// By action: what its rules say about single numbers.
+    pub(super) bounds: Vec<Vec<Bound>>,
+}
+
+/// What a row is judged in.
+#[derive(Clone, Copy)]
+pub struct Situation<'a> {
+    pub memory: &'a Memory,
+    pub road: &'a Road,
+    pub rules: &'a ActiveRules,
+    pub surroundings: &'a dyn Surroundings,
+    /// Seed of the episode.
+    pub seed: u64,
+    /// Number of the step, from 0.
+    pub step: u64,
+}
+
+/// What choosing a row would do now.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Offer {
+    Legal(Draw),
+    Refused(Refusal),
+}
+
+/// A row with its drawn values.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Draw {
+    pub row: usize,
+    /// Values of the `any` parameters, as declared; numbers in SI units.
+    pub values: Vec<(Arc<str>, Value)>,
+    /// What it does to the world, in order.
+    pub effects: Vec<Effect>,
+    pub memory_after: Memory,
+}
+
+/// Why a row cannot be chosen.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Refusal {
+    /// The rule that says no; `None` if the world has no place for it or a value is out of range.
+    pub rule: Option<String>,
+    /// With figures, in words.
+    pub reason: String,
+}
+
+impl ActionTable {
+    pub fn new(space: Arc<Space>) -> ActionTable {
+        let bounds = (0..space.actions.len()).map(|action| bounds(&space, action)).collect();
+        ActionTable { space, bounds }
+    }
+
+    pub fn space(&self) -> &Arc<Space> {
+        &self.space
+    }
+
+    pub fn rows(&self) -> &[Row] {
+        &self.space.rows
+    }
+
+    /// One offer for each row. Every row draws from a stream of its own, so that what one row draws
+    /// says nothing about another.
+    pub fn offers(&self, situation: &Situation<'_>) -> Vec<Offer> {
+        (0..self.rows().len()).map(|row| self.offer(situation, row)).collect()
+    }
+
+    /// The offer of one row: the same as in [`ActionTable::offers`].
+    pub fn offer(&self, situation: &Situation<'_>, row: usize) -> Offer {
+        match Judge::new(self, situation, row).draw() {
+            Ok(draw) => Offer::Legal(draw),
+            Err(refusal) => Offer::Refused(refusal),
+        }
+    }
+
+    /// Judges given values by the rules that drawing obeys: for replays and for `why`.
+    ///
+    /// # Errors
+    /// Every rule that says no, and every value that is missing, unknown or out of range.
+    pub fn check(
+        &self,
+        situation: &Situation<'_>,
+        row: usize,
+        values: &[(Arc<str>, Value)],
+    ) -> Result<Draw, Vec<Refusal>> {
+        Judge::new(self, situation, row).check(values)
+    }
+}

@@ -1,0 +1,56 @@
+//! The shipped spaces as tables, and the rules of avastra45 against predicates written by hand.
+
+mod rules;
+mod table;
+
+use std::path::Path;
+use std::sync::Arc;
+
+use crate::action::ActionTable;
+use crate::action::SpawnFacts;
+use crate::action::SpawnRequest;
+use crate::action::Surroundings;
+use crate::model::ReadError;
+use crate::model::load;
+use crate::syntax::Style;
+use crate::syntax::render;
+
+/// The table of a shipped space on Road 2.
+fn table(path: &str) -> ActionTable {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join(path);
+    let loaded =
+        load(&root, &|path| std::fs::read_to_string(path).map_err(|error| ReadError(error.to_string())))
+            .unwrap();
+    let shown: Vec<String> =
+        loaded.diagnostics.iter().map(|found| render(found, &loaded.sources, Style::Plain)).collect();
+    assert!(shown.is_empty(), "{}", shown.join("\n"));
+    ActionTable::new(loaded.space.unwrap())
+}
+
+/// A world in which everything fits and the gap is the distance asked for.
+struct Plain {
+    safety_gap_m: f64,
+}
+
+impl Surroundings for Plain {
+    fn survey(&self, request: &SpawnRequest) -> Result<SpawnFacts, String> {
+        Ok(SpawnFacts { spawn_gap_m: request.distance_m, safety_gap_m: self.safety_gap_m })
+    }
+}
+
+/// A world without room for anybody.
+struct Full;
+
+impl Surroundings for Full {
+    fn survey(&self, _request: &SpawnRequest) -> Result<SpawnFacts, String> {
+        Err("no room".to_owned())
+    }
+}
+
+fn named(names: &[&str]) -> Vec<String> {
+    names.iter().map(|name| (*name).to_owned()).collect()
+}
+
+fn value_of(values: &[(Arc<str>, crate::model::Value)], name: &str) -> Option<crate::model::Value> {
+    values.iter().find(|(known, _)| &**known == name).map(|(_, value)| *value)
+}
