@@ -11,3 +11,4 @@ pub mod road;
 pub mod syntax;
 pub mod model;
 pub mod action;
+pub mod sim;

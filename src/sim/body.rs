@@ -1,0 +1,37 @@
+//! Bodies of road users: dimensions, masses, acceleration and brakes.
+//!
+//! Typical cars of each class, in the absence of published dimensions of LGSVL's models; the truck
+//! and the bus brake better than FMVSS 121 demands on average (3.8 and 4.2 m/s²).
+
+use crate::model::vocabulary::Body;
+
+/// What a body is and can do on a dry road.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct BodyParameters {
+    pub length_m: f64,
+    pub width_m: f64,
+    pub height_m: f64,
+    pub mass_t: f64,
+    pub acceleration_mps2_max: f64,
+    /// Magnitude.
+    pub deceleration_mps2_max: f64,
+}
+
+/// The parameters of a body.
+pub(super) fn parameters(body: Body) -> BodyParameters {
+    let of = |[length_m, width_m, height_m]: [f64; 3],
+              mass_t,
+              acceleration_mps2_max,
+              deceleration_mps2_max| {
+        BodyParameters { length_m, width_m, height_m, mass_t, acceleration_mps2_max, deceleration_mps2_max }
+    };
+    match body {
+        Body::Jeep => of([4.79, 1.88, 1.87], 2.00, 2.5, 7.0),
+        Body::Sedan => of([4.80, 1.85, 1.45], 1.55, 3.0, 8.0),
+        Body::SUV => of([4.70, 1.90, 1.70], 1.85, 2.8, 7.8),
+        Body::Hatchback => of([4.28, 1.79, 1.46], 1.30, 3.0, 8.0),
+        Body::BoxTruck => of([7.50, 2.40, 3.20], 6.0, 1.5, 5.5),
+        Body::SchoolBus => of([11.0, 2.44, 3.10], 11.0, 1.2, 5.0),
+        Body::Pedestrian => of([0.5, 0.5, 1.75], 0.075, 1.5, 1.5),
+    }
+}

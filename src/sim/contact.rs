@@ -1,0 +1,59 @@
+//! Contacts of the ego vehicle with obstacles, and what they do to it.
+//!
+//! Outlines are swept from tick to tick, so nothing passes through anything. The impact is plastic
+//! and acts along the ego vehicle's heading alone: enough for what follows a first contact, and no
+//! claim about damage. Obstacles do not collide with each other.
+
+use crate::geometry::Sweep;
+use crate::geometry::Vec2;
+use crate::geometry::first_contact;
+
+use super::ego::VehicleParameters;
+use super::world::Contact;
+use super::world::DT_S;
+
+/// One party of a possible contact during one tick.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Party {
+    pub sweep: Sweep,
+    pub velocity_mps: Vec2,
+}
+
+/// The contact that begins within the tick after `tick`, if there is one.
+pub(super) fn meet(ego: &Party, ego_speed_mps: f64, obstacle: &Party, id: u32, tick: u64) -> Option<Contact> {
+    let first = first_contact(&ego.sweep, &obstacle.sweep)?;
+    let ego_pose = ego.sweep.at(first.fraction).pose;
+    let closing_mps = (ego.velocity_mps - obstacle.velocity_mps).dot(&first.normal);
+    Some(Contact {
+        time_s: (tick as f64 + first.fraction) * DT_S,
+        obstacle: id,
+        point: first.point,
+        on_ego: ego_pose.to_local(first.point),
+        ego_speed_mps,
+        obstacle_velocity_mps: obstacle.velocity_mps,
+        obstacle_velocity_on_ego_mps: Vec2::new(
+            ego_pose.forward().dot(&obstacle.velocity_mps),
+            ego_pose.left().dot(&obstacle.velocity_mps),
+        ),
+        closing_speed_mps: closing_mps.max(0.0),
+    })
+}
+
+/// Common speed along the ego vehicle's heading after a plastic impact with a mass, at least 0, m/s.
+pub(super) fn common_speed_mps(ego_speed_mps: f64, other_along_mps: f64, other_mass_t: f64) -> f64 {
+    let ego_mass_t = VehicleParameters::MKZ.mass_t;
+    let momentum = ego_mass_t * ego_speed_mps + other_mass_t * other_along_mps;
+    (momentum / (ego_mass_t + other_mass_t)).max(0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn masses_share_the_momentum() {
+        assert!((common_speed_mps(10.0, 0.0, VehicleParameters::MKZ.mass_t) - 5.0).abs() < 1e-12);
+        assert!(common_speed_mps(10.0, 0.0, 0.075) > 9.6);
+        assert_eq!(common_speed_mps(10.0, -10.0, 11.0), 0.0);
+    }
+}

@@ -1,0 +1,39 @@
+//! The world: ego vehicle, other road users, weather, light, signals, contacts.
+
+mod body;
+mod contact;
+mod ego;
+mod environment;
+mod following;
+mod mover;
+mod npc;
+mod pedestrian;
+mod placement;
+mod safety;
+mod sense;
+mod signals;
+#[cfg(test)]
+mod testing;
+#[cfg(test)]
+mod tests;
+mod way;
+mod world;
+
+pub use ego::Control;
+pub use ego::VehicleParameters;
+pub use ego::pedal_acceleration_mps2;
+pub use ego::pedals_for;
+pub use following::Following;
+pub use sense::Conditions;
+pub use sense::EgoMotion;
+pub use sense::FRAME_TICKS;
+pub use sense::Sensed;
+pub use sense::SensedObject;
+pub use sense::SignalColour;
+pub use world::Contact;
+pub use world::DT_S;
+pub use world::ENGINE;
+pub use world::Obstacle;
+pub use world::Scene;
+pub use world::Start;
+pub use world::World;

@@ -1,0 +1,128 @@
+//! What moves an obstacle: a driver, two legs, or nothing. And what everybody may look at while
+//! deciding how.
+
+use crate::geometry::OrientedBox;
+use crate::geometry::Pose;
+use crate::geometry::Vec2;
+
+use super::body::BodyParameters;
+use super::environment::GRAVITY_MPS2;
+use super::npc::Driver;
+use super::pedestrian::Walker;
+use super::sense::EgoMotion;
+use super::signals::SignalClock;
+use super::world::DT_S;
+use super::world::Obstacle;
+use super::world::Scene;
+
+/// How long somebody who touched the ego vehicle stays where they came to rest, s.
+const WRECK_S: f64 = 2.0;
+
+/// The world around a mover during one tick.
+#[derive(Clone, Copy)]
+pub(super) struct Around<'a> {
+    pub scene: &'a Scene,
+    pub ego: &'a EgoMotion,
+    pub ego_outline: &'a OrientedBox,
+    pub ego_velocity_mps: Vec2,
+    pub ego_station_m: f64,
+    pub obstacles: &'a [Obstacle],
+    pub signals: &'a SignalClock,
+    pub tick: u64,
+    pub friction: f64,
+    /// Of the choices of other road users.
+    pub seed: u64,
+}
+
+impl Around<'_> {
+    /// Outlines and velocities of the ego vehicle and of every obstacle but one.
+    pub fn others(&self, except: u32) -> impl Iterator<Item = (&OrientedBox, Vec2)> {
+        let obstacles = self.obstacles.iter().filter(move |obstacle| obstacle.id != except);
+        core::iter::once((self.ego_outline, self.ego_velocity_mps))
+            .chain(obstacles.map(|obstacle| (&obstacle.outline, obstacle.velocity_mps)))
+    }
+
+    /// The hardest braking of a body on this road, m/s².
+    pub fn braking_mps2(&self, size: &BodyParameters) -> f64 {
+        size.deceleration_mps2_max.min(self.friction * GRAVITY_MPS2)
+    }
+}
+
+/// The hidden side of an obstacle.
+#[derive(Debug, Clone)]
+pub(super) struct Mover {
+    pub size: BodyParameters,
+    pub motion: Motion,
+    /// Whether the ego vehicle and it have touched, whoever ran into whom.
+    pub touched: bool,
+    /// Ticks at rest since then.
+    rest_ticks: u32,
+    /// Part of it that the ego vehicle's sensors saw when they last looked.
+    pub visible_fraction: f64,
+}
+
+#[derive(Debug, Clone)]
+pub(super) enum Motion {
+    Drive(Driver),
+    Walk(Walker),
+    Stand,
+}
+
+/// Where a mover is after a tick.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Moved {
+    /// Centre of the outline.
+    pub pose: Pose,
+    /// Heading of the lane that it drives in; its own on foot.
+    pub lane_heading_rad: f64,
+    pub velocity_mps: Vec2,
+}
+
+impl Moved {
+    /// On foot and standing.
+    pub fn at_rest(pose: Pose) -> Moved {
+        Moved { pose, lane_heading_rad: pose.heading_rad, velocity_mps: Vec2::zeros() }
+    }
+}
+
+impl Mover {
+    pub fn new(size: BodyParameters, motion: Motion) -> Mover {
+        Mover { size, motion, touched: false, rest_ticks: 0, visible_fraction: 1.0 }
+    }
+
+    /// One tick of the obstacle `this`; `None` if it leaves the world.
+    pub fn step(&mut self, this: &Obstacle, around: &Around) -> Option<Moved> {
+        if self.touched && this.velocity_mps == Vec2::zeros() {
+            self.rest_ticks += 1;
+            if f64::from(self.rest_ticks) * DT_S >= WRECK_S {
+                return None;
+            }
+        }
+        let rest = Moved::at_rest(this.outline.pose);
+        match &mut self.motion {
+            Motion::Drive(driver) => driver.step(this, &self.size, self.touched, around),
+            Motion::Walk(_) if self.touched => Some(rest),
+            Motion::Walk(walker) => walker.step(around.tick),
+            Motion::Stand => Some(rest),
+        }
+    }
+
+    /// It touched the ego vehicle, and moves at most at `speed_mps` from now on, until its brakes stop it.
+    pub fn touch(&mut self, speed_mps: f64) {
+        self.touched = true;
+        if let Motion::Drive(driver) = &mut self.motion {
+            driver.speed_mps = speed_mps;
+        }
+    }
+
+    pub fn trace(&self, sink: &mut dyn FnMut(u64)) {
+        sink(u64::from(self.touched));
+        sink(u64::from(self.rest_ticks));
+        sink(self.visible_fraction.to_bits());
+        match &self.motion {
+            Motion::Drive(driver) => driver.trace(sink),
+            Motion::Walk(walker) => walker.trace(sink),
+            Motion::Stand => {}
+        }
+    }
+}

@@ -1,0 +1,481 @@
+//! Other drivers: along their way by the Intelligent Driver Model, and from lane to lane.
+//!
+//! IDM after Treiber, Hennecke and Helbing (2000), with the brakes of the body on the grip of the
+//! road and a kinematic floor, because IDM alone assumes brakes without limit. They stop for red
+//! lights, slow down for bends, follow whoever is in front of them, and look before they change
+//! lanes; they do not yield at junctions, and what they do to the ego vehicle otherwise is the
+//! scenario's business. Leaders and occasions are looked for ten times a second: reaction time.
+
+use std::sync::Arc;
+
+use crate::geometry::OrientedBox;
+use crate::geometry::Path;
+use crate::geometry::Pose;
+use crate::geometry::Vec2;
+use crate::geometry::unit_vector;
+use crate::geometry::wrap_angle;
+use crate::model::vocabulary::Side;
+use crate::rng;
+use crate::rng::Rng;
+use crate::rng::Stream;
+use crate::road::LaneIndex;
+
+use super::body::BodyParameters;
+use super::following::Following;
+use super::mover::Around;
+use super::mover::Moved;
+use super::sense::FRAME_TICKS;
+use super::sense::SignalColour;
+use super::way::Way;
+use super::way::beside;
+use super::world::DT_S;
+use super::world::Obstacle;
+
+/// IDM: comfortable deceleration, m/s².
+const COMFORT_MPS2: f64 = 2.0;
+/// IDM: gap at standstill, m.
+const GAP_M_MIN: f64 = 2.0;
+/// IDM: time gap, s.
+const TIME_GAP_S: f64 = 1.2;
+/// What they look ahead beyond the way on which they could stop gently, m.
+const LOOK_AHEAD_M: f64 = 25.0;
+/// Room beside the outline that they want to be free, m.
+const SIDE_ROOM_M: f64 = 0.2;
+/// Room in front of and behind them that they want before changing lanes, m.
+const MIRROR_ROOM_M: f64 = 2.0;
+/// A yellow light that takes harder braking is passed, m/s².
+const YELLOW_BRAKING_MPS2: f64 = 3.0;
+/// Highest lateral speed of a lane change, m/s: bound of a cut-in in UN R157.
+const CHANGE_MPS_MAX: f64 = 1.8;
+/// Peak of the quintic's rate over its mean.
+const QUINTIC_PEAK: f64 = 1.875;
+/// A lane change takes at least this long, s.
+const CHANGE_S_MIN: f64 = 2.0;
+/// Below this speed a lane change slows down with the vehicle, which cannot slide sideways, m/s.
+const CHANGE_FULL_MPS: f64 = 5.0;
+/// Neighbouring lanes whose centres are farther apart have parted, m.
+const CHANGE_M_MAX: f64 = 8.0;
+
+/// A lane change that waits for its occasion.
+#[derive(Debug, Clone)]
+pub(super) struct Manoeuvre {
+    pub when: When,
+    pub towards: Towards,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum When {
+    /// From this tick on.
+    Tick(u64),
+    /// When its rear is this far in front of the ego vehicle's front, m.
+    AheadOfEgo(f64),
+}
+
+#[derive(Debug, Clone)]
+pub(super) enum Towards {
+    To(Side),
+    /// Left if that lane is there and free, else right.
+    Either,
+    /// Against the change before.
+    Back,
+    Way(Arc<Way>),
+}
+
+#[derive(Debug, Clone)]
+pub(super) struct Driver {
+    way: Arc<Way>,
+    /// Of the outline's centre.
+    station_m: f64,
+    pub speed_mps: f64,
+    cruise_mps: f64,
+    leader: Option<Leader>,
+    change: Option<Change>,
+    last_change: Option<Side>,
+    /// In reverse order: the next one is last.
+    plan: Vec<Manoeuvre>,
+    /// How often it drew where to go, so that each draw has its own stream.
+    draws: u32,
+}
+
+/// Whoever is in front.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Leader {
+    gap_m: f64,
+    /// Along the own way; negative if it comes nearer.
+    speed_mps: f64,
+}
+
+/// A lane change under way.
+#[derive(Debug, Clone)]
+struct Change {
+    to: Arc<Way>,
+    to_station_m: f64,
+    /// In `[0, 1)`.
+    progress: f64,
+    duration_s: f64,
+}
+
+impl Driver {
+    /// A driver with its centre at a station of a way, at `speed_mps` or what the bend there allows.
+    ///
+    /// `plan` is in order; `draws` tells how many draws went into it.
+    pub fn new(
+        way: Arc<Way>,
+        station_m: f64,
+        speed_mps: f64,
+        mut plan: Vec<Manoeuvre>,
+        draws: u32,
+    ) -> Driver {
+        plan.reverse();
+        Driver {
+            speed_mps: speed_mps.min(way.speed_mps_max(station_m)),
+            way,
+            station_m,
+            cruise_mps: speed_mps,
+            leader: None,
+            change: None,
+            last_change: None,
+            plan,
+            draws,
+        }
+    }
+
+    /// The way it follows now.
+    pub fn way(&self) -> &Way {
+        &self.way
+    }
+
+    /// Where it is before its first tick.
+    pub fn moved(&self) -> Moved {
+        let pose = self.way.path.pose_at(self.station_m);
+        Moved { pose, lane_heading_rad: pose.heading_rad, velocity_mps: pose.forward() * self.speed_mps }
+    }
+
+    /// Gap to another outline on its way, m, if that is ahead and in its corridor; and the other's
+    /// speed along the way.
+    pub fn gap_to(
+        &self,
+        size: &BodyParameters,
+        other: &OrientedBox,
+        velocity_mps: Vec2,
+    ) -> Option<(f64, f64)> {
+        let here = self.way.path.pose_at(self.station_m);
+        in_corridor(&self.way.path, self.station_m, &here, size, other, velocity_mps)
+            .map(|leader| (leader.gap_m, leader.speed_mps))
+    }
+
+    pub fn step(
+        &mut self,
+        this: &Obstacle,
+        size: &BodyParameters,
+        touched: bool,
+        around: &Around,
+    ) -> Option<Moved> {
+        if !touched && (around.tick + u64::from(this.id)).is_multiple_of(FRAME_TICKS) {
+            self.look(this, size, around);
+        }
+        let braking_mps2 = around.braking_mps2(size);
+        let wanted_mps2 = if touched { -braking_mps2 } else { self.wanted_mps2(size, around, braking_mps2) };
+        let acceleration_mps2 = wanted_mps2.clamp(-braking_mps2, size.acceleration_mps2_max);
+        let speed_mps = (self.speed_mps + acceleration_mps2 * DT_S).max(0.0);
+        let way_m = (self.speed_mps + speed_mps) / 2.0 * DT_S;
+        self.speed_mps = speed_mps;
+        self.station_m += way_m;
+        if let Some(leader) = &mut self.leader {
+            leader.gap_m += leader.speed_mps * DT_S - way_m;
+        }
+        // A lane that ends under a lane change goes on straight until the change is done.
+        if self.change.is_none() && self.station_m >= self.way.path.length_m() {
+            return None;
+        }
+        Some(self.advance_change(way_m, this.outline.pose.position))
+    }
+
+    /// Feeds every bit that later ticks depend on to `sink`; ways follow from the draws.
+    pub fn trace(&self, sink: &mut dyn FnMut(u64)) {
+        for value in [self.station_m, self.speed_mps, self.cruise_mps] {
+            sink(value.to_bits());
+        }
+        let leader = self.leader.unwrap_or(Leader { gap_m: -1.0, speed_mps: 0.0 });
+        sink(leader.gap_m.to_bits());
+        sink(leader.speed_mps.to_bits());
+        if let Some(change) = &self.change {
+            for value in [change.to_station_m, change.progress, change.duration_s] {
+                sink(value.to_bits());
+            }
+        }
+        sink(self.last_change.map_or(0, |side| side as u64 + 1));
+        sink(self.plan.len() as u64);
+        sink(u64::from(self.draws));
+    }
+
+    /// Whom to follow, whether the occasion for the next lane change is there, where the way goes on.
+    fn look(&mut self, this: &Obstacle, size: &BodyParameters, around: &Around) {
+        if self.way.ends_soon(self.station_m) {
+            let mut rng = self.draw(this.id, around);
+            if let Some((way, station_m)) = self.way.prolonged(&around.scene.map, self.station_m, &mut rng) {
+                (self.way, self.station_m) = (Arc::new(way), station_m);
+            }
+        }
+        if self.change.is_none() {
+            self.begin_change(this, size, around);
+        }
+        self.leader = self.find_leader(this, size, around);
+    }
+
+    fn find_leader(&self, this: &Obstacle, size: &BodyParameters, around: &Around) -> Option<Leader> {
+        let here = &this.outline.pose;
+        let forward = here.forward();
+        let reach_m = LOOK_AHEAD_M
+            + self.speed_mps * (TIME_GAP_S + self.speed_mps / (2.0 * COMFORT_MPS2))
+            + size.length_m / 2.0;
+        let mut nearest: Option<Leader> = None;
+        for (outline, velocity_mps) in around.others(this.id) {
+            let delta = outline.pose.position - here.position;
+            let reach_m = reach_m + outline.half_length_m;
+            if delta.norm_squared() > reach_m * reach_m || forward.dot(&delta) < 0.0 {
+                continue;
+            }
+            let on_own_way = in_corridor(&self.way.path, self.station_m, here, size, outline, velocity_mps);
+            let on_next_way = self.change.as_ref().and_then(|change| {
+                in_corridor(&change.to.path, change.to_station_m, here, size, outline, velocity_mps)
+            });
+            for leader in on_own_way.into_iter().chain(on_next_way) {
+                if nearest.is_none_or(|found| leader.gap_m < found.gap_m) {
+                    nearest = Some(leader);
+                }
+            }
+        }
+        nearest
+    }
+
+    fn wanted_mps2(&self, size: &BodyParameters, around: &Around, braking_mps2: f64) -> f64 {
+        let mut bend_mps = self.way.speed_mps_max(self.station_m);
+        if let Some(change) = &self.change {
+            bend_mps = bend_mps.min(change.to.speed_mps_max(change.to_station_m));
+        }
+        let wish_mps = self.cruise_mps.min(bend_mps).max(0.1);
+        let ratio = self.speed_mps / wish_mps;
+        // To be too fast is no emergency.
+        let free_mps2 =
+            (size.acceleration_mps2_max * (1.0 - ratio * ratio * ratio * ratio)).max(-COMFORT_MPS2);
+        let mut wanted_mps2 = free_mps2;
+        if let Some(leader) = &self.leader {
+            wanted_mps2 = wanted_mps2.min(self.follow_mps2(size, leader, free_mps2));
+        }
+        if let Some(gap_m) = self.stop_gap_m(size, around, braking_mps2) {
+            let line = Leader { gap_m, speed_mps: 0.0 };
+            wanted_mps2 = wanted_mps2.min(self.follow_mps2(size, &line, free_mps2));
+        }
+        wanted_mps2
+    }
+
+    /// IDM's interaction, and at least the braking that still avoids the leader.
+    fn follow_mps2(&self, size: &BodyParameters, leader: &Leader, free_mps2: f64) -> f64 {
+        let closing_mps = self.speed_mps - leader.speed_mps;
+        let following = Following {
+            gap_m_min: GAP_M_MIN,
+            time_gap_s: TIME_GAP_S,
+            acceleration_mps2: size.acceleration_mps2_max,
+            comfortable_mps2: COMFORT_MPS2,
+        };
+        let crowding = following.wanted_gap_m(self.speed_mps, leader.speed_mps) / leader.gap_m.max(0.1);
+        let idm_mps2 = free_mps2 - size.acceleration_mps2_max * crowding * crowding;
+        if closing_mps <= 0.0 {
+            return idm_mps2;
+        }
+        let needed_mps2 = closing_mps * closing_mps / (2.0 * (leader.gap_m - GAP_M_MIN / 2.0).max(0.1));
+        if needed_mps2 > COMFORT_MPS2 { idm_mps2.min(-needed_mps2) } else { idm_mps2 }
+    }
+
+    /// Gap from the front to the stop line at which it has to stop now, m.
+    fn stop_gap_m(&self, size: &BodyParameters, around: &Around, braking_mps2: f64) -> Option<f64> {
+        let front_m = self.station_m + size.length_m / 2.0;
+        let line = self.way.stop_lines.iter().find(|line| line.station_m > front_m)?;
+        let gap_m = line.station_m - front_m;
+        let braking_m = self.speed_mps * self.speed_mps / 2.0;
+        if gap_m > LOOK_AHEAD_M + braking_m / COMFORT_MPS2 {
+            return None;
+        }
+        // Who cannot stop before the line any more does not stop behind it either.
+        let stops = match around.signals.colour(&around.scene.map, line.signal, around.tick) {
+            SignalColour::Green => false,
+            SignalColour::Yellow => gap_m * YELLOW_BRAKING_MPS2 > braking_m,
+            SignalColour::Red => gap_m * braking_mps2 > braking_m,
+        };
+        stops.then_some(gap_m)
+    }
+
+    /// Begins the next lane change of the plan if it is due, there is a lane, and it is free.
+    fn begin_change(&mut self, this: &Obstacle, size: &BodyParameters, around: &Around) {
+        let Some(next) = self.plan.last() else { return };
+        let due = match next.when {
+            When::Tick(tick) => around.tick >= tick,
+            When::AheadOfEgo(gap_m) => {
+                let ahead_m = around.ego_outline.pose.to_local(this.outline.pose.position).x;
+                ahead_m - size.length_m / 2.0 - around.ego_outline.half_length_m >= gap_m
+            }
+        };
+        if !due {
+            return;
+        }
+        let begun = match next.towards.clone() {
+            Towards::Way(way) => {
+                let to_m = way.path.project(this.outline.pose.position).station_m;
+                Some((way, to_m, None))
+            }
+            Towards::To(side) => self.change_to(side, this, size, around),
+            Towards::Either => self
+                .change_to(Side::Left, this, size, around)
+                .or_else(|| self.change_to(Side::Right, this, size, around)),
+            Towards::Back => match self.last_change {
+                Some(Side::Left) => self.change_to(Side::Right, this, size, around),
+                Some(Side::Right) => self.change_to(Side::Left, this, size, around),
+                None => None,
+            },
+        };
+        let Some((to, to_station_m, side)) = begun else { return };
+        let aside_m = (to.path.pose_at(to_station_m).position - this.outline.pose.position).norm();
+        self.change = Some(Change {
+            to,
+            to_station_m,
+            progress: 0.0,
+            duration_s: (QUINTIC_PEAK * aside_m / CHANGE_MPS_MAX).max(CHANGE_S_MIN),
+        });
+        self.last_change = side;
+        self.plan.pop();
+    }
+
+    /// The way in the neighbouring lane, if there is one and room in it, and the own station there.
+    fn change_to(
+        &mut self,
+        side: Side,
+        this: &Obstacle,
+        size: &BodyParameters,
+        around: &Around,
+    ) -> Option<(Arc<Way>, f64, Option<Side>)> {
+        let map = &around.scene.map;
+        let target = lane_beside(around, self.way.lane_at(self.station_m).0, side)?;
+        let centre = &map.lane(target).centre;
+        let there = centre.project(this.outline.pose.position);
+        if there.distance_m > CHANGE_M_MAX || !self.is_free(centre, there.station_m, this, size, around) {
+            return None;
+        }
+        let mut rng = self.draw(this.id, around);
+        let way = Way::along(map, &[target], &mut rng)?;
+        Some((Arc::new(way), there.station_m, Some(side)))
+    }
+
+    /// Whether nobody is beside it in another lane, or so fast behind that a second would not do.
+    fn is_free(
+        &self,
+        path: &Path,
+        station_m: f64,
+        this: &Obstacle,
+        size: &BodyParameters,
+        around: &Around,
+    ) -> bool {
+        let here = path.pose_at(station_m);
+        let forward = here.forward();
+        around.others(this.id).all(|(outline, velocity_mps)| {
+            let ahead_m = forward.dot(&(outline.pose.position - here.position));
+            let Some(other) = beside(path, outline.pose.position, station_m + ahead_m) else { return true };
+            let (half_length_m, half_width_m) = extent_m(outline, other.heading_rad);
+            let aside_m = other.offset_m.abs() - half_width_m - size.width_m / 2.0;
+            let apart_m = (other.station_m - station_m).abs() - half_length_m - size.length_m / 2.0;
+            let closing_mps = (velocity_mps.dot(&forward) - self.speed_mps)
+                * if other.station_m < station_m { 1.0 } else { -1.0 };
+            aside_m > SIDE_ROOM_M || apart_m > MIRROR_ROOM_M + closing_mps.max(0.0)
+        })
+    }
+
+    /// Moves the lane change on by a tick in which `way_m` were driven, from where it was `before`.
+    fn advance_change(&mut self, way_m: f64, before: Vec2) -> Moved {
+        let from = self.way.path.pose_at(self.station_m);
+        let Some(change) = &mut self.change else {
+            let velocity_mps = from.forward() * self.speed_mps;
+            return Moved { pose: from, lane_heading_rad: from.heading_rad, velocity_mps };
+        };
+        let guess_m = change.to_station_m + way_m;
+        change.to_station_m =
+            beside(&change.to.path, from.position, guess_m).map_or(guess_m, |found| found.station_m);
+        let to = change.to.path.pose_at(change.to_station_m);
+        let progress_per_m = 1.0 / (self.speed_mps.max(CHANGE_FULL_MPS) * change.duration_s);
+        change.progress += progress_per_m * way_m;
+        if change.progress >= 1.0 {
+            (self.way, self.station_m) = (Arc::clone(&change.to), change.to_station_m);
+            self.change = None;
+            let velocity_mps = (to.position - before) / DT_S;
+            return Moved { pose: to, lane_heading_rad: to.heading_rad, velocity_mps };
+        }
+        let (blend, slope) = quintic(change.progress);
+        let heading_rad = from.heading_rad + wrap_angle(to.heading_rad - from.heading_rad) * blend;
+        let turned_rad = libm::atan(from.to_local(to.position).y * slope * progress_per_m);
+        let pose = Pose {
+            position: from.position + (to.position - from.position) * blend,
+            heading_rad: wrap_angle(heading_rad + turned_rad),
+        };
+        // Measured, because between two lanes in a bend it is neither lane's speed.
+        let lane = if change.progress < 0.5 { from } else { to };
+        let velocity_mps = (pose.position - before) / DT_S;
+        Moved { pose, lane_heading_rad: lane.heading_rad, velocity_mps }
+    }
+
+    fn draw(&mut self, id: u32, around: &Around) -> Rng {
+        self.draws += 1;
+        choices(around.seed, id, self.draws - 1)
+    }
+}
+
+/// The stream of one choice of one road user.
+pub(super) fn choices(seed: u64, id: u32, draw: u32) -> Rng {
+    rng::stream(seed, Stream::Traffic, u64::from(id) << 32 | u64::from(draw))
+}
+
+/// The same-direction lane on a side of a lane, if there is one.
+pub(super) fn lane_beside(around: &Around, lane: LaneIndex, side: Side) -> Option<LaneIndex> {
+    let lane = around.scene.map.lane(lane);
+    let neighbour = match side {
+        Side::Left => lane.left,
+        Side::Right => lane.right,
+    };
+    neighbour.filter(|neighbour| neighbour.same_direction).map(|neighbour| neighbour.lane)
+}
+
+/// An outline as the leader of somebody at a station, if it is ahead and in the corridor.
+fn in_corridor(
+    path: &Path,
+    station_m: f64,
+    here: &Pose,
+    size: &BodyParameters,
+    outline: &OrientedBox,
+    velocity_mps: Vec2,
+) -> Option<Leader> {
+    let straight_m = (outline.pose.position - here.position).norm();
+    let other = beside(path, outline.pose.position, station_m + straight_m)?;
+    let (half_length_m, half_width_m) = extent_m(outline, other.heading_rad);
+    let aside_m = other.offset_m.abs() - half_width_m - size.width_m / 2.0;
+    if other.station_m < station_m || aside_m > SIDE_ROOM_M {
+        return None;
+    }
+    Some(Leader {
+        gap_m: other.station_m - station_m - half_length_m - size.length_m / 2.0,
+        speed_mps: velocity_mps.dot(&unit_vector(other.heading_rad)),
+    })
+}
+
+/// Half extents of an outline along and across a heading, m.
+fn extent_m(outline: &OrientedBox, heading_rad: f64) -> (f64, f64) {
+    let along = unit_vector(outline.pose.heading_rad - heading_rad).abs();
+    (
+        outline.half_length_m * along.x + outline.half_width_m * along.y,
+        outline.half_length_m * along.y + outline.half_width_m * along.x,
+    )
+}
+
+/// The smooth step with no acceleration at its ends, and its slope.
+fn quintic(x: f64) -> (f64, f64) {
+    let value = x * x * x * (10.0 + x * (6.0 * x - 15.0));
+    let rest = x * (1.0 - x);
+    (value, 30.0 * rest * rest)
+}

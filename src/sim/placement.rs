@@ -1,0 +1,455 @@
+//! Where a spawn puts its road user, and whether there is room.
+//!
+//! `distance_m` is always the gap between the outlines along the ego vehicle's route. What lies at
+//! that distance is each verb's business; the offsets at the roadside and the waiting times are those
+//! of the published package (its absolute offsets are not: they ignore the lanes). Traffic drives on
+//! the right.
+
+use std::sync::Arc;
+
+use crate::action::SpawnFacts;
+use crate::action::SpawnRequest;
+use crate::geometry::OrientedBox;
+use crate::geometry::Pose;
+use crate::geometry::distance_m;
+use crate::geometry::wrap_angle;
+use crate::model::vocabulary::LaneChoice;
+use crate::model::vocabulary::Side;
+use crate::model::vocabulary::Then;
+use crate::model::vocabulary::Verb;
+use crate::rng;
+use crate::road::Conflict;
+use crate::road::LaneIndex;
+use crate::road::RouteLane;
+
+use super::body;
+use super::body::BodyParameters;
+use super::ego::VehicleParameters;
+use super::mover::Around;
+use super::mover::Motion;
+use super::mover::Moved;
+use super::mover::Mover;
+use super::npc::Driver;
+use super::npc::Manoeuvre;
+use super::npc::Towards;
+use super::npc::When;
+use super::npc::choices;
+use super::npc::lane_beside;
+use super::pedestrian::Walker;
+use super::safety;
+use super::sense::SignalColour;
+use super::way::Way;
+use super::world::DT_S;
+use super::world::Obstacle;
+
+/// Where pedestrians begin and end, beside the middle of the ego vehicle's lane, m.
+const KERB_M: f64 = 5.0;
+/// Fastest and farthest that a request may ask for, m/s and m: beyond any road of a scenario, and
+/// small enough for every sum that is made of them.
+const SPEED_MPS_MAX: f64 = 70.0;
+const DISTANCE_M_MAX: f64 = 1000.0;
+/// Nobody appears nearer to anybody else, m.
+const ROOM_M: f64 = 0.5;
+/// A median wider than this divides a road: nobody comes towards the ego vehicle across it, m.
+const MEDIAN_M_MAX: f64 = 3.0;
+/// Before somebody ahead changes lanes, s.
+const CHANGE_AFTER_S: f64 = 1.0;
+/// How far in front of the ego vehicle an overtaker cuts in, m.
+const CUT_IN_M: f64 = 5.0;
+/// How far beyond the asked distance a crossing may lie, m.
+const CROSSING_M: f64 = 60.0;
+/// A rendezvous with an ego vehicle slower than this would be too far away, m/s.
+const RENDEZVOUS_MPS_MIN: f64 = 3.0;
+/// Step in which a drive towards a rendezvous is timed, m.
+const TIMING_M: f64 = 1.0;
+
+/// A road user ready to appear.
+pub(super) struct Placed {
+    pub obstacle: Obstacle,
+    pub mover: Mover,
+}
+
+/// Where a request would put its road user, and what it would be, under a new id.
+///
+/// # Errors
+/// Why it cannot, in words that complete "cannot spawn: …".
+pub(super) fn place(around: &Around, request: &SpawnRequest, id: u32) -> Result<Placed, String> {
+    check(request)?;
+    let size = body::parameters(request.body);
+    let driver = match request.verb {
+        Verb::DriveAhead => drive_ahead(around, request, &size, id)?,
+        Verb::Overtake => overtake(around, request, &size, id)?,
+        Verb::DriveOpposite => drive_opposite(around, request, &size, id)?,
+        Verb::CrossRoad => cross_road(around, request, &size, id)?,
+        Verb::Walk | Verb::Stand => return on_foot(around, request, size, id),
+    };
+    check_way(around, &driver, &size)?;
+    let moved = driver.moved();
+    finish(around, request, Mover::new(size, Motion::Drive(driver)), id, moved)
+}
+
+/// Whether a request is one that anybody could carry out. Scripts come from outside, so nothing is
+/// taken for granted; NaN is in no range.
+fn check(request: &SpawnRequest) -> Result<(), String> {
+    if !(0.0..=SPEED_MPS_MAX).contains(&request.speed_mps) {
+        return Err(format!("the speed is not between 0 and {SPEED_MPS_MAX} m/s"));
+    }
+    if !(0.0..=DISTANCE_M_MAX).contains(&request.distance_m) {
+        return Err(format!("the distance is not between 0 and {DISTANCE_M_MAX} m"));
+    }
+    match request.verb {
+        Verb::Walk | Verb::Stand if request.body.is_vehicle() => Err("only a pedestrian walks".into()),
+        Verb::Walk | Verb::Stand => Ok(()),
+        Verb::DriveAhead | Verb::Overtake | Verb::DriveOpposite | Verb::CrossRoad => {
+            if request.body.is_vehicle() { Ok(()) } else { Err("a pedestrian does not drive".into()) }
+        }
+    }
+}
+
+/// The distances that rules ask for.
+///
+/// The gap at the spawn is between the outlines. The gap that a careful driver needs (see `safety`) is
+/// to slow down to one ahead, or to rest for one who crosses, walks or stands; for one from behind it
+/// is what the newcomer needs to slow down to the ego vehicle. One that comes the other way stays in
+/// its own lanes and needs none, unless its way crosses the route at a junction.
+pub(super) fn facts(around: &Around, request: &SpawnRequest, placed: &Placed) -> SpawnFacts {
+    let along_mps = around.ego_outline.pose.forward().dot(&placed.obstacle.velocity_mps);
+    let (ego_mps, friction) = (around.ego.speed_mps, around.friction);
+    let safety_gap_m = match request.verb {
+        Verb::DriveAhead => safety::behind_leader_m(ego_mps, along_mps, friction),
+        Verb::Overtake => safety::from_behind_m(along_mps, ego_mps, around.braking_mps2(&placed.mover.size)),
+        Verb::DriveOpposite if meets_route(around, &placed.mover) => {
+            safety::oncoming_m(ego_mps, -along_mps, friction)
+        }
+        Verb::DriveOpposite => 0.0,
+        Verb::CrossRoad | Verb::Walk | Verb::Stand => safety::behind_leader_m(ego_mps, 0.0, friction),
+    };
+    SpawnFacts { spawn_gap_m: placed.obstacle.distance_m, safety_gap_m }
+}
+
+/// Whether the way of a driver crosses or joins what the ego vehicle has before it.
+fn meets_route(around: &Around, mover: &Mover) -> bool {
+    let Motion::Drive(driver) = &mover.motion else { return false };
+    let mut ahead =
+        around.scene.route.conflicts.iter().filter(|conflict| conflict.station_m > around.ego_station_m);
+    ahead.any(|conflict| driver.way().lane_begin_m(conflict.lane).is_some())
+}
+
+fn finish(
+    around: &Around,
+    request: &SpawnRequest,
+    mover: Mover,
+    id: u32,
+    moved: Moved,
+) -> Result<Placed, String> {
+    let outline = OrientedBox::new(moved.pose, mover.size.length_m, mover.size.width_m);
+    if around.others(id).any(|(other, _)| distance_m(&outline, other) < ROOM_M) {
+        return Err("another road user is there".into());
+    }
+    let obstacle = Obstacle {
+        id,
+        body: request.body,
+        colour: request.colour,
+        verb: request.verb,
+        outline,
+        distance_m: distance_m(around.ego_outline, &outline),
+        height_m: mover.size.height_m,
+        lane_heading_rad: moved.lane_heading_rad,
+        velocity_mps: moved.velocity_mps,
+        spawned_tick: around.tick,
+    };
+    Ok(Placed { obstacle, mover })
+}
+
+/// A newcomer must be able to brake for those before it. The ego vehicle is not among them: how near
+/// to it a newcomer may appear is for the rules of the space to say.
+fn check_way(around: &Around, driver: &Driver, size: &BodyParameters) -> Result<(), String> {
+    let braking_mps2 = around.braking_mps2(size);
+    let blocked = around.obstacles.iter().any(|other| {
+        driver.gap_to(size, &other.outline, other.velocity_mps).is_some_and(|(gap_m, speed_mps)| {
+            let closing_mps = (driver.speed_mps - speed_mps).max(0.0);
+            gap_m < 1.0 + closing_mps * closing_mps / (2.0 * braking_mps2) + 0.1 * closing_mps
+        })
+    });
+    if blocked { Err("another road user is too near in its lane".into()) } else { Ok(()) }
+}
+
+/// Station on the route of a centre that lies `distance_m` before the ego vehicle's front.
+fn ahead_m(around: &Around, request: &SpawnRequest, size: &BodyParameters) -> Result<f64, String> {
+    let front_m = VehicleParameters::MKZ.front_m(around.ego_station_m);
+    let station_m = front_m + request.distance_m + size.length_m / 2.0;
+    if station_m > around.scene.route.path.length_m() {
+        return Err("the route ends before that distance".into());
+    }
+    Ok(station_m)
+}
+
+fn on_foot(around: &Around, request: &SpawnRequest, size: BodyParameters, id: u32) -> Result<Placed, String> {
+    let station_m = ahead_m(around, request, &size)?;
+    let lane = around.scene.route.path.pose_at(station_m);
+    let (left_m, turn_rad) = match request.side {
+        Side::Left => (KERB_M, -core::f64::consts::FRAC_PI_2),
+        Side::Right => (-KERB_M, core::f64::consts::FRAC_PI_2),
+    };
+    let facing = |at: Pose| Pose { heading_rad: wrap_angle(at.heading_rad + turn_rad), ..at };
+    let (pose, motion) = if request.verb == Verb::Stand {
+        (facing(lane), Motion::Stand)
+    } else {
+        let from = facing(lane.offset(0.0, left_m));
+        (from, Motion::Walk(Walker::new(from, 2.0 * KERB_M, request.speed_mps, around.tick)))
+    };
+    let moved = Moved::at_rest(pose);
+    finish(around, request, Mover::new(size, motion), id, moved)
+}
+
+fn drive_ahead(
+    around: &Around,
+    request: &SpawnRequest,
+    size: &BodyParameters,
+    id: u32,
+) -> Result<Driver, String> {
+    let station_m = ahead_m(around, request, size)?;
+    let own = lane_at(around, station_m);
+    let lane = chosen_lane(around, station_m, request.lane)?;
+    let mut rng = choices(around.seed, id, 0);
+    let mut plan = Vec::new();
+    if request.then == Then::Change {
+        let towards = match request.lane {
+            LaneChoice::Left => Side::Right,
+            LaneChoice::Right => Side::Left,
+            LaneChoice::Current => {
+                let sides: Vec<Side> = [Side::Left, Side::Right]
+                    .into_iter()
+                    .filter(|side| lane_beside(around, own, *side).is_some())
+                    .collect();
+                if sides.is_empty() {
+                    return Err("no lane to change to".into());
+                }
+                sides[rng::below(&mut rng, sides.len() as u32) as usize]
+            }
+        };
+        let when = When::Tick(around.tick + (CHANGE_AFTER_S / DT_S + 0.5) as u64);
+        plan.push(Manoeuvre { when, towards: Towards::To(towards) });
+    }
+    let beside_ego = around.scene.route.path.pose_at(station_m).position;
+    let station_m = around.scene.map.lane(lane).centre.project(beside_ego).station_m;
+    let way = Way::along(&around.scene.map, &[lane], &mut rng).ok_or("that lane leads nowhere")?;
+    Ok(Driver::new(Arc::new(way), station_m, request.speed_mps, plan, 1))
+}
+
+fn overtake(
+    around: &Around,
+    request: &SpawnRequest,
+    size: &BodyParameters,
+    id: u32,
+) -> Result<Driver, String> {
+    let lane = chosen_lane(around, around.ego_station_m, request.lane)?;
+    let mut rng = choices(around.seed, id, 0);
+    let mut plan = Vec::new();
+    let cut_in = |towards| Manoeuvre { when: When::AheadOfEgo(CUT_IN_M), towards };
+    match (request.lane, request.then) {
+        (LaneChoice::Current, then) => {
+            plan.push(Manoeuvre { when: When::Tick(around.tick), towards: Towards::Either });
+            if then == Then::Change {
+                plan.push(cut_in(Towards::Back));
+            }
+        }
+        (LaneChoice::Left, Then::Change) => plan.push(cut_in(Towards::To(Side::Right))),
+        (LaneChoice::Right, Then::Change) => plan.push(cut_in(Towards::To(Side::Left))),
+        (LaneChoice::Left | LaneChoice::Right, Then::Keep) => {}
+    }
+    // Its front bumper is `distance_m` behind the ego vehicle's rear bumper, measured in its own lane.
+    let rear = around.ego.rear_axle.offset(-VehicleParameters::MKZ.rear_axle_to_back_m, 0.0);
+    let map = &around.scene.map;
+    let rear_m = map.lane(lane).centre.project(rear.position).station_m;
+    let mut station_m = rear_m - request.distance_m - size.length_m / 2.0;
+    let mut lanes = vec![lane];
+    while station_m < size.length_m / 2.0 {
+        let previous = lane_before(around, lanes[0]).ok_or("the road begins too near behind")?;
+        station_m += map.lane(previous).centre.length_m();
+        lanes.insert(0, previous);
+    }
+    let way = Way::along(map, &lanes, &mut rng).ok_or("that lane leads nowhere")?;
+    Ok(Driver::new(Arc::new(way), station_m, request.speed_mps, plan, 1))
+}
+
+fn drive_opposite(
+    around: &Around,
+    request: &SpawnRequest,
+    size: &BodyParameters,
+    id: u32,
+) -> Result<Driver, String> {
+    let station_m = ahead_m(around, request, size)?;
+    let map = &around.scene.map;
+    let inner = lane_along(around, station_m, false, |lane| opposing_lane(around, lane))?;
+    let mut rng = choices(around.seed, id, 0);
+    let (lane, plan) = match request.then {
+        Then::Keep => (inner, Vec::new()),
+        Then::Change => {
+            let second = lane_beside(around, inner, Side::Right).ok_or("no second opposing lane")?;
+            let when = When::Tick(around.tick);
+            (second, vec![Manoeuvre { when, towards: Towards::To(Side::Left) }])
+        }
+    };
+    let beside_route = around.scene.route.path.pose_at(station_m).position;
+    let station_m = map.lane(lane).centre.project(beside_route).station_m;
+    let way = Way::along(map, &[lane], &mut rng).ok_or("that lane leads nowhere")?;
+    Ok(Driver::new(Arc::new(way), station_m, request.speed_mps, plan, 1))
+}
+
+fn cross_road(
+    around: &Around,
+    request: &SpawnRequest,
+    size: &BodyParameters,
+    id: u32,
+) -> Result<Driver, String> {
+    let front_m = VehicleParameters::MKZ.front_m(around.ego_station_m);
+    let side = match request.side {
+        Side::Left => "left",
+        Side::Right => "right",
+    };
+    let mut reason = format!("no crossing leg from the {side} within {CROSSING_M} m");
+    for conflict in &around.scene.route.conflicts {
+        let distance_m = conflict.station_m - front_m;
+        let from_right = conflict.angle_rad > 0.0;
+        if !(request.distance_m..=request.distance_m + CROSSING_M).contains(&distance_m)
+            || from_right != (request.side == Side::Right)
+        {
+            continue;
+        }
+        match rendezvous(around, request, size, id, conflict, distance_m) {
+            Ok(driver) => return Ok(driver),
+            Err(why) => reason = why,
+        }
+    }
+    Err(reason)
+}
+
+/// A driver who reaches a conflict when the ego vehicle does, if that keeps its present speed.
+fn rendezvous(
+    around: &Around,
+    request: &SpawnRequest,
+    size: &BodyParameters,
+    id: u32,
+    conflict: &Conflict,
+    distance_m: f64,
+) -> Result<Driver, String> {
+    let map = &around.scene.map;
+    let arrival_s = distance_m / around.ego.speed_mps.max(RENDEZVOUS_MPS_MIN);
+    let needed_m = request.speed_mps * arrival_s + size.length_m;
+    let mut lanes = vec![conflict.lane];
+    let mut upstream_m = conflict.lane_station_m;
+    while upstream_m < needed_m {
+        let Some(previous) = map.lane(lanes[0]).predecessors.first() else { break };
+        upstream_m += map.lane(*previous).centre.length_m();
+        lanes.insert(0, *previous);
+    }
+    let mut rng = choices(around.seed, id, 0);
+    let way = Way::along(map, &lanes, &mut rng).ok_or("that lane leads nowhere")?;
+    let meeting_m = way.lane_begin_m(conflict.lane).expect("the way was made through this lane")
+        + conflict.lane_station_m;
+    // Backwards from the meeting at the speed that each bend allows, its front first.
+    let mut front_m = meeting_m;
+    let mut left_s = arrival_s;
+    let mut passed_lines: Vec<(usize, f64)> = Vec::new();
+    while left_s > 1e-9 {
+        let speed_mps = request.speed_mps.min(way.speed_mps_max(front_m)).max(0.1);
+        let step_m = TIMING_M.min(speed_mps * left_s);
+        front_m -= step_m;
+        left_s -= step_m / speed_mps;
+        let lines =
+            way.stop_lines.iter().filter(|line| (front_m..front_m + step_m).contains(&line.station_m));
+        passed_lines.extend(lines.map(|line| (line.signal, left_s.max(0.0))));
+        if front_m < size.length_m {
+            return Err("the crossing road is too short".into());
+        }
+    }
+    let is_green = |(signal, after_s): &(usize, f64)| {
+        let tick = around.tick + (after_s / DT_S) as u64;
+        around.signals.colour(map, *signal, tick) == SignalColour::Green
+    };
+    if !passed_lines.iter().all(is_green) {
+        return Err("its signal will not be green".into());
+    }
+    let station_m = front_m - size.length_m / 2.0;
+    if request.then == Then::Keep {
+        return Ok(Driver::new(Arc::new(way), station_m, request.speed_mps, Vec::new(), 1));
+    }
+    // It starts beside its way and changes into it on the approach.
+    let start = way.path.pose_at(station_m).position;
+    let (leg, _) = way.lane_at(station_m);
+    if map.lane(leg).junction.is_some() {
+        return Err("too near to the junction for a lane change".into());
+    }
+    let beside = lane_beside(around, leg, Side::Right)
+        .or_else(|| lane_beside(around, leg, Side::Left))
+        .ok_or("no second lane in the crossing leg")?;
+    let station_m = map.lane(beside).centre.project(start).station_m;
+    let first = Way::along(map, &[beside], &mut rng).ok_or("that lane leads nowhere")?;
+    let change = Manoeuvre { when: When::Tick(around.tick), towards: Towards::Way(Arc::new(way)) };
+    Ok(Driver::new(Arc::new(first), station_m, request.speed_mps, vec![change], 1))
+}
+
+fn lane_at(around: &Around, station_m: f64) -> LaneIndex {
+    around.scene.route.lane_at(station_m).lane
+}
+
+fn chosen_lane(around: &Around, station_m: f64, choice: LaneChoice) -> Result<LaneIndex, String> {
+    let beside = |side, refusal: &str| {
+        lane_along(around, station_m, true, |lane| lane_beside(around, lane, side).ok_or(refusal.into()))
+    };
+    match choice {
+        LaneChoice::Current => Ok(lane_at(around, station_m)),
+        LaneChoice::Left => beside(Side::Left, "no lane on the left"),
+        LaneChoice::Right => beside(Side::Right, "no lane on the right"),
+    }
+}
+
+/// The first lane to the left that comes the other way.
+fn opposing_lane(around: &Around, lane: LaneIndex) -> Result<LaneIndex, String> {
+    let left = around.scene.map.lane(lane).left.ok_or("no opposing lane")?;
+    match left.same_direction {
+        true => opposing_lane(around, left.lane),
+        false if left.gap_m > MEDIAN_M_MAX => Err("a median lies before the opposing lane".into()),
+        false => Ok(left.lane),
+    }
+}
+
+/// The lane that `pick` finds for the lane of the route at a station.
+///
+/// Inside junctions lanes have few neighbours. There it is the lane that joins what `pick` finds for
+/// the streets before and after, in the direction of the route or against it.
+fn lane_along(
+    around: &Around,
+    station_m: f64,
+    forward: bool,
+    pick: impl Fn(LaneIndex) -> Result<LaneIndex, String>,
+) -> Result<LaneIndex, String> {
+    let map = &around.scene.map;
+    let here = lane_at(around, station_m);
+    let refusal = match pick(here) {
+        Ok(found) => return Ok(found),
+        Err(refusal) => refusal,
+    };
+    let route = &around.scene.route.lanes;
+    let Some(index) = route.iter().position(|part| part.lane == here) else { return Err(refusal) };
+    let is_street = |part: &&RouteLane| map.lane(part.lane).junction.is_none();
+    let before = route[..index].iter().rfind(is_street);
+    let after = route[index + 1..].iter().find(is_street);
+    let (Some(before), Some(after), Some(_)) = (before, after, map.lane(here).junction) else {
+        return Err(refusal);
+    };
+    let (from, to) = match (pick(before.lane)?, pick(after.lane)?) {
+        (before, after) if forward => (before, after),
+        (before, after) => (after, before),
+    };
+    let through = &map.lane(from).successors;
+    through.iter().copied().find(|lane| map.lane(*lane).successors.contains(&to)).ok_or(refusal)
+}
+
+/// The lane from which one comes into a lane: that of the route, if it is one, else the first.
+fn lane_before(around: &Around, lane: LaneIndex) -> Option<LaneIndex> {
+    let route = &around.scene.route.lanes;
+    let on_route = route.windows(2).find(|pair| pair[1].lane == lane).map(|pair| pair[0].lane);
+    on_route.or_else(|| around.scene.map.lane(lane).predecessors.first().copied())
+}

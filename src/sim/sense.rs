@@ -1,0 +1,202 @@
+//! What reaches the ego vehicle's sensors: the truth, cut down to what is in range. Of each object it
+//! is told how much is in sight; nothing is left out for being hidden.
+//!
+//! This is the physical side of sensing (line of sight, light, weather). What a driving system makes
+//! of it, with its errors and delays, is `ads`.
+
+use crate::geometry::OrientedBox;
+use crate::geometry::Pose;
+use crate::geometry::Vec2;
+use crate::geometry::ray_hit_m;
+use crate::model::vocabulary::Body;
+
+use super::world::Obstacle;
+
+/// Objects farther away than this are not sensed at all, m: the clear-day range for cars of the
+/// LiDAR and the camera that driving systems are given.
+pub(super) const RANGE_M: f64 = 120.0;
+
+/// Ticks between two frames: lines of sight are looked at, driving systems perceive and other drivers
+/// react at 10 Hz.
+pub const FRAME_TICKS: u64 = 5;
+
+/// Points of an outline to which a line of sight is tried.
+const RAYS: u32 = 8;
+
+/// One look around, made anew for every tick in which the driving system asks.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Sensed {
+    /// Since the start of the episode, s.
+    pub time_s: f64,
+    pub ego: EgoMotion,
+    pub objects: Vec<SensedObject>,
+    /// State of every signal of the map, by index in `RoadMap::signals`.
+    pub signals: Vec<SignalColour>,
+    pub conditions: Conditions,
+}
+
+/// True motion of the ego vehicle. Its rear axle is the reference point, as in Apollo.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct EgoMotion {
+    /// Pose of the rear axle's centre.
+    pub rear_axle: Pose,
+    pub speed_mps: f64,
+    pub acceleration_mps2: f64,
+    pub yaw_rate_radps: f64,
+    /// Angle of the road wheels, rad, positive to the left.
+    pub steer_rad: f64,
+}
+
+/// A road user within sensor range, as it truly is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SensedObject {
+    /// The same for the whole life of the object, from 1.
+    pub id: u32,
+    pub body: Body,
+    /// Centre of the outline.
+    pub pose: Pose,
+    pub velocity_mps: Vec2,
+    pub length_m: f64,
+    pub width_m: f64,
+    pub height_m: f64,
+    /// Part of its outline that nothing hides, in `[0, 1]`, by line of sight; at most 0.1 s old.
+    pub visible_fraction: f64,
+    /// Distance between the outlines, m.
+    pub distance_m: f64,
+}
+
+/// Light and weather where the ego vehicle is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Conditions {
+    /// 1 by day, less in the dark: the light that a camera has.
+    pub light: f64,
+    /// Rain, mm/h.
+    pub rain_mmph: f64,
+    /// Meteorological optical range, m.
+    pub visibility_m: f64,
+    /// Water on the road, mm.
+    pub water_mm: f64,
+    /// Coefficient of tyre friction.
+    pub friction: f64,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum SignalColour {
+    Red,
+    Yellow,
+    Green,
+}
+
+/// Part of an obstacle's outline that can be seen from a point, in `[0, 1]`.
+///
+/// Lines of sight run to points spread evenly over its width as seen from `eye`. One that meets a
+/// lower body still shows what rises above that, so a car does not hide a bus wholly. Buildings and
+/// the ego vehicle itself hide nothing.
+pub(super) fn visible_fraction(eye: Vec2, target: &Obstacle, obstacles: &[Obstacle]) -> f64 {
+    let towards = target.outline.pose.position - eye;
+    let distance_m = towards.norm();
+    if distance_m < 1e-6 {
+        return 1.0;
+    }
+    // One bit for each obstacle that may stand in the way; most often there is none.
+    let mut hiders = 0_u32;
+    for (index, other) in obstacles.iter().take(u32::BITS as usize).enumerate() {
+        hiders |= u32::from(may_hide(eye, towards, distance_m, target, other)) << index;
+    }
+    if hiders == 0 {
+        return 1.0;
+    }
+    let (first, last) = silhouette(eye, towards, &target.outline);
+    let mut seen = 0.0;
+    for ray in 0..RAYS {
+        let point = first + (last - first) * ((f64::from(ray) + 0.5) / f64::from(RAYS));
+        let reach_m = (point - eye).norm();
+        let direction = (point - eye) / reach_m.max(1e-6);
+        let mut shown: f64 = 1.0;
+        for (_, other) in obstacles.iter().enumerate().filter(|(index, _)| hiders >> index & 1 == 1) {
+            if ray_hit_m(eye, direction, reach_m, &other.outline).is_some() {
+                shown = shown.min((1.0 - other.height_m / target.height_m).max(0.0));
+            }
+        }
+        seen += shown / f64::from(RAYS);
+    }
+    seen
+}
+
+/// Whether a circle around `other` reaches into the cone that holds the target, in front of it.
+fn may_hide(eye: Vec2, towards: Vec2, distance_m: f64, target: &Obstacle, other: &Obstacle) -> bool {
+    if other.id == target.id {
+        return false;
+    }
+    let delta = other.outline.pose.position - eye;
+    let ahead_m = towards.dot(&delta) / distance_m;
+    let aside_m = (towards.x * delta.y - towards.y * delta.x).abs() / distance_m;
+    let radius_m = other.outline.radius_m();
+    ahead_m > -radius_m
+        && ahead_m < distance_m + target.outline.radius_m()
+        && aside_m < radius_m + target.outline.radius_m() * (ahead_m / distance_m).max(0.0)
+}
+
+/// The outermost corners of an outline as seen from a point: left and right of the line to it.
+fn silhouette(eye: Vec2, towards: Vec2, outline: &OrientedBox) -> (Vec2, Vec2) {
+    let slope = |corner: &Vec2| {
+        let delta = corner - eye;
+        (towards.x * delta.y - towards.y * delta.x) / towards.dot(&delta).max(1e-6)
+    };
+    let corners = outline.corners();
+    let mut ends = (corners[0], corners[0]);
+    for corner in corners {
+        if slope(&corner) > slope(&ends.0) {
+            ends.0 = corner;
+        }
+        if slope(&corner) < slope(&ends.1) {
+            ends.1 = corner;
+        }
+    }
+    ends
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::vocabulary::Colour;
+    use crate::model::vocabulary::Verb;
+
+    fn obstacle(id: u32, body: Body, x_m: f64, y_m: f64) -> Obstacle {
+        let size = crate::sim::body::parameters(body);
+        Obstacle {
+            id,
+            body,
+            colour: Colour::Red,
+            verb: Verb::Stand,
+            outline: OrientedBox::new(Pose::new(x_m, y_m, 0.0), size.length_m, size.width_m),
+            height_m: size.height_m,
+            lane_heading_rad: 0.0,
+            velocity_mps: Vec2::zeros(),
+            distance_m: 0.0,
+            spawned_tick: 0,
+        }
+    }
+
+    #[test]
+    fn a_bus_hides_and_a_sedan_does_so_in_part() {
+        let eye = Vec2::zeros();
+        let walker = obstacle(1, Body::Pedestrian, 30.0, 0.0);
+        let see = |others: &[Obstacle]| visible_fraction(eye, &walker, others);
+        assert_eq!(see(&[walker]), 1.0);
+        assert_eq!(see(&[walker, obstacle(2, Body::SchoolBus, 15.0, 0.0)]), 0.0);
+        assert_eq!(see(&[walker, obstacle(2, Body::SchoolBus, 45.0, 0.0)]), 1.0);
+        assert_eq!(see(&[walker, obstacle(2, Body::SchoolBus, 15.0, 4.0)]), 1.0);
+        let over_the_roof = see(&[walker, obstacle(2, Body::Sedan, 15.0, 0.0)]);
+        assert!((over_the_roof - (1.0 - 1.45 / 1.75)).abs() < 1e-9, "{over_the_roof}");
+    }
+
+    #[test]
+    fn half_hidden_is_half_seen() {
+        let target = obstacle(1, Body::Sedan, 40.0, 0.0);
+        let mut wall = obstacle(2, Body::BoxTruck, 20.0, 0.0);
+        // Its left flank lies on the line of sight to the target's middle.
+        wall.outline.pose.position.y = -wall.outline.half_width_m;
+        assert_eq!(visible_fraction(Vec2::zeros(), &target, &[target, wall]), 0.5);
+    }
+}

@@ -1,0 +1,371 @@
+//! What road users do: every verb on a hand-made road, and what must hold of all of them.
+
+use std::sync::Arc;
+
+use proptest::prelude::*;
+
+use super::Contact;
+use super::Control;
+use super::DT_S;
+use super::Obstacle;
+use super::Scene;
+use super::Start;
+use super::VehicleParameters;
+use super::World;
+use super::pedals_for;
+use super::testing;
+use crate::action::Effect;
+use crate::action::SpawnRequest;
+use crate::action::Surroundings;
+use crate::geometry::distance_m;
+use crate::geometry::wrap_angle;
+use crate::model::vocabulary::Body;
+use crate::model::vocabulary::Colour;
+use crate::model::vocabulary::LaneChoice;
+use crate::model::vocabulary::Level;
+use crate::model::vocabulary::Phenomenon;
+use crate::model::vocabulary::Side;
+use crate::model::vocabulary::Then;
+use crate::model::vocabulary::Verb;
+use crate::model::vocabulary::Word;
+
+fn request(verb: Verb, distance_m: f64, speed_mps: f64) -> SpawnRequest {
+    let on_foot = matches!(verb, Verb::Walk | Verb::Stand);
+    SpawnRequest {
+        body: if on_foot { Body::Pedestrian } else { Body::Sedan },
+        colour: Colour::Red,
+        verb,
+        lane: LaneChoice::Current,
+        side: Side::Right,
+        then: Then::Keep,
+        speed_mps,
+        distance_m,
+    }
+}
+
+/// Holds a speed and the route, whatever is in the way, by aiming at a point ahead (pure pursuit).
+fn hold(world: &World, speed_mps: f64) -> Control {
+    let ego = world.ego();
+    let (throttle_pct, brake_pct) = pedals_for(2.0 * (speed_mps - ego.speed_mps));
+    let ahead_m = 3.0 + 0.5 * ego.speed_mps;
+    let aim = world.scene().route.path.pose_at(world.ego_station_m() + ahead_m);
+    let local = ego.rear_axle.to_local(aim.position);
+    let curvature_per_m = 2.0 * local.y / local.norm_squared();
+    let steer_rad = libm::atan(curvature_per_m * VehicleParameters::MKZ.wheelbase_m);
+    Control { throttle_pct, brake_pct, steer_rad }
+}
+
+/// Drives on for a while; returns the contacts.
+fn drive(world: &mut World, speed_mps: f64, time_s: f64) -> Vec<Contact> {
+    let end_s = world.time_s() + time_s;
+    let mut contacts = Vec::new();
+    while world.time_s() < end_s - 1e-9 {
+        let control = hold(world, speed_mps);
+        contacts.extend_from_slice(world.tick(&control));
+    }
+    contacts
+}
+
+fn spawn(world: &mut World, request: SpawnRequest) -> Obstacle {
+    let facts = world.survey(&request).expect("there is room");
+    let id = world.apply(&Effect::Spawn(request)).expect("there is room").expect("a newcomer has an id");
+    let newcomer = *find(world, id).expect("it just came");
+    assert_eq!(facts.spawn_gap_m, distance_m(&world.ego_outline(), &newcomer.outline));
+    newcomer
+}
+
+fn find(world: &World, id: u32) -> Option<&Obstacle> {
+    world.obstacles().iter().find(|obstacle| obstacle.id == id)
+}
+
+fn y_m(world: &World, id: u32) -> f64 {
+    find(world, id).expect("it is still there").outline.pose.position.y
+}
+
+#[test]
+fn ahead_and_then_into_the_lane_of_the_ego_vehicle() {
+    let mut world = testing::world(&testing::straight());
+    drive(&mut world, 8.0, 5.0);
+    let own = spawn(&mut world, request(Verb::DriveAhead, 50.0, 10.0));
+    assert!((distance_m(&world.ego_outline(), &own.outline) - 50.0).abs() < 1e-6);
+    assert!((own.velocity_mps.x - 10.0).abs() < 1e-9);
+    let beside =
+        SpawnRequest { lane: LaneChoice::Right, then: Then::Change, ..request(Verb::DriveAhead, 12.0, 10.0) };
+    let beside = spawn(&mut world, beside);
+    assert!((beside.outline.pose.position.y + 5.25).abs() < 1e-9);
+    let mut sideways_mps: f64 = 0.0;
+    for _ in 0..400 {
+        let control = hold(&world, 8.0);
+        world.tick(&control);
+        let now = find(&world, beside.id).expect("it drives on");
+        sideways_mps = sideways_mps.max(now.velocity_mps.y);
+    }
+    assert!((y_m(&world, beside.id) + 1.75).abs() < 1e-6);
+    assert!((1.7..1.8 + 1e-6).contains(&sideways_mps), "{sideways_mps}");
+    assert!(distance_m(&world.ego_outline(), &find(&world, beside.id).unwrap().outline) > 12.0);
+}
+
+#[test]
+fn what_nobody_could_carry_out_is_refused() {
+    let mut world = testing::world(&testing::straight());
+    drive(&mut world, 8.0, 5.0);
+    let ahead = request(Verb::DriveAhead, 50.0, 10.0);
+    for speed_mps in [f64::NAN, f64::INFINITY, -0.1, 70.1, 1e300] {
+        let refusal = world.survey(&SpawnRequest { speed_mps, ..ahead }).expect_err("no such speed");
+        assert_eq!(refusal, "the speed is not between 0 and 70 m/s");
+    }
+    for distance_m in [f64::NAN, f64::INFINITY, -0.1, 1000.1, 1e300] {
+        let refusal = world.survey(&SpawnRequest { distance_m, ..ahead }).expect_err("no such distance");
+        assert_eq!(refusal, "the distance is not between 0 and 1000 m");
+    }
+    for verb in Verb::ALL {
+        let on_foot = matches!(verb, Verb::Walk | Verb::Stand);
+        let body = if on_foot { Body::SUV } else { Body::Pedestrian };
+        let refusal = world.survey(&SpawnRequest { verb: *verb, body, ..ahead }).expect_err("no such body");
+        assert_eq!(refusal, if on_foot { "only a pedestrian walks" } else { "a pedestrian does not drive" });
+    }
+}
+
+#[test]
+fn refusals_say_why() {
+    let mut world = testing::world(&testing::straight());
+    drive(&mut world, 8.0, 5.0);
+    let refused =
+        |world: &World, request: SpawnRequest| world.survey(&request).expect_err("it is impossible");
+    let left = SpawnRequest { lane: LaneChoice::Left, ..request(Verb::DriveAhead, 12.0, 10.0) };
+    assert_eq!(refused(&world, left), "no lane on the left");
+    assert_eq!(
+        refused(&world, request(Verb::DriveAhead, 900.0, 10.0)),
+        "the route ends before that distance"
+    );
+    let crossing = request(Verb::CrossRoad, 12.0, 10.0);
+    assert_eq!(refused(&world, crossing), "no crossing leg from the right within 60 m");
+    spawn(&mut world, request(Verb::Stand, 40.0, 1.0));
+    assert_eq!(refused(&world, request(Verb::Stand, 40.2, 1.0)), "another road user is there");
+    let driver = request(Verb::DriveAhead, 30.0, 20.0);
+    assert_eq!(refused(&world, driver), "another road user is too near in its lane");
+}
+
+#[test]
+fn overtakes_and_cuts_in() {
+    for lane in [LaneChoice::Right, LaneChoice::Current] {
+        let mut world = testing::world(&testing::straight());
+        drive(&mut world, 8.0, 8.0);
+        let passing = SpawnRequest { lane, then: Then::Change, ..request(Verb::Overtake, 12.0, 14.0) };
+        let passing = spawn(&mut world, passing);
+        assert!(passing.outline.pose.position.x < world.ego_outline().pose.position.x - 12.0);
+        assert_eq!(drive(&mut world, 8.0, 15.0), []);
+        let now = find(&world, passing.id).expect("it drives on");
+        assert!(now.outline.pose.position.x > world.ego_outline().pose.position.x + 10.0, "{lane:?}");
+        assert!((now.outline.pose.position.y + 1.75).abs() < 1e-6, "{lane:?}");
+    }
+}
+
+#[test]
+fn follows_where_it_cannot_pass() {
+    let mut world = testing::world(&testing::crossing());
+    drive(&mut world, 8.0, 6.0);
+    let behind = spawn(&mut world, request(Verb::Overtake, 15.0, 12.0));
+    assert_eq!(drive(&mut world, 8.0, 5.0), []);
+    // The ego vehicle stops as hard as it can.
+    for _ in 0..300 {
+        assert_eq!(world.tick(&Control { brake_pct: 100.0, ..Control::default() }), []);
+    }
+    let behind = find(&world, behind.id).expect("it waits behind");
+    assert!((1.0..4.0).contains(&distance_m(&world.ego_outline(), &behind.outline)));
+}
+
+#[test]
+fn comes_towards_in_the_inner_opposing_lane() {
+    for then in [Then::Keep, Then::Change] {
+        let mut world = testing::world(&testing::straight());
+        drive(&mut world, 8.0, 5.0);
+        let towards = SpawnRequest { then, ..request(Verb::DriveOpposite, 50.0, 12.0) };
+        let towards = spawn(&mut world, towards);
+        assert!(towards.velocity_mps.x < -11.9);
+        let begin_m = if then == Then::Keep { 1.75 } else { 5.25 };
+        assert!((towards.outline.pose.position.y - begin_m).abs() < 1e-9);
+        assert_eq!(drive(&mut world, 8.0, 6.0), []);
+        assert!((y_m(&world, towards.id) - 1.75).abs() < 1e-6);
+    }
+}
+
+#[test]
+fn crosses_when_the_ego_vehicle_is_there() {
+    for then in [Then::Keep, Then::Change] {
+        let start = Start { signal_phase_s: 10.0, ..testing::start() };
+        let mut world = World::new(testing::crossing(), &start);
+        while world.ego_station_m() < 150.0 {
+            let control = hold(&world, 15.0);
+            world.tick(&control);
+        }
+        let across = SpawnRequest { then, ..request(Verb::CrossRoad, 25.0, 10.0) };
+        // Its light is green from 7 to 19 s.
+        assert!((7.0..15.0).contains(&world.time_s()));
+        let across = spawn(&mut world, across);
+        assert!(across.velocity_mps.y > 9.9);
+        let contacts = drive(&mut world, 15.0, 4.0);
+        assert_eq!(contacts.len(), 1, "{then:?}");
+        assert!(contacts[0].closing_speed_mps > 5.0);
+    }
+}
+
+#[test]
+fn a_red_light_stops_and_refuses() {
+    let mut world = testing::world(&testing::crossing());
+    drive(&mut world, 12.0, 4.0);
+    // The light of the ego vehicle is green until 12 s, so the other one's is red.
+    while world.ego_station_m() < 145.0 {
+        drive(&mut world, 12.0, 0.1);
+    }
+    let across = request(Verb::CrossRoad, 25.0, 10.0);
+    assert_eq!(world.survey(&across).expect_err("its light is red"), "its signal will not be green");
+
+    let mut world = World::new(testing::crossing(), &Start { signal_phase_s: 15.0, ..testing::start() });
+    let ahead = spawn(&mut world, request(Verb::DriveAhead, 60.0, 12.0));
+    drive(&mut world, 3.0, 15.0);
+    let stopped = find(&world, ahead.id).expect("it waits");
+    assert!(stopped.velocity_mps.norm() < 0.2);
+    let front_m = stopped.outline.pose.position.x + stopped.outline.half_length_m;
+    assert!((281.0..285.0).contains(&front_m), "{front_m}");
+}
+
+#[test]
+fn a_pedestrian_run_over_is_one_contact() {
+    let mut world = testing::world(&testing::straight());
+    drive(&mut world, 15.0, 10.0);
+    let standing = spawn(&mut world, request(Verb::Stand, 40.0, 1.0));
+    let before_mps = world.ego().speed_mps;
+    let contacts = drive(&mut world, 15.0, 6.0);
+    assert_eq!(contacts.len(), 1);
+    let contact = contacts[0];
+    assert_eq!(contact.obstacle, standing.id);
+    assert!((contact.on_ego.x - 2.35).abs() < 0.01, "{contact:?}");
+    assert!((contact.closing_speed_mps - before_mps).abs() < 0.5);
+    assert_eq!(find(&world, standing.id), None);
+}
+
+#[test]
+fn a_pedestrian_crosses_from_the_left() {
+    let mut world = testing::world(&testing::straight());
+    let walker = SpawnRequest { body: Body::Pedestrian, side: Side::Left, ..request(Verb::Walk, 40.0, 1.4) };
+    let walker = spawn(&mut world, walker);
+    assert!((walker.outline.pose.position.y - 3.25).abs() < 1e-9);
+    drive(&mut world, 0.0, 8.5);
+    assert!((y_m(&world, walker.id) + 6.75).abs() < 1e-6);
+    drive(&mut world, 0.0, 2.0);
+    assert_eq!(find(&world, walker.id), None);
+}
+
+#[test]
+fn an_eleventh_removes_the_oldest() {
+    let mut world = testing::world(&testing::straight());
+    for i in 0..11 {
+        spawn(&mut world, request(Verb::Stand, 10.0 * f64::from(i + 1), 1.0));
+    }
+    let ids: Vec<u32> = world.obstacles().iter().map(|obstacle| obstacle.id).collect();
+    assert_eq!(ids, (2..=11).collect::<Vec<u32>>());
+}
+
+#[test]
+fn a_snapshot_goes_on_alike() {
+    let mut world = busy_world(&testing::straight(), 3);
+    let mut copy = world.clone();
+    let first = (drive(&mut world, 10.0, 10.0), bits(&world));
+    let second = (drive(&mut copy, 10.0, 10.0), bits(&copy));
+    assert_eq!(first, second);
+}
+
+fn bits(world: &World) -> Vec<u64> {
+    let mut bits = Vec::new();
+    world.trace(&mut |word| bits.push(word));
+    bits
+}
+
+/// A world in which everything that can be spawned was asked for.
+fn busy_world(scene: &Arc<Scene>, seed: u64) -> World {
+    let mut world = World::new(Arc::clone(scene), &Start { seed, ..testing::start() });
+    drive(&mut world, 10.0, 6.0);
+    let mut k = seed as usize;
+    for verb in [Verb::DriveAhead, Verb::Overtake, Verb::DriveOpposite, Verb::CrossRoad, Verb::Walk] {
+        for lane in [LaneChoice::Current, LaneChoice::Right] {
+            k += 1;
+            let request = SpawnRequest {
+                body: Body::ALL[k % 6],
+                lane,
+                then: Then::ALL[k % 2],
+                side: Side::ALL[k % 2],
+                ..request(verb, 15.0 + 2.0 * k as f64, 12.0)
+            };
+            // Some do not fit, which is no matter here.
+            let _refusal = world.apply(&Effect::Spawn(request));
+        }
+    }
+    world
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 24, ..ProptestConfig::default() })]
+
+    #[test]
+    fn drivers_do_not_run_into_each_other(seed in 0_u64..1000, road in 0..3) {
+        let scene = match road {
+            0 => testing::straight(),
+            1 => testing::crossing(),
+            _ => testing::corner(),
+        };
+        let mut world = busy_world(&scene, seed);
+        world.apply(&Effect::Sky(Phenomenon::Wetness, Level::Moderate)).expect("the sky obeys");
+        // The ego vehicle brakes: those behind must, too.
+        for _ in 0..1000 {
+            let speed_mps = if world.time_s() < 10.0 { 10.0 } else { 0.0 };
+            let control = hold(&world, speed_mps);
+            let before: Vec<Obstacle> = world.obstacles().to_vec();
+            world.tick(&control);
+            for was in before.iter().filter(|was| was.verb != Verb::Walk) {
+                let Some(now) = find(&world, was.id) else { continue };
+                // Nobody jumps, neither between lanes nor between their halves.
+                let moved = now.outline.pose.position - was.outline.pose.position;
+                prop_assert!((moved - now.velocity_mps * DT_S).norm() < 0.02, "{was:?} {now:?}");
+                let turned = wrap_angle(now.outline.pose.heading_rad - was.outline.pose.heading_rad);
+                prop_assert!(turned.abs() < 0.06, "{was:?} {now:?}");
+            }
+            let vehicles: Vec<&Obstacle> =
+                world.obstacles().iter().filter(|obstacle| obstacle.verb != Verb::Walk).collect();
+            for (i, a) in vehicles.iter().enumerate() {
+                for b in &vehicles[i + 1..] {
+                    prop_assert!(distance_m(&a.outline, &b.outline) > 0.0, "{a:?} {b:?}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn every_verb_has_its_place_on_road_2() {
+    let scene = testing::corner();
+    let mut found = Vec::new();
+    for phase_s in [0.0, 17.0] {
+        let mut world =
+            World::new(Arc::clone(&scene), &Start { signal_phase_s: phase_s, ..testing::start() });
+        while !world.arrived() {
+            drive(&mut world, 7.0, 1.0);
+            for verb in Verb::ALL {
+                for (lane, side, then) in [
+                    (LaneChoice::Current, Side::Left, Then::Keep),
+                    (LaneChoice::Current, Side::Left, Then::Change),
+                    (LaneChoice::Left, Side::Right, Then::Keep),
+                    (LaneChoice::Right, Side::Right, Then::Change),
+                ] {
+                    let wish = SpawnRequest { lane, side, then, ..request(*verb, 20.0, 11.0) };
+                    let kind = (*verb, lane, side, then);
+                    if world.survey(&wish).is_ok() && !found.contains(&kind) {
+                        found.push(kind);
+                    }
+                }
+            }
+        }
+        assert!(world.ego_offset_m().abs() < 0.1, "it drives on the route");
+    }
+    assert_eq!(found.len(), 4 * Verb::ALL.len(), "{found:?}");
+}

@@ -1,0 +1,149 @@
+//! Ways: the chain of lanes that a vehicle follows, as one path with its stop lines and the speeds
+//! that its bends allow. Made once and shared; a world's snapshot copies none of it.
+
+use crate::geometry::Path;
+use crate::geometry::Vec2;
+use crate::rng;
+use crate::rng::Rng;
+use crate::road::LaneIndex;
+use crate::road::RoadMap;
+use crate::road::RouteStopLine;
+
+/// Lateral acceleration that other drivers accept in a bend, m/s²: upper end of comfort.
+const LATERAL_MPS2: f64 = 3.0;
+
+/// Deceleration with which they slow down for it, m/s².
+const BEND_BRAKING_MPS2: f64 = 2.0;
+
+/// A way reaches at least this far beyond the lanes it was asked for, if the road does, m.
+const REACH_M: f64 = 400.0;
+
+#[derive(Debug, Clone)]
+pub(super) struct Way {
+    pub path: Path,
+    lanes: Vec<WayLane>,
+    /// By rising station.
+    pub stop_lines: Vec<RouteStopLine>,
+    /// Highest speed at each vertex of `path`, m/s.
+    speeds_mps_max: Vec<f64>,
+    /// Whether lanes go on where it ends.
+    open: bool,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct WayLane {
+    lane: LaneIndex,
+    from_m: f64,
+}
+
+impl Way {
+    /// The way through `lanes`, which must follow each other, and on along successors drawn from
+    /// `rng`. `None` without lanes.
+    pub fn along(map: &RoadMap, lanes: &[LaneIndex], rng: &mut Rng) -> Option<Way> {
+        let mut chain = lanes.to_vec();
+        let mut last = *lanes.last()?;
+        let mut beyond_m = 0.0;
+        while beyond_m < REACH_M {
+            let next = &map.lane(last).successors;
+            if next.is_empty() {
+                break;
+            }
+            last = next[rng::below(rng, next.len() as u32) as usize];
+            beyond_m += map.lane(last).centre.length_m();
+            chain.push(last);
+        }
+        Way::through(map, &chain)
+    }
+
+    fn through(map: &RoadMap, chain: &[LaneIndex]) -> Option<Way> {
+        let path = Path::join(chain.iter().map(|lane| &map.lane(*lane).centre))?;
+        let mut lanes: Vec<WayLane> = Vec::new();
+        let mut stop_lines = Vec::new();
+        let mut end: Option<(f64, Vec2)> = None;
+        for index in chain {
+            let lane = map.lane(*index);
+            let centre = &lane.centre;
+            // Where lanes do not quite meet, the path bridges them.
+            let from_m = end.map_or(0.0, |(to_m, tip)| to_m + (centre.points()[0].position - tip).norm());
+            lanes.push(WayLane { lane: *index, from_m });
+            stop_lines.extend(
+                lane.stop_lines
+                    .iter()
+                    .map(|line| RouteStopLine { station_m: from_m + line.station_m, signal: line.signal }),
+            );
+            let tip = centre.points()[centre.points().len() - 1].position;
+            end = Some((from_m + centre.length_m(), tip));
+        }
+        let open = chain.last().is_some_and(|last| !map.lane(*last).successors.is_empty());
+        let speeds_mps_max = bend_speeds_mps(&path);
+        Some(Way { path, lanes, stop_lines, speeds_mps_max, open })
+    }
+
+    /// The lane at a station, clamped to the ends, and the station on it.
+    pub fn lane_at(&self, station_m: f64) -> (LaneIndex, f64) {
+        let after = self.lanes.partition_point(|lane| lane.from_m <= station_m).max(1);
+        let found = self.lanes[after - 1];
+        (found.lane, station_m - found.from_m)
+    }
+
+    /// Station at which a lane begins, if the way takes it.
+    pub fn lane_begin_m(&self, lane: LaneIndex) -> Option<f64> {
+        self.lanes.iter().find(|part| part.lane == lane).map(|part| part.from_m)
+    }
+
+    /// Highest speed at a station: what the bend there and the bends ahead allow, m/s.
+    pub fn speed_mps_max(&self, station_m: f64) -> f64 {
+        let after = self.path.points().partition_point(|point| point.station_m <= station_m);
+        self.speeds_mps_max[after.min(self.speeds_mps_max.len() - 1)]
+    }
+
+    /// Whether so little is left from a station that the way should be prolonged.
+    pub fn ends_soon(&self, station_m: f64) -> bool {
+        self.open && self.path.length_m() - station_m < REACH_M / 2.0
+    }
+
+    /// The same way from the lane at `station_m` on, but longer; and that station on it.
+    pub fn prolonged(&self, map: &RoadMap, station_m: f64, rng: &mut Rng) -> Option<(Way, f64)> {
+        let (here, lane_station_m) = self.lane_at(station_m);
+        let first = self.lanes.iter().rposition(|part| part.lane == here && part.from_m <= station_m)?;
+        let rest: Vec<LaneIndex> = self.lanes[first..].iter().map(|part| part.lane).collect();
+        Some((Way::along(map, &rest, rng)?, lane_station_m))
+    }
+}
+
+/// A point beside a path, from a guess that is at most a bend away.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Beside {
+    pub station_m: f64,
+    pub offset_m: f64,
+    /// Of the path there.
+    pub heading_rad: f64,
+}
+
+/// Where a point lies beside a path, by stepping along its tangents: much quicker than a search,
+/// but `None` for points so far aside that the steps do not settle. Nobody there is in the way.
+pub(super) fn beside(path: &Path, point: Vec2, guess_m: f64) -> Option<Beside> {
+    let mut station_m = guess_m;
+    for _ in 0..5 {
+        let pose = path.pose_at(station_m);
+        let local = pose.to_local(point);
+        if local.x.abs() < 0.02 {
+            return Some(Beside { station_m, offset_m: local.y, heading_rad: pose.heading_rad });
+        }
+        station_m += local.x;
+    }
+    None
+}
+
+/// The speed of the bend at each vertex, lowered so that braking for the next ones stays gentle.
+fn bend_speeds_mps(path: &Path) -> Vec<f64> {
+    let points = path.points();
+    let mut speeds: Vec<f64> =
+        points.iter().map(|p| (LATERAL_MPS2 / p.curvature_per_m.abs().max(1e-4)).sqrt()).collect();
+    for i in (0..points.len() - 1).rev() {
+        let way_m = points[i + 1].station_m - points[i].station_m;
+        let braked_mps = (speeds[i + 1] * speeds[i + 1] + 2.0 * BEND_BRAKING_MPS2 * way_m).sqrt();
+        speeds[i] = speeds[i].min(braked_mps);
+    }
+    speeds
+}

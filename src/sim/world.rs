@@ -1,0 +1,500 @@
+//! The world of one episode.
+
+use std::sync::Arc;
+
+use crate::action::Effect;
+use crate::action::SpawnFacts;
+use crate::action::SpawnRequest;
+use crate::action::Surroundings;
+use crate::geometry::OrientedBox;
+use crate::geometry::Sweep;
+use crate::geometry::Vec2;
+use crate::geometry::distance_m;
+use crate::model::vocabulary::Body;
+use crate::model::vocabulary::Colour;
+use crate::model::vocabulary::Level;
+use crate::model::vocabulary::TimeOfDay;
+use crate::model::vocabulary::Verb;
+use crate::road::RoadMap;
+use crate::road::Route;
+
+use super::contact::Party;
+use super::contact::common_speed_mps;
+use super::contact::meet;
+use super::ego::Control;
+use super::ego::Ego;
+use super::ego::VehicleParameters;
+use super::environment::Environment;
+use super::mover::Around;
+use super::mover::Mover;
+use super::placement;
+use super::sense::Conditions;
+use super::sense::EgoMotion;
+use super::sense::FRAME_TICKS;
+use super::sense::RANGE_M;
+use super::sense::Sensed;
+use super::sense::SensedObject;
+use super::sense::SignalColour;
+use super::sense::visible_fraction;
+use super::signals::SignalClock;
+
+/// Name of this simulated world. Raised whenever the same seed no longer gives the same episode, so
+/// that an old scenario is told apart from a refuted one.
+pub const ENGINE: &str = "plane/1";
+
+/// One physics step, s: 50 Hz.
+pub const DT_S: f64 = 0.02;
+
+/// Speed at which an episode begins, m/s.
+const START_MPS: f64 = 3.0;
+
+/// Obstacles at a time (published package): the next one removes the oldest.
+const OBSTACLES_MAX: usize = 10;
+
+/// How far along the route the ego vehicle is looked for from where it was, m. More than it drives
+/// in a tick, so that it is found again after a corner cut, and less than any loop of a route.
+const ROUTE_SEARCH_M: f64 = 2.0;
+
+/// What stays the same during all episodes of one road. Shared, never copied.
+#[derive(Debug)]
+pub struct Scene {
+    pub map: Arc<RoadMap>,
+    /// Where the ego vehicle is to go.
+    pub route: Route,
+}
+
+/// How an episode begins.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Start {
+    pub time: TimeOfDay,
+    pub rain: Level,
+    pub fog: Level,
+    pub wetness: Level,
+    /// Where in their cycle the signals begin, s.
+    pub signal_phase_s: f64,
+    /// Seed of the choices of other road users.
+    pub seed: u64,
+}
+
+/// The whole state of an episode: `Clone` is a snapshot.
+#[derive(Debug, Clone)]
+pub struct World {
+    scene: Arc<Scene>,
+    ticks: u64,
+    ego: Ego,
+    /// Outline of the ego vehicle, kept because everybody asks for it.
+    ego_outline: OrientedBox,
+    /// Rear axle beside the route.
+    ego_station_m: f64,
+    ego_offset_m: f64,
+    red_runs: u32,
+    environment: Environment,
+    conditions: Conditions,
+    signals: SignalClock,
+    obstacles: Vec<Obstacle>,
+    /// What moves the obstacle of the same index.
+    movers: Vec<Mover>,
+    /// Those that began in the tick before.
+    contacts: Vec<Contact>,
+    next_id: u32,
+    /// Of the choices of other road users.
+    seed: u64,
+}
+
+/// A road user other than the ego vehicle, as others may see it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Obstacle {
+    /// From 1, in order of appearance.
+    pub id: u32,
+    pub body: Body,
+    pub colour: Colour,
+    pub verb: Verb,
+    pub outline: OrientedBox,
+    pub height_m: f64,
+    /// Heading of the lane that it drives in; its own on foot.
+    pub lane_heading_rad: f64,
+    pub velocity_mps: Vec2,
+    /// Gap between its outline and the ego vehicle's, m; 0 if they touch.
+    pub distance_m: f64,
+    pub spawned_tick: u64,
+}
+
+/// The ego vehicle touched an obstacle that it did not touch in the tick before.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Contact {
+    pub time_s: f64,
+    pub obstacle: u32,
+    pub point: Vec2,
+    /// The point in the frame of the ego outline's centre: x ahead, y left, m.
+    pub on_ego: Vec2,
+    pub ego_speed_mps: f64,
+    pub obstacle_velocity_mps: Vec2,
+    /// The same in the frame of the ego outline: x ahead, y left.
+    pub obstacle_velocity_on_ego_mps: Vec2,
+    /// Speed at which the gap between the outlines closed, m/s, not negative. What turning adds is
+    /// left out.
+    pub closing_speed_mps: f64,
+}
+
+impl World {
+    /// The beginning of an episode: the ego vehicle rolls at 3 m/s with its rear axle on the start of
+    /// the route, and nobody else is there.
+    pub fn new(scene: Arc<Scene>, start: &Start) -> World {
+        let ego = Ego::new(scene.route.path.pose_at(0.0), START_MPS);
+        let environment =
+            Environment { time: start.time, rain: start.rain, fog: start.fog, wetness: start.wetness };
+        World {
+            ticks: 0,
+            ego_outline: ego.outline(),
+            ego,
+            ego_station_m: 0.0,
+            ego_offset_m: 0.0,
+            red_runs: 0,
+            conditions: environment.conditions(),
+            environment,
+            signals: SignalClock::new(start.signal_phase_s),
+            obstacles: Vec::with_capacity(OBSTACLES_MAX),
+            movers: Vec::with_capacity(OBSTACLES_MAX),
+            contacts: Vec::new(),
+            next_id: 1,
+            seed: start.seed,
+            scene,
+        }
+    }
+
+    pub fn scene(&self) -> &Arc<Scene> {
+        &self.scene
+    }
+
+    /// Advances by [`DT_S`]; returns the contacts that began.
+    ///
+    /// An obstacle that was touched once brakes to rest, leaves 2 s later, and touches nobody again.
+    pub fn tick(&mut self, control: &Control) -> &[Contact] {
+        self.contacts.clear();
+        let outline = self.ego_outline;
+        self.ego.step(control, self.conditions.friction, DT_S);
+        self.ego_outline = self.ego.outline();
+        self.follow_route();
+        // Taken once: of two contacts in a tick, the second does not see what the first did to the ego.
+        let ego = Party {
+            sweep: Sweep { start: outline, end: self.ego_outline.pose },
+            velocity_mps: self.ego_outline.pose.forward() * self.ego.motion.speed_mps,
+        };
+        let ego_mps = self.ego.motion.speed_mps;
+        // Taken out for the tick, so that each can move while it looks at the world.
+        let mut movers = core::mem::take(&mut self.movers);
+        let mut index = 0;
+        while index < movers.len() {
+            if self.tick_obstacle(index, &mut movers[index], &ego, ego_mps) {
+                index += 1;
+            } else {
+                movers.remove(index);
+                self.obstacles.remove(index);
+            }
+        }
+        self.movers = movers;
+        for obstacle in &mut self.obstacles {
+            obstacle.distance_m = distance_m(&self.ego_outline, &obstacle.outline);
+        }
+        self.ticks += 1;
+        if self.ticks.is_multiple_of(FRAME_TICKS) {
+            self.look();
+        }
+        &self.contacts
+    }
+
+    /// Carries out an effect.
+    ///
+    /// # Errors
+    /// Why a spawn is impossible; the world is then unchanged. The id of the newcomer otherwise.
+    pub fn apply(&mut self, effect: &Effect) -> Result<Option<u32>, String> {
+        match effect {
+            Effect::Time(time) => self.environment.time = *time,
+            Effect::Sky(phenomenon, level) => self.environment.set(*phenomenon, *level),
+            Effect::Spawn(request) => return self.spawn(request).map(Some),
+        }
+        self.conditions = self.environment.conditions();
+        Ok(None)
+    }
+
+    pub fn ticks(&self) -> u64 {
+        self.ticks
+    }
+
+    pub fn time_s(&self) -> f64 {
+        self.ticks as f64 * DT_S
+    }
+
+    pub fn ego(&self) -> EgoMotion {
+        self.ego.motion
+    }
+
+    pub fn ego_outline(&self) -> OrientedBox {
+        self.ego_outline
+    }
+
+    /// Station of the ego vehicle's rear axle on the route, m.
+    pub fn ego_station_m(&self) -> f64 {
+        self.ego_station_m
+    }
+
+    /// How far the ego vehicle's rear axle is to the left of the route, m.
+    pub fn ego_offset_m(&self) -> f64 {
+        self.ego_offset_m
+    }
+
+    /// Stop lines of the route that the ego vehicle's front passed under a red light.
+    pub fn red_runs(&self) -> u32 {
+        self.red_runs
+    }
+
+    pub fn obstacles(&self) -> &[Obstacle] {
+        &self.obstacles
+    }
+
+    pub fn time_of_day(&self) -> TimeOfDay {
+        self.environment.time
+    }
+
+    /// Levels of rain, fog and wetness.
+    pub fn sky(&self) -> [Level; 3] {
+        [self.environment.rain, self.environment.fog, self.environment.wetness]
+    }
+
+    /// Light, weather and grip.
+    pub fn conditions(&self) -> Conditions {
+        self.conditions
+    }
+
+    /// Colour of a signal now, by index in `RoadMap::signals`.
+    pub fn signal(&self, signal: usize) -> SignalColour {
+        self.signals.colour(&self.scene.map, signal, self.ticks)
+    }
+
+    /// What the sensors see now, in buffers of its own.
+    pub fn sensed(&self) -> Sensed {
+        let mut sensed = Sensed {
+            time_s: 0.0,
+            ego: self.ego.motion,
+            objects: Vec::new(),
+            signals: Vec::new(),
+            conditions: self.conditions,
+        };
+        self.sense(&mut sensed);
+        sensed
+    }
+
+    /// Fills `into` with what the sensors see now; its buffers are reused.
+    ///
+    /// Everything is of this tick, except lines of sight, which are looked at ten times a second.
+    pub fn sense(&self, into: &mut Sensed) {
+        into.time_s = self.time_s();
+        into.ego = self.ego.motion;
+        into.conditions = self.conditions;
+        into.signals.clear();
+        into.signals.extend((0..self.scene.map.signals.len()).map(|signal| self.signal(signal)));
+        into.objects.clear();
+        for (obstacle, mover) in self.obstacles.iter().zip(&self.movers) {
+            let away = obstacle.outline.pose.position - self.ego_outline.pose.position;
+            if away.norm_squared() > RANGE_M * RANGE_M {
+                continue;
+            }
+            into.objects.push(SensedObject {
+                id: obstacle.id,
+                body: obstacle.body,
+                pose: obstacle.outline.pose,
+                velocity_mps: obstacle.velocity_mps,
+                length_m: mover.size.length_m,
+                width_m: mover.size.width_m,
+                height_m: mover.size.height_m,
+                visible_fraction: mover.visible_fraction,
+                distance_m: obstacle.distance_m,
+            });
+        }
+    }
+
+    /// Feeds every bit of the state that later ticks depend on to `sink`, in a fixed order.
+    pub fn trace(&self, sink: &mut dyn FnMut(u64)) {
+        sink(self.ticks);
+        self.ego.trace(sink);
+        sink(self.ego_station_m.to_bits());
+        sink(self.ego_offset_m.to_bits());
+        sink(u64::from(self.red_runs));
+        sink(self.environment.time as u64);
+        for level in self.sky() {
+            sink(level as u64);
+        }
+        self.signals.trace(sink);
+        sink(u64::from(self.next_id));
+        sink(self.seed);
+        for (obstacle, mover) in self.obstacles.iter().zip(&self.movers) {
+            sink(u64::from(obstacle.id));
+            sink(obstacle.spawned_tick);
+            for word in [obstacle.body as u64, obstacle.colour as u64, obstacle.verb as u64] {
+                sink(word);
+            }
+            let pose = &obstacle.outline.pose;
+            for value in [pose.position.x, pose.position.y, pose.heading_rad] {
+                sink(value.to_bits());
+            }
+            for value in obstacle.velocity_mps.iter() {
+                sink(value.to_bits());
+            }
+            mover.trace(sink);
+        }
+    }
+
+    /// Whether the ego vehicle's front bumper is at most 1 m before the goal, or beyond it.
+    pub fn arrived(&self) -> bool {
+        self.ego_front_m() >= self.scene.route.goal_m - 1.0
+    }
+
+    /// Station of the ego vehicle's front bumper on the route, m.
+    fn ego_front_m(&self) -> f64 {
+        VehicleParameters::MKZ.front_m(self.ego_station_m)
+    }
+
+    fn around(&self) -> Around<'_> {
+        Around {
+            scene: &self.scene,
+            ego: &self.ego.motion,
+            ego_outline: &self.ego_outline,
+            ego_velocity_mps: self.ego_outline.pose.forward() * self.ego.motion.speed_mps,
+            ego_station_m: self.ego_station_m,
+            obstacles: &self.obstacles,
+            signals: &self.signals,
+            tick: self.ticks,
+            friction: self.conditions.friction,
+            seed: self.seed,
+        }
+    }
+
+    fn spawn(&mut self, request: &SpawnRequest) -> Result<u32, String> {
+        let placed = placement::place(&self.around(), request, self.next_id)?;
+        if self.obstacles.len() == OBSTACLES_MAX {
+            self.obstacles.remove(0);
+            self.movers.remove(0);
+        }
+        self.obstacles.push(placed.obstacle);
+        self.movers.push(placed.mover);
+        self.next_id += 1;
+        self.look();
+        Ok(placed.obstacle.id)
+    }
+
+    /// Moves one obstacle and looks whether the ego vehicle and it touch; `false` if it left.
+    /// `ego_mps` is the ego vehicle's speed before any contact of this tick.
+    fn tick_obstacle(&mut self, index: usize, mover: &mut Mover, ego: &Party, ego_mps: f64) -> bool {
+        let before = self.obstacles[index];
+        let Some(moved) = mover.step(&before, &self.around()) else { return false };
+        let obstacle = &mut self.obstacles[index];
+        (obstacle.outline.pose, obstacle.velocity_mps) = (moved.pose, moved.velocity_mps);
+        obstacle.lane_heading_rad = moved.lane_heading_rad;
+        if mover.touched {
+            return true;
+        }
+        let other = Party {
+            sweep: Sweep { start: before.outline, end: moved.pose },
+            velocity_mps: moved.velocity_mps,
+        };
+        if let Some(contact) = meet(ego, ego_mps, &other, before.id, self.ticks) {
+            let heading = self.ego_outline.pose.forward();
+            let along_mps = heading.dot(&moved.velocity_mps);
+            // Impacts chain: the second acts on the speed that the first left.
+            let common_mps = common_speed_mps(self.ego.motion.speed_mps, along_mps, mover.size.mass_t);
+            self.ego.motion.speed_mps = common_mps;
+            // Who is pushed forward goes on at what the push gives; who is stopped stays.
+            mover.touch((moved.pose.forward().dot(&heading) * common_mps).max(0.0));
+            self.contacts.push(contact);
+        }
+        true
+    }
+
+    /// Looks along the lines of sight from the ego vehicle's roof.
+    fn look(&mut self) {
+        let eye = self.ego_outline.pose.position;
+        for (obstacle, mover) in self.obstacles.iter().zip(&mut self.movers) {
+            mover.visible_fraction = visible_fraction(eye, obstacle, &self.obstacles);
+        }
+    }
+
+    /// Finds the ego vehicle beside its route again, and counts the red lights it passed.
+    fn follow_route(&mut self) {
+        let front_before_m = self.ego_front_m();
+        let route = &self.scene.route;
+        let found =
+            route.path.project_near(self.ego.motion.rear_axle.position, self.ego_station_m, ROUTE_SEARCH_M);
+        self.ego_station_m = found.station_m;
+        self.ego_offset_m = found.offset_m;
+        let passed = front_before_m..self.ego_front_m();
+        self.red_runs += route
+            .stop_lines
+            .iter()
+            .filter(|line| passed.contains(&line.station_m) && self.signal(line.signal) == SignalColour::Red)
+            .count() as u32;
+    }
+}
+
+impl Surroundings for World {
+    fn survey(&self, request: &SpawnRequest) -> Result<SpawnFacts, String> {
+        let around = self.around();
+        let placed = placement::place(&around, request, self.next_id)?;
+        Ok(placement::facts(&around, request, &placed))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::vocabulary::LaneChoice;
+    use crate::model::vocabulary::Side;
+    use crate::model::vocabulary::Then;
+    use crate::sim::testing;
+
+    #[test]
+    fn of_two_contacts_in_a_tick_neither_sees_the_other() {
+        let mut world = testing::world(&testing::straight());
+        world.ego.motion.speed_mps = 10.0;
+        for distance_m in [8.0, 10.0] {
+            let request = SpawnRequest {
+                body: Body::Pedestrian,
+                colour: Colour::Red,
+                verb: Verb::Stand,
+                lane: LaneChoice::Current,
+                side: Side::Right,
+                then: Then::Keep,
+                speed_mps: 0.0,
+                distance_m,
+            };
+            world.spawn(&request).expect("there is room");
+        }
+        // Side by side, where no request would put them.
+        let beside = world.obstacles[0].outline.pose.position + Vec2::new(0.0, 0.7);
+        world.obstacles[1].outline.pose.position = beside;
+        let contacts = loop {
+            let contacts = world.tick(&Control::default()).to_vec();
+            if !contacts.is_empty() {
+                break contacts;
+            }
+        };
+        let [first, second] = contacts[..] else { panic!("{contacts:?}") };
+        assert_eq!(first.ego_speed_mps, second.ego_speed_mps);
+        let common_mps = |speed_mps| common_speed_mps(speed_mps, 0.0, 0.075);
+        assert_eq!(world.ego().speed_mps, common_mps(common_mps(first.ego_speed_mps)));
+    }
+
+    #[test]
+    fn the_ego_vehicle_arrives_and_counts_red_lights() {
+        let mut world = testing::world(&testing::crossing());
+        let throttle = Control { throttle_pct: 40.0, ..Control::default() };
+        // 100 m in 8 s, the stop line at 185 m after about 13 s, when its light is yellow.
+        while !world.arrived() {
+            let control = if world.ego().speed_mps < 10.0 { throttle } else { Control::default() };
+            world.tick(&control);
+            assert!(world.time_s() < 60.0);
+        }
+        assert!((world.ego_station_m() + 3.705 - 399.0).abs() < 0.3);
+        assert_eq!(world.ego_offset_m(), 0.0);
+        assert_eq!(world.red_runs(), 1);
+    }
+}
