@@ -12,3 +12,4 @@ pub mod syntax;
 pub mod model;
 pub mod action;
 pub mod sim;
+pub mod ads;

@@ -1,0 +1,253 @@
+//! The route as a driving system reads it off its HD map: evenly sampled, with the speed that limits
+//! and curves allow at each place.
+//!
+//! Even samples make look-ups and projections cheap enough to be done for every predicted position
+//! of every object. No signals and no obstacles here.
+
+use crate::geometry::Pose;
+use crate::geometry::Vec2;
+use crate::geometry::unit_vector;
+use crate::geometry::wrap_angle;
+use crate::sim::Scene;
+
+/// Distance between samples, m. On the tightest bend a car can drive (5 m) the chord is 6 mm off.
+const SPACING_M: f64 = 0.5;
+/// Samples skipped by the rounds of a projection, coarse to fine: 8 m, 2 m, none.
+const STRIDES: [usize; 3] = [16, 4, 1];
+
+/// How far before and behind its last place a vehicle is looked for, m: more than it drives or errs
+/// within a tick, less than to another branch of the route.
+const NEAR_M: f64 = 5.0;
+
+/// What bounds the speed on a free road.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SpeedRules {
+    /// m/s.
+    pub cruise_mps: f64,
+    /// In curves, m/s².
+    pub lateral_acceleration_mps2_max: f64,
+    /// With which the vehicle slows down for a curve or a lower limit ahead, magnitude, m/s².
+    pub slowdown_mps2: f64,
+}
+
+#[derive(Debug, Clone)]
+pub struct Guide {
+    samples: Vec<Sample>,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Sample {
+    position: Vec2,
+    forward: Vec2,
+    heading_rad: f64,
+    curvature_per_m: f64,
+    speed_mps_max: f64,
+}
+
+/// Stations from the nearer to the farther end, m.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Span {
+    pub from_m: f64,
+    pub to_m: f64,
+}
+
+impl Span {
+    pub fn middle_m(&self) -> f64 {
+        (self.from_m + self.to_m) / 2.0
+    }
+}
+
+/// A place beside the route.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Beside {
+    pub station_m: f64,
+    /// m to the left.
+    pub offset_m: f64,
+    /// Unit vector along the route there.
+    pub forward: Vec2,
+}
+
+impl Beside {
+    /// The part of a strip `half_way_m` to each side of the route that a box centred here takes.
+    /// `forward` is the unit vector along the box.
+    pub fn taken(&self, forward: Vec2, length_m: f64, width_m: f64, half_way_m: f64) -> Option<Span> {
+        let cosine = self.forward.dot(&forward);
+        let sine = self.forward.x * forward.y - self.forward.y * forward.x;
+        let across_m = (sine.abs() * length_m + cosine.abs() * width_m) / 2.0;
+        if self.offset_m.abs() - across_m >= half_way_m {
+            return None;
+        }
+        let centre = Vec2::new(self.station_m, self.offset_m);
+        let ahead = Vec2::new(cosine, sine) * (length_m / 2.0);
+        let left = Vec2::new(-sine, cosine) * (width_m / 2.0);
+        let corners =
+            [centre + ahead + left, centre - ahead + left, centre - ahead - left, centre + ahead - left];
+        let mut span = Span { from_m: f64::INFINITY, to_m: f64::NEG_INFINITY };
+        for index in 0..4 {
+            let (a, b) = (corners[index], corners[(index + 1) % 4]);
+            let (right, left) = if a.y <= b.y { (a, b) } else { (b, a) };
+            if right.y > half_way_m || left.y < -half_way_m {
+                continue;
+            }
+            let rise_m = (left.y - right.y).max(1e-9);
+            for edge_m in [right.y.max(-half_way_m), left.y.min(half_way_m)] {
+                let station_m = right.x + (left.x - right.x) * ((edge_m - right.y) / rise_m).clamp(0.0, 1.0);
+                span.from_m = span.from_m.min(station_m);
+                span.to_m = span.to_m.max(station_m);
+            }
+        }
+        (span.from_m <= span.to_m).then_some(span)
+    }
+}
+
+impl Guide {
+    pub fn new(scene: &Scene, rules: &SpeedRules) -> Guide {
+        let route = &scene.route;
+        let count = (route.path.length_m() / SPACING_M).ceil() as usize + 1;
+        let mut lane = 0;
+        let mut samples: Vec<Sample> = (0..count)
+            .map(|index| {
+                let station_m = index as f64 * SPACING_M;
+                while lane + 1 < route.lanes.len() && route.lanes[lane].to_m <= station_m {
+                    lane += 1;
+                }
+                let limit_mps =
+                    route.lanes.get(lane).map_or(f64::INFINITY, |on| scene.map.lane(on.lane).speed_limit_mps);
+                let pose = route.path.pose_at(station_m);
+                let curvature_per_m = route.path.curvature_at(station_m);
+                let curve_mps =
+                    (rules.lateral_acceleration_mps2_max / curvature_per_m.abs().max(1e-6)).sqrt();
+                Sample {
+                    position: pose.position,
+                    forward: unit_vector(pose.heading_rad),
+                    heading_rad: pose.heading_rad,
+                    curvature_per_m,
+                    speed_mps_max: limit_mps.min(rules.cruise_mps).min(curve_mps),
+                }
+            })
+            .collect();
+        for index in (0..count - 1).rev() {
+            let next_mps = samples[index + 1].speed_mps_max;
+            let reachable_mps = (next_mps * next_mps + 2.0 * rules.slowdown_mps2 * SPACING_M).sqrt();
+            samples[index].speed_mps_max = samples[index].speed_mps_max.min(reachable_mps);
+        }
+        Guide { samples }
+    }
+
+    /// The pose at a station; beyond the ends the route goes on straight.
+    pub fn pose_at(&self, station_m: f64) -> Pose {
+        let (index, fraction) = self.segment(station_m);
+        let (a, b) = (&self.samples[index], &self.samples[index + 1]);
+        let turn_rad = wrap_angle(b.heading_rad - a.heading_rad) * fraction.clamp(0.0, 1.0);
+        Pose {
+            position: a.position + (b.position - a.position) * fraction,
+            heading_rad: wrap_angle(a.heading_rad + turn_rad),
+        }
+    }
+
+    /// 1/m, positive to the left.
+    pub fn curvature_at(&self, station_m: f64) -> f64 {
+        let (index, fraction) = self.segment(station_m);
+        let (a, b) = (&self.samples[index], &self.samples[index + 1]);
+        a.curvature_per_m + (b.curvature_per_m - a.curvature_per_m) * fraction.clamp(0.0, 1.0)
+    }
+
+    /// Speed that limits and curves, here and ahead, allow, m/s.
+    pub fn speed_mps_max(&self, station_m: f64) -> f64 {
+        let (index, fraction) = self.segment(station_m);
+        let (a, b) = (&self.samples[index], &self.samples[index + 1]);
+        a.speed_mps_max + (b.speed_mps_max - a.speed_mps_max) * fraction.clamp(0.0, 1.0)
+    }
+
+    /// The place of the route beside a vehicle that was lately near a station; `None` looks everywhere.
+    pub fn locate(&self, point: Vec2, near_m: Option<f64>) -> Beside {
+        match near_m {
+            Some(near_m) => self.project(point, near_m - NEAR_M, near_m + NEAR_M),
+            None => self.project(point, 0.0, f64::INFINITY),
+        }
+    }
+
+    /// The nearest place of the route between two stations.
+    pub fn project(&self, point: Vec2, from_m: f64, to_m: f64) -> Beside {
+        let (mut first, mut last) = (self.index(from_m), self.index(to_m));
+        let squared_m2 = |index: usize| (point - self.samples[index].position).norm_squared();
+        let mut best = (last, squared_m2(last));
+        for stride in STRIDES {
+            for index in (first..last).step_by(stride) {
+                let candidate = squared_m2(index);
+                if candidate < best.1 {
+                    best = (index, candidate);
+                }
+            }
+            first = best.0.saturating_sub(stride - 1);
+            last = (best.0 + stride).min(self.samples.len());
+        }
+        let nearest = &self.samples[best.0];
+        let delta = point - nearest.position;
+        let forward = nearest.forward;
+        Beside {
+            station_m: best.0 as f64 * SPACING_M + forward.dot(&delta),
+            offset_m: forward.x * delta.y - forward.y * delta.x,
+            forward,
+        }
+    }
+
+    fn index(&self, station_m: f64) -> usize {
+        ((station_m / SPACING_M).max(0.0) as usize).min(self.samples.len() - 1)
+    }
+
+    /// Segment and fraction of it; the fraction leaves `[0, 1]` beyond the ends.
+    fn segment(&self, station_m: f64) -> (usize, f64) {
+        let index = self.index(station_m).min(self.samples.len() - 2);
+        (index, station_m / SPACING_M - index as f64)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ads::testing::winding;
+
+    const RULES: SpeedRules =
+        SpeedRules { cruise_mps: 11.0, lateral_acceleration_mps2_max: 2.0, slowdown_mps2: 1.5 };
+
+    #[test]
+    fn places_and_projections_agree_with_the_path() {
+        let scene = winding();
+        let guide = Guide::new(&scene, &RULES);
+        for index in 0..370 {
+            let station_m = f64::from(index) + 0.3;
+            let on_path = scene.route.path.pose_at(station_m);
+            assert!((guide.pose_at(station_m).position - on_path.position).norm() < 0.01, "{station_m}");
+            let beside = guide.project(on_path.offset(0.0, 1.0).position, station_m - 20.0, station_m + 20.0);
+            assert!((beside.station_m - station_m).abs() < 0.06, "{beside:?} at {station_m}");
+            assert!((beside.offset_m - 1.0).abs() < 0.01, "{beside:?}");
+        }
+    }
+
+    #[test]
+    fn curves_are_foreseen() {
+        let guide = Guide::new(&winding(), &RULES);
+        assert_eq!(guide.speed_mps_max(50.0), 11.0);
+        // √(2 · 15 + …): the route lies 1.75 m outside the left-hand bend's line of 15 m.
+        assert!((guide.speed_mps_max(135.0) - (2.0_f64 * 16.75).sqrt()).abs() < 0.1);
+        for index in 0..700 {
+            let (here, next) = (f64::from(index) * 0.5, f64::from(index + 1) * 0.5);
+            let (before, after) = (guide.speed_mps_max(here), guide.speed_mps_max(next));
+            assert!(before * before - after * after <= 2.0 * 1.5 * 0.5 + 1e-9, "at {here}");
+        }
+    }
+
+    #[test]
+    fn only_the_part_on_the_way_is_taken() {
+        let beside = Beside { station_m: 10.0, offset_m: -3.0, forward: Vec2::new(1.0, 0.0) };
+        // Across the way, its front reaching to -1: half a metre of it is on a way of ±1.5 m.
+        let across = beside.taken(Vec2::new(0.0, 1.0), 4.0, 2.0, 1.5).expect("its front is there");
+        assert!((across.from_m - 9.0).abs() < 1e-9 && (across.to_m - 11.0).abs() < 1e-9, "{across:?}");
+        assert_eq!(beside.taken(Vec2::new(1.0, 0.0), 4.0, 2.0, 1.5), None);
+        // Turned by 45° only a corner is there.
+        let half = core::f64::consts::FRAC_1_SQRT_2;
+        let corner = beside.taken(Vec2::new(half, half), 4.0, 2.0, 1.5).expect("a corner is there");
+        assert!(corner.from_m > 9.0 && corner.to_m < 12.0, "{corner:?}");
+    }
+}

@@ -1,0 +1,29 @@
+//! Driving systems: what drives the ego vehicle. They see `Sensed` and the HD map, never the `World`.
+//!
+//! `modular` is the system under test, `reference` holds drivers to compare it with; `guide` and
+//! `steering` serve both.
+
+mod driver;
+mod guide;
+mod modular;
+mod reference;
+mod registry;
+mod status;
+mod steering;
+#[cfg(test)]
+mod testing;
+#[cfg(test)]
+mod tests;
+
+pub use driver::Ads;
+pub use modular::ConfigError;
+pub use modular::Modular;
+pub use modular::ModularConfig;
+pub use reference::Idm;
+pub use registry::Entry;
+pub use registry::REGISTRY;
+pub use registry::by_name;
+pub use status::PerceivedObject;
+pub use status::PlannedPoint;
+pub use status::Reason;
+pub use status::Status;

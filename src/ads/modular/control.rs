@@ -1,0 +1,76 @@
+//! Control: pedals and wheel that follow the plan, every tick.
+//!
+//! Apollo's cascade: the station error becomes a wanted speed, the speed error an acceleration, to
+//! which the plan's own acceleration is added, read a little ahead; the calibration table turns it
+//! into pedals. Steering is `ads::steering`.
+
+use std::sync::Arc;
+
+use crate::ads::guide::Guide;
+use crate::ads::steering::Steering;
+use crate::geometry::Pose;
+use crate::sim::Control;
+use crate::sim::DT_S;
+use crate::sim::EgoMotion;
+use crate::sim::pedals_for;
+
+use super::config::ControlConfig;
+use super::planning::Trajectory;
+
+#[derive(Debug, Clone)]
+pub struct Controller {
+    config: ControlConfig,
+    steering: Arc<Steering>,
+    integral_mps2: f64,
+}
+
+impl Controller {
+    pub fn new(config: &ControlConfig) -> Controller {
+        let steering = Steering::shared(&config.steering);
+        Controller { config: *config, steering, integral_mps2: 0.0 }
+    }
+
+    /// The command `since_s` after the trajectory was planned, believed to be at `localized`.
+    pub fn follow(
+        &mut self,
+        trajectory: &Trajectory,
+        since_s: f64,
+        guide: &Guide,
+        localized: &Pose,
+        station_m: f64,
+        motion: &EgoMotion,
+    ) -> Control {
+        let acceleration_mps2 = self.acceleration_mps2(trajectory, since_s, station_m, motion.speed_mps);
+        let (throttle_pct, brake_pct) = pedals_for(acceleration_mps2);
+        let steer_rad = self.steering.steer_rad(guide, localized, station_m, motion);
+        Control { throttle_pct, brake_pct, steer_rad }
+    }
+
+    fn acceleration_mps2(
+        &mut self,
+        trajectory: &Trajectory,
+        since_s: f64,
+        station_m: f64,
+        speed_mps: f64,
+    ) -> f64 {
+        let config = &self.config;
+        let target = trajectory.at(since_s);
+        let planned_mps2 = trajectory.at(since_s + config.preview_s).acceleration_mps2;
+        if target.speed_mps <= config.stopped_mps && planned_mps2.abs() <= 0.01 {
+            // Apollo's full stop is the lesser of -3 m/s² and the command. With its bounds the command is
+            // never below -2.3 where nothing is planned, so that is the same; the integral begins anew.
+            // Its other occasion, a path that ends within 0.3 m, does not exist: plans here are stretches
+            // of time, and one that ends in a stop ends in points at rest.
+            self.integral_mps2 = 0.0;
+            return -config.standstill_mps2;
+        }
+        let station_error_m =
+            (target.station_m - station_m).clamp(-config.station_error_m_max, config.station_error_m_max);
+        let speed_error_mps = (target.speed_mps - speed_mps + config.station_kp * station_error_m)
+            .clamp(-config.speed_error_mps_max, config.speed_error_mps_max);
+        self.integral_mps2 = (self.integral_mps2 + config.speed_ki * speed_error_mps * DT_S)
+            .clamp(-config.integral_mps2_max, config.integral_mps2_max);
+        let gain = if speed_mps <= config.switch_mps { config.speed_kp_low } else { config.speed_kp_high };
+        planned_mps2 + gain * speed_error_mps + self.integral_mps2
+    }
+}

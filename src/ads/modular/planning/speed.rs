@@ -1,0 +1,314 @@
+//! The speed law: the acceleration that each constraint allows, and what follows from it.
+//!
+//! A braking parabola for places to stop at, the intelligent driver model (Treiber) for leaders with
+//! a kinematic bound beneath it, a look-ahead on the speed that limits and curves allow. All of it
+//! goes through Apollo's jerk limits, the emergency too: that is one of its documented weaknesses.
+
+use crate::ads::guide::Guide;
+use crate::ads::status::Reason;
+use crate::sim::Following;
+use crate::sim::VehicleParameters;
+
+use super::super::config::PlanningConfig;
+use super::corridor::Claim;
+
+/// Time between points of a trajectory, s.
+pub const POINT_S: f64 = 0.1;
+/// 8 s.
+const POINTS: usize = 81;
+/// Time in which a speed error is to vanish, s.
+const SPEED_ERROR_S: f64 = 0.6;
+/// Look-ahead on the permitted speed, s.
+const PREVIEW_S: f64 = 0.6;
+/// A standing vehicle this near to its place to stop stays there, m.
+const STOPPED_SHORT_M: f64 = 0.3;
+/// Gap that even an emergency braking tries to leave, m.
+const EMERGENCY_GAP_M: f64 = 1.0;
+/// Gap to a leader that the kinematic bound preserves, m.
+const LEADER_GAP_M: f64 = 2.5;
+
+/// A point of a plan: rear axle along the route.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Point {
+    pub station_m: f64,
+    pub speed_mps: f64,
+    pub acceleration_mps2: f64,
+}
+
+/// A plan of 8 s, every 0.1 s.
+#[derive(Debug, Clone)]
+pub struct Trajectory {
+    pub points: [Point; POINTS],
+    /// The constraint that decides its beginning.
+    pub reason: Reason,
+}
+
+impl Default for Trajectory {
+    fn default() -> Trajectory {
+        Trajectory { points: [Point::default(); POINTS], reason: Reason::Start }
+    }
+}
+
+impl Trajectory {
+    /// The point a time (s) after the beginning, interpolated; the last one afterwards.
+    pub fn at(&self, time_s: f64) -> Point {
+        let place = (time_s / POINT_S).max(0.0);
+        let index = place as usize;
+        if index >= POINTS - 1 {
+            return self.points[POINTS - 1];
+        }
+        let fraction = place - index as f64;
+        let (a, b) = (&self.points[index], &self.points[index + 1]);
+        let mix = |a: f64, b: f64| a + (b - a) * fraction;
+        Point {
+            station_m: mix(a.station_m, b.station_m),
+            speed_mps: mix(a.speed_mps, b.speed_mps),
+            acceleration_mps2: mix(a.acceleration_mps2, b.acceleration_mps2),
+        }
+    }
+
+    /// Constant braking to rest: the plan when there is none.
+    pub fn braking(station_m: f64, speed_mps: f64, decel_mps2: f64) -> Trajectory {
+        let mut trajectory = Trajectory { reason: Reason::Fallback, ..Trajectory::default() };
+        let mut point = Point { station_m, speed_mps, acceleration_mps2: -decel_mps2 };
+        for slot in &mut trajectory.points {
+            *slot = point;
+            point = point.after(-decel_mps2);
+        }
+        trajectory
+    }
+}
+
+impl Point {
+    /// One point on, at an acceleration; there is no driving backwards.
+    fn after(&self, acceleration_mps2: f64) -> Point {
+        let speed_mps = (self.speed_mps + acceleration_mps2 * POINT_S).max(0.0);
+        Point {
+            station_m: self.station_m + (self.speed_mps + speed_mps) / 2.0 * POINT_S,
+            speed_mps,
+            acceleration_mps2: if speed_mps > 0.0 { acceleration_mps2 } else { acceleration_mps2.max(0.0) },
+        }
+    }
+}
+
+/// Something that bounds the acceleration.
+#[derive(Debug, Clone, Copy)]
+pub struct Constraint {
+    reason: Reason,
+    kind: Kind,
+}
+
+#[derive(Debug, Clone, Copy)]
+enum Kind {
+    /// The front bumper stops at `stop_m`; `touch_m` is where it would hit, if there is anything to
+    /// hit. Void after `until_s`.
+    Fence { stop_m: f64, touch_m: Option<f64>, until_s: f64 },
+    /// Index in the claims.
+    Leader(usize),
+}
+
+/// What a constraint allows at a moment.
+#[derive(Debug, Clone, Copy)]
+struct Bound {
+    acceleration_mps2: f64,
+    emergency: bool,
+}
+
+impl Constraint {
+    /// A line to stop at, with nothing behind it to hit.
+    pub fn line(reason: Reason, stop_m: f64) -> Constraint {
+        Constraint { reason, kind: Kind::Fence { stop_m, touch_m: None, until_s: f64::INFINITY } }
+    }
+
+    /// A road user that stands with its near end at `from_m`.
+    pub fn stop(config: &PlanningConfig, id: u32, from_m: f64) -> Constraint {
+        let kind =
+            Kind::Fence { stop_m: from_m - config.stop_gap_m, touch_m: Some(from_m), until_s: f64::INFINITY };
+        Constraint { reason: Reason::Stop(id), kind }
+    }
+
+    /// A road user that crosses at `from_m` and is gone after `until_s`.
+    pub fn give_way(config: &PlanningConfig, id: u32, from_m: f64, until_s: f64) -> Constraint {
+        let kind = Kind::Fence { stop_m: from_m - config.yield_gap_m, touch_m: Some(from_m), until_s };
+        Constraint { reason: Reason::Yield(id), kind }
+    }
+
+    /// The road user `id` of claim `index`, which drives ahead, or will.
+    pub fn follow(id: u32, index: usize) -> Constraint {
+        Constraint { reason: Reason::Follow(id), kind: Kind::Leader(index) }
+    }
+
+    fn bound(&self, config: &PlanningConfig, claims: &[Claim], time_s: f64, point: &Point) -> Option<Bound> {
+        let speed_mps = point.speed_mps;
+        let front_m = VehicleParameters::MKZ.front_m(point.station_m);
+        match &self.kind {
+            Kind::Fence { until_s, .. } if time_s > *until_s => None,
+            Kind::Fence { stop_m, touch_m, .. } => {
+                let hardest_mps2 = touch_m
+                    .map_or(0.0, |touch_m| braking_mps2(speed_mps, touch_m - EMERGENCY_GAP_M - front_m));
+                let emergency = hardest_mps2 > config.deceleration_mps2_max;
+                let planned = fence_mps2(config, speed_mps, stop_m - front_m);
+                Some(Bound {
+                    acceleration_mps2: if emergency { planned.min(-hardest_mps2) } else { planned },
+                    emergency,
+                })
+            }
+            Kind::Leader(index) => {
+                let claim = &claims[*index];
+                if time_s > claim.exit_s() {
+                    return None;
+                }
+                let gap_m = claim.near_end_m(time_s) - front_m;
+                let closing_mps = (speed_mps - claim.along_mps).max(0.0);
+                let hardest_mps2 = braking_mps2(closing_mps, gap_m - EMERGENCY_GAP_M);
+                let emergency = hardest_mps2 > config.deceleration_mps2_max;
+                let planned = leader_mps2(config, speed_mps, claim.along_mps, gap_m);
+                Some(Bound {
+                    acceleration_mps2: if emergency { planned.min(-hardest_mps2) } else { planned },
+                    emergency,
+                })
+            }
+        }
+    }
+}
+
+/// Rolls the law forward from `start` into `trajectory`.
+pub fn roll(
+    config: &PlanningConfig,
+    guide: &Guide,
+    start: Point,
+    constraints: &[Constraint],
+    claims: &[Claim],
+    trajectory: &mut Trajectory,
+) {
+    let mut point = start;
+    for index in 0..POINTS {
+        let time_s = index as f64 * POINT_S;
+        trajectory.points[index] = point;
+        let mut wanted_mps2 = free_mps2(config, guide, &point);
+        let mut floor_mps2 = -config.deceleration_mps2_max;
+        let mut reason = Reason::Cruise;
+        for constraint in constraints {
+            let Some(bound) = constraint.bound(config, claims, time_s, &point) else { continue };
+            if bound.emergency {
+                floor_mps2 = -config.emergency_mps2;
+            }
+            if bound.acceleration_mps2 < wanted_mps2 {
+                wanted_mps2 = bound.acceleration_mps2;
+                reason = constraint.reason;
+            }
+        }
+        if index == 0 {
+            trajectory.reason = reason;
+        }
+        let wanted_mps2 = wanted_mps2.clamp(floor_mps2, config.acceleration_mps2_max);
+        let change_mps2 = (wanted_mps2 - point.acceleration_mps2)
+            .clamp(-config.jerk_mps3_down * POINT_S, config.jerk_mps3_up * POINT_S);
+        point = point.after(point.acceleration_mps2 + change_mps2);
+    }
+}
+
+/// Acceleration on a free road.
+fn free_mps2(config: &PlanningConfig, guide: &Guide, point: &Point) -> f64 {
+    let ahead_m = point.station_m + point.speed_mps * PREVIEW_S;
+    let allowed_mps = guide.speed_mps_max(point.station_m).min(guide.speed_mps_max(ahead_m));
+    ((allowed_mps - point.speed_mps) / SPEED_ERROR_S).min(config.acceleration_mps2_max)
+}
+
+/// Acceleration that stops the vehicle in `room_m`: coming nearer, it is the braking parabola of
+/// the comfortable deceleration; where that has been missed, whatever still stops in time.
+fn fence_mps2(config: &PlanningConfig, speed_mps: f64, room_m: f64) -> f64 {
+    let comfortable_mps2 = config.comfortable_mps2;
+    // Until the braking has built up, the vehicle goes on as if for half that time.
+    let build_up_m = speed_mps * comfortable_mps2 / config.jerk_mps3_down / 2.0;
+    let needed_mps2 = braking_mps2(speed_mps, room_m - build_up_m);
+    if needed_mps2 >= comfortable_mps2 {
+        return -needed_mps2;
+    }
+    let parabola_mps = (2.0 * comfortable_mps2 * (room_m - STOPPED_SHORT_M).max(0.0)).sqrt();
+    (parabola_mps - speed_mps) / SPEED_ERROR_S
+}
+
+/// Acceleration behind a leader: the intelligent driver model's interaction term, not below the
+/// comfortable deceleration while there is a gap, because it brakes hard for any short one; and, where
+/// closing in demands more, the braking that brings both to one speed in time.
+fn leader_mps2(config: &PlanningConfig, speed_mps: f64, leader_mps: f64, gap_m: f64) -> f64 {
+    let (acceleration_mps2, comfortable_mps2) = (config.acceleration_mps2_max, config.comfortable_mps2);
+    let following = Following {
+        gap_m_min: config.follow_gap_m,
+        time_gap_s: config.follow_time_s,
+        acceleration_mps2,
+        comfortable_mps2,
+    };
+    let ratio = following.wanted_gap_m(speed_mps, leader_mps) / gap_m.max(0.1);
+    let floor_mps2 =
+        if gap_m > config.follow_gap_m { comfortable_mps2 } else { config.deceleration_mps2_max };
+    let model_mps2 = (acceleration_mps2 * (1.0 - ratio * ratio)).max(-floor_mps2);
+    let needed_mps2 = braking_mps2((speed_mps - leader_mps).max(0.0), gap_m - LEADER_GAP_M);
+    if needed_mps2 > comfortable_mps2 / 2.0 { model_mps2.min(-needed_mps2) } else { model_mps2 }
+}
+
+/// Deceleration that loses a speed within a distance, m/s².
+fn braking_mps2(speed_mps: f64, room_m: f64) -> f64 {
+    speed_mps * speed_mps / (2.0 * room_m.max(0.1))
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::ads::testing::straight;
+
+    fn rolled(start: Point, constraints: &[Constraint]) -> Trajectory {
+        let config = PlanningConfig::default();
+        let guide = Guide::new(&straight(), &config.speed_rules());
+        let mut trajectory = Trajectory::default();
+        roll(&config, &guide, start, constraints, &[], &mut trajectory);
+        trajectory
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(64))]
+
+        #[test]
+        fn jerk_and_acceleration_stay_in_their_bounds(
+            speed_mps in 0.0..15.0_f64, acceleration_mps2 in -4.0..2.0_f64, stop_m in 5.0..80.0_f64,
+        ) {
+            let start = Point { station_m: 10.0, speed_mps, acceleration_mps2 };
+            let fence = Constraint::stop(&PlanningConfig::default(), 1, 10.0 + stop_m);
+            let trajectory = rolled(start, &[fence]);
+            for pair in trajectory.points.windows(2) {
+                prop_assert!(pair[1].speed_mps >= 0.0 && pair[1].station_m >= pair[0].station_m);
+                prop_assert!(pair[1].acceleration_mps2 >= -6.0 - 1e-9);
+                if pair[1].speed_mps > 0.0 {
+                    let jerk_mps3 = (pair[1].acceleration_mps2 - pair[0].acceleration_mps2) / POINT_S;
+                    prop_assert!((-4.0 - 1e-6..=2.0 + 1e-6).contains(&jerk_mps3), "{jerk_mps3}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_stop_that_can_be_foreseen_is_gentle_and_in_place() {
+        let start = Point { station_m: 0.0, speed_mps: 11.0, acceleration_mps2: 0.0 };
+        let trajectory = rolled(start, &[Constraint::line(Reason::RedLight, 50.0)]);
+        let last = trajectory.points[POINTS - 1];
+        assert!(
+            last.speed_mps < 0.5 && (48.0..50.2).contains(&VehicleParameters::MKZ.front_m(last.station_m)),
+            "{last:?}"
+        );
+        let hardest_mps2 =
+            trajectory.points.iter().fold(0.0_f64, |worst, point| worst.min(point.acceleration_mps2));
+        assert!(hardest_mps2 > -3.0, "{hardest_mps2}");
+    }
+
+    #[test]
+    fn the_jerk_limit_costs_a_second_and_a_half_to_full_braking() {
+        let start = Point { station_m: 0.0, speed_mps: 14.0, acceleration_mps2: 0.0 };
+        let wall = Constraint::stop(&PlanningConfig::default(), 1, VehicleParameters::MKZ.front_m(12.0));
+        let trajectory = rolled(start, &[wall]);
+        assert!(trajectory.at(1.4).acceleration_mps2 > -5.7);
+        assert!((trajectory.at(1.5).acceleration_mps2 + 6.0).abs() < 1e-6);
+    }
+}

@@ -1,0 +1,302 @@
+//! Where the tracked objects will be: 8 s ahead, every 0.5 s.
+//!
+//! Vehicles keep their lane, and at a fork take the successor that turns least; they are believed to
+//! leave it only once their centre is over its edge or their lateral speed has lasted half a second.
+//! That is a documented weakness of the system modelled (Apollo issues 11118, 12798, 14212), kept on
+//! purpose. Pedestrians and vehicles off the lanes keep their velocity. No interaction is predicted,
+//! and no obedience to signals.
+
+use std::sync::Arc;
+
+use crate::geometry::Vec2;
+use crate::geometry::unit_vector;
+use crate::geometry::wrap_angle;
+use crate::model::vocabulary::Body;
+use crate::road::LaneIndex;
+use crate::road::LanePlace;
+use crate::road::RoadMap;
+use crate::sim::Scene;
+
+use super::config::PredictionConfig;
+use super::perception::FRAME_S;
+use super::perception::Track;
+
+/// Predicted positions after the present one.
+pub const STEPS: usize = 16;
+/// Time between them, s.
+pub const STEP_S: f64 = 0.5;
+/// How far a vehicle may have gone on its lane since the last frame, m.
+const FRAME_REACH_M: f64 = 8.0;
+/// Lanes farther from the centre of a vehicle than this are not its own, m.
+const LANE_REACH_M: f64 = 1.0;
+/// Part of a new lateral speed that is believed in a frame: differences of positions are noisy.
+const LATERAL_GAIN: f64 = 0.3;
+
+#[derive(Debug, Clone)]
+pub struct Prediction {
+    config: PredictionConfig,
+    scene: Arc<Scene>,
+    memories: Vec<Memory>,
+    forecasts: Vec<Forecast>,
+}
+
+/// An object and its future.
+#[derive(Debug, Clone)]
+pub struct Forecast {
+    pub id: u32,
+    pub body: Body,
+    pub heading_rad: f64,
+    /// Unit vector along the heading.
+    pub forward: Vec2,
+    pub velocity_mps: Vec2,
+    pub length_m: f64,
+    pub width_m: f64,
+    pub height_m: f64,
+    /// Whether it is taken to move at all; if not, all positions are the same.
+    pub moving: bool,
+    /// Centre now and every [`STEP_S`] from now.
+    pub positions: [Vec2; STEPS + 1],
+}
+
+/// What is remembered of a vehicle from frame to frame.
+#[derive(Debug, Clone)]
+struct Memory {
+    id: u32,
+    place: Option<LanePlace>,
+    lateral_mps: f64,
+    drifting_s: f64,
+    seen: bool,
+}
+
+impl Prediction {
+    pub fn new(config: &PredictionConfig, scene: &Arc<Scene>) -> Prediction {
+        Prediction { config: *config, scene: Arc::clone(scene), memories: Vec::new(), forecasts: Vec::new() }
+    }
+
+    pub fn forecasts(&self) -> &[Forecast] {
+        &self.forecasts
+    }
+
+    /// Predicts anew from tracks that are `age_s` old.
+    pub fn update<'a>(&mut self, tracks: impl Iterator<Item = &'a Track>, age_s: f64, ego: Vec2) {
+        self.forecasts.clear();
+        for memory in &mut self.memories {
+            memory.seen = false;
+        }
+        for track in tracks {
+            let position = track.centre() + track.velocity_mps * age_s;
+            let still_mps = if track.body.is_vehicle() {
+                self.config.still_vehicle_mps
+            } else {
+                self.config.still_pedestrian_mps
+            };
+            let moving = track.velocity_mps.norm() >= still_mps;
+            let velocity_mps = if moving { track.velocity_mps } else { Vec2::zeros() };
+            let mut positions: [Vec2; STEPS + 1] =
+                core::array::from_fn(|step| position + velocity_mps * (step as f64 * STEP_S));
+            let near = (position - ego).norm() < self.config.reach_m;
+            if moving && near && track.body.is_vehicle() {
+                let index = self.memory_of(track.id);
+                let memory = &mut self.memories[index];
+                memory.follow(&self.config, &self.scene.map, position, track.heading_rad);
+                if let Some(place) = memory.place {
+                    let lateral_mps = if memory.drifting_s >= self.config.lateral_persistence_s - 1e-9 {
+                        memory.lateral_mps
+                    } else {
+                        0.0
+                    };
+                    along_lanes(&self.scene.map, place, velocity_mps, lateral_mps, &mut positions);
+                }
+            }
+            self.forecasts.push(Forecast {
+                id: track.id,
+                body: track.body,
+                heading_rad: track.heading_rad,
+                forward: unit_vector(track.heading_rad),
+                velocity_mps: track.velocity_mps,
+                length_m: track.length_m,
+                width_m: track.width_m,
+                height_m: track.height_m,
+                moving,
+                positions,
+            });
+        }
+        self.memories.retain(|memory| memory.seen);
+    }
+
+    fn memory_of(&mut self, id: u32) -> usize {
+        let index = self.memories.iter().position(|memory| memory.id == id).unwrap_or_else(|| {
+            self.memories.push(Memory { id, place: None, lateral_mps: 0.0, drifting_s: 0.0, seen: true });
+            self.memories.len() - 1
+        });
+        self.memories[index].seen = true;
+        index
+    }
+}
+
+impl Memory {
+    /// Finds the lane of the vehicle again: the one it was on, its successor, or any that fits.
+    fn follow(&mut self, config: &PredictionConfig, map: &RoadMap, position: Vec2, heading_rad: f64) {
+        let before = self.place;
+        let kept = before.and_then(|place| still_on(config, map, place, position, heading_rad));
+        self.place = kept.or_else(|| {
+            map.nearest(position, heading_rad, LANE_REACH_M)
+                .filter(|place| aligned(config, map, *place, heading_rad))
+        });
+        // Offsets from two different lanes make no difference.
+        if let (Some(old), Some(new)) = (before, kept) {
+            let measured_mps = (new.offset_m - old.offset_m) / FRAME_S;
+            self.lateral_mps += LATERAL_GAIN * (measured_mps - self.lateral_mps);
+        }
+        self.drifting_s =
+            if self.lateral_mps.abs() > config.lateral_speed_mps { self.drifting_s + FRAME_S } else { 0.0 };
+    }
+}
+
+fn still_on(
+    config: &PredictionConfig,
+    map: &RoadMap,
+    place: LanePlace,
+    position: Vec2,
+    heading_rad: f64,
+) -> Option<LanePlace> {
+    let mut lane = place.lane;
+    let mut found = map.lane(lane).centre.project_near(position, place.station_m, FRAME_REACH_M);
+    if found.station_m >= map.lane(lane).centre.length_m() {
+        lane = straightest_successor(map, lane)?;
+        found = map.lane(lane).centre.project_near(position, 0.0, FRAME_REACH_M);
+    }
+    let place = LanePlace { lane, station_m: found.station_m, offset_m: found.offset_m };
+    let inside = found.distance_m <= map.lane(lane).width_at(found.station_m) / 2.0;
+    (inside && aligned(config, map, place, heading_rad)).then_some(place)
+}
+
+fn aligned(config: &PredictionConfig, map: &RoadMap, place: LanePlace, heading_rad: f64) -> bool {
+    let lane_rad = map.lane(place.lane).centre.pose_at(place.station_m).heading_rad;
+    wrap_angle(heading_rad - lane_rad).abs() <= config.off_lane_rad
+}
+
+/// The successor at whose end the heading has changed least. Of equals, the first.
+fn straightest_successor(map: &RoadMap, lane: LaneIndex) -> Option<LaneIndex> {
+    let end_rad = |lane: LaneIndex| {
+        let points = map.lane(lane).centre.points();
+        points[points.len() - 1].heading_rad
+    };
+    let here_rad = end_rad(lane);
+    let mut best: Option<(LaneIndex, f64)> = None;
+    for &successor in &map.lane(lane).successors {
+        let turn_rad = wrap_angle(end_rad(successor) - here_rad).abs();
+        if best.is_none_or(|(_, least_rad)| turn_rad < least_rad) {
+            best = Some((successor, turn_rad));
+        }
+    }
+    best.map(|(successor, _)| successor)
+}
+
+/// Positions along the lanes ahead, at the present speed and, if the vehicle drifts, over to the
+/// middle of the lane beside.
+fn along_lanes(
+    map: &RoadMap,
+    place: LanePlace,
+    velocity_mps: Vec2,
+    lateral_mps: f64,
+    positions: &mut [Vec2; STEPS + 1],
+) {
+    let speed_mps = velocity_mps.norm();
+    let mut lane = place.lane;
+    let mut begin_m = 0.0;
+    // A drift ends in the middle of its own lane or of the next one.
+    let centre_m = if place.offset_m * lateral_mps < 0.0 {
+        0.0
+    } else {
+        map.lane(lane).width_at(place.station_m) * lateral_mps.signum()
+    };
+    let drift_m_max = (centre_m - place.offset_m).abs();
+    let mut segment = 0;
+    for (step, position) in positions.iter_mut().enumerate() {
+        let time_s = step as f64 * STEP_S;
+        let station_m = place.station_m + speed_mps * time_s;
+        while station_m - begin_m > map.lane(lane).centre.length_m() {
+            let Some(next) = straightest_successor(map, lane) else { break };
+            begin_m += map.lane(lane).centre.length_m();
+            lane = next;
+            segment = 0;
+        }
+        // Stations only rise, so the segment is found by walking on rather than by searching.
+        let points = map.lane(lane).centre.points();
+        while segment + 2 < points.len() && points[segment + 1].station_m <= station_m - begin_m {
+            segment += 1;
+        }
+        let (a, b) = (&points[segment], &points[segment + 1]);
+        let along = (b.position - a.position) / (b.station_m - a.station_m);
+        let offset_m = place.offset_m + (lateral_mps * time_s).clamp(-drift_m_max, drift_m_max);
+        *position = a.position
+            + along * (station_m - begin_m - a.station_m)
+            + Vec2::new(-along.y, along.x) * offset_m;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ads::testing::winding;
+    use crate::geometry::Pose;
+
+    fn prediction(scene: &Arc<Scene>) -> Prediction {
+        Prediction::new(&PredictionConfig::default(), scene)
+    }
+
+    #[test]
+    fn vehicles_are_predicted_round_bends() {
+        let scene = winding();
+        let mut prediction = prediction(&scene);
+        let path = &scene.route.path;
+        let pose = path.pose_at(110.0);
+        let track = Track::for_tests(1, Body::Sedan, pose, pose.forward() * 8.0);
+        prediction.update([&track].into_iter(), 0.0, Vec2::new(0.0, 0.0));
+        // Beyond 80 m from the ego vehicle it is taken to go straight on; near by, round the bend.
+        assert!(path.project(prediction.forecasts()[0].positions[STEPS]).distance_m > 10.0);
+        prediction.update([&track].into_iter(), 0.0, pose.position);
+        for (step, position) in prediction.forecasts()[0].positions.iter().enumerate() {
+            let beside = path.project(*position);
+            assert!(beside.distance_m < 0.1, "{beside:?} at step {step}");
+            assert!((beside.station_m - 110.0 - 4.0 * step as f64).abs() < 0.1, "{beside:?}");
+        }
+    }
+
+    #[test]
+    fn leaving_the_lane_is_believed_after_half_a_second() {
+        let scene = winding();
+        let mut prediction = prediction(&scene);
+        // It comes towards the route's start on the left-hand lane and drifts over at 1 m/s.
+        let mut believed_at = None;
+        for frame in 0..15 {
+            let time_s = f64::from(frame) * FRAME_S;
+            let pose = Pose::new(70.0 - 8.0 * time_s, 1.75 - time_s, core::f64::consts::PI);
+            let track = Track::for_tests(1, Body::Sedan, pose, Vec2::new(-8.0, -1.0));
+            prediction.update([&track].into_iter(), 0.0, Vec2::zeros());
+            let ends_at_m = prediction.forecasts()[0].positions[STEPS].y;
+            if believed_at.is_none() && ends_at_m < -1.0 {
+                believed_at = Some(time_s);
+            }
+        }
+        let believed_s = believed_at.expect("in the end it is believed");
+        assert!((0.5..1.0).contains(&believed_s), "{believed_s}");
+    }
+
+    #[test]
+    fn standing_things_stay_and_walkers_walk() {
+        let scene = winding();
+        let mut prediction = prediction(&scene);
+        let at = Pose::new(20.0, -5.0, 0.0);
+        let tracks = [
+            Track::for_tests(1, Body::Pedestrian, at, Vec2::new(0.0, 0.1)),
+            Track::for_tests(2, Body::Pedestrian, at, Vec2::new(0.0, 1.2)),
+            Track::for_tests(3, Body::BoxTruck, at, Vec2::new(0.5, 0.0)),
+        ];
+        prediction.update(tracks.iter(), 0.1, Vec2::zeros());
+        let ends: Vec<Vec2> = prediction.forecasts().iter().map(|f| f.positions[STEPS]).collect();
+        assert!((ends[0] - at.position).norm() < 0.02 && (ends[2] - at.position).norm() < 0.06);
+        assert!((ends[1] - Vec2::new(20.0, -5.0 + 8.1 * 1.2)).norm() < 1e-9, "{}", ends[1]);
+    }
+}

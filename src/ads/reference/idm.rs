@@ -1,0 +1,252 @@
+//! The intelligent driver model (Treiber, Hennecke, Helbing 2000) on the route, with true knowledge.
+//!
+//! It sees everything within 120 m, hidden or not, looking around ten times a second. Around the
+//! model stand three rules of our own: it stops at red and yellow lights where it can, brakes for
+//! what is on its way, and lets pass whoever would cross its way at nearly the same time. Predictions
+//! are straight lines at constant speed.
+
+use std::sync::Arc;
+
+use crate::ads::driver::Ads;
+use crate::ads::guide::Guide;
+use crate::ads::guide::SpeedRules;
+use crate::ads::status::PerceivedObject;
+use crate::ads::status::Reason;
+use crate::ads::status::Status;
+use crate::ads::steering::Steering;
+use crate::ads::steering::SteeringConfig;
+use crate::geometry::unit_vector;
+use crate::sim::Control;
+use crate::sim::DT_S;
+use crate::sim::FRAME_TICKS;
+use crate::sim::Following;
+use crate::sim::Scene;
+use crate::sim::Sensed;
+use crate::sim::SensedObject;
+use crate::sim::SignalColour;
+use crate::sim::VehicleParameters;
+use crate::sim::pedals_for;
+
+/// The model's parameters, for towns.
+const MODEL: Following =
+    Following { gap_m_min: 3.0, time_gap_s: 1.5, acceleration_mps2: 2.0, comfortable_mps2: 3.0 };
+/// Hardest braking, m/s²: the vehicle's limit.
+const HARDEST_MPS2: f64 = 6.0;
+/// A light that needs harder braking is passed, m/s².
+const LIGHT_MPS2: f64 = 4.0;
+const RULES: SpeedRules =
+    SpeedRules { cruise_mps: 11.18, lateral_acceleration_mps2_max: 2.0, slowdown_mps2: 1.5 };
+/// Range of its knowledge, m.
+const SIGHT_M: f64 = 120.0;
+/// Room kept free beside the vehicle, m.
+const SIDE_M: f64 = 0.4;
+/// Crossings are looked for this far ahead, in steps, s.
+const LOOK_AHEAD_S: f64 = 6.0;
+const LOOK_STEP_S: f64 = 0.25;
+/// Least difference of the times at which two road users pass one place, s.
+const CONFLICT_S: f64 = 1.0;
+/// Gap from the front bumper to a stop line, and to the way of somebody who crosses, m.
+const LINE_GAP_M: f64 = 1.0;
+const CROSSING_GAP_M: f64 = 3.0;
+/// Acceleration that holds the vehicle at rest, m/s².
+const HOLD_MPS2: f64 = -3.0;
+
+#[derive(Debug, Clone)]
+pub struct Idm {
+    scene: Arc<Scene>,
+    guide: Arc<Guide>,
+    steering: Arc<Steering>,
+    /// Where on the route, m; `None` before the first tick.
+    station_m: Option<f64>,
+    steer_rad: f64,
+    /// What it keeps away from, looked for every fifth tick.
+    ahead: Vec<Ahead>,
+    ticks: u64,
+    status: Status,
+}
+
+/// Something to keep away from, as the model sees it.
+#[derive(Debug, Clone)]
+struct Ahead {
+    /// Station of its near end when it was looked at, m.
+    near_m: f64,
+    /// Since then, s.
+    age_s: f64,
+    speed_mps: f64,
+    reason: Reason,
+}
+
+impl Ahead {
+    fn gap_m(&self, front_m: f64) -> f64 {
+        self.near_m + self.speed_mps * self.age_s - front_m
+    }
+}
+
+impl Idm {
+    pub fn new(scene: &Arc<Scene>) -> Idm {
+        Idm {
+            scene: Arc::clone(scene),
+            guide: Arc::new(Guide::new(scene, &RULES)),
+            steering: Steering::shared(&SteeringConfig::default()),
+            station_m: None,
+            steer_rad: 0.0,
+            ahead: Vec::new(),
+            ticks: 0,
+            status: Status::default(),
+        }
+    }
+
+    fn acceleration_mps2(&self, sensed: &Sensed, station_m: f64) -> (f64, Reason) {
+        let speed_mps = sensed.ego.speed_mps;
+        let front_m = VehicleParameters::MKZ.front_m(station_m);
+        let allowed_mps =
+            self.guide.speed_mps_max(station_m).min(self.guide.speed_mps_max(station_m + speed_mps * 0.6));
+        let mut wanted = (model_mps2(speed_mps, allowed_mps, None), Reason::Cruise);
+        for ahead in &self.ahead {
+            let gap = Some((ahead.gap_m(front_m), ahead.speed_mps));
+            let acceleration_mps2 = model_mps2(speed_mps, allowed_mps, gap);
+            if acceleration_mps2 < wanted.0 {
+                wanted = (acceleration_mps2, ahead.reason);
+            }
+        }
+        (wanted.0.max(-HARDEST_MPS2), wanted.1)
+    }
+
+    /// Looks around, every fifth tick.
+    fn look(&mut self, sensed: &Sensed, station_m: f64) {
+        for ahead in &mut self.ahead {
+            ahead.age_s += DT_S;
+        }
+        if !self.ticks.is_multiple_of(FRAME_TICKS) {
+            return;
+        }
+        let front_m = VehicleParameters::MKZ.front_m(station_m);
+        let mut ahead = core::mem::take(&mut self.ahead);
+        ahead.clear();
+        ahead.extend(self.lights(sensed, front_m));
+        let objects = sensed.objects.iter().filter(|object| object.distance_m < SIGHT_M);
+        ahead.extend(objects.filter_map(|object| self.ahead(object, sensed.ego.speed_mps, front_m)));
+        self.ahead = ahead;
+        self.report(sensed);
+    }
+
+    /// Lights that it stops for, as things that stand a little behind their line.
+    fn lights<'a>(&'a self, sensed: &'a Sensed, front_m: f64) -> impl Iterator<Item = Ahead> + 'a {
+        let speed_mps = sensed.ego.speed_mps;
+        self.scene.route.stop_lines.iter().filter_map(move |line| {
+            let distance_m = line.station_m - front_m;
+            let needed_mps2 = speed_mps * speed_mps / (2.0 * distance_m.max(0.1));
+            let stops = sensed.signals[line.signal] != SignalColour::Green
+                && (-LINE_GAP_M..SIGHT_M).contains(&distance_m)
+                && needed_mps2 <= LIGHT_MPS2;
+            stops.then_some(Ahead {
+                near_m: line.station_m - LINE_GAP_M + MODEL.gap_m_min,
+                age_s: 0.0,
+                speed_mps: 0.0,
+                reason: Reason::RedLight,
+            })
+        })
+    }
+
+    /// What a road user means for the ego vehicle: a leader, something in the way, one who crosses.
+    fn ahead(&self, object: &SensedObject, speed_mps: f64, front_m: f64) -> Option<Ahead> {
+        let half_way_m = VehicleParameters::MKZ.width_m / 2.0 + SIDE_M;
+        let rear_m = front_m - VehicleParameters::MKZ.length_m;
+        let forward = unit_vector(object.pose.heading_rad);
+        for step in 0..=(LOOK_AHEAD_S / LOOK_STEP_S) as usize {
+            let time_s = step as f64 * LOOK_STEP_S;
+            let position = object.pose.position + object.velocity_mps * time_s;
+            let beside = self.guide.project(position, rear_m - 10.0, front_m + SIGHT_M);
+            let Some(span) = beside.taken(forward, object.length_m, object.width_m, half_way_m) else {
+                continue;
+            };
+            let (near_m, far_m) = (span.from_m, span.to_m);
+            if step == 0 {
+                // On the way now: behind its middle the ego vehicle is past it.
+                return (span.middle_m() > front_m - 1.0).then(|| Ahead {
+                    near_m,
+                    age_s: 0.0,
+                    speed_mps: object.velocity_mps.dot(&beside.forward).max(0.0),
+                    reason: Reason::Follow(object.id),
+                });
+            }
+            let ego_from_m = rear_m + speed_mps * (time_s - CONFLICT_S).max(0.0);
+            // A slow vehicle may speed up meanwhile.
+            let reach_s = time_s + CONFLICT_S;
+            let ego_to_m =
+                front_m + (speed_mps * reach_s + reach_s * reach_s).min(RULES.cruise_mps * reach_s);
+            if near_m <= ego_to_m && far_m >= ego_from_m && near_m >= front_m {
+                let speed_mps = object.velocity_mps.dot(&beside.forward).max(0.0);
+                let near_m = near_m - speed_mps * time_s - CROSSING_GAP_M + MODEL.gap_m_min;
+                return Some(Ahead { near_m, age_s: 0.0, speed_mps, reason: Reason::Yield(object.id) });
+            }
+        }
+        None
+    }
+
+    /// Writes the truth it drives by into the status; buffers are reused.
+    fn report(&mut self, sensed: &Sensed) {
+        let perceived = &mut self.status.perceived;
+        perceived.clear();
+        perceived.extend(sensed.objects.iter().filter(|object| object.distance_m < SIGHT_M).map(|object| {
+            PerceivedObject {
+                id: Some(object.id),
+                body: object.body,
+                pose: object.pose,
+                velocity_mps: object.velocity_mps,
+                length_m: object.length_m,
+                width_m: object.width_m,
+                height_m: object.height_m,
+                predicted: Vec::new(),
+            }
+        }));
+    }
+}
+
+impl Ads for Idm {
+    fn drive(&mut self, sensed: &Sensed) -> Control {
+        let pose = &sensed.ego.rear_axle;
+        if self.station_m.is_none() {
+            self.steer_rad = sensed.ego.steer_rad;
+        }
+        let station_m = self.guide.locate(pose.position, self.station_m).station_m;
+        self.station_m = Some(station_m);
+        self.look(sensed, station_m);
+        let (mut acceleration_mps2, reason) = self.acceleration_mps2(sensed, station_m);
+        if sensed.ego.speed_mps < 0.1 && acceleration_mps2 <= 0.0 {
+            acceleration_mps2 = HOLD_MPS2;
+        }
+        let (throttle_pct, brake_pct) = pedals_for(acceleration_mps2);
+        let steer_rad = self.steering.steer_rad(&self.guide, pose, station_m, &sensed.ego);
+        let control = Control { throttle_pct, brake_pct, steer_rad };
+        self.status.localized = Some(*pose);
+        self.status.control = control;
+        self.status.steer_rate_radps = (sensed.ego.steer_rad - self.steer_rad) / DT_S;
+        self.status.reason = reason;
+        self.steer_rad = sensed.ego.steer_rad;
+        self.ticks += 1;
+        control
+    }
+
+    fn status(&self) -> &Status {
+        &self.status
+    }
+
+    fn clone_box(&self) -> Box<dyn Ads> {
+        Box::new(self.clone())
+    }
+}
+
+/// The model's acceleration, m/s², with the gap (m) and speed (m/s) of what is ahead.
+fn model_mps2(speed_mps: f64, allowed_mps: f64, ahead: Option<(f64, f64)>) -> f64 {
+    let free = if speed_mps <= allowed_mps {
+        let part = speed_mps / allowed_mps;
+        MODEL.acceleration_mps2 * (1.0 - part * part * part * part)
+    } else {
+        // The model brakes hardly for a falling limit; follow it as closely as it falls.
+        (allowed_mps - speed_mps) / 0.6
+    };
+    let Some((gap_m, ahead_mps)) = ahead else { return free };
+    let ratio = MODEL.wanted_gap_m(speed_mps, ahead_mps) / gap_m.max(0.1);
+    free.min(MODEL.acceleration_mps2) - MODEL.acceleration_mps2 * ratio * ratio
+}

@@ -1,0 +1,37 @@
+//! Every driving system by name. A new one is one line here; the conformance tests run through it.
+
+use std::sync::Arc;
+
+use crate::sim::Scene;
+
+use super::driver::Ads;
+use super::modular::Modular;
+use super::modular::ModularConfig;
+use super::reference::Idm;
+
+/// A driving system that can be asked for by name.
+pub struct Entry {
+    pub name: &'static str,
+    pub summary: &'static str,
+    /// A fresh driver for one episode; the seed feeds its sensor errors.
+    pub build: fn(scene: &Arc<Scene>, seed: u64) -> Box<dyn Ads>,
+}
+
+/// The driving system of that name.
+pub fn by_name(name: &str) -> Option<&'static Entry> {
+    REGISTRY.iter().find(|entry| entry.name == name)
+}
+
+/// Every driving system of avastra.
+pub const REGISTRY: &[Entry] = &[
+    Entry {
+        name: "modular",
+        summary: "localisation, perception, prediction, planning and control after Apollo 7.0",
+        build: |scene, seed| Box::new(Modular::new(scene, &ModularConfig::default(), seed)),
+    },
+    Entry {
+        name: "idm",
+        summary: "reference driver: perfect knowledge, intelligent driver model, lane following",
+        build: |scene, _seed| Box::new(Idm::new(scene)),
+    },
+];

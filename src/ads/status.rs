@@ -1,0 +1,80 @@
+//! The inside of a driving system, as far as the paper's internal state and the pictures need it.
+
+use core::fmt;
+
+use crate::geometry::Pose;
+use crate::geometry::Vec2;
+use crate::model::vocabulary::Body;
+use crate::sim::Control;
+
+/// What a driving system believes, wants and commands.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Status {
+    /// Where it believes its rear axle is.
+    pub localized: Option<Pose>,
+    pub perceived: Vec<PerceivedObject>,
+    /// Planned positions of the rear axle, every 0.1 s from the moment of planning.
+    pub planned: Vec<PlannedPoint>,
+    pub control: Control,
+    /// Apollo's `steering_rate`: its command is constant, so this is the measured rate, rad/s.
+    pub steer_rate_radps: f64,
+    /// Why it drives as it does now: the constraint that holds it back most.
+    pub reason: Reason,
+}
+
+/// An object as the driving system believes it to be.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PerceivedObject {
+    /// Id of the true object; `None` is a ghost.
+    pub id: Option<u32>,
+    pub body: Body,
+    /// Centre of the outline.
+    pub pose: Pose,
+    pub velocity_mps: Vec2,
+    pub length_m: f64,
+    pub width_m: f64,
+    pub height_m: f64,
+    /// Predicted positions of the centre, every 0.5 s from the moment of planning.
+    pub predicted: Vec<Vec2>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PlannedPoint {
+    pub pose: Pose,
+    pub speed_mps: f64,
+}
+
+/// The most restrictive constraint of a plan. `Display` gives a few words, for example `follow 3`;
+/// numbers are ids of objects.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Reason {
+    /// Nothing planned yet.
+    #[default]
+    Start,
+    /// Free road: the limit, a curve ahead or the cruising speed decides.
+    Cruise,
+    /// A red or yellow light.
+    RedLight,
+    /// Something that stands in the way.
+    Stop(u32),
+    /// Something that moves ahead in the same direction.
+    Follow(u32),
+    /// Something that will cross the way.
+    Yield(u32),
+    /// Lost the route: constant braking.
+    Fallback,
+}
+
+impl fmt::Display for Reason {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Reason::Start => write!(f, "start"),
+            Reason::Cruise => write!(f, "cruise"),
+            Reason::RedLight => write!(f, "red light"),
+            Reason::Stop(id) => write!(f, "stop {id}"),
+            Reason::Follow(id) => write!(f, "follow {id}"),
+            Reason::Yield(id) => write!(f, "yield {id}"),
+            Reason::Fallback => write!(f, "fallback"),
+        }
+    }
+}
