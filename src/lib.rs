@@ -13,3 +13,7 @@ pub mod model;
 pub mod action;
 pub mod sim;
 pub mod ads;
+pub mod mdp;
+pub mod agent;
+pub mod episode;
+pub mod oracle;

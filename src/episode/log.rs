@@ -1,0 +1,110 @@
+//! What an episode leaves behind: enough to judge it, to count it and to replay it.
+
+use crate::action::Draw;
+use crate::mdp::StateVector;
+use crate::model::Memory;
+use crate::model::vocabulary::Body;
+use crate::model::vocabulary::Verb;
+use crate::sim::Contact;
+use crate::sim::Start;
+
+/// One episode, from start to end.
+#[derive(Debug, Clone, PartialEq)]
+pub struct EpisodeLog {
+    pub road: String,
+    pub ads: String,
+    pub seed: u64,
+    pub start: Start,
+    /// States of the space at the start.
+    pub memory: Memory,
+    pub steps: Vec<StepLog>,
+    pub collisions: Vec<Collision>,
+    pub end: End,
+    pub duration_s: f64,
+    /// Driven by the ego vehicle, m.
+    pub distance_m: f64,
+    /// Red lights passed by the ego vehicle.
+    pub red_runs: u32,
+    /// Physics steps done.
+    pub ticks: u64,
+}
+
+/// One action of the agent and the observation period after it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StepLog {
+    /// When the action was carried out, s.
+    pub time_s: f64,
+    /// What the agent saw before it acted, shape `(STATE_LEN,)`.
+    pub state: StateVector,
+    pub outcome: Outcome,
+    /// Largest collision probability of the observation period, in `[0, 1]`.
+    pub proc: f64,
+    pub reward: f64,
+    /// SHA-256 over every bit of the world's state after every tick so far.
+    pub trace: [u8; 32],
+}
+
+/// What became of the agent's choice.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Outcome {
+    /// Carried out as drawn; the ids of the road users it made appear.
+    Done { draw: Draw, spawned: Vec<u32> },
+    /// Nobody chose anything: no row was legal, or the script says so.
+    Passed,
+    /// Impossible: nothing changed, and the step passed without an action.
+    Refused { row: usize, rule: Option<String>, reason: String },
+}
+
+/// The ego vehicle touched somebody.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Collision {
+    pub contact: Contact,
+    /// Index of the step in which it happened.
+    pub step: usize,
+    pub body: Body,
+    pub verb: Verb,
+    /// When the obstacle appeared, s.
+    pub spawned_s: f64,
+}
+
+impl EpisodeLog {
+    /// SHA-256 over every bit of the world's state after every tick; zeros if there was no step.
+    pub fn trace(&self) -> [u8; 32] {
+        self.steps.last().map_or([0; 32], |step| step.trace)
+    }
+}
+
+/// Why an episode ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum End {
+    /// The goal was reached: terminal.
+    Arrived,
+    /// No progress for several steps: truncated.
+    Stalled,
+    /// As many steps as the space allows: truncated.
+    StepLimit,
+    /// The script of a replay has no more steps.
+    Script,
+}
+
+impl End {
+    pub fn name(self) -> &'static str {
+        match self {
+            End::Arrived => "arrived",
+            End::Stalled => "stalled",
+            End::StepLimit => "limit",
+            End::Script => "script",
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_end_can_be_claimed() {
+        let ends = [End::Arrived, End::Stalled, End::StepLimit, End::Script];
+        assert_eq!(ends.map(End::name), crate::model::ENDS);
+    }
+}

@@ -1,0 +1,61 @@
+//! Scripts: the choices of an episode that has been, to be made again.
+
+use std::sync::Arc;
+
+use crate::action::ActionTable;
+use crate::model::Scenario;
+use crate::model::Value;
+
+use super::log::EpisodeLog;
+use super::log::Outcome;
+use super::run::Choice;
+use super::run::Moment;
+
+/// What happens in each step, from step 0; `None` is a step without an action.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Script {
+    steps: Vec<Option<ScriptedAction>>,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+struct ScriptedAction {
+    row: usize,
+    /// Values of the `any` parameters.
+    values: Vec<(Arc<str>, Value)>,
+}
+
+impl Script {
+    /// The choices that a log records.
+    pub fn of_log(log: &EpisodeLog) -> Script {
+        let step = |outcome: &Outcome| match outcome {
+            Outcome::Done { draw, .. } => Some(ScriptedAction { row: draw.row, values: draw.values.clone() }),
+            Outcome::Passed | Outcome::Refused { .. } => None,
+        };
+        Script { steps: log.steps.iter().map(|logged| step(&logged.outcome)).collect() }
+    }
+
+    /// The choices that a scenario lists; steps that it leaves out pass without an action.
+    pub fn of_scenario(scenario: &Scenario) -> Script {
+        let mut steps = Vec::new();
+        for step in &scenario.steps {
+            steps.resize(step.number as usize, None);
+            steps.push(step.row.map(|row| ScriptedAction { row, values: step.drawn.clone() }));
+        }
+        Script { steps }
+    }
+
+    /// The choice of one moment: legal under the same rules that a run draws by, or refused.
+    pub fn choose(&self, table: &ActionTable, moment: &Moment) -> Choice {
+        match self.steps.get(moment.step) {
+            None => Choice::Stop,
+            Some(None) => Choice::Pass,
+            Some(Some(action)) => match table.check(moment.situation, action.row, &action.values) {
+                Ok(draw) => Choice::Act(draw),
+                Err(refusals) => {
+                    let first = refusals.into_iter().next().expect("a refusal comes with a reason");
+                    Choice::Refused { row: action.row, rule: first.rule, reason: first.reason }
+                }
+            },
+        }
+    }
+}

@@ -1,0 +1,44 @@
+//! What an episode is made of before anybody has chosen anything.
+
+use std::sync::Arc;
+
+use crate::action::ActionTable;
+use crate::action::ActiveRules;
+use crate::ads;
+use crate::model::Memory;
+use crate::model::Road;
+use crate::model::Space;
+use crate::rng;
+use crate::rng::Stream;
+use crate::sim::Scene;
+use crate::sim::Start;
+
+/// Signals begin anywhere in this span, s: a whole number of cycles of two, three and four groups.
+const SIGNAL_PHASE_S: f64 = 204.0;
+
+/// Everything that an episode is made of but the choices.
+pub struct Setup<'a> {
+    pub table: &'a ActionTable,
+    pub road: &'a Road,
+    pub scene: Arc<Scene>,
+    pub rules: &'a ActiveRules,
+    pub ads: &'static ads::Entry,
+    pub seed: u64,
+    pub start: Start,
+    /// States of the space at the start; those that mean weather agree with `start`.
+    pub memory: Memory,
+}
+
+/// The world that a road's episodes share.
+pub fn scene(road: &Road) -> Scene {
+    Scene { map: road.map.clone(), route: road.route.clone() }
+}
+
+/// How an episode of a seed begins that starts with this memory.
+pub fn start(space: &Space, memory: &Memory, seed: u64) -> Start {
+    let mut rng = rng::stream(seed, Stream::Reset, 1);
+    // A multiple of 1/64 s is short in a file.
+    let signal_phase_s = (rng::between(&mut rng, 0.0, SIGNAL_PHASE_S) * 64.0).floor() / 64.0;
+    let (time, [rain, fog, wetness]) = space.weather(memory);
+    Start { time, rain, fog, wetness, signal_phase_s, seed }
+}

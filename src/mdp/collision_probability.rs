@@ -1,0 +1,214 @@
+//! Collision probability (ProC): how near the ego vehicle is to a crash, in `[0, 1]`.
+//!
+//! Paper, "Collision Probability Measurement", Eqs. 9–16, with the repairs that make them hold:
+//! distances are between outlines, so that ProC reaches 1 at contact; decelerations are magnitudes;
+//! a safety distance is never below the least gap; oncoming traffic adds its own braking distance.
+//! ProC is a ratio of distances, not the probability of anything; the name is the paper's.
+
+use crate::geometry::wrap_angle;
+use crate::model::vocabulary::Body;
+use crate::sim::Obstacle;
+use crate::sim::World;
+
+/// Constants of ProC. `default()` is avastra's own reading.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ProcSettings {
+    /// Braking of every vehicle, magnitude, m/s². Paper: 6 (Berkeley algorithm).
+    pub vehicle_decel_mps2: f64,
+    /// Braking of a pedestrian, m/s². DeepCollision's code: 1.5.
+    pub pedestrian_decel_mps2: f64,
+    /// `R_min`: the least gap between vehicles in one lane, m. Paper: 5.
+    pub gap_m_min: f64,
+    /// Added to the lateral safety distance, m. Paper: 0, which makes it 0 beside parallel traffic;
+    /// DeepCollision's and the published code: 5.
+    pub lateral_margin_m: f64,
+}
+
+impl Default for ProcSettings {
+    fn default() -> ProcSettings {
+        ProcSettings {
+            vehicle_decel_mps2: 6.0,
+            pedestrian_decel_mps2: 1.5,
+            gap_m_min: 5.0,
+            lateral_margin_m: 5.0,
+        }
+    }
+}
+
+/// Longitudinal safety distance `LoSD` (m), Eq. 9, of a follower behind a leader.
+///
+/// Speeds along the lane, at least 0. At least `gap_m_min`: a faster leader needs no more room.
+pub fn longitudinal_safety_distance_m(
+    follower_mps: f64,
+    follower_decel_mps2: f64,
+    leader_mps: f64,
+    leader_decel_mps2: f64,
+    gap_m_min: f64,
+) -> f64 {
+    // The paper gives the deceleration as -6 m/s². Its magnitude is meant: with the sign, a faster
+    // follower would need less room.
+    let follower_m = follower_mps * follower_mps / (2.0 * follower_decel_mps2);
+    let leader_m = leader_mps * leader_mps / (2.0 * leader_decel_mps2);
+    (follower_m - leader_m).max(0.0) + gap_m_min
+}
+
+/// Safety distance (m) of two that drive towards each other: both must stop. Ours, after RSS; the
+/// paper has no such case and would subtract the oncoming speed.
+pub fn opposing_safety_distance_m(
+    ego_mps: f64,
+    ego_decel_mps2: f64,
+    other_mps: f64,
+    other_decel_mps2: f64,
+    gap_m_min: f64,
+) -> f64 {
+    ego_mps * ego_mps / (2.0 * ego_decel_mps2) + other_mps * other_mps / (2.0 * other_decel_mps2) + gap_m_min
+}
+
+/// Lateral safety distance `LaSD` (m), Eq. 10: `(v sin β)² / (a sin β)`, which is `v² |sin β| / a`
+/// and so 0 in parallel traffic, plus a margin.
+pub fn lateral_safety_distance_m(
+    ego_mps: f64,
+    lane_angle_rad: f64,
+    ego_decel_mps2: f64,
+    margin_m: f64,
+) -> f64 {
+    ego_mps * ego_mps * libm::sin(lane_angle_rad).abs() / ego_decel_mps2 + margin_m
+}
+
+/// How much of a safety distance is used up (Eqs. 14 and 15), in `[0, 1]`; 0 where none is needed.
+pub fn probability(safety_distance_m: f64, current_distance_m: f64) -> f64 {
+    if safety_distance_m <= 0.0 {
+        return 0.0;
+    }
+    ((safety_distance_m - current_distance_m) / safety_distance_m).clamp(0.0, 1.0)
+}
+
+/// Both dimensions together, Eq. 16.
+pub fn combined(longitudinal: f64, lateral: f64) -> f64 {
+    let (most, least) = (longitudinal.max(lateral), longitudinal.min(lateral));
+    most + (1.0 - most) * least
+}
+
+/// ProC of the ego vehicle against everybody around it, at this moment.
+///
+/// An obstacle is in the same lane if its centre lies within half the width that the route's lane has
+/// there. Then Eq. 9 applies, with who is behind as the follower, or the safety distance of two who
+/// drive towards each other. Otherwise Eq. 10 applies, with the angle β from the ego's heading to that
+/// of the lane in which the obstacle drives, or to where somebody on foot is turned. Of all obstacles
+/// the greatest probability of each dimension counts; Eq. 16 joins the two.
+pub fn collision_probability(world: &World, settings: &ProcSettings) -> f64 {
+    let (mut longitudinal, mut lateral) = (0.0_f64, 0.0_f64);
+    for obstacle in world.obstacles() {
+        if beyond_reach(world, obstacle, settings) {
+            continue;
+        }
+        let current_m = obstacle.distance_m;
+        let position = obstacle.outline.pose.position;
+        // No place of the route that is farther along it than this could be the nearest.
+        let reach_m = 2.0 * (position - world.ego().rear_axle.position).norm() + world.ego_offset_m().abs();
+        let beside = world.scene().route.path.project_near(position, world.ego_station_m(), reach_m);
+        if beside.offset_m.abs() <= route_half_width_m(world, beside.station_m) {
+            let ahead = beside.station_m >= world.ego_station_m();
+            let safety_m = same_lane_safety_m(world, obstacle, ahead, settings);
+            longitudinal = longitudinal.max(probability(safety_m, current_m));
+        } else {
+            let angle_rad = wrap_angle(obstacle.lane_heading_rad - world.ego().rear_axle.heading_rad);
+            let safety_m = lateral_safety_distance_m(
+                world.ego().speed_mps,
+                angle_rad,
+                settings.vehicle_decel_mps2,
+                settings.lateral_margin_m,
+            );
+            lateral = lateral.max(probability(safety_m, current_m));
+        }
+    }
+    combined(longitudinal, lateral)
+}
+
+/// Half the width of the route's lane at a station of the route, m.
+fn route_half_width_m(world: &World, station_m: f64) -> f64 {
+    let scene = world.scene();
+    let here = scene.route.lane_at(station_m);
+    scene.map.lane(here.lane).width_at(station_m - here.from_m) / 2.0
+}
+
+fn same_lane_safety_m(world: &World, obstacle: &Obstacle, ahead: bool, settings: &ProcSettings) -> f64 {
+    let ego = world.ego();
+    let along_mps = obstacle.velocity_mps.dot(&ego.rear_axle.forward());
+    let other_decel_mps2 = decel_mps2(obstacle, settings);
+    let (ego_mps, ego_decel_mps2) = (ego.speed_mps, settings.vehicle_decel_mps2);
+    let gap_m_min = settings.gap_m_min;
+    if ahead && along_mps < 0.0 {
+        opposing_safety_distance_m(ego_mps, ego_decel_mps2, -along_mps, other_decel_mps2, gap_m_min)
+    } else if ahead {
+        longitudinal_safety_distance_m(ego_mps, ego_decel_mps2, along_mps, other_decel_mps2, gap_m_min)
+    } else {
+        let follower_mps = along_mps.max(0.0);
+        longitudinal_safety_distance_m(follower_mps, other_decel_mps2, ego_mps, ego_decel_mps2, gap_m_min)
+    }
+}
+
+fn decel_mps2(obstacle: &Obstacle, settings: &ProcSettings) -> f64 {
+    match obstacle.body {
+        Body::Pedestrian => settings.pedestrian_decel_mps2,
+        _ => settings.vehicle_decel_mps2,
+    }
+}
+
+/// Whether every safety distance that could apply is shorter than the gap: then ProC is 0, and the
+/// costly projection is not needed.
+fn beyond_reach(world: &World, obstacle: &Obstacle, settings: &ProcSettings) -> bool {
+    let speed_mps = world.ego().speed_mps;
+    let other_m = obstacle.velocity_mps.norm_squared() / (2.0 * decel_mps2(obstacle, settings));
+    let longest_m = speed_mps * speed_mps / settings.vehicle_decel_mps2
+        + other_m
+        + settings.gap_m_min.max(settings.lateral_margin_m);
+    obstacle.distance_m > longest_m
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    #[test]
+    fn safety_distances_match_worked_figures() {
+        // Paper's constants at the speeds of RSS's usual table: 9.33, 21.33 and 5 m.
+        for (follower, leader, expected) in [(14.0, 12.0, 9.333), (14.0, 0.0, 21.333), (20.0, 20.0, 5.0)] {
+            let safety_m = longitudinal_safety_distance_m(follower, 6.0, leader, 6.0, 5.0);
+            assert!((safety_m - expected).abs() < 1e-3, "{follower} behind {leader}: {safety_m}");
+        }
+        assert!((opposing_safety_distance_m(12.0, 6.0, 6.0, 6.0, 5.0) - 20.0).abs() < 1e-12);
+        let right_angle = core::f64::consts::FRAC_PI_2;
+        assert!((lateral_safety_distance_m(15.0, right_angle, 6.0, 0.0) - 37.5).abs() < 1e-12);
+        assert_eq!(lateral_safety_distance_m(15.0, 0.0, 6.0, 0.0), 0.0);
+    }
+
+    #[test]
+    fn contact_is_certain_and_a_needless_distance_is_safe() {
+        assert_eq!(probability(12.0, 0.0), 1.0);
+        assert_eq!(probability(12.0, 12.0), 0.0);
+        assert_eq!(probability(0.0, 0.0), 0.0);
+        assert_eq!(combined(1.0, 0.3), 1.0);
+    }
+
+    proptest! {
+        #[test]
+        fn proc_stays_in_bounds_and_falls_with_the_gap(
+            safety_m in 0.1_f64..80.0, near_m in 0.0_f64..60.0, more_m in 0.0_f64..60.0, lateral in 0.0_f64..=1.0,
+        ) {
+            let (near, far) = (probability(safety_m, near_m), probability(safety_m, near_m + more_m));
+            prop_assert!((0.0..=1.0).contains(&near) && far <= near);
+            let both = combined(near, lateral);
+            prop_assert!(both >= near.max(lateral) && both <= 1.0);
+            prop_assert_eq!(both, combined(lateral, near));
+        }
+
+        #[test]
+        fn a_faster_follower_needs_no_less_room(follower in 0.0_f64..30.0, more in 0.0_f64..10.0, leader in 0.0_f64..30.0) {
+            let slow = longitudinal_safety_distance_m(follower, 6.0, leader, 6.0, 5.0);
+            let fast = longitudinal_safety_distance_m(follower + more, 6.0, leader, 6.0, 5.0);
+            prop_assert!(slow >= 5.0 && fast >= slow);
+        }
+    }
+}

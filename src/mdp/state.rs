@@ -1,0 +1,239 @@
+//! The 19 state variables: 7 of the surroundings (paper, Table 1), 12 of the driving system (Table 2).
+//!
+//! Raw values in SI units; scaling for a network is the learner's business. Perceived and true
+//! objects are matched by identity, so an object that is missed or imagined does not count as a
+//! difference here.
+//!
+//! Where nobody is around, `speedNearestObs` is 0 (the published package: 100, no speed that anybody
+//! drives); `distToNearestObs` already tells that nobody is there. `trafficLight` is 0 both for yellow
+//! and for no light ahead. Both are ours.
+
+use ndarray::Array1;
+
+use crate::ads::PerceivedObject;
+use crate::ads::Status;
+use crate::geometry::Vec2;
+use crate::geometry::wrap_angle;
+use crate::model::vocabulary::TimeOfDay;
+use crate::sim::Obstacle;
+use crate::sim::SignalColour;
+use crate::sim::World;
+
+/// Number of state variables.
+pub const STATE_LEN: usize = 19;
+
+/// The state variables' names in the paper, in order.
+pub const STATE_NAMES: [&str; STATE_LEN] = [
+    "weather",
+    "timeOfDay",
+    "trafficLight",
+    "numObs",
+    "distToNearestObs",
+    "speedNearestObs",
+    "roadCondition",
+    "distDeviation",
+    "angleDeviation",
+    "positionDiff",
+    "directionDiff",
+    "sizeDiff",
+    "velocityDiff",
+    "throttle",
+    "steerRate",
+    "steerTarget",
+    "accRate",
+    "brakePercentage",
+    "speed",
+];
+
+/// One state: shape `(STATE_LEN,)`.
+pub type StateVector = Array1<f32>;
+
+/// Distance that stands for "no obstacle around", m, as in the published package.
+const NOBODY_M: f64 = 100.0;
+/// How far ahead a traffic light or a junction is looked for, m.
+const LOOK_AHEAD_M: f64 = 100.0;
+/// A junction nearer than this counts as being at it, m, as in the published package.
+const NEAR_JUNCTION_M: f64 = 20.0;
+/// A localisation error below this has no direction, m.
+const DEVIATION_M_MIN: f64 = 1e-3;
+
+/// Reads the state vector off the world and the driving system.
+pub fn observe(world: &World, status: &Status) -> StateVector {
+    let surroundings = surroundings(world);
+    let driving_system = driving_system(world, status);
+    surroundings.into_iter().chain(driving_system).map(|value| value as f32).collect()
+}
+
+fn surroundings(world: &World) -> [f64; 7] {
+    let [rain, fog, wetness] = world.sky().map(|level| level.intensity());
+    let nearest = nearest_obstacle(world);
+    [
+        // One number for three phenomena, as the published package packs them.
+        100.0 * rain + 10.0 * fog + wetness,
+        hour(world.time_of_day()),
+        signal_ahead(world),
+        world.obstacles().len() as f64,
+        nearest.map_or(NOBODY_M, |(distance_m, _)| distance_m),
+        // Ours: the package's 100 would be the fastest obstacle of all.
+        nearest.map_or(0.0, |(_, speed_mps)| speed_mps),
+        road_condition(world),
+    ]
+}
+
+fn driving_system(world: &World, status: &Status) -> [f64; 12] {
+    let ego = world.ego();
+    let localized = status.localized.unwrap_or(ego.rear_axle);
+    let deviation = localized.position - ego.rear_axle.position;
+    let differences = perception_differences(world.obstacles(), &status.perceived);
+    let steer_rad_max = crate::sim::VehicleParameters::MKZ.steer_rad_max;
+    [
+        deviation.norm(),
+        deviation_angle_rad(deviation),
+        differences.position_m,
+        differences.direction_rad,
+        differences.size_m,
+        differences.velocity_mps,
+        status.control.throttle_pct,
+        status.steer_rate_radps,
+        100.0 * status.control.steer_rad / steer_rad_max,
+        ego.acceleration_mps2,
+        status.control.brake_pct,
+        ego.speed_mps,
+    ]
+}
+
+/// Clock of the published package, h.
+fn hour(time: TimeOfDay) -> f64 {
+    match time {
+        TimeOfDay::Morning => 10.0,
+        TimeOfDay::Noon => 14.0,
+        TimeOfDay::Night => 20.0,
+    }
+}
+
+/// Distance (m, between outlines) and speed (m/s) of the nearest obstacle.
+fn nearest_obstacle(world: &World) -> Option<(f64, f64)> {
+    let gaps = world.obstacles().iter().map(|obstacle| (obstacle.distance_m, obstacle.velocity_mps.norm()));
+    gaps.min_by(|a, b| a.0.total_cmp(&b.0))
+}
+
+/// Colour of the next traffic light on the route: red -1, yellow 0, green 1; 0 if there is none.
+fn signal_ahead(world: &World) -> f64 {
+    let station_m = world.ego_station_m();
+    let ahead = |at_m: f64| at_m >= station_m && at_m <= station_m + LOOK_AHEAD_M;
+    let next = world.scene().route.stop_lines.iter().find(|line| ahead(line.station_m));
+    match next.map(|line| world.signal(line.signal)) {
+        Some(SignalColour::Red) => -1.0,
+        Some(SignalColour::Green) => 1.0,
+        // Neither tells that the way is free or closed, so both stand between red and green.
+        Some(SignalColour::Yellow) | None => 0.0,
+    }
+}
+
+/// Kind of road: 0 one-way, 1 two-way, 2 at a junction, 3 inside one.
+fn road_condition(world: &World) -> f64 {
+    let scene = world.scene();
+    let station_m = world.ego_station_m();
+    let here = scene.map.lane(scene.route.lane_at(station_m).lane);
+    let soon = scene.map.lane(scene.route.lane_at(station_m + NEAR_JUNCTION_M).lane);
+    if here.junction.is_some() {
+        return 3.0;
+    }
+    if soon.junction.is_some() {
+        return 2.0;
+    }
+    let mut beside = here.left;
+    while let Some(neighbour) = beside {
+        if !neighbour.same_direction {
+            return 1.0;
+        }
+        beside = scene.map.lane(neighbour.lane).left;
+    }
+    0.0
+}
+
+/// `angleDeviation`, Eq. 2, by `atan2` (the printed `arctan` loses the quadrant and divides by 0);
+/// 0 where the error is too small to have a direction.
+fn deviation_angle_rad(deviation: Vec2) -> f64 {
+    if deviation.norm() < DEVIATION_M_MIN {
+        return 0.0;
+    }
+    libm::atan2(deviation.y, deviation.x)
+}
+
+/// The largest difference of each kind between what is perceived and what is (Eqs. 3–6).
+#[derive(Debug, Default, PartialEq)]
+struct Differences {
+    position_m: f64,
+    direction_rad: f64,
+    size_m: f64,
+    velocity_mps: f64,
+}
+
+fn perception_differences(real: &[Obstacle], perceived: &[PerceivedObject]) -> Differences {
+    let mut most = Differences::default();
+    for object in perceived {
+        let Some(truth) = real.iter().find(|truth| Some(truth.id) == object.id) else { continue };
+        let outline = &truth.outline;
+        let turned_rad = wrap_angle(object.pose.heading_rad - outline.pose.heading_rad).abs();
+        let size = nalgebra::Vector3::new(
+            object.height_m - truth.height_m,
+            object.width_m - 2.0 * outline.half_width_m,
+            object.length_m - 2.0 * outline.half_length_m,
+        );
+        most.position_m = most.position_m.max((object.pose.position - outline.pose.position).norm());
+        most.direction_rad = most.direction_rad.max(turned_rad);
+        most.size_m = most.size_m.max(size.norm());
+        most.velocity_mps = most.velocity_mps.max((object.velocity_mps - truth.velocity_mps).norm());
+    }
+    most
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::OrientedBox;
+    use crate::geometry::Pose;
+    use crate::model::vocabulary::Body;
+    use crate::model::vocabulary::Colour;
+    use crate::model::vocabulary::Verb;
+
+    #[test]
+    fn a_direction_needs_a_deviation() {
+        assert_eq!(deviation_angle_rad(Vec2::new(1e-4, 1e-4)), 0.0);
+        assert!((deviation_angle_rad(Vec2::new(-1.0, 0.0)) - core::f64::consts::PI).abs() < 1e-12);
+    }
+
+    #[test]
+    fn differences_are_maxima_over_matched_objects() {
+        let truth = Obstacle {
+            id: 1,
+            body: Body::Sedan,
+            colour: Colour::Red,
+            verb: Verb::DriveAhead,
+            outline: OrientedBox::new(Pose::new(10.0, 0.0, 3.1), 4.8, 1.85),
+            height_m: 1.45,
+            lane_heading_rad: core::f64::consts::PI,
+            velocity_mps: Vec2::new(-8.0, 0.0),
+            distance_m: 5.0,
+            spawned_tick: 0,
+        };
+        let object = |id, x_m, heading_rad| PerceivedObject {
+            id,
+            body: Body::Sedan,
+            pose: Pose::new(x_m, 0.0, heading_rad),
+            velocity_mps: Vec2::new(-8.0, 3.0),
+            length_m: 4.8,
+            width_m: 1.85,
+            height_m: 1.05,
+            predicted: Vec::new(),
+        };
+        // The second is a ghost: far off, but no difference to anything that exists.
+        let found = perception_differences(&[truth], &[object(Some(1), 10.5, -3.1), object(None, 90.0, 0.0)]);
+        assert!((found.position_m - 0.5).abs() < 1e-12);
+        assert!((found.direction_rad - (core::f64::consts::TAU - 6.2)).abs() < 1e-12);
+        assert!((found.size_m - 0.4).abs() < 1e-12);
+        assert!((found.velocity_mps - 3.0).abs() < 1e-12);
+        assert_eq!(perception_differences(&[truth], &[]), Differences::default());
+    }
+}

@@ -1,0 +1,96 @@
+//! The claims of an emitted scenario against what a replay finds.
+
+use crate::episode::Collision;
+use crate::episode::EpisodeLog;
+use crate::episode::Outcome;
+use crate::model::Claim;
+use crate::model::Scenario;
+use crate::model::Space;
+use crate::model::digest_text;
+
+use super::facts;
+
+/// One claim, and what came of it.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct ClaimResult {
+    /// The claim in words.
+    pub claim: String,
+    pub confirmed: bool,
+    /// What the replay found instead, or `as claimed`.
+    pub found: String,
+}
+
+/// Checks every claim of a scenario, and that each of its steps was legal.
+pub fn verify(space: &Space, scenario: &Scenario, log: &EpisodeLog) -> Vec<ClaimResult> {
+    let steps = log.steps.iter().enumerate().filter_map(|(number, step)| match &step.outcome {
+        Outcome::Refused { rule, reason, .. } => {
+            let rule = rule.as_ref().map_or(String::new(), |rule| format!("rule `{rule}`: "));
+            Some(judged(format!("step {number} is legal"), Err(format!("{rule}{reason}"))))
+        }
+        _ => None,
+    });
+    steps.chain(scenario.claims.iter().map(|claim| check(space, claim, log))).collect()
+}
+
+fn check(space: &Space, claim: &Claim, log: &EpisodeLog) -> ClaimResult {
+    match claim {
+        Claim::Collision { obstacle, time_s } => {
+            let at = time_s.as_ref().map_or(String::new(), |time| format!(" at {time} s"));
+            let outcome = collision(log, *obstacle).and_then(|index| match time_s {
+                Some(claimed) if !claimed.rounds(log.collisions[index].contact.time_s) => {
+                    Err(format!("at {:.2} s", log.collisions[index].contact.time_s))
+                }
+                _ => Ok(()),
+            });
+            judged(format!("collision{}{at}", with(*obstacle)), outcome)
+        }
+        Claim::Verdict { name, obstacle } => {
+            let judge = |index: usize| {
+                let facts = facts(log, index);
+                match space.verdict(name, facts) {
+                    Some(true) => Ok(()),
+                    _ => Err(format!(
+                        "repeated: {}, sudden: {}, struck: {}",
+                        facts.repeated, facts.sudden, facts.struck
+                    )),
+                }
+            };
+            judged(format!("{name}{}", with(*obstacle)), collision(log, *obstacle).and_then(judge))
+        }
+        Claim::Proc(claimed) => {
+            let found: Vec<f64> = log.steps.iter().map(|step| step.proc).collect();
+            let fits = claimed.len() == found.len()
+                && claimed.iter().zip(&found).all(|(claimed, found)| claimed.rounds(*found));
+            let shown: Vec<String> = found.iter().map(|proc| format!("{proc:.3}")).collect();
+            let result = if fits { Ok(()) } else { Err(format!("[{}]", shown.join(", "))) };
+            judged("collision probability of each step".to_owned(), result)
+        }
+        Claim::Trace(claimed) => {
+            let found = digest_text(&log.trace());
+            let result = if &found == claimed { Ok(()) } else { Err(found) };
+            judged("trace of the whole state".to_owned(), result)
+        }
+        Claim::End(claimed) => {
+            let found = log.end.name();
+            let result = if found == claimed { Ok(()) } else { Err(found.to_owned()) };
+            judged(format!("end {claimed}"), result)
+        }
+    }
+}
+
+/// The first collision with an obstacle, or with anybody.
+fn collision(log: &EpisodeLog, obstacle: Option<u32>) -> Result<usize, String> {
+    let meant = |collision: &Collision| obstacle.is_none_or(|id| collision.contact.obstacle == id);
+    log.collisions.iter().position(meant).ok_or_else(|| "no such collision".to_owned())
+}
+
+fn with(obstacle: Option<u32>) -> String {
+    obstacle.map_or(String::new(), |id| format!(" with npc#{id}"))
+}
+
+fn judged(claim: String, found: Result<(), String>) -> ClaimResult {
+    match found {
+        Ok(()) => ClaimResult { claim, confirmed: true, found: "as claimed".to_owned() },
+        Err(found) => ClaimResult { claim, confirmed: false, found },
+    }
+}
