@@ -17,3 +17,6 @@ pub mod mdp;
 pub mod agent;
 pub mod episode;
 pub mod oracle;
+pub mod study;
+pub mod emit;
+pub mod report;

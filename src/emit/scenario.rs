@@ -1,0 +1,198 @@
+//! An episode log as a scenario file: its steps up to the last counted collision, and what the
+//! replay must find.
+
+use std::sync::Arc;
+
+use crate::action::ActionTable;
+use crate::action::Draw;
+use crate::episode::Collision;
+use crate::episode::EpisodeLog;
+use crate::episode::Outcome;
+use crate::model::ActionDef;
+use crate::model::Space;
+use crate::model::StateDef;
+use crate::model::Value;
+use crate::model::digest_text;
+use crate::model::vocabulary::Word;
+use crate::sim::ENGINE;
+use crate::syntax::LANGUAGE;
+use crate::syntax::ast::ClauseKind;
+use crate::syntax::ast::Expect;
+use crate::syntax::ast::Expr;
+use crate::syntax::ast::Field;
+use crate::syntax::ast::File;
+use crate::syntax::ast::ItemKind;
+use crate::syntax::ast::Name;
+use crate::syntax::ast::Scenario;
+use crate::syntax::ast::Span;
+use crate::syntax::ast::Step;
+use crate::syntax::ast::Text;
+use crate::syntax::ast::Use;
+use crate::units::Dimension;
+
+use super::tree;
+
+/// What an emitted file says about where it comes from.
+#[derive(Debug, Clone, Copy)]
+pub struct Provenance<'a> {
+    /// Name of the scenario.
+    pub name: &'a str,
+    /// Path of the space's file, as the emitted file is to name it.
+    pub space_path: &'a str,
+    /// Number of the episode in its run.
+    pub episode: usize,
+    pub agent: &'a str,
+    /// Rules that were switched off, and optional ones that were on.
+    pub without: &'a [String],
+    pub with: &'a [String],
+}
+
+/// The scenario of an episode, cut after the step of its last counted collision.
+///
+/// `counted` holds the indices of the counted collisions, rising, and must not be empty.
+pub fn scenario(table: &ActionTable, log: &EpisodeLog, counted: &[usize], source: &Provenance) -> File {
+    let space = table.space();
+    let last = *counted.last().expect("an episode without a counted collision is not emitted");
+    let steps = log.collisions[last].step + 1;
+    let item = Scenario {
+        name: Name::built(source.name),
+        origin: origin(log, source),
+        road: Name::built(log.road.as_str()),
+        start: start(space, log),
+        steps: (0..steps).map(|number| step(table, log, number)).collect(),
+        expects: expects(log, counted, steps),
+    };
+    let digest = Some(Text::new(space.digest.clone(), Span::NONE));
+    let space_use = Use { path: Text::new(source.space_path, Span::NONE), digest };
+    let docs = vec![tree::doc(headline(log, &log.collisions[counted[0]]))];
+    File {
+        docs: vec![tree::doc("Emitted by `avastra run`; replay with `avastra replay FILE`.")],
+        items: vec![
+            tree::item(Vec::new(), ItemKind::Language(tree::digits(LANGUAGE.to_string()))),
+            tree::item(Vec::new(), ItemKind::Use(space_use)),
+            tree::item(docs, ItemKind::Scenario(item)),
+        ],
+        span: Span::NONE,
+    }
+}
+
+/// An action as it was drawn, in one line: `drive_ahead(lane: Left, …) with { speed: 11 m/s, … }`.
+pub fn action_text(table: &ActionTable, draw: &Draw) -> String {
+    let axes = &table.rows()[draw.row].label;
+    if draw.values.is_empty() {
+        return axes.clone();
+    }
+    let drawn = drawn(table, draw);
+    let fields: Vec<String> = drawn
+        .iter()
+        .map(|field| format!("{}: {}", field.name.text, crate::syntax::print_expr(&field.value)))
+        .collect();
+    format!("{axes} with {{ {} }}", fields.join(", "))
+}
+
+fn origin(log: &EpisodeLog, source: &Provenance) -> Vec<Field> {
+    let names = |rules: &[String]| tree::list(rules.iter().map(|rule| tree::name(rule)).collect());
+    let mut fields = vec![
+        tree::field("seed", tree::whole(log.seed)),
+        tree::field("episode", tree::whole(source.episode as u64)),
+        tree::field("policy", tree::text(source.agent)),
+        tree::field("ads", tree::text(log.ads.as_str())),
+        tree::field("engine", tree::text(ENGINE)),
+    ];
+    if !source.without.is_empty() {
+        fields.push(tree::field("without", names(source.without)));
+    }
+    if !source.with.is_empty() {
+        fields.push(tree::field("with", names(source.with)));
+    }
+    fields
+}
+
+fn start(space: &Space, log: &EpisodeLog) -> Vec<Field> {
+    let states = space.states.iter().map(|state| tree::field(&state.name, state_value(space, log, state)));
+    states
+        .chain([
+            tree::field("signal_phase", tree::quantity(log.start.signal_phase_s, Dimension::DURATION)),
+            tree::field("traffic_seed", tree::whole(log.start.seed)),
+        ])
+        .collect()
+}
+
+/// A plain state's value, or a record of a map's cells; cells that are all alike are one value.
+fn state_value(space: &Space, log: &EpisodeLog, state: &StateDef) -> Expr {
+    let cells = &log.memory.cells()[state.first_cell..state.first_cell + state.cells];
+    let literal = |value: &Value| tree::value(space, *value, state.ty);
+    match state.key {
+        Some(key) if cells.iter().any(|cell| cell != &cells[0]) => {
+            let keys = &space.enums[key.0].variants;
+            tree::record(keys.iter().zip(cells).map(|(key, cell)| tree::field(key, literal(cell))).collect())
+        }
+        _ => literal(&cells[0]),
+    }
+}
+
+fn step(table: &ActionTable, log: &EpisodeLog, number: usize) -> Step {
+    let (action, drawn) = match &log.steps[number].outcome {
+        Outcome::Passed | Outcome::Refused { .. } => (tree::call("wait", Vec::new()), Vec::new()),
+        Outcome::Done { draw, .. } => {
+            let space = table.space();
+            let row = &table.rows()[draw.row];
+            let action = &space.actions[row.action];
+            let axes =
+                row.axes.iter().map(|(name, value)| (name.to_string(), literal(space, action, name, *value)));
+            (tree::call(&action.name, axes.collect()), self::drawn(table, draw))
+        }
+    };
+    Step { number: tree::digits(number.to_string()), action, drawn, span: Span::NONE }
+}
+
+/// The drawn parameters of a step, as fields of its `with` block.
+fn drawn(table: &ActionTable, draw: &Draw) -> Vec<Field> {
+    let space = table.space();
+    let action = &space.actions[table.rows()[draw.row].action];
+    let field = |(name, value): &(Arc<str>, Value)| tree::field(name, literal(space, action, name, *value));
+    draw.values.iter().map(field).collect()
+}
+
+/// A parameter's value as its literal.
+fn literal(space: &Space, action: &ActionDef, parameter: &str, value: Value) -> Expr {
+    let found = action.parameters.iter().find(|candidate| &*candidate.name == parameter);
+    tree::value(space, value, found.expect("values are of the action's own parameters").ty)
+}
+
+fn expects(log: &EpisodeLog, counted: &[usize], steps: usize) -> Vec<Expect> {
+    let mut expects = Vec::new();
+    for (index, collision) in
+        log.collisions.iter().enumerate().filter(|(_, collision)| collision.step < steps)
+    {
+        let contact = &collision.contact;
+        let clauses = vec![
+            tree::clause(ClauseKind::With, tree::road_user(contact.obstacle)),
+            tree::clause(ClauseKind::At, tree::rounded(contact.time_s, 2, Dimension::DURATION)),
+        ];
+        expects.push(tree::expect(tree::name("collision"), clauses));
+        if counted.contains(&index) {
+            let who = vec![tree::clause(ClauseKind::With, tree::road_user(contact.obstacle))];
+            expects.push(tree::expect(tree::name("counted"), who));
+        }
+    }
+    let proc = log.steps[..steps].iter().map(|step| tree::rounded(step.proc, 3, Dimension::RATIO));
+    expects.push(tree::expect(tree::equal(tree::name("proc"), tree::list(proc.collect())), Vec::new()));
+    let trace = tree::text(digest_text(&log.steps[steps - 1].trace));
+    expects.push(tree::expect(tree::equal(tree::name("trace"), trace), Vec::new()));
+    expects
+}
+
+/// What happens, in a sentence for the reader.
+fn headline(log: &EpisodeLog, collision: &Collision) -> String {
+    let contact = &collision.contact;
+    format!(
+        "{} npc#{} ({}) is hit at {:.1} s by an ego vehicle at {:.1} km/h on {}.",
+        collision.body.name(),
+        contact.obstacle,
+        collision.verb.name(),
+        contact.time_s,
+        contact.ego_speed_mps * 3.6,
+        log.road
+    )
+}

@@ -1,0 +1,113 @@
+//! Small constructors for syntax trees that were never text.
+
+use crate::model::Space;
+use crate::model::Type;
+use crate::model::Value;
+use crate::syntax::ast::Arg;
+use crate::syntax::ast::BinaryOp;
+use crate::syntax::ast::Call;
+use crate::syntax::ast::Clause;
+use crate::syntax::ast::ClauseKind;
+use crate::syntax::ast::Doc;
+use crate::syntax::ast::Expect;
+use crate::syntax::ast::Expr;
+use crate::syntax::ast::ExprKind;
+use crate::syntax::ast::Field;
+use crate::syntax::ast::Item;
+use crate::syntax::ast::ItemKind;
+use crate::syntax::ast::Name;
+use crate::syntax::ast::Number;
+use crate::syntax::ast::Span;
+use crate::units::Dimension;
+use crate::units::decimal;
+
+pub fn item(docs: Vec<Doc>, kind: ItemKind) -> Item {
+    Item { docs, kind, span: Span::NONE }
+}
+
+pub fn doc(text: impl Into<String>) -> Doc {
+    Doc { text: text.into(), span: Span::NONE }
+}
+
+pub fn name(text: &str) -> Expr {
+    Expr::built(ExprKind::Name(text.to_owned()))
+}
+
+pub fn text(value: impl Into<String>) -> Expr {
+    Expr::built(ExprKind::Text(value.into()))
+}
+
+/// A number without a unit, digits as given.
+pub fn digits(digits: impl Into<String>) -> Number {
+    Number { digits: digits.into(), unit: None, span: Span::NONE }
+}
+
+pub fn whole(value: u64) -> Expr {
+    Expr::built(ExprKind::Number(digits(value.to_string())))
+}
+
+/// A quantity in its SI unit, shortest decimal that reads back to the same f64.
+pub fn quantity(value: f64, dimension: Dimension) -> Expr {
+    written(decimal(value.abs(), false), value < 0.0, dimension)
+}
+
+/// A quantity rounded to some decimals.
+pub fn rounded(value: f64, decimals: usize, dimension: Dimension) -> Expr {
+    written(format!("{:.decimals$}", value.abs()), value < 0.0, dimension)
+}
+
+fn written(digits: String, negative: bool, dimension: Dimension) -> Expr {
+    let unit = dimension.si_unit();
+    let unit = (!unit.is_empty()).then(|| Name::built(unit));
+    let number = Expr::built(ExprKind::Number(Number { digits, unit, span: Span::NONE }));
+    if negative {
+        let op = crate::syntax::ast::UnaryOp::Negate;
+        return Expr::built(ExprKind::Unary { op, operand: Box::new(number) });
+    }
+    number
+}
+
+/// A value of the language as its literal.
+pub fn value(space: &Space, value: Value, ty: Type) -> Expr {
+    match (value, ty) {
+        (Value::Bool(truth), _) => Expr::built(ExprKind::Bool(truth)),
+        (Value::Variant(index, variant), _) => name(&space.enums[index.0].variants[variant]),
+        (Value::Number(number), Type::Quantity(dimension)) => quantity(number, dimension),
+        (Value::Number(number), _) => quantity(number, Dimension::RATIO),
+    }
+}
+
+pub fn field(field: &str, value: Expr) -> Field {
+    Field { name: Name::built(field), value, span: Span::NONE }
+}
+
+pub fn record(fields: Vec<Field>) -> Expr {
+    Expr::built(ExprKind::Record(fields))
+}
+
+pub fn list(items: Vec<Expr>) -> Expr {
+    Expr::built(ExprKind::List(items))
+}
+
+pub fn call(function: &str, args: Vec<(String, Expr)>) -> Call {
+    let args = args.into_iter().map(|(name, value)| Arg { name: Some(Name::built(name)), value });
+    Call { name: Name::built(function), args: args.collect(), span: Span::NONE }
+}
+
+pub fn equal(left: Expr, right: Expr) -> Expr {
+    let (left, right) = (Box::new(left), Box::new(right));
+    Expr::built(ExprKind::Binary { op: BinaryOp::Equal, op_span: Span::NONE, left, right })
+}
+
+/// `npc#2`.
+pub fn road_user(id: u32) -> Expr {
+    Expr::built(ExprKind::Numbered { name: Name::built("npc"), number: id.to_string() })
+}
+
+pub fn clause(kind: ClauseKind, value: Expr) -> Clause {
+    Clause { kind, value, span: Span::NONE }
+}
+
+pub fn expect(claim: Expr, clauses: Vec<Clause>) -> Expect {
+    Expect { claim, clauses, span: Span::NONE }
+}

@@ -1,0 +1,256 @@
+//! Top views as SVG: road, signals, ego vehicle, obstacles, what is perceived and what is planned.
+//!
+//! One panel is one moment, north up, centred on the ego vehicle. True obstacles are filled, what
+//! the driving system believes is dashed; so a missed or misplaced object shows at a glance.
+
+use std::fmt::Write;
+
+use crate::ads::PerceivedObject;
+use crate::ads::Status;
+use crate::geometry::OrientedBox;
+use crate::geometry::Pose;
+use crate::geometry::Vec2;
+use crate::model::vocabulary::Body;
+use crate::model::vocabulary::Colour;
+use crate::model::vocabulary::Phenomenon;
+use crate::model::vocabulary::Word;
+use crate::road::Lane;
+use crate::sim::Obstacle;
+use crate::sim::SignalColour;
+use crate::sim::World;
+
+/// Edge of a panel, px.
+pub const PANEL_PX: f64 = 480.0;
+/// How far a panel reaches from the ego vehicle in each direction, m.
+pub const VIEW_RADIUS_M: f64 = 45.0;
+/// Height of the caption under a panel, px.
+const CAPTION_PX: f64 = 56.0;
+/// Length of a drawn velocity: this many seconds of it.
+const VELOCITY_S: f64 = 1.0;
+
+/// What one panel shows.
+pub struct Snapshot {
+    pub world: World,
+    pub status: Status,
+    /// Where the ego vehicle touched somebody within the last moments.
+    pub contact: Option<Vec2>,
+}
+
+/// The moments side by side, as one SVG document.
+pub fn picture(moments: &[Snapshot]) -> String {
+    let width_px = PANEL_PX * moments.len().max(1) as f64;
+    let height_px = PANEL_PX + CAPTION_PX;
+    let mut svg = String::new();
+    let _ = writeln!(
+        svg,
+        r##"<svg xmlns="http://www.w3.org/2000/svg" width="{width_px}" height="{height_px}" viewBox="0 0 {width_px} {height_px}" font-family="sans-serif">
+<rect width="100%" height="100%" fill="#ffffff"/>"##
+    );
+    for (index, moment) in moments.iter().enumerate() {
+        let left_px = PANEL_PX * index as f64;
+        let _ = writeln!(
+            svg,
+            r##"<svg x="{left_px}" y="0" width="{PANEL_PX}" height="{PANEL_PX}"><rect width="100%" height="100%" fill="#e9eee4" stroke="#888888"/>"##
+        );
+        Panel::new(&mut svg, &moment.world).draw(moment);
+        svg.push_str("</svg>\n");
+        caption(&mut svg, left_px, moment);
+    }
+    svg.push_str("</svg>\n");
+    svg
+}
+
+/// Draws in world coordinates around the ego vehicle.
+struct Panel<'a> {
+    svg: &'a mut String,
+    centre: Vec2,
+    px_per_m: f64,
+}
+
+impl Panel<'_> {
+    fn new<'a>(svg: &'a mut String, world: &World) -> Panel<'a> {
+        let centre = world.ego_outline().pose.position;
+        Panel { svg, centre, px_per_m: PANEL_PX / (2.0 * VIEW_RADIUS_M) }
+    }
+
+    fn draw(&mut self, moment: &Snapshot) {
+        let world = &moment.world;
+        let map = &world.scene().map;
+        for lane in &map.lanes {
+            self.lane(lane);
+        }
+        for crosswalk in &map.crosswalks {
+            self.polygon(&crosswalk.outline, r##"fill="#ffffff" fill-opacity="0.55""##);
+        }
+        for lane in &map.lanes {
+            for line in &lane.stop_lines {
+                self.stop_line(lane, line.station_m, world.signal(line.signal));
+            }
+        }
+        let route: Vec<Vec2> = world.scene().route.path.points().iter().map(|p| p.position).collect();
+        self.polyline(&route, r##"stroke="#5b7fb5" stroke-width="1.5" stroke-dasharray="6 5""##);
+        for obstacle in world.obstacles() {
+            self.obstacle(obstacle);
+        }
+        self.body(&world.ego_outline(), r##"fill="#1f5fd0" stroke="#0a2a66""##);
+        for object in &moment.status.perceived {
+            self.perceived(object);
+        }
+        let planned: Vec<Vec2> = moment.status.planned.iter().map(|p| p.pose.position).collect();
+        self.polyline(&planned, r##"stroke="#12913a" stroke-width="2.5""##);
+        if let Some(point) = moment.contact {
+            self.cross(point);
+        }
+    }
+
+    fn lane(&mut self, lane: &Lane) {
+        if lane.centre.project(self.centre).distance_m > VIEW_RADIUS_M * 1.5 {
+            return;
+        }
+        let length_m = lane.centre.length_m();
+        let steps = (length_m / 2.0).ceil().max(1.0) as usize;
+        let edge = |side: f64| {
+            (0..=steps).map(move |i| {
+                let station_m = length_m * i as f64 / steps as f64;
+                let half_m = lane.width_at(station_m) / 2.0;
+                lane.centre.pose_at(station_m).offset(0.0, side * half_m).position
+            })
+        };
+        let outline: Vec<Vec2> = edge(1.0).chain(edge(-1.0).rev()).collect();
+        let fill = if lane.junction.is_some() { "#c9cccf" } else { "#bfc3c7" };
+        let style = format!(r##"fill="{fill}" stroke="#f4f4f4" stroke-width="0.8""##);
+        self.polygon(&outline, &style);
+    }
+
+    fn stop_line(&mut self, lane: &Lane, station_m: f64, colour: SignalColour) {
+        let half_m = lane.width_at(station_m) / 2.0;
+        let pose = lane.centre.pose_at(station_m);
+        let ends = [pose.offset(0.0, half_m).position, pose.offset(0.0, -half_m).position];
+        let paint = match colour {
+            SignalColour::Red => "#d62020",
+            SignalColour::Yellow => "#e8b400",
+            SignalColour::Green => "#1fae4b",
+        };
+        self.polyline(&ends, &format!(r##"stroke="{paint}" stroke-width="4""##));
+    }
+
+    fn obstacle(&mut self, obstacle: &Obstacle) {
+        let fill = paint(obstacle.colour);
+        let style = if obstacle.body == Body::Pedestrian {
+            r##"fill="#b0128a" stroke="#5a0046""##.to_owned()
+        } else {
+            format!(r##"fill="{fill}" stroke="#202020""##)
+        };
+        self.body(&obstacle.outline, &style);
+        let centre = obstacle.outline.pose.position;
+        let arrow = [centre, centre + obstacle.velocity_mps * VELOCITY_S];
+        self.polyline(&arrow, r##"stroke="#202020" stroke-width="1.2""##);
+        let (x, y) = self.at(centre + Vec2::new(1.5, 1.5));
+        let _ = writeln!(
+            self.svg,
+            r##"<text x="{x:.1}" y="{y:.1}" font-size="11" fill="#202020">{} {}</text>"##,
+            obstacle.id,
+            obstacle.body.name()
+        );
+    }
+
+    fn perceived(&mut self, object: &PerceivedObject) {
+        let outline = OrientedBox::new(object.pose, object.length_m, object.width_m);
+        self.body(&outline, r##"fill="none" stroke="#e06a00" stroke-width="1.6" stroke-dasharray="4 3""##);
+        let mut way = vec![object.pose.position];
+        way.extend(&object.predicted);
+        self.polyline(&way, r##"stroke="#e06a00" stroke-width="1" stroke-dasharray="2 3""##);
+    }
+
+    /// An outline with a line across its front, so that the heading shows.
+    fn body(&mut self, outline: &OrientedBox, style: &str) {
+        self.polygon(&outline.corners(), style);
+        let nose = Pose::offset(&outline.pose, outline.half_length_m * 0.6, 0.0);
+        let across = [
+            nose.offset(0.0, outline.half_width_m).position,
+            nose.offset(outline.half_length_m * 0.4, 0.0).position,
+            nose.offset(0.0, -outline.half_width_m).position,
+        ];
+        self.polyline(&across, r##"stroke="#101010" stroke-width="0.8""##);
+    }
+
+    fn cross(&mut self, point: Vec2) {
+        for (dx, dy) in [(1.2, 1.2), (1.2, -1.2)] {
+            let arm = Vec2::new(dx, dy);
+            self.polyline(&[point - arm, point + arm], r##"stroke="#d60000" stroke-width="3""##);
+        }
+    }
+
+    fn polygon(&mut self, points: &[Vec2], style: &str) {
+        let points = self.points(points);
+        let _ = writeln!(self.svg, r##"<polygon points="{points}" {style}/>"##);
+    }
+
+    fn polyline(&mut self, points: &[Vec2], style: &str) {
+        let points = self.points(points);
+        let _ = writeln!(self.svg, r##"<polyline points="{points}" fill="none" {style}/>"##);
+    }
+
+    fn points(&self, points: &[Vec2]) -> String {
+        let mut text = String::new();
+        for point in points {
+            let (x, y) = self.at(*point);
+            let _ = write!(text, "{x:.1},{y:.1} ");
+        }
+        text
+    }
+
+    /// Pixel of a world point; SVG's y axis points down.
+    fn at(&self, point: Vec2) -> (f64, f64) {
+        let delta = (point - self.centre) * self.px_per_m;
+        (PANEL_PX / 2.0 + delta.x, PANEL_PX / 2.0 - delta.y)
+    }
+}
+
+fn caption(svg: &mut String, left_px: f64, moment: &Snapshot) {
+    let world = &moment.world;
+    let sky: Vec<String> = Phenomenon::ALL
+        .iter()
+        .zip(world.sky())
+        .filter(|(_, level)| level.intensity() > 0.0)
+        .map(|(phenomenon, level)| format!("{} {}", phenomenon.name(), level.name()))
+        .collect();
+    let sky = if sky.is_empty() { "clear".to_owned() } else { sky.join(", ") };
+    let lines = [
+        format!(
+            "t = {:.2} s   {:.1} km/h   {}, {sky}",
+            world.time_s(),
+            world.ego().speed_mps * 3.6,
+            world.time_of_day().name()
+        ),
+        format!(
+            "{}   throttle {:.0} %, brake {:.0} %",
+            moment.status.reason, moment.status.control.throttle_pct, moment.status.control.brake_pct
+        ),
+        "filled: true   dashed: perceived   green: planned".to_owned(),
+    ];
+    for (index, line) in lines.iter().enumerate() {
+        let y_px = PANEL_PX + 16.0 * (index as f64 + 1.0);
+        let _ = writeln!(
+            svg,
+            r##"<text x="{:.0}" y="{y_px:.0}" font-size="12" fill="#202020">{}</text>"##,
+            left_px + 6.0,
+            escape(line)
+        );
+    }
+}
+
+fn escape(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
+}
+
+fn paint(colour: Colour) -> &'static str {
+    match colour {
+        Colour::Pink => "#f08bc0",
+        Colour::Red => "#d63333",
+        Colour::Yellow => "#f0d030",
+        Colour::Black => "#3c3c3c",
+        Colour::White => "#fafafa",
+        Colour::Skyblue => "#7cc4f0",
+    }
+}
