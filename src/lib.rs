@@ -20,3 +20,4 @@ pub mod oracle;
 pub mod study;
 pub mod emit;
 pub mod report;
+pub mod cli;

@@ -1,0 +1,201 @@
+//! The command line.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use clap::Parser;
+use clap::Subcommand;
+use clap::ValueEnum;
+
+/// Finds out which of the things that may happen around a self-driving car make it crash.
+#[derive(Debug, Parser)]
+#[command(name = "avastra", version, max_term_width = 100)]
+#[command(after_help = "Exit status: 0 ok, 1 usage or file, 2 mistakes in a source file, \
+                        3 a claim refuted, 4 collision found under --fail-on-collision.")]
+pub struct Arguments {
+    #[command(subcommand)]
+    pub command: Command,
+    #[command(flatten)]
+    pub output: OutputArguments,
+}
+
+#[derive(Debug, Clone, Args)]
+pub struct OutputArguments {
+    /// How to print: for people, plain text without colour or drawing, or JSON.
+    #[arg(long, global = true, value_enum, default_value_t = Format::Human)]
+    pub format: Format,
+    /// When to use colour.
+    #[arg(long, global = true, value_enum, default_value_t = When::Auto)]
+    pub color: When,
+    /// Print results and errors only.
+    #[arg(long, short, global = true)]
+    pub quiet: bool,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Format {
+    Human,
+    Plain,
+    /// The last line on stdout is one object with the result.
+    Json,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum When {
+    Auto,
+    Always,
+    Never,
+}
+
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Check files and list every mistake.
+    Check(CheckArguments),
+    /// Write the typed action table of a space, with masks per road.
+    Compile(CompileArguments),
+    /// Print the action table.
+    Table(TableArguments),
+    /// Say whether a row is legal here, and which rule says no.
+    Why(WhyArguments),
+    /// Format files in the one style.
+    Fmt(FmtArguments),
+    /// Play episodes and write the crashes back as scenarios.
+    Run(RunArguments),
+    /// Run emitted scenarios again and check every claim they make.
+    Replay(ReplayArguments),
+    /// Draw moments of an emitted scenario as SVG.
+    Render(RenderArguments),
+}
+
+#[derive(Debug, Args)]
+pub struct CheckArguments {
+    #[arg(required = true, value_name = "FILE")]
+    pub files: Vec<PathBuf>,
+    /// List each rule, the rows it binds and where it is enforced.
+    #[arg(long)]
+    pub audit: bool,
+    /// Take warnings for errors.
+    #[arg(long)]
+    pub strict: bool,
+    /// Print a stage of the pipeline as JSON.
+    #[arg(long, value_enum)]
+    pub dump: Option<Stage>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Stage {
+    Ast,
+    Actions,
+}
+
+#[derive(Debug, Args)]
+pub struct CompileArguments {
+    pub file: PathBuf,
+    /// Where to write the table [default: build/STEM.table.yaml].
+    #[arg(long, short)]
+    pub output: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+pub struct TableArguments {
+    pub file: PathBuf,
+    /// Only what this road allows, with the reason where it does not.
+    #[arg(long)]
+    pub road: Option<String>,
+}
+
+#[derive(Debug, Args)]
+pub struct WhyArguments {
+    pub file: PathBuf,
+    /// Number of the row in the table.
+    #[arg(long)]
+    pub row: usize,
+    /// Road of the question [default: the first of the space].
+    #[arg(long)]
+    pub road: Option<String>,
+    /// States at that moment, for example `time: Night, sky: { Rain: High }`.
+    #[arg(long)]
+    pub state: Option<String>,
+    #[command(flatten)]
+    pub rules: RuleArguments,
+}
+
+#[derive(Debug, Args)]
+pub struct FmtArguments {
+    /// Files to rewrite; `-` reads stdin and writes stdout.
+    #[arg(required = true, value_name = "FILE")]
+    pub files: Vec<PathBuf>,
+    /// Change nothing; exit 2 if a file is not formatted.
+    #[arg(long)]
+    pub check: bool,
+}
+
+#[derive(Debug, Clone, Default, Args)]
+pub struct RuleArguments {
+    /// Switch a rule off; may be given several times.
+    #[arg(long, value_name = "RULE")]
+    pub without: Vec<String>,
+    /// Switch an optional rule on.
+    #[arg(long, value_name = "RULE")]
+    pub with: Vec<String>,
+}
+
+#[derive(Debug, Args)]
+pub struct RunArguments {
+    /// The space [default: the one compiled last here].
+    pub file: Option<PathBuf>,
+    /// Road to drive; may be given several times [default: all of the space].
+    #[arg(long)]
+    pub road: Vec<String>,
+    /// Driving system under test.
+    #[arg(long, default_value = crate::study::DEFAULT_ADS)]
+    pub ads: String,
+    /// Who chooses the actions.
+    #[arg(long, default_value = "random")]
+    pub agent: String,
+    /// Episodes on each road.
+    #[arg(long, default_value_t = 100, value_parser = clap::value_parser!(u32).range(1..=i64::from(crate::study::EPISODES_MAX)))]
+    pub episodes: u32,
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+    /// Worker threads; the result does not depend on it [default: one for each core].
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=1024))]
+    pub jobs: Option<u32>,
+    #[command(flatten)]
+    pub rules: RuleArguments,
+    /// Run directory, new or empty [default: the next free runs/NNNN].
+    #[arg(long)]
+    pub out: Option<PathBuf>,
+    /// Go on with an interrupted run directory; its own settings hold.
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["file", "road", "ads", "agent", "episodes", "seed", "out", "without", "with"])]
+    pub resume: Option<PathBuf>,
+    /// Exit with status 4 if a counted collision was found.
+    #[arg(long)]
+    pub fail_on_collision: bool,
+}
+
+#[derive(Debug, Args)]
+pub struct ReplayArguments {
+    #[arg(required = true, value_name = "FILE")]
+    pub files: Vec<PathBuf>,
+    /// Replay against another driving system: shows what happens, checks no claim.
+    #[arg(long)]
+    pub ads: Option<String>,
+}
+
+#[derive(Debug, Args)]
+pub struct RenderArguments {
+    pub file: PathBuf,
+    /// Moments to draw, in s since the start; several make a strip.
+    #[arg(long, value_delimiter = ',', value_name = "T", allow_negative_numbers = true)]
+    pub at: Vec<f64>,
+    /// A strip of the six seconds up to the first collision.
+    #[arg(long, conflicts_with = "at")]
+    pub strip: bool,
+    /// Where to write [default: STEM.svg here; `-` is stdout].
+    #[arg(long, short)]
+    pub output: Option<PathBuf>,
+    /// Draw the drive of another driving system.
+    #[arg(long)]
+    pub ads: Option<String>,
+}

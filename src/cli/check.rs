@@ -1,0 +1,50 @@
+//! `avastra check`: every static check, and a look at the stages.
+
+use crate::action::ActionTable;
+use crate::action::audit;
+
+use super::arguments::CheckArguments;
+use super::arguments::Stage;
+use super::error::Failure;
+use super::load;
+use super::output::Output;
+
+/// Checks each file by itself; the mistakes of all are printed before the command fails.
+pub fn check(output: &Output, arguments: &CheckArguments) -> Result<(), Failure> {
+    let (mut errors, mut warnings) = (0, 0);
+    let mut files = Vec::new();
+    for path in &arguments.files {
+        let loaded =
+            crate::model::load(path, &load::read).map_err(|error| Failure::file("read", path, error))?;
+        output.diagnostics(&loaded.sources, &loaded.diagnostics);
+        let wrong = loaded.diagnostics.iter().filter(|diagnostic| diagnostic.is_error()).count();
+        errors += wrong;
+        warnings += loaded.diagnostics.len() - wrong;
+        let table = loaded.space.clone().map(ActionTable::new);
+        let dump = match arguments.dump {
+            Some(Stage::Ast) => Some(json(&loaded.files[0].tree)),
+            Some(Stage::Actions) => table.as_ref().map(|table| json(&table.file())),
+            None => None,
+        };
+        if let Some(dump) = &dump {
+            output.say(&serde_json::to_string_pretty(dump).expect("it is JSON already"));
+        }
+        let audit = table.as_ref().filter(|_| arguments.audit && wrong == 0).map(audit);
+        if let Some(audit) = &audit {
+            output.say(&audit.to_string());
+        }
+        if wrong == 0 {
+            output.tell(&format!("{}: no mistakes", path.display()));
+        }
+        files.push(serde_json::json!({ "file": path, "errors": wrong, "dump": dump, "audit": audit }));
+    }
+    output.result("check", serde_json::json!({ "errors": errors, "warnings": warnings, "files": files }));
+    if arguments.strict {
+        errors += warnings;
+    }
+    if errors > 0 { Err(Failure::Source { errors }) } else { Ok(()) }
+}
+
+fn json(value: &impl serde::Serialize) -> serde_json::Value {
+    serde_json::to_value(value).expect("trees and tables have string keys only")
+}

@@ -1,0 +1,92 @@
+//! `avastra compile` and `avastra table`: the typed action table as a file and as text.
+
+use std::path::Path;
+use std::path::PathBuf;
+
+use crate::action::ActionTable;
+use crate::action::TableFile;
+use crate::syntax::listed;
+
+use super::arguments::CompileArguments;
+use super::arguments::TableArguments;
+use super::error::Failure;
+use super::load;
+use super::output::Output;
+use super::progress::plural;
+use super::run_directory::write;
+
+/// Names the table that `avastra run` takes when it is given none.
+const LAST: &str = "build/last";
+
+/// Writes the table and remembers it as the last.
+pub fn compile(output: &Output, arguments: &CompileArguments) -> Result<(), Failure> {
+    let table = load::table(output, &arguments.file)?;
+    let path = arguments.output.clone().unwrap_or_else(|| {
+        let stem = arguments.file.file_stem().unwrap_or_default().to_string_lossy();
+        PathBuf::from(format!("build/{stem}.table.yaml"))
+    });
+    let file = table.file();
+    let text = serde_yaml::to_string(&file).map_err(|error| Failure::file("write", &path, error))?;
+    write(&path, &text)?;
+    write(Path::new(LAST), &format!("{}\n", path.display()))?;
+    output.tell(&format!("{}: {} -> {}", arguments.file.display(), size(&table), path.display()));
+    output.result("compile", serde_json::json!({ "table": path, "rows": table.rows().len() }));
+    Ok(())
+}
+
+/// The table compiled last in this directory, checked against its sources.
+pub fn last(output: &Output) -> Result<ActionTable, Failure> {
+    let no_table = || {
+        Failure::usage(
+            "no compiled table here: run `avastra compile FILE` first, or name a space: `avastra run FILE`",
+        )
+    };
+    let path = load::read(Path::new(LAST)).map_err(|_| no_table())?;
+    let path = PathBuf::from(path.trim_end());
+    let text = load::read(&path).map_err(|error| Failure::file("read", &path, error))?;
+    let file: TableFile = serde_yaml::from_str(&text).map_err(|error| Failure::file("read", &path, error))?;
+    let table = load::table(output, Path::new(&file.space))?;
+    if table.file() != file {
+        return Err(Failure::usage(format!(
+            "`{}` is older than its sources: run `avastra compile {}` again",
+            path.display(),
+            file.space
+        )));
+    }
+    Ok(table)
+}
+
+/// Prints the table.
+pub fn table(output: &Output, arguments: &TableArguments) -> Result<(), Failure> {
+    let table = load::table(output, &arguments.file)?;
+    if let Some(road) = &arguments.road {
+        known_road(&table, road)?;
+    }
+    output.say(table.text(arguments.road.as_deref()).trim_end());
+    output.result("table", table.file());
+    Ok(())
+}
+
+/// Index of a road of the space.
+///
+/// # Errors
+/// If there is none of that name; the message lists those there are.
+pub fn known_road(table: &ActionTable, name: &str) -> Result<usize, Failure> {
+    let roads = &table.space().roads;
+    roads.iter().position(|road| road.name == name).ok_or_else(|| {
+        let known: Vec<&str> = roads.iter().map(|road| road.name.as_str()).collect();
+        Failure::usage(format!("no road `{name}` in this space: it has {}", listed(&known)))
+    })
+}
+
+/// `45 rows of 10 actions, 8 rules, 1 road`.
+fn size(table: &ActionTable) -> String {
+    let space = table.space();
+    format!(
+        "{} of {}, {}, {}",
+        plural(table.rows().len(), "row"),
+        plural(space.actions.len(), "action"),
+        plural(space.rules.len(), "rule"),
+        plural(space.roads.len(), "road"),
+    )
+}

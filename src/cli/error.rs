@@ -1,0 +1,47 @@
+//! Why a command failed, and the exit status that says so.
+
+use std::path::Path;
+use std::path::PathBuf;
+
+/// Every way in which a command can end but well.
+#[derive(Debug, thiserror::Error)]
+pub enum Failure {
+    #[error("{message}")]
+    Usage { message: String },
+    #[error("cannot {doing} `{}`: {reason}", path.display())]
+    File { doing: &'static str, path: PathBuf, reason: String },
+    /// The diagnostics are on stderr already.
+    #[error("{count} in the source", count = super::progress::plural(*errors, "mistake"))]
+    Source { errors: usize },
+    #[error("{count} not formatted", count = super::progress::plural(*files, "file"))]
+    Unformatted { files: usize },
+    #[error("{count} refuted", count = super::progress::plural(*claims, "claim"))]
+    Refuted { claims: usize },
+    #[error("{count} found", count = super::progress::plural(*collisions, "counted collision"))]
+    Collision { collisions: usize },
+    /// Ctrl-C: what was done is saved.
+    #[error("interrupted; go on with `avastra run --resume {}`", directory.display())]
+    Interrupted { directory: PathBuf },
+}
+
+impl Failure {
+    pub fn usage(message: impl Into<String>) -> Failure {
+        Failure::Usage { message: message.into() }
+    }
+
+    pub fn file(doing: &'static str, path: &Path, reason: impl ToString) -> Failure {
+        Failure::File { doing, path: path.to_owned(), reason: reason.to_string() }
+    }
+
+    /// Exit status, as documented in `--help`.
+    pub fn status(&self) -> u8 {
+        match self {
+            Failure::Usage { .. } | Failure::File { .. } => 1,
+            Failure::Source { .. } | Failure::Unformatted { .. } => 2,
+            Failure::Refuted { .. } => 3,
+            Failure::Collision { .. } => 4,
+            // What a shell reports for a process that SIGINT ended.
+            Failure::Interrupted { .. } => 130,
+        }
+    }
+}

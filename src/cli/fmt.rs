@@ -1,0 +1,63 @@
+//! `avastra fmt`: the one style.
+
+use std::io::Read;
+use std::path::Path;
+
+use crate::syntax::FormatError;
+use crate::syntax::Sources;
+
+use super::arguments::FmtArguments;
+use super::error::Failure;
+use super::load;
+use super::output::Output;
+use super::run_directory::write;
+
+/// Rewrites files that are not formatted, or with `--check` counts them.
+pub fn fmt(output: &Output, arguments: &FmtArguments) -> Result<(), Failure> {
+    let mut unformatted = 0;
+    let mut texts = Vec::new();
+    for path in &arguments.files {
+        let from_stdin = path == Path::new("-");
+        let text = if from_stdin { stdin()? } else { file(path)? };
+        let formatted = formatted(output, path, &text)?;
+        let is_formatted = formatted == text;
+        if arguments.check {
+            if !is_formatted {
+                unformatted += 1;
+                output.say(&format!("{}: not formatted", path.display()));
+            }
+        } else if from_stdin {
+            output.say(formatted.trim_end_matches('\n'));
+            texts.push(formatted);
+        } else if !is_formatted {
+            write(path, &formatted)?;
+            output.tell(&format!("{}: formatted", path.display()));
+        }
+    }
+    output.result("fmt", serde_json::json!({ "unformatted": unformatted, "texts": texts }));
+    if unformatted > 0 { Err(Failure::Unformatted { files: unformatted }) } else { Ok(()) }
+}
+
+fn formatted(output: &Output, path: &Path, text: &str) -> Result<String, Failure> {
+    let mut sources = Sources::new();
+    let file = sources.add(path.display().to_string(), text);
+    crate::syntax::format(file, text).map_err(|error| match error {
+        FormatError::Syntax(diagnostics) => {
+            output.diagnostics(&sources, &diagnostics);
+            Failure::Source { errors: diagnostics.len() }
+        }
+        FormatError::Meaning => Failure::file("format", path, error),
+    })
+}
+
+fn file(path: &Path) -> Result<String, Failure> {
+    load::read(path).map_err(|error| Failure::file("read", path, error))
+}
+
+fn stdin() -> Result<String, Failure> {
+    let mut text = String::new();
+    std::io::stdin()
+        .read_to_string(&mut text)
+        .map_err(|error| Failure::file("read", Path::new("stdin"), error))?;
+    Ok(text)
+}

@@ -1,0 +1,99 @@
+//! Files into checked programs, with their diagnostics printed.
+
+use std::path::Component;
+use std::path::Path;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use crate::action::ActionTable;
+use crate::model;
+use crate::model::Loaded;
+use crate::model::ReadError;
+use crate::model::Scenario;
+use crate::model::Space;
+
+use super::error::Failure;
+use super::output::Output;
+
+/// Larger files are refused: no hand and no command of ours writes them.
+const FILE_BYTES_MAX: u64 = 64 << 20;
+
+/// Reads and checks a file with everything that it uses. Diagnostics are printed.
+///
+/// # Errors
+/// If the file cannot be read, or the source has mistakes.
+pub fn load(output: &Output, path: &Path) -> Result<Loaded, Failure> {
+    // The root file's absence is a failure of the command, not of the source.
+    let loaded = model::load(path, &read).map_err(|error| Failure::file("read", path, error))?;
+    output.diagnostics(&loaded.sources, &loaded.diagnostics);
+    match loaded.diagnostics.iter().filter(|diagnostic| diagnostic.is_error()).count() {
+        0 => Ok(loaded),
+        errors => Err(Failure::Source { errors }),
+    }
+}
+
+/// The action table of a space file.
+///
+/// # Errors
+/// As [`load`], and if the file declares no action, or is a scenario.
+pub fn table(output: &Output, path: &Path) -> Result<ActionTable, Failure> {
+    let loaded = load(output, path)?;
+    if loaded.scenario.is_some() {
+        let path = path.display();
+        return Err(Failure::usage(format!("`{path}` is a scenario: `avastra replay {path}` plays it")));
+    }
+    Ok(ActionTable::new(space(loaded, path)?))
+}
+
+/// A scenario file: its space's table and its scenario.
+///
+/// # Errors
+/// As [`load`], and if the file has no scenario.
+pub fn scenario(output: &Output, path: &Path) -> Result<(ActionTable, Scenario), Failure> {
+    let mut loaded = load(output, path)?;
+    let scenario = loaded.scenario.take();
+    let scenario = scenario.ok_or_else(|| Failure::usage(format!("`{}` has no scenario", path.display())))?;
+    Ok((ActionTable::new(space(loaded, path)?), scenario))
+}
+
+fn space(loaded: Loaded, path: &Path) -> Result<Arc<Space>, Failure> {
+    let space = loaded.space.filter(|space| !space.actions.is_empty());
+    space.ok_or_else(|| Failure::usage(format!("`{}` declares no action", path.display())))
+}
+
+/// The one way in which text comes into avastra.
+pub fn read(path: &Path) -> Result<String, ReadError> {
+    let length = std::fs::metadata(path).map_err(|error| ReadError(reason(&error)))?.len();
+    if length > FILE_BYTES_MAX {
+        return Err(ReadError(format!("{length} bytes are more than {FILE_BYTES_MAX}")));
+    }
+    let bytes = std::fs::read(path).map_err(|error| ReadError(reason(&error)))?;
+    String::from_utf8(bytes).map_err(|error| {
+        ReadError(format!("not text: byte {} is not UTF-8", error.utf8_error().valid_up_to()))
+    })
+}
+
+/// The system's reason without its error number.
+fn reason(error: &std::io::Error) -> String {
+    let text = error.to_string();
+    let text = text.split(" (os error").next().unwrap_or(&text).to_lowercase();
+    text.to_owned()
+}
+
+/// A path to `file` that holds in `directory`, with `/` between its parts.
+///
+/// # Errors
+/// If one of the two does not exist.
+pub fn relative(directory: &Path, file: &Path) -> Result<String, Failure> {
+    let absolute = |path: &Path| {
+        let path = if path.as_os_str().is_empty() { Path::new(".") } else { path };
+        path.canonicalize().map_err(|error| Failure::file("find", path, reason(&error)))
+    };
+    let (directory, file) = (absolute(directory)?, absolute(file)?);
+    let shared = directory.components().zip(file.components()).take_while(|(a, b)| a == b).count();
+    let up = directory.components().skip(shared).map(|_| Component::ParentDir);
+    let path: PathBuf = up.chain(file.components().skip(shared)).collect();
+    let parts: Vec<String> =
+        path.components().map(|part| part.as_os_str().to_string_lossy().into_owned()).collect();
+    Ok(parts.join("/"))
+}

@@ -1,0 +1,59 @@
+//! The command line: the one place that reads files, the clock and the environment, and exits.
+
+mod arguments;
+mod check;
+mod compile;
+mod error;
+mod fmt;
+mod load;
+mod output;
+mod progress;
+mod render;
+mod replay;
+mod run;
+mod run_directory;
+mod why;
+
+use std::process::ExitCode;
+
+use clap::Parser;
+
+use arguments::Arguments;
+use arguments::Command;
+use error::Failure;
+use output::Output;
+
+/// Runs the command that the process was started with.
+pub fn main() -> ExitCode {
+    let arguments = match Arguments::try_parse() {
+        Ok(arguments) => arguments,
+        Err(error) => {
+            // Help and version are not failures; every other message of clap's is a usage error.
+            let _ = error.print();
+            if !error.use_stderr() {
+                return ExitCode::SUCCESS;
+            }
+            let failure = Failure::usage(error.kind().to_string());
+            output::usage_in_json(&failure);
+            return ExitCode::from(failure.status());
+        }
+    };
+    let output = Output::new(&arguments.output);
+    let result = match &arguments.command {
+        Command::Check(arguments) => check::check(&output, arguments),
+        Command::Compile(arguments) => compile::compile(&output, arguments),
+        Command::Table(arguments) => compile::table(&output, arguments),
+        Command::Why(arguments) => why::why(&output, arguments),
+        Command::Fmt(arguments) => fmt::fmt(&output, arguments),
+        Command::Run(arguments) => run::run(&output, arguments),
+        Command::Replay(arguments) => replay::replay(&output, arguments),
+        Command::Render(arguments) => render::render(&output, arguments),
+    };
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => {
+            output.failure(&failure);
+            ExitCode::from(failure.status())
+        }
+    }
+}

@@ -1,0 +1,118 @@
+//! Printing: results on stdout, everything else on stderr, in the form that was asked for.
+
+use std::io::IsTerminal;
+use std::io::Write;
+
+use crate::syntax::Diagnostic;
+use crate::syntax::Sources;
+use crate::syntax::Style;
+
+use super::arguments::Format;
+use super::arguments::OutputArguments;
+use super::arguments::When;
+use super::error::Failure;
+
+/// How this command prints.
+pub struct Output {
+    format: Format,
+    colour: bool,
+    pub quiet: bool,
+}
+
+/// The result of a command in JSON: its last line on stdout.
+#[derive(serde::Serialize)]
+struct Line<'a, T> {
+    /// Raised whenever a field changes its meaning or goes away.
+    schema: u32,
+    command: &'a str,
+    #[serde(flatten)]
+    result: T,
+}
+
+impl Output {
+    pub fn new(arguments: &OutputArguments) -> Output {
+        let colour = match arguments.color {
+            When::Always => true,
+            When::Never => false,
+            When::Auto => {
+                arguments.format == Format::Human
+                    && std::io::stderr().is_terminal()
+                    && std::env::var_os("NO_COLOR").is_none()
+            }
+        };
+        Output { format: arguments.format, colour, quiet: arguments.quiet }
+    }
+
+    pub fn is_json(&self) -> bool {
+        self.format == Format::Json
+    }
+
+    /// Text for people on stdout; nothing in JSON.
+    pub fn say(&self, text: &str) {
+        if !self.is_json() {
+            print(text);
+        }
+    }
+
+    /// Text that `--quiet` leaves out.
+    pub fn tell(&self, text: &str) {
+        if !self.quiet {
+            self.say(text);
+        }
+    }
+
+    /// The result in JSON; nothing in the other forms.
+    pub fn result(&self, command: &str, result: impl serde::Serialize) {
+        if self.is_json() {
+            let line = Line { schema: 1, command, result };
+            let line = serde_json::to_string(&line).expect("results have string keys only");
+            print(&line);
+        }
+    }
+
+    /// Diagnostics on stderr; in JSON one object a line.
+    pub fn diagnostics(&self, sources: &Sources, diagnostics: &[Diagnostic]) {
+        for diagnostic in diagnostics {
+            if self.is_json() {
+                let record = crate::syntax::record(diagnostic, sources);
+                let line = serde_json::to_string(&record).expect("records have string keys only");
+                remark(&line);
+            } else {
+                let style = if self.colour { Style::Human } else { Style::Plain };
+                remark(&format!("{}\n", crate::syntax::render(diagnostic, sources, style).trim_end()));
+            }
+        }
+    }
+
+    pub fn failure(&self, failure: &Failure) {
+        if self.is_json() {
+            self.result(
+                "error",
+                serde_json::json!({ "status": failure.status(), "message": failure.to_string() }),
+            );
+        } else if self.colour {
+            remark(&format!("\x1b[1;31merror\x1b[0m: {failure}"));
+        } else {
+            remark(&format!("error: {failure}"));
+        }
+    }
+}
+
+/// The result object of a command line that could not be read, if it asks for JSON.
+pub fn usage_in_json(failure: &Failure) {
+    let arguments: Vec<String> = std::env::args().collect();
+    let asks = |pair: &[String]| pair[0] == "--format" && pair[1] == "json";
+    if arguments.windows(2).any(asks) || arguments.iter().any(|argument| argument == "--format=json") {
+        Output { format: Format::Json, colour: false, quiet: false }.failure(failure);
+    }
+}
+
+/// A line on stdout. A reader that has gone away (`| head`) is no error, here and on stderr.
+fn print(text: &str) {
+    let _ = writeln!(std::io::stdout(), "{text}");
+}
+
+/// A line on stderr.
+pub fn remark(text: &str) {
+    let _ = writeln!(std::io::stderr(), "{text}");
+}

@@ -1,0 +1,58 @@
+//! Progress of long work: a bar on a terminal, plain lines otherwise.
+
+use std::io::IsTerminal;
+
+use indicatif::ProgressBar;
+use indicatif::ProgressStyle;
+
+use super::output::remark;
+
+/// How far a run is. Dropping it clears the bar.
+pub struct Progress {
+    bar: Option<ProgressBar>,
+    lines: bool,
+    total: u64,
+    done: u64,
+    found: usize,
+}
+
+impl Progress {
+    /// `quiet` shows nothing at all; `resumed` episodes count as done already.
+    pub fn new(total: u64, resumed: u64, quiet: bool) -> Progress {
+        let terminal = std::io::stderr().is_terminal();
+        let bar = (!quiet && terminal).then(|| {
+            let bar = ProgressBar::new(total).with_position(resumed);
+            let template = "{bar:30} {pos}/{len} episodes, {msg}, {per_sec}, {eta} left";
+            bar.set_style(ProgressStyle::with_template(template).expect("a fixed template"));
+            bar.set_message("no counted collision");
+            bar
+        });
+        Progress { bar, lines: !quiet && !terminal, total, done: resumed, found: 0 }
+    }
+
+    /// One more episode is done, with so many counted collisions.
+    pub fn episode(&mut self, counted: usize) {
+        self.done += 1;
+        self.found += counted;
+        let message = format!("{} counted", plural(self.found, "collision"));
+        if let Some(bar) = &self.bar {
+            bar.set_message(message);
+            bar.inc(1);
+        } else if self.lines && (self.done * 10 / self.total > (self.done - 1) * 10 / self.total) {
+            remark(&format!("{}/{} episodes, {message}", self.done, self.total));
+        }
+    }
+}
+
+impl Drop for Progress {
+    fn drop(&mut self) {
+        if let Some(bar) = &self.bar {
+            bar.finish_and_clear();
+        }
+    }
+}
+
+/// `1 collision`, `2 collisions`.
+pub fn plural(count: usize, noun: &str) -> String {
+    if count == 1 { format!("1 {noun}") } else { format!("{count} {noun}s") }
+}

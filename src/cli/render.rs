@@ -1,0 +1,106 @@
+//! `avastra render`: moments of an emitted scenario as a picture.
+
+use std::path::Path;
+use std::path::PathBuf;
+
+use crate::action::ActionTable;
+use crate::geometry::Vec2;
+use crate::model::Claim;
+use crate::model::Scenario;
+use crate::report::Snapshot;
+use crate::report::picture;
+use crate::sim::DT_S;
+use crate::study;
+
+use super::arguments::RenderArguments;
+use super::error::Failure;
+use super::load;
+use super::output::Output;
+use super::run_directory::write;
+
+/// A contact is marked this long after it happened, s.
+const CONTACT_SHOWN_S: f64 = 1.0;
+/// Moments of a strip: this many, one second apart, the last at the first collision.
+const STRIP_LEN: u32 = 7;
+
+/// Draws the file's scenario.
+pub fn render(output: &Output, arguments: &RenderArguments) -> Result<(), Failure> {
+    let (table, scenario) = load::scenario(output, &arguments.file)?;
+    let scenario = &scenario;
+    let times_s = times(arguments, scenario)?;
+    let ads = arguments.ads.as_deref();
+    let moments = moments(&table, scenario, ads, &times_s)?;
+    if moments.len() < times_s.len() {
+        return Err(Failure::usage(format!(
+            "`{}` is over before {} s",
+            scenario.name,
+            times_s[moments.len()]
+        )));
+    }
+    let svg = picture(&moments);
+    let path = arguments.output.clone().unwrap_or_else(|| {
+        let stem = arguments.file.file_stem().unwrap_or_default().to_string_lossy();
+        PathBuf::from(format!("{stem}.svg"))
+    });
+    let on_stdout = path == Path::new("-");
+    if on_stdout {
+        output.say(svg.trim_end());
+    } else {
+        write(&path, &svg)?;
+        output.tell(&path.display().to_string());
+    }
+    let svg = on_stdout.then_some(svg);
+    output.result("render", serde_json::json!({ "picture": path, "times_s": times_s, "svg": svg }));
+    Ok(())
+}
+
+/// The moments asked for, rising.
+fn times(arguments: &RenderArguments, scenario: &Scenario) -> Result<Vec<f64>, Failure> {
+    if !arguments.strip {
+        let mut times_s = arguments.at.clone();
+        if times_s.is_empty() {
+            return Err(Failure::usage("say which moments: `--at T`, `--at T1,T2,…` or `--strip`"));
+        }
+        if let Some(time_s) = times_s.iter().find(|time_s| !(time_s.is_finite() && **time_s >= 0.0)) {
+            return Err(Failure::usage(format!("`--at {time_s}` is no moment of an episode")));
+        }
+        times_s.sort_by(f64::total_cmp);
+        return Ok(times_s);
+    }
+    let first_s = scenario.claims.iter().find_map(|claim| match claim {
+        Claim::Collision { time_s, .. } => time_s.map(|time| time.value),
+        _ => None,
+    });
+    let Some(first_s) = first_s else {
+        return Err(Failure::usage("`--strip` needs a scenario that expects a collision: use `--at`"));
+    };
+    let back = |n: u32| (first_s - f64::from(STRIP_LEN - 1 - n)).max(0.0);
+    Ok((0..STRIP_LEN).map(back).collect())
+}
+
+/// The world at the first tick at or after each time, as far as the episode lasts.
+fn moments(
+    table: &ActionTable,
+    scenario: &Scenario,
+    ads: Option<&str>,
+    times_s: &[f64],
+) -> Result<Vec<Snapshot>, Failure> {
+    let mut moments: Vec<Snapshot> = Vec::new();
+    let mut last_contact: Option<(f64, Vec2)> = None;
+    study::replay(table, scenario, ads, &mut |world, ads, contacts| {
+        if let Some(contact) = contacts.last() {
+            last_contact = Some((contact.time_s, contact.point));
+        }
+        // Half a tick of slack: times are decimals, ticks are multiples of 20 ms.
+        while times_s.get(moments.len()).is_some_and(|&time_s| world.time_s() + DT_S / 2.0 >= time_s) {
+            let fresh = last_contact.filter(|(time_s, _)| world.time_s() - time_s <= CONTACT_SHOWN_S);
+            moments.push(Snapshot {
+                world: world.clone(),
+                status: ads.status().clone(),
+                contact: fresh.map(|(_, point)| point),
+            });
+        }
+    })
+    .map_err(|error| Failure::usage(error.to_string()))?;
+    Ok(moments)
+}

@@ -1,0 +1,264 @@
+//! `avastra run`: episodes in, crashes out.
+
+use std::path::Path;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+use std::sync::atomic::Ordering;
+use std::time::Instant;
+
+use crate::action::ActionTable;
+use crate::emit;
+use crate::episode::EpisodeLog;
+use crate::sim::ENGINE;
+use crate::study::EpisodeSummary;
+use crate::study::Run;
+use crate::study::RunSettings;
+use crate::study::Totals;
+use crate::study::play;
+
+use super::arguments::RunArguments;
+use super::compile;
+use super::error::Failure;
+use super::load;
+use super::output::Output;
+use super::output::remark;
+use super::progress::Progress;
+use super::progress::plural;
+use super::run_directory;
+use super::run_directory::RunDirectory;
+use super::run_directory::write;
+
+const VERSION: &str = env!("CARGO_PKG_VERSION");
+
+/// How many critical scenarios the summary names.
+const NAMED_MAX: usize = 10;
+
+/// Plays the episodes of a new run, or those that an interrupted one still lacks.
+pub fn run(output: &Output, arguments: &RunArguments) -> Result<(), Failure> {
+    let (run, mut directory) = match &arguments.resume {
+        Some(path) => resumed(output, path)?,
+        None => begun(output, arguments)?,
+    };
+    let done =
+        directory.database.episodes().map_err(|error| Failure::file("read", &directory.path, error))?;
+    let todo: Vec<usize> = (0..run.episodes()).filter(|number| !done.contains(number)).collect();
+    output.tell(&heading(&run, &directory.path));
+
+    let stop = stop_on_interrupt()?;
+    #[allow(clippy::disallowed_methods, reason = "this is cli, and the time goes nowhere but the summary")]
+    let started = Instant::now();
+    let mut progress =
+        Progress::new(run.episodes() as u64, done.len() as u64, output.quiet || output.is_json());
+    let space_path = space_path(&run, &directory)?;
+    play(&run, &todo, jobs(arguments), &stop, &mut |number, log| {
+        let summary = EpisodeSummary::new(run.space(), number, &log);
+        keep(&run, &mut directory, &space_path, &summary, &log)?;
+        progress.episode(summary.counted());
+        Ok(())
+    })?;
+    drop(progress);
+
+    let totals =
+        directory.database.totals().map_err(|error| Failure::file("read", &directory.path, error))?;
+    output.say(&totals_text(&totals, started.elapsed().as_secs_f64(), todo.len()));
+    let critical = critical_files(&directory.path)?;
+    output.say(&critical_text(&directory.path, &critical));
+    output.result(
+        "run",
+        serde_json::json!({ "directory": directory.path, "totals": totals, "critical": critical }),
+    );
+    if stop.load(Ordering::Relaxed) && (totals.episodes as usize) < run.episodes() {
+        return Err(Failure::Interrupted { directory: directory.path });
+    }
+    if arguments.fail_on_collision && totals.counted > 0 {
+        return Err(Failure::Collision { collisions: totals.counted as usize });
+    }
+    Ok(())
+}
+
+/// A new run, from the command line.
+fn begun(output: &Output, arguments: &RunArguments) -> Result<(Run, RunDirectory), Failure> {
+    let table = match &arguments.file {
+        Some(file) => load::table(output, file)?,
+        None => compile::last(output)?,
+    };
+    let space = table.space();
+    let roads = if arguments.road.is_empty() {
+        space.roads.iter().map(|road| road.name.clone()).collect()
+    } else {
+        arguments.road.clone()
+    };
+    let settings = RunSettings {
+        avastra: VERSION.to_owned(),
+        engine: ENGINE.to_owned(),
+        space: space.path.display().to_string(),
+        space_digest: space.digest.clone(),
+        roads,
+        ads: arguments.ads.clone(),
+        agent: arguments.agent.clone(),
+        episodes: arguments.episodes,
+        seed: arguments.seed,
+        without: arguments.rules.without.clone(),
+        with: arguments.rules.with.clone(),
+    };
+    let run = ready(table, settings)?;
+    let path = run_directory::create(arguments.out.as_deref())?;
+    let space = load::relative(&path, &run.space().path)?;
+    run_directory::write_settings(&path, &RunSettings { space, ..run.settings().clone() })?;
+    Ok((run, RunDirectory::open(path)?))
+}
+
+/// The rest of an interrupted run.
+fn resumed(output: &Output, path: &Path) -> Result<(Run, RunDirectory), Failure> {
+    let settings = run_directory::settings(path)?;
+    if (settings.engine.as_str(), settings.avastra.as_str()) != (ENGINE, VERSION) {
+        return Err(Failure::usage(format!(
+            "the run was begun by avastra {} in world `{}`, this is avastra {VERSION} in `{ENGINE}`: begin a new one",
+            settings.avastra, settings.engine
+        )));
+    }
+    let table = load::table(output, &path.join(&settings.space))?;
+    if table.space().digest != settings.space_digest {
+        return Err(Failure::usage(format!(
+            "`{}` has changed since the run was begun: begin a new one",
+            table.space().path.display()
+        )));
+    }
+    Ok((ready(table, settings)?, RunDirectory::open(path.to_owned())?))
+}
+
+fn ready(table: ActionTable, settings: RunSettings) -> Result<Run, Failure> {
+    Run::new(table, settings).map_err(|error| Failure::usage(error.to_string()))
+}
+
+/// Writes what an episode found. The scenario comes first: an episode that is in the database has
+/// its file.
+fn keep(
+    run: &Run,
+    directory: &mut RunDirectory,
+    space_path: &str,
+    summary: &EpisodeSummary,
+    log: &EpisodeLog,
+) -> Result<(), Failure> {
+    let counted: Vec<usize> =
+        summary.collisions.iter().filter(|finding| finding.counted).map(|finding| finding.number).collect();
+    if !counted.is_empty() {
+        let name = format!("{}_{:04}", log.road, summary.episode);
+        let source = emit::Provenance {
+            name: &name,
+            space_path,
+            episode: summary.episode,
+            agent: &run.settings().agent,
+            without: &run.settings().without,
+            with: &run.settings().with,
+        };
+        let file = emit::scenario(run.table(), log, &counted, &source);
+        write(&directory.critical(&name), &crate::syntax::print(&file))?;
+    }
+    directory
+        .database
+        .add(summary, log, |draw| emit::action_text(run.table(), draw))
+        .map_err(|error| Failure::file("write", &directory.path.join("run.db"), error))
+}
+
+/// The space as a file in `critical/` must name it.
+fn space_path(run: &Run, directory: &RunDirectory) -> Result<String, Failure> {
+    load::relative(&directory.path.join("critical"), &run.space().path)
+}
+
+fn jobs(arguments: &RunArguments) -> usize {
+    let cores = || std::thread::available_parallelism().map_or(1, usize::from);
+    arguments.jobs.map_or_else(cores, |jobs| jobs as usize)
+}
+
+/// A flag that the first Ctrl-C sets; the second ends the process at once.
+fn stop_on_interrupt() -> Result<Arc<AtomicBool>, Failure> {
+    let stop = Arc::new(AtomicBool::new(false));
+    let flag = stop.clone();
+    ctrlc::set_handler(move || {
+        if flag.swap(true, Ordering::Relaxed) {
+            std::process::exit(130);
+        }
+        remark("finishing the episodes under way; press again to leave them");
+    })
+    .map_err(|error| Failure::usage(format!("cannot listen for Ctrl-C: {error}")))?;
+    Ok(stop)
+}
+
+fn heading(run: &Run, directory: &Path) -> String {
+    let settings = run.settings();
+    format!(
+        "{}: {} against {}, {} on {}, seed {}, into {}",
+        run.space().path.display(),
+        settings.agent,
+        settings.ads,
+        plural(settings.episodes as usize, "episode"),
+        settings.roads.join(", "),
+        settings.seed,
+        directory.display()
+    )
+}
+
+fn totals_text(totals: &Totals, elapsed_s: f64, played: usize) -> String {
+    let mut text = format!(
+        "\n{}: {} arrived, {} stalled, {} at the step limit; {:.1} km in {:.1} min of simulated time",
+        plural(totals.episodes as usize, "episode"),
+        totals.arrived,
+        totals.stalled,
+        totals.step_limit,
+        totals.driven_m / 1000.0,
+        totals.simulated_s / 60.0,
+    );
+    if played == totals.episodes as usize && elapsed_s > 0.0 {
+        text.push_str(&format!(" ({elapsed_s:.1} s, {:.0} times real time)", totals.simulated_s / elapsed_s));
+    }
+    text.push_str(&format!(
+        "\n{} in {}; {} counted in {}",
+        plural(totals.collisions as usize, "collision"),
+        plural(totals.episodes_with_collision as usize, "episode"),
+        totals.counted,
+        plural(totals.episodes_with_counted as usize, "episode"),
+    ));
+    if let Some(first_s) = totals.first_counted_s_mean {
+        text.push_str(&format!(", the first after {first_s:.1} s on average"));
+    }
+    if totals.counted < totals.collisions {
+        text.push_str(&format!(
+            "\nof all: {} sudden, {} where the other ran into the ego vehicle",
+            totals.sudden, totals.struck
+        ));
+    }
+    text
+}
+
+/// Paths of the emitted scenarios, sorted.
+fn critical_files(directory: &Path) -> Result<Vec<PathBuf>, Failure> {
+    let critical = directory.join("critical");
+    let entries = std::fs::read_dir(&critical).map_err(|error| Failure::file("read", &critical, error))?;
+    let mut files: Vec<PathBuf> = entries
+        .flatten()
+        .map(|entry| entry.path())
+        .filter(|path| path.extension().is_some_and(|extension| extension == "ava"))
+        .collect();
+    files.sort();
+    Ok(files)
+}
+
+fn critical_text(directory: &Path, files: &[PathBuf]) -> String {
+    if files.is_empty() {
+        return "no critical scenario".to_owned();
+    }
+    let mut text = format!("\n{} with a counted collision:", plural(files.len(), "scenario"));
+    for file in files.iter().take(NAMED_MAX) {
+        text.push_str(&format!("\n  {}", file.display()));
+    }
+    if files.len() > NAMED_MAX {
+        text.push_str(&format!("\n  and {} more", files.len() - NAMED_MAX));
+    }
+    // A shell splits a path at its blanks, and must still see the star.
+    let directory = directory.display().to_string();
+    let directory = if directory.contains(' ') { format!("'{directory}'") } else { directory };
+    text.push_str(&format!("\nreplay them with: avastra replay {directory}/critical/*.ava"));
+    text
+}

@@ -1,0 +1,103 @@
+//! Run directories: `run.yaml`, `run.db` and `critical/*.ava`.
+
+use std::io::ErrorKind;
+use std::path::Path;
+use std::path::PathBuf;
+
+use crate::study::Database;
+use crate::study::RunSettings;
+
+use super::error::Failure;
+use super::load;
+
+/// A run directory on disk.
+pub struct RunDirectory {
+    pub path: PathBuf,
+    pub database: Database,
+}
+
+/// Makes a new directory, or the next free `runs/NNNN`.
+pub fn create(out: Option<&Path>) -> Result<PathBuf, Failure> {
+    let path = match out {
+        Some(path) => {
+            make_empty(path)?;
+            path.to_owned()
+        }
+        None => next_free(Path::new("runs"))?,
+    };
+    let critical = path.join("critical");
+    std::fs::create_dir_all(&critical).map_err(|error| Failure::file("create", &critical, error))?;
+    Ok(path)
+}
+
+/// Writes `run.yaml`. It comes before the database: from then on the run can be resumed.
+pub fn write_settings(directory: &Path, settings: &RunSettings) -> Result<(), Failure> {
+    let text = serde_yaml::to_string(settings).expect("settings are plain strings and numbers");
+    write(&directory.join("run.yaml"), &text)
+}
+
+/// The settings that a directory was made with.
+pub fn settings(directory: &Path) -> Result<RunSettings, Failure> {
+    let path = directory.join("run.yaml");
+    if !path.is_file() {
+        return Err(Failure::usage(format!(
+            "`{}` is no run directory: it has no run.yaml",
+            directory.display()
+        )));
+    }
+    let text = load::read(&path).map_err(|error| Failure::file("read", &path, error))?;
+    serde_yaml::from_str(&text).map_err(|error| Failure::file("read", &path, error))
+}
+
+impl RunDirectory {
+    /// An existing directory, with its database.
+    pub fn open(path: PathBuf) -> Result<RunDirectory, Failure> {
+        let file = path.join("run.db");
+        let database = Database::open(&file).map_err(|error| Failure::file("open", &file, error))?;
+        Ok(RunDirectory { path, database })
+    }
+
+    /// Where the critical scenario of an episode is kept.
+    pub fn critical(&self, name: &str) -> PathBuf {
+        self.path.join("critical").join(format!("{name}.ava"))
+    }
+}
+
+/// Writes a file whole or not at all: a kill leaves the old one.
+pub fn write(path: &Path, text: &str) -> Result<(), Failure> {
+    if let Some(parent) = path.parent().filter(|parent| !parent.as_os_str().is_empty()) {
+        std::fs::create_dir_all(parent).map_err(|error| Failure::file("create", parent, error))?;
+    }
+    let mut partial = path.as_os_str().to_owned();
+    partial.push(".partial");
+    let partial = PathBuf::from(partial);
+    std::fs::write(&partial, text).map_err(|error| Failure::file("write", &partial, error))?;
+    std::fs::rename(&partial, path).map_err(|error| Failure::file("write", path, error))
+}
+
+fn make_empty(path: &Path) -> Result<(), Failure> {
+    std::fs::create_dir_all(path).map_err(|error| Failure::file("create", path, error))?;
+    let mut entries = std::fs::read_dir(path).map_err(|error| Failure::file("read", path, error))?;
+    if entries.next().is_some() {
+        return Err(Failure::usage(format!(
+            "`{}` is not empty: name a new directory, or go on with `--resume {}`",
+            path.display(),
+            path.display()
+        )));
+    }
+    Ok(())
+}
+
+/// Makes the first directory `NNNN` that does not exist yet.
+fn next_free(runs: &Path) -> Result<PathBuf, Failure> {
+    std::fs::create_dir_all(runs).map_err(|error| Failure::file("create", runs, error))?;
+    for number in 1.. {
+        let path = runs.join(format!("{number:04}"));
+        match std::fs::create_dir(&path) {
+            Ok(()) => return Ok(path),
+            Err(error) if error.kind() == ErrorKind::AlreadyExists => {}
+            Err(error) => return Err(Failure::file("create", &path, error)),
+        }
+    }
+    unreachable!("there is always a next number")
+}

@@ -1,0 +1,72 @@
+//! `avastra why`: is a row legal here, and which rule says no.
+
+use std::sync::Arc;
+
+use crate::action::ActiveRules;
+use crate::action::Offer;
+use crate::action::Situation;
+use crate::emit;
+use crate::episode;
+use crate::sim::World;
+
+use super::arguments::WhyArguments;
+use super::compile::known_road;
+use super::error::Failure;
+use super::load;
+use super::output::Output;
+
+/// Seed of the question: what is asked is the rule, not the draw.
+const SEED: u64 = 0;
+
+/// Judges a row at the start of a road, with the states as given.
+pub fn why(output: &Output, arguments: &WhyArguments) -> Result<(), Failure> {
+    let table = load::table(output, &arguments.file)?;
+    let space = table.space();
+    let Some(row) = table.rows().get(arguments.row) else {
+        return Err(Failure::usage(format!(
+            "no row {}: the table has rows 0 to {}",
+            arguments.row,
+            table.rows().len().saturating_sub(1)
+        )));
+    };
+    let road = match &arguments.road {
+        Some(name) => known_road(&table, name)?,
+        None => 0,
+    };
+    let road = &space.roads[road];
+    let rules = ActiveRules::new(space, &arguments.rules.with, &arguments.rules.without)
+        .map_err(|error| Failure::usage(error.to_string()))?;
+    let memory = match &arguments.state {
+        None => space.initial_memory(SEED),
+        Some(text) => space.memory_from(text, SEED).map_err(Failure::usage)?,
+    };
+    let start = episode::start(space, &memory, SEED);
+    let world = World::new(Arc::new(episode::scene(road)), &start);
+    let situation =
+        Situation { memory: &memory, road, rules: &rules, surroundings: &world, seed: SEED, step: 0 };
+    let offer = table.offer(&situation, arguments.row);
+
+    output.say(&format!("row {}: {} on {}", row.index, row.label, road.name));
+    for &rule in &row.rules {
+        let state = if rules.is_active(rule) { "" } else { " (off)" };
+        output.say(&format!("  bound by {}{state}", space.rules[rule].name));
+    }
+    let verdict = match &offer {
+        Offer::Legal(draw) => format!("legal, for example {}", emit::action_text(&table, draw)),
+        Offer::Refused(refusal) => match &refusal.rule {
+            Some(rule) => format!("not legal: rule `{rule}` says no: {}", refusal.reason),
+            None => format!("not legal: {}", refusal.reason),
+        },
+    };
+    output.say(&format!("at the start of the road, {verdict}"));
+    let (legal, rule, reason) = match offer {
+        Offer::Legal(_) => (true, None, None),
+        Offer::Refused(refusal) => (false, refusal.rule, Some(refusal.reason)),
+    };
+    output.result(
+        "why",
+        serde_json::json!({ "row": row.index, "label": row.label, "road": road.name,
+                            "legal": legal, "rule": rule, "reason": reason }),
+    );
+    Ok(())
+}

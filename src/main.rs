@@ -1,0 +1,5 @@
+//! The `avastra` command.
+
+fn main() -> std::process::ExitCode {
+    avastra::cli::main()
+}

@@ -1,0 +1,190 @@
+//! The command as its users meet it: good days and bad ones.
+
+use std::path::Path;
+
+use assert_cmd::Command;
+
+use crate::cases::cases;
+use crate::cases::each_case;
+use crate::cases::root;
+
+/// `avastra` with arguments, in the repository.
+fn avastra(arguments: &[&str]) -> Command {
+    let mut command = Command::cargo_bin("avastra").expect("the binary is built with the tests");
+    command.current_dir(root()).args(arguments);
+    command
+}
+
+/// Exit status, stdout and stderr.
+fn outcome(command: &mut Command) -> (i32, String, String) {
+    let output = command.output().expect("it starts");
+    let text = |bytes: Vec<u8>| String::from_utf8(bytes).expect("it prints UTF-8");
+    let status = output.status.code().expect("no signal ends it");
+    (status, text(output.stdout), text(output.stderr))
+}
+
+#[test]
+fn every_broken_file_has_its_diagnostics() {
+    each_case("diagnostics", |path| {
+        let path = path.strip_prefix(root()).expect("it is a case");
+        let (status, stdout, stderr) =
+            outcome(&mut avastra(&["check", "--format", "plain", &path.display().to_string()]));
+        assert_eq!((status, stdout.as_str()), (2, ""), "{}\n{stderr}", path.display());
+        stderr
+    });
+}
+
+#[test]
+fn every_diagnostic_is_also_json() {
+    for (stem, path) in cases("diagnostics") {
+        let (_, stdout, stderr) =
+            outcome(&mut avastra(&["check", "--format", "json", &path.display().to_string()]));
+        for line in stderr.lines().chain(stdout.lines()) {
+            let value: serde_json::Value = serde_json::from_str(line).unwrap_or_else(|error| {
+                panic!("{stem}: {error}: {line}");
+            });
+            assert!(value.is_object(), "{stem}: {line}");
+        }
+    }
+}
+
+#[test]
+fn what_cannot_be_read_is_said_so() {
+    let scratch = tempfile::tempdir().expect("a scratch directory");
+    let binary = scratch.path().join("binary.ava");
+    std::fs::write(&binary, [0x7f, b'E', b'L', b'F', 0xff, 0xfe, 0x00]).expect("it is writable");
+    let cases: [(&Path, &str); 3] = [
+        (scratch.path(), "is a directory"),
+        (&binary, "not text: byte 4 is not UTF-8"),
+        (&scratch.path().join("absent.ava"), "no such file"),
+    ];
+    for (path, reason) in cases {
+        for verb in ["check", "compile", "table", "fmt", "run", "replay"] {
+            let (status, _, stderr) = outcome(&mut avastra(&[verb, &path.display().to_string()]));
+            assert_eq!(status, 1, "{verb} {}: {stderr}", path.display());
+            assert!(stderr.contains(reason), "{verb} {}: {stderr}", path.display());
+            assert!(!stderr.contains("panicked"), "{verb}: {stderr}");
+        }
+    }
+}
+
+#[test]
+fn what_does_not_exist_is_named_with_what_does() {
+    let space = "scenarios/avastra45.ava";
+    let cases: [(&[&str], &str); 8] = [
+        (&["run", space, "--road", "nowhere"], "`corner`"),
+        (&["run", space, "--ads", "apolo"], "`modular` and `idm`"),
+        (&["run", space, "--agent", "rndom"], "`random`"),
+        (&["run", space, "--without", "npc_gpa"], "npc_gap"),
+        (&["run", "--resume", "scenarios"], "no run.yaml"),
+        (&["why", space, "--row", "45"], "rows 0 to 44"),
+        (&["why", space, "--row", "0", "--state", "tiem: Night"], "time"),
+        (&["render", space, "--at", "1"], "no scenario"),
+    ];
+    for (arguments, hint) in cases {
+        let (status, _, stderr) = outcome(&mut avastra(arguments));
+        assert_eq!(status, 1, "{arguments:?}: {stderr}");
+        assert!(stderr.contains(hint), "{arguments:?}: {stderr}");
+    }
+}
+
+#[test]
+fn compile_and_run_write_the_same_files_twice() {
+    let scratch = tempfile::tempdir().expect("a scratch directory");
+    let space = root().join("scenarios/avastra45.ava").display().to_string();
+    let in_scratch = |arguments: &[&str]| {
+        let (status, stdout, stderr) = outcome(avastra(arguments).current_dir(scratch.path()));
+        assert_eq!(status, 0, "{arguments:?}: {stderr}");
+        stdout
+    };
+    in_scratch(&["compile", &space]);
+    let settings = ["--seed", "7", "--episodes", "20"];
+    in_scratch(&[&["run", "--jobs", "1"], &settings[..]].concat());
+    in_scratch(&[&["run", "--jobs", "2"], &settings[..]].concat());
+    let critical = |run: &str| -> Vec<(String, String)> {
+        let directory = scratch.path().join("runs").join(run).join("critical");
+        let mut files: Vec<(String, String)> = std::fs::read_dir(&directory)
+            .expect("the run made it")
+            .flatten()
+            .map(|entry| {
+                let text = std::fs::read_to_string(entry.path()).expect("it is readable");
+                (entry.file_name().to_string_lossy().into_owned(), text)
+            })
+            .collect();
+        files.sort();
+        files
+    };
+    let files = critical("0001");
+    assert!(!files.is_empty(), "twenty episodes find a crash");
+    assert_eq!(files, critical("0002"));
+
+    let first = format!("runs/0001/critical/{}", files[0].0);
+    assert!(in_scratch(&["replay", &first]).contains("confirmed"));
+    in_scratch(&["render", &first, "--strip", "-o", "strip.svg"]);
+    let svg = std::fs::read_to_string(scratch.path().join("strip.svg")).expect("it was drawn");
+    roxmltree::Document::parse(&svg).expect("a picture is well-formed XML");
+
+    // A false claim, and a scenario whose steps differ, are refuted.
+    let lie = files[0].1.replace("expect proc == [", "expect proc == [0.999, ");
+    std::fs::write(scratch.path().join("runs/0001/critical/lie.ava"), lie).expect("it is writable");
+    let (status, stdout, _) =
+        outcome(avastra(&["replay", "runs/0001/critical/lie.ava"]).current_dir(scratch.path()));
+    assert_eq!(status, 3, "{stdout}");
+    assert!(stdout.contains("collision probability"), "{stdout}");
+}
+
+#[test]
+fn an_interrupted_run_goes_on_where_it_was() {
+    let scratch = tempfile::tempdir().expect("a scratch directory");
+    let space = root().join("scenarios/avastra45.ava").display().to_string();
+    let run = |out: &str| {
+        let arguments = ["run", &space, "--seed", "3", "--episodes", "12", "--out", out, "--quiet"];
+        outcome(avastra(&arguments).current_dir(scratch.path()))
+    };
+    assert_eq!(run("whole").0, 0);
+    assert_eq!(run("cut").0, 0);
+    // As if it had been killed half-way.
+    let database = rusqlite::Connection::open(scratch.path().join("cut/run.db")).expect("it is a database");
+    let cut = "DELETE FROM step WHERE episode >= 5; DELETE FROM collision WHERE episode >= 5;
+               DELETE FROM episode WHERE episode >= 5;";
+    database.execute_batch(cut).expect("it can be cut");
+    drop(database);
+    let (status, _, stderr) = outcome(avastra(&["run", "--resume", "cut"]).current_dir(scratch.path()));
+    assert_eq!(status, 0, "{stderr}");
+    let traces = |run: &str| -> Vec<String> {
+        let path = scratch.path().join(run).join("run.db");
+        let database = rusqlite::Connection::open(path).expect("it is a database");
+        let mut query = database.prepare("SELECT trace FROM episode ORDER BY episode").expect("a query");
+        let rows = query.query_map([], |row| row.get(0)).expect("it has traces");
+        rows.map(|trace| trace.expect("a trace is text")).collect()
+    };
+    assert_eq!(traces("whole"), traces("cut"));
+}
+
+#[test]
+fn shipped_files_are_sound_and_formatted() {
+    let files: Vec<String> = std::fs::read_dir(root().join("scenarios"))
+        .expect("it is a directory")
+        .flatten()
+        .map(|entry| entry.path())
+        .filter(|path| path.extension().is_some_and(|extension| extension == "ava"))
+        .map(|path| path.display().to_string())
+        .collect();
+    let files: Vec<&str> = files.iter().map(String::as_str).collect();
+    let (status, _, stderr) = outcome(&mut avastra(&[&["check", "--strict"], &files[..]].concat()));
+    assert_eq!(status, 0, "{stderr}");
+    let (status, stdout, _) = outcome(&mut avastra(&[&["fmt", "--check"], &files[..]].concat()));
+    assert_eq!(status, 0, "{stdout}");
+}
+
+#[test]
+fn formatting_is_as_reviewed_and_changes_nothing_twice() {
+    each_case("format", |path| {
+        let text = std::fs::read_to_string(path).expect("a case is readable");
+        let once = outcome(avastra(&["fmt", "-"]).write_stdin(text));
+        assert_eq!(once.0, 0, "{}", once.2);
+        let twice = outcome(avastra(&["fmt", "-"]).write_stdin(once.1.clone()));
+        assert_eq!(once.1, twice.1);
+        once.1
+    });
+}

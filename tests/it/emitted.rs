@@ -1,0 +1,106 @@
+//! What a run emits: replays to the bit, reads back to the same value, depends on nothing but the
+//! seed.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::sync::atomic::AtomicBool;
+
+use avastra::emit;
+use avastra::episode::EpisodeLog;
+use avastra::episode::Outcome;
+use avastra::episode::Script;
+use avastra::oracle;
+use avastra::study::Run;
+use avastra::study::play;
+
+use crate::cases::expect_snapshot;
+use crate::cases::root;
+use crate::world::assert_replays;
+use crate::world::read;
+use crate::world::run;
+use crate::world::run_of;
+use crate::world::space_at;
+
+const EPISODES: u32 = 12;
+
+#[test]
+fn every_log_replays_to_the_bit() {
+    let run = run(EPISODES, 7, &[]);
+    for number in 0..run.episodes() {
+        assert_replays(&run, number, &run.episode(number));
+    }
+}
+
+#[test]
+fn half_an_action_is_none() {
+    let run = run_of(space_at("tests/cases/spaces/two_at_one_place.ava"), 3, 1, &[]);
+    for number in 0..run.episodes() {
+        let log = run.episode(number);
+        assert!(log.steps.iter().all(|step| matches!(step.outcome, Outcome::Refused { .. })));
+        // Neither the first of the two nor the night is left behind.
+        assert!(log.steps.iter().all(|step| step.state[1] == 14.0 && step.state[3] == 0.0));
+        assert_replays(&run, number, &log);
+    }
+}
+
+#[test]
+fn the_number_of_workers_changes_nothing() {
+    let run = run(EPISODES, 11, &[]);
+    assert_eq!(logs(&run, 1), logs(&run, 2));
+}
+
+#[test]
+fn emitted_scenarios_keep_every_claim() {
+    let run = run(60, 3, &[]);
+    let mut emitted = 0;
+    for (number, log) in logs(&run, 2) {
+        let counted = oracle::counted(run.space(), &log);
+        if counted.is_empty() {
+            continue;
+        }
+        emitted += 1;
+        let text = text(&run, number, &log, &counted);
+        let formatted = avastra::syntax::format(Default::default(), &text).expect("what is emitted parses");
+        assert_eq!(formatted, text, "emitted text is formatted text");
+        if emitted <= 2 {
+            expect_snapshot("emitted", &format!("scenario_{emitted}"), &text);
+        }
+        // As if the file stood in `scenarios/`: that is where its `use` looks.
+        let path = root().join("scenarios/emitted.ava");
+        let with_it = |path: &Path| -> Result<String, _> {
+            if path.ends_with("emitted.ava") { Ok(text.clone()) } else { read(path) }
+        };
+        let loaded = avastra::model::load(&path, &with_it).expect("it is there");
+        assert!(loaded.diagnostics.is_empty(), "{text}\n{:?}", loaded.diagnostics);
+        let scenario = loaded.scenario.as_ref().expect("it has a scenario");
+        let script = Script::of_scenario(scenario);
+        let again = run.play(number, &mut |moment| script.choose(run.table(), moment), &mut |_, _, _| {});
+        for verdict in oracle::verify(run.space(), scenario, &again) {
+            assert!(verdict.confirmed, "{verdict:?}\n{text}");
+        }
+    }
+    assert!(emitted >= 2, "sixty episodes of random search find crashes; these found {emitted}");
+}
+
+fn text(run: &Run, number: usize, log: &EpisodeLog, counted: &[usize]) -> String {
+    let source = emit::Provenance {
+        name: &format!("{}_{number:04}", log.road),
+        space_path: "avastra45.ava",
+        episode: number,
+        agent: &run.settings().agent,
+        without: &[],
+        with: &[],
+    };
+    avastra::syntax::print(&emit::scenario(run.table(), log, counted, &source))
+}
+
+fn logs(run: &Run, jobs: usize) -> BTreeMap<usize, EpisodeLog> {
+    let numbers: Vec<usize> = (0..run.episodes()).collect();
+    let mut logs = BTreeMap::new();
+    play::<()>(run, &numbers, jobs, &AtomicBool::new(false), &mut |number, log| {
+        logs.insert(number, log);
+        Ok(())
+    })
+    .expect("nothing here fails");
+    logs
+}

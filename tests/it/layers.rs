@@ -1,0 +1,87 @@
+//! The order of the modules: each may use only those to its left.
+
+use std::path::Path;
+use std::path::PathBuf;
+
+use crate::cases::root;
+
+/// From left to right, as in `src/lib.rs` and ARCHITECTURE.md.
+const ORDER: [&str; 17] = [
+    "units", "rng", "geometry", "road", "syntax", "model", "action", "sim", "ads", "mdp", "agent", "episode",
+    "oracle", "study", "emit", "report", "cli",
+];
+
+#[test]
+fn modules_use_only_what_stands_to_their_left() {
+    let mut wrong = Vec::new();
+    for path in sources(&root().join("src")) {
+        let Some(rank) = rank(&path) else { continue };
+        let text = std::fs::read_to_string(&path).expect("a source file is readable");
+        for (number, line) in text.lines().enumerate() {
+            for used in line.split("crate::").skip(1) {
+                let module: String = used.chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect();
+                let line = format!("{}:{}: {}", path.display(), number + 1, line.trim());
+                match ORDER.iter().position(|name| *name == module) {
+                    Some(other) if other > rank => wrong.push(line),
+                    Some(_) => {}
+                    // `crate::{…}` hides what it uses from this test.
+                    None => wrong.push(line),
+                }
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "uses against the order of the modules:\n{}", wrong.join("\n"));
+}
+
+#[test]
+fn the_library_declares_the_modules_in_order() {
+    let text = std::fs::read_to_string(root().join("src/lib.rs")).expect("src/lib.rs is readable");
+    let declared: Vec<&str> =
+        text.lines().filter_map(|line| line.strip_prefix("pub mod ")?.strip_suffix(';')).collect();
+    assert_eq!(declared, ORDER);
+}
+
+#[test]
+fn one_file_alone_names_parry() {
+    let naming: Vec<PathBuf> = sources(&root().join("src"))
+        .into_iter()
+        .filter(|path| std::fs::read_to_string(path).is_ok_and(|text| text.contains("parry2d::")))
+        .collect();
+    assert_eq!(naming, [root().join("src/geometry/contact.rs")]);
+}
+
+#[test]
+fn cli_alone_touches_files_and_the_environment() {
+    let outside = |path: &PathBuf| !path.starts_with(root().join("src/cli"));
+    for path in sources(&root().join("src")).into_iter().filter(outside) {
+        let text = std::fs::read_to_string(&path).expect("a source file is readable");
+        // Tests at the end of a file may read what the repository ships.
+        let text = text.split("#[cfg(test)]").next().unwrap_or(&text);
+        let is_test = path.components().any(|part| part.as_os_str().to_string_lossy().contains("test"));
+        for word in ["std::fs", "std::env::var", "Instant::now", "SystemTime"] {
+            assert!(is_test || !text.contains(word), "{} names {word}", path.display());
+        }
+    }
+}
+
+/// Position of the module that a file belongs to; none for `lib.rs` and `main.rs`.
+fn rank(path: &Path) -> Option<usize> {
+    let inside = path.strip_prefix(root().join("src")).expect("it was found there");
+    let module = inside.iter().next()?.to_str()?.trim_end_matches(".rs");
+    ORDER.iter().position(|name| *name == module)
+}
+
+/// Every Rust file below a directory, sorted.
+fn sources(directory: &Path) -> Vec<PathBuf> {
+    let mut found = Vec::new();
+    for entry in std::fs::read_dir(directory).expect("a source directory is readable").flatten() {
+        let path = entry.path();
+        if path.is_dir() {
+            found.extend(sources(&path));
+        } else if path.extension().is_some_and(|extension| extension == "rs") {
+            found.push(path);
+        }
+    }
+    found.sort();
+    found
+}

@@ -1,0 +1,11 @@
+//! Tests at the pipeline's edges: a case is a file under `tests/cases/`, its expectation a file
+//! under `snapshots/`.
+
+mod cases;
+mod command;
+mod drives;
+mod emitted;
+mod layers;
+mod rules;
+mod tables;
+mod world;

@@ -1,0 +1,65 @@
+//! The shipped space, ready to play.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use avastra::action::ActionTable;
+use avastra::episode::EpisodeLog;
+use avastra::episode::Script;
+use avastra::model::ReadError;
+use avastra::model::Space;
+use avastra::study::Run;
+use avastra::study::RunSettings;
+
+use crate::cases::root;
+
+/// Reads a file as the command line does.
+pub fn read(path: &Path) -> Result<String, ReadError> {
+    std::fs::read_to_string(path).map_err(|error| ReadError(error.to_string()))
+}
+
+/// A shipped space, which must be without mistakes.
+pub fn space(name: &str) -> Arc<Space> {
+    space_at(&format!("scenarios/{name}"))
+}
+
+/// A space by its path in the repository.
+pub fn space_at(name: &str) -> Arc<Space> {
+    let loaded = avastra::model::load(&root().join(name), &read).expect("it is there");
+    assert!(loaded.diagnostics.is_empty(), "{name}: {:?}", loaded.diagnostics);
+    loaded.space.expect("a space without mistakes is a space")
+}
+
+/// An episode again from its own log: the same, bit for bit.
+pub fn assert_replays(run: &Run, number: usize, log: &EpisodeLog) {
+    let script = Script::of_log(log);
+    let mut again = run.play(number, &mut |moment| script.choose(run.table(), moment), &mut |_, _, _| {});
+    // A script does not know that a choice was refused, only that nothing happened.
+    for (step, was) in again.steps.iter_mut().zip(&log.steps) {
+        step.outcome = was.outcome.clone();
+    }
+    assert_eq!(&again, log, "episode {number}");
+}
+
+/// A run of masked random search against the modular driving system.
+pub fn run(episodes: u32, seed: u64, without: &[&str]) -> Run {
+    run_of(space("avastra45.ava"), episodes, seed, without)
+}
+
+/// The same over any space.
+pub fn run_of(space: Arc<Space>, episodes: u32, seed: u64, without: &[&str]) -> Run {
+    let settings = RunSettings {
+        avastra: "test".to_owned(),
+        engine: avastra::sim::ENGINE.to_owned(),
+        space: "scenarios/avastra45.ava".to_owned(),
+        space_digest: space.digest.clone(),
+        roads: space.roads.iter().map(|road| road.name.clone()).collect(),
+        ads: "modular".to_owned(),
+        agent: "random".to_owned(),
+        episodes,
+        seed,
+        without: without.iter().map(|rule| (*rule).to_owned()).collect(),
+        with: Vec::new(),
+    };
+    Run::new(ActionTable::new(space), settings).expect("the settings name what exists")
+}
