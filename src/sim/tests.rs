@@ -291,7 +291,7 @@ fn busy_world(scene: &Arc<Scene>, seed: u64) -> World {
         for lane in [LaneChoice::Current, LaneChoice::Right] {
             k += 1;
             let request = SpawnRequest {
-                body: Body::ALL[k % 6],
+                body: if verb == Verb::Walk { Body::Pedestrian } else { Body::ALL[k % 6] },
                 lane,
                 then: Then::ALL[k % 2],
                 side: Side::ALL[k % 2],
