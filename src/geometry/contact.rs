@@ -1,8 +1,8 @@
 //! Distances between oriented boxes, rays, and the first contact of two moving boxes.
 //!
 //! The one file that names `parry2d`; everybody else speaks in [`OrientedBox`]. The distance of two
-//! boxes is asked for many times a tick and so is our own, in closed form; parry, whose general
-//! algorithm takes four times as long, is the oracle of its tests.
+//! boxes is asked for many times a tick and so is our own, in closed form; parry casts the rays and is
+//! the oracle of the distance's tests.
 
 use parry2d::query::RayCast;
 
