@@ -43,7 +43,7 @@ pub struct RunSettings {
     pub engine: String,
     /// Path of the space, from the run directory.
     pub space: String,
-    /// Digest of the space's file.
+    /// Digest of the space with all that it uses.
     pub space_digest: String,
     pub roads: Vec<String>,
     pub ads: String,
@@ -57,7 +57,7 @@ pub struct RunSettings {
     pub with: Vec<String>,
 }
 
-/// Why a run cannot begin.
+/// Why a run or a replay cannot begin.
 #[derive(Debug, thiserror::Error)]
 pub enum RunError {
     #[error("no road `{name}` in this space: it has {known}")]
@@ -66,7 +66,7 @@ pub enum RunError {
     Ads { name: String, known: String },
     #[error("no agent `{name}`: there are {known}")]
     Agent { name: String, known: String },
-    #[error("{0}")]
+    #[error(transparent)]
     Rule(#[from] crate::action::UnknownRule),
     #[error("`{name}` is asked for twice, or both on and off")]
     Twice { name: String },
@@ -94,7 +94,8 @@ impl Run {
     /// Looks everything up that the settings name.
     ///
     /// # Errors
-    /// If the settings name a road, a driving system, an agent or a rule that does not exist.
+    /// If the settings name a road, a driving system, an agent or a rule that does not exist, a name
+    /// twice, or a number of episodes that is not possible.
     pub fn new(table: ActionTable, settings: RunSettings) -> Result<Run, RunError> {
         if !(1..=EPISODES_MAX).contains(&settings.episodes) {
             return Err(RunError::Episodes { found: settings.episodes });
