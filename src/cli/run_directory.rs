@@ -64,7 +64,14 @@ impl RunDirectory {
 }
 
 /// Writes a file whole or not at all: a kill leaves the old one.
+/// A link is followed, and what is no regular file (a pipe, a terminal, the null device) is
+/// written to rather than replaced.
 pub fn write(path: &Path, text: &str) -> Result<(), Failure> {
+    let followed = std::fs::canonicalize(path);
+    let path = followed.as_deref().unwrap_or(path);
+    if path.exists() && !path.is_file() {
+        return std::fs::write(path, text).map_err(|error| Failure::file("write", path, error));
+    }
     if let Some(parent) = path.parent().filter(|parent| !parent.as_os_str().is_empty()) {
         std::fs::create_dir_all(parent).map_err(|error| Failure::file("create", parent, error))?;
     }

@@ -133,6 +133,25 @@ fn compile_and_run_write_the_same_files_twice() {
     assert!(stdout.contains("collision probability"), "{stdout}");
 }
 
+#[cfg(unix)]
+#[test]
+fn what_is_no_plain_file_is_written_to_and_never_replaced() {
+    let scratch = tempfile::tempdir().expect("a scratch directory");
+    let kept = scratch.path().join("kept.yaml");
+    std::fs::write(&kept, "old").expect("it is writable");
+    let to_file = scratch.path().join("to_file.yaml");
+    let to_device = scratch.path().join("to_device.yaml");
+    std::os::unix::fs::symlink(&kept, &to_file).expect("links can be made");
+    std::os::unix::fs::symlink("/dev/null", &to_device).expect("links can be made");
+    for link in [to_file, to_device] {
+        let out = link.to_str().expect("the path is text");
+        let (status, _, stderr) = outcome(&mut avastra(&["compile", "scenarios/avastra45.ava", "-o", out]));
+        assert_eq!(status, 0, "{stderr}");
+        assert!(link.is_symlink(), "{out} was replaced");
+    }
+    assert!(std::fs::read_to_string(&kept).expect("it is readable").len() > 1000, "the link was followed");
+}
+
 #[test]
 fn an_interrupted_run_goes_on_where_it_was() {
     let scratch = tempfile::tempdir().expect("a scratch directory");
