@@ -2,3 +2,5 @@
 
 mod corner;
 mod reading;
+mod residential;
+mod survey;
