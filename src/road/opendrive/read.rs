@@ -13,6 +13,8 @@ use super::elements::ControllerElement;
 use super::elements::Document;
 use super::elements::JunctionElement;
 use super::elements::LaneElement;
+use super::elements::MarkElement;
+use super::elements::MarkRule;
 use super::elements::ObjectElement;
 use super::elements::Orientation;
 use super::elements::Outline;
@@ -207,6 +209,9 @@ impl Reader {
         if driving && widths.is_empty() && borders.is_empty() {
             return Err(lane.wrong(format!("lane {id} has neither `width` nor `border`")));
         }
+        let marks = lane.children("roadMark");
+        let mut marks: Vec<MarkElement> = marks.map(|mark| road_mark(mark, id)).collect::<Result<_, _>>()?;
+        marks.sort_by(|a, b| a.begin_m.total_cmp(&b.begin_m));
         Ok(LaneElement {
             id,
             line: lane.line(),
@@ -216,6 +221,7 @@ impl Reader {
             predecessors: linked("predecessor")?,
             successors: linked("successor")?,
             speeds,
+            marks,
         })
     }
 
@@ -304,6 +310,28 @@ impl Reader {
         }
         Ok(all)
     }
+}
+
+/// A marking at the outer line of a lane. What `laneChange` says holds; without it, what drivers read
+/// from the paint: solid lines and anything raised forbid, a broken line beside a solid one permits a
+/// change from its own side.
+fn road_mark(mark: Element, lane: i32) -> Result<MarkElement, RoadError> {
+    // Of double lines the inner one, nearer to the reference line, is named first.
+    let (outwards, inwards) = match lane < 0 {
+        true => (MarkRule::Decrease, MarkRule::Increase),
+        false => (MarkRule::Increase, MarkRule::Decrease),
+    };
+    let rule = match (mark.attribute("laneChange"), mark.attribute("type").unwrap_or("none")) {
+        (Some("both"), _) => MarkRule::Both,
+        (Some("none"), _) => MarkRule::Neither,
+        (Some("increase"), _) => MarkRule::Increase,
+        (Some("decrease"), _) => MarkRule::Decrease,
+        (_, "solid" | "solid solid" | "curb" | "edge" | "grass") => MarkRule::Neither,
+        (_, "solid broken") => inwards,
+        (_, "broken solid") => outwards,
+        _ => MarkRule::Both,
+    };
+    Ok(MarkElement { begin_m: mark.number_or("sOffset", 0.0)?, rule })
 }
 
 fn piece(geometry: Element) -> Result<Piece, RoadError> {

@@ -1,4 +1,5 @@
 //! Tests of the whole module: the authored map against its survey, and reading made-up files.
 
+mod changes;
 mod corner;
 mod reading;
