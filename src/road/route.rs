@@ -165,15 +165,17 @@ impl RouteLaneChange {
         -self.shift_m(station_m) * part
     }
 
+    /// Length of the change if it begins at another station, m: that of the path, or as much as is left
+    /// before `latest_m`, but at least [`RouteLaneChange::LENGTH_M_MIN`].
+    pub fn length_from_m(&self, begin_m: f64) -> f64 {
+        (self.end_m - self.begin_m).min(self.latest_m - begin_m).max(RouteLaneChange::LENGTH_M_MIN)
+    }
+
     /// Where a vehicle drives beside the path that begins the change at another station, m, positive to
-    /// the left.
-    ///
-    /// From there on it needs the same length as the path, or as much as is left before `latest_m`, but
-    /// at least 15 m.
+    /// the left; in the source lane if that is infinite.
     pub fn postponed_offset_m(&self, station_m: f64, begin_m: f64) -> f64 {
-        let length_m =
-            (self.end_m - self.begin_m).min(self.latest_m - begin_m).max(RouteLaneChange::LENGTH_M_MIN);
-        self.source_offset_m(station_m) + self.shift_m(station_m) * quintic((station_m - begin_m) / length_m)
+        let part = quintic((station_m - begin_m) / self.length_from_m(begin_m));
+        self.source_offset_m(station_m) + self.shift_m(station_m) * part
     }
 
     /// No lane change is shorter, m.
