@@ -1,5 +1,6 @@
 //! Tests of the whole module: the authored map against its survey, and reading made-up files.
 
+mod abreast;
 mod changes;
 mod corner;
 mod reading;
