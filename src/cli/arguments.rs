@@ -65,6 +65,8 @@ pub enum Command {
     Replay(ReplayArguments),
     /// Draw moments of an emitted scenario as SVG.
     Render(RenderArguments),
+    /// Print or draw a map, and a route through it.
+    Road(RoadArguments),
 }
 
 #[derive(Debug, Args)]
@@ -198,4 +200,22 @@ pub struct RenderArguments {
     /// Draw the drive of another driving system.
     #[arg(long)]
     pub ads: Option<String>,
+}
+
+#[derive(Debug, Args)]
+pub struct RoadArguments {
+    /// An OpenDRIVE map, or a space (`.ava`) whose road is meant.
+    pub file: PathBuf,
+    /// Road of the space [default: its first].
+    #[arg(long)]
+    pub road: Option<String>,
+    /// Where a route starts, for example `1/-1@12.5`: road, lane, station of the road in m.
+    #[arg(long, value_name = "PLACE", requires = "to", allow_hyphen_values = true)]
+    pub from: Option<String>,
+    /// Where it ends.
+    #[arg(long, value_name = "PLACE", requires = "from", allow_hyphen_values = true)]
+    pub to: Option<String>,
+    /// Draw it to a file as well; `-` is stdout, and nothing else is printed.
+    #[arg(long, value_name = "FILE")]
+    pub svg: Option<PathBuf>,
 }
