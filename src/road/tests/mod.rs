@@ -4,3 +4,5 @@ mod abreast;
 mod changes;
 mod corner;
 mod reading;
+mod residential;
+mod survey;
