@@ -4,6 +4,8 @@ use std::sync::Arc;
 
 use crate::model::check::names::Names;
 use crate::model::check::names::unknown;
+use crate::model::check::scenario_rules::Moment;
+use crate::model::check::scenario_rules::breaches;
 use crate::model::check::scenario_value::figure;
 use crate::model::check::scenario_value::number;
 use crate::model::check::scenario_value::value;
@@ -60,7 +62,7 @@ pub fn scenario(file: &ast::File, space: &Space) -> Result<Scenario, Vec<Diagnos
     let origin = reader.origin(&declared.origin);
     let road = reader.road(&declared.road);
     let start = reader.start(declared);
-    let steps = reader.steps(&declared.steps, &start.memory, &origin);
+    let steps = reader.steps(&declared.steps, &start.memory, &origin, road);
     let claims = declared.expects.iter().filter_map(|expect| reader.claim(expect)).collect();
     let docs = item.docs.iter().map(|doc| doc.text.clone()).collect();
     let name = declared.name.text.clone();
@@ -213,9 +215,15 @@ impl<'a> Reader<'a> {
         }
     }
 
-    fn steps(&mut self, declared: &[ast::Step], start: &Memory, origin: &Origin) -> Vec<ScenarioStep> {
+    fn steps(
+        &mut self,
+        declared: &[ast::Step],
+        start: &Memory,
+        origin: &Origin,
+        road: Option<usize>,
+    ) -> Vec<ScenarioStep> {
         let mut steps: Vec<ScenarioStep> = Vec::new();
-        let mut memory = start.clone();
+        let mut history = vec![(0, start.clone())];
         for step in declared {
             let number = step.number.digits.parse::<u64>();
             let Ok(number) = number else {
@@ -241,9 +249,11 @@ impl<'a> Reader<'a> {
             let action = &self.space.actions[row.action];
             let Some(drawn) = self.drawn(step, action) else { continue };
             let locals = locals(action, row, &drawn);
-            let after = self.space.memory_after(row.action, &locals, &memory);
-            self.check_moves(step, row, (&memory, &after), origin);
-            memory = after;
+            let memory = &history[history.len() - 1].1;
+            let after = self.space.memory_after(row.action, &locals, memory);
+            let moment = Moment { step, row, locals: &locals, after: &after, history: &history, road };
+            self.diagnostics.extend(breaches(self.space, &moment, origin));
+            history.push((number, after));
             steps.push(ScenarioStep { number, row: Some(row.index), drawn });
         }
         steps
@@ -356,22 +366,6 @@ impl<'a> Reader<'a> {
             values.push((parameter.name.clone(), value));
         }
         sound.then_some(values)
-    }
-
-    /// Steps must obey the transition rules that were in force.
-    fn check_moves(&mut self, step: &ast::Step, row: &Row, memory: (&Memory, &Memory), origin: &Origin) {
-        for rule in row.rules.iter().map(|rule| &self.space.rules[*rule]) {
-            let asked = if rule.optional { origin.with.contains(&rule.name) } else { true };
-            if !asked || origin.without.contains(&rule.name) {
-                continue;
-            }
-            let Some(reason) = self.space.forbidden_move(rule, memory.0, memory.1) else { continue };
-            let message = format!("step {} breaks rule `{}`", step.number.digits, rule.name);
-            let error = Diagnostic::error(code::BROKEN_RULE, message)
-                .at(step.span, reason)
-                .beside(rule.span, "does not allow it");
-            self.diagnostics.push(error);
-        }
     }
 
     fn claim(&mut self, expect: &ast::Expect) -> Option<Claim> {
