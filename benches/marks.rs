@@ -123,7 +123,7 @@ fn ticks_per_s(world: &World, scene: &Arc<Scene>, name: &str) -> f64 {
         let took = seconds(TICKS, || {
             world.sense(&mut sensed);
             world.tick(&driver.drive(&sensed));
-            most = most.max(collision_probability(&world, &settings));
+            most = most.max(collision_probability(&world, &settings, &|_| false));
         });
         black_box(most);
         took
@@ -140,6 +140,7 @@ fn run(space: Arc<Space>) -> Run {
         roads: vec![space.roads[0].name.clone()],
         ads: "modular".to_owned(),
         agent: "random".to_owned(),
+        policy: None,
         episodes: EPISODES,
         seed: 1,
         without: Vec::new(),

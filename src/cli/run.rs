@@ -97,6 +97,7 @@ fn begun(output: &Output, arguments: &RunArguments) -> Result<(Run, RunDirectory
         roads,
         ads: arguments.ads.clone(),
         agent: arguments.agent.clone(),
+        policy: None,
         episodes: arguments.episodes,
         seed: arguments.seed,
         without: arguments.rules.without.clone(),

@@ -7,8 +7,8 @@ use crate::action::Draw;
 use crate::action::Situation;
 use crate::ads::Ads;
 use crate::mdp;
+use crate::mdp::Observation;
 use crate::mdp::ProcSettings;
-use crate::mdp::StateVector;
 use crate::model::Memory;
 use crate::model::OutcomeFacts;
 use crate::sim::Contact;
@@ -32,7 +32,7 @@ pub type Watch<'a> = dyn FnMut(&World, &dyn Ads, &[Contact]) + 'a;
 /// What whoever acts may look at.
 pub struct Moment<'a> {
     pub step: usize,
-    pub state: &'a StateVector,
+    pub observation: &'a Observation,
     pub situation: &'a Situation<'a>,
 }
 
@@ -54,32 +54,33 @@ pub enum Choice {
 /// Plays one episode. `choose` acts once a step; `watch` sees the world after every tick, and once
 /// before the first.
 pub fn run(setup: &Setup, choose: &mut dyn FnMut(&Moment) -> Choice, watch: &mut Watch) -> EpisodeLog {
+    run_to_last(setup, choose, watch, &mut |_| {})
+}
+
+/// The same; `last` looks at the moment at which the next choice would have been due.
+pub fn run_to_last(
+    setup: &Setup,
+    choose: &mut dyn FnMut(&Moment) -> Choice,
+    watch: &mut Watch,
+    last: &mut dyn FnMut(&Moment),
+) -> EpisodeLog {
     let mut play = Play::new(setup);
     watch(&play.world, play.ads.as_ref(), &[]);
     let end = loop {
-        let state = mdp::observe(&play.world, play.ads.status());
-        let choice = {
-            let situation = Situation {
-                memory: &play.memory,
-                road: setup.road,
-                rules: setup.rules,
-                surroundings: &play.world,
-                seed: setup.seed,
-                step: play.steps.len() as u64,
-            };
-            choose(&Moment { step: play.steps.len(), state: &state, situation: &situation })
-        };
+        let observation = Observation::new(&play.world, play.ads.status());
+        let choice = choose(&play.moment(&observation, &play.situation()));
         let outcome = match choice {
             Choice::Act(draw) => play.carry_out(draw),
             Choice::Pass => Outcome::Passed,
             Choice::Refused { row, rule, reason } => Outcome::Refused { row, rule, reason },
             Choice::Stop => break End::Script,
         };
-        play.observation_period(state, outcome, watch);
+        play.observation_period(observation, outcome, watch);
         if let Some(end) = play.end() {
             break end;
         }
     };
+    last(&play.moment(&Observation::new(&play.world, play.ads.status()), &play.situation()));
     play.into_log(end)
 }
 
@@ -122,6 +123,21 @@ impl<'a> Play<'a> {
         }
     }
 
+    fn situation(&self) -> Situation<'_> {
+        Situation {
+            memory: &self.memory,
+            road: self.setup.road,
+            rules: self.setup.rules,
+            surroundings: &self.world,
+            seed: self.setup.seed,
+            step: self.steps.len() as u64,
+        }
+    }
+
+    fn moment<'m>(&self, observation: &'m Observation, situation: &'m Situation<'m>) -> Moment<'m> {
+        Moment { step: self.steps.len(), observation, situation }
+    }
+
     /// All of an action or nothing of it: its second spawn may find its first in the way.
     fn carry_out(&mut self, draw: Draw) -> Outcome {
         let before = self.world.clone();
@@ -140,7 +156,7 @@ impl<'a> Play<'a> {
     }
 
     /// Drives for one observation period (OTP), or until the goal.
-    fn observation_period(&mut self, state: StateVector, outcome: Outcome, watch: &mut Watch) {
+    fn observation_period(&mut self, observation: Observation, outcome: Outcome, watch: &mut Watch) {
         let time_s = self.world.time_s();
         let station_m = self.world.ego_station_m();
         let (mut proc, mut collided) = (0.0_f64, false);
@@ -158,10 +174,12 @@ impl<'a> Play<'a> {
             ..OutcomeFacts::default()
         });
         let trace = self.trace.clone().finalize().into();
+        let state = observation.state;
         self.steps.push(StepLog { time_s, state, outcome, proc, reward, trace });
     }
 
-    /// One physics step; the collision probability after it. Contact is certainty.
+    /// One physics step; the collision probability after it. Contact is certainty, once: who has been
+    /// hit stands against the ego vehicle for a while, and is no danger any more.
     fn tick(&mut self, watch: &mut Watch, collided: &mut bool) -> f64 {
         self.world.sense(&mut self.sensed);
         let control = self.ads.drive(&self.sensed);
@@ -173,7 +191,11 @@ impl<'a> Play<'a> {
         self.world.trace(&mut |bits| self.trace.update(bits.to_le_bytes()));
         watch(&self.world, self.ads.as_ref(), &contacts);
         *collided |= !contacts.is_empty();
-        if contacts.is_empty() { mdp::collision_probability(&self.world, &self.proc) } else { 1.0 }
+        if !contacts.is_empty() {
+            return 1.0;
+        }
+        let is_hit = |id| self.collisions.iter().any(|collision| collision.contact.obstacle == id);
+        mdp::collision_probability(&self.world, &self.proc, &is_hit)
     }
 
     fn collision(&self, contact: Contact) -> Collision {
