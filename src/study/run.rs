@@ -51,6 +51,9 @@ pub struct RunSettings {
     /// Episodes on each road.
     pub episodes: u32,
     pub seed: u64,
+    /// Vehicles of ambient traffic.
+    #[serde(default)]
+    pub ambient: u32,
     /// Rules switched off.
     pub without: Vec<String>,
     /// Optional rules switched on.
@@ -164,7 +167,7 @@ impl Run {
             rules: &self.rules,
             ads: self.ads,
             seed,
-            start: episode::start(self.space(), &memory, seed),
+            start: Start { ambient: self.settings.ambient, ..episode::start(self.space(), &memory, seed) },
             memory,
         };
         episode::run(&setup, choose, watch)
@@ -241,6 +244,7 @@ pub fn replay(
         start: Start {
             signal_phase_s: scenario.start.signal_phase_s,
             seed: scenario.start.traffic_seed.unwrap_or(seed),
+            ambient: scenario.start.ambient,
             ..episode::start(space, &memory, seed)
         },
         memory,
