@@ -84,6 +84,7 @@ fn crowded(scene: &Arc<Scene>) -> World {
         wetness: Level::None,
         signal_phase_s: 0.0,
         seed: 1,
+        ambient: 0,
     };
     let mut world = World::new(scene.clone(), &start);
     let verbs = [Verb::DriveAhead, Verb::DriveOpposite, Verb::Overtake, Verb::Walk];
@@ -143,6 +144,7 @@ fn run(space: Arc<Space>) -> Run {
         policy: None,
         episodes: EPISODES,
         seed: 1,
+        ambient: 0,
         without: Vec::new(),
         with: Vec::new(),
     };

@@ -13,6 +13,7 @@ use crate::model::Memory;
 use crate::model::OutcomeFacts;
 use crate::sim::Contact;
 use crate::sim::DT_S;
+use crate::sim::Incident;
 use crate::sim::Sensed;
 use crate::sim::World;
 
@@ -93,6 +94,7 @@ struct Play<'a> {
     memory: Memory,
     steps: Vec<StepLog>,
     collisions: Vec<Collision>,
+    incidents: Vec<Incident>,
     trace: Sha256,
     distance_m: f64,
     /// Steps without progress up to now.
@@ -116,6 +118,7 @@ impl<'a> Play<'a> {
             memory: setup.memory.clone(),
             steps: Vec::new(),
             collisions: Vec::new(),
+            incidents: Vec::new(),
             trace: Sha256::new(),
             distance_m: 0.0,
             stalled: 0,
@@ -187,6 +190,7 @@ impl<'a> Play<'a> {
         for &contact in &contacts {
             self.collisions.push(self.collision(contact));
         }
+        self.incidents.extend_from_slice(self.world.incidents());
         self.distance_m += self.world.ego().speed_mps * DT_S;
         self.world.trace(&mut |bits| self.trace.update(bits.to_le_bytes()));
         watch(&self.world, self.ads.as_ref(), &contacts);
@@ -234,6 +238,7 @@ impl<'a> Play<'a> {
             start: self.setup.start,
             memory: self.setup.memory.clone(),
             collisions: self.collisions,
+            incidents: self.incidents,
             end,
             duration_s: self.world.time_s(),
             distance_m: self.distance_m,

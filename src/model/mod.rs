@@ -27,6 +27,7 @@ pub use eval::OutcomeFacts;
 pub use eval::evaluate;
 pub use interval::End;
 pub use interval::Interval;
+pub use limits::AMBIENT_MAX;
 pub use limits::SPAWN_DISTANCE_M;
 pub use limits::SPAWN_SPEED_MPS;
 pub use limits::TICK_MS;

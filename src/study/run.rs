@@ -55,6 +55,9 @@ pub struct RunSettings {
     /// Episodes on each road.
     pub episodes: u32,
     pub seed: u64,
+    /// Vehicles of ambient traffic.
+    #[serde(default)]
+    pub ambient: u32,
     /// Rules switched off.
     pub without: Vec<String>,
     /// Optional rules switched on.
@@ -174,7 +177,8 @@ impl Run {
         watch: &mut Watch,
     ) -> EpisodeLog {
         let seed = rng::child_seed(self.settings.seed, Stream::Episode, number as u64);
-        let setup = self.arena.setup(number / self.settings.episodes as usize, seed);
+        let mut setup = self.arena.setup(number / self.settings.episodes as usize, seed);
+        setup.start.ambient = self.settings.ambient;
         episode::run(&setup, choose, watch)
     }
 }
@@ -249,6 +253,7 @@ pub fn replay(
         start: Start {
             signal_phase_s: scenario.start.signal_phase_s,
             seed: scenario.start.traffic_seed.unwrap_or(seed),
+            ambient: scenario.start.ambient,
             ..episode::start(space, &memory, seed)
         },
         memory,

@@ -59,6 +59,7 @@ pub fn run_of(space: Arc<Space>, episodes: u32, seed: u64, without: &[&str]) -> 
         policy: None,
         episodes,
         seed,
+        ambient: 0,
         without: without.iter().map(|rule| (*rule).to_owned()).collect(),
         with: Vec::new(),
     };

@@ -10,6 +10,7 @@ use crate::model::check::scenario_value::figure;
 use crate::model::check::scenario_value::number;
 use crate::model::check::scenario_value::value;
 use crate::model::code;
+use crate::model::limits::AMBIENT_MAX;
 use crate::model::limits::SIGNAL_PHASE_S;
 use crate::model::row::Row;
 use crate::model::row::locals;
@@ -155,7 +156,7 @@ impl<'a> Reader<'a> {
         let space = self.space;
         // The seed is arbitrary: what it draws is replaced below, or reported as missing.
         let mut memory = space.initial_memory(0);
-        let mut start = (0.0, None);
+        let mut start = (0.0, None, 0);
         self.once("field", &declared.start);
         for field in &declared.start {
             match field.name.text.as_str() {
@@ -170,11 +171,22 @@ impl<'a> Reader<'a> {
                     }
                 }
                 "traffic_seed" => start.1 = self.whole(&field.value),
+                "ambient" => {
+                    let wanted = self.whole(&field.value).unwrap_or(0);
+                    if wanted > u64::from(AMBIENT_MAX) {
+                        let message = format!("{wanted} ambient vehicles are not possible");
+                        let error = Diagnostic::error(code::OUT_OF_RANGE, message);
+                        self.report(
+                            error.at(field.value.span, format!("must lie within 0 .. {AMBIENT_MAX}")),
+                        );
+                    }
+                    start.2 = wanted.min(u64::from(AMBIENT_MAX)) as u32;
+                }
                 name => match space.state(name) {
                     Some(state) => self.start_state(state, &field.value, &mut memory),
                     None => {
                         let states = space.states.iter().map(|state| state.name.as_str());
-                        let names = states.chain(["signal_phase", "traffic_seed"]);
+                        let names = states.chain(["signal_phase", "traffic_seed", "ambient"]);
                         self.report(unknown("field", name, field.name.span, names));
                     }
                 },
@@ -188,7 +200,7 @@ impl<'a> Reader<'a> {
                 self.report(error.help(format!("add `start {{ {}: … }}`", state.name)));
             }
         }
-        ScenarioStart { memory, signal_phase_s: start.0, traffic_seed: start.1 }
+        ScenarioStart { memory, signal_phase_s: start.0, traffic_seed: start.1, ambient: start.2 }
     }
 
     /// `time: Noon`, `sky: None` for all keys, `sky: { Rain: High }` for some.
