@@ -97,8 +97,10 @@ fn begun(output: &Output, arguments: &RunArguments) -> Result<(Run, RunDirectory
         roads,
         ads: arguments.ads.clone(),
         agent: arguments.agent.clone(),
+        policy: None,
         episodes: arguments.episodes,
         seed: arguments.seed,
+        ambient: arguments.ambient,
         without: arguments.rules.without.clone(),
         with: arguments.rules.with.clone(),
     };
@@ -188,8 +190,12 @@ fn stop_on_interrupt() -> Result<Arc<AtomicBool>, Failure> {
 
 fn heading(run: &Run, directory: &Path) -> String {
     let settings = run.settings();
+    let ambient = match settings.ambient {
+        0 => String::new(),
+        wanted => format!(", {} of ambient traffic", plural(wanted as usize, "vehicle")),
+    };
     format!(
-        "{}: {} against {}, {} on {}, seed {}, into {}",
+        "{}: {} against {}, {} on {}{ambient}, seed {}, into {}",
         run.space().path.display(),
         settings.agent,
         settings.ads,

@@ -175,6 +175,16 @@ impl Drawing<'_> {
     fn route(&mut self, route: &Route) {
         let style = r##"stroke="#e65100" stroke-opacity="0.75" stroke-width="4" stroke-linejoin="round""##;
         self.canvas.polyline(&stretch(&route.path, 0.0, route.goal_m), style);
+        for change in &route.changes {
+            let style = r##"stroke="#6a00c8" stroke-width="5" stroke-linecap="round""##;
+            self.canvas.polyline(&stretch(&route.path, change.begin_m, change.end_m), style);
+            // Beside the middle of the change, on the side that it leaves.
+            let middle = route.path.pose_at((change.begin_m + change.end_m) / 2.0);
+            let aside_px = if change.lateral_m > 0.0 { -16.0 } else { 16.0 };
+            let at = middle.offset(0.0, aside_px / self.canvas.px_per_m).position;
+            let style = r##"font-size="12" fill="#6a00c8" text-anchor="middle""##;
+            self.canvas.text(at, "lane change", style);
+        }
         for (station_m, name, paint) in [(0.0, "start", "#1b7f3a"), (route.goal_m, "goal", "#111111")] {
             let at = route.path.pose_at(station_m);
             let (x, y) = self.canvas.at(at.position);

@@ -29,6 +29,7 @@ use super::mover::Around;
 use super::mover::Motion;
 use super::mover::Moved;
 use super::mover::Mover;
+use super::npc::Cruise;
 use super::npc::Driver;
 use super::npc::Manoeuvre;
 use super::npc::Towards;
@@ -196,7 +197,16 @@ fn on_foot(around: &Around, request: &SpawnRequest, size: BodyParameters, id: u3
         (facing(lane), Motion::Stand)
     } else {
         let from = facing(lane.offset(0.0, left_m));
-        (from, Motion::Walk(Walker::new(from, 2.0 * KERB_M, request.speed_mps, around.tick)))
+        (
+            from,
+            Motion::Walk(Walker::new(
+                from,
+                2.0 * KERB_M,
+                request.speed_mps,
+                around.tick,
+                &mut choices(around.seed, id, 0),
+            )),
+        )
     };
     let moved = Moved::at_rest(pose);
     finish(around, request, Mover::new(size, motion), id, moved)
@@ -233,8 +243,8 @@ fn drive_ahead(
     }
     let beside_ego = around.scene.route.path.pose_at(station_m).position;
     let station_m = around.scene.map.lane(lane).centre.project(beside_ego).station_m;
-    let way = Way::along(&around.scene.map, &[lane], &mut rng).ok_or("that lane leads nowhere")?;
-    Ok(Driver::new(Arc::new(way), station_m, request.speed_mps, plan, 1))
+    let way = Way::along(around.scene, &[lane], &mut rng).ok_or("that lane leads nowhere")?;
+    Ok(Driver::new(around.scene, Arc::new(way), station_m, Cruise::Commanded(request.speed_mps), plan, 1))
 }
 
 fn overtake(
@@ -269,8 +279,8 @@ fn overtake(
         station_m += map.lane(previous).centre.length_m();
         lanes.insert(0, previous);
     }
-    let way = Way::along(map, &lanes, &mut rng).ok_or("that lane leads nowhere")?;
-    Ok(Driver::new(Arc::new(way), station_m, request.speed_mps, plan, 1))
+    let way = Way::along(around.scene, &lanes, &mut rng).ok_or("that lane leads nowhere")?;
+    Ok(Driver::new(around.scene, Arc::new(way), station_m, Cruise::Commanded(request.speed_mps), plan, 1))
 }
 
 fn drive_opposite(
@@ -293,8 +303,8 @@ fn drive_opposite(
     };
     let beside_route = around.scene.route.path.pose_at(station_m).position;
     let station_m = map.lane(lane).centre.project(beside_route).station_m;
-    let way = Way::along(map, &[lane], &mut rng).ok_or("that lane leads nowhere")?;
-    Ok(Driver::new(Arc::new(way), station_m, request.speed_mps, plan, 1))
+    let way = Way::along(around.scene, &[lane], &mut rng).ok_or("that lane leads nowhere")?;
+    Ok(Driver::new(around.scene, Arc::new(way), station_m, Cruise::Commanded(request.speed_mps), plan, 1))
 }
 
 fn cross_road(
@@ -345,7 +355,7 @@ fn rendezvous(
         lanes.insert(0, *previous);
     }
     let mut rng = choices(around.seed, id, 0);
-    let way = Way::along(map, &lanes, &mut rng).ok_or("that lane leads nowhere")?;
+    let way = Way::along(around.scene, &lanes, &mut rng).ok_or("that lane leads nowhere")?;
     let meeting_m = way.lane_begin_m(conflict.lane).expect("the way was made through this lane")
         + conflict.lane_station_m;
     // Backwards from the meeting at the speed that each bend allows, its front first.
@@ -373,7 +383,14 @@ fn rendezvous(
     }
     let station_m = front_m - size.length_m / 2.0;
     if request.then == Then::Keep {
-        return Ok(Driver::new(Arc::new(way), station_m, request.speed_mps, Vec::new(), 1));
+        return Ok(Driver::new(
+            around.scene,
+            Arc::new(way),
+            station_m,
+            Cruise::Commanded(request.speed_mps),
+            Vec::new(),
+            1,
+        ));
     }
     // It starts beside its way and changes into it on the approach.
     let start = way.path.pose_at(station_m).position;
@@ -385,9 +402,16 @@ fn rendezvous(
         .or_else(|| lane_beside(around, leg, Side::Left))
         .ok_or("no second lane in the crossing leg")?;
     let station_m = map.lane(beside).centre.project(start).station_m;
-    let first = Way::along(map, &[beside], &mut rng).ok_or("that lane leads nowhere")?;
+    let first = Way::along(around.scene, &[beside], &mut rng).ok_or("that lane leads nowhere")?;
     let change = Manoeuvre { when: When::Tick(around.tick), towards: Towards::Way(Arc::new(way)) };
-    Ok(Driver::new(Arc::new(first), station_m, request.speed_mps, vec![change], 1))
+    Ok(Driver::new(
+        around.scene,
+        Arc::new(first),
+        station_m,
+        Cruise::Commanded(request.speed_mps),
+        vec![change],
+        1,
+    ))
 }
 
 fn lane_at(around: &Around, station_m: f64) -> LaneIndex {

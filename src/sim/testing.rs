@@ -33,6 +33,7 @@ pub fn start() -> Start {
         wetness: Level::None,
         signal_phase_s: 0.0,
         seed: 7,
+        ambient: 0,
     }
 }
 
@@ -119,12 +120,12 @@ pub fn corner() -> Arc<Scene> {
         map.nearest(Vec2::new(x_m, y_m), heading_rad, 1.0).expect("the survey lies on the map")
     };
     let route = Route::find(&map, nearest(0.0, 0.0, 2.377), nearest(-71.4, 145.5, -2.983));
-    Arc::new(Scene { route: route.expect("there is a way"), map: map.into() })
+    Arc::new(Scene::new(map.into(), route.expect("there is a way")))
 }
 
 fn scene(opendrive: &str, start: (&str, i32, f64), goal: (&str, i32, f64)) -> Arc<Scene> {
     let map = RoadMap::from_opendrive("test", opendrive).expect("the map is sound");
     let place = |(road, lane, s_m): (&str, i32, f64)| map.place(road, lane, s_m).expect("it is on the map");
     let route = Route::find(&map, place(start), place(goal)).expect("there is a way");
-    Arc::new(Scene { map: map.into(), route })
+    Arc::new(Scene::new(map.into(), route))
 }

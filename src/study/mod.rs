@@ -1,14 +1,16 @@
 //! Runs: many episodes, judged, counted and kept.
 
+mod arena;
 mod database;
 mod run;
 mod summary;
 
+pub use arena::DEFAULT_ADS;
 pub use database::Database;
 pub use database::DatabaseError;
 pub use database::Totals;
-pub use run::DEFAULT_ADS;
 pub use run::EPISODES_MAX;
+pub use run::PolicyReference;
 pub use run::Run;
 pub use run::RunError;
 pub use run::RunSettings;

@@ -56,8 +56,10 @@ pub fn run_of(space: Arc<Space>, episodes: u32, seed: u64, without: &[&str]) -> 
         roads: space.roads.iter().map(|road| road.name.clone()).collect(),
         ads: "modular".to_owned(),
         agent: "random".to_owned(),
+        policy: None,
         episodes,
         seed,
+        ambient: 0,
         without: without.iter().map(|rule| (*rule).to_owned()).collect(),
         with: Vec::new(),
     };
