@@ -6,6 +6,7 @@ mod summary;
 
 pub use database::Database;
 pub use database::DatabaseError;
+pub use database::RefusalCount;
 pub use database::Totals;
 pub use run::DEFAULT_ADS;
 pub use run::EPISODES_MAX;
