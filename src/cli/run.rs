@@ -12,6 +12,7 @@ use crate::emit;
 use crate::episode::EpisodeLog;
 use crate::sim::ENGINE;
 use crate::study::EpisodeSummary;
+use crate::study::RefusalCount;
 use crate::study::Run;
 use crate::study::RunSettings;
 use crate::study::Totals;
@@ -31,7 +32,7 @@ use super::run_directory::write;
 
 const VERSION: &str = env!("CARGO_PKG_VERSION");
 
-/// How many critical scenarios the summary names.
+/// How many critical scenarios, and how many reasons of refusals, the summary names.
 const NAMED_MAX: usize = 10;
 
 /// Plays the episodes of a new run, or those that an interrupted one still lacks.
@@ -61,12 +62,17 @@ pub fn run(output: &Output, arguments: &RunArguments) -> Result<(), Failure> {
 
     let totals =
         directory.database.totals().map_err(|error| Failure::file("read", &directory.path, error))?;
+    let refusals =
+        directory.database.refusals().map_err(|error| Failure::file("read", &directory.path, error))?;
     output.say(&totals_text(&totals, started.elapsed().as_secs_f64(), todo.len()));
+    if !refusals.is_empty() {
+        output.say(&refusals_text(&refusals));
+    }
     let critical = critical_files(&directory.path)?;
     output.say(&critical_text(&directory.path, &critical));
     output.result(
         "run",
-        serde_json::json!({ "directory": directory.path, "totals": totals, "critical": critical }),
+        serde_json::json!({ "directory": directory.path, "totals": totals, "refusals": refusals, "critical": critical }),
     );
     if stop.load(Ordering::Relaxed) && (totals.episodes as usize) < run.episodes() {
         return Err(Failure::Interrupted { directory: directory.path });
@@ -234,6 +240,19 @@ fn totals_text(totals: &Totals, elapsed_s: f64, played: usize) -> String {
             "\nof all: {} sudden, {} where the other ran into the ego vehicle",
             totals.sudden, totals.struck
         ));
+    }
+    text
+}
+
+/// Steps in which nothing was done of what was asked for, by reason.
+fn refusals_text(refusals: &[RefusalCount]) -> String {
+    let all: i64 = refusals.iter().map(|refusal| refusal.times).sum();
+    let mut text = format!("refused: {}", plural(all as usize, "action"));
+    for refusal in refusals.iter().take(NAMED_MAX) {
+        text.push_str(&format!("\n  {} × {}", refusal.times, refusal.reason));
+    }
+    if refusals.len() > NAMED_MAX {
+        text.push_str(&format!("\n  and for {} other reasons", refusals.len() - NAMED_MAX));
     }
     text
 }

@@ -7,6 +7,7 @@ use crate::geometry::Vec2;
 
 use super::body::BodyParameters;
 use super::environment::GRAVITY_MPS2;
+use super::environment::friction;
 use super::npc::Driver;
 use super::pedestrian::Walker;
 use super::sense::EgoMotion;
@@ -31,7 +32,10 @@ pub(super) struct Around<'a> {
     pub movers: [&'a [Mover]; 2],
     pub signals: &'a SignalClock,
     pub tick: u64,
+    /// Under the ego vehicle.
     pub friction: f64,
+    pub water_mm: f64,
+    pub visibility_m: f64,
     /// Of the choices of other road users.
     pub seed: u64,
 }
@@ -62,9 +66,9 @@ impl Around<'_> {
         })
     }
 
-    /// The hardest braking of a body on this road, m/s².
-    pub fn braking_mps2(&self, size: &BodyParameters) -> f64 {
-        size.deceleration_mps2_max.min(self.friction * GRAVITY_MPS2)
+    /// The hardest braking of a body at a speed on this road, m/s².
+    pub fn braking_mps2(&self, size: &BodyParameters, speed_mps: f64) -> f64 {
+        size.deceleration_mps2_max.min(friction(self.water_mm, speed_mps) * GRAVITY_MPS2)
     }
 }
 

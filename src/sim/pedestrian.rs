@@ -128,7 +128,7 @@ impl Walker {
             return (f64::from(self.stayed_ticks) * DT_S < STAY_S)
                 .then_some(Moved::at_rest(this.outline.pose));
         }
-        if around.tick + 1 <= self.begins_tick {
+        if around.tick < self.begins_tick {
             return Some(Moved::at_rest(this.outline.pose));
         }
         if self.pace_mps == 0.0 {

@@ -38,7 +38,9 @@ use super::npc::choices;
 use super::npc::lane_beside;
 use super::pedestrian::Walker;
 use super::safety;
+use super::sense::RANGE_M;
 use super::sense::SignalColour;
+use super::sense::visible_fraction;
 use super::way::Way;
 use super::world::DT_S;
 use super::world::Obstacle;
@@ -110,22 +112,39 @@ fn check(request: &SpawnRequest) -> Result<(), String> {
 /// The distances that rules ask for.
 ///
 /// The gap at the spawn is between the outlines. The gap that a careful driver needs (see `safety`) is
-/// to slow down to one ahead, or to rest for one who crosses, walks or stands; for one from behind it
-/// is what the newcomer needs to slow down to the ego vehicle. One that comes the other way stays in
-/// its own lanes and needs none, unless its way crosses the route at a junction.
+/// to slow down to one ahead, or to rest for one who crosses, walks or stands: their stopping zone.
+/// For one from behind it is what the newcomer needs to slow down to the ego vehicle. One that comes
+/// the other way stays in its own lanes and needs none, unless its way crosses the route at a junction.
+///
+/// Nobody but those from behind appears in plain view nearer than the way that the ego vehicle drives
+/// while a careful driver perceives and reacts, even if they would be no danger: who is in sight, and
+/// not hidden by others, fog or distance, did not come from nowhere.
 pub(super) fn facts(around: &Around, request: &SpawnRequest, placed: &Placed) -> SpawnFacts {
     let along_mps = around.ego_outline.pose.forward().dot(&placed.obstacle.velocity_mps);
     let (ego_mps, friction) = (around.ego.speed_mps, around.friction);
-    let safety_gap_m = match request.verb {
+    let braking_gap_m = match request.verb {
         Verb::DriveAhead => safety::behind_leader_m(ego_mps, along_mps, friction),
-        Verb::Overtake => safety::from_behind_m(along_mps, ego_mps, around.braking_mps2(&placed.mover.size)),
+        Verb::Overtake => {
+            let braking_mps2 = around.braking_mps2(&placed.mover.size, along_mps.max(0.0));
+            safety::from_behind_m(along_mps, ego_mps, braking_mps2)
+        }
         Verb::DriveOpposite if meets_route(around, &placed.mover) => {
             safety::oncoming_m(ego_mps, -along_mps, friction)
         }
         Verb::DriveOpposite => 0.0,
         Verb::CrossRoad | Verb::Walk | Verb::Stand => safety::behind_leader_m(ego_mps, 0.0, friction),
     };
-    SpawnFacts { spawn_gap_m: placed.obstacle.distance_m, safety_gap_m }
+    let spawn_gap_m = placed.obstacle.distance_m;
+    let is_behind = request.verb == Verb::Overtake;
+    let sight_m = RANGE_M.min(around.visibility_m);
+    let in_view = || {
+        let eye = around.ego_outline.pose.position;
+        spawn_gap_m < sight_m && visible_fraction(eye, &placed.obstacle, around.obstacles) > 0.0
+    };
+    let noticing_m = safety::noticing_m(ego_mps);
+    let is_sudden = !is_behind && noticing_m > braking_gap_m && in_view();
+    let safety_gap_m = if is_sudden { noticing_m } else { braking_gap_m };
+    SpawnFacts { spawn_gap_m, safety_gap_m }
 }
 
 /// Whether the way of a driver crosses or joins what the ego vehicle has before it.
@@ -165,7 +184,7 @@ fn finish(
 /// A newcomer must be able to brake for those before it. The ego vehicle is not among them: how near
 /// to it a newcomer may appear is for the rules of the space to say.
 fn check_way(around: &Around, driver: &Driver, size: &BodyParameters) -> Result<(), String> {
-    let braking_mps2 = around.braking_mps2(size);
+    let braking_mps2 = around.braking_mps2(size, driver.speed_mps);
     let blocked = around.obstacles.iter().any(|other| {
         driver.gap_to(size, &other.outline, other.velocity_mps).is_some_and(|(gap_m, speed_mps)| {
             let closing_mps = (driver.speed_mps - speed_mps).max(0.0);

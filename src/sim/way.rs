@@ -33,6 +33,9 @@ pub(super) struct Way {
     open: bool,
 }
 
+/// Lanes that begin farther ahead than this matter to nobody yet, m.
+const AHEAD_M: f64 = 150.0;
+
 /// A conflict area on a way.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct WayArea {
@@ -122,12 +125,9 @@ impl Way {
 
     /// Station at which a lane begins that is not left at `rear_m`, if the way still takes it.
     pub fn lane_ahead_m(&self, lane: LaneIndex, rear_m: f64) -> Option<f64> {
-        let to_m = |index: usize| self.lanes.get(index + 1).map_or(f64::INFINITY, |next| next.from_m);
-        let found = self.lanes.iter().enumerate();
-        found
-            .filter(|(_, part)| part.lane == lane)
-            .find(|(index, _)| to_m(*index) > rear_m)
-            .map(|(_, part)| part.from_m)
+        let first = self.lanes.partition_point(|part| part.from_m <= rear_m).max(1) - 1;
+        let mut ahead = self.lanes[first..].iter().take_while(|part| part.from_m < rear_m + AHEAD_M);
+        ahead.find(|part| part.lane == lane).map(|part| part.from_m)
     }
 
     /// Highest speed at a station: what the bend there and the bends ahead allow, m/s.

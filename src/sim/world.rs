@@ -33,6 +33,7 @@ use super::ego::Control;
 use super::ego::Ego;
 use super::ego::VehicleParameters;
 use super::environment::Environment;
+use super::environment::friction;
 use super::junction::ConflictAreas;
 use super::mover::Around;
 use super::mover::Moved;
@@ -199,8 +200,7 @@ impl World {
     /// the route, and nobody else is there.
     pub fn new(scene: Arc<Scene>, start: &Start) -> World {
         let ego = Ego::new(scene.route.path.pose_at(0.0), START_MPS);
-        let environment =
-            Environment { time: start.time, rain: start.rain, fog: start.fog, wetness: start.wetness };
+        let environment = Environment::new(start.time, [start.rain, start.fog, start.wetness]);
         let mut world = World {
             ticks: 0,
             ego_outline: ego.outline(),
@@ -208,7 +208,7 @@ impl World {
             ego_station_m: 0.0,
             ego_offset_m: 0.0,
             red_runs: 0,
-            conditions: environment.conditions(),
+            conditions: environment.conditions(START_MPS),
             environment,
             signals: SignalClock::new(start.signal_phase_s),
             obstacles: Vec::with_capacity(OBSTACLES_MAX),
@@ -238,7 +238,8 @@ impl World {
         self.contacts.clear();
         self.incidents.clear();
         let outline = self.ego_outline;
-        self.ego.step(control, self.conditions.friction, DT_S);
+        let friction = friction(self.environment.water_mm(), self.ego.motion.speed_mps);
+        self.ego.step(control, friction, DT_S);
         self.ego_outline = self.ego.outline();
         self.follow_route();
         // Taken once: of two contacts in a tick, the second does not see what the first did to the ego.
@@ -267,6 +268,8 @@ impl World {
             self.renew_ambient(false);
         }
         if self.ticks.is_multiple_of(FRAME_TICKS) {
+            self.environment.pass(FRAME_TICKS as f64 * DT_S);
+            self.conditions = self.environment.conditions(self.ego.motion.speed_mps);
             self.look();
         }
         &self.contacts
@@ -282,7 +285,7 @@ impl World {
             Effect::Sky(phenomenon, level) => self.environment.set(*phenomenon, *level),
             Effect::Spawn(request) => return self.spawn(request).map(Some),
         }
-        self.conditions = self.environment.conditions();
+        self.conditions = self.environment.conditions(self.ego.motion.speed_mps);
         Ok(None)
     }
 
@@ -394,10 +397,8 @@ impl World {
         sink(self.ego_station_m.to_bits());
         sink(self.ego_offset_m.to_bits());
         sink(u64::from(self.red_runs));
-        sink(self.environment.time as u64);
-        for level in self.sky() {
-            sink(level as u64);
-        }
+        self.environment.trace(sink);
+        sink(self.conditions.friction.to_bits());
         self.signals.trace(sink);
         sink(u64::from(self.next_id));
         self.ambient.trace(sink);
@@ -441,6 +442,8 @@ impl World {
             signals: &self.signals,
             tick: self.ticks,
             friction: self.conditions.friction,
+            water_mm: self.environment.water_mm(),
+            visibility_m: self.conditions.visibility_m,
             seed: self.seed,
         }
     }

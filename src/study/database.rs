@@ -2,6 +2,7 @@
 //!
 //! Each episode is one transaction, so a kill at any moment loses at most the episode under way.
 
+use std::collections::BTreeMap;
 use std::collections::BTreeSet;
 use std::path::Path;
 
@@ -129,6 +130,23 @@ impl Database {
         numbers.map(|found| number(found?)).collect()
     }
 
+    /// Why steps passed although something was asked for, and how often; the most frequent first.
+    /// Figures in a reason are left out, so that reasons can be told apart.
+    ///
+    /// # Errors
+    /// If the file cannot be read.
+    pub fn refusals(&self) -> Result<Vec<RefusalCount>, DatabaseError> {
+        let mut statement = self.connection.prepare("SELECT refused FROM step WHERE refused IS NOT NULL")?;
+        let mut counts: BTreeMap<String, i64> = BTreeMap::new();
+        for reason in statement.query_map([], |row| row.get::<_, String>(0))? {
+            *counts.entry(without_figures(&reason?)).or_default() += 1;
+        }
+        let mut refusals: Vec<RefusalCount> =
+            counts.into_iter().map(|(reason, times)| RefusalCount { reason, times }).collect();
+        refusals.sort_by_key(|refusal| -refusal.times);
+        Ok(refusals)
+    }
+
     /// Totals over all episodes.
     ///
     /// # Errors
@@ -166,6 +184,23 @@ impl Database {
             },
         )?)
     }
+}
+
+/// How often a reason kept an action from being carried out.
+#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
+pub struct RefusalCount {
+    pub reason: String,
+    pub times: i64,
+}
+
+/// A reason with `…` for each number.
+fn without_figures(reason: &str) -> String {
+    let is_figure = |word: &str| word.parse::<f64>().is_ok();
+    let shown = reason.split(' ').map(|word| {
+        let bare = word.trim_end_matches([',', ';']);
+        if is_figure(bare) { word.replace(bare, "…") } else { word.to_owned() }
+    });
+    shown.collect::<Vec<_>>().join(" ")
 }
 
 /// What a run has found so far.
@@ -254,4 +289,16 @@ fn add_collision(
             finding.counted,
         ])?;
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn reasons_differ_by_their_words() {
+        let reason = "no_teleport: the gap would be 12.5 m, a fair one is 17 m";
+        assert_eq!(without_figures(reason), "no_teleport: the gap would be … m, a fair one is … m");
+        assert_eq!(without_figures("cannot spawn: no lane on the left"), "cannot spawn: no lane on the left");
+    }
 }

@@ -8,6 +8,7 @@ mod summary;
 pub use arena::DEFAULT_ADS;
 pub use database::Database;
 pub use database::DatabaseError;
+pub use database::RefusalCount;
 pub use database::Totals;
 pub use run::EPISODES_MAX;
 pub use run::PolicyReference;

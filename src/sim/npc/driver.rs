@@ -118,7 +118,7 @@ pub(in crate::sim) struct Driver {
     pub(super) insists_to_m: f64,
     /// Ticks at rest because of others.
     pub(super) waited_ticks: u32,
-    change: Option<Change>,
+    pub(super) change: Option<Change>,
     last_change: Option<Side>,
     /// In reverse order: the next one is last.
     plan: Vec<Manoeuvre>,
@@ -138,7 +138,7 @@ pub(super) struct Leader {
 
 /// A lane change under way.
 #[derive(Debug, Clone)]
-struct Change {
+pub(super) struct Change {
     to: Arc<Way>,
     to_station_m: f64,
     /// In `[0, 1)`.
@@ -216,7 +216,7 @@ impl Driver {
         if !touched && (around.tick + u64::from(this.id)).is_multiple_of(FRAME_TICKS) {
             self.look(this, size, around);
         }
-        let braking_mps2 = around.braking_mps2(size);
+        let braking_mps2 = around.braking_mps2(size, self.speed_mps);
         let wanted_mps2 = if touched { -braking_mps2 } else { self.wanted_mps2(size, around, braking_mps2) };
         let acceleration_mps2 = wanted_mps2.clamp(-braking_mps2, size.acceleration_mps2_max);
         let speed_mps = (self.speed_mps + acceleration_mps2 * DT_S).max(0.0);
@@ -284,7 +284,10 @@ impl Driver {
         if self.change.is_none() {
             self.begin_change(this, size, around);
         }
-        self.leader = self.find_leader(this, size, around);
+        let beside = self.foresee(this, size, around);
+        let leader = self.find_leader(this, size, around);
+        let nearer = |a: &Leader, b: &Leader| a.gap_m.total_cmp(&b.gap_m);
+        self.leader = leader.into_iter().chain(beside).min_by(nearer);
         let held = self.hold_m.is_some();
         self.hold_m = self.find_hold_m(this, size, around);
         if held && self.hold_m.is_none() && self.speed_mps < SETS_OUT_MPS {

@@ -183,7 +183,7 @@ impl Driver {
     fn passage(&self, from_m: f64, to_m: f64, size: &BodyParameters, around: &Around) -> Passage {
         let front_m = self.station_m + size.length_m / 2.0;
         let in_m = from_m - front_m;
-        let braking_mps2 = around.braking_mps2(size);
+        let braking_mps2 = around.braking_mps2(size, self.speed_mps);
         let red_gap_m = self.stop_gap_m(size, around, braking_mps2);
         let holds =
             self.hold_m.is_some_and(|hold_m| hold_m < from_m) || red_gap_m.is_some_and(|gap_m| gap_m < in_m);

@@ -1,6 +1,7 @@
 //! Other drivers: how they follow, change lanes and let others go first.
 
 mod driver;
+mod foresight;
 mod manners;
 
 pub(super) use driver::Cruise;
