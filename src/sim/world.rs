@@ -7,11 +7,11 @@ use crate::action::SpawnFacts;
 use crate::action::SpawnRequest;
 use crate::action::Surroundings;
 use crate::geometry::FirstContact;
+use crate::geometry::Frame;
 use crate::geometry::OrientedBox;
 use crate::geometry::Pose;
 use crate::geometry::Sweep;
 use crate::geometry::Vec2;
-use crate::geometry::distance_m;
 use crate::geometry::first_contact;
 use crate::model::vocabulary::Body;
 use crate::model::vocabulary::Colour;
@@ -260,8 +260,9 @@ impl World {
             }
         }
         self.movers = movers;
+        let ego = Frame::of(&self.ego_outline);
         for obstacle in &mut self.obstacles {
-            obstacle.distance_m = distance_m(&self.ego_outline, &obstacle.outline);
+            obstacle.distance_m = ego.distance_m(&Frame::of(&obstacle.outline));
         }
         self.ticks += 1;
         if self.ambient.wanted() > 0 && self.ticks.is_multiple_of(RENEWAL_TICKS) {
