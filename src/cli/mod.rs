@@ -12,6 +12,8 @@ mod render;
 mod replay;
 mod run;
 mod run_directory;
+mod train;
+mod verify;
 mod why;
 
 use std::process::ExitCode;
@@ -46,6 +48,8 @@ pub fn main() -> ExitCode {
         Command::Why(arguments) => why::why(&output, arguments),
         Command::Fmt(arguments) => fmt::fmt(&output, arguments),
         Command::Run(arguments) => run::run(&output, arguments),
+        Command::Train(arguments) => train::train(&output, arguments),
+        Command::Verify(arguments) => verify::verify(&output, arguments),
         Command::Replay(arguments) => replay::replay(&output, arguments),
         Command::Render(arguments) => render::render(&output, arguments),
     };
