@@ -190,7 +190,8 @@ impl Frame {
             )
         };
         let meets = |shape: &Frame, centre: Vec2, extent: Vec2| {
-            centre.x.abs() <= shape.half_length_m + extent.x && centre.y.abs() <= shape.half_width_m + extent.y
+            centre.x.abs() <= shape.half_length_m + extent.x
+                && centre.y.abs() <= shape.half_width_m + extent.y
         };
         if meets(self, there, extent(other)) && meets(other, here, extent(self)) {
             return 0.0;
@@ -206,8 +207,7 @@ impl Frame {
         };
         let ahead = Vec2::new(cosine, sine);
         let left = Vec2::new(-sine, cosine);
-        let of_other =
-            nearest_m2(self, there, ahead * other.half_length_m, left * other.half_width_m);
+        let of_other = nearest_m2(self, there, ahead * other.half_length_m, left * other.half_width_m);
         // Seen from the other box, this one is turned the other way.
         let ahead = Vec2::new(cosine, -sine);
         let left = Vec2::new(sine, cosine);

@@ -45,13 +45,15 @@ pub enum DatabaseError {
     Layout { found: i64 },
     #[error("it names an episode {found}")]
     Episode { found: i64 },
+    #[error("its checkpoint is damaged: begin a new training")]
+    Checkpoint,
     #[error(transparent)]
     Sqlite(#[from] rusqlite::Error),
 }
 
 /// An open run database.
 pub struct Database {
-    connection: Connection,
+    pub(super) connection: Connection,
 }
 
 impl Database {
@@ -85,36 +87,7 @@ impl Database {
         in_words: impl Fn(&Draw) -> String,
     ) -> Result<(), DatabaseError> {
         let transaction = self.connection.transaction()?;
-        add_episode(&transaction, summary, log)?;
-        for (index, step) in log.steps.iter().enumerate() {
-            let (row, action, refused) = match &step.outcome {
-                Outcome::Done { draw, .. } => (Some(draw.row), Some(in_words(draw)), None),
-                Outcome::Passed => (None, None, None),
-                Outcome::Refused { row, rule, reason } => (
-                    Some(*row),
-                    None,
-                    Some(rule.as_ref().map_or(reason.clone(), |rule| format!("{rule}: {reason}"))),
-                ),
-            };
-            let mut values: Vec<rusqlite::types::Value> = vec![
-                (summary.episode as i64).into(),
-                (index as i64).into(),
-                step.time_s.into(),
-                row.map(|row| row as i64).into(),
-                action.into(),
-                refused.into(),
-                step.proc.into(),
-                step.reward.into(),
-            ];
-            values.extend(step.state.iter().map(|&value| f64::from(value).into()));
-            let places = vec!["?"; values.len()].join(", ");
-            transaction
-                .prepare_cached(&format!("INSERT INTO step VALUES ({places})"))?
-                .execute(rusqlite::params_from_iter(values))?;
-        }
-        for finding in &summary.collisions {
-            add_collision(&transaction, summary.episode, finding)?;
-        }
+        add_all(&transaction, summary, log, in_words)?;
         transaction.commit()?;
         Ok(())
     }
@@ -236,6 +209,46 @@ fn step_table() -> String {
            {}, PRIMARY KEY (episode, step)) STRICT;",
         states.join(", ")
     )
+}
+
+/// An episode with its steps and collisions.
+pub(super) fn add_all(
+    transaction: &Transaction,
+    summary: &EpisodeSummary,
+    log: &EpisodeLog,
+    in_words: impl Fn(&Draw) -> String,
+) -> Result<(), DatabaseError> {
+    add_episode(transaction, summary, log)?;
+    for (index, step) in log.steps.iter().enumerate() {
+        let (row, action, refused) = match &step.outcome {
+            Outcome::Done { draw, .. } => (Some(draw.row), Some(in_words(draw)), None),
+            Outcome::Passed => (None, None, None),
+            Outcome::Refused { row, rule, reason } => (
+                Some(*row),
+                None,
+                Some(rule.as_ref().map_or(reason.clone(), |rule| format!("{rule}: {reason}"))),
+            ),
+        };
+        let mut values: Vec<rusqlite::types::Value> = vec![
+            (summary.episode as i64).into(),
+            (index as i64).into(),
+            step.time_s.into(),
+            row.map(|row| row as i64).into(),
+            action.into(),
+            refused.into(),
+            step.proc.into(),
+            step.reward.into(),
+        ];
+        values.extend(step.state.iter().map(|&value| f64::from(value).into()));
+        let places = vec!["?"; values.len()].join(", ");
+        transaction
+            .prepare_cached(&format!("INSERT INTO step VALUES ({places})"))?
+            .execute(rusqlite::params_from_iter(values))?;
+    }
+    for finding in &summary.collisions {
+        add_collision(transaction, summary.episode, finding)?;
+    }
+    Ok(())
 }
 
 fn add_episode(

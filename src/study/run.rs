@@ -83,6 +83,12 @@ pub enum RunError {
     Agent { name: String, known: String },
     #[error("`{name}` has to be trained first: `avastra train`, then `avastra run --policy FILE`")]
     Untrained { name: String },
+    #[error("`{name}` has nothing to learn: `avastra run --agent {name}` plays it")]
+    Unteachable { name: String },
+    #[error("the checkpoint is not of a training with such settings: begin a new one")]
+    Checkpoint,
+    #[error(transparent)]
+    Settings(#[from] agent::SettingsError),
     #[error(transparent)]
     Rule(#[from] crate::action::UnknownRule),
     #[error("`{name}` is asked for twice, or both on and off")]
