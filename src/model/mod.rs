@@ -38,6 +38,7 @@ pub use load::load;
 pub use row::Reach;
 pub use row::Row;
 pub(crate) use row::locals;
+pub use scenario::Avoidability;
 pub use scenario::Claim;
 pub use scenario::ENDS;
 pub use scenario::Figure;
