@@ -147,6 +147,7 @@ fn run(space: Arc<Space>) -> Run {
         ambient: 0,
         without: Vec::new(),
         with: Vec::new(),
+        avoidability: Default::default(),
     };
     Run::new(ActionTable::new(space), settings).expect("the settings name what exists")
 }

@@ -11,6 +11,7 @@ use crate::action::ActionTable;
 use crate::emit;
 use crate::episode::EpisodeLog;
 use crate::model::Policy;
+use crate::oracle::AvoidabilitySettings;
 use crate::sim::ENGINE;
 use crate::study::EpisodeSummary;
 use crate::study::PolicyReference;
@@ -55,8 +56,7 @@ pub fn run(output: &Output, arguments: &RunArguments) -> Result<(), Failure> {
     let mut progress =
         Progress::new(run.episodes() as u64, done.len() as u64, output.quiet || output.is_json());
     let space_path = space_path(&run, &directory)?;
-    play(&run, &todo, jobs(arguments), &stop, &mut |number, log| {
-        let summary = EpisodeSummary::new(run.space(), number, &log);
+    play(&run, &todo, jobs(arguments), &stop, &mut |summary, log| {
         keep(&run, &mut directory, &space_path, &summary, &log)?;
         progress.episode(summary.counted());
         Ok(())
@@ -114,6 +114,7 @@ fn begun(output: &Output, arguments: &RunArguments) -> Result<(Run, RunDirectory
         ambient: arguments.ambient,
         without: arguments.rules.without.clone(),
         with: arguments.rules.with.clone(),
+        avoidability: AvoidabilitySettings::default(),
     };
     let run = ready(table, settings, policy.as_ref())?;
     let path = run_directory::create(arguments.out.as_deref())?;
@@ -198,9 +199,7 @@ fn keep(
     summary: &EpisodeSummary,
     log: &EpisodeLog,
 ) -> Result<(), Failure> {
-    let counted: Vec<usize> =
-        summary.collisions.iter().filter(|finding| finding.counted).map(|finding| finding.number).collect();
-    if !counted.is_empty() {
+    if summary.counted() > 0 {
         let name = format!("{}_{:04}", log.road, summary.episode);
         let source = emit::Provenance {
             name: &name,
@@ -210,7 +209,7 @@ fn keep(
             without: &run.settings().without,
             with: &run.settings().with,
         };
-        let file = emit::scenario(run.table(), log, &counted, &source);
+        let file = emit::scenario(run.table(), log, summary, &source);
         write(&directory.critical(&name), &crate::syntax::print(&file))?;
     }
     directory
@@ -284,10 +283,14 @@ fn totals_text(totals: &Totals, elapsed_s: f64, played: usize) -> String {
     if let Some(first_s) = totals.first_counted_s_mean {
         text.push_str(&format!(", the first after {first_s:.1} s on average"));
     }
-    if totals.counted < totals.collisions {
+    if totals.collisions > 0 {
         text.push_str(&format!(
             "\nof all: {} sudden, {} where the other ran into the ego vehicle",
             totals.sudden, totals.struck
+        ));
+        text.push_str(&format!(
+            "\nof all: {} avoidable by a careful driver, {} only without any delay, {} unavoidable",
+            totals.avoidable, totals.beyond_reference, totals.unavoidable
         ));
     }
     text

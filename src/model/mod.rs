@@ -45,6 +45,7 @@ pub use proofs::witness;
 pub use row::Reach;
 pub use row::Row;
 pub(crate) use row::locals;
+pub use scenario::Avoidability;
 pub use scenario::Claim;
 pub use scenario::ENDS;
 pub use scenario::Figure;

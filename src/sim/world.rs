@@ -1,5 +1,7 @@
 //! The world of one episode.
 
+mod playback;
+
 use std::sync::Arc;
 
 use crate::action::Effect;

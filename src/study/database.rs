@@ -20,7 +20,7 @@ use super::summary::EpisodeSummary;
 use super::summary::Finding;
 
 /// Layout of the tables; raised whenever a column changes.
-const SCHEMA_VERSION: i64 = 1;
+const SCHEMA_VERSION: i64 = 2;
 
 const SCHEMA: &str = "
 CREATE TABLE episode (
@@ -34,6 +34,7 @@ CREATE TABLE collision (
   ego_speed_mps REAL NOT NULL, closing_speed_mps REAL NOT NULL,
   on_ego_ahead_m REAL NOT NULL, on_ego_left_m REAL NOT NULL,
   repeated INTEGER NOT NULL, sudden INTEGER NOT NULL, struck INTEGER NOT NULL, counted INTEGER NOT NULL,
+  avoidability TEXT NOT NULL, hazard_onset_s REAL NOT NULL, avoided_by TEXT NOT NULL, evasion TEXT,
   PRIMARY KEY (episode, number)
 ) STRICT;
 ";
@@ -133,7 +134,10 @@ impl Database {
                         coalesce(sum(distance_m), 0.0), coalesce(sum(red_runs), 0), avg(first_counted_s),
                         (SELECT coalesce(sum(sudden), 0) FROM collision),
                         (SELECT coalesce(sum(struck), 0) FROM collision),
-                        (SELECT coalesce(sum(repeated), 0) FROM collision)
+                        (SELECT coalesce(sum(repeated), 0) FROM collision),
+                        (SELECT coalesce(sum(avoidability = 'avoidable'), 0) FROM collision),
+                        (SELECT coalesce(sum(avoidability = 'beyond_reference'), 0) FROM collision),
+                        (SELECT coalesce(sum(avoidability = 'unavoidable'), 0) FROM collision)
                  FROM episode",
             [],
             |row| {
@@ -153,6 +157,9 @@ impl Database {
                     sudden: row.get(12)?,
                     struck: row.get(13)?,
                     repeated: row.get(14)?,
+                    avoidable: row.get(15)?,
+                    beyond_reference: row.get(16)?,
+                    unavoidable: row.get(17)?,
                 })
             },
         )?)
@@ -198,6 +205,10 @@ pub struct Totals {
     pub sudden: i64,
     pub struck: i64,
     pub repeated: i64,
+    /// Collisions by what careful drivers make of them: their sum is `collisions`.
+    pub avoidable: i64,
+    pub beyond_reference: i64,
+    pub unavoidable: i64,
 }
 
 fn step_table() -> String {
@@ -280,10 +291,12 @@ fn add_collision(
     episode: usize,
     finding: &Finding,
 ) -> Result<(), rusqlite::Error> {
-    let (collision, facts) = (&finding.collision, &finding.facts);
+    let Finding { collision, facts, judgement, .. } = finding;
     let contact = &collision.contact;
     transaction
-        .prepare_cached("INSERT INTO collision VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)")?
+        .prepare_cached(
+            "INSERT INTO collision VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+        )?
         .execute(params![
             episode as i64,
             finding.number as i64,
@@ -300,6 +313,10 @@ fn add_collision(
             facts.sudden,
             facts.struck,
             finding.counted,
+            judgement.class.name(),
+            judgement.onset_s,
+            judgement.avoided_by.join(" "),
+            judgement.evasion,
         ])?;
     Ok(())
 }

@@ -17,6 +17,7 @@ pub use run::PolicyReference;
 pub use run::Run;
 pub use run::RunError;
 pub use run::RunSettings;
+pub use run::judge_replay;
 pub use run::play;
 pub use run::replay;
 pub use summary::EpisodeSummary;

@@ -62,6 +62,7 @@ pub fn run_of(space: Arc<Space>, episodes: u32, seed: u64, without: &[&str]) -> 
         ambient: 0,
         without: without.iter().map(|rule| (*rule).to_owned()).collect(),
         with: Vec::new(),
+        avoidability: Default::default(),
     };
     Run::new(ActionTable::new(space), settings).expect("the settings name what exists")
 }

@@ -7,12 +7,13 @@ use crate::action::ActionTable;
 use crate::agent::Agent;
 use crate::agent::QPolicy;
 use crate::episode;
+use crate::oracle::AvoidabilitySettings;
 use crate::rng;
 use crate::rng::Stream;
 use crate::study::arena::Arena;
 use crate::study::arena::choose;
+use crate::study::arena::judged;
 use crate::study::run::RunError;
-use crate::study::summary::EpisodeSummary;
 
 use super::training::with_period;
 
@@ -54,7 +55,8 @@ pub fn evaluate(
         agent.begin();
         let mut choose = |moment: &episode::Moment| choose(arena.table(), &mut agent, moment);
         let log = episode::run(&setup, &mut choose, &mut |_, _, _| {});
-        let counted = EpisodeSummary::new(arena.table().space(), number as usize, &log).counted() as u64;
+        let summary = judged(&setup, number as usize, &log, &AvoidabilitySettings::default());
+        let counted = summary.counted() as u64;
         found.collisions += log.collisions.len() as u64;
         found.counted += counted;
         found.colliding += u64::from(counted > 0);

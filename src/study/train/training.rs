@@ -27,10 +27,12 @@ use crate::mdp;
 use crate::mdp::Observation;
 use crate::mdp::StepOutcome;
 use crate::model::Space;
+use crate::oracle::AvoidabilitySettings;
 use crate::rng;
 use crate::rng::Stream;
 use crate::study::arena::Arena;
 use crate::study::arena::carry_out;
+use crate::study::arena::judged;
 use crate::study::arena::legal;
 use crate::study::run::RunError;
 use crate::study::run::check_episodes;
@@ -176,7 +178,7 @@ impl Training {
                 last = Some((moment.observation.clone(), legal));
             },
         );
-        let summary = EpisodeSummary::new(arena.table().space(), number, &log);
+        let summary = judged(&setup, number, &log, &AvoidabilitySettings::default());
         let (last, last_legal) = last.expect("every episode has a last moment");
         let trajectory = Trajectory {
             steps: experiences(&settings.hyperparameters, choices, &log, &summary),
