@@ -8,6 +8,7 @@ mod guide;
 mod modular;
 mod reference;
 mod registry;
+mod selected;
 mod status;
 mod steering;
 #[cfg(test)]
@@ -17,12 +18,19 @@ mod tests;
 
 pub use driver::Ads;
 pub use modular::ConfigError;
+pub use modular::Foresight;
 pub use modular::Modular;
 pub use modular::ModularConfig;
+pub use modular::Module;
+pub use modular::Weaknesses;
 pub use reference::Idm;
 pub use registry::Entry;
 pub use registry::REGISTRY;
 pub use registry::by_name;
+pub use selected::NoSettings;
+pub use selected::Selected;
+pub use status::GHOST_ID_MIN;
+pub use status::Manoeuvre;
 pub use status::PerceivedObject;
 pub use status::PlannedPoint;
 pub use status::Reason;

@@ -10,6 +10,7 @@ use super::modular::ModularConfig;
 use super::reference::Idm;
 
 /// A driving system that can be asked for by name.
+#[derive(Debug)]
 pub struct Entry {
     pub name: &'static str,
     pub summary: &'static str,
