@@ -15,6 +15,7 @@ use super::reference::Reference;
 use super::reference::Rss;
 
 /// A driving system that can be asked for by name.
+#[derive(Debug)]
 pub struct Entry {
     pub name: &'static str,
     pub summary: &'static str,
