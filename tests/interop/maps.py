@@ -7,7 +7,9 @@ any differ, or if a map holds nothing to compare. CARLA's y axis points south, i
 CARLA walks along cubics (`paramPoly3`) by chords of about half a metre, which is centimetres off in
 tight turns. There the judge is the standard's own definition, computed here by fine steps; how far CARLA
 is off is printed for information. Where two pieces of a reference line meet at an angle, a lane beside it
-leaps, and no pose can be compared: such places are left out and counted as kinks.
+leaps, and no pose can be compared: such places are left out and counted as kinks; as are lanes shorter than
+20 cm, for which CARLA gives their beginning whatever the station. Where a lane lies beyond the centre of a
+bend its curve runs backwards; its direction is that of the road.
 """
 
 import json
@@ -214,7 +216,7 @@ def compare(title, path, avastra):
         low, high = min(stations) + INSIDE_M, max(stations) - INSIDE_M
         road, against = lane["key"]["road"], stations[0] > stations[-1]
         for _, s, x, y, heading, _ in lane["poses"]:
-            if definition.at_kink(road, s):
+            if lane["length_m"] < 0.2 or definition.at_kink(road, s):
                 tally.kinks += 1
                 continue
             inside = min(max(s, low), high)
@@ -228,7 +230,9 @@ def compare(title, path, avastra):
             judge = (place.x, -place.y, -rotation.yaw)
             if definition.is_cubic(road, s):
                 tally.cubic += 1
-                exact = definition.pose(road, key[2], inside, against)
+                exact = definition.pose(road, key[2], s, against)
+                if turn_deg(exact[2], judge[2]) > 90.0:
+                    exact = (exact[0], exact[1], exact[2] + 180.0)
                 tally.theirs_m = max(tally.theirs_m, math.hypot(exact[0] - judge[0], exact[1] - judge[1]))
                 tally.theirs_deg = max(tally.theirs_deg, turn_deg(exact[2], judge[2]))
                 judge = exact
