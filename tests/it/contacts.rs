@@ -336,7 +336,8 @@ type Before = (OrientedBox, Vec<Obstacle>);
 
 #[test]
 fn the_contacts_of_whole_episodes_are_the_twins() {
-    let run = run(24, 5, &[]);
+    // Without the rule that keeps newcomers at a fair distance there is more to find.
+    let run = run(16, 5, &["no_teleport"]);
     let (mut contacts, mut misses) = (0, 0);
     for number in 0..run.episodes() {
         let log = run.episode(number);
