@@ -56,6 +56,14 @@ impl Sweep {
         OrientedBox { pose, ..self.start }
     }
 
+    /// Velocity, as the way it would make during the whole motion, of the point of the box that is at
+    /// `point` after a part of it, m.
+    pub fn rate_m(&self, fraction: f64, point: Vec2) -> Vec2 {
+        let turn_rad = wrap_angle(self.end.heading_rad - self.start.pose.heading_rad);
+        let arm = point - self.at(fraction).pose.position;
+        self.displacement() + Vec2::new(-arm.y, arm.x) * turn_rad
+    }
+
     fn displacement(&self) -> Vec2 {
         self.end.position - self.start.pose.position
     }

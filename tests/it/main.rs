@@ -3,9 +3,11 @@
 
 mod cases;
 mod command;
+mod contacts;
 mod drives;
 mod emitted;
 mod layers;
 mod rules;
 mod tables;
+mod traces;
 mod world;
