@@ -144,6 +144,7 @@ fn run(space: Arc<Space>) -> Run {
         seed: 1,
         without: Vec::new(),
         with: Vec::new(),
+        avoidability: Default::default(),
     };
     Run::new(ActionTable::new(space), settings).expect("the settings name what exists")
 }
