@@ -61,6 +61,8 @@ pub enum Reason {
     Follow(u32),
     /// Something that will cross the way.
     Yield(u32),
+    /// Waits for a gap in the lane that it must change to.
+    LaneChange,
     /// Lost the route: constant braking.
     Fallback,
 }
@@ -74,6 +76,7 @@ impl fmt::Display for Reason {
             Reason::Stop(id) => write!(f, "stop {id}"),
             Reason::Follow(id) => write!(f, "follow {id}"),
             Reason::Yield(id) => write!(f, "yield {id}"),
+            Reason::LaneChange => write!(f, "lane change"),
             Reason::Fallback => write!(f, "fallback"),
         }
     }

@@ -33,6 +33,31 @@ pub fn straight() -> Arc<Scene> {
     scene(&[(600.0, 0.0, 0.0)])
 }
 
+/// A one-way road of two lanes along +x, 400 m long. The route starts in the right-hand lane, at
+/// y = -5.25 m, and has its goal after 350 m in the left-hand one, at y = -1.75 m. A solid line closes
+/// the way between them after `open_m`.
+pub fn two_lanes(open_m: f64) -> Arc<Scene> {
+    let lane = |id: i32, mark: &str| {
+        format!(
+            r#"<lane id="{id}" type="driving"><width sOffset="0" a="3.5" b="0" c="0" d="0"/>{mark}</lane>"#
+        )
+    };
+    let mark = format!(r#"<roadMark sOffset="0" type="broken"/><roadMark sOffset="{open_m}" type="solid"/>"#);
+    let text = format!(
+        r#"<OpenDRIVE><header name="two lanes"/><road id="1" length="400" junction="-1">
+        <type s="0" type="town"><speed max="50" unit="km/h"/></type>
+        <planView><geometry s="0" x="0" y="0" hdg="0" length="400"><line/></geometry></planView>
+        <lanes><laneSection s="0"><right>{}{}</right></laneSection></lanes></road></OpenDRIVE>"#,
+        lane(-1, &mark),
+        lane(-2, "")
+    );
+    let map = RoadMap::from_opendrive("two lanes", &text).expect("the road is sound");
+    let start = map.place("1", -2, 0.0).expect("the road begins");
+    let goal = map.place("1", -1, 350.0).expect("the road is long");
+    let route = Route::find(&map, start, goal).expect("a lane change leads there");
+    Arc::new(Scene::new(map.into(), route))
+}
+
 /// Straights, a right-angled bend of 15 m radius to the left and a hairpin of 10 m to the right,
 /// each entered and left by clothoids of 8 m.
 pub fn winding() -> Arc<Scene> {
@@ -93,7 +118,7 @@ fn scene(pieces: &[(f64, f64, f64)]) -> Arc<Scene> {
     let goal = map.place("1", -1, station_m - 40.0).expect("the road is long");
     let mut route = Route::find(&map, start, goal).expect("one lane leads there");
     route.stop_lines.push(RouteStopLine { station_m: 100.0, signal: 0 });
-    Arc::new(Scene { map: map.into(), route })
+    Arc::new(Scene::new(map.into(), route))
 }
 
 /// An object that keeps its velocity until it brakes.
@@ -209,5 +234,5 @@ pub fn corner() -> Arc<Scene> {
     let start = map.nearest(Vec2::new(0.0, 0.0), 2.377, 1.0).expect("a lane at the start");
     let goal = map.nearest(Vec2::new(-71.4, 145.5), -2.983, 1.0).expect("a lane at the goal");
     let route = Route::find(&map, start, goal).expect("the goal can be reached");
-    Arc::new(Scene { map: map.into(), route })
+    Arc::new(Scene::new(map.into(), route))
 }

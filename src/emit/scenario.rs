@@ -121,6 +121,7 @@ fn start(space: &Space, log: &EpisodeLog) -> Vec<Field> {
             tree::field("signal_phase", tree::quantity(log.start.signal_phase_s, Dimension::DURATION)),
             tree::field("traffic_seed", tree::whole(log.start.seed)),
         ])
+        .chain((log.start.ambient > 0).then(|| tree::field("ambient", tree::whole(log.start.ambient.into()))))
         .collect()
 }
 

@@ -41,6 +41,8 @@ pub struct ScenarioStart {
     pub signal_phase_s: f64,
     /// `traffic_seed`: seed of the choices of other road users.
     pub traffic_seed: Option<u64>,
+    /// `ambient`: vehicles of ambient traffic; 0 if not given.
+    pub ambient: u32,
 }
 
 #[derive(Debug, Clone, PartialEq)]

@@ -47,8 +47,8 @@ pub fn counted(space: &Space, log: &EpisodeLog, judgements: &[Judgement]) -> Vec
     (0..log.collisions.len()).filter(counts).collect()
 }
 
-/// A contact this near to two faces is one of the corner between them, m. Ten times what a first
-/// contact leaves open.
+/// A contact this near to two faces is one of the corner between them, m. Far more than a first contact
+/// leaves open.
 const CORNER_M: f64 = 1e-3;
 
 /// Whether the obstacle ran into the ego vehicle rather than the other way round.

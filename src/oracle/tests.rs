@@ -49,8 +49,9 @@ fn world() -> World {
         wetness: Level::None,
         signal_phase_s: 0.0,
         seed: 1,
+        ambient: 0,
     };
-    World::new(Arc::new(Scene { map: map.into(), route }), &start)
+    World::new(Arc::new(Scene::new(map.into(), route)), &start)
 }
 
 /// IDM with weak brakes, or none.

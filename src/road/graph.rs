@@ -9,6 +9,7 @@ use super::centre_line::CentreLine;
 use super::centre_line::NoCentreLine;
 use super::centre_line::centre_line;
 use super::index::LaneGrid;
+use super::lane_change::permitted;
 use super::map::Junction;
 use super::map::Lane;
 use super::map::LaneIndex;
@@ -145,7 +146,10 @@ impl<'a> Builder<'a> {
                     let index = LaneIndex(self.map.lanes.len());
                     self.lanes.insert((road_index, section_index, element.id), index);
                     let limit_mps = limit_mps.unwrap_or(LIMIT_MPS_DEFAULT);
-                    self.map.lanes.push(new_lane(key, centre, limit_mps, junction));
+                    self.map.lanes.push(Lane {
+                        keeps_left: road.left_hand,
+                        ..new_lane(key, centre, limit_mps, junction)
+                    });
                 }
             }
         }
@@ -322,8 +326,29 @@ impl<'a> Builder<'a> {
                     } else {
                         of_right.right = neighbour(left_index);
                     }
+                    if same_direction && road.junction.is_none() {
+                        let [to_right, to_left] = permitted(road, section, left, right);
+                        self.allow_changes(left_index, right_index, &to_right);
+                        self.allow_changes(right_index, left_index, &to_left);
+                    }
                 }
             }
+        }
+    }
+
+    /// Permits changes from a lane to its neighbour between stations of the road's reference line.
+    fn allow_changes(&mut self, from: LaneIndex, to: LaneIndex, parts_m: &[(f64, f64)]) {
+        let lane = &mut self.map.lanes[from.0];
+        let stations_m = |(a_m, b_m): &(f64, f64)| {
+            let (a_m, b_m) = (lane.station_of(*a_m), lane.station_of(*b_m));
+            (a_m.min(b_m), a_m.max(b_m))
+        };
+        let mut parts_m: Vec<(f64, f64)> = parts_m.iter().map(stations_m).collect();
+        parts_m.sort_by(|a, b| a.0.total_cmp(&b.0));
+        if lane.left.is_some_and(|left| left.lane == to) {
+            lane.changes_left_m = parts_m;
+        } else {
+            lane.changes_right_m = parts_m;
         }
     }
 }
@@ -356,10 +381,13 @@ fn new_lane(key: LaneKey, centre: CentreLine, speed_limit_mps: f64, junction: Op
         centre: centre.path,
         widths_m: centre.widths_m,
         speed_limit_mps,
+        keeps_left: false,
         successors: Vec::new(),
         predecessors: Vec::new(),
         left: None,
         right: None,
+        changes_left_m: Vec::new(),
+        changes_right_m: Vec::new(),
         junction,
         stop_lines: Vec::new(),
         road_stations_m: centre.road_stations_m,

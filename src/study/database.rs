@@ -2,6 +2,7 @@
 //!
 //! Each episode is one transaction, so a kill at any moment loses at most the episode under way.
 
+use std::collections::BTreeMap;
 use std::collections::BTreeSet;
 use std::path::Path;
 
@@ -45,13 +46,15 @@ pub enum DatabaseError {
     Layout { found: i64 },
     #[error("it names an episode {found}")]
     Episode { found: i64 },
+    #[error("its checkpoint is damaged: begin a new training")]
+    Checkpoint,
     #[error(transparent)]
     Sqlite(#[from] rusqlite::Error),
 }
 
 /// An open run database.
 pub struct Database {
-    connection: Connection,
+    pub(super) connection: Connection,
 }
 
 impl Database {
@@ -85,36 +88,7 @@ impl Database {
         in_words: impl Fn(&Draw) -> String,
     ) -> Result<(), DatabaseError> {
         let transaction = self.connection.transaction()?;
-        add_episode(&transaction, summary, log)?;
-        for (index, step) in log.steps.iter().enumerate() {
-            let (row, action, refused) = match &step.outcome {
-                Outcome::Done { draw, .. } => (Some(draw.row), Some(in_words(draw)), None),
-                Outcome::Passed => (None, None, None),
-                Outcome::Refused { row, rule, reason } => (
-                    Some(*row),
-                    None,
-                    Some(rule.as_ref().map_or(reason.clone(), |rule| format!("{rule}: {reason}"))),
-                ),
-            };
-            let mut values: Vec<rusqlite::types::Value> = vec![
-                (summary.episode as i64).into(),
-                (index as i64).into(),
-                step.time_s.into(),
-                row.map(|row| row as i64).into(),
-                action.into(),
-                refused.into(),
-                step.proc.into(),
-                step.reward.into(),
-            ];
-            values.extend(step.state.iter().map(|&value| f64::from(value).into()));
-            let places = vec!["?"; values.len()].join(", ");
-            transaction
-                .prepare_cached(&format!("INSERT INTO step VALUES ({places})"))?
-                .execute(rusqlite::params_from_iter(values))?;
-        }
-        for finding in &summary.collisions {
-            add_collision(&transaction, summary.episode, finding)?;
-        }
+        add_all(&transaction, summary, log, in_words)?;
         transaction.commit()?;
         Ok(())
     }
@@ -128,6 +102,23 @@ impl Database {
         let numbers = statement.query_map([], |row| row.get::<_, i64>(0))?;
         let number = |found: i64| usize::try_from(found).map_err(|_| DatabaseError::Episode { found });
         numbers.map(|found| number(found?)).collect()
+    }
+
+    /// Why steps passed although something was asked for, and how often; the most frequent first.
+    /// Figures in a reason are left out, so that reasons can be told apart.
+    ///
+    /// # Errors
+    /// If the file cannot be read.
+    pub fn refusals(&self) -> Result<Vec<RefusalCount>, DatabaseError> {
+        let mut statement = self.connection.prepare("SELECT refused FROM step WHERE refused IS NOT NULL")?;
+        let mut counts: BTreeMap<String, i64> = BTreeMap::new();
+        for reason in statement.query_map([], |row| row.get::<_, String>(0))? {
+            *counts.entry(without_figures(&reason?)).or_default() += 1;
+        }
+        let mut refusals: Vec<RefusalCount> =
+            counts.into_iter().map(|(reason, times)| RefusalCount { reason, times }).collect();
+        refusals.sort_by_key(|refusal| -refusal.times);
+        Ok(refusals)
     }
 
     /// Totals over all episodes.
@@ -175,6 +166,23 @@ impl Database {
     }
 }
 
+/// How often a reason kept an action from being carried out.
+#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
+pub struct RefusalCount {
+    pub reason: String,
+    pub times: i64,
+}
+
+/// A reason with `…` for each number.
+fn without_figures(reason: &str) -> String {
+    let is_figure = |word: &str| word.parse::<f64>().is_ok();
+    let shown = reason.split(' ').map(|word| {
+        let bare = word.trim_end_matches([',', ';']);
+        if is_figure(bare) { word.replace(bare, "…") } else { word.to_owned() }
+    });
+    shown.collect::<Vec<_>>().join(" ")
+}
+
 /// What a run has found so far.
 #[derive(Debug, Clone, Default, PartialEq, serde::Serialize)]
 pub struct Totals {
@@ -212,6 +220,46 @@ fn step_table() -> String {
            {}, PRIMARY KEY (episode, step)) STRICT;",
         states.join(", ")
     )
+}
+
+/// An episode with its steps and collisions.
+pub(super) fn add_all(
+    transaction: &Transaction,
+    summary: &EpisodeSummary,
+    log: &EpisodeLog,
+    in_words: impl Fn(&Draw) -> String,
+) -> Result<(), DatabaseError> {
+    add_episode(transaction, summary, log)?;
+    for (index, step) in log.steps.iter().enumerate() {
+        let (row, action, refused) = match &step.outcome {
+            Outcome::Done { draw, .. } => (Some(draw.row), Some(in_words(draw)), None),
+            Outcome::Passed => (None, None, None),
+            Outcome::Refused { row, rule, reason } => (
+                Some(*row),
+                None,
+                Some(rule.as_ref().map_or(reason.clone(), |rule| format!("{rule}: {reason}"))),
+            ),
+        };
+        let mut values: Vec<rusqlite::types::Value> = vec![
+            (summary.episode as i64).into(),
+            (index as i64).into(),
+            step.time_s.into(),
+            row.map(|row| row as i64).into(),
+            action.into(),
+            refused.into(),
+            step.proc.into(),
+            step.reward.into(),
+        ];
+        values.extend(step.state.iter().map(|&value| f64::from(value).into()));
+        let places = vec!["?"; values.len()].join(", ");
+        transaction
+            .prepare_cached(&format!("INSERT INTO step VALUES ({places})"))?
+            .execute(rusqlite::params_from_iter(values))?;
+    }
+    for finding in &summary.collisions {
+        add_collision(transaction, summary.episode, finding)?;
+    }
+    Ok(())
 }
 
 fn add_episode(
@@ -271,4 +319,16 @@ fn add_collision(
             judgement.evasion,
         ])?;
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn reasons_differ_by_their_words() {
+        let reason = "no_teleport: the gap would be 12.5 m, a fair one is 17 m";
+        assert_eq!(without_figures(reason), "no_teleport: the gap would be … m, a fair one is … m");
+        assert_eq!(without_figures("cannot spawn: no lane on the left"), "cannot spawn: no lane on the left");
+    }
 }

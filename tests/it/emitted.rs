@@ -13,6 +13,7 @@ use avastra::episode::Watch;
 use avastra::oracle;
 use avastra::study::EpisodeSummary;
 use avastra::study::Run;
+use avastra::study::RunSettings;
 use avastra::study::play;
 
 use crate::cases::expect_snapshot;
@@ -30,6 +31,19 @@ fn every_log_replays_to_the_bit() {
     let run = run(EPISODES, 7, &[]);
     for number in 0..run.episodes() {
         assert_replays(&run, number, &run.episode(number));
+    }
+}
+
+#[test]
+fn ambient_traffic_replays_to_the_bit() {
+    let quiet = run(4, 7, &[]);
+    let settings = RunSettings { ambient: 6, ..quiet.settings().clone() };
+    let busy = Run::new(quiet.table().clone(), settings).expect("the settings name what exists");
+    for number in 0..busy.episodes() {
+        let log = busy.episode(number);
+        assert_eq!(log.start.ambient, 6);
+        assert_ne!(log.trace(), quiet.episode(number).trace());
+        assert_replays(&busy, number, &log);
     }
 }
 

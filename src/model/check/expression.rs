@@ -641,13 +641,12 @@ pub(super) fn unknown_unit(word: &ast::Name) -> Diagnostic {
     let letters = |word: &str| word.chars().filter(|c| c.is_alphanumeric()).collect::<String>();
     // `kmh` means `km/h` rather than `km`.
     let meant = words().find(|unit| letters(unit) == letters(&word.text) && !letters(unit).is_empty());
-    let help = match meant.or(nearest(&word.text, words())) {
-        Some(near) => format!("did you mean `{near}`?"),
-        None => format!("the units are {}", words().collect::<Vec<_>>().join(", ")),
-    };
-    Diagnostic::error(code::UNKNOWN_UNIT, format!("unknown unit `{}`", word.text))
-        .at(word.span, "not a unit")
-        .help(help)
+    let error = Diagnostic::error(code::UNKNOWN_UNIT, format!("unknown unit `{}`", word.text))
+        .at(word.span, "not a unit");
+    match meant.or(nearest(&word.text, words())) {
+        Some(near) => error.meant(word.span, near),
+        None => error.help(format!("the units are {}", words().collect::<Vec<_>>().join(", "))),
+    }
 }
 
 /// Reads `12`, `0.50` and `1e-9` exactly, if they fit.

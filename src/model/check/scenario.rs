@@ -4,10 +4,13 @@ use std::sync::Arc;
 
 use crate::model::check::names::Names;
 use crate::model::check::names::unknown;
+use crate::model::check::scenario_rules::Moment;
+use crate::model::check::scenario_rules::breaches;
 use crate::model::check::scenario_value::figure;
 use crate::model::check::scenario_value::number;
 use crate::model::check::scenario_value::value;
 use crate::model::code;
+use crate::model::limits::AMBIENT_MAX;
 use crate::model::limits::SIGNAL_PHASE_S;
 use crate::model::row::Row;
 use crate::model::row::locals;
@@ -61,7 +64,7 @@ pub fn scenario(file: &ast::File, space: &Space) -> Result<Scenario, Vec<Diagnos
     let origin = reader.origin(&declared.origin);
     let road = reader.road(&declared.road);
     let start = reader.start(declared);
-    let steps = reader.steps(&declared.steps, &start.memory, &origin);
+    let steps = reader.steps(&declared.steps, &start.memory, &origin, road);
     let claims = declared.expects.iter().filter_map(|expect| reader.claim(expect)).collect();
     let docs = item.docs.iter().map(|doc| doc.text.clone()).collect();
     let name = declared.name.text.clone();
@@ -154,7 +157,7 @@ impl<'a> Reader<'a> {
         let space = self.space;
         // The seed is arbitrary: what it draws is replaced below, or reported as missing.
         let mut memory = space.initial_memory(0);
-        let mut start = (0.0, None);
+        let mut start = (0.0, None, 0);
         self.once("field", &declared.start);
         for field in &declared.start {
             match field.name.text.as_str() {
@@ -169,11 +172,22 @@ impl<'a> Reader<'a> {
                     }
                 }
                 "traffic_seed" => start.1 = self.whole(&field.value),
+                "ambient" => {
+                    let wanted = self.whole(&field.value).unwrap_or(0);
+                    if wanted > u64::from(AMBIENT_MAX) {
+                        let message = format!("{wanted} ambient vehicles are not possible");
+                        let error = Diagnostic::error(code::OUT_OF_RANGE, message);
+                        self.report(
+                            error.at(field.value.span, format!("must lie within 0 .. {AMBIENT_MAX}")),
+                        );
+                    }
+                    start.2 = wanted.min(u64::from(AMBIENT_MAX)) as u32;
+                }
                 name => match space.state(name) {
                     Some(state) => self.start_state(state, &field.value, &mut memory),
                     None => {
                         let states = space.states.iter().map(|state| state.name.as_str());
-                        let names = states.chain(["signal_phase", "traffic_seed"]);
+                        let names = states.chain(["signal_phase", "traffic_seed", "ambient"]);
                         self.report(unknown("field", name, field.name.span, names));
                     }
                 },
@@ -187,7 +201,7 @@ impl<'a> Reader<'a> {
                 self.report(error.help(format!("add `start {{ {}: … }}`", state.name)));
             }
         }
-        ScenarioStart { memory, signal_phase_s: start.0, traffic_seed: start.1 }
+        ScenarioStart { memory, signal_phase_s: start.0, traffic_seed: start.1, ambient: start.2 }
     }
 
     /// `time: Noon`, `sky: None` for all keys, `sky: { Rain: High }` for some.
@@ -214,9 +228,15 @@ impl<'a> Reader<'a> {
         }
     }
 
-    fn steps(&mut self, declared: &[ast::Step], start: &Memory, origin: &Origin) -> Vec<ScenarioStep> {
+    fn steps(
+        &mut self,
+        declared: &[ast::Step],
+        start: &Memory,
+        origin: &Origin,
+        road: Option<usize>,
+    ) -> Vec<ScenarioStep> {
         let mut steps: Vec<ScenarioStep> = Vec::new();
-        let mut memory = start.clone();
+        let mut history = vec![(0, start.clone())];
         for step in declared {
             let number = step.number.digits.parse::<u64>();
             let Ok(number) = number else {
@@ -242,9 +262,11 @@ impl<'a> Reader<'a> {
             let action = &self.space.actions[row.action];
             let Some(drawn) = self.drawn(step, action) else { continue };
             let locals = locals(action, row, &drawn);
-            let after = self.space.memory_after(row.action, &locals, &memory);
-            self.check_moves(step, row, (&memory, &after), origin);
-            memory = after;
+            let memory = &history[history.len() - 1].1;
+            let after = self.space.memory_after(row.action, &locals, memory);
+            let moment = Moment { step, row, locals: &locals, after: &after, history: &history, road };
+            self.diagnostics.extend(breaches(self.space, &moment, origin));
+            history.push((number, after));
             steps.push(ScenarioStep { number, row: Some(row.index), drawn });
         }
         steps
@@ -357,22 +379,6 @@ impl<'a> Reader<'a> {
             values.push((parameter.name.clone(), value));
         }
         sound.then_some(values)
-    }
-
-    /// Steps must obey the transition rules that were in force.
-    fn check_moves(&mut self, step: &ast::Step, row: &Row, memory: (&Memory, &Memory), origin: &Origin) {
-        for rule in row.rules.iter().map(|rule| &self.space.rules[*rule]) {
-            let asked = if rule.optional { origin.with.contains(&rule.name) } else { true };
-            if !asked || origin.without.contains(&rule.name) {
-                continue;
-            }
-            let Some(reason) = self.space.forbidden_move(rule, memory.0, memory.1) else { continue };
-            let message = format!("step {} breaks rule `{}`", step.number.digits, rule.name);
-            let error = Diagnostic::error(code::BROKEN_RULE, message)
-                .at(step.span, reason)
-                .beside(rule.span, "does not allow it");
-            self.diagnostics.push(error);
-        }
     }
 
     fn claim(&mut self, expect: &ast::Expect) -> Option<Claim> {

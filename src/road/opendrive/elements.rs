@@ -69,6 +69,26 @@ pub struct LaneElement {
     pub successors: Vec<i32>,
     /// As in [`RoadElement::speeds`], from the section's beginning.
     pub speeds: Vec<(f64, Option<f64>)>,
+    /// Markings of its outer line, by rising beginning.
+    pub marks: Vec<MarkElement>,
+}
+
+/// A marking between two lanes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MarkElement {
+    /// From the section's beginning, m.
+    pub begin_m: f64,
+    pub rule: MarkRule,
+}
+
+/// Into which lane one may change over a marking, by the order of their ids.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum MarkRule {
+    Both,
+    Neither,
+    /// Only into the lane with the greater id.
+    Increase,
+    Decrease,
 }
 
 #[derive(Debug, Clone)]

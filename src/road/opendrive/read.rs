@@ -13,6 +13,8 @@ use super::elements::ControllerElement;
 use super::elements::Document;
 use super::elements::JunctionElement;
 use super::elements::LaneElement;
+use super::elements::MarkElement;
+use super::elements::MarkRule;
 use super::elements::ObjectElement;
 use super::elements::Orientation;
 use super::elements::Outline;
@@ -36,6 +38,17 @@ const LANES_MAX: i32 = 100;
 /// One curve may turn so far, rad; a real one turns by a few.
 const TURN_RAD_MAX: f64 = 200.0;
 
+/// What is wrong with a text that is no XML. A text that ends too early is told by its last line:
+/// the reader of XML points at its beginning.
+fn not_xml(text: &str, error: &roxmltree::Error) -> RoadError {
+    let message = error.to_string();
+    if matches!(error, roxmltree::Error::UnexpectedEndOfStream | roxmltree::Error::UnclosedRootNode) {
+        let last = u32::try_from(text.trim_end().lines().count()).unwrap_or(u32::MAX);
+        return wrong(last, format!("this is not well-formed XML, as if cut off in the middle: {message}"));
+    }
+    wrong(error.pos().row, format!("this is not well-formed XML: {message}"))
+}
+
 /// Reads a whole file.
 ///
 /// # Errors
@@ -44,8 +57,7 @@ pub fn read(name: &str, text: &str) -> Result<Document, RoadError> {
     if text.trim().is_empty() {
         return Err(wrong(1, "the file is empty; an OpenDRIVE map is expected"));
     }
-    let document = roxmltree::Document::parse(text)
-        .map_err(|error| wrong(error.pos().row, format!("this is not well-formed XML: {error}")))?;
+    let document = roxmltree::Document::parse(text).map_err(|error| not_xml(text, &error))?;
     let lines = Lines::new(text);
     let root = Element::new(document.root_element(), &lines);
     if root.name() != "OpenDRIVE" {
@@ -207,6 +219,9 @@ impl Reader {
         if driving && widths.is_empty() && borders.is_empty() {
             return Err(lane.wrong(format!("lane {id} has neither `width` nor `border`")));
         }
+        let marks = lane.children("roadMark");
+        let mut marks: Vec<MarkElement> = marks.map(|mark| road_mark(mark, id)).collect::<Result<_, _>>()?;
+        marks.sort_by(|a, b| a.begin_m.total_cmp(&b.begin_m));
         Ok(LaneElement {
             id,
             line: lane.line(),
@@ -216,6 +231,7 @@ impl Reader {
             predecessors: linked("predecessor")?,
             successors: linked("successor")?,
             speeds,
+            marks,
         })
     }
 
@@ -304,6 +320,28 @@ impl Reader {
         }
         Ok(all)
     }
+}
+
+/// A marking at the outer line of a lane. What `laneChange` says holds; without it, what drivers read
+/// from the paint: solid lines and anything raised forbid, a broken line beside a solid one permits a
+/// change from its own side.
+fn road_mark(mark: Element, lane: i32) -> Result<MarkElement, RoadError> {
+    // Of double lines the inner one, nearer to the reference line, is named first.
+    let (outwards, inwards) = match lane < 0 {
+        true => (MarkRule::Decrease, MarkRule::Increase),
+        false => (MarkRule::Increase, MarkRule::Decrease),
+    };
+    let rule = match (mark.attribute("laneChange"), mark.attribute("type").unwrap_or("none")) {
+        (Some("both"), _) => MarkRule::Both,
+        (Some("none"), _) => MarkRule::Neither,
+        (Some("increase"), _) => MarkRule::Increase,
+        (Some("decrease"), _) => MarkRule::Decrease,
+        (_, "solid" | "solid solid" | "curb" | "edge" | "grass") => MarkRule::Neither,
+        (_, "solid broken") => inwards,
+        (_, "broken solid") => outwards,
+        _ => MarkRule::Both,
+    };
+    Ok(MarkElement { begin_m: mark.number_or("sOffset", 0.0)?, rule })
 }
 
 fn piece(geometry: Element) -> Result<Piece, RoadError> {
