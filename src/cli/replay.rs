@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use crate::model::Avoidability;
 use crate::model::Scenario;
 use crate::oracle;
 use crate::study;
@@ -26,7 +27,11 @@ pub fn replay(output: &Output, arguments: &ReplayArguments) -> Result<(), Failur
         if let Some(ads) = ads {
             let counted = oracle::counted(table.space(), &log, &judgements).len();
             let collisions = plural(log.collisions.len(), "collision");
-            output.say(&format!("{} against {ads}: {collisions}, {counted} counted", path.display()));
+            let avoidable = judgements.iter().filter(|j| j.class == Avoidability::Avoidable).count();
+            output.say(&format!(
+                "{} against {ads}: {collisions}, {counted} counted, {avoidable} avoidable",
+                path.display()
+            ));
             results.push(serde_json::json!({
                 "file": path, "scenario": scenario.name, "ads": ads,
                 "collisions": log.collisions.len(), "counted": counted, "judgements": judgements,

@@ -282,6 +282,11 @@ fn rewards_and_verdicts_are_computed() {
     let hit = crate::model::OutcomeFacts { struck: true, ..crash };
     assert_eq!([crash, quiet, Default::default()].map(|outcome| space.reward(outcome)), [7.5, 0.5, -1.0]);
     assert_eq!([crash, quiet, hit].map(|outcome| space.counts(outcome)), [true, false, false]);
+
+    let loaded = load_files(&[("a.ava", &format!("{BASE}verdict counted: collision and avoidable\n"))]);
+    let space = loaded.space.unwrap();
+    let careless = crate::model::OutcomeFacts { avoidable: true, ..crash };
+    assert_eq!([crash, careless].map(|outcome| space.counts(outcome)), [false, true]);
     assert_eq!(space.verdict("unknown", crash), None);
 }
 

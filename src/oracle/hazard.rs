@@ -24,13 +24,15 @@ const STRIDE: usize = 2 * FRAME_TICKS as usize;
 pub fn onset(recording: &[World], obstacle: u32, met: OrientedBox) -> Option<usize> {
     let mut way: Vec<OrientedBox> = vec![met];
     let mut sensed = recording.last()?.sensed();
+    // Backwards in time: whether the hazard has begun to be one, and the earliest sight of it.
+    let mut began = false;
     let mut first = None;
     for (index, world) in recording.iter().enumerate().rev() {
         let left = recording.len() - index;
         if left.is_multiple_of(STRIDE) {
             way.push(world.ego_outline());
         }
-        if !left.is_multiple_of(FRAME_TICKS as usize) && first.is_some() {
+        if !left.is_multiple_of(FRAME_TICKS as usize) && began {
             continue;
         }
         let Some(other) = world.obstacles().iter().find(|other| other.id == obstacle) else { break };
@@ -39,9 +41,13 @@ pub fn onset(recording: &[World], obstacle: u32, met: OrientedBox) -> Option<usi
             then.pose.position += other.velocity_mps * (step * STRIDE) as f64 * DT_S;
             way.iter().any(|ego| near(ego, &then))
         });
-        if !conflicts && first.is_some() {
-            break;
+        if !conflicts {
+            if began {
+                break;
+            }
+            continue;
         }
+        began = true;
         world.sense(&mut sensed);
         let seen = sensed.objects.iter().find(|object| object.id == obstacle);
         if seen.is_some_and(|object| in_sight(object, &sensed.conditions)) {

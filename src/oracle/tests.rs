@@ -19,6 +19,7 @@ use crate::model::vocabulary::Verb;
 use crate::road::RoadMap;
 use crate::road::Route;
 use crate::sim::Control;
+use crate::sim::DT_S;
 use crate::sim::Scene;
 use crate::sim::Sensed;
 use crate::sim::Start;
@@ -27,6 +28,7 @@ use crate::sim::World;
 use super::avoidable::AvoidabilitySettings;
 use super::avoidable::Judgement;
 use super::avoidable::judge_one;
+use super::hazard::onset;
 
 /// A lane each way along +x for 800 m, 3 m wide: too narrow to pass anybody in it.
 const NARROW: &str = r#"<OpenDRIVE><header name="narrow"/>
@@ -75,10 +77,14 @@ impl Ads for Broken {
 }
 
 fn vehicle(world: &mut World, distance_m: f64, speed_mps: f64) {
+    appear(world, Body::Sedan, Verb::DriveAhead, distance_m, speed_mps);
+}
+
+fn appear(world: &mut World, body: Body, verb: Verb, distance_m: f64, speed_mps: f64) {
     let request = SpawnRequest {
-        body: Body::Sedan,
+        body,
         colour: Colour::Red,
-        verb: Verb::DriveAhead,
+        verb,
         lane: LaneChoice::Current,
         side: Side::Right,
         then: Then::Keep,
@@ -88,14 +94,17 @@ fn vehicle(world: &mut World, distance_m: f64, speed_mps: f64) {
     world.apply(&Effect::Spawn(request)).expect("there is room");
 }
 
-/// Drives with weak brakes, makes `events` happen at their times, and judges the first contact.
-fn judged(brake_pct_max: f64, events: &[(f64, &dyn Fn(&mut World))]) -> Judgement {
+/// When whatever is to happen happens, s: the ego vehicle is at its cruising speed.
+const EVENT_S: f64 = 12.0;
+
+/// Drives with weak brakes, makes `event` happen, and judges the first contact.
+fn judged(brake_pct_max: f64, event: impl Fn(&mut World)) -> Judgement {
     let mut world = world();
     let mut broken = Broken { driver: ads::Idm::new(world.scene()), brake_pct_max };
     let mut recording: Vec<World> = Vec::new();
     let mut sensed = world.sensed();
     for tick in 0..3000_u32 {
-        for (_, event) in events.iter().filter(|(at_s, _)| tick == (at_s * 50.0) as u32) {
+        if tick == (EVENT_S / DT_S).round() as u32 {
             event(&mut world);
         }
         world.sense(&mut sensed);
@@ -113,25 +122,21 @@ fn judged(brake_pct_max: f64, events: &[(f64, &dyn Fn(&mut World))]) -> Judgemen
 #[test]
 fn an_ordinary_stop_of_the_leader_is_avoidable() {
     // The leader slows down behind somebody who creeps; brakes of half a m/s² do not.
-    let events = |world: &mut World| {
+    let judgement = judged(17.0, |world| {
         vehicle(world, 115.0, 0.5);
         vehicle(world, 30.0, 10.0);
-    };
-    let judgement = judged(17.0, &[(12.0, &events)]);
+    });
     assert_eq!(judgement.class, Avoidability::Avoidable);
     assert_eq!(judgement.avoided_by, ["cc", "fsm", "rss", "r157"]);
 }
 
 /// Somebody 30 km/h slower appears so far ahead of an ego vehicle at about 11 m/s.
 fn appears(distance_m: f64) -> Judgement {
-    judged(
-        0.0,
-        &[(12.0, &|world: &mut World| {
-            let own_mps = world.ego().speed_mps;
-            assert!((own_mps - 11.0).abs() < 0.5, "{own_mps}");
-            vehicle(world, distance_m, own_mps - 30.0 / 3.6);
-        })],
-    )
+    judged(0.0, |world| {
+        let own_mps = world.ego().speed_mps;
+        assert!((own_mps - 11.0).abs() < 0.5, "{own_mps}");
+        vehicle(world, distance_m, own_mps - 30.0 / 3.6);
+    })
 }
 
 #[test]
@@ -139,7 +144,7 @@ fn what_appears_in_front_of_the_bumper_is_unavoidable() {
     let judgement = appears(3.0);
     assert_eq!(judgement.class, Avoidability::Unavoidable);
     assert!(judgement.avoided_by.is_empty() && judgement.evasion.is_none());
-    assert!((judgement.onset_s - 12.0).abs() < 0.11, "{}", judgement.onset_s);
+    assert!((judgement.onset_s - EVENT_S).abs() < 0.11, "{}", judgement.onset_s);
 }
 
 #[test]
@@ -149,4 +154,23 @@ fn between_human_and_machine_lies_the_beyond() {
     assert_eq!(judgement.evasion.as_deref(), Some("full brake"));
     // 8.33 m/s at 1.15 s, 0.6 s of build-up and 6 m/s²: 9.6 + 4.2 + 2.9 m and something for the lag.
     assert_eq!(appears(20.0).class, Avoidability::Avoidable);
+}
+
+#[test]
+fn the_hazard_of_a_pedestrian_begins_with_the_first_step() {
+    let judgement = judged(0.0, |world| appear(world, Body::Pedestrian, Verb::Walk, 46.0, 1.4));
+    // Pedestrians wait for a second at the kerb, 5 m aside.
+    assert!((judgement.onset_s - (EVENT_S + 1.0)).abs() < 0.11, "{judgement:?}");
+    assert_ne!(judgement.class, Avoidability::Unavoidable, "{judgement:?}");
+}
+
+#[test]
+fn what_was_never_in_sight_has_no_onset() {
+    let mut hidden = world();
+    vehicle(&mut hidden, 20.0, 0.5);
+    let met = hidden.ego_outline();
+    assert_eq!(onset(&[hidden.clone()], 1, met), None, "20 m away and no way leads there");
+    let there = hidden.obstacles()[0].outline;
+    assert_eq!(onset(&[hidden.clone()], 1, there), Some(0));
+    assert_eq!(onset(&[hidden], 2, there), None, "nobody of that number");
 }

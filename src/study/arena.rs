@@ -12,18 +12,13 @@ use crate::ads;
 use crate::agent::Agent;
 use crate::episode;
 use crate::episode::Choice;
-use crate::episode::EpisodeLog;
 use crate::episode::Moment;
-use crate::episode::Script;
-use crate::oracle;
-use crate::oracle::AvoidabilitySettings;
 use crate::rng;
 use crate::rng::Stream;
 use crate::sim::Scene;
 use crate::syntax::listed;
 
 use super::run::RunError;
-use super::summary::EpisodeSummary;
 
 /// Everything that the episodes of a run or a training share.
 pub struct Arena {
@@ -88,20 +83,6 @@ impl Arena {
             memory,
         }
     }
-}
-
-/// Judges the collisions of an episode by playing it again.
-pub(super) fn judged(
-    setup: &episode::Setup,
-    number: usize,
-    log: &EpisodeLog,
-    settings: &AvoidabilitySettings,
-) -> EpisodeSummary {
-    let script = Script::of_log(log);
-    let judgements = oracle::judge(log, settings, &mut |watch| {
-        episode::run(setup, &mut |moment| script.choose(setup.table, moment), watch);
-    });
-    EpisodeSummary::new(setup.table.space(), number, log, judgements)
 }
 
 /// Lets an agent choose among the offers of the moment. With nothing legal, the step passes.

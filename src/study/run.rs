@@ -36,7 +36,6 @@ use super::arena::Arena;
 use super::arena::DEFAULT_ADS;
 use super::arena::choose;
 use super::arena::driving_system;
-use super::arena::judged;
 use super::summary::EpisodeSummary;
 
 /// Everything that is needed to repeat a run; written to `run.yaml`.
@@ -186,8 +185,8 @@ impl Run {
     /// Plays one episode and judges its collisions.
     pub fn judged(&self, number: usize) -> (EpisodeSummary, EpisodeLog) {
         let log = self.episode(number);
-        let summary = judged(&self.setup(number), number, &log, &self.settings.avoidability);
-        (summary, log)
+        let setup = self.setup(number);
+        (EpisodeSummary::judged(&setup, number, &log, &self.settings.avoidability), log)
     }
 
     /// Plays one episode's beginning with other choices: a replay of it, for example.
@@ -200,6 +199,7 @@ impl Run {
         episode::run(&self.setup(number), choose, watch)
     }
 
+    /// The beginning of an episode.
     fn setup(&self, number: usize) -> episode::Setup<'_> {
         let seed = rng::child_seed(self.settings.seed, Stream::Episode, number as u64);
         let mut setup = self.arena.setup(number / self.settings.episodes as usize, seed);

@@ -1,10 +1,14 @@
 //! What an episode amounts to: its collisions, each with the facts of its verdict.
 
+use crate::episode;
 use crate::episode::Collision;
 use crate::episode::EpisodeLog;
+use crate::episode::Script;
+use crate::episode::Setup;
 use crate::model::OutcomeFacts;
 use crate::model::Space;
 use crate::oracle;
+use crate::oracle::AvoidabilitySettings;
 use crate::oracle::Judgement;
 
 /// An episode, judged.
@@ -27,19 +31,29 @@ pub struct Finding {
 }
 
 impl EpisodeSummary {
-    /// Applies the space's verdict to every collision of a log; `judgements` has one for each.
-    pub fn new(
-        space: &Space,
-        episode: usize,
+    /// Judges every collision of a log, by playing it again from its setup, and applies the space's
+    /// verdict.
+    pub fn judged(
+        setup: &Setup,
+        number: usize,
         log: &EpisodeLog,
-        judgements: Vec<Judgement>,
+        settings: &AvoidabilitySettings,
     ) -> EpisodeSummary {
-        let find = |(number, judgement)| {
-            let facts = oracle::facts(log, number, &judgement);
+        let script = Script::of_log(log);
+        let judgements = oracle::judge(log, settings, &mut |watch| {
+            episode::run(setup, &mut |moment| script.choose(setup.table, moment), watch);
+        });
+        EpisodeSummary::new(setup.table.space(), number, log, judgements)
+    }
+
+    /// Applies the space's verdict to every collision of a log; `judgements` has one for each.
+    pub fn new(space: &Space, number: usize, log: &EpisodeLog, judgements: Vec<Judgement>) -> EpisodeSummary {
+        let find = |(index, judgement)| {
+            let facts = oracle::facts(log, index, &judgement);
             let counted = space.counts(facts);
-            Finding { number, collision: log.collisions[number], facts, judgement, counted }
+            Finding { number: index, collision: log.collisions[index], facts, judgement, counted }
         };
-        EpisodeSummary { episode, collisions: judgements.into_iter().enumerate().map(find).collect() }
+        EpisodeSummary { episode: number, collisions: judgements.into_iter().enumerate().map(find).collect() }
     }
 
     /// Number of counted collisions.

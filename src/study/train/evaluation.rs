@@ -12,8 +12,8 @@ use crate::rng;
 use crate::rng::Stream;
 use crate::study::arena::Arena;
 use crate::study::arena::choose;
-use crate::study::arena::judged;
 use crate::study::run::RunError;
+use crate::study::summary::EpisodeSummary;
 
 use super::training::with_period;
 
@@ -55,8 +55,8 @@ pub fn evaluate(
         agent.begin();
         let mut choose = |moment: &episode::Moment| choose(arena.table(), &mut agent, moment);
         let log = episode::run(&setup, &mut choose, &mut |_, _, _| {});
-        let summary = judged(&setup, number as usize, &log, &AvoidabilitySettings::default());
-        let counted = summary.counted() as u64;
+        let settings = AvoidabilitySettings::default();
+        let counted = EpisodeSummary::judged(&setup, number as usize, &log, &settings).counted() as u64;
         found.collisions += log.collisions.len() as u64;
         found.counted += counted;
         found.colliding += u64::from(counted > 0);

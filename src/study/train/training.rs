@@ -32,7 +32,6 @@ use crate::rng;
 use crate::rng::Stream;
 use crate::study::arena::Arena;
 use crate::study::arena::carry_out;
-use crate::study::arena::judged;
 use crate::study::arena::legal;
 use crate::study::run::RunError;
 use crate::study::run::check_episodes;
@@ -178,7 +177,7 @@ impl Training {
                 last = Some((moment.observation.clone(), legal));
             },
         );
-        let summary = judged(&setup, number, &log, &AvoidabilitySettings::default());
+        let summary = EpisodeSummary::judged(&setup, number, &log, &AvoidabilitySettings::default());
         let (last, last_legal) = last.expect("every episode has a last moment");
         let trajectory = Trajectory {
             steps: experiences(&settings.hyperparameters, choices, &log, &summary),
