@@ -8,4 +8,6 @@ mod emitted;
 mod layers;
 mod rules;
 mod tables;
+mod torch;
+mod training;
 mod world;
