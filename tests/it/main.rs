@@ -11,4 +11,6 @@ mod references;
 mod rules;
 mod tables;
 mod traces;
+mod torch;
+mod training;
 mod world;
