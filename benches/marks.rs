@@ -139,6 +139,7 @@ fn run(space: Arc<Space>) -> Run {
         space_digest: String::new(),
         roads: vec![space.roads[0].name.clone()],
         ads: "modular".to_owned(),
+        profile: None,
         agent: "random".to_owned(),
         episodes: EPISODES,
         seed: 1,

@@ -60,9 +60,7 @@ impl Selected {
     /// A fresh driver for one episode.
     pub fn build(&self, scene: &Arc<Scene>, seed: u64) -> Box<dyn Ads> {
         match &self.profile {
-            Some(profile) => {
-                Box::new(Modular::with_foresight(scene, profile, seed, self.foresight.clone()))
-            }
+            Some(profile) => Box::new(Modular::with_foresight(scene, profile, seed, self.foresight.clone())),
             None => (self.entry.build)(scene, seed),
         }
     }

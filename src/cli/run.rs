@@ -11,7 +11,9 @@ use crate::action::ActionTable;
 use crate::emit;
 use crate::episode::EpisodeLog;
 use crate::sim::ENGINE;
+use crate::study;
 use crate::study::EpisodeSummary;
+use crate::study::Profile;
 use crate::study::Run;
 use crate::study::RunSettings;
 use crate::study::Totals;
@@ -89,6 +91,10 @@ fn begun(output: &Output, arguments: &RunArguments) -> Result<(Run, RunDirectory
     } else {
         arguments.road.clone()
     };
+    let profile = match &arguments.ads_config {
+        Some(path) => Some(load::profile(path)?),
+        None => study::driving_system(&arguments.ads).ok().and_then(|ads| ads.profile().copied()),
+    };
     let settings = RunSettings {
         avastra: VERSION.to_owned(),
         engine: ENGINE.to_owned(),
@@ -96,6 +102,7 @@ fn begun(output: &Output, arguments: &RunArguments) -> Result<(Run, RunDirectory
         space_digest: space.digest.clone(),
         roads,
         ads: arguments.ads.clone(),
+        profile: profile.as_ref().map(Profile::new),
         agent: arguments.agent.clone(),
         episodes: arguments.episodes,
         seed: arguments.seed,

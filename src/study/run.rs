@@ -16,6 +16,8 @@ use crate::action::ActionTable;
 use crate::action::ActiveRules;
 use crate::action::Offer;
 use crate::ads;
+use crate::ads::ModularConfig;
+use crate::ads::Selected;
 use crate::agent;
 use crate::agent::Agent;
 use crate::episode;
@@ -47,6 +49,9 @@ pub struct RunSettings {
     pub space_digest: String,
     pub roads: Vec<String>,
     pub ads: String,
+    /// Settings of the driving system, if it has any; without them it is as it comes.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub profile: Option<Profile>,
     pub agent: String,
     /// Episodes on each road.
     pub episodes: u32,
@@ -55,6 +60,20 @@ pub struct RunSettings {
     pub without: Vec<String>,
     /// Optional rules switched on.
     pub with: Vec<String>,
+}
+
+/// Settings of a driving system, and a digest that tells whether they still mean the same.
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Profile {
+    pub digest: String,
+    pub settings: ModularConfig,
+}
+
+impl Profile {
+    pub fn new(settings: &ModularConfig) -> Profile {
+        Profile { digest: settings.digest(), settings: *settings }
+    }
 }
 
 /// Why a run or a replay cannot begin.
@@ -72,6 +91,15 @@ pub enum RunError {
     Twice { name: String },
     #[error("{found} episodes a road: from 1 to {EPISODES_MAX} are possible")]
     Episodes { found: u32 },
+    #[error(transparent)]
+    NoSettings(#[from] ads::NoSettings),
+    #[error("the profile of `{scenario}`: {error}")]
+    Profile { scenario: String, error: ads::ConfigError },
+    #[error(
+        "{what} was made with settings of `{ads}` that mean something else in this version: nothing need \
+         happen alike; name a profile with `--ads-config FILE` to see what happens with that"
+    )]
+    ProfileDigest { what: String, ads: String },
     #[error("`{scenario}` was made in world `{engine}`; this is `{ENGINE}`, where nothing need happen alike")]
     Engine { scenario: String, engine: String },
 }
@@ -84,7 +112,7 @@ pub struct Run {
     table: ActionTable,
     rules: ActiveRules,
     settings: RunSettings,
-    ads: &'static ads::Entry,
+    ads: Selected,
     agent: &'static agent::Entry,
     /// Index of each road in the space, with its scene.
     roads: Vec<(usize, Arc<Scene>)>,
@@ -115,7 +143,13 @@ impl Run {
             Ok((index, Arc::new(episode::scene(&space.roads[index]))))
         });
         let roads = roads.collect::<Result<_, RunError>>()?;
-        let ads = driving_system(&settings.ads)?;
+        let mut ads = driving_system(&settings.ads)?;
+        if let Some(profile) = &settings.profile {
+            if profile.settings.digest() != profile.digest {
+                return Err(RunError::ProfileDigest { what: "the run".to_owned(), ads: settings.ads });
+            }
+            ads = ads.with_profile(profile.settings)?;
+        }
         let agent = agent::by_name(&settings.agent).ok_or_else(|| {
             let known = listed(&agent::REGISTRY.iter().map(|entry| entry.name).collect::<Vec<_>>());
             RunError::Agent { name: settings.agent.clone(), known }
@@ -162,7 +196,7 @@ impl Run {
             road: &self.space().roads[*index],
             scene: scene.clone(),
             rules: &self.rules,
-            ads: self.ads,
+            ads: self.ads.clone(),
             seed,
             start: episode::start(self.space(), &memory, seed),
             memory,
@@ -221,11 +255,27 @@ pub fn replay(
     ads: Option<&str>,
     watch: &mut Watch,
 ) -> Result<EpisodeLog, RunError> {
+    let ads = match ads {
+        Some(name) => driving_system(name)?,
+        None => recorded(scenario)?,
+    };
+    replay_with(table, scenario, ads, watch)
+}
+
+/// Plays a scenario with any driving system, under the rules that it was made with.
+///
+/// # Errors
+/// If the scenario is of another world or other rules.
+pub fn replay_with(
+    table: &ActionTable,
+    scenario: &Scenario,
+    ads: Selected,
+    watch: &mut Watch,
+) -> Result<EpisodeLog, RunError> {
     let origin = &scenario.origin;
     if let Some(engine) = origin.engine.as_ref().filter(|engine| engine.as_str() != ENGINE) {
         return Err(RunError::Engine { scenario: scenario.name.clone(), engine: engine.clone() });
     }
-    let ads = driving_system(ads.or(origin.ads.as_deref()).unwrap_or(DEFAULT_ADS))?;
     let space = table.space();
     let rules = ActiveRules::new(space, &origin.with, &origin.without)?;
     let road = &space.roads[scenario.road];
@@ -252,8 +302,33 @@ pub fn replay(
 /// Who drives where nobody is named.
 pub const DEFAULT_ADS: &str = "modular";
 
-fn driving_system(name: &str) -> Result<&'static ads::Entry, RunError> {
-    ads::by_name(name).ok_or_else(|| {
+/// The driving system that a scenario was made with, and its settings.
+///
+/// # Errors
+/// If there is none of that name, or its settings do not exist any more or mean something else.
+pub fn recorded(scenario: &Scenario) -> Result<Selected, RunError> {
+    let origin = &scenario.origin;
+    let mut ads = driving_system(origin.ads.as_deref().unwrap_or(DEFAULT_ADS))?;
+    if let Some(line) = &origin.profile {
+        let profile = ModularConfig::from_yaml(line)
+            .map_err(|error| RunError::Profile { scenario: scenario.name.clone(), error })?;
+        ads = ads.with_profile(profile)?;
+    }
+    let digest = ads.profile().map(ModularConfig::digest);
+    match &origin.profile_digest {
+        Some(recorded) if Some(recorded) != digest.as_ref() => {
+            Err(RunError::ProfileDigest { what: format!("`{}`", scenario.name), ads: ads.name().to_owned() })
+        }
+        _ => Ok(ads),
+    }
+}
+
+/// The driving system of that name, as it comes.
+///
+/// # Errors
+/// If there is none.
+pub fn driving_system(name: &str) -> Result<Selected, RunError> {
+    ads::by_name(name).map(Selected::new).ok_or_else(|| {
         let known = listed(&ads::REGISTRY.iter().map(|entry| entry.name).collect::<Vec<_>>());
         RunError::Ads { name: name.to_owned(), known }
     })

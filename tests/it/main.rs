@@ -6,6 +6,7 @@ mod command;
 mod drives;
 mod emitted;
 mod layers;
+mod profiles;
 mod rules;
 mod tables;
 mod world;

@@ -55,6 +55,7 @@ pub fn run_of(space: Arc<Space>, episodes: u32, seed: u64, without: &[&str]) -> 
         space_digest: space.digest.clone(),
         roads: space.roads.iter().map(|road| road.name.clone()).collect(),
         ads: "modular".to_owned(),
+        profile: None,
         agent: "random".to_owned(),
         episodes,
         seed,

@@ -56,7 +56,8 @@ impl ModularConfig {
     pub fn from_yaml(text: &str) -> Result<ModularConfig, ConfigError> {
         let file: Value = serde_yaml::from_str(text)
             .map_err(|error| ConfigError::Yaml { reason: error.to_string().trim().to_owned() })?;
-        let mut whole = serde_json::to_value(ModularConfig::default()).expect("a configuration is plain data");
+        let mut whole =
+            serde_json::to_value(ModularConfig::default()).expect("a configuration is plain data");
         // A file of comments alone is the default.
         if !file.is_null() {
             overlay(text, "", &file, &mut whole)?;
@@ -247,7 +248,10 @@ mod tests {
                 "perception:\n  grid_m: 5\nplanning:\n  cruise_mps: 400\n",
                 "line 4: `planning.cruise_mps` is 400; write a value from 1 to 40",
             ),
-            ("{planning: {cruise_mps: fast}}", "line 1: `planning.cruise_mps` is the text `fast`; write a number"),
+            (
+                "{planning: {cruise_mps: fast}}",
+                "line 1: `planning.cruise_mps` is the text `fast`; write a number",
+            ),
             ("planning: 7", "line 1: `planning` is `7`; write a section of `key: value` lines"),
             ("tracking: {perfect: 1}", "line 1: `tracking.perfect` is `1`; write `true` or `false`"),
             (

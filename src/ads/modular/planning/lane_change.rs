@@ -14,23 +14,30 @@ use crate::sim::Scene;
 use crate::sim::VehicleParameters;
 
 use super::super::config::PlanningConfig;
+use super::super::perception::FRAME_S;
 use super::super::prediction::Forecast;
 use super::speed::Constraint;
 
 /// Vehicles farther away along the road do not matter, m: the greatest gap that is asked for in a town.
 const LOOK_M: f64 = 200.0;
 
+/// For so long a lane must have been clear, s: a new track takes almost half of it to be published.
+/// Apollo waits as long after a failed attempt.
+const CLEAR_S: f64 = 1.0;
+
 #[derive(Debug, Clone)]
 pub struct LaneChanges {
     scene: Arc<Scene>,
     /// Where each change of the route begins, m; infinite while it has not.
     begins_m: Vec<f64>,
+    /// For how long the lane of the next one has been clear, s.
+    clear_s: f64,
 }
 
 impl LaneChanges {
     pub fn new(scene: &Arc<Scene>) -> LaneChanges {
         let begins_m = vec![f64::INFINITY; scene.route.changes.len()];
-        LaneChanges { scene: Arc::clone(scene), begins_m }
+        LaneChanges { scene: Arc::clone(scene), begins_m, clear_s: 0.0 }
     }
 
     /// The guide of the lanes as they are to be driven now.
@@ -63,13 +70,19 @@ impl LaneChanges {
         speed_mps: f64,
         forecasts: &[Forecast],
     ) -> bool {
-        let Some(change) = self.due(station_m) else { return false };
-        if !is_clear(config, guide, change.lateral_m, station_m, speed_mps, forecasts) {
+        let Some((index, change)) = self.next() else { return false };
+        let soon = station_m >= change.begin_m - speed_mps * CLEAR_S && !self.under_way(station_m);
+        if !soon || !is_clear(config, guide, change.lateral_m, station_m, speed_mps, forecasts) {
+            self.clear_s = 0.0;
             return false;
         }
-        let (index, _) = self.next().expect("one is due");
-        self.begins_m[index] = station_m;
-        true
+        let begins = self.due(station_m).is_some() && self.clear_s >= CLEAR_S;
+        self.clear_s += FRAME_S;
+        if begins {
+            self.begins_m[index] = station_m;
+            self.clear_s = 0.0;
+        }
+        begins
     }
 
     /// A stop where the next change is just possible.
@@ -142,7 +155,12 @@ mod tests {
             .chain(rear)
             .zip(1..)
             .map(|(x_m, id)| {
-                Track::for_tests(id, Body::Sedan, Pose::new(x_m, -1.75, heading_rad), Vec2::new(other_mps, 0.0))
+                Track::for_tests(
+                    id,
+                    Body::Sedan,
+                    Pose::new(x_m, -1.75, heading_rad),
+                    Vec2::new(other_mps, 0.0),
+                )
             })
             .collect();
         let mut prediction = Prediction::new(&Default::default(), true, &scene, None);
@@ -153,9 +171,13 @@ mod tests {
     #[test]
     fn the_gap_is_ten_metres_or_three_seconds_of_the_difference() {
         assert!(clear(None, None, 0.0));
-        for (gap_m, other_mps, expected) in
-            [(9.5, 10.0, false), (10.5, 10.0, true), (14.5, 5.0, false), (15.5, 5.0, true), (10.5, 15.0, true)]
-        {
+        for (gap_m, other_mps, expected) in [
+            (9.5, 10.0, false),
+            (10.5, 10.0, true),
+            (14.5, 5.0, false),
+            (15.5, 5.0, true),
+            (10.5, 15.0, true),
+        ] {
             assert_eq!(clear(Some(gap_m), None, other_mps), expected, "{gap_m} m ahead at {other_mps}");
         }
         for (gap_m, other_mps, expected) in

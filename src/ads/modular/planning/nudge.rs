@@ -125,11 +125,8 @@ impl LateralPlan {
             return;
         }
         let clear_m = half_way_m + config.nudge_buffer_m;
-        let offset_m = if edge.left_m + edge.right_m < 0.0 {
-            edge.left_m + clear_m
-        } else {
-            edge.right_m - clear_m
-        };
+        let offset_m =
+            if edge.left_m + edge.right_m < 0.0 { edge.left_m + clear_m } else { edge.right_m - clear_m };
         let on = scene.route.lane_at(edge.span.from_m);
         let lane_m = scene.map.lane(on.lane).width_at(edge.span.from_m - on.from_m);
         if offset_m.abs() > lane_m / 2.0 - half_way_m - EDGE_M {
@@ -179,7 +176,9 @@ mod tests {
         let tracks: Vec<Track> = places
             .iter()
             .zip(1..)
-            .map(|((body, x_m, y_m), id)| Track::for_tests(id, *body, Pose::new(*x_m, *y_m, 0.0), Vec2::zeros()))
+            .map(|((body, x_m, y_m), id)| {
+                Track::for_tests(id, *body, Pose::new(*x_m, *y_m, 0.0), Vec2::zeros())
+            })
             .collect();
         prediction.update(&tracks, 0.0, 0.0, Vec2::zeros());
         let mut plan = LateralPlan::default();
