@@ -84,6 +84,7 @@ fn crowded(scene: &Arc<Scene>) -> World {
         wetness: Level::None,
         signal_phase_s: 0.0,
         seed: 1,
+        ambient: 0,
     };
     let mut world = World::new(scene.clone(), &start);
     let verbs = [Verb::DriveAhead, Verb::DriveOpposite, Verb::Overtake, Verb::Walk];
@@ -123,7 +124,7 @@ fn ticks_per_s(world: &World, scene: &Arc<Scene>, name: &str) -> f64 {
         let took = seconds(TICKS, || {
             world.sense(&mut sensed);
             world.tick(&driver.drive(&sensed));
-            most = most.max(collision_probability(&world, &settings));
+            most = most.max(collision_probability(&world, &settings, &|_| false));
         });
         black_box(most);
         took
@@ -141,10 +142,13 @@ fn run(space: Arc<Space>) -> Run {
         ads: "modular".to_owned(),
         profile: None,
         agent: "random".to_owned(),
+        policy: None,
         episodes: EPISODES,
         seed: 1,
+        ambient: 0,
         without: Vec::new(),
         with: Vec::new(),
+        avoidability: Default::default(),
     };
     Run::new(ActionTable::new(space), settings).expect("the settings name what exists")
 }

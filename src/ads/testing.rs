@@ -56,7 +56,7 @@ pub fn two_lanes(open_m: f64) -> Arc<Scene> {
     let start = map.place("1", -2, 0.0).expect("the road begins");
     let goal = map.place("1", -1, 350.0).expect("the road is long");
     let route = Route::find(&map, start, goal).expect("a lane change leads there");
-    Arc::new(Scene { map: map.into(), route })
+    Arc::new(Scene::new(map.into(), route))
 }
 
 /// Straights, a right-angled bend of 15 m radius to the left and a hairpin of 10 m to the right,
@@ -121,7 +121,7 @@ fn scene(pieces: &[(f64, f64, f64)]) -> Arc<Scene> {
     route.stop_lines.push(RouteStopLine { station_m: 100.0, signal: 0 });
     let position = route.path.pose_at(100.0).offset(10.0, -4.0).position;
     map.signals.push(Signal { id: "1".into(), position, junction: None, group: 0 });
-    Arc::new(Scene { map: map.into(), route })
+    Arc::new(Scene::new(map.into(), route))
 }
 
 /// An object that keeps its velocity until it brakes.
@@ -237,5 +237,5 @@ pub fn corner() -> Arc<Scene> {
     let start = map.nearest(Vec2::new(0.0, 0.0), 2.377, 1.0).expect("a lane at the start");
     let goal = map.nearest(Vec2::new(-71.4, 145.5), -2.983, 1.0).expect("a lane at the goal");
     let route = Route::find(&map, start, goal).expect("the goal can be reached");
-    Arc::new(Scene { map: map.into(), route })
+    Arc::new(Scene::new(map.into(), route))
 }

@@ -10,8 +10,11 @@ mod output;
 mod progress;
 mod render;
 mod replay;
+mod road;
 mod run;
 mod run_directory;
+mod train;
+mod verify;
 mod why;
 
 use std::process::ExitCode;
@@ -46,8 +49,11 @@ pub fn main() -> ExitCode {
         Command::Why(arguments) => why::why(&output, arguments),
         Command::Fmt(arguments) => fmt::fmt(&output, arguments),
         Command::Run(arguments) => run::run(&output, arguments),
+        Command::Train(arguments) => train::train(&output, arguments),
+        Command::Verify(arguments) => verify::verify(&output, arguments),
         Command::Replay(arguments) => replay::replay(&output, arguments),
         Command::Render(arguments) => render::render(&output, arguments),
+        Command::Road(arguments) => road::road(&output, arguments),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,

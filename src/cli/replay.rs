@@ -28,19 +28,21 @@ pub fn replay(output: &Output, arguments: &ReplayArguments) -> Result<(), Failur
             Some(path) => format!("{} with {}", ads.name(), path.display()),
             None => ads.name().to_owned(),
         };
-        let log = study::replay_with(&table, &scenario, ads, &mut |_, _, _| {})
+        let log = study::replay_with(&table, &scenario, &ads, &mut |_, _, _| {})
+            .map_err(|error| Failure::usage(error.to_string()))?;
+        let judgements = study::judge_replay(&table, &scenario, &ads, &log)
             .map_err(|error| Failure::usage(error.to_string()))?;
         if !is_recorded {
-            let counted = oracle::counted(table.space(), &log).len();
+            let counted = oracle::counted(table.space(), &log, &judgements).len();
             let collisions = plural(log.collisions.len(), "collision");
             output.say(&format!("{} against {name}: {collisions}, {counted} counted", path.display()));
             results.push(serde_json::json!({
                 "file": path, "scenario": scenario.name, "ads": name,
-                "collisions": log.collisions.len(), "counted": counted,
+                "collisions": log.collisions.len(), "counted": counted, "judgements": judgements,
             }));
             continue;
         }
-        let verdicts = oracle::verify(table.space(), &scenario, &log);
+        let verdicts = oracle::verify(table.space(), &scenario, &log, &judgements);
         let wrong = verdicts.iter().filter(|verdict| !verdict.confirmed).count();
         refuted += wrong;
         confirmed += verdicts.len() - wrong;

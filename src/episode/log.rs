@@ -8,6 +8,7 @@ use crate::model::Memory;
 use crate::model::vocabulary::Body;
 use crate::model::vocabulary::Verb;
 use crate::sim::Contact;
+use crate::sim::Incident;
 use crate::sim::Start;
 
 /// One episode, from start to end.
@@ -23,6 +24,8 @@ pub struct EpisodeLog {
     pub memory: Memory,
     pub steps: Vec<StepLog>,
     pub collisions: Vec<Collision>,
+    /// Contacts of obstacles with each other.
+    pub incidents: Vec<Incident>,
     pub end: End,
     pub duration_s: f64,
     /// Driven by the ego vehicle, m.

@@ -31,14 +31,14 @@ pub struct Setup<'a> {
 
 /// The world that a road's episodes share.
 pub fn scene(road: &Road) -> Scene {
-    Scene { map: road.map.clone(), route: road.route.clone() }
+    Scene::new(road.map.clone(), road.route.clone())
 }
 
-/// How an episode of a seed begins that starts with this memory.
+/// How an episode of a seed begins that starts with this memory, without ambient traffic.
 pub fn start(space: &Space, memory: &Memory, seed: u64) -> Start {
     let mut rng = rng::stream(seed, Stream::Reset, 1);
     // A multiple of 1/64 s is short in a file.
     let signal_phase_s = (rng::between(&mut rng, 0.0, SIGNAL_PHASE_S) * 64.0).floor() / 64.0;
     let (time, [rain, fog, wetness]) = space.weather(memory);
-    Start { time, rain, fog, wetness, signal_phase_s, seed }
+    Start { time, rain, fog, wetness, signal_phase_s, seed, ambient: 0 }
 }

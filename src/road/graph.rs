@@ -146,7 +146,10 @@ impl<'a> Builder<'a> {
                     let index = LaneIndex(self.map.lanes.len());
                     self.lanes.insert((road_index, section_index, element.id), index);
                     let limit_mps = limit_mps.unwrap_or(LIMIT_MPS_DEFAULT);
-                    self.map.lanes.push(new_lane(key, centre, limit_mps, junction));
+                    self.map.lanes.push(Lane {
+                        keeps_left: road.left_hand,
+                        ..new_lane(key, centre, limit_mps, junction)
+                    });
                 }
             }
         }
@@ -378,6 +381,7 @@ fn new_lane(key: LaneKey, centre: CentreLine, speed_limit_mps: f64, junction: Op
         centre: centre.path,
         widths_m: centre.widths_m,
         speed_limit_mps,
+        keeps_left: false,
         successors: Vec::new(),
         predecessors: Vec::new(),
         left: None,

@@ -43,6 +43,8 @@ pub struct Lane {
     pub widths_m: Vec<f64>,
     /// m/s.
     pub speed_limit_mps: f64,
+    /// Whether traffic keeps left on its road.
+    pub keeps_left: bool,
     pub successors: Vec<LaneIndex>,
     pub predecessors: Vec<LaneIndex>,
     /// Next driving lane to the left, in the same or the opposite direction, however wide the gap.

@@ -2,6 +2,7 @@
 //!
 //! No vehicles here, and no time: signals have a place, not a colour.
 
+mod abreast;
 mod centre_line;
 mod conflict;
 mod graph;
@@ -16,6 +17,9 @@ mod signals;
 #[cfg(test)]
 mod tests;
 
+pub use abreast::Abreast;
+pub use abreast::Connection;
+pub use abreast::Opposing;
 pub use map::Crosswalk;
 pub use map::Junction;
 pub use map::Lane;

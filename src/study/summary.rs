@@ -5,6 +5,7 @@ use crate::episode::EpisodeLog;
 use crate::model::OutcomeFacts;
 use crate::model::Space;
 use crate::oracle;
+use crate::oracle::Judgement;
 
 /// An episode, judged.
 #[derive(Debug, Clone, PartialEq)]
@@ -21,17 +22,24 @@ pub struct Finding {
     pub number: usize,
     pub collision: Collision,
     pub facts: OutcomeFacts,
+    pub judgement: Judgement,
     pub counted: bool,
 }
 
 impl EpisodeSummary {
-    /// Judges every collision of a log by the space's verdict.
-    pub fn new(space: &Space, episode: usize, log: &EpisodeLog) -> EpisodeSummary {
-        let judge = |number: usize| {
-            let facts = oracle::facts(log, number);
-            Finding { number, collision: log.collisions[number], counted: space.counts(facts), facts }
+    /// Applies the space's verdict to every collision of a log; `judgements` has one for each.
+    pub fn new(
+        space: &Space,
+        episode: usize,
+        log: &EpisodeLog,
+        judgements: Vec<Judgement>,
+    ) -> EpisodeSummary {
+        let find = |(number, judgement)| {
+            let facts = oracle::facts(log, number, &judgement);
+            let counted = space.counts(facts);
+            Finding { number, collision: log.collisions[number], facts, judgement, counted }
         };
-        EpisodeSummary { episode, collisions: (0..log.collisions.len()).map(judge).collect() }
+        EpisodeSummary { episode, collisions: judgements.into_iter().enumerate().map(find).collect() }
     }
 
     /// Number of counted collisions.

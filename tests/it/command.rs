@@ -35,6 +35,21 @@ fn every_broken_file_has_its_diagnostics() {
 }
 
 #[test]
+fn a_run_says_what_it_refused_and_how_much_traffic_there_was() {
+    let scratch = tempfile::tempdir().expect("a scratch directory");
+    let out = scratch.path().join("run").display().to_string();
+    let space = ["run", "scenarios/avastra45.ava", "--format", "plain"];
+    let settings =
+        ["--agent", "random-raw", "--episodes", "2", "--seed", "3", "--ambient", "4", "--out", &out];
+    let (status, stdout, stderr) = outcome(&mut avastra(&[&space[..], &settings[..]].concat()));
+    assert_eq!(status, 0, "{stderr}");
+    assert!(stdout.contains("refused: "), "{stdout}");
+    assert!(stdout.contains(" × "), "{stdout}");
+    let settings = std::fs::read_to_string(scratch.path().join("run/run.yaml")).expect("it is written");
+    assert!(settings.contains("ambient: 4"), "{settings}");
+}
+
+#[test]
 fn every_diagnostic_is_also_json() {
     for (stem, path) in cases("diagnostics") {
         let (_, stdout, stderr) =
@@ -73,7 +88,7 @@ fn what_does_not_exist_is_named_with_what_does() {
     let space = "scenarios/avastra45.ava";
     let cases: [(&[&str], &str); 8] = [
         (&["run", space, "--road", "nowhere"], "`corner`"),
-        (&["run", space, "--ads", "apolo"], "`modular` and `idm`"),
+        (&["run", space, "--ads", "apolo"], "`modular`, `idm`, `cc`"),
         (&["run", space, "--agent", "rndom"], "`random`"),
         (&["run", space, "--without", "npc_gpa"], "npc_gap"),
         (&["run", "--resume", "scenarios"], "no run.yaml"),

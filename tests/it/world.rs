@@ -57,10 +57,13 @@ pub fn run_of(space: Arc<Space>, episodes: u32, seed: u64, without: &[&str]) -> 
         ads: "modular".to_owned(),
         profile: None,
         agent: "random".to_owned(),
+        policy: None,
         episodes,
         seed,
+        ambient: 0,
         without: without.iter().map(|rule| (*rule).to_owned()).collect(),
         with: Vec::new(),
+        avoidability: Default::default(),
     };
     Run::new(ActionTable::new(space), settings).expect("the settings name what exists")
 }

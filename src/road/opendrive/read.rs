@@ -38,6 +38,17 @@ const LANES_MAX: i32 = 100;
 /// One curve may turn so far, rad; a real one turns by a few.
 const TURN_RAD_MAX: f64 = 200.0;
 
+/// What is wrong with a text that is no XML. A text that ends too early is told by its last line:
+/// the reader of XML points at its beginning.
+fn not_xml(text: &str, error: &roxmltree::Error) -> RoadError {
+    let message = error.to_string();
+    if matches!(error, roxmltree::Error::UnexpectedEndOfStream | roxmltree::Error::UnclosedRootNode) {
+        let last = u32::try_from(text.trim_end().lines().count()).unwrap_or(u32::MAX);
+        return wrong(last, format!("this is not well-formed XML, as if cut off in the middle: {message}"));
+    }
+    wrong(error.pos().row, format!("this is not well-formed XML: {message}"))
+}
+
 /// Reads a whole file.
 ///
 /// # Errors
@@ -46,8 +57,7 @@ pub fn read(name: &str, text: &str) -> Result<Document, RoadError> {
     if text.trim().is_empty() {
         return Err(wrong(1, "the file is empty; an OpenDRIVE map is expected"));
     }
-    let document = roxmltree::Document::parse(text)
-        .map_err(|error| wrong(error.pos().row, format!("this is not well-formed XML: {error}")))?;
+    let document = roxmltree::Document::parse(text).map_err(|error| not_xml(text, &error))?;
     let lines = Lines::new(text);
     let root = Element::new(document.root_element(), &lines);
     if root.name() != "OpenDRIVE" {

@@ -41,7 +41,7 @@ const SURVEY: [(f64, f64); 25] = [
     (-71.41, 145.54),
 ];
 
-fn corner() -> RoadMap {
+pub fn corner() -> RoadMap {
     RoadMap::from_opendrive("corner", CORNER).unwrap()
 }
 

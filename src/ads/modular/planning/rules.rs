@@ -121,9 +121,9 @@ mod tests {
     /// Whether somebody at an offset from the path (m), walking to the left, stops the vehicle before a
     /// crosswalk.
     fn stops_for(offset_m: f64, left_mps: f64, stood_s: f64) -> bool {
-        let mut scene = Scene { map: straight().map.clone(), route: straight().route.clone() };
-        scene.route.crosswalks_m.push((80.0, 84.0));
-        let scene = std::sync::Arc::new(scene);
+        let mut route = straight().route.clone();
+        route.crosswalks_m.push((80.0, 84.0));
+        let scene = std::sync::Arc::new(Scene::new(straight().map.clone(), route));
         let config = PlanningConfig::default();
         let guide = Guide::new(&scene, &config.speed_rules());
         let walker =
