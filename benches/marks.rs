@@ -226,6 +226,7 @@ fn run(space: Arc<Space>) -> Run {
         space_digest: String::new(),
         roads: vec![space.roads[0].name.clone()],
         ads: "modular".to_owned(),
+        profile: None,
         agent: "random".to_owned(),
         policy: None,
         episodes: EPISODES,

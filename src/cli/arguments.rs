@@ -156,6 +156,9 @@ pub struct RunArguments {
     /// Driving system under test.
     #[arg(long, default_value = crate::study::DEFAULT_ADS)]
     pub ads: String,
+    /// Profile of the `modular` driving system, for example scenarios/ads/cautious.yaml [default: as it comes].
+    #[arg(long, value_name = "FILE")]
+    pub ads_config: Option<PathBuf>,
     /// Who chooses the actions.
     #[arg(long, default_value = "random")]
     pub agent: String,
@@ -179,7 +182,7 @@ pub struct RunArguments {
     #[arg(long)]
     pub out: Option<PathBuf>,
     /// Go on with an interrupted run directory; its own settings hold.
-    #[arg(long, value_name = "DIR", conflicts_with_all = ["file", "road", "ads", "agent", "policy", "episodes", "seed", "ambient", "out", "without", "with"])]
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["file", "road", "ads", "ads_config", "agent", "policy", "episodes", "seed", "ambient", "out", "without", "with"])]
     pub resume: Option<PathBuf>,
     /// Exit with status 4 if a counted collision was found.
     #[arg(long)]
@@ -234,6 +237,10 @@ pub struct ReplayArguments {
     /// Replay against another driving system: shows what happens, checks no claim.
     #[arg(long)]
     pub ads: Option<String>,
+    /// Replay against another profile of `modular`: claims are checked only if it means the same as the
+    /// recorded one.
+    #[arg(long, value_name = "FILE")]
+    pub ads_config: Option<PathBuf>,
 }
 
 #[derive(Debug, Args)]

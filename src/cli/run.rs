@@ -13,8 +13,10 @@ use crate::episode::EpisodeLog;
 use crate::model::Policy;
 use crate::oracle::AvoidabilitySettings;
 use crate::sim::ENGINE;
+use crate::study;
 use crate::study::EpisodeSummary;
 use crate::study::PolicyReference;
+use crate::study::Profile;
 use crate::study::RefusalCount;
 use crate::study::Run;
 use crate::study::RunSettings;
@@ -100,6 +102,10 @@ fn begun(output: &Output, arguments: &RunArguments) -> Result<(Run, RunDirectory
     } else {
         arguments.road.clone()
     };
+    let profile = match &arguments.ads_config {
+        Some(path) => Some(load::profile(path)?),
+        None => study::driving_system(&arguments.ads).ok().and_then(|ads| ads.profile().copied()),
+    };
     let settings = RunSettings {
         avastra: VERSION.to_owned(),
         engine: ENGINE.to_owned(),
@@ -107,6 +113,7 @@ fn begun(output: &Output, arguments: &RunArguments) -> Result<(Run, RunDirectory
         space_digest: space.digest.clone(),
         roads,
         ads: arguments.ads.clone(),
+        profile: profile.as_ref().map(Profile::new),
         agent: policy.as_ref().map_or(&arguments.agent, |(_, policy)| &policy.name).clone(),
         policy: None,
         episodes: arguments.episodes,

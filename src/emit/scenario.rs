@@ -103,8 +103,15 @@ fn origin(log: &EpisodeLog, source: &Provenance) -> Vec<Field> {
         tree::field("episode", tree::whole(source.episode as u64)),
         tree::field("policy", tree::text(source.agent)),
         tree::field("ads", tree::text(log.ads.as_str())),
-        tree::field("engine", tree::text(ENGINE)),
     ];
+    if let Some(profile) = &log.profile {
+        let line = profile.to_line();
+        if !line.is_empty() {
+            fields.push(tree::field("profile", tree::text(line)));
+        }
+        fields.push(tree::field("profile_digest", tree::text(profile.digest())));
+    }
+    fields.push(tree::field("engine", tree::text(ENGINE)));
     if !source.without.is_empty() {
         fields.push(tree::field("without", names(source.without)));
     }

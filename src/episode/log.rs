@@ -1,6 +1,8 @@
 //! What an episode leaves behind: enough to judge it, to count it and to replay it.
 
 use crate::action::Draw;
+use crate::ads::ModularConfig;
+use crate::mdp::PerceptionCounts;
 use crate::mdp::StateVector;
 use crate::model::Memory;
 use crate::model::vocabulary::Body;
@@ -14,6 +16,8 @@ use crate::sim::Start;
 pub struct EpisodeLog {
     pub road: String,
     pub ads: String,
+    /// Settings of the driving system, if it has any.
+    pub profile: Option<ModularConfig>,
     pub seed: u64,
     pub start: Start,
     /// States of the space at the start.
@@ -43,6 +47,8 @@ pub struct StepLog {
     /// Largest collision probability of the observation period, in `[0, 1]`.
     pub proc: f64,
     pub reward: f64,
+    /// Obstacles that the driving system misses, and ghosts that it sees, at the end of the period.
+    pub perception: PerceptionCounts,
     /// SHA-256 over every bit of the world's state after every tick so far.
     pub trace: [u8; 32],
 }

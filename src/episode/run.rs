@@ -105,7 +105,7 @@ struct Play<'a> {
 impl<'a> Play<'a> {
     fn new(setup: &'a Setup<'a>) -> Play<'a> {
         let world = World::new(setup.scene.clone(), &setup.start);
-        let mut ads = (setup.ads.build)(&setup.scene, setup.seed);
+        let mut ads = setup.ads.build(&setup.scene, setup.seed);
         let mut sensed = world.sensed();
         // One look before the first step, so that its state has an inside.
         ads.drive(&sensed);
@@ -178,7 +178,8 @@ impl<'a> Play<'a> {
         });
         let trace = self.trace.clone().finalize().into();
         let state = observation.state;
-        self.steps.push(StepLog { time_s, state, outcome, proc, reward, trace });
+        let perception = mdp::perception_counts(&self.world, self.ads.status());
+        self.steps.push(StepLog { time_s, state, outcome, proc, reward, perception, trace });
     }
 
     /// One physics step; the collision probability after it. Contact is certainty, once: who has been
@@ -233,7 +234,8 @@ impl<'a> Play<'a> {
     fn into_log(self, end: End) -> EpisodeLog {
         EpisodeLog {
             road: self.setup.road.name.clone(),
-            ads: self.setup.ads.name.to_owned(),
+            ads: self.setup.ads.name().to_owned(),
+            profile: self.setup.ads.profile().copied(),
             seed: self.setup.seed,
             start: self.setup.start,
             memory: self.setup.memory.clone(),

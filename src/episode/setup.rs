@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use crate::action::ActionTable;
 use crate::action::ActiveRules;
-use crate::ads;
+use crate::ads::Selected;
 use crate::model::Memory;
 use crate::model::Road;
 use crate::model::Space;
@@ -22,7 +22,7 @@ pub struct Setup<'a> {
     pub road: &'a Road,
     pub scene: Arc<Scene>,
     pub rules: &'a ActiveRules,
-    pub ads: &'static ads::Entry,
+    pub ads: Selected,
     pub seed: u64,
     pub start: Start,
     /// States of the space at the start; those that mean weather agree with `start`.

@@ -26,6 +26,10 @@ pub struct Origin {
     pub episode: Option<u64>,
     pub policy: Option<String>,
     pub ads: Option<String>,
+    /// Settings of the driving system that are not its defaults, as one line of YAML.
+    pub profile: Option<String>,
+    /// Digest of all its settings.
+    pub profile_digest: Option<String>,
     pub engine: Option<String>,
     /// Rules that were asked for (`--with`) and switched off (`--without`).
     pub with: Vec<String>,

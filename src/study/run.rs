@@ -11,6 +11,8 @@ use std::sync::mpsc;
 
 use crate::action::ActionTable;
 use crate::action::ActiveRules;
+use crate::ads;
+use crate::ads::Selected;
 use crate::agent;
 use crate::agent::Agent;
 use crate::agent::Kind;
@@ -33,9 +35,10 @@ use crate::sim::Start;
 use crate::syntax::listed;
 
 use super::arena::Arena;
-use super::arena::DEFAULT_ADS;
 use super::arena::choose;
 use super::arena::driving_system;
+use super::profile::Profile;
+use super::profile::recorded;
 use super::summary::EpisodeSummary;
 
 /// Everything that is needed to repeat a run; written to `run.yaml`.
@@ -52,6 +55,9 @@ pub struct RunSettings {
     pub space_digest: String,
     pub roads: Vec<String>,
     pub ads: String,
+    /// Settings of the driving system, if it has any; without them it is as it comes.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub profile: Option<Profile>,
     pub agent: String,
     /// The policy that the agent follows, from the run directory, and its digest.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -102,6 +108,15 @@ pub enum RunError {
     Twice { name: String },
     #[error("{found} episodes a road: from 1 to {EPISODES_MAX} are possible")]
     Episodes { found: u32 },
+    #[error(transparent)]
+    NoSettings(#[from] ads::NoSettings),
+    #[error("the profile of `{scenario}`: {error}")]
+    Profile { scenario: String, error: ads::ConfigError },
+    #[error(
+        "{what} was made with settings of `{ads}` that mean something else in this version: nothing need \
+         happen alike; name a profile with `--ads-config FILE` to see what happens with that"
+    )]
+    ProfileDigest { what: String, ads: String },
     #[error("`{scenario}` was made in world `{engine}`; this is `{ENGINE}`, where nothing need happen alike")]
     Engine { scenario: String, engine: String },
 }
@@ -154,7 +169,10 @@ impl Run {
     fn with_agent(table: ActionTable, settings: RunSettings, agent: Box<MakeAgent>) -> Result<Run, RunError> {
         check_episodes(settings.episodes)?;
         let rules = (settings.with.as_slice(), settings.without.as_slice());
-        let arena = Arena::new(table, &settings.roads, &settings.ads, rules)?;
+        let mut arena = Arena::new(table, &settings.roads, &settings.ads, rules)?;
+        if let Some(profile) = &settings.profile {
+            arena.set_profile(profile)?;
+        }
         Ok(Run { arena, settings, agent })
     }
 
@@ -258,11 +276,27 @@ pub fn replay(
     ads: Option<&str>,
     watch: &mut Watch,
 ) -> Result<EpisodeLog, RunError> {
+    let ads = match ads {
+        Some(name) => driving_system(name)?,
+        None => recorded(scenario)?,
+    };
+    replay_with(table, scenario, &ads, watch)
+}
+
+/// Plays a scenario with any driving system, under the rules that it was made with.
+///
+/// # Errors
+/// If the scenario is of another world or other rules.
+pub fn replay_with(
+    table: &ActionTable,
+    scenario: &Scenario,
+    ads: &Selected,
+    watch: &mut Watch,
+) -> Result<EpisodeLog, RunError> {
     let origin = &scenario.origin;
     if let Some(engine) = origin.engine.as_ref().filter(|engine| engine.as_str() != ENGINE) {
         return Err(RunError::Engine { scenario: scenario.name.clone(), engine: engine.clone() });
     }
-    let ads = driving_system(ads.or(origin.ads.as_deref()).unwrap_or(DEFAULT_ADS))?;
     let space = table.space();
     let rules = ActiveRules::new(space, &origin.with, &origin.without)?;
     let road = &space.roads[scenario.road];
@@ -273,7 +307,7 @@ pub fn replay(
         road,
         scene: Arc::new(episode::scene(road)),
         rules: &rules,
-        ads,
+        ads: ads.clone(),
         seed,
         start: Start {
             signal_phase_s: scenario.start.signal_phase_s,
@@ -290,16 +324,16 @@ pub fn replay(
 /// Judges the collisions of a replay, by playing it again.
 ///
 /// # Errors
-/// As [`replay`].
+/// As [`replay_with`].
 pub fn judge_replay(
     table: &ActionTable,
     scenario: &Scenario,
-    ads: Option<&str>,
+    ads: &Selected,
     log: &EpisodeLog,
 ) -> Result<Vec<Judgement>, RunError> {
     let mut failure = None;
     let judgements = oracle::judge(log, &AvoidabilitySettings::default(), &mut |watch| {
-        failure = replay(table, scenario, ads, watch).err();
+        failure = replay_with(table, scenario, ads, watch).err();
     });
     failure.map_or(Ok(judgements), Err)
 }

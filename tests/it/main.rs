@@ -7,6 +7,7 @@ mod contacts;
 mod drives;
 mod emitted;
 mod layers;
+mod profiles;
 mod references;
 mod rules;
 mod tables;

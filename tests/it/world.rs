@@ -60,6 +60,7 @@ pub fn run_against(ads: &str, space: Arc<Space>, episodes: u32, seed: u64, witho
         space_digest: space.digest.clone(),
         roads: space.roads.iter().map(|road| road.name.clone()).collect(),
         ads: ads.to_owned(),
+        profile: None,
         agent: "random".to_owned(),
         policy: None,
         episodes,

@@ -5,7 +5,7 @@
 //! may differ from the recording: it is right up to the first difference that matters.
 
 use crate::geometry::Vec2;
-use crate::sim::DT_S;
+use crate::sim::FRAME_TICKS;
 use crate::sim::Obstacle;
 
 use super::perception::FRAME_S;
@@ -26,17 +26,21 @@ struct Course {
 impl Foresight {
     /// Notes where everybody is; to be called after every tick, with its number.
     pub fn record(&mut self, tick: u64, obstacles: &[Obstacle]) {
-        if !tick.is_multiple_of(crate::sim::FRAME_TICKS) {
+        if !tick.is_multiple_of(FRAME_TICKS) {
             return;
         }
         for obstacle in obstacles {
-            let position = obstacle.outline.pose.position;
-            match self.courses.iter_mut().find(|course| course.id == obstacle.id) {
-                Some(course) => course.positions.push(position),
-                None => {
-                    let begin_s = tick as f64 * DT_S;
-                    self.courses.push(Course { id: obstacle.id, begin_s, positions: vec![position] });
-                }
+            self.note(obstacle.id, tick / FRAME_TICKS, obstacle.outline.pose.position);
+        }
+    }
+
+    /// Notes where one is in a frame; frames of one follow each other without a gap.
+    pub(super) fn note(&mut self, id: u32, frame: u64, position: Vec2) {
+        match self.courses.iter_mut().find(|course| course.id == id) {
+            Some(course) => course.positions.push(position),
+            None => {
+                let begin_s = frame as f64 * FRAME_S;
+                self.courses.push(Course { id, begin_s, positions: vec![position] });
             }
         }
     }
@@ -86,7 +90,7 @@ mod tests {
     fn what_was_recorded_is_foreseen() {
         let mut foresight = Foresight::default();
         for tick in 0..200_u64 {
-            let x_m = (tick as f64 * DT_S) * (tick as f64 * DT_S);
+            let x_m = (tick as f64 * crate::sim::DT_S) * (tick as f64 * crate::sim::DT_S);
             foresight.record(
                 tick,
                 &[Obstacle {

@@ -24,6 +24,11 @@ impl Junctions {
         Junctions { spans_m }
     }
 
+    #[cfg(test)]
+    pub fn for_tests(spans_m: &[(f64, f64)]) -> Junctions {
+        Junctions { spans_m: spans_m.to_vec() }
+    }
+
     pub fn inside(&self, station_m: f64) -> bool {
         self.spans_m.iter().any(|(from_m, to_m)| (*from_m..=*to_m).contains(&station_m))
     }
@@ -31,5 +36,24 @@ impl Junctions {
     /// The junctions that begin between two stations: from and to, m.
     pub fn between(&self, from_m: f64, to_m: f64) -> impl Iterator<Item = (f64, f64)> {
         self.spans_m.iter().copied().filter(move |(enter_m, _)| (from_m..to_m).contains(enter_m))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ads::testing::corner;
+    use crate::ads::testing::straight;
+
+    #[test]
+    fn the_corner_has_junctions_and_a_straight_road_none() {
+        assert_eq!(Junctions::of(&straight()).between(0.0, 600.0).count(), 0);
+        let junctions = Junctions::of(&corner());
+        let spans: Vec<(f64, f64)> = junctions.between(-100.0, 1000.0).collect();
+        assert!(!spans.is_empty());
+        for (enter_m, exit_m) in spans {
+            assert!(enter_m < exit_m && junctions.inside((enter_m + exit_m) / 2.0));
+            assert!(!junctions.inside(exit_m + 1.0));
+        }
     }
 }

@@ -325,6 +325,25 @@ mod tests {
     }
 
     #[test]
+    fn a_perfect_prediction_reads_the_recording() {
+        let scene = winding();
+        let mut foresight = Foresight::default();
+        // It will brake at 2 m/s² and turn off the road.
+        for frame in 0..200_u64 {
+            let time_s = frame as f64 * FRAME_S;
+            let position = Vec2::new(20.0 + 8.0 * time_s - time_s * time_s, -1.75 - 0.1 * time_s * time_s);
+            foresight.note(1, frame, position);
+        }
+        let config = PredictionConfig { perfect: true, ..PredictionConfig::default() };
+        let mut knowing = Prediction::new(&config, true, &scene, Some(Arc::new(foresight)));
+        let track = Track::for_tests(1, Body::Sedan, Pose::new(28.0, -1.75, 0.0), Vec2::new(6.0, 0.0));
+        knowing.update(&[track], 0.0, 1.0, Vec2::zeros());
+        let at_4_s = knowing.forecasts()[0].positions[6];
+        // 16 - 7 m onwards and 1.6 - 0.1 m aside of where it is now.
+        assert!((at_4_s - Vec2::new(28.0 + 16.0 - 7.0, -1.75 - 1.5)).norm() < 0.01, "{at_4_s}");
+    }
+
+    #[test]
     fn standing_things_stay_and_walkers_walk() {
         let scene = winding();
         let mut prediction = prediction(&scene);

@@ -101,7 +101,8 @@ impl<'a> Reader<'a> {
     }
 
     fn origin(&mut self, fields: &[ast::Field]) -> Origin {
-        const FIELDS: [&str; 7] = ["seed", "episode", "policy", "ads", "engine", "with", "without"];
+        const FIELDS: [&str; 9] =
+            ["seed", "episode", "policy", "ads", "profile", "profile_digest", "engine", "with", "without"];
         let mut origin = Origin::default();
         self.once("field", fields);
         for field in fields {
@@ -110,6 +111,8 @@ impl<'a> Reader<'a> {
                 "episode" => origin.episode = self.whole(&field.value),
                 "policy" => origin.policy = self.text(&field.value),
                 "ads" => origin.ads = self.text(&field.value),
+                "profile" => origin.profile = self.text(&field.value),
+                "profile_digest" => origin.profile_digest = self.text(&field.value),
                 "engine" => origin.engine = self.text(&field.value),
                 "with" => origin.with = self.rule_names(&field.value),
                 "without" => origin.without = self.rule_names(&field.value),

@@ -98,3 +98,39 @@ impl ModularConfig {
         config
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Every shipped fault: its file's name begins with the module at fault.
+    fn faults() -> Vec<(String, ModularConfig)> {
+        let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios/ads/faults");
+        let mut files: Vec<_> =
+            std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
+        files.sort();
+        let read = |path: &std::path::PathBuf| {
+            let text = std::fs::read_to_string(path).unwrap();
+            (
+                path.file_stem().unwrap().to_string_lossy().into_owned(),
+                ModularConfig::from_yaml(&text).unwrap(),
+            )
+        };
+        files.iter().map(read).collect()
+    }
+
+    #[test]
+    fn a_fault_vanishes_with_its_own_module_and_with_no_other() {
+        let healthy = ModularConfig::default();
+        assert!(faults().len() >= 12);
+        for (name, fault) in faults() {
+            for module in Module::ALL {
+                let cured = fault.idealised(module) == healthy.idealised(module);
+                assert_eq!(cured, name.starts_with(module.name()), "{name} by {}", module.name());
+            }
+        }
+        for module in Module::ALL {
+            assert!(faults().iter().any(|(name, _)| name.starts_with(module.name())), "{}", module.name());
+        }
+    }
+}

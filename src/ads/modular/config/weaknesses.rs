@@ -19,7 +19,7 @@ pub struct Weaknesses {
     pub e_closest_static_only: bool,
     /// (f) A pedestrian who has stood for some time is ignored until he moves again. Apollo's crosswalk `stop_timeout`; issue 11926: creeps into a pedestrian. Off: he is not.
     pub f_standing_pedestrian_ignored: bool,
-    /// (g) A red light that would need hard braking is passed. Apollo `max_stop_deceleration`. Off: it is braked for as hard as can be.
+    /// (g) A red light that would need hard braking is passed. Apollo `max_stop_deceleration`. Off: it is braked for, however late.
     pub g_late_red_passed: bool,
     /// (h) Traffic beside and behind is not reacted to. Apollo issue 14633, `BACKSIDE_VEHICLE` off. Off: whoever moves over from beside is let in.
     pub h_blind_to_side_and_rear: bool,

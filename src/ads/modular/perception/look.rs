@@ -48,6 +48,8 @@ pub struct Perception {
 struct Watched {
     id: u32,
     rng: Rng,
+    /// Whether it has been detected at all, and whether it was missed in the last frame.
+    seen: bool,
     missed: bool,
     size_factor: f64,
     frame: u64,
@@ -113,7 +115,7 @@ impl Perception {
         let index = self.watched.iter().position(|watched| watched.id == id).unwrap_or_else(|| {
             let mut rng = rng::stream(self.seed, Stream::Perception, u64::from(id));
             let size_factor = 1.0 + self.config.size_sigma * rng::normal(&mut rng).clamp(-3.0, 3.0);
-            self.watched.push(Watched { id, rng, missed: true, size_factor, frame: 0 });
+            self.watched.push(Watched { id, rng, seen: false, missed: true, size_factor, frame: 0 });
             self.watched.len() - 1
         });
         self.watched[index].frame = self.frame;
@@ -141,9 +143,15 @@ impl Perception {
 }
 
 impl Watched {
-    /// The next state of the chain, whose share of misses is one minus the chance.
+    /// The next state of the chain, whose share of misses is one minus the chance. Before the first
+    /// detection there is no run of misses to be in: frames are independent.
     fn draw(&mut self, detection_chance: f64, miss_run_s: f64) {
         let luck = rng::unit(&mut self.rng);
+        if !self.seen {
+            self.missed = luck >= detection_chance;
+            self.seen = !self.missed;
+            return;
+        }
         if detection_chance <= 0.0 {
             self.missed = true;
             return;

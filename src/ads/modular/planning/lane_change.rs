@@ -14,23 +14,30 @@ use crate::sim::Scene;
 use crate::sim::VehicleParameters;
 
 use super::super::config::PlanningConfig;
+use super::super::perception::FRAME_S;
 use super::super::prediction::Forecast;
 use super::speed::Constraint;
 
 /// Vehicles farther away along the road do not matter, m: the greatest gap that is asked for in a town.
 const LOOK_M: f64 = 200.0;
 
+/// For so long a lane must have been clear, s: a new track takes almost half of it to be published.
+/// Apollo waits as long after a failed attempt.
+const CLEAR_S: f64 = 1.0;
+
 #[derive(Debug, Clone)]
 pub struct LaneChanges {
     scene: Arc<Scene>,
     /// Where each change of the route begins, m; infinite while it has not.
     begins_m: Vec<f64>,
+    /// For how long the lane of the next one has been clear, s.
+    clear_s: f64,
 }
 
 impl LaneChanges {
     pub fn new(scene: &Arc<Scene>) -> LaneChanges {
         let begins_m = vec![f64::INFINITY; scene.route.changes.len()];
-        LaneChanges { scene: Arc::clone(scene), begins_m }
+        LaneChanges { scene: Arc::clone(scene), begins_m, clear_s: 0.0 }
     }
 
     /// The guide of the lanes as they are to be driven now.
@@ -63,13 +70,19 @@ impl LaneChanges {
         speed_mps: f64,
         forecasts: &[Forecast],
     ) -> bool {
-        let Some(change) = self.due(station_m) else { return false };
-        if !is_clear(config, guide, change.lateral_m, station_m, speed_mps, forecasts) {
+        let Some((index, change)) = self.next() else { return false };
+        let soon = station_m >= change.begin_m - speed_mps * CLEAR_S && !self.under_way(station_m);
+        if !soon || !is_clear(config, guide, change.lateral_m, station_m, speed_mps, forecasts) {
+            self.clear_s = 0.0;
             return false;
         }
-        let (index, _) = self.next().expect("one is due");
-        self.begins_m[index] = station_m;
-        true
+        let begins = self.due(station_m).is_some() && self.clear_s >= CLEAR_S;
+        self.clear_s += FRAME_S;
+        if begins {
+            self.begins_m[index] = station_m;
+            self.clear_s = 0.0;
+        }
+        begins
     }
 
     /// A stop where the next change is just possible.

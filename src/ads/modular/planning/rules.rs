@@ -46,10 +46,9 @@ pub fn crosswalks(
             let velocity_mps = walker.velocity_mps;
             let left_mps = beside.forward.x * velocity_mps.y - beside.forward.y * velocity_mps.x;
             let away_mps = left_mps * beside.offset_m.signum();
-            if !walker.moving {
-                // Apollo's `stop_timeout`: whoever does not go lets the vehicle go first.
-                return off_m <= config.crosswalk_strict_m
-                    && standing.time_s(walker.id) <= CROSSWALK_PATIENCE_S;
+            // Apollo's `stop_timeout`: whoever does not go lets the vehicle go first.
+            if standing.time_s(walker.id) > CROSSWALK_PATIENCE_S {
+                return false;
             }
             let comes = away_mps < -ACROSS_MPS;
             comes && off_m <= config.crosswalk_loose_m
@@ -97,4 +96,71 @@ pub fn can_stop(config: &PlanningConfig, decel_mps2: f64, distance_m: f64, speed
     // Until the braking has built up, the vehicle goes on as if for half that time.
     let build_up_s = decel_mps2 / config.jerk_mps3_down / 2.0;
     speed_mps * build_up_s + speed_mps * speed_mps / (2.0 * decel_mps2) <= distance_m.max(0.2)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ads::modular::planning::nudge::LateralPlan;
+    use crate::ads::modular::prediction::Prediction;
+    use crate::ads::modular::tracking::Track;
+    use crate::ads::testing::straight;
+    use crate::geometry::Pose;
+    use crate::geometry::Vec2;
+    use crate::model::vocabulary::Body;
+
+    const START: Point = Point { station_m: 40.0, speed_mps: 8.0, acceleration_mps2: 0.0 };
+
+    fn forecast(scene: &std::sync::Arc<Scene>, body: Body, at: Vec2, velocity_mps: Vec2) -> Forecast {
+        let mut prediction = Prediction::new(&Default::default(), true, scene, None);
+        let track = Track::for_tests(1, body, Pose { position: at, heading_rad: 0.0 }, velocity_mps);
+        prediction.update(&[track], 0.0, 0.0, Vec2::zeros());
+        prediction.forecasts()[0].clone()
+    }
+
+    /// Whether somebody at an offset from the path (m), walking to the left, stops the vehicle before a
+    /// crosswalk.
+    fn stops_for(offset_m: f64, left_mps: f64, stood_s: f64) -> bool {
+        let mut route = straight().route.clone();
+        route.crosswalks_m.push((80.0, 84.0));
+        let scene = std::sync::Arc::new(Scene::new(straight().map.clone(), route));
+        let config = PlanningConfig::default();
+        let guide = Guide::new(&scene, &config.speed_rules());
+        let walker =
+            forecast(&scene, Body::Pedestrian, Vec2::new(82.0, offset_m - 1.75), Vec2::new(0.0, left_mps));
+        let mut standing = Standing::default();
+        (0..=(stood_s * 10.0) as u32).for_each(|_| standing.update(core::slice::from_ref(&walker)));
+        let mut constraints = Vec::new();
+        crosswalks(&config, &scene, &guide, &START, &[walker], &standing, &mut constraints);
+        !constraints.is_empty()
+    }
+
+    #[test]
+    fn crosswalks_are_left_to_who_is_on_them_or_comes() {
+        assert!(stops_for(-7.0, 1.2, 0.0), "comes from the right");
+        assert!(!stops_for(-7.0, -1.2, 0.0), "goes away");
+        assert!(!stops_for(-9.0, 1.2, 0.0), "is too far");
+        assert!(stops_for(-3.0, 0.0, 2.0), "waits");
+        assert!(!stops_for(-3.0, 0.0, 6.0), "has waited for long");
+        assert!(!stops_for(3.0, 1.2, 0.0), "has crossed");
+    }
+
+    #[test]
+    fn a_junction_is_kept_clear_when_its_exit_is_blocked() {
+        let scene = straight();
+        let config = PlanningConfig::default();
+        let guide = Guide::new(&scene, &config.speed_rules());
+        let fences = |x_m: f64, speed_mps: f64| {
+            let leader = forecast(&scene, Body::Sedan, Vec2::new(x_m, -1.75), Vec2::new(speed_mps, 0.0));
+            let ahead = START.station_m..START.station_m + HORIZON_M;
+            let claim = Claim::of(&leader, &guide, &LateralPlan::default(), &ahead, 0.4);
+            let junctions = Junctions::for_tests(&[(70.0, 95.0)]);
+            let mut constraints = Vec::new();
+            keep_clear(&config, &junctions, &START, claim.as_slice(), &mut constraints);
+            constraints.len()
+        };
+        assert_eq!(fences(102.0, 0.0), 1, "stands just behind");
+        assert_eq!(fences(102.0, 5.0), 0, "moves off");
+        assert_eq!(fences(120.0, 0.0), 0, "leaves room");
+    }
 }
