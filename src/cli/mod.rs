@@ -3,15 +3,21 @@
 mod arguments;
 mod check;
 mod compile;
+mod completions;
+mod diff;
+mod doc;
 mod error;
+mod explain;
 mod fmt;
 mod load;
+mod new;
 mod output;
 mod progress;
 mod render;
 mod replay;
 mod run;
 mod run_directory;
+mod sarif;
 mod why;
 
 use std::process::ExitCode;
@@ -45,10 +51,16 @@ pub fn main() -> ExitCode {
         Command::Table(arguments) => compile::table(&output, arguments),
         Command::Why(arguments) => why::why(&output, arguments),
         Command::Fmt(arguments) => fmt::fmt(&output, arguments),
+        Command::Explain(arguments) => explain::explain(&output, arguments),
+        Command::Diff(arguments) => diff::diff(&output, arguments),
+        Command::Doc(arguments) => doc::doc(&output, arguments),
+        Command::New(arguments) => new::new(&output, arguments),
+        Command::Completions(arguments) => completions::completions(&output, arguments),
         Command::Run(arguments) => run::run(&output, arguments),
         Command::Replay(arguments) => replay::replay(&output, arguments),
         Command::Render(arguments) => render::render(&output, arguments),
     };
+    output.finish();
     match result {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {

@@ -2,6 +2,7 @@
 //!
 //! Files are read through a function that `cli` hands in; nothing here touches a disk.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::path::Component;
 use std::path::Path;
@@ -56,6 +57,13 @@ pub struct Loaded {
     pub space: Option<Arc<Space>>,
     /// The scenario of the root, if it has one and it is sound.
     pub scenario: Option<Scenario>,
+    /// Files by index, imports before those that use them.
+    order: Vec<usize>,
+}
+
+/// The declarations that hold, overridden ones replaced, in the order of the files' reading.
+pub(super) fn standing_items(loaded: &Loaded) -> Vec<Cow<'_, ast::Item>> {
+    overriding::resolve(&loaded.files, &loaded.order).0
 }
 
 /// Reads a root file, all it uses, and checks the whole.
@@ -74,7 +82,15 @@ pub fn load(root: &Path, read: &ReadFile<'_>) -> Result<Loaded, ReadError> {
     let Loader { sources, files, order, mut diagnostics, .. } = loader;
     // A file that does not parse lacks declarations, and everything else would look unknown.
     if diagnostics.iter().any(Diagnostic::is_error) {
-        return Ok(Loaded { sources, diagnostics, remarks: Vec::new(), files, space: None, scenario: None });
+        return Ok(Loaded {
+            sources,
+            diagnostics,
+            remarks: Vec::new(),
+            files,
+            space: None,
+            scenario: None,
+            order,
+        });
     }
     let folders = files.iter().map(|file| folder(&file.path)).collect();
     let mut maps = MapReader { read, folders, texts: BTreeMap::new(), known: BTreeMap::new() };
@@ -96,7 +112,7 @@ pub fn load(root: &Path, read: &ReadFile<'_>) -> Result<Loaded, ReadError> {
     if has_scenario || diagnostics.iter().any(Diagnostic::is_error) {
         remarks.clear();
     }
-    Ok(Loaded { sources, diagnostics, remarks, files, space: space.map(Arc::new), scenario })
+    Ok(Loaded { sources, diagnostics, remarks, files, space: space.map(Arc::new), scenario, order })
 }
 
 /// Digest of a file's bytes as the language writes it: `sha256:…`.
