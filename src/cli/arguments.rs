@@ -21,7 +21,7 @@ pub struct Arguments {
 
 #[derive(Debug, Clone, Args)]
 pub struct OutputArguments {
-    /// How to print: for people, plain text without colour or drawing, or JSON.
+    /// How to print: for people, plain text without colour or drawing, JSON, or SARIF.
     #[arg(long, global = true, value_enum, default_value_t = Format::Human)]
     pub format: Format,
     /// When to use colour.
@@ -38,6 +38,8 @@ pub enum Format {
     Plain,
     /// The last line on stdout is one object with the result.
     Json,
+    /// Diagnostics alone, as one SARIF 2.1.0 log on stdout.
+    Sarif,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -59,6 +61,16 @@ pub enum Command {
     Why(WhyArguments),
     /// Format files in the one style.
     Fmt(FmtArguments),
+    /// Say what a code like AV0101 means, or list all.
+    Explain(ExplainArguments),
+    /// Say how two spaces differ in rows, rules and draws.
+    Diff(DiffArguments),
+    /// Print a space as Markdown.
+    Doc(DocArguments),
+    /// Write a small space with its road, to begin with.
+    New(NewArguments),
+    /// Print a script by which a shell completes this command line.
+    Completions(CompletionsArguments),
     /// Play episodes and write the crashes back as scenarios.
     Run(RunArguments),
     /// Train an agent and write what it learned as a policy.
@@ -86,6 +98,41 @@ pub struct CheckArguments {
     /// Print a stage of the pipeline as JSON.
     #[arg(long, value_enum)]
     pub dump: Option<Stage>,
+    /// Make the changes that the diagnostics offer, in the files named here.
+    #[arg(long)]
+    pub fix: bool,
+}
+
+#[derive(Debug, Args)]
+pub struct ExplainArguments {
+    /// For example AV0401 [default: list all].
+    pub code: Option<String>,
+}
+
+#[derive(Debug, Args)]
+pub struct DiffArguments {
+    pub old: PathBuf,
+    pub new: PathBuf,
+}
+
+#[derive(Debug, Args)]
+pub struct DocArguments {
+    pub file: PathBuf,
+    /// Where to write [default: stdout].
+    #[arg(long, short)]
+    pub output: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+pub struct NewArguments {
+    /// Made if need be; no file in it is replaced.
+    pub directory: PathBuf,
+}
+
+#[derive(Debug, Args)]
+pub struct CompletionsArguments {
+    #[arg(value_enum)]
+    pub shell: clap_complete::Shell,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]

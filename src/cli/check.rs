@@ -1,22 +1,34 @@
 //! `avastra check`: every static check, and a look at the stages.
 
+use std::path::Path;
+
 use crate::action::ActionTable;
 use crate::action::audit;
+use crate::model::Loaded;
+use crate::syntax::apply_fixes;
+use crate::syntax::ast::FileId;
 
 use super::arguments::CheckArguments;
 use super::arguments::Stage;
 use super::error::Failure;
 use super::load;
 use super::output::Output;
+use super::progress::plural;
+use super::run_directory::write;
 
 /// Checks each file by itself; the mistakes of all are printed before the command fails.
 pub fn check(output: &Output, arguments: &CheckArguments) -> Result<(), Failure> {
     let (mut errors, mut warnings) = (0, 0);
     let mut files = Vec::new();
     for path in &arguments.files {
-        let loaded =
-            crate::model::load(path, &load::read).map_err(|error| Failure::file("read", path, error))?;
+        let mut loaded = load::read_and_check(path)?;
+        if arguments.fix && fix(output, path, &loaded)? {
+            loaded = load::read_and_check(path)?;
+        }
         output.diagnostics(&loaded.sources, &loaded.diagnostics);
+        if !output.quiet {
+            output.diagnostics(&loaded.sources, &loaded.remarks);
+        }
         let wrong = loaded.diagnostics.iter().filter(|diagnostic| diagnostic.is_error()).count();
         errors += wrong;
         warnings += loaded.diagnostics.len() - wrong;
@@ -43,6 +55,17 @@ pub fn check(output: &Output, arguments: &CheckArguments) -> Result<(), Failure>
         errors += warnings;
     }
     if errors > 0 { Err(Failure::Source { errors }) } else { Ok(()) }
+}
+
+/// Makes the changes that the diagnostics offer in the file itself; whether there were any.
+fn fix(output: &Output, path: &Path, loaded: &Loaded) -> Result<bool, Failure> {
+    let root = FileId::default();
+    let (text, made) = apply_fixes(root, loaded.sources.text(root), &loaded.diagnostics);
+    if made > 0 {
+        write(path, &text)?;
+        output.tell(&format!("{}: {} made", path.display(), plural(made, "change")));
+    }
+    Ok(made > 0)
 }
 
 fn json(value: &impl serde::Serialize) -> serde_json::Value {

@@ -17,6 +17,9 @@ use crate::model::Space;
 use super::error::Failure;
 use super::output::Output;
 
+/// Files of a directory that are searched for a name, at most.
+const NEARBY_MAX: usize = 32;
+
 /// Larger files are refused: no hand and no command of ours writes them.
 const FILE_BYTES_MAX: u64 = 64 << 20;
 
@@ -26,12 +29,42 @@ const FILE_BYTES_MAX: u64 = 64 << 20;
 /// If the file cannot be read, or the source has mistakes.
 pub fn load(output: &Output, path: &Path) -> Result<Loaded, Failure> {
     // The root file's absence is a failure of the command, not of the source.
-    let loaded = model::load(path, &read).map_err(|error| Failure::file("read", path, error))?;
+    let loaded = read_and_check(path)?;
     output.diagnostics(&loaded.sources, &loaded.diagnostics);
     match loaded.diagnostics.iter().filter(|diagnostic| diagnostic.is_error()).count() {
         0 => Ok(loaded),
         errors => Err(Failure::Source { errors }),
     }
+}
+
+/// Reads and checks a file; names that a file nearby declares are said to be there.
+///
+/// # Errors
+/// If the file cannot be read.
+pub fn read_and_check(path: &Path) -> Result<Loaded, Failure> {
+    let mut loaded = model::load(path, &read).map_err(|error| Failure::file("read", path, error))?;
+    if loaded.diagnostics.iter().any(crate::syntax::Diagnostic::is_error) {
+        model::suggest_uses(&mut loaded, &nearby(path));
+    }
+    Ok(loaded)
+}
+
+/// Other source files in the directory of a file and in the one above, as it would name them.
+fn nearby(path: &Path) -> Vec<(String, String)> {
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let mut found = Vec::new();
+    for prefix in ["", "../"] {
+        let directory = Path::new(".").join(folder).join(prefix);
+        let Ok(entries) = std::fs::read_dir(directory) else { continue };
+        let mut files: Vec<PathBuf> = entries.flatten().map(|entry| entry.path()).collect();
+        files.retain(|file| file.extension().is_some_and(|extension| extension == "ava"));
+        files.sort();
+        for file in files.into_iter().take(NEARBY_MAX) {
+            let name = file.file_name().unwrap_or_default().to_string_lossy().into_owned();
+            found.extend(read(&file).ok().map(|text| (format!("{prefix}{name}"), text)));
+        }
+    }
+    found
 }
 
 /// The action table of a space file.

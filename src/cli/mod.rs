@@ -3,9 +3,14 @@
 mod arguments;
 mod check;
 mod compile;
+mod completions;
+mod diff;
+mod doc;
 mod error;
+mod explain;
 mod fmt;
 mod load;
+mod new;
 mod output;
 mod progress;
 mod render;
@@ -13,6 +18,7 @@ mod replay;
 mod road;
 mod run;
 mod run_directory;
+mod sarif;
 mod train;
 mod verify;
 mod why;
@@ -48,6 +54,11 @@ pub fn main() -> ExitCode {
         Command::Table(arguments) => compile::table(&output, arguments),
         Command::Why(arguments) => why::why(&output, arguments),
         Command::Fmt(arguments) => fmt::fmt(&output, arguments),
+        Command::Explain(arguments) => explain::explain(&output, arguments),
+        Command::Diff(arguments) => diff::diff(&output, arguments),
+        Command::Doc(arguments) => doc::doc(&output, arguments),
+        Command::New(arguments) => new::new(&output, arguments),
+        Command::Completions(arguments) => completions::completions(&output, arguments),
         Command::Run(arguments) => run::run(&output, arguments),
         Command::Train(arguments) => train::train(&output, arguments),
         Command::Verify(arguments) => verify::verify(&output, arguments),
@@ -55,6 +66,7 @@ pub fn main() -> ExitCode {
         Command::Render(arguments) => render::render(&output, arguments),
         Command::Road(arguments) => road::road(&output, arguments),
     };
+    output.finish();
     match result {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {

@@ -1,9 +1,11 @@
 //! Printing: results on stdout, everything else on stderr, in the form that was asked for.
 
+use std::cell::RefCell;
 use std::io::IsTerminal;
 use std::io::Write;
 
 use crate::syntax::Diagnostic;
+use crate::syntax::DiagnosticRecord;
 use crate::syntax::Sources;
 use crate::syntax::Style;
 
@@ -11,12 +13,15 @@ use super::arguments::Format;
 use super::arguments::OutputArguments;
 use super::arguments::When;
 use super::error::Failure;
+use super::sarif;
 
 /// How this command prints.
 pub struct Output {
     format: Format,
     colour: bool,
     pub quiet: bool,
+    /// What SARIF wants in one piece at the end.
+    collected: RefCell<Vec<DiagnosticRecord>>,
 }
 
 /// The result of a command in JSON: its last line on stdout.
@@ -40,16 +45,29 @@ impl Output {
                     && std::env::var_os("NO_COLOR").is_none()
             }
         };
-        Output { format: arguments.format, colour, quiet: arguments.quiet }
+        let collected = RefCell::default();
+        Output { format: arguments.format, colour, quiet: arguments.quiet, collected }
     }
 
     pub fn is_json(&self) -> bool {
         self.format == Format::Json
     }
 
+    fn is_sarif(&self) -> bool {
+        self.format == Format::Sarif
+    }
+
+    /// Ends the command's output.
+    pub fn finish(&self) {
+        if self.is_sarif() {
+            let log = sarif::log(&self.collected.borrow());
+            print(&serde_json::to_string_pretty(&log).expect("it is JSON already"));
+        }
+    }
+
     /// Text for people on stdout; nothing in JSON.
     pub fn say(&self, text: &str) {
-        if !self.is_json() {
+        if !self.is_json() && !self.is_sarif() {
             print(text);
         }
     }
@@ -73,7 +91,9 @@ impl Output {
     /// Diagnostics on stderr; in JSON one object a line.
     pub fn diagnostics(&self, sources: &Sources, diagnostics: &[Diagnostic]) {
         for diagnostic in diagnostics {
-            if self.is_json() {
+            if self.is_sarif() {
+                self.collected.borrow_mut().push(crate::syntax::record(diagnostic, sources));
+            } else if self.is_json() {
                 let record = crate::syntax::record(diagnostic, sources);
                 let line = serde_json::to_string(&record).expect("records have string keys only");
                 remark(&line);
@@ -103,7 +123,8 @@ pub fn usage_in_json(failure: &Failure) {
     let arguments: Vec<String> = std::env::args().collect();
     let asks = |pair: &[String]| pair[0] == "--format" && pair[1] == "json";
     if arguments.windows(2).any(asks) || arguments.iter().any(|argument| argument == "--format=json") {
-        Output { format: Format::Json, colour: false, quiet: false }.failure(failure);
+        Output { format: Format::Json, colour: false, quiet: false, collected: RefCell::default() }
+            .failure(failure);
     }
 }
 

@@ -2,6 +2,7 @@
 //!
 //! Files are read through a function that `cli` hands in; nothing here touches a disk.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::path::Component;
 use std::path::Path;
@@ -60,6 +61,13 @@ pub struct Loaded {
     pub scenario: Option<Scenario>,
     /// The policy of the root, if it has one and it is sound.
     pub policy: Option<Policy>,
+    /// Files by index, imports before those that use them.
+    order: Vec<usize>,
+}
+
+/// The declarations that hold, overridden ones replaced, in the order of the files' reading.
+pub(super) fn standing_items(loaded: &Loaded) -> Vec<Cow<'_, ast::Item>> {
+    overriding::resolve(&loaded.files, &loaded.order).0
 }
 
 /// Reads a root file, all it uses, and checks the whole.
@@ -86,6 +94,7 @@ pub fn load(root: &Path, read: &ReadFile<'_>) -> Result<Loaded, ReadError> {
             space: None,
             scenario: None,
             policy: None,
+            order,
         });
     }
     let folders = files.iter().map(|file| folder(&file.path)).collect();
@@ -116,7 +125,7 @@ pub fn load(root: &Path, read: &ReadFile<'_>) -> Result<Loaded, ReadError> {
     if has_scenario || has_policy || diagnostics.iter().any(Diagnostic::is_error) {
         remarks.clear();
     }
-    Ok(Loaded { sources, diagnostics, remarks, files, space: space.map(Arc::new), scenario, policy })
+    Ok(Loaded { sources, diagnostics, remarks, files, space: space.map(Arc::new), scenario, policy, order })
 }
 
 /// Digest of a file's bytes as the language writes it: `sha256:…`.

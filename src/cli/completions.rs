@@ -1,0 +1,19 @@
+//! `avastra completions`: what a shell needs to complete the command line.
+
+use clap::CommandFactory;
+
+use super::arguments::Arguments;
+use super::arguments::CompletionsArguments;
+use super::error::Failure;
+use super::output::Output;
+
+/// Prints a script for the shell; `avastra completions bash > FILE` and source it.
+pub fn completions(output: &Output, arguments: &CompletionsArguments) -> Result<(), Failure> {
+    let mut script = Vec::new();
+    clap_complete::generate(arguments.shell, &mut Arguments::command(), "avastra", &mut script);
+    let script = String::from_utf8(script).expect("scripts are text");
+    output.say(script.trim_end());
+    output
+        .result("completions", serde_json::json!({ "shell": arguments.shell.to_string(), "script": script }));
+    Ok(())
+}

@@ -1,0 +1,194 @@
+//! `avastra doc`: a space as Markdown, from its documentation comments and what was proved of it.
+
+use core::fmt::Write;
+
+use crate::model::ActionDef;
+use crate::model::Domain;
+use crate::model::Interval;
+use crate::model::Parameter;
+use crate::model::Reach;
+use crate::model::RuleBody;
+use crate::model::RuleDef;
+use crate::model::Space;
+use crate::model::Type;
+use crate::model::Value;
+
+use super::arguments::DocArguments;
+use super::error::Failure;
+use super::load;
+use super::output::Output;
+use super::progress::plural;
+use super::run_directory::write;
+
+/// Prints the page, or writes it.
+pub fn doc(output: &Output, arguments: &DocArguments) -> Result<(), Failure> {
+    let table = load::table(output, &arguments.file)?;
+    let text = page(table.space());
+    match &arguments.output {
+        Some(path) => {
+            write(path, &text)?;
+            output.tell(&path.display().to_string());
+        }
+        None => output.say(text.trim_end()),
+    }
+    output.result("doc", serde_json::json!({ "text": text }));
+    Ok(())
+}
+
+fn page(space: &Space) -> String {
+    let mut text = String::new();
+    let stem = space.path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
+    // Writing to a String cannot fail.
+    let _ = write!(text, "# {stem}\n\n{}", paragraph(&space.docs));
+    let _ = writeln!(text, "## Actions\n\n{}.\n", plural(space.rows.len(), "row"));
+    for (index, action) in space.actions.iter().enumerate() {
+        action_section(&mut text, space, index, action);
+    }
+    text.push_str("## Rules\n\n");
+    for (index, rule) in space.rules.iter().enumerate() {
+        rule_section(&mut text, space, index, rule);
+    }
+    if !space.states.is_empty() {
+        text.push_str("## State\n\n| state | values | begins as | meaning |\n|---|---|---|---|\n");
+        for state in &space.states {
+            let of = match state.key {
+                Some(key) => format!("{} -> {}", space.enums[key.0].name, type_name(space, state.ty)),
+                None => type_name(space, state.ty),
+            };
+            let begins = match &state.initial {
+                crate::model::Initial::Any => "drawn".to_owned(),
+                crate::model::Initial::Value(_) => {
+                    space.show(space.initial_memory(0).cells()[state.first_cell], state.ty)
+                }
+            };
+            let _ = writeln!(text, "| `{}` | {of} | {begins} | {} |", state.name, inline(&state.docs));
+        }
+        text.push('\n');
+    }
+    if !space.enums.is_empty() {
+        text.push_str("## Enums\n\n| enum | variants | meaning |\n|---|---|---|\n");
+        for declared in &space.enums {
+            let between = if declared.ordered { " < " } else { ", " };
+            let variants = declared.variants.join(between);
+            let _ = writeln!(text, "| `{}` | {variants} | {} |", declared.name, inline(&declared.docs));
+        }
+        text.push('\n');
+    }
+    text.push_str("## Roads\n\n| road | limit | map | meaning |\n|---|---|---|---|\n");
+    for road in &space.roads {
+        let map = road.map_path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let limit = crate::units::decimal((road.facts.limit_mps * 1000.0).round() / 1000.0, false);
+        let _ = writeln!(text, "| `{}` | {limit} m/s | {map} | {} |", road.name, inline(&road.docs));
+    }
+    text.push_str("\n## Verdicts\n\n");
+    for verdict in &space.verdicts {
+        let _ = writeln!(text, "- `{}`: {}", verdict.name, inline(&verdict.docs));
+    }
+    text
+}
+
+fn action_section(text: &mut String, space: &Space, index: usize, action: &ActionDef) {
+    let rows: Vec<usize> = space.rows.iter().filter(|row| row.action == index).map(|row| row.index).collect();
+    let numbers = match rows.as_slice() {
+        [] => "no rows".to_owned(),
+        [only] => format!("row {only}"),
+        [first, .., last] => format!("rows {first} to {last}"),
+    };
+    let _ = write!(text, "### `{}` ({numbers})\n\n{}", action.name, paragraph(&action.docs));
+    if action.parameters.is_empty() {
+        return;
+    }
+    text.push_str("| parameter | how | values | after the rules |\n|---|---|---|---|\n");
+    for parameter in &action.parameters {
+        let how = if parameter.axis { "each" } else { "any" };
+        let _ = writeln!(
+            text,
+            "| `{}` | {how} | {} | {} |",
+            parameter.name,
+            values(space, &parameter.domain, parameter.ty),
+            ranges(space, index, parameter)
+        );
+    }
+    text.push('\n');
+}
+
+fn rule_section(text: &mut String, space: &Space, index: usize, rule: &RuleDef) {
+    let rows = space.rows.iter().filter(|row| row.rules.contains(&index)).count();
+    let optional = if rule.optional { ", optional" } else { "" };
+    let _ = write!(text, "### `{}` (binds {}{optional})\n\n", rule.name, plural(rows, "row"));
+    text.push_str(&paragraph(&rule.docs));
+    if let RuleBody::Moves { state, allowed, .. } = &rule.body {
+        let state = &space.states[*state];
+        let Type::Enum(of) = state.ty else { return };
+        let variants = &space.enums[of.0].variants;
+        let _ = writeln!(text, "| `{}` from | to |\n|---|---|", state.name);
+        for (from, to) in allowed.iter().enumerate() {
+            let to: Vec<&str> =
+                to.iter().zip(variants).filter(|(allowed, _)| **allowed).map(|(_, to)| to.as_str()).collect();
+            let _ = writeln!(text, "| {} | {} |", variants[from], to.join(", "));
+        }
+        text.push('\n');
+    }
+}
+
+/// What the rules leave of a range, for each road where it differs from what is declared.
+fn ranges(space: &Space, action: usize, parameter: &Parameter) -> String {
+    let Domain::Range(low, high) = &parameter.domain else { return String::new() };
+    let declared = Interval::closed(*low, *high);
+    let unit = unit(parameter.ty);
+    let mut shown: Vec<String> = Vec::new();
+    for (index, road) in space.roads.iter().enumerate() {
+        let reaches = space.rows.iter().filter(|row| row.action == action).map(|row| &row.roads[index]);
+        let kept = reaches.filter_map(|reach| match reach {
+            Reach::Open(ranges) => {
+                ranges.iter().find(|(name, _)| *name == parameter.name).map(|(_, interval)| *interval)
+            }
+            Reach::Dead { .. } => None,
+        });
+        let Some(kept) = kept.reduce(|all, interval| all.hull(&interval)) else { continue };
+        if kept != declared {
+            shown.push(format!("{kept} {unit} on {}", road.name));
+        }
+    }
+    shown.join("; ")
+}
+
+fn values(space: &Space, domain: &Domain, ty: Type) -> String {
+    match domain {
+        Domain::Range(low, high) => {
+            let shown = |end: f64| space.show(Value::Number(end), ty);
+            format!("{} .. {}", shown(low.to_f64()), shown(high.to_f64()))
+        }
+        Domain::Values(values) if values.len() > 12 => {
+            let ends = [values[0], values[values.len() - 1]].map(|value| space.show(value, ty));
+            format!("{} … {} ({} values)", ends[0], ends[1], values.len())
+        }
+        Domain::Values(values) => {
+            values.iter().map(|value| space.show(*value, ty)).collect::<Vec<_>>().join(", ")
+        }
+    }
+}
+
+fn type_name(space: &Space, ty: Type) -> String {
+    match ty {
+        Type::Bool => "Bool".to_owned(),
+        Type::Int => "Int".to_owned(),
+        Type::Quantity(dimension) => dimension.to_string(),
+        Type::Enum(of) => space.enums[of.0].name.clone(),
+    }
+}
+
+fn unit(ty: Type) -> String {
+    match ty {
+        Type::Quantity(dimension) => dimension.si_unit(),
+        Type::Int | Type::Bool | Type::Enum(_) => String::new(),
+    }
+}
+
+fn paragraph(docs: &[String]) -> String {
+    if docs.is_empty() { String::new() } else { format!("{}\n\n", docs.join("\n")) }
+}
+
+fn inline(docs: &[String]) -> String {
+    docs.join(" ").replace('|', "\\|")
+}
