@@ -11,7 +11,7 @@ use avastra::sim::Scene;
 use avastra::sim::Start;
 use avastra::sim::World;
 
-use crate::world::space;
+use crate::world::space_at;
 
 /// How far from the route the rear axle may come, m, in however wide a lane.
 const OFFSET_M_MAX: f64 = 0.7;
@@ -21,7 +21,7 @@ const DRIVES: usize = 100;
 
 #[test]
 fn undisturbed_drives_arrive_in_every_weather() {
-    let space = space("avastra45.ava");
+    let space = space_at("tests/cases/spaces/four_roads.ava");
     for (index, road) in space.roads.iter().enumerate() {
         let scene = Arc::new(episode::scene(road));
         for entry in ads::REGISTRY {
@@ -34,7 +34,7 @@ fn undisturbed_drives_arrive_in_every_weather() {
 
 #[test]
 fn a_healthy_driving_system_survives_ambient_traffic() {
-    let space = space("avastra45.ava");
+    let space = space_at("tests/cases/spaces/four_roads.ava");
     let (mut drives, mut hit) = (0, Vec::new());
     for (index, road) in space.roads.iter().enumerate() {
         let scene = Arc::new(episode::scene(road));
