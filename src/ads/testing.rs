@@ -12,6 +12,7 @@ use crate::model::vocabulary::Body;
 use crate::road::RoadMap;
 use crate::road::Route;
 use crate::road::RouteStopLine;
+use crate::road::Signal;
 use crate::sim::Conditions;
 use crate::sim::Control;
 use crate::sim::DT_S;
@@ -113,11 +114,13 @@ fn scene(pieces: &[(f64, f64, f64)]) -> Arc<Scene> {
          <center><lane id=\"0\" type=\"none\"/></center>\
          <right><lane id=\"-1\" type=\"driving\">{width}</lane></right></laneSection></lanes></road></OpenDRIVE>"
     );
-    let map = RoadMap::from_opendrive("by hand", &text).expect("the road is sound");
+    let mut map = RoadMap::from_opendrive("by hand", &text).expect("the road is sound");
     let start = map.place("1", -1, 0.0).expect("the road begins");
     let goal = map.place("1", -1, station_m - 40.0).expect("the road is long");
     let mut route = Route::find(&map, start, goal).expect("one lane leads there");
     route.stop_lines.push(RouteStopLine { station_m: 100.0, signal: 0 });
+    let position = route.path.pose_at(100.0).offset(10.0, -4.0).position;
+    map.signals.push(Signal { id: "1".into(), position, junction: None, group: 0 });
     Arc::new(Scene::new(map.into(), route))
 }
 

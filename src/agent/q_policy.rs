@@ -10,6 +10,7 @@ use ndarray::Axis;
 use crate::action::ActionTable;
 use crate::mdp::Observation;
 use crate::model::EffectDef;
+use crate::model::Policy;
 use crate::rng;
 use crate::rng::Rng;
 use crate::syntax::nearest;
@@ -89,6 +90,23 @@ impl QPolicy {
         assert_eq!(*network.shape(), QPolicy::shape(&settings, rows.allowed.len()), "the network fits");
         let features = Features::new(settings.state, settings.encoding);
         QPolicy { settings, features, rows, network, last_environment: None }
+    }
+
+    /// The policy that a file describes, for the table that it is to choose from.
+    ///
+    /// # Errors
+    /// If its settings cannot be read, or describe another network than it has.
+    pub fn read(file: &Policy, table: &ActionTable) -> Result<QPolicy, SettingsError> {
+        let settings = Hyperparameters::from_record(&file.hyperparameters)?;
+        let rows = Rows::new(table, &settings.actions)?;
+        let shape = Shape { layers: file.layers.clone(), dueling: file.dueling };
+        if shape != QPolicy::shape(&settings, rows.allowed.len()) {
+            let message = "the network is not the one that its settings describe";
+            return Err(SettingsError::Text(message.to_owned()));
+        }
+        let network = Network::from_parameters(shape, file.parameters.clone());
+        let network = network.expect("the checker has counted the weights");
+        Ok(QPolicy::new(Arc::new(settings), Arc::new(rows), network))
     }
 
     pub fn settings(&self) -> &Hyperparameters {

@@ -61,8 +61,12 @@ pub enum Command {
     Fmt(FmtArguments),
     /// Play episodes and write the crashes back as scenarios.
     Run(RunArguments),
+    /// Train an agent and write what it learned as a policy.
+    Train(TrainArguments),
     /// Run emitted scenarios again and check every claim they make.
     Replay(ReplayArguments),
+    /// Check every claim of emitted scenarios and policies.
+    Verify(VerifyArguments),
     /// Draw moments of an emitted scenario as SVG.
     Render(RenderArguments),
     /// Print or draw a map, and a route through it.
@@ -155,6 +159,9 @@ pub struct RunArguments {
     /// Who chooses the actions.
     #[arg(long, default_value = "random")]
     pub agent: String,
+    /// Let a trained policy choose them; without FILE on its own space.
+    #[arg(long, value_name = "POLICY", conflicts_with = "agent")]
+    pub policy: Option<PathBuf>,
     /// Episodes on each road.
     #[arg(long, default_value_t = 100, value_parser = clap::value_parser!(u32).range(1..=i64::from(crate::study::EPISODES_MAX)))]
     pub episodes: u32,
@@ -172,11 +179,52 @@ pub struct RunArguments {
     #[arg(long)]
     pub out: Option<PathBuf>,
     /// Go on with an interrupted run directory; its own settings hold.
-    #[arg(long, value_name = "DIR", conflicts_with_all = ["file", "road", "ads", "agent", "episodes", "seed", "ambient", "out", "without", "with"])]
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["file", "road", "ads", "agent", "policy", "episodes", "seed", "ambient", "out", "without", "with"])]
     pub resume: Option<PathBuf>,
     /// Exit with status 4 if a counted collision was found.
     #[arg(long)]
     pub fail_on_collision: bool,
+}
+
+#[derive(Debug, Args)]
+pub struct TrainArguments {
+    /// The space.
+    #[arg(required_unless_present = "resume")]
+    pub file: Option<PathBuf>,
+    /// Road to drive; with several, episodes go round them [default: all of the space].
+    #[arg(long)]
+    pub road: Vec<String>,
+    /// Driving system under test.
+    #[arg(long, default_value = crate::study::DEFAULT_ADS)]
+    pub ads: String,
+    /// Who learns.
+    #[arg(long, default_value = "ddqn")]
+    pub agent: String,
+    /// Settings to begin with [default: the agent's own].
+    #[arg(long)]
+    pub preset: Option<String>,
+    /// Settings that differ from the preset, as YAML.
+    #[arg(long, value_name = "YAML")]
+    pub config: Option<PathBuf>,
+    /// Episodes on all roads together.
+    #[arg(long, default_value_t = 750, value_parser = clap::value_parser!(u32).range(1..=i64::from(crate::study::EPISODES_MAX)))]
+    pub episodes: u32,
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+    #[command(flatten)]
+    pub rules: RuleArguments,
+    /// Run directory, new or empty [default: the next free runs/NNNN].
+    #[arg(long)]
+    pub out: Option<PathBuf>,
+    /// Go on with an interrupted run directory; its own settings hold.
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["file", "road", "ads", "agent", "preset", "config", "episodes", "seed", "out", "without", "with"])]
+    pub resume: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+pub struct VerifyArguments {
+    #[arg(required = true, value_name = "FILE")]
+    pub files: Vec<PathBuf>,
 }
 
 #[derive(Debug, Args)]

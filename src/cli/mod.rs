@@ -13,6 +13,8 @@ mod replay;
 mod road;
 mod run;
 mod run_directory;
+mod train;
+mod verify;
 mod why;
 
 use std::process::ExitCode;
@@ -47,6 +49,8 @@ pub fn main() -> ExitCode {
         Command::Why(arguments) => why::why(&output, arguments),
         Command::Fmt(arguments) => fmt::fmt(&output, arguments),
         Command::Run(arguments) => run::run(&output, arguments),
+        Command::Train(arguments) => train::train(&output, arguments),
+        Command::Verify(arguments) => verify::verify(&output, arguments),
         Command::Replay(arguments) => replay::replay(&output, arguments),
         Command::Render(arguments) => render::render(&output, arguments),
         Command::Road(arguments) => road::road(&output, arguments),

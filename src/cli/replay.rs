@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use crate::model::Avoidability;
 use crate::model::Scenario;
 use crate::oracle;
 use crate::study;
@@ -21,17 +22,23 @@ pub fn replay(output: &Output, arguments: &ReplayArguments) -> Result<(), Failur
         let ads = arguments.ads.as_deref();
         let log = study::replay(&table, &scenario, ads, &mut |_, _, _| {})
             .map_err(|error| Failure::usage(error.to_string()))?;
+        let judgements = study::judge_replay(&table, &scenario, ads, &log)
+            .map_err(|error| Failure::usage(error.to_string()))?;
         if let Some(ads) = ads {
-            let counted = oracle::counted(table.space(), &log).len();
+            let counted = oracle::counted(table.space(), &log, &judgements).len();
             let collisions = plural(log.collisions.len(), "collision");
-            output.say(&format!("{} against {ads}: {collisions}, {counted} counted", path.display()));
+            let avoidable = judgements.iter().filter(|j| j.class == Avoidability::Avoidable).count();
+            output.say(&format!(
+                "{} against {ads}: {collisions}, {counted} counted, {avoidable} avoidable",
+                path.display()
+            ));
             results.push(serde_json::json!({
                 "file": path, "scenario": scenario.name, "ads": ads,
-                "collisions": log.collisions.len(), "counted": counted,
+                "collisions": log.collisions.len(), "counted": counted, "judgements": judgements,
             }));
             continue;
         }
-        let verdicts = oracle::verify(table.space(), &scenario, &log);
+        let verdicts = oracle::verify(table.space(), &scenario, &log, &judgements);
         let wrong = verdicts.iter().filter(|verdict| !verdict.confirmed).count();
         refuted += wrong;
         confirmed += verdicts.len() - wrong;

@@ -15,6 +15,8 @@ use crate::model::Value;
 use crate::model::digest_text;
 use crate::model::vocabulary::Word;
 use crate::sim::ENGINE;
+use crate::study::EpisodeSummary;
+use crate::study::Finding;
 use crate::syntax::LANGUAGE;
 use crate::syntax::ast::ClauseKind;
 use crate::syntax::ast::Expect;
@@ -47,24 +49,28 @@ pub struct Provenance<'a> {
     pub with: &'a [String],
 }
 
-/// The scenario of an episode, cut after the step of its last counted collision.
-///
-/// `counted` holds the indices of the counted collisions, rising, and must not be empty.
-pub fn scenario(table: &ActionTable, log: &EpisodeLog, counted: &[usize], source: &Provenance) -> File {
+/// The scenario of an episode, cut after the step of its last counted collision; there must be one.
+pub fn scenario(
+    table: &ActionTable,
+    log: &EpisodeLog,
+    summary: &EpisodeSummary,
+    source: &Provenance,
+) -> File {
     let space = table.space();
-    let last = *counted.last().expect("an episode without a counted collision is not emitted");
-    let steps = log.collisions[last].step + 1;
+    let counted: Vec<&Finding> = summary.collisions.iter().filter(|finding| finding.counted).collect();
+    let last = counted.last().expect("an episode without a counted collision is not emitted");
+    let steps = last.collision.step + 1;
     let item = Scenario {
         name: Name::built(source.name),
         origin: origin(log, source),
         road: Name::built(log.road.as_str()),
         start: start(space, log),
         steps: (0..steps).map(|number| step(table, log, number)).collect(),
-        expects: expects(log, counted, steps),
+        expects: expects(log, summary, steps),
     };
     let digest = Some(Text::new(space.digest.clone(), Span::NONE));
     let space_use = Use { path: Text::new(source.space_path, Span::NONE), digest };
-    let docs = vec![tree::doc(headline(log, &log.collisions[counted[0]]))];
+    let docs = vec![tree::doc(headline(log, &counted[0].collision))];
     File {
         docs: vec![tree::doc("Emitted by `avastra run`; replay with `avastra replay FILE`.")],
         items: vec![
@@ -161,21 +167,23 @@ fn literal(space: &Space, action: &ActionDef, parameter: &str, value: Value) -> 
     tree::value(space, value, found.expect("values are of the action's own parameters").ty)
 }
 
-fn expects(log: &EpisodeLog, counted: &[usize], steps: usize) -> Vec<Expect> {
+fn expects(log: &EpisodeLog, summary: &EpisodeSummary, steps: usize) -> Vec<Expect> {
     let mut expects = Vec::new();
-    for (index, collision) in
-        log.collisions.iter().enumerate().filter(|(_, collision)| collision.step < steps)
-    {
-        let contact = &collision.contact;
-        let clauses = vec![
-            tree::clause(ClauseKind::With, tree::road_user(contact.obstacle)),
-            tree::clause(ClauseKind::At, tree::rounded(contact.time_s, 2, Dimension::DURATION)),
-        ];
-        expects.push(tree::expect(tree::name("collision"), clauses));
-        if counted.contains(&index) {
-            let who = vec![tree::clause(ClauseKind::With, tree::road_user(contact.obstacle))];
-            expects.push(tree::expect(tree::name("counted"), who));
+    for finding in summary.collisions.iter().filter(|finding| finding.collision.step < steps) {
+        let contact = &finding.collision.contact;
+        let who = || tree::clause(ClauseKind::With, tree::road_user(contact.obstacle));
+        let at = tree::clause(ClauseKind::At, tree::rounded(contact.time_s, 2, Dimension::DURATION));
+        expects.push(tree::expect(tree::name("collision"), vec![who(), at]));
+        if finding.counted {
+            expects.push(tree::expect(tree::name("counted"), vec![who()]));
         }
+        let drivers = &finding.judgement.avoided_by;
+        let by = (!drivers.is_empty()).then(|| {
+            let drivers = drivers.iter().map(|driver| tree::name(driver));
+            tree::clause(ClauseKind::By, tree::list(drivers.collect()))
+        });
+        let class = tree::name(finding.judgement.class.name());
+        expects.push(tree::expect(class, by.into_iter().chain([who()]).collect()));
     }
     let proc = log.steps[..steps].iter().map(|step| tree::rounded(step.proc, 3, Dimension::RATIO));
     expects.push(tree::expect(tree::equal(tree::name("proc"), tree::list(proc.collect())), Vec::new()));

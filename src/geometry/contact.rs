@@ -56,6 +56,14 @@ impl Sweep {
         OrientedBox { pose, ..self.start }
     }
 
+    /// Velocity, as the way it would make during the whole motion, of the point of the box that is at
+    /// `point` after a part of it, m.
+    pub fn rate_m(&self, fraction: f64, point: Vec2) -> Vec2 {
+        let turn_rad = wrap_angle(self.end.heading_rad - self.start.pose.heading_rad);
+        let arm = point - self.at(fraction).pose.position;
+        self.displacement() + Vec2::new(-arm.y, arm.x) * turn_rad
+    }
+
     fn displacement(&self) -> Vec2 {
         self.end.position - self.start.pose.position
     }
@@ -190,7 +198,8 @@ impl Frame {
             )
         };
         let meets = |shape: &Frame, centre: Vec2, extent: Vec2| {
-            centre.x.abs() <= shape.half_length_m + extent.x && centre.y.abs() <= shape.half_width_m + extent.y
+            centre.x.abs() <= shape.half_length_m + extent.x
+                && centre.y.abs() <= shape.half_width_m + extent.y
         };
         if meets(self, there, extent(other)) && meets(other, here, extent(self)) {
             return 0.0;
@@ -206,8 +215,7 @@ impl Frame {
         };
         let ahead = Vec2::new(cosine, sine);
         let left = Vec2::new(-sine, cosine);
-        let of_other =
-            nearest_m2(self, there, ahead * other.half_length_m, left * other.half_width_m);
+        let of_other = nearest_m2(self, there, ahead * other.half_length_m, left * other.half_width_m);
         // Seen from the other box, this one is turned the other way.
         let ahead = Vec2::new(cosine, -sine);
         let left = Vec2::new(sine, cosine);

@@ -66,8 +66,37 @@ pub enum Claim {
     Trace(String),
     /// `expect counted with npc#2`: the named verdict holds of the collision.
     Verdict { name: String, obstacle: Option<u32> },
+    /// `expect avoidable by [cc, fsm] with npc#2`: the class of the collision, and the reference drivers
+    /// that avoid it.
+    Avoidability { class: Avoidability, by: Option<Vec<String>>, obstacle: Option<u32> },
     /// `expect end == arrived`: one of [`ENDS`].
     End(String),
+}
+
+/// What careful drivers make of a collision.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Avoidability {
+    /// A careful reference driver avoids it.
+    Avoidable,
+    /// None does, but an evasive manoeuvre without any delay.
+    BeyondReference,
+    /// Nothing that was tried.
+    Unavoidable,
+}
+
+impl Avoidability {
+    pub const ALL: [Avoidability; 3] =
+        [Avoidability::Avoidable, Avoidability::BeyondReference, Avoidability::Unavoidable];
+
+    /// The word for it in scenarios.
+    pub fn name(self) -> &'static str {
+        match self {
+            Avoidability::Avoidable => "avoidable",
+            Avoidability::BeyondReference => "beyond_reference",
+            Avoidability::Unavoidable => "unavoidable",
+        }
+    }
 }
 
 /// How an episode may end, in the words of `expect end == …`.

@@ -46,6 +46,7 @@ pub fn build(document: &Document) -> Result<RoadMap, RoadError> {
     add_signals(&mut builder)?;
     add_crosswalks(&mut builder);
     let mut map = builder.map;
+    map.warnings.extend(loose_links(&map));
     for lane in &mut map.lanes {
         lane.successors.sort();
         lane.predecessors.sort();
@@ -85,6 +86,7 @@ impl<'a> Builder<'a> {
             name: document.name.clone(),
             lanes: Vec::new(),
             signals: Vec::new(),
+            signs: Vec::new(),
             junctions: document
                 .junctions
                 .iter()
@@ -228,6 +230,10 @@ impl<'a> Builder<'a> {
                 };
                 let incoming = road(&connection.incoming_road)?;
                 let connecting = road(&connection.connecting_road)?;
+                if connection.lane_links.is_empty() {
+                    let message = format!("a connection of junction `{}` links no lanes", junction.id);
+                    self.warn(connection.line, message);
+                }
                 let contact = self.contact_at(incoming, &junction.id, connecting, connection.contact);
                 for (from, to) in &connection.lane_links {
                     let from = self.end(incoming, *from, contact);
@@ -360,6 +366,29 @@ struct End {
     section: usize,
     lane: i32,
     contact: Contact,
+}
+
+/// Ends of linked lanes farther apart than this do not meet, m: a car would have to jump.
+const LOOSE_M: f64 = 0.5;
+
+/// A warning if lanes are linked whose ends do not meet.
+fn loose_links(map: &RoadMap) -> Option<String> {
+    let links =
+        map.lanes.iter().flat_map(|lane| lane.successors.iter().map(move |next| (lane, map.lane(*next))));
+    let loose = links.filter_map(|(lane, next)| {
+        let end = lane.centre.pose_at(lane.centre.length_m()).position;
+        let apart_m = (next.centre.pose_at(0.0).position - end).norm();
+        (apart_m > LOOSE_M).then_some((apart_m, lane, next))
+    });
+    let loose: Vec<_> = loose.collect();
+    let (apart_m, lane, next) = loose.iter().max_by(|a, b| a.0.total_cmp(&b.0))?;
+    let name = |lane: &Lane| format!("lane {} of road `{}`", lane.key.lane, lane.key.road);
+    Some(format!(
+        "{} links join lanes that do not meet; the worst, from {} to {}, leaps {apart_m:.2} m",
+        loose.len(),
+        name(lane),
+        name(next)
+    ))
 }
 
 /// An error at a line of the file.

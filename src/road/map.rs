@@ -104,8 +104,25 @@ pub struct Signal {
     pub position: Vec2,
     /// Index in [`RoadMap::junctions`].
     pub junction: Option<usize>,
-    /// Position of its controller in the junction's cycle, from 0.
+    /// Position of its controller in the junction's cycle, from 0. Lights that no controller of a
+    /// junction switches form a group for each arm, after those.
     pub group: usize,
+}
+
+/// A stop or yield sign. Lights have precedence where both stand.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Sign {
+    pub id: String,
+    pub kind: SignKind,
+    pub position: Vec2,
+    /// Where it holds, with the station of the lane, m.
+    pub lanes: Vec<(LaneIndex, f64)>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum SignKind {
+    Stop,
+    Yield,
 }
 
 #[derive(Debug, Clone, PartialEq)]
@@ -131,6 +148,7 @@ pub struct RoadMap {
     pub name: String,
     pub lanes: Vec<Lane>,
     pub signals: Vec<Signal>,
+    pub signs: Vec<Sign>,
     pub junctions: Vec<Junction>,
     pub crosswalks: Vec<Crosswalk>,
     /// What was read but not understood, in words; each is worth a look.

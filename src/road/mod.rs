@@ -30,6 +30,8 @@ pub use map::Neighbour;
 pub use map::RoadError;
 pub use map::RoadMap;
 pub use map::Side;
+pub use map::Sign;
+pub use map::SignKind;
 pub use map::Signal;
 pub use map::StopLine;
 pub use map::Turn;

@@ -1,5 +1,7 @@
 //! The world of one episode.
 
+mod playback;
+
 use std::sync::Arc;
 
 use crate::action::Effect;
@@ -180,8 +182,7 @@ pub struct Contact {
     pub obstacle_velocity_mps: Vec2,
     /// The same in the frame of the ego outline: x ahead, y left.
     pub obstacle_velocity_on_ego_mps: Vec2,
-    /// Speed at which the gap between the outlines closed, m/s, not negative. What turning adds is
-    /// left out.
+    /// Speed at which the gap between the outlines closed where they met, m/s, not negative.
     pub closing_speed_mps: f64,
 }
 

@@ -23,6 +23,9 @@ use crate::episode::Script;
 use crate::episode::Watch;
 use crate::model::Scenario;
 use crate::model::Space;
+use crate::oracle;
+use crate::oracle::AvoidabilitySettings;
+use crate::oracle::Judgement;
 use crate::rng;
 use crate::rng::Stream;
 use crate::sim::ENGINE;
@@ -33,6 +36,7 @@ use super::arena::Arena;
 use super::arena::DEFAULT_ADS;
 use super::arena::choose;
 use super::arena::driving_system;
+use super::summary::EpisodeSummary;
 
 /// Everything that is needed to repeat a run; written to `run.yaml`.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -62,6 +66,9 @@ pub struct RunSettings {
     pub without: Vec<String>,
     /// Optional rules switched on.
     pub with: Vec<String>,
+    /// By what it is told whether a collision was avoidable.
+    #[serde(default)]
+    pub avoidability: AvoidabilitySettings,
 }
 
 /// A policy file that a run was begun with.
@@ -83,6 +90,12 @@ pub enum RunError {
     Agent { name: String, known: String },
     #[error("`{name}` has to be trained first: `avastra train`, then `avastra run --policy FILE`")]
     Untrained { name: String },
+    #[error("`{name}` has nothing to learn: `avastra run --agent {name}` plays it")]
+    Unteachable { name: String },
+    #[error("the checkpoint is not of a training with such settings: begin a new one")]
+    Checkpoint,
+    #[error(transparent)]
+    Settings(#[from] agent::SettingsError),
     #[error(transparent)]
     Rule(#[from] crate::action::UnknownRule),
     #[error("`{name}` is asked for twice, or both on and off")]
@@ -169,6 +182,13 @@ impl Run {
         self.play(number, &mut |moment| choose(self.table(), agent.as_mut(), moment), &mut |_, _, _| {})
     }
 
+    /// Plays one episode and judges its collisions.
+    pub fn judged(&self, number: usize) -> (EpisodeSummary, EpisodeLog) {
+        let log = self.episode(number);
+        let setup = self.setup(number);
+        (EpisodeSummary::judged(&setup, number, &log, &self.settings.avoidability), log)
+    }
+
     /// Plays one episode's beginning with other choices: a replay of it, for example.
     pub fn play(
         &self,
@@ -176,15 +196,20 @@ impl Run {
         choose: &mut dyn FnMut(&Moment) -> Choice,
         watch: &mut Watch,
     ) -> EpisodeLog {
+        episode::run(&self.setup(number), choose, watch)
+    }
+
+    /// The beginning of an episode.
+    fn setup(&self, number: usize) -> episode::Setup<'_> {
         let seed = rng::child_seed(self.settings.seed, Stream::Episode, number as u64);
         let mut setup = self.arena.setup(number / self.settings.episodes as usize, seed);
         setup.start.ambient = self.settings.ambient;
-        episode::run(&setup, choose, watch)
+        setup
     }
 }
 
-/// Plays episodes on `jobs` threads and hands each log to `done` on this one, in the order in which
-/// they end. Stops early, between episodes, when `stop` is set or `done` fails.
+/// Plays and judges episodes on `jobs` threads and hands each to `done` on this one, in the order in
+/// which they end. Stops early, between episodes, when `stop` is set or `done` fails.
 ///
 /// # Errors
 /// The first error of `done`.
@@ -193,7 +218,7 @@ pub fn play<E>(
     numbers: &[usize],
     jobs: usize,
     stop: &AtomicBool,
-    done: &mut dyn FnMut(usize, EpisodeLog) -> Result<(), E>,
+    done: &mut dyn FnMut(EpisodeSummary, EpisodeLog) -> Result<(), E>,
 ) -> Result<(), E> {
     let next = AtomicUsize::new(0);
     let abandoned = AtomicBool::new(false);
@@ -206,15 +231,15 @@ pub fn play<E>(
                 let sender = sender;
                 while !stop.load(Ordering::Relaxed) && !abandoned.load(Ordering::Relaxed) {
                     let Some(&number) = numbers.get(next.fetch_add(1, Ordering::Relaxed)) else { break };
-                    if sender.send((number, run.episode(number))).is_err() {
+                    if sender.send(run.judged(number)).is_err() {
                         break;
                     }
                 }
             });
         }
         drop(sender);
-        for (number, log) in receiver {
-            if let Err(error) = done(number, log) {
+        for (summary, log) in receiver {
+            if let Err(error) = done(summary, log) {
                 abandoned.store(true, Ordering::Relaxed);
                 return Err(error);
             }
@@ -260,4 +285,21 @@ pub fn replay(
     };
     let script = Script::of_scenario(scenario);
     Ok(episode::run(&setup, &mut |moment| script.choose(table, moment), watch))
+}
+
+/// Judges the collisions of a replay, by playing it again.
+///
+/// # Errors
+/// As [`replay`].
+pub fn judge_replay(
+    table: &ActionTable,
+    scenario: &Scenario,
+    ads: Option<&str>,
+    log: &EpisodeLog,
+) -> Result<Vec<Judgement>, RunError> {
+    let mut failure = None;
+    let judgements = oracle::judge(log, &AvoidabilitySettings::default(), &mut |watch| {
+        failure = replay(table, scenario, ads, watch).err();
+    });
+    failure.map_or(Ok(judgements), Err)
 }

@@ -3,9 +3,12 @@
 
 mod cases;
 mod command;
+mod contacts;
 mod drives;
 mod emitted;
 mod layers;
+mod references;
 mod rules;
 mod tables;
+mod traces;
 mod world;

@@ -275,10 +275,14 @@ impl Idm {
             }
         }));
     }
-}
 
-impl Ads for Idm {
-    fn drive(&mut self, sensed: &Sensed) -> Control {
+    /// Drives the route like the model, but with the acceleration that `decide` makes of the model's,
+    /// given with its reason, m/s².
+    pub(super) fn drive_with(
+        &mut self,
+        sensed: &Sensed,
+        decide: impl FnOnce(f64, Reason) -> (f64, Reason),
+    ) -> Control {
         let pose = &sensed.ego.rear_axle;
         if self.station_m.is_none() {
             self.steer_rad = sensed.ego.steer_rad;
@@ -286,7 +290,8 @@ impl Ads for Idm {
         let station_m = self.guide.locate(pose.position, self.station_m).station_m;
         self.station_m = Some(station_m);
         self.look(sensed, station_m);
-        let (mut acceleration_mps2, reason) = self.acceleration_mps2(sensed, station_m);
+        let (model_mps2, model_reason) = self.acceleration_mps2(sensed, station_m);
+        let (mut acceleration_mps2, reason) = decide(model_mps2, model_reason);
         if sensed.ego.speed_mps < 0.1 && acceleration_mps2 <= 0.0 {
             acceleration_mps2 = HOLD_MPS2;
         }
@@ -300,6 +305,17 @@ impl Ads for Idm {
         self.steer_rad = sensed.ego.steer_rad;
         self.ticks += 1;
         control
+    }
+
+    /// The route that it drives on.
+    pub(super) fn guide(&self) -> &Guide {
+        &self.guide
+    }
+}
+
+impl Ads for Idm {
+    fn drive(&mut self, sensed: &Sensed) -> Control {
+        self.drive_with(sensed, |acceleration_mps2, reason| (acceleration_mps2, reason))
     }
 
     fn status(&self) -> &Status {

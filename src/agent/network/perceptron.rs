@@ -220,7 +220,7 @@ mod tests {
 
     fn network(dueling: bool) -> Network {
         let shape = Shape { layers: vec![4, 8, 6, 3], dueling };
-        Network::new(shape, Initialization::Normal(0.6), &mut stream(5, Stream::Initialization, 0))
+        Network::new(shape, Initialization::Normal(0.3), &mut stream(5, Stream::Initialization, 0))
     }
 
     fn inputs() -> Array2<f32> {
@@ -242,22 +242,28 @@ mod tests {
                 let mut at = 0..;
                 q.mapv(|q| q - place(at.next().expect("it never ends")))
             });
+            let mut kinks = 0;
             for at in 0..gradient.len() {
-                const STEP: f32 = 1.0 / 4096.0;
                 let here = network.parameters[at];
-                network.parameters[at] = here + STEP;
-                let above = loss(&network);
-                network.parameters[at] = here - STEP;
-                let below = loss(&network);
-                network.parameters[at] = here;
-                let difference = (above - below) / (2.0 * f64::from(STEP));
-                let error = (difference - f64::from(gradient[at])).abs();
-                assert!(
-                    error < 2e-2 * (1.0 + difference.abs()),
-                    "{dueling} {at}: {difference} {}",
-                    gradient[at]
-                );
+                let mut difference = |step: f32| {
+                    let mut loss_at = |parameter| {
+                        network.parameters[at] = parameter;
+                        loss(&network)
+                    };
+                    let difference = (loss_at(here + step) - loss_at(here - step)) / (2.0 * f64::from(step));
+                    network.parameters[at] = here;
+                    difference
+                };
+                let (wide, narrow) = (difference(1.0 / 128.0), difference(1.0 / 256.0));
+                // The loss is a parabola in each parameter, but for the kinks of ReLU.
+                if (wide - narrow).abs() > 1e-3 * (1.0 + narrow.abs()) {
+                    kinks += 1;
+                    continue;
+                }
+                let error = (narrow - f64::from(gradient[at])).abs();
+                assert!(error < 4e-3 * (1.0 + narrow.abs()), "{dueling} {at}: {narrow} {}", gradient[at]);
             }
+            assert!(kinks * 5 < gradient.len(), "{kinks} of {}", gradient.len());
         }
     }
 

@@ -14,6 +14,7 @@ use crate::model::limits::AMBIENT_MAX;
 use crate::model::limits::SIGNAL_PHASE_S;
 use crate::model::row::Row;
 use crate::model::row::locals;
+use crate::model::scenario::Avoidability;
 use crate::model::scenario::Claim;
 use crate::model::scenario::ENDS;
 use crate::model::scenario::Figure;
@@ -384,7 +385,7 @@ impl<'a> Reader<'a> {
         let unclear = || {
             Diagnostic::error(code::UNKNOWN_CLAIM, "unknown claim").at(expect.span, "cannot be checked").help(
                 "claims are `collision with npc#2 at 14.22 s`, `proc == [0.5]`, `trace == \"sha256:…\"`, \
-                 `end == arrived`, or the name of a verdict",
+                 `end == arrived`, `avoidable by [cc, fsm]`, or the name of a verdict",
             )
         };
         match &expect.claim.kind {
@@ -395,6 +396,10 @@ impl<'a> Reader<'a> {
             ast::ExprKind::Name(name) if self.space.verdicts.iter().any(|verdict| verdict.name == *name) => {
                 let (obstacle, _) = self.clauses(&expect.clauses, false)?;
                 Some(Claim::Verdict { name: name.clone(), obstacle })
+            }
+            ast::ExprKind::Name(name) if Avoidability::ALL.iter().any(|class| class.name() == name) => {
+                let class = Avoidability::ALL.into_iter().find(|class| class.name() == name)?;
+                self.avoidability(class, expect)
             }
             ast::ExprKind::Binary { op: BinaryOp::Equal, left, right, .. } => match (&left.kind, &right.kind)
             {
@@ -426,6 +431,25 @@ impl<'a> Reader<'a> {
                 None
             }
         }
+    }
+
+    /// `avoidable by [cc, fsm] with npc#2`; the drivers' names are the oracle's business.
+    fn avoidability(&mut self, class: Avoidability, expect: &ast::Expect) -> Option<Claim> {
+        let (by, others): (Vec<&ast::Clause>, Vec<&ast::Clause>) =
+            expect.clauses.iter().partition(|clause| clause.kind == ClauseKind::By);
+        let drivers = by.iter().map(|clause| match &clause.value.kind {
+            ast::ExprKind::List(items) => items.iter().map(driver).collect(),
+            _ => None,
+        });
+        let drivers: Option<Vec<Vec<String>>> = drivers.collect();
+        let Some(drivers) = drivers.filter(|lists| lists.len() <= 1) else {
+            let error = Diagnostic::error(code::UNKNOWN_CLAIM, "wanted one list of reference drivers");
+            self.report(error.at(by[0].span, "not one").help("write `avoidable by [cc, fsm]`"));
+            return None;
+        };
+        let others: Vec<ast::Clause> = others.into_iter().cloned().collect();
+        let (obstacle, _) = self.clauses(&others, false)?;
+        Some(Claim::Avoidability { class, by: drivers.into_iter().next(), obstacle })
     }
 
     /// `with npc#2` and, if the claim has a time, `at 14.22 s`.
@@ -514,5 +538,13 @@ impl Space {
             Some(Diagnostic { message, help: Some(help), .. }) => Err(format!("{message}; {help}")),
             Some(Diagnostic { message, .. }) => Err(message),
         }
+    }
+}
+
+/// The name of a reference driver.
+fn driver(expr: &ast::Expr) -> Option<String> {
+    match &expr.kind {
+        ast::ExprKind::Name(name) => Some(name.clone()),
+        _ => None,
     }
 }
