@@ -52,12 +52,13 @@ fn a_healthy_driving_system_survives_ambient_traffic() {
                     world.sense(&mut sensed);
                     contact = world.tick(&driver.drive(&sensed)).first().copied();
                 }
-                hit.extend(contact.map(|contact| (entry.name, seed, contact)));
+                let name = &scene.map.name;
+                hit.extend(contact.map(|contact| format!("{} on {name}, {seed}: {contact:?}", entry.name)));
             }
         }
     }
-    // Long vehicles cut corners, and the driving systems do not look to the side.
-    assert!(hit.len() * 10 <= drives, "{hit:?}");
+    // Not one, if it were not for the tails of buses that turn beside the ego vehicle in narrow lanes.
+    assert!(hit.len() * 40 <= drives, "{} of {drives}: {hit:#?}", hit.len());
 }
 
 /// Every level of every phenomenon comes up at every time of day; signals begin anywhere.
