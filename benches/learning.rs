@@ -46,7 +46,9 @@ fn measured(text: &str) -> (f64, f64) {
     let mut learner = Learner::new(Arc::new(settings), Arc::new(rows), 1);
     let mut rng = rng::stream(1, Stream::Traffic, 0);
     // Fills the memory, and warms everything up.
-    (0..20).for_each(|_| drop(black_box(learner.learn(&episode(&mut rng, 100), &mut rng.clone()).loss)));
+    (0..20).for_each(|_| {
+        black_box(learner.learn(&episode(&mut rng, 100), &mut rng.clone()).loss);
+    });
     let seconds: Vec<f64> = (0..REPEATS)
         .map(|_| {
             let episode = episode(&mut rng, STEPS);

@@ -29,6 +29,8 @@ pub enum Stream {
     Perception = 6,
     /// Choices of other road users, for example which way to turn.
     Traffic = 7,
+    /// Ambient traffic: where somebody appears and what they are; one index an attempt.
+    Ambient = 8,
     /// First weights of a network.
     Initialization = 21,
     /// Which transitions a learner looks at again.

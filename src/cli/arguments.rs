@@ -69,6 +69,8 @@ pub enum Command {
     Verify(VerifyArguments),
     /// Draw moments of an emitted scenario as SVG.
     Render(RenderArguments),
+    /// Print or draw a map, and a route through it.
+    Road(RoadArguments),
 }
 
 #[derive(Debug, Args)]
@@ -154,6 +156,9 @@ pub struct RunArguments {
     /// Driving system under test.
     #[arg(long, default_value = crate::study::DEFAULT_ADS)]
     pub ads: String,
+    /// Profile of the `modular` driving system, for example scenarios/ads/cautious.yaml [default: as it comes].
+    #[arg(long, value_name = "FILE")]
+    pub ads_config: Option<PathBuf>,
     /// Who chooses the actions.
     #[arg(long, default_value = "random")]
     pub agent: String,
@@ -165,6 +170,9 @@ pub struct RunArguments {
     pub episodes: u32,
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
+    /// Vehicles of ambient traffic around the ego vehicle, besides those that actions make appear.
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=i64::from(crate::model::AMBIENT_MAX)))]
+    pub ambient: u32,
     /// Worker threads; the result does not depend on it [default: one for each core].
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=1024))]
     pub jobs: Option<u32>,
@@ -174,7 +182,7 @@ pub struct RunArguments {
     #[arg(long)]
     pub out: Option<PathBuf>,
     /// Go on with an interrupted run directory; its own settings hold.
-    #[arg(long, value_name = "DIR", conflicts_with_all = ["file", "road", "ads", "agent", "policy", "episodes", "seed", "out", "without", "with"])]
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["file", "road", "ads", "ads_config", "agent", "policy", "episodes", "seed", "ambient", "out", "without", "with"])]
     pub resume: Option<PathBuf>,
     /// Exit with status 4 if a counted collision was found.
     #[arg(long)]
@@ -229,6 +237,10 @@ pub struct ReplayArguments {
     /// Replay against another driving system: shows what happens, checks no claim.
     #[arg(long)]
     pub ads: Option<String>,
+    /// Replay against another profile of `modular`: claims are checked only if it means the same as the
+    /// recorded one.
+    #[arg(long, value_name = "FILE")]
+    pub ads_config: Option<PathBuf>,
 }
 
 #[derive(Debug, Args)]
@@ -246,4 +258,22 @@ pub struct RenderArguments {
     /// Draw the drive of another driving system.
     #[arg(long)]
     pub ads: Option<String>,
+}
+
+#[derive(Debug, Args)]
+pub struct RoadArguments {
+    /// An OpenDRIVE map, or a space (`.ava`) whose road is meant.
+    pub file: PathBuf,
+    /// Road of the space [default: its first].
+    #[arg(long)]
+    pub road: Option<String>,
+    /// Where a route starts, for example `1/-1@12.5`: road, lane, station of the road in m.
+    #[arg(long, value_name = "PLACE", requires = "to", allow_hyphen_values = true)]
+    pub from: Option<String>,
+    /// Where it ends.
+    #[arg(long, value_name = "PLACE", requires = "from", allow_hyphen_values = true)]
+    pub to: Option<String>,
+    /// Draw it to a file as well; `-` is stdout, and nothing else is printed.
+    #[arg(long, value_name = "FILE")]
+    pub svg: Option<PathBuf>,
 }

@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use crate::action::ActionTable;
+use crate::ads::ModularConfig;
 use crate::model;
 use crate::model::Loaded;
 use crate::model::Policy;
@@ -59,6 +60,15 @@ pub fn scenario(output: &Output, path: &Path) -> Result<(ActionTable, Scenario),
     let scenario = loaded.scenario.take();
     let scenario = scenario.ok_or_else(|| Failure::usage(format!("`{}` has no scenario", path.display())))?;
     Ok((ActionTable::new(space(loaded, path)?), scenario))
+}
+
+/// A profile of the `modular` driving system.
+///
+/// # Errors
+/// If the file cannot be read, or is no profile.
+pub fn profile(path: &Path) -> Result<ModularConfig, Failure> {
+    let text = read(path).map_err(|error| Failure::file("read", path, error))?;
+    ModularConfig::from_yaml(&text).map_err(|error| Failure::file("use", path, error))
 }
 
 /// What a file that avastra wrote holds.

@@ -10,6 +10,7 @@ mod output;
 mod progress;
 mod render;
 mod replay;
+mod road;
 mod run;
 mod run_directory;
 mod train;
@@ -52,6 +53,7 @@ pub fn main() -> ExitCode {
         Command::Verify(arguments) => verify::verify(&output, arguments),
         Command::Replay(arguments) => replay::replay(&output, arguments),
         Command::Render(arguments) => render::render(&output, arguments),
+        Command::Road(arguments) => road::road(&output, arguments),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,

@@ -11,9 +11,13 @@ use crate::action::ActionTable;
 use crate::emit;
 use crate::episode::EpisodeLog;
 use crate::model::Policy;
+use crate::oracle::AvoidabilitySettings;
 use crate::sim::ENGINE;
+use crate::study;
 use crate::study::EpisodeSummary;
 use crate::study::PolicyReference;
+use crate::study::Profile;
+use crate::study::RefusalCount;
 use crate::study::Run;
 use crate::study::RunSettings;
 use crate::study::Totals;
@@ -34,7 +38,7 @@ use super::verify::acting;
 
 pub const VERSION: &str = env!("CARGO_PKG_VERSION");
 
-/// How many critical scenarios the summary names.
+/// How many critical scenarios, and how many reasons of refusals, the summary names.
 const NAMED_MAX: usize = 10;
 
 /// Plays the episodes of a new run, or those that an interrupted one still lacks.
@@ -54,8 +58,7 @@ pub fn run(output: &Output, arguments: &RunArguments) -> Result<(), Failure> {
     let mut progress =
         Progress::new(run.episodes() as u64, done.len() as u64, output.quiet || output.is_json());
     let space_path = space_path(&run, &directory)?;
-    play(&run, &todo, jobs(arguments), &stop, &mut |number, log| {
-        let summary = EpisodeSummary::new(run.space(), number, &log);
+    play(&run, &todo, jobs(arguments), &stop, &mut |summary, log| {
         keep(&run, &mut directory, &space_path, &summary, &log)?;
         progress.episode(summary.counted());
         Ok(())
@@ -64,12 +67,17 @@ pub fn run(output: &Output, arguments: &RunArguments) -> Result<(), Failure> {
 
     let totals =
         directory.database.totals().map_err(|error| Failure::file("read", &directory.path, error))?;
+    let refusals =
+        directory.database.refusals().map_err(|error| Failure::file("read", &directory.path, error))?;
     output.say(&totals_text(&totals, started.elapsed().as_secs_f64(), todo.len()));
+    if !refusals.is_empty() {
+        output.say(&refusals_text(&refusals));
+    }
     let critical = critical_files(&directory.path)?;
     output.say(&critical_text(&directory.path, &critical));
     output.result(
         "run",
-        serde_json::json!({ "directory": directory.path, "totals": totals, "critical": critical }),
+        serde_json::json!({ "directory": directory.path, "totals": totals, "refusals": refusals, "critical": critical }),
     );
     if stop.load(Ordering::Relaxed) && (totals.episodes as usize) < run.episodes() {
         return Err(Failure::Interrupted { command: "run", directory: directory.path });
@@ -94,6 +102,10 @@ fn begun(output: &Output, arguments: &RunArguments) -> Result<(Run, RunDirectory
     } else {
         arguments.road.clone()
     };
+    let profile = match &arguments.ads_config {
+        Some(path) => Some(load::profile(path)?),
+        None => study::driving_system(&arguments.ads).ok().and_then(|ads| ads.profile().copied()),
+    };
     let settings = RunSettings {
         avastra: VERSION.to_owned(),
         engine: ENGINE.to_owned(),
@@ -101,12 +113,15 @@ fn begun(output: &Output, arguments: &RunArguments) -> Result<(Run, RunDirectory
         space_digest: space.digest.clone(),
         roads,
         ads: arguments.ads.clone(),
+        profile: profile.as_ref().map(Profile::new),
         agent: policy.as_ref().map_or(&arguments.agent, |(_, policy)| &policy.name).clone(),
         policy: None,
         episodes: arguments.episodes,
         seed: arguments.seed,
+        ambient: arguments.ambient,
         without: arguments.rules.without.clone(),
         with: arguments.rules.with.clone(),
+        avoidability: AvoidabilitySettings::default(),
     };
     let run = ready(table, settings, policy.as_ref())?;
     let path = run_directory::create(arguments.out.as_deref())?;
@@ -191,9 +206,7 @@ fn keep(
     summary: &EpisodeSummary,
     log: &EpisodeLog,
 ) -> Result<(), Failure> {
-    let counted: Vec<usize> =
-        summary.collisions.iter().filter(|finding| finding.counted).map(|finding| finding.number).collect();
-    if !counted.is_empty() {
+    if summary.counted() > 0 {
         let name = format!("{}_{:04}", log.road, summary.episode);
         let source = emit::Provenance {
             name: &name,
@@ -203,7 +216,7 @@ fn keep(
             without: &run.settings().without,
             with: &run.settings().with,
         };
-        let file = emit::scenario(run.table(), log, &counted, &source);
+        let file = emit::scenario(run.table(), log, summary, &source);
         write(&directory.critical(&name), &crate::syntax::print(&file))?;
     }
     directory
@@ -238,8 +251,12 @@ pub fn stop_on_interrupt() -> Result<Arc<AtomicBool>, Failure> {
 
 fn heading(run: &Run, directory: &Path) -> String {
     let settings = run.settings();
+    let ambient = match settings.ambient {
+        0 => String::new(),
+        wanted => format!(", {} of ambient traffic", plural(wanted as usize, "vehicle")),
+    };
     format!(
-        "{}: {} against {}, {} on {}, seed {}, into {}",
+        "{}: {} against {}, {} on {}{ambient}, seed {}, into {}",
         run.space().path.display(),
         settings.agent,
         settings.ads,
@@ -273,11 +290,28 @@ fn totals_text(totals: &Totals, elapsed_s: f64, played: usize) -> String {
     if let Some(first_s) = totals.first_counted_s_mean {
         text.push_str(&format!(", the first after {first_s:.1} s on average"));
     }
-    if totals.counted < totals.collisions {
+    if totals.collisions > 0 {
         text.push_str(&format!(
             "\nof all: {} sudden, {} where the other ran into the ego vehicle",
             totals.sudden, totals.struck
         ));
+        text.push_str(&format!(
+            "\nof all: {} avoidable by a careful driver, {} only without any delay, {} unavoidable",
+            totals.avoidable, totals.beyond_reference, totals.unavoidable
+        ));
+    }
+    text
+}
+
+/// Steps in which nothing was done of what was asked for, by reason.
+fn refusals_text(refusals: &[RefusalCount]) -> String {
+    let all: i64 = refusals.iter().map(|refusal| refusal.times).sum();
+    let mut text = format!("refused: {}", plural(all as usize, "action"));
+    for refusal in refusals.iter().take(NAMED_MAX) {
+        text.push_str(&format!("\n  {} × {}", refusal.times, refusal.reason));
+    }
+    if refusals.len() > NAMED_MAX {
+        text.push_str(&format!("\n  and for {} other reasons", refusals.len() - NAMED_MAX));
     }
     text
 }

@@ -161,10 +161,8 @@ fn write_critical(
     directory: &RunDirectory,
     trained: &TrainedEpisode,
 ) -> Result<(), Failure> {
-    let findings = trained.summary.collisions.iter().filter(|finding| finding.counted);
-    let counted: Vec<usize> = findings.map(|finding| finding.number).collect();
     let settings = training.settings();
-    if counted.is_empty() || settings.hyperparameters.observation_period_s.is_some() {
+    if trained.summary.counted() == 0 || settings.hyperparameters.observation_period_s.is_some() {
         return Ok(());
     }
     let name = format!("{}_{:04}", trained.log.road, trained.summary.episode);
@@ -177,7 +175,7 @@ fn write_critical(
         without: &settings.without,
         with: &settings.with,
     };
-    let file = emit::scenario(training.table(), &trained.log, &counted, &source);
+    let file = emit::scenario(training.table(), &trained.log, &trained.summary, &source);
     write(&directory.critical(&name), &crate::syntax::print(&file))
 }
 

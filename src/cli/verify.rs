@@ -38,7 +38,8 @@ pub fn verify(output: &Output, arguments: &VerifyArguments) -> Result<(), Failur
     }
     if !scenarios.is_empty() {
         // Its result comes after the policies': a failure of theirs must not hide it.
-        let outcome = replay::replay(output, &ReplayArguments { files: scenarios, ads: None });
+        let outcome =
+            replay::replay(output, &ReplayArguments { files: scenarios, ads: None, ads_config: None });
         match outcome {
             Err(Failure::Refuted { claims }) => refuted += claims,
             other => other?,

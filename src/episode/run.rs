@@ -13,6 +13,7 @@ use crate::model::Memory;
 use crate::model::OutcomeFacts;
 use crate::sim::Contact;
 use crate::sim::DT_S;
+use crate::sim::Incident;
 use crate::sim::Sensed;
 use crate::sim::World;
 
@@ -93,6 +94,7 @@ struct Play<'a> {
     memory: Memory,
     steps: Vec<StepLog>,
     collisions: Vec<Collision>,
+    incidents: Vec<Incident>,
     trace: Sha256,
     distance_m: f64,
     /// Steps without progress up to now.
@@ -103,7 +105,7 @@ struct Play<'a> {
 impl<'a> Play<'a> {
     fn new(setup: &'a Setup<'a>) -> Play<'a> {
         let world = World::new(setup.scene.clone(), &setup.start);
-        let mut ads = (setup.ads.build)(&setup.scene, setup.seed);
+        let mut ads = setup.ads.build(&setup.scene, setup.seed);
         let mut sensed = world.sensed();
         // One look before the first step, so that its state has an inside.
         ads.drive(&sensed);
@@ -116,6 +118,7 @@ impl<'a> Play<'a> {
             memory: setup.memory.clone(),
             steps: Vec::new(),
             collisions: Vec::new(),
+            incidents: Vec::new(),
             trace: Sha256::new(),
             distance_m: 0.0,
             stalled: 0,
@@ -175,7 +178,8 @@ impl<'a> Play<'a> {
         });
         let trace = self.trace.clone().finalize().into();
         let state = observation.state;
-        self.steps.push(StepLog { time_s, state, outcome, proc, reward, trace });
+        let perception = mdp::perception_counts(&self.world, self.ads.status());
+        self.steps.push(StepLog { time_s, state, outcome, proc, reward, perception, trace });
     }
 
     /// One physics step; the collision probability after it. Contact is certainty, once: who has been
@@ -187,6 +191,7 @@ impl<'a> Play<'a> {
         for &contact in &contacts {
             self.collisions.push(self.collision(contact));
         }
+        self.incidents.extend_from_slice(self.world.incidents());
         self.distance_m += self.world.ego().speed_mps * DT_S;
         self.world.trace(&mut |bits| self.trace.update(bits.to_le_bytes()));
         watch(&self.world, self.ads.as_ref(), &contacts);
@@ -229,11 +234,13 @@ impl<'a> Play<'a> {
     fn into_log(self, end: End) -> EpisodeLog {
         EpisodeLog {
             road: self.setup.road.name.clone(),
-            ads: self.setup.ads.name.to_owned(),
+            ads: self.setup.ads.name().to_owned(),
+            profile: self.setup.ads.profile().copied(),
             seed: self.setup.seed,
             start: self.setup.start,
             memory: self.setup.memory.clone(),
             collisions: self.collisions,
+            incidents: self.incidents,
             end,
             duration_s: self.world.time_s(),
             distance_m: self.distance_m,

@@ -22,6 +22,10 @@ pub const NO_ROUTE: &str = "AV0108";
 pub const IMPORT_CYCLE: &str = "AV0109";
 /// An imported file that is not the one that was meant.
 pub const DIGEST: &str = "AV0110";
+/// A declaration that nothing names.
+pub const UNUSED: &str = "AV0111";
+/// An `override` of nothing.
+pub const OVERRIDE: &str = "AV0112";
 
 // Types and units.
 
@@ -54,6 +58,8 @@ pub const ARGUMENTS: &str = "AV0211";
 pub const INFINITE: &str = "AV0301";
 /// A table that is too long to be made.
 pub const TOO_MANY_ROWS: &str = "AV0302";
+/// Two rows that are one action.
+pub const TWINS: &str = "AV0303";
 /// A range, a list or a `where` that leaves nothing.
 pub const EMPTY: &str = "AV0304";
 /// An action without an effect.
@@ -75,16 +81,30 @@ pub const OUT_OF_BOUNDS: &str = "AV0310";
 pub const DEAD: &str = "AV0401";
 /// Rows that cannot run on some road.
 pub const MASKED: &str = "AV0402";
+/// Rows of which neither is known.
+pub const UNDECIDED: &str = "AV0403";
+/// A range of which rules leave less than half.
+pub const CUT: &str = "AV0404";
 /// A rule that names a parameter which its action lacks.
 pub const LACKING_PARAMETER: &str = "AV0405";
 /// A rule about spawns on an action that has none.
 pub const NO_SPAWN: &str = "AV0406";
 /// A rule that would never be enforced.
 pub const BINDS_NOTHING: &str = "AV0407";
+/// A rule that can refuse nothing.
+pub const NEVER_ACTS: &str = "AV0408";
+/// A spawn that nobody could avoid.
+pub const UNFAIR: &str = "AV0409";
+/// A rule that follows from others.
+pub const IMPLIED: &str = "AV0410";
 /// A value that a transition rule does not lead out of.
 pub const DEADLOCK: &str = "AV0501";
 /// A value that a transition rule does not lead to.
 pub const UNREACHABLE: &str = "AV0502";
+/// A value that leads to itself alone.
+pub const STUCK: &str = "AV0503";
+/// A row that a transition rule never allows.
+pub const NEVER_ENABLED: &str = "AV0504";
 
 // Scenarios.
 
@@ -96,7 +116,7 @@ pub const STEP_ORDER: &str = "AV0602";
 pub const NOT_DRAWN: &str = "AV0603";
 /// A drawn value out of its range.
 pub const OUT_OF_RANGE: &str = "AV0604";
-/// A step that breaks a transition rule.
+/// A step that breaks a rule.
 pub const BROKEN_RULE: &str = "AV0605";
 /// A start that leaves a state open.
 pub const OPEN_START: &str = "AV0606";

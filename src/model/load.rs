@@ -13,12 +13,14 @@ use sha2::Sha256;
 
 use crate::model::check;
 use crate::model::code;
+use crate::model::overriding;
 use crate::model::policy;
 use crate::model::policy::Policy;
 use crate::model::scenario::Scenario;
 use crate::model::space::Space;
 use crate::road::RoadMap;
 use crate::syntax::Diagnostic;
+use crate::syntax::Severity;
 use crate::syntax::Sources;
 use crate::syntax::ast;
 use crate::syntax::ast::FileId;
@@ -48,6 +50,8 @@ pub struct Loaded {
     /// The texts that the diagnostics point into.
     pub sources: Sources,
     pub diagnostics: Vec<Diagnostic>,
+    /// What is worth knowing of a sound space and asks for no change: `check` prints it.
+    pub remarks: Vec<Diagnostic>,
     /// In order of reading, the root first, so never empty; a file's [`FileId`] is its position.
     pub files: Vec<LoadedFile>,
     /// The space that the root is or uses, if it is sound.
@@ -74,12 +78,22 @@ pub fn load(root: &Path, read: &ReadFile<'_>) -> Result<Loaded, ReadError> {
     let Loader { sources, files, order, mut diagnostics, .. } = loader;
     // A file that does not parse lacks declarations, and everything else would look unknown.
     if diagnostics.iter().any(Diagnostic::is_error) {
-        return Ok(Loaded { sources, diagnostics, files, space: None, scenario: None, policy: None });
+        return Ok(Loaded {
+            sources,
+            diagnostics,
+            remarks: Vec::new(),
+            files,
+            space: None,
+            scenario: None,
+            policy: None,
+        });
     }
     let folders = files.iter().map(|file| folder(&file.path)).collect();
     let mut maps = MapReader { read, folders, texts: BTreeMap::new(), known: BTreeMap::new() };
     diagnostics.extend(check_digests(&files, &mut maps));
     let (space, found) = check_space(&files, &order, &mut maps);
+    let (mut remarks, found): (Vec<_>, Vec<_>) =
+        found.into_iter().partition(|found| found.severity == Severity::Note);
     diagnostics.extend(found);
     let space = space.filter(|_| !diagnostics.iter().any(Diagnostic::is_error));
     let mut scenario = None;
@@ -98,7 +112,11 @@ pub fn load(root: &Path, read: &ReadFile<'_>) -> Result<Loaded, ReadError> {
             Err(found) => diagnostics.extend(found),
         }
     }
-    Ok(Loaded { sources, diagnostics, files, space: space.map(Arc::new), scenario, policy })
+    // Remarks are about spaces; who reads a scenario or a policy knows its space.
+    if has_scenario || has_policy || diagnostics.iter().any(Diagnostic::is_error) {
+        remarks.clear();
+    }
+    Ok(Loaded { sources, diagnostics, remarks, files, space: space.map(Arc::new), scenario, policy })
 }
 
 /// Digest of a file's bytes as the language writes it: `sha256:…`.
@@ -126,15 +144,20 @@ fn check_space(
         })
     };
     // A scenario is no space itself: its space is what it uses first.
-    let root = files.iter().find(|file| declares(file)).unwrap_or(&files[0]);
+    let index = files.iter().position(declares).unwrap_or(0);
+    let root = &files[index];
     let root = check::Root {
+        file: FileId(u32::try_from(index).expect("a file's id is its position")),
         path: root.path.clone(),
         // Where a map cannot be read there is no space either.
         digest: whole_digest(files, &root.path, maps).unwrap_or_default(),
         docs: root.tree.docs.iter().map(|doc| doc.text.clone()).collect(),
     };
-    let items: Vec<&ast::Item> = order.iter().flat_map(|file| &files[*file].tree.items).collect();
-    check::space(root, &items, maps)
+    let (items, mut diagnostics) = overriding::resolve(files, order);
+    let items: Vec<&ast::Item> = items.iter().map(core::convert::AsRef::as_ref).collect();
+    let (space, found) = check::space(root, &items, maps);
+    diagnostics.extend(found);
+    (space, diagnostics)
 }
 
 /// Compares every `use … digest` with what was read.
@@ -189,9 +212,14 @@ fn uses(file: &LoadedFile) -> impl Iterator<Item = &ast::Use> {
     })
 }
 
+/// The files that a file uses.
+pub(super) fn used_paths(file: &LoadedFile) -> impl Iterator<Item = PathBuf> {
+    uses(file).map(|used| normal(&folder(&file.path).join(&used.path.value)))
+}
+
 /// The maps that a file's roads name, as written.
 fn maps_named(file: &LoadedFile) -> impl Iterator<Item = &str> {
-    let roads = file.tree.items.iter().filter_map(|item| match &item.kind {
+    let roads = file.tree.items.iter().filter_map(|item| match item.kind.plain() {
         ItemKind::Road(block) => Some(block),
         _ => None,
     });

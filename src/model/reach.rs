@@ -136,14 +136,14 @@ impl Space {
 }
 
 /// One row on one road.
-struct Prover<'a> {
-    space: &'a Space,
-    row: &'a Row,
+pub(super) struct Prover<'a> {
+    pub space: &'a Space,
+    pub row: &'a Row,
     /// Values of all parameters; only those of axes mean something.
-    values: &'a [Value],
-    bounds: &'a [Bound],
+    pub values: &'a [Value],
+    pub bounds: &'a [Bound],
     /// `None`: any road.
-    road: Option<&'a Road>,
+    pub road: Option<&'a Road>,
 }
 
 impl Prover<'_> {
@@ -171,11 +171,14 @@ impl Prover<'_> {
     }
 
     /// All values that the drawn parameters may have under these rules; `None` if there are none.
-    fn settle(&self, rules: &[usize]) -> Option<Vec<Values>> {
-        let mut locals = self.declared();
-        let before = self.space.cells_unknown();
+    pub fn settle(&self, rules: &[usize]) -> Option<Vec<Values>> {
+        self.narrow(self.declared(), &self.space.cells_unknown(), rules)
+    }
+
+    /// The same, begun with these values of the parameters and cells.
+    pub fn narrow(&self, mut locals: Vec<Values>, before: &[Values], rules: &[usize]) -> Option<Vec<Values>> {
         for _ in 0..ROUNDS {
-            let after = self.space.cells_after(self.row.action, &locals, &before);
+            let after = self.space.cells_after(self.row.action, &locals, before);
             for bound in self.bounds {
                 if bound.rule.is_some_and(|rule| !rules.contains(&rule)) {
                     continue;
@@ -192,7 +195,7 @@ impl Prover<'_> {
                 locals[bound.local] = Values::Number(narrowed);
             }
         }
-        let after = self.space.cells_after(self.row.action, &locals, &before);
+        let after = self.space.cells_after(self.row.action, &locals, before);
         let possible = rules.iter().all(|rule| match &self.space.rules[*rule].body {
             RuleBody::Holds(bindings) => bindings
                 .iter()
@@ -208,12 +211,12 @@ impl Prover<'_> {
         possible.then_some(locals)
     }
 
-    fn known<'a>(&'a self, locals: &'a [Values], cells: &'a [Values]) -> Known<'a> {
+    pub fn known<'a>(&'a self, locals: &'a [Values], cells: &'a [Values]) -> Known<'a> {
         Known { functions: &self.space.functions, locals, cells, road: self.road.map(|road| &road.facts) }
     }
 
     /// What the parameters may be before any rule.
-    fn declared(&self) -> Vec<Values> {
+    pub fn declared(&self) -> Vec<Values> {
         let parameters = &self.space.actions[self.row.action].parameters;
         let point = |value: &Value| match value {
             Value::Bool(truth) => Values::truth(*truth),
@@ -257,7 +260,7 @@ impl Prover<'_> {
                 ));
             }
             match figures.as_slice() {
-                [] => parts.push(format!("rule `{name}` never holds")),
+                [] => parts.push(self.without_figures(name)),
                 figures => parts.push(format!("rule `{name}`: {}", figures.join("; "))),
             }
         }
@@ -267,6 +270,17 @@ impl Prover<'_> {
                 Some(road) => format!("{} (road `{}`)", parts.join("; "), road.name),
                 None => parts.join("; "),
             },
+        }
+    }
+}
+
+impl Prover<'_> {
+    /// What a rule that bounds no number says of the row.
+    fn without_figures(&self, name: &str) -> String {
+        match self.row.axes.is_empty() {
+            true => format!("rule `{name}` never holds"),
+            // Other rows of the action may well obey it.
+            false => format!("rule `{name}` cannot hold in `{}`", self.row.label),
         }
     }
 }
@@ -337,7 +351,7 @@ fn report_dead(space: &Space, action: &ActionDef, rows: &[&Row]) -> Vec<Diagnost
 }
 
 /// `row 15`, `rows 15..27`, `rows 3, 7 and 9`.
-fn numbers(rows: &[&Row]) -> String {
+pub(super) fn numbers(rows: &[&Row]) -> String {
     let indices: Vec<usize> = rows.iter().map(|row| row.index).collect();
     match indices.as_slice() {
         [only] => format!("row {only}"),

@@ -9,6 +9,7 @@ use crate::action::ActionTable;
 use crate::action::ActiveRules;
 use crate::action::Offer;
 use crate::ads;
+use crate::ads::Selected;
 use crate::agent::Agent;
 use crate::episode;
 use crate::episode::Choice;
@@ -18,13 +19,14 @@ use crate::rng::Stream;
 use crate::sim::Scene;
 use crate::syntax::listed;
 
+use super::profile::Profile;
 use super::run::RunError;
 
 /// Everything that the episodes of a run or a training share.
 pub struct Arena {
     table: ActionTable,
     rules: ActiveRules,
-    ads: &'static ads::Entry,
+    ads: Selected,
     /// Index of each road in the space, with its scene.
     roads: Vec<(usize, Arc<Scene>)>,
 }
@@ -62,6 +64,19 @@ impl Arena {
         &self.table
     }
 
+    /// From now on with these settings of the driving system.
+    ///
+    /// # Errors
+    /// If it has none, or they mean something else in this version.
+    pub(super) fn set_profile(&mut self, profile: &Profile) -> Result<(), RunError> {
+        if profile.settings.digest() != profile.digest {
+            let ads = self.ads.name().to_owned();
+            return Err(RunError::ProfileDigest { what: "the run".to_owned(), ads });
+        }
+        self.ads = self.ads.clone().with_profile(profile.settings)?;
+        Ok(())
+    }
+
     /// Number of roads.
     pub fn roads(&self) -> usize {
         self.roads.len()
@@ -77,7 +92,7 @@ impl Arena {
             road: &space.roads[*index],
             scene: scene.clone(),
             rules: &self.rules,
-            ads: self.ads,
+            ads: self.ads.clone(),
             seed,
             start: episode::start(space, &memory, seed),
             memory,
@@ -118,8 +133,12 @@ pub(super) fn carry_out(
 /// Who drives where nobody is named.
 pub const DEFAULT_ADS: &str = "modular";
 
-pub(super) fn driving_system(name: &str) -> Result<&'static ads::Entry, RunError> {
-    ads::by_name(name).ok_or_else(|| {
+/// The driving system of that name, as it comes.
+///
+/// # Errors
+/// If there is none.
+pub fn driving_system(name: &str) -> Result<Selected, RunError> {
+    ads::by_name(name).map(Selected::new).ok_or_else(|| {
         let known = listed(&ads::REGISTRY.iter().map(|entry| entry.name).collect::<Vec<_>>());
         RunError::Ads { name: name.to_owned(), known }
     })

@@ -11,6 +11,8 @@ use std::sync::mpsc;
 
 use crate::action::ActionTable;
 use crate::action::ActiveRules;
+use crate::ads;
+use crate::ads::Selected;
 use crate::agent;
 use crate::agent::Agent;
 use crate::agent::Kind;
@@ -23,6 +25,9 @@ use crate::episode::Script;
 use crate::episode::Watch;
 use crate::model::Scenario;
 use crate::model::Space;
+use crate::oracle;
+use crate::oracle::AvoidabilitySettings;
+use crate::oracle::Judgement;
 use crate::rng;
 use crate::rng::Stream;
 use crate::sim::ENGINE;
@@ -30,9 +35,11 @@ use crate::sim::Start;
 use crate::syntax::listed;
 
 use super::arena::Arena;
-use super::arena::DEFAULT_ADS;
 use super::arena::choose;
 use super::arena::driving_system;
+use super::profile::Profile;
+use super::profile::recorded;
+use super::summary::EpisodeSummary;
 
 /// Everything that is needed to repeat a run; written to `run.yaml`.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -48,6 +55,9 @@ pub struct RunSettings {
     pub space_digest: String,
     pub roads: Vec<String>,
     pub ads: String,
+    /// Settings of the driving system, if it has any; without them it is as it comes.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub profile: Option<Profile>,
     pub agent: String,
     /// The policy that the agent follows, from the run directory, and its digest.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -55,10 +65,16 @@ pub struct RunSettings {
     /// Episodes on each road.
     pub episodes: u32,
     pub seed: u64,
+    /// Vehicles of ambient traffic.
+    #[serde(default)]
+    pub ambient: u32,
     /// Rules switched off.
     pub without: Vec<String>,
     /// Optional rules switched on.
     pub with: Vec<String>,
+    /// By what it is told whether a collision was avoidable.
+    #[serde(default)]
+    pub avoidability: AvoidabilitySettings,
 }
 
 /// A policy file that a run was begun with.
@@ -92,6 +108,15 @@ pub enum RunError {
     Twice { name: String },
     #[error("{found} episodes a road: from 1 to {EPISODES_MAX} are possible")]
     Episodes { found: u32 },
+    #[error(transparent)]
+    NoSettings(#[from] ads::NoSettings),
+    #[error("the profile of `{scenario}`: {error}")]
+    Profile { scenario: String, error: ads::ConfigError },
+    #[error(
+        "{what} was made with settings of `{ads}` that mean something else in this version: nothing need \
+         happen alike; name a profile with `--ads-config FILE` to see what happens with that"
+    )]
+    ProfileDigest { what: String, ads: String },
     #[error("`{scenario}` was made in world `{engine}`; this is `{ENGINE}`, where nothing need happen alike")]
     Engine { scenario: String, engine: String },
 }
@@ -144,7 +169,10 @@ impl Run {
     fn with_agent(table: ActionTable, settings: RunSettings, agent: Box<MakeAgent>) -> Result<Run, RunError> {
         check_episodes(settings.episodes)?;
         let rules = (settings.with.as_slice(), settings.without.as_slice());
-        let arena = Arena::new(table, &settings.roads, &settings.ads, rules)?;
+        let mut arena = Arena::new(table, &settings.roads, &settings.ads, rules)?;
+        if let Some(profile) = &settings.profile {
+            arena.set_profile(profile)?;
+        }
         Ok(Run { arena, settings, agent })
     }
 
@@ -172,6 +200,13 @@ impl Run {
         self.play(number, &mut |moment| choose(self.table(), agent.as_mut(), moment), &mut |_, _, _| {})
     }
 
+    /// Plays one episode and judges its collisions.
+    pub fn judged(&self, number: usize) -> (EpisodeSummary, EpisodeLog) {
+        let log = self.episode(number);
+        let setup = self.setup(number);
+        (EpisodeSummary::judged(&setup, number, &log, &self.settings.avoidability), log)
+    }
+
     /// Plays one episode's beginning with other choices: a replay of it, for example.
     pub fn play(
         &self,
@@ -179,14 +214,20 @@ impl Run {
         choose: &mut dyn FnMut(&Moment) -> Choice,
         watch: &mut Watch,
     ) -> EpisodeLog {
+        episode::run(&self.setup(number), choose, watch)
+    }
+
+    /// The beginning of an episode.
+    fn setup(&self, number: usize) -> episode::Setup<'_> {
         let seed = rng::child_seed(self.settings.seed, Stream::Episode, number as u64);
-        let setup = self.arena.setup(number / self.settings.episodes as usize, seed);
-        episode::run(&setup, choose, watch)
+        let mut setup = self.arena.setup(number / self.settings.episodes as usize, seed);
+        setup.start.ambient = self.settings.ambient;
+        setup
     }
 }
 
-/// Plays episodes on `jobs` threads and hands each log to `done` on this one, in the order in which
-/// they end. Stops early, between episodes, when `stop` is set or `done` fails.
+/// Plays and judges episodes on `jobs` threads and hands each to `done` on this one, in the order in
+/// which they end. Stops early, between episodes, when `stop` is set or `done` fails.
 ///
 /// # Errors
 /// The first error of `done`.
@@ -195,7 +236,7 @@ pub fn play<E>(
     numbers: &[usize],
     jobs: usize,
     stop: &AtomicBool,
-    done: &mut dyn FnMut(usize, EpisodeLog) -> Result<(), E>,
+    done: &mut dyn FnMut(EpisodeSummary, EpisodeLog) -> Result<(), E>,
 ) -> Result<(), E> {
     let next = AtomicUsize::new(0);
     let abandoned = AtomicBool::new(false);
@@ -208,15 +249,15 @@ pub fn play<E>(
                 let sender = sender;
                 while !stop.load(Ordering::Relaxed) && !abandoned.load(Ordering::Relaxed) {
                     let Some(&number) = numbers.get(next.fetch_add(1, Ordering::Relaxed)) else { break };
-                    if sender.send((number, run.episode(number))).is_err() {
+                    if sender.send(run.judged(number)).is_err() {
                         break;
                     }
                 }
             });
         }
         drop(sender);
-        for (number, log) in receiver {
-            if let Err(error) = done(number, log) {
+        for (summary, log) in receiver {
+            if let Err(error) = done(summary, log) {
                 abandoned.store(true, Ordering::Relaxed);
                 return Err(error);
             }
@@ -235,11 +276,27 @@ pub fn replay(
     ads: Option<&str>,
     watch: &mut Watch,
 ) -> Result<EpisodeLog, RunError> {
+    let ads = match ads {
+        Some(name) => driving_system(name)?,
+        None => recorded(scenario)?,
+    };
+    replay_with(table, scenario, &ads, watch)
+}
+
+/// Plays a scenario with any driving system, under the rules that it was made with.
+///
+/// # Errors
+/// If the scenario is of another world or other rules.
+pub fn replay_with(
+    table: &ActionTable,
+    scenario: &Scenario,
+    ads: &Selected,
+    watch: &mut Watch,
+) -> Result<EpisodeLog, RunError> {
     let origin = &scenario.origin;
     if let Some(engine) = origin.engine.as_ref().filter(|engine| engine.as_str() != ENGINE) {
         return Err(RunError::Engine { scenario: scenario.name.clone(), engine: engine.clone() });
     }
-    let ads = driving_system(ads.or(origin.ads.as_deref()).unwrap_or(DEFAULT_ADS))?;
     let space = table.space();
     let rules = ActiveRules::new(space, &origin.with, &origin.without)?;
     let road = &space.roads[scenario.road];
@@ -250,15 +307,33 @@ pub fn replay(
         road,
         scene: Arc::new(episode::scene(road)),
         rules: &rules,
-        ads,
+        ads: ads.clone(),
         seed,
         start: Start {
             signal_phase_s: scenario.start.signal_phase_s,
             seed: scenario.start.traffic_seed.unwrap_or(seed),
+            ambient: scenario.start.ambient,
             ..episode::start(space, &memory, seed)
         },
         memory,
     };
     let script = Script::of_scenario(scenario);
     Ok(episode::run(&setup, &mut |moment| script.choose(table, moment), watch))
+}
+
+/// Judges the collisions of a replay, by playing it again.
+///
+/// # Errors
+/// As [`replay_with`].
+pub fn judge_replay(
+    table: &ActionTable,
+    scenario: &Scenario,
+    ads: &Selected,
+    log: &EpisodeLog,
+) -> Result<Vec<Judgement>, RunError> {
+    let mut failure = None;
+    let judgements = oracle::judge(log, &AvoidabilitySettings::default(), &mut |watch| {
+        failure = replay_with(table, scenario, ads, watch).err();
+    });
+    failure.map_or(Ok(judgements), Err)
 }

@@ -126,9 +126,20 @@ pub enum ItemKind {
     Expect(Expect),
     Scenario(Scenario),
     Policy(Policy),
+    /// `override` before a declaration: it stands in place of the one of that kind and name in a
+    /// used file.
+    Override(Box<ItemKind>),
 }
 
 impl ItemKind {
+    /// The declaration itself, without `override`.
+    pub fn plain(&self) -> &ItemKind {
+        match self {
+            ItemKind::Override(inner) => inner.plain(),
+            kind => kind,
+        }
+    }
+
     /// The keyword that begins it.
     pub fn keyword(&self) -> &'static str {
         match self {
@@ -148,6 +159,7 @@ impl ItemKind {
             ItemKind::Expect(_) => "expect",
             ItemKind::Scenario(_) => "scenario",
             ItemKind::Policy(_) => "policy",
+            ItemKind::Override(_) => "override",
         }
     }
 
@@ -165,6 +177,7 @@ impl ItemKind {
             ItemKind::Verdict(item) => Some(&item.name),
             ItemKind::Scenario(item) => Some(&item.name),
             ItemKind::Policy(item) => Some(&item.name),
+            ItemKind::Override(inner) => inner.name(),
             ItemKind::Language(_)
             | ItemKind::Use(_)
             | ItemKind::Episode(_)

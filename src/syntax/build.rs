@@ -131,10 +131,15 @@ impl Builder {
     /// What an `item` declares.
     pub fn item(&self, pair: Pair<'_, Rule>) -> Built<ItemKind> {
         let declaration = pair.into_inner().next().expect("an item is one declaration");
+        self.declaration(declaration)
+    }
+
+    fn declaration(&self, declaration: Pair<'_, Rule>) -> Built<ItemKind> {
         let rule = declaration.as_rule();
         let span = self.span(&declaration);
         let mut parts = Parts::of(declaration);
         Ok(match rule {
+            Rule::overriding => ItemKind::Override(Box::new(self.declaration(parts.next())?)),
             Rule::language => ItemKind::Language(self.number(parts.next())),
             Rule::use_file => {
                 let path = self.text(parts.next())?;

@@ -20,5 +20,7 @@ pub const CHARACTER: &str = "AV0008";
 pub const TEXT: &str = "AV0009";
 /// `a < b < c`.
 pub const CHAIN: &str = "AV0010";
+/// A comment in the manner of another language.
+pub const COMMENT: &str = "AV0012";
 /// A rule with transitions that is not on exactly one state.
 pub const MOVES: &str = "AV0011";

@@ -48,6 +48,24 @@ pub struct Diagnostic {
     pub notes: Vec<String>,
     /// What to do about it.
     pub help: Option<String>,
+    /// Changes that a machine may make: each by itself takes this mistake away.
+    pub fixes: Vec<Fix>,
+}
+
+/// A change of the source.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Fix {
+    /// As a command: ``write `drive_ahead` ``.
+    pub title: String,
+    /// They do not overlap.
+    pub edits: Vec<Edit>,
+}
+
+/// A text in place of another; an empty span inserts.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Edit {
+    pub span: Span,
+    pub text: String,
 }
 
 impl Diagnostic {
@@ -59,6 +77,11 @@ impl Diagnostic {
         Diagnostic::new(code, Severity::Warning, message)
     }
 
+    /// Something worth knowing that asks for no change.
+    pub fn remark(code: &'static str, message: impl Into<String>) -> Self {
+        Diagnostic::new(code, Severity::Note, message)
+    }
+
     fn new(code: &'static str, severity: Severity, message: impl Into<String>) -> Self {
         Diagnostic {
             code,
@@ -67,6 +90,7 @@ impl Diagnostic {
             labels: Vec::new(),
             notes: Vec::new(),
             help: None,
+            fixes: Vec::new(),
         }
     }
 
@@ -90,6 +114,17 @@ impl Diagnostic {
     pub fn help(mut self, help: impl Into<String>) -> Self {
         self.help = Some(help.into());
         self
+    }
+
+    /// Adds a change of one place that takes the mistake away.
+    pub fn fix(mut self, title: impl Into<String>, span: Span, text: impl Into<String>) -> Self {
+        self.fixes.push(Fix { title: title.into(), edits: vec![Edit { span, text: text.into() }] });
+        self
+    }
+
+    /// Says what was probably meant, and offers to write it.
+    pub fn meant(self, span: Span, word: &str) -> Self {
+        self.help(format!("did you mean `{word}`?")).fix(format!("write `{word}`"), span, word)
     }
 
     pub fn is_error(&self) -> bool {
@@ -225,58 +260,6 @@ fn floor_boundary(text: &str, offset: usize) -> usize {
     text.floor_char_boundary(offset.min(text.len()))
 }
 
-/// A diagnostic as data: what `--format json` prints. Its fields are public and stable.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct DiagnosticRecord {
-    pub code: &'static str,
-    pub severity: Severity,
-    pub message: String,
-    pub labels: Vec<LabelRecord>,
-    pub notes: Vec<String>,
-    pub help: Option<String>,
-}
-
-/// A place as data. Lines and columns count from 1, columns in characters, bytes from 0.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct LabelRecord {
-    pub file: String,
-    pub line: usize,
-    pub column: usize,
-    pub end_line: usize,
-    pub end_column: usize,
-    pub start_byte: usize,
-    pub end_byte: usize,
-    pub text: String,
-    pub primary: bool,
-}
-
-/// The same diagnostic as data.
-pub fn record(diagnostic: &Diagnostic, sources: &Sources) -> DiagnosticRecord {
-    let labels = diagnostic.labels.iter().map(|label| {
-        let (line, column) = sources.line_column(label.span.file, label.span.start);
-        let (end_line, end_column) = sources.line_column(label.span.file, label.span.end);
-        LabelRecord {
-            file: sources.name(label.span.file).to_owned(),
-            line,
-            column,
-            end_line,
-            end_column,
-            start_byte: label.span.start,
-            end_byte: label.span.end,
-            text: label.text.clone(),
-            primary: label.primary,
-        }
-    });
-    DiagnosticRecord {
-        code: diagnostic.code,
-        severity: diagnostic.severity,
-        message: diagnostic.message.clone(),
-        labels: labels.collect(),
-        notes: diagnostic.notes.clone(),
-        help: diagnostic.help.clone(),
-    }
-}
-
 /// The candidate that the author may have meant by `word`, if one is near enough.
 pub fn nearest<'a>(word: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     // A third of the word may be wrong: more, and the guess is noise.
@@ -323,8 +306,6 @@ mod tests {
         assert!(plain.contains("= units are types"), "{plain}");
         assert!(plain.contains("= help: divide one by a speed"), "{plain}");
         assert!(render(&diagnostic, &sources, Style::Human).contains('\u{1b}'));
-        let data = record(&diagnostic, &sources);
-        assert_eq!((data.labels[0].line, data.labels[0].column), (2, 14));
     }
 
     #[test]
@@ -334,7 +315,6 @@ mod tests {
         for span in [Span::new(file, 1, 3), Span::new(file, 90, 7), Span::new(FileId(9), 0, 4), Span::NONE] {
             let diagnostic = Diagnostic::warning("AV0001", "odd").at(span, "x");
             assert!(render(&diagnostic, &sources, Style::Plain).contains("odd"));
-            record(&diagnostic, &sources);
         }
     }
 

@@ -12,6 +12,7 @@ pub struct AvaParser;
 pub fn words(rule: Rule) -> Option<&'static str> {
     Some(match rule {
         Rule::item | Rule::declaration_keyword | Rule::next_declaration => "a declaration",
+        Rule::overriding => "a declaration after `override`",
         Rule::expression | Rule::operand | Rule::prefix => "an expression",
         Rule::name | Rule::names => "a name",
         Rule::argument | Rule::argument_name => "an argument",
@@ -122,6 +123,7 @@ pub fn is_plain_terminal(rule: Rule) -> bool {
             | Rule::close_paren
             | Rule::open_bracket
             | Rule::close_bracket
+            | Rule::kw_override
             | Rule::kw_language
             | Rule::kw_use
             | Rule::kw_digest

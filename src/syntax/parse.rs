@@ -39,9 +39,9 @@ pub const LANGUAGE: u64 = 1;
 const DIAGNOSTICS_MAX: usize = 100;
 
 /// Every word that begins a declaration.
-const DECLARATIONS: [&str; 17] = [
+const DECLARATIONS: [&str; 18] = [
     "language", "use", "enum", "state", "let", "fn", "action", "group", "optional", "rule", "road",
-    "episode", "reward", "verdict", "expect", "scenario", "policy",
+    "episode", "reward", "verdict", "expect", "scenario", "policy", "override",
 ];
 
 /// Words that begin something inside a declaration.
@@ -188,12 +188,17 @@ impl Reader<'_> {
             return Diagnostic::error(code::SYNTAX, message).at(span, "unexpected");
         }
         if !is_word {
-            return Diagnostic::error(code::SYNTAX, format!("expected a declaration, found `{found}`"))
-                .at(span, "unexpected");
+            let unexpected =
+                Diagnostic::error(code::SYNTAX, format!("expected a declaration, found `{found}`"))
+                    .at(span, "unexpected");
+            return match found {
+                "#" => unexpected.help("a comment begins with `//`").fix("write `//`", span, "//"),
+                _ => unexpected,
+            };
         }
         let unknown = Diagnostic::error(code::DECLARATION, format!("no declaration begins with `{found}`"));
         match nearest(found, DECLARATIONS) {
-            Some(meant) => unknown.at(span, "unknown declaration").help(format!("did you mean `{meant}`?")),
+            Some(meant) => unknown.at(span, "unknown declaration").meant(span, meant),
             None => unknown.at(span, "unknown declaration").note(format!(
                 "declarations begin with {}",
                 enumerated(&DECLARATIONS.map(|word| format!("`{word}`")), "or")
@@ -228,7 +233,7 @@ impl Reader<'_> {
         }
         // Short words are near to too many others.
         match nearest(found, CLAUSES).filter(|_| found.len() > 2 && !CLAUSES.contains(&found)) {
-            Some(meant) => mistake.help(format!("did you mean `{meant}`?")),
+            Some(meant) => mistake.meant(Span::new(self.file, token_start, token_start + found.len()), meant),
             None => mistake,
         }
     }
@@ -297,7 +302,8 @@ impl Reader<'_> {
             return vec![
                 Diagnostic::error(code::LANGUAGE, message)
                     .at(Span::new(self.file, start, start + found.len()), "expected `language 1` here")
-                    .help("begin the file with `language 1`"),
+                    .help("begin the file with `language 1`")
+                    .fix("write `language 1`", Span::new(self.file, start, start), "language 1\n"),
             ];
         };
         let mut found = Vec::new();

@@ -50,6 +50,12 @@ pub fn print(file: &File) -> String {
     print_with(file, "", &[])
 }
 
+/// A declaration that was read or built, without its documentation and comments.
+pub fn print_item(kind: &ItemKind) -> String {
+    let item = Item { docs: Vec::new(), kind: kind.clone(), span: Span::NONE };
+    print(&File { items: vec![item], ..File::default() }).trim_end().to_owned()
+}
+
 /// An expression in one line.
 pub fn print_expr(expr: &Expr) -> String {
     expression(expr).flat()
@@ -215,6 +221,10 @@ impl Printer<'_> {
 
     fn declaration(&mut self, kind: &ItemKind, span: Span) {
         match kind {
+            ItemKind::Override(inner) => {
+                self.words("override ");
+                self.declaration(inner, span);
+            }
             ItemKind::Language(version) => self.words(&format!("language {}", number(version))),
             ItemKind::Use(used) => {
                 self.words(&format!("use {}", quoted(&used.path.value)));
@@ -286,7 +296,8 @@ impl Printer<'_> {
 
     /// Whether the names of an `enum` or a `group` carry comments, so that each needs its own line.
     fn is_annotated_list(&self, kind: &ItemKind, span: Span) -> bool {
-        matches!(kind, ItemKind::Enum(_) | ItemKind::Group(_)) && self.comment_between(span.start, span.end)
+        matches!(kind.plain(), ItemKind::Enum(_) | ItemKind::Group(_))
+            && self.comment_between(span.start, span.end)
     }
 
     /// `head A | B`: on one line if it fits and nothing is said about the names one by one.
@@ -512,7 +523,7 @@ impl Printer<'_> {
 /// Whether a declaration holds no entries of its own.
 fn one_line(kind: &ItemKind) -> bool {
     let plain = |value: &Expr| !matches!(value.kind, ExprKind::Match { .. });
-    match kind {
+    match kind.plain() {
         ItemKind::Language(_) | ItemKind::Use(_) | ItemKind::Enum(_) | ItemKind::Group(_) => true,
         ItemKind::State(item) => match &item.initial {
             Initial::Any => true,
@@ -530,6 +541,7 @@ fn one_line(kind: &ItemKind) -> bool {
         | ItemKind::Episode(_)
         | ItemKind::Reward(_)
         | ItemKind::Scenario(_)
+        | ItemKind::Override(_)
         | ItemKind::Policy(_) => false,
     }
 }

@@ -92,6 +92,10 @@ impl Scanner<'_> {
                 self.comment();
                 return;
             }
+            '/' if rest.starts_with("/*") => {
+                self.foreign_comment();
+                return;
+            }
             '"' => self.quoted(),
             '(' | '[' | '{' => {
                 self.at += 1;
@@ -117,6 +121,29 @@ impl Scanner<'_> {
         let end = start + self.text[start..self.at].trim_end().len();
         self.found.comments.push(Comment { start, end, own_line: self.line_blank });
         self.hidden_characters(start);
+    }
+
+    /// `/* … */` is another language's comment. What is inside says nothing, so it is passed over.
+    fn foreign_comment(&mut self) {
+        let start = self.at;
+        let inside = start + "/*".len();
+        let closer = self.text[inside..].find("*/").map(|at| inside + at);
+        self.at = closer.map_or(self.text.len(), |at| at + "*/".len());
+        let line_end = self.text[start..].find('\n').map_or(self.text.len(), |at| start + at);
+        let span = Span::new(self.file, start, self.at.min(line_end));
+        let problem = Diagnostic::error(code::COMMENT, "`/*` begins no comment")
+            .at(span, "a comment begins with `//` and ends with its line")
+            .help("write `//` before each of its lines");
+        let whole_line =
+            closer.is_some() && self.at <= line_end && self.text[self.at..line_end].trim().is_empty();
+        let problem = match closer {
+            Some(closer) if whole_line => {
+                let text = format!("// {}", self.text[inside..closer].trim());
+                problem.fix("write it with `//`", span, text)
+            }
+            _ => problem,
+        };
+        self.found.problems.push(problem);
     }
 
     fn quoted(&mut self) {
@@ -217,7 +244,9 @@ impl Scanner<'_> {
             .at(span, format!("U+{:04X}", u32::from(first)))
             .note("names are made of ASCII letters, digits and `_`; comments and texts may hold anything");
         let problem = match meant {
-            Some(meant) => problem.help(format!("write `{meant}`")),
+            Some(meant) => {
+                problem.help(format!("write `{meant}`")).fix(format!("write `{meant}`"), span, meant)
+            }
             None => problem,
         };
         self.found.problems.push(problem);
@@ -237,6 +266,7 @@ fn bidi(character: char, span: Span) -> Diagnostic {
     .at(span, "")
     .note("what such a line shows is not what it says")
     .help("delete the character")
+    .fix("delete it", span, "")
 }
 
 /// What an author meant by a sign that a word processor made prettier.
@@ -259,6 +289,30 @@ fn meant(character: char) -> Option<&'static str> {
         '²' => "^2",
         '°' => "deg",
         '\u{a0}' => " ",
+        // Letters of other alphabets that look like Latin ones.
+        'а' | 'α' => "a",
+        'с' => "c",
+        'е' => "e",
+        'і' | 'ι' => "i",
+        'о' | 'ο' => "o",
+        'р' | 'ρ' => "p",
+        'ѕ' => "s",
+        'х' | 'χ' => "x",
+        'у' => "y",
+        'ν' => "v",
+        'А' | 'Α' => "A",
+        'В' | 'Β' => "B",
+        'С' => "C",
+        'Е' | 'Ε' => "E",
+        'Н' | 'Η' => "H",
+        'К' | 'Κ' => "K",
+        'М' | 'Μ' => "M",
+        'Ν' => "N",
+        'О' | 'Ο' => "O",
+        'Р' | 'Ρ' => "P",
+        'Ѕ' => "S",
+        'Т' | 'Τ' => "T",
+        'Х' | 'Χ' => "X",
         '；' | '，' => ",",
         '：' => ":",
         _ => return None,

@@ -101,12 +101,15 @@ impl Checker {
         let place = Place { locals: &locals, states: true, ..Place::default() };
         let effects: Vec<Option<EffectDef>> =
             declared.effects.iter().map(|effect| self.effect(effect, &place)).collect();
-        let effects: Option<Vec<EffectDef>> = effects.into_iter().collect();
+        if effects.iter().any(Option::is_none) {
+            // What is sound of it is kept, so that rules on it are looked at all the same.
+            self.half_broken.push(self.actions.len());
+        }
         Some(ActionDef {
             name: declared.name.text.clone(),
             docs: docs(item),
             parameters,
-            effects: effects?,
+            effects: effects.into_iter().flatten().collect(),
             span: declared.name.span,
         })
     }
@@ -369,7 +372,7 @@ impl Checker {
                 let error = match nearest(name, locals) {
                     Some(near) => Diagnostic::error(code::UNKNOWN, format!("unknown name `{name}`"))
                         .at(expr.span, "not declared")
-                        .help(format!("did you mean `{near}`?")),
+                        .meant(expr.span, near),
                     None => unknown_word::<W>(kind, name, expr.span),
                 };
                 self.report(error);

@@ -6,6 +6,7 @@ use crate::model::check::each;
 use crate::model::check::expression::Place;
 use crate::model::check::names::Names;
 use crate::model::check::names::unknown;
+use crate::model::check::rule::names_in;
 use crate::model::code;
 use crate::model::enclose::VARIANTS_MAX;
 use crate::model::expr::Expr;
@@ -76,14 +77,28 @@ impl Checker {
 
     pub(super) fn declare_constants(&mut self, items: &[&ast::Item]) {
         let mut names = Names::default();
+        let mut open: Vec<&ast::Let> = Vec::new();
         for (_, declared) in each(items, |kind| match kind {
             ItemKind::Let(declared) => Some(declared),
             _ => None,
         }) {
-            if let Err(error) = names.declare("constant", &declared.name, self.constants.len()) {
-                self.report(error);
-                continue;
+            match names.declare("constant", &declared.name, open.len()) {
+                Ok(()) => open.push(declared),
+                Err(error) => self.report(error),
             }
+        }
+        // The order of declarations means nothing: a constant waits for those that it names. Where
+        // they wait in a circle, the first is taken, and its names are unknown.
+        let named: Vec<Vec<ast::Name>> = open.iter().map(|declared| names_in(&declared.value)).collect();
+        let mut waiting: Vec<usize> = (0..open.len()).collect();
+        while !waiting.is_empty() {
+            let waits = |at: usize| {
+                named[at].iter().any(|name| {
+                    names.get(&name.text).is_some_and(|other| other == at || waiting.contains(&other))
+                })
+            };
+            let next = waiting.iter().position(|at| !waits(*at)).unwrap_or(0);
+            let declared = open[waiting.remove(next)];
             let value = self.expr(&declared.value, &Place::default(), None);
             let value = value.and_then(|value| Some(Expr { kind: self.fold(&value)?, ..value }));
             self.constants.push((declared.name.text.clone(), value));
@@ -332,11 +347,11 @@ fn variants_of(declared: &ast::Enum) -> Vec<String> {
 pub(super) fn unknown_word<W: Word>(kind: &str, word: &str, span: Span) -> Diagnostic {
     let words: Vec<&str> = W::ALL.iter().map(|word| word.name()).collect();
     let error = Diagnostic::error(code::NOT_A_WORD, format!("the engine knows no {kind} `{word}`"));
-    let help = match nearest(word, words.iter().copied()) {
-        Some(near) => format!("did you mean `{near}`?"),
-        None => format!("it knows {}", listed(&words)),
-    };
-    error.at(span, "").help(help)
+    let error = error.at(span, "");
+    match nearest(word, words.iter().copied()) {
+        Some(near) => error.help(format!("did you mean `{near}`?")),
+        None => error.help(format!("it knows {}", listed(&words))),
+    }
 }
 
 /// A state or other thing that is not declared, among candidates.

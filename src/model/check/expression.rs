@@ -30,6 +30,8 @@ pub(super) struct Place<'a> {
     pub road: bool,
     pub spawn: bool,
     pub outcome: bool,
+    /// Whether the collision has been judged: true of verdicts, not of rewards.
+    pub judged: bool,
 }
 
 /// The facts of the world by their spelling; which are on offer is the place's business.
@@ -41,6 +43,7 @@ const FACTS: &[(&str, Fact, Type)] = &[
     ("repeated", Fact::Repeated, Type::Bool),
     ("sudden", Fact::Sudden, Type::Bool),
     ("struck", Fact::Struck, Type::Bool),
+    ("avoidable", Fact::Avoidable, Type::Bool),
 ];
 
 impl Place<'_> {
@@ -50,6 +53,7 @@ impl Place<'_> {
             Fact::RoadLimit => self.road,
             Fact::SpawnGap | Fact::SafetyGap => self.spawn,
             Fact::Proc | Fact::Collision | Fact::Repeated | Fact::Sudden | Fact::Struck => self.outcome,
+            Fact::Avoidable => self.judged,
         };
         offered.then_some((*fact, *ty))
     }
@@ -637,13 +641,12 @@ pub(super) fn unknown_unit(word: &ast::Name) -> Diagnostic {
     let letters = |word: &str| word.chars().filter(|c| c.is_alphanumeric()).collect::<String>();
     // `kmh` means `km/h` rather than `km`.
     let meant = words().find(|unit| letters(unit) == letters(&word.text) && !letters(unit).is_empty());
-    let help = match meant.or(nearest(&word.text, words())) {
-        Some(near) => format!("did you mean `{near}`?"),
-        None => format!("the units are {}", words().collect::<Vec<_>>().join(", ")),
-    };
-    Diagnostic::error(code::UNKNOWN_UNIT, format!("unknown unit `{}`", word.text))
-        .at(word.span, "not a unit")
-        .help(help)
+    let error = Diagnostic::error(code::UNKNOWN_UNIT, format!("unknown unit `{}`", word.text))
+        .at(word.span, "not a unit");
+    match meant.or(nearest(&word.text, words())) {
+        Some(near) => error.meant(word.span, near),
+        None => error.help(format!("the units are {}", words().collect::<Vec<_>>().join(", "))),
+    }
 }
 
 /// Reads `12`, `0.50` and `1e-9` exactly, if they fit.

@@ -11,8 +11,10 @@ mod names;
 mod road;
 mod rule;
 mod scenario;
+mod scenario_rules;
 mod scenario_value;
 mod settings;
+mod unused;
 
 pub(super) use road::Maps;
 pub use scenario::scenario;
@@ -27,6 +29,7 @@ use crate::model::enclose::enclose;
 use crate::model::expr::Expr;
 use crate::model::expr::ExprKind;
 use crate::model::limits;
+use crate::model::proofs;
 use crate::model::reach;
 use crate::model::space::ActionDef;
 use crate::model::space::EnumDef;
@@ -39,6 +42,7 @@ use crate::model::value::Type;
 use crate::model::value::Value;
 use crate::syntax::Diagnostic;
 use crate::syntax::ast;
+use crate::syntax::ast::FileId;
 use crate::syntax::ast::ItemKind;
 use crate::syntax::ast::Span;
 use crate::units::Rational;
@@ -61,6 +65,8 @@ pub(super) struct Checker {
     functions: Vec<FnDef>,
     action_names: Names,
     actions: Vec<Option<ActionDef>>,
+    /// Actions with an effect that is broken: nothing is to be said of what they lack.
+    half_broken: Vec<usize>,
     groups: Vec<GroupDef>,
     /// Number of rows of each action, where its axes are sound.
     row_counts: Vec<Option<u64>>,
@@ -68,6 +74,9 @@ pub(super) struct Checker {
 
 /// What the reader of files knows about the root of a space.
 pub(super) struct Root {
+    /// Claims are judged, and unused declarations looked for, in this file alone: those of a used
+    /// file are about that file as it is by itself.
+    pub file: FileId,
     pub path: PathBuf,
     pub digest: String,
     pub docs: Vec<String>,
@@ -93,9 +102,11 @@ pub(super) fn space(
     let roads = checker.roads(items, road_names, maps);
     checker.count_rows();
 
+    let own: Vec<&ast::Item> = items.iter().copied().filter(|item| item.span.file == root.file).collect();
+
     // What was broken is missing, and indices would be off: without errors nothing is missing.
     if checker.has_errors() {
-        checker.look_at_expects(items);
+        checker.look_at_expects(&own);
         return (None, checker.finish());
     }
     let mut space = Space {
@@ -118,7 +129,9 @@ pub(super) fn space(
     space.rows = reach::rows(&space);
     checker.diagnostics.extend(reach::report(&space));
     checker.diagnostics.extend(limits::report(&space));
-    space.expects = checker.expects(items, &space);
+    space.expects = checker.expects(&own, &space);
+    checker.diagnostics.extend(unused::report(&own, items));
+    checker.diagnostics.extend(proofs::report(&space));
     let sound = !checker.has_errors();
     (sound.then_some(space), checker.finish())
 }

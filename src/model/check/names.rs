@@ -23,13 +23,17 @@ impl Names {
     /// If the name is taken.
     pub fn declare(&mut self, kind: &str, name: &Name, index: usize) -> Result<(), Diagnostic> {
         if let Some((_, first)) = self.found.get(&name.text) {
+            let help = match first.file == name.span.file {
+                true => "rename or remove one of them",
+                false => "rename one of them, or write `override` before the later one to replace the other",
+            };
             return Err(Diagnostic::error(
                 code::DUPLICATE,
                 format!("the {kind} `{}` is declared twice", name.text),
             )
             .at(name.span, "again here")
             .beside(*first, "first here")
-            .help("rename or remove one of them"));
+            .help(help));
         }
         self.found.insert(name.text.clone(), (index, name.span));
         Ok(())
@@ -54,7 +58,7 @@ pub(super) fn unknown<'a>(
     let candidates: Vec<&str> = candidates.into_iter().collect();
     let error = Diagnostic::error(code::UNKNOWN, format!("unknown {kind} `{name}`")).at(span, "not declared");
     match nearest(name, candidates.iter().copied()) {
-        Some(near) => error.help(format!("did you mean `{near}`?")),
+        Some(near) => error.meant(span, near),
         None if !candidates.is_empty() && candidates.len() <= 12 => {
             error.help(format!("there is {}", listed(&candidates)))
         }

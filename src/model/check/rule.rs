@@ -69,9 +69,9 @@ impl Checker {
             }
             let locals = locals(&definition);
             let spawns = definition.effects.iter().any(|effect| matches!(effect, EffectDef::Spawn(_)));
-            let place = Place { locals: &locals, states: true, road: true, spawn: true, outcome: false };
+            let place = Place { locals: &locals, states: true, road: true, spawn: true, ..Place::default() };
             let Some(condition) = self.typed(condition, &place, Type::Bool) else { continue };
-            if condition.needs_survey() && !spawns {
+            if condition.needs_survey() && !spawns && !self.half_broken.contains(&action) {
                 let message =
                     format!("`{}` asks about a spawn, and `{}` has none", rule.name.text, definition.name);
                 let error = Diagnostic::error(code::NO_SPAWN, message).at(condition.span, "needs a spawn");
@@ -110,7 +110,7 @@ impl Checker {
             self.report(error.help(format!("write `rule {} on {action}: …`", rule.name.text)));
             return None;
         }
-        let place = Place { locals: &[], states: true, road: true, spawn: true, outcome: false };
+        let place = Place { locals: &[], states: true, road: true, spawn: true, ..Place::default() };
         let compiled = self.typed(condition, &place, Type::Bool)?;
         let binds = |action: &ActionDef| {
             action.effects.iter().any(|effect| match effect {
@@ -121,9 +121,11 @@ impl Checker {
         let open = !compiled.needs_survey() && !compiled.reads_memory();
         let all = self.actions.iter().enumerate();
         Some(
-            all.filter(|(_, a)| a.as_ref().is_some_and(|a| open || binds(a)))
-                .map(|(index, _)| index)
-                .collect(),
+            all.filter(|(index, a)| {
+                a.as_ref().is_some_and(|a| open || binds(a) || self.half_broken.contains(index))
+            })
+            .map(|(index, _)| index)
+            .collect(),
         )
     }
 
@@ -251,7 +253,7 @@ fn reads_state(condition: &Expr, state: &crate::model::space::StateDef) -> bool 
 }
 
 /// Every bare name in an expression, in order.
-fn names_in(expr: &ast::Expr) -> Vec<ast::Name> {
+pub(super) fn names_in(expr: &ast::Expr) -> Vec<ast::Name> {
     let mut names = Vec::new();
     collect_names(expr, &mut names);
     names

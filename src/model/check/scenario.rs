@@ -4,13 +4,17 @@ use std::sync::Arc;
 
 use crate::model::check::names::Names;
 use crate::model::check::names::unknown;
+use crate::model::check::scenario_rules::Moment;
+use crate::model::check::scenario_rules::breaches;
 use crate::model::check::scenario_value::figure;
 use crate::model::check::scenario_value::number;
 use crate::model::check::scenario_value::value;
 use crate::model::code;
+use crate::model::limits::AMBIENT_MAX;
 use crate::model::limits::SIGNAL_PHASE_S;
 use crate::model::row::Row;
 use crate::model::row::locals;
+use crate::model::scenario::Avoidability;
 use crate::model::scenario::Claim;
 use crate::model::scenario::ENDS;
 use crate::model::scenario::Figure;
@@ -60,7 +64,7 @@ pub fn scenario(file: &ast::File, space: &Space) -> Result<Scenario, Vec<Diagnos
     let origin = reader.origin(&declared.origin);
     let road = reader.road(&declared.road);
     let start = reader.start(declared);
-    let steps = reader.steps(&declared.steps, &start.memory, &origin);
+    let steps = reader.steps(&declared.steps, &start.memory, &origin, road);
     let claims = declared.expects.iter().filter_map(|expect| reader.claim(expect)).collect();
     let docs = item.docs.iter().map(|doc| doc.text.clone()).collect();
     let name = declared.name.text.clone();
@@ -97,7 +101,8 @@ impl<'a> Reader<'a> {
     }
 
     fn origin(&mut self, fields: &[ast::Field]) -> Origin {
-        const FIELDS: [&str; 7] = ["seed", "episode", "policy", "ads", "engine", "with", "without"];
+        const FIELDS: [&str; 9] =
+            ["seed", "episode", "policy", "ads", "profile", "profile_digest", "engine", "with", "without"];
         let mut origin = Origin::default();
         self.once("field", fields);
         for field in fields {
@@ -106,6 +111,8 @@ impl<'a> Reader<'a> {
                 "episode" => origin.episode = self.whole(&field.value),
                 "policy" => origin.policy = self.text(&field.value),
                 "ads" => origin.ads = self.text(&field.value),
+                "profile" => origin.profile = self.text(&field.value),
+                "profile_digest" => origin.profile_digest = self.text(&field.value),
                 "engine" => origin.engine = self.text(&field.value),
                 "with" => origin.with = self.rule_names(&field.value),
                 "without" => origin.without = self.rule_names(&field.value),
@@ -153,7 +160,7 @@ impl<'a> Reader<'a> {
         let space = self.space;
         // The seed is arbitrary: what it draws is replaced below, or reported as missing.
         let mut memory = space.initial_memory(0);
-        let mut start = (0.0, None);
+        let mut start = (0.0, None, 0);
         self.once("field", &declared.start);
         for field in &declared.start {
             match field.name.text.as_str() {
@@ -168,11 +175,22 @@ impl<'a> Reader<'a> {
                     }
                 }
                 "traffic_seed" => start.1 = self.whole(&field.value),
+                "ambient" => {
+                    let wanted = self.whole(&field.value).unwrap_or(0);
+                    if wanted > u64::from(AMBIENT_MAX) {
+                        let message = format!("{wanted} ambient vehicles are not possible");
+                        let error = Diagnostic::error(code::OUT_OF_RANGE, message);
+                        self.report(
+                            error.at(field.value.span, format!("must lie within 0 .. {AMBIENT_MAX}")),
+                        );
+                    }
+                    start.2 = wanted.min(u64::from(AMBIENT_MAX)) as u32;
+                }
                 name => match space.state(name) {
                     Some(state) => self.start_state(state, &field.value, &mut memory),
                     None => {
                         let states = space.states.iter().map(|state| state.name.as_str());
-                        let names = states.chain(["signal_phase", "traffic_seed"]);
+                        let names = states.chain(["signal_phase", "traffic_seed", "ambient"]);
                         self.report(unknown("field", name, field.name.span, names));
                     }
                 },
@@ -186,7 +204,7 @@ impl<'a> Reader<'a> {
                 self.report(error.help(format!("add `start {{ {}: … }}`", state.name)));
             }
         }
-        ScenarioStart { memory, signal_phase_s: start.0, traffic_seed: start.1 }
+        ScenarioStart { memory, signal_phase_s: start.0, traffic_seed: start.1, ambient: start.2 }
     }
 
     /// `time: Noon`, `sky: None` for all keys, `sky: { Rain: High }` for some.
@@ -213,9 +231,15 @@ impl<'a> Reader<'a> {
         }
     }
 
-    fn steps(&mut self, declared: &[ast::Step], start: &Memory, origin: &Origin) -> Vec<ScenarioStep> {
+    fn steps(
+        &mut self,
+        declared: &[ast::Step],
+        start: &Memory,
+        origin: &Origin,
+        road: Option<usize>,
+    ) -> Vec<ScenarioStep> {
         let mut steps: Vec<ScenarioStep> = Vec::new();
-        let mut memory = start.clone();
+        let mut history = vec![(0, start.clone())];
         for step in declared {
             let number = step.number.digits.parse::<u64>();
             let Ok(number) = number else {
@@ -241,9 +265,11 @@ impl<'a> Reader<'a> {
             let action = &self.space.actions[row.action];
             let Some(drawn) = self.drawn(step, action) else { continue };
             let locals = locals(action, row, &drawn);
-            let after = self.space.memory_after(row.action, &locals, &memory);
-            self.check_moves(step, row, (&memory, &after), origin);
-            memory = after;
+            let memory = &history[history.len() - 1].1;
+            let after = self.space.memory_after(row.action, &locals, memory);
+            let moment = Moment { step, row, locals: &locals, after: &after, history: &history, road };
+            self.diagnostics.extend(breaches(self.space, &moment, origin));
+            history.push((number, after));
             steps.push(ScenarioStep { number, row: Some(row.index), drawn });
         }
         steps
@@ -358,27 +384,11 @@ impl<'a> Reader<'a> {
         sound.then_some(values)
     }
 
-    /// Steps must obey the transition rules that were in force.
-    fn check_moves(&mut self, step: &ast::Step, row: &Row, memory: (&Memory, &Memory), origin: &Origin) {
-        for rule in row.rules.iter().map(|rule| &self.space.rules[*rule]) {
-            let asked = if rule.optional { origin.with.contains(&rule.name) } else { true };
-            if !asked || origin.without.contains(&rule.name) {
-                continue;
-            }
-            let Some(reason) = self.space.forbidden_move(rule, memory.0, memory.1) else { continue };
-            let message = format!("step {} breaks rule `{}`", step.number.digits, rule.name);
-            let error = Diagnostic::error(code::BROKEN_RULE, message)
-                .at(step.span, reason)
-                .beside(rule.span, "does not allow it");
-            self.diagnostics.push(error);
-        }
-    }
-
     fn claim(&mut self, expect: &ast::Expect) -> Option<Claim> {
         let unclear = || {
             Diagnostic::error(code::UNKNOWN_CLAIM, "unknown claim").at(expect.span, "cannot be checked").help(
                 "claims are `collision with npc#2 at 14.22 s`, `proc == [0.5]`, `trace == \"sha256:…\"`, \
-                 `end == arrived`, or the name of a verdict",
+                 `end == arrived`, `avoidable by [cc, fsm]`, or the name of a verdict",
             )
         };
         match &expect.claim.kind {
@@ -389,6 +399,10 @@ impl<'a> Reader<'a> {
             ast::ExprKind::Name(name) if self.space.verdicts.iter().any(|verdict| verdict.name == *name) => {
                 let (obstacle, _) = self.clauses(&expect.clauses, false)?;
                 Some(Claim::Verdict { name: name.clone(), obstacle })
+            }
+            ast::ExprKind::Name(name) if Avoidability::ALL.iter().any(|class| class.name() == name) => {
+                let class = Avoidability::ALL.into_iter().find(|class| class.name() == name)?;
+                self.avoidability(class, expect)
             }
             ast::ExprKind::Binary { op: BinaryOp::Equal, left, right, .. } => match (&left.kind, &right.kind)
             {
@@ -420,6 +434,25 @@ impl<'a> Reader<'a> {
                 None
             }
         }
+    }
+
+    /// `avoidable by [cc, fsm] with npc#2`; the drivers' names are the oracle's business.
+    fn avoidability(&mut self, class: Avoidability, expect: &ast::Expect) -> Option<Claim> {
+        let (by, others): (Vec<&ast::Clause>, Vec<&ast::Clause>) =
+            expect.clauses.iter().partition(|clause| clause.kind == ClauseKind::By);
+        let drivers = by.iter().map(|clause| match &clause.value.kind {
+            ast::ExprKind::List(items) => items.iter().map(driver).collect(),
+            _ => None,
+        });
+        let drivers: Option<Vec<Vec<String>>> = drivers.collect();
+        let Some(drivers) = drivers.filter(|lists| lists.len() <= 1) else {
+            let error = Diagnostic::error(code::UNKNOWN_CLAIM, "wanted one list of reference drivers");
+            self.report(error.at(by[0].span, "not one").help("write `avoidable by [cc, fsm]`"));
+            return None;
+        };
+        let others: Vec<ast::Clause> = others.into_iter().cloned().collect();
+        let (obstacle, _) = self.clauses(&others, false)?;
+        Some(Claim::Avoidability { class, by: drivers.into_iter().next(), obstacle })
     }
 
     /// `with npc#2` and, if the claim has a time, `at 14.22 s`.
@@ -508,5 +541,13 @@ impl Space {
             Some(Diagnostic { message, help: Some(help), .. }) => Err(format!("{message}; {help}")),
             Some(Diagnostic { message, .. }) => Err(message),
         }
+    }
+}
+
+/// The name of a reference driver.
+fn driver(expr: &ast::Expr) -> Option<String> {
+    match &expr.kind {
+        ast::ExprKind::Name(name) => Some(name.clone()),
+        _ => None,
     }
 }

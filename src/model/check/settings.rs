@@ -48,7 +48,11 @@ impl Checker {
         for (item, fields) in blocks {
             if let Some(first) = first.replace(item.span) {
                 let error = Diagnostic::error(code::DUPLICATE, "`episode` is declared twice");
-                self.report(error.at(item.span, "again here").beside(first, "first here"));
+                let error = error.at(item.span, "again here").beside(first, "first here");
+                self.report(match first.file == item.span.file {
+                    true => error.help("remove one of them"),
+                    false => error.help("write `override` before the later one to replace the other"),
+                });
                 continue;
             }
             let mut names = Names::default();
@@ -153,7 +157,11 @@ impl Checker {
         for (item, declared) in blocks {
             if let Some(first) = first.replace(item.span) {
                 let error = Diagnostic::error(code::DUPLICATE, "`reward` is declared twice");
-                self.report(error.at(item.span, "again here").beside(first, "first here"));
+                let error = error.at(item.span, "again here").beside(first, "first here");
+                self.report(match first.file == item.span.file {
+                    true => error.help("remove one of them"),
+                    false => error.help("write `override` before the later one to replace the other"),
+                });
                 continue;
             }
             let mut closed = false;
@@ -178,7 +186,7 @@ impl Checker {
     }
 
     pub(super) fn verdicts(&mut self, items: &[&ast::Item]) -> Vec<VerdictDef> {
-        let place = Place { outcome: true, ..Place::default() };
+        let place = Place { outcome: true, judged: true, ..Place::default() };
         let mut names = Names::default();
         let mut verdicts = Vec::new();
         for (item, declared) in each(items, |kind| match kind {

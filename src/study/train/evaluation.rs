@@ -7,6 +7,7 @@ use crate::action::ActionTable;
 use crate::agent::Agent;
 use crate::agent::QPolicy;
 use crate::episode;
+use crate::oracle::AvoidabilitySettings;
 use crate::rng;
 use crate::rng::Stream;
 use crate::study::arena::Arena;
@@ -54,7 +55,8 @@ pub fn evaluate(
         agent.begin();
         let mut choose = |moment: &episode::Moment| choose(arena.table(), &mut agent, moment);
         let log = episode::run(&setup, &mut choose, &mut |_, _, _| {});
-        let counted = EpisodeSummary::new(arena.table().space(), number as usize, &log).counted() as u64;
+        let settings = AvoidabilitySettings::default();
+        let counted = EpisodeSummary::judged(&setup, number as usize, &log, &settings).counted() as u64;
         found.collisions += log.collisions.len() as u64;
         found.counted += counted;
         found.colliding += u64::from(counted > 0);

@@ -27,6 +27,7 @@ use crate::mdp;
 use crate::mdp::Observation;
 use crate::mdp::StepOutcome;
 use crate::model::Space;
+use crate::oracle::AvoidabilitySettings;
 use crate::rng;
 use crate::rng::Stream;
 use crate::study::arena::Arena;
@@ -176,7 +177,7 @@ impl Training {
                 last = Some((moment.observation.clone(), legal));
             },
         );
-        let summary = EpisodeSummary::new(arena.table().space(), number, &log);
+        let summary = EpisodeSummary::judged(&setup, number, &log, &AvoidabilitySettings::default());
         let (last, last_legal) = last.expect("every episode has a last moment");
         let trajectory = Trajectory {
             steps: experiences(&settings.hyperparameters, choices, &log, &summary),

@@ -1,0 +1,104 @@
+//! Ranges of which the rules leave less than half: usually meant, sometimes a slip of the pen.
+
+use crate::model::bound::bounds;
+use crate::model::code;
+use crate::model::expr::Comparison;
+use crate::model::interval::End;
+use crate::model::interval::Interval;
+use crate::model::row::Reach;
+use crate::model::space::Domain;
+use crate::model::space::Parameter;
+use crate::model::space::Space;
+use crate::model::value::Type;
+use crate::syntax::Diagnostic;
+use crate::syntax::listed;
+use crate::units::Rational;
+
+/// One remark for each rule and range that is cut alike, naming the actions and roads.
+pub(super) fn report(space: &Space) -> Vec<Diagnostic> {
+    let mut found: Vec<Cut<'_>> = Vec::new();
+    for row in &space.rows {
+        for (road, reach) in space.roads.iter().zip(&row.roads) {
+            let Reach::Open(ranges) = reach else { continue };
+            for (name, kept) in ranges {
+                let action = &space.actions[row.action];
+                let parameter = action.parameters.iter().find(|parameter| parameter.name == *name);
+                let Some(parameter) = parameter else { continue };
+                let Some(percent) = kept_percent(&parameter.domain, kept) else { continue };
+                let rules = cutting_rules(space, row.action, parameter);
+                if rules.is_empty() {
+                    continue;
+                }
+                let cut = Cut { parameter, kept: *kept, percent, rules, road: &road.name };
+                let alike = |known: &&mut Cut<'_>| {
+                    known.parameter.name == cut.parameter.name
+                        && (known.road, known.kept, &known.rules) == (cut.road, cut.kept, &cut.rules)
+                        && known.parameter.domain == cut.parameter.domain
+                };
+                if found.iter_mut().find(alike).is_none() {
+                    found.push(cut);
+                }
+            }
+        }
+    }
+    found.into_iter().map(|cut| cut.remark(space)).collect()
+}
+
+struct Cut<'a> {
+    parameter: &'a Parameter,
+    kept: Interval,
+    /// Of the declared range.
+    percent: f64,
+    rules: Vec<usize>,
+    road: &'a str,
+}
+
+impl Cut<'_> {
+    fn remark(self, space: &Space) -> Diagnostic {
+        let Type::Quantity(dimension) = self.parameter.ty else {
+            unreachable!("whole numbers are lists of values")
+        };
+        let names: Vec<&str> = self.rules.iter().map(|rule| space.rules[*rule].name.as_str()).collect();
+        let message = format!(
+            "{} {} {:.0} % of the range of `{}` on `{}`",
+            listed(&names),
+            if names.len() == 1 { "leaves" } else { "leave" },
+            self.percent,
+            self.parameter.name,
+            self.road,
+        );
+        let remark = Diagnostic::remark(code::CUT, message)
+            .at(self.parameter.span, format!("{} {} is left", self.kept, dimension.si_unit()));
+        self.rules
+            .iter()
+            .fold(remark, |remark, rule| remark.beside(space.rules[*rule].span, "by this rule"))
+            .help("if that is meant, all is well; else narrow the range or loosen the rule")
+    }
+}
+
+/// How much of a range is left, if less than half, and more than nothing.
+fn kept_percent(domain: &Domain, kept: &Interval) -> Option<f64> {
+    let (Domain::Range(low, high), End::At(from, _), End::At(to, _)) = (domain, kept.low, kept.high) else {
+        return None;
+    };
+    let (whole, left) = (high.checked_sub(*low)?, to.checked_sub(from)?);
+    let share = left.checked_div(whole)?;
+    let half = Rational::new(1, 2).expect("2 is not 0");
+    // A single value is what an equality asks for, and no accident.
+    (share > Rational::ZERO && share < half).then(|| share.to_f64() * 100.0)
+}
+
+/// Rules in force that bound the parameter, none of them by an equality.
+fn cutting_rules(space: &Space, action: usize, parameter: &Parameter) -> Vec<usize> {
+    let local = space.actions[action].parameters.iter().position(|known| known.name == parameter.name);
+    let bounds = bounds(space, action);
+    let on_it = || bounds.iter().filter(|bound| Some(bound.local) == local);
+    if on_it().any(|bound| bound.op == Comparison::Equal) {
+        return Vec::new();
+    }
+    let mut rules: Vec<usize> =
+        on_it().filter_map(|bound| bound.rule).filter(|rule| !space.rules[*rule].optional).collect();
+    rules.sort_unstable();
+    rules.dedup();
+    rules
+}

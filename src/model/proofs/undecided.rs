@@ -1,0 +1,50 @@
+//! Rows of which nothing is known: neither proved dead nor seen to run.
+
+use crate::model::code;
+use crate::model::proofs::witness::witness;
+use crate::model::reach::numbers;
+use crate::model::row::Reach;
+use crate::model::row::Row;
+use crate::model::space::Space;
+use crate::syntax::Diagnostic;
+use crate::syntax::listed;
+
+/// Rows times roads that are searched for witnesses, at most.
+const SEARCHES_MAX: usize = 20_000;
+
+/// One warning for each action and road with such rows.
+pub(super) fn report(space: &Space) -> Vec<Diagnostic> {
+    let mut diagnostics = Vec::new();
+    let mut left = SEARCHES_MAX;
+    for (action, definition) in space.actions.iter().enumerate() {
+        for (index, road) in space.roads.iter().enumerate() {
+            let mut unknown: Vec<&Row> = Vec::new();
+            for row in space.rows.iter().filter(|row| row.action == action) {
+                if matches!(row.roads[index], Reach::Dead { .. }) || left == 0 {
+                    continue;
+                }
+                left -= 1;
+                if witness(space, row, road).is_none() {
+                    unknown.push(row);
+                }
+            }
+            let Some(first) = unknown.first() else { continue };
+            let message = format!("whether `{}` can run on `{}` is not known", definition.name, road.name);
+            let rules: Vec<&str> = first.rules.iter().map(|rule| space.rules[*rule].name.as_str()).collect();
+            let warning =
+                Diagnostic::warning(code::UNDECIDED, message).at(definition.span, numbers(&unknown));
+            let warning = match rules.is_empty() {
+                true => {
+                    warning.note("no values were found with which it runs, and no proof that there are none")
+                }
+                false => warning.note(format!(
+                    "no values were found that obey {}, and no proof that there are none",
+                    listed(&rules)
+                )),
+            };
+            diagnostics
+                .push(warning.help("bound its parameters by simpler comparisons, one parameter a side"));
+        }
+    }
+    diagnostics
+}

@@ -1,0 +1,162 @@
+//! Diagnostics as data: what `--format json` and `--format sarif` are made of, and how a fix is
+//! applied. The shape is public: a field that changes its meaning raises [`SCHEMA`].
+
+use serde::Serialize;
+
+use crate::syntax::Diagnostic;
+use crate::syntax::Severity;
+use crate::syntax::Sources;
+use crate::syntax::ast::FileId;
+use crate::syntax::ast::Span;
+use crate::syntax::diagnostic::Edit;
+
+/// Version of the records' fields.
+pub const SCHEMA: u32 = 1;
+
+/// A diagnostic as data.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct DiagnosticRecord {
+    pub schema: u32,
+    pub code: &'static str,
+    pub severity: Severity,
+    pub message: String,
+    pub labels: Vec<LabelRecord>,
+    pub notes: Vec<String>,
+    pub help: Option<String>,
+    pub fixes: Vec<FixRecord>,
+}
+
+/// A place as data. Lines and columns count from 1, columns in characters, bytes from 0.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct PlaceRecord {
+    pub file: String,
+    pub line: usize,
+    pub column: usize,
+    pub end_line: usize,
+    pub end_column: usize,
+    pub start_byte: usize,
+    pub end_byte: usize,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct LabelRecord {
+    #[serde(flatten)]
+    pub place: PlaceRecord,
+    pub text: String,
+    pub primary: bool,
+}
+
+/// A change that a machine may make.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct FixRecord {
+    pub title: String,
+    pub edits: Vec<EditRecord>,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct EditRecord {
+    #[serde(flatten)]
+    pub place: PlaceRecord,
+    /// What stands there afterwards.
+    pub text: String,
+}
+
+/// The same diagnostic as data.
+pub fn record(diagnostic: &Diagnostic, sources: &Sources) -> DiagnosticRecord {
+    let labels = diagnostic.labels.iter().map(|label| LabelRecord {
+        place: place(label.span, sources),
+        text: label.text.clone(),
+        primary: label.primary,
+    });
+    let edit = |edit: &Edit| EditRecord { place: place(edit.span, sources), text: edit.text.clone() };
+    let fixes = diagnostic
+        .fixes
+        .iter()
+        .map(|fix| FixRecord { title: fix.title.clone(), edits: fix.edits.iter().map(edit).collect() });
+    DiagnosticRecord {
+        schema: SCHEMA,
+        code: diagnostic.code,
+        severity: diagnostic.severity,
+        message: diagnostic.message.clone(),
+        labels: labels.collect(),
+        notes: diagnostic.notes.clone(),
+        help: diagnostic.help.clone(),
+        fixes: fixes.collect(),
+    }
+}
+
+fn place(span: Span, sources: &Sources) -> PlaceRecord {
+    let (line, column) = sources.line_column(span.file, span.start);
+    let (end_line, end_column) = sources.line_column(span.file, span.end);
+    PlaceRecord {
+        file: sources.name(span.file).to_owned(),
+        line,
+        column,
+        end_line,
+        end_column,
+        start_byte: span.start,
+        end_byte: span.end,
+    }
+}
+
+/// The text of a file after the first fix of each diagnostic that lies in it, and how many were
+/// made. A fix that overlaps an earlier one is left for the next time.
+pub fn apply_fixes(file: FileId, text: &str, diagnostics: &[Diagnostic]) -> (String, usize) {
+    let mut edits: Vec<&Edit> = Vec::new();
+    let mut made = 0;
+    for fix in diagnostics.iter().filter_map(|diagnostic| diagnostic.fixes.first()) {
+        let clash = |edit: &Edit| {
+            let apart = |other: &&Edit| {
+                edit.span.end < other.span.start || other.span.end < edit.span.start || edit == *other
+            };
+            edit.span.file != file
+                || text.get(edit.span.start..edit.span.end).is_none()
+                || !edits.iter().all(apart)
+        };
+        if fix.edits.iter().any(clash) {
+            continue;
+        }
+        made += 1;
+        for edit in &fix.edits {
+            if !edits.contains(&edit) {
+                edits.push(edit);
+            }
+        }
+    }
+    edits.sort_by_key(|edit| edit.span);
+    let mut fixed = String::with_capacity(text.len());
+    let mut at = 0;
+    for edit in edits {
+        fixed.push_str(&text[at..edit.span.start]);
+        fixed.push_str(&edit.text);
+        at = edit.span.end;
+    }
+    fixed.push_str(&text[at..]);
+    (fixed, made)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn places_count_from_one_and_fixes_are_made_once() {
+        let mut sources = Sources::new();
+        let text = "language 1\nlet x = 12 m + 3 s\n";
+        let file = sources.add("a.ava", text);
+        let mistake = Diagnostic::error("AV0201", "odd").at(Span::new(file, 24, 25), "here");
+        let mistake = mistake.meant(Span::new(file, 28, 29), "m");
+        let data = record(&mistake, &sources);
+        assert_eq!((data.labels[0].place.line, data.labels[0].place.column), (2, 14));
+        assert_eq!(data.fixes[0].edits[0].text, "m");
+        let twice = [mistake.clone(), mistake];
+        assert_eq!(apply_fixes(file, text, &twice), ("language 1\nlet x = 12 m + 3 m\n".to_owned(), 2));
+        assert_eq!(apply_fixes(FileId(9), text, &twice).1, 0);
+    }
+
+    #[test]
+    fn bad_spans_are_records_too() {
+        let sources = Sources::new();
+        record(&Diagnostic::warning("AV0001", "odd").at(Span::new(FileId(9), 4, 7), "x"), &sources);
+    }
+}
