@@ -4,8 +4,11 @@
 //! element of the result adds its terms by rising inner index, each a multiplication and then an
 //! addition. Wide registers hold different elements, so their width changes nothing but the time.
 
+use ndarray::ArrayView1;
 use ndarray::ArrayView2;
 use ndarray::ArrayViewMut2;
+use ndarray::Axis;
+use ndarray::s;
 
 /// Rows and columns of the tile that stays in registers: eight registers of eight numbers.
 const TILE_ROWS: usize = 4;
@@ -56,8 +59,10 @@ fn by_tiles(left: ArrayView2<f32>, right: ArrayView2<f32>, mut out: ArrayViewMut
         for row in (0..rows).step_by(TILE_ROWS) {
             let sums = tile(&bands[row * inner..(row + TILE_ROWS) * inner], &panel);
             for (offset, sums) in sums.iter().enumerate().take(rows - row) {
-                for (at, &sum) in sums.iter().enumerate().take(width) {
-                    out[[row + offset, column + at]] = sum;
+                let mut to = out.slice_mut(s![row + offset, column..column + width]);
+                match to.as_slice_mut() {
+                    Some(to) => to.copy_from_slice(&sums[..width]),
+                    None => to.assign(&ArrayView1::from(&sums[..width])),
                 }
             }
         }
@@ -69,10 +74,20 @@ fn by_tiles(left: ArrayView2<f32>, right: ArrayView2<f32>, mut out: ArrayViewMut
 fn packed_rows(left: ArrayView2<f32>) -> Vec<f32> {
     let (rows, inner) = left.dim();
     let mut bands = vec![0.0; rows.div_ceil(TILE_ROWS) * TILE_ROWS * inner];
-    for (row, values) in left.rows().into_iter().enumerate() {
-        let band = &mut bands[row / TILE_ROWS * TILE_ROWS * inner..];
-        for (at, &value) in values.iter().enumerate() {
-            band[at * TILE_ROWS + row % TILE_ROWS] = value;
+    for (band, rows) in
+        bands.chunks_exact_mut(TILE_ROWS * inner).zip(left.axis_chunks_iter(Axis(0), TILE_ROWS))
+    {
+        // The order of reading follows the memory, whichever way the matrix lies there.
+        if rows.strides()[1] == 1 {
+            for (row, values) in rows.rows().into_iter().enumerate() {
+                for (packed, &value) in band.chunks_exact_mut(TILE_ROWS).zip(values) {
+                    packed[row] = value;
+                }
+            }
+        } else {
+            for (packed, values) in band.chunks_exact_mut(TILE_ROWS).zip(rows.columns()) {
+                packed.iter_mut().zip(values).for_each(|(packed, &value)| *packed = value);
+            }
         }
     }
     bands
@@ -81,9 +96,20 @@ fn packed_rows(left: ArrayView2<f32>) -> Vec<f32> {
 /// A panel of `width` columns, row by row, each padded to [`TILE_COLUMNS`].
 #[inline(always)]
 fn pack_columns(right: ArrayView2<f32>, column: usize, width: usize, panel: &mut [f32]) {
-    for (values, packed) in right.rows().into_iter().zip(panel.chunks_exact_mut(TILE_COLUMNS)) {
-        for (at, value) in packed.iter_mut().enumerate() {
-            *value = if at < width { values[column + at] } else { 0.0 };
+    let columns = right.slice(s![.., column..column + width]);
+    if width < TILE_COLUMNS {
+        panel.fill(0.0);
+    }
+    if columns.strides()[1] == 1 {
+        for (packed, values) in panel.chunks_exact_mut(TILE_COLUMNS).zip(columns.rows()) {
+            let values = values.to_slice().expect("neighbours in a row are neighbours in memory");
+            packed[..width].copy_from_slice(values);
+        }
+    } else {
+        for (at, values) in columns.columns().into_iter().enumerate() {
+            for (packed, &value) in panel.chunks_exact_mut(TILE_COLUMNS).zip(values) {
+                packed[at] = value;
+            }
         }
     }
 }
