@@ -9,6 +9,7 @@ mod emitted;
 mod layers;
 mod profiles;
 mod references;
+mod road;
 mod rules;
 mod tables;
 mod traces;
