@@ -240,7 +240,7 @@ mod tests {
                 q.mapv(|q| q - place(at.next().expect("it never ends")))
             });
             let mut kinks = 0;
-            for at in 0..gradient.len() {
+            for (at, &slope) in gradient.iter().enumerate() {
                 let here = network.parameters[at];
                 let mut difference = |step: f32| {
                     let mut loss_at = |parameter| {
@@ -257,8 +257,8 @@ mod tests {
                     kinks += 1;
                     continue;
                 }
-                let error = (narrow - f64::from(gradient[at])).abs();
-                assert!(error < 4e-3 * (1.0 + narrow.abs()), "{dueling} {at}: {narrow} {}", gradient[at]);
+                let error = (narrow - f64::from(slope)).abs();
+                assert!(error < 4e-3 * (1.0 + narrow.abs()), "{dueling} {at}: {narrow} {slope}");
             }
             assert!(kinks * 5 < gradient.len(), "{kinks} of {}", gradient.len());
         }
