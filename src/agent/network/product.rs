@@ -4,7 +4,6 @@
 //! element of the result adds its terms by rising inner index, each a multiplication and then an
 //! addition. Wide registers hold different elements, so their width changes nothing but the time.
 
-use ndarray::ArrayView1;
 use ndarray::ArrayView2;
 use ndarray::ArrayViewMut2;
 use ndarray::Axis;
@@ -14,7 +13,7 @@ use ndarray::s;
 const TILE_ROWS: usize = 4;
 const TILE_COLUMNS: usize = 16;
 
-/// `left · right` into `out`: shapes `(m, k)`, `(k, n)` and `(m, n)`, any strides.
+/// `left · right` into `out`: shapes `(m, k)`, `(k, n)` and `(m, n)`; `out` lies row by row.
 pub fn product(left: ArrayView2<f32>, right: ArrayView2<f32>, out: ArrayViewMut2<f32>) {
     assert_eq!(left.ncols(), right.nrows(), "inner lengths must agree");
     assert_eq!(out.dim(), (left.nrows(), right.ncols()), "the result has the outer lengths");
@@ -51,6 +50,7 @@ fn by_tiles_avx2(left: ArrayView2<f32>, right: ArrayView2<f32>, out: ArrayViewMu
 #[inline(always)]
 fn by_tiles(left: ArrayView2<f32>, right: ArrayView2<f32>, mut out: ArrayViewMut2<f32>) {
     let (rows, inner, columns) = (left.nrows(), left.ncols(), right.ncols());
+    let to = out.as_slice_mut().expect("the result lies row by row");
     let bands = packed_rows(left);
     let mut panel = vec![0.0; inner * TILE_COLUMNS];
     for column in (0..columns).step_by(TILE_COLUMNS) {
@@ -59,11 +59,8 @@ fn by_tiles(left: ArrayView2<f32>, right: ArrayView2<f32>, mut out: ArrayViewMut
         for row in (0..rows).step_by(TILE_ROWS) {
             let sums = tile(&bands[row * inner..(row + TILE_ROWS) * inner], &panel);
             for (offset, sums) in sums.iter().enumerate().take(rows - row) {
-                let mut to = out.slice_mut(s![row + offset, column..column + width]);
-                match to.as_slice_mut() {
-                    Some(to) => to.copy_from_slice(&sums[..width]),
-                    None => to.assign(&ArrayView1::from(&sums[..width])),
-                }
+                let begin = (row + offset) * columns + column;
+                to[begin..begin + width].copy_from_slice(&sums[..width]);
             }
         }
     }
