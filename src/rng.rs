@@ -29,6 +29,14 @@ pub enum Stream {
     Perception = 6,
     /// Choices of other road users, for example which way to turn.
     Traffic = 7,
+    /// Ambient traffic: where somebody appears and what they are; one index an attempt.
+    Ambient = 8,
+    /// First weights of a network.
+    Initialization = 21,
+    /// Which transitions a learner looks at again.
+    Replay = 22,
+    /// Seeds of the episodes that a trained policy is judged by.
+    Evaluation = 23,
 }
 
 /// The stream of one consumer; `index` tells apart its uses, for example the step number.

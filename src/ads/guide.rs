@@ -19,6 +19,9 @@ const STRIDES: [usize; 3] = [16, 4, 1];
 /// within a tick, less than to another branch of the route.
 const NEAR_M: f64 = 5.0;
 
+/// Step of the differences that give the slope of a guide beside the path, m.
+const H_M: f64 = 0.25;
+
 /// What bounds the speed on a free road.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SpeedRules {
@@ -101,7 +104,23 @@ impl Beside {
 }
 
 impl Guide {
+    /// Along the route's path: lane changes as early as they are comfortable.
     pub fn new(scene: &Scene, rules: &SpeedRules) -> Guide {
+        Guide::beside(scene, rules, |_| 0.0)
+    }
+
+    /// As [`Guide::new`], but each lane change begins at a station of its own (m); it does not begin at
+    /// all while that is infinite. Stations remain those of the route's path.
+    pub fn with_changes(scene: &Scene, rules: &SpeedRules, begins_m: &[f64]) -> Guide {
+        debug_assert_eq!(begins_m.len(), scene.route.changes.len());
+        let changes = || scene.route.changes.iter().zip(begins_m);
+        Guide::beside(scene, rules, |station_m| {
+            changes().map(|(change, begin_m)| change.postponed_offset_m(station_m, *begin_m)).sum()
+        })
+    }
+
+    /// Beside the route's path, by a smooth function of its station, m to the left.
+    fn beside(scene: &Scene, rules: &SpeedRules, offset_m: impl Fn(f64) -> f64) -> Guide {
         let route = &scene.route;
         let count = (route.path.length_m() / SPACING_M).ceil() as usize + 1;
         let mut lane = 0;
@@ -113,8 +132,13 @@ impl Guide {
                 }
                 let limit_mps =
                     route.lanes.get(lane).map_or(f64::INFINITY, |on| scene.map.lane(on.lane).speed_limit_mps);
-                let pose = route.path.pose_at(station_m);
-                let curvature_per_m = route.path.curvature_at(station_m);
+                let on_path = route.path.pose_at(station_m);
+                let aside_m = [-H_M, 0.0, H_M].map(|ahead_m| offset_m(station_m + ahead_m));
+                let slope = (aside_m[2] - aside_m[0]) / (2.0 * H_M);
+                let bend_per_m = (aside_m[2] - 2.0 * aside_m[1] + aside_m[0]) / (H_M * H_M);
+                let mut pose = on_path.offset(0.0, aside_m[1]);
+                pose.heading_rad = wrap_angle(pose.heading_rad + libm::atan2(slope, 1.0));
+                let curvature_per_m = route.path.curvature_at(station_m) + bend_per_m;
                 let curve_mps =
                     (rules.lateral_acceleration_mps2_max / curvature_per_m.abs().max(1e-6)).sqrt();
                 Sample {
@@ -173,11 +197,14 @@ impl Guide {
         let squared_m2 = |index: usize| (point - self.samples[index].position).norm_squared();
         let mut best = (last, squared_m2(last));
         for stride in STRIDES {
-            for index in (first..last).step_by(stride) {
+            // Not `step_by`: it costs as much as the distances.
+            let mut index = first;
+            while index < last {
                 let candidate = squared_m2(index);
                 if candidate < best.1 {
                     best = (index, candidate);
                 }
+                index += stride;
             }
             first = best.0.saturating_sub(stride - 1);
             last = (best.0 + stride).min(self.samples.len());

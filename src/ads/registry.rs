@@ -7,9 +7,15 @@ use crate::sim::Scene;
 use super::driver::Ads;
 use super::modular::Modular;
 use super::modular::ModularConfig;
+use super::reference::CarefulHuman;
+use super::reference::FuzzySafety;
 use super::reference::Idm;
+use super::reference::MinimalPerformance;
+use super::reference::Reference;
+use super::reference::Rss;
 
 /// A driving system that can be asked for by name.
+#[derive(Debug)]
 pub struct Entry {
     pub name: &'static str,
     pub summary: &'static str,
@@ -33,5 +39,25 @@ pub const REGISTRY: &[Entry] = &[
         name: "idm",
         summary: "reference driver: perfect knowledge, intelligent driver model, lane following",
         build: |scene, _seed| Box::new(Idm::new(scene)),
+    },
+    Entry {
+        name: "cc",
+        summary: "reference driver: competent and careful human of UN R157, after JAMA",
+        build: |scene, _seed| Box::new(Reference::new(scene, CarefulHuman::Anticipating)),
+    },
+    Entry {
+        name: "fsm",
+        summary: "reference driver: fuzzy safety model of UN R157",
+        build: |scene, _seed| Box::new(Reference::new(scene, FuzzySafety::default())),
+    },
+    Entry {
+        name: "rss",
+        summary: "reference driver: responsibility-sensitive safety",
+        build: |scene, _seed| Box::new(Reference::new(scene, Rss::default())),
+    },
+    Entry {
+        name: "r157",
+        summary: "reference driver: the least that UN R157 demands",
+        build: |scene, _seed| Box::new(Reference::new(scene, MinimalPerformance)),
     },
 ];

@@ -18,8 +18,42 @@ pub struct Status {
     pub control: Control,
     /// Apollo's `steering_rate`: its command is constant, so this is the measured rate, rad/s.
     pub steer_rate_radps: f64,
+    /// What it does with the path.
+    pub manoeuvre: Manoeuvre,
     /// Why it drives as it does now: the constraint that holds it back most.
     pub reason: Reason,
+}
+
+/// Ids from here on belong to ghosts: objects that a driving system sees and that are not there.
+pub const GHOST_ID_MIN: u32 = 1 << 31;
+
+/// What a plan does with the path. `Display` gives a few words, for example `nudge 3`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Manoeuvre {
+    #[default]
+    LaneFollow,
+    /// Passes something that stands at the edge of the lane, within it.
+    Nudge(u32),
+    /// Changes lanes.
+    LaneChange,
+    /// Keeps its lane until there is a gap in the one that it must change to.
+    AwaitGap,
+}
+
+impl fmt::Display for Manoeuvre {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Manoeuvre::LaneFollow => write!(f, "lane follow"),
+            Manoeuvre::Nudge(id) => write!(f, "nudge {}", named(*id)),
+            Manoeuvre::LaneChange => write!(f, "lane change"),
+            Manoeuvre::AwaitGap => write!(f, "await gap"),
+        }
+    }
+}
+
+/// An object's number, or that it is a ghost.
+fn named(id: u32) -> String {
+    if id >= GHOST_ID_MIN { "a ghost".to_owned() } else { id.to_string() }
 }
 
 /// An object as the driving system believes it to be.
@@ -61,6 +95,12 @@ pub enum Reason {
     Follow(u32),
     /// Something that will cross the way.
     Yield(u32),
+    /// Waits for a gap in the lane that it must change to.
+    LaneChange,
+    /// A crosswalk that a pedestrian is on or comes onto.
+    Crosswalk,
+    /// A junction that could not be left at once.
+    KeepClear,
     /// Lost the route: constant braking.
     Fallback,
 }
@@ -71,9 +111,12 @@ impl fmt::Display for Reason {
             Reason::Start => write!(f, "start"),
             Reason::Cruise => write!(f, "cruise"),
             Reason::RedLight => write!(f, "red light"),
-            Reason::Stop(id) => write!(f, "stop {id}"),
-            Reason::Follow(id) => write!(f, "follow {id}"),
-            Reason::Yield(id) => write!(f, "yield {id}"),
+            Reason::Stop(id) => write!(f, "stop {}", named(*id)),
+            Reason::Follow(id) => write!(f, "follow {}", named(*id)),
+            Reason::Yield(id) => write!(f, "yield {}", named(*id)),
+            Reason::LaneChange => write!(f, "lane change"),
+            Reason::Crosswalk => write!(f, "crosswalk"),
+            Reason::KeepClear => write!(f, "keep clear"),
             Reason::Fallback => write!(f, "fallback"),
         }
     }

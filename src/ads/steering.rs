@@ -62,6 +62,31 @@ impl Default for SteeringConfig {
     }
 }
 
+impl SteeringConfig {
+    /// Least and greatest value of every number.
+    pub(super) const RANGES: &[(&str, f64, f64)] = &[
+        ("weight_offset", 0.001, 100.0),
+        ("weight_heading", 0.001, 100.0),
+        ("weight_steer", 0.01, 100.0),
+        ("cornering_stiffness_nprad", 1000.0, 10_000_000.0),
+        ("mass_kg", 100.0, 100_000.0),
+        ("lateral_acceleration_mps2_max", 0.5, 20.0),
+        ("preview_s", 0.0, 1.0),
+        ("lock_speed_mps", 0.01, 2.0),
+    ];
+}
+
+/// How a path lies beside the guide at a station.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Aside {
+    /// m to the left.
+    pub offset_m: f64,
+    /// Change of that per metre of station.
+    pub slope: f64,
+    /// Change of the slope per metre, 1/m.
+    pub curvature_per_m: f64,
+}
+
 /// Apollo's gain schedules: speed (m/s) and ratio of the weight.
 const OFFSET_SCHEDULE: [(f64, f64); 5] = [(4.0, 1.0), (8.0, 0.6), (12.0, 0.2), (20.0, 0.1), (25.0, 0.05)];
 const HEADING_SCHEDULE: [(f64, f64); 5] = [(4.0, 1.0), (8.0, 0.6), (12.0, 0.4), (20.0, 0.2), (25.0, 0.1)];
@@ -95,6 +120,18 @@ impl Steering {
     /// Wanted angle of the road wheels, rad, for a vehicle that believes its rear axle to be at
     /// `rear_axle`, near `station_m` of the guide.
     pub fn steer_rad(&self, guide: &Guide, rear_axle: &Pose, station_m: f64, motion: &EgoMotion) -> f64 {
+        self.steer_aside_rad(guide, &|_| Aside::default(), rear_axle, station_m, motion)
+    }
+
+    /// The same for a path that lies beside the guide.
+    pub fn steer_aside_rad(
+        &self,
+        guide: &Guide,
+        aside: &dyn Fn(f64) -> Aside,
+        rear_axle: &Pose,
+        station_m: f64,
+        motion: &EgoMotion,
+    ) -> f64 {
         let vehicle = VehicleParameters::MKZ;
         let speed_mps = motion.speed_mps;
         if speed_mps < self.config.lock_speed_mps {
@@ -105,14 +142,17 @@ impl Steering {
         let centre = rear_axle.offset(rear_m, 0.0);
         let beside = guide.locate(centre.position, Some(station_m + rear_m));
         let reference = guide.pose_at(beside.station_m);
-        let curvature_here_per_m = guide.curvature_at(beside.station_m);
-        let curvature_per_m = guide.curvature_at(beside.station_m + speed_mps * self.config.preview_s);
+        let ahead_m = beside.station_m + speed_mps * self.config.preview_s;
+        let (here, ahead) = (aside(beside.station_m), aside(ahead_m));
+        let curvature_here_per_m = guide.curvature_at(beside.station_m) + here.curvature_per_m;
+        let curvature_per_m = guide.curvature_at(ahead_m) + ahead.curvature_per_m;
 
-        let heading_error_rad = wrap_angle(rear_axle.heading_rad - reference.heading_rad);
+        let path_rad = reference.heading_rad + libm::atan(here.slope);
+        let heading_error_rad = wrap_angle(rear_axle.heading_rad - path_rad);
         // The rear axle rolls without slip at town speeds; the centre of mass swings out beside it.
         let slip_mps = motion.yaw_rate_radps * rear_m;
         let error = Vector4::new(
-            beside.offset_m,
+            beside.offset_m - here.offset_m,
             speed_mps * libm::sin(heading_error_rad) + slip_mps,
             heading_error_rad,
             motion.yaw_rate_radps - speed_mps * curvature_here_per_m,

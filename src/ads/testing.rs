@@ -12,6 +12,7 @@ use crate::model::vocabulary::Body;
 use crate::road::RoadMap;
 use crate::road::Route;
 use crate::road::RouteStopLine;
+use crate::road::Signal;
 use crate::sim::Conditions;
 use crate::sim::Control;
 use crate::sim::DT_S;
@@ -31,6 +32,31 @@ pub const CLEAR_DAY: Conditions =
 /// A straight road of 600 m along +x.
 pub fn straight() -> Arc<Scene> {
     scene(&[(600.0, 0.0, 0.0)])
+}
+
+/// A one-way road of two lanes along +x, 400 m long. The route starts in the right-hand lane, at
+/// y = -5.25 m, and has its goal after 350 m in the left-hand one, at y = -1.75 m. A solid line closes
+/// the way between them after `open_m`.
+pub fn two_lanes(open_m: f64) -> Arc<Scene> {
+    let lane = |id: i32, mark: &str| {
+        format!(
+            r#"<lane id="{id}" type="driving"><width sOffset="0" a="3.5" b="0" c="0" d="0"/>{mark}</lane>"#
+        )
+    };
+    let mark = format!(r#"<roadMark sOffset="0" type="broken"/><roadMark sOffset="{open_m}" type="solid"/>"#);
+    let text = format!(
+        r#"<OpenDRIVE><header name="two lanes"/><road id="1" length="400" junction="-1">
+        <type s="0" type="town"><speed max="50" unit="km/h"/></type>
+        <planView><geometry s="0" x="0" y="0" hdg="0" length="400"><line/></geometry></planView>
+        <lanes><laneSection s="0"><right>{}{}</right></laneSection></lanes></road></OpenDRIVE>"#,
+        lane(-1, &mark),
+        lane(-2, "")
+    );
+    let map = RoadMap::from_opendrive("two lanes", &text).expect("the road is sound");
+    let start = map.place("1", -2, 0.0).expect("the road begins");
+    let goal = map.place("1", -1, 350.0).expect("the road is long");
+    let route = Route::find(&map, start, goal).expect("a lane change leads there");
+    Arc::new(Scene::new(map.into(), route))
 }
 
 /// Straights, a right-angled bend of 15 m radius to the left and a hairpin of 10 m to the right,
@@ -88,12 +114,14 @@ fn scene(pieces: &[(f64, f64, f64)]) -> Arc<Scene> {
          <center><lane id=\"0\" type=\"none\"/></center>\
          <right><lane id=\"-1\" type=\"driving\">{width}</lane></right></laneSection></lanes></road></OpenDRIVE>"
     );
-    let map = RoadMap::from_opendrive("by hand", &text).expect("the road is sound");
+    let mut map = RoadMap::from_opendrive("by hand", &text).expect("the road is sound");
     let start = map.place("1", -1, 0.0).expect("the road begins");
     let goal = map.place("1", -1, station_m - 40.0).expect("the road is long");
     let mut route = Route::find(&map, start, goal).expect("one lane leads there");
     route.stop_lines.push(RouteStopLine { station_m: 100.0, signal: 0 });
-    Arc::new(Scene { map: map.into(), route })
+    let position = route.path.pose_at(100.0).offset(10.0, -4.0).position;
+    map.signals.push(Signal { id: "1".into(), position, junction: None, group: 0 });
+    Arc::new(Scene::new(map.into(), route))
 }
 
 /// An object that keeps its velocity until it brakes.
@@ -209,5 +237,5 @@ pub fn corner() -> Arc<Scene> {
     let start = map.nearest(Vec2::new(0.0, 0.0), 2.377, 1.0).expect("a lane at the start");
     let goal = map.nearest(Vec2::new(-71.4, 145.5), -2.983, 1.0).expect("a lane at the goal");
     let route = Route::find(&map, start, goal).expect("the goal can be reached");
-    Arc::new(Scene { map: map.into(), route })
+    Arc::new(Scene::new(map.into(), route))
 }

@@ -94,6 +94,7 @@ fn all_drive_the_corner_in_any_weather() {
                 wetness: level(seed / 3),
                 signal_phase_s: seed as f64 * 3.7,
                 seed,
+                ambient: 0,
             };
             let mut ads = (entry.build)(&scene, seed);
             let drive = drive_alone(&scene, ads.as_mut(), &start);

@@ -2,7 +2,7 @@
 
 use ndarray::ArrayView1;
 
-use crate::mdp::StateVector;
+use crate::mdp::Observation;
 use crate::rng;
 use crate::rng::Rng;
 
@@ -12,11 +12,11 @@ use super::registry::Agent;
 pub struct MaskedRandom;
 
 impl Agent for MaskedRandom {
-    fn choose(&mut self, _state: &StateVector, legal: ArrayView1<bool>, rng: &mut Rng) -> usize {
+    fn choose(&mut self, _: &Observation, legal: ArrayView1<bool>, rng: &mut Rng) -> Option<usize> {
         let choices = legal.iter().filter(|&&is_legal| is_legal).count();
         let nth = rng::below(rng, choices as u32) as usize;
         let mut rows = legal.iter().enumerate().filter(|&(_, &is_legal)| is_legal).map(|(row, _)| row);
-        rows.nth(nth).expect("the draw is below the number of legal rows")
+        rows.nth(nth)
     }
 }
 
@@ -24,7 +24,7 @@ impl Agent for MaskedRandom {
 pub struct RawRandom;
 
 impl Agent for RawRandom {
-    fn choose(&mut self, _state: &StateVector, legal: ArrayView1<bool>, rng: &mut Rng) -> usize {
-        rng::below(rng, legal.len() as u32) as usize
+    fn choose(&mut self, _: &Observation, legal: ArrayView1<bool>, rng: &mut Rng) -> Option<usize> {
+        Some(rng::below(rng, legal.len() as u32) as usize)
     }
 }

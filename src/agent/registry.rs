@@ -3,23 +3,35 @@
 
 use ndarray::ArrayView1;
 
-use crate::mdp::StateVector;
+use crate::mdp::Observation;
 use crate::rng::Rng;
 
+use super::presets;
+use super::presets::Preset;
 use super::random;
 
 /// Chooses rows of the action table.
 pub trait Agent: Send {
-    /// The row to carry out next. `legal` has shape `(rows,)`; at least one is true.
-    fn choose(&mut self, state: &StateVector, legal: ArrayView1<bool>, rng: &mut Rng) -> usize;
+    /// A new episode begins.
+    fn begin(&mut self) {}
+
+    /// The row to carry out next, or none. `legal` has shape `(rows,)`; at least one is true.
+    fn choose(&mut self, observation: &Observation, legal: ArrayView1<bool>, rng: &mut Rng) -> Option<usize>;
 }
 
 /// An agent that can be asked for by name.
 pub struct Entry {
     pub name: &'static str,
     pub summary: &'static str,
-    /// A fresh agent for one episode.
-    pub build: fn() -> Box<dyn Agent>,
+    pub kind: Kind,
+}
+
+/// How one comes by an agent.
+pub enum Kind {
+    /// It can act at once: a fresh one for each episode.
+    Ready(fn() -> Box<dyn Agent>),
+    /// It has to be trained: its presets, the default first. See [`super::Learner`].
+    Learning(&'static [Preset]),
 }
 
 /// Every agent of avastra.
@@ -27,12 +39,22 @@ pub const REGISTRY: &[Entry] = &[
     Entry {
         name: "random",
         summary: "uniform over the rows that the rules allow at the moment",
-        build: || Box::new(random::MaskedRandom),
+        kind: Kind::Ready(|| Box::new(random::MaskedRandom)),
     },
     Entry {
         name: "random-raw",
         summary: "uniform over all rows, as the published random search; an illegal choice is a step lost",
-        build: || Box::new(random::RawRandom),
+        kind: Kind::Ready(|| Box::new(random::RawRandom)),
+    },
+    Entry {
+        name: "ddqn",
+        summary: "the paper's agent: Double DQN with prioritised replay",
+        kind: Kind::Learning(presets::DDQN),
+    },
+    Entry {
+        name: "deep_collision",
+        summary: "DeepCollision's agent: plain DQN over 12 variables",
+        kind: Kind::Learning(presets::DEEP_COLLISION),
     },
 ];
 
@@ -43,23 +65,44 @@ pub fn by_name(name: &str) -> Option<&'static Entry> {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Arc;
+
     use super::*;
-    use crate::mdp::STATE_LEN;
+    use crate::agent::Learner;
+    use crate::agent::Rows;
     use crate::rng::Stream;
     use crate::rng::stream;
     use ndarray::Array1;
 
+    /// A fresh agent of an entry, for five rows.
+    fn fresh(entry: &Entry, seed: u64) -> Vec<Box<dyn Agent>> {
+        let rows = || Arc::new(Rows { allowed: vec![true; 5], environment: vec![false; 5] });
+        match entry.kind {
+            Kind::Ready(build) => vec![build()],
+            Kind::Learning(presets) => {
+                let learner = |preset: &Preset| -> Box<dyn Agent> {
+                    Box::new(Learner::new(Arc::new((preset.settings)()), rows(), seed))
+                };
+                presets.iter().map(learner).collect()
+            }
+        }
+    }
+
     #[test]
     fn every_agent_chooses_a_row_and_repeats_itself() {
-        let state = StateVector::zeros(STATE_LEN);
         let legal = Array1::from_vec(vec![false, true, false, true, true]);
         for entry in REGISTRY {
-            let choices = |seed| -> Vec<usize> {
-                let mut agent = (entry.build)();
-                let mut rng = stream(seed, Stream::Exploration, 0);
-                (0..50).map(|_| agent.choose(&state, legal.view(), &mut rng)).collect()
+            let choices = |seed| -> Vec<Vec<usize>> {
+                let choices = |mut agent: Box<dyn Agent>| {
+                    let mut rng = stream(seed, Stream::Exploration, 0);
+                    agent.begin();
+                    let observation = Observation::zeros();
+                    let choose = |_| agent.choose(&observation, legal.view(), &mut rng).unwrap();
+                    (0..50).map(choose).collect()
+                };
+                fresh(entry, seed).into_iter().map(choices).collect()
             };
-            assert!(choices(1).iter().all(|&row| row < legal.len()), "{}", entry.name);
+            assert!(choices(1).iter().flatten().all(|&row| row < legal.len()), "{}", entry.name);
             assert_eq!(choices(1), choices(1), "{}", entry.name);
             assert_ne!(choices(1), choices(2), "{}", entry.name);
         }
@@ -67,13 +110,12 @@ mod tests {
 
     #[test]
     fn masked_random_obeys_the_mask_evenly() {
-        let state = StateVector::zeros(STATE_LEN);
         let legal = Array1::from_vec(vec![false, true, false, true, true]);
-        let mut agent = (by_name("random").expect("it is registered").build)();
+        let mut agent = random::MaskedRandom;
         let mut rng = stream(3, Stream::Exploration, 0);
         let mut seen = [0_u32; 5];
         for _ in 0..3000 {
-            seen[agent.choose(&state, legal.view(), &mut rng)] += 1;
+            seen[agent.choose(&Observation::zeros(), legal.view(), &mut rng).unwrap()] += 1;
         }
         assert_eq!((seen[0], seen[2]), (0, 0));
         assert!([1, 3, 4].iter().all(|&row: &usize| (900..1100).contains(&seen[row])), "{seen:?}");

@@ -73,10 +73,16 @@ pub enum Command {
     Completions(CompletionsArguments),
     /// Play episodes and write the crashes back as scenarios.
     Run(RunArguments),
+    /// Train an agent and write what it learned as a policy.
+    Train(TrainArguments),
     /// Run emitted scenarios again and check every claim they make.
     Replay(ReplayArguments),
+    /// Check every claim of emitted scenarios and policies.
+    Verify(VerifyArguments),
     /// Draw moments of an emitted scenario as SVG.
     Render(RenderArguments),
+    /// Print or draw a map, and a route through it.
+    Road(RoadArguments),
 }
 
 #[derive(Debug, Args)]
@@ -197,14 +203,23 @@ pub struct RunArguments {
     /// Driving system under test.
     #[arg(long, default_value = crate::study::DEFAULT_ADS)]
     pub ads: String,
+    /// Profile of the `modular` driving system, for example scenarios/ads/cautious.yaml [default: as it comes].
+    #[arg(long, value_name = "FILE")]
+    pub ads_config: Option<PathBuf>,
     /// Who chooses the actions.
     #[arg(long, default_value = "random")]
     pub agent: String,
+    /// Let a trained policy choose them; without FILE on its own space.
+    #[arg(long, value_name = "POLICY", conflicts_with = "agent")]
+    pub policy: Option<PathBuf>,
     /// Episodes on each road.
     #[arg(long, default_value_t = 100, value_parser = clap::value_parser!(u32).range(1..=i64::from(crate::study::EPISODES_MAX)))]
     pub episodes: u32,
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
+    /// Vehicles of ambient traffic around the ego vehicle, besides those that actions make appear.
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=i64::from(crate::model::AMBIENT_MAX)))]
+    pub ambient: u32,
     /// Worker threads; the result does not depend on it [default: one for each core].
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=1024))]
     pub jobs: Option<u32>,
@@ -214,11 +229,52 @@ pub struct RunArguments {
     #[arg(long)]
     pub out: Option<PathBuf>,
     /// Go on with an interrupted run directory; its own settings hold.
-    #[arg(long, value_name = "DIR", conflicts_with_all = ["file", "road", "ads", "agent", "episodes", "seed", "out", "without", "with"])]
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["file", "road", "ads", "ads_config", "agent", "policy", "episodes", "seed", "ambient", "out", "without", "with"])]
     pub resume: Option<PathBuf>,
     /// Exit with status 4 if a counted collision was found.
     #[arg(long)]
     pub fail_on_collision: bool,
+}
+
+#[derive(Debug, Args)]
+pub struct TrainArguments {
+    /// The space.
+    #[arg(required_unless_present = "resume")]
+    pub file: Option<PathBuf>,
+    /// Road to drive; with several, episodes go round them [default: all of the space].
+    #[arg(long)]
+    pub road: Vec<String>,
+    /// Driving system under test.
+    #[arg(long, default_value = crate::study::DEFAULT_ADS)]
+    pub ads: String,
+    /// Who learns.
+    #[arg(long, default_value = "ddqn")]
+    pub agent: String,
+    /// Settings to begin with [default: the agent's own].
+    #[arg(long)]
+    pub preset: Option<String>,
+    /// Settings that differ from the preset, as YAML.
+    #[arg(long, value_name = "YAML")]
+    pub config: Option<PathBuf>,
+    /// Episodes on all roads together.
+    #[arg(long, default_value_t = 750, value_parser = clap::value_parser!(u32).range(1..=i64::from(crate::study::EPISODES_MAX)))]
+    pub episodes: u32,
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+    #[command(flatten)]
+    pub rules: RuleArguments,
+    /// Run directory, new or empty [default: the next free runs/NNNN].
+    #[arg(long)]
+    pub out: Option<PathBuf>,
+    /// Go on with an interrupted run directory; its own settings hold.
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["file", "road", "ads", "agent", "preset", "config", "episodes", "seed", "out", "without", "with"])]
+    pub resume: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+pub struct VerifyArguments {
+    #[arg(required = true, value_name = "FILE")]
+    pub files: Vec<PathBuf>,
 }
 
 #[derive(Debug, Args)]
@@ -228,6 +284,10 @@ pub struct ReplayArguments {
     /// Replay against another driving system: shows what happens, checks no claim.
     #[arg(long)]
     pub ads: Option<String>,
+    /// Replay against another profile of `modular`: claims are checked only if it means the same as the
+    /// recorded one.
+    #[arg(long, value_name = "FILE")]
+    pub ads_config: Option<PathBuf>,
 }
 
 #[derive(Debug, Args)]
@@ -245,4 +305,22 @@ pub struct RenderArguments {
     /// Draw the drive of another driving system.
     #[arg(long)]
     pub ads: Option<String>,
+}
+
+#[derive(Debug, Args)]
+pub struct RoadArguments {
+    /// An OpenDRIVE map, or a space (`.ava`) whose road is meant.
+    pub file: PathBuf,
+    /// Road of the space [default: its first].
+    #[arg(long)]
+    pub road: Option<String>,
+    /// Where a route starts, for example `1/-1@12.5`: road, lane, station of the road in m.
+    #[arg(long, value_name = "PLACE", requires = "to", allow_hyphen_values = true)]
+    pub from: Option<String>,
+    /// Where it ends.
+    #[arg(long, value_name = "PLACE", requires = "from", allow_hyphen_values = true)]
+    pub to: Option<String>,
+    /// Draw it to a file as well; `-` is stdout, and nothing else is printed.
+    #[arg(long, value_name = "FILE")]
+    pub svg: Option<PathBuf>,
 }

@@ -20,8 +20,8 @@ pub enum Failure {
     #[error("{count} found", count = super::progress::plural(*collisions, "counted collision"))]
     Collision { collisions: usize },
     /// Ctrl-C: what was done is saved.
-    #[error("interrupted; go on with `avastra run --resume {}`", directory.display())]
-    Interrupted { directory: PathBuf },
+    #[error("interrupted; go on with `avastra {command} --resume {}`", directory.display())]
+    Interrupted { command: &'static str, directory: PathBuf },
 }
 
 impl Failure {

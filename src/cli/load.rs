@@ -6,8 +6,10 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use crate::action::ActionTable;
+use crate::ads::ModularConfig;
 use crate::model;
 use crate::model::Loaded;
+use crate::model::Policy;
 use crate::model::ReadError;
 use crate::model::Scenario;
 use crate::model::Space;
@@ -78,6 +80,10 @@ pub fn table(output: &Output, path: &Path) -> Result<ActionTable, Failure> {
         let path = path.display();
         return Err(Failure::usage(format!("`{path}` is a scenario: `avastra replay {path}` plays it")));
     }
+    if loaded.policy.is_some() {
+        let path = path.display();
+        return Err(Failure::usage(format!("`{path}` is a policy: `avastra run --policy {path}` plays it")));
+    }
     Ok(ActionTable::new(space(loaded, path)?))
 }
 
@@ -90,6 +96,48 @@ pub fn scenario(output: &Output, path: &Path) -> Result<(ActionTable, Scenario),
     let scenario = loaded.scenario.take();
     let scenario = scenario.ok_or_else(|| Failure::usage(format!("`{}` has no scenario", path.display())))?;
     Ok((ActionTable::new(space(loaded, path)?), scenario))
+}
+
+/// A profile of the `modular` driving system.
+///
+/// # Errors
+/// If the file cannot be read, or is no profile.
+pub fn profile(path: &Path) -> Result<ModularConfig, Failure> {
+    let text = read(path).map_err(|error| Failure::file("read", path, error))?;
+    ModularConfig::from_yaml(&text).map_err(|error| Failure::file("use", path, error))
+}
+
+/// What a file that avastra wrote holds.
+pub enum Emitted {
+    Scenario,
+    /// With the table of its space.
+    Policy(ActionTable, Box<Policy>),
+}
+
+/// A scenario or policy file.
+///
+/// # Errors
+/// As [`load`], and if the file has neither.
+pub fn emitted(output: &Output, path: &Path) -> Result<Emitted, Failure> {
+    let mut loaded = load(output, path)?;
+    if let Some(policy) = loaded.policy.take() {
+        return Ok(Emitted::Policy(ActionTable::new(space(loaded, path)?), Box::new(policy)));
+    }
+    if loaded.scenario.is_some() {
+        return Ok(Emitted::Scenario);
+    }
+    Err(Failure::usage(format!("`{}` has neither a scenario nor a policy", path.display())))
+}
+
+/// A policy file: its space's table and its policy.
+///
+/// # Errors
+/// As [`load`], and if the file has no policy.
+pub fn policy(output: &Output, path: &Path) -> Result<(ActionTable, Policy), Failure> {
+    match emitted(output, path)? {
+        Emitted::Policy(table, policy) => Ok((table, *policy)),
+        Emitted::Scenario => Err(Failure::usage(format!("`{}` is no policy", path.display()))),
+    }
 }
 
 fn space(loaded: Loaded, path: &Path) -> Result<Arc<Space>, Failure> {

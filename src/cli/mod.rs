@@ -15,9 +15,12 @@ mod output;
 mod progress;
 mod render;
 mod replay;
+mod road;
 mod run;
 mod run_directory;
 mod sarif;
+mod train;
+mod verify;
 mod why;
 
 use std::process::ExitCode;
@@ -57,8 +60,11 @@ pub fn main() -> ExitCode {
         Command::New(arguments) => new::new(&output, arguments),
         Command::Completions(arguments) => completions::completions(&output, arguments),
         Command::Run(arguments) => run::run(&output, arguments),
+        Command::Train(arguments) => train::train(&output, arguments),
+        Command::Verify(arguments) => verify::verify(&output, arguments),
         Command::Replay(arguments) => replay::replay(&output, arguments),
         Command::Render(arguments) => render::render(&output, arguments),
+        Command::Road(arguments) => road::road(&output, arguments),
     };
     output.finish();
     match result {

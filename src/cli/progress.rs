@@ -1,9 +1,12 @@
 //! Progress of long work: a bar on a terminal, plain lines otherwise.
 
+use std::collections::VecDeque;
 use std::io::IsTerminal;
 
 use indicatif::ProgressBar;
 use indicatif::ProgressStyle;
+
+use crate::study::TrainedEpisode;
 
 use super::output::remark;
 
@@ -45,6 +48,66 @@ impl Progress {
 }
 
 impl Drop for Progress {
+    fn drop(&mut self) {
+        if let Some(bar) = &self.bar {
+            bar.finish_and_clear();
+        }
+    }
+}
+
+/// Episodes over which a training's progress is averaged.
+const RECENT: usize = 25;
+
+/// How far a training is. Dropping it clears the bar.
+pub struct TrainingProgress {
+    bar: Option<ProgressBar>,
+    lines: bool,
+    total: u64,
+    done: u64,
+    found: usize,
+    /// Sums of rewards of the last episodes.
+    recent: VecDeque<f64>,
+}
+
+impl TrainingProgress {
+    /// `quiet` shows nothing at all; `resumed` episodes count as done already.
+    pub fn new(total: u64, resumed: u64, quiet: bool) -> TrainingProgress {
+        let terminal = std::io::stderr().is_terminal();
+        let bar = (!quiet && terminal).then(|| {
+            let bar = ProgressBar::new(total).with_position(resumed);
+            let template = "{bar:20} {pos}/{len} episodes, {msg}, {eta} left";
+            bar.set_style(ProgressStyle::with_template(template).expect("a fixed template"));
+            bar
+        });
+        let lines = !quiet && !terminal;
+        TrainingProgress { bar, lines, total, done: resumed, found: 0, recent: VecDeque::new() }
+    }
+
+    /// One more episode has been learned from.
+    pub fn episode(&mut self, trained: &TrainedEpisode) {
+        self.done += 1;
+        self.found += trained.summary.counted();
+        self.recent.push_back(trained.sum);
+        if self.recent.len() > RECENT {
+            self.recent.pop_front();
+        }
+        let mean = self.recent.iter().sum::<f64>() / self.recent.len() as f64;
+        let loss = trained.lesson.loss.map_or("no loss yet".to_owned(), |loss| format!("loss {loss:.3}"));
+        let message = format!(
+            "return {mean:.1}, {} counted, ε {:.2}, {loss}",
+            plural(self.found, "collision"),
+            trained.exploration_epsilon
+        );
+        if let Some(bar) = &self.bar {
+            bar.set_message(message);
+            bar.inc(1);
+        } else if self.lines && (self.done * 10 / self.total > (self.done - 1) * 10 / self.total) {
+            remark(&format!("{}/{} episodes, {message}", self.done, self.total));
+        }
+    }
+}
+
+impl Drop for TrainingProgress {
     fn drop(&mut self) {
         if let Some(bar) = &self.bar {
             bar.finish_and_clear();

@@ -2,9 +2,13 @@
 
 use std::path::Path;
 
+use crate::ads::ModularConfig;
+use crate::ads::Selected;
+use crate::model::Avoidability;
 use crate::model::Scenario;
 use crate::oracle;
 use crate::study;
+use crate::study::RunError;
 
 use super::arguments::ReplayArguments;
 use super::error::Failure;
@@ -12,26 +16,38 @@ use super::load;
 use super::output::Output;
 use super::progress::plural;
 
-/// Replays the scenario of every file; with `--ads` only tells what happens.
+/// Replays the scenario of every file; with `--ads` or another profile only tells what happens.
 pub fn replay(output: &Output, arguments: &ReplayArguments) -> Result<(), Failure> {
     let (mut refuted, mut confirmed) = (0, 0);
     let mut results = Vec::new();
+    let profile = arguments.ads_config.as_deref().map(load::profile).transpose()?;
     for path in &arguments.files {
         let (table, scenario) = load::scenario(output, path)?;
-        let ads = arguments.ads.as_deref();
-        let log = study::replay(&table, &scenario, ads, &mut |_, _, _| {})
+        let (ads, is_recorded) = driver(arguments, profile.as_ref(), &scenario)
             .map_err(|error| Failure::usage(error.to_string()))?;
-        if let Some(ads) = ads {
-            let counted = oracle::counted(table.space(), &log).len();
+        let name = match &arguments.ads_config {
+            Some(path) => format!("{} with {}", ads.name(), path.display()),
+            None => ads.name().to_owned(),
+        };
+        let log = study::replay_with(&table, &scenario, &ads, &mut |_, _, _| {})
+            .map_err(|error| Failure::usage(error.to_string()))?;
+        let judgements = study::judge_replay(&table, &scenario, &ads, &log)
+            .map_err(|error| Failure::usage(error.to_string()))?;
+        if !is_recorded {
+            let counted = oracle::counted(table.space(), &log, &judgements).len();
             let collisions = plural(log.collisions.len(), "collision");
-            output.say(&format!("{} against {ads}: {collisions}, {counted} counted", path.display()));
+            let avoidable = judgements.iter().filter(|j| j.class == Avoidability::Avoidable).count();
+            output.say(&format!(
+                "{} against {name}: {collisions}, {counted} counted, {avoidable} avoidable",
+                path.display()
+            ));
             results.push(serde_json::json!({
-                "file": path, "scenario": scenario.name, "ads": ads,
-                "collisions": log.collisions.len(), "counted": counted,
+                "file": path, "scenario": scenario.name, "ads": name,
+                "collisions": log.collisions.len(), "counted": counted, "judgements": judgements,
             }));
             continue;
         }
-        let verdicts = oracle::verify(table.space(), &scenario, &log);
+        let verdicts = oracle::verify(table.space(), &scenario, &log, &judgements);
         let wrong = verdicts.iter().filter(|verdict| !verdict.confirmed).count();
         refuted += wrong;
         confirmed += verdicts.len() - wrong;
@@ -43,6 +59,22 @@ pub fn replay(output: &Output, arguments: &ReplayArguments) -> Result<(), Failur
         serde_json::json!({ "confirmed": confirmed, "refuted": refuted, "scenarios": results }),
     );
     if refuted > 0 { Err(Failure::Refuted { claims: refuted }) } else { Ok(()) }
+}
+
+/// Who drives, and whether that is who the scenario was made with.
+fn driver(
+    arguments: &ReplayArguments,
+    profile: Option<&ModularConfig>,
+    scenario: &Scenario,
+) -> Result<(Selected, bool), RunError> {
+    if arguments.ads.is_none() && profile.is_none() {
+        return Ok((study::recorded(scenario)?, true));
+    }
+    let recorded = scenario.origin.ads.as_deref().unwrap_or(study::DEFAULT_ADS);
+    let ads = study::driving_system(arguments.ads.as_deref().unwrap_or(recorded))?;
+    let Some(profile) = profile else { return Ok((ads, false)) };
+    let same = arguments.ads.is_none() && scenario.origin.profile_digest == Some(profile.digest());
+    Ok((ads.with_profile(*profile)?, same))
 }
 
 fn report(output: &Output, path: &Path, scenario: &Scenario, verdicts: &[oracle::ClaimResult]) {

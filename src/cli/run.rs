@@ -10,8 +10,14 @@ use std::time::Instant;
 use crate::action::ActionTable;
 use crate::emit;
 use crate::episode::EpisodeLog;
+use crate::model::Policy;
+use crate::oracle::AvoidabilitySettings;
 use crate::sim::ENGINE;
+use crate::study;
 use crate::study::EpisodeSummary;
+use crate::study::PolicyReference;
+use crate::study::Profile;
+use crate::study::RefusalCount;
 use crate::study::Run;
 use crate::study::RunSettings;
 use crate::study::Totals;
@@ -28,10 +34,11 @@ use super::progress::plural;
 use super::run_directory;
 use super::run_directory::RunDirectory;
 use super::run_directory::write;
+use super::verify::acting;
 
-const VERSION: &str = env!("CARGO_PKG_VERSION");
+pub const VERSION: &str = env!("CARGO_PKG_VERSION");
 
-/// How many critical scenarios the summary names.
+/// How many critical scenarios, and how many reasons of refusals, the summary names.
 const NAMED_MAX: usize = 10;
 
 /// Plays the episodes of a new run, or those that an interrupted one still lacks.
@@ -51,8 +58,7 @@ pub fn run(output: &Output, arguments: &RunArguments) -> Result<(), Failure> {
     let mut progress =
         Progress::new(run.episodes() as u64, done.len() as u64, output.quiet || output.is_json());
     let space_path = space_path(&run, &directory)?;
-    play(&run, &todo, jobs(arguments), &stop, &mut |number, log| {
-        let summary = EpisodeSummary::new(run.space(), number, &log);
+    play(&run, &todo, jobs(arguments), &stop, &mut |summary, log| {
         keep(&run, &mut directory, &space_path, &summary, &log)?;
         progress.episode(summary.counted());
         Ok(())
@@ -61,15 +67,20 @@ pub fn run(output: &Output, arguments: &RunArguments) -> Result<(), Failure> {
 
     let totals =
         directory.database.totals().map_err(|error| Failure::file("read", &directory.path, error))?;
+    let refusals =
+        directory.database.refusals().map_err(|error| Failure::file("read", &directory.path, error))?;
     output.say(&totals_text(&totals, started.elapsed().as_secs_f64(), todo.len()));
+    if !refusals.is_empty() {
+        output.say(&refusals_text(&refusals));
+    }
     let critical = critical_files(&directory.path)?;
     output.say(&critical_text(&directory.path, &critical));
     output.result(
         "run",
-        serde_json::json!({ "directory": directory.path, "totals": totals, "critical": critical }),
+        serde_json::json!({ "directory": directory.path, "totals": totals, "refusals": refusals, "critical": critical }),
     );
     if stop.load(Ordering::Relaxed) && (totals.episodes as usize) < run.episodes() {
-        return Err(Failure::Interrupted { directory: directory.path });
+        return Err(Failure::Interrupted { command: "run", directory: directory.path });
     }
     if arguments.fail_on_collision && totals.counted > 0 {
         return Err(Failure::Collision { collisions: totals.counted as usize });
@@ -79,15 +90,21 @@ pub fn run(output: &Output, arguments: &RunArguments) -> Result<(), Failure> {
 
 /// A new run, from the command line.
 fn begun(output: &Output, arguments: &RunArguments) -> Result<(Run, RunDirectory), Failure> {
-    let table = match &arguments.file {
-        Some(file) => load::table(output, file)?,
-        None => compile::last(output)?,
+    let policy = arguments.policy.as_ref().map(|path| load::policy(output, path)).transpose()?;
+    let table = match (&arguments.file, &policy) {
+        (Some(file), _) => load::table(output, file)?,
+        (None, Some((table, _))) => table.clone(),
+        (None, None) => compile::last(output)?,
     };
     let space = table.space();
     let roads = if arguments.road.is_empty() {
         space.roads.iter().map(|road| road.name.clone()).collect()
     } else {
         arguments.road.clone()
+    };
+    let profile = match &arguments.ads_config {
+        Some(path) => Some(load::profile(path)?),
+        None => study::driving_system(&arguments.ads).ok().and_then(|ads| ads.profile().copied()),
     };
     let settings = RunSettings {
         avastra: VERSION.to_owned(),
@@ -96,22 +113,33 @@ fn begun(output: &Output, arguments: &RunArguments) -> Result<(Run, RunDirectory
         space_digest: space.digest.clone(),
         roads,
         ads: arguments.ads.clone(),
-        agent: arguments.agent.clone(),
+        profile: profile.as_ref().map(Profile::new),
+        agent: policy.as_ref().map_or(&arguments.agent, |(_, policy)| &policy.name).clone(),
+        policy: None,
         episodes: arguments.episodes,
         seed: arguments.seed,
+        ambient: arguments.ambient,
         without: arguments.rules.without.clone(),
         with: arguments.rules.with.clone(),
+        avoidability: AvoidabilitySettings::default(),
     };
-    let run = ready(table, settings)?;
+    let run = ready(table, settings, policy.as_ref())?;
     let path = run_directory::create(arguments.out.as_deref())?;
     let space = load::relative(&path, &run.space().path)?;
-    run_directory::write_settings(&path, &RunSettings { space, ..run.settings().clone() })?;
+    let reference = match (&arguments.policy, &policy) {
+        (Some(file), Some((_, policy))) => {
+            Some(PolicyReference { file: load::relative(&path, file)?, digest: policy.digest.clone() })
+        }
+        _ => None,
+    };
+    let settings = RunSettings { space, policy: reference, ..run.settings().clone() };
+    run_directory::write_settings(&path, &settings)?;
     Ok((run, RunDirectory::open(path)?))
 }
 
 /// The rest of an interrupted run.
 fn resumed(output: &Output, path: &Path) -> Result<(Run, RunDirectory), Failure> {
-    let settings = run_directory::settings(path)?;
+    let settings: RunSettings = run_directory::settings(path)?;
     if (settings.engine.as_str(), settings.avastra.as_str()) != (ENGINE, VERSION) {
         return Err(Failure::usage(format!(
             "the run was begun by avastra {} in world `{}`, this is avastra {VERSION} in `{ENGINE}`: begin a new one",
@@ -125,11 +153,48 @@ fn resumed(output: &Output, path: &Path) -> Result<(Run, RunDirectory), Failure>
             table.space().path.display()
         )));
     }
-    Ok((ready(table, settings)?, RunDirectory::open(path.to_owned())?))
+    let policy = match &settings.policy {
+        None => None,
+        Some(reference) => {
+            let (own, policy) = load::policy(output, &path.join(&reference.file))?;
+            if policy.digest != reference.digest {
+                let name = &policy.name;
+                return Err(Failure::usage(format!(
+                    "the policy `{name}` has changed since the run was begun: begin a new one"
+                )));
+            }
+            Some((own, policy))
+        }
+    };
+    Ok((ready(table, settings, policy.as_ref())?, RunDirectory::open(path.to_owned())?))
 }
 
-fn ready(table: ActionTable, settings: RunSettings) -> Result<Run, Failure> {
-    Run::new(table, settings).map_err(|error| Failure::usage(error.to_string()))
+/// A run of the agent that the settings name, or of a policy, which comes with its own table.
+fn ready(
+    table: ActionTable,
+    settings: RunSettings,
+    policy: Option<&(ActionTable, Policy)>,
+) -> Result<Run, Failure> {
+    let Some((own, policy)) = policy else {
+        return Run::new(table, settings).map_err(|error| Failure::usage(error.to_string()));
+    };
+    let labels =
+        |table: &ActionTable| -> Vec<String> { table.rows().iter().map(|row| row.label.clone()).collect() };
+    if labels(own) != labels(&table) {
+        let (name, path) = (&policy.name, table.space().path.display());
+        return Err(Failure::usage(format!(
+            "`{name}` was trained for another action table than that of `{path}`"
+        )));
+    }
+    let acting = acting(&table, policy)?;
+    let (period_s, step_s) = (acting.settings().observation_period_s, table.space().episode.step_s);
+    if let Some(period_s) = period_s.filter(|&period_s| period_s != step_s) {
+        return Err(Failure::usage(format!(
+            "`{}` was trained with steps of {period_s} s, the space has {step_s} s: write `step: {period_s} s` there",
+            policy.name
+        )));
+    }
+    Run::with_policy(table, settings, acting).map_err(|error| Failure::usage(error.to_string()))
 }
 
 /// Writes what an episode found. The scenario comes first: an episode that is in the database has
@@ -141,9 +206,7 @@ fn keep(
     summary: &EpisodeSummary,
     log: &EpisodeLog,
 ) -> Result<(), Failure> {
-    let counted: Vec<usize> =
-        summary.collisions.iter().filter(|finding| finding.counted).map(|finding| finding.number).collect();
-    if !counted.is_empty() {
+    if summary.counted() > 0 {
         let name = format!("{}_{:04}", log.road, summary.episode);
         let source = emit::Provenance {
             name: &name,
@@ -153,7 +216,7 @@ fn keep(
             without: &run.settings().without,
             with: &run.settings().with,
         };
-        let file = emit::scenario(run.table(), log, &counted, &source);
+        let file = emit::scenario(run.table(), log, summary, &source);
         write(&directory.critical(&name), &crate::syntax::print(&file))?;
     }
     directory
@@ -173,7 +236,7 @@ fn jobs(arguments: &RunArguments) -> usize {
 }
 
 /// A flag that the first Ctrl-C sets; the second ends the process at once.
-fn stop_on_interrupt() -> Result<Arc<AtomicBool>, Failure> {
+pub fn stop_on_interrupt() -> Result<Arc<AtomicBool>, Failure> {
     let stop = Arc::new(AtomicBool::new(false));
     let flag = stop.clone();
     ctrlc::set_handler(move || {
@@ -188,8 +251,12 @@ fn stop_on_interrupt() -> Result<Arc<AtomicBool>, Failure> {
 
 fn heading(run: &Run, directory: &Path) -> String {
     let settings = run.settings();
+    let ambient = match settings.ambient {
+        0 => String::new(),
+        wanted => format!(", {} of ambient traffic", plural(wanted as usize, "vehicle")),
+    };
     format!(
-        "{}: {} against {}, {} on {}, seed {}, into {}",
+        "{}: {} against {}, {} on {}{ambient}, seed {}, into {}",
         run.space().path.display(),
         settings.agent,
         settings.ads,
@@ -223,11 +290,28 @@ fn totals_text(totals: &Totals, elapsed_s: f64, played: usize) -> String {
     if let Some(first_s) = totals.first_counted_s_mean {
         text.push_str(&format!(", the first after {first_s:.1} s on average"));
     }
-    if totals.counted < totals.collisions {
+    if totals.collisions > 0 {
         text.push_str(&format!(
             "\nof all: {} sudden, {} where the other ran into the ego vehicle",
             totals.sudden, totals.struck
         ));
+        text.push_str(&format!(
+            "\nof all: {} avoidable by a careful driver, {} only without any delay, {} unavoidable",
+            totals.avoidable, totals.beyond_reference, totals.unavoidable
+        ));
+    }
+    text
+}
+
+/// Steps in which nothing was done of what was asked for, by reason.
+fn refusals_text(refusals: &[RefusalCount]) -> String {
+    let all: i64 = refusals.iter().map(|refusal| refusal.times).sum();
+    let mut text = format!("refused: {}", plural(all as usize, "action"));
+    for refusal in refusals.iter().take(NAMED_MAX) {
+        text.push_str(&format!("\n  {} × {}", refusal.times, refusal.reason));
+    }
+    if refusals.len() > NAMED_MAX {
+        text.push_str(&format!("\n  and for {} other reasons", refusals.len() - NAMED_MAX));
     }
     text
 }

@@ -5,7 +5,6 @@ use std::path::Path;
 use std::path::PathBuf;
 
 use crate::study::Database;
-use crate::study::RunSettings;
 
 use super::error::Failure;
 use super::load;
@@ -31,13 +30,13 @@ pub fn create(out: Option<&Path>) -> Result<PathBuf, Failure> {
 }
 
 /// Writes `run.yaml`. It comes before the database: from then on the run can be resumed.
-pub fn write_settings(directory: &Path, settings: &RunSettings) -> Result<(), Failure> {
+pub fn write_settings(directory: &Path, settings: &impl serde::Serialize) -> Result<(), Failure> {
     let text = serde_yaml::to_string(settings).expect("settings are plain strings and numbers");
     write(&directory.join("run.yaml"), &text)
 }
 
 /// The settings that a directory was made with.
-pub fn settings(directory: &Path) -> Result<RunSettings, Failure> {
+pub fn settings<S: serde::de::DeserializeOwned>(directory: &Path) -> Result<S, Failure> {
     let path = directory.join("run.yaml");
     if !path.is_file() {
         return Err(Failure::usage(format!(

@@ -1,10 +1,13 @@
-//! Results as source: an episode log becomes a scenario in the language it came from.
+//! Results as source: an episode log becomes a scenario in the language it came from, and what an agent
+//! learned a policy.
 //!
 //! Builds syntax trees and leaves the spelling to `syntax::format`; prints no concrete syntax itself.
 
+mod policy;
 mod scenario;
 mod tree;
 
+pub use policy::policy_text;
 pub use scenario::Provenance;
 pub use scenario::action_text;
 pub use scenario::scenario;

@@ -15,6 +15,8 @@ use crate::model::Value;
 use crate::model::digest_text;
 use crate::model::vocabulary::Word;
 use crate::sim::ENGINE;
+use crate::study::EpisodeSummary;
+use crate::study::Finding;
 use crate::syntax::LANGUAGE;
 use crate::syntax::ast::ClauseKind;
 use crate::syntax::ast::Expect;
@@ -47,24 +49,28 @@ pub struct Provenance<'a> {
     pub with: &'a [String],
 }
 
-/// The scenario of an episode, cut after the step of its last counted collision.
-///
-/// `counted` holds the indices of the counted collisions, rising, and must not be empty.
-pub fn scenario(table: &ActionTable, log: &EpisodeLog, counted: &[usize], source: &Provenance) -> File {
+/// The scenario of an episode, cut after the step of its last counted collision; there must be one.
+pub fn scenario(
+    table: &ActionTable,
+    log: &EpisodeLog,
+    summary: &EpisodeSummary,
+    source: &Provenance,
+) -> File {
     let space = table.space();
-    let last = *counted.last().expect("an episode without a counted collision is not emitted");
-    let steps = log.collisions[last].step + 1;
+    let counted: Vec<&Finding> = summary.collisions.iter().filter(|finding| finding.counted).collect();
+    let last = counted.last().expect("an episode without a counted collision is not emitted");
+    let steps = last.collision.step + 1;
     let item = Scenario {
         name: Name::built(source.name),
         origin: origin(log, source),
         road: Name::built(log.road.as_str()),
         start: start(space, log),
         steps: (0..steps).map(|number| step(table, log, number)).collect(),
-        expects: expects(log, counted, steps),
+        expects: expects(log, summary, steps),
     };
     let digest = Some(Text::new(space.digest.clone(), Span::NONE));
     let space_use = Use { path: Text::new(source.space_path, Span::NONE), digest };
-    let docs = vec![tree::doc(headline(log, &log.collisions[counted[0]]))];
+    let docs = vec![tree::doc(headline(log, &counted[0].collision))];
     File {
         docs: vec![tree::doc("Emitted by `avastra run`; replay with `avastra replay FILE`.")],
         items: vec![
@@ -97,8 +103,15 @@ fn origin(log: &EpisodeLog, source: &Provenance) -> Vec<Field> {
         tree::field("episode", tree::whole(source.episode as u64)),
         tree::field("policy", tree::text(source.agent)),
         tree::field("ads", tree::text(log.ads.as_str())),
-        tree::field("engine", tree::text(ENGINE)),
     ];
+    if let Some(profile) = &log.profile {
+        let line = profile.to_line();
+        if !line.is_empty() {
+            fields.push(tree::field("profile", tree::text(line)));
+        }
+        fields.push(tree::field("profile_digest", tree::text(profile.digest())));
+    }
+    fields.push(tree::field("engine", tree::text(ENGINE)));
     if !source.without.is_empty() {
         fields.push(tree::field("without", names(source.without)));
     }
@@ -115,6 +128,7 @@ fn start(space: &Space, log: &EpisodeLog) -> Vec<Field> {
             tree::field("signal_phase", tree::quantity(log.start.signal_phase_s, Dimension::DURATION)),
             tree::field("traffic_seed", tree::whole(log.start.seed)),
         ])
+        .chain((log.start.ambient > 0).then(|| tree::field("ambient", tree::whole(log.start.ambient.into()))))
         .collect()
 }
 
@@ -160,21 +174,23 @@ fn literal(space: &Space, action: &ActionDef, parameter: &str, value: Value) -> 
     tree::value(space, value, found.expect("values are of the action's own parameters").ty)
 }
 
-fn expects(log: &EpisodeLog, counted: &[usize], steps: usize) -> Vec<Expect> {
+fn expects(log: &EpisodeLog, summary: &EpisodeSummary, steps: usize) -> Vec<Expect> {
     let mut expects = Vec::new();
-    for (index, collision) in
-        log.collisions.iter().enumerate().filter(|(_, collision)| collision.step < steps)
-    {
-        let contact = &collision.contact;
-        let clauses = vec![
-            tree::clause(ClauseKind::With, tree::road_user(contact.obstacle)),
-            tree::clause(ClauseKind::At, tree::rounded(contact.time_s, 2, Dimension::DURATION)),
-        ];
-        expects.push(tree::expect(tree::name("collision"), clauses));
-        if counted.contains(&index) {
-            let who = vec![tree::clause(ClauseKind::With, tree::road_user(contact.obstacle))];
-            expects.push(tree::expect(tree::name("counted"), who));
+    for finding in summary.collisions.iter().filter(|finding| finding.collision.step < steps) {
+        let contact = &finding.collision.contact;
+        let who = || tree::clause(ClauseKind::With, tree::road_user(contact.obstacle));
+        let at = tree::clause(ClauseKind::At, tree::rounded(contact.time_s, 2, Dimension::DURATION));
+        expects.push(tree::expect(tree::name("collision"), vec![who(), at]));
+        if finding.counted {
+            expects.push(tree::expect(tree::name("counted"), vec![who()]));
         }
+        let drivers = &finding.judgement.avoided_by;
+        let by = (!drivers.is_empty()).then(|| {
+            let drivers = drivers.iter().map(|driver| tree::name(driver));
+            tree::clause(ClauseKind::By, tree::list(drivers.collect()))
+        });
+        let class = tree::name(finding.judgement.class.name());
+        expects.push(tree::expect(class, by.into_iter().chain([who()]).collect()));
     }
     let proc = log.steps[..steps].iter().map(|step| tree::rounded(step.proc, 3, Dimension::RATIO));
     expects.push(tree::expect(tree::equal(tree::name("proc"), tree::list(proc.collect())), Vec::new()));

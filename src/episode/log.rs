@@ -1,11 +1,14 @@
 //! What an episode leaves behind: enough to judge it, to count it and to replay it.
 
 use crate::action::Draw;
+use crate::ads::ModularConfig;
+use crate::mdp::PerceptionCounts;
 use crate::mdp::StateVector;
 use crate::model::Memory;
 use crate::model::vocabulary::Body;
 use crate::model::vocabulary::Verb;
 use crate::sim::Contact;
+use crate::sim::Incident;
 use crate::sim::Start;
 
 /// One episode, from start to end.
@@ -13,12 +16,16 @@ use crate::sim::Start;
 pub struct EpisodeLog {
     pub road: String,
     pub ads: String,
+    /// Settings of the driving system, if it has any.
+    pub profile: Option<ModularConfig>,
     pub seed: u64,
     pub start: Start,
     /// States of the space at the start.
     pub memory: Memory,
     pub steps: Vec<StepLog>,
     pub collisions: Vec<Collision>,
+    /// Contacts of obstacles with each other.
+    pub incidents: Vec<Incident>,
     pub end: End,
     pub duration_s: f64,
     /// Driven by the ego vehicle, m.
@@ -40,6 +47,8 @@ pub struct StepLog {
     /// Largest collision probability of the observation period, in `[0, 1]`.
     pub proc: f64,
     pub reward: f64,
+    /// Obstacles that the driving system misses, and ghosts that it sees, at the end of the period.
+    pub perception: PerceptionCounts,
     /// SHA-256 over every bit of the world's state after every tick so far.
     pub trace: [u8; 32],
 }

@@ -16,6 +16,7 @@ pub use run::Choice;
 pub use run::Moment;
 pub use run::Watch;
 pub use run::run;
+pub use run::run_to_last;
 pub use script::Script;
 pub use setup::Setup;
 pub use setup::scene;

@@ -7,12 +7,13 @@ use crate::action::Draw;
 use crate::action::Situation;
 use crate::ads::Ads;
 use crate::mdp;
+use crate::mdp::Observation;
 use crate::mdp::ProcSettings;
-use crate::mdp::StateVector;
 use crate::model::Memory;
 use crate::model::OutcomeFacts;
 use crate::sim::Contact;
 use crate::sim::DT_S;
+use crate::sim::Incident;
 use crate::sim::Sensed;
 use crate::sim::World;
 
@@ -32,7 +33,7 @@ pub type Watch<'a> = dyn FnMut(&World, &dyn Ads, &[Contact]) + 'a;
 /// What whoever acts may look at.
 pub struct Moment<'a> {
     pub step: usize,
-    pub state: &'a StateVector,
+    pub observation: &'a Observation,
     pub situation: &'a Situation<'a>,
 }
 
@@ -54,32 +55,33 @@ pub enum Choice {
 /// Plays one episode. `choose` acts once a step; `watch` sees the world after every tick, and once
 /// before the first.
 pub fn run(setup: &Setup, choose: &mut dyn FnMut(&Moment) -> Choice, watch: &mut Watch) -> EpisodeLog {
+    run_to_last(setup, choose, watch, &mut |_| {})
+}
+
+/// The same; `last` looks at the moment at which the next choice would have been due.
+pub fn run_to_last(
+    setup: &Setup,
+    choose: &mut dyn FnMut(&Moment) -> Choice,
+    watch: &mut Watch,
+    last: &mut dyn FnMut(&Moment),
+) -> EpisodeLog {
     let mut play = Play::new(setup);
     watch(&play.world, play.ads.as_ref(), &[]);
     let end = loop {
-        let state = mdp::observe(&play.world, play.ads.status());
-        let choice = {
-            let situation = Situation {
-                memory: &play.memory,
-                road: setup.road,
-                rules: setup.rules,
-                surroundings: &play.world,
-                seed: setup.seed,
-                step: play.steps.len() as u64,
-            };
-            choose(&Moment { step: play.steps.len(), state: &state, situation: &situation })
-        };
+        let observation = Observation::new(&play.world, play.ads.status());
+        let choice = choose(&play.moment(&observation, &play.situation()));
         let outcome = match choice {
             Choice::Act(draw) => play.carry_out(draw),
             Choice::Pass => Outcome::Passed,
             Choice::Refused { row, rule, reason } => Outcome::Refused { row, rule, reason },
             Choice::Stop => break End::Script,
         };
-        play.observation_period(state, outcome, watch);
+        play.observation_period(observation, outcome, watch);
         if let Some(end) = play.end() {
             break end;
         }
     };
+    last(&play.moment(&Observation::new(&play.world, play.ads.status()), &play.situation()));
     play.into_log(end)
 }
 
@@ -92,6 +94,7 @@ struct Play<'a> {
     memory: Memory,
     steps: Vec<StepLog>,
     collisions: Vec<Collision>,
+    incidents: Vec<Incident>,
     trace: Sha256,
     distance_m: f64,
     /// Steps without progress up to now.
@@ -102,7 +105,7 @@ struct Play<'a> {
 impl<'a> Play<'a> {
     fn new(setup: &'a Setup<'a>) -> Play<'a> {
         let world = World::new(setup.scene.clone(), &setup.start);
-        let mut ads = (setup.ads.build)(&setup.scene, setup.seed);
+        let mut ads = setup.ads.build(&setup.scene, setup.seed);
         let mut sensed = world.sensed();
         // One look before the first step, so that its state has an inside.
         ads.drive(&sensed);
@@ -115,11 +118,27 @@ impl<'a> Play<'a> {
             memory: setup.memory.clone(),
             steps: Vec::new(),
             collisions: Vec::new(),
+            incidents: Vec::new(),
             trace: Sha256::new(),
             distance_m: 0.0,
             stalled: 0,
             proc: ProcSettings::default(),
         }
+    }
+
+    fn situation(&self) -> Situation<'_> {
+        Situation {
+            memory: &self.memory,
+            road: self.setup.road,
+            rules: self.setup.rules,
+            surroundings: &self.world,
+            seed: self.setup.seed,
+            step: self.steps.len() as u64,
+        }
+    }
+
+    fn moment<'m>(&self, observation: &'m Observation, situation: &'m Situation<'m>) -> Moment<'m> {
+        Moment { step: self.steps.len(), observation, situation }
     }
 
     /// All of an action or nothing of it: its second spawn may find its first in the way.
@@ -140,7 +159,7 @@ impl<'a> Play<'a> {
     }
 
     /// Drives for one observation period (OTP), or until the goal.
-    fn observation_period(&mut self, state: StateVector, outcome: Outcome, watch: &mut Watch) {
+    fn observation_period(&mut self, observation: Observation, outcome: Outcome, watch: &mut Watch) {
         let time_s = self.world.time_s();
         let station_m = self.world.ego_station_m();
         let (mut proc, mut collided) = (0.0_f64, false);
@@ -158,10 +177,13 @@ impl<'a> Play<'a> {
             ..OutcomeFacts::default()
         });
         let trace = self.trace.clone().finalize().into();
-        self.steps.push(StepLog { time_s, state, outcome, proc, reward, trace });
+        let state = observation.state;
+        let perception = mdp::perception_counts(&self.world, self.ads.status());
+        self.steps.push(StepLog { time_s, state, outcome, proc, reward, perception, trace });
     }
 
-    /// One physics step; the collision probability after it. Contact is certainty.
+    /// One physics step; the collision probability after it. Contact is certainty, once: who has been
+    /// hit stands against the ego vehicle for a while, and is no danger any more.
     fn tick(&mut self, watch: &mut Watch, collided: &mut bool) -> f64 {
         self.world.sense(&mut self.sensed);
         let control = self.ads.drive(&self.sensed);
@@ -169,11 +191,16 @@ impl<'a> Play<'a> {
         for &contact in &contacts {
             self.collisions.push(self.collision(contact));
         }
+        self.incidents.extend_from_slice(self.world.incidents());
         self.distance_m += self.world.ego().speed_mps * DT_S;
         self.world.trace(&mut |bits| self.trace.update(bits.to_le_bytes()));
         watch(&self.world, self.ads.as_ref(), &contacts);
         *collided |= !contacts.is_empty();
-        if contacts.is_empty() { mdp::collision_probability(&self.world, &self.proc) } else { 1.0 }
+        if !contacts.is_empty() {
+            return 1.0;
+        }
+        let is_hit = |id| self.collisions.iter().any(|collision| collision.contact.obstacle == id);
+        mdp::collision_probability(&self.world, &self.proc, &is_hit)
     }
 
     fn collision(&self, contact: Contact) -> Collision {
@@ -207,11 +234,13 @@ impl<'a> Play<'a> {
     fn into_log(self, end: End) -> EpisodeLog {
         EpisodeLog {
             road: self.setup.road.name.clone(),
-            ads: self.setup.ads.name.to_owned(),
+            ads: self.setup.ads.name().to_owned(),
+            profile: self.setup.ads.profile().copied(),
             seed: self.setup.seed,
             start: self.setup.start,
             memory: self.setup.memory.clone(),
             collisions: self.collisions,
+            incidents: self.incidents,
             end,
             duration_s: self.world.time_s(),
             distance_m: self.distance_m,

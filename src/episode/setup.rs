@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use crate::action::ActionTable;
 use crate::action::ActiveRules;
-use crate::ads;
+use crate::ads::Selected;
 use crate::model::Memory;
 use crate::model::Road;
 use crate::model::Space;
@@ -22,7 +22,7 @@ pub struct Setup<'a> {
     pub road: &'a Road,
     pub scene: Arc<Scene>,
     pub rules: &'a ActiveRules,
-    pub ads: &'static ads::Entry,
+    pub ads: Selected,
     pub seed: u64,
     pub start: Start,
     /// States of the space at the start; those that mean weather agree with `start`.
@@ -31,14 +31,14 @@ pub struct Setup<'a> {
 
 /// The world that a road's episodes share.
 pub fn scene(road: &Road) -> Scene {
-    Scene { map: road.map.clone(), route: road.route.clone() }
+    Scene::new(road.map.clone(), road.route.clone())
 }
 
-/// How an episode of a seed begins that starts with this memory.
+/// How an episode of a seed begins that starts with this memory, without ambient traffic.
 pub fn start(space: &Space, memory: &Memory, seed: u64) -> Start {
     let mut rng = rng::stream(seed, Stream::Reset, 1);
     // A multiple of 1/64 s is short in a file.
     let signal_phase_s = (rng::between(&mut rng, 0.0, SIGNAL_PHASE_S) * 64.0).floor() / 64.0;
     let (time, [rain, fog, wetness]) = space.weather(memory);
-    Start { time, rain, fog, wetness, signal_phase_s, seed }
+    Start { time, rain, fog, wetness, signal_phase_s, seed, ambient: 0 }
 }

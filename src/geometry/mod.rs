@@ -9,6 +9,7 @@ mod pose;
 
 pub use contact::Clearance;
 pub use contact::FirstContact;
+pub use contact::Frame;
 pub use contact::Sweep;
 pub use contact::clearance;
 pub use contact::distance_m;

@@ -34,6 +34,10 @@ pub struct Projection {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Path {
     points: Vec<PathPoint>,
+    /// For places evenly spread from the beginning to the end, the segment that holds each: where to
+    /// begin to look for a station.
+    cells: Vec<u32>,
+    cells_per_m: f64,
 }
 
 impl Path {
@@ -56,7 +60,20 @@ impl Path {
             };
             points.push(PathPoint { station_m, position, heading_rad, curvature_per_m });
         }
-        (points.len() >= 2).then_some(Path { points })
+        if points.len() < 2 {
+            return None;
+        }
+        // As many as vertices: on average a cell is as long as a segment.
+        let cells_per_m = points.len() as f64 / points[points.len() - 1].station_m;
+        let mut segment = 0;
+        let cells = (0..points.len()).map(|cell| {
+            let from_m = cell as f64 / cells_per_m;
+            while segment + 2 < points.len() && points[segment + 1].station_m <= from_m {
+                segment += 1;
+            }
+            segment as u32
+        });
+        Some(Path { cells: cells.collect(), cells_per_m, points })
     }
 
     /// A straight path. `None` if the ends coincide.
@@ -133,29 +150,43 @@ impl Path {
     }
 
     fn project_segments(&self, point: Vec2, first: usize, last: usize) -> Projection {
-        let mut best = Projection { station_m: 0.0, offset_m: 0.0, distance_m: f64::INFINITY };
-        for pair in self.points[first..=last].windows(2) {
+        // Index, part of the segment, squared distance.
+        let mut best = (first, 0.0, f64::INFINITY);
+        for (index, pair) in self.points[first..=last].windows(2).enumerate() {
             let (a, b) = (&pair[0], &pair[1]);
             let chord = b.position - a.position;
             let length_m = b.station_m - a.station_m;
-            let fraction = ((point - a.position).dot(&chord) / (length_m * length_m)).clamp(0.0, 1.0);
-            let delta = point - (a.position + chord * fraction);
-            let distance_m = delta.norm();
-            if distance_m < best.distance_m {
-                best = Projection {
-                    station_m: a.station_m + fraction * length_m,
-                    offset_m: (chord.x * delta.y - chord.y * delta.x) / length_m,
-                    distance_m,
-                };
+            let away = point - a.position;
+            let fraction = (away.dot(&chord) / (length_m * length_m)).clamp(0.0, 1.0);
+            let distance_m2 = (away - chord * fraction).norm_squared();
+            if distance_m2 < best.2 {
+                best = (first + index, fraction, distance_m2);
             }
         }
-        best
+        let (index, fraction, distance_m2) = best;
+        let (a, b) = (&self.points[index], &self.points[index + 1]);
+        let chord = b.position - a.position;
+        let length_m = b.station_m - a.station_m;
+        let delta = point - (a.position + chord * fraction);
+        Projection {
+            station_m: a.station_m + fraction * length_m,
+            offset_m: (chord.x * delta.y - chord.y * delta.x) / length_m,
+            distance_m: distance_m2.sqrt(),
+        }
     }
 
     /// Index of the segment that holds a station, clamped to the ends.
     fn segment(&self, station_m: f64) -> usize {
-        let after = self.points.partition_point(|p| p.station_m <= station_m);
-        after.clamp(1, self.points.len() - 1) - 1
+        let cell = (station_m.max(0.0) * self.cells_per_m) as usize;
+        let mut index = self.cells[cell.min(self.cells.len() - 1)] as usize;
+        while index + 2 < self.points.len() && self.points[index + 1].station_m <= station_m {
+            index += 1;
+        }
+        // Rounding may have named the cell after the right one.
+        while index > 0 && self.points[index].station_m > station_m {
+            index -= 1;
+        }
+        index
     }
 
     /// Segment and fraction of it; the fraction leaves `[0, 1]` beyond the ends.
@@ -190,6 +221,27 @@ mod tests {
             assert!((found.offset_m - 1.5).abs() < 1e-3, "{found:?}");
             let near = path.project_near(beside, station_m, 2.0);
             assert_eq!(near, found);
+        }
+    }
+
+    #[test]
+    fn cells_find_the_segment_that_a_search_finds() {
+        // Vertices by the centimetre, by the metre and far apart.
+        let steps_m = [0.01, 0.013, 0.02, 1.0, 1.0, 1.7, 40.0, 0.01, 0.01, 3.0];
+        let mut x_m = 0.0;
+        let samples = core::iter::once(0.0).chain(steps_m.iter().cycle().take(60).copied()).map(|step_m| {
+            x_m += step_m;
+            (Vec2::new(x_m, 0.0), 0.0, 0.0)
+        });
+        let path = Path::new(samples).expect("many points");
+        let searched = |station_m: f64| {
+            path.points.partition_point(|p| p.station_m <= station_m).clamp(1, path.points.len() - 1) - 1
+        };
+        let vertices =
+            path.points.iter().flat_map(|p| [p.station_m.next_down(), p.station_m, p.station_m.next_up()]);
+        let between = (-50..3000).map(|i| f64::from(i) * 0.1);
+        for station_m in vertices.chain(between).chain([f64::NEG_INFINITY, f64::INFINITY]) {
+            assert_eq!(path.segment(station_m), searched(station_m), "{station_m}");
         }
     }
 

@@ -95,11 +95,12 @@ pub fn combined(longitudinal: f64, lateral: f64) -> f64 {
 /// there. Then Eq. 9 applies, with who is behind as the follower, or the safety distance of two who
 /// drive towards each other. Otherwise Eq. 10 applies, with the angle β from the ego's heading to that
 /// of the lane in which the obstacle drives, or to where somebody on foot is turned. Of all obstacles
-/// the greatest probability of each dimension counts; Eq. 16 joins the two.
-pub fn collision_probability(world: &World, settings: &ProcSettings) -> f64 {
+/// the greatest probability of each dimension counts; Eq. 16 joins the two. Those of whom `is_hit` says
+/// that the ego vehicle has hit them already are left out.
+pub fn collision_probability(world: &World, settings: &ProcSettings, is_hit: &dyn Fn(u32) -> bool) -> f64 {
     let (mut longitudinal, mut lateral) = (0.0_f64, 0.0_f64);
     for obstacle in world.obstacles() {
-        if beyond_reach(world, obstacle, settings) {
+        if is_hit(obstacle.id) || beyond_reach(world, obstacle, settings) {
             continue;
         }
         let current_m = obstacle.distance_m;

@@ -1,9 +1,12 @@
-//! The Markov decision process of the paper: its 19 state variables and the collision probability.
+//! The Markov decision process of the paper: its 19 state variables, the collision probability and the
+//! reward.
 //!
-//! The paper's equations and nothing else. What a collision probability is worth is written in the
-//! space (`reward { … }`) and evaluated by `model`.
+//! The paper's equations and nothing else. A space may say by itself what a collision probability is
+//! worth (`reward { … }`): `model` evaluates that.
 
 mod collision_probability;
+mod observation;
+mod reward;
 mod state;
 
 pub use collision_probability::ProcSettings;
@@ -13,7 +16,16 @@ pub use collision_probability::lateral_safety_distance_m;
 pub use collision_probability::longitudinal_safety_distance_m;
 pub use collision_probability::opposing_safety_distance_m;
 pub use collision_probability::probability;
+pub use observation::BEYOND_LEN;
+pub use observation::BEYOND_NAMES;
+pub use observation::Observation;
+pub use observation::variable;
+pub use reward::RewardSettings;
+pub use reward::StepOutcome;
+pub use reward::reward;
+pub use state::PerceptionCounts;
 pub use state::STATE_LEN;
 pub use state::STATE_NAMES;
 pub use state::StateVector;
 pub use state::observe;
+pub use state::perception_counts;

@@ -1,8 +1,8 @@
 //! The 19 state variables: 7 of the surroundings (paper, Table 1), 12 of the driving system (Table 2).
 //!
 //! Raw values in SI units; scaling for a network is the learner's business. Perceived and true
-//! objects are matched by identity, so an object that is missed or imagined does not count as a
-//! difference here.
+//! objects are matched by identity; an object that is missed or imagined is no difference and is
+//! counted apart.
 //!
 //! Where nobody is around, `speedNearestObs` is 0 (the published package: 100, no speed that anybody
 //! drives); `distToNearestObs` already tells that nobody is there. `trafficLight` is 0 both for yellow
@@ -54,6 +54,8 @@ const NOBODY_M: f64 = 100.0;
 const LOOK_AHEAD_M: f64 = 100.0;
 /// A junction nearer than this counts as being at it, m, as in the published package.
 const NEAR_JUNCTION_M: f64 = 20.0;
+/// Obstacles farther away are beyond every sensor, m.
+const SENSOR_REACH_M: f64 = 120.0;
 /// A localisation error below this has no direction, m.
 const DEVIATION_M_MIN: f64 = 1e-3;
 
@@ -161,6 +163,29 @@ fn deviation_angle_rad(deviation: Vec2) -> f64 {
     libm::atan2(deviation.y, deviation.x)
 }
 
+/// What the differences of Eqs. 3–6 cannot show, because it has no counterpart.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct PerceptionCounts {
+    /// Obstacles that are there and are not perceived.
+    pub missed: u32,
+    /// Objects that are perceived and are not there.
+    pub ghosts: u32,
+}
+
+/// Counts missed objects and ghosts. Obstacles beyond the sensors' reach (120 m) are not missed.
+pub fn perception_counts(world: &World, status: &Status) -> PerceptionCounts {
+    counts(world.obstacles(), &status.perceived)
+}
+
+fn counts(real: &[Obstacle], perceived: &[PerceivedObject]) -> PerceptionCounts {
+    let known = |id: u32| perceived.iter().any(|object| object.id == Some(id));
+    let missed =
+        real.iter().filter(|obstacle| obstacle.distance_m <= SENSOR_REACH_M && !known(obstacle.id)).count();
+    let ghosts =
+        perceived.iter().filter(|object| !real.iter().any(|truth| Some(truth.id) == object.id)).count();
+    PerceptionCounts { missed: missed as u32, ghosts: ghosts as u32 }
+}
+
 /// The largest difference of each kind between what is perceived and what is (Eqs. 3–6).
 #[derive(Debug, Default, PartialEq)]
 struct Differences {
@@ -235,5 +260,12 @@ mod tests {
         assert!((found.size_m - 0.4).abs() < 1e-12);
         assert!((found.velocity_mps - 3.0).abs() < 1e-12);
         assert_eq!(perception_differences(&[truth], &[]), Differences::default());
+        let far = Obstacle { distance_m: 200.0, id: 2, ..truth };
+        let seen = |objects: &[PerceivedObject]| {
+            let counts = counts(&[truth, far], objects);
+            (counts.missed, counts.ghosts)
+        };
+        assert_eq!(seen(&[]), (1, 0));
+        assert_eq!(seen(&[object(Some(1), 10.5, 0.0), object(None, 90.0, 0.0)]), (0, 1));
     }
 }

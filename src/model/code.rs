@@ -125,6 +125,17 @@ pub const UNKNOWN_CLAIM: &str = "AV0607";
 /// A file with no scenario, or with two.
 pub const ONE_SCENARIO: &str = "AV0608";
 
+// Policies.
+
+/// A network that fits neither its table nor its own layers.
+pub const POLICY_SHAPE: &str = "AV0701";
+/// A policy file that is not what was written.
+pub const POLICY_DIGEST: &str = "AV0702";
+/// A policy that cannot be read.
+pub const POLICY_FORM: &str = "AV0703";
+/// A file with two policies.
+pub const ONE_POLICY: &str = "AV0704";
+
 // Static claims.
 
 /// A claim that is false.

@@ -151,7 +151,9 @@ fn fact_values(fact: Fact, known: &Known<'_>) -> Values {
         },
         Fact::SpawnGap | Fact::SafetyGap => Values::Number(Interval::NOT_NEGATIVE),
         Fact::Proc => Values::Number(Interval::closed(Rational::ZERO, Rational::ONE)),
-        Fact::Collision | Fact::Repeated | Fact::Sudden | Fact::Struck => Values::UNKNOWN_TRUTH,
+        Fact::Collision | Fact::Repeated | Fact::Sudden | Fact::Struck | Fact::Avoidable => {
+            Values::UNKNOWN_TRUTH
+        }
     }
 }
 

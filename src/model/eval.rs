@@ -44,6 +44,8 @@ pub struct OutcomeFacts {
     pub sudden: bool,
     /// The thing ran into the ego vehicle's side or rear.
     pub struck: bool,
+    /// A careful reference driver would not have touched it. Only known of judged collisions.
+    pub avoidable: bool,
     /// Collision probability of the step, in `[0, 1]`.
     pub proc: f64,
 }
@@ -103,6 +105,7 @@ fn fact_value(fact: Fact, facts: &Facts<'_>) -> Value {
         Fact::Repeated => Value::Bool(facts.outcome.repeated),
         Fact::Sudden => Value::Bool(facts.outcome.sudden),
         Fact::Struck => Value::Bool(facts.outcome.struck),
+        Fact::Avoidable => Value::Bool(facts.outcome.avoidable),
     }
 }
 

@@ -68,6 +68,8 @@ pub enum Fact {
     Sudden,
     /// `struck`: the thing ran into the ego vehicle's side or rear.
     Struck,
+    /// `avoidable`: a careful reference driver would not have touched it.
+    Avoidable,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -26,6 +26,9 @@ pub const SPAWN_DISTANCE_M: RangeInclusive<f64> = 0.0..=1000.0;
 /// Where the cycle of the signals may begin, s.
 pub const SIGNAL_PHASE_S: RangeInclusive<f64> = 0.0..=3600.0;
 
+/// Most ambient vehicles around the ego vehicle.
+pub const AMBIENT_MAX: u32 = 20;
+
 /// Every spawn whose speed or distance may leave its bounds, once, with the first row that shows it.
 /// Rules do not count: `--without` can switch them off.
 pub(crate) fn report(space: &Space) -> Vec<Diagnostic> {

@@ -15,6 +15,8 @@ use sha2::Sha256;
 use crate::model::check;
 use crate::model::code;
 use crate::model::overriding;
+use crate::model::policy;
+use crate::model::policy::Policy;
 use crate::model::scenario::Scenario;
 use crate::model::space::Space;
 use crate::road::RoadMap;
@@ -57,6 +59,8 @@ pub struct Loaded {
     pub space: Option<Arc<Space>>,
     /// The scenario of the root, if it has one and it is sound.
     pub scenario: Option<Scenario>,
+    /// The policy of the root, if it has one and it is sound.
+    pub policy: Option<Policy>,
     /// Files by index, imports before those that use them.
     order: Vec<usize>,
 }
@@ -89,6 +93,7 @@ pub fn load(root: &Path, read: &ReadFile<'_>) -> Result<Loaded, ReadError> {
             files,
             space: None,
             scenario: None,
+            policy: None,
             order,
         });
     }
@@ -108,11 +113,19 @@ pub fn load(root: &Path, read: &ReadFile<'_>) -> Result<Loaded, ReadError> {
             Err(found) => diagnostics.extend(found),
         }
     }
-    // Remarks are about spaces; who reads a scenario knows its space.
-    if has_scenario || diagnostics.iter().any(Diagnostic::is_error) {
+    let mut policy = None;
+    let has_policy = files[0].tree.items.iter().any(|item| matches!(item.kind, ItemKind::Policy(_)));
+    if let (Some(space), true) = (&space, has_policy) {
+        match policy::policy(sources.text(FileId(0)), &files[0].tree, space) {
+            Ok(found) => policy = Some(found),
+            Err(found) => diagnostics.extend(found),
+        }
+    }
+    // Remarks are about spaces; who reads a scenario or a policy knows its space.
+    if has_scenario || has_policy || diagnostics.iter().any(Diagnostic::is_error) {
         remarks.clear();
     }
-    Ok(Loaded { sources, diagnostics, remarks, files, space: space.map(Arc::new), scenario, order })
+    Ok(Loaded { sources, diagnostics, remarks, files, space: space.map(Arc::new), scenario, policy, order })
 }
 
 /// Digest of a file's bytes as the language writes it: `sha256:…`.

@@ -26,6 +26,10 @@ pub struct Origin {
     pub episode: Option<u64>,
     pub policy: Option<String>,
     pub ads: Option<String>,
+    /// Settings of the driving system that are not its defaults, as one line of YAML.
+    pub profile: Option<String>,
+    /// Digest of all its settings.
+    pub profile_digest: Option<String>,
     pub engine: Option<String>,
     /// Rules that were asked for (`--with`) and switched off (`--without`).
     pub with: Vec<String>,
@@ -41,6 +45,8 @@ pub struct ScenarioStart {
     pub signal_phase_s: f64,
     /// `traffic_seed`: seed of the choices of other road users.
     pub traffic_seed: Option<u64>,
+    /// `ambient`: vehicles of ambient traffic; 0 if not given.
+    pub ambient: u32,
 }
 
 #[derive(Debug, Clone, PartialEq)]
@@ -64,8 +70,37 @@ pub enum Claim {
     Trace(String),
     /// `expect counted with npc#2`: the named verdict holds of the collision.
     Verdict { name: String, obstacle: Option<u32> },
+    /// `expect avoidable by [cc, fsm] with npc#2`: the class of the collision, and the reference drivers
+    /// that avoid it.
+    Avoidability { class: Avoidability, by: Option<Vec<String>>, obstacle: Option<u32> },
     /// `expect end == arrived`: one of [`ENDS`].
     End(String),
+}
+
+/// What careful drivers make of a collision.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Avoidability {
+    /// A careful reference driver avoids it.
+    Avoidable,
+    /// None does, but an evasive manoeuvre without any delay.
+    BeyondReference,
+    /// Nothing that was tried.
+    Unavoidable,
+}
+
+impl Avoidability {
+    pub const ALL: [Avoidability; 3] =
+        [Avoidability::Avoidable, Avoidability::BeyondReference, Avoidability::Unavoidable];
+
+    /// The word for it in scenarios.
+    pub fn name(self) -> &'static str {
+        match self {
+            Avoidability::Avoidable => "avoidable",
+            Avoidability::BeyondReference => "beyond_reference",
+            Avoidability::Unavoidable => "unavoidable",
+        }
+    }
 }
 
 /// How an episode may end, in the words of `expect end == …`.

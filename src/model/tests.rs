@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use crate::model::Avoidability;
 use crate::model::Claim;
 use crate::model::Loaded;
 use crate::model::ReadError;
@@ -118,7 +119,8 @@ fn every_mistake_has_its_code() {
         ("expect count(actions) == 5", &["AV0801"]),
         ("expect count(ahead) == 3 m", &["AV0802"]),
         ("verdict v: collision and nott repeated", &["AV0001"]),
-        ("verdict v: collision and avoidable", &["AV0101"]),
+        ("verdict v: collision and avoidable", &[]),
+        ("reward { avoidable => 1\n _ => 0 }", &["AV0101"]),
         ("reward { collision => 1 }", &["AV0205"]),
         ("episode { roads: [cornr] }", &["AV0101"]),
         ("episode { step: 6 m }", &["AV0201"]),
@@ -172,6 +174,7 @@ scenario s {
   }
   expect collision with npc#2 at 14.22 s
   expect counted with npc#2
+  expect avoidable by [cc, fsm] with npc#2
   expect proc == [0.0, 0.125]
   expect trace == \"sha256:ab\"
   expect end == arrived
@@ -200,7 +203,10 @@ fn scenarios_are_read() {
     assert_eq!(scenario.steps[2].drawn[2].1.number(), 20.1);
     let Claim::Collision { obstacle: Some(2), time_s: Some(time_s) } = &scenario.claims[0] else { panic!() };
     assert!(time_s.rounds(14.2249) && !time_s.rounds(14.23));
-    assert_eq!(scenario.claims.len(), 5);
+    let by = Some(vec!["cc".to_owned(), "fsm".to_owned()]);
+    let avoidable = Claim::Avoidability { class: Avoidability::Avoidable, by, obstacle: Some(2) };
+    assert_eq!(scenario.claims[2], avoidable);
+    assert_eq!(scenario.claims.len(), 6);
 }
 
 #[test]
@@ -217,6 +223,8 @@ fn mistakes_in_scenarios_have_their_codes() {
         ("time: Noon, ", "", &["AV0606"]),
         ("expect end == arrived", "expect minimal", &["AV0607"]),
         ("expect end == arrived", "expect end == crashed", &["AV0607"]),
+        ("by [cc, fsm]", "by [1]", &["AV0607"]),
+        ("by [cc, fsm]", "at 14 s", &["AV0607"]),
         ("signal_phase: 12.5 s", "signal_phase: -1 s", &["AV0604"]),
         ("signal_phase: 12.5 s", "signal_phase: 3601 s", &["AV0604"]),
         ("seed: 7", "seed: 7, seed: 8", &["AV0102"]),
@@ -274,6 +282,11 @@ fn rewards_and_verdicts_are_computed() {
     let hit = crate::model::OutcomeFacts { struck: true, ..crash };
     assert_eq!([crash, quiet, Default::default()].map(|outcome| space.reward(outcome)), [7.5, 0.5, -1.0]);
     assert_eq!([crash, quiet, hit].map(|outcome| space.counts(outcome)), [true, false, false]);
+
+    let loaded = load_files(&[("a.ava", &format!("{BASE}verdict counted: collision and avoidable\n"))]);
+    let space = loaded.space.unwrap();
+    let careless = crate::model::OutcomeFacts { avoidable: true, ..crash };
+    assert_eq!([crash, careless].map(|outcome| space.counts(outcome)), [false, true]);
     assert_eq!(space.verdict("unknown", crash), None);
 }
 

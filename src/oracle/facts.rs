@@ -7,13 +7,15 @@
 //! touched once touches nobody again; the word stays for worlds in which one can. Not taken over:
 //! that a second pedestrian of an episode never counts.
 
-use crate::episode::Collision;
 use crate::episode::EpisodeLog;
 use crate::geometry::Vec2;
+use crate::model::Avoidability;
 use crate::model::OutcomeFacts;
 use crate::model::Space;
 use crate::sim::Contact;
 use crate::sim::VehicleParameters;
+
+use super::avoidable::Judgement;
 
 /// A collision so soon after the obstacle appeared is its appearance's fault, s (published package).
 const SUDDEN_S: f64 = 0.75;
@@ -24,27 +26,29 @@ const STANDING_MPS: f64 = 1.0;
 /// this came from the side by itself, m/s.
 const SIDEWAYS_MPS: f64 = 0.1;
 
-/// The facts about one collision of a log.
-pub fn facts(log: &EpisodeLog, index: usize) -> OutcomeFacts {
+/// The facts about one collision of a log, of which `judgement` is the verdict.
+pub fn facts(log: &EpisodeLog, index: usize, judgement: &Judgement) -> OutcomeFacts {
     let collision = &log.collisions[index];
     let earlier = &log.collisions[..index];
     OutcomeFacts {
         collision: true,
         repeated: earlier.iter().any(|other| other.contact.obstacle == collision.contact.obstacle),
         sudden: collision.contact.time_s - collision.spawned_s <= SUDDEN_S,
-        struck: struck(collision, &VehicleParameters::MKZ),
+        struck: struck(&collision.contact, &VehicleParameters::MKZ),
+        avoidable: judgement.class == Avoidability::Avoidable,
         // Contact is certainty.
         proc: 1.0,
     }
 }
 
-/// Indices of the collisions that the space's verdict counts.
-pub fn counted(space: &Space, log: &EpisodeLog) -> Vec<usize> {
-    (0..log.collisions.len()).filter(|&index| space.counts(facts(log, index))).collect()
+/// Indices of the collisions that the space's verdict counts. `judgements` has one for each collision.
+pub fn counted(space: &Space, log: &EpisodeLog, judgements: &[Judgement]) -> Vec<usize> {
+    let counts = |index: &usize| space.counts(facts(log, *index, &judgements[*index]));
+    (0..log.collisions.len()).filter(counts).collect()
 }
 
-/// A contact this near to two faces is one of the corner between them, m. Ten times what a first
-/// contact leaves open.
+/// A contact this near to two faces is one of the corner between them, m. Far more than a first contact
+/// leaves open.
 const CORNER_M: f64 = 1e-3;
 
 /// Whether the obstacle ran into the ego vehicle rather than the other way round.
@@ -52,8 +56,7 @@ const CORNER_M: f64 = 1e-3;
 /// True if the ego vehicle stood; if it was hit at the rear; if it was hit at the side behind its
 /// front axle, or before it by somebody moving towards that side; and at a front corner if the
 /// obstacle moved sideways onto it faster than the ego vehicle drove.
-fn struck(collision: &Collision, ego: &VehicleParameters) -> bool {
-    let contact = &collision.contact;
+pub(super) fn struck(contact: &Contact, ego: &VehicleParameters) -> bool {
     if contact.ego_speed_mps < STANDING_MPS {
         return true;
     }
@@ -101,6 +104,7 @@ fn face(point: Vec2, ego: &VehicleParameters) -> Face {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::episode::Collision;
     use crate::model::vocabulary::Body;
     use crate::model::vocabulary::Verb;
 
@@ -139,7 +143,7 @@ mod tests {
             ),
         ];
         for (name, collision, expected) in cases {
-            assert_eq!(struck(&collision, &mkz), expected, "{name}");
+            assert_eq!(struck(&collision.contact, &mkz), expected, "{name}");
         }
     }
 }

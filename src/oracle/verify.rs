@@ -8,6 +8,7 @@ use crate::model::Scenario;
 use crate::model::Space;
 use crate::model::digest_text;
 
+use super::avoidable::Judgement;
 use super::facts;
 
 /// One claim, and what came of it.
@@ -20,8 +21,14 @@ pub struct ClaimResult {
     pub found: String,
 }
 
-/// Checks every claim of a scenario, and that each of its steps was legal.
-pub fn verify(space: &Space, scenario: &Scenario, log: &EpisodeLog) -> Vec<ClaimResult> {
+/// Checks every claim of a scenario, and that each of its steps was legal. `judgements` has one for
+/// each collision of the log.
+pub fn verify(
+    space: &Space,
+    scenario: &Scenario,
+    log: &EpisodeLog,
+    judgements: &[Judgement],
+) -> Vec<ClaimResult> {
     let steps = log.steps.iter().enumerate().filter_map(|(number, step)| match &step.outcome {
         Outcome::Refused { rule, reason, .. } => {
             let rule = rule.as_ref().map_or(String::new(), |rule| format!("rule `{rule}`: "));
@@ -29,10 +36,10 @@ pub fn verify(space: &Space, scenario: &Scenario, log: &EpisodeLog) -> Vec<Claim
         }
         _ => None,
     });
-    steps.chain(scenario.claims.iter().map(|claim| check(space, claim, log))).collect()
+    steps.chain(scenario.claims.iter().map(|claim| check(space, claim, log, judgements))).collect()
 }
 
-fn check(space: &Space, claim: &Claim, log: &EpisodeLog) -> ClaimResult {
+fn check(space: &Space, claim: &Claim, log: &EpisodeLog, judgements: &[Judgement]) -> ClaimResult {
     match claim {
         Claim::Collision { obstacle, time_s } => {
             let at = time_s.as_ref().map_or(String::new(), |time| format!(" at {time} s"));
@@ -46,16 +53,28 @@ fn check(space: &Space, claim: &Claim, log: &EpisodeLog) -> ClaimResult {
         }
         Claim::Verdict { name, obstacle } => {
             let judge = |index: usize| {
-                let facts = facts(log, index);
+                let facts = facts(log, index, &judgements[index]);
                 match space.verdict(name, facts) {
                     Some(true) => Ok(()),
                     _ => Err(format!(
-                        "repeated: {}, sudden: {}, struck: {}",
-                        facts.repeated, facts.sudden, facts.struck
+                        "repeated: {}, sudden: {}, struck: {}, {}",
+                        facts.repeated,
+                        facts.sudden,
+                        facts.struck,
+                        in_words(&judgements[index])
                     )),
                 }
             };
             judged(format!("{name}{}", with(*obstacle)), collision(log, *obstacle).and_then(judge))
+        }
+        Claim::Avoidability { class, by, obstacle } => {
+            let judge = |index: usize| {
+                let found = &judgements[index];
+                let same_drivers = by.as_ref().is_none_or(|by| *by == found.avoided_by);
+                if *class == found.class && same_drivers { Ok(()) } else { Err(in_words(found)) }
+            };
+            let claim = format!("{}{}{}", class.name(), by_whom(by.as_deref()), with(*obstacle));
+            judged(claim, collision(log, *obstacle).and_then(judge))
         }
         Claim::Proc(claimed) => {
             let found: Vec<f64> = log.steps.iter().map(|step| step.proc).collect();
@@ -86,6 +105,15 @@ fn collision(log: &EpisodeLog, obstacle: Option<u32>) -> Result<usize, String> {
 
 fn with(obstacle: Option<u32>) -> String {
     obstacle.map_or(String::new(), |id| format!(" with npc#{id}"))
+}
+
+/// The class of a collision and the reference drivers that avoid it.
+fn in_words(judgement: &Judgement) -> String {
+    format!("{}{}", judgement.class.name(), by_whom(Some(&judgement.avoided_by)))
+}
+
+fn by_whom(drivers: Option<&[String]>) -> String {
+    drivers.map_or(String::new(), |drivers| format!(" by [{}]", drivers.join(", ")))
 }
 
 fn judged(claim: String, found: Result<(), String>) -> ClaimResult {

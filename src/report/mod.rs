@@ -1,8 +1,11 @@
-//! Results for people: pictures of moments of an episode.
+//! Results for people: pictures of maps and of moments of an episode.
 
+mod canvas;
 mod picture;
+mod road;
 
 pub use picture::PANEL_PX;
 pub use picture::Snapshot;
 pub use picture::VIEW_RADIUS_M;
 pub use picture::picture;
+pub use road::draw;

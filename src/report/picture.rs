@@ -19,6 +19,11 @@ use crate::sim::Obstacle;
 use crate::sim::SignalColour;
 use crate::sim::World;
 
+use super::canvas::Canvas;
+use super::canvas::across;
+use super::canvas::escape;
+use super::canvas::lane_outline;
+
 /// Edge of a panel, px.
 pub const PANEL_PX: f64 = 480.0;
 /// How far a panel reaches from the ego vehicle in each direction, m.
@@ -62,15 +67,16 @@ pub fn picture(moments: &[Snapshot]) -> String {
 
 /// Draws in world coordinates around the ego vehicle.
 struct Panel<'a> {
-    svg: &'a mut String,
+    canvas: Canvas<'a>,
     centre: Vec2,
-    px_per_m: f64,
 }
 
 impl Panel<'_> {
     fn new<'a>(svg: &'a mut String, world: &World) -> Panel<'a> {
         let centre = world.ego_outline().pose.position;
-        Panel { svg, centre, px_per_m: PANEL_PX / (2.0 * VIEW_RADIUS_M) }
+        let north_west = centre + Vec2::new(-VIEW_RADIUS_M, VIEW_RADIUS_M);
+        let canvas = Canvas { svg, north_west, px_per_m: PANEL_PX / (2.0 * VIEW_RADIUS_M) };
+        Panel { canvas, centre }
     }
 
     fn draw(&mut self, moment: &Snapshot) {
@@ -80,7 +86,7 @@ impl Panel<'_> {
             self.lane(lane);
         }
         for crosswalk in &map.crosswalks {
-            self.polygon(&crosswalk.outline, r##"fill="#ffffff" fill-opacity="0.55""##);
+            self.canvas.polygon(&crosswalk.outline, r##"fill="#ffffff" fill-opacity="0.55""##);
         }
         for lane in &map.lanes {
             for line in &lane.stop_lines {
@@ -88,7 +94,7 @@ impl Panel<'_> {
             }
         }
         let route: Vec<Vec2> = world.scene().route.path.points().iter().map(|p| p.position).collect();
-        self.polyline(&route, r##"stroke="#5b7fb5" stroke-width="1.5" stroke-dasharray="6 5""##);
+        self.canvas.polyline(&route, r##"stroke="#5b7fb5" stroke-width="1.5" stroke-dasharray="6 5""##);
         for obstacle in world.obstacles() {
             self.obstacle(obstacle);
         }
@@ -97,7 +103,7 @@ impl Panel<'_> {
             self.perceived(object);
         }
         let planned: Vec<Vec2> = moment.status.planned.iter().map(|p| p.pose.position).collect();
-        self.polyline(&planned, r##"stroke="#12913a" stroke-width="2.5""##);
+        self.canvas.polyline(&planned, r##"stroke="#12913a" stroke-width="2.5""##);
         if let Some(point) = moment.contact {
             self.cross(point);
         }
@@ -107,31 +113,18 @@ impl Panel<'_> {
         if lane.centre.project(self.centre).distance_m > VIEW_RADIUS_M * 1.5 {
             return;
         }
-        let length_m = lane.centre.length_m();
-        let steps = (length_m / 2.0).ceil().max(1.0) as usize;
-        let edge = |side: f64| {
-            (0..=steps).map(move |i| {
-                let station_m = length_m * i as f64 / steps as f64;
-                let half_m = lane.width_at(station_m) / 2.0;
-                lane.centre.pose_at(station_m).offset(0.0, side * half_m).position
-            })
-        };
-        let outline: Vec<Vec2> = edge(1.0).chain(edge(-1.0).rev()).collect();
         let fill = if lane.junction.is_some() { "#c9cccf" } else { "#bfc3c7" };
         let style = format!(r##"fill="{fill}" stroke="#f4f4f4" stroke-width="0.8""##);
-        self.polygon(&outline, &style);
+        self.canvas.polygon(&lane_outline(lane), &style);
     }
 
     fn stop_line(&mut self, lane: &Lane, station_m: f64, colour: SignalColour) {
-        let half_m = lane.width_at(station_m) / 2.0;
-        let pose = lane.centre.pose_at(station_m);
-        let ends = [pose.offset(0.0, half_m).position, pose.offset(0.0, -half_m).position];
         let paint = match colour {
             SignalColour::Red => "#d62020",
             SignalColour::Yellow => "#e8b400",
             SignalColour::Green => "#1fae4b",
         };
-        self.polyline(&ends, &format!(r##"stroke="{paint}" stroke-width="4""##));
+        self.canvas.polyline(&across(lane, station_m), &format!(r##"stroke="{paint}" stroke-width="4""##));
     }
 
     fn obstacle(&mut self, obstacle: &Obstacle) {
@@ -144,14 +137,10 @@ impl Panel<'_> {
         self.body(&obstacle.outline, &style);
         let centre = obstacle.outline.pose.position;
         let arrow = [centre, centre + obstacle.velocity_mps * VELOCITY_S];
-        self.polyline(&arrow, r##"stroke="#202020" stroke-width="1.2""##);
-        let (x, y) = self.at(centre + Vec2::new(1.5, 1.5));
-        let _ = writeln!(
-            self.svg,
-            r##"<text x="{x:.1}" y="{y:.1}" font-size="11" fill="#202020">{} {}</text>"##,
-            obstacle.id,
-            obstacle.body.name()
-        );
+        self.canvas.polyline(&arrow, r##"stroke="#202020" stroke-width="1.2""##);
+        let name = format!("{} {}", obstacle.id, obstacle.body.name());
+        let style = r##"font-size="11" fill="#202020""##;
+        self.canvas.text(centre + Vec2::new(1.5, 1.5), &name, style);
     }
 
     fn perceived(&mut self, object: &PerceivedObject) {
@@ -159,51 +148,26 @@ impl Panel<'_> {
         self.body(&outline, r##"fill="none" stroke="#e06a00" stroke-width="1.6" stroke-dasharray="4 3""##);
         let mut way = vec![object.pose.position];
         way.extend(&object.predicted);
-        self.polyline(&way, r##"stroke="#e06a00" stroke-width="1" stroke-dasharray="2 3""##);
+        self.canvas.polyline(&way, r##"stroke="#e06a00" stroke-width="1" stroke-dasharray="2 3""##);
     }
 
     /// An outline with a line across its front, so that the heading shows.
     fn body(&mut self, outline: &OrientedBox, style: &str) {
-        self.polygon(&outline.corners(), style);
+        self.canvas.polygon(&outline.corners(), style);
         let nose = Pose::offset(&outline.pose, outline.half_length_m * 0.6, 0.0);
         let across = [
             nose.offset(0.0, outline.half_width_m).position,
             nose.offset(outline.half_length_m * 0.4, 0.0).position,
             nose.offset(0.0, -outline.half_width_m).position,
         ];
-        self.polyline(&across, r##"stroke="#101010" stroke-width="0.8""##);
+        self.canvas.polyline(&across, r##"stroke="#101010" stroke-width="0.8""##);
     }
 
     fn cross(&mut self, point: Vec2) {
         for (dx, dy) in [(1.2, 1.2), (1.2, -1.2)] {
             let arm = Vec2::new(dx, dy);
-            self.polyline(&[point - arm, point + arm], r##"stroke="#d60000" stroke-width="3""##);
+            self.canvas.polyline(&[point - arm, point + arm], r##"stroke="#d60000" stroke-width="3""##);
         }
-    }
-
-    fn polygon(&mut self, points: &[Vec2], style: &str) {
-        let points = self.points(points);
-        let _ = writeln!(self.svg, r##"<polygon points="{points}" {style}/>"##);
-    }
-
-    fn polyline(&mut self, points: &[Vec2], style: &str) {
-        let points = self.points(points);
-        let _ = writeln!(self.svg, r##"<polyline points="{points}" fill="none" {style}/>"##);
-    }
-
-    fn points(&self, points: &[Vec2]) -> String {
-        let mut text = String::new();
-        for point in points {
-            let (x, y) = self.at(*point);
-            let _ = write!(text, "{x:.1},{y:.1} ");
-        }
-        text
-    }
-
-    /// Pixel of a world point; SVG's y axis points down.
-    fn at(&self, point: Vec2) -> (f64, f64) {
-        let delta = (point - self.centre) * self.px_per_m;
-        (PANEL_PX / 2.0 + delta.x, PANEL_PX / 2.0 - delta.y)
     }
 }
 
@@ -238,10 +202,6 @@ fn caption(svg: &mut String, left_px: f64, moment: &Snapshot) {
             escape(line)
         );
     }
-}
-
-fn escape(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
 }
 
 fn paint(colour: Colour) -> &'static str {

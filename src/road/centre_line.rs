@@ -10,6 +10,11 @@ use super::opendrive::SectionElement;
 /// Chords stay this near to the curve, m; half of what the rest may rely on.
 const CHORD_ERROR_M: f64 = 5e-4;
 
+/// Between two vertices the heading and the road's station are read off a straight line; so far they may
+/// be off, rad and m. Matters where a lane runs near the centre of a tight bend.
+const HEADING_ERROR_RAD: f64 = 5e-4;
+const STATION_ERROR_M: f64 = 2e-3;
+
 /// Longest chord where anything bends or widens, m.
 const CHORD_M_MAX: f64 = 1.0;
 
@@ -173,7 +178,8 @@ impl Curve<'_> {
 
     /// Appends points strictly between two until the chords are near enough.
     fn refine(&self, begin: Sample, end: Sample, depth: u32, samples: &mut Vec<Sample>) {
-        if depth == 0 || samples.len() > SAMPLES_MAX || self.deviation_m(begin, end) < CHORD_ERROR_M {
+        let near = || self.deviation_m(begin, end) < CHORD_ERROR_M && self.interpolates(begin, end);
+        if depth == 0 || samples.len() > SAMPLES_MAX || near() {
             return;
         }
         let middle = self.at((begin.s_m + end.s_m) / 2.0);
@@ -186,6 +192,18 @@ impl Curve<'_> {
         let same_heading = |other: Sample| (other.heading_rad - begin.heading_rad).abs() < 1e-9;
         let middle = self.at((begin.s_m + end.s_m) / 2.0);
         same_heading(middle) && same_heading(end) && self.deviation_m(begin, end) < 1e-6
+    }
+
+    /// Whether the middle of the chord has nearly the station and the heading of the curve there.
+    fn interpolates(&self, begin: Sample, end: Sample) -> bool {
+        let between = self.at((begin.s_m + end.s_m) / 2.0);
+        let chord = end.position - begin.position;
+        let length_m = chord.norm().max(1e-9);
+        let ahead_m = chord.dot(&(between.position - begin.position)) / length_m;
+        let turned_rad = wrap_angle(end.heading_rad - begin.heading_rad);
+        let heading_rad = begin.heading_rad + turned_rad * (ahead_m / length_m);
+        let aside_rad = wrap_angle(between.heading_rad - heading_rad).abs();
+        between.folded || aside_rad < HEADING_ERROR_RAD && (ahead_m - length_m / 2.0).abs() < STATION_ERROR_M
     }
 
     /// How far the curve leaves the chord, or the width its linear interpolation, m.

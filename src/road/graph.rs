@@ -9,6 +9,7 @@ use super::centre_line::CentreLine;
 use super::centre_line::NoCentreLine;
 use super::centre_line::centre_line;
 use super::index::LaneGrid;
+use super::lane_change::permitted;
 use super::map::Junction;
 use super::map::Lane;
 use super::map::LaneIndex;
@@ -45,6 +46,7 @@ pub fn build(document: &Document) -> Result<RoadMap, RoadError> {
     add_signals(&mut builder)?;
     add_crosswalks(&mut builder);
     let mut map = builder.map;
+    map.warnings.extend(loose_links(&map));
     for lane in &mut map.lanes {
         lane.successors.sort();
         lane.predecessors.sort();
@@ -84,6 +86,7 @@ impl<'a> Builder<'a> {
             name: document.name.clone(),
             lanes: Vec::new(),
             signals: Vec::new(),
+            signs: Vec::new(),
             junctions: document
                 .junctions
                 .iter()
@@ -145,7 +148,10 @@ impl<'a> Builder<'a> {
                     let index = LaneIndex(self.map.lanes.len());
                     self.lanes.insert((road_index, section_index, element.id), index);
                     let limit_mps = limit_mps.unwrap_or(LIMIT_MPS_DEFAULT);
-                    self.map.lanes.push(new_lane(key, centre, limit_mps, junction));
+                    self.map.lanes.push(Lane {
+                        keeps_left: road.left_hand,
+                        ..new_lane(key, centre, limit_mps, junction)
+                    });
                 }
             }
         }
@@ -224,6 +230,10 @@ impl<'a> Builder<'a> {
                 };
                 let incoming = road(&connection.incoming_road)?;
                 let connecting = road(&connection.connecting_road)?;
+                if connection.lane_links.is_empty() {
+                    let message = format!("a connection of junction `{}` links no lanes", junction.id);
+                    self.warn(connection.line, message);
+                }
                 let contact = self.contact_at(incoming, &junction.id, connecting, connection.contact);
                 for (from, to) in &connection.lane_links {
                     let from = self.end(incoming, *from, contact);
@@ -322,8 +332,29 @@ impl<'a> Builder<'a> {
                     } else {
                         of_right.right = neighbour(left_index);
                     }
+                    if same_direction && road.junction.is_none() {
+                        let [to_right, to_left] = permitted(road, section, left, right);
+                        self.allow_changes(left_index, right_index, &to_right);
+                        self.allow_changes(right_index, left_index, &to_left);
+                    }
                 }
             }
+        }
+    }
+
+    /// Permits changes from a lane to its neighbour between stations of the road's reference line.
+    fn allow_changes(&mut self, from: LaneIndex, to: LaneIndex, parts_m: &[(f64, f64)]) {
+        let lane = &mut self.map.lanes[from.0];
+        let stations_m = |(a_m, b_m): &(f64, f64)| {
+            let (a_m, b_m) = (lane.station_of(*a_m), lane.station_of(*b_m));
+            (a_m.min(b_m), a_m.max(b_m))
+        };
+        let mut parts_m: Vec<(f64, f64)> = parts_m.iter().map(stations_m).collect();
+        parts_m.sort_by(|a, b| a.0.total_cmp(&b.0));
+        if lane.left.is_some_and(|left| left.lane == to) {
+            lane.changes_left_m = parts_m;
+        } else {
+            lane.changes_right_m = parts_m;
         }
     }
 }
@@ -335,6 +366,29 @@ struct End {
     section: usize,
     lane: i32,
     contact: Contact,
+}
+
+/// Ends of linked lanes farther apart than this do not meet, m: a car would have to jump.
+const LOOSE_M: f64 = 0.5;
+
+/// A warning if lanes are linked whose ends do not meet.
+fn loose_links(map: &RoadMap) -> Option<String> {
+    let links =
+        map.lanes.iter().flat_map(|lane| lane.successors.iter().map(move |next| (lane, map.lane(*next))));
+    let loose = links.filter_map(|(lane, next)| {
+        let end = lane.centre.pose_at(lane.centre.length_m()).position;
+        let apart_m = (next.centre.pose_at(0.0).position - end).norm();
+        (apart_m > LOOSE_M).then_some((apart_m, lane, next))
+    });
+    let loose: Vec<_> = loose.collect();
+    let (apart_m, lane, next) = loose.iter().max_by(|a, b| a.0.total_cmp(&b.0))?;
+    let name = |lane: &Lane| format!("lane {} of road `{}`", lane.key.lane, lane.key.road);
+    Some(format!(
+        "{} links join lanes that do not meet; the worst, from {} to {}, leaps {apart_m:.2} m",
+        loose.len(),
+        name(lane),
+        name(next)
+    ))
 }
 
 /// An error at a line of the file.
@@ -356,10 +410,13 @@ fn new_lane(key: LaneKey, centre: CentreLine, speed_limit_mps: f64, junction: Op
         centre: centre.path,
         widths_m: centre.widths_m,
         speed_limit_mps,
+        keeps_left: false,
         successors: Vec::new(),
         predecessors: Vec::new(),
         left: None,
         right: None,
+        changes_left_m: Vec::new(),
+        changes_right_m: Vec::new(),
         junction,
         stop_lines: Vec::new(),
         road_stations_m: centre.road_stations_m,

@@ -43,11 +43,18 @@ pub struct Lane {
     pub widths_m: Vec<f64>,
     /// m/s.
     pub speed_limit_mps: f64,
+    /// Whether traffic keeps left on its road.
+    pub keeps_left: bool,
     pub successors: Vec<LaneIndex>,
     pub predecessors: Vec<LaneIndex>,
     /// Next driving lane to the left, in the same or the opposite direction, however wide the gap.
     pub left: Option<Neighbour>,
     pub right: Option<Neighbour>,
+    /// Between which stations one may change to the left, by rising station, m: outside junctions, into a
+    /// neighbour of the same direction, where markings and widths permit it.
+    pub changes_left_m: Vec<(f64, f64)>,
+    /// The same to the right.
+    pub changes_right_m: Vec<(f64, f64)>,
     /// Index in [`RoadMap::junctions`], if the lane runs inside one.
     pub junction: Option<usize>,
     pub turn: Turn,
@@ -64,6 +71,13 @@ pub struct Neighbour {
     pub same_direction: bool,
     /// Width of whatever lies between the two lanes (a median), m; 0 where they share a line.
     pub gap_m: f64,
+}
+
+/// A side of a lane, in its driving direction.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Side {
+    Left,
+    Right,
 }
 
 /// What a lane does inside a junction; `Straight` everywhere else.
@@ -90,8 +104,25 @@ pub struct Signal {
     pub position: Vec2,
     /// Index in [`RoadMap::junctions`].
     pub junction: Option<usize>,
-    /// Position of its controller in the junction's cycle, from 0.
+    /// Position of its controller in the junction's cycle, from 0. Lights that no controller of a
+    /// junction switches form a group for each arm, after those.
     pub group: usize,
+}
+
+/// A stop or yield sign. Lights have precedence where both stand.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Sign {
+    pub id: String,
+    pub kind: SignKind,
+    pub position: Vec2,
+    /// Where it holds, with the station of the lane, m.
+    pub lanes: Vec<(LaneIndex, f64)>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum SignKind {
+    Stop,
+    Yield,
 }
 
 #[derive(Debug, Clone, PartialEq)]
@@ -117,6 +148,7 @@ pub struct RoadMap {
     pub name: String,
     pub lanes: Vec<Lane>,
     pub signals: Vec<Signal>,
+    pub signs: Vec<Sign>,
     pub junctions: Vec<Junction>,
     pub crosswalks: Vec<Crosswalk>,
     /// What was read but not understood, in words; each is worth a look.
@@ -215,6 +247,22 @@ impl RoadMap {
 const MISFIT_RAD_PER_M: f64 = 0.1;
 
 impl Lane {
+    /// The next driving lane to a side, in whichever direction.
+    pub fn neighbour(&self, side: Side) -> Option<Neighbour> {
+        match side {
+            Side::Left => self.left,
+            Side::Right => self.right,
+        }
+    }
+
+    /// Between which stations one may change to a side, m.
+    pub fn changes_m(&self, side: Side) -> &[(f64, f64)] {
+        match side {
+            Side::Left => &self.changes_left_m,
+            Side::Right => &self.changes_right_m,
+        }
+    }
+
     /// Width at a station, clamped to the lane, m.
     pub fn width_at(&self, station_m: f64) -> f64 {
         let points = self.centre.points();
@@ -234,6 +282,16 @@ impl Lane {
         let fraction = ((s_m - from_m) / (to_m - from_m)).clamp(0.0, 1.0);
         let (a, b) = (&self.centre.points()[after - 1], &self.centre.points()[after]);
         a.station_m + (b.station_m - a.station_m) * fraction
+    }
+
+    /// Station of the road's reference line beside a station of the lane, clamped to the lane, m.
+    pub fn road_station_m(&self, station_m: f64) -> f64 {
+        let points = self.centre.points();
+        let after = points.partition_point(|point| point.station_m <= station_m).clamp(1, points.len() - 1);
+        let (a, b) = (&points[after - 1], &points[after]);
+        let fraction = ((station_m - a.station_m) / (b.station_m - a.station_m)).clamp(0.0, 1.0);
+        let (from_m, to_m) = (self.road_stations_m[after - 1], self.road_stations_m[after]);
+        from_m + (to_m - from_m) * fraction
     }
 
     /// Between which stations of the road's reference line the lane lies, m.

@@ -1,27 +1,29 @@
 //! Routes: the way of the ego vehicle through the lane graph.
 
-use std::cmp::Reverse;
-use std::collections::BTreeMap;
 use std::collections::BTreeSet;
-use std::collections::BinaryHeap;
 
 use crate::geometry::Path;
-use crate::geometry::Vec2;
 use crate::geometry::wrap_angle;
 
 use super::conflict::conflicts;
 use super::conflict::spans_inside;
+use super::join::Joined;
+use super::lane_change::LENGTH_M_MIN;
+use super::lane_change::quintic;
 use super::map::LaneIndex;
 use super::map::LanePlace;
 use super::map::RoadError;
 use super::map::RoadMap;
+use super::search::Move;
+use super::search::cheapest_way;
 
-/// A way from a start to a goal along lane centres.
+/// A way from a start to a goal along lane centres and from lane to lane.
 #[derive(Debug, Clone)]
 pub struct Route {
-    /// Lanes in order, each with the route station at which it begins (the first may be negative:
-    /// the lane begins behind the start) and the station at which it ends.
+    /// Lanes in order.
     pub lanes: Vec<RouteLane>,
+    /// Lane changes in order; they do not overlap.
+    pub changes: Vec<RouteLaneChange>,
     /// Centre line from the start (station 0) to the goal and on, up to 60 m if the lanes go on.
     pub path: Path,
     /// Station of the goal, m.
@@ -33,11 +35,35 @@ pub struct Route {
     pub conflicts: Vec<Conflict>,
 }
 
+/// A lane of a route: station `m` of the route is beside station `m - from_m` of the lane (within a
+/// decimetre during lane changes).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RouteLane {
     pub lane: LaneIndex,
+    /// Station of the route at which the lane begins, m. Before `enter_m` if the route begins in the
+    /// lane, or comes into it by a lane change.
     pub from_m: f64,
+    /// Station from which on the route is in the lane, m. That of a lane change is its middle.
+    pub enter_m: f64,
+    /// Station at which the route leaves it, m.
     pub to_m: f64,
+}
+
+/// A lane change of a route. The path performs it as early as it is comfortable.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RouteLaneChange {
+    /// Here the path leaves the centre of the source lane, m.
+    pub begin_m: f64,
+    /// Here it is on the centre of the target lane, m.
+    pub end_m: f64,
+    /// By this station the change must be over, m: there the road leaves no more room for it, or the
+    /// next change or the goal needs it done.
+    pub latest_m: f64,
+    /// Distance between the two centres at the end, m, positive to the left.
+    pub lateral_m: f64,
+    /// Distance between the centres (m, positive to the left) over the station, from `begin_m` to the end
+    /// of the stretch on which one may change.
+    pub(super) shifts_m: Vec<(f64, f64)>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -63,35 +89,52 @@ pub struct Conflict {
 /// So far the path goes on past the goal, m.
 const PAST_GOAL_M: f64 = 60.0;
 
-/// Lanes are joined over this length, m: a millimetre between the end of one and the beginning of the
-/// next would otherwise become a segment across the road.
-const JOINT_M: f64 = 0.1;
+/// A stop line this little before or behind the part of a lane that is on the route is on it, too, m.
+const PART_M: f64 = 0.2;
 
 impl Route {
-    /// The shortest way along successors.
+    /// The cheapest way along successors and, with lane changes, along neighbours.
+    ///
+    /// A lane change costs as much as a detour of 100 m and is made only outside junctions, where
+    /// markings permit it and a stretch is long enough: at least half of the comfortable length.
     ///
     /// # Errors
-    /// If the goal cannot be reached without a lane change.
+    /// If the goal cannot be reached.
     pub fn find(map: &RoadMap, start: LanePlace, goal: LanePlace) -> Result<Route, RoadError> {
-        let mut way = shortest_way(map, start, goal).ok_or_else(|| no_way(map, start, goal))?;
-        let goal_index = way.len() - 1;
+        let way = cheapest_way(map, start, goal).ok_or_else(|| no_way(map, start, goal))?;
+        let mut joined = Joined::new(map, start);
+        for step in &way {
+            joined.add(step);
+        }
+        let goal_index = joined.lanes.len() - 1;
         let mut past_m = map.lane(goal.lane).centre.length_m() - goal.station_m;
+        let mut last = goal.lane;
         while past_m < PAST_GOAL_M {
-            let Some(next) = straightest_successor(map, way[way.len() - 1]) else { break };
+            let Some(next) = straightest_successor(map, last) else { break };
             past_m += map.lane(next).centre.length_m();
-            way.push(next);
+            joined.add(&Move::Follow(next));
+            last = next;
         }
 
-        let (lanes, whole) = join(map, &way, start.station_m).ok_or_else(|| RoadError::Route {
+        let whole = joined.path().ok_or_else(|| RoadError::Route {
             message: "the start lies at the end of the road; move it back".to_owned(),
         })?;
+        let (lanes, mut changes) = (joined.lanes, joined.changes);
         let goal_m = lanes[goal_index].from_m + goal.station_m;
         let path = whole.part(0.0, goal_m + PAST_GOAL_M).ok_or_else(|| RoadError::Route {
             message: "the road goes on for less than 1 µm from the start; move it back".to_owned(),
         })?;
+        let mut latest_m = goal_m;
+        for change in changes.iter_mut().rev() {
+            change.latest_m = change.latest_m.min(latest_m);
+            latest_m = change.latest_m - (change.end_m - change.begin_m);
+        }
         let stop_lines = lanes.iter().flat_map(|lane| {
             let of_lane = map.lane(lane.lane).stop_lines.iter();
-            of_lane.map(|line| RouteStopLine { station_m: lane.from_m + line.station_m, signal: line.signal })
+            let on_route = of_lane
+                .map(|line| RouteStopLine { station_m: lane.from_m + line.station_m, signal: line.signal });
+            // Of a lane that is left or entered midway, only a part is on the route.
+            on_route.filter(|line| (lane.enter_m - PART_M..=lane.to_m + PART_M).contains(&line.station_m))
         });
         let mut crosswalks_m: Vec<_> =
             map.crosswalks.iter().flat_map(|crosswalk| spans_inside(&path, &crosswalk.outline)).collect();
@@ -101,6 +144,7 @@ impl Route {
             crosswalks_m,
             conflicts: conflicts(map, &lanes, &path),
             lanes,
+            changes,
             path,
             goal_m,
         })
@@ -108,50 +152,42 @@ impl Route {
 
     /// The lane of the route at a station, clamped to its ends.
     pub fn lane_at(&self, station_m: f64) -> RouteLane {
-        let after = self.lanes.partition_point(|lane| lane.from_m <= station_m);
+        let after = self.lanes.partition_point(|lane| lane.enter_m <= station_m);
         self.lanes[after.max(1) - 1]
     }
 }
 
-/// Lanes from start to goal (Dijkstra); `None` if there is no way.
-fn shortest_way(map: &RoadMap, start: LanePlace, goal: LanePlace) -> Option<Vec<LaneIndex>> {
-    if start.lane == goal.lane && start.station_m <= goal.station_m {
-        return Some(vec![start.lane]);
+impl RouteLaneChange {
+    /// Where the centre of the source lane lies beside the path (within 5 cm), m, positive to the left:
+    /// 0 up to the beginning. Behind the stretch on which one may change the last value holds.
+    pub fn source_offset_m(&self, station_m: f64) -> f64 {
+        let part = quintic((station_m - self.begin_m) / (self.end_m - self.begin_m));
+        -self.shift_m(station_m) * part
     }
-    // A lane may be its own way back, so the start is no node: only what follows it is.
-    let rest_m = map.lane(start.lane).centre.length_m() - start.station_m;
-    let mut open = BinaryHeap::new();
-    let mut came_from: BTreeMap<LaneIndex, LaneIndex> = BTreeMap::new();
-    for next in &map.lane(start.lane).successors {
-        open.push(Reverse((millimetres(rest_m), *next, start.lane)));
-    }
-    while let Some(Reverse((distance, lane, from))) = open.pop() {
-        if came_from.contains_key(&lane) {
-            continue;
-        }
-        came_from.insert(lane, from);
-        if lane == goal.lane {
-            break;
-        }
-        let distance = distance + millimetres(map.lane(lane).centre.length_m());
-        for next in &map.lane(lane).successors {
-            open.push(Reverse((distance, *next, lane)));
-        }
-    }
-    let mut way = vec![goal.lane];
-    let mut from = *came_from.get(&goal.lane)?;
-    while from != start.lane {
-        way.push(from);
-        from = came_from[&from];
-    }
-    way.push(start.lane);
-    way.reverse();
-    Some(way)
-}
 
-/// Whole numbers, because a heap needs a total order.
-fn millimetres(length_m: f64) -> u64 {
-    (length_m.max(0.0) * 1e3) as u64
+    /// Length of the change if it begins at another station, m: that of the path, or as much as is left
+    /// before `latest_m`, but at least [`RouteLaneChange::LENGTH_M_MIN`].
+    pub fn length_from_m(&self, begin_m: f64) -> f64 {
+        (self.end_m - self.begin_m).min(self.latest_m - begin_m).max(RouteLaneChange::LENGTH_M_MIN)
+    }
+
+    /// Where a vehicle drives beside the path that begins the change at another station, m, positive to
+    /// the left; in the source lane if that is infinite.
+    pub fn postponed_offset_m(&self, station_m: f64, begin_m: f64) -> f64 {
+        let part = quintic((station_m - begin_m) / self.length_from_m(begin_m));
+        self.source_offset_m(station_m) + self.shift_m(station_m) * part
+    }
+
+    /// No lane change is shorter, m.
+    pub const LENGTH_M_MIN: f64 = LENGTH_M_MIN;
+
+    /// Distance between the two centres at a station, m, positive to the left.
+    fn shift_m(&self, station_m: f64) -> f64 {
+        let after = self.shifts_m.partition_point(|(at_m, _)| *at_m <= station_m);
+        let after = after.clamp(1, self.shifts_m.len() - 1);
+        let ((from_m, from), (to_m, to)) = (self.shifts_m[after - 1], self.shifts_m[after]);
+        from + (to - from) * ((station_m - from_m) / (to_m - from_m)).clamp(0.0, 1.0)
+    }
 }
 
 /// Why there is no way, and whether a lane change would make one.
@@ -174,7 +210,10 @@ fn no_way(map: &RoadMap, start: LanePlace, goal: LanePlace) -> RoadError {
     };
     let (from, to) = (name(start), name(goal));
     let message = if reached.contains(&goal.lane) {
-        format!("from {from}, {to} can be reached only with a lane change; start or end in another lane")
+        format!(
+            "from {from}, {to} can be reached only with a lane change for which there is no room: markings, a \
+             junction or the end of a lane forbid it; start earlier or in another lane"
+        )
     } else {
         format!("there is no way from {from} to {to}")
     };
@@ -189,29 +228,4 @@ fn straightest_successor(map: &RoadMap, lane: LaneIndex) -> Option<LaneIndex> {
     };
     let successors = &map.lane(lane).successors;
     successors.iter().copied().min_by(|a, b| turn_rad(a).total_cmp(&turn_rad(b)))
-}
-
-/// One path through lanes, from a station of the first, and where on it each of them lies.
-fn join(map: &RoadMap, way: &[LaneIndex], start_m: f64) -> Option<(Vec<RouteLane>, Path)> {
-    let mut points: Vec<(Vec2, f64, f64)> = Vec::new();
-    let mut lanes: Vec<RouteLane> = Vec::new();
-    let mut length_m = 0.0;
-    for index in way {
-        let centre = &map.lane(*index).centre;
-        let (from_m, begin_m) = if lanes.is_empty() {
-            (-start_m, start_m.clamp(0.0, centre.length_m()))
-        } else if points.is_empty() {
-            // The start was the very end of the lane before.
-            (length_m, 0.0)
-        } else {
-            (length_m, JOINT_M.min(centre.length_m() / 2.0))
-        };
-        let part = centre.part(begin_m, centre.length_m());
-        for point in part.iter().flat_map(Path::points) {
-            length_m += points.last().map_or(0.0, |last| (point.position - last.0).norm());
-            points.push((point.position, point.heading_rad, point.curvature_per_m));
-        }
-        lanes.push(RouteLane { lane: *index, from_m, to_m: length_m });
-    }
-    Path::new(points).map(|path| (lanes, path))
 }

@@ -1,4 +1,4 @@
-//! Traffic lights with their groups and stop lines, and crosswalks.
+//! Traffic lights with their groups and stop lines, stop and yield signs, and crosswalks.
 
 use std::collections::BTreeMap;
 
@@ -8,59 +8,149 @@ use crate::geometry::Vec2;
 use super::graph::Builder;
 use super::graph::wrong;
 use super::map::Crosswalk;
+use super::map::LaneIndex;
 use super::map::RoadError;
+use super::map::Sign;
+use super::map::SignKind;
 use super::map::Signal;
 use super::map::StopLine;
+use super::opendrive::Meaning;
 use super::opendrive::Orientation;
 use super::opendrive::Outline;
 use super::opendrive::RoadElement;
+use super::opendrive::RoadLink;
 use super::opendrive::SignalElement;
 
 /// Heads of one group nearer than this share a stop line, m.
 const SHARED_LINE_M: f64 = 1.0;
 
-/// Adds all lights, with a stop line on each lane they hold for.
+/// Adds all lights and signs: lights with a stop line on each lane they hold for.
 pub fn add_signals(builder: &mut Builder) -> Result<(), RoadError> {
     let document = builder.document;
     let groups = groups(builder)?;
-    let mut indices = BTreeMap::new();
-    for road in &document.roads {
+    let mut arms = Arms::default();
+    let mut found = BTreeMap::new();
+    for (road_index, road) in document.roads.iter().enumerate() {
         for signal in road.signals.iter().filter(|signal| !signal.reference) {
-            let place = groups.get(signal.id.as_str()).copied();
-            if place.is_none() {
-                let message =
-                    format!("signal `{}` has no controller in any junction; it is its own group", signal.id);
-                builder.warn(signal.line, message);
-            }
-            if indices.insert(signal.id.as_str(), builder.map.signals.len()).is_some() {
+            let position = position(road, signal.s_m, signal.t_m);
+            let id = signal.id.clone();
+            let place = match signal.meaning {
+                Meaning::Stop | Meaning::Yield => {
+                    let stop = signal.meaning == Meaning::Stop;
+                    let kind = if stop { SignKind::Stop } else { SignKind::Yield };
+                    builder.map.signs.push(Sign { id, kind, position, lanes: Vec::new() });
+                    Found::Sign(builder.map.signs.len() - 1)
+                }
+                Meaning::Light | Meaning::OtherLight => {
+                    let switched = groups.get(signal.id.as_str()).copied();
+                    let place = switched.or_else(|| arms.group(builder, road_index, signal));
+                    builder.map.signals.push(Signal {
+                        id,
+                        position,
+                        junction: place.map(|(junction, _)| junction),
+                        group: place.map_or(0, |(_, group)| group),
+                    });
+                    Found::Light(builder.map.signals.len() - 1)
+                }
+            };
+            if found.insert(signal.id.as_str(), place).is_some() {
                 return Err(wrong(signal.line, format!("a second signal has the id `{}`", signal.id)));
             }
-            builder.map.signals.push(Signal {
-                id: signal.id.clone(),
-                position: position(road, signal.s_m, signal.t_m),
-                junction: place.map(|(junction, _)| junction),
-                group: place.map_or(0, |(_, group)| group),
-            });
         }
     }
     for controller in &document.controllers {
-        for (signal, line) in &controller.signals {
-            if !indices.contains_key(signal.as_str()) {
-                let message =
-                    format!("controller `{}` switches signal `{signal}`, which is no light", controller.id);
-                builder.warn(*line, message);
-            }
+        let is_light = |id: &String| matches!(found.get(id.as_str()), Some(Found::Light(_)));
+        let missing: Vec<_> = controller.signals.iter().filter(|(id, _)| !is_light(id)).collect();
+        if let Some((first, line)) = missing.first() {
+            let message = format!(
+                "controller `{}` switches {} signals that are no lights, `{first}` the first of them",
+                controller.id,
+                missing.len()
+            );
+            builder.warn(*line, message);
         }
     }
     for (road_index, road) in document.roads.iter().enumerate() {
-        for signal in road.signals.iter().filter(|signal| !signal.pedestrian) {
-            // A reference may also point to a sign, which was left out.
-            if let Some(index) = indices.get(signal.id.as_str()) {
-                add_stop_lines(builder, road_index, signal, *index);
+        for signal in road.signals.iter().filter(|signal| signal.meaning != Meaning::OtherLight) {
+            // A reference may also point to a sign that was left out.
+            match found.get(signal.id.as_str()) {
+                Some(Found::Light(index)) => add_stop_lines(builder, road_index, signal, *index),
+                Some(Found::Sign(index)) => {
+                    let lanes = lanes_of(builder, road_index, signal);
+                    builder.map.signs[*index].lanes.extend(lanes);
+                }
+                None => {}
             }
         }
     }
+    arms.warn(builder);
     Ok(())
+}
+
+/// What a signal became: an index in the map's signals or signs.
+enum Found {
+    Light(usize),
+    Sign(usize),
+}
+
+/// Groups for lights that no controller of a junction switches: one for each arm, so that never two
+/// streets that cross are green together.
+#[derive(Default)]
+struct Arms {
+    /// By junction, road and whether the light holds along the reference line.
+    groups: BTreeMap<(usize, usize, bool), usize>,
+    lights: usize,
+    lone: usize,
+}
+
+impl Arms {
+    /// Junction and group of a light, by the junction to which the traffic that it stops drives.
+    fn group(
+        &mut self,
+        builder: &mut Builder,
+        road_index: usize,
+        signal: &SignalElement,
+    ) -> Option<(usize, usize)> {
+        let road = &builder.document.roads[road_index];
+        let along = match signal.orientation {
+            Orientation::Along => true,
+            Orientation::Against => false,
+            // The nearer end is meant.
+            Orientation::Both => signal.s_m > road.length_m / 2.0,
+        };
+        let ahead = if along { &road.successor } else { &road.predecessor };
+        let junction = match ahead {
+            Some(RoadLink::Junction { id, .. }) => builder.junctions.get(id.as_str()).copied(),
+            _ => None,
+        };
+        let Some(junction) = junction else {
+            self.lone += 1;
+            return None;
+        };
+        self.lights += 1;
+        let groups = &mut builder.map.junctions[junction].groups;
+        let group = *self.groups.entry((junction, road_index, along)).or_insert_with(|| {
+            *groups += 1;
+            *groups - 1
+        });
+        Some((junction, group))
+    }
+
+    fn warn(&self, builder: &mut Builder) {
+        let warnings = &mut builder.map.warnings;
+        if self.lights > 0 {
+            warnings.push(format!(
+                "no junction's controller switches {} signals: each arm of their junctions is a group of its own",
+                self.lights
+            ));
+        }
+        if self.lone > 0 {
+            warnings.push(format!(
+                "{} signals belong to no junction and have no controller in one: each is its own group",
+                self.lone
+            ));
+        }
+    }
 }
 
 /// Junction and group of each signal that a junction's controller switches.
@@ -85,21 +175,7 @@ fn groups<'a>(builder: &Builder<'a>) -> Result<BTreeMap<&'a str, (usize, usize)>
 }
 
 fn add_stop_lines(builder: &mut Builder, road_index: usize, signal: &SignalElement, index: usize) {
-    let road = &builder.document.roads[road_index];
-    let section_index = road.section_at(signal.s_m);
-    for lane in &road.sections[section_index].lanes {
-        let orientation_fits = match signal.orientation {
-            Orientation::Along => road.runs_along(lane.id),
-            Orientation::Against => !road.runs_along(lane.id),
-            Orientation::Both => true,
-        };
-        let valid = signal.validity.is_empty()
-            || signal.validity.iter().any(|(from, to)| (*from..=*to).contains(&lane.id));
-        if !orientation_fits || !valid {
-            continue;
-        }
-        let Some(lane_index) = builder.lane_index(road_index, section_index, lane.id) else { continue };
-        let station_m = builder.map.lane(lane_index).station_of(signal.s_m);
+    for (lane_index, station_m) in lanes_of(builder, road_index, signal) {
         let same_light = |other: &StopLine| {
             let (a, b) = (&builder.map.signals[other.signal], &builder.map.signals[index]);
             let same_group = a.junction.is_some() && (a.junction, a.group) == (b.junction, b.group);
@@ -109,6 +185,24 @@ fn add_stop_lines(builder: &mut Builder, road_index: usize, signal: &SignalEleme
             builder.map.lanes[lane_index.0].stop_lines.push(StopLine { station_m, signal: index });
         }
     }
+}
+
+/// The lanes that a signal holds for, with its station on them, m.
+fn lanes_of(builder: &Builder, road_index: usize, signal: &SignalElement) -> Vec<(LaneIndex, f64)> {
+    let road = &builder.document.roads[road_index];
+    let section_index = road.section_at(signal.s_m);
+    let held = road.sections[section_index].lanes.iter().filter(|lane| {
+        let orientation_fits = match signal.orientation {
+            Orientation::Along => road.runs_along(lane.id),
+            Orientation::Against => !road.runs_along(lane.id),
+            Orientation::Both => true,
+        };
+        let valid = signal.validity.is_empty()
+            || signal.validity.iter().any(|(from, to)| (*from..=*to).contains(&lane.id));
+        orientation_fits && valid
+    });
+    let indices = held.filter_map(|lane| builder.lane_index(road_index, section_index, lane.id));
+    indices.map(|index| (index, builder.map.lane(index).station_of(signal.s_m))).collect()
 }
 
 /// Adds all crosswalks, with their corners in the plane.

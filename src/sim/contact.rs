@@ -23,7 +23,9 @@ pub(super) struct Party {
 pub(super) fn meet(ego: &Party, ego_speed_mps: f64, obstacle: &Party, id: u32, tick: u64) -> Option<Contact> {
     let first = first_contact(&ego.sweep, &obstacle.sweep)?;
     let ego_pose = ego.sweep.at(first.fraction).pose;
-    let closing_mps = (ego.velocity_mps - obstacle.velocity_mps).dot(&first.normal);
+    // Of the points that meet: a corner that swings out closes a gap, too.
+    let rate_m = |party: &Party| party.sweep.rate_m(first.fraction, first.point);
+    let closing_mps = (rate_m(ego) - rate_m(obstacle)).dot(&first.normal) / DT_S;
     Some(Contact {
         time_s: (tick as f64 + first.fraction) * DT_S,
         obstacle: id,

@@ -228,6 +228,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
+    use crate::sim::environment::friction;
 
     const DT_S: f64 = 0.02;
 
@@ -250,6 +251,43 @@ mod tests {
             let found_m = stopping_m(speed_mps, friction);
             let lag_m = found_m - braking_m;
             assert!((0.2..0.25 * speed_mps).contains(&lag_m), "μ {friction}: {found_m} m");
+        }
+    }
+
+    /// The calibration of stopping distances: 30, 50 and 70 km/h on a dry, a wet (0.2 mm) and a flooded
+    /// (2 mm) road, against ∫ v / min(6, μ(v) g) dv and a lag of at most a quarter of a second.
+    #[test]
+    fn stopping_distance_follows_speed_and_water() {
+        let expected_m = |speed_mps: f64, water_mm: f64| {
+            let slices = 1000;
+            let dv_mps = speed_mps / f64::from(slices);
+            let slice_m = |slice| {
+                let v_mps = (f64::from(slice) + 0.5) * dv_mps;
+                v_mps * dv_mps / (friction(water_mm, v_mps) * GRAVITY_MPS2).min(6.0)
+            };
+            (0..slices).map(slice_m).sum::<f64>()
+        };
+        let mut last_m = 0.0;
+        for (speed_kmph, table_m) in
+            [(30.0, [5.8, 5.8, 7.1]), (50.0, [16.1, 16.1, 19.7]), (70.0, [31.5, 31.5, 45.2])]
+        {
+            let speed_mps = speed_kmph / 3.6;
+            for (water_mm, table_m) in [0.0, 0.2, 2.0].into_iter().zip(table_m) {
+                let braking_m = expected_m(speed_mps, water_mm);
+                assert!((braking_m - table_m).abs() < 0.1, "{speed_kmph} km/h, {water_mm} mm: {braking_m}");
+                let mut ego = Ego::new(Pose::new(0.0, 0.0, 0.0), speed_mps);
+                let control = Control { brake_pct: 100.0, ..Control::default() };
+                while ego.motion.speed_mps > 0.0 {
+                    ego.step(&control, friction(water_mm, ego.motion.speed_mps), DT_S);
+                }
+                let found_m = ego.motion.rear_axle.position.x;
+                assert!(
+                    (0.0..0.25 * speed_mps).contains(&(found_m - braking_m)),
+                    "{speed_kmph} km/h, {water_mm} mm: {found_m}"
+                );
+                assert!(found_m >= last_m - 1e-9 || water_mm == 0.0);
+                last_m = found_m;
+            }
         }
     }
 

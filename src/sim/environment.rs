@@ -1,6 +1,26 @@
-//! Light, weather and grip: what the levels of a scenario mean in physical units.
+//! Light, weather and grip: the **model card** of the physical world.
 //!
-//! Levels come from the language; the numbers behind them stand here, each with its source. Weather acts at once and everywhere: no drying, no drifting fog.
+//! Levels come from the language; the numbers behind them stand here, and here it says where those
+//! come from that stand elsewhere. "Ours" is said of what no source gives.
+//!
+//! | effect | model | source | where |
+//! |---|---|---|---|
+//! | rain | 2.5, 10, 50 mm/h | bounds of light, moderate, violent rain (WMO) | here |
+//! | fog | meteorological optical range 500, 150, 50 m | classes fog < 1000, thick < 200, dense < 50 m | here |
+//! | wetness | 0.1, 0.5, 1.5 mm of water | ours, within the columns of the friction table | here |
+//! | water on the road | rain fills, drains with [`DRAIN_S`], dries with [`DRYING_MMPH`] | ours, from the two rows above | here |
+//! | friction | new tyres at 50, 90, 130 km/h and 0, 0.2, 1, 2 mm | Bosch, Automotive Handbook; between its columns the mapping 0.1, 0.5, 1.5 mm to 0.70, 0.60, 0.52 is ours | here |
+//! | braking | min(brakes, μ·g), forces inside the friction circle | physics | `ego`, `mover` |
+//! | light | 0.8, 1, 0.15 of a camera's light | ours: a low sun costs contrast, street lamps leave the range of low beams | here |
+//! | sight through fog and rain | R·e^(σR) = R₀, σ = 2.996 / MOR (Koschmieder) + 1.076·R^0.67 dB/km (Carbonneau) | as named | `ads::modular::perception` |
+//! | detection by class, position noise | ranges of LiDAR and camera for cars and pedestrians, noise per metre | `scenarios/ads/default.yaml` | `ads::modular::perception` |
+//! | night | camera ranges fall with the light, LiDAR's do not | low beams: 35 to 50 % on pedestrians, 70 % on lit vehicles | `ads::modular::perception` |
+//! | localisation | error grows to a factor at 50 mm/h or 1.5 mm | LiDAR map matching, ×1.5 to 3 | `ads::modular::localization` |
+//! | line of sight | rays against outlines; low bodies hide the lower part | geometry | `sense` |
+//!
+//! The level that an action sets is where the water on the road begins; from then on it follows the rain.
+//! Left out: temperature, ice, wind, spray, drifting fog, glare, puddles that lie in places: the water
+//! is the same everywhere.
 
 use crate::model::vocabulary::Level;
 use crate::model::vocabulary::Phenomenon;
@@ -19,59 +39,172 @@ const LIGHT: [f64; 3] = [0.8, 1.0, 0.15];
 const RAIN_MMPH: [f64; 4] = [0.0, 2.5, 10.0, 50.0];
 /// Meteorological optical range, m: within the classes fog (< 1000), thick (< 200) and dense (< 50).
 const VISIBILITY_M: [f64; 4] = [10_000.0, 500.0, 150.0, 50.0];
-/// Water on the road, mm. Ours, spaced like the friction table's columns.
+/// Water on the road, mm, with which a level of wetness begins. Ours, spaced like the friction table's
+/// columns.
 const WATER_MM: [f64; 4] = [0.0, 0.1, 0.5, 1.5];
-/// Friction at most 50 km/h for these depths of water, between new and worn tyres of Bosch's
-/// Automotive Handbook.
-const FRICTION: [f64; 4] = [0.85, 0.70, 0.60, 0.52];
 
-/// Time of day and the levels of the three phenomena.
+/// Time in which a road drains to a third, s. Under steady rain the depth tends to rain times this:
+/// 0.1 mm at 2.5 mm/h, 0.4 mm at 10 mm/h and 2 mm, which are puddles, at 50 mm/h; so light rain keeps
+/// the wetness of its own level (0.1 mm / 2.5 mm/h = 144 s), and the other two stay near theirs.
+const DRAIN_S: f64 = 144.0;
+/// What evaporates from a wet road, mm/h. Ours: open water loses 3 to 5 mm on a summer's day.
+const DRYING_MMPH: f64 = 0.3;
+const S_PER_H: f64 = 3600.0;
+
+/// Depths of water of the columns of [`FRICTION`], mm.
+const DEPTHS_MM: [f64; 7] = [0.0, 0.1, 0.2, 0.5, 1.0, 1.5, 2.0];
+/// Speeds of its rows, m/s.
+const SPEEDS_MPS: [f64; 3] = [50.0 / 3.6, 90.0 / 3.6, 130.0 / 3.6];
+/// Friction of new tyres. At 0, 0.2, 1 and 2 mm Bosch's table; at 50 km/h also our mapping of the three
+/// levels, elsewhere what lies between the columns.
+const FRICTION: [[f64; 7]; 3] = [
+    [0.85, 0.70, 0.65, 0.60, 0.55, 0.52, 0.50],
+    [0.80, 0.70, 0.60, 0.4875, 0.30, 0.175, 0.05],
+    [0.75, 0.65, 0.55, 0.41875, 0.20, 0.10, 0.0],
+];
+/// Friction never falls below this: ice. A table that ends at 0 is of aquaplaning wheels, not of braking.
+const FRICTION_MIN: f64 = 0.05;
+
+/// Time of day, the levels of the three phenomena, and the water that came of them.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Environment {
     pub time: TimeOfDay,
     pub rain: Level,
     pub fog: Level,
     pub wetness: Level,
+    water_mm: f64,
 }
 
 impl Environment {
+    /// A road as wet as the wetter of two levels makes it: an episode does not begin with the first
+    /// drop.
+    pub fn new(time: TimeOfDay, [rain, fog, wetness]: [Level; 3]) -> Environment {
+        Environment { time, rain, fog, wetness, water_mm: WATER_MM[wetness.max(rain) as usize] }
+    }
+
     pub fn set(&mut self, phenomenon: Phenomenon, level: Level) {
         match phenomenon {
             Phenomenon::Rain => self.rain = level,
             Phenomenon::Fog => self.fog = level,
-            Phenomenon::Wetness => self.wetness = level,
+            Phenomenon::Wetness => {
+                self.wetness = level;
+                self.water_mm = WATER_MM[level as usize];
+            }
         }
     }
 
-    /// Rain wets the road as much as the wetness of its own level: a dry road in a downpour does
-    /// not exist, even where a scenario names the rain alone.
-    pub fn conditions(&self) -> Conditions {
-        let wet = self.wetness.max(self.rain) as usize;
+    /// Lets it rain, drain and dry for a while that is short against [`DRAIN_S`].
+    pub fn pass(&mut self, time_s: f64) {
+        let rain_mmph = RAIN_MMPH[self.rain as usize];
+        let gain_mmps = (rain_mmph - DRYING_MMPH) / S_PER_H - self.water_mm / DRAIN_S;
+        self.water_mm = (self.water_mm + gain_mmps * time_s).max(0.0);
+    }
+
+    pub fn water_mm(&self) -> f64 {
+        self.water_mm
+    }
+
+    /// What holds for an ego vehicle at a speed.
+    pub fn conditions(&self, ego_mps: f64) -> Conditions {
         Conditions {
             light: LIGHT[self.time as usize],
             rain_mmph: RAIN_MMPH[self.rain as usize],
             visibility_m: VISIBILITY_M[self.fog as usize],
-            water_mm: WATER_MM[wet],
-            friction: FRICTION[wet],
+            water_mm: self.water_mm,
+            friction: friction(self.water_mm, ego_mps),
         }
     }
+
+    pub fn trace(&self, sink: &mut dyn FnMut(u64)) {
+        for word in [self.time as u64, self.rain as u64, self.fog as u64, self.wetness as u64] {
+            sink(word);
+        }
+        sink(self.water_mm.to_bits());
+    }
+}
+
+/// Coefficient of friction of a tyre on a road with so much water, at a speed: the table, linear
+/// between its entries and held beyond its ends.
+pub(super) fn friction(water_mm: f64, speed_mps: f64) -> f64 {
+    let (column, right) = place(&DEPTHS_MM, water_mm);
+    let (row, below) = place(&SPEEDS_MPS, speed_mps);
+    let along = |row: &[f64; 7]| row[column] + (row[column + 1] - row[column]) * right;
+    let (slow, fast) = (along(&FRICTION[row]), along(&FRICTION[row + 1]));
+    (slow + (fast - slow) * below).max(FRICTION_MIN)
+}
+
+/// The entry at or before a value in a rising list, and how far it lies towards the next, in `[0, 1]`.
+fn place(entries: &[f64], value: f64) -> (usize, f64) {
+    let after = entries.partition_point(|entry| *entry <= value).clamp(1, entries.len() - 1);
+    let (from, to) = (entries[after - 1], entries[after]);
+    (after - 1, ((value - from) / (to - from)).clamp(0.0, 1.0))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    fn after(mut environment: Environment, time_s: u32) -> f64 {
+        for _ in 0..time_s * 10 {
+            environment.pass(0.1);
+        }
+        environment.conditions(0.0).water_mm
+    }
+
+    fn noon(levels: [Level; 3]) -> Environment {
+        Environment::new(TimeOfDay::Noon, levels)
+    }
+
     #[test]
-    fn rain_wets_and_fog_hides() {
-        let mut environment =
-            Environment { time: TimeOfDay::Noon, rain: Level::None, fog: Level::None, wetness: Level::Light };
-        assert_eq!(environment.conditions().friction, 0.70);
+    fn levels_mean_what_the_table_says() {
+        let mut environment = noon([Level::None, Level::None, Level::Light]);
+        assert_eq!(environment.conditions(0.0).friction, 0.70);
         environment.set(Phenomenon::Rain, Level::High);
+        environment.set(Phenomenon::Wetness, Level::High);
         environment.set(Phenomenon::Fog, Level::Moderate);
-        let conditions = environment.conditions();
+        let conditions = environment.conditions(0.0);
         assert_eq!((conditions.friction, conditions.rain_mmph, conditions.visibility_m), (0.52, 50.0, 150.0));
         environment.set(Phenomenon::Rain, Level::None);
         environment.set(Phenomenon::Wetness, Level::None);
-        assert_eq!(environment.conditions().friction, 0.85);
+        assert_eq!(environment.conditions(0.0).friction, 0.85);
+    }
+
+    #[test]
+    fn friction_is_the_handbooks() {
+        for (water_mm, frictions) in [
+            (0.0, [0.85, 0.80, 0.75]),
+            (0.2, [0.65, 0.60, 0.55]),
+            (1.0, [0.55, 0.30, 0.20]),
+            (2.0, [0.50, 0.05, 0.05]),
+        ] {
+            for (speed_kmph, expected) in [50.0, 90.0, 130.0].into_iter().zip(frictions) {
+                assert!(
+                    (friction(water_mm, speed_kmph / 3.6) - expected).abs() < 1e-9,
+                    "{water_mm} {speed_kmph}"
+                );
+            }
+        }
+        assert_eq!(friction(9.0, 0.0), 0.50);
+    }
+
+    #[test]
+    fn rain_wets_and_a_road_dries() {
+        use Level::High;
+        use Level::Light;
+        use Level::Moderate;
+        use Level::None;
+        // Rain alone fills the road in minutes, up to puddles.
+        let mut downpour = noon([None; 3]);
+        downpour.set(Phenomenon::Rain, High);
+        assert!((after(downpour, 60) - 0.67).abs() < 0.02, "{}", after(downpour, 60));
+        assert!((after(downpour, 1500) - 1.99).abs() < 0.02);
+        // Each rain keeps about the wetness of its own level.
+        for (level, water_mm) in [(Light, 0.09), (Moderate, 0.39), (High, 1.99)] {
+            assert!((after(noon([level, None, level]), 1500) - water_mm).abs() < 0.01, "{level:?}");
+        }
+        // A wet road under a dry sky.
+        let wet = noon([None, None, High]);
+        assert!((after(wet, 144) - 1.5 / core::f64::consts::E).abs() < 0.02);
+        assert_eq!(after(wet, 1500), 0.0);
     }
 }

@@ -1,10 +1,12 @@
 //! The world: ego vehicle, other road users, weather, light, signals, contacts.
 
+mod ambient;
 mod body;
 mod contact;
 mod ego;
 mod environment;
 mod following;
+mod junction;
 mod mover;
 mod npc;
 mod pedestrian;
@@ -33,6 +35,7 @@ pub use sense::SignalColour;
 pub use world::Contact;
 pub use world::DT_S;
 pub use world::ENGINE;
+pub use world::Incident;
 pub use world::Obstacle;
 pub use world::Scene;
 pub use world::Start;

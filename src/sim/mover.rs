@@ -7,6 +7,7 @@ use crate::geometry::Vec2;
 
 use super::body::BodyParameters;
 use super::environment::GRAVITY_MPS2;
+use super::environment::friction;
 use super::npc::Driver;
 use super::pedestrian::Walker;
 use super::sense::EgoMotion;
@@ -15,7 +16,7 @@ use super::world::DT_S;
 use super::world::Obstacle;
 use super::world::Scene;
 
-/// How long somebody who touched the ego vehicle stays where they came to rest, s.
+/// How long somebody who touched anybody stays where they came to rest, s.
 const WRECK_S: f64 = 2.0;
 
 /// The world around a mover during one tick.
@@ -27,9 +28,14 @@ pub(super) struct Around<'a> {
     pub ego_velocity_mps: Vec2,
     pub ego_station_m: f64,
     pub obstacles: &'a [Obstacle],
+    /// What moves the first of them, and those after the one that moves just now.
+    pub movers: [&'a [Mover]; 2],
     pub signals: &'a SignalClock,
     pub tick: u64,
+    /// Under the ego vehicle.
     pub friction: f64,
+    pub water_mm: f64,
+    pub visibility_m: f64,
     /// Of the choices of other road users.
     pub seed: u64,
 }
@@ -42,9 +48,27 @@ impl Around<'_> {
             .chain(obstacles.map(|obstacle| (&obstacle.outline, obstacle.velocity_mps)))
     }
 
-    /// The hardest braking of a body on this road, m/s².
-    pub fn braking_mps2(&self, size: &BodyParameters) -> f64 {
-        size.deceleration_mps2_max.min(self.friction * GRAVITY_MPS2)
+    /// Outlines and velocities of all vehicles, the ego vehicle first.
+    pub fn vehicles(&self) -> impl Iterator<Item = (&OrientedBox, Vec2)> {
+        let vehicles = self.obstacles.iter().filter(|obstacle| obstacle.body.is_vehicle());
+        core::iter::once((self.ego_outline, self.ego_velocity_mps))
+            .chain(vehicles.map(|obstacle| (&obstacle.outline, obstacle.velocity_mps)))
+    }
+
+    /// Every driver but one, each with its obstacle, wrecks left out.
+    pub fn drivers(&self, except: u32) -> impl Iterator<Item = (&Obstacle, &Driver)> {
+        let [before, after] = self.movers;
+        let rest = self.obstacles.get(before.len() + 1..).unwrap_or_default();
+        let all = self.obstacles.iter().zip(before).chain(rest.iter().zip(after));
+        all.filter_map(move |(obstacle, mover)| match &mover.motion {
+            Motion::Drive(driver) if obstacle.id != except && !mover.is_wreck() => Some((obstacle, driver)),
+            Motion::Drive(_) | Motion::Walk(_) | Motion::Stand => None,
+        })
+    }
+
+    /// The hardest braking of a body at a speed on this road, m/s².
+    pub fn braking_mps2(&self, size: &BodyParameters, speed_mps: f64) -> f64 {
+        size.deceleration_mps2_max.min(friction(self.water_mm, speed_mps) * GRAVITY_MPS2)
     }
 }
 
@@ -55,6 +79,8 @@ pub(super) struct Mover {
     pub motion: Motion,
     /// Whether the ego vehicle and it have touched, whoever ran into whom.
     pub touched: bool,
+    /// Whether it ran into another obstacle or the other into it. It stands where that happened.
+    pub crashed: bool,
     /// Ticks at rest since then.
     rest_ticks: u32,
     /// Part of it that the ego vehicle's sensors saw when they last looked.
@@ -87,22 +113,28 @@ impl Moved {
 
 impl Mover {
     pub fn new(size: BodyParameters, motion: Motion) -> Mover {
-        Mover { size, motion, touched: false, rest_ticks: 0, visible_fraction: 1.0 }
+        Mover { size, motion, touched: false, crashed: false, rest_ticks: 0, visible_fraction: 1.0 }
+    }
+
+    /// Whether it does nothing any more but come to rest.
+    pub fn is_wreck(&self) -> bool {
+        self.touched || self.crashed
     }
 
     /// One tick of the obstacle `this`; `None` if it leaves the world.
     pub fn step(&mut self, this: &Obstacle, around: &Around) -> Option<Moved> {
-        if self.touched && this.velocity_mps == Vec2::zeros() {
+        if self.is_wreck() && this.velocity_mps == Vec2::zeros() {
             self.rest_ticks += 1;
             if f64::from(self.rest_ticks) * DT_S >= WRECK_S {
                 return None;
             }
         }
-        let rest = Moved::at_rest(this.outline.pose);
+        let rest = Moved { lane_heading_rad: this.lane_heading_rad, ..Moved::at_rest(this.outline.pose) };
         match &mut self.motion {
+            _ if self.crashed => Some(rest),
             Motion::Drive(driver) => driver.step(this, &self.size, self.touched, around),
             Motion::Walk(_) if self.touched => Some(rest),
-            Motion::Walk(walker) => walker.step(around.tick),
+            Motion::Walk(walker) => walker.step(this, around),
             Motion::Stand => Some(rest),
         }
     }
@@ -115,8 +147,17 @@ impl Mover {
         }
     }
 
+    /// It and another obstacle touched: both stand from now on.
+    pub fn crash(&mut self) {
+        self.crashed = true;
+        if let Motion::Drive(driver) = &mut self.motion {
+            driver.speed_mps = 0.0;
+        }
+    }
+
     pub fn trace(&self, sink: &mut dyn FnMut(u64)) {
         sink(u64::from(self.touched));
+        sink(u64::from(self.crashed));
         sink(u64::from(self.rest_ticks));
         sink(self.visible_fraction.to_bits());
         match &self.motion {

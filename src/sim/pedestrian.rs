@@ -1,17 +1,76 @@
 //! Pedestrians who cross the road: wait, walk straight over, stay a moment, leave.
 //!
-//! They look at nothing and nobody, as in the published package; one who is hit stops (see `mover`).
+//! Waiting 1 s at the kerb and walking on whatever comes is the published package's pedestrian, and
+//! still the most frequent of four manners, drawn once from the pedestrian's own stream:
+//!
+//! | share | manner | what it does |
+//! |---|---|---|
+//! | 55 % | steady | walks on at its pace, whoever comes |
+//! | 15 % | hesitant | stays at the kerb while a vehicle would be there within 3 s, at most 3 s longer |
+//! | 15 % | startled | stops once, for 1 to 2 s, when a vehicle would reach it within 1.5 s |
+//! | 15 % | hurried | runs, at most 8 km/h (Euro NCAP's running adult), while one would within 3 s |
+//!
+//! The shares and times are ours; no source counts them. All of them cross in the end, and nobody
+//! walks into the side of a vehicle: they wait before it, pass each other on the right, and leave after
+//! 10 s without a way on. One who is hit stops (see `mover`).
 
+use crate::geometry::OrientedBox;
 use crate::geometry::Pose;
+use crate::geometry::Vec2;
+use crate::geometry::distance_m;
+use crate::rng;
+use crate::rng::Rng;
 
+use super::mover::Around;
 use super::mover::Moved;
+use super::sense::FRAME_TICKS;
 use super::world::DT_S;
+use super::world::Obstacle;
 
 /// At the kerb before setting out, s (published package).
 const WAIT_S: f64 = 1.0;
-
 /// On the other side before leaving, s.
 const STAY_S: f64 = 2.0;
+/// Running adult of Euro NCAP (8 km/h), m/s.
+const RUN_MPS_MAX: f64 = 8.0 / 3.6;
+/// Of the walking pace, when in a hurry. Ours.
+const HURRY: f64 = 1.6;
+/// A vehicle that would be there sooner is close: for those at the kerb or in a hurry, s.
+const CLOSE_S: f64 = 3.0;
+/// The same for those who are startled, s: perception and reaction of a driver take 1.15 s.
+const STARTLE_S: f64 = 1.5;
+/// Beside its flank, a vehicle's way is so much wider for those who look at it, m.
+const MARGIN_M: f64 = 1.0;
+/// How far before their feet they look for whoever stands there, m.
+const STEP_M: f64 = 0.6;
+/// Room that they leave to whatever that is, m.
+const ROOM_M: f64 = 0.25;
+/// From here on others on foot are passed, m, on the right and so far aside, m, at this speed, m/s.
+const MEET_M: f64 = 3.0;
+const ASIDE_M: f64 = 0.9;
+const ASIDE_MPS: f64 = 0.7;
+/// Who cannot go on for so long leaves, s.
+const GIVE_UP_S: f64 = 10.0;
+
+/// What a pedestrian does when a vehicle comes near.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Manner {
+    Steady,
+    Hesitant,
+    Startled,
+    Hurried,
+}
+
+impl Manner {
+    fn draw(rng: &mut Rng) -> Manner {
+        match rng::below(rng, 100) {
+            0..55 => Manner::Steady,
+            55..70 => Manner::Hesitant,
+            70..85 => Manner::Startled,
+            _ => Manner::Hurried,
+        }
+    }
+}
 
 #[derive(Debug, Clone)]
 pub(super) struct Walker {
@@ -19,51 +78,191 @@ pub(super) struct Walker {
     from: Pose,
     way_m: f64,
     speed_mps: f64,
-    /// Tick of the first step.
+    manner: Manner,
+    /// How long a startled one stops, ticks; 0 once it has.
+    startle_ticks: u32,
+    /// Done so far, m, and to the left of the straight line, m.
+    walked_m: f64,
+    aside_m: f64,
+    /// Pace and side that it wants, as of its last look.
+    pace_mps: f64,
+    wants_aside_m: f64,
+    /// Tick of the first step, moved on by whatever holds it back.
     begins_tick: u64,
+    /// Latest tick of the first step.
+    begins_tick_max: u64,
+    /// Ticks without a way on, and at the other side.
+    stuck_ticks: u32,
+    stayed_ticks: u32,
 }
 
 impl Walker {
-    pub fn new(from: Pose, way_m: f64, speed_mps: f64, spawn_tick: u64) -> Walker {
-        Walker { from, way_m, speed_mps, begins_tick: spawn_tick + (WAIT_S / DT_S + 0.5) as u64 }
+    /// Somebody who is to walk `way_m` ahead from a pose; the manner is drawn.
+    pub fn new(from: Pose, way_m: f64, speed_mps: f64, spawn_tick: u64, rng: &mut Rng) -> Walker {
+        let begins_tick = spawn_tick + ticks(WAIT_S);
+        let manner = Manner::draw(rng);
+        Walker {
+            from,
+            way_m,
+            speed_mps,
+            manner,
+            startle_ticks: ticks(rng::between(rng, 1.0, 2.0)) as u32,
+            walked_m: 0.0,
+            aside_m: 0.0,
+            pace_mps: speed_mps,
+            wants_aside_m: 0.0,
+            begins_tick,
+            begins_tick_max: begins_tick + ticks(CLOSE_S),
+            stuck_ticks: 0,
+            stayed_ticks: 0,
+        }
     }
 
     /// Where it is at the end of a tick; `None` once it has left.
-    pub fn step(&self, tick: u64) -> Option<Moved> {
-        let walking_s = (tick + 1).saturating_sub(self.begins_tick) as f64 * DT_S;
-        let walked_m = self.speed_mps * walking_s;
-        if walked_m >= self.way_m + self.speed_mps * STAY_S {
-            return None;
+    pub fn step(&mut self, this: &Obstacle, around: &Around) -> Option<Moved> {
+        if (around.tick + u64::from(this.id)).is_multiple_of(FRAME_TICKS) {
+            self.look(this, around);
         }
-        let walks = walked_m > 0.0 && walked_m < self.way_m;
-        let rest = Moved::at_rest(self.from.offset(walked_m.min(self.way_m), 0.0));
-        Some(if walks { Moved { velocity_mps: self.from.forward() * self.speed_mps, ..rest } } else { rest })
+        if self.walked_m >= self.way_m {
+            self.stayed_ticks += 1;
+            return (f64::from(self.stayed_ticks) * DT_S < STAY_S)
+                .then_some(Moved::at_rest(this.outline.pose));
+        }
+        if around.tick < self.begins_tick {
+            return Some(Moved::at_rest(this.outline.pose));
+        }
+        if self.pace_mps == 0.0 {
+            self.stuck_ticks += 1;
+            return (f64::from(self.stuck_ticks) * DT_S < GIVE_UP_S)
+                .then_some(Moved::at_rest(this.outline.pose));
+        }
+        self.stuck_ticks = 0;
+        self.walked_m = (self.walked_m + self.pace_mps * DT_S).min(self.way_m);
+        let aside_m = (self.wants_aside_m - self.aside_m).clamp(-ASIDE_MPS * DT_S, ASIDE_MPS * DT_S);
+        self.aside_m += aside_m;
+        let pose = self.from.offset(self.walked_m, self.aside_m);
+        let velocity_mps = (pose.position - this.outline.pose.position) / DT_S;
+        Some(Moved { pose, lane_heading_rad: pose.heading_rad, velocity_mps })
     }
 
     pub fn trace(&self, sink: &mut dyn FnMut(u64)) {
-        for value in
-            [self.from.position.x, self.from.position.y, self.from.heading_rad, self.way_m, self.speed_mps]
-        {
+        for value in [
+            self.from.position.x,
+            self.from.position.y,
+            self.from.heading_rad,
+            self.way_m,
+            self.speed_mps,
+            self.walked_m,
+            self.aside_m,
+            self.pace_mps,
+            self.wants_aside_m,
+        ] {
             sink(value.to_bits());
         }
+        for count in [self.startle_ticks, self.stuck_ticks, self.stayed_ticks] {
+            sink(u64::from(count));
+        }
         sink(self.begins_tick);
+        sink(self.begins_tick_max);
+        sink(self.manner as u64);
     }
+
+    /// Ten times a second: who comes, who is in the way, and what to do about it.
+    fn look(&mut self, this: &Obstacle, around: &Around) {
+        let waits = around.tick < self.begins_tick && self.walked_m == 0.0;
+        let soonest_s = soonest_s(&this.outline, around);
+        if waits {
+            let held_to = (around.tick + FRAME_TICKS + 1).min(self.begins_tick_max);
+            if self.manner == Manner::Hesitant && soonest_s < CLOSE_S && held_to > self.begins_tick {
+                self.begins_tick = held_to;
+            }
+            return;
+        }
+        self.wants_aside_m = if self.meets_somebody(this, around) { -ASIDE_M } else { 0.0 };
+        let startled = self.manner == Manner::Startled && self.startle_ticks > 0;
+        if self.is_blocked(this, around) {
+            self.pace_mps = 0.0;
+        } else if startled && (soonest_s < STARTLE_S || self.pace_mps == 0.0) {
+            self.startle_ticks = self.startle_ticks.saturating_sub(FRAME_TICKS as u32);
+            self.pace_mps = 0.0;
+        } else if self.manner == Manner::Hurried && soonest_s < CLOSE_S {
+            self.pace_mps = (self.speed_mps * HURRY).min(RUN_MPS_MAX).max(self.speed_mps);
+        } else {
+            self.pace_mps = self.speed_mps;
+        }
+    }
+
+    /// Whether something stands or passes right before its feet.
+    fn is_blocked(&self, this: &Obstacle, around: &Around) -> bool {
+        let next = OrientedBox { pose: this.outline.pose.offset(STEP_M, 0.0), ..this.outline };
+        around.others(this.id).any(|(outline, _)| {
+            let reach_m = outline.half_length_m + outline.half_width_m + 2.0;
+            let away = outline.pose.position - next.pose.position;
+            away.norm_squared() < reach_m * reach_m && distance_m(&next, outline) < ROOM_M
+        })
+    }
+
+    /// Whether somebody else on foot is ahead on about the same line.
+    fn meets_somebody(&self, this: &Obstacle, around: &Around) -> bool {
+        let others = around.obstacles.iter().filter(|other| other.id != this.id && !other.body.is_vehicle());
+        others.into_iter().any(|other| {
+            let there = self.from.to_local(other.outline.pose.position);
+            (-1.0..MEET_M).contains(&(there.x - self.walked_m)) && there.y.abs() < 2.0 * ASIDE_M
+        })
+    }
+}
+
+/// Time until the first vehicle would reach an outline if all go on as they do, s.
+fn soonest_s(outline: &OrientedBox, around: &Around) -> f64 {
+    around.vehicles().fold(f64::INFINITY, |soonest_s, (vehicle, velocity_mps)| {
+        soonest_s.min(arrival_s(outline, vehicle, velocity_mps))
+    })
+}
+
+fn arrival_s(outline: &OrientedBox, vehicle: &OrientedBox, velocity_mps: Vec2) -> f64 {
+    let away = outline.pose.position - vehicle.pose.position;
+    let speed_mps = velocity_mps.norm();
+    if speed_mps < 1.0 || away.norm_squared() > 60.0 * 60.0 {
+        return f64::INFINITY;
+    }
+    let forward = velocity_mps / speed_mps;
+    let ahead_m = forward.dot(&away) - vehicle.half_length_m - outline.half_length_m;
+    let aside_m = (forward.x * away.y - forward.y * away.x).abs();
+    if ahead_m < 0.0 || aside_m > vehicle.half_width_m + outline.half_width_m + MARGIN_M {
+        return f64::INFINITY;
+    }
+    ahead_m / speed_mps
+}
+
+fn ticks(time_s: f64) -> u64 {
+    (time_s / DT_S + 0.5) as u64
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::Vec2;
+    use crate::rng::Stream;
 
     #[test]
-    fn waits_walks_stays_and_leaves() {
-        let walker = Walker::new(Pose::new(0.0, 0.0, 0.0), 10.0, 1.25, 100);
-        let x_m = |time_s: f64| walker.step(100 + (time_s / DT_S) as u64).map(|moved| moved.pose.position.x);
-        assert_eq!(x_m(0.9), Some(0.0));
-        assert!((x_m(5.0).expect("on its way") - 5.0).abs() < 0.05);
-        assert_eq!(x_m(10.9), Some(10.0));
-        assert_eq!(x_m(11.1), None);
-        let standing = walker.step(100).expect("it waits");
-        assert_eq!(standing.velocity_mps, Vec2::zeros());
+    fn manners_come_in_their_shares() {
+        let mut rng = rng::stream(3, Stream::Traffic, 0);
+        let mut found = [0; 4];
+        for _ in 0..2000 {
+            found[Manner::draw(&mut rng) as usize] += 1;
+        }
+        for (count, share) in found.iter().zip([0.55, 0.15, 0.15, 0.15]) {
+            assert!((f64::from(*count) / 2000.0 - share).abs() < 0.03, "{found:?}");
+        }
+    }
+
+    #[test]
+    fn who_comes_is_told_from_who_passes() {
+        let walker = OrientedBox::new(Pose::new(0.0, 0.0, 0.0), 0.5, 0.5);
+        let car = |x_m, y_m| OrientedBox::new(Pose::new(x_m, y_m, 0.0), 4.0, 2.0);
+        let speed = Vec2::new(10.0, 0.0);
+        assert!((arrival_s(&walker, &car(-22.25, 0.0), speed) - 2.0).abs() < 1e-9);
+        assert_eq!(arrival_s(&walker, &car(-22.0, 4.0), speed), f64::INFINITY);
+        assert_eq!(arrival_s(&walker, &car(22.0, 0.0), speed), f64::INFINITY);
+        assert_eq!(arrival_s(&walker, &car(-22.0, 0.0), Vec2::zeros()), f64::INFINITY);
     }
 }

@@ -29,6 +29,7 @@ use super::mover::Around;
 use super::mover::Motion;
 use super::mover::Moved;
 use super::mover::Mover;
+use super::npc::Cruise;
 use super::npc::Driver;
 use super::npc::Manoeuvre;
 use super::npc::Towards;
@@ -37,7 +38,9 @@ use super::npc::choices;
 use super::npc::lane_beside;
 use super::pedestrian::Walker;
 use super::safety;
+use super::sense::RANGE_M;
 use super::sense::SignalColour;
+use super::sense::visible_fraction;
 use super::way::Way;
 use super::world::DT_S;
 use super::world::Obstacle;
@@ -109,22 +112,39 @@ fn check(request: &SpawnRequest) -> Result<(), String> {
 /// The distances that rules ask for.
 ///
 /// The gap at the spawn is between the outlines. The gap that a careful driver needs (see `safety`) is
-/// to slow down to one ahead, or to rest for one who crosses, walks or stands; for one from behind it
-/// is what the newcomer needs to slow down to the ego vehicle. One that comes the other way stays in
-/// its own lanes and needs none, unless its way crosses the route at a junction.
+/// to slow down to one ahead, or to rest for one who crosses, walks or stands: their stopping zone.
+/// For one from behind it is what the newcomer needs to slow down to the ego vehicle. One that comes
+/// the other way stays in its own lanes and needs none, unless its way crosses the route at a junction.
+///
+/// Nobody but those from behind appears in plain view nearer than the way that the ego vehicle drives
+/// while a careful driver perceives and reacts, even if they would be no danger: who is in sight, and
+/// not hidden by others, fog or distance, did not come from nowhere.
 pub(super) fn facts(around: &Around, request: &SpawnRequest, placed: &Placed) -> SpawnFacts {
     let along_mps = around.ego_outline.pose.forward().dot(&placed.obstacle.velocity_mps);
     let (ego_mps, friction) = (around.ego.speed_mps, around.friction);
-    let safety_gap_m = match request.verb {
+    let braking_gap_m = match request.verb {
         Verb::DriveAhead => safety::behind_leader_m(ego_mps, along_mps, friction),
-        Verb::Overtake => safety::from_behind_m(along_mps, ego_mps, around.braking_mps2(&placed.mover.size)),
+        Verb::Overtake => {
+            let braking_mps2 = around.braking_mps2(&placed.mover.size, along_mps.max(0.0));
+            safety::from_behind_m(along_mps, ego_mps, braking_mps2)
+        }
         Verb::DriveOpposite if meets_route(around, &placed.mover) => {
             safety::oncoming_m(ego_mps, -along_mps, friction)
         }
         Verb::DriveOpposite => 0.0,
         Verb::CrossRoad | Verb::Walk | Verb::Stand => safety::behind_leader_m(ego_mps, 0.0, friction),
     };
-    SpawnFacts { spawn_gap_m: placed.obstacle.distance_m, safety_gap_m }
+    let spawn_gap_m = placed.obstacle.distance_m;
+    let is_behind = request.verb == Verb::Overtake;
+    let sight_m = RANGE_M.min(around.visibility_m);
+    let in_view = || {
+        let eye = around.ego_outline.pose.position;
+        spawn_gap_m < sight_m && visible_fraction(eye, &placed.obstacle, around.obstacles) > 0.0
+    };
+    let noticing_m = safety::noticing_m(ego_mps);
+    let is_sudden = !is_behind && noticing_m > braking_gap_m && in_view();
+    let safety_gap_m = if is_sudden { noticing_m } else { braking_gap_m };
+    SpawnFacts { spawn_gap_m, safety_gap_m }
 }
 
 /// Whether the way of a driver crosses or joins what the ego vehicle has before it.
@@ -164,7 +184,7 @@ fn finish(
 /// A newcomer must be able to brake for those before it. The ego vehicle is not among them: how near
 /// to it a newcomer may appear is for the rules of the space to say.
 fn check_way(around: &Around, driver: &Driver, size: &BodyParameters) -> Result<(), String> {
-    let braking_mps2 = around.braking_mps2(size);
+    let braking_mps2 = around.braking_mps2(size, driver.speed_mps);
     let blocked = around.obstacles.iter().any(|other| {
         driver.gap_to(size, &other.outline, other.velocity_mps).is_some_and(|(gap_m, speed_mps)| {
             let closing_mps = (driver.speed_mps - speed_mps).max(0.0);
@@ -196,7 +216,16 @@ fn on_foot(around: &Around, request: &SpawnRequest, size: BodyParameters, id: u3
         (facing(lane), Motion::Stand)
     } else {
         let from = facing(lane.offset(0.0, left_m));
-        (from, Motion::Walk(Walker::new(from, 2.0 * KERB_M, request.speed_mps, around.tick)))
+        (
+            from,
+            Motion::Walk(Walker::new(
+                from,
+                2.0 * KERB_M,
+                request.speed_mps,
+                around.tick,
+                &mut choices(around.seed, id, 0),
+            )),
+        )
     };
     let moved = Moved::at_rest(pose);
     finish(around, request, Mover::new(size, motion), id, moved)
@@ -233,8 +262,8 @@ fn drive_ahead(
     }
     let beside_ego = around.scene.route.path.pose_at(station_m).position;
     let station_m = around.scene.map.lane(lane).centre.project(beside_ego).station_m;
-    let way = Way::along(&around.scene.map, &[lane], &mut rng).ok_or("that lane leads nowhere")?;
-    Ok(Driver::new(Arc::new(way), station_m, request.speed_mps, plan, 1))
+    let way = Way::along(around.scene, &[lane], &mut rng).ok_or("that lane leads nowhere")?;
+    Ok(Driver::new(around.scene, Arc::new(way), station_m, Cruise::Commanded(request.speed_mps), plan, 1))
 }
 
 fn overtake(
@@ -269,8 +298,8 @@ fn overtake(
         station_m += map.lane(previous).centre.length_m();
         lanes.insert(0, previous);
     }
-    let way = Way::along(map, &lanes, &mut rng).ok_or("that lane leads nowhere")?;
-    Ok(Driver::new(Arc::new(way), station_m, request.speed_mps, plan, 1))
+    let way = Way::along(around.scene, &lanes, &mut rng).ok_or("that lane leads nowhere")?;
+    Ok(Driver::new(around.scene, Arc::new(way), station_m, Cruise::Commanded(request.speed_mps), plan, 1))
 }
 
 fn drive_opposite(
@@ -293,8 +322,8 @@ fn drive_opposite(
     };
     let beside_route = around.scene.route.path.pose_at(station_m).position;
     let station_m = map.lane(lane).centre.project(beside_route).station_m;
-    let way = Way::along(map, &[lane], &mut rng).ok_or("that lane leads nowhere")?;
-    Ok(Driver::new(Arc::new(way), station_m, request.speed_mps, plan, 1))
+    let way = Way::along(around.scene, &[lane], &mut rng).ok_or("that lane leads nowhere")?;
+    Ok(Driver::new(around.scene, Arc::new(way), station_m, Cruise::Commanded(request.speed_mps), plan, 1))
 }
 
 fn cross_road(
@@ -345,7 +374,7 @@ fn rendezvous(
         lanes.insert(0, *previous);
     }
     let mut rng = choices(around.seed, id, 0);
-    let way = Way::along(map, &lanes, &mut rng).ok_or("that lane leads nowhere")?;
+    let way = Way::along(around.scene, &lanes, &mut rng).ok_or("that lane leads nowhere")?;
     let meeting_m = way.lane_begin_m(conflict.lane).expect("the way was made through this lane")
         + conflict.lane_station_m;
     // Backwards from the meeting at the speed that each bend allows, its front first.
@@ -373,7 +402,14 @@ fn rendezvous(
     }
     let station_m = front_m - size.length_m / 2.0;
     if request.then == Then::Keep {
-        return Ok(Driver::new(Arc::new(way), station_m, request.speed_mps, Vec::new(), 1));
+        return Ok(Driver::new(
+            around.scene,
+            Arc::new(way),
+            station_m,
+            Cruise::Commanded(request.speed_mps),
+            Vec::new(),
+            1,
+        ));
     }
     // It starts beside its way and changes into it on the approach.
     let start = way.path.pose_at(station_m).position;
@@ -385,9 +421,16 @@ fn rendezvous(
         .or_else(|| lane_beside(around, leg, Side::Left))
         .ok_or("no second lane in the crossing leg")?;
     let station_m = map.lane(beside).centre.project(start).station_m;
-    let first = Way::along(map, &[beside], &mut rng).ok_or("that lane leads nowhere")?;
+    let first = Way::along(around.scene, &[beside], &mut rng).ok_or("that lane leads nowhere")?;
     let change = Manoeuvre { when: When::Tick(around.tick), towards: Towards::Way(Arc::new(way)) };
-    Ok(Driver::new(Arc::new(first), station_m, request.speed_mps, vec![change], 1))
+    Ok(Driver::new(
+        around.scene,
+        Arc::new(first),
+        station_m,
+        Cruise::Commanded(request.speed_mps),
+        vec![change],
+        1,
+    ))
 }
 
 fn lane_at(around: &Around, station_m: f64) -> LaneIndex {

@@ -51,6 +51,11 @@ pub(super) fn oncoming_m(own_mps: f64, towards_mps: f64, friction: f64) -> f64 {
     behind_leader_m(own_mps, 0.0, friction) + towards_mps.max(0.0) * stopping_s
 }
 
+/// Way of a driver until they have perceived and reacted to what they see appear, m.
+pub(super) fn noticing_m(own_mps: f64) -> f64 {
+    own_mps.max(0.0) * (PERCEPTION_S + REACTION_S)
+}
+
 /// Gap that somebody from behind needs to slow down to the ego vehicle, m; 0 if they are no faster.
 /// They chose to come near, so no time goes into perceiving it.
 pub(super) fn from_behind_m(behind_mps: f64, ego_mps: f64, braking_mps2: f64) -> f64 {

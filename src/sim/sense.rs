@@ -76,7 +76,7 @@ pub struct Conditions {
     pub visibility_m: f64,
     /// Water on the road, mm.
     pub water_mm: f64,
-    /// Coefficient of tyre friction.
+    /// Coefficient of tyre friction at the ego vehicle's speed, at most 0.1 s old.
     pub friction: f64,
 }
 

@@ -33,6 +33,7 @@ pub fn start() -> Start {
         wetness: Level::None,
         signal_phase_s: 0.0,
         seed: 7,
+        ambient: 0,
     }
 }
 
@@ -111,6 +112,64 @@ pub fn crossing() -> Arc<Scene> {
     scene(&map, ("1", -1, 100.0), ("3", -1, 190.0))
 }
 
+/// Four one-lane streets through the origin, to the east, north, west and south, 200 m each way, that
+/// cross without signals. The ego vehicle comes from the west and begins at x = -100.
+pub fn four_arms() -> Arc<Scene> {
+    let mut roads = String::new();
+    let mut connections = String::new();
+    for (arm, heading) in ["e", "n", "w", "s"].into_iter().zip(0..4) {
+        let heading_rad = f64::from(heading) * core::f64::consts::FRAC_PI_2;
+        let mut road = |id: &str, from_m: f64, length_m: f64, junction: i32, links: &str, lane_link: &str| {
+            let (sin, cos) = libm::sincos(heading_rad);
+            let (x, y) = (cos * from_m, sin * from_m);
+            roads += &format!(
+                r#"<road id="{id}-{arm}" length="{length_m}" junction="{junction}"><link>{links}</link>
+                <type s="0" type="town"><speed max="50" unit="km/h"/></type>
+                <planView><geometry s="0" x="{x}" y="{y}" hdg="{heading_rad}" length="{length_m}"><line/></geometry></planView>
+                <lanes><laneSection s="0"><center><lane id="0" type="none"/></center>
+                <right><lane id="-1" type="driving">{lane_link}<width sOffset="0" a="3.5" b="0" c="0" d="0"/></lane></right>
+                </laneSection></lanes></road>"#
+            );
+        };
+        let joins = format!(
+            r#"<predecessor elementType="road" elementId="in-{arm}" contactPoint="end"/>
+            <successor elementType="road" elementId="out-{arm}" contactPoint="start"/>"#
+        );
+        let both = r#"<link><predecessor id="-1"/><successor id="-1"/></link>"#;
+        road("in", -210.0, 200.0, -1, r#"<successor elementType="junction" elementId="9"/>"#, "");
+        road("through", -10.0, 20.0, 9, &joins, both);
+        road("out", 10.0, 200.0, -1, r#"<predecessor elementType="junction" elementId="9"/>"#, "");
+        connections += &format!(
+            r#"<connection id="{heading}" incomingRoad="in-{arm}" connectingRoad="through-{arm}"
+            contactPoint="start"><laneLink from="-1" to="-1"/></connection>"#
+        );
+    }
+    let map = format!(
+        r#"<OpenDRIVE><header name="four arms"/>{roads}<junction id="9" name="middle">{connections}</junction></OpenDRIVE>"#
+    );
+    scene(&map, ("in-e", -1, 110.0), ("out-e", -1, 150.0))
+}
+
+/// Two lanes to the east with a planted strip of 2 m between them; the route is on the left one.
+pub fn divided() -> Arc<Scene> {
+    let lane = |id: i32, kind: &str, width_m: f64| {
+        format!(
+            r#"<lane id="{id}" type="{kind}"><width sOffset="0" a="{width_m}" b="0" c="0" d="0"/></lane>"#
+        )
+    };
+    let map = format!(
+        r#"<OpenDRIVE><header name="divided"/><road id="1" length="600" junction="-1"><link/>
+        <type s="0" type="town"><speed max="50" unit="km/h"/></type>
+        <planView><geometry s="0" x="0" y="0" hdg="0" length="600"><line/></geometry></planView>
+        <lanes><laneSection s="0"><center><lane id="0" type="none"/></center>
+        <right>{}{}{}</right></laneSection></lanes></road></OpenDRIVE>"#,
+        lane(-1, "driving", 3.5),
+        lane(-2, "median", 2.0),
+        lane(-3, "driving", 3.5)
+    );
+    scene(&map, ("1", -1, 100.0), ("1", -1, 500.0))
+}
+
 /// Road 2, from its surveyed start to its goal.
 pub fn corner() -> Arc<Scene> {
     let text = include_str!("../../scenarios/roads/corner.xodr");
@@ -119,12 +178,12 @@ pub fn corner() -> Arc<Scene> {
         map.nearest(Vec2::new(x_m, y_m), heading_rad, 1.0).expect("the survey lies on the map")
     };
     let route = Route::find(&map, nearest(0.0, 0.0, 2.377), nearest(-71.4, 145.5, -2.983));
-    Arc::new(Scene { route: route.expect("there is a way"), map: map.into() })
+    Arc::new(Scene::new(map.into(), route.expect("there is a way")))
 }
 
 fn scene(opendrive: &str, start: (&str, i32, f64), goal: (&str, i32, f64)) -> Arc<Scene> {
     let map = RoadMap::from_opendrive("test", opendrive).expect("the map is sound");
     let place = |(road, lane, s_m): (&str, i32, f64)| map.place(road, lane, s_m).expect("it is on the map");
     let route = Route::find(&map, place(start), place(goal)).expect("there is a way");
-    Arc::new(Scene { map: map.into(), route })
+    Arc::new(Scene::new(map.into(), route))
 }

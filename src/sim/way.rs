@@ -6,8 +6,9 @@ use crate::geometry::Vec2;
 use crate::rng;
 use crate::rng::Rng;
 use crate::road::LaneIndex;
-use crate::road::RoadMap;
 use crate::road::RouteStopLine;
+
+use super::world::Scene;
 
 /// Lateral acceleration that other drivers accept in a bend, m/s²: upper end of comfort.
 const LATERAL_MPS2: f64 = 3.0;
@@ -24,10 +25,29 @@ pub(super) struct Way {
     lanes: Vec<WayLane>,
     /// By rising station.
     pub stop_lines: Vec<RouteStopLine>,
+    /// Where others may cross or join, by rising station.
+    pub areas: Vec<WayArea>,
     /// Highest speed at each vertex of `path`, m/s.
     speeds_mps_max: Vec<f64>,
     /// Whether lanes go on where it ends.
     open: bool,
+}
+
+/// Lanes that begin farther ahead than this matter to nobody yet, m.
+const AHEAD_M: f64 = 150.0;
+
+/// A conflict area on a way.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct WayArea {
+    /// On the way, m.
+    pub from_m: f64,
+    pub to_m: f64,
+    /// The lane that crosses or joins, and where on it, m.
+    pub other: LaneIndex,
+    pub other_from_m: f64,
+    pub other_to_m: f64,
+    /// Whether this way goes before the other lane's.
+    pub goes_first: bool,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -39,7 +59,8 @@ struct WayLane {
 impl Way {
     /// The way through `lanes`, which must follow each other, and on along successors drawn from
     /// `rng`. `None` without lanes.
-    pub fn along(map: &RoadMap, lanes: &[LaneIndex], rng: &mut Rng) -> Option<Way> {
+    pub fn along(scene: &Scene, lanes: &[LaneIndex], rng: &mut Rng) -> Option<Way> {
+        let map = &scene.map;
         let mut chain = lanes.to_vec();
         let mut last = *lanes.last()?;
         let mut beyond_m = 0.0;
@@ -52,13 +73,15 @@ impl Way {
             beyond_m += map.lane(last).centre.length_m();
             chain.push(last);
         }
-        Way::through(map, &chain)
+        Way::through(scene, &chain)
     }
 
-    fn through(map: &RoadMap, chain: &[LaneIndex]) -> Option<Way> {
+    fn through(scene: &Scene, chain: &[LaneIndex]) -> Option<Way> {
+        let map = &scene.map;
         let path = Path::join(chain.iter().map(|lane| &map.lane(*lane).centre))?;
         let mut lanes: Vec<WayLane> = Vec::new();
         let mut stop_lines = Vec::new();
+        let mut areas = Vec::new();
         let mut end: Option<(f64, Vec2)> = None;
         for index in chain {
             let lane = map.lane(*index);
@@ -71,12 +94,21 @@ impl Way {
                     .iter()
                     .map(|line| RouteStopLine { station_m: from_m + line.station_m, signal: line.signal }),
             );
+            areas.extend(scene.conflict_areas().of(*index).iter().map(|area| WayArea {
+                from_m: from_m + area.from_m,
+                to_m: from_m + area.to_m,
+                other: area.other,
+                other_from_m: area.other_from_m,
+                other_to_m: area.other_to_m,
+                goes_first: area.goes_first,
+            }));
             let tip = centre.points()[centre.points().len() - 1].position;
             end = Some((from_m + centre.length_m(), tip));
         }
         let open = chain.last().is_some_and(|last| !map.lane(*last).successors.is_empty());
         let speeds_mps_max = bend_speeds_mps(&path);
-        Some(Way { path, lanes, stop_lines, speeds_mps_max, open })
+        areas.sort_by(|a, b| a.from_m.total_cmp(&b.from_m).then(a.other.cmp(&b.other)));
+        Some(Way { path, lanes, stop_lines, areas, speeds_mps_max, open })
     }
 
     /// The lane at a station, clamped to the ends, and the station on it.
@@ -91,10 +123,22 @@ impl Way {
         self.lanes.iter().find(|part| part.lane == lane).map(|part| part.from_m)
     }
 
+    /// Station at which a lane begins that is not left at `rear_m`, if the way still takes it.
+    pub fn lane_ahead_m(&self, lane: LaneIndex, rear_m: f64) -> Option<f64> {
+        let first = self.lanes.partition_point(|part| part.from_m <= rear_m).max(1) - 1;
+        let mut ahead = self.lanes[first..].iter().take_while(|part| part.from_m < rear_m + AHEAD_M);
+        ahead.find(|part| part.lane == lane).map(|part| part.from_m)
+    }
+
     /// Highest speed at a station: what the bend there and the bends ahead allow, m/s.
     pub fn speed_mps_max(&self, station_m: f64) -> f64 {
         let after = self.path.points().partition_point(|point| point.station_m <= station_m);
         self.speeds_mps_max[after.min(self.speeds_mps_max.len() - 1)]
+    }
+
+    /// Speed limit of the lane at a station, m/s.
+    pub fn limit_mps(&self, scene: &Scene, station_m: f64) -> f64 {
+        scene.map.lane(self.lane_at(station_m).0).speed_limit_mps
     }
 
     /// Whether so little is left from a station that the way should be prolonged.
@@ -103,11 +147,11 @@ impl Way {
     }
 
     /// The same way from the lane at `station_m` on, but longer; and that station on it.
-    pub fn prolonged(&self, map: &RoadMap, station_m: f64, rng: &mut Rng) -> Option<(Way, f64)> {
+    pub fn prolonged(&self, scene: &Scene, station_m: f64, rng: &mut Rng) -> Option<(Way, f64)> {
         let (here, lane_station_m) = self.lane_at(station_m);
         let first = self.lanes.iter().rposition(|part| part.lane == here && part.from_m <= station_m)?;
         let rest: Vec<LaneIndex> = self.lanes[first..].iter().map(|part| part.lane).collect();
-        Some((Way::along(map, &rest, rng)?, lane_station_m))
+        Some((Way::along(scene, &rest, rng)?, lane_station_m))
     }
 }
 

@@ -1,23 +1,33 @@
 //! The world of one episode.
 
+mod playback;
+
 use std::sync::Arc;
 
 use crate::action::Effect;
 use crate::action::SpawnFacts;
 use crate::action::SpawnRequest;
 use crate::action::Surroundings;
+use crate::geometry::FirstContact;
+use crate::geometry::Frame;
 use crate::geometry::OrientedBox;
+use crate::geometry::Pose;
 use crate::geometry::Sweep;
 use crate::geometry::Vec2;
-use crate::geometry::distance_m;
+use crate::geometry::first_contact;
 use crate::model::vocabulary::Body;
 use crate::model::vocabulary::Colour;
 use crate::model::vocabulary::Level;
 use crate::model::vocabulary::TimeOfDay;
 use crate::model::vocabulary::Verb;
+use crate::road::LaneIndex;
 use crate::road::RoadMap;
 use crate::road::Route;
 
+use super::ambient::Ambient;
+use super::ambient::COMMANDED_MAX;
+use super::ambient::RENEWAL_TICKS;
+use super::ambient::is_gone;
 use super::contact::Party;
 use super::contact::common_speed_mps;
 use super::contact::meet;
@@ -25,7 +35,10 @@ use super::ego::Control;
 use super::ego::Ego;
 use super::ego::VehicleParameters;
 use super::environment::Environment;
+use super::environment::friction;
+use super::junction::ConflictAreas;
 use super::mover::Around;
+use super::mover::Moved;
 use super::mover::Mover;
 use super::placement;
 use super::sense::Conditions;
@@ -61,6 +74,33 @@ pub struct Scene {
     pub map: Arc<RoadMap>,
     /// Where the ego vehicle is to go.
     pub route: Route,
+    areas: ConflictAreas,
+    /// Lanes outside junctions, each with the length of all up to its end, m.
+    streets: Vec<(LaneIndex, f64)>,
+}
+
+impl Scene {
+    pub fn new(map: Arc<RoadMap>, route: Route) -> Scene {
+        let mut streets = Vec::new();
+        let mut end_m = 0.0;
+        for (index, lane) in map.lanes.iter().enumerate().filter(|(_, lane)| lane.junction.is_none()) {
+            end_m += lane.centre.length_m();
+            streets.push((LaneIndex(index), end_m));
+        }
+        Scene { areas: ConflictAreas::new(&map), streets, map, route }
+    }
+
+    /// The place at a fraction of all streets laid end to end: every metre is as likely as any other.
+    pub(super) fn street_at(&self, fraction: f64) -> Option<(LaneIndex, f64)> {
+        let at_m = fraction * self.streets.last()?.1;
+        let index = self.streets.partition_point(|street| street.1 <= at_m).min(self.streets.len() - 1);
+        let begin_m = if index == 0 { 0.0 } else { self.streets[index - 1].1 };
+        Some((self.streets[index].0, at_m - begin_m))
+    }
+
+    pub(super) fn conflict_areas(&self) -> &ConflictAreas {
+        &self.areas
+    }
 }
 
 /// How an episode begins.
@@ -74,6 +114,8 @@ pub struct Start {
     pub signal_phase_s: f64,
     /// Seed of the choices of other road users.
     pub seed: u64,
+    /// Vehicles of ambient traffic that are kept around the ego vehicle, at most `model::AMBIENT_MAX`.
+    pub ambient: u32,
 }
 
 /// The whole state of an episode: `Clone` is a snapshot.
@@ -96,7 +138,9 @@ pub struct World {
     movers: Vec<Mover>,
     /// Those that began in the tick before.
     contacts: Vec<Contact>,
+    incidents: Vec<Incident>,
     next_id: u32,
+    ambient: Ambient,
     /// Of the choices of other road users.
     seed: u64,
 }
@@ -104,7 +148,7 @@ pub struct World {
 /// A road user other than the ego vehicle, as others may see it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Obstacle {
-    /// From 1, in order of appearance.
+    /// From 1, in order of appearance; ambient traffic has numbers of its own.
     pub id: u32,
     pub body: Body,
     pub colour: Colour,
@@ -119,6 +163,13 @@ pub struct Obstacle {
     pub spawned_tick: u64,
 }
 
+impl Obstacle {
+    /// Whether it is ambient traffic, which no action made appear.
+    pub fn is_ambient(&self) -> bool {
+        self.id > COMMANDED_MAX
+    }
+}
+
 /// The ego vehicle touched an obstacle that it did not touch in the tick before.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Contact {
@@ -131,9 +182,18 @@ pub struct Contact {
     pub obstacle_velocity_mps: Vec2,
     /// The same in the frame of the ego outline: x ahead, y left.
     pub obstacle_velocity_on_ego_mps: Vec2,
-    /// Speed at which the gap between the outlines closed, m/s, not negative. What turning adds is
-    /// left out.
+    /// Speed at which the gap between the outlines closed where they met, m/s, not negative.
     pub closing_speed_mps: f64,
+}
+
+/// Two obstacles touched each other. Both stand where it happened, and leave 2 s later.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Incident {
+    pub time_s: f64,
+    /// Who moved into the other.
+    pub obstacle: u32,
+    pub other: u32,
+    pub point: Vec2,
 }
 
 impl World {
@@ -141,25 +201,30 @@ impl World {
     /// the route, and nobody else is there.
     pub fn new(scene: Arc<Scene>, start: &Start) -> World {
         let ego = Ego::new(scene.route.path.pose_at(0.0), START_MPS);
-        let environment =
-            Environment { time: start.time, rain: start.rain, fog: start.fog, wetness: start.wetness };
-        World {
+        let environment = Environment::new(start.time, [start.rain, start.fog, start.wetness]);
+        let mut world = World {
             ticks: 0,
             ego_outline: ego.outline(),
             ego,
             ego_station_m: 0.0,
             ego_offset_m: 0.0,
             red_runs: 0,
-            conditions: environment.conditions(),
+            conditions: environment.conditions(START_MPS),
             environment,
             signals: SignalClock::new(start.signal_phase_s),
             obstacles: Vec::with_capacity(OBSTACLES_MAX),
             movers: Vec::with_capacity(OBSTACLES_MAX),
             contacts: Vec::new(),
+            incidents: Vec::new(),
             next_id: 1,
+            ambient: Ambient::new(start.ambient),
             seed: start.seed,
             scene,
+        };
+        for _ in 0..world.ambient.wanted() {
+            world.renew_ambient(true);
         }
+        world
     }
 
     pub fn scene(&self) -> &Arc<Scene> {
@@ -168,11 +233,14 @@ impl World {
 
     /// Advances by [`DT_S`]; returns the contacts that began.
     ///
-    /// An obstacle that was touched once brakes to rest, leaves 2 s later, and touches nobody again.
+    /// An obstacle that the ego vehicle touched once brakes to rest, leaves 2 s later, and touches it no
+    /// more. Two obstacles that touch each other stand at once (see [`World::incidents`]).
     pub fn tick(&mut self, control: &Control) -> &[Contact] {
         self.contacts.clear();
+        self.incidents.clear();
         let outline = self.ego_outline;
-        self.ego.step(control, self.conditions.friction, DT_S);
+        let friction = friction(self.environment.water_mm(), self.ego.motion.speed_mps);
+        self.ego.step(control, friction, DT_S);
         self.ego_outline = self.ego.outline();
         self.follow_route();
         // Taken once: of two contacts in a tick, the second does not see what the first did to the ego.
@@ -185,7 +253,7 @@ impl World {
         let mut movers = core::mem::take(&mut self.movers);
         let mut index = 0;
         while index < movers.len() {
-            if self.tick_obstacle(index, &mut movers[index], &ego, ego_mps) {
+            if self.tick_obstacle(index, &mut movers, &ego, ego_mps) {
                 index += 1;
             } else {
                 movers.remove(index);
@@ -193,11 +261,17 @@ impl World {
             }
         }
         self.movers = movers;
+        let ego = Frame::of(&self.ego_outline);
         for obstacle in &mut self.obstacles {
-            obstacle.distance_m = distance_m(&self.ego_outline, &obstacle.outline);
+            obstacle.distance_m = ego.distance_m(&Frame::of(&obstacle.outline));
         }
         self.ticks += 1;
+        if self.ambient.wanted() > 0 && self.ticks.is_multiple_of(RENEWAL_TICKS) {
+            self.renew_ambient(false);
+        }
         if self.ticks.is_multiple_of(FRAME_TICKS) {
+            self.environment.pass(FRAME_TICKS as f64 * DT_S);
+            self.conditions = self.environment.conditions(self.ego.motion.speed_mps);
             self.look();
         }
         &self.contacts
@@ -213,7 +287,7 @@ impl World {
             Effect::Sky(phenomenon, level) => self.environment.set(*phenomenon, *level),
             Effect::Spawn(request) => return self.spawn(request).map(Some),
         }
-        self.conditions = self.environment.conditions();
+        self.conditions = self.environment.conditions(self.ego.motion.speed_mps);
         Ok(None)
     }
 
@@ -250,6 +324,11 @@ impl World {
 
     pub fn obstacles(&self) -> &[Obstacle] {
         &self.obstacles
+    }
+
+    /// Contacts among obstacles that began in the tick before.
+    pub fn incidents(&self) -> &[Incident] {
+        &self.incidents
     }
 
     pub fn time_of_day(&self) -> TimeOfDay {
@@ -320,12 +399,11 @@ impl World {
         sink(self.ego_station_m.to_bits());
         sink(self.ego_offset_m.to_bits());
         sink(u64::from(self.red_runs));
-        sink(self.environment.time as u64);
-        for level in self.sky() {
-            sink(level as u64);
-        }
+        self.environment.trace(sink);
+        sink(self.conditions.friction.to_bits());
         self.signals.trace(sink);
         sink(u64::from(self.next_id));
+        self.ambient.trace(sink);
         sink(self.seed);
         for (obstacle, mover) in self.obstacles.iter().zip(&self.movers) {
             sink(u64::from(obstacle.id));
@@ -354,7 +432,7 @@ impl World {
         VehicleParameters::MKZ.front_m(self.ego_station_m)
     }
 
-    fn around(&self) -> Around<'_> {
+    fn around<'a>(&'a self, movers: [&'a [Mover]; 2]) -> Around<'a> {
         Around {
             scene: &self.scene,
             ego: &self.ego.motion,
@@ -362,31 +440,71 @@ impl World {
             ego_velocity_mps: self.ego_outline.pose.forward() * self.ego.motion.speed_mps,
             ego_station_m: self.ego_station_m,
             obstacles: &self.obstacles,
+            movers,
             signals: &self.signals,
             tick: self.ticks,
             friction: self.conditions.friction,
+            water_mm: self.environment.water_mm(),
+            visibility_m: self.conditions.visibility_m,
             seed: self.seed,
         }
     }
 
     fn spawn(&mut self, request: &SpawnRequest) -> Result<u32, String> {
-        let placed = placement::place(&self.around(), request, self.next_id)?;
-        if self.obstacles.len() == OBSTACLES_MAX {
-            self.obstacles.remove(0);
-            self.movers.remove(0);
+        let placed = placement::place(&self.around([&self.movers, &[]]), request, self.next_id)?;
+        let commanded = self.obstacles.iter().filter(|obstacle| !obstacle.is_ambient());
+        if commanded.count() == OBSTACLES_MAX {
+            let oldest = self.obstacles.iter().position(|obstacle| !obstacle.is_ambient());
+            self.remove(oldest.expect("there are ten of them"));
         }
+        let id = placed.obstacle.id;
         self.obstacles.push(placed.obstacle);
         self.movers.push(placed.mover);
         self.next_id += 1;
         self.look();
-        Ok(placed.obstacle.id)
+        Ok(id)
     }
 
-    /// Moves one obstacle and looks whether the ego vehicle and it touch; `false` if it left.
+    fn remove(&mut self, index: usize) {
+        self.obstacles.remove(index);
+        self.movers.remove(index);
+    }
+
+    /// Lets ambient traffic leave and appear; `begins` is before the first tick.
+    fn renew_ambient(&mut self, begins: bool) {
+        let ego_outline = self.ego_outline;
+        let gone = |obstacle: &Obstacle| obstacle.is_ambient() && is_gone(obstacle, &ego_outline);
+        while let Some(index) = self.obstacles.iter().position(gone) {
+            self.remove(index);
+        }
+        let present = self.obstacles.iter().filter(|obstacle| obstacle.is_ambient()).count();
+        if !self.ambient.lacks(present) {
+            return;
+        }
+        // Taken out for the attempt, which looks at the world.
+        let mut ambient = self.ambient.clone();
+        if let Some(placed) = ambient.attempt(&self.around([&self.movers, &[]]), begins) {
+            self.obstacles.push(placed.obstacle);
+            self.movers.push(placed.mover);
+        }
+        self.ambient = ambient;
+    }
+
+    /// Moves one obstacle and looks whether it touches anybody; `false` if it left.
     /// `ego_mps` is the ego vehicle's speed before any contact of this tick.
-    fn tick_obstacle(&mut self, index: usize, mover: &mut Mover, ego: &Party, ego_mps: f64) -> bool {
+    fn tick_obstacle(&mut self, index: usize, movers: &mut [Mover], ego: &Party, ego_mps: f64) -> bool {
         let before = self.obstacles[index];
-        let Some(moved) = mover.step(&before, &self.around()) else { return false };
+        let (earlier, rest) = movers.split_at_mut(index);
+        let (mover, later) = rest.split_first_mut().expect("every obstacle has its mover");
+        let Some(mut moved) = mover.step(&before, &self.around([&*earlier, &*later])) else { return false };
+        if let Some((other, pose, incident)) = self.bump(index, &before.outline, &moved.pose) {
+            moved = Moved { pose, velocity_mps: Vec2::zeros(), ..moved };
+            mover.crash();
+            let hit = if other < index { &mut earlier[other] } else { &mut later[other - index - 1] };
+            hit.crash();
+            self.obstacles[other].velocity_mps = Vec2::zeros();
+            self.incidents.push(incident);
+        }
         let obstacle = &mut self.obstacles[index];
         (obstacle.outline.pose, obstacle.velocity_mps) = (moved.pose, moved.velocity_mps);
         obstacle.lane_heading_rad = moved.lane_heading_rad;
@@ -408,6 +526,42 @@ impl World {
             self.contacts.push(contact);
         }
         true
+    }
+
+    /// The first other obstacle in the way of a motion: its index, where the motion ends, and what to
+    /// tell of it.
+    ///
+    /// Obstacles move one after another, each among the others as they stand at that moment. So no
+    /// two can come to overlap, whatever the size of a step.
+    fn bump(&self, index: usize, outline: &OrientedBox, end: &Pose) -> Option<(usize, Pose, Incident)> {
+        let way = end.position - outline.pose.position;
+        if way == Vec2::zeros() && end.heading_rad == outline.pose.heading_rad {
+            return None;
+        }
+        let sweep = Sweep { start: *outline, end: *end };
+        let reach_m = outline.half_length_m + outline.half_width_m + way.norm();
+        let mut first: Option<(usize, FirstContact)> = None;
+        for (other, obstacle) in self.obstacles.iter().enumerate() {
+            let near_m = reach_m + obstacle.outline.half_length_m + obstacle.outline.half_width_m;
+            let away = obstacle.outline.pose.position - outline.pose.position;
+            if other == index || away.norm_squared() > near_m * near_m {
+                continue;
+            }
+            let still = Sweep { start: obstacle.outline, end: obstacle.outline.pose };
+            if let Some(contact) = first_contact(&sweep, &still)
+                && first.is_none_or(|(_, found)| contact.fraction < found.fraction)
+            {
+                first = Some((other, contact));
+            }
+        }
+        let (other, contact) = first?;
+        let incident = Incident {
+            time_s: (self.ticks as f64 + contact.fraction) * DT_S,
+            obstacle: self.obstacles[index].id,
+            other: self.obstacles[other].id,
+            point: contact.point,
+        };
+        Some((other, sweep.at(contact.fraction).pose, incident))
     }
 
     /// Looks along the lines of sight from the ego vehicle's roof.
@@ -437,7 +591,7 @@ impl World {
 
 impl Surroundings for World {
     fn survey(&self, request: &SpawnRequest) -> Result<SpawnFacts, String> {
-        let around = self.around();
+        let around = self.around([&self.movers, &[]]);
         let placed = placement::place(&around, request, self.next_id)?;
         Ok(placement::facts(&around, request, &placed))
     }

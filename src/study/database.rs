@@ -2,6 +2,7 @@
 //!
 //! Each episode is one transaction, so a kill at any moment loses at most the episode under way.
 
+use std::collections::BTreeMap;
 use std::collections::BTreeSet;
 use std::path::Path;
 
@@ -19,7 +20,7 @@ use super::summary::EpisodeSummary;
 use super::summary::Finding;
 
 /// Layout of the tables; raised whenever a column changes.
-const SCHEMA_VERSION: i64 = 1;
+const SCHEMA_VERSION: i64 = 2;
 
 const SCHEMA: &str = "
 CREATE TABLE episode (
@@ -33,6 +34,7 @@ CREATE TABLE collision (
   ego_speed_mps REAL NOT NULL, closing_speed_mps REAL NOT NULL,
   on_ego_ahead_m REAL NOT NULL, on_ego_left_m REAL NOT NULL,
   repeated INTEGER NOT NULL, sudden INTEGER NOT NULL, struck INTEGER NOT NULL, counted INTEGER NOT NULL,
+  avoidability TEXT NOT NULL, hazard_onset_s REAL NOT NULL, avoided_by TEXT NOT NULL, evasion TEXT,
   PRIMARY KEY (episode, number)
 ) STRICT;
 ";
@@ -44,13 +46,15 @@ pub enum DatabaseError {
     Layout { found: i64 },
     #[error("it names an episode {found}")]
     Episode { found: i64 },
+    #[error("its checkpoint is damaged: begin a new training")]
+    Checkpoint,
     #[error(transparent)]
     Sqlite(#[from] rusqlite::Error),
 }
 
 /// An open run database.
 pub struct Database {
-    connection: Connection,
+    pub(super) connection: Connection,
 }
 
 impl Database {
@@ -84,36 +88,7 @@ impl Database {
         in_words: impl Fn(&Draw) -> String,
     ) -> Result<(), DatabaseError> {
         let transaction = self.connection.transaction()?;
-        add_episode(&transaction, summary, log)?;
-        for (index, step) in log.steps.iter().enumerate() {
-            let (row, action, refused) = match &step.outcome {
-                Outcome::Done { draw, .. } => (Some(draw.row), Some(in_words(draw)), None),
-                Outcome::Passed => (None, None, None),
-                Outcome::Refused { row, rule, reason } => (
-                    Some(*row),
-                    None,
-                    Some(rule.as_ref().map_or(reason.clone(), |rule| format!("{rule}: {reason}"))),
-                ),
-            };
-            let mut values: Vec<rusqlite::types::Value> = vec![
-                (summary.episode as i64).into(),
-                (index as i64).into(),
-                step.time_s.into(),
-                row.map(|row| row as i64).into(),
-                action.into(),
-                refused.into(),
-                step.proc.into(),
-                step.reward.into(),
-            ];
-            values.extend(step.state.iter().map(|&value| f64::from(value).into()));
-            let places = vec!["?"; values.len()].join(", ");
-            transaction
-                .prepare_cached(&format!("INSERT INTO step VALUES ({places})"))?
-                .execute(rusqlite::params_from_iter(values))?;
-        }
-        for finding in &summary.collisions {
-            add_collision(&transaction, summary.episode, finding)?;
-        }
+        add_all(&transaction, summary, log, in_words)?;
         transaction.commit()?;
         Ok(())
     }
@@ -129,6 +104,23 @@ impl Database {
         numbers.map(|found| number(found?)).collect()
     }
 
+    /// Why steps passed although something was asked for, and how often; the most frequent first.
+    /// Figures in a reason are left out, so that reasons can be told apart.
+    ///
+    /// # Errors
+    /// If the file cannot be read.
+    pub fn refusals(&self) -> Result<Vec<RefusalCount>, DatabaseError> {
+        let mut statement = self.connection.prepare("SELECT refused FROM step WHERE refused IS NOT NULL")?;
+        let mut counts: BTreeMap<String, i64> = BTreeMap::new();
+        for reason in statement.query_map([], |row| row.get::<_, String>(0))? {
+            *counts.entry(without_figures(&reason?)).or_default() += 1;
+        }
+        let mut refusals: Vec<RefusalCount> =
+            counts.into_iter().map(|(reason, times)| RefusalCount { reason, times }).collect();
+        refusals.sort_by_key(|refusal| -refusal.times);
+        Ok(refusals)
+    }
+
     /// Totals over all episodes.
     ///
     /// # Errors
@@ -142,7 +134,10 @@ impl Database {
                         coalesce(sum(distance_m), 0.0), coalesce(sum(red_runs), 0), avg(first_counted_s),
                         (SELECT coalesce(sum(sudden), 0) FROM collision),
                         (SELECT coalesce(sum(struck), 0) FROM collision),
-                        (SELECT coalesce(sum(repeated), 0) FROM collision)
+                        (SELECT coalesce(sum(repeated), 0) FROM collision),
+                        (SELECT coalesce(sum(avoidability = 'avoidable'), 0) FROM collision),
+                        (SELECT coalesce(sum(avoidability = 'beyond_reference'), 0) FROM collision),
+                        (SELECT coalesce(sum(avoidability = 'unavoidable'), 0) FROM collision)
                  FROM episode",
             [],
             |row| {
@@ -162,10 +157,30 @@ impl Database {
                     sudden: row.get(12)?,
                     struck: row.get(13)?,
                     repeated: row.get(14)?,
+                    avoidable: row.get(15)?,
+                    beyond_reference: row.get(16)?,
+                    unavoidable: row.get(17)?,
                 })
             },
         )?)
     }
+}
+
+/// How often a reason kept an action from being carried out.
+#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
+pub struct RefusalCount {
+    pub reason: String,
+    pub times: i64,
+}
+
+/// A reason with `…` for each number.
+fn without_figures(reason: &str) -> String {
+    let is_figure = |word: &str| word.parse::<f64>().is_ok();
+    let shown = reason.split(' ').map(|word| {
+        let bare = word.trim_end_matches([',', ';']);
+        if is_figure(bare) { word.replace(bare, "…") } else { word.to_owned() }
+    });
+    shown.collect::<Vec<_>>().join(" ")
 }
 
 /// What a run has found so far.
@@ -190,6 +205,10 @@ pub struct Totals {
     pub sudden: i64,
     pub struck: i64,
     pub repeated: i64,
+    /// Collisions by what careful drivers make of them: their sum is `collisions`.
+    pub avoidable: i64,
+    pub beyond_reference: i64,
+    pub unavoidable: i64,
 }
 
 fn step_table() -> String {
@@ -201,6 +220,46 @@ fn step_table() -> String {
            {}, PRIMARY KEY (episode, step)) STRICT;",
         states.join(", ")
     )
+}
+
+/// An episode with its steps and collisions.
+pub(super) fn add_all(
+    transaction: &Transaction,
+    summary: &EpisodeSummary,
+    log: &EpisodeLog,
+    in_words: impl Fn(&Draw) -> String,
+) -> Result<(), DatabaseError> {
+    add_episode(transaction, summary, log)?;
+    for (index, step) in log.steps.iter().enumerate() {
+        let (row, action, refused) = match &step.outcome {
+            Outcome::Done { draw, .. } => (Some(draw.row), Some(in_words(draw)), None),
+            Outcome::Passed => (None, None, None),
+            Outcome::Refused { row, rule, reason } => (
+                Some(*row),
+                None,
+                Some(rule.as_ref().map_or(reason.clone(), |rule| format!("{rule}: {reason}"))),
+            ),
+        };
+        let mut values: Vec<rusqlite::types::Value> = vec![
+            (summary.episode as i64).into(),
+            (index as i64).into(),
+            step.time_s.into(),
+            row.map(|row| row as i64).into(),
+            action.into(),
+            refused.into(),
+            step.proc.into(),
+            step.reward.into(),
+        ];
+        values.extend(step.state.iter().map(|&value| f64::from(value).into()));
+        let places = vec!["?"; values.len()].join(", ");
+        transaction
+            .prepare_cached(&format!("INSERT INTO step VALUES ({places})"))?
+            .execute(rusqlite::params_from_iter(values))?;
+    }
+    for finding in &summary.collisions {
+        add_collision(transaction, summary.episode, finding)?;
+    }
+    Ok(())
 }
 
 fn add_episode(
@@ -232,10 +291,12 @@ fn add_collision(
     episode: usize,
     finding: &Finding,
 ) -> Result<(), rusqlite::Error> {
-    let (collision, facts) = (&finding.collision, &finding.facts);
+    let Finding { collision, facts, judgement, .. } = finding;
     let contact = &collision.contact;
     transaction
-        .prepare_cached("INSERT INTO collision VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)")?
+        .prepare_cached(
+            "INSERT INTO collision VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+        )?
         .execute(params![
             episode as i64,
             finding.number as i64,
@@ -252,6 +313,22 @@ fn add_collision(
             facts.sudden,
             facts.struck,
             finding.counted,
+            judgement.class.name(),
+            judgement.onset_s,
+            judgement.avoided_by.join(" "),
+            judgement.evasion,
         ])?;
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn reasons_differ_by_their_words() {
+        let reason = "no_teleport: the gap would be 12.5 m, a fair one is 17 m";
+        assert_eq!(without_figures(reason), "no_teleport: the gap would be … m, a fair one is … m");
+        assert_eq!(without_figures("cannot spawn: no lane on the left"), "cannot spawn: no lane on the left");
+    }
 }

@@ -3,21 +3,20 @@
 //! Episodes are independent of each other and of the number of workers; each has its own seed,
 //! derived from the run's.
 
-use std::collections::BTreeSet;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::sync::atomic::AtomicUsize;
 use std::sync::atomic::Ordering;
 use std::sync::mpsc;
 
-use ndarray::Array1;
-
 use crate::action::ActionTable;
 use crate::action::ActiveRules;
-use crate::action::Offer;
 use crate::ads;
+use crate::ads::Selected;
 use crate::agent;
 use crate::agent::Agent;
+use crate::agent::Kind;
+use crate::agent::QPolicy;
 use crate::episode;
 use crate::episode::Choice;
 use crate::episode::EpisodeLog;
@@ -26,12 +25,21 @@ use crate::episode::Script;
 use crate::episode::Watch;
 use crate::model::Scenario;
 use crate::model::Space;
+use crate::oracle;
+use crate::oracle::AvoidabilitySettings;
+use crate::oracle::Judgement;
 use crate::rng;
 use crate::rng::Stream;
 use crate::sim::ENGINE;
-use crate::sim::Scene;
 use crate::sim::Start;
 use crate::syntax::listed;
+
+use super::arena::Arena;
+use super::arena::choose;
+use super::arena::driving_system;
+use super::profile::Profile;
+use super::profile::recorded;
+use super::summary::EpisodeSummary;
 
 /// Everything that is needed to repeat a run; written to `run.yaml`.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -47,14 +55,34 @@ pub struct RunSettings {
     pub space_digest: String,
     pub roads: Vec<String>,
     pub ads: String,
+    /// Settings of the driving system, if it has any; without them it is as it comes.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub profile: Option<Profile>,
     pub agent: String,
+    /// The policy that the agent follows, from the run directory, and its digest.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub policy: Option<PolicyReference>,
     /// Episodes on each road.
     pub episodes: u32,
     pub seed: u64,
+    /// Vehicles of ambient traffic.
+    #[serde(default)]
+    pub ambient: u32,
     /// Rules switched off.
     pub without: Vec<String>,
     /// Optional rules switched on.
     pub with: Vec<String>,
+    /// By what it is told whether a collision was avoidable.
+    #[serde(default)]
+    pub avoidability: AvoidabilitySettings,
+}
+
+/// A policy file that a run was begun with.
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PolicyReference {
+    pub file: String,
+    pub digest: String,
 }
 
 /// Why a run or a replay cannot begin.
@@ -66,12 +94,29 @@ pub enum RunError {
     Ads { name: String, known: String },
     #[error("no agent `{name}`: there are {known}")]
     Agent { name: String, known: String },
+    #[error("`{name}` has to be trained first: `avastra train`, then `avastra run --policy FILE`")]
+    Untrained { name: String },
+    #[error("`{name}` has nothing to learn: `avastra run --agent {name}` plays it")]
+    Unteachable { name: String },
+    #[error("the checkpoint is not of a training with such settings: begin a new one")]
+    Checkpoint,
+    #[error(transparent)]
+    Settings(#[from] agent::SettingsError),
     #[error(transparent)]
     Rule(#[from] crate::action::UnknownRule),
     #[error("`{name}` is asked for twice, or both on and off")]
     Twice { name: String },
     #[error("{found} episodes a road: from 1 to {EPISODES_MAX} are possible")]
     Episodes { found: u32 },
+    #[error(transparent)]
+    NoSettings(#[from] ads::NoSettings),
+    #[error("the profile of `{scenario}`: {error}")]
+    Profile { scenario: String, error: ads::ConfigError },
+    #[error(
+        "{what} was made with settings of `{ads}` that mean something else in this version: nothing need \
+         happen alike; name a profile with `--ads-config FILE` to see what happens with that"
+    )]
+    ProfileDigest { what: String, ads: String },
     #[error("`{scenario}` was made in world `{engine}`; this is `{ENGINE}`, where nothing need happen alike")]
     Engine { scenario: String, engine: String },
 }
@@ -79,15 +124,21 @@ pub enum RunError {
 /// Most episodes that a run may have on each road.
 pub const EPISODES_MAX: u32 = 1_000_000;
 
+/// Makes the agent of an episode.
+type MakeAgent = dyn Fn() -> Box<dyn Agent> + Send + Sync;
+
+/// # Errors
+/// If a run cannot have so many episodes on a road.
+pub(super) fn check_episodes(episodes: u32) -> Result<(), RunError> {
+    let fits = (1..=EPISODES_MAX).contains(&episodes);
+    if fits { Ok(()) } else { Err(RunError::Episodes { found: episodes }) }
+}
+
 /// A run that is ready to play.
 pub struct Run {
-    table: ActionTable,
-    rules: ActiveRules,
+    arena: Arena,
     settings: RunSettings,
-    ads: &'static ads::Entry,
-    agent: &'static agent::Entry,
-    /// Index of each road in the space, with its scene.
-    roads: Vec<(usize, Arc<Scene>)>,
+    agent: Box<MakeAgent>,
 }
 
 impl Run {
@@ -97,39 +148,40 @@ impl Run {
     /// If the settings name a road, a driving system, an agent or a rule that does not exist, a name
     /// twice, or a number of episodes that is not possible.
     pub fn new(table: ActionTable, settings: RunSettings) -> Result<Run, RunError> {
-        if !(1..=EPISODES_MAX).contains(&settings.episodes) {
-            return Err(RunError::Episodes { found: settings.episodes });
-        }
-        if let Some(name) =
-            twice(&settings.roads).or_else(|| twice(settings.with.iter().chain(&settings.without)))
-        {
-            return Err(RunError::Twice { name });
-        }
-        let space = table.space();
-        let roads = settings.roads.iter().map(|name| {
-            let index = space.roads.iter().position(|road| &road.name == name);
-            let index = index.ok_or_else(|| {
-                let known = listed(&space.roads.iter().map(|road| road.name.as_str()).collect::<Vec<_>>());
-                RunError::Road { name: name.clone(), known }
-            })?;
-            Ok((index, Arc::new(episode::scene(&space.roads[index]))))
-        });
-        let roads = roads.collect::<Result<_, RunError>>()?;
-        let ads = driving_system(&settings.ads)?;
         let agent = agent::by_name(&settings.agent).ok_or_else(|| {
             let known = listed(&agent::REGISTRY.iter().map(|entry| entry.name).collect::<Vec<_>>());
             RunError::Agent { name: settings.agent.clone(), known }
         })?;
-        let rules = ActiveRules::new(space, &settings.with, &settings.without)?;
-        Ok(Run { table, rules, settings, ads, agent, roads })
+        match agent.kind {
+            Kind::Ready(build) => Run::with_agent(table, settings, Box::new(build)),
+            Kind::Learning(_) => Err(RunError::Untrained { name: settings.agent }),
+        }
+    }
+
+    /// The same with a trained policy for an agent.
+    ///
+    /// # Errors
+    /// As [`Run::new`].
+    pub fn with_policy(table: ActionTable, settings: RunSettings, policy: QPolicy) -> Result<Run, RunError> {
+        Run::with_agent(table, settings, Box::new(move || Box::new(policy.clone())))
+    }
+
+    fn with_agent(table: ActionTable, settings: RunSettings, agent: Box<MakeAgent>) -> Result<Run, RunError> {
+        check_episodes(settings.episodes)?;
+        let rules = (settings.with.as_slice(), settings.without.as_slice());
+        let mut arena = Arena::new(table, &settings.roads, &settings.ads, rules)?;
+        if let Some(profile) = &settings.profile {
+            arena.set_profile(profile)?;
+        }
+        Ok(Run { arena, settings, agent })
     }
 
     pub fn table(&self) -> &ActionTable {
-        &self.table
+        self.arena.table()
     }
 
     pub fn space(&self) -> &Arc<Space> {
-        self.table.space()
+        self.arena.table().space()
     }
 
     pub fn settings(&self) -> &RunSettings {
@@ -138,13 +190,21 @@ impl Run {
 
     /// Number of episodes on all roads together.
     pub fn episodes(&self) -> usize {
-        self.roads.len() * self.settings.episodes as usize
+        self.arena.roads() * self.settings.episodes as usize
     }
 
     /// Plays one episode; numbers run through the roads one after another.
     pub fn episode(&self, number: usize) -> EpisodeLog {
-        let mut agent = (self.agent.build)();
-        self.play(number, &mut |moment| choose(&self.table, agent.as_mut(), moment), &mut |_, _, _| {})
+        let mut agent = (self.agent)();
+        agent.begin();
+        self.play(number, &mut |moment| choose(self.table(), agent.as_mut(), moment), &mut |_, _, _| {})
+    }
+
+    /// Plays one episode and judges its collisions.
+    pub fn judged(&self, number: usize) -> (EpisodeSummary, EpisodeLog) {
+        let log = self.episode(number);
+        let setup = self.setup(number);
+        (EpisodeSummary::judged(&setup, number, &log, &self.settings.avoidability), log)
     }
 
     /// Plays one episode's beginning with other choices: a replay of it, for example.
@@ -154,25 +214,20 @@ impl Run {
         choose: &mut dyn FnMut(&Moment) -> Choice,
         watch: &mut Watch,
     ) -> EpisodeLog {
-        let (index, scene) = &self.roads[number / self.settings.episodes as usize];
+        episode::run(&self.setup(number), choose, watch)
+    }
+
+    /// The beginning of an episode.
+    fn setup(&self, number: usize) -> episode::Setup<'_> {
         let seed = rng::child_seed(self.settings.seed, Stream::Episode, number as u64);
-        let memory = self.space().initial_memory(seed);
-        let setup = episode::Setup {
-            table: &self.table,
-            road: &self.space().roads[*index],
-            scene: scene.clone(),
-            rules: &self.rules,
-            ads: self.ads,
-            seed,
-            start: episode::start(self.space(), &memory, seed),
-            memory,
-        };
-        episode::run(&setup, choose, watch)
+        let mut setup = self.arena.setup(number / self.settings.episodes as usize, seed);
+        setup.start.ambient = self.settings.ambient;
+        setup
     }
 }
 
-/// Plays episodes on `jobs` threads and hands each log to `done` on this one, in the order in which
-/// they end. Stops early, between episodes, when `stop` is set or `done` fails.
+/// Plays and judges episodes on `jobs` threads and hands each to `done` on this one, in the order in
+/// which they end. Stops early, between episodes, when `stop` is set or `done` fails.
 ///
 /// # Errors
 /// The first error of `done`.
@@ -181,7 +236,7 @@ pub fn play<E>(
     numbers: &[usize],
     jobs: usize,
     stop: &AtomicBool,
-    done: &mut dyn FnMut(usize, EpisodeLog) -> Result<(), E>,
+    done: &mut dyn FnMut(EpisodeSummary, EpisodeLog) -> Result<(), E>,
 ) -> Result<(), E> {
     let next = AtomicUsize::new(0);
     let abandoned = AtomicBool::new(false);
@@ -194,15 +249,15 @@ pub fn play<E>(
                 let sender = sender;
                 while !stop.load(Ordering::Relaxed) && !abandoned.load(Ordering::Relaxed) {
                     let Some(&number) = numbers.get(next.fetch_add(1, Ordering::Relaxed)) else { break };
-                    if sender.send((number, run.episode(number))).is_err() {
+                    if sender.send(run.judged(number)).is_err() {
                         break;
                     }
                 }
             });
         }
         drop(sender);
-        for (number, log) in receiver {
-            if let Err(error) = done(number, log) {
+        for (summary, log) in receiver {
+            if let Err(error) = done(summary, log) {
                 abandoned.store(true, Ordering::Relaxed);
                 return Err(error);
             }
@@ -221,11 +276,27 @@ pub fn replay(
     ads: Option<&str>,
     watch: &mut Watch,
 ) -> Result<EpisodeLog, RunError> {
+    let ads = match ads {
+        Some(name) => driving_system(name)?,
+        None => recorded(scenario)?,
+    };
+    replay_with(table, scenario, &ads, watch)
+}
+
+/// Plays a scenario with any driving system, under the rules that it was made with.
+///
+/// # Errors
+/// If the scenario is of another world or other rules.
+pub fn replay_with(
+    table: &ActionTable,
+    scenario: &Scenario,
+    ads: &Selected,
+    watch: &mut Watch,
+) -> Result<EpisodeLog, RunError> {
     let origin = &scenario.origin;
     if let Some(engine) = origin.engine.as_ref().filter(|engine| engine.as_str() != ENGINE) {
         return Err(RunError::Engine { scenario: scenario.name.clone(), engine: engine.clone() });
     }
-    let ads = driving_system(ads.or(origin.ads.as_deref()).unwrap_or(DEFAULT_ADS))?;
     let space = table.space();
     let rules = ActiveRules::new(space, &origin.with, &origin.without)?;
     let road = &space.roads[scenario.road];
@@ -236,11 +307,12 @@ pub fn replay(
         road,
         scene: Arc::new(episode::scene(road)),
         rules: &rules,
-        ads,
+        ads: ads.clone(),
         seed,
         start: Start {
             signal_phase_s: scenario.start.signal_phase_s,
             seed: scenario.start.traffic_seed.unwrap_or(seed),
+            ambient: scenario.start.ambient,
             ..episode::start(space, &memory, seed)
         },
         memory,
@@ -249,33 +321,19 @@ pub fn replay(
     Ok(episode::run(&setup, &mut |moment| script.choose(table, moment), watch))
 }
 
-/// Who drives where nobody is named.
-pub const DEFAULT_ADS: &str = "modular";
-
-fn driving_system(name: &str) -> Result<&'static ads::Entry, RunError> {
-    ads::by_name(name).ok_or_else(|| {
-        let known = listed(&ads::REGISTRY.iter().map(|entry| entry.name).collect::<Vec<_>>());
-        RunError::Ads { name: name.to_owned(), known }
-    })
-}
-
-/// Lets an agent choose among the offers of the moment. With nothing legal, the step passes.
-fn choose(table: &ActionTable, agent: &mut dyn Agent, moment: &Moment) -> Choice {
-    let mut offers = table.offers(moment.situation);
-    let legal: Array1<bool> = offers.iter().map(|offer| matches!(offer, Offer::Legal(_))).collect();
-    if !legal.iter().any(|&is_legal| is_legal) {
-        return Choice::Pass;
-    }
-    let mut rng = rng::stream(moment.situation.seed, Stream::Exploration, moment.step as u64);
-    let row = agent.choose(moment.state, legal.view(), &mut rng);
-    match offers.swap_remove(row) {
-        Offer::Legal(draw) => Choice::Act(draw),
-        Offer::Refused(refusal) => Choice::Refused { row, rule: refusal.rule, reason: refusal.reason },
-    }
-}
-
-/// The first name that comes a second time.
-fn twice<'a>(names: impl IntoIterator<Item = &'a String>) -> Option<String> {
-    let mut seen = BTreeSet::new();
-    names.into_iter().find(|name| !seen.insert(*name)).cloned()
+/// Judges the collisions of a replay, by playing it again.
+///
+/// # Errors
+/// As [`replay_with`].
+pub fn judge_replay(
+    table: &ActionTable,
+    scenario: &Scenario,
+    ads: &Selected,
+    log: &EpisodeLog,
+) -> Result<Vec<Judgement>, RunError> {
+    let mut failure = None;
+    let judgements = oracle::judge(log, &AvoidabilitySettings::default(), &mut |watch| {
+        failure = replay_with(table, scenario, ads, watch).err();
+    });
+    failure.map_or(Ok(judgements), Err)
 }

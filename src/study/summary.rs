@@ -1,10 +1,15 @@
 //! What an episode amounts to: its collisions, each with the facts of its verdict.
 
+use crate::episode;
 use crate::episode::Collision;
 use crate::episode::EpisodeLog;
+use crate::episode::Script;
+use crate::episode::Setup;
 use crate::model::OutcomeFacts;
 use crate::model::Space;
 use crate::oracle;
+use crate::oracle::AvoidabilitySettings;
+use crate::oracle::Judgement;
 
 /// An episode, judged.
 #[derive(Debug, Clone, PartialEq)]
@@ -21,17 +26,34 @@ pub struct Finding {
     pub number: usize,
     pub collision: Collision,
     pub facts: OutcomeFacts,
+    pub judgement: Judgement,
     pub counted: bool,
 }
 
 impl EpisodeSummary {
-    /// Judges every collision of a log by the space's verdict.
-    pub fn new(space: &Space, episode: usize, log: &EpisodeLog) -> EpisodeSummary {
-        let judge = |number: usize| {
-            let facts = oracle::facts(log, number);
-            Finding { number, collision: log.collisions[number], counted: space.counts(facts), facts }
+    /// Judges every collision of a log, by playing it again from its setup, and applies the space's
+    /// verdict.
+    pub fn judged(
+        setup: &Setup,
+        number: usize,
+        log: &EpisodeLog,
+        settings: &AvoidabilitySettings,
+    ) -> EpisodeSummary {
+        let script = Script::of_log(log);
+        let judgements = oracle::judge(log, settings, &mut |watch| {
+            episode::run(setup, &mut |moment| script.choose(setup.table, moment), watch);
+        });
+        EpisodeSummary::new(setup.table.space(), number, log, judgements)
+    }
+
+    /// Applies the space's verdict to every collision of a log; `judgements` has one for each.
+    pub fn new(space: &Space, number: usize, log: &EpisodeLog, judgements: Vec<Judgement>) -> EpisodeSummary {
+        let find = |(index, judgement)| {
+            let facts = oracle::facts(log, index, &judgement);
+            let counted = space.counts(facts);
+            Finding { number: index, collision: log.collisions[index], facts, judgement, counted }
         };
-        EpisodeSummary { episode, collisions: (0..log.collisions.len()).map(judge).collect() }
+        EpisodeSummary { episode: number, collisions: judgements.into_iter().enumerate().map(find).collect() }
     }
 
     /// Number of counted collisions.

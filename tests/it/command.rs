@@ -40,6 +40,21 @@ fn every_broken_file_has_its_diagnostics() {
 }
 
 #[test]
+fn a_run_says_what_it_refused_and_how_much_traffic_there_was() {
+    let scratch = tempfile::tempdir().expect("a scratch directory");
+    let out = scratch.path().join("run").display().to_string();
+    let space = ["run", "scenarios/avastra45.ava", "--format", "plain"];
+    let settings =
+        ["--agent", "random-raw", "--episodes", "2", "--seed", "3", "--ambient", "4", "--out", &out];
+    let (status, stdout, stderr) = outcome(&mut avastra(&[&space[..], &settings[..]].concat()));
+    assert_eq!(status, 0, "{stderr}");
+    assert!(stdout.contains("refused: "), "{stdout}");
+    assert!(stdout.contains(" × "), "{stdout}");
+    let settings = std::fs::read_to_string(scratch.path().join("run/run.yaml")).expect("it is written");
+    assert!(settings.contains("ambient: 4"), "{settings}");
+}
+
+#[test]
 fn every_diagnostic_is_also_json() {
     for (stem, path) in cases("diagnostics") {
         let (_, stdout, stderr) =
@@ -78,7 +93,7 @@ fn what_does_not_exist_is_named_with_what_does() {
     let space = "scenarios/avastra45.ava";
     let cases: [(&[&str], &str); 8] = [
         (&["run", space, "--road", "nowhere"], "`corner`"),
-        (&["run", space, "--ads", "apolo"], "`modular` and `idm`"),
+        (&["run", space, "--ads", "apolo"], "`modular`, `idm`, `cc`"),
         (&["run", space, "--agent", "rndom"], "`random`"),
         (&["run", space, "--without", "npc_gpa"], "npc_gap"),
         (&["run", "--resume", "scenarios"], "no run.yaml"),
@@ -129,13 +144,21 @@ fn compile_and_run_write_the_same_files_twice() {
     let svg = std::fs::read_to_string(scratch.path().join("strip.svg")).expect("it was drawn");
     roxmltree::Document::parse(&svg).expect("a picture is well-formed XML");
 
-    // A false claim, and a scenario whose steps differ, are refuted.
-    let lie = files[0].1.replace("expect proc == [", "expect proc == [0.999, ");
-    std::fs::write(scratch.path().join("runs/0001/critical/lie.ava"), lie).expect("it is writable");
-    let (status, stdout, _) =
-        outcome(avastra(&["replay", "runs/0001/critical/lie.ava"]).current_dir(scratch.path()));
-    assert_eq!(status, 3, "{stdout}");
-    assert!(stdout.contains("collision probability"), "{stdout}");
+    // A false claim is refuted, whatever it is about.
+    let lies = [
+        ("expect proc == [", "expect proc == [0.999, ", "collision probability"),
+        ("expect avoidable by [", "expect avoidable by [idm, ", "found   avoidable by ["),
+        ("expect avoidable by [", "expect beyond_reference by [", "claimed beyond_reference by ["),
+    ];
+    for (truth, lie, complaint) in lies {
+        assert!(files[0].1.contains(truth), "{}", files[0].1);
+        let text = files[0].1.replace(truth, lie);
+        std::fs::write(scratch.path().join("runs/0001/critical/lie.ava"), text).expect("it is writable");
+        let (status, stdout, _) =
+            outcome(avastra(&["replay", "runs/0001/critical/lie.ava"]).current_dir(scratch.path()));
+        assert_eq!(status, 3, "{stdout}");
+        assert!(stdout.contains(complaint), "{stdout}");
+    }
 }
 
 #[cfg(unix)]

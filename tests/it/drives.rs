@@ -13,21 +13,51 @@ use avastra::sim::World;
 
 use crate::world::space;
 
-/// How far from the middle of its lane the rear axle may come, m. The lanes are 4 m wide, the
-/// vehicle 2.06 m: so it stays in its lane with a quarter of a metre to spare on either side.
+/// How far from the route the rear axle may come, m, in however wide a lane.
 const OFFSET_M_MAX: f64 = 0.7;
+
+/// The number of drives of each driving system, dealt out over the roads.
+const DRIVES: usize = 100;
 
 #[test]
 fn undisturbed_drives_arrive_in_every_weather() {
     let space = space("avastra45.ava");
-    for road in &space.roads {
+    for (index, road) in space.roads.iter().enumerate() {
         let scene = Arc::new(episode::scene(road));
         for entry in ads::REGISTRY {
-            for seed in 0..100 {
+            for seed in (index as u64..DRIVES as u64).step_by(space.roads.len()) {
                 drive(&scene, entry, seed, road.facts.limit_mps);
             }
         }
     }
+}
+
+#[test]
+fn a_healthy_driving_system_survives_ambient_traffic() {
+    let space = space("avastra45.ava");
+    let (mut drives, mut hit) = (0, Vec::new());
+    for (index, road) in space.roads.iter().enumerate() {
+        let scene = Arc::new(episode::scene(road));
+        for entry in ads::REGISTRY {
+            for seed in (index as u64..60).step_by(space.roads.len()) {
+                drives += 1;
+                let start = Start { ambient: 8, ..start(seed) };
+                let mut world = World::new(scene.clone(), &start);
+                let mut driver = (entry.build)(&scene, seed);
+                let mut sensed = world.sensed();
+                let mut contact = None;
+                while !world.arrived() && contact.is_none() {
+                    let name = &scene.map.name;
+                    assert!(world.time_s() < 240.0, "{} on {name}, {start:?}: does not arrive", entry.name);
+                    world.sense(&mut sensed);
+                    contact = world.tick(&driver.drive(&sensed)).first().copied();
+                }
+                hit.extend(contact.map(|contact| (entry.name, seed, contact)));
+            }
+        }
+    }
+    // Long vehicles cut corners, and the driving systems do not look to the side.
+    assert!(hit.len() * 10 <= drives, "{hit:?}");
 }
 
 /// Every level of every phenomenon comes up at every time of day; signals begin anywhere.
@@ -35,7 +65,7 @@ fn start(seed: u64) -> Start {
     let pick = |n: u64| Level::ALL[(seed / n % 4) as usize];
     let time = TimeOfDay::ALL[(seed % 3) as usize];
     let signal_phase_s = (seed * 7 % 60) as f64;
-    Start { time, rain: pick(3), fog: pick(12), wetness: pick(5), signal_phase_s, seed }
+    Start { time, rain: pick(3), fog: pick(12), wetness: pick(5), signal_phase_s, seed, ambient: 0 }
 }
 
 fn drive(scene: &Arc<Scene>, entry: &ads::Entry, seed: u64, limit_mps: f64) {
@@ -43,15 +73,23 @@ fn drive(scene: &Arc<Scene>, entry: &ads::Entry, seed: u64, limit_mps: f64) {
     let mut world = World::new(scene.clone(), &start);
     let mut driver = (entry.build)(scene, seed);
     let mut sensed = world.sensed();
-    let who = format!("{} with {start:?}", entry.name);
+    let who = format!("{} on {}, {start:?}", entry.name, scene.map.name);
     while !world.arrived() {
         assert!(world.time_s() < 240.0, "{who}: does not arrive");
         world.sense(&mut sensed);
         let contacts = world.tick(&driver.drive(&sensed));
         assert!(contacts.is_empty(), "{who}: {contacts:?}");
         assert!(world.ego().speed_mps <= 1.05 * limit_mps, "{who}: {} m/s", world.ego().speed_mps);
-        let offset_m = world.ego_offset_m();
-        assert!(offset_m.abs() <= OFFSET_M_MAX, "{who}: {offset_m} m off at {} m", world.ego_station_m());
+        let (offset_m, station_m) = (world.ego_offset_m(), world.ego_station_m());
+        let room_m = (room_m(scene, &world)).min(OFFSET_M_MAX);
+        assert!(offset_m.abs() <= room_m, "{who}: {offset_m} m off at {station_m} m, with {room_m} m");
     }
     assert_eq!(world.red_runs(), 0, "{who}: ran a red light");
+}
+
+/// How far from the middle of its lane the ego vehicle may be without touching an edge, m.
+fn room_m(scene: &Scene, world: &World) -> f64 {
+    let here = scene.route.lane_at(world.ego_station_m());
+    let width_m = scene.map.lane(here.lane).width_at(world.ego_station_m() - here.from_m);
+    width_m / 2.0 - world.ego_outline().half_width_m
 }

@@ -9,8 +9,11 @@ use avastra::emit;
 use avastra::episode::EpisodeLog;
 use avastra::episode::Outcome;
 use avastra::episode::Script;
+use avastra::episode::Watch;
 use avastra::oracle;
+use avastra::study::EpisodeSummary;
 use avastra::study::Run;
+use avastra::study::RunSettings;
 use avastra::study::play;
 
 use crate::cases::expect_snapshot;
@@ -32,6 +35,19 @@ fn every_log_replays_to_the_bit() {
 }
 
 #[test]
+fn ambient_traffic_replays_to_the_bit() {
+    let quiet = run(4, 7, &[]);
+    let settings = RunSettings { ambient: 6, ..quiet.settings().clone() };
+    let busy = Run::new(quiet.table().clone(), settings).expect("the settings name what exists");
+    for number in 0..busy.episodes() {
+        let log = busy.episode(number);
+        assert_eq!(log.start.ambient, 6);
+        assert_ne!(log.trace(), quiet.episode(number).trace());
+        assert_replays(&busy, number, &log);
+    }
+}
+
+#[test]
 fn half_an_action_is_none() {
     let run = run_of(space_at("tests/cases/spaces/two_at_one_place.ava"), 3, 1, &[]);
     for number in 0..run.episodes() {
@@ -46,20 +62,19 @@ fn half_an_action_is_none() {
 #[test]
 fn the_number_of_workers_changes_nothing() {
     let run = run(EPISODES, 11, &[]);
-    assert_eq!(logs(&run, 1), logs(&run, 2));
+    assert_eq!(judged(&run, 1), judged(&run, 2));
 }
 
 #[test]
 fn emitted_scenarios_keep_every_claim() {
     let run = run(60, 3, &[]);
     let mut emitted = 0;
-    for (number, log) in logs(&run, 2) {
-        let counted = oracle::counted(run.space(), &log);
-        if counted.is_empty() {
+    for (number, (summary, log)) in judged(&run, 2) {
+        if summary.counted() == 0 {
             continue;
         }
         emitted += 1;
-        let text = text(&run, number, &log, &counted);
+        let text = text(&run, &summary, &log);
         let formatted = avastra::syntax::format(Default::default(), &text).expect("what is emitted parses");
         assert_eq!(formatted, text, "emitted text is formatted text");
         if emitted <= 2 {
@@ -74,33 +89,38 @@ fn emitted_scenarios_keep_every_claim() {
         assert!(loaded.diagnostics.is_empty(), "{text}\n{:?}", loaded.diagnostics);
         let scenario = loaded.scenario.as_ref().expect("it has a scenario");
         let script = Script::of_scenario(scenario);
-        let again = run.play(number, &mut |moment| script.choose(run.table(), moment), &mut |_, _, _| {});
-        for verdict in oracle::verify(run.space(), scenario, &again) {
+        let play =
+            |watch: &mut Watch| run.play(number, &mut |moment| script.choose(run.table(), moment), watch);
+        let again = play(&mut |_, _, _| {});
+        let judgements = oracle::judge(&again, &run.settings().avoidability, &mut |watch| {
+            play(watch);
+        });
+        for verdict in oracle::verify(run.space(), scenario, &again, &judgements) {
             assert!(verdict.confirmed, "{verdict:?}\n{text}");
         }
     }
     assert!(emitted >= 2, "sixty episodes of random search find crashes; these found {emitted}");
 }
 
-fn text(run: &Run, number: usize, log: &EpisodeLog, counted: &[usize]) -> String {
+fn text(run: &Run, summary: &EpisodeSummary, log: &EpisodeLog) -> String {
     let source = emit::Provenance {
-        name: &format!("{}_{number:04}", log.road),
+        name: &format!("{}_{:04}", log.road, summary.episode),
         space_path: "avastra45.ava",
-        episode: number,
+        episode: summary.episode,
         agent: &run.settings().agent,
         without: &[],
         with: &[],
     };
-    avastra::syntax::print(&emit::scenario(run.table(), log, counted, &source))
+    avastra::syntax::print(&emit::scenario(run.table(), log, summary, &source))
 }
 
-fn logs(run: &Run, jobs: usize) -> BTreeMap<usize, EpisodeLog> {
+fn judged(run: &Run, jobs: usize) -> BTreeMap<usize, (EpisodeSummary, EpisodeLog)> {
     let numbers: Vec<usize> = (0..run.episodes()).collect();
-    let mut logs = BTreeMap::new();
-    play::<()>(run, &numbers, jobs, &AtomicBool::new(false), &mut |number, log| {
-        logs.insert(number, log);
+    let mut episodes = BTreeMap::new();
+    play::<()>(run, &numbers, jobs, &AtomicBool::new(false), &mut |summary, log| {
+        episodes.insert(summary.episode, (summary, log));
         Ok(())
     })
     .expect("nothing here fails");
-    logs
+    episodes
 }

@@ -4,9 +4,15 @@
 mod cases;
 mod command;
 mod corpus;
+mod contacts;
 mod drives;
 mod emitted;
 mod layers;
+mod profiles;
+mod references;
 mod rules;
 mod tables;
+mod traces;
+mod torch;
+mod training;
 mod world;

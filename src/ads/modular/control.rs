@@ -2,7 +2,9 @@
 //!
 //! Apollo's cascade: the station error becomes a wanted speed, the speed error an acceleration, to
 //! which the plan's own acceleration is added, read a little ahead; the calibration table turns it
-//! into pedals. Steering is `ads::steering`.
+//! into pedals. Steering is `ads::steering`. Left out: Apollo's low-pass filters of the steering
+//! angle (10 Hz, above what the actuator follows) and its calibration by speed (the published rows
+//! hardly change with it).
 
 use std::sync::Arc;
 
@@ -15,6 +17,7 @@ use crate::sim::EgoMotion;
 use crate::sim::pedals_for;
 
 use super::config::ControlConfig;
+use super::planning::LateralPlan;
 use super::planning::Trajectory;
 
 #[derive(Debug, Clone)]
@@ -22,12 +25,14 @@ pub struct Controller {
     config: ControlConfig,
     steering: Arc<Steering>,
     integral_mps2: f64,
+    /// The last commanded angle, for a planted lag, rad.
+    steer_rad: f64,
 }
 
 impl Controller {
     pub fn new(config: &ControlConfig) -> Controller {
         let steering = Steering::shared(&config.steering);
-        Controller { config: *config, steering, integral_mps2: 0.0 }
+        Controller { config: *config, steering, integral_mps2: 0.0, steer_rad: 0.0 }
     }
 
     /// The command `since_s` after the trajectory was planned, believed to be at `localized`.
@@ -36,14 +41,22 @@ impl Controller {
         trajectory: &Trajectory,
         since_s: f64,
         guide: &Guide,
+        lateral: &LateralPlan,
         localized: &Pose,
         station_m: f64,
         motion: &EgoMotion,
     ) -> Control {
-        let acceleration_mps2 = self.acceleration_mps2(trajectory, since_s, station_m, motion.speed_mps);
+        let actuators = &self.config.actuators;
+        let (brake_mps2_max, throttle_mps2_max) = (actuators.brake_mps2_max, actuators.throttle_mps2_max);
+        let lag_s = actuators.steer_lag_s;
+        let acceleration_mps2 = self
+            .acceleration_mps2(trajectory, since_s, station_m, motion.speed_mps)
+            .clamp(-brake_mps2_max, throttle_mps2_max);
         let (throttle_pct, brake_pct) = pedals_for(acceleration_mps2);
-        let steer_rad = self.steering.steer_rad(guide, localized, station_m, motion);
-        Control { throttle_pct, brake_pct, steer_rad }
+        let aside = |at_m: f64| lateral.aside(at_m);
+        let wanted_rad = self.steering.steer_aside_rad(guide, &aside, localized, station_m, motion);
+        self.steer_rad += (wanted_rad - self.steer_rad) * (DT_S / (lag_s + DT_S));
+        Control { throttle_pct, brake_pct, steer_rad: self.steer_rad }
     }
 
     fn acceleration_mps2(
@@ -53,7 +66,7 @@ impl Controller {
         station_m: f64,
         speed_mps: f64,
     ) -> f64 {
-        let config = &self.config;
+        let config = &self.config.pedals;
         let target = trajectory.at(since_s);
         let planned_mps2 = trajectory.at(since_s + config.preview_s).acceleration_mps2;
         if target.speed_mps <= config.stopped_mps && planned_mps2.abs() <= 0.01 {

@@ -1,10 +1,13 @@
-//! The modular driving system: localisation → perception → prediction → planning → control.
+//! The modular driving system: localisation → perception → tracking → prediction → planning → control.
 //!
 //! Modelled on Apollo 7.0's published structure and constants. Each part has the limits its original
-//! is known for; no failure is scripted. Nothing here is a claim about Apollo itself.
+//! is known for; the documented weaknesses (a) to (i) are switches, and no failure is scripted.
+//! Nothing here is a claim about Apollo itself.
 
 mod config;
 mod control;
+mod foresight;
+mod junctions;
 mod localization;
 mod perception;
 mod planning;
@@ -12,7 +15,11 @@ mod prediction;
 mod stack;
 #[cfg(test)]
 mod tests;
+mod tracking;
 
 pub use config::ConfigError;
 pub use config::ModularConfig;
+pub use config::Module;
+pub use config::Weaknesses;
+pub use foresight::Foresight;
 pub use stack::Modular;

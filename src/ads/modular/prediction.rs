@@ -3,8 +3,9 @@
 //! Vehicles keep their lane, and at a fork take the successor that turns least; they are believed to
 //! leave it only once their centre is over its edge or their lateral speed has lasted half a second.
 //! That is a documented weakness of the system modelled (Apollo issues 11118, 12798, 14212), kept on
-//! purpose. Pedestrians and vehicles off the lanes keep their velocity. No interaction is predicted,
-//! and no obedience to signals.
+//! purpose and switchable (b). Pedestrians and vehicles off the lanes keep their velocity. No
+//! interaction is predicted, and no obedience to signals. Apollo's learned predictors are not modelled:
+//! what they have in common with this is that they follow lanes.
 
 use std::sync::Arc;
 
@@ -18,8 +19,9 @@ use crate::road::RoadMap;
 use crate::sim::Scene;
 
 use super::config::PredictionConfig;
+use super::foresight::Foresight;
 use super::perception::FRAME_S;
-use super::perception::Track;
+use super::tracking::Track;
 
 /// Predicted positions after the present one.
 pub const STEPS: usize = 16;
@@ -35,6 +37,7 @@ const LATERAL_GAIN: f64 = 0.3;
 #[derive(Debug, Clone)]
 pub struct Prediction {
     config: PredictionConfig,
+    foresight: Option<Arc<Foresight>>,
     scene: Arc<Scene>,
     memories: Vec<Memory>,
     forecasts: Vec<Forecast>,
@@ -69,16 +72,28 @@ struct Memory {
 }
 
 impl Prediction {
-    pub fn new(config: &PredictionConfig, scene: &Arc<Scene>) -> Prediction {
-        Prediction { config: *config, scene: Arc::clone(scene), memories: Vec::new(), forecasts: Vec::new() }
+    /// `lane_bound` is weakness (b). A foresight is used only by a perfect prediction.
+    pub fn new(
+        config: &PredictionConfig,
+        lane_bound: bool,
+        scene: &Arc<Scene>,
+        foresight: Option<Arc<Foresight>>,
+    ) -> Prediction {
+        let mut config = *config;
+        if !lane_bound || config.perfect {
+            config.lateral_persistence_s = 0.0;
+        }
+        let foresight = foresight.filter(|_| config.perfect);
+        let (memories, forecasts) = (Vec::new(), Vec::new());
+        Prediction { config, foresight, scene: Arc::clone(scene), memories, forecasts }
     }
 
     pub fn forecasts(&self) -> &[Forecast] {
         &self.forecasts
     }
 
-    /// Predicts anew from tracks that are `age_s` old.
-    pub fn update<'a>(&mut self, tracks: impl Iterator<Item = &'a Track>, age_s: f64, ego: Vec2) {
+    /// Predicts anew, at `time_s` of the episode, from tracks that are `age_s` old.
+    pub fn update(&mut self, tracks: &[Track], age_s: f64, time_s: f64, ego: Vec2) {
         self.forecasts.clear();
         for memory in &mut self.memories {
             memory.seen = false;
@@ -90,12 +105,15 @@ impl Prediction {
             } else {
                 self.config.still_pedestrian_mps
             };
-            let moving = track.velocity_mps.norm() >= still_mps;
+            let moving = track.velocity_mps.norm() >= still_mps && !self.config.frozen;
             let velocity_mps = if moving { track.velocity_mps } else { Vec2::zeros() };
             let mut positions: [Vec2; STEPS + 1] =
                 core::array::from_fn(|step| position + velocity_mps * (step as f64 * STEP_S));
             let near = (position - ego).norm() < self.config.reach_m;
-            if moving && near && track.body.is_vehicle() {
+            let foreseen = self.foresight.as_ref().is_some_and(|foresight| {
+                foresight.positions(track.id, time_s, position, STEP_S, &mut positions)
+            });
+            if moving && near && track.body.is_vehicle() && !foreseen {
                 let index = self.memory_of(track.id);
                 let memory = &mut self.memories[index];
                 memory.follow(&self.config, &self.scene.map, position, track.heading_rad);
@@ -117,7 +135,7 @@ impl Prediction {
                 length_m: track.length_m,
                 width_m: track.width_m,
                 height_m: track.height_m,
-                moving,
+                moving: moving || (foreseen && (positions[STEPS] - position).norm() > 1.0),
                 positions,
             });
         }
@@ -243,7 +261,7 @@ mod tests {
     use crate::geometry::Pose;
 
     fn prediction(scene: &Arc<Scene>) -> Prediction {
-        Prediction::new(&PredictionConfig::default(), scene)
+        Prediction::new(&PredictionConfig::default(), true, scene, None)
     }
 
     #[test]
@@ -253,10 +271,10 @@ mod tests {
         let path = &scene.route.path;
         let pose = path.pose_at(110.0);
         let track = Track::for_tests(1, Body::Sedan, pose, pose.forward() * 8.0);
-        prediction.update([&track].into_iter(), 0.0, Vec2::new(0.0, 0.0));
+        prediction.update(&[track], 0.0, 0.0, Vec2::new(0.0, 0.0));
         // Beyond 80 m from the ego vehicle it is taken to go straight on; near by, round the bend.
         assert!(path.project(prediction.forecasts()[0].positions[STEPS]).distance_m > 10.0);
-        prediction.update([&track].into_iter(), 0.0, pose.position);
+        prediction.update(&[track], 0.0, 0.0, pose.position);
         for (step, position) in prediction.forecasts()[0].positions.iter().enumerate() {
             let beside = path.project(*position);
             assert!(beside.distance_m < 0.1, "{beside:?} at step {step}");
@@ -264,24 +282,65 @@ mod tests {
         }
     }
 
-    #[test]
-    fn leaving_the_lane_is_believed_after_half_a_second() {
+    /// When a car that drifts out of its lane at 1 m/s is first predicted to end in the next, s.
+    fn believed_s(config: &PredictionConfig, lane_bound: bool) -> f64 {
         let scene = winding();
-        let mut prediction = prediction(&scene);
-        // It comes towards the route's start on the left-hand lane and drifts over at 1 m/s.
-        let mut believed_at = None;
-        for frame in 0..15 {
+        let mut prediction = Prediction::new(config, lane_bound, &scene, None);
+        for frame in 0..60 {
             let time_s = f64::from(frame) * FRAME_S;
             let pose = Pose::new(70.0 - 8.0 * time_s, 1.75 - time_s, core::f64::consts::PI);
             let track = Track::for_tests(1, Body::Sedan, pose, Vec2::new(-8.0, -1.0));
-            prediction.update([&track].into_iter(), 0.0, Vec2::zeros());
-            let ends_at_m = prediction.forecasts()[0].positions[STEPS].y;
-            if believed_at.is_none() && ends_at_m < -1.0 {
-                believed_at = Some(time_s);
+            prediction.update(&[track], 0.0, 0.0, Vec2::zeros());
+            if prediction.forecasts()[0].positions[STEPS].y < -1.0 {
+                return time_s;
             }
         }
-        let believed_s = believed_at.expect("in the end it is believed");
-        assert!((0.5..1.0).contains(&believed_s), "{believed_s}");
+        f64::INFINITY
+    }
+
+    #[test]
+    fn weakness_b_believes_in_leaving_the_lane_half_a_second_late() {
+        let config = PredictionConfig::default();
+        let late_s = believed_s(&config, true);
+        let soon_s = believed_s(&config, false);
+        assert!((0.5..1.0).contains(&late_s), "{late_s}");
+        assert!((late_s - soon_s - 0.4).abs() < 0.11, "{soon_s}");
+        // Idealised, it is without the weakness even where no recording is at hand.
+        assert_eq!(believed_s(&PredictionConfig { perfect: true, ..config }, true), soon_s);
+    }
+
+    #[test]
+    fn a_frozen_prediction_keeps_everybody_where_he_is() {
+        let config = PredictionConfig { frozen: true, ..PredictionConfig::default() };
+        let mut prediction = Prediction::new(&config, true, &winding(), None);
+        let at = Pose::new(20.0, -1.75, 0.0);
+        prediction.update(
+            &[Track::for_tests(1, Body::Sedan, at, Vec2::new(8.0, 0.0))],
+            0.0,
+            0.0,
+            Vec2::zeros(),
+        );
+        let forecast = &prediction.forecasts()[0];
+        assert!(!forecast.moving && forecast.positions.iter().all(|position| *position == at.position));
+    }
+
+    #[test]
+    fn a_perfect_prediction_reads_the_recording() {
+        let scene = winding();
+        let mut foresight = Foresight::default();
+        // It will brake at 2 m/s² and turn off the road.
+        for frame in 0..200_u64 {
+            let time_s = frame as f64 * FRAME_S;
+            let position = Vec2::new(20.0 + 8.0 * time_s - time_s * time_s, -1.75 - 0.1 * time_s * time_s);
+            foresight.note(1, frame, position);
+        }
+        let config = PredictionConfig { perfect: true, ..PredictionConfig::default() };
+        let mut knowing = Prediction::new(&config, true, &scene, Some(Arc::new(foresight)));
+        let track = Track::for_tests(1, Body::Sedan, Pose::new(28.0, -1.75, 0.0), Vec2::new(6.0, 0.0));
+        knowing.update(&[track], 0.0, 1.0, Vec2::zeros());
+        let at_4_s = knowing.forecasts()[0].positions[6];
+        // 16 - 7 m onwards and 1.6 - 0.1 m aside of where it is now.
+        assert!((at_4_s - Vec2::new(28.0 + 16.0 - 7.0, -1.75 - 1.5)).norm() < 0.01, "{at_4_s}");
     }
 
     #[test]
@@ -294,7 +353,7 @@ mod tests {
             Track::for_tests(2, Body::Pedestrian, at, Vec2::new(0.0, 1.2)),
             Track::for_tests(3, Body::BoxTruck, at, Vec2::new(0.5, 0.0)),
         ];
-        prediction.update(tracks.iter(), 0.1, Vec2::zeros());
+        prediction.update(&tracks, 0.1, 0.0, Vec2::zeros());
         let ends: Vec<Vec2> = prediction.forecasts().iter().map(|f| f.positions[STEPS]).collect();
         assert!((ends[0] - at.position).norm() < 0.02 && (ends[2] - at.position).norm() < 0.06);
         assert!((ends[1] - Vec2::new(20.0, -5.0 + 8.1 * 1.2)).norm() < 1e-9, "{}", ends[1]);

@@ -1,12 +1,12 @@
 //! The parts of the modular driving system put together, and when each of them runs.
 //!
-//! Localisation and control run every tick (50 Hz; Apollo: 100), perception, prediction and planning
-//! once a frame (10 Hz).
+//! Localisation and control run every tick (50 Hz; Apollo: 100), perception, tracking, prediction and
+//! planning once a frame (10 Hz).
 
 use std::sync::Arc;
 
 use crate::ads::driver::Ads;
-use crate::ads::guide::Guide;
+use crate::ads::status::GHOST_ID_MIN;
 use crate::ads::status::PerceivedObject;
 use crate::ads::status::PlannedPoint;
 use crate::ads::status::Status;
@@ -16,26 +16,31 @@ use crate::sim::DT_S;
 use crate::sim::FRAME_TICKS;
 use crate::sim::Scene;
 use crate::sim::Sensed;
-use crate::sim::SignalColour;
 
 use super::config::ModularConfig;
 use super::control::Controller;
+use super::foresight::Foresight;
+use super::junctions::Junctions;
 use super::localization::Localization;
 use super::perception::FRAME_S;
+use super::perception::LightReader;
 use super::perception::Perception;
+use super::planning::Outlook;
 use super::planning::Planner;
 use super::prediction::Prediction;
+use super::tracking::Tracking;
 
 /// The driving system under test.
 #[derive(Debug, Clone)]
 pub struct Modular {
-    guide: Arc<Guide>,
+    junctions: Arc<Junctions>,
     localization: Localization,
     perception: Perception,
+    lights: LightReader,
+    tracking: Tracking,
     prediction: Prediction,
     planner: Planner,
     controller: Controller,
-    latency_frames: u32,
     ticks: u64,
     /// Where it believes to be on the route, m.
     station_m: f64,
@@ -44,16 +49,30 @@ pub struct Modular {
 }
 
 impl Modular {
+    /// With these settings; the seed feeds its sensor errors.
     pub fn new(scene: &Arc<Scene>, config: &ModularConfig, seed: u64) -> Modular {
-        let guide = Arc::new(Guide::new(scene, &config.planning.speed_rules()));
+        Modular::with_foresight(scene, config, seed, None)
+    }
+
+    /// The same, with a recording of the future for a perfect prediction.
+    pub fn with_foresight(
+        scene: &Arc<Scene>,
+        config: &ModularConfig,
+        seed: u64,
+        foresight: Option<Arc<Foresight>>,
+    ) -> Modular {
+        let junctions = Arc::new(Junctions::of(scene));
+        let weak = &config.weaknesses;
+        let latency_frames = config.perception.latency_frames;
         Modular {
             localization: Localization::new(&config.localization, seed),
-            perception: Perception::new(&config.perception, seed),
-            prediction: Prediction::new(&config.prediction, scene),
-            planner: Planner::new(&config.planning, scene, &guide),
+            perception: Perception::new(&config.perception, weak.a_late_unstable_tracks, seed),
+            lights: LightReader::new(&config.perception, scene),
+            tracking: Tracking::new(&config.tracking, weak.a_late_unstable_tracks, latency_frames),
+            prediction: Prediction::new(&config.prediction, weak.b_lane_bound_prediction, scene, foresight),
+            planner: Planner::new(config, scene, &junctions),
             controller: Controller::new(&config.control),
-            latency_frames: config.perception.latency_frames,
-            guide,
+            junctions,
             ticks: 0,
             station_m: 0.0,
             steer_rad: 0.0,
@@ -61,27 +80,19 @@ impl Modular {
         }
     }
 
-    /// Perception, prediction and planning.
+    /// Perception, tracking, prediction and planning.
     fn cycle(&mut self, sensed: &Sensed, localized: &Pose) {
-        // With latency, a frame is used one cycle after it was taken.
-        if self.latency_frames == 0 {
-            self.perception.look(sensed, localized);
-        }
-        let age_s = f64::from(self.latency_frames) * FRAME_S;
-        self.prediction.update(self.perception.published(), age_s, localized.position);
-        let since_s = if self.ticks == 0 { 0.0 } else { FRAME_S };
-        let signals: &[SignalColour] = &sensed.signals;
-        self.planner.plan(
+        self.tracking.update(self.perception.look(sensed, localized));
+        let (tracks, age_s) = (self.tracking.published(), self.tracking.age_s());
+        self.prediction.update(tracks, age_s, sensed.time_s, localized.position);
+        self.planner.plan(&Outlook {
             localized,
-            self.station_m,
-            sensed.ego.speed_mps,
-            since_s,
-            self.prediction.forecasts(),
-            signals,
-        );
-        if self.latency_frames > 0 {
-            self.perception.look(sensed, localized);
-        }
+            station_m: self.station_m,
+            speed_mps: sensed.ego.speed_mps,
+            since_s: if self.ticks == 0 { 0.0 } else { FRAME_S },
+            forecasts: self.prediction.forecasts(),
+            lights: self.lights.look(sensed, self.station_m),
+        });
         self.report();
     }
 
@@ -97,7 +108,7 @@ impl Modular {
             predicted.clear();
             predicted.extend_from_slice(&forecast.positions[1..]);
             let object = PerceivedObject {
-                id: Some(forecast.id),
+                id: (forecast.id < GHOST_ID_MIN).then_some(forecast.id),
                 body: forecast.body,
                 pose,
                 velocity_mps: forecast.velocity_mps,
@@ -111,23 +122,22 @@ impl Modular {
                 None => perceived.push(object),
             }
         }
-        let guide = &self.guide;
+        let (guide, lateral) = (self.planner.guide(), self.planner.lateral());
         self.status.planned.clear();
-        self.status.planned.extend(
-            self.planner.trajectory().points.iter().map(|point| PlannedPoint {
-                pose: guide.pose_at(point.station_m),
-                speed_mps: point.speed_mps,
-            }),
-        );
+        self.status.planned.extend(self.planner.trajectory().points.iter().map(|point| PlannedPoint {
+            pose: guide.pose_at(point.station_m).offset(0.0, lateral.aside(point.station_m).offset_m),
+            speed_mps: point.speed_mps,
+        }));
         self.status.reason = self.planner.reason();
+        self.status.manoeuvre = self.planner.manoeuvre();
     }
 }
 
 impl Ads for Modular {
     fn drive(&mut self, sensed: &Sensed) -> Control {
-        let localized = self.localization.locate(sensed);
+        let localized = self.localization.locate(sensed, !self.junctions.inside(self.station_m));
         let near_m = (self.ticks > 0).then_some(self.station_m);
-        self.station_m = self.guide.locate(localized.position, near_m).station_m;
+        self.station_m = self.planner.guide().locate(localized.position, near_m).station_m;
         let in_cycle = self.ticks % FRAME_TICKS;
         if in_cycle == 0 {
             self.cycle(sensed, &localized);
@@ -135,7 +145,8 @@ impl Ads for Modular {
         let control = self.controller.follow(
             self.planner.trajectory(),
             in_cycle as f64 * DT_S,
-            &self.guide,
+            self.planner.guide(),
+            self.planner.lateral(),
             &localized,
             self.station_m,
             &sensed.ego,

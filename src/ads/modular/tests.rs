@@ -1,17 +1,26 @@
 //! Closed loop on hand-made roads: the parts together.
 
+use std::sync::Arc;
+
+use crate::ads::status::Manoeuvre;
+use crate::ads::status::Reason;
 use crate::ads::testing::Rig;
 use crate::ads::testing::object;
 use crate::ads::testing::straight;
+use crate::ads::testing::two_lanes;
 use crate::ads::testing::winding;
 use crate::geometry::Pose;
+use crate::geometry::Vec2;
 use crate::model::vocabulary::Body;
+use crate::road::RouteLaneChange;
+use crate::sim::Scene;
 use crate::sim::SignalColour;
 
 use super::Modular;
 use super::ModularConfig;
+use super::Module;
 
-fn rig(scene: &std::sync::Arc<crate::sim::Scene>, seed: u64) -> Rig {
+fn rig(scene: &Arc<Scene>, seed: u64) -> Rig {
     Rig::new(scene, Box::new(Modular::new(scene, &ModularConfig::default(), seed)), 0.0)
 }
 
@@ -75,12 +84,21 @@ fn it_gives_way_to_a_pedestrian_and_goes_on() {
     }
 }
 
-/// Smallest gap to a car that crosses from the right, timed to meet the ego vehicle, m.
-fn gap_to_a_crosser(brief_overlap_s: f64, seed: u64) -> f64 {
-    let scene = straight();
+/// The default with one weakness, or none, of those that the closure switches.
+fn config(change: impl Fn(&mut ModularConfig)) -> ModularConfig {
     let mut config = ModularConfig::default();
-    config.planning.brief_overlap_s = brief_overlap_s;
-    let mut rig = Rig::new(&scene, Box::new(Modular::new(&scene, &config, seed)), 0.0);
+    change(&mut config);
+    config
+}
+
+fn rig_of(scene: &Arc<Scene>, config: &ModularConfig, seed: u64) -> Rig {
+    Rig::new(scene, Box::new(Modular::new(scene, config, seed)), 0.0)
+}
+
+/// Smallest gap to a car that crosses from the right, timed to meet the ego vehicle, m.
+fn gap_to_a_crosser(config: &ModularConfig, seed: u64) -> f64 {
+    let scene = straight();
+    let mut rig = rig_of(&scene, config, seed);
     rig.run(10.0);
     let (meeting_m, speed_mps) = (rig.station_m() + 60.0, 10.0);
     let arrival_s = 60.0 / rig.sensed.ego.speed_mps;
@@ -91,9 +109,208 @@ fn gap_to_a_crosser(brief_overlap_s: f64, seed: u64) -> f64 {
 }
 
 #[test]
-fn a_brief_overlap_is_not_given_way_to_unless_that_is_switched_off() {
+fn weakness_d_does_not_give_way_to_a_brief_overlap() {
+    let mended = config(|config| config.weaknesses.d_brief_yielding = false);
+    let deaf = config(|config| {
+        config.weaknesses.d_brief_yielding = false;
+        config.planning.never_yields = true;
+    });
     for seed in 0..5 {
-        assert!(gap_to_a_crosser(0.0, seed) > 1.0);
-        assert!(gap_to_a_crosser(2.0, seed) < 1.0);
+        assert!(gap_to_a_crosser(&mended, seed) > 1.0);
+        assert!(gap_to_a_crosser(&ModularConfig::default(), seed) < 1.0);
+        // Idealised planning has neither the weakness nor a planted fault.
+        assert!(gap_to_a_crosser(&deaf, seed) < 1.0);
+        assert!(gap_to_a_crosser(&deaf.idealised(Module::Planning), seed) > 1.0);
     }
+}
+
+/// A car stands suddenly so far ahead of the bumper of a vehicle at cruising speed: the gap that is
+/// left, and the speed at contact (m/s) if none is.
+fn sudden_wall(config: &ModularConfig, ahead_m: f64) -> (f64, f64) {
+    let scene = straight();
+    let mut rig = rig_of(&scene, config, 1);
+    rig.run(12.0);
+    rig.gap_m_min = f64::INFINITY;
+    let x_m = rig.station_m() + 3.705 + ahead_m + 2.4;
+    rig.sensed.objects.push(object(1, Body::Sedan, Pose::new(x_m, -1.75, 0.0), 0.0));
+    for _ in 0..500 {
+        rig.tick();
+        rig.measure();
+        if rig.gap_m_min <= 0.0 {
+            return (0.0, rig.sensed.ego.speed_mps);
+        }
+    }
+    (rig.gap_m_min, 0.0)
+}
+
+#[test]
+fn weakness_c_brakes_late() {
+    let mended = config(|config| config.weaknesses.c_bounded_jerk = false);
+    let (gap_m, late_mps) = sudden_wall(&ModularConfig::default(), 24.0);
+    let (mended_gap_m, mended_mps) = sudden_wall(&mended, 24.0);
+    assert!(mended_mps == 0.0 && mended_gap_m > gap_m + 0.5, "{gap_m} {late_mps} to {mended_gap_m}");
+}
+
+#[test]
+fn weakness_i_brakes_at_four_where_no_plan_keeps_clear() {
+    let mended = config(|config| config.weaknesses.i_gentle_fallback = false);
+    let (weak_mps, mended_mps) =
+        (sudden_wall(&ModularConfig::default(), 21.0).1, sudden_wall(&mended, 21.0).1);
+    assert!(weak_mps > mended_mps + 0.5, "{weak_mps} and {mended_mps} m/s");
+}
+
+#[test]
+fn weak_brakes_hit_what_idealised_control_stops_for() {
+    let faulty = config(|config| {
+        config.weaknesses.c_bounded_jerk = false;
+        config.control.actuators.brake_mps2_max = 2.0;
+    });
+    assert!(sudden_wall(&faulty, 26.0).1 > 3.0);
+    assert_eq!(sudden_wall(&faulty.idealised(Module::Control), 26.0).1, 0.0);
+}
+
+/// Least gap, m, to a car that stands in the lane behind another, at the lane's edge, that is passed.
+fn gap_behind_a_parked_car(config: &ModularConfig) -> f64 {
+    let scene = straight();
+    let mut rig = rig_of(&scene, config, 1);
+    rig.run(8.0);
+    let parked_m = rig.station_m() + 60.0;
+    rig.sensed.objects.push(object(1, Body::Sedan, Pose::new(parked_m, -3.55, 0.0), 0.0));
+    rig.sensed.objects.push(object(2, Body::Sedan, Pose::new(parked_m + 28.0, -1.75, 0.0), 0.0));
+    let mut nudged = false;
+    for _ in 0..1000 {
+        rig.tick();
+        nudged |= rig.ads.status().manoeuvre == Manoeuvre::Nudge(1);
+    }
+    assert!(nudged);
+    rig.measure();
+    rig.sensed.objects[1].distance_m
+}
+
+#[test]
+fn weakness_e_sees_only_the_closest_of_what_stands() {
+    let mended = config(|config| config.weaknesses.e_closest_static_only = false);
+    let (weak_m, mended_m) =
+        (gap_behind_a_parked_car(&ModularConfig::default()), gap_behind_a_parked_car(&mended));
+    assert!(mended_m > 4.0 && weak_m < 3.0, "{weak_m} and {mended_m} m");
+}
+
+#[test]
+fn it_passes_a_parked_car_within_its_lane() {
+    let scene = straight();
+    let mut rig = rig_of(&scene, &ModularConfig::default(), 2);
+    rig.sensed.objects.push(object(1, Body::Sedan, Pose::new(200.0, -3.55, 0.0), 0.0));
+    let mut slowest_mps = f64::INFINITY;
+    while rig.station_m() < 260.0 {
+        rig.tick();
+        if rig.station_m() > 120.0 {
+            slowest_mps = slowest_mps.min(rig.sensed.ego.speed_mps);
+        }
+    }
+    assert!(slowest_mps > 7.0 && rig.gap_m_min > 0.05, "{slowest_mps} m/s, {} m", rig.gap_m_min);
+    assert!((rig.sensed.ego.rear_axle.position.y + 1.75).abs() < 0.2, "it is back in the middle");
+}
+
+#[test]
+fn weakness_f_creeps_into_a_pedestrian_who_stands() {
+    let mended = config(|config| config.weaknesses.f_standing_pedestrian_ignored = false);
+    let gap_m = |config: &ModularConfig| {
+        let scene = straight();
+        let mut rig = rig_of(&scene, config, 1);
+        rig.sensed.objects.push(object(1, Body::Pedestrian, Pose::new(80.0, -1.75, 0.0), 0.0));
+        rig.run(30.0);
+        rig.gap_m_min
+    };
+    assert!(gap_m(&mended) > 2.0, "{}", gap_m(&mended));
+    assert!(gap_m(&ModularConfig::default()) <= 0.0);
+}
+
+#[test]
+fn weakness_g_passes_a_light_that_turns_red_late() {
+    let mended = config(|config| config.weaknesses.g_late_red_passed = false);
+    let slowest_mps = |config: &ModularConfig| {
+        let scene = straight();
+        let mut rig = rig_of(&scene, config, 1);
+        while rig.station_m() + 3.705 < 84.0 {
+            rig.tick();
+        }
+        rig.sensed.signals[0] = SignalColour::Red;
+        let mut slowest_mps = f64::INFINITY;
+        for _ in 0..150 {
+            rig.tick();
+            slowest_mps = rig.sensed.ego.speed_mps.min(slowest_mps);
+        }
+        slowest_mps
+    };
+    assert!(slowest_mps(&ModularConfig::default()) > 9.0);
+    assert!(slowest_mps(&mended) < 5.0, "{}", slowest_mps(&mended));
+}
+
+#[test]
+fn weakness_h_does_not_let_in_who_comes_over_from_beside() {
+    let mended = config(|config| config.weaknesses.h_blind_to_side_and_rear = false);
+    let gap_m = |config: &ModularConfig| {
+        let scene = straight();
+        let mut rig = rig_of(&scene, config, 1);
+        rig.run(12.0);
+        rig.gap_m_min = f64::INFINITY;
+        let x_m = rig.station_m() + 3.705 - 4.0;
+        rig.sensed.objects.push(object(1, Body::Sedan, Pose::new(x_m, 1.75, 0.0), 0.0));
+        rig.sensed.objects[0].velocity_mps = Vec2::new(rig.sensed.ego.speed_mps, -0.5);
+        // It stays in the middle of the lane once it is there.
+        rig.run(7.0);
+        rig.sensed.objects[0].velocity_mps.y = 0.0;
+        rig.run(3.0);
+        rig.gap_m_min
+    };
+    assert_eq!(gap_m(&ModularConfig::default()), 0.0);
+    assert!(gap_m(&mended) > 0.0);
+}
+
+/// The vehicle on the two-lane road, whose route changes from y = -5.25 m to y = -1.75 m.
+fn changing(open_m: f64) -> Rig {
+    let scene = two_lanes(open_m);
+    let ads = Box::new(Modular::new(&scene, &ModularConfig::default(), 1));
+    Rig::new(&scene, ads, 8.0)
+}
+
+#[test]
+fn it_changes_lanes_where_the_gap_is_safe() {
+    let mut free = changing(200.0);
+    let mut changed = false;
+    for _ in 0..1500 {
+        free.tick();
+        changed |= free.ads.status().manoeuvre == Manoeuvre::LaneChange;
+    }
+    let y_m = free.sensed.ego.rear_axle.position.y;
+    assert!(changed && (y_m + 1.75).abs() < 0.3, "{y_m}");
+
+    // Somebody faster comes from behind: first he, then the change.
+    let mut passed = changing(300.0);
+    passed.sensed.objects.push(object(1, Body::Sedan, Pose::new(-15.0, -1.75, 0.0), 13.0));
+    passed.run(1.0);
+    assert!((passed.sensed.ego.rear_axle.position.y + 5.25).abs() < 0.3);
+    passed.run(20.0);
+    assert!((passed.sensed.ego.rear_axle.position.y + 1.75).abs() < 0.3);
+    assert!(passed.gap_m_min > 1.0, "{}", passed.gap_m_min);
+}
+
+#[test]
+fn it_waits_for_a_gap_where_a_change_is_just_possible() {
+    let mut rig = changing(100.0);
+    let queue = |i: u32| object(i + 1, Body::Sedan, Pose::new(f64::from(i) * 8.0, -1.75, 0.0), 0.0);
+    rig.sensed.objects = (0..14).map(queue).collect();
+    rig.run(30.0);
+    let place = rig.sensed.ego.rear_axle.position;
+    let wait_m = rig.scene.route.changes[0].latest_m - RouteLaneChange::LENGTH_M_MIN;
+    assert!((place.y + 5.25).abs() < 0.3 && (wait_m - 6.0..wait_m + 0.5).contains(&place.x), "{place}");
+    let status = rig.ads.status();
+    assert_eq!((status.manoeuvre, status.reason), (Manoeuvre::AwaitGap, Reason::LaneChange));
+    // The queue moves off; behind it there is room.
+    for object in &mut rig.sensed.objects {
+        object.velocity_mps = Vec2::new(9.0, 0.0);
+    }
+    rig.run(40.0);
+    assert!((rig.sensed.ego.rear_axle.position.y + 1.75).abs() < 0.3);
+    assert!(rig.gap_m_min > 0.8, "{}", rig.gap_m_min);
 }

@@ -4,10 +4,15 @@
 //! model stand three rules of our own: it stops at red and yellow lights where it can, brakes for
 //! what is on its way, and lets pass whoever would cross its way at nearly the same time. Predictions
 //! are straight lines at constant speed.
+//!
+//! Lane changes of the route it begins once nobody in the target lane would have to brake hard for it,
+//! nor it for them (the safety criterion of MOBIL: Kesting, Treiber, Helbing 2007); until then it stays
+//! in its lane and stops where a short change is just possible.
 
 use std::sync::Arc;
 
 use crate::ads::driver::Ads;
+use crate::ads::guide::Beside;
 use crate::ads::guide::Guide;
 use crate::ads::guide::SpeedRules;
 use crate::ads::status::PerceivedObject;
@@ -16,6 +21,7 @@ use crate::ads::status::Status;
 use crate::ads::steering::Steering;
 use crate::ads::steering::SteeringConfig;
 use crate::geometry::unit_vector;
+use crate::road::RouteLaneChange;
 use crate::sim::Control;
 use crate::sim::DT_S;
 use crate::sim::FRAME_TICKS;
@@ -51,10 +57,15 @@ const CROSSING_GAP_M: f64 = 3.0;
 /// Acceleration that holds the vehicle at rest, m/s².
 const HOLD_MPS2: f64 = -3.0;
 
+/// Braking that a lane change may ask of anybody, magnitude, m/s².
+const SAFE_MPS2: f64 = 2.0;
+
 #[derive(Debug, Clone)]
 pub struct Idm {
     scene: Arc<Scene>,
     guide: Arc<Guide>,
+    /// Where each lane change of the route begins, m; infinite while no gap was found.
+    begins_m: Vec<f64>,
     steering: Arc<Steering>,
     /// Where on the route, m; `None` before the first tick.
     station_m: Option<f64>,
@@ -84,9 +95,11 @@ impl Ahead {
 
 impl Idm {
     pub fn new(scene: &Arc<Scene>) -> Idm {
+        let begins_m = vec![f64::INFINITY; scene.route.changes.len()];
         Idm {
             scene: Arc::clone(scene),
-            guide: Arc::new(Guide::new(scene, &RULES)),
+            guide: Arc::new(Guide::with_changes(scene, &RULES, &begins_m)),
+            begins_m,
             steering: Steering::shared(&SteeringConfig::default()),
             station_m: None,
             steer_rad: 0.0,
@@ -121,13 +134,74 @@ impl Idm {
             return;
         }
         let front_m = VehicleParameters::MKZ.front_m(station_m);
+        self.seek_gap(sensed, station_m);
         let mut ahead = core::mem::take(&mut self.ahead);
         ahead.clear();
         ahead.extend(self.lights(sensed, front_m));
         let objects = sensed.objects.iter().filter(|object| object.distance_m < SIGHT_M);
         ahead.extend(objects.filter_map(|object| self.ahead(object, sensed.ego.speed_mps, front_m)));
+        ahead.extend(self.last_chance());
         self.ahead = ahead;
         self.report(sensed);
+    }
+
+    /// The lane change that has not begun yet, and whether those before it are over.
+    fn pending_change(&self, station_m: f64) -> Option<(usize, bool)> {
+        let index = self.begins_m.iter().position(|begin_m| begin_m.is_infinite())?;
+        let before = index.checked_sub(1).map(|before| {
+            let change = &self.scene.route.changes[before];
+            self.begins_m[before] + change.length_from_m(self.begins_m[before])
+        });
+        Some((index, before.is_none_or(|over_m| station_m >= over_m)))
+    }
+
+    /// Begins the next lane change if it is time and there is a gap.
+    fn seek_gap(&mut self, sensed: &Sensed, station_m: f64) {
+        let Some((index, true)) = self.pending_change(station_m) else { return };
+        let change = &self.scene.route.changes[index];
+        if station_m < change.begin_m || !self.has_gap(sensed, station_m, change.lateral_m) {
+            return;
+        }
+        self.begins_m[index] = station_m;
+        self.guide = Arc::new(Guide::with_changes(&self.scene, &RULES, &self.begins_m));
+    }
+
+    /// Whether everybody in the lane `lateral_m` to the left, and the ego vehicle, could do with gentle
+    /// braking if it were there now.
+    fn has_gap(&self, sensed: &Sensed, station_m: f64, lateral_m: f64) -> bool {
+        let half_way_m = VehicleParameters::MKZ.width_m / 2.0 + SIDE_M;
+        let front_m = VehicleParameters::MKZ.front_m(station_m);
+        let rear_m = front_m - VehicleParameters::MKZ.length_m;
+        let ego_mps = sensed.ego.speed_mps;
+        sensed.objects.iter().all(|object| {
+            let at = self.guide.project(object.pose.position, rear_m - SIGHT_M, front_m + SIGHT_M);
+            let in_target = Beside { offset_m: at.offset_m - lateral_m, ..at };
+            let forward = unit_vector(object.pose.heading_rad);
+            let Some(span) = in_target.taken(forward, object.length_m, object.width_m, half_way_m) else {
+                return true;
+            };
+            let along_mps = object.velocity_mps.dot(&at.forward).max(0.0);
+            let needed_mps2 = if span.from_m > front_m {
+                model_mps2(ego_mps, ego_mps.max(1.0), Some((span.from_m - front_m, along_mps)))
+            } else if span.to_m < rear_m {
+                model_mps2(along_mps, along_mps.max(1.0), Some((rear_m - span.to_m, ego_mps)))
+            } else {
+                return false;
+            };
+            needed_mps2 > -SAFE_MPS2
+        })
+    }
+
+    /// Where it must wait for a gap, as something that stands there.
+    fn last_chance(&self) -> Option<Ahead> {
+        let (index, _) = self.pending_change(0.0)?;
+        let wait_m = self.scene.route.changes[index].latest_m - RouteLaneChange::LENGTH_M_MIN;
+        Some(Ahead {
+            near_m: VehicleParameters::MKZ.front_m(wait_m) + MODEL.gap_m_min,
+            age_s: 0.0,
+            speed_mps: 0.0,
+            reason: Reason::LaneChange,
+        })
     }
 
     /// Lights that it stops for, as things that stand a little behind their line.
@@ -201,10 +275,14 @@ impl Idm {
             }
         }));
     }
-}
 
-impl Ads for Idm {
-    fn drive(&mut self, sensed: &Sensed) -> Control {
+    /// Drives the route like the model, but with the acceleration that `decide` makes of the model's,
+    /// given with its reason, m/s².
+    pub(super) fn drive_with(
+        &mut self,
+        sensed: &Sensed,
+        decide: impl FnOnce(f64, Reason) -> (f64, Reason),
+    ) -> Control {
         let pose = &sensed.ego.rear_axle;
         if self.station_m.is_none() {
             self.steer_rad = sensed.ego.steer_rad;
@@ -212,7 +290,8 @@ impl Ads for Idm {
         let station_m = self.guide.locate(pose.position, self.station_m).station_m;
         self.station_m = Some(station_m);
         self.look(sensed, station_m);
-        let (mut acceleration_mps2, reason) = self.acceleration_mps2(sensed, station_m);
+        let (model_mps2, model_reason) = self.acceleration_mps2(sensed, station_m);
+        let (mut acceleration_mps2, reason) = decide(model_mps2, model_reason);
         if sensed.ego.speed_mps < 0.1 && acceleration_mps2 <= 0.0 {
             acceleration_mps2 = HOLD_MPS2;
         }
@@ -226,6 +305,17 @@ impl Ads for Idm {
         self.steer_rad = sensed.ego.steer_rad;
         self.ticks += 1;
         control
+    }
+
+    /// The route that it drives on.
+    pub(super) fn guide(&self) -> &Guide {
+        &self.guide
+    }
+}
+
+impl Ads for Idm {
+    fn drive(&mut self, sensed: &Sensed) -> Control {
+        self.drive_with(sensed, |acceleration_mps2, reason| (acceleration_mps2, reason))
     }
 
     fn status(&self) -> &Status {
@@ -249,4 +339,70 @@ fn model_mps2(speed_mps: f64, allowed_mps: f64, ahead: Option<(f64, f64)>) -> f6
     let Some((gap_m, ahead_mps)) = ahead else { return free };
     let ratio = MODEL.wanted_gap_m(speed_mps, ahead_mps) / gap_m.max(0.1);
     free.min(MODEL.acceleration_mps2) - MODEL.acceleration_mps2 * ratio * ratio
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ads::testing::Rig;
+    use crate::ads::testing::object;
+    use crate::ads::testing::two_lanes;
+    use crate::geometry::Pose;
+    use crate::geometry::Vec2;
+    use crate::model::vocabulary::Body;
+
+    const SOURCE_Y_M: f64 = -5.25;
+    const TARGET_Y_M: f64 = -1.75;
+
+    fn rig(open_m: f64) -> Rig {
+        let scene = two_lanes(open_m);
+        let ads = Box::new(Idm::new(&scene));
+        Rig::new(&scene, ads, 8.0)
+    }
+
+    fn place(rig: &Rig) -> Vec2 {
+        rig.sensed.ego.rear_axle.position
+    }
+
+    #[test]
+    fn on_a_free_road_it_changes_as_planned() {
+        let mut rig = rig(200.0);
+        rig.run(30.0);
+        assert!((place(&rig).y - TARGET_Y_M).abs() < 0.1, "{:?}", place(&rig));
+        assert!(rig.offset_m_max < 0.3, "{} m off the path", rig.offset_m_max);
+    }
+
+    #[test]
+    fn it_does_not_cut_in_and_waits_where_a_change_is_just_possible() {
+        let mut rig = rig(100.0);
+        // A queue stands beside all that is left of the way.
+        rig.sensed.objects = (0..14)
+            .map(|i| object(i + 1, Body::Sedan, Pose::new(f64::from(i) * 8.0, TARGET_Y_M, 0.0), 0.0))
+            .collect();
+        rig.run(30.0);
+        let waits = place(&rig);
+        assert!((waits.y - SOURCE_Y_M).abs() < 0.1, "{waits:?}");
+        let wait_m = rig.scene.route.changes[0].latest_m - RouteLaneChange::LENGTH_M_MIN;
+        assert!(waits.x <= wait_m + 0.1 && waits.x > wait_m - 4.0, "{waits:?} against {wait_m}");
+        assert_eq!(rig.ads.status().reason, Reason::LaneChange);
+        assert!(rig.gap_m_min > 1.0, "{}", rig.gap_m_min);
+        // The queue moves off; behind it there is room.
+        for object in &mut rig.sensed.objects {
+            object.velocity_mps = Vec2::new(9.0, 0.0);
+        }
+        rig.run(40.0);
+        assert!((place(&rig).y - TARGET_Y_M).abs() < 0.1 && place(&rig).x > 150.0, "{:?}", place(&rig));
+        assert!(rig.gap_m_min > 1.0, "{}", rig.gap_m_min);
+    }
+
+    #[test]
+    fn it_lets_a_faster_vehicle_pass_first() {
+        let mut rig = rig(300.0);
+        rig.sensed.objects = vec![object(1, Body::Sedan, Pose::new(-15.0, TARGET_Y_M, 0.0), 13.0)];
+        rig.run(1.0);
+        assert!((place(&rig).y - SOURCE_Y_M).abs() < 0.05, "{:?}", place(&rig));
+        rig.run(20.0);
+        assert!((place(&rig).y - TARGET_Y_M).abs() < 0.1, "{:?}", place(&rig));
+        assert!(rig.gap_m_min > 1.0, "{}", rig.gap_m_min);
+    }
 }

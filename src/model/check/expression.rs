@@ -30,6 +30,8 @@ pub(super) struct Place<'a> {
     pub road: bool,
     pub spawn: bool,
     pub outcome: bool,
+    /// Whether the collision has been judged: true of verdicts, not of rewards.
+    pub judged: bool,
 }
 
 /// The facts of the world by their spelling; which are on offer is the place's business.
@@ -41,6 +43,7 @@ const FACTS: &[(&str, Fact, Type)] = &[
     ("repeated", Fact::Repeated, Type::Bool),
     ("sudden", Fact::Sudden, Type::Bool),
     ("struck", Fact::Struck, Type::Bool),
+    ("avoidable", Fact::Avoidable, Type::Bool),
 ];
 
 impl Place<'_> {
@@ -50,6 +53,7 @@ impl Place<'_> {
             Fact::RoadLimit => self.road,
             Fact::SpawnGap | Fact::SafetyGap => self.spawn,
             Fact::Proc | Fact::Collision | Fact::Repeated | Fact::Sudden | Fact::Struck => self.outcome,
+            Fact::Avoidable => self.judged,
         };
         offered.then_some((*fact, *ty))
     }

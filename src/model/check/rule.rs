@@ -69,7 +69,7 @@ impl Checker {
             }
             let locals = locals(&definition);
             let spawns = definition.effects.iter().any(|effect| matches!(effect, EffectDef::Spawn(_)));
-            let place = Place { locals: &locals, states: true, road: true, spawn: true, outcome: false };
+            let place = Place { locals: &locals, states: true, road: true, spawn: true, ..Place::default() };
             let Some(condition) = self.typed(condition, &place, Type::Bool) else { continue };
             if condition.needs_survey() && !spawns && !self.half_broken.contains(&action) {
                 let message =
@@ -110,7 +110,7 @@ impl Checker {
             self.report(error.help(format!("write `rule {} on {action}: …`", rule.name.text)));
             return None;
         }
-        let place = Place { locals: &[], states: true, road: true, spawn: true, outcome: false };
+        let place = Place { locals: &[], states: true, road: true, spawn: true, ..Place::default() };
         let compiled = self.typed(condition, &place, Type::Bool)?;
         let binds = |action: &ActionDef| {
             action.effects.iter().any(|effect| match effect {

@@ -10,9 +10,11 @@ use crate::model::check::scenario_value::figure;
 use crate::model::check::scenario_value::number;
 use crate::model::check::scenario_value::value;
 use crate::model::code;
+use crate::model::limits::AMBIENT_MAX;
 use crate::model::limits::SIGNAL_PHASE_S;
 use crate::model::row::Row;
 use crate::model::row::locals;
+use crate::model::scenario::Avoidability;
 use crate::model::scenario::Claim;
 use crate::model::scenario::ENDS;
 use crate::model::scenario::Figure;
@@ -99,7 +101,8 @@ impl<'a> Reader<'a> {
     }
 
     fn origin(&mut self, fields: &[ast::Field]) -> Origin {
-        const FIELDS: [&str; 7] = ["seed", "episode", "policy", "ads", "engine", "with", "without"];
+        const FIELDS: [&str; 9] =
+            ["seed", "episode", "policy", "ads", "profile", "profile_digest", "engine", "with", "without"];
         let mut origin = Origin::default();
         self.once("field", fields);
         for field in fields {
@@ -108,6 +111,8 @@ impl<'a> Reader<'a> {
                 "episode" => origin.episode = self.whole(&field.value),
                 "policy" => origin.policy = self.text(&field.value),
                 "ads" => origin.ads = self.text(&field.value),
+                "profile" => origin.profile = self.text(&field.value),
+                "profile_digest" => origin.profile_digest = self.text(&field.value),
                 "engine" => origin.engine = self.text(&field.value),
                 "with" => origin.with = self.rule_names(&field.value),
                 "without" => origin.without = self.rule_names(&field.value),
@@ -155,7 +160,7 @@ impl<'a> Reader<'a> {
         let space = self.space;
         // The seed is arbitrary: what it draws is replaced below, or reported as missing.
         let mut memory = space.initial_memory(0);
-        let mut start = (0.0, None);
+        let mut start = (0.0, None, 0);
         self.once("field", &declared.start);
         for field in &declared.start {
             match field.name.text.as_str() {
@@ -170,11 +175,22 @@ impl<'a> Reader<'a> {
                     }
                 }
                 "traffic_seed" => start.1 = self.whole(&field.value),
+                "ambient" => {
+                    let wanted = self.whole(&field.value).unwrap_or(0);
+                    if wanted > u64::from(AMBIENT_MAX) {
+                        let message = format!("{wanted} ambient vehicles are not possible");
+                        let error = Diagnostic::error(code::OUT_OF_RANGE, message);
+                        self.report(
+                            error.at(field.value.span, format!("must lie within 0 .. {AMBIENT_MAX}")),
+                        );
+                    }
+                    start.2 = wanted.min(u64::from(AMBIENT_MAX)) as u32;
+                }
                 name => match space.state(name) {
                     Some(state) => self.start_state(state, &field.value, &mut memory),
                     None => {
                         let states = space.states.iter().map(|state| state.name.as_str());
-                        let names = states.chain(["signal_phase", "traffic_seed"]);
+                        let names = states.chain(["signal_phase", "traffic_seed", "ambient"]);
                         self.report(unknown("field", name, field.name.span, names));
                     }
                 },
@@ -188,7 +204,7 @@ impl<'a> Reader<'a> {
                 self.report(error.help(format!("add `start {{ {}: … }}`", state.name)));
             }
         }
-        ScenarioStart { memory, signal_phase_s: start.0, traffic_seed: start.1 }
+        ScenarioStart { memory, signal_phase_s: start.0, traffic_seed: start.1, ambient: start.2 }
     }
 
     /// `time: Noon`, `sky: None` for all keys, `sky: { Rain: High }` for some.
@@ -372,7 +388,7 @@ impl<'a> Reader<'a> {
         let unclear = || {
             Diagnostic::error(code::UNKNOWN_CLAIM, "unknown claim").at(expect.span, "cannot be checked").help(
                 "claims are `collision with npc#2 at 14.22 s`, `proc == [0.5]`, `trace == \"sha256:…\"`, \
-                 `end == arrived`, or the name of a verdict",
+                 `end == arrived`, `avoidable by [cc, fsm]`, or the name of a verdict",
             )
         };
         match &expect.claim.kind {
@@ -383,6 +399,10 @@ impl<'a> Reader<'a> {
             ast::ExprKind::Name(name) if self.space.verdicts.iter().any(|verdict| verdict.name == *name) => {
                 let (obstacle, _) = self.clauses(&expect.clauses, false)?;
                 Some(Claim::Verdict { name: name.clone(), obstacle })
+            }
+            ast::ExprKind::Name(name) if Avoidability::ALL.iter().any(|class| class.name() == name) => {
+                let class = Avoidability::ALL.into_iter().find(|class| class.name() == name)?;
+                self.avoidability(class, expect)
             }
             ast::ExprKind::Binary { op: BinaryOp::Equal, left, right, .. } => match (&left.kind, &right.kind)
             {
@@ -414,6 +434,25 @@ impl<'a> Reader<'a> {
                 None
             }
         }
+    }
+
+    /// `avoidable by [cc, fsm] with npc#2`; the drivers' names are the oracle's business.
+    fn avoidability(&mut self, class: Avoidability, expect: &ast::Expect) -> Option<Claim> {
+        let (by, others): (Vec<&ast::Clause>, Vec<&ast::Clause>) =
+            expect.clauses.iter().partition(|clause| clause.kind == ClauseKind::By);
+        let drivers = by.iter().map(|clause| match &clause.value.kind {
+            ast::ExprKind::List(items) => items.iter().map(driver).collect(),
+            _ => None,
+        });
+        let drivers: Option<Vec<Vec<String>>> = drivers.collect();
+        let Some(drivers) = drivers.filter(|lists| lists.len() <= 1) else {
+            let error = Diagnostic::error(code::UNKNOWN_CLAIM, "wanted one list of reference drivers");
+            self.report(error.at(by[0].span, "not one").help("write `avoidable by [cc, fsm]`"));
+            return None;
+        };
+        let others: Vec<ast::Clause> = others.into_iter().cloned().collect();
+        let (obstacle, _) = self.clauses(&others, false)?;
+        Some(Claim::Avoidability { class, by: drivers.into_iter().next(), obstacle })
     }
 
     /// `with npc#2` and, if the claim has a time, `at 14.22 s`.
@@ -502,5 +541,13 @@ impl Space {
             Some(Diagnostic { message, help: Some(help), .. }) => Err(format!("{message}; {help}")),
             Some(Diagnostic { message, .. }) => Err(message),
         }
+    }
+}
+
+/// The name of a reference driver.
+fn driver(expr: &ast::Expr) -> Option<String> {
+    match &expr.kind {
+        ast::ExprKind::Name(name) => Some(name.clone()),
+        _ => None,
     }
 }

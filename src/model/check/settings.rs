@@ -186,7 +186,7 @@ impl Checker {
     }
 
     pub(super) fn verdicts(&mut self, items: &[&ast::Item]) -> Vec<VerdictDef> {
-        let place = Place { outcome: true, ..Place::default() };
+        let place = Place { outcome: true, judged: true, ..Place::default() };
         let mut names = Names::default();
         let mut verdicts = Vec::new();
         for (item, declared) in each(items, |kind| match kind {

@@ -60,7 +60,7 @@ pub struct SectionElement {
 pub struct LaneElement {
     pub id: i32,
     pub line: u32,
-    /// Whether its type is `driving`.
+    /// Whether cars may drive on it, in one direction.
     pub driving: bool,
     /// Over the distance from the section's beginning.
     pub widths: Cubics,
@@ -69,6 +69,26 @@ pub struct LaneElement {
     pub successors: Vec<i32>,
     /// As in [`RoadElement::speeds`], from the section's beginning.
     pub speeds: Vec<(f64, Option<f64>)>,
+    /// Markings of its outer line, by rising beginning.
+    pub marks: Vec<MarkElement>,
+}
+
+/// A marking between two lanes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MarkElement {
+    /// From the section's beginning, m.
+    pub begin_m: f64,
+    pub rule: MarkRule,
+}
+
+/// Into which lane one may change over a marking, by the order of their ids.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum MarkRule {
+    Both,
+    Neither,
+    /// Only into the lane with the greater id.
+    Increase,
+    Decrease,
 }
 
 #[derive(Debug, Clone)]
@@ -79,10 +99,21 @@ pub struct SignalElement {
     pub t_m: f64,
     /// The light itself, or a further place for the light with this id.
     pub reference: bool,
-    pub pedestrian: bool,
+    pub meaning: Meaning,
     pub orientation: Orientation,
     /// Inclusive ranges of lane ids; empty means all.
     pub validity: Vec<(i32, i32)>,
+}
+
+/// What a signal tells whom.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Meaning {
+    /// A light for vehicles. A reference is taken for one, too, until its light or sign is found.
+    Light,
+    /// A light for pedestrians, cyclists or trams.
+    OtherLight,
+    Stop,
+    Yield,
 }
 
 /// For traffic in which direction of the reference line a signal holds.

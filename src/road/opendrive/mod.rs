@@ -1,6 +1,6 @@
 //! Reading OpenDRIVE (ASAM, 1.4 to 1.8): an XML text becomes typed elements that know their line.
 //!
-//! Left out on purpose: elevation, superelevation, lateral profiles, road marks, surfaces, railroads
+//! Left out on purpose: heights (with a warning where a road is not flat), surfaces, railroads
 //! and everything that does not say where a vehicle may drive, must stop or may be crossed.
 
 mod cubic;
@@ -11,6 +11,8 @@ mod xml;
 
 pub use elements::Contact;
 pub use elements::Document;
+pub use elements::MarkRule;
+pub use elements::Meaning;
 pub use elements::Orientation;
 pub use elements::Outline;
 pub use elements::RoadElement;

@@ -13,6 +13,9 @@ use super::elements::ControllerElement;
 use super::elements::Document;
 use super::elements::JunctionElement;
 use super::elements::LaneElement;
+use super::elements::MarkElement;
+use super::elements::MarkRule;
+use super::elements::Meaning;
 use super::elements::ObjectElement;
 use super::elements::Orientation;
 use super::elements::Outline;
@@ -32,6 +35,9 @@ const ROAD_M_MAX: f64 = 100_000.0;
 
 /// More lanes than any road has to one side.
 const LANES_MAX: i32 = 100;
+
+/// More copies than any road has of one crosswalk.
+const REPEATS_MAX: f64 = 1000.0;
 
 /// One curve may turn so far, rad; a real one turns by a few.
 const TURN_RAD_MAX: f64 = 200.0;
@@ -116,6 +122,7 @@ impl Reader {
             let limit = kind.child("speed").map(|speed| self.speed(speed)).transpose()?;
             speeds.push((kind.number_or("s", 0.0)?, limit.flatten()));
         }
+        self.ignore_heights(road)?;
         let lanes =
             road.child("lanes").ok_or_else(|| road.wrong(format!("road `{id}` lacks its `lanes`")))?;
         Ok(RoadElement {
@@ -133,6 +140,31 @@ impl Reader {
             id,
             length_m,
         })
+    }
+
+    /// Roads are read as flat; says so where they are not.
+    fn ignore_heights(&mut self, road: Element) -> Result<(), RoadError> {
+        let profiles = [
+            ("elevationProfile", "elevation", "slopes: roads are taken as flat"),
+            ("lateralProfile", "superelevation", "banked roads: they are taken as flat"),
+            ("lateralProfile", "crossfall", "crossfalls: roads are taken as flat"),
+            ("lateralProfile", "shape", "lateral shapes: roads are taken as flat"),
+        ];
+        for (profile, record, words) in profiles {
+            for entry in road.child(profile).into_iter().flat_map(|profile| profile.children(record)) {
+                // A constant height is no slope; a constant bank is one.
+                let names = if record == "elevation" { &["b", "c", "d"][..] } else { &["a", "b", "c", "d"] };
+                let mut bends = false;
+                for name in names {
+                    bends |= entry.number_or(name, 0.0)?.abs() > 1e-9;
+                }
+                if bends {
+                    self.ignore(words.to_owned());
+                    break;
+                }
+            }
+        }
+        Ok(())
     }
 
     fn reference_line(&mut self, road: Element, id: &str, length_m: f64) -> Result<ReferenceLine, RoadError> {
@@ -169,6 +201,11 @@ impl Reader {
         let mut sections: Vec<SectionElement> = Vec::new();
         for section in lanes.children("laneSection") {
             let begin_m = section.number("s")?;
+            if section.attribute("singleSide") == Some("true") {
+                let message =
+                    "lane sections of a single side are not read; give both sides the same sections";
+                return Err(section.wrong(message));
+            }
             if begin_m < 0.0 || begin_m > length_m {
                 let message = format!("a lane section begins at {begin_m} m, beyond the ends of road `{id}`");
                 return Err(section.wrong(message));
@@ -211,12 +248,23 @@ impl Reader {
         for speed in lane.children("speed") {
             speeds.push((speed.number_or("sOffset", 0.0)?, self.speed(speed)?));
         }
-        let driving = lane.attribute("type") == Some("driving");
+        let kind = lane.attribute("type").unwrap_or("none");
+        let mut driving = is_driving(kind);
+        if !driving && !BESIDE_THE_ROAD.contains(&kind) {
+            self.ignore(format!("lanes of type `{kind}`"));
+        }
+        if let Some(direction @ ("reversed" | "both")) = lane.attribute("direction").filter(|_| driving) {
+            self.ignore(format!("lanes of direction `{direction}`"));
+            driving = false;
+        }
         let widths = cubics(lane.children("width"), "sOffset")?;
         let borders = cubics(lane.children("border"), "sOffset")?;
         if driving && widths.is_empty() && borders.is_empty() {
             return Err(lane.wrong(format!("lane {id} has neither `width` nor `border`")));
         }
+        let marks = lane.children("roadMark");
+        let mut marks: Vec<MarkElement> = marks.map(|mark| road_mark(mark, id)).collect::<Result<_, _>>()?;
+        marks.sort_by(|a, b| a.begin_m.total_cmp(&b.begin_m));
         Ok(LaneElement {
             id,
             line: lane.line(),
@@ -226,6 +274,7 @@ impl Reader {
             predecessors: linked("predecessor")?,
             successors: linked("successor")?,
             speeds,
+            marks,
         })
     }
 
@@ -264,10 +313,10 @@ impl Reader {
                 }
             };
             let kind = signal.attribute("type").unwrap_or("");
-            if !reference && !matches!(kind, "1000001" | "1000002") {
+            let Some(meaning) = (if reference { Some(Meaning::Light) } else { meaning(kind) }) else {
                 self.ignore(format!("signals of type `{kind}`"));
                 continue;
-            }
+            };
             let validity = signal.children("validity");
             all.push(SignalElement {
                 id: signal.text("id")?.to_owned(),
@@ -275,7 +324,7 @@ impl Reader {
                 s_m: signal.number("s")?,
                 t_m: signal.number_or("t", 0.0)?,
                 reference,
-                pedestrian: kind == "1000002",
+                meaning,
                 orientation: match signal.attribute("orientation") {
                     Some("+") => Orientation::Along,
                     Some("-") => Orientation::Against,
@@ -304,16 +353,95 @@ impl Reader {
                 self.warn(object, "ignored a crosswalk without an outline of three corners");
                 continue;
             };
-            all.push(ObjectElement {
-                id: object.text("id")?.to_owned(),
-                s_m: object.number("s")?,
-                t_m: object.number_or("t", 0.0)?,
-                heading_rad: object.number_or("hdg", 0.0)?,
-                outline,
-            });
+            let id = object.text("id")?;
+            let (s_m, t_m) = (object.number("s")?, object.number_or("t", 0.0)?);
+            for (moved_m, t_m) in repeats(object, s_m, t_m)? {
+                all.push(ObjectElement {
+                    id: id.to_owned(),
+                    s_m: s_m + moved_m,
+                    t_m,
+                    heading_rad: object.number_or("hdg", 0.0)?,
+                    outline: match &outline {
+                        Outline::Local(corners) => Outline::Local(corners.clone()),
+                        Outline::Road(corners) => {
+                            Outline::Road(corners.iter().map(|(s, t)| (s + moved_m, *t)).collect())
+                        }
+                    },
+                });
+            }
         }
         Ok(all)
     }
+}
+
+/// What a type of signal means: OpenDRIVE's own catalogue for lights; for signs the German numbers, which
+/// CARLA's maps use as well, and the American ones.
+fn meaning(kind: &str) -> Option<Meaning> {
+    match kind {
+        "1000002" | "1000007" | "1000013" => Some(Meaning::OtherLight),
+        "206" | "R1-1" => Some(Meaning::Stop),
+        "205" | "R1-2" => Some(Meaning::Yield),
+        _ => kind
+            .parse()
+            .is_ok_and(|number| (1_000_001..=1_000_020).contains(&number))
+            .then_some(Meaning::Light),
+    }
+}
+
+/// Whether vehicles of all kinds may use a lane of a type, in one direction.
+fn is_driving(kind: &str) -> bool {
+    matches!(
+        kind,
+        "driving"
+            | "entry"
+            | "exit"
+            | "onRamp"
+            | "offRamp"
+            | "connectingRamp"
+            | "slipLane"
+            | "mwyEntry"
+            | "mwyExit"
+    )
+}
+
+/// Types of lanes that no car drives on: nothing is lost without them.
+const BESIDE_THE_ROAD: [&str; 14] = [
+    "none",
+    "shoulder",
+    "border",
+    "curb",
+    "median",
+    "sidewalk",
+    "walking",
+    "biking",
+    "parking",
+    "stop",
+    "rail",
+    "tram",
+    "roadWorks",
+    "roadMarks",
+];
+
+/// A marking at the outer line of a lane. What `laneChange` says holds; without it, what drivers read
+/// from the paint: solid lines and anything raised forbid, a broken line beside a solid one permits a
+/// change from its own side.
+fn road_mark(mark: Element, lane: i32) -> Result<MarkElement, RoadError> {
+    // Of double lines the inner one, nearer to the reference line, is named first.
+    let (outwards, inwards) = match lane < 0 {
+        true => (MarkRule::Decrease, MarkRule::Increase),
+        false => (MarkRule::Increase, MarkRule::Decrease),
+    };
+    let rule = match (mark.attribute("laneChange"), mark.attribute("type").unwrap_or("none")) {
+        (Some("both"), _) => MarkRule::Both,
+        (Some("none"), _) => MarkRule::Neither,
+        (Some("increase"), _) => MarkRule::Increase,
+        (Some("decrease"), _) => MarkRule::Decrease,
+        (_, "solid" | "solid solid" | "curb" | "edge" | "grass") => MarkRule::Neither,
+        (_, "solid broken") => inwards,
+        (_, "broken solid") => outwards,
+        _ => MarkRule::Both,
+    };
+    Ok(MarkElement { begin_m: mark.number_or("sOffset", 0.0)?, rule })
 }
 
 fn piece(geometry: Element) -> Result<Piece, RoadError> {
@@ -402,6 +530,31 @@ fn cubics<'a, 'input: 'a>(
         })
     });
     pieces.collect::<Result<_, _>>().map(Cubics::new)
+}
+
+/// Where an object stands: how far ahead of its own station, and how far left of the reference line, m.
+fn repeats(object: Element, s_m: f64, t_m: f64) -> Result<Vec<(f64, f64)>, RoadError> {
+    let mut places = Vec::new();
+    for repeat in object.children("repeat") {
+        let (begin_m, length_m) = (repeat.number("s")?, repeat.number_or("length", 0.0)?);
+        let distance_m = repeat.number_or("distance", 0.0)?;
+        let (from_m, to_m) = (repeat.number_or("tStart", t_m)?, repeat.number_or("tEnd", t_m)?);
+        // Without a distance one body is drawn out over the length, which a crosswalk is not.
+        let times = if distance_m > 1e-3 {
+            (length_m / distance_m + 1e-9).floor().clamp(0.0, REPEATS_MAX)
+        } else {
+            0.0
+        };
+        for i in 0..=times as u32 {
+            let ahead_m = distance_m * f64::from(i);
+            let fraction = if length_m > 0.0 { ahead_m / length_m } else { 0.0 };
+            places.push((begin_m + ahead_m - s_m, from_m + (to_m - from_m) * fraction));
+        }
+    }
+    if places.is_empty() {
+        places.push((0.0, t_m));
+    }
+    Ok(places)
 }
 
 fn outline(object: Element) -> Result<Option<Outline>, RoadError> {

@@ -1,4 +1,9 @@
 //! Tests of the whole module: the authored map against its survey, and reading made-up files.
 
+mod abreast;
+mod boulevard;
+mod changes;
 mod corner;
 mod reading;
+mod residential;
+mod survey;

@@ -9,6 +9,7 @@ use crate::road::Lane;
 use crate::road::RoadError;
 use crate::road::RoadMap;
 use crate::road::Route;
+use crate::road::SignKind;
 
 const CORNER: &str = include_str!("../../../scenarios/roads/corner.xodr");
 
@@ -111,14 +112,20 @@ fn lights_stop_the_lanes_they_are_meant_for() {
     let tail = r#"<signals>
         <signal id="a" s="90" t="-5" orientation="+" type="1000001"><validity fromLane="-1" toLane="-1"/></signal>
         <signal id="b" s="10" t="5" orientation="-" type="1000001"/>
-        <signal id="c" s="10" t="5" orientation="-" type="206"/></signals>"#;
+        <signal id="c" s="10" t="5" orientation="-" type="206"/>
+        <signal id="d" s="10" t="5" orientation="-" type="274"/></signals>"#;
     let map = read(&one_road("", "", LINE_100, lanes, tail));
     assert_eq!(map.signals.len(), 2);
     assert_eq!(lane(&map, 0, -1).stop_lines.len(), 1);
     assert!((lane(&map, 0, -1).stop_lines[0].station_m - 90.0).abs() < 1e-6);
     assert!(lane(&map, 0, -2).stop_lines.is_empty());
     assert!((lane(&map, 0, 1).stop_lines[0].station_m - 90.0).abs() < 1e-6, "counted in driving direction");
-    assert!(map.warnings.iter().any(|warning| warning.contains("type `206`")), "{:?}", map.warnings);
+    assert!(map.warnings.iter().any(|warning| warning.contains("type `274`")), "{:?}", map.warnings);
+    assert!(map.warnings.iter().any(|warning| warning.contains("2 signals belong to no junction")));
+    // The sign comes with the lane it holds for, counted in driving direction, too.
+    assert_eq!((map.signs.len(), map.signs[0].kind), (1, SignKind::Stop));
+    assert_eq!(map.lane(map.signs[0].lanes[0].0).key.lane, 1);
+    assert!((map.signs[0].lanes[0].1 - 90.0).abs() < 1e-6);
 }
 
 #[test]
@@ -139,6 +146,71 @@ fn crosswalks_have_corners_in_either_frame() {
     let route =
         Route::find(&map, map.place("1", -1, 0.0).unwrap(), map.place("1", -1, 99.0).unwrap()).unwrap();
     assert_eq!(route.crosswalks_m.len(), 3);
+}
+
+/// SUMO's maps have controllers that no junction names, and arrow lights.
+#[test]
+fn lights_without_a_junctions_controller_are_grouped_by_their_arms() {
+    let road = |id: u32, x: f64, y: f64, hdg: f64, link: &str, signals: &str| {
+        format!(
+            r#"<road id="{id}" length="50" junction="-1"><link>{link}</link><planView>
+            <geometry s="0" x="{x}" y="{y}" hdg="{hdg}" length="50"><line/></geometry></planView>
+            <lanes>{TWO_LANES}</lanes><signals>{signals}</signals></road>"#
+        )
+    };
+    let ahead = r#"<successor elementType="junction" elementId="9"/>"#;
+    let light = |id: &str, kind: &str| {
+        format!(r#"<signal id="{id}" s="48" t="-3" orientation="+" dynamic="yes" type="{kind}"/>"#)
+    };
+    let text = format!(
+        r#"<OpenDRIVE><header name="arms"/>{}{}{}<junction id="9" name=""/></OpenDRIVE>"#,
+        road(1, -60.0, 0.0, 0.0, ahead, &(light("a", "1000001") + &light("b", "1000011"))),
+        road(2, 0.0, -60.0, 1.5707963267948966, ahead, &light("c", "1000011")),
+        road(3, 100.0, 0.0, 0.0, "", &light("lone", "1000001")),
+    );
+    let map = read(&text);
+    let groups: Vec<_> = map.signals.iter().map(|signal| (signal.junction, signal.group)).collect();
+    assert_eq!(groups, [(Some(0), 0), (Some(0), 0), (Some(0), 1), (None, 0)]);
+    assert_eq!(map.junctions[0].groups, 2);
+    // Two heads of one arm are one stop line.
+    assert!(map.lanes.iter().all(|lane| lane.stop_lines.len() <= 1));
+    assert!(map.warnings.iter().any(|warning| warning.contains("3 signals")), "{:?}", map.warnings);
+}
+
+#[test]
+fn what_a_flat_map_of_cars_cannot_hold_is_said() {
+    let lanes = TWO_LANES.replace(
+        r#"<lane id="-1" type="driving">"#,
+        r#"<lane id="-2" type="onRamp"><width a="3"/></lane><lane id="-3" type="bus"><width a="3"/></lane>
+        <lane id="-4" type="driving" direction="reversed"><width a="3"/></lane><lane id="-1" type="driving">"#,
+    );
+    let heights = r#"<elevationProfile><elevation s="0" a="3" b="0.05" c="0" d="0"/></elevationProfile>
+        <lateralProfile><superelevation s="0" a="0.02" b="0" c="0" d="0"/></lateralProfile>"#;
+    let map = read(&one_road("", heights, LINE_100, &lanes, ""));
+    let ids: Vec<_> = map.lanes.iter().map(|lane| lane.key.lane).collect();
+    assert_eq!(ids, [1, -1, -2], "a ramp is a lane, a bus lane is none");
+    for words in ["slopes", "banked", "type `bus`", "direction `reversed`"] {
+        assert!(map.warnings.iter().any(|warning| warning.contains(words)), "{words}: {:?}", map.warnings);
+    }
+    let level = r#"<elevationProfile><elevation s="0" a="3" b="0" c="0" d="0"/></elevationProfile>"#;
+    let map = read(&one_road("", level, LINE_100, TWO_LANES, ""));
+    assert!(!map.warnings.iter().any(|warning| warning.contains("slopes")), "{:?}", map.warnings);
+}
+
+#[test]
+fn a_repeated_crosswalk_is_several() {
+    let tail = r#"<objects><object type="crosswalk" id="z" s="20" t="0" length="3" width="8">
+        <repeat s="20" length="60" distance="30" tStart="0" tEnd="0"/></object></objects>"#;
+    let map = read(&one_road("", "", LINE_100, TWO_LANES, tail));
+    let middles: Vec<f64> = map
+        .crosswalks
+        .iter()
+        .map(|crosswalk| (crosswalk.outline[0].x + crosswalk.outline[2].x) / 2.0)
+        .collect();
+    assert_eq!(middles.len(), 3);
+    for (found_m, expected_m) in middles.iter().zip([20.0, 50.0, 80.0]) {
+        assert!((found_m - expected_m).abs() < 1e-9, "{middles:?}");
+    }
 }
 
 /// The end of each curve, from textbook formulas: a quarter of a circle, a parabola, and the clothoid
@@ -288,6 +360,22 @@ proptest! {
             prop_assert!(all_finite(&map));
             let _ = map.nearest(Vec2::new(0.0, 0.0), 0.0, 1e6);
             if let (Ok(start), Ok(goal)) = (map.place("1", -1, 10.0), map.place("5", -3, 10.0)) {
+                let _ = Route::find(&map, start, goal);
+            }
+        }
+    }
+
+    /// Nor does a missing element, or one that stands twice.
+    #[test]
+    fn lost_and_doubled_elements_do_no_harm(place in 0.0..1.0_f64, doubled in any::<bool>()) {
+        let begins: Vec<_> = CORNER.match_indices("\n").map(|(at, _)| at + 1).collect();
+        let line = ((place * begins.len() as f64) as usize).min(begins.len() - 2);
+        let (from, to) = (begins[line], begins[line + 1]);
+        let middle = if doubled { CORNER[from..to].repeat(2) } else { String::new() };
+        let text = format!("{}{middle}{}", &CORNER[..from], &CORNER[to..]);
+        if let Ok(map) = RoadMap::from_opendrive("damaged", &text) {
+            prop_assert!(all_finite(&map));
+            if let (Ok(start), Ok(goal)) = (map.place("1", -2, 10.0), map.place("5", -3, 10.0)) {
                 let _ = Route::find(&map, start, goal);
             }
         }

@@ -2,6 +2,7 @@
 
 use core::ops::Range;
 
+use crate::ads::guide::Beside;
 use crate::ads::guide::Guide;
 use crate::ads::guide::Span;
 use crate::geometry::Vec2;
@@ -10,6 +11,7 @@ use crate::sim::VehicleParameters;
 use super::super::prediction::Forecast;
 use super::super::prediction::STEP_S;
 use super::super::prediction::STEPS;
+use super::nudge::LateralPlan;
 use super::speed::Trajectory;
 
 /// Farther behind the rear axle nothing matters, m.
@@ -40,6 +42,7 @@ impl Claim {
     pub fn of(
         forecast: &Forecast,
         guide: &Guide,
+        lateral: &LateralPlan,
         ahead: &Range<f64>,
         lateral_buffer_m: f64,
     ) -> Option<Claim> {
@@ -66,7 +69,9 @@ impl Claim {
             if step > 0 {
                 forward = direction(position - forecast.positions[step - 1], forward);
             }
-            let beside = guide.project(position, ahead.start - BEHIND_M, ahead.end);
+            let on_guide = guide.project(position, ahead.start - BEHIND_M, ahead.end);
+            let offset_m = on_guide.offset_m - lateral.aside(on_guide.station_m).offset_m;
+            let beside = Beside { offset_m, ..on_guide };
             let taken = beside.taken(forward, forecast.length_m, forecast.width_m, half_way_m);
             let near = |span: &Span| span.from_m < ahead.end && span.to_m > ahead.start - BEHIND_M;
             let Some(span) = taken.filter(near) else {

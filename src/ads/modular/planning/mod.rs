@@ -1,12 +1,20 @@
-//! Planning: a speed along the route that obeys limits, lights and everybody on the way.
+//! Planning: a path and a speed along the route that obey limits, lights and everybody on the way.
 //!
-//! The path is the route itself: no lane changes, no evasion to the side (Apollo borrows a lane only
-//! below 5 m/s).
+//! Path: the lane, a shift within it past what stands at its edge, the route's lane changes once their
+//! gap is safe. Speed: stop fences, following, giving way. Left out, of Apollo's tasks: lane borrowing
+//! (below 5 m/s only), the optimisers (a speed law and a quintic shift stand for them), stop signs
+//! (maps have none here), pull-over and parking.
 
 mod corridor;
+mod lane_change;
 mod lights;
+mod nudge;
 mod planner;
+mod rules;
 mod speed;
+mod standing;
 
+pub use nudge::LateralPlan;
+pub use planner::Outlook;
 pub use planner::Planner;
 pub use speed::Trajectory;

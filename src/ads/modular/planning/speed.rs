@@ -2,7 +2,7 @@
 //!
 //! A braking parabola for places to stop at, the intelligent driver model (Treiber) for leaders with
 //! a kinematic bound beneath it, a look-ahead on the speed that limits and curves allow. All of it
-//! goes through Apollo's jerk limits, the emergency too: that is one of its documented weaknesses.
+//! goes through Apollo's jerk limits, the emergency too: that is its documented weakness (c).
 
 use crate::ads::guide::Guide;
 use crate::ads::status::Reason;
@@ -16,6 +16,8 @@ use super::corridor::Claim;
 pub const POINT_S: f64 = 0.1;
 /// 8 s.
 const POINTS: usize = 81;
+/// Every so many points a plan is checked for contact.
+const CHECK_POINTS: usize = 4;
 /// Time in which a speed error is to vanish, s.
 const SPEED_ERROR_S: f64 = 0.6;
 /// Look-ahead on the permitted speed, s.
@@ -65,6 +67,28 @@ impl Trajectory {
             speed_mps: mix(a.speed_mps, b.speed_mps),
             acceleration_mps2: mix(a.acceleration_mps2, b.acceleration_mps2),
         }
+    }
+
+    /// Whether the plan stops short of everything that it is to stop for and closes up to nobody.
+    pub fn keeps_clear(&self, constraints: &[Constraint], claims: &[Claim]) -> bool {
+        constraints.iter().all(|constraint| {
+            let room_m = |index: usize| {
+                let time_s = index as f64 * POINT_S;
+                let front_m = VehicleParameters::MKZ.front_m(self.points[index].station_m);
+                match &constraint.kind {
+                    Kind::Fence { touch_m, until_s, .. } => {
+                        touch_m.filter(|_| time_s <= *until_s).map(|touch_m| touch_m - front_m)
+                    }
+                    Kind::Leader(index) => {
+                        let claim = &claims[*index];
+                        (time_s <= claim.exit_s()).then(|| claim.near_end_m(time_s) - front_m)
+                    }
+                }
+            };
+            // What is touched already, or beside, no plan can keep clear of.
+            let is_open = room_m(0).is_none_or(|room_m| room_m > 0.0);
+            !is_open || (0..POINTS).step_by(CHECK_POINTS).all(|index| room_m(index).is_none_or(|m| m > 0.0))
+        })
     }
 
     /// Constant braking to rest: the plan when there is none.

@@ -2,8 +2,8 @@
 //!
 //! IDM after Treiber, Hennecke and Helbing (2000), with the brakes of the body on the grip of the
 //! road and a kinematic floor, because IDM alone assumes brakes without limit. They stop for red
-//! lights, slow down for bends, follow whoever is in front of them, and look before they change
-//! lanes; they do not yield at junctions, and what they do to the ego vehicle otherwise is the
+//! lights, slow down for bends, follow whoever is in front of them, let others go first at junctions
+//! (see `manners`) and look before they change lanes; what they do to the ego vehicle otherwise is the
 //! scenario's business. Leaders and occasions are looked for ten times a second: reaction time.
 
 use std::sync::Arc;
@@ -19,26 +19,31 @@ use crate::rng;
 use crate::rng::Rng;
 use crate::rng::Stream;
 use crate::road::LaneIndex;
+use crate::road::Neighbour;
 
-use super::body::BodyParameters;
-use super::following::Following;
-use super::mover::Around;
-use super::mover::Moved;
-use super::sense::FRAME_TICKS;
-use super::sense::SignalColour;
-use super::way::Way;
-use super::way::beside;
-use super::world::DT_S;
-use super::world::Obstacle;
+use crate::sim::body::BodyParameters;
+use crate::sim::following::Following;
+use crate::sim::mover::Around;
+use crate::sim::mover::Moved;
+use crate::sim::sense::FRAME_TICKS;
+use crate::sim::sense::SignalColour;
+use crate::sim::way::Way;
+use crate::sim::way::beside;
+use crate::sim::world::DT_S;
+use crate::sim::world::Obstacle;
+use crate::sim::world::Scene;
+
+use super::manners::GIVE_UP_S;
+use super::manners::STANDS_MPS;
 
 /// IDM: comfortable deceleration, m/s².
-const COMFORT_MPS2: f64 = 2.0;
+pub(super) const COMFORT_MPS2: f64 = 2.0;
 /// IDM: gap at standstill, m.
-const GAP_M_MIN: f64 = 2.0;
+pub(super) const GAP_M_MIN: f64 = 2.0;
 /// IDM: time gap, s.
 const TIME_GAP_S: f64 = 1.2;
 /// What they look ahead beyond the way on which they could stop gently, m.
-const LOOK_AHEAD_M: f64 = 25.0;
+pub(super) const LOOK_AHEAD_M: f64 = 25.0;
 /// Room beside the outline that they want to be free, m.
 const SIDE_ROOM_M: f64 = 0.2;
 /// Room in front of and behind them that they want before changing lanes, m.
@@ -55,16 +60,22 @@ const CHANGE_S_MIN: f64 = 2.0;
 const CHANGE_FULL_MPS: f64 = 5.0;
 /// Neighbouring lanes whose centres are farther apart have parted, m.
 const CHANGE_M_MAX: f64 = 8.0;
+/// A wider strip between two lanes is a median, which nobody crosses to change lanes, m.
+const STRIP_M_MAX: f64 = 0.5;
+/// Who is slower than this when a wait ends sets out anew, m/s.
+const SETS_OUT_MPS: f64 = 1.0;
+/// Who stands at more than this angle to the way stands across it or against it (cosine of 45°).
+const CROSSWISE_COS_MAX: f64 = core::f64::consts::FRAC_1_SQRT_2;
 
 /// A lane change that waits for its occasion.
 #[derive(Debug, Clone)]
-pub(super) struct Manoeuvre {
+pub(in crate::sim) struct Manoeuvre {
     pub when: When,
     pub towards: Towards,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum When {
+pub(in crate::sim) enum When {
     /// From this tick on.
     Tick(u64),
     /// When its rear is this far in front of the ego vehicle's front, m.
@@ -72,7 +83,7 @@ pub(super) enum When {
 }
 
 #[derive(Debug, Clone)]
-pub(super) enum Towards {
+pub(in crate::sim) enum Towards {
     To(Side),
     /// Left if that lane is there and free, else right.
     Either,
@@ -81,15 +92,33 @@ pub(super) enum Towards {
     Way(Arc<Way>),
 }
 
+/// How fast somebody wants to drive, and who they are to the ego vehicle.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(in crate::sim) enum Cruise {
+    /// At the speed that an action asked for, m/s, and without yielding to the ego vehicle at junctions.
+    Commanded(f64),
+    /// At a part of each lane's limit, and with manners towards everybody: ambient traffic.
+    Limit(f64),
+}
+
 #[derive(Debug, Clone)]
-pub(super) struct Driver {
-    way: Arc<Way>,
+pub(in crate::sim) struct Driver {
+    pub(super) way: Arc<Way>,
     /// Of the outline's centre.
-    station_m: f64,
+    pub(super) station_m: f64,
     pub speed_mps: f64,
-    cruise_mps: f64,
-    leader: Option<Leader>,
-    change: Option<Change>,
+    pub(super) cruise_mps: f64,
+    /// Part of the limits that it drives at; `None` if its speed was asked for.
+    limit_part: Option<f64>,
+    pub(super) yields_to_ego: bool,
+    pub(super) leader: Option<Leader>,
+    /// Station at which it waits for others, or will.
+    pub(super) hold_m: Option<f64>,
+    /// Up to this station it goes on after a wait, whoever comes.
+    pub(super) insists_to_m: f64,
+    /// Ticks at rest because of others.
+    pub(super) waited_ticks: u32,
+    pub(super) change: Option<Change>,
     last_change: Option<Side>,
     /// In reverse order: the next one is last.
     plan: Vec<Manoeuvre>,
@@ -99,15 +128,17 @@ pub(super) struct Driver {
 
 /// Whoever is in front.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Leader {
-    gap_m: f64,
+pub(super) struct Leader {
+    pub gap_m: f64,
     /// Along the own way; negative if it comes nearer.
-    speed_mps: f64,
+    pub speed_mps: f64,
+    /// Whether it heads across the way or against it.
+    pub crosswise: bool,
 }
 
 /// A lane change under way.
 #[derive(Debug, Clone)]
-struct Change {
+pub(super) struct Change {
     to: Arc<Way>,
     to_station_m: f64,
     /// In `[0, 1)`.
@@ -116,23 +147,34 @@ struct Change {
 }
 
 impl Driver {
-    /// A driver with its centre at a station of a way, at `speed_mps` or what the bend there allows.
+    /// A driver with its centre at a station of a way, at its cruising speed or what the bend there
+    /// allows.
     ///
     /// `plan` is in order; `draws` tells how many draws went into it.
     pub fn new(
+        scene: &Scene,
         way: Arc<Way>,
         station_m: f64,
-        speed_mps: f64,
+        cruise: Cruise,
         mut plan: Vec<Manoeuvre>,
         draws: u32,
     ) -> Driver {
         plan.reverse();
+        let (cruise_mps, limit_part) = match cruise {
+            Cruise::Commanded(speed_mps) => (speed_mps, None),
+            Cruise::Limit(part) => (part * way.limit_mps(scene, station_m), Some(part)),
+        };
         Driver {
-            speed_mps: speed_mps.min(way.speed_mps_max(station_m)),
+            speed_mps: cruise_mps.min(way.speed_mps_max(station_m)),
             way,
             station_m,
-            cruise_mps: speed_mps,
+            cruise_mps,
+            limit_part,
+            yields_to_ego: limit_part.is_some(),
             leader: None,
+            hold_m: None,
+            insists_to_m: f64::NEG_INFINITY,
+            waited_ticks: 0,
             change: None,
             last_change: None,
             plan,
@@ -174,13 +216,16 @@ impl Driver {
         if !touched && (around.tick + u64::from(this.id)).is_multiple_of(FRAME_TICKS) {
             self.look(this, size, around);
         }
-        let braking_mps2 = around.braking_mps2(size);
+        let braking_mps2 = around.braking_mps2(size, self.speed_mps);
         let wanted_mps2 = if touched { -braking_mps2 } else { self.wanted_mps2(size, around, braking_mps2) };
         let acceleration_mps2 = wanted_mps2.clamp(-braking_mps2, size.acceleration_mps2_max);
         let speed_mps = (self.speed_mps + acceleration_mps2 * DT_S).max(0.0);
         let way_m = (self.speed_mps + speed_mps) / 2.0 * DT_S;
         self.speed_mps = speed_mps;
         self.station_m += way_m;
+        if self.gives_up() {
+            return None;
+        }
         if let Some(leader) = &mut self.leader {
             leader.gap_m += leader.speed_mps * DT_S - way_m;
         }
@@ -191,14 +236,29 @@ impl Driver {
         Some(self.advance_change(way_m, this.outline.pose.position))
     }
 
+    /// Counts a tick at rest because of others; whether that was the last straw.
+    fn gives_up(&mut self) -> bool {
+        let blocked = self.leader.is_some_and(|leader| leader.crosswise && leader.gap_m < GAP_M_MIN + 3.0);
+        if self.speed_mps >= STANDS_MPS {
+            self.waited_ticks = 0;
+        } else if self.hold_m.is_some() || blocked {
+            self.waited_ticks += 1;
+        }
+        f64::from(self.waited_ticks) * DT_S >= GIVE_UP_S
+    }
+
     /// Feeds every bit that later ticks depend on to `sink`; ways follow from the draws.
     pub fn trace(&self, sink: &mut dyn FnMut(u64)) {
         for value in [self.station_m, self.speed_mps, self.cruise_mps] {
             sink(value.to_bits());
         }
-        let leader = self.leader.unwrap_or(Leader { gap_m: -1.0, speed_mps: 0.0 });
+        let leader = self.leader.unwrap_or(Leader { gap_m: -1.0, speed_mps: 0.0, crosswise: false });
         sink(leader.gap_m.to_bits());
         sink(leader.speed_mps.to_bits());
+        sink(u64::from(leader.crosswise));
+        sink(self.hold_m.unwrap_or(f64::INFINITY).to_bits());
+        sink(self.insists_to_m.to_bits());
+        sink(u64::from(self.waited_ticks));
         if let Some(change) = &self.change {
             for value in [change.to_station_m, change.progress, change.duration_s] {
                 sink(value.to_bits());
@@ -213,14 +273,26 @@ impl Driver {
     fn look(&mut self, this: &Obstacle, size: &BodyParameters, around: &Around) {
         if self.way.ends_soon(self.station_m) {
             let mut rng = self.draw(this.id, around);
-            if let Some((way, station_m)) = self.way.prolonged(&around.scene.map, self.station_m, &mut rng) {
+            if let Some((way, station_m)) = self.way.prolonged(around.scene, self.station_m, &mut rng) {
+                self.insists_to_m += station_m - self.station_m;
                 (self.way, self.station_m) = (Arc::new(way), station_m);
             }
+        }
+        if let Some(part) = self.limit_part {
+            self.cruise_mps = part * self.way.limit_mps(around.scene, self.station_m);
         }
         if self.change.is_none() {
             self.begin_change(this, size, around);
         }
-        self.leader = self.find_leader(this, size, around);
+        let beside = self.foresee(this, size, around);
+        let leader = self.find_leader(this, size, around);
+        let nearer = |a: &Leader, b: &Leader| a.gap_m.total_cmp(&b.gap_m);
+        self.leader = leader.into_iter().chain(beside).min_by(nearer);
+        let held = self.hold_m.is_some();
+        self.hold_m = self.find_hold_m(this, size, around);
+        if held && self.hold_m.is_none() && self.speed_mps < SETS_OUT_MPS {
+            self.insists_to_m = self.junction_end_m(size);
+        }
     }
 
     fn find_leader(&self, this: &Obstacle, size: &BodyParameters, around: &Around) -> Option<Leader> {
@@ -264,7 +336,12 @@ impl Driver {
             wanted_mps2 = wanted_mps2.min(self.follow_mps2(size, leader, free_mps2));
         }
         if let Some(gap_m) = self.stop_gap_m(size, around, braking_mps2) {
-            let line = Leader { gap_m, speed_mps: 0.0 };
+            let line = Leader { gap_m, speed_mps: 0.0, crosswise: false };
+            wanted_mps2 = wanted_mps2.min(self.follow_mps2(size, &line, free_mps2));
+        }
+        if let Some(hold_m) = self.hold_m {
+            let gap_m = hold_m - self.station_m - size.length_m / 2.0;
+            let line = Leader { gap_m, speed_mps: 0.0, crosswise: false };
             wanted_mps2 = wanted_mps2.min(self.follow_mps2(size, &line, free_mps2));
         }
         wanted_mps2
@@ -289,7 +366,12 @@ impl Driver {
     }
 
     /// Gap from the front to the stop line at which it has to stop now, m.
-    fn stop_gap_m(&self, size: &BodyParameters, around: &Around, braking_mps2: f64) -> Option<f64> {
+    pub(super) fn stop_gap_m(
+        &self,
+        size: &BodyParameters,
+        around: &Around,
+        braking_mps2: f64,
+    ) -> Option<f64> {
         let front_m = self.station_m + size.length_m / 2.0;
         let line = self.way.stop_lines.iter().find(|line| line.station_m > front_m)?;
         let gap_m = line.station_m - front_m;
@@ -362,7 +444,7 @@ impl Driver {
             return None;
         }
         let mut rng = self.draw(this.id, around);
-        let way = Way::along(map, &[target], &mut rng)?;
+        let way = Way::along(around.scene, &[target], &mut rng)?;
         Some((Arc::new(way), there.station_m, Some(side)))
     }
 
@@ -404,7 +486,7 @@ impl Driver {
         change.progress += progress_per_m * way_m;
         if change.progress >= 1.0 {
             (self.way, self.station_m) = (Arc::clone(&change.to), change.to_station_m);
-            self.change = None;
+            (self.change, self.hold_m, self.insists_to_m) = (None, None, f64::NEG_INFINITY);
             let velocity_mps = (to.position - before) / DT_S;
             return Moved { pose: to, lane_heading_rad: to.heading_rad, velocity_mps };
         }
@@ -428,18 +510,19 @@ impl Driver {
 }
 
 /// The stream of one choice of one road user.
-pub(super) fn choices(seed: u64, id: u32, draw: u32) -> Rng {
+pub(in crate::sim) fn choices(seed: u64, id: u32, draw: u32) -> Rng {
     rng::stream(seed, Stream::Traffic, u64::from(id) << 32 | u64::from(draw))
 }
 
-/// The same-direction lane on a side of a lane, if there is one.
-pub(super) fn lane_beside(around: &Around, lane: LaneIndex, side: Side) -> Option<LaneIndex> {
+/// The same-direction lane on a side of a lane, if there is one and no median lies between.
+pub(in crate::sim) fn lane_beside(around: &Around, lane: LaneIndex, side: Side) -> Option<LaneIndex> {
     let lane = around.scene.map.lane(lane);
     let neighbour = match side {
         Side::Left => lane.left,
         Side::Right => lane.right,
     };
-    neighbour.filter(|neighbour| neighbour.same_direction).map(|neighbour| neighbour.lane)
+    let reachable = |neighbour: &Neighbour| neighbour.same_direction && neighbour.gap_m <= STRIP_M_MAX;
+    neighbour.filter(reachable).map(|neighbour| neighbour.lane)
 }
 
 /// An outline as the leader of somebody at a station, if it is ahead and in the corridor.
@@ -461,6 +544,7 @@ fn in_corridor(
     Some(Leader {
         gap_m: other.station_m - station_m - half_length_m - size.length_m / 2.0,
         speed_mps: velocity_mps.dot(&unit_vector(other.heading_rad)),
+        crosswise: libm::cos(outline.pose.heading_rad - other.heading_rad) < CROSSWISE_COS_MAX,
     })
 }
 

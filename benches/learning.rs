@@ -1,0 +1,99 @@
+//! Marks of learning: updates a second on one core, one line `mark NAME VALUE UNIT` each.
+//!
+//! An update is what the learner does: draw a batch of 64 by priority, Double DQN's three passes and the
+//! way back, Adam, and the new priorities. 19 inputs and 45 rows, as in the paper.
+
+use std::hint::black_box;
+use std::sync::Arc;
+use std::time::Instant;
+
+use avastra::agent;
+use avastra::agent::Agent;
+use avastra::agent::Experience;
+use avastra::agent::Hyperparameters;
+use avastra::agent::Kind;
+use avastra::agent::Learner;
+use avastra::agent::Rows;
+use avastra::agent::Trajectory;
+use avastra::mdp::Observation;
+use avastra::rng;
+use avastra::rng::Stream;
+use ndarray::Array1;
+
+const ROWS: usize = 45;
+/// Of each, the median counts.
+const REPEATS: usize = 7;
+/// Steps of an episode, and so updates that are measured at once.
+const STEPS: usize = 100;
+
+fn main() {
+    for hidden in [[64, 64], [256, 256], [1024, 512]] {
+        let [first, second] = hidden;
+        let (updates, choices) = measured(&format!("hidden_units: [{first}, {second}]\n"));
+        println!("mark updates_per_s_{first}_{second} {updates:.0} updates/s");
+        println!("mark choice_{first}_{second} {choices:.1} us");
+    }
+}
+
+/// Updates a second, and the time of a greedy choice, us.
+fn measured(text: &str) -> (f64, f64) {
+    let Kind::Learning(presets) = agent::by_name("ddqn").expect("it is registered").kind else {
+        panic!("it learns")
+    };
+    let text = format!("{text}learning_starts: 1\nexploration_begin: 0\nexploration_end: 0\n");
+    let settings = Hyperparameters::from_yaml(presets, Some("paper"), &text).expect("the settings are sound");
+    let rows = Rows { allowed: vec![true; ROWS], environment: vec![false; ROWS] };
+    let mut learner = Learner::new(Arc::new(settings), Arc::new(rows), 1);
+    let mut rng = rng::stream(1, Stream::Traffic, 0);
+    // Fills the memory, and warms everything up.
+    (0..20).for_each(|_| {
+        black_box(learner.learn(&episode(&mut rng, 100), &mut rng.clone()).loss);
+    });
+    let seconds: Vec<f64> = (0..REPEATS)
+        .map(|_| {
+            let episode = episode(&mut rng, STEPS);
+            let begin = Instant::now();
+            black_box(learner.learn(&episode, &mut rng));
+            begin.elapsed().as_secs_f64()
+        })
+        .collect();
+    let look = observation(&mut rng);
+    let legal = Array1::from_elem(ROWS, true);
+    let choices: Vec<f64> = (0..REPEATS)
+        .map(|_| {
+            let begin = Instant::now();
+            for _ in 0..200 {
+                black_box(learner.choose(&look, legal.view(), &mut rng));
+            }
+            begin.elapsed().as_secs_f64() / 200.0
+        })
+        .collect();
+    (STEPS as f64 / median(seconds), median(choices) * 1e6)
+}
+
+fn episode(rng: &mut rng::Rng, steps: usize) -> Trajectory {
+    let step = |rng: &mut rng::Rng| Experience {
+        observation: observation(rng),
+        legal: Array1::from_elem(ROWS, true),
+        row: rng::below(rng, ROWS as u32) as usize,
+        reward: rng::normal(rng),
+        hits: Vec::new(),
+    };
+    Trajectory {
+        steps: (0..steps).map(|_| step(rng)).collect(),
+        last: observation(rng),
+        last_legal: Array1::from_elem(ROWS, true),
+        terminal: true,
+    }
+}
+
+fn observation(rng: &mut rng::Rng) -> Observation {
+    let mut observation = Observation::zeros();
+    observation.state.iter_mut().for_each(|value| *value = rng::normal(rng) as f32);
+    observation
+}
+
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values[values.len() / 2]
+}

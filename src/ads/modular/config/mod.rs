@@ -1,0 +1,39 @@
+//! What may be set of the modular driving system: unit, range and where it comes from.
+//!
+//! Constants that belong to a method rather than to the system modelled (step sizes, filter gains,
+//! look-aheads) stand with their use in the parts. `scenarios/ads/default.yaml` is the default
+//! written out, `scenarios/ads/faults/` holds faults to plant. "Apollo" is Apollo 7.0; "ours" marks
+//! what its published configuration leaves open.
+
+mod driving;
+mod module;
+mod read;
+mod sensing;
+mod settings;
+mod weaknesses;
+
+use serde::Deserialize;
+use serde::Serialize;
+
+pub use driving::ControlConfig;
+pub use driving::PlanningConfig;
+pub use driving::PredictionConfig;
+pub use module::Module;
+pub use read::ConfigError;
+pub use sensing::LocalizationConfig;
+pub use sensing::PerceptionConfig;
+pub use sensing::TrackingConfig;
+pub use weaknesses::Weaknesses;
+
+/// Settings of [`Modular`](super::Modular). Keys that a file leaves out keep their default.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct ModularConfig {
+    pub localization: LocalizationConfig,
+    pub perception: PerceptionConfig,
+    pub tracking: TrackingConfig,
+    pub prediction: PredictionConfig,
+    pub planning: PlanningConfig,
+    pub control: ControlConfig,
+    pub weaknesses: Weaknesses,
+}

@@ -1,0 +1,136 @@
+//! The modules of the system, and what each of them would be without error.
+
+use super::ModularConfig;
+use super::driving::ControlConfig;
+use super::driving::PlanningConfig;
+use super::driving::PredictionConfig;
+use super::sensing::LocalizationConfig;
+use super::sensing::PerceptionConfig;
+use super::sensing::TrackingConfig;
+use super::weaknesses::Weaknesses;
+
+/// A part of the modular driving system that a failure can be blamed on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Module {
+    Localization,
+    Perception,
+    Tracking,
+    Prediction,
+    Planning,
+    /// Time between a look and its use.
+    Latency,
+    Control,
+}
+
+impl Module {
+    /// In the order of the data's way.
+    pub const ALL: [Module; 7] = [
+        Module::Localization,
+        Module::Perception,
+        Module::Tracking,
+        Module::Prediction,
+        Module::Planning,
+        Module::Latency,
+        Module::Control,
+    ];
+
+    /// Its name in tables and files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Module::Localization => "localization",
+            Module::Perception => "perception",
+            Module::Tracking => "tracking",
+            Module::Prediction => "prediction",
+            Module::Planning => "planning",
+            Module::Latency => "latency",
+            Module::Control => "control",
+        }
+    }
+}
+
+impl ModularConfig {
+    /// The same system with one module without error: no noise, no planted fault, no weakness of its
+    /// own. Weakness (a) belongs to perception (range, occlusion, flicker) and to tracking
+    /// (publication): each of the two loses its share by its `perfect` switch.
+    ///
+    /// Planning keeps its way of driving (speeds, gaps) only as far as the default has it: a profile
+    /// that follows too closely is a fault of planning, too.
+    pub fn idealised(&self, module: Module) -> ModularConfig {
+        let mut config = *self;
+        match module {
+            Module::Localization => {
+                config.localization = LocalizationConfig {
+                    position_sigma_m: 0.0,
+                    heading_sigma_rad: 0.0,
+                    latency_s: self.localization.latency_s,
+                    ..LocalizationConfig::default()
+                };
+            }
+            Module::Perception => {
+                config.perception = PerceptionConfig {
+                    latency_frames: self.perception.latency_frames,
+                    perfect: true,
+                    ..PerceptionConfig::default()
+                };
+            }
+            Module::Tracking => {
+                config.tracking = TrackingConfig { perfect: true, ..TrackingConfig::default() }
+            }
+            Module::Prediction => {
+                config.prediction = PredictionConfig { perfect: true, ..PredictionConfig::default() };
+                config.weaknesses.b_lane_bound_prediction = false;
+            }
+            Module::Planning => {
+                config.planning = PlanningConfig::default();
+                config.weaknesses = Weaknesses {
+                    a_late_unstable_tracks: self.weaknesses.a_late_unstable_tracks,
+                    b_lane_bound_prediction: self.weaknesses.b_lane_bound_prediction,
+                    ..Weaknesses::NONE
+                };
+            }
+            Module::Latency => {
+                config.localization.latency_s = 0.0;
+                config.perception.latency_frames = 0;
+            }
+            Module::Control => config.control = ControlConfig::default(),
+        }
+        config
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Every shipped fault: its file's name begins with the module at fault.
+    fn faults() -> Vec<(String, ModularConfig)> {
+        let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios/ads/faults");
+        let mut files: Vec<_> =
+            std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
+        files.sort();
+        let read = |path: &std::path::PathBuf| {
+            let text = std::fs::read_to_string(path).unwrap();
+            (
+                path.file_stem().unwrap().to_string_lossy().into_owned(),
+                ModularConfig::from_yaml(&text).unwrap(),
+            )
+        };
+        files.iter().map(read).collect()
+    }
+
+    #[test]
+    fn a_fault_vanishes_with_its_own_module_and_with_no_other() {
+        let healthy = ModularConfig::default();
+        assert!(faults().len() >= 12);
+        for (name, fault) in faults() {
+            for module in Module::ALL {
+                let cured = fault.idealised(module) == healthy.idealised(module);
+                assert_eq!(cured, name.starts_with(module.name()), "{name} by {}", module.name());
+            }
+        }
+        for module in Module::ALL {
+            assert!(faults().iter().any(|(name, _)| name.starts_with(module.name())), "{}", module.name());
+        }
+    }
+}

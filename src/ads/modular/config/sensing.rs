@@ -1,0 +1,109 @@
+//! Settings of the parts that find out what is: localisation, perception, tracking.
+
+use super::settings::section;
+
+section! {
+    /// Pose error of RTK and LiDAR map matching.
+    pub struct LocalizationConfig {
+        /// Standard deviation of the slowly moving position error per axis under open sky, m, in `[0, 5]`. RTK fixed: 0.02 to 0.05; RTK float: 0.2 to 0.5.
+        position_sigma_m: f64 = 0.04, 0.0..=5.0;
+        /// Factor of it in streets, where houses and trees hide part of the sky: outside junctions, in `[1, 50]`. Apollo's MSF: 0.05 to 0.10 m RMS over both axes; urban canyon: 0.5 to 2.5 m.
+        street_factor: f64 = 1.5, 1.0..=50.0;
+        /// Standard deviation of the heading error, rad, in `[0, 0.1]`. Published: 0.2° to 0.5°.
+        heading_sigma_rad: f64 = 0.0035, 0.0..=0.1;
+        /// Correlation time of both, s, in `[0.1, 100]`. Multipath and map matching: about 5.
+        correlation_s: f64 = 5.0, 0.1..=100.0;
+        /// Age of a pose when it is used, s, in `[0, 0.1]`. LGSVL with Apollo: 0.01 to 0.02.
+        latency_s: f64 = 0.015, 0.0..=0.1;
+        /// Factor of both deviations in a downpour (50 mm/h) or on a flooded road, in `[1, 10]`. LiDAR map matching: 1.5 to 3.
+        rain_factor: f64 = 3.0, 1.0..=10.0;
+        /// Constant error along the heading, m, in `[-5, 5]`. A fault to plant: none by default.
+        bias_ahead_m: f64 = 0.0, -5.0..=5.0;
+        /// Constant error to the left, m, in `[-5, 5]`. A fault to plant: none by default.
+        bias_left_m: f64 = 0.0, -5.0..=5.0;
+    }
+}
+
+section! {
+    /// Detection of objects and of the colours of traffic lights.
+    pub struct PerceptionConfig {
+        /// Reach of the LiDAR in clear air, m, in `[0, 300]`: vehicles. Sensor data sheets, 10 % reflectance: 120. Weakness (a) ends it at `grid_m`.
+        lidar_vehicle_m: f64 = 120.0, 0.0..=300.0;
+        /// The same for pedestrians: 60. Weakness (a) ends it at `small_m`.
+        lidar_pedestrian_m: f64 = 60.0, 0.0..=300.0;
+        /// Where the detector's grid ends, m, in `[0, 300]`. Apollo's PointPillars: 74.88.
+        grid_m: f64 = 74.88, 0.0..=300.0;
+        /// Where it still finds pedestrians, m, in `[0, 300]`. nuScenes scores them to 40.
+        small_m: f64 = 40.0, 0.0..=300.0;
+        /// Range of the cameras by day in clear air, m, in `[0, 300]`: vehicles. Sensor defaults of the literature: 120.
+        camera_vehicle_m: f64 = 120.0, 0.0..=300.0;
+        /// The same for pedestrians: 60.
+        camera_pedestrian_m: f64 = 60.0, 0.0..=300.0;
+        /// Factor of the camera's range in full darkness, in `[0, 1]`: vehicles, which carry lamps. Night tests: 0.7.
+        night_vehicle_factor: f64 = 0.7, 0.0..=1.0;
+        /// The same for pedestrians. Low beam, dark clothing: 25 to 40 m of 80.
+        night_pedestrian_factor: f64 = 0.4, 0.0..=1.0;
+        /// Part of the camera in the fused range, in `[0, 1]`; the LiDAR has the rest. nuScenes, BEVFusion: losing the camera costs about a fifth of what losing the LiDAR costs.
+        camera_weight: f64 = 0.2, 0.0..=1.0;
+        /// Cameras alone begin a track only beyond this distance, m, in `[0, 300]`. Apollo: 50.
+        camera_alone_m: f64 = 50.0, 0.0..=300.0;
+        /// Cameras alone begin no track in less light than this, in `[0, 1]`. Apollo: none at night.
+        camera_alone_light: f64 = 0.5, 0.0..=1.0;
+        /// Factor of all ranges, in `[0.05, 2]`. A fault to plant: 1 by default.
+        range_factor: f64 = 1.0, 0.05..=2.0;
+        /// Chance of detection in a frame far inside the range, in `[0, 1]`. Logistic form; 0.98 ours.
+        detection_chance_max: f64 = 0.98, 0.0..=1.0;
+        /// Mean length of a run of missed frames, s, in `[0.1, 10]`. Flicker of detections: 0.3 to 0.5; the share of missed frames does not depend on it.
+        miss_run_s: f64 = 0.4, 0.1..=10.0;
+        /// An object of which less is in sight is not detected under weakness (a), in `[0, 1]`. Published occlusion levels: 0.2.
+        visible_fraction_min: f64 = 0.2, 0.0..=1.0;
+        /// Ghosts that begin in a second in clear air, 1/s, in `[0, 10]`. Sensor defaults of the literature: 0.002.
+        ghosts_per_s: f64 = 0.002, 0.0..=10.0;
+        /// Factor of that rate in a downpour (50 mm/h), in `[1, 1000]`. The same: 20.
+        ghosts_rain_factor: f64 = 20.0, 1.0..=1000.0;
+        /// Mean life of a ghost, s, in `[0.1, 10]`. As a run of missed frames; the figure is ours.
+        ghost_s: f64 = 0.4, 0.1..=10.0;
+        /// Frames of 0.1 s between the look and its use, in `[0, 20]`. Published latency 60 to 120 ms: 1.
+        latency_frames: u32 = 1, 0.0..=20.0;
+        /// Position noise at no distance, m, in `[0, 5]`. nuScenes, LiDAR detectors.
+        position_sigma_m: f64 = 0.10, 0.0..=5.0;
+        /// Position noise per metre of distance, in `[0, 0.1]`. The same.
+        position_sigma_per_m: f64 = 0.002, 0.0..=0.1;
+        /// Heading noise of a frame, rad, in `[0, 1]`. LiDAR: 3°.
+        heading_sigma_rad: f64 = 0.052, 0.0..=1.0;
+        /// Relative error of the size of an object, kept for its life, in `[0, 0.2]`. nuScenes: 0.05.
+        size_sigma: f64 = 0.05, 0.0..=0.2;
+        /// Under weakness (a) a vehicle longer than this flickers, m, in `[0, 30]`. Ours.
+        large_vehicle_m: f64 = 7.0, 0.0..=30.0;
+        /// Length of the part then seen, m, in `[1, 30]`. Ours.
+        flicker_length_m: f64 = 4.5, 1.0..=30.0;
+        /// Colours of traffic lights are read from here on, m, in `[0, 300]`, or from the meteorological optical range. The camera's: 120.
+        light_range_m: f64 = 120.0, 0.0..=300.0;
+        /// A colour that goes out of sight is taken to hold for so long, s, in `[0, 10]`. Ours.
+        light_memory_s: f64 = 1.5, 0.0..=10.0;
+        /// No pedestrian is ever detected. A fault to plant.
+        blind_to_pedestrians: bool = false;
+        /// No vehicle longer than `large_vehicle_m` is ever detected. A fault to plant.
+        blind_to_large_vehicles: bool = false;
+        /// Every object that the sensors reach is detected as it is, hidden or not, without ghosts; and so is every light. An idealisation, to find causes with.
+        perfect: bool = false;
+    }
+}
+
+section! {
+    /// Tracks out of detections.
+    pub struct TrackingConfig {
+        /// Frames in a row before a track is published under weakness (a), in `[1, 100]`. Apollo `pub_track_time_thresh` 3: the fourth.
+        frames_to_publish: u32 = 4, 1.0..=100.0;
+        /// A track unseen for longer is dropped, s, in `[0, 5]`. Apollo's tracker reserves 0.3.
+        reserve_s: f64 = 0.3, 0.0..=5.0;
+        /// Acceleration that the tracker expects of vehicles, standard deviation, m/s², in `[0.1, 20]`. Ours.
+        vehicle_acceleration_sigma_mps2: f64 = 3.0, 0.1..=20.0;
+        /// The same for pedestrians.
+        pedestrian_acceleration_sigma_mps2: f64 = 2.0, 0.1..=20.0;
+        /// Factor of the velocity that is reported, in `[0, 2]`. A fault to plant: 1 by default.
+        velocity_factor: f64 = 1.0, 0.0..=2.0;
+        /// A detected object is published at once with its true velocity and heading, and not forgotten for 5 s. An idealisation, to find causes with.
+        perfect: bool = false;
+    }
+}

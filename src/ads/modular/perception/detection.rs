@@ -1,0 +1,24 @@
+//! One object as a detector reports it in one frame.
+
+use crate::geometry::Pose;
+use crate::geometry::Vec2;
+use crate::model::vocabulary::Body;
+
+/// One object in one frame, on the map.
+#[derive(Debug, Clone, Copy)]
+pub struct Detection {
+    pub id: u32,
+    pub body: Body,
+    /// Pose as measured: centre of the whole object, see `shift_m`.
+    pub pose: Pose,
+    /// From there to the centre of the part that was seen, along the heading, m.
+    pub shift_m: f64,
+    pub length_m: f64,
+    pub width_m: f64,
+    pub height_m: f64,
+    /// Standard deviation of the position, m.
+    pub sigma_m: f64,
+    /// What no sensor measures at once, and only an idealised tracker is given: the true motion.
+    pub true_velocity_mps: Vec2,
+    pub true_heading_rad: f64,
+}

@@ -1,0 +1,191 @@
+//! The route's lane changes: when one begins, and where it must be waited for.
+//!
+//! The vehicle stays in its lane until the target lane is clear by the rule of Apollo's lane change
+//! decider (`IsClearToChangeLane`), and stops where a short change is just possible. A change that has
+//! begun is carried through; Apollo may break one off.
+
+use std::sync::Arc;
+
+use crate::ads::guide::Beside;
+use crate::ads::guide::Guide;
+use crate::ads::status::Reason;
+use crate::road::RouteLaneChange;
+use crate::sim::Scene;
+use crate::sim::VehicleParameters;
+
+use super::super::config::PlanningConfig;
+use super::super::perception::FRAME_S;
+use super::super::prediction::Forecast;
+use super::speed::Constraint;
+
+/// Vehicles farther away along the road do not matter, m: the greatest gap that is asked for in a town.
+const LOOK_M: f64 = 200.0;
+
+/// For so long a lane must have been clear, s: a new track takes almost half of it to be published.
+/// Apollo waits as long after a failed attempt.
+const CLEAR_S: f64 = 1.0;
+
+#[derive(Debug, Clone)]
+pub struct LaneChanges {
+    scene: Arc<Scene>,
+    /// Where each change of the route begins, m; infinite while it has not.
+    begins_m: Vec<f64>,
+    /// For how long the lane of the next one has been clear, s.
+    clear_s: f64,
+}
+
+impl LaneChanges {
+    pub fn new(scene: &Arc<Scene>) -> LaneChanges {
+        let begins_m = vec![f64::INFINITY; scene.route.changes.len()];
+        LaneChanges { scene: Arc::clone(scene), begins_m, clear_s: 0.0 }
+    }
+
+    /// The guide of the lanes as they are to be driven now.
+    pub fn guide(&self, config: &PlanningConfig) -> Guide {
+        if self.begins_m.is_empty() {
+            return Guide::new(&self.scene, &config.speed_rules());
+        }
+        Guide::with_changes(&self.scene, &config.speed_rules(), &self.begins_m)
+    }
+
+    /// Whether a change is under way at a station.
+    pub fn under_way(&self, station_m: f64) -> bool {
+        self.scene.route.changes.iter().zip(&self.begins_m).any(|(change, begin_m)| {
+            *begin_m <= station_m && station_m < begin_m + change.length_from_m(*begin_m)
+        })
+    }
+
+    /// The change that is due but has not begun, if there is one.
+    pub fn due(&self, station_m: f64) -> Option<&RouteLaneChange> {
+        let (_, change) = self.next()?;
+        (station_m >= change.begin_m && !self.under_way(station_m)).then_some(change)
+    }
+
+    /// Begins the next change if it is due and its lane is clear; `true` if the guide is another now.
+    pub fn seek(
+        &mut self,
+        config: &PlanningConfig,
+        guide: &Guide,
+        station_m: f64,
+        speed_mps: f64,
+        forecasts: &[Forecast],
+    ) -> bool {
+        let Some((index, change)) = self.next() else { return false };
+        let soon = station_m >= change.begin_m - speed_mps * CLEAR_S && !self.under_way(station_m);
+        if !soon || !is_clear(config, guide, change.lateral_m, station_m, speed_mps, forecasts) {
+            self.clear_s = 0.0;
+            return false;
+        }
+        let begins = self.due(station_m).is_some() && self.clear_s >= CLEAR_S;
+        self.clear_s += FRAME_S;
+        if begins {
+            self.begins_m[index] = station_m;
+            self.clear_s = 0.0;
+        }
+        begins
+    }
+
+    /// A stop where the next change is just possible.
+    pub fn constrain(&self, constraints: &mut Vec<Constraint>) {
+        if let Some((_, change)) = self.next() {
+            let wait_m = change.latest_m - RouteLaneChange::LENGTH_M_MIN;
+            let stop_m = VehicleParameters::MKZ.front_m(wait_m);
+            constraints.push(Constraint::line(Reason::LaneChange, stop_m));
+        }
+    }
+
+    fn next(&self) -> Option<(usize, &RouteLaneChange)> {
+        let index = self.begins_m.iter().position(|begin_m| begin_m.is_infinite())?;
+        Some((index, &self.scene.route.changes[index]))
+    }
+}
+
+/// Apollo's rule: the gap in front and behind is at least 10 m and 3 s at the difference of the speeds,
+/// to oncoming traffic 50 m and 5 s at their sum.
+fn is_clear(
+    config: &PlanningConfig,
+    guide: &Guide,
+    lateral_m: f64,
+    station_m: f64,
+    speed_mps: f64,
+    forecasts: &[Forecast],
+) -> bool {
+    let half_way_m = VehicleParameters::MKZ.width_m / 2.0 + config.lateral_buffer_m;
+    let (rear_m, front_m) =
+        (VehicleParameters::MKZ.rear_m(station_m), VehicleParameters::MKZ.front_m(station_m));
+    forecasts.iter().all(|forecast| {
+        let at = guide.project(forecast.positions[0], station_m - LOOK_M, station_m + LOOK_M);
+        let in_target = Beside { offset_m: at.offset_m - lateral_m, ..at };
+        let taken = in_target.taken(forecast.forward, forecast.length_m, forecast.width_m, half_way_m);
+        let Some(span) = taken else { return true };
+        let along_mps = forecast.velocity_mps.dot(&at.forward);
+        let oncoming = at.forward.dot(&forecast.forward) < 0.0 && along_mps < 0.0;
+        let (ahead_m, behind_m) = if oncoming {
+            let time_s = config.change_oncoming_time_s;
+            (config.change_oncoming_gap_m.max(time_s * (speed_mps - along_mps)), 0.0)
+        } else {
+            let (gap_m, time_s) = (config.change_gap_m, config.change_time_s);
+            (gap_m.max(time_s * (speed_mps - along_mps)), gap_m.max(time_s * (along_mps - speed_mps)))
+        };
+        span.from_m - front_m > ahead_m || rear_m - span.to_m > behind_m
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ads::modular::prediction::Prediction;
+    use crate::ads::modular::tracking::Track;
+    use crate::ads::testing::two_lanes;
+    use crate::geometry::Pose;
+    use crate::geometry::Vec2;
+    use crate::model::vocabulary::Body;
+
+    /// Whether the left-hand lane is clear for a vehicle at 10 m/s whose rear axle is at 100 m.
+    fn clear(gap_ahead_m: Option<f64>, gap_behind_m: Option<f64>, other_mps: f64) -> bool {
+        let scene = two_lanes(300.0);
+        let config = PlanningConfig::default();
+        let guide = LaneChanges::new(&scene).guide(&config);
+        let half_m = 4.7 / 2.0;
+        let front = gap_ahead_m.map(|gap_m| VehicleParameters::MKZ.front_m(100.0) + gap_m + half_m);
+        let rear = gap_behind_m.map(|gap_m| VehicleParameters::MKZ.rear_m(100.0) - gap_m - half_m);
+        let heading_rad = if other_mps < 0.0 { core::f64::consts::PI } else { 0.0 };
+        let tracks: Vec<Track> = front
+            .into_iter()
+            .chain(rear)
+            .zip(1..)
+            .map(|(x_m, id)| {
+                Track::for_tests(
+                    id,
+                    Body::Sedan,
+                    Pose::new(x_m, -1.75, heading_rad),
+                    Vec2::new(other_mps, 0.0),
+                )
+            })
+            .collect();
+        let mut prediction = Prediction::new(&Default::default(), true, &scene, None);
+        prediction.update(&tracks, 0.0, 0.0, Vec2::zeros());
+        is_clear(&config, &guide, 3.5, 100.0, 10.0, prediction.forecasts())
+    }
+
+    #[test]
+    fn the_gap_is_ten_metres_or_three_seconds_of_the_difference() {
+        assert!(clear(None, None, 0.0));
+        for (gap_m, other_mps, expected) in [
+            (9.5, 10.0, false),
+            (10.5, 10.0, true),
+            (14.5, 5.0, false),
+            (15.5, 5.0, true),
+            (10.5, 15.0, true),
+        ] {
+            assert_eq!(clear(Some(gap_m), None, other_mps), expected, "{gap_m} m ahead at {other_mps}");
+        }
+        for (gap_m, other_mps, expected) in
+            [(9.5, 10.0, false), (10.5, 5.0, true), (14.5, 15.0, false), (15.5, 15.0, true)]
+        {
+            assert_eq!(clear(None, Some(gap_m), other_mps), expected, "{gap_m} m behind at {other_mps}");
+        }
+        // Oncoming: 5 s at the sum of the speeds.
+        assert!(!clear(Some(95.0), None, -10.0) && clear(Some(105.0), None, -10.0));
+    }
+}

@@ -1,0 +1,215 @@
+//! The path beside the guide: a shift within the lane past a vehicle that stands at its edge.
+//!
+//! Apollo's path bounds keep 0.3 m from static obstacles, 3 m before and 2 m behind them; its
+//! piecewise-jerk optimiser is replaced by a quintic shift of bounded lateral acceleration. Pedestrians
+//! and whatever moves are not nudged round.
+
+use crate::ads::guide::Guide;
+use crate::ads::guide::Span;
+use crate::ads::steering::Aside;
+use crate::sim::Scene;
+use crate::sim::VehicleParameters;
+
+use super::super::config::PlanningConfig;
+use super::super::prediction::Forecast;
+use super::planner::HORIZON_M;
+
+/// Apollo's `obstacle_lon_start_buffer` and `obstacle_lon_end_buffer`, m.
+const BEFORE_M: f64 = 3.0;
+const BEHIND_M: f64 = 2.0;
+/// The shift may go on until the bumper is so near, m, where there is no more room.
+const BEFORE_M_MIN: f64 = 0.5;
+/// Lateral acceleration of the shift, m/s², and its least length, m. Ours.
+const LATERAL_MPS2: f64 = 1.5;
+const LENGTH_M_MIN: f64 = 5.0;
+/// Room left to the edge of the lane, m. Ours.
+const EDGE_M: f64 = 0.1;
+
+/// Where the path lies beside the guide.
+#[derive(Debug, Clone, Default)]
+pub struct LateralPlan {
+    bump: Option<Bump>,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Bump {
+    id: u32,
+    /// What is passed, along the guide.
+    span: Span,
+    offset_m: f64,
+    /// Stations of the rear axle at which the shift begins and is complete, and at which it begins to
+    /// end and has ended, m.
+    up_m: (f64, f64),
+    down_m: (f64, f64),
+}
+
+/// What stands in the way, and how far it reaches across.
+struct Edge {
+    id: u32,
+    span: Span,
+    right_m: f64,
+    left_m: f64,
+}
+
+impl LateralPlan {
+    pub fn aside(&self, station_m: f64) -> Aside {
+        let Some(bump) = &self.bump else { return Aside::default() };
+        if station_m <= bump.up_m.0 || station_m >= bump.down_m.1 {
+            return Aside::default();
+        }
+        let (from_m, length_m, sign) = if station_m < bump.up_m.1 {
+            (bump.up_m.0, bump.up_m.1 - bump.up_m.0, 1.0)
+        } else if station_m <= bump.down_m.0 {
+            return Aside { offset_m: bump.offset_m, ..Aside::default() };
+        } else {
+            (bump.down_m.1, bump.down_m.1 - bump.down_m.0, -1.0)
+        };
+        let u = sign * (station_m - from_m) / length_m;
+        Aside {
+            offset_m: bump.offset_m * u * u * u * (10.0 - u * (15.0 - 6.0 * u)),
+            slope: sign * bump.offset_m * 30.0 * u * u * (1.0 - u) * (1.0 - u) / length_m,
+            curvature_per_m: bump.offset_m * 60.0 * u * (1.0 - u) * (1.0 - 2.0 * u) / (length_m * length_m),
+        }
+    }
+
+    /// What is being passed, and where it stands.
+    pub fn passing(&self) -> Option<(u32, Span)> {
+        self.bump.map(|bump| (bump.id, bump.span))
+    }
+
+    /// One cycle later: ends a shift that is over, begins one that is needed and possible.
+    pub fn update(
+        &mut self,
+        config: &PlanningConfig,
+        scene: &Scene,
+        guide: &Guide,
+        station_m: f64,
+        speed_mps: f64,
+        forecasts: &[Forecast],
+    ) {
+        if let Some(bump) = self.bump {
+            let gone = !forecasts.iter().any(|forecast| forecast.id == bump.id && !forecast.moving);
+            if station_m > bump.down_m.1 || (gone && station_m < bump.up_m.0) {
+                self.bump = None;
+            }
+        }
+        if self.bump.is_some() {
+            return;
+        }
+        let half_way_m = VehicleParameters::MKZ.width_m / 2.0;
+        let front_m = VehicleParameters::MKZ.front_m(station_m);
+        let edges = || {
+            let standing = forecasts.iter().filter(|forecast| !forecast.moving);
+            standing.filter_map(|forecast| {
+                let beside = guide.project(forecast.positions[0], station_m, station_m + HORIZON_M);
+                let sine = beside.forward.x * forecast.forward.y - beside.forward.y * forecast.forward.x;
+                let cosine = beside.forward.dot(&forecast.forward);
+                let across_m = (sine.abs() * forecast.length_m + cosine.abs() * forecast.width_m) / 2.0;
+                let reach_m = half_way_m + config.lateral_buffer_m;
+                let (length_m, width_m) = (forecast.length_m, forecast.width_m);
+                let span = beside.taken(forecast.forward, length_m, width_m, 2.0 * reach_m)?;
+                let (right_m, left_m) = (beside.offset_m - across_m, beside.offset_m + across_m);
+                (span.to_m > front_m).then_some(Edge { id: forecast.id, span, right_m, left_m })
+            })
+        };
+        let in_the_way = |edge: &Edge| {
+            edge.right_m < half_way_m + config.lateral_buffer_m
+                && edge.left_m > -half_way_m - config.lateral_buffer_m
+        };
+        let nearest = edges()
+            .filter(|edge| in_the_way(edge) && edge.span.from_m > front_m)
+            .min_by(|a, b| a.span.from_m.total_cmp(&b.span.from_m));
+        let Some(edge) = nearest else { return };
+        let vehicle = |forecast: &Forecast| forecast.id == edge.id && forecast.body.is_vehicle();
+        if !forecasts.iter().any(vehicle) {
+            return;
+        }
+        let clear_m = half_way_m + config.nudge_buffer_m;
+        let offset_m =
+            if edge.left_m + edge.right_m < 0.0 { edge.left_m + clear_m } else { edge.right_m - clear_m };
+        let on = scene.route.lane_at(edge.span.from_m);
+        let lane_m = scene.map.lane(on.lane).width_at(edge.span.from_m - on.from_m);
+        if offset_m.abs() > lane_m / 2.0 - half_way_m - EDGE_M {
+            return;
+        }
+        let (before_m, behind_m) = (VehicleParameters::MKZ.front_m(0.0), -VehicleParameters::MKZ.rear_m(0.0));
+        let length_m = (speed_mps * (5.78 * offset_m.abs() / LATERAL_MPS2).sqrt()).max(LENGTH_M_MIN);
+        let (wanted_m, last_m) =
+            (edge.span.from_m - before_m - BEFORE_M, edge.span.from_m - before_m - BEFORE_M_MIN);
+        let up_to_m = wanted_m.max(station_m + length_m);
+        if up_to_m > last_m {
+            return;
+        }
+        let down_from_m = edge.span.to_m + behind_m + BEHIND_M;
+        let bump = Bump {
+            id: edge.id,
+            span: edge.span,
+            offset_m,
+            up_m: (up_to_m - length_m, up_to_m),
+            down_m: (down_from_m, down_from_m + length_m),
+        };
+        let free = edges().filter(|other| other.id != edge.id).all(|other| {
+            let abreast = other.span.from_m < bump.down_m.1 + before_m && other.span.to_m > bump.up_m.0;
+            !abreast || other.left_m < offset_m - clear_m || other.right_m > offset_m + clear_m
+        });
+        if free {
+            self.bump = Some(bump);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ads::modular::prediction::Prediction;
+    use crate::ads::modular::tracking::Track;
+    use crate::ads::testing::straight;
+    use crate::geometry::Pose;
+    use crate::geometry::Vec2;
+    use crate::model::vocabulary::Body;
+
+    fn planned(places: &[(Body, f64, f64)]) -> LateralPlan {
+        let scene = straight();
+        let config = PlanningConfig::default();
+        let guide = Guide::new(&scene, &config.speed_rules());
+        let mut prediction = Prediction::new(&Default::default(), true, &scene, None);
+        let tracks: Vec<Track> = places
+            .iter()
+            .zip(1..)
+            .map(|((body, x_m, y_m), id)| {
+                Track::for_tests(id, *body, Pose::new(*x_m, *y_m, 0.0), Vec2::zeros())
+            })
+            .collect();
+        prediction.update(&tracks, 0.0, 0.0, Vec2::zeros());
+        let mut plan = LateralPlan::default();
+        plan.update(&config, &scene, &guide, 10.0, 8.0, prediction.forecasts());
+        plan
+    }
+
+    #[test]
+    fn it_shifts_as_far_as_needed_and_back_smoothly() {
+        // The lane's middle is at -1.75; the car's left side at -2.55 leaves 0.8 m to it.
+        let plan = planned(&[(Body::Sedan, 60.0, -3.5)]);
+        let at_car = plan.aside(60.0);
+        assert!((at_car.offset_m - (1.03 + 0.3 - 0.8)).abs() < 1e-6, "{at_car:?}");
+        assert_eq!((plan.aside(10.0), plan.aside(120.0)), (Aside::default(), Aside::default()));
+        let h = 1e-3;
+        for decimetre in 100..1200 {
+            let at_m = f64::from(decimetre) / 10.0 + 0.05;
+            let (before, here, after) = (plan.aside(at_m - h), plan.aside(at_m), plan.aside(at_m + h));
+            assert!(((after.offset_m - before.offset_m) / (2.0 * h) - here.slope).abs() < 1e-4, "{at_m}");
+            assert!(((after.slope - before.slope) / (2.0 * h) - here.curvature_per_m).abs() < 1e-4, "{at_m}");
+            assert!(8.0 * 8.0 * here.curvature_per_m.abs() < 1.6, "{here:?}");
+        }
+    }
+
+    #[test]
+    fn it_leaves_the_lane_for_nobody_and_squeezes_past_nobody() {
+        assert!(planned(&[(Body::Sedan, 60.0, -1.75)]).passing().is_none(), "in the middle");
+        assert!(planned(&[(Body::Pedestrian, 60.0, -3.5)]).passing().is_none(), "a pedestrian");
+        assert!(planned(&[(Body::Sedan, 16.0, -3.5)]).passing().is_none(), "too near");
+        let gate = [(Body::Sedan, 60.0, -3.5), (Body::Sedan, 62.0, 0.4)];
+        assert!(planned(&gate).passing().is_none(), "one on each side");
+        assert!(planned(&[(Body::Sedan, 60.0, -4.6)]).passing().is_none(), "beside the lane");
+    }
+}

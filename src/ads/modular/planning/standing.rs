@@ -1,0 +1,49 @@
+//! How long pedestrians have stood: weakness (f) ignores those who have done so for some time.
+//!
+//! Tracked speeds are too noisy to tell that somebody stands; that he stays where he is does.
+
+use crate::geometry::Vec2;
+
+use super::super::perception::FRAME_S;
+use super::super::prediction::Forecast;
+
+/// Whoever stays this near to a place stands there, m. Ours.
+const PLACE_M: f64 = 0.5;
+
+#[derive(Debug, Clone, Default)]
+pub struct Standing {
+    known: Vec<Stood>,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Stood {
+    id: u32,
+    place: Vec2,
+    time_s: f64,
+    seen: bool,
+}
+
+impl Standing {
+    /// One cycle later.
+    pub fn update(&mut self, forecasts: &[Forecast]) {
+        self.known.iter_mut().for_each(|stood| stood.seen = false);
+        for walker in forecasts.iter().filter(|forecast| !forecast.body.is_vehicle()) {
+            let position = walker.positions[0];
+            let fresh = Stood { id: walker.id, place: position, time_s: 0.0, seen: true };
+            match self.known.iter_mut().find(|stood| stood.id == walker.id) {
+                Some(stood) if (position - stood.place).norm() > PLACE_M => *stood = fresh,
+                Some(stood) => {
+                    stood.time_s += FRAME_S;
+                    stood.seen = true;
+                }
+                None => self.known.push(fresh),
+            }
+        }
+        self.known.retain(|stood| stood.seen);
+    }
+
+    /// For how long a pedestrian has been in one place, s.
+    pub fn time_s(&self, id: u32) -> f64 {
+        self.known.iter().find(|stood| stood.id == id).map_or(0.0, |stood| stood.time_s)
+    }
+}

@@ -1,0 +1,65 @@
+//! The competent and careful human driver: performance model 1 of UN R157, after JAMA.
+//!
+//! UN R157, Annex 4, Appendix 3 (Annex 3 in the 01 series). A vehicle that leaves the middle of its
+//! lane by more than drivers wander (0.375 m) is evaluated for 0.4 s; 0.75 s later the foot is on the
+//! brake, which reaches 0.774 g within 0.6 s (jerk 12.65 m/s³); meanwhile the released accelerator
+//! gives 0.4 m/s². It is critical at a time to collision of at most 2 s, and a vehicle ahead that
+//! brakes hardly, or that a cut-out has uncovered, at a time headway below 2 s.
+//!
+//! Beyond the model, which knows vehicles of the ego vehicle's direction only: whoever will be on the
+//! way when the ego vehicle comes there is critical at the same 2 s, from wherever they come. Left
+//! out is the automatic emergency brake that one published implementation adds to the human.
+
+use super::encounter::Encounter;
+use super::model::Model;
+use super::reflex::Braking;
+
+const GRAVITY_MPS2: f64 = 9.81;
+
+/// Critical time to collision and critical time headway, s.
+const CRITICAL_S: f64 = 2.0;
+/// A deceleration of the vehicle ahead beyond this is seen as hard braking, m/s² (published
+/// implementation).
+const LEADER_MPS2: f64 = 5.0;
+/// Deceleration of the hardest braking, m/s².
+const BRAKING_MPS2: f64 = 0.774 * GRAVITY_MPS2;
+/// Within this of its course somebody merely wanders, m.
+const WANDER_M: f64 = 0.375;
+
+/// The driver, by when a cut-in is noticed: implementations read the regulation in two ways.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum CarefulHuman {
+    /// When it has left its course by more than drivers wander, and has been evaluated for 0.4 s.
+    Anticipating,
+    /// When it is in the way, without evaluation: the reading behind the published cut-in grids.
+    Late,
+}
+
+impl Model for CarefulHuman {
+    fn braking(&self) -> Braking {
+        Braking {
+            evaluation_s: match self {
+                CarefulHuman::Anticipating => 0.4,
+                CarefulHuman::Late => 0.0,
+            },
+            reaction_s: 0.75,
+            release_mps2: 0.4,
+            jerk_mps3: 12.65,
+            deceleration_mps2_max: BRAKING_MPS2,
+        }
+    }
+
+    fn demand_mps2(&self, encounter: &Encounter) -> f64 {
+        let in_the_way = encounter.side_gap_m <= 0.0 && !encounter.is_beside();
+        let closing_in = in_the_way && encounter.time_to_collision_s() <= CRITICAL_S;
+        let braking_ahead = in_the_way
+            && encounter.other_mps2 <= -LEADER_MPS2
+            && encounter.headway_s() < CRITICAL_S
+            && encounter.closing_mps() > 0.0;
+        let is_noticed = encounter.crosses || encounter.aside_m > WANDER_M;
+        let will_meet = *self == CarefulHuman::Anticipating
+            && is_noticed
+            && encounter.meeting_s.is_some_and(|time_s| time_s <= CRITICAL_S);
+        if closing_in || braking_ahead || will_meet { BRAKING_MPS2 } else { 0.0 }
+    }
+}

@@ -1,0 +1,188 @@
+//! A reference driver: a published model of careful braking in a car that follows its route.
+//!
+//! The route, its lights and ordinary traffic are the business of [`Idm`], which sees here with the
+//! model's own reaction time (what was seen, carried on at constant speed) and brakes for others no
+//! harder than is comfortable. Whatever is harder is the model's reaction to a risk.
+//!
+//! A reference driver is the judge's careful driver: what is in its line of sight, and near enough for
+//! the fog, it knows as it truly is. Darkness and rain do not blind it, nobody behind it concerns it,
+//! and it does not swerve: the published models brake.
+
+use std::collections::BTreeMap;
+use std::collections::VecDeque;
+use std::sync::Arc;
+
+use crate::ads::driver::Ads;
+use crate::ads::guide::Guide;
+use crate::ads::status::Reason;
+use crate::ads::status::Status;
+use crate::sim::Conditions;
+use crate::sim::Control;
+use crate::sim::DT_S;
+use crate::sim::FRAME_TICKS;
+use crate::sim::Scene;
+use crate::sim::Sensed;
+use crate::sim::SensedObject;
+use crate::sim::VehicleParameters;
+
+use super::encounter::Encounter;
+use super::idm::Idm;
+use super::model::Model;
+use super::reflex::Reflex;
+
+/// Comfortable deceleration for other road users, m/s² (IDM's, and of the same size as what passengers
+/// call comfortable).
+const COMFORTABLE_MPS2: f64 = 3.0;
+/// Part of somebody's outline that must be in sight to be recognised. Ours.
+const SEEN_PART_MIN: f64 = 0.25;
+/// Slower than this towards the way is no movement towards it, m/s.
+const TOWARDS_MPS_MIN: f64 = 0.05;
+/// One look, s.
+const FRAME_S: f64 = FRAME_TICKS as f64 * DT_S;
+
+/// Whether careful eyes see somebody: enough of the outline is in the line of sight, and no farther
+/// away than the fog lets see.
+pub fn in_sight(object: &SensedObject, conditions: &Conditions) -> bool {
+    object.visible_fraction >= SEEN_PART_MIN && object.distance_m <= conditions.visibility_m
+}
+
+/// A driver of the model `M`.
+#[derive(Debug, Clone)]
+pub struct Reference<M> {
+    route: Idm,
+    model: M,
+    reflex: Reflex,
+    /// What the model demands since the last look, and because of whom.
+    demand: Option<(f64, u32)>,
+    /// What was in sight at the last looks, the newest last.
+    looks: VecDeque<Vec<SensedObject>>,
+    /// What the route's driver is shown; kept for its buffers.
+    shown: Option<Sensed>,
+    watched: BTreeMap<u32, Watched>,
+    ticks: u64,
+    station_m: Option<f64>,
+}
+
+/// What is remembered of a road user from look to look.
+#[derive(Debug, Clone, Copy)]
+struct Watched {
+    other_mps: f64,
+    side_gap_m: f64,
+    aside_m: f64,
+}
+
+impl<M: Model> Reference<M> {
+    pub fn new(scene: &Arc<Scene>, model: M) -> Reference<M> {
+        Reference {
+            route: Idm::new(scene),
+            reflex: Reflex::new(model.braking()),
+            model,
+            demand: None,
+            looks: VecDeque::new(),
+            shown: None,
+            watched: BTreeMap::new(),
+            ticks: 0,
+            station_m: None,
+        }
+    }
+
+    /// Looks at everybody in sight: what the model demands, and what the route's driver learns.
+    fn look(&mut self, sensed: &Sensed, station_m: f64) {
+        let mut seen = match self.looks.len() > self.delay_frames() {
+            true => self.looks.pop_front().unwrap_or_default(),
+            false => Vec::new(),
+        };
+        seen.clear();
+        seen.extend(sensed.objects.iter().filter(|object| in_sight(object, &sensed.conditions)));
+        let front_m = VehicleParameters::MKZ.front_m(station_m);
+        self.demand = None;
+        let mut watched = BTreeMap::new();
+        for object in &seen {
+            let guide: &Guide = self.route.guide();
+            let ego = &sensed.ego;
+            let found = Encounter::seen(guide, object, front_m, ego.speed_mps, ego.acceleration_mps2);
+            let Some(mut encounter) = found else { continue };
+            watched.insert(object.id, remember(self.watched.get(&object.id), &mut encounter));
+            let demand_mps2 = self.model.demand_mps2(&encounter);
+            if demand_mps2 > self.demand.map_or(0.0, |(most_mps2, _)| most_mps2) {
+                self.demand = Some((demand_mps2, object.id));
+            }
+        }
+        self.watched = watched;
+        self.looks.push_back(seen);
+    }
+
+    /// Looks between seeing something and doing something about it.
+    fn delay_frames(&self) -> usize {
+        (self.model.braking().reaction_s / FRAME_S).ceil() as usize
+    }
+
+    /// The senses with the oldest look, carried on to the present at constant speed.
+    fn delayed(&self, sensed: &Sensed, mut shown: Sensed) -> Sensed {
+        let Sensed { time_s, ego, objects: _, signals, conditions } = sensed;
+        (shown.time_s, shown.ego, shown.conditions) = (*time_s, *ego, *conditions);
+        shown.signals.clone_from(signals);
+        shown.objects.clear();
+        if self.looks.len() <= self.delay_frames() {
+            return shown;
+        }
+        let age_s = (self.looks.len() - 1) as f64 * FRAME_S + (self.ticks % FRAME_TICKS) as f64 * DT_S;
+        let objects = self.looks.front().into_iter().flatten();
+        shown.objects.extend(objects.map(|object| {
+            let mut object = *object;
+            object.pose.position += object.velocity_mps * age_s;
+            object
+        }));
+        shown
+    }
+}
+
+/// Completes an encounter by what was seen of it before; what to remember of it now.
+fn remember(before: Option<&Watched>, encounter: &mut Encounter) -> Watched {
+    if let Some(before) = before {
+        encounter.other_mps2 = (encounter.other_mps - before.other_mps) / FRAME_S;
+        if encounter.towards_mps > TOWARDS_MPS_MIN {
+            encounter.aside_m = before.aside_m + (before.side_gap_m - encounter.side_gap_m).max(0.0);
+        }
+    }
+    let Encounter { other_mps, side_gap_m, aside_m, .. } = *encounter;
+    Watched { other_mps, side_gap_m, aside_m }
+}
+
+impl<M: Model> Ads for Reference<M> {
+    fn drive(&mut self, sensed: &Sensed) -> Control {
+        let position = sensed.ego.rear_axle.position;
+        let station_m = self.route.guide().locate(position, self.station_m).station_m;
+        self.station_m = Some(station_m);
+        if self.ticks.is_multiple_of(FRAME_TICKS) {
+            self.look(sensed, station_m);
+        }
+        let shown = self.shown.take().unwrap_or_else(|| sensed.clone());
+        let shown = self.delayed(sensed, shown);
+        self.ticks += 1;
+        let (demand_mps2, because_of) = self.demand.unwrap_or((0.0, 0));
+        let now_mps2 = self.reflex.step(demand_mps2, DT_S);
+        // The models mean what the car does, which follows the pedal with a lag.
+        let lag_s = VehicleParameters::MKZ.pedal_lag_s;
+        let braking_mps2 = now_mps2 + (self.reflex.after(demand_mps2, DT_S) - now_mps2) * (lag_s / DT_S);
+        let control = self.route.drive_with(&shown, |model_mps2, reason| {
+            let for_others = matches!(reason, Reason::Stop(_) | Reason::Follow(_) | Reason::Yield(_));
+            let route_mps2 = if for_others { model_mps2.max(-COMFORTABLE_MPS2) } else { model_mps2 };
+            if braking_mps2 > 0.0 && -braking_mps2 < route_mps2 {
+                (-braking_mps2, Reason::Yield(because_of))
+            } else {
+                (route_mps2, reason)
+            }
+        });
+        self.shown = Some(shown);
+        control
+    }
+
+    fn status(&self) -> &Status {
+        self.route.status()
+    }
+
+    fn clone_box(&self) -> Box<dyn Ads> {
+        Box::new(self.clone())
+    }
+}

@@ -1,0 +1,102 @@
+//! Evasive manoeuvres: from the first moment one pedal and one place beside the route, whatever
+//! happens. The best of them bounds what any driver could have done.
+//!
+//! They are tried out against a recording, so they need no eyes. The wheel is in the hands of the
+//! common lateral controller, which is quick but not the quickest that tyres allow; a collision that
+//! none of them avoids could still be avoided by a stunt.
+
+use std::sync::Arc;
+
+use crate::ads::driver::Ads;
+use crate::ads::guide::Guide;
+use crate::ads::guide::SpeedRules;
+use crate::ads::status::Reason;
+use crate::ads::status::Status;
+use crate::ads::steering::Steering;
+use crate::ads::steering::SteeringConfig;
+use crate::sim::Control;
+use crate::sim::Scene;
+use crate::sim::Sensed;
+use crate::sim::pedals_for;
+
+/// The guide's speeds are not used: a manoeuvre has its pedal.
+const RULES: SpeedRules =
+    SpeedRules { cruise_mps: f64::INFINITY, lateral_acceleration_mps2_max: 5.0, slowdown_mps2: 6.0 };
+
+/// Pedals of the manoeuvres: full brake, half of it, none, full throttle.
+const PEDALS: [Pedal; 4] = [Pedal::FullBrake, Pedal::Gentle(-3.0), Pedal::Gentle(0.0), Pedal::Gentle(2.0)];
+/// Places beside the route that are steered for, m to the left.
+const OFFSETS_M: [f64; 9] = [0.0, 0.6, -0.6, 1.2, -1.2, 2.0, -2.0, 3.5, -3.5];
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Pedal {
+    FullBrake,
+    /// An acceleration, m/s².
+    Gentle(f64),
+}
+
+/// One manoeuvre.
+#[derive(Debug, Clone)]
+pub struct Evasion {
+    guide: Arc<Guide>,
+    steering: Arc<Steering>,
+    pedal: Pedal,
+    offset_m: f64,
+    station_m: Option<f64>,
+    status: Status,
+}
+
+impl Evasion {
+    /// Every manoeuvre on a route, full braking in the lane first.
+    pub fn all(scene: &Scene) -> impl Iterator<Item = Evasion> {
+        let guide = Arc::new(Guide::new(scene, &RULES));
+        let steering = Steering::shared(&SteeringConfig::default());
+        OFFSETS_M.into_iter().flat_map(move |offset_m| {
+            let (guide, steering) = (Arc::clone(&guide), Arc::clone(&steering));
+            PEDALS.into_iter().map(move |pedal| Evasion {
+                guide: Arc::clone(&guide),
+                steering: Arc::clone(&steering),
+                pedal,
+                offset_m,
+                station_m: None,
+                status: Status { reason: Reason::Fallback, ..Status::default() },
+            })
+        })
+    }
+
+    /// What it does, in words.
+    pub fn describe(&self) -> String {
+        let pedal = match self.pedal {
+            Pedal::FullBrake => "full brake".to_owned(),
+            Pedal::Gentle(acceleration_mps2) => format!("{acceleration_mps2:+.1} m/s²"),
+        };
+        if self.offset_m == 0.0 { pedal } else { format!("{pedal}, {:+.1} m aside", self.offset_m) }
+    }
+}
+
+impl Ads for Evasion {
+    fn drive(&mut self, sensed: &Sensed) -> Control {
+        let rear_axle = &sensed.ego.rear_axle;
+        let station_m = self.guide.locate(rear_axle.position, self.station_m).station_m;
+        self.station_m = Some(station_m);
+        // To steer for a place beside the route is to steer for the route from the other side of it.
+        let as_if = rear_axle.offset(0.0, -self.offset_m);
+        let steer_rad = self.steering.steer_rad(&self.guide, &as_if, station_m, &sensed.ego);
+        let (throttle_pct, brake_pct) = match self.pedal {
+            Pedal::FullBrake => (0.0, 100.0),
+            Pedal::Gentle(acceleration_mps2) => pedals_for(acceleration_mps2),
+        };
+        let control = Control { throttle_pct, brake_pct, steer_rad };
+        self.status.localized = Some(*rear_axle);
+        self.status.control = control;
+        control
+    }
+
+    fn status(&self) -> &Status {
+        &self.status
+    }
+
+    fn clone_box(&self) -> Box<dyn Ads> {
+        Box::new(self.clone())
+    }
+}

@@ -1,0 +1,50 @@
+//! The least that UN R157 demands of a lane-keeping system when somebody cuts in.
+//!
+//! UN R157, 5.2.5.2: a cut-in that is 0.3 m into the lane must be avoided if its time to collision is
+//! above Δv / (2 · 6 m/s²) + 0.35 s. So the least that complies brakes at 6 m/s², 0.35 s after that
+//! bound is reached; to the bound comes one look of 0.1 s, as in the published implementation.
+//!
+//! Beyond the text, which speaks of cut-ins: the same bound holds for whoever is ahead already, and for
+//! those who cross or come towards, as soon as their way leads into the ego vehicle's.
+
+use super::encounter::Encounter;
+use super::model::Model;
+use super::reflex::Braking;
+
+const DECELERATION_MPS2: f64 = 6.0;
+const RESPONSE_S: f64 = 0.35;
+/// One look of a system that looks ten times a second, s.
+const LOOK_S: f64 = 0.1;
+/// Side gap at which somebody is 0.3 m into a lane of 3.5 m that two cars of 1.9 m share with theirs,
+/// m: the published implementation's reading.
+const INTRUSION_SIDE_GAP_M: f64 = 0.5;
+
+/// The regulation's minimal performance.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct MinimalPerformance;
+
+/// Time to collision from which a cut-in can be avoided, s.
+pub fn avoidable_from_s(closing_mps: f64) -> f64 {
+    closing_mps.max(0.0) / (2.0 * DECELERATION_MPS2) + RESPONSE_S
+}
+
+impl Model for MinimalPerformance {
+    fn braking(&self) -> Braking {
+        Braking {
+            evaluation_s: 0.0,
+            reaction_s: RESPONSE_S,
+            release_mps2: 0.0,
+            jerk_mps3: f64::INFINITY,
+            deceleration_mps2_max: DECELERATION_MPS2,
+        }
+    }
+
+    fn demand_mps2(&self, encounter: &Encounter) -> f64 {
+        let bound_s = avoidable_from_s(encounter.closing_mps()) + LOOK_S;
+        let intrudes = encounter.side_gap_m <= INTRUSION_SIDE_GAP_M && !encounter.is_beside();
+        let cuts_in = intrudes && encounter.time_to_collision_s() <= bound_s;
+        let from_aside = encounter.crosses || encounter.other_mps < 0.0;
+        let crosses = from_aside && encounter.meeting_s.is_some_and(|time_s| time_s <= bound_s);
+        if cuts_in || crosses { DECELERATION_MPS2 } else { 0.0 }
+    }
+}

@@ -1,0 +1,70 @@
+//! A driving system as it is chosen for a run: by name, and with its settings.
+
+use std::sync::Arc;
+
+use crate::sim::Scene;
+
+use super::driver::Ads;
+use super::modular::Foresight;
+use super::modular::Modular;
+use super::modular::ModularConfig;
+use super::registry::Entry;
+
+/// A driving system and, if it is `modular`, its profile.
+#[derive(Debug, Clone)]
+pub struct Selected {
+    entry: &'static Entry,
+    profile: Option<ModularConfig>,
+    foresight: Option<Arc<Foresight>>,
+}
+
+/// A profile for a driving system that has no settings.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("`{ads}` has no settings: only `modular` takes a profile")]
+pub struct NoSettings {
+    pub ads: String,
+}
+
+impl Selected {
+    /// The driving system as it comes.
+    pub fn new(entry: &'static Entry) -> Selected {
+        let profile = (entry.name == MODULAR).then(ModularConfig::default);
+        Selected { entry, profile, foresight: None }
+    }
+
+    /// With a profile.
+    ///
+    /// # Errors
+    /// If it is not `modular`.
+    pub fn with_profile(self, profile: ModularConfig) -> Result<Selected, NoSettings> {
+        if self.profile.is_none() {
+            return Err(NoSettings { ads: self.entry.name.to_owned() });
+        }
+        Ok(Selected { profile: Some(profile), ..self })
+    }
+
+    /// With the recorded future of others, which a perfect prediction uses.
+    pub fn with_foresight(self, foresight: Arc<Foresight>) -> Selected {
+        Selected { foresight: Some(foresight), ..self }
+    }
+
+    pub fn name(&self) -> &'static str {
+        self.entry.name
+    }
+
+    /// Its settings, if it has any.
+    pub fn profile(&self) -> Option<&ModularConfig> {
+        self.profile.as_ref()
+    }
+
+    /// A fresh driver for one episode.
+    pub fn build(&self, scene: &Arc<Scene>, seed: u64) -> Box<dyn Ads> {
+        match &self.profile {
+            Some(profile) => Box::new(Modular::with_foresight(scene, profile, seed, self.foresight.clone())),
+            None => (self.entry.build)(scene, seed),
+        }
+    }
+}
+
+/// Name of the driving system that has settings.
+const MODULAR: &str = "modular";

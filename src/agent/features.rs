@@ -1,0 +1,151 @@
+//! From an observation to the numbers that go into a network.
+//!
+//! Scales are fixed, so that a policy means the same on every road and there is no running mean to be
+//! frozen. They bring the usual range of a variable to about one; rare values may exceed it.
+
+use crate::mdp::Observation;
+use crate::mdp::STATE_LEN;
+use crate::mdp::STATE_NAMES;
+use crate::mdp::variable;
+
+use super::hyperparameters::Encoding;
+use super::hyperparameters::StateSet;
+
+/// How many of the paper's variables are of the surroundings; they come first.
+const EXTERNAL_LEN: usize = 7;
+
+/// DeepCollision's state, in its order.
+const DEEP_COLLISION: [&str; 12] = [
+    "egoX",
+    "egoY",
+    "egoZ",
+    "rain",
+    "fog",
+    "wetness",
+    "timeOfDay",
+    "trafficLight",
+    "egoRoll",
+    "egoHeading",
+    "egoPitch",
+    "speed",
+];
+
+/// What the extended set has beside the paper's 19.
+const EXTENSION: [&str; 8] = [
+    "nearestAhead",
+    "nearestLeft",
+    "nearestSpeedAhead",
+    "nearestSpeedLeft",
+    "routeLeft",
+    "junctionAhead",
+    "laneOffset",
+    "time",
+];
+
+/// How one variable is encoded when it is scaled.
+enum Scale {
+    /// Divided by this.
+    By(f32),
+    /// One number for each of these values, 1 where the variable has it.
+    OneHot(&'static [f32]),
+    /// The three phenomena that the paper packs into one number.
+    Weather,
+}
+
+/// A list of variables and how they are encoded.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Features {
+    variables: Vec<usize>,
+    encoding: Encoding,
+    len: usize,
+}
+
+impl Features {
+    pub fn new(set: StateSet, encoding: Encoding) -> Features {
+        let named = |names: &[&str]| -> Vec<usize> {
+            names.iter().map(|name| variable(name).expect("the name is a variable's")).collect()
+        };
+        let variables = match set {
+            StateSet::Full => (0..STATE_LEN).collect(),
+            StateSet::External => (0..EXTERNAL_LEN).collect(),
+            StateSet::Internal => (EXTERNAL_LEN..STATE_LEN).collect(),
+            StateSet::DeepCollision => named(&DEEP_COLLISION),
+            StateSet::Extended => (0..STATE_LEN).chain(named(&EXTENSION)).collect(),
+        };
+        let mut features = Features { variables, encoding, len: 0 };
+        features.len = features.encode(&Observation::zeros()).len();
+        features
+    }
+
+    /// Number of network inputs.
+    pub fn len(&self) -> usize {
+        self.len
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.len == 0
+    }
+
+    /// Network inputs, shape `(len,)`.
+    pub fn encode(&self, observation: &Observation) -> Vec<f32> {
+        let mut inputs = Vec::with_capacity(self.len);
+        for &index in &self.variables {
+            let value = observation.get(index);
+            match (self.encoding, scale(index)) {
+                (Encoding::Raw, _) => inputs.push(value),
+                (Encoding::Scaled, Scale::By(unit)) => inputs.push(value / unit),
+                (Encoding::Scaled, Scale::OneHot(values)) => {
+                    inputs.extend(values.iter().map(|&one| f32::from(u8::from(value == one))));
+                }
+                (Encoding::Scaled, Scale::Weather) => {
+                    let phenomena = ["rain", "fog", "wetness"];
+                    let value = |name| observation.get(variable(name).expect("the name is a variable's"));
+                    inputs.extend(phenomena.map(value));
+                }
+            }
+        }
+        inputs
+    }
+}
+
+/// Scale of a variable, by its index.
+fn scale(index: usize) -> Scale {
+    let name = STATE_NAMES.get(index).copied();
+    let name = name.unwrap_or_else(|| crate::mdp::BEYOND_NAMES[index - STATE_LEN]);
+    match name {
+        "weather" => Scale::Weather,
+        "timeOfDay" => Scale::OneHot(&[10.0, 14.0, 20.0]),
+        "trafficLight" => Scale::OneHot(&[-1.0, 0.0, 1.0]),
+        "roadCondition" => Scale::OneHot(&[0.0, 1.0, 2.0, 3.0]),
+        "numObs" | "speed" | "speedNearestObs" | "nearestSpeedAhead" | "nearestSpeedLeft" => Scale::By(10.0),
+        "distToNearestObs" | "nearestAhead" => Scale::By(50.0),
+        "nearestLeft" => Scale::By(10.0),
+        "velocityDiff" | "accRate" => Scale::By(5.0),
+        "throttle" | "steerTarget" | "brakePercentage" | "junctionAhead" | "time" => Scale::By(100.0),
+        "routeLeft" | "egoX" | "egoY" => Scale::By(300.0),
+        "angleDeviation" | "directionDiff" | "egoHeading" => Scale::By(core::f32::consts::PI),
+        _ => Scale::By(1.0),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sets_have_the_papers_sizes() {
+        let len = |set| Features::new(set, Encoding::Raw).len();
+        let sets = [StateSet::Full, StateSet::Internal, StateSet::External, StateSet::DeepCollision];
+        assert_eq!(sets.map(len), [19, 12, 7, 12]);
+        assert_eq!(Features::new(StateSet::Extended, Encoding::Scaled).len(), 36);
+    }
+
+    #[test]
+    fn categories_become_one_hot() {
+        let mut observation = Observation::zeros();
+        observation.state[1] = 14.0;
+        observation.beyond[3] = 0.5;
+        let inputs = Features::new(StateSet::External, Encoding::Scaled).encode(&observation);
+        assert_eq!(inputs[..9], [0.5, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 0.0]);
+    }
+}

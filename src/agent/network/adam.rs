@@ -1,0 +1,68 @@
+//! Adam (Kingma and Ba, 2015, Algorithm 1), with the operations in PyTorch's order.
+
+/// The optimiser and its running moments, one of each for each parameter.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Adam {
+    pub(in crate::agent) mean: Vec<f32>,
+    pub(in crate::agent) square: Vec<f32>,
+    /// The decay rates to the power of the steps done, in `f64` lest they drift.
+    pub(in crate::agent) mean_power: f64,
+    pub(in crate::agent) square_power: f64,
+}
+
+/// Decay rates of the moments, and what keeps the quotient finite: the algorithm's own defaults, which
+/// every source of ours uses.
+const MEAN_DECAY: f64 = 0.9;
+const SQUARE_DECAY: f64 = 0.999;
+const FLOOR: f32 = 1e-8;
+
+impl Adam {
+    /// For so many parameters.
+    pub fn new(parameters: usize) -> Adam {
+        Adam {
+            mean: vec![0.0; parameters],
+            square: vec![0.0; parameters],
+            mean_power: 1.0,
+            square_power: 1.0,
+        }
+    }
+
+    /// One step down the gradient.
+    pub fn step(&mut self, parameters: &mut [f32], gradient: &[f32], learning_rate: f64) {
+        assert_eq!(parameters.len(), gradient.len(), "one slope for each parameter");
+        assert_eq!(parameters.len(), self.mean.len(), "the optimiser is of another network");
+        self.mean_power *= MEAN_DECAY;
+        self.square_power *= SQUARE_DECAY;
+        let rate = (learning_rate / (1.0 - self.mean_power)) as f32;
+        let spread = libm::sqrt(1.0 - self.square_power) as f32;
+        let (mean_share, square_share) = ((1.0 - MEAN_DECAY) as f32, (1.0 - SQUARE_DECAY) as f32);
+        let moments = self.mean.iter_mut().zip(&mut self.square);
+        for ((parameter, &slope), (mean, square)) in parameters.iter_mut().zip(gradient).zip(moments) {
+            *mean += (slope - *mean) * mean_share;
+            *square = *square * SQUARE_DECAY as f32 + slope * slope * square_share;
+            *parameter -= rate * (*mean / (square.sqrt() / spread + FLOOR));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_first_step_is_the_learning_rate_against_the_slope() {
+        let mut parameters = [1.0, 1.0];
+        Adam::new(2).step(&mut parameters, &[0.3, -20.0], 0.01);
+        assert!((parameters[0] - 0.99).abs() < 1e-6 && (parameters[1] - 1.01).abs() < 1e-6);
+    }
+
+    #[test]
+    fn it_finds_the_bottom_of_a_bowl() {
+        let (mut adam, mut parameters) = (Adam::new(2), [3.0_f32, -2.0]);
+        for _ in 0..2000 {
+            let gradient = [2.0 * (parameters[0] - 1.0), 20.0 * (parameters[1] - 0.5)];
+            adam.step(&mut parameters, &gradient, 0.02);
+        }
+        assert!((parameters[0] - 1.0).abs() < 1e-3 && (parameters[1] - 0.5).abs() < 1e-3, "{parameters:?}");
+    }
+}

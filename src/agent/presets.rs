@@ -1,0 +1,171 @@
+//! The presets: what the papers print, what their authors published, and ours.
+
+use super::hyperparameters::Encoding;
+use super::hyperparameters::Exploration;
+use super::hyperparameters::Hyperparameters;
+use super::hyperparameters::Loss;
+use super::hyperparameters::RewardSource;
+use super::hyperparameters::StateSet;
+use super::network::Initialization;
+
+/// Settings with a name.
+pub struct Preset {
+    pub name: &'static str,
+    pub settings: fn() -> Hyperparameters,
+}
+
+/// Presets of the agent `ddqn`, the default first.
+pub const DDQN: &[Preset] = &[
+    Preset { name: "avastra", settings: avastra },
+    Preset { name: "paper", settings: paper },
+    Preset { name: "released", settings: released },
+];
+
+/// Presets of the agent `deep_collision`, the default first.
+pub const DEEP_COLLISION: &[Preset] = &[
+    Preset { name: "paper", settings: deep_collision },
+    Preset { name: "released", settings: deep_collision_released },
+];
+
+/// The paper as printed. What it leaves open is as in its published package, but for that package's
+/// faults; how long ε falls is DeepCollision's, which the paper refers to.
+pub(super) fn paper() -> Hyperparameters {
+    Hyperparameters {
+        preset: "paper".to_owned(),
+        state: StateSet::Full,
+        encoding: Encoding::Raw,
+        actions: Vec::new(),
+        masks_choice: true,
+        masks_target: true,
+        environment_gate_steps: 0,
+        observation_period_s: None,
+        reward: RewardSource::Equation,
+        collision_reward: 7.5,
+        // The reward knows of no verdict.
+        uncounted_reward: 7.5,
+        safe_proc_max: 0.2,
+        bound_is_safe: true,
+        safe_reward: -1.0,
+        delayed_credit: false,
+        hidden_units: vec![1024, 512],
+        dueling: false,
+        initialization: Initialization::Normal(0.01),
+        learning_rate: 3e-3,
+        loss: Loss::Squared,
+        gradient_norm_max: None,
+        batch_len: 64,
+        // "When the Replay Buffer reaches its capacity".
+        learning_starts: 3000,
+        updates_per_step: 1,
+        target_period_updates: 100,
+        double: true,
+        discount: 0.9,
+        n_step: 1,
+        arrival_is_terminal: true,
+        replay_capacity: 3000,
+        priority_exponent: 0.7,
+        priority_floor: 0.01,
+        priority_first: 0.01,
+        importance_begin: 0.4,
+        importance_end: 0.4,
+        importance_updates: 1,
+        exploration: Exploration::Linear,
+        exploration_begin: 1.0,
+        exploration_end: 0.1,
+        exploration_steps: 6000,
+        random_steps: 0,
+        exploration_inverted: false,
+        random_decay: 0.0,
+        evaluation_epsilon: 0.1,
+    }
+}
+
+/// The published package with its faults: it bootstraps through arrival, knows no rule but a gate for
+/// weather and time, and pays for a collision at the step that made the obstacle. Its second table of
+/// weights for the traffic rows alone is one with the first here.
+pub(super) fn released() -> Hyperparameters {
+    Hyperparameters {
+        preset: "released".to_owned(),
+        masks_choice: false,
+        masks_target: false,
+        environment_gate_steps: 5,
+        bound_is_safe: false,
+        delayed_credit: true,
+        arrival_is_terminal: false,
+        exploration: Exploration::ExponentialThenEnd,
+        exploration_steps: 8500,
+        random_steps: 3000,
+        random_decay: 0.05,
+        evaluation_epsilon: 0.2,
+        ..paper()
+    }
+}
+
+/// Ours: scaled variables, learning from the first few hundred transitions, several updates a step,
+/// three-step returns, a dueling head, and R_col for collisions that count alone.
+pub(super) fn avastra() -> Hyperparameters {
+    Hyperparameters {
+        preset: "avastra".to_owned(),
+        state: StateSet::Extended,
+        encoding: Encoding::Scaled,
+        uncounted_reward: 0.0,
+        hidden_units: vec![64, 64],
+        dueling: true,
+        initialization: Initialization::He,
+        learning_rate: 5e-4,
+        loss: Loss::Huber,
+        gradient_norm_max: Some(10.0),
+        learning_starts: 300,
+        updates_per_step: 4,
+        target_period_updates: 200,
+        n_step: 3,
+        replay_capacity: 20_000,
+        priority_exponent: 0.6,
+        priority_floor: 1e-3,
+        priority_first: 1.0,
+        importance_end: 1.0,
+        importance_updates: 30_000,
+        exploration_end: 0.05,
+        exploration_steps: 3000,
+        evaluation_epsilon: 0.05,
+        ..paper()
+    }
+}
+
+/// DeepCollision as described: plain DQN over 12 raw variables, evenly drawn replay.
+fn deep_collision() -> Hyperparameters {
+    Hyperparameters {
+        preset: "paper".to_owned(),
+        state: StateSet::DeepCollision,
+        collision_reward: 1.0,
+        uncounted_reward: 1.0,
+        bound_is_safe: false,
+        hidden_units: vec![200, 200],
+        initialization: Initialization::Normal(0.1),
+        learning_rate: 0.01,
+        batch_len: 32,
+        learning_starts: 2000,
+        double: false,
+        replay_capacity: 2000,
+        priority_exponent: 0.0,
+        priority_first: 1.0,
+        importance_begin: 0.0,
+        importance_end: 0.0,
+        ..paper()
+    }
+}
+
+/// DeepCollision's published code: ε is the share of greedy choices, and falls; no rule is known, and
+/// arrival ends nothing.
+fn deep_collision_released() -> Hyperparameters {
+    Hyperparameters {
+        preset: "released".to_owned(),
+        masks_choice: false,
+        masks_target: false,
+        arrival_is_terminal: false,
+        exploration: Exploration::Exponential,
+        exploration_inverted: true,
+        evaluation_epsilon: 0.2,
+        ..deep_collision()
+    }
+}

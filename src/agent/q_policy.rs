@@ -1,0 +1,187 @@
+//! A network that acts: ε-greedy over the rows that are open to it.
+
+use std::sync::Arc;
+
+use ndarray::Array1;
+use ndarray::ArrayView1;
+use ndarray::ArrayView2;
+use ndarray::Axis;
+
+use crate::action::ActionTable;
+use crate::mdp::Observation;
+use crate::model::EffectDef;
+use crate::model::Policy;
+use crate::rng;
+use crate::rng::Rng;
+use crate::syntax::nearest;
+
+use super::features::Features;
+use super::hyperparameters::Hyperparameters;
+use super::hyperparameters::SettingsError;
+use super::network::Network;
+use super::network::Shape;
+use super::registry::Agent;
+
+/// What is known of the rows before any episode.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Rows {
+    /// Whether the agent may choose it at all, shape `(rows,)`.
+    pub allowed: Vec<bool>,
+    /// Whether it changes the weather or the time and makes nobody appear, shape `(rows,)`.
+    pub environment: Vec<bool>,
+}
+
+impl Rows {
+    /// The rows of a table; `actions` names the actions and groups that are allowed, none: all.
+    ///
+    /// # Errors
+    /// If the space has no action or group of such a name.
+    pub fn new(table: &ActionTable, actions: &[String]) -> Result<Rows, SettingsError> {
+        let space = table.space();
+        let mut allowed = vec![actions.is_empty(); space.actions.len()];
+        for name in actions {
+            let action = space.actions.iter().position(|action| action.name == *name);
+            let group = space.groups.iter().find(|group| group.name == *name);
+            match (action, group) {
+                (Some(action), _) => allowed[action] = true,
+                (None, Some(group)) => group.actions.iter().for_each(|&action| allowed[action] = true),
+                (None, None) => {
+                    let actions = space.actions.iter().map(|action| action.name.as_str());
+                    let groups = space.groups.iter().map(|group| group.name.as_str());
+                    let suggestion = nearest(name, actions.chain(groups));
+                    let hint = suggestion.map_or(String::new(), |name| format!(": did you mean `{name}`?"));
+                    let message = format!("`actions`: the space has no action or group `{name}`{hint}");
+                    return Err(SettingsError::Text(message));
+                }
+            }
+        }
+        let is_environment = |action: usize| {
+            !space.actions[action].effects.iter().any(|effect| matches!(effect, EffectDef::Spawn(_)))
+        };
+        Ok(Rows {
+            allowed: table.rows().iter().map(|row| allowed[row.action]).collect(),
+            environment: table.rows().iter().map(|row| is_environment(row.action)).collect(),
+        })
+    }
+}
+
+/// A Q-network with everything that it takes to act.
+#[derive(Debug, Clone)]
+pub struct QPolicy {
+    pub(super) settings: Arc<Hyperparameters>,
+    pub(super) features: Features,
+    pub(super) rows: Arc<Rows>,
+    pub(super) network: Network,
+    /// The last row that changed weather or time in this episode, and the steps since then.
+    last_environment: Option<(usize, u32)>,
+}
+
+impl QPolicy {
+    /// Shape of the network that such settings need for so many rows.
+    pub fn shape(settings: &Hyperparameters, rows: usize) -> Shape {
+        let inputs = Features::new(settings.state, settings.encoding).len();
+        let hidden = settings.hidden_units.iter().copied();
+        let layers = core::iter::once(inputs).chain(hidden).chain([rows]).collect();
+        Shape { layers, dueling: settings.dueling }
+    }
+
+    /// The network must have the [`QPolicy::shape`] of the settings.
+    pub fn new(settings: Arc<Hyperparameters>, rows: Arc<Rows>, network: Network) -> QPolicy {
+        assert_eq!(*network.shape(), QPolicy::shape(&settings, rows.allowed.len()), "the network fits");
+        let features = Features::new(settings.state, settings.encoding);
+        QPolicy { settings, features, rows, network, last_environment: None }
+    }
+
+    /// The policy that a file describes, for the table that it is to choose from.
+    ///
+    /// # Errors
+    /// If its settings cannot be read, or describe another network than it has.
+    pub fn read(file: &Policy, table: &ActionTable) -> Result<QPolicy, SettingsError> {
+        let settings = Hyperparameters::from_record(&file.hyperparameters)?;
+        let rows = Rows::new(table, &settings.actions)?;
+        let shape = Shape { layers: file.layers.clone(), dueling: file.dueling };
+        if shape != QPolicy::shape(&settings, rows.allowed.len()) {
+            let message = "the network is not the one that its settings describe";
+            return Err(SettingsError::Text(message.to_owned()));
+        }
+        let network = Network::from_parameters(shape, file.parameters.clone());
+        let network = network.expect("the checker has counted the weights");
+        Ok(QPolicy::new(Arc::new(settings), Arc::new(rows), network))
+    }
+
+    pub fn settings(&self) -> &Hyperparameters {
+        &self.settings
+    }
+
+    pub fn network(&self) -> &Network {
+        &self.network
+    }
+
+    /// Q-values of a state, shape `(rows,)`.
+    pub fn q_values(&self, observation: &Observation) -> Array1<f32> {
+        let inputs = self.features.encode(observation);
+        let inputs = ArrayView2::from_shape((1, inputs.len()), &inputs).expect("one row of its length");
+        self.network.q_values(inputs).index_axis_move(Axis(0), 0)
+    }
+
+    /// Rows to choose from, shape `(rows,)`.
+    pub(super) fn open(&self, legal: ArrayView1<bool>) -> Vec<bool> {
+        let masks = self.settings.masks_choice;
+        let rows = self.rows.allowed.iter().zip(legal).enumerate();
+        rows.map(|(row, (&allowed, &legal))| allowed && (legal || !masks) && self.gate_is_open(row)).collect()
+    }
+
+    /// The published package's gate: weather and time change seldom, and never to what they are.
+    fn gate_is_open(&self, row: usize) -> bool {
+        let period = self.settings.environment_gate_steps;
+        match self.last_environment {
+            Some((last, since)) if period > 0 && self.rows.environment[row] => since >= period && row != last,
+            _ => true,
+        }
+    }
+
+    /// Keeps the gate's time.
+    pub(super) fn chosen(&mut self, row: usize) {
+        if self.rows.environment[row] {
+            self.last_environment = Some((row, 1));
+        } else if let Some((_, since)) = &mut self.last_environment {
+            *since += 1;
+        }
+    }
+
+    /// The open row of the highest Q-value, the first of equals.
+    pub(super) fn greedy(&self, observation: &Observation, open: &[bool]) -> Option<usize> {
+        best(self.q_values(observation).view(), open)
+    }
+}
+
+/// The trained policy.
+impl Agent for QPolicy {
+    fn begin(&mut self) {
+        self.last_environment = None;
+    }
+
+    fn choose(&mut self, observation: &Observation, legal: ArrayView1<bool>, rng: &mut Rng) -> Option<usize> {
+        let open = self.open(legal);
+        let explores = rng::unit(rng) < self.settings.evaluation_epsilon;
+        let row = if explores { any(&open, rng) } else { self.greedy(observation, &open) }?;
+        self.chosen(row);
+        Some(row)
+    }
+}
+
+/// The first of the largest values among the rows that are open.
+pub(super) fn best(values: ArrayView1<f32>, open: &[bool]) -> Option<usize> {
+    let rows = values.iter().zip(open).enumerate().filter(|(_, (_, is_open))| **is_open);
+    let better = |best: Option<(usize, f32)>, (row, value): (usize, f32)| match best {
+        Some((_, most)) if most >= value => best,
+        _ => Some((row, value)),
+    };
+    rows.map(|(row, (&value, _))| (row, value)).fold(None, better).map(|(row, _)| row)
+}
+
+/// Any of the rows that are open, each as likely.
+pub(super) fn any(open: &[bool], rng: &mut Rng) -> Option<usize> {
+    let rows: Vec<usize> = (0..open.len()).filter(|&row| open[row]).collect();
+    (!rows.is_empty()).then(|| rows[rng::below(rng, rows.len() as u32) as usize])
+}

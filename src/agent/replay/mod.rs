@@ -1,0 +1,9 @@
+//! Experience replay: transitions that are kept, and drawn again by their priority.
+
+mod buffer;
+mod sum_tree;
+
+pub use buffer::Priorities;
+pub use buffer::Replay;
+pub use buffer::Sample;
+pub use buffer::Transition;

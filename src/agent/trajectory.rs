@@ -1,0 +1,47 @@
+//! What a learning agent is told of an episode when it has ended.
+//!
+//! Learning waits for the end because only then it is known which collisions count. It costs nothing
+//! but a lag of one episode, and makes the end of an episode the place where everything is at rest.
+
+use ndarray::Array1;
+
+use crate::mdp::Observation;
+
+/// The choices of one episode, in order.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Trajectory {
+    pub steps: Vec<Experience>,
+    /// What the agent would have seen next.
+    pub last: Observation,
+    /// Rows that would have been legal then, shape `(rows,)`.
+    pub last_legal: Array1<bool>,
+    /// Whether the episode came to an end of its own (arrival), as opposed to being cut off.
+    pub terminal: bool,
+}
+
+/// One choice and what it was worth.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Experience {
+    pub observation: Observation,
+    /// Rows that were legal, shape `(rows,)`.
+    pub legal: Array1<bool>,
+    pub row: usize,
+    pub reward: f64,
+    /// For each contact of this step: the index, here, of the choice that made the obstacle appear.
+    pub hits: Vec<usize>,
+}
+
+/// What learning from an episode did.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Lesson {
+    pub updates: u64,
+    /// Mean loss of these updates; none if there was none.
+    pub loss: Option<f64>,
+}
+
+impl Trajectory {
+    /// Sum of the rewards, not discounted.
+    pub fn sum(&self) -> f64 {
+        self.steps.iter().map(|step| step.reward).sum()
+    }
+}

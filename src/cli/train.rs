@@ -1,0 +1,259 @@
+//! `avastra train`: an agent learns where the crashes are, and is kept as a policy.
+
+use std::path::Path;
+use std::path::PathBuf;
+use std::sync::atomic::AtomicBool;
+use std::sync::atomic::Ordering;
+
+use crate::agent;
+use crate::agent::Hyperparameters;
+use crate::agent::Kind;
+use crate::emit;
+use crate::model::Space;
+use crate::sim::ENGINE;
+use crate::study::TrainSettings;
+use crate::study::TrainedEpisode;
+use crate::study::Training;
+use crate::study::evaluate;
+use crate::syntax::listed;
+
+use super::arguments::TrainArguments;
+use super::error::Failure;
+use super::load;
+use super::output::Output;
+use super::progress::TrainingProgress;
+use super::progress::plural;
+use super::run::VERSION;
+use super::run::stop_on_interrupt;
+use super::run_directory;
+use super::run_directory::RunDirectory;
+use super::run_directory::write;
+
+/// Episodes between two checkpoints: what a kill may cost to play again.
+const CHECKPOINT_EPISODES: usize = 25;
+/// Episodes on each road that the finished policy is judged by: the paper's number.
+const EVALUATION_EPISODES: u64 = 15;
+
+/// Trains to the end, or until Ctrl-C; then says how to go on.
+pub fn train(output: &Output, arguments: &TrainArguments) -> Result<(), Failure> {
+    let (mut training, mut directory) = match &arguments.resume {
+        Some(path) => resumed(output, path)?,
+        None => begun(output, arguments)?,
+    };
+    let settings = training.settings().clone();
+    output.tell(&heading(&training, &directory.path));
+    let stop = stop_on_interrupt()?;
+    let quiet = output.quiet || output.is_json();
+    let mut progress = TrainingProgress::new(settings.episodes as u64, training.episodes() as u64, quiet);
+    while !training.is_done() && !stop.load(Ordering::Relaxed) {
+        let trained = training.episode();
+        keep(&training, &mut directory, &trained, &stop)?;
+        progress.episode(&trained);
+    }
+    drop(progress);
+    if !training.is_done() {
+        return Err(Failure::Interrupted { command: "train", directory: directory.path });
+    }
+    finish(output, &training, &directory)
+}
+
+/// A new training, from the command line.
+fn begun(output: &Output, arguments: &TrainArguments) -> Result<(Training, RunDirectory), Failure> {
+    let file = arguments.file.as_ref().expect("clap asks for it where there is no `--resume`");
+    let table = load::table(output, file)?;
+    let hyperparameters = hyperparameters(arguments)?;
+    let space = table.space();
+    let roads = if arguments.road.is_empty() {
+        space.roads.iter().map(|road| road.name.clone()).collect()
+    } else {
+        arguments.road.clone()
+    };
+    let settings = TrainSettings {
+        avastra: VERSION.to_owned(),
+        engine: ENGINE.to_owned(),
+        space: space.path.display().to_string(),
+        space_digest: space.digest.clone(),
+        roads,
+        ads: arguments.ads.clone(),
+        agent: arguments.agent.clone(),
+        episodes: arguments.episodes,
+        seed: arguments.seed,
+        without: arguments.rules.without.clone(),
+        with: arguments.rules.with.clone(),
+        hyperparameters,
+    };
+    let training = Training::new(table, settings).map_err(|error| Failure::usage(error.to_string()))?;
+    let path = run_directory::create(arguments.out.as_deref())?;
+    let space = load::relative(&path, &training.table().space().path)?;
+    run_directory::write_settings(&path, &TrainSettings { space, ..training.settings().clone() })?;
+    Ok((training, RunDirectory::open(path)?))
+}
+
+/// The preset that is asked for, as the configuration file changes it.
+fn hyperparameters(arguments: &TrainArguments) -> Result<Hyperparameters, Failure> {
+    let learning = agent::REGISTRY.iter().filter(|entry| matches!(entry.kind, Kind::Learning(_)));
+    let entry = agent::by_name(&arguments.agent).ok_or_else(|| {
+        let known = listed(&learning.map(|entry| entry.name).collect::<Vec<_>>());
+        Failure::usage(format!("no agent `{}` that learns: there are {known}", arguments.agent))
+    })?;
+    let Kind::Learning(presets) = entry.kind else {
+        let name = entry.name;
+        return Err(Failure::usage(format!(
+            "`{name}` has nothing to learn: `avastra run --agent {name}` plays it"
+        )));
+    };
+    let (text, path) = match &arguments.config {
+        None => (String::new(), Path::new("--preset")),
+        Some(path) => (load::read(path).map_err(|error| Failure::file("read", path, error))?, path.as_path()),
+    };
+    Hyperparameters::from_yaml(presets, arguments.preset.as_deref(), &text)
+        .map_err(|error| Failure::file("take", path, error))
+}
+
+/// The rest of an interrupted training.
+fn resumed(output: &Output, path: &Path) -> Result<(Training, RunDirectory), Failure> {
+    let settings: TrainSettings = run_directory::settings(path)?;
+    if (settings.engine.as_str(), settings.avastra.as_str()) != (ENGINE, VERSION) {
+        return Err(Failure::usage(format!(
+            "the training was begun by avastra {} in world `{}`, this is avastra {VERSION} in `{ENGINE}`: begin a new one",
+            settings.avastra, settings.engine
+        )));
+    }
+    let table = load::table(output, &path.join(&settings.space))?;
+    if table.space().digest != settings.space_digest {
+        return Err(Failure::usage(format!(
+            "`{}` has changed since the training was begun: begin a new one",
+            table.space().path.display()
+        )));
+    }
+    let mut directory = RunDirectory::open(path.to_owned())?;
+    let checkpoint =
+        directory.database.return_to_checkpoint().map_err(|error| Failure::file("resume", path, error))?;
+    let training = match checkpoint {
+        None => Training::new(table, settings),
+        Some(checkpoint) => Training::resumed(table, settings, checkpoint.episodes, &checkpoint.learner),
+    };
+    Ok((training.map_err(|error| Failure::usage(error.to_string()))?, directory))
+}
+
+/// Commits an episode; with it a checkpoint every so often, at the end, and where the user stops.
+fn keep(
+    training: &Training,
+    directory: &mut RunDirectory,
+    trained: &TrainedEpisode,
+    stop: &AtomicBool,
+) -> Result<(), Failure> {
+    write_critical(training, directory, trained)?;
+    let is_due = training.episodes().is_multiple_of(CHECKPOINT_EPISODES)
+        || training.is_done()
+        || stop.load(Ordering::Relaxed);
+    let checkpoint = is_due.then(|| training.checkpoint());
+    directory
+        .database
+        .add_trained(trained, checkpoint.as_deref(), |draw| emit::action_text(training.table(), draw))
+        .map_err(|error| Failure::file("write", &directory.path.join("run.db"), error))
+}
+
+/// Writes the counted collisions of an episode as a scenario. A training with an observation period of
+/// its own writes none: the space would replay them at its own pace.
+fn write_critical(
+    training: &Training,
+    directory: &RunDirectory,
+    trained: &TrainedEpisode,
+) -> Result<(), Failure> {
+    let settings = training.settings();
+    if trained.summary.counted() == 0 || settings.hyperparameters.observation_period_s.is_some() {
+        return Ok(());
+    }
+    let name = format!("{}_{:04}", trained.log.road, trained.summary.episode);
+    let space_path = load::relative(&directory.path.join("critical"), &training.table().space().path)?;
+    let source = emit::Provenance {
+        name: &name,
+        space_path: &space_path,
+        episode: trained.summary.episode,
+        agent: &settings.agent,
+        without: &settings.without,
+        with: &settings.with,
+    };
+    let file = emit::scenario(training.table(), &trained.log, &trained.summary, &source);
+    write(&directory.critical(&name), &crate::syntax::print(&file))
+}
+
+/// Judges the policy, writes it, and says what came of the training.
+fn finish(output: &Output, training: &Training, directory: &RunDirectory) -> Result<(), Failure> {
+    let settings = training.settings();
+    let table = training.table().clone();
+    let rules = (settings.with.as_slice(), settings.without.as_slice());
+    let roads = &settings.roads;
+    let evaluation =
+        evaluate(table, training.policy(), roads, &settings.ads, rules, (EVALUATION_EPISODES, settings.seed));
+    let evaluation = evaluation.map_err(|error| Failure::usage(error.to_string()))?;
+    let path = write_policy(training, &evaluation, &directory.path)?;
+    let totals =
+        directory.database.totals().map_err(|error| Failure::file("read", &directory.path, error))?;
+    output.say(&format!(
+        "\n{}: {}, {} counted in {}",
+        plural(totals.episodes as usize, "episode"),
+        plural(totals.collisions as usize, "collision"),
+        totals.counted,
+        plural(totals.episodes_with_counted as usize, "episode"),
+    ));
+    output.say(&format!(
+        "the policy, on {} of its own: {} counted in {}",
+        plural(evaluation.episodes as usize * roads.len(), "episode"),
+        plural(evaluation.counted as usize, "collision"),
+        plural(evaluation.colliding as usize, "episode"),
+    ));
+    output.say(&format!("{}\nplay it with: avastra run --policy {}", path.display(), path.display()));
+    output.result(
+        "train",
+        serde_json::json!({
+            "directory": directory.path, "totals": totals, "policy": path,
+            "evaluation": {
+                "episodes": evaluation.episodes * roads.len() as u64, "collisions": evaluation.collisions,
+                "counted": evaluation.counted, "colliding": evaluation.colliding,
+            },
+        }),
+    );
+    Ok(())
+}
+
+/// Writes `policy/NAME.ava`.
+fn write_policy(
+    training: &Training,
+    evaluation: &crate::study::Evaluation,
+    directory: &Path,
+) -> Result<PathBuf, Failure> {
+    let settings = training.settings();
+    let name = match settings.roads.as_slice() {
+        [road] => format!("{road}_{}_{}", settings.agent, settings.seed),
+        _ => format!("{}_{}", settings.agent, settings.seed),
+    };
+    let folder = directory.join("policy");
+    std::fs::create_dir_all(&folder).map_err(|error| Failure::file("create", &folder, error))?;
+    let space: &Space = training.table().space();
+    let space_path = load::relative(&folder, &space.path)?;
+    let text = emit::policy_text(training.policy(), settings, evaluation, &name, &space_path);
+    let path = folder.join(format!("{name}.ava"));
+    write(&path, &text)?;
+    Ok(path)
+}
+
+fn heading(training: &Training, directory: &Path) -> String {
+    let settings = training.settings();
+    let network = training.policy().network();
+    let widths: Vec<String> = network.shape().layers.iter().map(ToString::to_string).collect();
+    format!(
+        "{}: {} ({}, network {}, {} parameters) against {}, {} on {}, seed {}, into {}",
+        training.table().space().path.display(),
+        settings.agent,
+        settings.hyperparameters.preset,
+        widths.join("-"),
+        network.parameters().len(),
+        settings.ads,
+        plural(settings.episodes as usize, "episode"),
+        settings.roads.join(", "),
+        settings.seed,
+        directory.display()
+    )
+}

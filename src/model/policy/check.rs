@@ -1,0 +1,119 @@
+//! The checks of a policy: its seal, its form, and that its network fits the table.
+
+use serde::de::DeserializeOwned;
+use serde_json::Value;
+
+use crate::model::code;
+use crate::model::space::Space;
+use crate::syntax::Diagnostic;
+use crate::syntax::ast;
+use crate::syntax::ast::Field;
+use crate::syntax::ast::ItemKind;
+use crate::syntax::ast::Span;
+
+use super::Net;
+use super::Policy;
+use super::PolicyClaims;
+use super::PolicyOrigin;
+use super::plain;
+use super::seal::seal;
+use super::weights::weights_from_lines;
+
+/// The policy of a file, checked against the space that it uses. `text` is what the tree was read from.
+///
+/// # Errors
+/// What is wrong with it, the seal first: of a damaged file nothing else is worth saying.
+pub fn policy(text: &str, file: &ast::File, space: &Space) -> Result<Policy, Vec<Diagnostic>> {
+    let mut found = file.items.iter().filter_map(|item| match &item.kind {
+        ItemKind::Policy(policy) => Some((item, policy)),
+        _ => None,
+    });
+    let (item, declared) = found.next().expect("it is asked only where there is one");
+    if let Some((second, _)) = found.next() {
+        let error = Diagnostic::error(code::ONE_POLICY, "the file holds two policies");
+        return Err(vec![error.at(second.span, "the second").help("one file, one policy")]);
+    }
+    if let Some(line) = declared.rules.first() {
+        let error = Diagnostic::error(code::POLICY_FORM, "the rules of a policy cannot be played");
+        let help = "this version plays the `net` of a policy: remove `rules`, and train it again";
+        return Err(vec![error.at(line.span, "the first of them").help(help)]);
+    }
+    let whole = item.span;
+    let net: Net = block(&declared.net, "net", whole)?;
+    let found = seal(text, file);
+    if net.digest != found {
+        let error = Diagnostic::error(code::POLICY_DIGEST, "the policy is not what was written")
+            .at(field_span(&declared.net, "digest", whole), "its digest differs")
+            .note(format!("the file has {found}"))
+            .help("get back the file as it was: a policy comes from `avastra train`, not from an editor");
+        return Err(vec![error]);
+    }
+    let origin: PolicyOrigin = block(&declared.origin, "origin", whole)?;
+    let claims: Option<PolicyClaims> =
+        if declared.claims.is_empty() { None } else { Some(block(&declared.claims, "claims", whole)?) };
+    let parameters = parameters(&net, declared, whole, space).map_err(|error| vec![error])?;
+    Ok(Policy {
+        name: declared.name.text.clone(),
+        docs: item.docs.iter().map(|doc| doc.text.clone()).collect(),
+        origin,
+        layers: net.layers,
+        dueling: net.dueling,
+        hyperparameters: net.hyperparameters,
+        parameters,
+        claims,
+        digest: net.digest,
+    })
+}
+
+/// A block of fields as the struct that it describes.
+fn block<T: DeserializeOwned>(fields: &[Field], name: &str, whole: Span) -> Result<T, Vec<Diagnostic>> {
+    let error = |span, label: String| {
+        let message = format!("cannot read `{name}` of the policy");
+        vec![Diagnostic::error(code::POLICY_FORM, message).at(span, label)]
+    };
+    let span = fields.first().map_or(whole, |field| field.name.span);
+    let record = plain::record(fields).map_err(|(span, label)| error(span, label.to_owned()))?;
+    serde_json::from_value(Value::Object(record)).map_err(|reason| error(span, reason.to_string()))
+}
+
+/// The network's numbers, as many as its shape wants for the table of the space.
+fn parameters(net: &Net, declared: &ast::Policy, whole: Span, space: &Space) -> Result<Vec<f32>, Diagnostic> {
+    let shape = field_span(&declared.net, "layers", whole);
+    let rows = space.rows.len();
+    if net.layers.len() < 2 || net.layers.last() != Some(&rows) {
+        let message = "the network does not fit the action table";
+        let error = Diagnostic::error(code::POLICY_SHAPE, message).at(shape, "its layers");
+        return Err(
+            error.note(format!("the table has {rows} rows, which must be the width of the last layer"))
+        );
+    }
+    let weights = field_span(&declared.net, "weights", whole);
+    let found = weights_from_lines(&net.weights).filter(|all| all.iter().all(|one| one.is_finite()));
+    let found = found.ok_or_else(|| {
+        Diagnostic::error(code::POLICY_FORM, "the weights are no Base64 of finite numbers")
+            .at(weights, "here")
+    })?;
+    let wanted = wanted(&net.layers, net.dueling);
+    if wanted != Some(found.len()) {
+        let message = "the network has another number of weights than its layers want";
+        let error = Diagnostic::error(code::POLICY_SHAPE, message).at(shape, "its layers");
+        let wanted = wanted.map_or("too many".to_owned(), |wanted| wanted.to_string());
+        return Err(error.note(format!("they want {wanted}, there are {}", found.len())));
+    }
+    Ok(found)
+}
+
+/// Number of weights and biases; `None` if it is beyond counting.
+fn wanted(layers: &[usize], dueling: bool) -> Option<usize> {
+    let mut sum = 0_usize;
+    for (at, pair) in layers.windows(2).enumerate() {
+        let is_last = at + 2 == layers.len();
+        let outputs = pair[1].checked_add(usize::from(dueling && is_last))?;
+        sum = sum.checked_add(pair[0].checked_add(1)?.checked_mul(outputs)?)?;
+    }
+    Some(sum)
+}
+
+fn field_span(fields: &[Field], name: &str, otherwise: Span) -> Span {
+    fields.iter().find(|field| field.name.text == name).map_or(otherwise, |field| field.value.span)
+}

@@ -1,0 +1,82 @@
+//! Policies: what an agent has learned, as a file says it.
+//!
+//! The network's numbers are opaque here: that they are as many as the shape wants, and that the file
+//! is as it was written, is checked; what they mean is `agent`'s business. The readable face (`rules`)
+//! is not read yet.
+
+mod check;
+mod plain;
+mod seal;
+mod weights;
+
+pub use check::policy;
+pub use plain::expression;
+pub use seal::seal;
+pub use weights::weights_from_lines;
+pub use weights::weights_to_lines;
+
+use serde_json::Map;
+use serde_json::Value;
+
+/// A policy, read and checked.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Policy {
+    pub name: String,
+    pub docs: Vec<String>,
+    pub origin: PolicyOrigin,
+    /// Widths of the network's layers: inputs, hidden ones, rows of the table.
+    pub layers: Vec<usize>,
+    /// Whether the last layer has one more output, the state's value.
+    pub dueling: bool,
+    /// Every setting of the agent by name.
+    pub hyperparameters: Map<String, Value>,
+    /// All weights and biases.
+    pub parameters: Vec<f32>,
+    pub claims: Option<PolicyClaims>,
+    /// Digest of the whole file but the paths in it.
+    pub digest: String,
+}
+
+/// Where a policy comes from: enough to train it again.
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PolicyOrigin {
+    pub agent: String,
+    pub seed: u64,
+    pub episodes: u64,
+    pub roads: Vec<String>,
+    pub ads: String,
+    pub engine: String,
+    pub avastra: String,
+    #[serde(default)]
+    pub with: Vec<String>,
+    #[serde(default)]
+    pub without: Vec<String>,
+}
+
+/// What a policy says that it achieves, on episodes that anybody can play again.
+#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PolicyClaims {
+    /// Episodes on each road.
+    pub episodes: u64,
+    pub seed: u64,
+    pub collisions: u64,
+    pub counted: u64,
+    /// Episodes with a counted collision.
+    pub colliding: u64,
+    /// SHA-256 over the traces of all episodes, in order.
+    pub trace: String,
+}
+
+/// The exact face of a policy as it stands in the file.
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Net {
+    pub layers: Vec<usize>,
+    pub dueling: bool,
+    pub hyperparameters: Map<String, Value>,
+    /// Base64 of the weights and biases, little-endian `f32`, layer by layer, cut into lines.
+    pub weights: Vec<String>,
+    pub digest: String,
+}

@@ -1,0 +1,38 @@
+//! The seal of a policy file: a digest over every byte of it, so that a flipped one anywhere is noticed.
+//!
+//! Left out are the digest itself and the paths of the files that it uses, so that a policy can move to
+//! another directory. What stands at the end of a path has its own digest.
+
+use sha2::Digest;
+use sha2::Sha256;
+
+use crate::model::load::digest_text;
+use crate::syntax::ast;
+use crate::syntax::ast::ItemKind;
+use crate::syntax::ast::Span;
+
+/// The seal that a policy file ought to have. `tree` is what was read from `text`.
+pub fn seal(text: &str, tree: &ast::File) -> String {
+    let mut open: Vec<Span> = tree
+        .items
+        .iter()
+        .filter_map(|item| match &item.kind {
+            ItemKind::Use(used) => Some(used.path.span),
+            ItemKind::Policy(policy) => {
+                let digest = policy.net.iter().find(|field| field.name.text == "digest");
+                digest.map(|field| field.value.span)
+            }
+            _ => None,
+        })
+        .collect();
+    open.sort_by_key(|span| span.start);
+    let (mut hash, mut from) = (Sha256::new(), 0);
+    for span in open {
+        hash.update(&text.as_bytes()[from..span.start]);
+        // A mark, so that what is left out cannot change its place.
+        hash.update([0]);
+        from = span.end;
+    }
+    hash.update(&text.as_bytes()[from..]);
+    digest_text(&hash.finalize().into())
+}

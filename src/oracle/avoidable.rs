@@ -1,0 +1,205 @@
+//! Could a careful driver have avoided this collision?
+//!
+//! The world is taken back to the onset of the hazard (see `hazard`), but no further than 8 s. Everybody
+//! else then moves as recorded until the recorded contact, and after it as they themselves decide.
+//! The ego vehicle, the same car on the same road, is driven by each reference driver in turn, who have
+//! watched for some time before they take over, and, if none of the careful ones avoids the collision,
+//! by evasive manoeuvres that begin at the onset without any delay.
+//!
+//! A driver avoids the collision if it does not touch the obstacle at all, and nobody else by its own
+//! fault, until 4 s after the recorded contact. That recorded road users do not give way to a car that
+//! now is elsewhere is why contacts with others who run into it are not held against it.
+
+use std::collections::VecDeque;
+
+use crate::ads;
+use crate::ads::Ads;
+use crate::ads::Evasion;
+use crate::episode::EpisodeLog;
+use crate::episode::Watch;
+use crate::geometry::OrientedBox;
+use crate::model::Avoidability;
+use crate::sim::Contact;
+use crate::sim::DT_S;
+use crate::sim::FRAME_TICKS;
+use crate::sim::VehicleParameters;
+use crate::sim::World;
+
+use super::facts::struck;
+use super::hazard::onset;
+
+/// What the verdict depends on. Recorded with every run.
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct AvoidabilitySettings {
+    /// The careful drivers: a collision that one of them avoids is avoidable. UN R157's two
+    /// performance models.
+    pub careful: Vec<String>,
+    /// Drivers that are tried and reported beside them.
+    pub reported: Vec<String>,
+    /// No onset is earlier than this before the contact, s. Ours: from 20 m/s a careful driver is at
+    /// rest within 5 s.
+    pub rewind_s: f64,
+    /// Drivers watch for this long before they take over, s. Ours: longer than any reaction time.
+    pub watch_s: f64,
+    /// How long after the recorded contact nothing must happen, s. Ours.
+    pub after_s: f64,
+}
+
+impl Default for AvoidabilitySettings {
+    fn default() -> AvoidabilitySettings {
+        let names = |names: [&str; 2]| names.map(str::to_owned).to_vec();
+        AvoidabilitySettings {
+            careful: names(["cc", "fsm"]),
+            reported: names(["rss", "r157"]),
+            rewind_s: 8.0,
+            watch_s: 2.0,
+            after_s: 4.0,
+        }
+    }
+}
+
+/// The verdict on one collision.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct Judgement {
+    pub class: Avoidability,
+    /// When the hazard began, s.
+    pub onset_s: f64,
+    /// Reference drivers that avoid the collision.
+    pub avoided_by: Vec<String>,
+    /// The evasive manoeuvre that avoids it, looked for if no careful driver does.
+    pub evasion: Option<String>,
+}
+
+/// Judges every collision of a log, in order. `rerun` plays the logged episode again under a watch.
+pub fn judge(
+    log: &EpisodeLog,
+    settings: &AvoidabilitySettings,
+    rerun: &mut dyn FnMut(&mut Watch),
+) -> Vec<Judgement> {
+    let mut judgements = Vec::new();
+    if log.collisions.is_empty() {
+        return judgements;
+    }
+    let kept = ticks(settings.rewind_s) + ticks(settings.watch_s);
+    let mut recording: VecDeque<World> = VecDeque::with_capacity(kept);
+    rerun(&mut |world, _, contacts| {
+        for contact in contacts {
+            judgements.push(judge_one(recording.make_contiguous(), contact, world.ego_outline(), settings));
+        }
+        if judgements.len() < log.collisions.len() {
+            if recording.len() == kept {
+                recording.pop_front();
+            }
+            recording.push_back(world.clone());
+        }
+    });
+    assert_eq!(judgements.len(), log.collisions.len(), "an episode played again is the same episode");
+    judgements
+}
+
+/// Judges one collision by the worlds before it.
+pub fn judge_one(
+    recording: &[World],
+    contact: &Contact,
+    met: OrientedBox,
+    settings: &AvoidabilitySettings,
+) -> Judgement {
+    let last = recording.len() - 1;
+    // Nobody can react to what was never in sight: the last moment is then the first.
+    let from = onset(recording, contact.obstacle, met).unwrap_or(last);
+    let from = from.max((last + 1).saturating_sub(ticks(settings.rewind_s)));
+    let case = Case { recording, from, obstacle: contact.obstacle, settings };
+    let avoids = |name: &&String| {
+        let entry = ads::by_name(name).expect("settings name drivers that exist");
+        case.avoids((entry.build)(recording[from].scene(), 0).as_mut())
+    };
+    let careful: Vec<String> = settings.careful.iter().filter(avoids).cloned().collect();
+    let reported: Vec<String> = settings.reported.iter().filter(avoids).cloned().collect();
+    let evasion = if careful.is_empty() { case.evasion() } else { None };
+    let class = if !careful.is_empty() {
+        Avoidability::Avoidable
+    } else if evasion.is_some() || !reported.is_empty() {
+        Avoidability::BeyondReference
+    } else {
+        Avoidability::Unavoidable
+    };
+    let onset_s = recording[from].time_s();
+    Judgement { class, onset_s, avoided_by: [careful, reported].concat(), evasion }
+}
+
+/// A collision that is to be driven again.
+struct Case<'a> {
+    recording: &'a [World],
+    /// Index of the onset.
+    from: usize,
+    obstacle: u32,
+    settings: &'a AvoidabilitySettings,
+}
+
+impl Case<'_> {
+    /// Whether a driver who watches first avoids the collision.
+    fn avoids(&self, driver: &mut dyn Ads) -> bool {
+        let watched = self.from - self.from.min(ticks(self.settings.watch_s));
+        let mut sensed = self.recording[watched].sensed();
+        for world in &self.recording[watched..self.from] {
+            world.sense(&mut sensed);
+            driver.drive(&sensed);
+        }
+        self.drive(driver, &mut |_| true)
+    }
+
+    /// The first manoeuvre that avoids the collision on the road, in words.
+    fn evasion(&self) -> Option<String> {
+        let start = &self.recording[self.from];
+        let mut manoeuvres = Evasion::all(start.scene());
+        let starts_on_road = is_on_road(start);
+        let found = manoeuvres.find(|manoeuvre| {
+            let mut driver = manoeuvre.clone();
+            self.drive(&mut driver, &mut |world| !starts_on_road || is_on_road(world))
+        })?;
+        Some(found.describe())
+    }
+
+    /// Drives from the onset on; `false` if there is a collision, or a world is not `allowed`.
+    fn drive(&self, driver: &mut dyn Ads, allowed: &mut dyn FnMut(&World) -> bool) -> bool {
+        let mut world = self.recording[self.from].clone();
+        let mut sensed = world.sensed();
+        for recorded in &self.recording[self.from + 1..] {
+            world.sense(&mut sensed);
+            let control = driver.drive(&sensed);
+            if self.is_hit(world.tick_recorded(&control, recorded)) || !self.is_fine(&world, allowed) {
+                return false;
+            }
+        }
+        for _ in 0..ticks(self.settings.after_s) {
+            world.sense(&mut sensed);
+            let control = driver.drive(&sensed);
+            if self.is_hit(world.tick(&control)) || !self.is_fine(&world, allowed) {
+                return false;
+            }
+        }
+        true
+    }
+
+    fn is_hit(&self, contacts: &[Contact]) -> bool {
+        contacts
+            .iter()
+            .any(|contact| contact.obstacle == self.obstacle || !struck(contact, &VehicleParameters::MKZ))
+    }
+
+    fn is_fine(&self, world: &World, allowed: &mut dyn FnMut(&World) -> bool) -> bool {
+        !world.ticks().is_multiple_of(FRAME_TICKS) || allowed(world)
+    }
+}
+
+/// Whether the ego vehicle stands on driving lanes with all its corners, of whatever direction.
+fn is_on_road(world: &World) -> bool {
+    let outline = world.ego_outline();
+    let map = &world.scene().map;
+    outline.corners().into_iter().all(|corner| map.nearest(corner, outline.pose.heading_rad, 1e-6).is_some())
+}
+
+fn ticks(duration_s: f64) -> usize {
+    (duration_s / DT_S).round() as usize
+}

@@ -1,0 +1,176 @@
+//! Collisions made by hand, whose verdicts can be told beforehand.
+
+use std::sync::Arc;
+
+use crate::action::Effect;
+use crate::action::SpawnRequest;
+use crate::ads;
+use crate::ads::Ads;
+use crate::ads::Status;
+use crate::model::Avoidability;
+use crate::model::vocabulary::Body;
+use crate::model::vocabulary::Colour;
+use crate::model::vocabulary::LaneChoice;
+use crate::model::vocabulary::Level;
+use crate::model::vocabulary::Side;
+use crate::model::vocabulary::Then;
+use crate::model::vocabulary::TimeOfDay;
+use crate::model::vocabulary::Verb;
+use crate::road::RoadMap;
+use crate::road::Route;
+use crate::sim::Control;
+use crate::sim::DT_S;
+use crate::sim::Scene;
+use crate::sim::Sensed;
+use crate::sim::Start;
+use crate::sim::World;
+
+use super::avoidable::AvoidabilitySettings;
+use super::avoidable::Judgement;
+use super::avoidable::judge_one;
+use super::hazard::onset;
+
+/// A lane each way along +x for 800 m, 3 m wide: too narrow to pass anybody in it.
+const NARROW: &str = r#"<OpenDRIVE><header name="narrow"/>
+<road id="1" length="800" junction="-1"><link/><type s="0" type="town"><speed max="50" unit="km/h"/></type>
+<planView><geometry s="0" x="0" y="0" hdg="0" length="800"><line/></geometry></planView>
+<lanes><laneSection s="0"><center><lane id="0" type="none"/></center>
+<right><lane id="-1" type="driving"><width sOffset="0" a="3" b="0" c="0" d="0"/></lane></right>
+</laneSection></lanes></road></OpenDRIVE>"#;
+
+fn world() -> World {
+    let map = RoadMap::from_opendrive("narrow", NARROW).expect("the map is sound");
+    let place = |s_m| map.place("1", -1, s_m).expect("it is on the map");
+    let route = Route::find(&map, place(10.0), place(790.0)).expect("one lane leads there");
+    let start = Start {
+        time: TimeOfDay::Noon,
+        rain: Level::None,
+        fog: Level::None,
+        wetness: Level::None,
+        signal_phase_s: 0.0,
+        seed: 1,
+        ambient: 0,
+    };
+    World::new(Arc::new(Scene::new(map.into(), route)), &start)
+}
+
+/// IDM with weak brakes, or none.
+#[derive(Debug, Clone)]
+struct Broken {
+    driver: ads::Idm,
+    brake_pct_max: f64,
+}
+
+impl Ads for Broken {
+    fn drive(&mut self, sensed: &Sensed) -> Control {
+        let control = self.driver.drive(sensed);
+        Control { brake_pct: control.brake_pct.min(self.brake_pct_max), ..control }
+    }
+
+    fn status(&self) -> &Status {
+        self.driver.status()
+    }
+
+    fn clone_box(&self) -> Box<dyn Ads> {
+        Box::new(self.clone())
+    }
+}
+
+fn vehicle(world: &mut World, distance_m: f64, speed_mps: f64) {
+    appear(world, Body::Sedan, Verb::DriveAhead, distance_m, speed_mps);
+}
+
+fn appear(world: &mut World, body: Body, verb: Verb, distance_m: f64, speed_mps: f64) {
+    let request = SpawnRequest {
+        body,
+        colour: Colour::Red,
+        verb,
+        lane: LaneChoice::Current,
+        side: Side::Right,
+        then: Then::Keep,
+        speed_mps,
+        distance_m,
+    };
+    world.apply(&Effect::Spawn(request)).expect("there is room");
+}
+
+/// When whatever is to happen happens, s: the ego vehicle is at its cruising speed.
+const EVENT_S: f64 = 12.0;
+
+/// Drives with weak brakes, makes `event` happen, and judges the first contact.
+fn judged(brake_pct_max: f64, event: impl Fn(&mut World)) -> Judgement {
+    let mut world = world();
+    let mut broken = Broken { driver: ads::Idm::new(world.scene()), brake_pct_max };
+    let mut recording: Vec<World> = Vec::new();
+    let mut sensed = world.sensed();
+    for tick in 0..3000_u32 {
+        if tick == (EVENT_S / DT_S).round() as u32 {
+            event(&mut world);
+        }
+        world.sense(&mut sensed);
+        let control = broken.drive(&sensed);
+        let contact = world.tick(&control).first().copied();
+        if let Some(contact) = contact {
+            let recent = &recording[recording.len().saturating_sub(500)..];
+            return judge_one(recent, &contact, world.ego_outline(), &AvoidabilitySettings::default());
+        }
+        recording.push(world.clone());
+    }
+    panic!("no contact in a minute");
+}
+
+#[test]
+fn an_ordinary_stop_of_the_leader_is_avoidable() {
+    // The leader slows down behind somebody who creeps; brakes of half a m/s² do not.
+    let judgement = judged(17.0, |world| {
+        vehicle(world, 115.0, 0.5);
+        vehicle(world, 30.0, 10.0);
+    });
+    assert_eq!(judgement.class, Avoidability::Avoidable);
+    assert_eq!(judgement.avoided_by, ["cc", "fsm", "rss", "r157"]);
+}
+
+/// Somebody 30 km/h slower appears so far ahead of an ego vehicle at about 11 m/s.
+fn appears(distance_m: f64) -> Judgement {
+    judged(0.0, |world| {
+        let own_mps = world.ego().speed_mps;
+        assert!((own_mps - 11.0).abs() < 0.5, "{own_mps}");
+        vehicle(world, distance_m, own_mps - 30.0 / 3.6);
+    })
+}
+
+#[test]
+fn what_appears_in_front_of_the_bumper_is_unavoidable() {
+    let judgement = appears(3.0);
+    assert_eq!(judgement.class, Avoidability::Unavoidable);
+    assert!(judgement.avoided_by.is_empty() && judgement.evasion.is_none());
+    assert!((judgement.onset_s - EVENT_S).abs() < 0.11, "{}", judgement.onset_s);
+}
+
+#[test]
+fn between_human_and_machine_lies_the_beyond() {
+    let judgement = appears(9.0);
+    assert_eq!(judgement.class, Avoidability::BeyondReference);
+    assert_eq!(judgement.evasion.as_deref(), Some("full brake"));
+    // 8.33 m/s at 1.15 s, 0.6 s of build-up and 6 m/s²: 9.6 + 4.2 + 2.9 m and something for the lag.
+    assert_eq!(appears(20.0).class, Avoidability::Avoidable);
+}
+
+#[test]
+fn the_hazard_of_a_pedestrian_begins_with_the_first_step() {
+    let judgement = judged(0.0, |world| appear(world, Body::Pedestrian, Verb::Walk, 46.0, 1.4));
+    // Pedestrians wait for a second at the kerb, 5 m aside.
+    assert!((judgement.onset_s - (EVENT_S + 1.0)).abs() < 0.11, "{judgement:?}");
+    assert_ne!(judgement.class, Avoidability::Unavoidable, "{judgement:?}");
+}
+
+#[test]
+fn what_was_never_in_sight_has_no_onset() {
+    let mut hidden = world();
+    vehicle(&mut hidden, 20.0, 0.5);
+    let met = hidden.ego_outline();
+    assert_eq!(onset(&[hidden.clone()], 1, met), None, "20 m away and no way leads there");
+    let there = hidden.obstacles()[0].outline;
+    assert_eq!(onset(&[hidden.clone()], 1, there), Some(0));
+    assert_eq!(onset(&[hidden], 2, there), None, "nobody of that number");
+}

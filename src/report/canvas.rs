@@ -1,0 +1,84 @@
+//! A drawing surface in world coordinates, north up, that writes SVG.
+//!
+//! What all top views share: the projection, lines, areas and words, and the shape of a lane. What is drawn, and
+//! in which colours, is decided by its users.
+
+use std::fmt::Write;
+
+use crate::geometry::Vec2;
+use crate::road::Lane;
+
+/// Distance of the samples along a curved outline, m.
+const STEP_M: f64 = 2.0;
+
+/// Appends to an SVG document. A style is a text of SVG attributes.
+pub struct Canvas<'a> {
+    pub svg: &'a mut String,
+    /// World point in the upper left corner, m.
+    pub north_west: Vec2,
+    pub px_per_m: f64,
+}
+
+impl Canvas<'_> {
+    /// Pixel of a world point; SVG's y axis points down.
+    pub fn at(&self, point: Vec2) -> (f64, f64) {
+        let delta = (point - self.north_west) * self.px_per_m;
+        (delta.x, -delta.y)
+    }
+
+    pub fn polygon(&mut self, points: &[Vec2], style: &str) {
+        let points = self.points(points);
+        let _ = writeln!(self.svg, r##"<polygon points="{points}" {style}/>"##);
+    }
+
+    pub fn polyline(&mut self, points: &[Vec2], style: &str) {
+        let points = self.points(points);
+        let _ = writeln!(self.svg, r##"<polyline points="{points}" fill="none" {style}/>"##);
+    }
+
+    /// Words that begin at a point, or where `style` says with `text-anchor`.
+    pub fn text(&mut self, point: Vec2, text: &str, style: &str) {
+        let (x, y) = self.at(point);
+        let _ = writeln!(self.svg, r##"<text x="{x:.1}" y="{y:.1}" {style}>{}</text>"##, escape(text));
+    }
+
+    fn points(&self, points: &[Vec2]) -> String {
+        let mut text = String::new();
+        for point in points {
+            let (x, y) = self.at(*point);
+            let _ = write!(text, "{x:.1},{y:.1} ");
+        }
+        text
+    }
+}
+
+/// One edge of a lane, in its driving direction: the left one for `side` 1, the right one for -1.
+pub fn lane_edge(lane: &Lane, side: f64) -> Vec<Vec2> {
+    let length_m = lane.centre.length_m();
+    let steps = (length_m / STEP_M).ceil().max(1.0) as usize;
+    let point = |i: usize| {
+        let station_m = length_m * i as f64 / steps as f64;
+        let half_m = lane.width_at(station_m) / 2.0;
+        lane.centre.pose_at(station_m).offset(0.0, side * half_m).position
+    };
+    (0..=steps).map(point).collect()
+}
+
+/// The surface of a lane.
+pub fn lane_outline(lane: &Lane) -> Vec<Vec2> {
+    let mut outline = lane_edge(lane, 1.0);
+    outline.extend(lane_edge(lane, -1.0).iter().rev());
+    outline
+}
+
+/// A line across a lane, from left to right.
+pub fn across(lane: &Lane, station_m: f64) -> [Vec2; 2] {
+    let half_m = lane.width_at(station_m) / 2.0;
+    let pose = lane.centre.pose_at(station_m);
+    [pose.offset(0.0, half_m).position, pose.offset(0.0, -half_m).position]
+}
+
+/// Text as SVG has to write it.
+pub fn escape(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
+}

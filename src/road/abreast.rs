@@ -1,0 +1,149 @@
+//! What lies beside a lane, whichever road of the file it belongs to: carriageways of one street are
+//! often roads of their own, with a median between them that no road describes.
+//!
+//! By geometry, not by links. Lane changes stay within a road: see [`Lane::changes_left_m`].
+//!
+//! [`Lane::changes_left_m`]: super::map::Lane::changes_left_m
+
+use crate::geometry::wrap_angle;
+
+use super::map::LaneIndex;
+use super::map::RoadMap;
+use super::map::Side;
+
+/// Lanes are parallel if their headings, or one and the reverse of the other, are this near, rad.
+const PARALLEL_RAD: f64 = 0.35;
+
+/// Of a parallel lane the nearest point is abreast; one that ends before is this much ahead or behind, m.
+const ABREAST_M: f64 = 1.0;
+
+/// No median is wider, m: beyond it another street begins.
+const MEDIAN_M_MAX: f64 = 40.0;
+
+/// A lane beside a place on another.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Abreast {
+    pub lane: LaneIndex,
+    /// On this lane, m.
+    pub station_m: f64,
+    /// From the centre of the lane asked about to the centre of this one, m, positive to the left.
+    pub lateral_m: f64,
+    pub width_m: f64,
+    pub same_direction: bool,
+}
+
+/// The nearest lane that leads the other way.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Opposing {
+    pub lane: LaneIndex,
+    /// On the opposing lane, which counts the other way, m.
+    pub station_m: f64,
+    /// From centre to centre, m, positive to the left.
+    pub lateral_m: f64,
+    /// Width of what lies between it and the nearest lane that leads our way, m; 0 if they share a line.
+    pub median_m: f64,
+}
+
+impl RoadMap {
+    /// All lanes parallel to a lane at a station of it, with edges within `reach_m` of its centre, from
+    /// left to right; without itself. Of lanes outside junctions only those outside junctions.
+    pub fn abreast(&self, lane: LaneIndex, station_m: f64, reach_m: f64) -> Vec<Abreast> {
+        let own = self.lane(lane);
+        let pose = own.centre.pose_at(station_m);
+        let mut found: Vec<Abreast> = Vec::new();
+        for (index, projection) in self.grid.near(&self.lanes, pose.position, reach_m) {
+            let other = self.lane(index);
+            if index == lane || other.junction.is_some() && own.junction.is_none() {
+                continue;
+            }
+            let there = other.centre.pose_at(projection.station_m);
+            let turn_rad = wrap_angle(there.heading_rad - pose.heading_rad).abs();
+            let same_direction = turn_rad < PARALLEL_RAD;
+            if !same_direction && turn_rad < core::f64::consts::PI - PARALLEL_RAD {
+                continue;
+            }
+            let offset = pose.to_local(there.position);
+            let width_m = other.width_at(projection.station_m);
+            if offset.x.abs() > ABREAST_M || offset.y.abs() - width_m / 2.0 > reach_m {
+                continue;
+            }
+            let (station_m, lateral_m) = (projection.station_m, offset.y);
+            let abreast = Abreast { lane: index, station_m, lateral_m, width_m, same_direction };
+            // Where a lane of one section follows that of another, both are abreast: one is enough.
+            let follows = |known: &Abreast| {
+                (known.lateral_m - lateral_m).abs() < 0.1 && known.same_direction == same_direction
+            };
+            if !found.iter().any(follows) {
+                found.push(abreast);
+            }
+        }
+        found.sort_by(|a, b| b.lateral_m.total_cmp(&a.lateral_m).then(a.lane.cmp(&b.lane)));
+        found
+    }
+
+    /// The nearest lane of the opposite direction beside a lane at a station of it, on the side where
+    /// opposing traffic is (left, unless traffic keeps left), across a median of at most 40 m; of this
+    /// road or another.
+    pub fn opposing(&self, lane: LaneIndex, station_m: f64) -> Option<Opposing> {
+        let own = self.lane(lane);
+        let side = if own.keeps_left { -1.0 } else { 1.0 };
+        // Lanes of our own direction may lie between, hence twice.
+        let abreast = self.abreast(lane, station_m, 2.0 * MEDIAN_M_MAX);
+        let aside_m = |beside: &Abreast| side * beside.lateral_m;
+        let nearest = abreast
+            .iter()
+            .filter(|beside| !beside.same_direction && aside_m(beside) > 0.0)
+            .min_by(|a, b| aside_m(a).total_cmp(&aside_m(b)))?;
+        let ours = abreast.iter().filter(|beside| {
+            beside.same_direction && aside_m(beside) > 0.0 && aside_m(beside) < aside_m(nearest)
+        });
+        let edge_m = ours
+            .map(|beside| aside_m(beside) + beside.width_m / 2.0)
+            .fold(own.width_at(station_m) / 2.0, f64::max);
+        let gap_m = aside_m(nearest) - nearest.width_m / 2.0 - edge_m;
+        let (lane, station_m, lateral_m) = (nearest.lane, nearest.station_m, nearest.lateral_m);
+        // Rounding leaves hairs between lanes that share a line.
+        let median_m = if gap_m > 1e-3 { gap_m } else { 0.0 };
+        (median_m <= MEDIAN_M_MAX).then_some(Opposing { lane, station_m, lateral_m, median_m })
+    }
+
+    /// The lane to which one may change from a lane at a station of it: same road, same direction, no
+    /// median between, permitted by markings and wide enough.
+    pub fn changeable(&self, lane: LaneIndex, side: Side, station_m: f64) -> Option<LaneIndex> {
+        let lane = self.lane(lane);
+        let mut permitted = lane.changes_m(side).iter();
+        permitted.any(|(from_m, to_m)| (*from_m..=*to_m).contains(&station_m)).then_some(())?;
+        lane.neighbour(side).map(|neighbour| neighbour.lane)
+    }
+
+    /// The ways through a junction, by rising index of the lanes they come from and use.
+    pub fn connections(&self, junction: usize) -> Vec<Connection> {
+        let inside = |lane: LaneIndex| self.lane(lane).junction == Some(junction);
+        let mut found = Vec::new();
+        for first in self.junctions[junction].lanes.iter().copied() {
+            for from in self.lane(first).predecessors.iter().copied().filter(|from| !inside(*from)) {
+                let mut open = vec![vec![first]];
+                while let Some(lanes) = open.pop() {
+                    for next in self.lane(lanes[lanes.len() - 1]).successors.iter().copied() {
+                        if !inside(next) {
+                            found.push(Connection { from, lanes: lanes.clone(), to: next });
+                        } else if !lanes.contains(&next) {
+                            open.push(lanes.iter().copied().chain([next]).collect());
+                        }
+                    }
+                }
+            }
+        }
+        found.sort();
+        found
+    }
+}
+
+/// A way through a junction.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Connection {
+    pub from: LaneIndex,
+    /// Inside the junction: one lane, or several where connecting roads have several lane sections.
+    pub lanes: Vec<LaneIndex>,
+    pub to: LaneIndex,
+}

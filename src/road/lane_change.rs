@@ -1,0 +1,273 @@
+//! Lane changes: where markings and widths permit them, and how a path goes from lane to lane.
+//!
+//! The lateral motion is a quintic in the station: no lateral speed, acceleration or jump of curvature
+//! at its ends (as in Apollo's and most planners' lane changes). Traffic is nobody's business here.
+
+use crate::geometry::Pose;
+use crate::geometry::Vec2;
+use crate::geometry::wrap_angle;
+
+use super::map::Lane;
+use super::map::LaneIndex;
+use super::map::RoadMap;
+use super::map::Side;
+use super::opendrive::MarkRule;
+use super::opendrive::RoadElement;
+use super::opendrive::SectionElement;
+
+/// A lane narrower than this cannot be driven in yet, m: bays open from nothing.
+const WIDTH_M_MIN: f64 = 2.0;
+
+/// A strip wider than this between two lanes is no line but a median, m.
+const STRIP_M_MAX: f64 = 0.5;
+
+/// Widths are looked at this often, m.
+const STEP_M: f64 = 1.0;
+
+/// Largest lateral acceleration of a lane change driven at the limit, m/s²: comfortable, and at 50 km/h
+/// it gives a length of 50 m for a lane of 3.3 m.
+const LATERAL_MPS2: f64 = 1.5;
+
+/// Largest second derivative of the quintic, `10 / √3`.
+const QUINTIC_SECOND_MAX: f64 = 5.773_502_691_896_258;
+
+/// No lane change is shorter, m: at walking pace a car needs it to shift by a lane.
+pub const LENGTH_M_MIN: f64 = 15.0;
+
+/// Parallel lanes are not followed farther than this, m.
+const STRETCH_M_MAX: f64 = 2000.0;
+
+/// Ends of lanes and of permitted parts are taken for one within this, m.
+const TOUCH_M: f64 = 0.01;
+
+/// Part of a lateral shift done at a part of its length, both in `[0, 1]`; its derivatives are 0 at
+/// both ends, to the second.
+pub fn quintic(fraction: f64) -> f64 {
+    let u = fraction.clamp(0.0, 1.0);
+    u * u * u * (10.0 - u * (15.0 - 6.0 * u))
+}
+
+fn quintic_first(u: f64) -> f64 {
+    30.0 * u * u * (1.0 - u) * (1.0 - u)
+}
+
+fn quintic_second(u: f64) -> f64 {
+    60.0 * u * (1.0 - u) * (1.0 - 2.0 * u)
+}
+
+/// Length of a comfortable lane change at a speed over a width, m.
+///
+/// A quintic of width `w` over the length `L` at the speed `v` accelerates laterally by at most
+/// `10/√3 w v²/L²`.
+pub fn comfortable_length_m(speed_mps: f64, width_m: f64) -> f64 {
+    (speed_mps * (QUINTIC_SECOND_MAX * width_m / LATERAL_MPS2).sqrt()).max(LENGTH_M_MIN)
+}
+
+/// Stations of the reference line between which one may change from the left of two lanes of a section
+/// to the right one, and back, m: not over a median, not over markings that forbid it, and only where
+/// both lanes are wide enough.
+pub fn permitted(
+    road: &RoadElement,
+    section: &SectionElement,
+    left: i32,
+    right: i32,
+) -> [Vec<(f64, f64)>; 2] {
+    // The line between two lanes belongs to the one nearer to the reference line.
+    let inner = if left.abs() < right.abs() { left } else { right };
+    let marks = section.lane(inner).map_or(&[][..], |lane| &lane.marks);
+    let steps = ((section.end_m - section.begin_m) / STEP_M).ceil().clamp(1.0, 1e6) as usize;
+    let step_m = (section.end_m - section.begin_m) / steps as f64;
+    let mut cuts_m: Vec<f64> = (0..=steps).map(|i| section.begin_m + step_m * i as f64).collect();
+    cuts_m.extend(marks.iter().map(|mark| section.begin_m + mark.begin_m));
+    cuts_m.retain(|at_m| (section.begin_m..=section.end_m).contains(at_m));
+    cuts_m.sort_by(f64::total_cmp);
+    let mut both = [Vec::new(), Vec::new()];
+    for pair in cuts_m.windows(2) {
+        let (from_m, to_m) = (pair[0], pair[1]);
+        if to_m - from_m < 1e-9 || ![from_m, to_m].iter().all(|at_m| wide(road, section, left, right, *at_m))
+        {
+            continue;
+        }
+        let middle_m = (from_m + to_m) / 2.0 - section.begin_m;
+        let rule = marks.iter().rfind(|mark| mark.begin_m <= middle_m).map_or(MarkRule::Both, |m| m.rule);
+        // Ids fall from left to right.
+        let allowed = [
+            matches!(rule, MarkRule::Both | MarkRule::Decrease),
+            matches!(rule, MarkRule::Both | MarkRule::Increase),
+        ];
+        for (parts, _) in both.iter_mut().zip(allowed).filter(|(_, allowed)| *allowed) {
+            append(parts, from_m, to_m);
+        }
+    }
+    both
+}
+
+fn wide(road: &RoadElement, section: &SectionElement, left: i32, right: i32, s_m: f64) -> bool {
+    // A hair before its end a section still follows its own polynomials.
+    let s_m = s_m.min(section.end_m - 1e-7);
+    let (left_centre, left_width) = road.lane_at(section, left, s_m);
+    let (right_centre, right_width) = road.lane_at(section, right, s_m);
+    let strip_m = left_centre.value - right_centre.value - (left_width.value + right_width.value) / 2.0;
+    left_width.value >= WIDTH_M_MIN && right_width.value >= WIDTH_M_MIN && strip_m <= STRIP_M_MAX
+}
+
+fn append(parts: &mut Vec<(f64, f64)>, from_m: f64, to_m: f64) {
+    match parts.last_mut() {
+        Some(last) if from_m - last.1 < 1e-6 => last.1 = to_m,
+        _ => parts.push((from_m, to_m)),
+    }
+}
+
+/// Two chains of lanes side by side, between which one may change all along.
+#[derive(Debug, Clone)]
+pub struct Stretch {
+    pub side: Side,
+    /// In driving direction.
+    pub pairs: Vec<Pair>,
+}
+
+/// A lane, its neighbour, and the stations of the first between which one may change.
+#[derive(Debug, Clone, Copy)]
+pub struct Pair {
+    pub source: LaneIndex,
+    pub target: LaneIndex,
+    pub from_m: f64,
+    pub to_m: f64,
+}
+
+/// A place on a [`Stretch`]: which pair, and the station of its source lane, m.
+#[derive(Debug, Clone, Copy)]
+pub struct Place {
+    pub pair: usize,
+    pub station_m: f64,
+}
+
+impl Stretch {
+    /// All stretches that a vehicle on a lane, at a station or later, can use to change to a side.
+    pub fn from(map: &RoadMap, source: LaneIndex, side: Side, station_m: f64) -> Vec<Stretch> {
+        let lane = map.lane(source);
+        let Some(target) = lane.neighbour(side).map(|neighbour| neighbour.lane) else { return Vec::new() };
+        let later = lane.changes_m(side).iter().filter(|(_, to_m)| *to_m > station_m);
+        let begun = later.map(|(from_m, to_m)| {
+            let first = Pair { source, target, from_m: from_m.max(station_m), to_m: *to_m };
+            Stretch { side, pairs: vec![first] }.extended(map)
+        });
+        begun.collect()
+    }
+
+    /// Goes on into the lanes ahead as long as they stay side by side.
+    fn extended(mut self, map: &RoadMap) -> Stretch {
+        while self.length_m() < STRETCH_M_MAX {
+            let last = self.pairs[self.pairs.len() - 1];
+            let (source, target) = (map.lane(last.source), map.lane(last.target));
+            if last.to_m < source.centre.length_m() - TOUCH_M {
+                break;
+            }
+            let next = source.successors.iter().find_map(|source| {
+                let beside = map.lane(*source).neighbour(self.side)?.lane;
+                let (from_m, to_m) = *map.lane(*source).changes_m(self.side).first()?;
+                let goes_on = target.successors.contains(&beside) && from_m < TOUCH_M;
+                goes_on.then_some(Pair { source: *source, target: beside, from_m: 0.0, to_m })
+            });
+            match next {
+                Some(next) if self.pairs.iter().all(|pair| pair.source != next.source) => {
+                    self.pairs.push(next);
+                }
+                _ => break,
+            }
+        }
+        self
+    }
+
+    pub fn length_m(&self) -> f64 {
+        self.pairs.iter().map(|pair| pair.to_m - pair.from_m).sum()
+    }
+
+    /// The place at a distance from the beginning along the source lanes, clamped to the end.
+    pub fn place(&self, distance_m: f64) -> Place {
+        let mut rest_m = distance_m;
+        for (index, pair) in self.pairs.iter().enumerate() {
+            let length_m = pair.to_m - pair.from_m;
+            if rest_m < length_m || index + 1 == self.pairs.len() {
+                return Place { pair: index, station_m: pair.from_m + rest_m.min(length_m) };
+            }
+            rest_m -= length_m;
+        }
+        unreachable!("a stretch has a first pair")
+    }
+
+    /// Station of the target lane abreast of a place, m.
+    pub fn target_station_m(&self, map: &RoadMap, place: Place) -> f64 {
+        let pair = &self.pairs[place.pair];
+        map.lane(pair.target).station_of(map.lane(pair.source).road_station_m(place.station_m))
+    }
+
+    /// Distance from the source to the target centre at a place, m, positive to the left.
+    pub fn shift_m(&self, map: &RoadMap, place: Place) -> f64 {
+        let (source, target) = self.poses(map, place);
+        let distance_m = (target.position - source.position).norm();
+        if self.side == Side::Left { distance_m } else { -distance_m }
+    }
+
+    /// Position, heading and curvature of a change over `length_m` from the beginning, at a fraction
+    /// of it.
+    pub fn blend(&self, map: &RoadMap, length_m: f64, fraction: f64) -> (Vec2, f64, f64) {
+        let place = self.place(length_m * fraction);
+        let (source, target) = self.poses(map, place);
+        let part = quintic(fraction);
+        let shift_m = self.shift_m(map, place);
+        let source_per_m = self.lane(map, place).centre.curvature_at(place.station_m);
+        let target_lane = map.lane(self.pairs[place.pair].target);
+        let target_per_m = target_lane.centre.curvature_at(self.target_station_m(map, place));
+        // The shift is a curve over the source lane, whose own stations shrink towards the inside of a
+        // bend by `1 - k t`.
+        let ahead = 1.0 - source_per_m * shift_m * part;
+        let slope = quintic_first(fraction) * shift_m / length_m / ahead;
+        let bend_per_m = quintic_second(fraction) * shift_m / (length_m * length_m * ahead * ahead);
+        let steepness = 1.0 + slope * slope;
+        let heading_rad = source.heading_rad
+            + wrap_angle(target.heading_rad - source.heading_rad) * part
+            + libm::atan2(slope, 1.0);
+        let along_per_m = source_per_m + (target_per_m - source_per_m) * part;
+        (
+            source.position + (target.position - source.position) * part,
+            wrap_angle(heading_rad),
+            along_per_m + bend_per_m / (steepness * steepness.sqrt()),
+        )
+    }
+
+    fn lane<'a>(&self, map: &'a RoadMap, place: Place) -> &'a Lane {
+        map.lane(self.pairs[place.pair].source)
+    }
+
+    /// Poses of the source and the target centre abreast of each other.
+    fn poses(&self, map: &RoadMap, place: Place) -> (Pose, Pose) {
+        let target = map.lane(self.pairs[place.pair].target);
+        (
+            self.lane(map, place).centre.pose_at(place.station_m),
+            target.centre.pose_at(self.target_station_m(map, place)),
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_quintic_has_its_derivatives_and_its_largest_acceleration() {
+        let h = 1e-4;
+        let mut largest: f64 = 0.0;
+        for i in 1..1000 {
+            let u = f64::from(i) / 1000.0;
+            let (first, second) = (quintic_first(u), quintic_second(u));
+            assert!(((quintic(u + h) - quintic(u - h)) / (2.0 * h) - first).abs() < 1e-6);
+            assert!(((quintic_first(u + h) - quintic_first(u - h)) / (2.0 * h) - second).abs() < 1e-5);
+            largest = largest.max(second.abs());
+        }
+        assert!((largest - QUINTIC_SECOND_MAX).abs() < 1e-4, "{largest}");
+        assert_eq!((quintic(0.0), quintic(0.5), quintic(1.0)), (0.0, 0.5, 1.0));
+        assert!((comfortable_length_m(50.0 / 3.6, 3.3) - 49.5).abs() < 0.1);
+        assert_eq!(comfortable_length_m(0.0, 3.3), LENGTH_M_MIN);
+    }
+}

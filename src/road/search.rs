@@ -1,0 +1,137 @@
+//! The cheapest way through the lane graph, lane changes included.
+//!
+//! Dijkstra's method over places from which a vehicle may go on: the beginning of a lane, or the end of
+//! a lane change into it.
+
+use std::cmp::Reverse;
+use std::collections::BTreeMap;
+use std::collections::BinaryHeap;
+
+use super::lane_change::LENGTH_M_MIN;
+use super::lane_change::Stretch;
+use super::lane_change::comfortable_length_m;
+use super::map::LaneIndex;
+use super::map::LanePlace;
+use super::map::RoadMap;
+use super::map::Side;
+
+/// What a lane change costs beside its length, m of detour. Ours: drivers take a block's detour rather
+/// than cut through traffic, but no more.
+const CHANGE_M: f64 = 100.0;
+
+/// What a change costs that has but half of its comfortable length, m of detour.
+const HURRIED_M: f64 = 200.0;
+
+/// How a way goes on.
+#[derive(Debug, Clone)]
+pub enum Move {
+    /// Into the lane that follows.
+    Follow(LaneIndex),
+    Change(Change),
+}
+
+/// A lane change on a way.
+#[derive(Debug, Clone)]
+pub struct Change {
+    /// Where it may be made; the change begins with it.
+    pub stretch: Stretch,
+    pub length_m: f64,
+}
+
+/// A place from which the search goes on.
+struct Label {
+    lane: LaneIndex,
+    /// Station from which on a vehicle can be in the lane, m.
+    station_m: f64,
+    /// Cost up to the beginning of the lane, mm: whole numbers, because a heap needs a total order.
+    cost_mm: i64,
+    /// Index of the label before, and how it leads here; `None` for the start.
+    came: Option<(usize, Move)>,
+}
+
+/// The moves from start to goal; `None` if there is no way.
+pub fn cheapest_way(map: &RoadMap, start: LanePlace, goal: LanePlace) -> Option<Vec<Move>> {
+    let mut search = Search { map, labels: Vec::new(), open: BinaryHeap::new(), settled: BTreeMap::new() };
+    search.push(start.lane, start.station_m, -millimetres(start.station_m), None);
+    while let Some(Reverse((_, _, index))) = search.open.pop() {
+        let (lane, station_m) = (search.labels[index].lane, search.labels[index].station_m);
+        // A dearer way into a lane is of use only if it is in it sooner.
+        if search.settled.get(&lane).is_some_and(|soonest_m| *soonest_m <= station_m) {
+            continue;
+        }
+        search.settled.insert(lane, station_m);
+        if lane == goal.lane && station_m <= goal.station_m {
+            return Some(search.way_to(index));
+        }
+        search.follow(index);
+        for side in [Side::Left, Side::Right] {
+            search.change(index, side);
+        }
+    }
+    None
+}
+
+struct Search<'a> {
+    map: &'a RoadMap,
+    labels: Vec<Label>,
+    /// By cost, station (mm) and index.
+    open: BinaryHeap<Reverse<(i64, i64, usize)>>,
+    settled: BTreeMap<LaneIndex, f64>,
+}
+
+impl Search<'_> {
+    fn push(&mut self, lane: LaneIndex, station_m: f64, cost_mm: i64, came: Option<(usize, Move)>) {
+        self.open.push(Reverse((cost_mm, millimetres(station_m), self.labels.len())));
+        self.labels.push(Label { lane, station_m, cost_mm, came });
+    }
+
+    fn follow(&mut self, index: usize) {
+        let map = self.map;
+        let (lane, cost_mm) = (map.lane(self.labels[index].lane), self.labels[index].cost_mm);
+        for next in &lane.successors {
+            let cost_mm = cost_mm + millimetres(lane.centre.length_m());
+            self.push(*next, 0.0, cost_mm, Some((index, Move::Follow(*next))));
+        }
+    }
+
+    /// Changes begin as early as they may. A hurried one makes room for another, or for a goal.
+    fn change(&mut self, index: usize, side: Side) {
+        let map = self.map;
+        let (lane, station_m) = (self.labels[index].lane, self.labels[index].station_m);
+        for stretch in Stretch::from(map, lane, side, station_m) {
+            let width_m = stretch.shift_m(map, stretch.place(0.0)).abs();
+            let comfortable_m = comfortable_length_m(map.lane(lane).speed_limit_mps, width_m);
+            let hurried_m = (comfortable_m / 2.0).max(LENGTH_M_MIN);
+            for (length_m, penalty_m) in [(comfortable_m, CHANGE_M), (hurried_m, HURRIED_M)] {
+                if length_m > stretch.length_m() {
+                    continue;
+                }
+                let end = stretch.place(length_m);
+                let passed_m: f64 = stretch.pairs[..end.pair]
+                    .iter()
+                    .map(|pair| map.lane(pair.source).centre.length_m())
+                    .sum();
+                let cost_mm = self.labels[index].cost_mm + millimetres(penalty_m + passed_m);
+                let target = stretch.pairs[end.pair].target;
+                let station_m = stretch.target_station_m(map, end);
+                let change = Move::Change(Change { stretch: stretch.clone(), length_m });
+                self.push(target, station_m, cost_mm, Some((index, change)));
+            }
+        }
+    }
+
+    fn way_to(&self, goal: usize) -> Vec<Move> {
+        let mut way = Vec::new();
+        let mut index = goal;
+        while let Some((before, step)) = &self.labels[index].came {
+            way.push(step.clone());
+            index = *before;
+        }
+        way.reverse();
+        way
+    }
+}
+
+fn millimetres(length_m: f64) -> i64 {
+    (length_m * 1e3) as i64
+}

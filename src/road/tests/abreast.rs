@@ -1,0 +1,118 @@
+//! What lies beside a lane: on its own road, across a median, in a junction.
+
+use crate::road::LaneIndex;
+use crate::road::RoadMap;
+use crate::road::Route;
+use crate::road::Side;
+
+use super::corner;
+
+/// A boulevard like Road 4's: two roads of two lanes each, one way each, bending to the left, with 20 m
+/// of median that no road describes. Traffic keeps to `rule`'s side.
+fn boulevard(rule: &str) -> RoadMap {
+    let lanes = r#"<lanes><laneSection s="0"><right>
+        <lane id="-1" type="driving"><width a="3.5"/></lane><lane id="-2" type="driving"><width a="3"/></lane>
+        </right></laneSection></lanes>"#;
+    let lanes = match rule {
+        "LHT" => lanes.replace("right>", "left>").replace(r#"id="-"#, r#"id=""#),
+        _ => lanes.to_owned(),
+    };
+    let side = if rule == "LHT" { -1.0 } else { 1.0 };
+    let road = |id: u32, x: f64, y: f64, hdg: f64, curvature: f64, length: f64| {
+        format!(
+            r#"<road id="{id}" length="{length}" junction="-1" rule="{rule}"><type s="0" type="town">
+            <speed max="50" unit="km/h"/></type><planView><geometry s="0" x="{x}" y="{y}" hdg="{hdg}" length="{length}">
+            <arc curvature="{curvature}"/></geometry></planView>{lanes}</road>"#
+        )
+    };
+    // Reference lines of radius 200 m and 180 m (220 m) about (0, 200).
+    let inner_m = 200.0 - 20.0 * side;
+    let text = format!(
+        r#"<OpenDRIVE><header name="boulevard"/>{}{}</OpenDRIVE>"#,
+        road(1, 0.0, 0.0, 0.0, 0.005, 100.0),
+        road(
+            2,
+            inner_m * libm::sin(0.5),
+            200.0 - inner_m * libm::cos(0.5),
+            0.5 - core::f64::consts::PI,
+            -1.0 / inner_m,
+            inner_m * 0.5
+        ),
+    );
+    RoadMap::from_opendrive("boulevard", &text).unwrap()
+}
+
+#[test]
+fn the_opposing_lane_is_found_across_a_median() {
+    for (rule, inner, outer, side) in [("RHT", -1, -2, 1.0), ("LHT", 1, 2, -1.0)] {
+        let map = boulevard(rule);
+        for (own, lateral_m) in [(inner, 20.0 + 3.5), (outer, 20.0 + 3.5 + 3.25)] {
+            let place = map.place("1", own, 50.0).unwrap();
+            let opposing = map.opposing(place.lane, place.station_m).unwrap();
+            let key = &map.lane(opposing.lane).key;
+            assert_eq!((key.road.as_str(), key.lane), ("2", inner), "{rule}");
+            assert!((opposing.median_m - 20.0).abs() < 0.01, "{opposing:?}");
+            assert!((opposing.lateral_m - side * lateral_m).abs() < 0.01, "{opposing:?}");
+            // Both stand at half of the same angle about the same centre.
+            let half_m = map.lane(opposing.lane).centre.length_m() / 2.0;
+            assert!((opposing.station_m - half_m).abs() < 0.1, "{opposing:?}");
+        }
+        let place = map.place("1", inner, 50.0).unwrap();
+        let widths: Vec<_> = map
+            .abreast(place.lane, place.station_m, 60.0)
+            .iter()
+            .map(|beside| (beside.same_direction, beside.width_m.round()))
+            .collect();
+        let mut expected = [(false, 3.0), (false, 4.0), (true, 3.0)];
+        if rule == "LHT" {
+            expected.reverse();
+        }
+        assert_eq!(widths, expected);
+    }
+}
+
+#[test]
+fn a_lane_change_never_crosses_a_median() {
+    let map = boulevard("RHT");
+    let place = |road: &str, lane: i32, s_m: f64| map.place(road, lane, s_m).unwrap();
+    let (inner, outer) = (place("1", -1, 10.0), place("1", -2, 10.0));
+    assert_eq!(map.changeable(inner.lane, Side::Left, 10.0), None);
+    assert_eq!(map.changeable(inner.lane, Side::Right, 10.0), Some(outer.lane));
+    assert_eq!(map.changeable(outer.lane, Side::Left, 10.0), Some(inner.lane));
+    assert!(Route::find(&map, inner, place("2", -1, 80.0)).is_err());
+    assert!(Route::find(&map, inner, place("1", -2, 80.0)).is_ok());
+    // Nor one between lanes of a road: here with a strip of grass of 2 m.
+    let text = r#"<OpenDRIVE><header name="strip"/><road id="1" length="100" junction="-1"><planView>
+        <geometry s="0" x="0" y="0" hdg="0" length="100"><line/></geometry></planView><lanes><laneSection s="0"><right>
+        <lane id="-1" type="driving"><width a="3"/></lane><lane id="-2" type="median"><width a="2"/></lane>
+        <lane id="-3" type="driving"><width a="3"/></lane></right></laneSection></lanes></road></OpenDRIVE>"#;
+    let map = RoadMap::from_opendrive("strip", text).unwrap();
+    let right = map.lane(LaneIndex(0)).right.unwrap();
+    assert!(right.same_direction && (right.gap_m - 2.0).abs() < 1e-9);
+    assert_eq!(map.changeable(LaneIndex(0), Side::Right, 50.0), None);
+}
+
+#[test]
+fn without_a_median_the_neighbour_is_the_opposing_lane() {
+    let map = corner::corner();
+    let place = map.place("1", -2, 80.0).unwrap();
+    let opposing = map.opposing(place.lane, place.station_m).unwrap();
+    assert_eq!((map.lane(opposing.lane).key.lane, opposing.median_m), (1, 0.0));
+    // Inside a one-way street there is none.
+    let one_way = map.place("5", -3, 60.0).unwrap();
+    assert_eq!(map.opposing(one_way.lane, one_way.station_m), None);
+}
+
+#[test]
+fn the_ways_through_a_junction_are_its_connections() {
+    let map = corner::corner();
+    for (index, junction) in map.junctions.iter().enumerate() {
+        let ways = map.connections(index);
+        assert_eq!(ways.len(), junction.lanes.len(), "each lane of this map connects one pair");
+        for way in &ways {
+            assert!(map.lane(way.from).successors.contains(&way.lanes[0]));
+            assert!(map.lane(way.lanes[0]).successors.contains(&way.to));
+            assert_eq!((map.lane(way.from).junction, map.lane(way.to).junction), (None, None));
+        }
+    }
+}

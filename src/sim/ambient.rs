@@ -1,0 +1,137 @@
+//! Ambient traffic: vehicles that nobody commanded and that want nothing but to drive on.
+//!
+//! An episode that asks for it keeps a number of them within [`AROUND_M`] of the ego vehicle. At the start
+//! they are there already; later ones appear on streets beyond what the ego vehicle's sensors reach,
+//! and leave once they are that far away and behind it, or far away. Where, what and how fast is drawn
+//! from a stream of their own, one index an attempt, so that commanded traffic draws what it would
+//! draw without them. They drive at 80 to 100 % of each lane's limit, keep their lane, turn as drawn,
+//! and keep the manners of `npc::manners` towards everybody, the ego vehicle included. They count
+//! neither towards the ten obstacles of the published package nor among `npc#1`, `npc#2`, …: their
+//! ids begin above [`COMMANDED_MAX`].
+
+use std::sync::Arc;
+
+use crate::geometry::OrientedBox;
+use crate::geometry::distance_m;
+use crate::model::AMBIENT_MAX;
+use crate::model::vocabulary::Body;
+use crate::model::vocabulary::Colour;
+use crate::model::vocabulary::Verb;
+use crate::model::vocabulary::Word;
+use crate::rng;
+use crate::rng::Rng;
+use crate::rng::Stream;
+
+use super::body;
+use super::mover::Around;
+use super::mover::Motion;
+use super::mover::Mover;
+use super::npc::Cruise;
+use super::npc::Driver;
+use super::placement::Placed;
+use super::sense::RANGE_M;
+use super::way::Way;
+use super::world::Obstacle;
+
+/// Ids up to this are of obstacles that an action made appear.
+pub(super) const COMMANDED_MAX: u32 = 1_000_000;
+
+/// Ticks between two looks whether somebody is missing: half a second.
+pub(super) const RENEWAL_TICKS: u64 = 25;
+
+/// They drive no farther from the ego vehicle than this, m.
+const AROUND_M: f64 = 200.0;
+/// At the start of an episode nobody stands nearer to the ego vehicle, m: two seconds at 50 km/h and
+/// the way to brake.
+const START_ROOM_M: f64 = 45.0;
+/// Nobody appears nearer to another road user, m.
+const ROOM_M: f64 = 20.0;
+/// Nobody appears nearer to the end of a street, where a signal may be red, m: the way to brake from
+/// 50 km/h at 3 m/s², rounded down.
+const STREET_END_M: f64 = 30.0;
+/// Draws before an attempt is given up.
+const DRAWS_MAX: usize = 8;
+
+/// How many are wanted, and what has been drawn for them.
+#[derive(Debug, Clone)]
+pub(super) struct Ambient {
+    wanted: u32,
+    attempts: u64,
+    next_id: u32,
+}
+
+impl Ambient {
+    pub fn new(wanted: u32) -> Ambient {
+        Ambient { wanted: wanted.min(AMBIENT_MAX), attempts: 0, next_id: COMMANDED_MAX + 1 }
+    }
+
+    /// Whether `present` ambient vehicles are too few.
+    pub fn lacks(&self, present: usize) -> bool {
+        present < self.wanted as usize
+    }
+
+    pub fn wanted(&self) -> u32 {
+        self.wanted
+    }
+
+    /// One attempt at a newcomer; `begins` says that the ego vehicle has not seen anything yet.
+    pub fn attempt(&mut self, around: &Around, begins: bool) -> Option<Placed> {
+        let mut rng = rng::stream(around.seed, Stream::Ambient, self.attempts);
+        self.attempts += 1;
+        let nearest_m = if begins { START_ROOM_M } else { RANGE_M };
+        let id = self.next_id;
+        let placed = (0..DRAWS_MAX).find_map(|_| draw(around, nearest_m, id, &mut rng))?;
+        self.next_id += 1;
+        Some(placed)
+    }
+
+    pub fn trace(&self, sink: &mut dyn FnMut(u64)) {
+        sink(u64::from(self.wanted));
+        sink(self.attempts);
+        sink(u64::from(self.next_id));
+    }
+}
+
+/// Whether an ambient vehicle has got so far away that it leaves, unseen.
+pub(super) fn is_gone(obstacle: &Obstacle, ego: &OrientedBox) -> bool {
+    let there = ego.pose.to_local(obstacle.outline.pose.position);
+    let away_m2 = there.norm_squared();
+    away_m2 > AROUND_M * AROUND_M || (there.x < 0.0 && away_m2 > (RANGE_M + 20.0) * (RANGE_M + 20.0))
+}
+
+/// A vehicle somewhere on a street, if it may appear there.
+fn draw(around: &Around, nearest_m: f64, id: u32, rng: &mut Rng) -> Option<Placed> {
+    let (lane, station_m) = around.scene.street_at(rng::unit(rng))?;
+    let bodies = Body::ALL.iter().filter(|body| body.is_vehicle()).count() as u32;
+    let body = *Body::ALL.iter().filter(|body| body.is_vehicle()).nth(rng::below(rng, bodies) as usize)?;
+    let colour = Colour::ALL[rng::below(rng, Colour::ALL.len() as u32) as usize];
+    let cruise = Cruise::Limit(rng::between(rng, 0.8, 1.0));
+    let size = body::parameters(body);
+    let centre = &around.scene.map.lane(lane).centre;
+    let away = centre.pose_at(station_m).position - around.ego_outline.pose.position;
+    if !(nearest_m * nearest_m..AROUND_M * AROUND_M).contains(&away.norm_squared())
+        || !(size.length_m..centre.length_m() - STREET_END_M).contains(&station_m)
+    {
+        return None;
+    }
+    let way = Way::along(around.scene, &[lane], rng)?;
+    let driver = Driver::new(around.scene, Arc::new(way), station_m, cruise, Vec::new(), 1);
+    let moved = driver.moved();
+    let outline = OrientedBox::new(moved.pose, size.length_m, size.width_m);
+    if around.others(id).any(|(other, _)| distance_m(&outline, other) < ROOM_M) {
+        return None;
+    }
+    let obstacle = Obstacle {
+        id,
+        body,
+        colour,
+        verb: Verb::DriveAhead,
+        outline,
+        height_m: size.height_m,
+        lane_heading_rad: moved.lane_heading_rad,
+        velocity_mps: moved.velocity_mps,
+        distance_m: distance_m(around.ego_outline, &outline),
+        spawned_tick: around.tick,
+    };
+    Some(Placed { obstacle, mover: Mover::new(size, Motion::Drive(driver)) })
+}

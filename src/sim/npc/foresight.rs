@@ -1,0 +1,76 @@
+//! Whose outline would meet whose in a tight turn.
+//!
+//! Leaders are looked for in a corridor as wide as the vehicle, and conflict areas are between lanes;
+//! but a bus in a bend sweeps more than its lane. So inside junctions drivers look two seconds ahead:
+//! where both would be if they went on as they do, and stop before the outlines meet. Of the two, the
+//! one whose centre is behind the other's does. Commanded vehicles do not look at the ego vehicle so.
+
+use crate::geometry::OrientedBox;
+use crate::geometry::Pose;
+use crate::geometry::distance_m;
+use crate::sim::body::BodyParameters;
+use crate::sim::mover::Around;
+use crate::sim::world::Obstacle;
+
+use super::driver::Driver;
+use super::driver::Leader;
+
+/// Moments that are looked at, s.
+const MOMENTS_S: [f64; 5] = [0.4, 0.8, 1.2, 1.6, 2.0];
+/// A vehicle at rest wonders where it would be at this speed, m/s.
+const CREEP_MPS: f64 = 1.0;
+/// Outlines are kept this far apart, m.
+const ROOM_M: f64 = 0.3;
+/// Others farther away are no matter, m: two school buses and a car's length.
+const NEAR_M: f64 = 16.0;
+/// Room left before the place where they would meet, m.
+const STOP_M: f64 = 1.0;
+
+impl Driver {
+    /// Somebody beside the way whom the own outline would meet soon, as a leader that stands there.
+    pub(super) fn foresee(&self, this: &Obstacle, size: &BodyParameters, around: &Around) -> Option<Leader> {
+        let half_m = size.length_m / 2.0;
+        let turns = |station_m: f64| around.scene.map.lane(self.way.lane_at(station_m).0).junction.is_some();
+        if self.change.is_some() || !(turns(self.station_m + half_m) || turns(self.station_m - half_m)) {
+            return None;
+        }
+        let here = &this.outline.pose;
+        let is_near = |outline: &OrientedBox| {
+            let away = outline.pose.position - here.position;
+            away.norm_squared() < NEAR_M * NEAR_M && here.forward().dot(&away) > 0.0
+        };
+        let mut free_m = f64::INFINITY;
+        if self.yields_to_ego && is_near(around.ego_outline) {
+            let ego = |time_s| Pose {
+                position: around.ego_outline.pose.position + around.ego_velocity_mps * time_s,
+                ..around.ego_outline.pose
+            };
+            free_m = free_m.min(self.free_way_m(this, around.ego_outline, ego));
+        }
+        for (obstacle, driver) in around.drivers(this.id).filter(|(other, _)| is_near(&other.outline)) {
+            let other = |time_s| driver.way.path.pose_at(driver.station_m + driver.speed_mps * time_s);
+            if driver.change.is_none() {
+                free_m = free_m.min(self.free_way_m(this, &obstacle.outline, other));
+            }
+        }
+        free_m.is_finite().then(|| Leader { gap_m: free_m + STOP_M, speed_mps: 0.0, crosswise: true })
+    }
+
+    /// How far this driver gets before its outline would meet another, m; infinite if it would not.
+    fn free_way_m(&self, this: &Obstacle, outline: &OrientedBox, other_at: impl Fn(f64) -> Pose) -> f64 {
+        let speed_mps = self.speed_mps.max(CREEP_MPS);
+        let mut free_m = 0.0;
+        for time_s in MOMENTS_S {
+            let own = OrientedBox {
+                pose: self.way.path.pose_at(self.station_m + speed_mps * time_s),
+                ..this.outline
+            };
+            let other = OrientedBox { pose: other_at(time_s), ..*outline };
+            if distance_m(&own, &other) < ROOM_M {
+                return free_m;
+            }
+            free_m = speed_mps * time_s;
+        }
+        f64::INFINITY
+    }
+}

@@ -1,0 +1,287 @@
+//! Who waits for whom at a junction.
+//!
+//! Before a conflict area (see `junction`) a driver waits for
+//!
+//! - whoever is in it;
+//! - whoever cannot stop before it any more, or has begun to cross it after a wait;
+//! - whoever goes first by the lanes' own order, unless one of the two is through before the other comes;
+//! - room behind it, if the one ahead stands: nobody stops in an area.
+//!
+//! Nobody waits for somebody who waits or stands at a red light. Who sets out after a wait crosses all
+//! areas of the junction and counts as if inside them, so that four who wait for each other do not all
+//! set out at once: they look one after another, and the first to look goes. Who has waited for
+//! [`PATIENCE_S`] goes before anybody who stands, whatever the order of the lanes; who has waited for
+//! [`GIVE_UP_S`] leaves the world, so that no standstill is forever.
+//!
+//! **Commanded vehicles and the ego vehicle.** A vehicle that an action made appear keeps these manners
+//! towards all other vehicles, but never yields to the ego vehicle at a junction: to cross or to turn
+//! before it is what its verb means. It follows, brakes for and does not push an ego vehicle that is
+//! ahead of it. Ambient vehicles yield to the ego vehicle as to everybody else, and take it for
+//! somebody who will not stop whenever it moves and no red light holds it.
+
+use crate::model::vocabulary::Body;
+use crate::road::LaneIndex;
+use crate::sim::body;
+use crate::sim::body::BodyParameters;
+use crate::sim::ego::VehicleParameters;
+use crate::sim::mover::Around;
+use crate::sim::sense::SignalColour;
+use crate::sim::way::WayArea;
+use crate::sim::world::DT_S;
+use crate::sim::world::Obstacle;
+
+use super::driver::COMFORT_MPS2;
+use super::driver::Driver;
+use super::driver::GAP_M_MIN;
+use super::driver::LOOK_AHEAD_M;
+
+/// After so long at rest nobody who stands is waited for any more, s. Ours.
+const PATIENCE_S: f64 = 8.0;
+/// After so long at rest for others a driver leaves the world, s. Ours: less than the 24 s without
+/// progress that end an episode of the shipped space.
+pub(super) const GIVE_UP_S: f64 = 20.0;
+/// Between one vehicle in an area and the next, s: accepted gaps in towns are longer, but the one who
+/// accepts them does not yet move.
+const GAP_S: f64 = 1.5;
+/// Who would have to brake harder than this does not stop any more, m/s² (as at a yellow light).
+const COMMITTED_MPS2: f64 = 3.0;
+/// Room between the front and the area that is waited for, m.
+const HOLD_ROOM_M: f64 = 0.5;
+/// Others so far from an area are no matter yet, m.
+const APPROACH_M: f64 = 80.0;
+/// A junction is no longer than this, m.
+const JUNCTION_M: f64 = 45.0;
+/// Below this speed somebody stands, m/s.
+pub(super) const STANDS_MPS: f64 = 0.1;
+/// An ego vehicle that moves faster than this is taken for one that will not stop, m/s.
+const EGO_MOVES_MPS: f64 = 1.0;
+
+/// One vehicle on its way through a conflict area.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Passage {
+    /// From its front to the beginning of the area, m; negative inside.
+    in_m: f64,
+    /// From its rear to the end of the area, m; negative beyond.
+    out_m: f64,
+    speed_mps: f64,
+    cruise_mps: f64,
+    acceleration_mps2: f64,
+    /// It will go through, whatever the order says.
+    committed: bool,
+    /// It stops before the area.
+    holds: bool,
+}
+
+impl Passage {
+    fn in_s(&self) -> f64 {
+        self.time_s(self.in_m)
+    }
+
+    fn out_s(&self) -> f64 {
+        self.time_s(self.out_m)
+    }
+
+    /// Time for a way at the vehicle's own acceleration up to its cruising speed, s.
+    fn time_s(&self, way_m: f64) -> f64 {
+        let way_m = way_m.max(0.0);
+        let (speed_mps, acceleration_mps2) = (self.speed_mps, self.acceleration_mps2);
+        let cruise_mps = self.cruise_mps.max(speed_mps).max(1.0);
+        let gained_m = (cruise_mps * cruise_mps - speed_mps * speed_mps) / (2.0 * acceleration_mps2);
+        if way_m <= gained_m {
+            return ((speed_mps * speed_mps + 2.0 * acceleration_mps2 * way_m).sqrt() - speed_mps)
+                / acceleration_mps2;
+        }
+        (cruise_mps - speed_mps) / acceleration_mps2 + (way_m - gained_m) / cruise_mps
+    }
+}
+
+/// Whether `own`, not yet in the area, has to wait for `other`.
+fn waits(own: &Passage, other: &Passage, goes_first: bool, impatient: bool) -> bool {
+    if other.out_m <= 0.0 || other.in_m > APPROACH_M {
+        return false;
+    }
+    if other.in_m <= 0.0 {
+        // Who is inside and moves may have left by then.
+        return other.speed_mps < 1.0 || other.out_s() + GAP_S / 2.0 > own.in_s();
+    }
+    if other.holds && !other.committed {
+        return false;
+    }
+    if own.out_s() + GAP_S < other.in_s() || other.out_s() + GAP_S < own.in_s() {
+        return false;
+    }
+    match (own.committed, other.committed) {
+        (true, false) => false,
+        (false, true) => true,
+        _ if impatient && other.speed_mps < STANDS_MPS => false,
+        _ => !goes_first,
+    }
+}
+
+impl Driver {
+    /// Station of the own way at which to wait now, m, if there is anybody to wait for.
+    pub(super) fn find_hold_m(&self, this: &Obstacle, size: &BodyParameters, around: &Around) -> Option<f64> {
+        let front_m = self.station_m + size.length_m / 2.0;
+        let reach_m = LOOK_AHEAD_M + self.speed_mps * self.speed_mps / (2.0 * COMFORT_MPS2);
+        let areas = &self.way.areas;
+        let open = areas.iter().position(|area| area.from_m > front_m)?;
+        let near = |area: &&WayArea| area.from_m <= front_m + reach_m;
+        let waited_for = areas[open..]
+            .iter()
+            .take_while(near)
+            .position(|area| self.must_wait(area, this, size, around))?;
+        // Not in an area before it either, unless the front is in that already.
+        let mut hold_m = areas[open + waited_for].from_m;
+        for area in areas[open..open + waited_for].iter().rev() {
+            if area.to_m > hold_m - HOLD_ROOM_M - GAP_M_MIN - size.length_m {
+                hold_m = hold_m.min(area.from_m);
+            }
+        }
+        Some(hold_m - HOLD_ROOM_M)
+    }
+
+    /// End of the last area that somebody at the junction ahead crosses, m.
+    pub(super) fn junction_end_m(&self, size: &BodyParameters) -> f64 {
+        let front_m = self.station_m + size.length_m / 2.0;
+        let ahead = self.way.areas.iter().filter(|area| area.from_m < front_m + JUNCTION_M);
+        ahead.fold(f64::NEG_INFINITY, |end_m, area| end_m.max(area.to_m))
+    }
+
+    fn must_wait(&self, area: &WayArea, this: &Obstacle, size: &BodyParameters, around: &Around) -> bool {
+        if self.would_stop_in(area, size) {
+            return true;
+        }
+        let own = self.passage(area.from_m, area.to_m, size, around);
+        let impatient = f64::from(self.waited_ticks) * DT_S >= PATIENCE_S;
+        let mut others = around.drivers(this.id);
+        let for_others = others.any(|(obstacle, driver)| {
+            let reach_m = APPROACH_M + JUNCTION_M;
+            let away = obstacle.outline.pose.position - this.outline.pose.position;
+            if away.norm_squared() > reach_m * reach_m {
+                return false;
+            }
+            let other = driver.passage_through(area, obstacle.body, around);
+            other.is_some_and(|other| waits(&own, &other, area.goes_first, impatient))
+        });
+        let for_ego = || {
+            let other = ego_passage(area, around);
+            other.is_some_and(|other| waits(&own, &other, area.goes_first, impatient))
+        };
+        for_others || (self.yields_to_ego && for_ego())
+    }
+
+    /// Whether the one ahead stands so near behind an area that there is no room for both.
+    fn would_stop_in(&self, area: &WayArea, size: &BodyParameters) -> bool {
+        let front_m = self.station_m + size.length_m / 2.0;
+        self.leader.as_ref().is_some_and(|leader| {
+            let stop_m = front_m + leader.gap_m - GAP_M_MIN;
+            let in_area = (area.from_m..area.to_m + size.length_m + HOLD_ROOM_M).contains(&stop_m);
+            in_area && !leader.crosswise && leader.speed_mps.abs() < 1.0
+        })
+    }
+
+    fn passage(&self, from_m: f64, to_m: f64, size: &BodyParameters, around: &Around) -> Passage {
+        let front_m = self.station_m + size.length_m / 2.0;
+        let in_m = from_m - front_m;
+        let braking_mps2 = around.braking_mps2(size, self.speed_mps);
+        let red_gap_m = self.stop_gap_m(size, around, braking_mps2);
+        let holds =
+            self.hold_m.is_some_and(|hold_m| hold_m < from_m) || red_gap_m.is_some_and(|gap_m| gap_m < in_m);
+        let stops_m = self.speed_mps * self.speed_mps / (2.0 * COMMITTED_MPS2);
+        Passage {
+            in_m,
+            out_m: to_m - (self.station_m - size.length_m / 2.0),
+            speed_mps: self.speed_mps,
+            cruise_mps: self.cruise_mps.min(self.way.speed_mps_max(self.station_m)),
+            acceleration_mps2: size.acceleration_mps2_max,
+            committed: front_m < self.insists_to_m || stops_m > in_m,
+            holds,
+        }
+    }
+
+    /// This driver's passage through the other side of somebody's area, if the way leads there.
+    fn passage_through(&self, area: &WayArea, body: Body, around: &Around) -> Option<Passage> {
+        let size = body::parameters(body);
+        let begin_m = self.way.lane_ahead_m(area.other, self.station_m - size.length_m / 2.0)?;
+        Some(self.passage(begin_m + area.other_from_m, begin_m + area.other_to_m, &size, around))
+    }
+}
+
+/// The ego vehicle's passage along its route, in the eyes of others.
+fn ego_passage(area: &WayArea, around: &Around) -> Option<Passage> {
+    let begin_m = ego_lane_begin_m(area.other, around)?;
+    let car = &VehicleParameters::MKZ;
+    let (front_m, rear_m) = (car.front_m(around.ego_station_m), car.rear_m(around.ego_station_m));
+    let (from_m, to_m) = (begin_m + area.other_from_m, begin_m + area.other_to_m);
+    let is_red = |signal| around.signals.colour(&around.scene.map, signal, around.tick) == SignalColour::Red;
+    let mut lines = around.scene.route.stop_lines.iter();
+    let holds = lines.any(|line| (front_m - 1.0..from_m).contains(&line.station_m) && is_red(line.signal));
+    Some(Passage {
+        in_m: from_m - front_m,
+        out_m: to_m - rear_m,
+        speed_mps: around.ego.speed_mps,
+        cruise_mps: around.scene.map.lane(area.other).speed_limit_mps,
+        acceleration_mps2: car.acceleration_mps2_max,
+        committed: !holds && around.ego.speed_mps > EGO_MOVES_MPS,
+        holds,
+    })
+}
+
+/// Station of the route at which a lane begins that the ego vehicle has not left yet, m.
+fn ego_lane_begin_m(lane: LaneIndex, around: &Around) -> Option<f64> {
+    let rear_m = VehicleParameters::MKZ.rear_m(around.ego_station_m);
+    let part = around.scene.route.lanes.iter().find(|part| part.lane == lane && part.to_m > rear_m)?;
+    Some(part.from_m)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn passage(in_m: f64, speed_mps: f64) -> Passage {
+        Passage {
+            in_m,
+            out_m: in_m + 10.0,
+            speed_mps,
+            cruise_mps: 10.0,
+            acceleration_mps2: 2.0,
+            committed: false,
+            holds: false,
+        }
+    }
+
+    #[test]
+    fn of_two_who_come_together_one_waits() {
+        let (own, other) = (passage(20.0, 10.0), passage(20.0, 10.0));
+        assert!(!waits(&own, &other, true, false));
+        assert!(waits(&own, &other, false, false));
+    }
+
+    #[test]
+    fn a_gap_is_enough_and_who_is_inside_is_not_run_into() {
+        let own = passage(5.0, 10.0);
+        assert!(!waits(&own, &passage(60.0, 10.0), false, false), "it is through before the other comes");
+        assert!(!waits(&own, &passage(-10.0, 10.0), true, false), "it has left");
+        assert!(waits(&own, &passage(-1.0, 0.0), true, true), "it stands in the area");
+        let late = Passage { holds: true, ..passage(5.0, 0.0) };
+        assert!(!waits(&own, &late, false, false), "it waits itself");
+    }
+
+    #[test]
+    fn patience_ends_and_commitment_counts() {
+        let (own, stands) = (passage(2.0, 0.0), passage(2.0, 0.0));
+        assert!(waits(&own, &stands, false, false));
+        assert!(!waits(&own, &stands, false, true));
+        let committed = Passage { committed: true, ..passage(2.0, 8.0) };
+        assert!(waits(&own, &committed, true, true));
+        assert!(!waits(&committed, &own, false, false));
+    }
+
+    #[test]
+    fn times_follow_from_the_acceleration() {
+        // 25 m to reach 10 m/s at 2 m/s², in 5 s; then 10 m/s.
+        assert!((passage(25.0, 0.0).in_s() - 5.0).abs() < 1e-9);
+        assert!((passage(45.0, 0.0).in_s() - 7.0).abs() < 1e-9);
+        assert!((passage(30.0, 10.0).in_s() - 3.0).abs() < 1e-9);
+    }
+}

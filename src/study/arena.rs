@@ -1,0 +1,151 @@
+//! Where episodes are played: a space with its roads, a driving system and the rules in force.
+
+use std::collections::BTreeSet;
+use std::sync::Arc;
+
+use ndarray::Array1;
+
+use crate::action::ActionTable;
+use crate::action::ActiveRules;
+use crate::action::Offer;
+use crate::ads;
+use crate::ads::Selected;
+use crate::agent::Agent;
+use crate::episode;
+use crate::episode::Choice;
+use crate::episode::Moment;
+use crate::rng;
+use crate::rng::Stream;
+use crate::sim::Scene;
+use crate::syntax::listed;
+
+use super::profile::Profile;
+use super::run::RunError;
+
+/// Everything that the episodes of a run or a training share.
+pub struct Arena {
+    table: ActionTable,
+    rules: ActiveRules,
+    ads: Selected,
+    /// Index of each road in the space, with its scene.
+    roads: Vec<(usize, Arc<Scene>)>,
+}
+
+impl Arena {
+    /// Looks the names up. `rules` are those switched on and those switched off.
+    ///
+    /// # Errors
+    /// If a road, a driving system or a rule does not exist, or is named twice.
+    pub fn new(
+        table: ActionTable,
+        roads: &[String],
+        ads: &str,
+        (with, without): (&[String], &[String]),
+    ) -> Result<Arena, RunError> {
+        if let Some(name) = twice(roads).or_else(|| twice(with.iter().chain(without))) {
+            return Err(RunError::Twice { name });
+        }
+        let space = table.space();
+        let roads = roads.iter().map(|name| {
+            let index = space.roads.iter().position(|road| &road.name == name);
+            let index = index.ok_or_else(|| {
+                let known = listed(&space.roads.iter().map(|road| road.name.as_str()).collect::<Vec<_>>());
+                RunError::Road { name: name.clone(), known }
+            })?;
+            Ok((index, Arc::new(episode::scene(&space.roads[index]))))
+        });
+        let roads = roads.collect::<Result<_, RunError>>()?;
+        let ads = driving_system(ads)?;
+        let rules = ActiveRules::new(space, with, without)?;
+        Ok(Arena { table, rules, ads, roads })
+    }
+
+    pub fn table(&self) -> &ActionTable {
+        &self.table
+    }
+
+    /// From now on with these settings of the driving system.
+    ///
+    /// # Errors
+    /// If it has none, or they mean something else in this version.
+    pub(super) fn set_profile(&mut self, profile: &Profile) -> Result<(), RunError> {
+        if profile.settings.digest() != profile.digest {
+            let ads = self.ads.name().to_owned();
+            return Err(RunError::ProfileDigest { what: "the run".to_owned(), ads });
+        }
+        self.ads = self.ads.clone().with_profile(profile.settings)?;
+        Ok(())
+    }
+
+    /// Number of roads.
+    pub fn roads(&self) -> usize {
+        self.roads.len()
+    }
+
+    /// An episode of a seed on the nth of the roads.
+    pub fn setup(&self, road: usize, seed: u64) -> episode::Setup<'_> {
+        let (index, scene) = &self.roads[road];
+        let space = self.table.space();
+        let memory = space.initial_memory(seed);
+        episode::Setup {
+            table: &self.table,
+            road: &space.roads[*index],
+            scene: scene.clone(),
+            rules: &self.rules,
+            ads: self.ads.clone(),
+            seed,
+            start: episode::start(space, &memory, seed),
+            memory,
+        }
+    }
+}
+
+/// Lets an agent choose among the offers of the moment. With nothing legal, the step passes.
+pub(super) fn choose(table: &ActionTable, agent: &mut dyn Agent, moment: &Moment) -> Choice {
+    let offers = table.offers(moment.situation);
+    let legal = legal(&offers);
+    carry_out(offers, legal.view(), agent, moment)
+}
+
+/// Which of the offers are legal, shape `(rows,)`.
+pub(super) fn legal(offers: &[Offer]) -> Array1<bool> {
+    offers.iter().map(|offer| matches!(offer, Offer::Legal(_))).collect()
+}
+
+/// What the agent makes of the offers.
+pub(super) fn carry_out(
+    mut offers: Vec<Offer>,
+    legal: ndarray::ArrayView1<bool>,
+    agent: &mut dyn Agent,
+    moment: &Moment,
+) -> Choice {
+    if !legal.iter().any(|&is_legal| is_legal) {
+        return Choice::Pass;
+    }
+    let mut rng = rng::stream(moment.situation.seed, Stream::Exploration, moment.step as u64);
+    let Some(row) = agent.choose(moment.observation, legal, &mut rng) else { return Choice::Pass };
+    match offers.swap_remove(row) {
+        Offer::Legal(draw) => Choice::Act(draw),
+        Offer::Refused(refusal) => Choice::Refused { row, rule: refusal.rule, reason: refusal.reason },
+    }
+}
+
+/// Who drives where nobody is named.
+pub const DEFAULT_ADS: &str = "modular";
+
+/// The driving system of that name, as it comes.
+///
+/// # Errors
+/// If there is none.
+pub fn driving_system(name: &str) -> Result<Selected, RunError> {
+    ads::by_name(name).map(Selected::new).ok_or_else(|| {
+        let known = listed(&ads::REGISTRY.iter().map(|entry| entry.name).collect::<Vec<_>>());
+        RunError::Ads { name: name.to_owned(), known }
+    })
+}
+
+/// The first name that comes a second time.
+fn twice<'a>(names: impl IntoIterator<Item = &'a String>) -> Option<String> {
+    let mut seen = BTreeSet::new();
+    names.into_iter().find(|name| !seen.insert(*name)).cloned()
+}

@@ -1,0 +1,66 @@
+//! What a policy achieves without learning any more, in figures that anybody can check.
+
+use sha2::Digest;
+use sha2::Sha256;
+
+use crate::action::ActionTable;
+use crate::agent::Agent;
+use crate::agent::QPolicy;
+use crate::episode;
+use crate::oracle::AvoidabilitySettings;
+use crate::rng;
+use crate::rng::Stream;
+use crate::study::arena::Arena;
+use crate::study::arena::choose;
+use crate::study::run::RunError;
+use crate::study::summary::EpisodeSummary;
+
+use super::training::with_period;
+
+/// The outcome of a number of episodes.
+#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
+pub struct Evaluation {
+    /// Episodes on each road.
+    pub episodes: u64,
+    pub seed: u64,
+    pub collisions: u64,
+    /// Collisions that the space's verdict counts.
+    pub counted: u64,
+    /// Episodes with a counted collision.
+    pub colliding: u64,
+    /// SHA-256 over the traces of all episodes, in order.
+    pub trace: [u8; 32],
+}
+
+/// Plays so many episodes on each road with a policy. `rules` are those switched on and off.
+///
+/// # Errors
+/// If a road, the driving system or a rule does not exist.
+pub fn evaluate(
+    table: ActionTable,
+    policy: &QPolicy,
+    roads: &[String],
+    ads: &str,
+    rules: (&[String], &[String]),
+    (episodes, seed): (u64, u64),
+) -> Result<Evaluation, RunError> {
+    let table = with_period(table, policy.settings().observation_period_s);
+    let arena = Arena::new(table, roads, ads, rules)?;
+    let mut traces = Sha256::new();
+    let mut found = Evaluation { episodes, seed, collisions: 0, counted: 0, colliding: 0, trace: [0; 32] };
+    for number in 0..episodes * arena.roads() as u64 {
+        let seed = rng::child_seed(seed, Stream::Evaluation, number);
+        let setup = arena.setup((number % arena.roads() as u64) as usize, seed);
+        let mut agent = policy.clone();
+        agent.begin();
+        let mut choose = |moment: &episode::Moment| choose(arena.table(), &mut agent, moment);
+        let log = episode::run(&setup, &mut choose, &mut |_, _, _| {});
+        let settings = AvoidabilitySettings::default();
+        let counted = EpisodeSummary::judged(&setup, number as usize, &log, &settings).counted() as u64;
+        found.collisions += log.collisions.len() as u64;
+        found.counted += counted;
+        found.colliding += u64::from(counted > 0);
+        traces.update(log.trace());
+    }
+    Ok(Evaluation { trace: traces.finalize().into(), ..found })
+}

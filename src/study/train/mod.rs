@@ -1,0 +1,12 @@
+//! Training: episodes one after another, from each of which the agent learns.
+
+mod evaluation;
+mod record;
+mod training;
+
+pub use evaluation::Evaluation;
+pub use evaluation::evaluate;
+pub use record::Checkpoint;
+pub use training::TrainSettings;
+pub use training::TrainedEpisode;
+pub use training::Training;

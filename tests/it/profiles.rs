@@ -1,0 +1,109 @@
+//! Profiles of the driving system: from file to run, from run to scenario, from scenario to replay.
+
+use std::path::Path;
+
+use avastra::ads::ModularConfig;
+use avastra::study::RunSettings;
+
+use crate::cases::root;
+use crate::command::avastra;
+use crate::command::outcome;
+
+const FAULT: &str = "scenarios/ads/faults/planning_never_yields.yaml";
+
+fn profile(name: &str) -> ModularConfig {
+    let path = root().join(name);
+    let text = std::fs::read_to_string(&path).expect("it is shipped");
+    ModularConfig::from_yaml(&text).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
+}
+
+/// A run of a few episodes into a directory.
+fn run(directory: &Path, more: &[&str]) -> (i32, String, String) {
+    let out = directory.display().to_string();
+    let mut arguments =
+        vec!["run", "scenarios/avastra45.ava", "--road", "corner", "--seed", "5", "--quiet", "--out", &out];
+    arguments.extend(more);
+    outcome(&mut avastra(&arguments))
+}
+
+#[test]
+fn shipped_profiles_are_accepted_and_recorded() {
+    let scratch = tempfile::tempdir().expect("a scratch directory");
+    for name in ["cautious", "degraded", "default"] {
+        let file = format!("scenarios/ads/{name}.yaml");
+        let directory = scratch.path().join(name);
+        let (status, _, stderr) = run(&directory, &["--episodes", "1", "--ads-config", &file]);
+        assert_eq!(status, 0, "{stderr}");
+        let text = std::fs::read_to_string(directory.join("run.yaml")).expect("it was written");
+        let settings: RunSettings = serde_yaml::from_str(&text).expect("it reads back");
+        let recorded = settings.profile.expect("modular has settings");
+        assert_eq!((recorded.settings, recorded.digest), (profile(&file), profile(&file).digest()));
+    }
+    assert_eq!(profile("scenarios/ads/default.yaml"), ModularConfig::default());
+}
+
+#[test]
+fn a_scenario_keeps_the_profile_that_it_was_found_with() {
+    let scratch = tempfile::tempdir().expect("a scratch directory");
+    let directory = scratch.path().join("run");
+    let (status, _, stderr) = run(&directory, &["--episodes", "30", "--ads-config", FAULT]);
+    assert_eq!(status, 0, "{stderr}");
+    let critical = directory.join("critical");
+    let mut files: Vec<_> = std::fs::read_dir(&critical)
+        .expect("it exists")
+        .map(|entry| entry.expect("it reads").path())
+        .collect();
+    files.sort();
+    let file = files.first().expect("who yields to nobody hits somebody");
+    let text = std::fs::read_to_string(file).expect("it was written");
+    assert!(text.contains("never_yields: true"), "{text}");
+
+    let path = file.display().to_string();
+    let (status, stdout, stderr) = outcome(&mut avastra(&["replay", &path]));
+    assert_eq!(status, 0, "{stdout}{stderr}");
+    // The same profile from its file is the recorded one: claims are checked.
+    let (status, stdout, _) = outcome(&mut avastra(&["replay", &path, "--ads-config", FAULT]));
+    assert!(status == 0 && !stdout.contains("against"), "{stdout}");
+    // Another one is not: what happens is told.
+    let cautious = "scenarios/ads/cautious.yaml";
+    let (status, stdout, _) = outcome(&mut avastra(&["replay", &path, "--ads-config", cautious]));
+    assert!(status == 0 && stdout.contains("against modular with scenarios/ads/cautious.yaml"), "{stdout}");
+
+    // A digest that the settings do not have: refused, with what to do.
+    let other = file.with_file_name("other.ava");
+    let digest = profile(FAULT).digest();
+    assert!(text.contains(&digest));
+    std::fs::write(&other, text.replace(&digest, &ModularConfig::default().digest()))
+        .expect("it is writable");
+    let (status, _, stderr) = outcome(&mut avastra(&["replay", &other.display().to_string()]));
+    assert!(status == 1 && stderr.contains("--ads-config FILE"), "{stderr}");
+}
+
+#[test]
+fn a_profile_with_a_mistake_is_refused_by_name_line_and_remedy() {
+    let scratch = tempfile::tempdir().expect("a scratch directory");
+    let file = scratch.path().join("mine.yaml");
+    let name = file.display().to_string();
+    let cases = [
+        (
+            "planning:\n  cruise_mp: 8\n",
+            "line 2: `planning.cruise_mp` is no setting; did you mean `cruise_mps`?",
+        ),
+        (
+            "planning:\n\n  cruise_mps: 80\n",
+            "line 3: `planning.cruise_mps` is 80; write a value from 1 to 40",
+        ),
+        ("tracking: [1]\n", "line 1: `tracking` is a list; write a section"),
+    ];
+    for (text, message) in cases {
+        std::fs::write(&file, text).expect("it is writable");
+        let directory = scratch.path().join("never");
+        let (status, _, stderr) = run(&directory, &["--ads-config", &name]);
+        assert_eq!(status, 1, "{stderr}");
+        assert!(stderr.contains(message) && stderr.contains("mine.yaml"), "{stderr}");
+        assert!(!directory.exists());
+    }
+    std::fs::write(&file, "planning: {cruise_mps: 8}\n").expect("it is writable");
+    let (status, _, stderr) = run(&scratch.path().join("idm"), &["--ads", "idm", "--ads-config", &name]);
+    assert!(status == 1 && stderr.contains("`idm` has no settings"), "{stderr}");
+}

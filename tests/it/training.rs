@@ -1,0 +1,176 @@
+//! Training at its edges: it resumes to the same bytes, and what it writes holds or is refused.
+
+use std::path::Path;
+use std::process::Stdio;
+use std::time::Duration;
+
+use assert_cmd::Command;
+use avastra::model::policy::Policy;
+use avastra::model::policy::seal;
+use avastra::syntax::ast::FileId;
+
+use crate::cases::root;
+use crate::world::read;
+
+const SMALL: &str = "learning_starts: 30\nupdates_per_step: 1\nhidden_units: [8]\nbatch_len: 8\n";
+
+fn avastra(arguments: &[&str]) -> Command {
+    let mut command = Command::cargo_bin("avastra").expect("the binary is built with the tests");
+    command.current_dir(root()).args(arguments);
+    command
+}
+
+/// A training of a few episodes with a network of a few neurons, into a directory.
+fn training(out: &Path) -> Vec<String> {
+    let config = out.with_extension("yaml");
+    std::fs::write(&config, SMALL).expect("it is writable");
+    let (config, out) = (config.display().to_string(), out.display().to_string());
+    let words = ["train", "scenarios/avastra45.ava", "--road", "corner", "--episodes", "30", "--seed", "5"];
+    words
+        .map(str::to_owned)
+        .into_iter()
+        .chain(["--config".to_owned(), config, "--out".to_owned(), out])
+        .collect()
+}
+
+fn policy_of(out: &Path) -> String {
+    std::fs::read_to_string(out.join("policy/corner_ddqn_5.ava")).expect("a policy is written at the end")
+}
+
+/// The policy of a whole training.
+fn trained(out: &Path) -> String {
+    let arguments = training(out);
+    avastra(&arguments.iter().map(String::as_str).collect::<Vec<_>>()).assert().success();
+    policy_of(out)
+}
+
+/// Loads a policy text as if it stood beside the shipped space.
+fn load(text: &str) -> Result<Policy, Vec<&'static str>> {
+    let path = root().join("scenarios/policy_under_test.ava");
+    let read = |asked: &Path| if asked == path { Ok(text.to_owned()) } else { read(asked) };
+    let loaded = avastra::model::load(&path, &read).expect("the root can be read");
+    loaded.policy.ok_or_else(|| loaded.diagnostics.iter().map(|diagnostic| diagnostic.code).collect())
+}
+
+/// A policy that has moved beside the shipped space.
+fn beside_the_space(text: &str) -> String {
+    let begin = text.find("use \"").expect("it uses a space") + 5;
+    let end = begin + text[begin..].find('"').expect("the path ends");
+    format!("{}avastra45.ava{}", &text[..begin], &text[end..])
+}
+
+#[test]
+fn a_killed_training_resumes_to_the_same_bytes() {
+    let scratch = tempfile::tempdir().expect("a scratch directory");
+    let whole = trained(&scratch.path().join("whole"));
+    let out = scratch.path().join("killed");
+    let arguments = training(&out);
+    let binary = avastra(&[]).get_program().to_owned();
+    let resume = ["train".to_owned(), "--resume".to_owned(), out.display().to_string()];
+    for (kill, wait_ms) in [150_u64, 450, 900, 1300].into_iter().enumerate() {
+        let begins = kill == 0 || !out.join("run.yaml").is_file();
+        if begins {
+            // Killed before it had written its settings, it is as if it had never been.
+            let _ = std::fs::remove_dir_all(&out);
+        }
+        let mut child = std::process::Command::new(&binary)
+            .current_dir(root())
+            .args(if begins { &arguments[..] } else { &resume[..] })
+            .stdout(Stdio::null())
+            .stderr(Stdio::null())
+            .spawn()
+            .expect("it starts");
+        std::thread::sleep(Duration::from_millis(wait_ms));
+        child.kill().expect("it is ours to kill");
+        child.wait().expect("it ends");
+    }
+    avastra(&resume.iter().map(String::as_str).collect::<Vec<_>>()).assert().success();
+    assert_eq!(policy_of(&out), whole);
+}
+
+#[test]
+fn a_policy_is_verified_played_and_refused_when_damaged() {
+    let scratch = tempfile::tempdir().expect("a scratch directory");
+    let out = scratch.path().join("run");
+    let text = trained(&out);
+    let file = out.join("policy/corner_ddqn_5.ava").display().to_string();
+    avastra(&["verify", &file]).assert().success();
+    avastra(&[
+        "run",
+        "--policy",
+        &file,
+        "--episodes",
+        "2",
+        "--out",
+        &out.join("played").display().to_string(),
+    ])
+    .assert()
+    .success();
+
+    let moved = beside_the_space(&text);
+    let policy = load(&moved).expect("a policy may move");
+    let weights = avastra::model::policy::weights_to_lines(&policy.parameters);
+    assert!(weights.iter().all(|line| moved.contains(line)), "the weights come back bit by bit");
+
+    // Every so many bytes one is flipped, and lower bits and higher ones in turn.
+    for (turn, at) in (0..moved.len()).step_by(151).enumerate() {
+        let mut bytes = moved.clone().into_bytes();
+        bytes[at] ^= 1 << (turn % 7);
+        let Ok(flipped) = String::from_utf8(bytes) else { continue };
+        assert!(load(&flipped).is_err(), "byte {at} of {}", moved.len());
+    }
+}
+
+#[test]
+fn a_policy_that_does_not_fit_is_refused() {
+    let scratch = tempfile::tempdir().expect("a scratch directory");
+    let moved = beside_the_space(&trained(&scratch.path().join("run")));
+    // Changed and sealed again, so that the seal is not what is found wrong.
+    let sealed = |text: &str| {
+        let (tree, _) = avastra::syntax::parse(FileId(0), text);
+        let begin = text.find("    digest: \"").expect("it is sealed") + 13;
+        format!("{}{}{}", &text[..begin], seal(text, &tree), &text[begin + 71..])
+    };
+    assert_eq!(load(&sealed(&moved)), load(&moved));
+    let cases = [
+        ("layers: [36, 8, 45]", "layers: [36, 8, 44]", "AV0701"),
+        ("layers: [36, 8, 45]", "layers: [36, 9, 45]", "AV0701"),
+        ("layers: [36, 8, 45]", "layers: [36, 8, 45, 45]", "AV0701"),
+        ("dueling: true\n    hyper", "dueling: false\n    hyper", "AV0701"),
+        ("    weights: [\n      \"", "    weights: [\n      \"*", "AV0703"),
+        ("    seed: 5", "    sed: 5", "AV0703"),
+        ("    seed: 5", "    seed: 5\n    seed: 5", "AV0703"),
+    ];
+    for (from, to, code) in cases {
+        assert!(moved.contains(from), "{from}");
+        let text = moved.replacen(from, to, 1);
+        assert_eq!(load(&sealed(&text)).expect_err("it does not fit"), [code], "{to}");
+    }
+    assert_eq!(load(&moved.replacen("seed: 5", "seed: 6", 1)).expect_err("not sealed"), ["AV0702"]);
+    let twice = format!("{moved}\n{}", &moved[moved.find("policy corner").expect("its name")..]);
+    assert_eq!(load(&twice.replacen("policy corner", "policy other", 1)).expect_err("two"), ["AV0704"]);
+}
+
+#[test]
+fn what_cannot_be_trained_is_said_so() {
+    let scratch = tempfile::tempdir().expect("a scratch directory");
+    let config = scratch.path().join("config.yaml");
+    std::fs::write(&config, "discuont: 0.9\n").expect("it is writable");
+    let config = config.display().to_string();
+    let space = "scenarios/avastra45.ava";
+    let cases: [(&[&str], &str); 7] = [
+        (&["train", space, "--agent", "random"], "nothing to learn"),
+        (&["train", space, "--agent", "dqn"], "`ddqn` and `deep_collision`"),
+        (&["train", space, "--preset", "realesed"], "`avastra`, `paper` and `released`"),
+        (&["train", space, "--config", &config], "did you mean `discount`?"),
+        (&["run", space, "--agent", "ddqn"], "has to be trained first"),
+        (&["run", "--policy", space], "neither a scenario nor a policy"),
+        (&["train", "--resume", "scenarios"], "no run.yaml"),
+    ];
+    for (arguments, reason) in cases {
+        let output = avastra(arguments).output().expect("it starts");
+        let stderr = String::from_utf8(output.stderr).expect("it prints UTF-8");
+        assert_eq!(output.status.code(), Some(1), "{arguments:?}: {stderr}");
+        assert!(stderr.contains(reason), "{arguments:?}: {stderr}");
+    }
+}
