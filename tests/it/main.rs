@@ -10,6 +10,7 @@ mod emitted;
 mod layers;
 mod profiles;
 mod references;
+mod road;
 mod rules;
 mod tables;
 mod traces;

@@ -23,10 +23,11 @@ pub fn space(name: &str) -> Arc<Space> {
     space_at(&format!("scenarios/{name}"))
 }
 
-/// A space by its path in the repository.
+/// A space by its path in the repository. That some row cannot run on some road is no mistake.
 pub fn space_at(name: &str) -> Arc<Space> {
     let loaded = avastra::model::load(&root().join(name), &read).expect("it is there");
-    assert!(loaded.diagnostics.is_empty(), "{name}: {:?}", loaded.diagnostics);
+    let is_sound = loaded.diagnostics.iter().all(|diagnostic| diagnostic.code == "AV0402");
+    assert!(is_sound, "{name}: {:?}", loaded.diagnostics);
     loaded.space.expect("a space without mistakes is a space")
 }
 
