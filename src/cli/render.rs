@@ -32,7 +32,8 @@ pub fn render(output: &Output, arguments: &RenderArguments) -> Result<(), Failur
     let times_s = times(arguments, scenario, table.space().episode.step_s)?;
     let ads = arguments.ads.as_deref();
     let moments = moments(&table, scenario, ads, &times_s)?;
-    if moments.len() < times_s.len() {
+    // A strip ends where its scenario does.
+    if moments.is_empty() || (!arguments.strip && moments.len() < times_s.len()) {
         return Err(Failure::usage(format!(
             "`{}` is over before {} s",
             scenario.name,
@@ -52,7 +53,10 @@ pub fn render(output: &Output, arguments: &RenderArguments) -> Result<(), Failur
         output.tell(&path.display().to_string());
     }
     let svg = on_stdout.then_some(svg);
-    output.result("render", serde_json::json!({ "picture": path, "times_s": times_s, "svg": svg }));
+    output.result(
+        "render",
+        serde_json::json!({ "picture": path, "times_s": times_s[..moments.len()], "svg": svg }),
+    );
     Ok(())
 }
 
@@ -78,7 +82,8 @@ fn times(arguments: &RenderArguments, scenario: &Scenario, step_s: f64) -> Resul
         let acted = acted.ok_or_else(|| {
             Failure::usage("`--strip` needs a scenario with an action or a collision: use `--at`")
         })?;
-        let begin_s = acted.number as f64 * step_s;
+        // The action is carried out between two ticks: one later it shows.
+        let begin_s = acted.number as f64 * step_s + DT_S;
         return Ok((0..STRIP_LEN).map(|n| begin_s + ACTION_STRIDE_S * f64::from(n)).collect());
     };
     let back = |n: u32| (first_s - f64::from(STRIP_LEN - 1 - n)).max(0.0);
