@@ -21,6 +21,7 @@ use crate::rng;
 use crate::road::Conflict;
 use crate::road::LaneIndex;
 use crate::road::RouteLane;
+use crate::road::Turn;
 
 use super::body;
 use super::body::BodyParameters;
@@ -536,9 +537,12 @@ fn lane_along(
     through.iter().copied().find(|lane| map.lane(*lane).successors.contains(&to)).ok_or(refusal)
 }
 
-/// The lane from which one comes into a lane: that of the route, if it is one, else the first.
+/// The lane from which one comes into a lane: that of the route, if it is one, else one straight behind,
+/// else the first.
 fn lane_before(around: &Around, lane: LaneIndex) -> Option<LaneIndex> {
-    let route = &around.scene.route.lanes;
-    let on_route = route.windows(2).find(|pair| pair[1].lane == lane).map(|pair| pair[0].lane);
-    on_route.or_else(|| around.scene.map.lane(lane).predecessors.first().copied())
+    let (map, route) = (&around.scene.map, &around.scene.route.lanes);
+    let before = &map.lane(lane).predecessors;
+    let on_route = before.iter().find(|lane| route.iter().any(|part| part.lane == **lane));
+    let straight = || before.iter().find(|lane| map.lane(**lane).turn == Turn::Straight);
+    on_route.or_else(straight).or(before.first()).copied()
 }
