@@ -20,6 +20,7 @@ mod run;
 mod run_directory;
 mod sarif;
 mod train;
+mod trials;
 mod verify;
 mod why;
 
