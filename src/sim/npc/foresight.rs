@@ -39,7 +39,7 @@ impl Driver {
         let matters = |outline: &OrientedBox, speed_mps: f64| {
             let away = outline.pose.position - here.position;
             away.norm_squared() < NEAR_M * NEAR_M
-                && (here.forward().dot(&away) > 0.0 || speed_mps < self.speed_mps)
+                && (this.forward.dot(&away) > 0.0 || speed_mps < self.speed_mps)
         };
         let mut free_m = f64::INFINITY;
         if self.yields_to_ego && matters(around.ego_outline, around.ego.speed_mps) {
@@ -49,7 +49,7 @@ impl Driver {
             };
             free_m = free_m.min(self.free_way_m(this, around.ego_outline, ego));
         }
-        for (obstacle, driver) in around.drivers(this.id) {
+        for (obstacle, _, driver) in around.drivers(this.id) {
             if driver.change.is_some() || !matters(&obstacle.outline, driver.speed_mps) {
                 continue;
             }
@@ -62,6 +62,7 @@ impl Driver {
     /// How far this driver gets before its outline would meet another, m; infinite if it would not.
     fn free_way_m(&self, this: &Obstacle, outline: &OrientedBox, other_at: impl Fn(f64) -> Pose) -> f64 {
         let speed_mps = self.speed_mps.max(CREEP_MPS);
+        let near_m = this.outline.radius_m() + outline.radius_m() + ROOM_M;
         let mut free_m = 0.0;
         for time_s in MOMENTS_S {
             let own = OrientedBox {
@@ -69,7 +70,8 @@ impl Driver {
                 ..this.outline
             };
             let other = OrientedBox { pose: other_at(time_s), ..*outline };
-            if distance_m(&own, &other) < ROOM_M {
+            let apart = other.pose.position - own.pose.position;
+            if apart.norm_squared() < near_m * near_m && distance_m(&own, &other) < ROOM_M {
                 return free_m;
             }
             free_m = speed_mps * time_s;
