@@ -79,6 +79,8 @@ pub enum Command {
     Replay(ReplayArguments),
     /// Check every claim of emitted scenarios and policies.
     Verify(VerifyArguments),
+    /// Say which module of the driving system an emitted scenario's crash is the fault of.
+    Diagnose(DiagnoseArguments),
     /// Draw moments of an emitted scenario as SVG.
     Render(RenderArguments),
     /// Print or draw a map, and a route through it.
@@ -288,6 +290,17 @@ pub struct ReplayArguments {
     /// recorded one.
     #[arg(long, value_name = "FILE")]
     pub ads_config: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+pub struct DiagnoseArguments {
+    pub file: PathBuf,
+    /// Another profile of `modular` than the recorded one.
+    #[arg(long, value_name = "FILE")]
+    pub ads_config: Option<PathBuf>,
+    /// Say also how many of N small variations of timing, speeds and sensor errors still crash.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    pub likelihood: Option<u32>,
 }
 
 #[derive(Debug, Args)]

@@ -96,6 +96,7 @@ impl Arena {
             seed,
             start: episode::start(space, &memory, seed),
             memory,
+            period_shifts: Vec::new(),
         }
     }
 }

@@ -21,6 +21,7 @@ pub use run::PolicyReference;
 pub use run::Run;
 pub use run::RunError;
 pub use run::RunSettings;
+pub use run::Stage;
 pub use run::judge_replay;
 pub use run::play;
 pub use run::replay;

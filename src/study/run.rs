@@ -31,6 +31,7 @@ use crate::oracle::Judgement;
 use crate::rng;
 use crate::rng::Stream;
 use crate::sim::ENGINE;
+use crate::sim::Scene;
 use crate::sim::Start;
 use crate::syntax::listed;
 
@@ -283,6 +284,65 @@ pub fn replay(
     replay_with(table, scenario, &ads, watch)
 }
 
+/// A scenario that is ready to play: its road and the rules that it was made with.
+pub struct Stage<'a> {
+    table: &'a ActionTable,
+    scenario: &'a Scenario,
+    rules: ActiveRules,
+    scene: Arc<Scene>,
+}
+
+impl<'a> Stage<'a> {
+    /// # Errors
+    /// If the scenario is of another world or other rules.
+    pub fn new(table: &'a ActionTable, scenario: &'a Scenario) -> Result<Stage<'a>, RunError> {
+        let origin = &scenario.origin;
+        if let Some(engine) = origin.engine.as_ref().filter(|engine| engine.as_str() != ENGINE) {
+            return Err(RunError::Engine { scenario: scenario.name.clone(), engine: engine.clone() });
+        }
+        let rules = ActiveRules::new(table.space(), &origin.with, &origin.without)?;
+        let scene = Arc::new(episode::scene(&table.space().roads[scenario.road]));
+        Ok(Stage { table, scenario, rules, scene })
+    }
+
+    /// The beginning of its episode, with any driving system.
+    pub fn setup(&self, ads: &Selected) -> episode::Setup<'_> {
+        let space = self.table.space();
+        let start = &self.scenario.start;
+        let seed = self.scenario.origin.seed.unwrap_or(0);
+        let memory = start.memory.clone();
+        episode::Setup {
+            table: self.table,
+            road: &space.roads[self.scenario.road],
+            scene: self.scene.clone(),
+            rules: &self.rules,
+            ads: ads.clone(),
+            seed,
+            start: Start {
+                signal_phase_s: start.signal_phase_s,
+                seed: start.traffic_seed.unwrap_or(seed),
+                ambient: start.ambient,
+                ..episode::start(space, &memory, seed)
+            },
+            memory,
+            period_shifts: Vec::new(),
+        }
+    }
+
+    /// Plays it as it is written down.
+    pub fn play(&self, ads: &Selected, watch: &mut Watch) -> EpisodeLog {
+        let script = Script::of_scenario(self.scenario);
+        episode::run(&self.setup(ads), &mut |moment| script.choose(self.table, moment), watch)
+    }
+
+    /// Judges the collisions of its log, by playing it again.
+    pub fn judge(&self, ads: &Selected, log: &EpisodeLog) -> Vec<Judgement> {
+        oracle::judge(log, &AvoidabilitySettings::default(), &mut |watch| {
+            self.play(ads, watch);
+        })
+    }
+}
+
 /// Plays a scenario with any driving system, under the rules that it was made with.
 ///
 /// # Errors
@@ -293,32 +353,7 @@ pub fn replay_with(
     ads: &Selected,
     watch: &mut Watch,
 ) -> Result<EpisodeLog, RunError> {
-    let origin = &scenario.origin;
-    if let Some(engine) = origin.engine.as_ref().filter(|engine| engine.as_str() != ENGINE) {
-        return Err(RunError::Engine { scenario: scenario.name.clone(), engine: engine.clone() });
-    }
-    let space = table.space();
-    let rules = ActiveRules::new(space, &origin.with, &origin.without)?;
-    let road = &space.roads[scenario.road];
-    let seed = origin.seed.unwrap_or(0);
-    let memory = scenario.start.memory.clone();
-    let setup = episode::Setup {
-        table,
-        road,
-        scene: Arc::new(episode::scene(road)),
-        rules: &rules,
-        ads: ads.clone(),
-        seed,
-        start: Start {
-            signal_phase_s: scenario.start.signal_phase_s,
-            seed: scenario.start.traffic_seed.unwrap_or(seed),
-            ambient: scenario.start.ambient,
-            ..episode::start(space, &memory, seed)
-        },
-        memory,
-    };
-    let script = Script::of_scenario(scenario);
-    Ok(episode::run(&setup, &mut |moment| script.choose(table, moment), watch))
+    Ok(Stage::new(table, scenario)?.play(ads, watch))
 }
 
 /// Judges the collisions of a replay, by playing it again.
@@ -331,9 +366,5 @@ pub fn judge_replay(
     ads: &Selected,
     log: &EpisodeLog,
 ) -> Result<Vec<Judgement>, RunError> {
-    let mut failure = None;
-    let judgements = oracle::judge(log, &AvoidabilitySettings::default(), &mut |watch| {
-        failure = replay_with(table, scenario, ads, watch).err();
-    });
-    failure.map_or(Ok(judgements), Err)
+    Ok(Stage::new(table, scenario)?.judge(ads, log))
 }
