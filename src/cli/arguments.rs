@@ -298,6 +298,9 @@ pub struct DiagnoseArguments {
     /// Another profile of `modular` than the recorded one.
     #[arg(long, value_name = "FILE")]
     pub ads_config: Option<PathBuf>,
+    /// Profile that says how good each module should be [default: `modular` as it comes].
+    #[arg(long, value_name = "FILE")]
+    pub baseline: Option<PathBuf>,
     /// Say also how many of N small variations of timing, speeds and sensor errors still crash.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
     pub likelihood: Option<u32>,

@@ -38,13 +38,13 @@ pub fn diagnose(output: &Output, arguments: &DiagnoseArguments) -> Result<(), Fa
         )));
     };
     let setup = stage.setup(&ads);
-    let diagnosis = oracle::diagnose(&setup, &log, index).map_err(|error| usage(&error))?;
-    let weaknesses = oracle::weaknesses(&setup, &log, index).map_err(|error| usage(&error))?;
+    let baseline = arguments.baseline.as_deref().map(load::profile).transpose()?.unwrap_or_default();
+    let diagnosis = oracle::diagnose(&setup, &log, index, &baseline).map_err(|error| usage(&error))?;
     let likelihood = arguments.likelihood.map(|count| oracle::likelihood(&setup, &log, index, count));
     let collision = &log.collisions[index];
     output.tell(&heading(collision));
     output.say(&table_text(&diagnosis));
-    output.say(&weaknesses_text(&weaknesses));
+    output.say(&weaknesses_text(&diagnosis.weaknesses));
     output.say(&sentence(&diagnosis));
     if let Some(likelihood) = &likelihood {
         output.say(&likelihood_text(likelihood));
@@ -54,7 +54,7 @@ pub fn diagnose(output: &Output, arguments: &DiagnoseArguments) -> Result<(), Fa
         serde_json::json!({
             "file": arguments.file, "scenario": scenario.name, "ads": ads.name(),
             "obstacle": collision.contact.obstacle, "time_s": collision.contact.time_s,
-            "diagnosis": diagnosis, "weaknesses": weaknesses, "likelihood": likelihood,
+            "diagnosis": diagnosis, "likelihood": likelihood,
         }),
     );
     Ok(())
@@ -71,18 +71,24 @@ fn heading(collision: &Collision) -> String {
 }
 
 fn table_text(diagnosis: &Diagnosis) -> String {
-    let mut text = format!("\n{:<14}{:<20}{:<20}", "module", "without its errors", "its errors alone");
+    let mut text = format!(
+        "\n{:<14}{:<20}{:<20}{}",
+        "module", "as in the baseline", "without its errors", "its errors alone"
+    );
     for found in &diagnosis.modules {
         let prevented =
             found.prevented.map_or(String::new(), |share| format!("prevents {:.0} %", share * 100.0));
         let line = format!(
-            "\n{:<14}{:<20}{:<20}{prevented}",
+            "\n{:<14}{:<20}{:<20}{:<18}{prevented}",
             found.module.name(),
+            found.restored.map_or("the same", oracle::Fate::in_words),
             found.idealised.in_words(),
             found.alone.in_words()
         );
-        text.push_str(line.trim_end());
+        text.push('\n');
+        text.push_str(line.trim());
     }
+    text.push_str(&format!("\n{:<34}{}", "all of them", diagnosis.ideal.in_words()));
     for [first, second] in &diagnosis.pairs {
         text.push_str(&format!("\n{} and {}: no crash without the errors of both", first.name(), second.name()));
     }
@@ -103,22 +109,30 @@ fn sentence(diagnosis: &Diagnosis) -> String {
         .modules
         .iter()
         .filter(|found| {
-            found.idealised == oracle::Fate::Vanished && !diagnosis.cause.contains(&found.module)
+            found.suffices() && !diagnosis.cause.contains(&found.module)
         })
         .map(|found| found.module.name())
         .collect();
     let finding = |module: Module| diagnosis.modules.iter().find(|found| found.module == module);
     match diagnosis.cause.as_slice() {
+        [] if diagnosis.varied_crashes.is_some() => {
+            "\nit hung by a hair: small variations do not crash, and no module can be named".to_owned()
+        }
         [] => "\nno module is at fault alone, nor are two together".to_owned(),
         [module] => {
-            let alone = finding(*module).is_some_and(|found| found.alone == oracle::Fate::Crash);
-            let alone = if alone { ", and they alone lead to it" } else { "" };
+            let found = finding(*module);
+            let alone = found.is_some_and(|found| found.alone == oracle::Fate::Crash);
+            let cure = match found.and_then(|found| found.restored) {
+                Some(oracle::Fate::Vanished) => "as in the baseline, there is no crash",
+                _ => "without its errors there is no crash",
+            };
+            let alone = if alone && diagnosis.ideal == oracle::Fate::Vanished { ", and they alone lead to it" } else { "" };
             let others = match others.as_slice() {
                 [] => String::new(),
                 names => format!("; {} would have made up for it", names.join(", ")),
             };
             let name = module.name();
-            format!("\n{name} is at fault: without its errors there is no crash{alone}{others}")
+            format!("\n{name} is at fault: {cure}{alone}{others}")
         }
         modules => {
             let names: Vec<&str> = modules.iter().map(|module| module.name()).collect();

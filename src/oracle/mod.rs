@@ -20,7 +20,7 @@ pub use cause::ModuleFinding;
 pub use cause::NoModules;
 pub use cause::WeaknessFinding;
 pub use cause::diagnose;
-pub use cause::weaknesses;
+pub use cause::fate;
 pub use crash::Fate;
 pub use facts::counted;
 pub use facts::facts;

@@ -9,6 +9,8 @@
 
 use std::sync::Arc;
 
+use crate::ads::Foresight;
+use crate::ads::Selected;
 use crate::episode::Choice;
 use crate::episode::EpisodeLog;
 use crate::episode::Moment;
@@ -23,7 +25,6 @@ use crate::units::Dimension;
 
 use super::crash::Crash;
 use super::crash::play;
-use crate::ads::Foresight;
 
 /// Standard deviation of times, s.
 const TIME_S: f64 = 0.1;
@@ -103,7 +104,7 @@ impl<'a> Variation<'a> {
     }
 
     /// The same changes with another driving system.
-    pub fn play(&self, crash: &Crash, ads: &crate::ads::Selected) -> EpisodeLog {
+    pub fn play(&self, crash: &Crash, ads: &Selected) -> EpisodeLog {
         let setup = Setup { ads: ads.clone(), ..self.setup.clone() };
         play(&setup, |moment| choose(crash, self.seed, moment)).0
     }
