@@ -81,6 +81,8 @@ pub enum Command {
     Verify(VerifyArguments),
     /// Say which module of the driving system an emitted scenario's crash is the fault of.
     Diagnose(DiagnoseArguments),
+    /// Find the smallest scenario that still makes the same crash.
+    Shrink(ShrinkArguments),
     /// Draw moments of an emitted scenario as SVG.
     Render(RenderArguments),
     /// Print or draw a map, and a route through it.
@@ -304,6 +306,14 @@ pub struct DiagnoseArguments {
     /// Say also how many of N small variations of timing, speeds and sensor errors still crash.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
     pub likelihood: Option<u32>,
+}
+
+#[derive(Debug, Args)]
+pub struct ShrinkArguments {
+    pub file: PathBuf,
+    /// Where to write [default: STEM.shrunk.ava beside the file].
+    #[arg(long, short)]
+    pub output: Option<PathBuf>,
 }
 
 #[derive(Debug, Args)]

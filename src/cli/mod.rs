@@ -20,6 +20,7 @@ mod road;
 mod run;
 mod run_directory;
 mod sarif;
+mod shrink;
 mod train;
 mod verify;
 mod why;
@@ -65,6 +66,7 @@ pub fn main() -> ExitCode {
         Command::Verify(arguments) => verify::verify(&output, arguments),
         Command::Replay(arguments) => replay::replay(&output, arguments),
         Command::Diagnose(arguments) => diagnose::diagnose(&output, arguments),
+        Command::Shrink(arguments) => shrink::shrink(&output, arguments),
         Command::Render(arguments) => render::render(&output, arguments),
         Command::Road(arguments) => road::road(&output, arguments),
     };

@@ -209,6 +209,7 @@ fn keep(
     if summary.counted() > 0 {
         let name = format!("{}_{:04}", log.road, summary.episode);
         let source = emit::Provenance {
+            command: "run",
             name: &name,
             space_path,
             episode: summary.episode,

@@ -37,6 +37,8 @@ use super::tree;
 /// What an emitted file says about where it comes from.
 #[derive(Debug, Clone, Copy)]
 pub struct Provenance<'a> {
+    /// The command that writes it, for example `run`.
+    pub command: &'a str,
     /// Name of the scenario.
     pub name: &'a str,
     /// Path of the space's file, as the emitted file is to name it.
@@ -72,7 +74,7 @@ pub fn scenario(
     let space_use = Use { path: Text::new(source.space_path, Span::NONE), digest };
     let docs = vec![tree::doc(headline(log, &counted[0].collision))];
     File {
-        docs: vec![tree::doc("Emitted by `avastra run`; replay with `avastra replay FILE`.")],
+        docs: vec![tree::doc(format!("Emitted by `avastra {}`; replay with `avastra replay FILE`.", source.command))],
         items: vec![
             tree::item(Vec::new(), ItemKind::Language(tree::digits(LANGUAGE.to_string()))),
             tree::item(Vec::new(), ItemKind::Use(space_use)),

@@ -6,6 +6,7 @@ mod cause;
 mod crash;
 mod facts;
 mod hazard;
+mod shrink;
 #[cfg(test)]
 mod tests;
 mod variation;
@@ -24,6 +25,8 @@ pub use cause::fate;
 pub use crash::Fate;
 pub use facts::counted;
 pub use facts::facts;
+pub use shrink::Shrunk;
+pub use shrink::shrink;
 pub use variation::Likelihood;
 pub use variation::likelihood;
 pub use variation::wilson;

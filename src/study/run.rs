@@ -12,6 +12,7 @@ use std::sync::mpsc;
 use crate::action::ActionTable;
 use crate::action::ActiveRules;
 use crate::ads;
+use crate::ads::ModularConfig;
 use crate::ads::Selected;
 use crate::agent;
 use crate::agent::Agent;
@@ -27,6 +28,7 @@ use crate::model::Scenario;
 use crate::model::Space;
 use crate::oracle;
 use crate::oracle::AvoidabilitySettings;
+use crate::oracle::ClaimResult;
 use crate::oracle::Judgement;
 use crate::rng;
 use crate::rng::Stream;
@@ -333,6 +335,13 @@ impl<'a> Stage<'a> {
     pub fn play(&self, ads: &Selected, watch: &mut Watch) -> EpisodeLog {
         let script = Script::of_scenario(self.scenario);
         episode::run(&self.setup(ads), &mut |moment| script.choose(self.table, moment), watch)
+    }
+
+    /// Checks its claims against a log of it.
+    pub fn verify(&self, ads: &Selected, log: &EpisodeLog) -> Vec<ClaimResult> {
+        let setup = self.setup(ads);
+        let cause = |index| Ok(oracle::diagnose(&setup, log, index, &ModularConfig::default())?.cause);
+        oracle::verify(self.table.space(), self.scenario, log, &self.judge(ads, log), &cause)
     }
 
     /// Judges the collisions of its log, by playing it again.

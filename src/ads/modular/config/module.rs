@@ -157,6 +157,11 @@ mod tests {
     }
 
     #[test]
+    fn every_module_can_be_claimed_as_a_cause() {
+        assert_eq!(Module::ALL.map(Module::name), crate::model::MODULES);
+    }
+
+    #[test]
     fn a_fault_vanishes_with_its_own_module_and_with_no_other() {
         let healthy = ModularConfig::default();
         assert!(faults().len() >= 12);
