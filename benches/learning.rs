@@ -36,6 +36,7 @@ fn main() {
 }
 
 /// Updates a second, and the time of a greedy choice, us.
+#[allow(clippy::disallowed_methods, reason = "a benchmark is about the clock")]
 fn measured(text: &str) -> (f64, f64) {
     let Kind::Learning(presets) = agent::by_name("ddqn").expect("it is registered").kind else {
         panic!("it learns")

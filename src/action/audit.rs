@@ -4,7 +4,9 @@ use core::fmt;
 
 use crate::action::table::ActionTable;
 use crate::model::Reach;
+use crate::model::Removal;
 use crate::model::RuleBody;
+use crate::model::removals;
 
 /// Every rule of a space.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
@@ -22,6 +24,8 @@ pub struct RuleAudit {
     pub masks: Vec<usize>,
     /// Numeric parameters whose range it cuts before they are drawn.
     pub cuts: Vec<String>,
+    /// How much of their ranges it takes away by itself, on each road.
+    pub removes: Vec<Removal>,
     pub enforced: Enforcement,
 }
 
@@ -66,6 +70,7 @@ pub fn audit(table: &ActionTable) -> Audit {
             rows: bound.map(|row| row.index).collect(),
             masks: masks.map(|row| row.index).collect(),
             cuts,
+            removes: removals(space, index),
             enforced,
         }
     });
@@ -84,6 +89,11 @@ impl fmt::Display for Audit {
             write!(f, "{:width$}  binds {:>3} rows, enforced on {enforced}", rule.name, rule.rows.len())?;
             if !rule.cuts.is_empty() {
                 write!(f, ", cuts {}", rule.cuts.join(", "))?;
+            }
+            for removal in rule.removes.iter().filter(|removal| removal.percent_max > 0.0) {
+                let (least, most) = (removal.percent_min.round(), removal.percent_max.round());
+                let share = if least == most { format!("{most}") } else { format!("{least} to {most}") };
+                write!(f, ", removes {share} % of {} on {}", removal.parameter, removal.road)?;
             }
             if !rule.masks.is_empty() {
                 write!(f, ", masks {} rows", rule.masks.len())?;

@@ -17,7 +17,7 @@ use crate::model::Space;
 use super::error::Failure;
 use super::output::Output;
 
-/// Files of a directory that are searched for a name, at most.
+/// Where a directory holds more files, one that declares a name is no guess at what was meant.
 const NEARBY_MAX: usize = 32;
 
 /// Larger files are refused: no hand and no command of ours writes them.
@@ -59,7 +59,10 @@ fn nearby(path: &Path) -> Vec<(String, String)> {
         let mut files: Vec<PathBuf> = entries.flatten().map(|entry| entry.path()).collect();
         files.retain(|file| file.extension().is_some_and(|extension| extension == "ava"));
         files.sort();
-        for file in files.into_iter().take(NEARBY_MAX) {
+        if files.len() > NEARBY_MAX {
+            continue;
+        }
+        for file in files {
             let name = file.file_name().unwrap_or_default().to_string_lossy().into_owned();
             found.extend(read(&file).ok().map(|text| (format!("{prefix}{name}"), text)));
         }

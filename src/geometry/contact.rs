@@ -176,11 +176,6 @@ impl Frame {
         }
     }
 
-    /// Unit vector along the box.
-    pub fn forward(&self) -> Vec2 {
-        self.forward
-    }
-
     /// Distance to another box, m; 0 if they touch or overlap.
     ///
     /// Boxes that do not overlap are nearest at a corner of one of them: each box asks the corners of

@@ -14,8 +14,7 @@ pub type Vec2 = nalgebra::Vector2<f64>;
 /// terms on an eighth of a turn to either side give it without `libm`'s care for huge angles, with the
 /// same bits on every machine, and within two units of the last digit.
 pub fn unit_vector(heading_rad: f64) -> Vec2 {
-    // NaN takes this way, too.
-    if !(heading_rad.abs() < FEW_TURNS_RAD) {
+    if heading_rad.is_nan() || heading_rad.abs() > FEW_TURNS_RAD {
         let (sin, cos) = libm::sincos(heading_rad);
         return Vec2::new(cos, sin);
     }

@@ -344,8 +344,8 @@ fn report_dead(space: &Space, action: &ActionDef, rows: &[&Row]) -> Vec<Diagnost
         };
         let names: Vec<&str> = rules.iter().map(|rule| space.rules[*rule].name.as_str()).collect();
         let message = format!("`{}` is masked on `{}` by {}", action.name, road.name, listed(&names));
-        let warning = Diagnostic::warning(code::MASKED, message).at(action.span, numbers(&masked));
-        diagnostics.push(warning.note(reason.clone()));
+        let remark = Diagnostic::remark(code::MASKED, message).at(action.span, numbers(&masked));
+        diagnostics.push(remark.note(reason.clone()));
     }
     diagnostics
 }

@@ -310,7 +310,7 @@ fn drive_opposite(
 ) -> Result<Driver, String> {
     let station_m = ahead_m(around, request, size)?;
     let map = &around.scene.map;
-    let inner = lane_along(around, station_m, false, |lane| opposing_lane(around, lane))?;
+    let inner = lane_along(around, station_m, false, |lane| opposing_lane(around, lane, station_m))?;
     let mut rng = choices(around.seed, id, 0);
     let (lane, plan) = match request.then {
         Then::Keep => (inner, Vec::new()),
@@ -448,14 +448,18 @@ fn chosen_lane(around: &Around, station_m: f64, choice: LaneChoice) -> Result<La
     }
 }
 
-/// The first lane to the left that comes the other way.
-fn opposing_lane(around: &Around, lane: LaneIndex) -> Result<LaneIndex, String> {
-    let left = around.scene.map.lane(lane).left.ok_or("no opposing lane")?;
-    match left.same_direction {
-        true => opposing_lane(around, left.lane),
-        false if left.gap_m > MEDIAN_M_MAX => Err("a median lies before the opposing lane".into()),
-        false => Ok(left.lane),
+/// The nearest lane that comes the other way beside a lane of the route, of its road or another, if no
+/// wide median lies between.
+fn opposing_lane(around: &Around, lane: LaneIndex, station_m: f64) -> Result<LaneIndex, String> {
+    let map = &around.scene.map;
+    let here = around.scene.route.path.pose_at(station_m).position;
+    let beside_m = map.lane(lane).centre.project(here).station_m;
+    let opposing = map.opposing(lane, beside_m).ok_or("no opposing lane")?;
+    if opposing.median_m > MEDIAN_M_MAX {
+        let median_m = opposing.median_m;
+        return Err(format!("a median of {median_m:.1} m lies before the opposing lane"));
     }
+    Ok(opposing.lane)
 }
 
 /// The lane that `pick` finds for the lane of the route at a station.

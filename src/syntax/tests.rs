@@ -179,6 +179,10 @@ fn depth_is_bounded_alike_everywhere() {
 fn long_lines_and_many_mistakes_are_no_trouble() {
     let long = format!("language 1\nlet x = \"{}\"\n", "x".repeat(1 << 20));
     assert!(codes(&long).is_empty());
+    // Ten million bytes on one line: read, refused with one short message, and shown.
+    let endless = format!("language 1\nlet x = \"{}\n", "x".repeat(10_000_000));
+    assert_eq!(codes(&endless), ["AV0009:2"]);
+    assert!(rendered(&endless).len() < 10_000);
     let wrong = format!("language 1\nlet x = {}\n", "x ".repeat(1 << 19));
     assert_eq!(codes(&wrong), ["AV0001:2"]);
     assert!(!rendered(&wrong).is_empty());
@@ -318,6 +322,8 @@ fn item() -> impl Strategy<Value = ItemKind> {
         });
     prop_oneof![
         (name(), expr()).prop_map(|(name, value)| ItemKind::Let(Let { name, value })),
+        (name(), expr())
+            .prop_map(|(name, value)| { ItemKind::Override(Box::new(ItemKind::Let(Let { name, value }))) }),
         (name(), expr()).prop_map(|(name, condition)| ItemKind::Verdict(Verdict { name, condition })),
         prop::collection::vec(case, 0..4).prop_map(ItemKind::Reward),
         entries().prop_map(ItemKind::Episode),
@@ -344,6 +350,37 @@ proptest! {
         prop_assert!(same_meaning(&built, &read), "{}", text);
         let formatted = format(FileId(0), &text).unwrap();
         prop_assert_eq!(format(FileId(0), &formatted).unwrap(), formatted);
+    }
+
+    /// A line of comment before every line of a generated program.
+    #[test]
+    fn comments_in_generated_programs_are_kept(kinds in prop::collection::vec(item(), 1..4)) {
+        let text = print(&file_of(kinds));
+        let commented: Vec<String> =
+            text.lines().enumerate().map(|(number, line)| format!("// note {number}.\n{line}\n")).collect();
+        // Inside a text a line break cannot stand, so every line begins outside of one.
+        let formatted = format(FileId(0), &commented.concat()).unwrap();
+        for number in 0..commented.len() {
+            prop_assert_eq!(formatted.matches(&format!("// note {number}.\n")).count(), 1, "{}", formatted);
+        }
+        prop_assert_eq!(format(FileId(0), &formatted).unwrap(), formatted);
+    }
+
+    /// Numbers that are emitted read back to the same bits.
+    #[test]
+    fn emitted_numbers_are_exact(value in -1e9_f64..1e9, fine in -1e-3_f64..1e-3) {
+        for value in [value, fine] {
+            let digits = crate::units::decimal(value.abs(), false);
+            let built = file_of(vec![ItemKind::Let(Let {
+                name: Name::built("x"),
+                value: Expr::built(ExprKind::Number(Number { digits, unit: Some(Name::built("m")), span: Span::NONE })),
+            })]);
+            let (read, found) = parse(FileId(0), &print(&built));
+            prop_assert!(found.is_empty());
+            let ItemKind::Let(Let { value: Expr { kind: ExprKind::Number(number), .. }, .. }) = &read.items[1].kind
+            else { panic!("a constant was printed") };
+            prop_assert_eq!(number.digits.parse::<f64>().unwrap().to_bits(), value.abs().to_bits());
+        }
     }
 
     /// A comment wherever a blank is, however odd the place.

@@ -174,7 +174,7 @@ class Definition:
         cubic = self.cubics.setdefault(id(piece), Cubic(piece))
         place = lambda s: self.beside(cubic, road, lane, s)
         (x, y), h = place(s), 1e-4
-        (x0, y0), (x1, y1) = place(s - h), place(s + h)
+        (x0, y0), (x1, y1) = place(max(s - h, cubic.begin_m)), place(min(s + h, cubic.begin_m + cubic.length_m))
         return x, y, math.degrees(math.atan2(y1 - y0, x1 - x0)) + (180.0 if against else 0.0)
 
     def beside(self, cubic, road, lane, s):

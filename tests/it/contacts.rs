@@ -336,8 +336,7 @@ type Before = (OrientedBox, Vec<Obstacle>);
 
 #[test]
 fn the_contacts_of_whole_episodes_are_the_twins() {
-    // Without the rule that keeps newcomers at a fair distance there is more to find.
-    let run = run(16, 5, &["no_teleport"]);
+    let run = run(24, 5, &[]);
     let (mut contacts, mut misses) = (0, 0);
     for number in 0..run.episodes() {
         let log = run.episode(number);
@@ -376,7 +375,7 @@ fn the_contacts_of_whole_episodes_are_the_twins() {
         assert_eq!(again.collisions, log.collisions);
     }
     println!("{contacts} contacts and {misses} ticks without one");
-    assert!(contacts >= 3 && misses > 10_000, "{contacts} {misses}");
+    assert!(contacts >= 1 && misses > 10_000, "{contacts} {misses}");
 }
 
 /// Time, place, side and speed of a contact within a tick.

@@ -16,26 +16,32 @@ use crate::world::space;
 /// How far from the route the rear axle may come, m, in however wide a lane.
 const OFFSET_M_MAX: f64 = 0.7;
 
-/// The number of drives of each driving system, dealt out over the roads.
-const DRIVES: usize = 100;
+/// The number of drives of `modular` on each road, and of every other driver over all roads.
+const DRIVES: u64 = 100;
 
 #[test]
 fn undisturbed_drives_arrive_in_every_weather() {
     let space = space("avastra45.ava");
-    for (index, road) in space.roads.iter().enumerate() {
-        let scene = Arc::new(episode::scene(road));
-        for entry in ads::REGISTRY {
-            for seed in (index as u64..DRIVES as u64).step_by(space.roads.len()) {
-                drive(&scene, entry, seed, road.facts.limit_mps);
-            }
+    std::thread::scope(|threads| {
+        for (index, road) in space.roads.iter().enumerate() {
+            let dealt = (index as u64, space.roads.len());
+            threads.spawn(move || {
+                let scene = Arc::new(episode::scene(road));
+                for entry in ads::REGISTRY {
+                    let (first, stride) = if entry.name == "modular" { (0, 1) } else { dealt };
+                    for seed in (first..DRIVES).step_by(stride) {
+                        drive(&scene, entry, seed, road.facts.limit_mps);
+                    }
+                }
+            });
         }
-    }
+    });
 }
 
 #[test]
-fn a_healthy_driving_system_survives_ambient_traffic() {
+fn a_healthy_driving_system_mostly_survives_ambient_traffic() {
     let space = space("avastra45.ava");
-    let (mut drives, mut hit) = (0, Vec::new());
+    let (mut drives, mut failed) = (0, Vec::new());
     for (index, road) in space.roads.iter().enumerate() {
         let scene = Arc::new(episode::scene(road));
         for entry in ads::REGISTRY {
@@ -46,18 +52,26 @@ fn a_healthy_driving_system_survives_ambient_traffic() {
                 let mut driver = (entry.build)(&scene, seed);
                 let mut sensed = world.sensed();
                 let mut contact = None;
-                while !world.arrived() && contact.is_none() {
-                    let name = &scene.map.name;
-                    assert!(world.time_s() < 240.0, "{} on {name}, {start:?}: does not arrive", entry.name);
+                while !world.arrived() && contact.is_none() && world.time_s() < 240.0 {
                     world.sense(&mut sensed);
                     contact = world.tick(&driver.drive(&sensed)).first().copied();
                 }
-                hit.extend(contact.map(|contact| (entry.name, seed, contact)));
+                if !world.arrived() {
+                    let (name, station_m) = (&scene.map.name, world.ego_station_m());
+                    failed.push(format!(
+                        "{} on {name} at {station_m:.0} m, {start:?}: {contact:?}",
+                        entry.name
+                    ));
+                }
             }
         }
     }
-    // Long vehicles cut corners, and the driving systems do not look to the side.
-    assert!(hit.len() * 10 <= drives, "{hit:?}");
+    // The weaknesses of `modular`, above all the crossing vehicle it does not brake for, show in ordinary
+    // traffic too; reference drivers do not look to the side, where the tail of a bus swings.
+    let of = |name: &str| failed.iter().filter(|who| who.starts_with(name)).count();
+    assert_eq!(of("idm "), 0, "{failed:#?}");
+    assert!(of("modular ") <= 2, "{failed:#?}");
+    assert!(failed.len() * 20 <= drives, "{} of {drives}: {failed:#?}", failed.len());
 }
 
 /// Every level of every phenomenon comes up at every time of day; signals begin anywhere.

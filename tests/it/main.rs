@@ -3,12 +3,14 @@
 
 mod cases;
 mod command;
+mod corpus;
 mod contacts;
 mod drives;
 mod emitted;
 mod layers;
 mod profiles;
 mod references;
+mod road;
 mod rules;
 mod tables;
 mod traces;

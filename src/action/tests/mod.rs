@@ -1,6 +1,7 @@
 //! The shipped spaces as tables, and the rules of avastra45 against predicates written by hand.
 
 mod rules;
+mod sound;
 mod table;
 
 use std::path::Path;

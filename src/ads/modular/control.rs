@@ -8,7 +8,6 @@
 
 use std::sync::Arc;
 
-use crate::ads::guide::Guide;
 use crate::ads::steering::Steering;
 use crate::geometry::Pose;
 use crate::sim::Control;
@@ -17,7 +16,7 @@ use crate::sim::EgoMotion;
 use crate::sim::pedals_for;
 
 use super::config::ControlConfig;
-use super::planning::LateralPlan;
+use super::planning::Planner;
 use super::planning::Trajectory;
 
 #[derive(Debug, Clone)]
@@ -38,10 +37,8 @@ impl Controller {
     /// The command `since_s` after the trajectory was planned, believed to be at `localized`.
     pub fn follow(
         &mut self,
-        trajectory: &Trajectory,
+        planner: &Planner,
         since_s: f64,
-        guide: &Guide,
-        lateral: &LateralPlan,
         localized: &Pose,
         station_m: f64,
         motion: &EgoMotion,
@@ -50,11 +47,11 @@ impl Controller {
         let (brake_mps2_max, throttle_mps2_max) = (actuators.brake_mps2_max, actuators.throttle_mps2_max);
         let lag_s = actuators.steer_lag_s;
         let acceleration_mps2 = self
-            .acceleration_mps2(trajectory, since_s, station_m, motion.speed_mps)
+            .acceleration_mps2(planner.trajectory(), since_s, station_m, motion.speed_mps)
             .clamp(-brake_mps2_max, throttle_mps2_max);
         let (throttle_pct, brake_pct) = pedals_for(acceleration_mps2);
-        let aside = |at_m: f64| lateral.aside(at_m);
-        let wanted_rad = self.steering.steer_aside_rad(guide, &aside, localized, station_m, motion);
+        let aside = |at_m: f64| planner.lateral().aside(at_m);
+        let wanted_rad = self.steering.steer_aside_rad(planner.guide(), &aside, localized, station_m, motion);
         self.steer_rad += (wanted_rad - self.steer_rad) * (DT_S / (lag_s + DT_S));
         Control { throttle_pct, brake_pct, steer_rad: self.steer_rad }
     }

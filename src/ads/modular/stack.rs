@@ -143,10 +143,8 @@ impl Ads for Modular {
             self.cycle(sensed, &localized);
         }
         let control = self.controller.follow(
-            self.planner.trajectory(),
+            &self.planner,
             in_cycle as f64 * DT_S,
-            self.planner.guide(),
-            self.planner.lateral(),
             &localized,
             self.station_m,
             &sensed.ego,

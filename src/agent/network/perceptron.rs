@@ -115,10 +115,10 @@ impl Network {
             product(from, weights.view(), to.view_mut());
             let is_hidden = at + 1 < layers.len();
             for mut row in to.rows_mut() {
-                for (value, &bias) in row.iter_mut().zip(biases) {
-                    let sum = *value + bias;
-                    *value = if is_hidden && sum <= 0.0 { 0.0 } else { sum };
-                }
+                row.iter_mut().zip(biases).for_each(|(value, &bias)| *value += bias);
+            }
+            if is_hidden {
+                to.iter_mut().for_each(|value| *value = if *value <= 0.0 { 0.0 } else { *value });
             }
             outputs.push(to);
         }
@@ -169,11 +169,8 @@ impl Network {
                 let mut before = Array2::zeros((slope.nrows(), rows));
                 product(slope.view(), weights.t(), before.view_mut());
                 // ReLU lets through what it let through before.
-                before.zip_mut_with(&outputs[at - 1], |slope, &output| {
-                    if output <= 0.0 {
-                        *slope = 0.0;
-                    }
-                });
+                let passed = before.iter_mut().zip(&outputs[at - 1]);
+                passed.for_each(|(slope, &output)| *slope = if output <= 0.0 { 0.0 } else { *slope });
                 slope = before;
             }
         }
@@ -243,7 +240,7 @@ mod tests {
                 q.mapv(|q| q - place(at.next().expect("it never ends")))
             });
             let mut kinks = 0;
-            for at in 0..gradient.len() {
+            for (at, &slope) in gradient.iter().enumerate() {
                 let here = network.parameters[at];
                 let mut difference = |step: f32| {
                     let mut loss_at = |parameter| {
@@ -260,8 +257,8 @@ mod tests {
                     kinks += 1;
                     continue;
                 }
-                let error = (narrow - f64::from(gradient[at])).abs();
-                assert!(error < 4e-3 * (1.0 + narrow.abs()), "{dueling} {at}: {narrow} {}", gradient[at]);
+                let error = (narrow - f64::from(slope)).abs();
+                assert!(error < 4e-3 * (1.0 + narrow.abs()), "{dueling} {at}: {narrow} {slope}");
             }
             assert!(kinks * 5 < gradient.len(), "{kinks} of {}", gradient.len());
         }

@@ -6,12 +6,14 @@
 
 use ndarray::ArrayView2;
 use ndarray::ArrayViewMut2;
+use ndarray::Axis;
+use ndarray::s;
 
 /// Rows and columns of the tile that stays in registers: eight registers of eight numbers.
 const TILE_ROWS: usize = 4;
 const TILE_COLUMNS: usize = 16;
 
-/// `left · right` into `out`: shapes `(m, k)`, `(k, n)` and `(m, n)`, any strides.
+/// `left · right` into `out`: shapes `(m, k)`, `(k, n)` and `(m, n)`; `out` lies row by row.
 pub fn product(left: ArrayView2<f32>, right: ArrayView2<f32>, out: ArrayViewMut2<f32>) {
     assert_eq!(left.ncols(), right.nrows(), "inner lengths must agree");
     assert_eq!(out.dim(), (left.nrows(), right.ncols()), "the result has the outer lengths");
@@ -48,6 +50,7 @@ fn by_tiles_avx2(left: ArrayView2<f32>, right: ArrayView2<f32>, out: ArrayViewMu
 #[inline(always)]
 fn by_tiles(left: ArrayView2<f32>, right: ArrayView2<f32>, mut out: ArrayViewMut2<f32>) {
     let (rows, inner, columns) = (left.nrows(), left.ncols(), right.ncols());
+    let to = out.as_slice_mut().expect("the result lies row by row");
     let bands = packed_rows(left);
     let mut panel = vec![0.0; inner * TILE_COLUMNS];
     for column in (0..columns).step_by(TILE_COLUMNS) {
@@ -56,9 +59,8 @@ fn by_tiles(left: ArrayView2<f32>, right: ArrayView2<f32>, mut out: ArrayViewMut
         for row in (0..rows).step_by(TILE_ROWS) {
             let sums = tile(&bands[row * inner..(row + TILE_ROWS) * inner], &panel);
             for (offset, sums) in sums.iter().enumerate().take(rows - row) {
-                for (at, &sum) in sums.iter().enumerate().take(width) {
-                    out[[row + offset, column + at]] = sum;
-                }
+                let begin = (row + offset) * columns + column;
+                to[begin..begin + width].copy_from_slice(&sums[..width]);
             }
         }
     }
@@ -69,10 +71,20 @@ fn by_tiles(left: ArrayView2<f32>, right: ArrayView2<f32>, mut out: ArrayViewMut
 fn packed_rows(left: ArrayView2<f32>) -> Vec<f32> {
     let (rows, inner) = left.dim();
     let mut bands = vec![0.0; rows.div_ceil(TILE_ROWS) * TILE_ROWS * inner];
-    for (row, values) in left.rows().into_iter().enumerate() {
-        let band = &mut bands[row / TILE_ROWS * TILE_ROWS * inner..];
-        for (at, &value) in values.iter().enumerate() {
-            band[at * TILE_ROWS + row % TILE_ROWS] = value;
+    for (band, rows) in
+        bands.chunks_exact_mut(TILE_ROWS * inner).zip(left.axis_chunks_iter(Axis(0), TILE_ROWS))
+    {
+        // The order of reading follows the memory, whichever way the matrix lies there.
+        if rows.strides()[1] == 1 {
+            for (row, values) in rows.rows().into_iter().enumerate() {
+                for (packed, &value) in band.chunks_exact_mut(TILE_ROWS).zip(values) {
+                    packed[row] = value;
+                }
+            }
+        } else {
+            for (packed, values) in band.chunks_exact_mut(TILE_ROWS).zip(rows.columns()) {
+                packed.iter_mut().zip(values).for_each(|(packed, &value)| *packed = value);
+            }
         }
     }
     bands
@@ -81,9 +93,20 @@ fn packed_rows(left: ArrayView2<f32>) -> Vec<f32> {
 /// A panel of `width` columns, row by row, each padded to [`TILE_COLUMNS`].
 #[inline(always)]
 fn pack_columns(right: ArrayView2<f32>, column: usize, width: usize, panel: &mut [f32]) {
-    for (values, packed) in right.rows().into_iter().zip(panel.chunks_exact_mut(TILE_COLUMNS)) {
-        for (at, value) in packed.iter_mut().enumerate() {
-            *value = if at < width { values[column + at] } else { 0.0 };
+    let columns = right.slice(s![.., column..column + width]);
+    if width < TILE_COLUMNS {
+        panel.fill(0.0);
+    }
+    if columns.strides()[1] == 1 {
+        for (packed, values) in panel.chunks_exact_mut(TILE_COLUMNS).zip(columns.rows()) {
+            let values = values.to_slice().expect("neighbours in a row are neighbours in memory");
+            packed[..width].copy_from_slice(values);
+        }
+    } else {
+        for (at, values) in columns.columns().into_iter().enumerate() {
+            for (packed, &value) in panel.chunks_exact_mut(TILE_COLUMNS).zip(values) {
+                packed[at] = value;
+            }
         }
     }
 }

@@ -248,7 +248,8 @@ impl Checker {
             };
             let Some(ty) = value else { continue };
             let Some(initial) = self.initial(declared, ty) else { continue };
-            let Some(meaning) = self.meaning(&declared.name, key, ty) else { continue };
+            // A state with a broken meaning is a state all the same to whatever names it.
+            let meaning = self.meaning(&declared.name, key, ty).unwrap_or(StateMeaning::Private);
             let cells = key.map_or(1, |of| self.enums[of.0].variants.len());
             self.states.push(StateDef {
                 name: declared.name.text.clone(),

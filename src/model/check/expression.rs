@@ -317,17 +317,17 @@ impl Checker {
 
     fn call(&mut self, call: &ast::Call, place: &Place<'_>) -> Option<Expr> {
         let Some(index) = self.function_names.get(&call.name.text) else {
+            if self.functions_to_come.contains(&call.name.text) {
+                let error = Diagnostic::error(code::NOT_HERE, "a constant cannot call functions");
+                self.report(error.at(call.span, "called here").help("make it a `fn` without parameters"));
+                return None;
+            }
             let error = unknown("function", &call.name.text, call.name.span, self.function_names.all());
             self.report(error);
             return None;
         };
-        let Some(signature) = self.signatures.get(index) else {
-            let error = Diagnostic::error(code::NOT_HERE, "a constant cannot call functions");
-            self.report(error.at(call.span, "called here"));
-            return None;
-        };
         // A function whose own header is broken was reported there.
-        let (parameters, result, header) = signature.clone()?;
+        let (parameters, result, header) = self.signatures.get(index).cloned().flatten()?;
         if call.args.len() != parameters.len() {
             let message = format!(
                 "`{}` takes {} argument{}, not {}",

@@ -60,6 +60,8 @@ pub(super) struct Checker {
     /// Constants are folded: each is a literal. `None` is one that is broken.
     constants: Vec<(String, Option<Expr>)>,
     function_names: Names,
+    /// What the functions will be called, while the constants are looked at.
+    functions_to_come: Vec<String>,
     /// `None` is a function with a broken header.
     signatures: Vec<Option<Signature>>,
     functions: Vec<FnDef>,
@@ -90,6 +92,9 @@ pub(super) fn space(
 ) -> (Option<Space>, Vec<Diagnostic>) {
     let mut checker = Checker::default();
     checker.declare_enums(items);
+    let function = |item: &&ast::Item| matches!(item.kind, ItemKind::Fn(_));
+    let functions = items.iter().copied().filter(function).filter_map(|item| item.kind.name());
+    checker.functions_to_come = functions.map(|name| name.text.clone()).collect();
     checker.declare_constants(items);
     checker.declare_functions(items);
     checker.declare_states(items);

@@ -205,7 +205,14 @@ impl Checker {
             action.effects.iter().any(|effect| matches!(effect, EffectDef::Set(set) if set.state == index))
         };
         let all = self.actions.iter().enumerate();
-        let actions = all.filter(|(_, a)| a.as_ref().is_some_and(sets)).map(|(index, _)| index).collect();
+        let actions: Vec<usize> =
+            all.filter(|(_, a)| a.as_ref().is_some_and(sets)).map(|(index, _)| index).collect();
+        if actions.is_empty() && !self.has_errors() {
+            let message = format!("`{}` binds no action", rule.name.text);
+            let error =
+                Diagnostic::error(code::BINDS_NOTHING, message).at(rule.name.span, "would never be enforced");
+            self.report(error.help(format!("no action sets `{}`: give one the effect", definition.name)));
+        }
         Some(RuleBody::Moves { state: index, allowed, actions })
     }
 

@@ -30,10 +30,10 @@ pub(super) fn report(own: &[&ast::Item], all: &[&ast::Item]) -> Vec<Diagnostic> 
     let mut diagnostics = Vec::new();
     for item in own {
         match &item.kind {
-            ItemKind::Enum(declared) => {
-                if is_unused(&declared.name) && declared.variants.iter().all(is_unused) {
-                    diagnostics.push(warning("enum", &declared.name));
-                }
+            ItemKind::Enum(declared)
+                if is_unused(&declared.name) && declared.variants.iter().all(is_unused) =>
+            {
+                diagnostics.push(warning("enum", &declared.name));
             }
             ItemKind::Let(declared) if is_unused(&declared.name) => {
                 diagnostics.push(warning("constant", &declared.name));
@@ -53,10 +53,10 @@ pub(super) fn report(own: &[&ast::Item], all: &[&ast::Item]) -> Vec<Diagnostic> 
                 diagnostics.push(warning("group", &declared.name));
             }
             // The world reads `time` and `sky`, whether the file does or not.
-            ItemKind::State(declared) if is_unused(&declared.name) => {
-                if !matches!(declared.name.text.as_str(), "time" | "sky") {
-                    diagnostics.push(warning("state", &declared.name));
-                }
+            ItemKind::State(declared)
+                if is_unused(&declared.name) && !matches!(declared.name.text.as_str(), "time" | "sky") =>
+            {
+                diagnostics.push(warning("state", &declared.name));
             }
             ItemKind::Action(declared) => {
                 let drawn = declared.params.iter().filter(|param| param.mode == ParamMode::Any);

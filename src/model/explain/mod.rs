@@ -90,6 +90,10 @@ pub const PAGES: &[Page] = &[
     page!("AV0606"),
     page!("AV0607"),
     page!("AV0608"),
+    page!("AV0701"),
+    page!("AV0702"),
+    page!("AV0703"),
+    page!("AV0704"),
     page!("AV0801"),
     page!("AV0802"),
 ];

@@ -51,7 +51,7 @@ pub fn policy(text: &str, file: &ast::File, space: &Space) -> Result<Policy, Vec
     let origin: PolicyOrigin = block(&declared.origin, "origin", whole)?;
     let claims: Option<PolicyClaims> =
         if declared.claims.is_empty() { None } else { Some(block(&declared.claims, "claims", whole)?) };
-    let parameters = parameters(&net, declared, whole, space).map_err(|error| vec![error])?;
+    let parameters = parameters(&net, declared, whole, space)?;
     Ok(Policy {
         name: declared.name.text.clone(),
         docs: item.docs.iter().map(|doc| doc.text.clone()).collect(),
@@ -77,28 +77,32 @@ fn block<T: DeserializeOwned>(fields: &[Field], name: &str, whole: Span) -> Resu
 }
 
 /// The network's numbers, as many as its shape wants for the table of the space.
-fn parameters(net: &Net, declared: &ast::Policy, whole: Span, space: &Space) -> Result<Vec<f32>, Diagnostic> {
+fn parameters(
+    net: &Net,
+    declared: &ast::Policy,
+    whole: Span,
+    space: &Space,
+) -> Result<Vec<f32>, Vec<Diagnostic>> {
     let shape = field_span(&declared.net, "layers", whole);
     let rows = space.rows.len();
     if net.layers.len() < 2 || net.layers.last() != Some(&rows) {
         let message = "the network does not fit the action table";
         let error = Diagnostic::error(code::POLICY_SHAPE, message).at(shape, "its layers");
-        return Err(
-            error.note(format!("the table has {rows} rows, which must be the width of the last layer"))
-        );
+        let note = format!("the table has {rows} rows, which must be the width of the last layer");
+        return Err(vec![error.note(note)]);
     }
-    let weights = field_span(&declared.net, "weights", whole);
     let found = weights_from_lines(&net.weights).filter(|all| all.iter().all(|one| one.is_finite()));
-    let found = found.ok_or_else(|| {
-        Diagnostic::error(code::POLICY_FORM, "the weights are no Base64 of finite numbers")
-            .at(weights, "here")
-    })?;
+    let Some(found) = found else {
+        let message = "the weights are no Base64 of finite numbers";
+        let weights = field_span(&declared.net, "weights", whole);
+        return Err(vec![Diagnostic::error(code::POLICY_FORM, message).at(weights, "here")]);
+    };
     let wanted = wanted(&net.layers, net.dueling);
     if wanted != Some(found.len()) {
         let message = "the network has another number of weights than its layers want";
         let error = Diagnostic::error(code::POLICY_SHAPE, message).at(shape, "its layers");
         let wanted = wanted.map_or("too many".to_owned(), |wanted| wanted.to_string());
-        return Err(error.note(format!("they want {wanted}, there are {}", found.len())));
+        return Err(vec![error.note(format!("they want {wanted}, there are {}", found.len()))]);
     }
     Ok(found)
 }

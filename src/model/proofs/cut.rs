@@ -5,7 +5,9 @@ use crate::model::code;
 use crate::model::expr::Comparison;
 use crate::model::interval::End;
 use crate::model::interval::Interval;
+use crate::model::reach::Prover;
 use crate::model::row::Reach;
+use crate::model::row::locals;
 use crate::model::space::Domain;
 use crate::model::space::Parameter;
 use crate::model::space::Space;
@@ -101,4 +103,61 @@ fn cutting_rules(space: &Space, action: usize, parameter: &Parameter) -> Vec<usi
     rules.sort_unstable();
     rules.dedup();
     rules
+}
+
+/// How much of the range of a parameter a rule takes away by itself on a road, in percent: the least
+/// and the most among the rows that it binds.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct Removal {
+    pub parameter: String,
+    pub road: String,
+    pub percent_min: f64,
+    pub percent_max: f64,
+}
+
+/// What a rule by itself removes from the ranges of the rows that it binds; nothing for a rule that
+/// bounds no range.
+pub fn removals(space: &Space, rule: usize) -> Vec<Removal> {
+    let mut found: Vec<Removal> = Vec::new();
+    for row in space.rows.iter().filter(|row| row.rules.contains(&rule)) {
+        let action = &space.actions[row.action];
+        let bounds = bounds(space, row.action);
+        let values = locals(action, row, &[]);
+        for road in &space.roads {
+            let prover = Prover { space, row, values: &values, bounds: &bounds, road: Some(road) };
+            let settled = prover.settle(&[rule]);
+            for bound in bounds.iter().filter(|bound| bound.rule == Some(rule)) {
+                let parameter = &action.parameters[bound.local];
+                let kept = settled.as_ref().map(|settled| settled[bound.local].interval());
+                let Some(percent) = removed_percent(&parameter.domain, kept) else { continue };
+                let same =
+                    |known: &&mut Removal| known.parameter == *parameter.name && known.road == road.name;
+                match found.iter_mut().find(same) {
+                    Some(known) => {
+                        known.percent_min = known.percent_min.min(percent);
+                        known.percent_max = known.percent_max.max(percent);
+                    }
+                    None => found.push(Removal {
+                        parameter: parameter.name.to_string(),
+                        road: road.name.clone(),
+                        percent_min: percent,
+                        percent_max: percent,
+                    }),
+                }
+            }
+        }
+    }
+    found
+}
+
+/// `None` for what is no range, or a range of one number; all of it if nothing is kept.
+fn removed_percent(domain: &Domain, kept: Option<Interval>) -> Option<f64> {
+    let Domain::Range(low, high) = domain else { return None };
+    let whole = high.checked_sub(*low).filter(|whole| *whole > Rational::ZERO)?;
+    let left = match kept.map(|kept| (kept.low, kept.high)) {
+        Some((End::At(from, _), End::At(to, _))) => to.checked_sub(from)?,
+        Some(_) => return None,
+        None => Rational::ZERO,
+    };
+    Some(100.0 - left.checked_div(whole)?.to_f64() * 100.0)
 }

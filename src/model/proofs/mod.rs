@@ -14,6 +14,8 @@ mod witness;
 
 pub(crate) use clock::next_rows;
 pub(crate) use clock::shortest_way;
+pub use cut::Removal;
+pub use cut::removals;
 pub use witness::Witness;
 pub use witness::witness;
 

@@ -4,6 +4,7 @@ mod abreast;
 mod boulevard;
 mod changes;
 mod corner;
+mod crossroad;
 mod reading;
 mod residential;
 mod survey;

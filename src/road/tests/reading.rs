@@ -165,7 +165,7 @@ fn lights_without_a_junctions_controller_are_grouped_by_their_arms() {
     let text = format!(
         r#"<OpenDRIVE><header name="arms"/>{}{}{}<junction id="9" name=""/></OpenDRIVE>"#,
         road(1, -60.0, 0.0, 0.0, ahead, &(light("a", "1000001") + &light("b", "1000011"))),
-        road(2, 0.0, -60.0, 1.5707963267948966, ahead, &light("c", "1000011")),
+        road(2, 0.0, -60.0, core::f64::consts::FRAC_PI_2, ahead, &light("c", "1000011")),
         road(3, 100.0, 0.0, 0.0, "", &light("lone", "1000001")),
     );
     let map = read(&text);

@@ -2,8 +2,9 @@
 //!
 //! Leaders are looked for in a corridor as wide as the vehicle, and conflict areas are between lanes;
 //! but a bus in a bend sweeps more than its lane. So inside junctions drivers look two seconds ahead:
-//! where both would be if they went on as they do, and stop before the outlines meet. Of the two, the
-//! one whose centre is behind the other's does. Commanded vehicles do not look at the ego vehicle so.
+//! where both would be if they went on as they do, and stop before the outlines meet. They look at
+//! whose centre is ahead of their own, and at whoever is slower: a tail swings into those. Commanded
+//! vehicles do not look at the ego vehicle so.
 
 use crate::geometry::OrientedBox;
 use crate::geometry::Pose;
@@ -35,23 +36,25 @@ impl Driver {
             return None;
         }
         let here = &this.outline.pose;
-        let is_near = |outline: &OrientedBox| {
+        let matters = |outline: &OrientedBox, speed_mps: f64| {
             let away = outline.pose.position - here.position;
-            away.norm_squared() < NEAR_M * NEAR_M && here.forward().dot(&away) > 0.0
+            away.norm_squared() < NEAR_M * NEAR_M
+                && (here.forward().dot(&away) > 0.0 || speed_mps < self.speed_mps)
         };
         let mut free_m = f64::INFINITY;
-        if self.yields_to_ego && is_near(around.ego_outline) {
+        if self.yields_to_ego && matters(around.ego_outline, around.ego.speed_mps) {
             let ego = |time_s| Pose {
                 position: around.ego_outline.pose.position + around.ego_velocity_mps * time_s,
                 ..around.ego_outline.pose
             };
             free_m = free_m.min(self.free_way_m(this, around.ego_outline, ego));
         }
-        for (obstacle, driver) in around.drivers(this.id).filter(|(other, _)| is_near(&other.outline)) {
-            let other = |time_s| driver.way.path.pose_at(driver.station_m + driver.speed_mps * time_s);
-            if driver.change.is_none() {
-                free_m = free_m.min(self.free_way_m(this, &obstacle.outline, other));
+        for (obstacle, driver) in around.drivers(this.id) {
+            if driver.change.is_some() || !matters(&obstacle.outline, driver.speed_mps) {
+                continue;
             }
+            let other = |time_s| driver.way.path.pose_at(driver.station_m + driver.speed_mps * time_s);
+            free_m = free_m.min(self.free_way_m(this, &obstacle.outline, other));
         }
         free_m.is_finite().then(|| Leader { gap_m: free_m + STOP_M, speed_mps: 0.0, crosswise: true })
     }

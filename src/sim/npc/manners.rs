@@ -124,7 +124,7 @@ impl Driver {
         let front_m = self.station_m + size.length_m / 2.0;
         let reach_m = LOOK_AHEAD_M + self.speed_mps * self.speed_mps / (2.0 * COMFORT_MPS2);
         let areas = &self.way.areas;
-        let open = areas.iter().position(|area| area.from_m > front_m)?;
+        let open = areas.partition_point(|area| area.from_m <= front_m);
         let near = |area: &&WayArea| area.from_m <= front_m + reach_m;
         let waited_for = areas[open..]
             .iter()

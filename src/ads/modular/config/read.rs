@@ -36,8 +36,11 @@ fn at(line: Option<usize>) -> String {
     line.map_or_else(String::new, |line| format!("line {line}: "))
 }
 
+/// Names of numbers, each with its least and greatest value.
+type Ranges = &'static [(&'static str, f64, f64)];
+
 /// Every section that has numbers, with their ranges.
-const SECTIONS: &[(&str, &[(&str, f64, f64)])] = &[
+const SECTIONS: &[(&str, Ranges)] = &[
     ("localization", LocalizationConfig::RANGES),
     ("perception", PerceptionConfig::RANGES),
     ("tracking", TrackingConfig::RANGES),

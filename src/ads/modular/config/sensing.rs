@@ -15,8 +15,8 @@ section! {
         correlation_s: f64 = 5.0, 0.1..=100.0;
         /// Age of a pose when it is used, s, in `[0, 0.1]`. LGSVL with Apollo: 0.01 to 0.02.
         latency_s: f64 = 0.015, 0.0..=0.1;
-        /// Factor of both deviations in a downpour (50 mm/h) or on a flooded road, in `[1, 10]`. LiDAR map matching: 1.5 to 3.
-        rain_factor: f64 = 3.0, 1.0..=10.0;
+        /// Factor of both deviations in a downpour (50 mm/h) or on a flooded road, in `[1, 10]`. LiDAR map matching: 1.5 to 3, of which this is the middle.
+        rain_factor: f64 = 2.25, 1.0..=10.0;
         /// Constant error along the heading, m, in `[-5, 5]`. A fault to plant: none by default.
         bias_ahead_m: f64 = 0.0, -5.0..=5.0;
         /// Constant error to the left, m, in `[-5, 5]`. A fault to plant: none by default.

@@ -14,7 +14,6 @@ mod rules;
 mod speed;
 mod standing;
 
-pub use nudge::LateralPlan;
 pub use planner::Outlook;
 pub use planner::Planner;
 pub use speed::Trajectory;

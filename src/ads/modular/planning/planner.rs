@@ -6,6 +6,7 @@
 use std::sync::Arc;
 
 use crate::ads::guide::Guide;
+use crate::ads::guide::Span;
 use crate::ads::status::Manoeuvre;
 use crate::ads::status::Reason;
 use crate::geometry::Pose;
@@ -108,7 +109,7 @@ impl Planner {
     }
 
     pub fn plan(&mut self, outlook: &Outlook) {
-        let &Outlook { station_m, speed_mps, since_s, forecasts, .. } = outlook;
+        let &Outlook { station_m, speed_mps, since_s, .. } = outlook;
         // Going on from the planned and not from the measured acceleration keeps the jerk bounded.
         let acceleration_mps2 = self.trajectory.at(since_s).acceleration_mps2;
         self.choose_path(outlook);
@@ -137,7 +138,6 @@ impl Planner {
             let trajectory = &mut self.trajectory;
             speed::roll(&config, &self.guide, start, &self.constraints, &self.claims, trajectory);
         }
-        debug_assert!(forecasts.len() >= self.claims.len());
     }
 
     /// Lane, lane change or a shift within the lane.
@@ -233,7 +233,7 @@ impl Planner {
 
     /// Whether somebody beside the vehicle, who has come or will come onto its way, is let in. Under
     /// weakness (h) nobody is (Apollo issue 14633).
-    fn lets_in(&self, claim: &Claim, span: &crate::ads::guide::Span, point: &Point) -> bool {
+    fn lets_in(&self, claim: &Claim, span: &Span, point: &Point) -> bool {
         !self.weaknesses.h_blind_to_side_and_rear
             && claim.moving
             && claim.cosine > ALONG_COSINE

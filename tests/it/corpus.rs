@@ -1,0 +1,229 @@
+//! The corpus of broken files: every code in it twice, every offered change a cure, and the forms in
+//! which diagnostics leave the house.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use avastra::model::Loaded;
+use avastra::model::ReadError;
+use avastra::model::explain::PAGES;
+use avastra::model::load;
+use avastra::syntax::Diagnostic;
+use avastra::syntax::Severity;
+use avastra::syntax::apply_fixes;
+use avastra::syntax::ast::FileId;
+
+use crate::cases::cases;
+use crate::cases::each_case;
+use crate::cases::root;
+use crate::command::avastra;
+use crate::command::outcome;
+
+/// Reads a case; its own text may be another than the file's.
+fn loaded(path: &Path, text: Option<&str>) -> Loaded {
+    let read = |file: &Path| match text {
+        Some(text) if file == path => Ok(text.to_owned()),
+        _ => std::fs::read_to_string(file).map_err(|error| ReadError(error.to_string())),
+    };
+    load(path, &read).expect("a case is readable")
+}
+
+fn all(loaded: &Loaded) -> impl Iterator<Item = &Diagnostic> {
+    loaded.diagnostics.iter().chain(&loaded.remarks)
+}
+
+#[test]
+fn every_code_is_provoked_and_every_error_twice() {
+    let mut files: BTreeMap<&str, Vec<String>> = BTreeMap::new();
+    let mut severities: BTreeMap<&str, Severity> = BTreeMap::new();
+    let cases = cases("diagnostics");
+    assert!(cases.len() >= 120, "{} cases", cases.len());
+    for (stem, path) in cases {
+        for found in all(&loaded(&path, None)) {
+            severities.insert(found.code, found.severity);
+            let stems = files.entry(found.code).or_default();
+            if !stems.contains(&stem) {
+                stems.push(stem.clone());
+            }
+        }
+    }
+    let mut missing = Vec::new();
+    for page in PAGES {
+        let wanted = match severities.get(page.code) {
+            Some(Severity::Error) | None => 2,
+            Some(Severity::Warning | Severity::Note) => 1,
+        };
+        let found = files.get(page.code).map_or(0, Vec::len);
+        if found < wanted {
+            missing.push(format!("{} occurs {found} times, wanted {wanted}", page.code));
+        }
+    }
+    assert!(missing.is_empty(), "{}", missing.join("\n"));
+}
+
+/// A name that a file nearby declares: which `use` is missing.
+#[test]
+fn a_missing_use_is_named() {
+    each_case("missing_use", |path| {
+        let path = path.strip_prefix(root()).expect("it is a case").display().to_string();
+        outcome(&mut avastra(&["check", "--format", "plain", &path])).2
+    });
+}
+
+/// What a diagnostic offers takes it away: made alone, the same mistake is no longer at that place.
+#[test]
+fn every_offered_change_is_a_cure() {
+    let mut tried = 0;
+    for (stem, path) in cases("diagnostics") {
+        let before = loaded(&path, None);
+        for found in all(&before) {
+            for fix in &found.fixes {
+                if fix.edits.iter().any(|edit| edit.span.file != FileId(0)) {
+                    continue;
+                }
+                let alone = Diagnostic { fixes: vec![fix.clone()], ..found.clone() };
+                let (text, made) =
+                    apply_fixes(FileId(0), before.sources.text(FileId(0)), std::slice::from_ref(&alone));
+                assert_eq!(made, 1, "{stem}: {}", fix.title);
+                let after = loaded(&path, Some(&text));
+                let same = |other: &&Diagnostic| other.code == found.code && other.message == found.message;
+                let count = |loaded: &Loaded| all(loaded).filter(same).count();
+                assert!(
+                    count(&after) < count(&before),
+                    "{stem}: `{}` does not cure {}",
+                    fix.title,
+                    found.code
+                );
+                tried += 1;
+            }
+        }
+    }
+    assert!(tried >= 20, "{tried} changes are offered");
+}
+
+/// The parts of SARIF 2.1.0 that its schema requires of a log, a run, a result and a fix.
+#[test]
+fn sarif_has_the_structure_of_the_standard() {
+    for stem in ["misspelt_name", "scenario_breaks_the_clock", "pretty_comparison", "cut_and_unfair"] {
+        let path = format!("tests/cases/diagnostics/{stem}.ava");
+        let (_, stdout, stderr) = outcome(&mut avastra(&["check", "--format", "sarif", &path]));
+        let log: serde_json::Value = serde_json::from_str(&stdout).expect("the log is JSON");
+        assert_eq!(log["version"], "2.1.0", "{stderr}");
+        let run = &log["runs"][0];
+        let driver = &run["tool"]["driver"];
+        assert_eq!((&driver["name"], &run["columnKind"]), (&"avastra".into(), &"unicodeCodePoints".into()));
+        let rules = driver["rules"].as_array().expect("rules");
+        let results = run["results"].as_array().expect("results");
+        assert!(!results.is_empty(), "{stem}");
+        for result in results {
+            let index = result["ruleIndex"].as_u64().expect("an index") as usize;
+            assert_eq!(rules[index]["id"], result["ruleId"]);
+            assert!(rules[index]["shortDescription"]["text"].is_string());
+            assert!(["error", "warning", "note"].contains(&result["level"].as_str().expect("a level")));
+            assert!(result["message"]["text"].is_string());
+            let related = result["relatedLocations"].as_array().into_iter().flatten();
+            for place in result["locations"].as_array().expect("locations").iter().chain(related) {
+                let physical = &place["physicalLocation"];
+                assert!(physical["artifactLocation"]["uri"].is_string());
+                assert!(physical["region"]["startLine"].as_u64() >= Some(1));
+                assert!(physical["region"]["startColumn"].as_u64() >= Some(1));
+            }
+            for fix in result["fixes"].as_array().into_iter().flatten() {
+                let change = &fix["artifactChanges"][0];
+                assert!(change["artifactLocation"]["uri"].is_string());
+                assert!(change["replacements"][0]["deletedRegion"]["startLine"].is_u64());
+                assert!(change["replacements"][0]["insertedContent"]["text"].is_string());
+            }
+        }
+    }
+}
+
+#[test]
+fn records_name_their_schema_and_their_changes() {
+    let path = "tests/cases/diagnostics/misspelt_name.ava";
+    let (_, _, stderr) = outcome(&mut avastra(&["check", "--format", "json", path]));
+    let first: serde_json::Value =
+        serde_json::from_str(stderr.lines().next().expect("a line")).expect("JSON");
+    assert_eq!(first["schema"], 1);
+    assert_eq!(first["fixes"][0]["edits"][0]["text"], "time");
+}
+
+#[test]
+fn fixes_are_made_when_asked_for() {
+    let scratch = tempfile::tempdir().expect("a scratch directory");
+    let path = scratch.path().join("a.ava");
+    std::fs::write(&path, "let far = 12 metre # far\n/* near */\nlet near = 3 m\n").expect("it is writable");
+    let name = path.display().to_string();
+    let (status, stdout, _) = outcome(&mut avastra(&["check", "--fix", &name]));
+    assert_eq!(status, 2, "{stdout}");
+    let (_, _, stderr) = outcome(&mut avastra(&["check", "--fix", &name]));
+    let text = std::fs::read_to_string(&path).expect("it is readable");
+    assert!(text.contains("// near"), "{text}{stderr}");
+}
+
+/// A new space is sound, formatted, and runs.
+#[test]
+fn a_new_space_is_ready_to_use() {
+    let scratch = tempfile::tempdir().expect("a scratch directory");
+    let in_scratch = |arguments: &[&str]| {
+        let (status, stdout, stderr) = outcome(avastra(arguments).current_dir(scratch.path()));
+        assert_eq!(status, 0, "{arguments:?}: {stdout}{stderr}");
+        stdout
+    };
+    in_scratch(&["new", "mine"]);
+    in_scratch(&["check", "--strict", "mine/space.ava"]);
+    in_scratch(&["fmt", "--check", "mine/space.ava", "mine/roads.ava"]);
+    in_scratch(&["run", "mine/space.ava", "--episodes", "1", "--quiet"]);
+    let page = in_scratch(&["doc", "mine/space.ava"]);
+    for words in
+        ["# space", "### `pedestrian` (rows 4 to 5)", "The clock only moves forward.", "| `time` from | to |"]
+    {
+        assert!(page.contains(words), "`{words}` in\n{page}");
+    }
+    let (status, _, stderr) = outcome(avastra(&["new", "mine"]).current_dir(scratch.path()));
+    assert_eq!(status, 1);
+    assert!(stderr.contains("exists"), "{stderr}");
+}
+
+#[test]
+fn codes_and_shells_are_explained() {
+    let (status, stdout, _) = outcome(&mut avastra(&["explain", "av0401"]));
+    assert_eq!(status, 0);
+    assert!(stdout.starts_with("# AV0401: ") && stdout.contains("## Right"), "{stdout}");
+    let (_, stdout, _) = outcome(&mut avastra(&["explain"]));
+    assert_eq!(stdout.lines().count(), PAGES.len());
+    let (status, _, stderr) = outcome(&mut avastra(&["explain", "AV9999"]));
+    assert_eq!(status, 1, "{stderr}");
+    for shell in ["bash", "zsh", "fish"] {
+        let (status, stdout, _) = outcome(&mut avastra(&["completions", shell]));
+        assert!(status == 0 && stdout.contains("explain"), "{shell}");
+    }
+}
+
+/// What an override changes, as `diff` says it.
+#[test]
+fn differences_are_told_by_their_meaning() {
+    let space = "scenarios/avastra45.ava";
+    let (status, stdout, stderr) = outcome(&mut avastra(&["diff", space, space]));
+    assert_eq!((status, stdout.as_str()), (0, "the two spaces mean the same\n"), "{stderr}");
+    let own = root().join("tests/cases/spaces/own_gap.ava");
+    let (status, stdout, stderr) = outcome(&mut avastra(&["diff", space, &own.display().to_string()]));
+    assert_eq!(status, 0, "{stderr}");
+    for line in [
+        "changed fn `lead`: ",
+        "tightened rule `walking_pace`: ",
+        "loosened rule `chronology`: Morning -> Night",
+        "added row `lightning()`: it is 45",
+    ] {
+        assert!(stdout.contains(line), "`{line}` in\n{stdout}");
+    }
+}
+
+#[test]
+fn every_prefix_of_a_space_is_checked_to_its_end() {
+    let text = std::fs::read_to_string(root().join("scenarios/avastra45.ava")).expect("it is readable");
+    let path = root().join("scenarios/avastra45.ava");
+    for (end, _) in text.char_indices().step_by(61) {
+        loaded(&path, Some(&text[..end]));
+    }
+}
