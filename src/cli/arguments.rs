@@ -224,6 +224,10 @@ pub struct RunArguments {
     /// Vehicles of ambient traffic around the ego vehicle, besides those that actions make appear.
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=i64::from(crate::model::AMBIENT_MAX)))]
     pub ambient: u32,
+    /// Say of each counted collision which module of the driving system is at fault; takes some twenty
+    /// replays for each.
+    #[arg(long)]
+    pub causes: bool,
     /// Worker threads; the result does not depend on it [default: one for each core].
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=1024))]
     pub jobs: Option<u32>,
@@ -233,7 +237,7 @@ pub struct RunArguments {
     #[arg(long)]
     pub out: Option<PathBuf>,
     /// Go on with an interrupted run directory; its own settings hold.
-    #[arg(long, value_name = "DIR", conflicts_with_all = ["file", "road", "ads", "ads_config", "agent", "policy", "episodes", "seed", "ambient", "out", "without", "with"])]
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["file", "road", "ads", "ads_config", "agent", "policy", "episodes", "seed", "ambient", "causes", "out", "without", "with"])]
     pub resume: Option<PathBuf>,
     /// Exit with status 4 if a counted collision was found.
     #[arg(long)]

@@ -119,6 +119,7 @@ fn begun(output: &Output, arguments: &RunArguments) -> Result<(Run, RunDirectory
         episodes: arguments.episodes,
         seed: arguments.seed,
         ambient: arguments.ambient,
+        causes: arguments.causes,
         without: arguments.rules.without.clone(),
         with: arguments.rules.with.clone(),
         avoidability: AvoidabilitySettings::default(),

@@ -193,6 +193,15 @@ fn expects(log: &EpisodeLog, summary: &EpisodeSummary, steps: usize) -> Vec<Expe
         });
         let class = tree::name(finding.judgement.class.name());
         expects.push(tree::expect(class, by.into_iter().chain([who()]).collect()));
+        if let Some([first, rest @ ..]) = finding.cause.as_deref() {
+            let first = tree::name(first.name());
+            let modules = rest.iter().map(|module| tree::name(module.name()));
+            let modules = match rest {
+                [] => first,
+                _ => tree::list(core::iter::once(first).chain(modules).collect()),
+            };
+            expects.push(tree::expect(tree::equal(tree::name("cause"), modules), vec![who()]));
+        }
     }
     let proc = log.steps[..steps].iter().map(|step| tree::rounded(step.proc, 3, Dimension::RATIO));
     expects.push(tree::expect(tree::equal(tree::name("proc"), tree::list(proc.collect())), Vec::new()));

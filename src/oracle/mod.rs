@@ -6,6 +6,7 @@ mod cause;
 mod crash;
 mod facts;
 mod hazard;
+mod severity;
 mod shrink;
 #[cfg(test)]
 mod tests;
@@ -25,6 +26,8 @@ pub use cause::fate;
 pub use crash::Fate;
 pub use facts::counted;
 pub use facts::facts;
+pub use severity::Severity;
+pub use severity::severity;
 pub use shrink::Shrunk;
 pub use shrink::shrink;
 pub use variation::Likelihood;

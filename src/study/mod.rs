@@ -2,6 +2,7 @@
 
 mod arena;
 mod database;
+mod measures;
 mod profile;
 mod run;
 mod summary;
@@ -14,6 +15,7 @@ pub use database::Database;
 pub use database::DatabaseError;
 pub use database::RefusalCount;
 pub use database::Totals;
+pub use measures::Measures;
 pub use profile::Profile;
 pub use profile::recorded;
 pub use run::EPISODES_MAX;

@@ -40,6 +40,7 @@ use crate::syntax::listed;
 use super::arena::Arena;
 use super::arena::choose;
 use super::arena::driving_system;
+use super::measures::Measures;
 use super::profile::Profile;
 use super::profile::recorded;
 use super::summary::EpisodeSummary;
@@ -71,6 +72,9 @@ pub struct RunSettings {
     /// Vehicles of ambient traffic.
     #[serde(default)]
     pub ambient: u32,
+    /// Whether each counted collision is diagnosed.
+    #[serde(default)]
+    pub causes: bool,
     /// Rules switched off.
     pub without: Vec<String>,
     /// Optional rules switched on.
@@ -111,6 +115,8 @@ pub enum RunError {
     Twice { name: String },
     #[error("{found} episodes a road: from 1 to {EPISODES_MAX} are possible")]
     Episodes { found: u32 },
+    #[error(transparent)]
+    NoModules(#[from] oracle::NoModules),
     #[error(transparent)]
     NoSettings(#[from] ads::NoSettings),
     #[error("the profile of `{scenario}`: {error}")]
@@ -176,6 +182,9 @@ impl Run {
         if let Some(profile) = &settings.profile {
             arena.set_profile(profile)?;
         }
+        if settings.causes && !arena.has_modules() {
+            return Err(RunError::NoModules(oracle::NoModules { ads: settings.ads }));
+        }
         Ok(Run { arena, settings, agent })
     }
 
@@ -205,9 +214,21 @@ impl Run {
 
     /// Plays one episode and judges its collisions.
     pub fn judged(&self, number: usize) -> (EpisodeSummary, EpisodeLog) {
-        let log = self.episode(number);
+        let mut agent = (self.agent)();
+        agent.begin();
+        let mut measures = Measures::default();
+        let log = self.play(
+            number,
+            &mut |moment| choose(self.table(), agent.as_mut(), moment),
+            &mut |world, _, contacts| measures.note(world, contacts),
+        );
         let setup = self.setup(number);
-        (EpisodeSummary::judged(&setup, number, &log, &self.settings.avoidability), log)
+        let mut summary = EpisodeSummary::judged(&setup, number, &log, &self.settings.avoidability);
+        (summary.criticality, summary.pet_s) = measures.of_steps(&log);
+        if self.settings.causes {
+            summary.find_causes(&setup, &log).expect("a run with causes is against a system of modules");
+        }
+        (summary, log)
     }
 
     /// Plays one episode's beginning with other choices: a replay of it, for example.
