@@ -543,9 +543,10 @@ fn lane_along(
     through.iter().copied().find(|lane| map.lane(*lane).successors.contains(&to)).ok_or(refusal)
 }
 
-/// The lane from which one comes into a lane: that of the route, if it is one, else the first.
+/// The lane from which one comes into a lane: that of the route, if it is one, else the first. (A route
+/// that changes lanes goes through lanes side by side, of which neither comes before the other.)
 fn lane_before(around: &Around, lane: LaneIndex) -> Option<LaneIndex> {
-    let route = &around.scene.route.lanes;
-    let on_route = route.windows(2).find(|pair| pair[1].lane == lane).map(|pair| pair[0].lane);
-    on_route.or_else(|| around.scene.map.lane(lane).predecessors.first().copied())
+    let before = &around.scene.map.lane(lane).predecessors;
+    let on_route = |lane: &&LaneIndex| around.scene.route.lanes.iter().any(|part| part.lane == **lane);
+    before.iter().find(on_route).or(before.first()).copied()
 }
