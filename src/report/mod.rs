@@ -3,7 +3,9 @@
 mod canvas;
 mod picture;
 mod road;
+mod trials;
 
 pub use picture::Snapshot;
 pub use picture::picture;
 pub use road::draw;
+pub use trials::trials;

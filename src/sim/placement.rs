@@ -22,6 +22,7 @@ use crate::rng;
 use crate::road::Conflict;
 use crate::road::LaneIndex;
 use crate::road::RouteLane;
+use crate::road::Turn;
 
 use super::body;
 use super::body::BodyParameters;
@@ -543,10 +544,12 @@ fn lane_along(
     through.iter().copied().find(|lane| map.lane(*lane).successors.contains(&to)).ok_or(refusal)
 }
 
-/// The lane from which one comes into a lane: that of the route, if it is one, else the first. (A route
-/// that changes lanes goes through lanes side by side, of which neither comes before the other.)
+/// The lane from which one comes into a lane: that of the route, if it is one, else one straight behind,
+/// else the first.
 fn lane_before(around: &Around, lane: LaneIndex) -> Option<LaneIndex> {
-    let before = &around.scene.map.lane(lane).predecessors;
-    let on_route = |lane: &&LaneIndex| around.scene.route.lanes.iter().any(|part| part.lane == **lane);
-    before.iter().find(on_route).or(before.first()).copied()
+    let (map, route) = (&around.scene.map, &around.scene.route.lanes);
+    let before = &map.lane(lane).predecessors;
+    let on_route = before.iter().find(|lane| route.iter().any(|part| part.lane == **lane));
+    let straight = || before.iter().find(|lane| map.lane(**lane).turn == Turn::Straight);
+    on_route.or_else(straight).or(before.first()).copied()
 }

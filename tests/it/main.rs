@@ -16,4 +16,5 @@ mod tables;
 mod traces;
 mod torch;
 mod training;
+mod trials;
 mod world;

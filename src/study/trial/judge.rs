@@ -178,6 +178,10 @@ fn crosses(seen: &Sighting) -> Result<usize, String> {
         frame.route_offset_m.abs() <= reach_m + frame.ego.half_width_m
     };
     let Some(index) = seen.frames.iter().position(on_path) else {
+        // An ego vehicle in a turn may be beside the path itself: a meeting all the same.
+        if seen.ending == Ending::TouchedEgo {
+            return Ok(seen.frames.len() - 1);
+        }
         return Err(ended(seen, "it had come onto the route"));
     };
     let frame = &seen.frames[index];
