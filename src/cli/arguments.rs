@@ -79,6 +79,10 @@ pub enum Command {
     Replay(ReplayArguments),
     /// Check every claim of emitted scenarios and policies.
     Verify(VerifyArguments),
+    /// Say which module of the driving system an emitted scenario's crash is the fault of.
+    Diagnose(DiagnoseArguments),
+    /// Find the smallest scenario that still makes the same crash.
+    Shrink(ShrinkArguments),
     /// Draw moments of an emitted scenario as SVG.
     Render(RenderArguments),
     /// Print or draw a map, and a route through it.
@@ -155,6 +159,29 @@ pub struct TableArguments {
     /// Only what this road allows, with the reason where it does not.
     #[arg(long)]
     pub road: Option<String>,
+    /// Carry every row out on the road, or on all of them, and judge whether it does what it says.
+    #[arg(long)]
+    pub r#try: bool,
+    #[command(flatten)]
+    pub trials: TrialArguments,
+}
+
+#[derive(Debug, Args)]
+pub struct TrialArguments {
+    /// Tries of each row on each road, at most.
+    #[arg(long, requires = "try", default_value_t = 6, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    pub tries: u32,
+    /// Undisturbed drives of each road, from whose steps the tries set out.
+    #[arg(long, requires = "try", default_value_t = 8, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    pub drives: u32,
+    /// Driving system of the ego vehicle.
+    #[arg(long, requires = "try", default_value = crate::study::DEFAULT_ADS)]
+    pub ads: String,
+    #[arg(long, requires = "try", default_value_t = 1)]
+    pub seed: u64,
+    /// Write one try of each row and road as a scenario, one that failed if there is any.
+    #[arg(long, requires = "try", value_name = "DIR")]
+    pub out: Option<PathBuf>,
 }
 
 #[derive(Debug, Args)]
@@ -220,6 +247,10 @@ pub struct RunArguments {
     /// Vehicles of ambient traffic around the ego vehicle, besides those that actions make appear.
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=i64::from(crate::model::AMBIENT_MAX)))]
     pub ambient: u32,
+    /// Say of each counted collision which module of the driving system is at fault; takes some twenty
+    /// replays for each.
+    #[arg(long)]
+    pub causes: bool,
     /// Worker threads; the result does not depend on it [default: one for each core].
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=1024))]
     pub jobs: Option<u32>,
@@ -229,7 +260,7 @@ pub struct RunArguments {
     #[arg(long)]
     pub out: Option<PathBuf>,
     /// Go on with an interrupted run directory; its own settings hold.
-    #[arg(long, value_name = "DIR", conflicts_with_all = ["file", "road", "ads", "ads_config", "agent", "policy", "episodes", "seed", "ambient", "out", "without", "with"])]
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["file", "road", "ads", "ads_config", "agent", "policy", "episodes", "seed", "ambient", "causes", "out", "without", "with"])]
     pub resume: Option<PathBuf>,
     /// Exit with status 4 if a counted collision was found.
     #[arg(long)]
@@ -288,6 +319,28 @@ pub struct ReplayArguments {
     /// recorded one.
     #[arg(long, value_name = "FILE")]
     pub ads_config: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+pub struct DiagnoseArguments {
+    pub file: PathBuf,
+    /// Another profile of `modular` than the recorded one.
+    #[arg(long, value_name = "FILE")]
+    pub ads_config: Option<PathBuf>,
+    /// Profile that says how good each module should be [default: `modular` as it comes].
+    #[arg(long, value_name = "FILE")]
+    pub baseline: Option<PathBuf>,
+    /// Say also how many of N small variations of timing, speeds and sensor errors still crash.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    pub likelihood: Option<u32>,
+}
+
+#[derive(Debug, Args)]
+pub struct ShrinkArguments {
+    pub file: PathBuf,
+    /// Where to write [default: STEM.shrunk.ava beside the file].
+    #[arg(long, short)]
+    pub output: Option<PathBuf>,
 }
 
 #[derive(Debug, Args)]

@@ -4,6 +4,7 @@ mod arguments;
 mod check;
 mod compile;
 mod completions;
+mod diagnose;
 mod diff;
 mod doc;
 mod error;
@@ -19,7 +20,9 @@ mod road;
 mod run;
 mod run_directory;
 mod sarif;
+mod shrink;
 mod train;
+mod trials;
 mod verify;
 mod why;
 
@@ -63,6 +66,8 @@ pub fn main() -> ExitCode {
         Command::Train(arguments) => train::train(&output, arguments),
         Command::Verify(arguments) => verify::verify(&output, arguments),
         Command::Replay(arguments) => replay::replay(&output, arguments),
+        Command::Diagnose(arguments) => diagnose::diagnose(&output, arguments),
+        Command::Shrink(arguments) => shrink::shrink(&output, arguments),
         Command::Render(arguments) => render::render(&output, arguments),
         Command::Road(arguments) => road::road(&output, arguments),
     };

@@ -9,6 +9,7 @@ use crate::model::Scenario;
 use crate::oracle;
 use crate::study;
 use crate::study::RunError;
+use crate::study::Stage;
 
 use super::arguments::ReplayArguments;
 use super::error::Failure;
@@ -29,11 +30,10 @@ pub fn replay(output: &Output, arguments: &ReplayArguments) -> Result<(), Failur
             Some(path) => format!("{} with {}", ads.name(), path.display()),
             None => ads.name().to_owned(),
         };
-        let log = study::replay_with(&table, &scenario, &ads, &mut |_, _, _| {})
-            .map_err(|error| Failure::usage(error.to_string()))?;
-        let judgements = study::judge_replay(&table, &scenario, &ads, &log)
-            .map_err(|error| Failure::usage(error.to_string()))?;
+        let stage = Stage::new(&table, &scenario).map_err(|error| Failure::usage(error.to_string()))?;
+        let log = stage.play(&ads, &mut |_, _, _| {});
         if !is_recorded {
+            let judgements = stage.judge(&ads, &log);
             let counted = oracle::counted(table.space(), &log, &judgements).len();
             let collisions = plural(log.collisions.len(), "collision");
             let avoidable = judgements.iter().filter(|j| j.class == Avoidability::Avoidable).count();
@@ -47,7 +47,7 @@ pub fn replay(output: &Output, arguments: &ReplayArguments) -> Result<(), Failur
             }));
             continue;
         }
-        let verdicts = oracle::verify(table.space(), &scenario, &log, &judgements);
+        let verdicts = stage.verify(&ads, &log);
         let wrong = verdicts.iter().filter(|verdict| !verdict.confirmed).count();
         refuted += wrong;
         confirmed += verdicts.len() - wrong;

@@ -119,6 +119,7 @@ fn begun(output: &Output, arguments: &RunArguments) -> Result<(Run, RunDirectory
         episodes: arguments.episodes,
         seed: arguments.seed,
         ambient: arguments.ambient,
+        causes: arguments.causes,
         without: arguments.rules.without.clone(),
         with: arguments.rules.with.clone(),
         avoidability: AvoidabilitySettings::default(),
@@ -209,6 +210,7 @@ fn keep(
     if summary.counted() > 0 {
         let name = format!("{}_{:04}", log.road, summary.episode);
         let source = emit::Provenance {
+            command: "run",
             name: &name,
             space_path,
             episode: summary.episode,

@@ -37,6 +37,8 @@ use super::tree;
 /// What an emitted file says about where it comes from.
 #[derive(Debug, Clone, Copy)]
 pub struct Provenance<'a> {
+    /// The command that writes it, for example `run`.
+    pub command: &'a str,
     /// Name of the scenario.
     pub name: &'a str,
     /// Path of the space's file, as the emitted file is to name it.
@@ -56,27 +58,46 @@ pub fn scenario(
     summary: &EpisodeSummary,
     source: &Provenance,
 ) -> File {
-    let space = table.space();
     let counted: Vec<&Finding> = summary.collisions.iter().filter(|finding| finding.counted).collect();
     let last = counted.last().expect("an episode without a counted collision is not emitted");
     let steps = last.collision.step + 1;
+    let emitted = format!("Emitted by `avastra {}`; replay with `avastra replay FILE`.", source.command);
+    let headline = headline(log, &counted[0].collision);
+    file(table, log, source, [&emitted, &headline], steps, expects(log, summary, steps))
+}
+
+/// All steps of an episode, with a headline, as a scenario that claims nothing: to look at.
+pub fn unclaimed(table: &ActionTable, log: &EpisodeLog, headline: &str, source: &Provenance) -> File {
+    let emitted =
+        format!("Emitted by `avastra {}`; look at it with `avastra render FILE --strip`.", source.command);
+    file(table, log, source, [&emitted, headline], log.steps.len(), Vec::new())
+}
+
+fn file(
+    table: &ActionTable,
+    log: &EpisodeLog,
+    source: &Provenance,
+    [emitted, headline]: [&str; 2],
+    steps: usize,
+    expects: Vec<Expect>,
+) -> File {
+    let space = table.space();
     let item = Scenario {
         name: Name::built(source.name),
         origin: origin(log, source),
         road: Name::built(log.road.as_str()),
         start: start(space, log),
         steps: (0..steps).map(|number| step(table, log, number)).collect(),
-        expects: expects(log, summary, steps),
+        expects,
     };
     let digest = Some(Text::new(space.digest.clone(), Span::NONE));
     let space_use = Use { path: Text::new(source.space_path, Span::NONE), digest };
-    let docs = vec![tree::doc(headline(log, &counted[0].collision))];
     File {
-        docs: vec![tree::doc("Emitted by `avastra run`; replay with `avastra replay FILE`.")],
+        docs: vec![tree::doc(emitted)],
         items: vec![
             tree::item(Vec::new(), ItemKind::Language(tree::digits(LANGUAGE.to_string()))),
             tree::item(Vec::new(), ItemKind::Use(space_use)),
-            tree::item(docs, ItemKind::Scenario(item)),
+            tree::item(vec![tree::doc(headline)], ItemKind::Scenario(item)),
         ],
         span: Span::NONE,
     }
@@ -191,6 +212,15 @@ fn expects(log: &EpisodeLog, summary: &EpisodeSummary, steps: usize) -> Vec<Expe
         });
         let class = tree::name(finding.judgement.class.name());
         expects.push(tree::expect(class, by.into_iter().chain([who()]).collect()));
+        if let Some([first, rest @ ..]) = finding.cause.as_deref() {
+            let first = tree::name(first.name());
+            let modules = rest.iter().map(|module| tree::name(module.name()));
+            let modules = match rest {
+                [] => first,
+                _ => tree::list(core::iter::once(first).chain(modules).collect()),
+            };
+            expects.push(tree::expect(tree::equal(tree::name("cause"), modules), vec![who()]));
+        }
     }
     let proc = log.steps[..steps].iter().map(|step| tree::rounded(step.proc, 3, Dimension::RATIO));
     expects.push(tree::expect(tree::equal(tree::name("proc"), tree::list(proc.collect())), Vec::new()));

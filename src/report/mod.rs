@@ -4,8 +4,6 @@ mod canvas;
 mod picture;
 mod road;
 
-pub use picture::PANEL_PX;
 pub use picture::Snapshot;
-pub use picture::VIEW_RADIUS_M;
 pub use picture::picture;
 pub use road::draw;

@@ -121,6 +121,12 @@ impl Way {
         (found.lane, station_m - found.from_m)
     }
 
+    /// The lanes from a station on, each with the station on it from which the way goes on.
+    pub fn lanes_from(&self, station_m: f64) -> impl Iterator<Item = (LaneIndex, f64)> {
+        let first = self.lanes.partition_point(|lane| lane.from_m <= station_m).max(1) - 1;
+        self.lanes[first..].iter().map(move |part| (part.lane, (station_m - part.from_m).max(0.0)))
+    }
+
     /// Station at which a lane begins, if the way takes it.
     pub fn lane_begin_m(&self, lane: LaneIndex) -> Option<f64> {
         self.lanes.iter().find(|part| part.lane == lane).map(|part| part.from_m)

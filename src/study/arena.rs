@@ -14,6 +14,7 @@ use crate::agent::Agent;
 use crate::episode;
 use crate::episode::Choice;
 use crate::episode::Moment;
+use crate::model::Road;
 use crate::rng;
 use crate::rng::Stream;
 use crate::sim::Scene;
@@ -77,9 +78,19 @@ impl Arena {
         Ok(())
     }
 
+    /// Whether the driving system is made of modules that could be at fault.
+    pub(super) fn has_modules(&self) -> bool {
+        self.ads.profile().is_some()
+    }
+
     /// Number of roads.
     pub fn roads(&self) -> usize {
         self.roads.len()
+    }
+
+    /// The nth of the roads.
+    pub fn road(&self, road: usize) -> &Road {
+        &self.table.space().roads[self.roads[road].0]
     }
 
     /// An episode of a seed on the nth of the roads.
@@ -96,6 +107,7 @@ impl Arena {
             seed,
             start: episode::start(space, &memory, seed),
             memory,
+            period_shifts: Vec::new(),
         }
     }
 }

@@ -2,10 +2,12 @@
 
 mod arena;
 mod database;
+mod measures;
 mod profile;
 mod run;
 mod summary;
 mod train;
+mod trial;
 
 pub use arena::Arena;
 pub use arena::DEFAULT_ADS;
@@ -14,6 +16,7 @@ pub use database::Database;
 pub use database::DatabaseError;
 pub use database::RefusalCount;
 pub use database::Totals;
+pub use measures::Measures;
 pub use profile::Profile;
 pub use profile::recorded;
 pub use run::EPISODES_MAX;
@@ -21,6 +24,7 @@ pub use run::PolicyReference;
 pub use run::Run;
 pub use run::RunError;
 pub use run::RunSettings;
+pub use run::Stage;
 pub use run::judge_replay;
 pub use run::play;
 pub use run::replay;
@@ -33,3 +37,9 @@ pub use train::TrainSettings;
 pub use train::TrainedEpisode;
 pub use train::Training;
 pub use train::evaluate;
+pub use trial::Cell;
+pub use trial::Count;
+pub use trial::Outcome as TrialOutcome;
+pub use trial::Sample;
+pub use trial::TrialSettings;
+pub use trial::Trials;

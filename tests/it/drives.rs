@@ -101,9 +101,12 @@ fn drive(scene: &Arc<Scene>, entry: &ads::Entry, seed: u64, limit_mps: f64) {
     assert_eq!(world.red_runs(), 0, "{who}: ran a red light");
 }
 
-/// How far from the middle of its lane the ego vehicle may be without touching an edge, m.
+/// Half the width of a lane marking, m: a wheel on the line has not left the lane.
+const ON_THE_LINE_M: f64 = 0.06;
+
+/// How far from the middle of its lane the ego vehicle may be without leaving it, m.
 fn room_m(scene: &Scene, world: &World) -> f64 {
     let here = scene.route.lane_at(world.ego_station_m());
     let width_m = scene.map.lane(here.lane).width_at(world.ego_station_m() - here.from_m);
-    width_m / 2.0 - world.ego_outline().half_width_m
+    width_m / 2.0 - world.ego_outline().half_width_m + ON_THE_LINE_M
 }

@@ -17,6 +17,7 @@ use crate::model::vocabulary::Side;
 use crate::rng;
 use crate::rng::Rng;
 use crate::rng::Stream;
+use crate::road;
 use crate::road::LaneIndex;
 use crate::road::Neighbour;
 
@@ -63,6 +64,8 @@ const CHANGE_M_MAX: f64 = 8.0;
 const STRIP_M_MAX: f64 = 0.5;
 /// Who is slower than this when a wait ends sets out anew, m/s.
 const SETS_OUT_MPS: f64 = 1.0;
+/// A lane change that is allowed from here on begins here, m.
+const AT_ONCE_M: f64 = 0.1;
 /// Who stands at more than this angle to the way stands across it or against it (cosine of 45°).
 const CROSSWISE_COS_MAX: f64 = core::f64::consts::FRAC_1_SQRT_2;
 
@@ -419,12 +422,8 @@ impl Driver {
         };
         let Some((to, to_station_m, side)) = begun else { return };
         let aside_m = (to.path.pose_at(to_station_m).position - this.outline.pose.position).norm();
-        self.change = Some(Change {
-            to,
-            to_station_m,
-            progress: 0.0,
-            duration_s: (QUINTIC_PEAK * aside_m / CHANGE_MPS_MAX).max(CHANGE_S_MIN),
-        });
+        self.change =
+            Some(Change { to, to_station_m, progress: 0.0, duration_s: change_duration_s(aside_m) });
         self.last_change = side;
         self.plan.pop();
     }
@@ -438,10 +437,17 @@ impl Driver {
         around: &Around,
     ) -> Option<(Arc<Way>, f64, Option<Side>)> {
         let map = &around.scene.map;
-        let target = lane_beside(around, self.way.lane_at(self.station_m).0, side)?;
+        let (here, here_m) = self.way.lane_at(self.station_m);
+        let target = lane_beside(around, here, side)?;
         let centre = &map.lane(target).centre;
         let there = centre.project(this.outline.pose.position);
-        if there.distance_m > CHANGE_M_MAX || !self.is_free(centre, there.station_m, this, size, around) {
+        // Markings hold for everybody, and nobody changes lanes in a junction, where they part.
+        let room_m = map.changes_from_m(here, on_road(side), here_m);
+        let room_m = room_m.iter().find(|(from_m, _)| from_m - here_m < AT_ONCE_M)?.1;
+        if there.distance_m > CHANGE_M_MAX
+            || room_m < change_length_m(self.speed_mps, there.distance_m)
+            || !self.is_free(centre, there.station_m, this, size, around)
+        {
             return None;
         }
         let mut rng = self.draw(this.id, around);
@@ -517,6 +523,42 @@ fn along(pose: Pose, speed_mps: f64) -> Moved {
 /// The stream of one choice of one road user.
 pub(in crate::sim) fn choices(seed: u64, id: u32, draw: u32) -> Rng {
     rng::stream(seed, Stream::Traffic, u64::from(id) << 32 | u64::from(draw))
+}
+
+/// Whether the street on which a way is at a station, or the next one if it is in a junction, has room for
+/// a lane change to a side.
+pub(in crate::sim) fn can_change(
+    around: &Around,
+    way: &Way,
+    station_m: f64,
+    side: Side,
+    speed_mps: f64,
+) -> bool {
+    let map = &around.scene.map;
+    let in_junction = |lane: LaneIndex| map.lane(lane).junction.is_some();
+    let ahead = way.lanes_from(station_m).skip_while(|(lane, _)| in_junction(*lane));
+    ahead.take_while(|(lane, _)| !in_junction(*lane)).any(|(lane, at_m)| {
+        let Some(target) = lane_beside(around, lane, side) else { return false };
+        let here = map.lane(lane).centre.pose_at(at_m).position;
+        let length_m = change_length_m(speed_mps, map.lane(target).centre.project(here).distance_m);
+        map.changes_from_m(lane, on_road(side), at_m).iter().any(|(_, room_m)| *room_m >= length_m)
+    })
+}
+
+fn change_duration_s(aside_m: f64) -> f64 {
+    (QUINTIC_PEAK * aside_m / CHANGE_MPS_MAX).max(CHANGE_S_MIN)
+}
+
+/// Way on which a lane change of so much to the side is done at a speed, m.
+fn change_length_m(speed_mps: f64, aside_m: f64) -> f64 {
+    speed_mps.max(CHANGE_FULL_MPS) * change_duration_s(aside_m)
+}
+
+fn on_road(side: Side) -> road::Side {
+    match side {
+        Side::Left => road::Side::Left,
+        Side::Right => road::Side::Right,
+    }
 }
 
 /// The same-direction lane on a side of a lane, if there is one and no median lies between.
