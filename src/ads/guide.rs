@@ -255,21 +255,29 @@ impl Guide {
             let ahead = (forward.dot(&(point - position)) / SPACING_M) as isize;
             let next = index.saturating_add_signed(ahead).clamp(within.first, within.last);
             if next == index {
-                return Some(self.least_beside(point, index, within));
+                return Some(self.descend(point, index, within));
             }
             index = next;
         }
         None
     }
 
-    /// Of a sample and its two neighbours the nearest to a point.
-    fn least_beside(&self, point: Vec2, index: usize, within: Stretch) -> usize {
-        let mut best = (index, self.squared_m2(point, index));
-        for neighbour in [index.saturating_sub(1).max(within.first), (index + 1).min(within.last)] {
-            let candidate = self.squared_m2(point, neighbour);
-            if candidate < best.1 {
-                best = (neighbour, candidate);
+    /// From a sample on to the one whose neighbours are both farther from a point; of equals, the first.
+    fn descend(&self, point: Vec2, from: usize, within: Stretch) -> usize {
+        let mut best = (from, self.squared_m2(point, from));
+        while best.0 < within.last {
+            let next = self.squared_m2(point, best.0 + 1);
+            if next >= best.1 {
+                break;
             }
+            best = (best.0 + 1, next);
+        }
+        while best.0 > within.first {
+            let before = self.squared_m2(point, best.0 - 1);
+            if before > best.1 {
+                break;
+            }
+            best = (best.0 - 1, before);
         }
         best.0
     }
@@ -364,7 +372,12 @@ mod tests {
                 let anew = guide.project(point, from_m, to_m);
                 match tracer.next(point) {
                     Some(beside) => {
-                        assert_eq!(beside, anew, "case {case}, moment {moment}");
+                        // A search may end a few samples beyond the stretch, on another tangent.
+                        let inside = (from_m..to_m).contains(&anew.station_m);
+                        assert!(
+                            beside == anew || !inside,
+                            "case {case}, moment {moment}: {beside:?} {anew:?}"
+                        );
                         near += 1;
                     }
                     None => {
