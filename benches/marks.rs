@@ -232,6 +232,7 @@ fn run(space: Arc<Space>) -> Run {
         episodes: EPISODES,
         seed: 1,
         ambient: 0,
+        causes: false,
         without: Vec::new(),
         with: Vec::new(),
         avoidability: Default::default(),
