@@ -11,7 +11,7 @@ use clap::ValueEnum;
 #[derive(Debug, Parser)]
 #[command(name = "avastra", version, max_term_width = 100)]
 #[command(after_help = "Exit status: 0 ok, 1 usage or file, 2 mistakes in a source file, \
-                        3 a claim refuted, 4 collision found under --fail-on-collision.")]
+                        3 a claim refuted, 4 collision found: by `run --fail-on-collision`, or by `test` in a scenario that still fails.")]
 pub struct Arguments {
     #[command(subcommand)]
     pub command: Command,
@@ -83,6 +83,8 @@ pub enum Command {
     Diagnose(DiagnoseArguments),
     /// Find the smallest scenario that still makes the same crash.
     Shrink(ShrinkArguments),
+    /// Play emitted scenarios as a regression suite for a driving system.
+    Test(TestArguments),
     /// Draw moments of an emitted scenario as SVG.
     Render(RenderArguments),
     /// Print or draw a map, and a route through it.
@@ -341,6 +343,21 @@ pub struct ShrinkArguments {
     /// Where to write [default: STEM.shrunk.ava beside the file].
     #[arg(long, short)]
     pub output: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+pub struct TestArguments {
+    /// Directory of scenarios, or a run directory.
+    pub directory: PathBuf,
+    /// Driving system under test [default: the one that each scenario was found with].
+    #[arg(long)]
+    pub ads: Option<String>,
+    /// Profile of the `modular` driving system.
+    #[arg(long, value_name = "FILE")]
+    pub ads_config: Option<PathBuf>,
+    /// Write the results as JUnit XML, too.
+    #[arg(long, value_name = "FILE")]
+    pub junit: Option<PathBuf>,
 }
 
 #[derive(Debug, Args)]

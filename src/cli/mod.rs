@@ -21,6 +21,7 @@ mod run;
 mod run_directory;
 mod sarif;
 mod shrink;
+mod test;
 mod train;
 mod trials;
 mod verify;
@@ -68,6 +69,7 @@ pub fn main() -> ExitCode {
         Command::Replay(arguments) => replay::replay(&output, arguments),
         Command::Diagnose(arguments) => diagnose::diagnose(&output, arguments),
         Command::Shrink(arguments) => shrink::shrink(&output, arguments),
+        Command::Test(arguments) => test::test(&output, arguments),
         Command::Render(arguments) => render::render(&output, arguments),
         Command::Road(arguments) => road::road(&output, arguments),
     };

@@ -46,6 +46,42 @@ impl Fate {
     }
 }
 
+/// What another driving system makes of a scenario that was found with a collision.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Regression {
+    /// It runs into the same obstacle.
+    StillFails { time_s: f64 },
+    /// It touches nobody, or somebody else only because that one ran into it.
+    Fixed,
+    /// It runs into somebody else.
+    OtherCrash,
+    /// The same obstacle runs into it.
+    Struck,
+    /// The obstacle never appears, because another drive left no legal place for it.
+    NeverMet,
+}
+
+impl Regression {
+    /// Whether the driving system runs into somebody.
+    pub fn is_failure(self) -> bool {
+        matches!(self, Regression::StillFails { .. } | Regression::OtherCrash)
+    }
+}
+
+/// Plays what led to the nth collision of a log with another driving system; `setup` is what the log was
+/// played from.
+pub fn regression(setup: &Setup, log: &EpisodeLog, index: usize, ads: &Selected) -> Regression {
+    let crash = Crash::new(setup, log, index);
+    let again = crash.play(ads);
+    match (crash.fate(&again), crash.again(&again)) {
+        (_, Some(collision)) => Regression::StillFails { time_s: collision.contact.time_s },
+        (Fate::Crash, None) => Regression::Struck,
+        (Fate::Other, None) => Regression::OtherCrash,
+        (Fate::Vanished, None) => Regression::Fixed,
+        (Fate::Absent, None) => Regression::NeverMet,
+    }
+}
+
 /// A collision of an episode, and how to play up to it.
 pub(super) struct Crash<'a> {
     pub setup: &'a Setup<'a>,

@@ -24,6 +24,8 @@ pub use cause::WeaknessFinding;
 pub use cause::diagnose;
 pub use cause::fate;
 pub use crash::Fate;
+pub use crash::Regression;
+pub use crash::regression;
 pub use facts::counted;
 pub use facts::facts;
 pub use severity::Severity;

@@ -4,6 +4,7 @@
 //! `m2 / (m1 + m2) · |v2 - v1|`. Injury models are left out: their curves are of whole populations.
 
 use crate::episode::Collision;
+use crate::geometry::Vec2;
 use crate::sim::VehicleParameters;
 use crate::sim::body_mass_t;
 
@@ -23,7 +24,14 @@ pub struct Severity {
     /// Where the ego vehicle was hit: `front`, `front left`, `front right` (its corners), `left`, `right`
     /// or `rear`.
     pub side: &'static str,
+    /// How the obstacle moved, seen from the ego vehicle: `standing`, `along` with it, `oncoming`,
+    /// `from the left` or `from the right`.
+    pub approach: &'static str,
 }
+
+/// Slower than this an obstacle stands, m/s.
+const STANDING_MPS: f64 = 0.3;
+
 
 /// The severity of a collision.
 pub fn severity(collision: &Collision) -> Severity {
@@ -39,13 +47,24 @@ pub fn severity(collision: &Collision) -> Severity {
         delta_v_mps: part(other_t),
         obstacle_delta_v_mps: part(ego_t),
         side: side(contact.on_ego, &VehicleParameters::MKZ),
+        approach: approach(obstacle_mps),
+    }
+}
+
+/// How somebody moves, by a velocity in the ego vehicle's frame: x ahead, y left.
+fn approach(velocity_mps: Vec2) -> &'static str {
+    match velocity_mps {
+        v if v.norm() < STANDING_MPS => "standing",
+        v if v.y.abs() <= v.x.abs() && v.x > 0.0 => "along",
+        v if v.y.abs() <= v.x.abs() => "oncoming",
+        v if v.y > 0.0 => "from the right",
+        _ => "from the left",
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::Vec2;
     use crate::model::vocabulary::Body;
     use crate::model::vocabulary::Verb;
     use crate::sim::Contact;
@@ -65,7 +84,7 @@ mod tests {
         for body in [Body::SchoolBus, Body::Hatchback, Body::Pedestrian] {
             let collision = Collision { contact, step: 0, body, verb: Verb::DriveAhead, spawned_s: 5.0 };
             let found = severity(&collision);
-            assert_eq!((found.relative_speed_mps, found.side), (5.0, "front"));
+            assert_eq!((found.relative_speed_mps, found.side, found.approach), (5.0, "front", "along"));
             assert!((found.delta_v_mps + found.obstacle_delta_v_mps - 5.0).abs() < 1e-12);
             let (ego_t, other_t) = (VehicleParameters::MKZ.mass_t, body_mass_t(body));
             assert!((ego_t * found.delta_v_mps - other_t * found.obstacle_delta_v_mps).abs() < 1e-9);

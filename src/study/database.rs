@@ -37,7 +37,7 @@ CREATE TABLE collision (
   on_ego_ahead_m REAL NOT NULL, on_ego_left_m REAL NOT NULL,
   repeated INTEGER NOT NULL, sudden INTEGER NOT NULL, struck INTEGER NOT NULL, counted INTEGER NOT NULL,
   avoidability TEXT NOT NULL, hazard_onset_s REAL NOT NULL, avoided_by TEXT NOT NULL, evasion TEXT,
-  side TEXT NOT NULL, relative_speed_mps REAL NOT NULL, delta_v_mps REAL NOT NULL,
+  side TEXT NOT NULL, approach TEXT NOT NULL, relative_speed_mps REAL NOT NULL, delta_v_mps REAL NOT NULL,
   obstacle_delta_v_mps REAL NOT NULL, cause TEXT,
   PRIMARY KEY (episode, number)
 ) STRICT;
@@ -314,7 +314,7 @@ fn add_collision(
     let cause = finding.cause.as_ref().map(in_words);
     transaction
         .prepare_cached(
-            "INSERT INTO collision VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+            "INSERT INTO collision VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
         )?
         .execute(params![
             episode as i64,
@@ -337,6 +337,7 @@ fn add_collision(
             judgement.avoided_by.join(" "),
             judgement.evasion,
             severity.side,
+            severity.approach,
             severity.relative_speed_mps,
             severity.delta_v_mps,
             severity.obstacle_delta_v_mps,

@@ -2,6 +2,7 @@
 
 mod arena;
 mod database;
+mod groups;
 mod measures;
 mod profile;
 mod run;
@@ -16,6 +17,7 @@ pub use database::Database;
 pub use database::DatabaseError;
 pub use database::RefusalCount;
 pub use database::Totals;
+pub use groups::Group;
 pub use measures::Measures;
 pub use profile::Profile;
 pub use profile::recorded;

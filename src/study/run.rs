@@ -242,7 +242,7 @@ impl Run {
     }
 
     /// The beginning of an episode.
-    fn setup(&self, number: usize) -> episode::Setup<'_> {
+    pub fn setup(&self, number: usize) -> episode::Setup<'_> {
         let seed = rng::child_seed(self.settings.seed, Stream::Episode, number as u64);
         let mut setup = self.arena.setup(number / self.settings.episodes as usize, seed);
         setup.start.ambient = self.settings.ambient;
