@@ -33,17 +33,11 @@ pub fn replay(output: &Output, arguments: &ReplayArguments) -> Result<(), Failur
             Some(path) => format!("{} with {}", ads.name(), path.display()),
             None => ads.name().to_owned(),
         };
-<<<<<<< HEAD
         let stage = Stage::new(&table, &scenario).map_err(|error| Failure::usage(error.to_string()))?;
-        let log = stage.play(&ads, &mut |_, _, _| {});
-=======
-        let stage =
-            Stage::new(&table, &scenario).map_err(|error| Failure::usage(error.to_string()))?;
         let mut measures = Measures::default();
         let log = stage.play(&ads, &mut |world, _, contacts| measures.note(world, contacts));
         let (criticality, pet_s) = measures.of_steps(&log);
         let severities: Vec<oracle::Severity> = log.collisions.iter().map(oracle::severity).collect();
->>>>>>> a1a2734d1582d42e271693590f75885176958dfc
         if !is_recorded {
             let judgements = stage.judge(&ads, &log);
             let counted = oracle::counted(table.space(), &log, &judgements).len();

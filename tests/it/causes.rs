@@ -57,7 +57,9 @@ fn the_module_at_fault_is_named() {
                 oracle::diagnose(&setup, &log, finding.number, &ModularConfig::default()).expect("it has");
             let blind = oracle::diagnose(&setup, &log, finding.number, &planted).expect("it has");
             found.push((name.clone(), number, diagnosis.cause.clone(), blind.cause.clone()));
-            if tries >= 4 { break }
+            if tries >= 4 {
+                break;
+            }
         }
     }
     panic!("{found:#?}");
