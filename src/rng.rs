@@ -31,6 +31,8 @@ pub enum Stream {
     Traffic = 7,
     /// Ambient traffic: where somebody appears and what they are; one index an attempt.
     Ambient = 8,
+    /// Small changes of a scenario, to see whether it still crashes.
+    Variation = 9,
     /// First weights of a network.
     Initialization = 21,
     /// Which transitions a learner looks at again.

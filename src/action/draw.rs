@@ -118,6 +118,17 @@ impl<'a> Judge<'a> {
         self.judge(&locals(self.action, self.row, values))
     }
 
+    /// # Errors
+    /// Everything that is wrong with the nearest values, or with those that are no numbers.
+    pub fn nearest(&self, wanted: &[(Arc<str>, Value)]) -> Result<Draw, Vec<Refusal>> {
+        let values = self.values(wanted, &mut |wanted, room| room.nearest(wanted.number()));
+        let values = values.map_err(|refusal| vec![refusal])?;
+        let drawn = self.action.parameters.iter().zip(values).filter(|(parameter, _)| !parameter.axis);
+        let drawn: Vec<(Arc<str>, Value)> =
+            drawn.map(|(parameter, value)| (parameter.name.clone(), value)).collect();
+        self.check(&drawn)
+    }
+
     /// Applies every rule in force to a complete set of values.
     fn judge(&self, locals: &[Value]) -> Result<Draw, Vec<Refusal>> {
         let space = self.space;
@@ -255,20 +266,34 @@ impl<'a> Judge<'a> {
         }
     }
 
-    /// Values for all parameters: first what is chosen from lists, then the numbers, each once
-    /// everything that fixes it is known.
     fn draw_values(&self, rng: &mut Rng) -> Result<Vec<Value>, Refusal> {
-        let parameters = &self.action.parameters;
-        let mut values = locals(self.action, self.row, &[]);
-        let mut open = Vec::new();
-        for (index, parameter) in parameters.iter().enumerate().filter(|(_, parameter)| !parameter.axis) {
-            match &parameter.domain {
-                Domain::Values(choices) => {
-                    values[index] = choices[rng::below(rng, choices.len() as u32) as usize]
-                }
-                Domain::Range(..) => open.push(index),
+        let drawn = self.action.parameters.iter().filter(|parameter| !parameter.axis);
+        let chosen = drawn.filter_map(|parameter| match &parameter.domain {
+            Domain::Values(choices) => {
+                let choice = choices[rng::below(rng, choices.len() as u32) as usize];
+                Some((parameter.name.clone(), choice))
             }
-        }
+            Domain::Range(..) => None,
+        });
+        let chosen: Vec<(Arc<str>, Value)> = chosen.collect();
+        self.values(&chosen, &mut |_, room| room.draw(rng))
+    }
+
+    /// Values for all parameters: first what was `given` of what is chosen from lists, then the numbers,
+    /// each once everything that fixes it is known; `number` takes one, given what was given for it,
+    /// where no equality sets it.
+    fn values(
+        &self,
+        given: &[(Arc<str>, Value)],
+        number: &mut dyn FnMut(Value, &Room) -> f64,
+    ) -> Result<Vec<Value>, Refusal> {
+        let parameters = &self.action.parameters;
+        let mut values = locals(self.action, self.row, given);
+        let is_open = |(_, parameter): &(usize, &Parameter)| {
+            !parameter.axis && matches!(parameter.domain, Domain::Range(..))
+        };
+        let open = parameters.iter().enumerate().filter(is_open);
+        let mut open: Vec<usize> = open.map(|(index, _)| index).collect();
         while !open.is_empty() {
             let waits = |local: usize| {
                 self.bounds_on(local).any(|bound| {
@@ -280,7 +305,7 @@ impl<'a> Judge<'a> {
             // rules have the last word.
             let next = open.iter().position(|local| !waits(*local)).unwrap_or(0);
             let local = open.remove(next);
-            values[local] = Value::Number(self.draw_number(local, &open, &values, rng)?);
+            values[local] = Value::Number(self.number(local, &open, &values, number)?);
         }
         Ok(values)
     }
@@ -295,12 +320,12 @@ impl<'a> Judge<'a> {
             .filter(in_force)
     }
 
-    fn draw_number(
+    fn number(
         &self,
         local: usize,
         open: &[usize],
         values: &[Value],
-        rng: &mut Rng,
+        number: &mut dyn FnMut(Value, &Room) -> f64,
     ) -> Result<f64, Refusal> {
         let parameter = &self.action.parameters[local];
         let (low, high) = parameter.domain.ends();
@@ -313,7 +338,7 @@ impl<'a> Judge<'a> {
             }
         }
         // The draw is made in any case: a rule that sets a value must not shift later draws.
-        let drawn = room.draw(rng);
+        let drawn = number(values[local], &room);
         let value = room.exact.unwrap_or(drawn);
         if room.is_empty() || !(low..=high).contains(&value) {
             let rule = room.cut_by.map(|rule| self.space.rules[rule].name.clone());
@@ -369,7 +394,24 @@ impl Room {
 
     /// A number of the room, on the grid where the room holds a point of it.
     fn draw(&self, rng: &mut Rng) -> f64 {
-        let drawn = rng::between(rng, self.low, self.high);
+        self.on_grid(rng::between(rng, self.low, self.high))
+    }
+
+    /// The number of the room nearest to another; the middle of the room for what is no number.
+    fn nearest(&self, wanted: f64) -> f64 {
+        let inside = |value: f64| {
+            (value > self.low || value == self.low && !self.low_open)
+                && (value < self.high || value == self.high && !self.high_open)
+        };
+        match () {
+            () if inside(wanted) => wanted,
+            () if wanted.is_nan() => self.on_grid(self.low + (self.high - self.low) / 2.0),
+            () => self.on_grid(wanted.max(self.low).min(self.high)),
+        }
+    }
+
+    /// A number of the room near one of it, on the grid where the room holds a point of it.
+    fn on_grid(&self, drawn: f64) -> f64 {
         let inside = |value: f64| {
             (value > self.low || value == self.low && !self.low_open)
                 && (value < self.high || value == self.high && !self.high_open)

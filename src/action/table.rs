@@ -90,6 +90,20 @@ impl ActionTable {
         }
     }
 
+    /// The legal values nearest to given ones: numbers that rules set follow from the others, and
+    /// numbers out of bounds move to the bound.
+    ///
+    /// # Errors
+    /// As [`ActionTable::check`].
+    pub fn nearest(
+        &self,
+        situation: &Situation<'_>,
+        row: usize,
+        values: &[(Arc<str>, Value)],
+    ) -> Result<Draw, Vec<Refusal>> {
+        Judge::new(self, situation, row).nearest(values)
+    }
+
     /// Judges given values by the rules that drawing obeys: for replays and for `why`.
     ///
     /// # Errors

@@ -5,6 +5,7 @@
 
 mod driver;
 mod guide;
+mod handover;
 mod modular;
 mod reference;
 mod registry;

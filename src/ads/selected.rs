@@ -5,6 +5,7 @@ use std::sync::Arc;
 use crate::sim::Scene;
 
 use super::driver::Ads;
+use super::handover::Handover;
 use super::modular::Foresight;
 use super::modular::Modular;
 use super::modular::ModularConfig;
@@ -16,6 +17,8 @@ pub struct Selected {
     entry: &'static Entry,
     profile: Option<ModularConfig>,
     foresight: Option<Arc<Foresight>>,
+    /// Who takes over, and when, s.
+    successor: Option<(Box<Selected>, f64)>,
 }
 
 /// A profile for a driving system that has no settings.
@@ -29,7 +32,7 @@ impl Selected {
     /// The driving system as it comes.
     pub fn new(entry: &'static Entry) -> Selected {
         let profile = (entry.name == MODULAR).then(ModularConfig::default);
-        Selected { entry, profile, foresight: None }
+        Selected { entry, profile, foresight: None, successor: None }
     }
 
     /// With a profile.
@@ -48,6 +51,11 @@ impl Selected {
         Selected { foresight: Some(foresight), ..self }
     }
 
+    /// Up to a moment of the episode, s; from there on `successor` drives, who has watched until then.
+    pub fn until(self, at_s: f64, successor: Selected) -> Selected {
+        Selected { successor: Some((Box::new(successor), at_s)), ..self }
+    }
+
     pub fn name(&self) -> &'static str {
         self.entry.name
     }
@@ -59,9 +67,13 @@ impl Selected {
 
     /// A fresh driver for one episode.
     pub fn build(&self, scene: &Arc<Scene>, seed: u64) -> Box<dyn Ads> {
-        match &self.profile {
+        let first: Box<dyn Ads> = match &self.profile {
             Some(profile) => Box::new(Modular::with_foresight(scene, profile, seed, self.foresight.clone())),
             None => (self.entry.build)(scene, seed),
+        };
+        match &self.successor {
+            Some((second, at_s)) => Box::new(Handover::new(first, second.build(scene, seed), *at_s)),
+            None => first,
         }
     }
 }

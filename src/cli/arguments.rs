@@ -11,7 +11,7 @@ use clap::ValueEnum;
 #[derive(Debug, Parser)]
 #[command(name = "avastra", version, max_term_width = 100)]
 #[command(after_help = "Exit status: 0 ok, 1 usage or file, 2 mistakes in a source file, \
-                        3 a claim refuted, 4 collision found under --fail-on-collision.")]
+                        3 a claim refuted, 4 collision found: by `run --fail-on-collision`, or by `test` in a scenario that still fails.")]
 pub struct Arguments {
     #[command(subcommand)]
     pub command: Command,
@@ -79,6 +79,12 @@ pub enum Command {
     Replay(ReplayArguments),
     /// Check every claim of emitted scenarios and policies.
     Verify(VerifyArguments),
+    /// Say which module of the driving system an emitted scenario's crash is the fault of.
+    Diagnose(DiagnoseArguments),
+    /// Find the smallest scenario that still makes the same crash.
+    Shrink(ShrinkArguments),
+    /// Play emitted scenarios as a regression suite for a driving system.
+    Test(TestArguments),
     /// Draw moments of an emitted scenario as SVG.
     Render(RenderArguments),
     /// Print or draw a map, and a route through it.
@@ -243,6 +249,10 @@ pub struct RunArguments {
     /// Vehicles of ambient traffic around the ego vehicle, besides those that actions make appear.
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=i64::from(crate::model::AMBIENT_MAX)))]
     pub ambient: u32,
+    /// Say of each counted collision which module of the driving system is at fault; takes some twenty
+    /// replays for each.
+    #[arg(long)]
+    pub causes: bool,
     /// Worker threads; the result does not depend on it [default: one for each core].
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=1024))]
     pub jobs: Option<u32>,
@@ -252,7 +262,7 @@ pub struct RunArguments {
     #[arg(long)]
     pub out: Option<PathBuf>,
     /// Go on with an interrupted run directory; its own settings hold.
-    #[arg(long, value_name = "DIR", conflicts_with_all = ["file", "road", "ads", "ads_config", "agent", "policy", "episodes", "seed", "ambient", "out", "without", "with"])]
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["file", "road", "ads", "ads_config", "agent", "policy", "episodes", "seed", "ambient", "causes", "out", "without", "with"])]
     pub resume: Option<PathBuf>,
     /// Exit with status 4 if a counted collision was found.
     #[arg(long)]
@@ -311,6 +321,43 @@ pub struct ReplayArguments {
     /// recorded one.
     #[arg(long, value_name = "FILE")]
     pub ads_config: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+pub struct DiagnoseArguments {
+    pub file: PathBuf,
+    /// Another profile of `modular` than the recorded one.
+    #[arg(long, value_name = "FILE")]
+    pub ads_config: Option<PathBuf>,
+    /// Profile that says how good each module should be [default: `modular` as it comes].
+    #[arg(long, value_name = "FILE")]
+    pub baseline: Option<PathBuf>,
+    /// Say also how many of N small variations of timing, speeds and sensor errors still crash.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    pub likelihood: Option<u32>,
+}
+
+#[derive(Debug, Args)]
+pub struct ShrinkArguments {
+    pub file: PathBuf,
+    /// Where to write [default: STEM.shrunk.ava beside the file].
+    #[arg(long, short)]
+    pub output: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+pub struct TestArguments {
+    /// Directory of scenarios, or a run directory.
+    pub directory: PathBuf,
+    /// Driving system under test [default: the one that each scenario was found with].
+    #[arg(long)]
+    pub ads: Option<String>,
+    /// Profile of the `modular` driving system.
+    #[arg(long, value_name = "FILE")]
+    pub ads_config: Option<PathBuf>,
+    /// Write the results as JUnit XML, too.
+    #[arg(long, value_name = "FILE")]
+    pub junit: Option<PathBuf>,
 }
 
 #[derive(Debug, Args)]

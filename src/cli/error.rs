@@ -19,6 +19,8 @@ pub enum Failure {
     Refuted { claims: usize },
     #[error("{count} found", count = super::progress::plural(*collisions, "counted collision"))]
     Collision { collisions: usize },
+    #[error("{count} failing", count = super::progress::plural(*scenarios, "scenario"))]
+    Failing { scenarios: usize },
     /// Ctrl-C: what was done is saved.
     #[error("interrupted; go on with `avastra {command} --resume {}`", directory.display())]
     Interrupted { command: &'static str, directory: PathBuf },
@@ -39,7 +41,7 @@ impl Failure {
             Failure::Usage { .. } | Failure::File { .. } => 1,
             Failure::Source { .. } | Failure::Unformatted { .. } => 2,
             Failure::Refuted { .. } => 3,
-            Failure::Collision { .. } => 4,
+            Failure::Collision { .. } | Failure::Failing { .. } => 4,
             // What a shell reports for a process that SIGINT ended.
             Failure::Interrupted { .. } => 130,
         }

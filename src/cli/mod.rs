@@ -4,6 +4,7 @@ mod arguments;
 mod check;
 mod compile;
 mod completions;
+mod diagnose;
 mod diff;
 mod doc;
 mod error;
@@ -19,6 +20,8 @@ mod road;
 mod run;
 mod run_directory;
 mod sarif;
+mod shrink;
+mod test;
 mod train;
 mod trials;
 mod verify;
@@ -64,6 +67,9 @@ pub fn main() -> ExitCode {
         Command::Train(arguments) => train::train(&output, arguments),
         Command::Verify(arguments) => verify::verify(&output, arguments),
         Command::Replay(arguments) => replay::replay(&output, arguments),
+        Command::Diagnose(arguments) => diagnose::diagnose(&output, arguments),
+        Command::Shrink(arguments) => shrink::shrink(&output, arguments),
+        Command::Test(arguments) => test::test(&output, arguments),
         Command::Render(arguments) => render::render(&output, arguments),
         Command::Road(arguments) => road::road(&output, arguments),
     };

@@ -4,11 +4,15 @@ use std::path::Path;
 
 use crate::ads::ModularConfig;
 use crate::ads::Selected;
+use crate::episode::Collision;
 use crate::model::Avoidability;
 use crate::model::Scenario;
+use crate::model::vocabulary::Word;
 use crate::oracle;
 use crate::study;
+use crate::study::Measures;
 use crate::study::RunError;
+use crate::study::Stage;
 
 use super::arguments::ReplayArguments;
 use super::error::Failure;
@@ -23,17 +27,19 @@ pub fn replay(output: &Output, arguments: &ReplayArguments) -> Result<(), Failur
     let profile = arguments.ads_config.as_deref().map(load::profile).transpose()?;
     for path in &arguments.files {
         let (table, scenario) = load::scenario(output, path)?;
-        let (ads, is_recorded) = driver(arguments, profile.as_ref(), &scenario)
+        let (ads, is_recorded) = driver(arguments.ads.as_deref(), profile.as_ref(), &scenario)
             .map_err(|error| Failure::usage(error.to_string()))?;
         let name = match &arguments.ads_config {
             Some(path) => format!("{} with {}", ads.name(), path.display()),
             None => ads.name().to_owned(),
         };
-        let log = study::replay_with(&table, &scenario, &ads, &mut |_, _, _| {})
-            .map_err(|error| Failure::usage(error.to_string()))?;
-        let judgements = study::judge_replay(&table, &scenario, &ads, &log)
-            .map_err(|error| Failure::usage(error.to_string()))?;
+        let stage = Stage::new(&table, &scenario).map_err(|error| Failure::usage(error.to_string()))?;
+        let mut measures = Measures::default();
+        let log = stage.play(&ads, &mut |world, _, contacts| measures.note(world, contacts));
+        let (criticality, pet_s) = measures.of_steps(&log);
+        let severities: Vec<oracle::Severity> = log.collisions.iter().map(oracle::severity).collect();
         if !is_recorded {
+            let judgements = stage.judge(&ads, &log);
             let counted = oracle::counted(table.space(), &log, &judgements).len();
             let collisions = plural(log.collisions.len(), "collision");
             let avoidable = judgements.iter().filter(|j| j.class == Avoidability::Avoidable).count();
@@ -44,15 +50,20 @@ pub fn replay(output: &Output, arguments: &ReplayArguments) -> Result<(), Failur
             results.push(serde_json::json!({
                 "file": path, "scenario": scenario.name, "ads": name,
                 "collisions": log.collisions.len(), "counted": counted, "judgements": judgements,
+                "severities": severities, "criticality": criticality, "pet_s": pet_s,
             }));
             continue;
         }
-        let verdicts = oracle::verify(table.space(), &scenario, &log, &judgements);
+        let verdicts = stage.verify(&ads, &log);
         let wrong = verdicts.iter().filter(|verdict| !verdict.confirmed).count();
         refuted += wrong;
         confirmed += verdicts.len() - wrong;
         report(output, path, &scenario, &verdicts);
-        results.push(serde_json::json!({ "file": path, "scenario": scenario.name, "claims": verdicts }));
+        log.collisions.iter().zip(&severities).for_each(|(collision, severity)| {
+            output.tell(&severity_text(collision, severity));
+        });
+        results.push(serde_json::json!({ "file": path, "scenario": scenario.name, "claims": verdicts,
+            "severities": severities, "criticality": criticality, "pet_s": pet_s }));
     }
     output.result(
         "replay",
@@ -62,19 +73,34 @@ pub fn replay(output: &Output, arguments: &ReplayArguments) -> Result<(), Failur
 }
 
 /// Who drives, and whether that is who the scenario was made with.
-fn driver(
-    arguments: &ReplayArguments,
+pub fn driver(
+    ads: Option<&str>,
     profile: Option<&ModularConfig>,
     scenario: &Scenario,
 ) -> Result<(Selected, bool), RunError> {
-    if arguments.ads.is_none() && profile.is_none() {
+    if ads.is_none() && profile.is_none() {
         return Ok((study::recorded(scenario)?, true));
     }
     let recorded = scenario.origin.ads.as_deref().unwrap_or(study::DEFAULT_ADS);
-    let ads = study::driving_system(arguments.ads.as_deref().unwrap_or(recorded))?;
-    let Some(profile) = profile else { return Ok((ads, false)) };
-    let same = arguments.ads.is_none() && scenario.origin.profile_digest == Some(profile.digest());
-    Ok((ads.with_profile(*profile)?, same))
+    let selected = study::driving_system(ads.unwrap_or(recorded))?;
+    let Some(profile) = profile else { return Ok((selected, false)) };
+    let same = ads.is_none() && scenario.origin.profile_digest == Some(profile.digest());
+    Ok((selected.with_profile(*profile)?, same))
+}
+
+/// How hard a collision was, in a line.
+fn severity_text(collision: &Collision, severity: &oracle::Severity) -> String {
+    format!(
+        "  {} npc#{} ({}) hit at {:.2} s by the ego vehicle's {}: closing at {:.1} m/s, delta-v {:.1} m/s, the other's {:.1} m/s",
+        collision.body.name(),
+        collision.contact.obstacle,
+        severity.approach,
+        collision.contact.time_s,
+        severity.side,
+        severity.closing_speed_mps,
+        severity.delta_v_mps,
+        severity.obstacle_delta_v_mps
+    )
 }
 
 fn report(output: &Output, path: &Path, scenario: &Scenario, verdicts: &[oracle::ClaimResult]) {

@@ -15,6 +15,7 @@ use crate::oracle::AvoidabilitySettings;
 use crate::sim::ENGINE;
 use crate::study;
 use crate::study::EpisodeSummary;
+use crate::study::Group;
 use crate::study::PolicyReference;
 use crate::study::Profile;
 use crate::study::RefusalCount;
@@ -73,11 +74,16 @@ pub fn run(output: &Output, arguments: &RunArguments) -> Result<(), Failure> {
     if !refusals.is_empty() {
         output.say(&refusals_text(&refusals));
     }
+    let groups =
+        directory.database.groups().map_err(|error| Failure::file("read", &directory.path, error))?;
+    if !groups.is_empty() {
+        output.say(&groups_text(&groups));
+    }
     let critical = critical_files(&directory.path)?;
     output.say(&critical_text(&directory.path, &critical));
     output.result(
         "run",
-        serde_json::json!({ "directory": directory.path, "totals": totals, "refusals": refusals, "critical": critical }),
+        serde_json::json!({ "directory": directory.path, "totals": totals, "refusals": refusals, "groups": groups, "critical": critical }),
     );
     if stop.load(Ordering::Relaxed) && (totals.episodes as usize) < run.episodes() {
         return Err(Failure::Interrupted { command: "run", directory: directory.path });
@@ -119,6 +125,7 @@ fn begun(output: &Output, arguments: &RunArguments) -> Result<(Run, RunDirectory
         episodes: arguments.episodes,
         seed: arguments.seed,
         ambient: arguments.ambient,
+        causes: arguments.causes,
         without: arguments.rules.without.clone(),
         with: arguments.rules.with.clone(),
         avoidability: AvoidabilitySettings::default(),
@@ -209,6 +216,7 @@ fn keep(
     if summary.counted() > 0 {
         let name = format!("{}_{:04}", log.road, summary.episode);
         let source = emit::Provenance {
+            command: "run",
             name: &name,
             space_path,
             episode: summary.episode,
@@ -312,6 +320,26 @@ fn refusals_text(refusals: &[RefusalCount]) -> String {
     }
     if refusals.len() > NAMED_MAX {
         text.push_str(&format!("\n  and for {} other reasons", refusals.len() - NAMED_MAX));
+    }
+    text
+}
+
+/// Distinct failures, each with how often it was found and a scenario that shows it.
+fn groups_text(groups: &[Group]) -> String {
+    let mut text = format!("{}:", plural(groups.len(), "distinct failure"));
+    for group in groups.iter().take(NAMED_MAX) {
+        let cause = match group.cause.as_deref() {
+            None => String::new(),
+            Some("") => ", no cause found".to_owned(),
+            Some(modules) => format!(", {}", modules.replace(' ', " and ")),
+        };
+        text.push_str(&format!(
+            "\n  {} × {} ({}, {}), hit by the {}{cause}: {}_{:04}",
+            group.count, group.kind, group.manoeuvre, group.approach, group.side, group.road, group.episode
+        ));
+    }
+    if groups.len() > NAMED_MAX {
+        text.push_str(&format!("\n  and {} others", groups.len() - NAMED_MAX));
     }
     text
 }

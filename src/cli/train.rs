@@ -168,6 +168,7 @@ fn write_critical(
     let name = format!("{}_{:04}", trained.log.road, trained.summary.episode);
     let space_path = load::relative(&directory.path.join("critical"), &training.table().space().path)?;
     let source = emit::Provenance {
+        command: "train",
         name: &name,
         space_path: &space_path,
         episode: trained.summary.episode,

@@ -64,6 +64,7 @@ fn emit_sample(
     let path = directory.join(format!("{name}.ava"));
     std::fs::create_dir_all(directory).map_err(|error| Failure::file("make", directory, error))?;
     let source = Provenance {
+        command: "table --try",
         name: &name,
         space_path: &load::relative(directory, &arguments.file)?,
         episode: 0,

@@ -37,6 +37,8 @@ use super::tree;
 /// What an emitted file says about where it comes from.
 #[derive(Debug, Clone, Copy)]
 pub struct Provenance<'a> {
+    /// The command that writes it, for example `run`.
+    pub command: &'a str,
     /// Name of the scenario.
     pub name: &'a str,
     /// Path of the space's file, as the emitted file is to name it.
@@ -59,15 +61,16 @@ pub fn scenario(
     let counted: Vec<&Finding> = summary.collisions.iter().filter(|finding| finding.counted).collect();
     let last = counted.last().expect("an episode without a counted collision is not emitted");
     let steps = last.collision.step + 1;
-    let emitted = "Emitted by `avastra run`; replay with `avastra replay FILE`.";
+    let emitted = format!("Emitted by `avastra {}`; replay with `avastra replay FILE`.", source.command);
     let headline = headline(log, &counted[0].collision);
-    file(table, log, source, [emitted, &headline], steps, expects(log, summary, steps))
+    file(table, log, source, [&emitted, &headline], steps, expects(log, summary, steps))
 }
 
 /// All steps of an episode, with a headline, as a scenario that claims nothing: to look at.
 pub fn unclaimed(table: &ActionTable, log: &EpisodeLog, headline: &str, source: &Provenance) -> File {
-    let emitted = "Emitted by `avastra table --try`; look at it with `avastra render FILE --strip`.";
-    file(table, log, source, [emitted, headline], log.steps.len(), Vec::new())
+    let emitted =
+        format!("Emitted by `avastra {}`; look at it with `avastra render FILE --strip`.", source.command);
+    file(table, log, source, [&emitted, headline], log.steps.len(), Vec::new())
 }
 
 fn file(
@@ -209,6 +212,15 @@ fn expects(log: &EpisodeLog, summary: &EpisodeSummary, steps: usize) -> Vec<Expe
         });
         let class = tree::name(finding.judgement.class.name());
         expects.push(tree::expect(class, by.into_iter().chain([who()]).collect()));
+        if let Some([first, rest @ ..]) = finding.cause.as_deref() {
+            let first = tree::name(first.name());
+            let modules = rest.iter().map(|module| tree::name(module.name()));
+            let modules = match rest {
+                [] => first,
+                _ => tree::list(core::iter::once(first).chain(modules).collect()),
+            };
+            expects.push(tree::expect(tree::equal(tree::name("cause"), modules), vec![who()]));
+        }
     }
     let proc = log.steps[..steps].iter().map(|step| tree::rounded(step.proc, 3, Dimension::RATIO));
     expects.push(tree::expect(tree::equal(tree::name("proc"), tree::list(proc.collect())), Vec::new()));

@@ -18,6 +18,7 @@ pub use run::Watch;
 pub use run::run;
 pub use run::run_to_last;
 pub use script::Script;
+pub use script::ScriptedAction;
 pub use setup::Setup;
 pub use setup::scene;
 pub use setup::start;

@@ -163,7 +163,9 @@ impl<'a> Play<'a> {
         let time_s = self.world.time_s();
         let station_m = self.world.ego_station_m();
         let (mut proc, mut collided) = (0.0_f64, false);
-        for _ in 0..(self.setup.table.space().episode.step_s / DT_S).round() as u64 {
+        let shift = self.setup.period_shifts.get(self.steps.len()).copied().unwrap_or(0);
+        let ticks = (self.setup.table.space().episode.step_s / DT_S).round() as i64 + i64::from(shift);
+        for _ in 0..ticks {
             proc = proc.max(self.tick(watch, &mut collided));
             if self.setup.table.space().episode.stop_arrived && self.world.arrived() {
                 break;

@@ -12,16 +12,17 @@ use super::run::Choice;
 use super::run::Moment;
 
 /// What happens in each step, from step 0; `None` is a step without an action.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct Script {
-    steps: Vec<Option<ScriptedAction>>,
+    pub steps: Vec<Option<ScriptedAction>>,
 }
 
+/// A row, and how it is to be carried out.
 #[derive(Debug, Clone, PartialEq)]
-struct ScriptedAction {
-    row: usize,
+pub struct ScriptedAction {
+    pub row: usize,
     /// Values of the `any` parameters.
-    values: Vec<(Arc<str>, Value)>,
+    pub values: Vec<(Arc<str>, Value)>,
 }
 
 impl Script {

@@ -17,6 +17,7 @@ use crate::sim::Start;
 const SIGNAL_PHASE_S: f64 = 204.0;
 
 /// Everything that an episode is made of but the choices.
+#[derive(Clone)]
 pub struct Setup<'a> {
     pub table: &'a ActionTable,
     pub road: &'a Road,
@@ -27,6 +28,9 @@ pub struct Setup<'a> {
     pub start: Start,
     /// States of the space at the start; those that mean weather agree with `start`.
     pub memory: Memory,
+    /// Ticks by which each observation period is longer than the space says, or shorter; none beyond its
+    /// end. Only whoever asks what a little more or less time would have changed has any.
+    pub period_shifts: Vec<i32>,
 }
 
 /// The world that a road's episodes share.

@@ -1,10 +1,11 @@
 //! The Markov decision process of the paper: its 19 state variables, the collision probability and the
 //! reward.
 //!
-//! The paper's equations and nothing else. A space may say by itself what a collision probability is
+//! The paper's equations, and beside them the usual measures of criticality. A space may say by itself what a collision probability is
 //! worth (`reward { … }`): `model` evaluates that.
 
 mod collision_probability;
+mod criticality;
 mod observation;
 mod reward;
 mod state;
@@ -16,6 +17,10 @@ pub use collision_probability::lateral_safety_distance_m;
 pub use collision_probability::longitudinal_safety_distance_m;
 pub use collision_probability::opposing_safety_distance_m;
 pub use collision_probability::probability;
+pub use criticality::Criticality;
+pub use criticality::Encroachment;
+pub use criticality::deceleration_to_avoid_mps2;
+pub use criticality::time_to_collision_s;
 pub use observation::BEYOND_LEN;
 pub use observation::BEYOND_NAMES;
 pub use observation::Observation;

@@ -57,6 +57,7 @@ pub use scenario::Avoidability;
 pub use scenario::Claim;
 pub use scenario::ENDS;
 pub use scenario::Figure;
+pub use scenario::MODULES;
 pub use scenario::Origin;
 pub use scenario::Scenario;
 pub use scenario::ScenarioStart;

@@ -73,6 +73,9 @@ pub enum Claim {
     /// `expect avoidable by [cc, fsm] with npc#2`: the class of the collision, and the reference drivers
     /// that avoid it.
     Avoidability { class: Avoidability, by: Option<Vec<String>>, obstacle: Option<u32> },
+    /// `expect cause == perception with npc#2`, `expect cause == [tracking, planning]`: the module at
+    /// fault, or the two that are at fault together; in words of [`MODULES`].
+    Cause { modules: Vec<String>, obstacle: Option<u32> },
     /// `expect end == arrived`: one of [`ENDS`].
     End(String),
 }
@@ -102,6 +105,10 @@ impl Avoidability {
         }
     }
 }
+
+/// The modules of a driving system that can be at fault, in the words of `expect cause == …`.
+pub const MODULES: [&str; 7] =
+    ["localization", "perception", "tracking", "prediction", "planning", "latency", "control"];
 
 /// How an episode may end, in the words of `expect end == …`.
 pub const ENDS: [&str; 4] = ["arrived", "stalled", "limit", "script"];

@@ -76,6 +76,18 @@ fn towards_mps(contact: &Contact, leftward: f64) -> f64 {
     -leftward * contact.obstacle_velocity_on_ego_mps.y
 }
 
+/// The side of the ego vehicle that a point belongs to, in words.
+pub(super) fn side(on_ego: Vec2, ego: &VehicleParameters) -> &'static str {
+    match face(on_ego, ego) {
+        Face::Front => "front",
+        Face::FrontCorner { leftward } if leftward > 0.0 => "front left",
+        Face::FrontCorner { .. } => "front right",
+        Face::Rear => "rear",
+        Face::Side { leftward } if leftward > 0.0 => "left",
+        Face::Side { .. } => "right",
+    }
+}
+
 /// `leftward` is 1 on the left and -1 on the right.
 enum Face {
     Front,

@@ -2,17 +2,38 @@
 //! claims hold.
 
 mod avoidable;
+mod cause;
+mod crash;
 mod facts;
 mod hazard;
+mod severity;
+mod shrink;
 #[cfg(test)]
 mod tests;
+mod variation;
 mod verify;
 
 pub use avoidable::AvoidabilitySettings;
 pub use avoidable::Judgement;
 pub use avoidable::judge;
 pub use avoidable::judge_one;
+pub use cause::Diagnosis;
+pub use cause::ModuleFinding;
+pub use cause::NoModules;
+pub use cause::WeaknessFinding;
+pub use cause::diagnose;
+pub use cause::fate;
+pub use crash::Fate;
+pub use crash::Regression;
+pub use crash::regression;
 pub use facts::counted;
 pub use facts::facts;
+pub use severity::Severity;
+pub use severity::severity;
+pub use shrink::Shrunk;
+pub use shrink::shrink;
+pub use variation::Likelihood;
+pub use variation::likelihood;
+pub use variation::wilson;
 pub use verify::ClaimResult;
 pub use verify::verify;

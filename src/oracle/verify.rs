@@ -1,5 +1,6 @@
 //! The claims of an emitted scenario against what a replay finds.
 
+use crate::ads::Module;
 use crate::episode::Collision;
 use crate::episode::EpisodeLog;
 use crate::episode::Outcome;
@@ -9,6 +10,7 @@ use crate::model::Space;
 use crate::model::digest_text;
 
 use super::avoidable::Judgement;
+use super::cause::NoModules;
 use super::facts;
 
 /// One claim, and what came of it.
@@ -22,12 +24,13 @@ pub struct ClaimResult {
 }
 
 /// Checks every claim of a scenario, and that each of its steps was legal. `judgements` has one for
-/// each collision of the log.
+/// each collision of the log; `cause` finds the modules at fault for the nth, if a claim asks for them.
 pub fn verify(
     space: &Space,
     scenario: &Scenario,
     log: &EpisodeLog,
     judgements: &[Judgement],
+    cause: &dyn Fn(usize) -> Result<Vec<Module>, NoModules>,
 ) -> Vec<ClaimResult> {
     let steps = log.steps.iter().enumerate().filter_map(|(number, step)| match &step.outcome {
         Outcome::Refused { rule, reason, .. } => {
@@ -36,10 +39,17 @@ pub fn verify(
         }
         _ => None,
     });
-    steps.chain(scenario.claims.iter().map(|claim| check(space, claim, log, judgements))).collect()
+    let claims = scenario.claims.iter().map(|claim| check(space, claim, log, judgements, cause));
+    steps.chain(claims).collect()
 }
 
-fn check(space: &Space, claim: &Claim, log: &EpisodeLog, judgements: &[Judgement]) -> ClaimResult {
+fn check(
+    space: &Space,
+    claim: &Claim,
+    log: &EpisodeLog,
+    judgements: &[Judgement],
+    cause: &dyn Fn(usize) -> Result<Vec<Module>, NoModules>,
+) -> ClaimResult {
     match claim {
         Claim::Collision { obstacle, time_s } => {
             let at = time_s.as_ref().map_or(String::new(), |time| format!(" at {time} s"));
@@ -74,6 +84,16 @@ fn check(space: &Space, claim: &Claim, log: &EpisodeLog, judgements: &[Judgement
                 if *class == found.class && same_drivers { Ok(()) } else { Err(in_words(found)) }
             };
             let claim = format!("{}{}{}", class.name(), by_whom(by.as_deref()), with(*obstacle));
+            judged(claim, collision(log, *obstacle).and_then(judge))
+        }
+        Claim::Cause { modules, obstacle } => {
+            let judge = |index: usize| {
+                let found = cause(index).map_err(|error| error.to_string())?;
+                let found: Vec<&str> = found.into_iter().map(Module::name).collect();
+                let same = modules.iter().map(String::as_str).eq(found.iter().copied());
+                if same { Ok(()) } else { Err(format!("[{}]", found.join(", "))) }
+            };
+            let claim = format!("cause [{}]{}", modules.join(", "), with(*obstacle));
             judged(claim, collision(log, *obstacle).and_then(judge))
         }
         Claim::Proc(claimed) => {

@@ -17,6 +17,11 @@ pub(super) struct BodyParameters {
     pub deceleration_mps2_max: f64,
 }
 
+/// Mass of a body, t.
+pub fn body_mass_t(body: Body) -> f64 {
+    parameters(body).mass_t
+}
+
 /// The parameters of a body.
 pub(super) fn parameters(body: Body) -> BodyParameters {
     let of = |[length_m, width_m, height_m]: [f64; 3],

@@ -21,6 +21,7 @@ mod tests;
 mod way;
 mod world;
 
+pub use body::body_mass_t;
 pub use ego::Control;
 pub use ego::VehicleParameters;
 pub use ego::pedal_acceleration_mps2;

@@ -11,6 +11,7 @@ use crate::action::SpawnFacts;
 use crate::action::SpawnRequest;
 use crate::geometry::OrientedBox;
 use crate::geometry::Pose;
+use crate::geometry::Vec2;
 use crate::geometry::distance_m;
 use crate::geometry::wrap_angle;
 use crate::model::vocabulary::LaneChoice;
@@ -178,6 +179,7 @@ fn finish(
         outline,
         distance_m: distance_m(around.ego_outline, &outline),
         height_m: mover.size.height_m,
+        forward: moved.forward,
         lane_heading_rad: moved.lane_heading_rad,
         velocity_mps: moved.velocity_mps,
         spawned_tick: around.tick,
@@ -231,7 +233,12 @@ fn on_foot(around: &Around, request: &SpawnRequest, size: BodyParameters, id: u3
             )),
         )
     };
-    let moved = Moved::at_rest(pose);
+    let moved = Moved {
+        pose,
+        forward: pose.forward(),
+        lane_heading_rad: pose.heading_rad,
+        velocity_mps: Vec2::zeros(),
+    };
     finish(around, request, Mover::new(size, motion), id, moved)
 }
 

@@ -78,6 +78,11 @@ impl Arena {
         Ok(())
     }
 
+    /// Whether the driving system is made of modules that could be at fault.
+    pub(super) fn has_modules(&self) -> bool {
+        self.ads.profile().is_some()
+    }
+
     /// Number of roads.
     pub fn roads(&self) -> usize {
         self.roads.len()
@@ -102,6 +107,7 @@ impl Arena {
             seed,
             start: episode::start(space, &memory, seed),
             memory,
+            period_shifts: Vec::new(),
         }
     }
 }

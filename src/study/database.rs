@@ -11,22 +11,24 @@ use rusqlite::Transaction;
 use rusqlite::params;
 
 use crate::action::Draw;
+use crate::ads::Module;
 use crate::episode::EpisodeLog;
 use crate::episode::Outcome;
 use crate::mdp::STATE_NAMES;
 use crate::model::vocabulary::Word;
+use crate::oracle;
 
 use super::summary::EpisodeSummary;
 use super::summary::Finding;
 
 /// Layout of the tables; raised whenever a column changes.
-const SCHEMA_VERSION: i64 = 2;
+const SCHEMA_VERSION: i64 = 3;
 
 const SCHEMA: &str = "
 CREATE TABLE episode (
   episode INTEGER PRIMARY KEY, road TEXT NOT NULL, seed TEXT NOT NULL, ended TEXT NOT NULL,
   duration_s REAL NOT NULL, distance_m REAL NOT NULL, steps INTEGER NOT NULL, red_runs INTEGER NOT NULL,
-  collisions INTEGER NOT NULL, counted INTEGER NOT NULL, first_counted_s REAL, trace TEXT NOT NULL
+  collisions INTEGER NOT NULL, counted INTEGER NOT NULL, first_counted_s REAL, trace TEXT NOT NULL, pet_s REAL
 ) STRICT;
 CREATE TABLE collision (
   episode INTEGER NOT NULL REFERENCES episode, number INTEGER NOT NULL, time_s REAL NOT NULL,
@@ -35,6 +37,8 @@ CREATE TABLE collision (
   on_ego_ahead_m REAL NOT NULL, on_ego_left_m REAL NOT NULL,
   repeated INTEGER NOT NULL, sudden INTEGER NOT NULL, struck INTEGER NOT NULL, counted INTEGER NOT NULL,
   avoidability TEXT NOT NULL, hazard_onset_s REAL NOT NULL, avoided_by TEXT NOT NULL, evasion TEXT,
+  side TEXT NOT NULL, approach TEXT NOT NULL, relative_speed_mps REAL NOT NULL, delta_v_mps REAL NOT NULL,
+  obstacle_delta_v_mps REAL NOT NULL, cause TEXT,
   PRIMARY KEY (episode, number)
 ) STRICT;
 ";
@@ -217,6 +221,7 @@ fn step_table() -> String {
         "CREATE TABLE step (
            episode INTEGER NOT NULL REFERENCES episode, step INTEGER NOT NULL, time_s REAL NOT NULL,
            action_row INTEGER, action TEXT, refused TEXT, proc REAL NOT NULL, reward REAL NOT NULL,
+           ttc_s REAL, thw_s REAL, drac_mps2 REAL, required_mps2 REAL, rss_unsafe_s REAL,
            {}, PRIMARY KEY (episode, step)) STRICT;",
         states.join(", ")
     )
@@ -250,6 +255,15 @@ pub(super) fn add_all(
             step.proc.into(),
             step.reward.into(),
         ];
+        // Only runs measure; trainings do not.
+        let measured = summary.criticality.get(index);
+        values.extend([
+            measured.and_then(|step| step.ttc_s).into(),
+            measured.and_then(|step| step.thw_s).into(),
+            measured.map(|step| step.drac_mps2).into(),
+            measured.map(|step| step.required_mps2).into(),
+            measured.map(|step| step.rss_unsafe_s).into(),
+        ]);
         values.extend(step.state.iter().map(|&value| f64::from(value).into()));
         let places = vec!["?"; values.len()].join(", ");
         transaction
@@ -267,8 +281,9 @@ fn add_episode(
     summary: &EpisodeSummary,
     log: &EpisodeLog,
 ) -> Result<(), rusqlite::Error> {
-    transaction.prepare_cached("INSERT INTO episode VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)")?.execute(
-        params![
+    transaction
+        .prepare_cached("INSERT INTO episode VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)")?
+        .execute(params![
             summary.episode as i64,
             log.road,
             log.seed.to_string(),
@@ -281,8 +296,8 @@ fn add_episode(
             summary.counted() as i64,
             summary.first_counted_s(),
             crate::model::digest_text(&log.trace()),
-        ],
-    )?;
+            summary.pet_s,
+        ])?;
     Ok(())
 }
 
@@ -293,9 +308,13 @@ fn add_collision(
 ) -> Result<(), rusqlite::Error> {
     let Finding { collision, facts, judgement, .. } = finding;
     let contact = &collision.contact;
+    let severity = oracle::severity(collision);
+    let in_words =
+        |modules: &Vec<Module>| modules.iter().map(|module| module.name()).collect::<Vec<_>>().join(" ");
+    let cause = finding.cause.as_ref().map(in_words);
     transaction
         .prepare_cached(
-            "INSERT INTO collision VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+            "INSERT INTO collision VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
         )?
         .execute(params![
             episode as i64,
@@ -317,6 +336,12 @@ fn add_collision(
             judgement.onset_s,
             judgement.avoided_by.join(" "),
             judgement.evasion,
+            severity.side,
+            severity.approach,
+            severity.relative_speed_mps,
+            severity.delta_v_mps,
+            severity.obstacle_delta_v_mps,
+            cause,
         ])?;
     Ok(())
 }

@@ -2,6 +2,8 @@
 
 mod arena;
 mod database;
+mod groups;
+mod measures;
 mod profile;
 mod run;
 mod summary;
@@ -15,6 +17,8 @@ pub use database::Database;
 pub use database::DatabaseError;
 pub use database::RefusalCount;
 pub use database::Totals;
+pub use groups::Group;
+pub use measures::Measures;
 pub use profile::Profile;
 pub use profile::recorded;
 pub use run::EPISODES_MAX;
@@ -22,6 +26,7 @@ pub use run::PolicyReference;
 pub use run::Run;
 pub use run::RunError;
 pub use run::RunSettings;
+pub use run::Stage;
 pub use run::judge_replay;
 pub use run::play;
 pub use run::replay;

@@ -12,6 +12,7 @@ use std::sync::mpsc;
 use crate::action::ActionTable;
 use crate::action::ActiveRules;
 use crate::ads;
+use crate::ads::ModularConfig;
 use crate::ads::Selected;
 use crate::agent;
 use crate::agent::Agent;
@@ -27,16 +28,19 @@ use crate::model::Scenario;
 use crate::model::Space;
 use crate::oracle;
 use crate::oracle::AvoidabilitySettings;
+use crate::oracle::ClaimResult;
 use crate::oracle::Judgement;
 use crate::rng;
 use crate::rng::Stream;
 use crate::sim::ENGINE;
+use crate::sim::Scene;
 use crate::sim::Start;
 use crate::syntax::listed;
 
 use super::arena::Arena;
 use super::arena::choose;
 use super::arena::driving_system;
+use super::measures::Measures;
 use super::profile::Profile;
 use super::profile::recorded;
 use super::summary::EpisodeSummary;
@@ -68,6 +72,9 @@ pub struct RunSettings {
     /// Vehicles of ambient traffic.
     #[serde(default)]
     pub ambient: u32,
+    /// Whether each counted collision is diagnosed.
+    #[serde(default)]
+    pub causes: bool,
     /// Rules switched off.
     pub without: Vec<String>,
     /// Optional rules switched on.
@@ -108,6 +115,8 @@ pub enum RunError {
     Twice { name: String },
     #[error("{found} episodes a road: from 1 to {EPISODES_MAX} are possible")]
     Episodes { found: u32 },
+    #[error(transparent)]
+    NoModules(#[from] oracle::NoModules),
     #[error(transparent)]
     NoSettings(#[from] ads::NoSettings),
     #[error("the profile of `{scenario}`: {error}")]
@@ -173,6 +182,9 @@ impl Run {
         if let Some(profile) = &settings.profile {
             arena.set_profile(profile)?;
         }
+        if settings.causes && !arena.has_modules() {
+            return Err(RunError::NoModules(oracle::NoModules { ads: settings.ads }));
+        }
         Ok(Run { arena, settings, agent })
     }
 
@@ -202,9 +214,21 @@ impl Run {
 
     /// Plays one episode and judges its collisions.
     pub fn judged(&self, number: usize) -> (EpisodeSummary, EpisodeLog) {
-        let log = self.episode(number);
+        let mut agent = (self.agent)();
+        agent.begin();
+        let mut measures = Measures::default();
+        let log = self.play(
+            number,
+            &mut |moment| choose(self.table(), agent.as_mut(), moment),
+            &mut |world, _, contacts| measures.note(world, contacts),
+        );
         let setup = self.setup(number);
-        (EpisodeSummary::judged(&setup, number, &log, &self.settings.avoidability), log)
+        let mut summary = EpisodeSummary::judged(&setup, number, &log, &self.settings.avoidability);
+        (summary.criticality, summary.pet_s) = measures.of_steps(&log);
+        if self.settings.causes {
+            summary.find_causes(&setup, &log).expect("a run with causes is against a system of modules");
+        }
+        (summary, log)
     }
 
     /// Plays one episode's beginning with other choices: a replay of it, for example.
@@ -218,7 +242,7 @@ impl Run {
     }
 
     /// The beginning of an episode.
-    fn setup(&self, number: usize) -> episode::Setup<'_> {
+    pub fn setup(&self, number: usize) -> episode::Setup<'_> {
         let seed = rng::child_seed(self.settings.seed, Stream::Episode, number as u64);
         let mut setup = self.arena.setup(number / self.settings.episodes as usize, seed);
         setup.start.ambient = self.settings.ambient;
@@ -283,6 +307,72 @@ pub fn replay(
     replay_with(table, scenario, &ads, watch)
 }
 
+/// A scenario that is ready to play: its road and the rules that it was made with.
+pub struct Stage<'a> {
+    table: &'a ActionTable,
+    scenario: &'a Scenario,
+    rules: ActiveRules,
+    scene: Arc<Scene>,
+}
+
+impl<'a> Stage<'a> {
+    /// # Errors
+    /// If the scenario is of another world or other rules.
+    pub fn new(table: &'a ActionTable, scenario: &'a Scenario) -> Result<Stage<'a>, RunError> {
+        let origin = &scenario.origin;
+        if let Some(engine) = origin.engine.as_ref().filter(|engine| engine.as_str() != ENGINE) {
+            return Err(RunError::Engine { scenario: scenario.name.clone(), engine: engine.clone() });
+        }
+        let rules = ActiveRules::new(table.space(), &origin.with, &origin.without)?;
+        let scene = Arc::new(episode::scene(&table.space().roads[scenario.road]));
+        Ok(Stage { table, scenario, rules, scene })
+    }
+
+    /// The beginning of its episode, with any driving system.
+    pub fn setup(&self, ads: &Selected) -> episode::Setup<'_> {
+        let space = self.table.space();
+        let start = &self.scenario.start;
+        let seed = self.scenario.origin.seed.unwrap_or(0);
+        let memory = start.memory.clone();
+        episode::Setup {
+            table: self.table,
+            road: &space.roads[self.scenario.road],
+            scene: self.scene.clone(),
+            rules: &self.rules,
+            ads: ads.clone(),
+            seed,
+            start: Start {
+                signal_phase_s: start.signal_phase_s,
+                seed: start.traffic_seed.unwrap_or(seed),
+                ambient: start.ambient,
+                ..episode::start(space, &memory, seed)
+            },
+            memory,
+            period_shifts: Vec::new(),
+        }
+    }
+
+    /// Plays it as it is written down.
+    pub fn play(&self, ads: &Selected, watch: &mut Watch) -> EpisodeLog {
+        let script = Script::of_scenario(self.scenario);
+        episode::run(&self.setup(ads), &mut |moment| script.choose(self.table, moment), watch)
+    }
+
+    /// Checks its claims against a log of it.
+    pub fn verify(&self, ads: &Selected, log: &EpisodeLog) -> Vec<ClaimResult> {
+        let setup = self.setup(ads);
+        let cause = |index| Ok(oracle::diagnose(&setup, log, index, &ModularConfig::default())?.cause);
+        oracle::verify(self.table.space(), self.scenario, log, &self.judge(ads, log), &cause)
+    }
+
+    /// Judges the collisions of its log, by playing it again.
+    pub fn judge(&self, ads: &Selected, log: &EpisodeLog) -> Vec<Judgement> {
+        oracle::judge(log, &AvoidabilitySettings::default(), &mut |watch| {
+            self.play(ads, watch);
+        })
+    }
+}
+
 /// Plays a scenario with any driving system, under the rules that it was made with.
 ///
 /// # Errors
@@ -293,32 +383,7 @@ pub fn replay_with(
     ads: &Selected,
     watch: &mut Watch,
 ) -> Result<EpisodeLog, RunError> {
-    let origin = &scenario.origin;
-    if let Some(engine) = origin.engine.as_ref().filter(|engine| engine.as_str() != ENGINE) {
-        return Err(RunError::Engine { scenario: scenario.name.clone(), engine: engine.clone() });
-    }
-    let space = table.space();
-    let rules = ActiveRules::new(space, &origin.with, &origin.without)?;
-    let road = &space.roads[scenario.road];
-    let seed = origin.seed.unwrap_or(0);
-    let memory = scenario.start.memory.clone();
-    let setup = episode::Setup {
-        table,
-        road,
-        scene: Arc::new(episode::scene(road)),
-        rules: &rules,
-        ads: ads.clone(),
-        seed,
-        start: Start {
-            signal_phase_s: scenario.start.signal_phase_s,
-            seed: scenario.start.traffic_seed.unwrap_or(seed),
-            ambient: scenario.start.ambient,
-            ..episode::start(space, &memory, seed)
-        },
-        memory,
-    };
-    let script = Script::of_scenario(scenario);
-    Ok(episode::run(&setup, &mut |moment| script.choose(table, moment), watch))
+    Ok(Stage::new(table, scenario)?.play(ads, watch))
 }
 
 /// Judges the collisions of a replay, by playing it again.
@@ -331,9 +396,5 @@ pub fn judge_replay(
     ads: &Selected,
     log: &EpisodeLog,
 ) -> Result<Vec<Judgement>, RunError> {
-    let mut failure = None;
-    let judgements = oracle::judge(log, &AvoidabilitySettings::default(), &mut |watch| {
-        failure = replay_with(table, scenario, ads, watch).err();
-    });
-    failure.map_or(Ok(judgements), Err)
+    Ok(Stage::new(table, scenario)?.judge(ads, log))
 }

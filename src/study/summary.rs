@@ -1,15 +1,19 @@
 //! What an episode amounts to: its collisions, each with the facts of its verdict.
 
+use crate::ads::ModularConfig;
+use crate::ads::Module;
 use crate::episode;
 use crate::episode::Collision;
 use crate::episode::EpisodeLog;
 use crate::episode::Script;
 use crate::episode::Setup;
+use crate::mdp::Criticality;
 use crate::model::OutcomeFacts;
 use crate::model::Space;
 use crate::oracle;
 use crate::oracle::AvoidabilitySettings;
 use crate::oracle::Judgement;
+use crate::oracle::NoModules;
 
 /// An episode, judged.
 #[derive(Debug, Clone, PartialEq)]
@@ -17,6 +21,10 @@ pub struct EpisodeSummary {
     /// Number of the episode in its run, from 0.
     pub episode: usize,
     pub collisions: Vec<Finding>,
+    /// Measures of danger in each step, where they were taken.
+    pub criticality: Vec<Criticality>,
+    /// Least post-encroachment time with anybody who was not hit, s; `None` above 5 s.
+    pub pet_s: Option<f64>,
 }
 
 /// A collision, judged.
@@ -27,6 +35,8 @@ pub struct Finding {
     pub collision: Collision,
     pub facts: OutcomeFacts,
     pub judgement: Judgement,
+    /// Modules at fault, if they were looked for.
+    pub cause: Option<Vec<Module>>,
     pub counted: bool,
 }
 
@@ -51,9 +61,29 @@ impl EpisodeSummary {
         let find = |(index, judgement)| {
             let facts = oracle::facts(log, index, &judgement);
             let counted = space.counts(facts);
-            Finding { number: index, collision: log.collisions[index], facts, judgement, counted }
+            Finding {
+                number: index,
+                collision: log.collisions[index],
+                facts,
+                judgement,
+                cause: None,
+                counted,
+            }
         };
-        EpisodeSummary { episode: number, collisions: judgements.into_iter().enumerate().map(find).collect() }
+        let collisions = judgements.into_iter().enumerate().map(find).collect();
+        EpisodeSummary { episode: number, collisions, criticality: Vec::new(), pet_s: None }
+    }
+
+    /// Looks for the cause of every counted collision.
+    ///
+    /// # Errors
+    /// If the driving system has no modules.
+    pub fn find_causes(&mut self, setup: &Setup, log: &EpisodeLog) -> Result<(), NoModules> {
+        for finding in self.collisions.iter_mut().filter(|finding| finding.counted) {
+            let diagnosis = oracle::diagnose(setup, log, finding.number, &ModularConfig::default())?;
+            finding.cause = Some(diagnosis.cause);
+        }
+        Ok(())
     }
 
     /// Number of counted collisions.

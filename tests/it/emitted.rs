@@ -95,7 +95,7 @@ fn emitted_scenarios_keep_every_claim() {
         let judgements = oracle::judge(&again, &run.settings().avoidability, &mut |watch| {
             play(watch);
         });
-        for verdict in oracle::verify(run.space(), scenario, &again, &judgements) {
+        for verdict in oracle::verify(run.space(), scenario, &again, &judgements, &|_| Ok(Vec::new())) {
             assert!(verdict.confirmed, "{verdict:?}\n{text}");
         }
     }
@@ -104,6 +104,7 @@ fn emitted_scenarios_keep_every_claim() {
 
 fn text(run: &Run, summary: &EpisodeSummary, log: &EpisodeLog) -> String {
     let source = emit::Provenance {
+        command: "run",
         name: &format!("{}_{:04}", log.road, summary.episode),
         space_path: "avastra45.ava",
         episode: summary.episode,

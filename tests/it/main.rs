@@ -2,6 +2,7 @@
 //! under `snapshots/`.
 
 mod cases;
+mod causes;
 mod command;
 mod corpus;
 mod contacts;

@@ -66,6 +66,7 @@ pub fn run_against(ads: &str, space: Arc<Space>, episodes: u32, seed: u64, witho
         episodes,
         seed,
         ambient: 0,
+        causes: false,
         without: without.iter().map(|rule| (*rule).to_owned()).collect(),
         with: Vec::new(),
         avoidability: Default::default(),

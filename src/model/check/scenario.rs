@@ -18,6 +18,7 @@ use crate::model::scenario::Avoidability;
 use crate::model::scenario::Claim;
 use crate::model::scenario::ENDS;
 use crate::model::scenario::Figure;
+use crate::model::scenario::MODULES;
 use crate::model::scenario::Origin;
 use crate::model::scenario::Scenario;
 use crate::model::scenario::ScenarioStart;
@@ -388,7 +389,7 @@ impl<'a> Reader<'a> {
         let unclear = || {
             Diagnostic::error(code::UNKNOWN_CLAIM, "unknown claim").at(expect.span, "cannot be checked").help(
                 "claims are `collision with npc#2 at 14.22 s`, `proc == [0.5]`, `trace == \"sha256:…\"`, \
-                 `end == arrived`, `avoidable by [cc, fsm]`, or the name of a verdict",
+                 `end == arrived`, `avoidable by [cc, fsm]`, `cause == perception`, or the name of a verdict",
             )
         };
         match &expect.claim.kind {
@@ -414,6 +415,11 @@ impl<'a> Reader<'a> {
                 (ast::ExprKind::Name(name), ast::ExprKind::Text(text)) if name == "trace" => {
                     Some(Claim::Trace(text.clone()))
                 }
+                (ast::ExprKind::Name(name), _) if name == "cause" => {
+                    let modules = self.modules(right)?;
+                    let (obstacle, _) = self.clauses(&expect.clauses, false)?;
+                    Some(Claim::Cause { modules, obstacle })
+                }
                 (ast::ExprKind::Name(name), ast::ExprKind::Name(end)) if name == "end" => {
                     if !ENDS.contains(&end.as_str()) {
                         let message = format!("an episode does not end `{end}`");
@@ -434,6 +440,28 @@ impl<'a> Reader<'a> {
                 None
             }
         }
+    }
+
+    /// `perception`, or `[tracking, planning]`.
+    fn modules(&mut self, value: &ast::Expr) -> Option<Vec<String>> {
+        let items = match &value.kind {
+            ast::ExprKind::List(items) => items.as_slice(),
+            _ => core::slice::from_ref(value),
+        };
+        let mut modules = Vec::new();
+        for item in items {
+            let ast::ExprKind::Name(name) = &item.kind else {
+                let error = Diagnostic::error(code::TYPE_MISMATCH, "wanted a module of the driving system");
+                self.report(error.at(item.span, "not a name"));
+                return None;
+            };
+            if !MODULES.contains(&name.as_str()) {
+                self.report(unknown("module", name, item.span, MODULES));
+                return None;
+            }
+            modules.push(name.clone());
+        }
+        Some(modules)
     }
 
     /// `avoidable by [cc, fsm] with npc#2`; the drivers' names are the oracle's business.

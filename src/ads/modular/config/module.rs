@@ -99,6 +99,43 @@ impl ModularConfig {
     }
 }
 
+impl ModularConfig {
+    /// The same system with one module as another profile has it. Weakness (a) goes with perception.
+    pub fn with_module_of(&self, module: Module, other: &ModularConfig) -> ModularConfig {
+        let mut config = *self;
+        match module {
+            Module::Localization => {
+                config.localization =
+                    LocalizationConfig { latency_s: self.localization.latency_s, ..other.localization };
+            }
+            Module::Perception => {
+                config.perception =
+                    PerceptionConfig { latency_frames: self.perception.latency_frames, ..other.perception };
+                config.weaknesses.a_late_unstable_tracks = other.weaknesses.a_late_unstable_tracks;
+            }
+            Module::Tracking => config.tracking = other.tracking,
+            Module::Prediction => {
+                config.prediction = other.prediction;
+                config.weaknesses.b_lane_bound_prediction = other.weaknesses.b_lane_bound_prediction;
+            }
+            Module::Planning => {
+                config.planning = other.planning;
+                config.weaknesses = Weaknesses {
+                    a_late_unstable_tracks: self.weaknesses.a_late_unstable_tracks,
+                    b_lane_bound_prediction: self.weaknesses.b_lane_bound_prediction,
+                    ..other.weaknesses
+                };
+            }
+            Module::Latency => {
+                config.localization.latency_s = other.localization.latency_s;
+                config.perception.latency_frames = other.perception.latency_frames;
+            }
+            Module::Control => config.control = other.control,
+        }
+        config
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -120,6 +157,11 @@ mod tests {
     }
 
     #[test]
+    fn every_module_can_be_claimed_as_a_cause() {
+        assert_eq!(Module::ALL.map(Module::name), crate::model::MODULES);
+    }
+
+    #[test]
     fn a_fault_vanishes_with_its_own_module_and_with_no_other() {
         let healthy = ModularConfig::default();
         assert!(faults().len() >= 12);
@@ -128,6 +170,16 @@ mod tests {
                 let cured = fault.idealised(module) == healthy.idealised(module);
                 assert_eq!(cured, name.starts_with(module.name()), "{name} by {}", module.name());
             }
+        }
+        for (name, fault) in faults() {
+            let (mut cured, mut swapped) = (Vec::new(), fault);
+            for module in Module::ALL {
+                let restored = fault.with_module_of(module, &healthy);
+                cured.extend((restored == healthy).then_some(module.name()));
+                swapped = swapped.with_module_of(module, &healthy);
+            }
+            assert!(cured.len() == 1 && name.starts_with(cured[0]), "{name} by {cured:?}");
+            assert_eq!(swapped, healthy, "all modules together are the whole profile");
         }
         for module in Module::ALL {
             assert!(faults().iter().any(|(name, _)| name.starts_with(module.name())), "{}", module.name());

@@ -28,6 +28,42 @@ pub struct Weaknesses {
 }
 
 impl Weaknesses {
+    /// Their names, from (a) to (i).
+    pub const NAMES: [&str; 9] = [
+        "a_late_unstable_tracks",
+        "b_lane_bound_prediction",
+        "c_bounded_jerk",
+        "d_brief_yielding",
+        "e_closest_static_only",
+        "f_standing_pedestrian_ignored",
+        "g_late_red_passed",
+        "h_blind_to_side_and_rear",
+        "i_gentle_fallback",
+    ];
+
+    /// Every weakness that is switched on, by name, with what is left when it alone is switched off.
+    pub fn each_off(&self) -> Vec<(&'static str, Weaknesses)> {
+        let mut found = Vec::new();
+        for (index, name) in Weaknesses::NAMES.into_iter().enumerate() {
+            let mut less = *self;
+            let switches = [
+                &mut less.a_late_unstable_tracks,
+                &mut less.b_lane_bound_prediction,
+                &mut less.c_bounded_jerk,
+                &mut less.d_brief_yielding,
+                &mut less.e_closest_static_only,
+                &mut less.f_standing_pedestrian_ignored,
+                &mut less.g_late_red_passed,
+                &mut less.h_blind_to_side_and_rear,
+                &mut less.i_gentle_fallback,
+            ];
+            if core::mem::take(switches[index]) {
+                found.push((name, less));
+            }
+        }
+        found
+    }
+
     /// Not one of them.
     pub const NONE: Weaknesses = Weaknesses {
         a_late_unstable_tracks: false,

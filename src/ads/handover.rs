@@ -1,0 +1,47 @@
+//! Two drivers of one drive: the second watches from the start and takes over at a moment.
+//!
+//! Whoever asks what another driver would have made of a hazard lets the first drive up to it, so
+//! that the hazard is the same to the bit, and the second from there on, with all that it has seen.
+
+use crate::sim::Control;
+use crate::sim::Sensed;
+
+use super::driver::Ads;
+use super::status::Status;
+
+/// The first driver until a moment, the second from then on. Both always drive; one is obeyed.
+pub struct Handover {
+    first: Box<dyn Ads>,
+    second: Box<dyn Ads>,
+    /// Since the start of the episode, s.
+    at_s: f64,
+    is_over: bool,
+}
+
+impl Handover {
+    pub fn new(first: Box<dyn Ads>, second: Box<dyn Ads>, at_s: f64) -> Handover {
+        Handover { first, second, at_s, is_over: false }
+    }
+}
+
+impl Ads for Handover {
+    fn drive(&mut self, sensed: &Sensed) -> Control {
+        let second = self.second.drive(sensed);
+        // Times are sums of ticks: the least bit must not decide.
+        self.is_over |= sensed.time_s >= self.at_s - 1e-6;
+        if self.is_over { second } else { self.first.drive(sensed) }
+    }
+
+    fn status(&self) -> &Status {
+        if self.is_over { self.second.status() } else { self.first.status() }
+    }
+
+    fn clone_box(&self) -> Box<dyn Ads> {
+        Box::new(Handover {
+            first: self.first.clone_box(),
+            second: self.second.clone_box(),
+            at_s: self.at_s,
+            is_over: self.is_over,
+        })
+    }
+}

@@ -1,0 +1,270 @@
+//! Measures of danger beside ProC: TTC, THW, DRAC, required deceleration, RSS, PET.
+//!
+//! Definitions after Westhofen et al., "Criticality Metrics for Automated Driving" (2022), and for RSS
+//! Shalev-Shwartz, Shammah and Shashua (2017). Here they are of the true world, not of what a driving
+//! system believes, and take road users to keep velocity and heading. Looked at ten times a second.
+
+use crate::ads::Rss;
+use crate::geometry::OrientedBox;
+use crate::geometry::Pose;
+use crate::geometry::Sweep;
+use crate::geometry::Vec2;
+use crate::geometry::distance_m;
+use crate::geometry::first_contact;
+use crate::geometry::wrap_angle;
+use crate::sim::DT_S;
+use crate::sim::FRAME_TICKS;
+use crate::sim::Obstacle;
+use crate::sim::World;
+
+/// Contacts later than this are not looked for, s.
+const HORIZON_S: f64 = 8.0;
+/// Encroachments farther apart in time than this are not looked for, s. Above 2 s is normal traffic.
+const PET_S_MAX: f64 = 5.0;
+/// Ways that differ less in heading than this do not cross, rad: 30°.
+const CROSSING_RAD: f64 = core::f64::consts::PI / 6.0;
+/// Slower than this nobody follows or needs to brake, m/s.
+const STANDING_MPS: f64 = 0.1;
+
+/// The most critical values over some time, of all road users around the ego vehicle.
+#[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize)]
+pub struct Criticality {
+    /// Least time to collision, s: until the outlines would touch. `None` if they never would within
+    /// 8 s.
+    pub ttc_s: Option<f64>,
+    /// Least time headway, s: gap to whoever drives ahead in the ego vehicle's way, over its speed.
+    pub thw_s: Option<f64>,
+    /// Greatest deceleration rate to avoid a crash, m/s²: `(v1 - v2)² / 2d` towards a slower one ahead.
+    pub drac_mps2: f64,
+    /// Greatest deceleration that would stop the ego vehicle short of a place where it would touch
+    /// somebody, m/s²: `v / 2 TTC`. In contrast to DRAC it sees those who cross or come towards.
+    pub required_mps2: f64,
+    /// Time in which both distances to somebody were unsafe by RSS, s.
+    pub rss_unsafe_s: f64,
+}
+
+impl Criticality {
+    /// The most critical values of two times together.
+    pub fn and(&self, other: &Criticality) -> Criticality {
+        let least = |a: Option<f64>, b: Option<f64>| match (a, b) {
+            (Some(a), Some(b)) => Some(a.min(b)),
+            (a, b) => a.or(b),
+        };
+        Criticality {
+            ttc_s: least(self.ttc_s, other.ttc_s),
+            thw_s: least(self.thw_s, other.thw_s),
+            drac_mps2: self.drac_mps2.max(other.drac_mps2),
+            required_mps2: self.required_mps2.max(other.required_mps2),
+            rss_unsafe_s: self.rss_unsafe_s + other.rss_unsafe_s,
+        }
+    }
+
+    /// Takes in the world of this moment; looks at one tick of five. `is_hit` says who has been hit
+    /// already and is left out.
+    pub fn note(&mut self, world: &World, is_hit: &dyn Fn(u32) -> bool) {
+        if !world.ticks().is_multiple_of(FRAME_TICKS) {
+            return;
+        }
+        let speed_mps = world.ego().speed_mps;
+        let mut is_unsafe = false;
+        for obstacle in world.obstacles().iter().filter(|obstacle| !is_hit(obstacle.id)) {
+            let seen = Seen::of(world, obstacle);
+            if let Some(ttc_s) = time_to_collision_s(world, obstacle) {
+                self.ttc_s = Some(self.ttc_s.map_or(ttc_s, |least| least.min(ttc_s)));
+                if ttc_s > 0.0 {
+                    self.required_mps2 = self.required_mps2.max(speed_mps / (2.0 * ttc_s));
+                }
+            }
+            if seen.is_ahead() {
+                if speed_mps > STANDING_MPS {
+                    let thw_s = seen.gap_m / speed_mps;
+                    self.thw_s = Some(self.thw_s.map_or(thw_s, |least| least.min(thw_s)));
+                }
+                self.drac_mps2 =
+                    self.drac_mps2.max(deceleration_to_avoid_mps2(speed_mps, seen.along_mps, seen.gap_m));
+            }
+            is_unsafe |= seen.is_unsafe(speed_mps, &Rss::default());
+        }
+        if is_unsafe {
+            self.rss_unsafe_s += FRAME_TICKS as f64 * DT_S;
+        }
+    }
+}
+
+/// Deceleration (m/s²) by which a follower comes to a leader's speed just before it reaches it; 0 if it
+/// is no faster.
+pub fn deceleration_to_avoid_mps2(follower_mps: f64, leader_mps: f64, gap_m: f64) -> f64 {
+    let closing_mps = (follower_mps - leader_mps).max(0.0);
+    if closing_mps == 0.0 {
+        return 0.0;
+    }
+    // A gap of nothing would ask for infinitely much: a millimetre is none.
+    closing_mps * closing_mps / (2.0 * gap_m.max(1e-3))
+}
+
+/// Time until the outlines touch if both keep velocity and heading, s; `None` beyond 8 s.
+pub fn time_to_collision_s(world: &World, obstacle: &Obstacle) -> Option<f64> {
+    let ego = world.ego_outline();
+    let ego_velocity_mps = ego.pose.forward() * world.ego().speed_mps;
+    let relative_mps = obstacle.velocity_mps - ego_velocity_mps;
+    if obstacle.distance_m > relative_mps.norm() * HORIZON_S {
+        return None;
+    }
+    let sweep = |start: OrientedBox, velocity_mps: Vec2| {
+        let position = start.pose.position + velocity_mps * HORIZON_S;
+        Sweep { start, end: Pose { position, heading_rad: start.pose.heading_rad } }
+    };
+    let first =
+        first_contact(&sweep(ego, ego_velocity_mps), &sweep(obstacle.outline, obstacle.velocity_mps))?;
+    Some(first.fraction * HORIZON_S)
+}
+
+/// An obstacle in the frame of the ego vehicle.
+struct Seen {
+    /// Between the outlines along the ego vehicle's heading, m; negative beside each other.
+    gap_m: f64,
+    /// The same across it.
+    side_gap_m: f64,
+    /// Its speed along the ego vehicle's heading, m/s.
+    along_mps: f64,
+    /// Its speed across, towards the ego vehicle, m/s.
+    towards_mps: f64,
+    is_in_front: bool,
+}
+
+impl Seen {
+    fn of(world: &World, obstacle: &Obstacle) -> Seen {
+        let (ego, other) = (world.ego_outline(), &obstacle.outline);
+        let place = ego.pose.to_local(other.pose.position);
+        let turn_rad = other.pose.heading_rad - ego.pose.heading_rad;
+        let (sin, cos) = (libm::sin(turn_rad).abs(), libm::cos(turn_rad).abs());
+        let half_ahead_m = other.half_length_m * cos + other.half_width_m * sin;
+        let half_left_m = other.half_length_m * sin + other.half_width_m * cos;
+        let across_mps = ego.pose.left().dot(&obstacle.velocity_mps);
+        Seen {
+            gap_m: place.x.abs() - ego.half_length_m - half_ahead_m,
+            side_gap_m: place.y.abs() - ego.half_width_m - half_left_m,
+            along_mps: ego.pose.forward().dot(&obstacle.velocity_mps),
+            towards_mps: if place.y > 0.0 { -across_mps } else { across_mps },
+            is_in_front: place.x > 0.0,
+        }
+    }
+
+    /// Whether it is what the ego vehicle follows: straight ahead and not coming towards it.
+    fn is_ahead(&self) -> bool {
+        self.is_in_front && self.gap_m > 0.0 && self.side_gap_m < 0.0 && self.along_mps >= 0.0
+    }
+
+    /// Whether both distances are unsafe by RSS, and the ego vehicle is the one to respond: to whom is
+    /// beside or behind, the other is.
+    fn is_unsafe(&self, speed_mps: f64, rss: &Rss) -> bool {
+        let safe_m = if self.along_mps >= 0.0 {
+            rss.longitudinal_m(speed_mps, self.along_mps)
+        } else {
+            rss.oncoming_m(speed_mps, -self.along_mps)
+        };
+        self.is_in_front
+            && self.gap_m > 0.0
+            && self.gap_m < safe_m
+            && self.side_gap_m < rss.lateral_m(self.towards_mps)
+    }
+}
+
+/// Post-encroachment time: between one leaving a place where ways cross and the other coming there.
+#[derive(Debug, Clone, Default)]
+pub struct Encroachment {
+    /// Outline of the ego vehicle every 0.1 s.
+    ego: Vec<OrientedBox>,
+    others: Vec<Trail>,
+}
+
+/// Where an obstacle was, every 0.1 s.
+#[derive(Debug, Clone)]
+struct Trail {
+    id: u32,
+    begin: usize,
+    outlines: Vec<OrientedBox>,
+}
+
+impl Encroachment {
+    /// Takes in the world of this moment; looks at one tick of five.
+    pub fn note(&mut self, world: &World) {
+        if !world.ticks().is_multiple_of(FRAME_TICKS) {
+            return;
+        }
+        let frame = self.ego.len();
+        self.ego.push(world.ego_outline());
+        for obstacle in world.obstacles() {
+            match self.others.iter_mut().find(|trail| trail.id == obstacle.id) {
+                Some(trail) => trail.outlines.push(obstacle.outline),
+                None => {
+                    let outlines = vec![obstacle.outline];
+                    self.others.push(Trail { id: obstacle.id, begin: frame, outlines });
+                }
+            }
+        }
+    }
+
+    /// The least post-encroachment time with anybody, s; `None` above 5 s. Those of whom `is_hit` says
+    /// that the ego vehicle has hit them are left out: they and it were at one place at one time.
+    pub fn least_s(&self, is_hit: &dyn Fn(u32) -> bool) -> Option<f64> {
+        let frame_s = FRAME_TICKS as f64 * DT_S;
+        let most = (PET_S_MAX / frame_s) as usize;
+        let mut least = most + 1;
+        for trail in self.others.iter().filter(|trail| !is_hit(trail.id)) {
+            for (index, other) in trail.outlines.iter().enumerate() {
+                let frame = trail.begin + index;
+                let from = (frame + 1).saturating_sub(least);
+                let until = (frame + least).min(self.ego.len());
+                for (place, ego) in self.ego.iter().enumerate().take(until).skip(from) {
+                    if crosses(ego, other) {
+                        least = least.min(place.abs_diff(frame));
+                    }
+                }
+            }
+        }
+        (least <= most).then_some(least as f64 * frame_s)
+    }
+}
+
+/// Whether two outlines of ways that cross lie on each other.
+fn crosses(ego: &OrientedBox, other: &OrientedBox) -> bool {
+    let reach_m = ego.radius_m() + other.radius_m();
+    let apart_m = ego.pose.position - other.pose.position;
+    let turn_rad = wrap_angle(ego.pose.heading_rad - other.pose.heading_rad).abs();
+    apart_m.norm_squared() < reach_m * reach_m
+        && (CROSSING_RAD..=core::f64::consts::PI - CROSSING_RAD).contains(&turn_rad)
+        && distance_m(ego, other) <= 0.0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn deceleration_is_by_the_formula() {
+        // 10 m/s faster, 20 m apart: 100 / 40.
+        assert_eq!(deceleration_to_avoid_mps2(15.0, 5.0, 20.0), 2.5);
+        assert_eq!(deceleration_to_avoid_mps2(5.0, 15.0, 20.0), 0.0);
+        assert!(deceleration_to_avoid_mps2(15.0, 5.0, 0.0).is_finite());
+    }
+
+    #[test]
+    fn the_time_between_two_at_a_crossing_is_found() {
+        // The ego vehicle leaves the crossing to the right at 10 m/s; somebody comes up from below later.
+        let mut encroachment = Encroachment::default();
+        let outline = |x_m, y_m, heading_rad| OrientedBox::new(Pose::new(x_m, y_m, heading_rad), 4.0, 2.0);
+        let upwards_rad = core::f64::consts::FRAC_PI_2;
+        let mut outlines = Vec::new();
+        for frame in 0..80 {
+            let driven_m = f64::from(frame);
+            encroachment.ego.push(outline(driven_m - 20.0, 0.0, 0.0));
+            outlines.push(outline(0.0, driven_m - 50.0, upwards_rad));
+        }
+        encroachment.others.push(Trail { id: 3, begin: 0, outlines });
+        // The rear leaves x = 1 m in frame 23; the front reaches y = -1 m in frame 47.
+        let found_s = encroachment.least_s(&|_| false).unwrap();
+        assert!((found_s - 2.4).abs() < 0.11, "{found_s}");
+        assert_eq!(encroachment.least_s(&|id| id == 3), None);
+    }
+}

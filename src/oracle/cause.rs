@@ -1,0 +1,263 @@
+//! Which module of a driving system a collision is the fault of.
+//!
+//! The ego vehicle drives as it did until the obstacle appears. From then on the same system drives with
+//! one module without its errors (`ads::Module`), which has watched from the start, so that the hazard
+//! is the same to the bit; everybody else decides for themselves. Modules without which the collision
+//! vanishes *suffice* to avoid it. If none does alone, pairs are tried.
+//!
+//! Several modules may suffice: good brakes make up for bad eyes, and nobody can tell from one crash
+//! which of the two is to blame without knowing how good eyes and brakes should be. A *baseline* says
+//! so: if modules differ from it, and the collision vanishes with one of them as the baseline has it,
+//! only such modules come into question. Then the cause is, in this order, one whose errors alone lead to the collision, all other modules being without any (which says something
+//! only where nothing happens without any errors at all); the one that prevents most of the collisions
+//! under small variations; one that has a documented weakness without which alone the collision
+//! vanishes; and the first on the data's way. Where no variation leads to the collision, it hung by a
+//! hair, and no module is named.
+//!
+//! Left out: what an error before the obstacle appeared has to do with it.
+
+use std::sync::Arc;
+
+use crate::ads::Foresight;
+use crate::ads::ModularConfig;
+use crate::ads::Module;
+use crate::ads::Selected;
+use crate::episode::EpisodeLog;
+use crate::episode::Setup;
+
+use super::crash::Crash;
+use super::crash::Fate;
+use super::crash::play;
+use super::variation::Variation;
+
+/// Variations by which modules that suffice alike are told apart.
+pub const VARIATIONS: u32 = 8;
+
+/// Ambient traffic may have been around for long: no takeover is earlier than this before the
+/// collision, s. Longer than any reaction or braking.
+const LOOK_BACK_S: f64 = 15.0;
+
+/// Why there is no cause to be found.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("`{ads}` is not made of modules that could be at fault: only `modular` is")]
+pub struct NoModules {
+    pub ads: String,
+}
+
+/// What a collision is owed to.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct Diagnosis {
+    /// The module at fault; two if only both together suffice; none if no two do.
+    pub cause: Vec<Module>,
+    pub modules: Vec<ModuleFinding>,
+    /// With no module's errors.
+    pub ideal: Fate,
+    /// Each documented weakness that is switched on.
+    pub weaknesses: Vec<WeaknessFinding>,
+    /// Small variations that led to the collision, of [`VARIATIONS`]. Looked at only to tell modules
+    /// apart.
+    pub varied_crashes: Option<u32>,
+    /// Pairs that suffice, looked for if no module does alone.
+    pub pairs: Vec<[Module; 2]>,
+    /// Takeover of the driving systems compared, s.
+    pub from_s: f64,
+}
+
+/// What one module has to do with a collision.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct ModuleFinding {
+    pub module: Module,
+    /// With this module as the baseline has it; `None` if it is so already.
+    pub restored: Option<Fate>,
+    /// With this module alone without its errors.
+    pub idealised: Fate,
+    /// With the errors of this module alone, all others being without.
+    pub alone: Fate,
+    /// Of the collisions under small variations, the share that vanishes with it restored, if that
+    /// suffices, or else idealised. Looked at only to tell modules apart.
+    pub prevented: Option<f64>,
+}
+
+/// A documented weakness, and the collision without it.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct WeaknessFinding {
+    pub weakness: &'static str,
+    pub without: Fate,
+}
+
+/// What another profile of the same driving system makes of the hazard of the nth collision of a log.
+///
+/// # Errors
+/// If the driving system has no modules.
+pub fn fate(
+    setup: &Setup,
+    log: &EpisodeLog,
+    index: usize,
+    profile: &ModularConfig,
+) -> Result<Fate, NoModules> {
+    Ok(Inquiry::new(&Crash::new(setup, log, index))?.fate(profile))
+}
+
+/// Finds the cause of the nth collision of a log that was played from `setup`.
+///
+/// # Errors
+/// If the driving system has no modules.
+pub fn diagnose(
+    setup: &Setup,
+    log: &EpisodeLog,
+    index: usize,
+    baseline: &ModularConfig,
+) -> Result<Diagnosis, NoModules> {
+    let crash = Crash::new(setup, log, index);
+    let inquiry = Inquiry::new(&crash)?;
+    let own = inquiry.profile;
+    let mut modules: Vec<ModuleFinding> = Vec::new();
+    for module in Module::ALL {
+        let others = Module::ALL.into_iter().filter(|other| *other != module);
+        let alone = others.fold(own, |config, other| config.idealised(other));
+        modules.push(ModuleFinding {
+            module,
+            restored: Some(own.with_module_of(module, baseline))
+                .filter(|restored| *restored != own)
+                .map(|restored| inquiry.fate(&restored)),
+            idealised: inquiry.fate(&own.idealised(module)),
+            alone: inquiry.fate(&alone),
+            prevented: None,
+        });
+    }
+    let ideal = inquiry.fate(&Module::ALL.into_iter().fold(own, |config, module| config.idealised(module)));
+    let off = own.weaknesses.each_off().into_iter();
+    let weaknesses: Vec<WeaknessFinding> = off
+        .map(|(weakness, weaknesses)| {
+            let without = inquiry.fate(&ModularConfig { weaknesses, ..own });
+            WeaknessFinding { weakness, without }
+        })
+        .collect();
+    // Places of the modules that may be the cause: fewer from criterion to criterion.
+    let mut best: Vec<usize> = (0..modules.len()).collect();
+    best.retain(|&index| modules[index].suffices());
+    prefer(&mut best, |index| modules[index].restored == Some(Fate::Vanished));
+    let mut pairs = Vec::new();
+    if best.is_empty() {
+        pairs = inquiry.pairs();
+    }
+    if ideal == Fate::Vanished {
+        prefer(&mut best, |index| modules[index].alone == Fate::Crash);
+    }
+    let mut varied_crashes = None;
+    if best.len() > 1 {
+        let candidates = best.iter().map(|&index| match modules[index].restored {
+            Some(Fate::Vanished) => own.with_module_of(modules[index].module, baseline),
+            _ => own.idealised(modules[index].module),
+        });
+        let (crashes, vanished) = varied(&crash, &candidates.collect::<Vec<_>>());
+        varied_crashes = Some(crashes);
+        if crashes == 0 {
+            best.clear();
+        }
+        for (&index, count) in best.iter().zip(vanished) {
+            modules[index].prevented = Some(f64::from(count) / f64::from(crashes));
+        }
+        let most = best.iter().filter_map(|&index| modules[index].prevented).fold(0.0, f64::max);
+        prefer(&mut best, |index| modules[index].prevented >= Some(most));
+        let to_blame = |found: &WeaknessFinding| found.without == Fate::Vanished;
+        prefer(&mut best, |index| {
+            weaknesses.iter().any(|found| to_blame(found) && owns(modules[index].module, found.weakness))
+        });
+    }
+    let cause = match (best.first(), pairs.first()) {
+        (Some(&index), _) => vec![modules[index].module],
+        (None, Some(pair)) => pair.to_vec(),
+        (None, None) => Vec::new(),
+    };
+    Ok(Diagnosis { cause, modules, ideal, weaknesses, varied_crashes, pairs, from_s: inquiry.from_s })
+}
+
+impl ModuleFinding {
+    /// Whether the collision vanishes with this module restored or idealised.
+    pub fn suffices(&self) -> bool {
+        self.restored == Some(Fate::Vanished) || self.idealised == Fate::Vanished
+    }
+}
+
+/// Keeps those that meet a criterion, if any do.
+fn prefer(best: &mut Vec<usize>, criterion: impl Fn(usize) -> bool) {
+    if best.iter().any(|&index| criterion(index)) {
+        best.retain(|&index| criterion(index));
+    }
+}
+
+/// Whether a documented weakness is one of a module, by what `ModularConfig::idealised` switches off.
+fn owns(module: Module, weakness: &str) -> bool {
+    match weakness {
+        "a_late_unstable_tracks" => matches!(module, Module::Perception | Module::Tracking),
+        "b_lane_bound_prediction" => module == Module::Prediction,
+        _ => module == Module::Planning,
+    }
+}
+
+/// The collision driven up to by its own driving system, and from then on by others.
+struct Inquiry<'a> {
+    crash: &'a Crash<'a>,
+    profile: ModularConfig,
+    foresight: Arc<Foresight>,
+    from_s: f64,
+}
+
+impl<'a> Inquiry<'a> {
+    fn new(crash: &'a Crash<'a>) -> Result<Inquiry<'a>, NoModules> {
+        let ads = &crash.setup.ads;
+        let profile = *ads.profile().ok_or_else(|| NoModules { ads: ads.name().to_owned() })?;
+        let (_, foresight) = play(crash.setup, |moment| crash.script.choose(crash.setup.table, moment));
+        let collision = &crash.collision;
+        let from_s = collision.spawned_s.max(collision.contact.time_s - LOOK_BACK_S);
+        Ok(Inquiry { crash, profile, foresight, from_s })
+    }
+
+    fn fate(&self, profile: &ModularConfig) -> Fate {
+        // The same settings make the same drive.
+        if *profile == self.profile {
+            return Fate::Crash;
+        }
+        let ads = taken_over(&self.crash.setup.ads, profile, &self.foresight, self.from_s);
+        self.crash.fate(&self.crash.play(&ads))
+    }
+
+    /// Pairs that suffice.
+    fn pairs(&self) -> Vec<[Module; 2]> {
+        let mut found = Vec::new();
+        for (index, first) in Module::ALL.into_iter().enumerate() {
+            for second in Module::ALL.into_iter().skip(index + 1) {
+                let both = self.profile.idealised(first).idealised(second);
+                if self.fate(&both) == Fate::Vanished {
+                    found.push([first, second]);
+                }
+            }
+        }
+        found
+    }
+}
+
+/// How many variations lead to the collision, and for each profile, how many of them no longer do.
+fn varied(crash: &Crash, profiles: &[ModularConfig]) -> (u32, Vec<u32>) {
+    let (mut crashes, mut vanished) = (0_u32, vec![0_u32; profiles.len()]);
+    for number in 1..=VARIATIONS {
+        let variation = Variation::of(crash, number);
+        let Some(collision) = crash.again(&variation.log) else { continue };
+        crashes += 1;
+        let from_s = collision.spawned_s.max(collision.contact.time_s - LOOK_BACK_S);
+        for (profile, count) in profiles.iter().zip(&mut vanished) {
+            let ads = taken_over(&crash.setup.ads, profile, &variation.foresight, from_s);
+            let fate = crash.fate(&variation.play(crash, &ads));
+            *count += u32::from(fate == Fate::Vanished);
+        }
+    }
+    (crashes, vanished)
+}
+
+/// A driving system that another profile of it takes over from, knowing the future.
+fn taken_over(ads: &Selected, profile: &ModularConfig, foresight: &Arc<Foresight>, from_s: f64) -> Selected {
+    let successor =
+        ads.clone().with_profile(*profile).expect("a driving system with a profile takes another");
+    ads.clone().until(from_s, successor.with_foresight(foresight.clone()))
+}

@@ -1,0 +1,155 @@
+//! One collision of an episode, found again in other plays of the same scenario.
+//!
+//! An obstacle is known by the step and the effect that made it appear, because its number depends on
+//! which other steps were carried out. What comes after the collision's own step is left out of every
+//! play; one step without an action is added, so that a collision that only comes later is still seen.
+
+use std::sync::Arc;
+
+use crate::ads::Foresight;
+use crate::ads::Selected;
+use crate::episode;
+use crate::episode::Choice;
+use crate::episode::Collision;
+use crate::episode::EpisodeLog;
+use crate::episode::Moment;
+use crate::episode::Outcome;
+use crate::episode::Script;
+use crate::episode::Setup;
+use crate::sim::VehicleParameters;
+
+use super::facts::struck;
+
+/// What became of a collision in another play.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Fate {
+    /// The ego vehicle touches the same obstacle.
+    Crash,
+    /// It touches somebody else, by its own fault.
+    Other,
+    /// It touches nobody, or somebody else only because that one ran into it.
+    Vanished,
+    /// The obstacle never appeared: the play says nothing.
+    Absent,
+}
+
+impl Fate {
+    /// In words, for tables.
+    pub fn in_words(self) -> &'static str {
+        match self {
+            Fate::Crash => "crash",
+            Fate::Other => "another crash",
+            Fate::Vanished => "no crash",
+            Fate::Absent => "never met",
+        }
+    }
+}
+
+/// What another driving system makes of a scenario that was found with a collision.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Regression {
+    /// It runs into the same obstacle.
+    StillFails { time_s: f64 },
+    /// It touches nobody, or somebody else only because that one ran into it.
+    Fixed,
+    /// It runs into somebody else.
+    OtherCrash,
+    /// The same obstacle runs into it.
+    Struck,
+    /// The obstacle never appears, because another drive left no legal place for it.
+    NeverMet,
+}
+
+impl Regression {
+    /// Whether the driving system runs into somebody.
+    pub fn is_failure(self) -> bool {
+        matches!(self, Regression::StillFails { .. } | Regression::OtherCrash)
+    }
+}
+
+/// Plays what led to the nth collision of a log with another driving system; `setup` is what the log was
+/// played from.
+pub fn regression(setup: &Setup, log: &EpisodeLog, index: usize, ads: &Selected) -> Regression {
+    let crash = Crash::new(setup, log, index);
+    let again = crash.play(ads);
+    match (crash.fate(&again), crash.again(&again)) {
+        (_, Some(collision)) => Regression::StillFails { time_s: collision.contact.time_s },
+        (Fate::Crash, None) => Regression::Struck,
+        (Fate::Other, None) => Regression::OtherCrash,
+        (Fate::Vanished, None) => Regression::Fixed,
+        (Fate::Absent, None) => Regression::NeverMet,
+    }
+}
+
+/// A collision of an episode, and how to play up to it.
+pub(super) struct Crash<'a> {
+    pub setup: &'a Setup<'a>,
+    pub script: Script,
+    /// Step and place among its newcomers; `None` is ambient traffic.
+    appeared: Option<(usize, usize)>,
+    pub collision: Collision,
+}
+
+impl<'a> Crash<'a> {
+    /// The nth collision of a log that was played from `setup`.
+    pub fn new(setup: &'a Setup<'a>, log: &EpisodeLog, index: usize) -> Crash<'a> {
+        let collision = log.collisions[index];
+        let obstacle = collision.contact.obstacle;
+        let place = |(step, logged): (usize, &episode::StepLog)| match &logged.outcome {
+            Outcome::Done { spawned, .. } => {
+                spawned.iter().position(|id| *id == obstacle).map(|place| (step, place))
+            }
+            Outcome::Passed | Outcome::Refused { .. } => None,
+        };
+        let appeared = log.steps.iter().enumerate().find_map(place);
+        let mut script = Script::of_log(log);
+        script.steps.truncate(collision.step + 1);
+        script.steps.push(None);
+        Crash { setup, script, appeared, collision }
+    }
+
+    /// Plays the script with a driving system.
+    pub fn play(&self, ads: &Selected) -> EpisodeLog {
+        let setup = Setup { ads: ads.clone(), ..self.setup.clone() };
+        let choose = |moment: &Moment<'_>| self.script.choose(setup.table, moment);
+        play(&setup, choose).0
+    }
+
+    /// What another play made of it.
+    pub fn fate(&self, log: &EpisodeLog) -> Fate {
+        let Some(obstacle) = self.obstacle(log) else { return Fate::Absent };
+        if log.collisions.iter().any(|collision| collision.contact.obstacle == obstacle) {
+            return Fate::Crash;
+        }
+        let at_fault = |collision: &Collision| !struck(&collision.contact, &VehicleParameters::MKZ);
+        if log.collisions.iter().any(at_fault) { Fate::Other } else { Fate::Vanished }
+    }
+
+    /// The collision in another play, if the ego vehicle ran into the obstacle there, too.
+    pub fn again<'l>(&self, log: &'l EpisodeLog) -> Option<&'l Collision> {
+        let obstacle = self.obstacle(log)?;
+        let same = |collision: &&Collision| {
+            collision.contact.obstacle == obstacle && !struck(&collision.contact, &VehicleParameters::MKZ)
+        };
+        log.collisions.iter().find(same)
+    }
+
+    /// The obstacle's number in another play.
+    fn obstacle(&self, log: &EpisodeLog) -> Option<u32> {
+        let Some((step, place)) = self.appeared else { return Some(self.collision.contact.obstacle) };
+        match &log.steps.get(step)?.outcome {
+            Outcome::Done { spawned, .. } => spawned.get(place).copied(),
+            Outcome::Passed | Outcome::Refused { .. } => None,
+        }
+    }
+}
+
+/// Plays an episode and records where everybody was.
+pub(super) fn play(setup: &Setup, mut choose: impl FnMut(&Moment) -> Choice) -> (EpisodeLog, Arc<Foresight>) {
+    let mut foresight = Foresight::default();
+    let log = episode::run(setup, &mut choose, &mut |world, _, _| {
+        foresight.record(world.ticks(), world.obstacles());
+    });
+    (log, Arc::new(foresight))
+}

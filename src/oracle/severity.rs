@@ -1,0 +1,92 @@
+//! How hard a collision was.
+//!
+//! Delta-v is the change of velocity of a perfectly inelastic impact of two bodies:
+//! `m2 / (m1 + m2) · |v2 - v1|`. Injury models are left out: their curves are of whole populations.
+
+use crate::episode::Collision;
+use crate::geometry::Vec2;
+use crate::sim::VehicleParameters;
+use crate::sim::body_mass_t;
+
+use super::facts::side;
+
+/// What an impact amounts to.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+pub struct Severity {
+    /// Speed at which the gap closed where the outlines met, m/s.
+    pub closing_speed_mps: f64,
+    /// Speed of the two relative to each other, m/s.
+    pub relative_speed_mps: f64,
+    /// Change of velocity of the ego vehicle, m/s.
+    pub delta_v_mps: f64,
+    /// Change of velocity of the obstacle, m/s.
+    pub obstacle_delta_v_mps: f64,
+    /// Where the ego vehicle was hit: `front`, `front left`, `front right` (its corners), `left`, `right`
+    /// or `rear`.
+    pub side: &'static str,
+    /// How the obstacle moved, seen from the ego vehicle: `standing`, `along` with it, `oncoming`,
+    /// `from the left` or `from the right`.
+    pub approach: &'static str,
+}
+
+/// Slower than this an obstacle stands, m/s.
+const STANDING_MPS: f64 = 0.3;
+
+/// The severity of a collision.
+pub fn severity(collision: &Collision) -> Severity {
+    let contact = &collision.contact;
+    let obstacle_mps = contact.obstacle_velocity_on_ego_mps;
+    let (ahead_mps, left_mps) = (contact.ego_speed_mps - obstacle_mps.x, obstacle_mps.y);
+    let relative_speed_mps = (ahead_mps * ahead_mps + left_mps * left_mps).sqrt();
+    let (ego_t, other_t) = (VehicleParameters::MKZ.mass_t, body_mass_t(collision.body));
+    let part = |mass_t: f64| mass_t / (ego_t + other_t) * relative_speed_mps;
+    Severity {
+        closing_speed_mps: contact.closing_speed_mps,
+        relative_speed_mps,
+        delta_v_mps: part(other_t),
+        obstacle_delta_v_mps: part(ego_t),
+        side: side(contact.on_ego, &VehicleParameters::MKZ),
+        approach: approach(obstacle_mps),
+    }
+}
+
+/// How somebody moves, by a velocity in the ego vehicle's frame: x ahead, y left.
+fn approach(velocity_mps: Vec2) -> &'static str {
+    match velocity_mps {
+        v if v.norm() < STANDING_MPS => "standing",
+        v if v.y.abs() <= v.x.abs() && v.x > 0.0 => "along",
+        v if v.y.abs() <= v.x.abs() => "oncoming",
+        v if v.y > 0.0 => "from the right",
+        _ => "from the left",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::vocabulary::Body;
+    use crate::model::vocabulary::Verb;
+    use crate::sim::Contact;
+
+    #[test]
+    fn momentum_is_kept() {
+        let contact = Contact {
+            time_s: 10.0,
+            obstacle: 1,
+            point: Vec2::zeros(),
+            on_ego: Vec2::new(2.4, 0.3),
+            ego_speed_mps: 8.0,
+            obstacle_velocity_mps: Vec2::zeros(),
+            obstacle_velocity_on_ego_mps: Vec2::new(4.0, 3.0),
+            closing_speed_mps: 4.0,
+        };
+        for body in [Body::SchoolBus, Body::Hatchback, Body::Pedestrian] {
+            let collision = Collision { contact, step: 0, body, verb: Verb::DriveAhead, spawned_s: 5.0 };
+            let found = severity(&collision);
+            assert_eq!((found.relative_speed_mps, found.side, found.approach), (5.0, "front", "along"));
+            assert!((found.delta_v_mps + found.obstacle_delta_v_mps - 5.0).abs() < 1e-12);
+            let (ego_t, other_t) = (VehicleParameters::MKZ.mass_t, body_mass_t(body));
+            assert!((ego_t * found.delta_v_mps - other_t * found.obstacle_delta_v_mps).abs() < 1e-9);
+        }
+    }
+}

@@ -1,0 +1,167 @@
+//! Small changes of a scenario, and how often it crashes under them.
+//!
+//! Nothing of a scenario is known to the last digit on a street. A variation changes, each by its own
+//! draw: when an action happens (normal, 0.1 s, cut at 0.3 s; the first stays at the start), every
+//! speed that an action draws (normal, 2 %, cut at 6 %), the phase of the signals (normal, 0.1 s, cut
+//! at 0.3 s), and all errors of the driving system's sensors, which are drawn anew. What the rules set
+//! follows from the changed values, and values stay within the rules. The widths are ours: what a
+//! tester's repetition of one manoeuvre on a proving ground may well differ by.
+
+use std::sync::Arc;
+
+use crate::ads::Foresight;
+use crate::ads::Selected;
+use crate::episode::Choice;
+use crate::episode::EpisodeLog;
+use crate::episode::Moment;
+use crate::episode::Setup;
+use crate::model::Type;
+use crate::model::Value;
+use crate::rng;
+use crate::rng::Rng;
+use crate::rng::Stream;
+use crate::sim::DT_S;
+use crate::units::Dimension;
+
+use super::crash::Crash;
+use super::crash::play;
+
+/// Standard deviation of times, s.
+const TIME_S: f64 = 0.1;
+/// Standard deviation of speeds, as a part of them.
+const SPEED: f64 = 0.02;
+/// Draws are cut at so many standard deviations.
+const CUT: f64 = 3.0;
+/// Draws of one variation before a step that they make illegal is carried out as it was.
+const DRAWS_MAX: u32 = 8;
+
+/// How often a collision happens under variations.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+pub struct Likelihood {
+    pub variations: u32,
+    pub crashes: u32,
+    /// Variations in which the obstacle never appeared, or appeared to an ego vehicle that had no way
+    /// to it: they count as no crash.
+    pub share: f64,
+    /// 95 % interval of the share, after Wilson.
+    pub low: f64,
+    pub high: f64,
+}
+
+/// The nth collision of a log under `variations` small changes; `setup` is what it was played from.
+/// A variation crashes if the ego vehicle runs into the same obstacle.
+pub fn likelihood(setup: &Setup, log: &EpisodeLog, index: usize, variations: u32) -> Likelihood {
+    let crash = Crash::new(setup, log, index);
+    let crashes =
+        (1..=variations).filter(|&number| crash.again(&Variation::of(&crash, number).log).is_some());
+    let crashes = crashes.count() as u32;
+    let (low, high) = wilson(crashes, variations);
+    let share = if variations == 0 { 0.0 } else { f64::from(crashes) / f64::from(variations) };
+    Likelihood { variations, crashes, share, low, high }
+}
+
+/// 95 % interval of a share by its count, after Wilson 1927; everything is possible of no trials.
+pub fn wilson(count: u32, trials: u32) -> (f64, f64) {
+    if trials == 0 {
+        return (0.0, 1.0);
+    }
+    // 97.5 % quantile of the normal distribution.
+    const Z: f64 = 1.959_963_984_540_054;
+    let (n, p) = (f64::from(trials), f64::from(count) / f64::from(trials));
+    let centre = p + Z * Z / (2.0 * n);
+    let half = Z * (p * (1.0 - p) / n + Z * Z / (4.0 * n * n)).sqrt();
+    let whole = 1.0 + Z * Z / n;
+    // At the ends rounding must not lose the exact 0 and 1.
+    let low = if count == 0 { 0.0 } else { (centre - half) / whole };
+    let high = if count == trials { 1.0 } else { (centre + half) / whole };
+    (low, high)
+}
+
+/// A scenario with small changes, played.
+pub(super) struct Variation<'a> {
+    pub setup: Setup<'a>,
+    pub log: EpisodeLog,
+    pub foresight: Arc<Foresight>,
+    seed: u64,
+}
+
+impl<'a> Variation<'a> {
+    /// The variation of a number, always the same.
+    pub fn of(crash: &Crash<'a>, number: u32) -> Variation<'a> {
+        let seed = rng::child_seed(crash.setup.seed, Stream::Variation, u64::from(number));
+        let mut rng = rng::stream(seed, Stream::Variation, 0);
+        let mut setup = crash.setup.clone();
+        setup.seed = seed;
+        setup.start.signal_phase_s = (setup.start.signal_phase_s + cut_normal(&mut rng) * TIME_S).max(0.0);
+        let mut late_ticks = 0;
+        for _ in 1..crash.script.steps.len() {
+            let next_ticks = (cut_normal(&mut rng) * TIME_S / DT_S).round() as i32;
+            setup.period_shifts.push(next_ticks - late_ticks);
+            late_ticks = next_ticks;
+        }
+        let (log, foresight) = play(&setup, |moment| choose(crash, seed, moment));
+        Variation { setup, log, foresight, seed }
+    }
+
+    /// The same changes with another driving system.
+    pub fn play(&self, crash: &Crash, ads: &Selected) -> EpisodeLog {
+        let setup = Setup { ads: ads.clone(), ..self.setup.clone() };
+        play(&setup, |moment| choose(crash, self.seed, moment)).0
+    }
+}
+
+/// The action of a step with other speeds. Where none of several draws is legal, the action as it was
+/// written stays as it is if it can.
+fn choose(crash: &Crash, seed: u64, moment: &Moment) -> Choice {
+    let table = crash.setup.table;
+    let Some(Some(action)) = crash.script.steps.get(moment.step) else {
+        return crash.script.choose(table, moment);
+    };
+    let parameters = &table.space().actions[table.rows()[action.row].action].parameters;
+    let is_speed =
+        |name: &str| parameters.iter().any(|p| &*p.name == name && p.ty == Type::Quantity(Dimension::SPEED));
+    let mut rng = rng::stream(seed, Stream::Variation, 1 + moment.step as u64);
+    for _ in 0..DRAWS_MAX {
+        let values: Vec<(Arc<str>, Value)> = action
+            .values
+            .iter()
+            .map(|(name, value)| match value {
+                Value::Number(speed_mps) if is_speed(name) => {
+                    let changed_mps = speed_mps * (1.0 + cut_normal(&mut rng) * SPEED);
+                    (name.clone(), Value::Number(changed_mps))
+                }
+                _ => (name.clone(), *value),
+            })
+            .collect();
+        if let Ok(draw) = table.nearest(moment.situation, action.row, &values) {
+            return Choice::Act(draw);
+        }
+    }
+    crash.script.choose(table, moment)
+}
+
+/// Standard normal, no farther out than [`CUT`].
+fn cut_normal(rng: &mut Rng) -> f64 {
+    rng::normal(rng).clamp(-CUT, CUT)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn intervals_are_wilsons() {
+        // Newcombe 1998, table I, method 3: 81 of 263, 15 of 148, 0 of 20, 1 of 29.
+        for (count, trials, low, high) in [
+            (81, 263, 0.2553, 0.3662),
+            (15, 148, 0.0624, 0.1605),
+            (0, 20, 0.0, 0.1611),
+            (1, 29, 0.0061, 0.1718),
+        ] {
+            let found = wilson(count, trials);
+            assert!((found.0 - low).abs() < 5e-5 && (found.1 - high).abs() < 5e-5, "{count}: {found:?}");
+        }
+        assert_eq!(wilson(20, 20), (1.0 - wilson(0, 20).1, 1.0));
+        assert_eq!(wilson(0, 0), (0.0, 1.0));
+    }
+}

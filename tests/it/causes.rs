@@ -1,0 +1,86 @@
+//! Causes: faults planted in the driving system are found again by the crashes that they make.
+
+use std::path::PathBuf;
+
+use avastra::ads::ModularConfig;
+use avastra::ads::Module;
+use avastra::oracle;
+use avastra::oracle::Fate;
+use avastra::study::Profile;
+use avastra::study::Run;
+use avastra::study::RunSettings;
+
+use crate::cases::root;
+use crate::world::run;
+
+/// Episodes in which a fault must make a crash.
+const EPISODES: u32 = 150;
+/// Small variations of a crash, half of which at least must crash, too: a fault's crash is no accident.
+const VARIATIONS: u32 = 6;
+
+/// Every module a little other than it comes, so that a cause is not told by what differs alone.
+const DECOYS: &str = "
+localization: { position_sigma_m: 0.06 }
+perception: { range_factor: 0.95, latency_frames: 2 }
+tracking: { velocity_factor: 0.98 }
+prediction: { lateral_speed_mps: 0.5 }
+planning: { acceleration_mps2_max: 1.8, nudge_buffer_m: 0.35 }
+control: { actuators: { brake_mps2_max: 8.0 } }
+";
+
+#[test]
+fn the_module_at_fault_is_named() {
+    let decoys = ModularConfig::from_yaml(DECOYS).expect("they are settings");
+    let mut found = Vec::new();
+    for (name, fault) in faults() {
+        let module = module_of(&name);
+        let planted = decoys.with_module_of(module, &fault);
+        let usual = run(EPISODES, 3, &[]);
+        let settings =
+            RunSettings { profile: Some(Profile::new(&planted)), seed: 3, ..usual.settings().clone() };
+        let run = Run::new(usual.table().clone(), settings).expect("the settings name what exists");
+        let mut tries = 0;
+        for number in 0..run.episodes() {
+            let (summary, log) = run.judged(number);
+            let Some(finding) = summary.collisions.iter().find(|finding| finding.counted) else { continue };
+            let setup = run.setup(number);
+            let healthy = oracle::fate(&setup, &log, finding.number, &decoys).expect("it has modules");
+            if healthy != Fate::Vanished {
+                continue;
+            }
+            let likely = oracle::likelihood(&setup, &log, finding.number, VARIATIONS);
+            if 2 * likely.crashes < VARIATIONS {
+                continue;
+            }
+            tries += 1;
+            let diagnosis =
+                oracle::diagnose(&setup, &log, finding.number, &ModularConfig::default()).expect("it has");
+            let blind = oracle::diagnose(&setup, &log, finding.number, &planted).expect("it has");
+            found.push((name.clone(), number, diagnosis.cause.clone(), blind.cause.clone()));
+            if tries >= 4 {
+                break;
+            }
+        }
+    }
+    panic!("{found:#?}");
+}
+
+/// Every shipped fault; its file's name begins with the module at fault.
+fn faults() -> Vec<(String, ModularConfig)> {
+    let mut files: Vec<PathBuf> = std::fs::read_dir(root().join("scenarios/ads/faults"))
+        .expect("it is shipped")
+        .map(|entry| entry.expect("it reads").path())
+        .collect();
+    files.sort();
+    let read = |path: PathBuf| {
+        let text = std::fs::read_to_string(&path).expect("it is readable");
+        let name = path.file_stem().expect("it has a name").to_string_lossy().into_owned();
+        (name, ModularConfig::from_yaml(&text).expect("it is a profile"))
+    };
+    files.into_iter().map(read).collect()
+}
+
+fn module_of(name: &str) -> Module {
+    let module = Module::ALL.into_iter().find(|module| name.starts_with(module.name()));
+    module.unwrap_or_else(|| panic!("{name} begins with no module"))
+}
