@@ -63,7 +63,7 @@ impl Driver {
             let other = |time_s| driver.way.path.pose_at(driver.station_m + driver.speed_mps * time_s);
             free_m = free_m.min(free_way_m(this, &own, speed_mps, &obstacle.outline, other));
         }
-        free_m.is_finite().then(|| Leader { gap_m: free_m + STOP_M, speed_mps: 0.0, crosswise: true })
+        free_m.is_finite().then_some(Leader { gap_m: free_m + STOP_M, speed_mps: 0.0, crosswise: true })
     }
 }
 
