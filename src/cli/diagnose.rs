@@ -90,7 +90,11 @@ fn table_text(diagnosis: &Diagnosis) -> String {
     }
     text.push_str(&format!("\n{:<34}{}", "all of them", diagnosis.ideal.in_words()));
     for [first, second] in &diagnosis.pairs {
-        text.push_str(&format!("\n{} and {}: no crash without the errors of both", first.name(), second.name()));
+        text.push_str(&format!(
+            "\n{} and {}: no crash without the errors of both",
+            first.name(),
+            second.name()
+        ));
     }
     text
 }
@@ -108,9 +112,7 @@ fn sentence(diagnosis: &Diagnosis) -> String {
     let others: Vec<&str> = diagnosis
         .modules
         .iter()
-        .filter(|found| {
-            found.suffices() && !diagnosis.cause.contains(&found.module)
-        })
+        .filter(|found| found.suffices() && !diagnosis.cause.contains(&found.module))
         .map(|found| found.module.name())
         .collect();
     let finding = |module: Module| diagnosis.modules.iter().find(|found| found.module == module);
@@ -126,7 +128,11 @@ fn sentence(diagnosis: &Diagnosis) -> String {
                 Some(oracle::Fate::Vanished) => "as in the baseline, there is no crash",
                 _ => "without its errors there is no crash",
             };
-            let alone = if alone && diagnosis.ideal == oracle::Fate::Vanished { ", and they alone lead to it" } else { "" };
+            let alone = if alone && diagnosis.ideal == oracle::Fate::Vanished {
+                ", and they alone lead to it"
+            } else {
+                ""
+            };
             let others = match others.as_slice() {
                 [] => String::new(),
                 names => format!("; {} would have made up for it", names.join(", ")),

@@ -33,8 +33,7 @@ pub fn replay(output: &Output, arguments: &ReplayArguments) -> Result<(), Failur
             Some(path) => format!("{} with {}", ads.name(), path.display()),
             None => ads.name().to_owned(),
         };
-        let stage =
-            Stage::new(&table, &scenario).map_err(|error| Failure::usage(error.to_string()))?;
+        let stage = Stage::new(&table, &scenario).map_err(|error| Failure::usage(error.to_string()))?;
         let mut measures = Measures::default();
         let log = stage.play(&ads, &mut |world, _, contacts| measures.note(world, contacts));
         let (criticality, pet_s) = measures.of_steps(&log);

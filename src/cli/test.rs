@@ -69,7 +69,8 @@ pub fn test(output: &Output, arguments: &TestArguments) -> Result<(), Failure> {
         serde_json::json!({ "still_fails": fails, "fixed": fixed, "changed": changed,
                             "errors": errors, "scenarios": listed }),
     );
-    let failing = cases.iter().filter(|case| matches!(&case.outcome, Ok(found) if found.is_failure())).count();
+    let failing =
+        cases.iter().filter(|case| matches!(&case.outcome, Ok(found) if found.is_failure())).count();
     if errors > 0 {
         return Err(Failure::usage(format!("{} could not be played", plural(errors, "scenario"))));
     }

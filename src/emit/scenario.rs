@@ -74,7 +74,10 @@ pub fn scenario(
     let space_use = Use { path: Text::new(source.space_path, Span::NONE), digest };
     let docs = vec![tree::doc(headline(log, &counted[0].collision))];
     File {
-        docs: vec![tree::doc(format!("Emitted by `avastra {}`; replay with `avastra replay FILE`.", source.command))],
+        docs: vec![tree::doc(format!(
+            "Emitted by `avastra {}`; replay with `avastra replay FILE`.",
+            source.command
+        ))],
         items: vec![
             tree::item(Vec::new(), ItemKind::Language(tree::digits(LANGUAGE.to_string()))),
             tree::item(Vec::new(), ItemKind::Use(space_use)),

@@ -114,7 +114,8 @@ pub fn time_to_collision_s(world: &World, obstacle: &Obstacle) -> Option<f64> {
         let position = start.pose.position + velocity_mps * HORIZON_S;
         Sweep { start, end: Pose { position, heading_rad: start.pose.heading_rad } }
     };
-    let first = first_contact(&sweep(ego, ego_velocity_mps), &sweep(obstacle.outline, obstacle.velocity_mps))?;
+    let first =
+        first_contact(&sweep(ego, ego_velocity_mps), &sweep(obstacle.outline, obstacle.velocity_mps))?;
     Some(first.fraction * HORIZON_S)
 }
 

@@ -32,7 +32,6 @@ pub struct Severity {
 /// Slower than this an obstacle stands, m/s.
 const STANDING_MPS: f64 = 0.3;
 
-
 /// The severity of a collision.
 pub fn severity(collision: &Collision) -> Severity {
     let contact = &collision.contact;

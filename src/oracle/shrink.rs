@@ -73,7 +73,13 @@ pub fn shrink(setup: &Setup, log: &EpisodeLog, index: usize, judgements: &[Judge
         }
     }
     let (kept, _) = search.keeps(&best, None).expect("every candidate that was taken makes the crash");
-    Shrunk { script: best.script, start: best.start, log: kept.log, judgements: kept.judgements, plays: search.plays }
+    Shrunk {
+        script: best.script,
+        start: best.start,
+        log: kept.log,
+        judgements: kept.judgements,
+        plays: search.plays,
+    }
 }
 
 /// What is made smaller.
@@ -207,7 +213,9 @@ impl Search<'_> {
         for (step, logged) in log.steps.iter().enumerate().take(best.script.steps.len()) {
             let Outcome::Done { draw, .. } = &logged.outcome else { continue };
             for row in 0..self.setup.table.rows().len() {
-                if effects(self.setup.table, row) >= draw.effects.len().min(effects(self.setup.table, draw.row)) {
+                if effects(self.setup.table, row)
+                    >= draw.effects.len().min(effects(self.setup.table, draw.row))
+                {
                     continue;
                 }
                 let mut candidate = best.clone();
@@ -240,7 +248,8 @@ impl Search<'_> {
     fn plainest_value(&mut self, best: &mut Candidate, step: usize, index: usize) {
         let Some(Some(action)) = best.script.steps.get(step).cloned() else { return };
         let (name, value) = action.values[index].clone();
-        let parameters = &self.setup.table.space().actions[self.setup.table.rows()[action.row].action].parameters;
+        let parameters =
+            &self.setup.table.space().actions[self.setup.table.rows()[action.row].action].parameters;
         let parameter = parameters.iter().find(|parameter| parameter.name == name);
         let domain = &parameter.expect("a legal action has values for its own parameters").domain;
         let with = |value: Value| {

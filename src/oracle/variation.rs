@@ -118,9 +118,8 @@ fn choose(crash: &Crash, seed: u64, moment: &Moment) -> Choice {
         return crash.script.choose(table, moment);
     };
     let parameters = &table.space().actions[table.rows()[action.row].action].parameters;
-    let is_speed = |name: &str| {
-        parameters.iter().any(|p| &*p.name == name && p.ty == Type::Quantity(Dimension::SPEED))
-    };
+    let is_speed =
+        |name: &str| parameters.iter().any(|p| &*p.name == name && p.ty == Type::Quantity(Dimension::SPEED));
     let mut rng = rng::stream(seed, Stream::Variation, 1 + moment.step as u64);
     for _ in 0..DRAWS_MAX {
         let values: Vec<(Arc<str>, Value)> = action
@@ -153,9 +152,12 @@ mod tests {
     #[test]
     fn intervals_are_wilsons() {
         // Newcombe 1998, table I, method 3: 81 of 263, 15 of 148, 0 of 20, 1 of 29.
-        for (count, trials, low, high) in
-            [(81, 263, 0.2553, 0.3662), (15, 148, 0.0624, 0.1605), (0, 20, 0.0, 0.1611), (1, 29, 0.0061, 0.1718)]
-        {
+        for (count, trials, low, high) in [
+            (81, 263, 0.2553, 0.3662),
+            (15, 148, 0.0624, 0.1605),
+            (0, 20, 0.0, 0.1611),
+            (1, 29, 0.0061, 0.1718),
+        ] {
             let found = wilson(count, trials);
             assert!((found.0 - low).abs() < 5e-5 && (found.1 - high).abs() < 5e-5, "{count}: {found:?}");
         }

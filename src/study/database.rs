@@ -281,8 +281,9 @@ fn add_episode(
     summary: &EpisodeSummary,
     log: &EpisodeLog,
 ) -> Result<(), rusqlite::Error> {
-    transaction.prepare_cached("INSERT INTO episode VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)")?.execute(
-        params![
+    transaction
+        .prepare_cached("INSERT INTO episode VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)")?
+        .execute(params![
             summary.episode as i64,
             log.road,
             log.seed.to_string(),
@@ -296,8 +297,7 @@ fn add_episode(
             summary.first_counted_s(),
             crate::model::digest_text(&log.trace()),
             summary.pet_s,
-        ],
-    )?;
+        ])?;
     Ok(())
 }
 
@@ -309,9 +309,8 @@ fn add_collision(
     let Finding { collision, facts, judgement, .. } = finding;
     let contact = &collision.contact;
     let severity = oracle::severity(collision);
-    let in_words = |modules: &Vec<Module>| {
-        modules.iter().map(|module| module.name()).collect::<Vec<_>>().join(" ")
-    };
+    let in_words =
+        |modules: &Vec<Module>| modules.iter().map(|module| module.name()).collect::<Vec<_>>().join(" ");
     let cause = finding.cause.as_ref().map(in_words);
     transaction
         .prepare_cached(

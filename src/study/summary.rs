@@ -61,7 +61,14 @@ impl EpisodeSummary {
         let find = |(index, judgement)| {
             let facts = oracle::facts(log, index, &judgement);
             let counted = space.counts(facts);
-            Finding { number: index, collision: log.collisions[index], facts, judgement, cause: None, counted }
+            Finding {
+                number: index,
+                collision: log.collisions[index],
+                facts,
+                judgement,
+                cause: None,
+                counted,
+            }
         };
         let collisions = judgements.into_iter().enumerate().map(find).collect();
         EpisodeSummary { episode: number, collisions, criticality: Vec::new(), pet_s: None }

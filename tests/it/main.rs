@@ -8,6 +8,7 @@ mod corpus;
 mod contacts;
 mod drives;
 mod emitted;
+mod failures;
 mod layers;
 mod profiles;
 mod references;
