@@ -180,9 +180,9 @@ fn junit(directory: &Path, cases: &[Case]) -> String {
             }
             Ok(_) => String::new(),
         };
-        write!(
+        writeln!(
             text,
-            "    <testcase classname=\"{}\" name=\"{}\" time=\"{:.3}\">{inside}</testcase>\n",
+            "    <testcase classname=\"{}\" name=\"{}\" time=\"{:.3}\">{inside}</testcase>",
             escaped(&case.road),
             escaped(&case.scenario),
             case.elapsed_s
