@@ -15,16 +15,14 @@ use crate::world::run;
 /// Episodes on each road.
 const EPISODES: u32 = 50;
 /// Faults, and the episode from which on one of the next [`TRIES`] shows a crash of theirs.
-const PLANTED: [(&str, usize); 12] = [
+const PLANTED: [(&str, usize); 10] = [
     ("control_late_steering", 71),
     ("control_weak_brakes", 134),
-    ("latency_half_second", 0),
     ("perception_blind_to_large_vehicles", 20),
     ("perception_blind_to_pedestrians", 1),
     ("perception_dropouts", 4),
     ("perception_half_range", 29),
     ("planning_never_yields", 1),
-    ("planning_tailgates", 0),
     ("prediction_frozen", 4),
     ("tracking_late", 0),
     ("tracking_no_velocity", 0),
