@@ -19,6 +19,9 @@ const STRIDES: [usize; 3] = [16, 4, 1];
 /// within a tick, less than to another branch of the route.
 const NEAR_M: f64 = 5.0;
 
+/// Steps along tangents until a place has settled; in a bend each leaves a fraction of the error.
+const SLIDES_MAX: usize = 8;
+
 /// Step of the differences that give the slope of a guide beside the path, m.
 const H_M: f64 = 0.25;
 
@@ -185,22 +188,53 @@ impl Guide {
 
     /// The place of the route beside a vehicle that was lately near a station; `None` looks everywhere.
     pub fn locate(&self, point: Vec2, near_m: Option<f64>) -> Beside {
-        match near_m {
-            Some(near_m) => self.project(point, near_m - NEAR_M, near_m + NEAR_M),
-            None => self.project(point, 0.0, f64::INFINITY),
-        }
+        let Some(near_m) = near_m else { return self.project(point, 0.0, f64::INFINITY) };
+        let within = Stretch { first: self.index(near_m - NEAR_M), last: self.index(near_m + NEAR_M) };
+        let found = self.slide(point, self.index(near_m), within);
+        self.beside_sample(point, found.unwrap_or_else(|| self.nearest(point, within)))
     }
 
     /// The nearest place of the route between two stations.
     pub fn project(&self, point: Vec2, from_m: f64, to_m: f64) -> Beside {
-        let (mut first, mut last) = (self.index(from_m), self.index(to_m));
-        let squared_m2 = |index: usize| (point - self.samples[index].position).norm_squared();
-        let mut best = (last, squared_m2(last));
+        let within = Stretch { first: self.index(from_m), last: self.index(to_m) };
+        self.beside_sample(point, self.nearest(point, within))
+    }
+
+    /// The same for the places of somebody who moves, one after another; the first of them, and who
+    /// gives the others. Those farther than `reach_m` from the stretch are told as such, most often
+    /// without a search.
+    pub fn trace(&self, point: Vec2, from_m: f64, to_m: f64, reach_m: f64) -> (Beside, Tracer<'_>) {
+        let within = Stretch { first: self.index(from_m), last: self.index(to_m) };
+        let index = self.nearest(point, within);
+        let distance_m = (point - self.samples[index].position).norm();
+        let reach_m = reach_m + SPACING_M;
+        let tracer = Tracer { guide: self, within, reach_m, point, index, distance_m };
+        (self.beside_sample(point, index), tracer)
+    }
+
+    fn beside_sample(&self, point: Vec2, index: usize) -> Beside {
+        let Sample { position, forward, .. } = self.samples[index];
+        let delta = point - position;
+        Beside {
+            station_m: index as f64 * SPACING_M + forward.dot(&delta),
+            offset_m: forward.x * delta.y - forward.y * delta.x,
+            forward,
+        }
+    }
+
+    fn squared_m2(&self, point: Vec2, index: usize) -> f64 {
+        (point - self.samples[index].position).norm_squared()
+    }
+
+    /// The sample of a stretch that is nearest to a point, coarse to fine.
+    fn nearest(&self, point: Vec2, within: Stretch) -> usize {
+        let Stretch { mut first, mut last } = within;
+        let mut best = (last, self.squared_m2(point, last));
         for stride in STRIDES {
             // Not `step_by`: it costs as much as the distances.
             let mut index = first;
             while index < last {
-                let candidate = squared_m2(index);
+                let candidate = self.squared_m2(point, index);
                 if candidate < best.1 {
                     best = (index, candidate);
                 }
@@ -209,14 +243,43 @@ impl Guide {
             first = best.0.saturating_sub(stride - 1);
             last = (best.0 + stride).min(self.samples.len());
         }
-        let nearest = &self.samples[best.0];
-        let delta = point - nearest.position;
-        let forward = nearest.forward;
-        Beside {
-            station_m: best.0 as f64 * SPACING_M + forward.dot(&delta),
-            offset_m: forward.x * delta.y - forward.y * delta.x,
-            forward,
+        best.0
+    }
+
+    /// The same by stepping along tangents from a sample nearby: much quicker, but `None` where the
+    /// steps do not settle.
+    fn slide(&self, point: Vec2, from: usize, within: Stretch) -> Option<usize> {
+        let mut index = from;
+        for _ in 0..SLIDES_MAX {
+            let Sample { position, forward, .. } = self.samples[index];
+            let ahead = (forward.dot(&(point - position)) / SPACING_M) as isize;
+            let next = index.saturating_add_signed(ahead).clamp(within.first, within.last);
+            if next == index {
+                return Some(self.descend(point, index, within));
+            }
+            index = next;
         }
+        None
+    }
+
+    /// From a sample on to the one whose neighbours are both farther from a point; of equals, the first.
+    fn descend(&self, point: Vec2, from: usize, within: Stretch) -> usize {
+        let mut best = (from, self.squared_m2(point, from));
+        while best.0 < within.last {
+            let next = self.squared_m2(point, best.0 + 1);
+            if next >= best.1 {
+                break;
+            }
+            best = (best.0 + 1, next);
+        }
+        while best.0 > within.first {
+            let before = self.squared_m2(point, best.0 - 1);
+            if before > best.1 {
+                break;
+            }
+            best = (best.0 - 1, before);
+        }
+        best.0
     }
 
     fn index(&self, station_m: f64) -> usize {
@@ -227,6 +290,47 @@ impl Guide {
     fn segment(&self, station_m: f64) -> (usize, f64) {
         let index = self.index(station_m).min(self.samples.len() - 2);
         (index, station_m / SPACING_M - index as f64)
+    }
+}
+
+/// Samples from the first to the last.
+#[derive(Debug, Clone, Copy)]
+struct Stretch {
+    first: usize,
+    last: usize,
+}
+
+/// Follows somebody who moves beside a stretch of a guide.
+#[derive(Debug)]
+pub struct Tracer<'a> {
+    guide: &'a Guide,
+    within: Stretch,
+    reach_m: f64,
+    /// The last place that was looked at, its nearest sample, and how far that was, m.
+    point: Vec2,
+    index: usize,
+    distance_m: f64,
+}
+
+impl Tracer<'_> {
+    /// The place of the route beside the next place; `None` if that is out of reach.
+    pub fn next(&mut self, point: Vec2) -> Option<Beside> {
+        let moved_m = (point - self.point).norm();
+        // Nobody is nearer than what is left of the last distance.
+        if self.distance_m - moved_m > self.reach_m {
+            return None;
+        }
+        let slid = if self.distance_m <= self.reach_m {
+            self.guide.slide(point, self.index, self.within)
+        } else {
+            None
+        };
+        let near = |index: &usize| self.guide.squared_m2(point, *index) <= self.reach_m * self.reach_m;
+        // Out of reach where it was, it may be in reach of another bend.
+        self.index = slid.filter(near).unwrap_or_else(|| self.guide.nearest(point, self.within));
+        self.point = point;
+        self.distance_m = self.guide.squared_m2(point, self.index).sqrt();
+        (self.distance_m <= self.reach_m).then(|| self.guide.beside_sample(point, self.index))
     }
 }
 
@@ -250,6 +354,41 @@ mod tests {
             assert!((beside.station_m - station_m).abs() < 0.06, "{beside:?} at {station_m}");
             assert!((beside.offset_m - 1.0).abs() < 0.01, "{beside:?}");
         }
+    }
+
+    #[test]
+    fn who_moves_is_followed_as_if_looked_for_anew() {
+        let guide = Guide::new(&winding(), &RULES);
+        let (from_m, to_m, reach_m) = (20.0, 330.0, 5.0);
+        let (mut near, mut far) = (0, 0);
+        for case in 0..400 {
+            // From beside the route in all directions, up to 2.2 m a step.
+            let start = guide.pose_at(f64::from(case % 100) * 3.5).offset(0.0, f64::from(case % 13) - 6.0);
+            let step = unit_vector(f64::from(case) * 0.7) * (f64::from(case % 11) * 0.22);
+            let (first, mut tracer) = guide.trace(start.position, from_m, to_m, reach_m);
+            assert_eq!(first, guide.project(start.position, from_m, to_m));
+            for moment in 1..=25 {
+                let point = start.position + step * f64::from(moment);
+                let anew = guide.project(point, from_m, to_m);
+                match tracer.next(point) {
+                    Some(beside) => {
+                        // A search may end a few samples beyond the stretch, on another tangent.
+                        let inside = (from_m..to_m).contains(&anew.station_m);
+                        assert!(
+                            beside == anew || !inside,
+                            "case {case}, moment {moment}: {beside:?} {anew:?}"
+                        );
+                        near += 1;
+                    }
+                    None => {
+                        let beyond = anew.station_m < from_m - reach_m || anew.station_m > to_m + reach_m;
+                        assert!(anew.offset_m.abs() > reach_m || beyond, "case {case}: {anew:?}");
+                        far += 1;
+                    }
+                }
+            }
+        }
+        assert!(near > 2000 && far > 2000, "{near} {far}");
     }
 
     #[test]

@@ -161,6 +161,29 @@ pub struct TableArguments {
     /// Only what this road allows, with the reason where it does not.
     #[arg(long)]
     pub road: Option<String>,
+    /// Carry every row out on the road, or on all of them, and judge whether it does what it says.
+    #[arg(long)]
+    pub r#try: bool,
+    #[command(flatten)]
+    pub trials: TrialArguments,
+}
+
+#[derive(Debug, Args)]
+pub struct TrialArguments {
+    /// Tries of each row on each road, at most.
+    #[arg(long, requires = "try", default_value_t = 6, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    pub tries: u32,
+    /// Undisturbed drives of each road, from whose steps the tries set out.
+    #[arg(long, requires = "try", default_value_t = 8, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    pub drives: u32,
+    /// Driving system of the ego vehicle.
+    #[arg(long, requires = "try", default_value = crate::study::DEFAULT_ADS)]
+    pub ads: String,
+    #[arg(long, requires = "try", default_value_t = 1)]
+    pub seed: u64,
+    /// Write one try of each row and road as a scenario, one that failed if there is any.
+    #[arg(long, requires = "try", value_name = "DIR")]
+    pub out: Option<PathBuf>,
 }
 
 #[derive(Debug, Args)]

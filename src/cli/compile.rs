@@ -14,6 +14,7 @@ use super::load;
 use super::output::Output;
 use super::progress::plural;
 use super::run_directory::write;
+use super::trials;
 
 /// Names the table that `avastra run` takes when it is given none.
 const LAST: &str = "build/last";
@@ -61,6 +62,9 @@ pub fn table(output: &Output, arguments: &TableArguments) -> Result<(), Failure>
     let table = load::table(output, &arguments.file)?;
     if let Some(road) = &arguments.road {
         known_road(&table, road)?;
+    }
+    if arguments.r#try {
+        return trials::trials(output, arguments, table);
     }
     output.say(table.text(arguments.road.as_deref()).trim_end());
     output.result("table", table.file());

@@ -23,6 +23,7 @@ mod sarif;
 mod shrink;
 mod test;
 mod train;
+mod trials;
 mod verify;
 mod why;
 

@@ -22,15 +22,18 @@ use super::run_directory::write;
 const CONTACT_SHOWN_S: f64 = 1.0;
 /// Moments of a strip: this many, one second apart, the last at the first collision.
 const STRIP_LEN: u32 = 7;
+/// Without a collision: this far apart, the first at the last action, s.
+const ACTION_STRIDE_S: f64 = 2.0;
 
 /// Draws the file's scenario.
 pub fn render(output: &Output, arguments: &RenderArguments) -> Result<(), Failure> {
     let (table, scenario) = load::scenario(output, &arguments.file)?;
     let scenario = &scenario;
-    let times_s = times(arguments, scenario)?;
+    let times_s = times(arguments, scenario, table.space().episode.step_s)?;
     let ads = arguments.ads.as_deref();
     let moments = moments(&table, scenario, ads, &times_s)?;
-    if moments.len() < times_s.len() {
+    // A strip ends where its scenario does.
+    if moments.is_empty() || (!arguments.strip && moments.len() < times_s.len()) {
         return Err(Failure::usage(format!(
             "`{}` is over before {} s",
             scenario.name,
@@ -50,12 +53,15 @@ pub fn render(output: &Output, arguments: &RenderArguments) -> Result<(), Failur
         output.tell(&path.display().to_string());
     }
     let svg = on_stdout.then_some(svg);
-    output.result("render", serde_json::json!({ "picture": path, "times_s": times_s, "svg": svg }));
+    output.result(
+        "render",
+        serde_json::json!({ "picture": path, "times_s": times_s[..moments.len()], "svg": svg }),
+    );
     Ok(())
 }
 
 /// The moments asked for, rising.
-fn times(arguments: &RenderArguments, scenario: &Scenario) -> Result<Vec<f64>, Failure> {
+fn times(arguments: &RenderArguments, scenario: &Scenario, step_s: f64) -> Result<Vec<f64>, Failure> {
     if !arguments.strip {
         let mut times_s = arguments.at.clone();
         if times_s.is_empty() {
@@ -72,7 +78,13 @@ fn times(arguments: &RenderArguments, scenario: &Scenario) -> Result<Vec<f64>, F
         _ => None,
     });
     let Some(first_s) = first_s else {
-        return Err(Failure::usage("`--strip` needs a scenario that expects a collision: use `--at`"));
+        let acted = scenario.steps.iter().rfind(|step| step.row.is_some());
+        let acted = acted.ok_or_else(|| {
+            Failure::usage("`--strip` needs a scenario with an action or a collision: use `--at`")
+        })?;
+        // The action is carried out between two ticks: one later it shows.
+        let begin_s = acted.number as f64 * step_s + DT_S;
+        return Ok((0..STRIP_LEN).map(|n| begin_s + ACTION_STRIDE_S * f64::from(n)).collect());
     };
     let back = |n: u32| (first_s - f64::from(STRIP_LEN - 1 - n)).max(0.0);
     Ok((0..STRIP_LEN).map(back).collect())

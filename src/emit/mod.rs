@@ -11,3 +11,4 @@ pub use policy::policy_text;
 pub use scenario::Provenance;
 pub use scenario::action_text;
 pub use scenario::scenario;
+pub use scenario::unclaimed;

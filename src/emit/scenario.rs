@@ -58,30 +58,46 @@ pub fn scenario(
     summary: &EpisodeSummary,
     source: &Provenance,
 ) -> File {
-    let space = table.space();
     let counted: Vec<&Finding> = summary.collisions.iter().filter(|finding| finding.counted).collect();
     let last = counted.last().expect("an episode without a counted collision is not emitted");
     let steps = last.collision.step + 1;
+    let emitted = format!("Emitted by `avastra {}`; replay with `avastra replay FILE`.", source.command);
+    let headline = headline(log, &counted[0].collision);
+    file(table, log, source, [&emitted, &headline], steps, expects(log, summary, steps))
+}
+
+/// All steps of an episode, with a headline, as a scenario that claims nothing: to look at.
+pub fn unclaimed(table: &ActionTable, log: &EpisodeLog, headline: &str, source: &Provenance) -> File {
+    let emitted =
+        format!("Emitted by `avastra {}`; look at it with `avastra render FILE --strip`.", source.command);
+    file(table, log, source, [&emitted, headline], log.steps.len(), Vec::new())
+}
+
+fn file(
+    table: &ActionTable,
+    log: &EpisodeLog,
+    source: &Provenance,
+    [emitted, headline]: [&str; 2],
+    steps: usize,
+    expects: Vec<Expect>,
+) -> File {
+    let space = table.space();
     let item = Scenario {
         name: Name::built(source.name),
         origin: origin(log, source),
         road: Name::built(log.road.as_str()),
         start: start(space, log),
         steps: (0..steps).map(|number| step(table, log, number)).collect(),
-        expects: expects(log, summary, steps),
+        expects,
     };
     let digest = Some(Text::new(space.digest.clone(), Span::NONE));
     let space_use = Use { path: Text::new(source.space_path, Span::NONE), digest };
-    let docs = vec![tree::doc(headline(log, &counted[0].collision))];
     File {
-        docs: vec![tree::doc(format!(
-            "Emitted by `avastra {}`; replay with `avastra replay FILE`.",
-            source.command
-        ))],
+        docs: vec![tree::doc(emitted)],
         items: vec![
             tree::item(Vec::new(), ItemKind::Language(tree::digits(LANGUAGE.to_string()))),
             tree::item(Vec::new(), ItemKind::Use(space_use)),
-            tree::item(docs, ItemKind::Scenario(item)),
+            tree::item(vec![tree::doc(headline)], ItemKind::Scenario(item)),
         ],
         span: Span::NONE,
     }

@@ -175,6 +175,11 @@ impl Path {
         }
     }
 
+    /// Index of the first vertex beyond a station, or of the last vertex.
+    pub fn vertex_after(&self, station_m: f64) -> usize {
+        if station_m < 0.0 { 0 } else { self.segment(station_m) + 1 }
+    }
+
     /// Index of the segment that holds a station, clamped to the ends.
     fn segment(&self, station_m: f64) -> usize {
         let cell = (station_m.max(0.0) * self.cells_per_m) as usize;

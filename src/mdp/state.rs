@@ -238,6 +238,7 @@ mod tests {
             verb: Verb::DriveAhead,
             outline: OrientedBox::new(Pose::new(10.0, 0.0, 3.1), 4.8, 1.85),
             height_m: 1.45,
+            forward: Vec2::new(-1.0, 0.0),
             lane_heading_rad: core::f64::consts::PI,
             velocity_mps: Vec2::new(-8.0, 0.0),
             distance_m: 5.0,

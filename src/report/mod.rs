@@ -3,9 +3,9 @@
 mod canvas;
 mod picture;
 mod road;
+mod trials;
 
-pub use picture::PANEL_PX;
 pub use picture::Snapshot;
-pub use picture::VIEW_RADIUS_M;
 pub use picture::picture;
 pub use road::draw;
+pub use trials::trials;

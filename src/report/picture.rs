@@ -1,7 +1,9 @@
 //! Top views as SVG: road, signals, ego vehicle, obstacles, what is perceived and what is planned.
 //!
-//! One panel is one moment, north up, centred on the ego vehicle. True obstacles are filled, what
-//! the driving system believes is dashed; so a missed or misplaced object shows at a glance.
+//! One panel is one moment, north up, centred on the ego vehicle; all panels of a picture have one scale,
+//! chosen so that the obstacles show. True obstacles are filled, with the way that they came since the first
+//! panel; what the driving system believes is dashed, so that a missed or misplaced object shows at a
+//! glance. Chevrons tell the direction of a lane, a yellow line parts traffic that comes from traffic that goes.
 
 use std::fmt::Write;
 
@@ -22,12 +24,20 @@ use crate::sim::World;
 use super::canvas::Canvas;
 use super::canvas::across;
 use super::canvas::escape;
+use super::canvas::lane_edge;
 use super::canvas::lane_outline;
 
 /// Edge of a panel, px.
-pub const PANEL_PX: f64 = 480.0;
-/// How far a panel reaches from the ego vehicle in each direction, m.
-pub const VIEW_RADIUS_M: f64 = 45.0;
+const PANEL_PX: f64 = 480.0;
+/// Panels side by side.
+const COLUMNS: usize = 4;
+/// How far a panel reaches from the ego vehicle in each direction, m: at least and at most.
+const VIEW_RADIUS_M: (f64, f64) = (35.0, 110.0);
+/// What it shows beyond the farthest obstacle that is within reach, m.
+const VIEW_MARGIN_M: f64 = 8.0;
+/// Between two chevrons of a lane, and their size, m.
+const CHEVRON_EVERY_M: f64 = 15.0;
+const CHEVRON_M: f64 = 0.7;
 /// Height of the caption under a panel, px.
 const CAPTION_PX: f64 = 56.0;
 /// Length of a drawn velocity: this many seconds of it.
@@ -41,10 +51,13 @@ pub struct Snapshot {
     pub contact: Option<Vec2>,
 }
 
-/// The moments side by side, as one SVG document.
+/// The moments in rows of four, as one SVG document.
 pub fn picture(moments: &[Snapshot]) -> String {
-    let width_px = PANEL_PX * moments.len().max(1) as f64;
-    let height_px = PANEL_PX + CAPTION_PX;
+    let columns = moments.len().clamp(1, COLUMNS);
+    let rows = moments.len().max(1).div_ceil(columns);
+    let width_px = PANEL_PX * columns as f64;
+    let height_px = (PANEL_PX + CAPTION_PX) * rows as f64;
+    let radius_m = view_radius_m(moments);
     let mut svg = String::new();
     let _ = writeln!(
         svg,
@@ -52,34 +65,51 @@ pub fn picture(moments: &[Snapshot]) -> String {
 <rect width="100%" height="100%" fill="#ffffff"/>"##
     );
     for (index, moment) in moments.iter().enumerate() {
-        let left_px = PANEL_PX * index as f64;
+        let left_px = PANEL_PX * (index % columns) as f64;
+        let top_px = (PANEL_PX + CAPTION_PX) * (index / columns) as f64;
         let _ = writeln!(
             svg,
-            r##"<svg x="{left_px}" y="0" width="{PANEL_PX}" height="{PANEL_PX}"><rect width="100%" height="100%" fill="#e9eee4" stroke="#888888"/>"##
+            r##"<svg x="{left_px}" y="{top_px}" width="{PANEL_PX}" height="{PANEL_PX}"><rect width="100%" height="100%" fill="#e9eee4" stroke="#888888"/>"##
         );
-        Panel::new(&mut svg, &moment.world).draw(moment);
+        Panel::new(&mut svg, &moment.world, radius_m).draw(moment, &moments[..index]);
         svg.push_str("</svg>\n");
-        caption(&mut svg, left_px, moment);
+        caption(&mut svg, (left_px, top_px), moment);
     }
     svg.push_str("</svg>\n");
     svg
+}
+
+/// As far as the farthest obstacle of any moment, of those that a panel can reach.
+fn view_radius_m(moments: &[Snapshot]) -> f64 {
+    let (least_m, most_m) = VIEW_RADIUS_M;
+    let away_m = |moment: &Snapshot, obstacle: &Obstacle| {
+        let away = obstacle.outline.pose.position - moment.world.ego_outline().pose.position;
+        away.x.abs().max(away.y.abs()) + VIEW_MARGIN_M
+    };
+    moments
+        .iter()
+        .flat_map(|moment| moment.world.obstacles().iter().map(move |obstacle| away_m(moment, obstacle)))
+        .filter(|radius_m| *radius_m <= most_m)
+        .fold(least_m, f64::max)
 }
 
 /// Draws in world coordinates around the ego vehicle.
 struct Panel<'a> {
     canvas: Canvas<'a>,
     centre: Vec2,
+    radius_m: f64,
 }
 
 impl Panel<'_> {
-    fn new<'a>(svg: &'a mut String, world: &World) -> Panel<'a> {
+    fn new<'a>(svg: &'a mut String, world: &World, radius_m: f64) -> Panel<'a> {
         let centre = world.ego_outline().pose.position;
-        let north_west = centre + Vec2::new(-VIEW_RADIUS_M, VIEW_RADIUS_M);
-        let canvas = Canvas { svg, north_west, px_per_m: PANEL_PX / (2.0 * VIEW_RADIUS_M) };
-        Panel { canvas, centre }
+        let north_west = centre + Vec2::new(-radius_m, radius_m);
+        let canvas = Canvas { svg, north_west, px_per_m: PANEL_PX / (2.0 * radius_m) };
+        Panel { canvas, centre, radius_m }
     }
 
-    fn draw(&mut self, moment: &Snapshot) {
+    /// `earlier` are the moments of the panels before.
+    fn draw(&mut self, moment: &Snapshot, earlier: &[Snapshot]) {
         let world = &moment.world;
         let map = &world.scene().map;
         for lane in &map.lanes {
@@ -95,7 +125,11 @@ impl Panel<'_> {
         }
         let route: Vec<Vec2> = world.scene().route.path.points().iter().map(|p| p.position).collect();
         self.canvas.polyline(&route, r##"stroke="#5b7fb5" stroke-width="1.5" stroke-dasharray="6 5""##);
+        for lane in &map.lanes {
+            self.direction(lane);
+        }
         for obstacle in world.obstacles() {
+            self.trail(obstacle, earlier);
             self.obstacle(obstacle);
         }
         self.body(&world.ego_outline(), r##"fill="#1f5fd0" stroke="#0a2a66""##);
@@ -109,13 +143,46 @@ impl Panel<'_> {
         }
     }
 
+    fn shows(&self, lane: &Lane) -> bool {
+        lane.centre.project(self.centre).distance_m <= self.radius_m * 1.5
+    }
+
     fn lane(&mut self, lane: &Lane) {
-        if lane.centre.project(self.centre).distance_m > VIEW_RADIUS_M * 1.5 {
+        if !self.shows(lane) {
             return;
         }
         let fill = if lane.junction.is_some() { "#c9cccf" } else { "#bfc3c7" };
         let style = format!(r##"fill="{fill}" stroke="#f4f4f4" stroke-width="0.8""##);
         self.canvas.polygon(&lane_outline(lane), &style);
+    }
+
+    /// Which way traffic goes, outside junctions, where lanes lie over each other.
+    fn direction(&mut self, lane: &Lane) {
+        if lane.junction.is_some() || !self.shows(lane) {
+            return;
+        }
+        let mut station_m = CHEVRON_EVERY_M / 2.0;
+        while station_m < lane.centre.length_m() {
+            let tip = lane.centre.pose_at(station_m);
+            let wing = |side: f64| tip.offset(-CHEVRON_M, CHEVRON_M * side).position;
+            let style = r##"stroke="#ffffff" stroke-width="1.2" stroke-opacity="0.8""##;
+            self.canvas.polyline(&[wing(1.0), tip.position, wing(-1.0)], style);
+            station_m += CHEVRON_EVERY_M;
+        }
+        if lane.left.is_some_and(|left| !left.same_direction) {
+            let edge = lane_edge(lane, 1.0);
+            self.canvas.polyline(&edge, r##"stroke="#d8a400" stroke-width="1.4""##);
+        }
+    }
+
+    /// The way that an obstacle came since the first panel.
+    fn trail(&mut self, obstacle: &Obstacle, earlier: &[Snapshot]) {
+        let known = earlier
+            .iter()
+            .filter_map(|moment| moment.world.obstacles().iter().find(|other| other.id == obstacle.id));
+        let mut way: Vec<Vec2> = known.map(|other| other.outline.pose.position).collect();
+        way.push(obstacle.outline.pose.position);
+        self.canvas.polyline(&way, r##"stroke="#7a1fa0" stroke-width="1.4" stroke-dasharray="1 3""##);
     }
 
     fn stop_line(&mut self, lane: &Lane, station_m: f64, colour: SignalColour) {
@@ -171,7 +238,7 @@ impl Panel<'_> {
     }
 }
 
-fn caption(svg: &mut String, left_px: f64, moment: &Snapshot) {
+fn caption(svg: &mut String, (left_px, top_px): (f64, f64), moment: &Snapshot) {
     let world = &moment.world;
     let sky: Vec<String> = Phenomenon::ALL
         .iter()
@@ -191,10 +258,10 @@ fn caption(svg: &mut String, left_px: f64, moment: &Snapshot) {
             "{}   throttle {:.0} %, brake {:.0} %",
             moment.status.reason, moment.status.control.throttle_pct, moment.status.control.brake_pct
         ),
-        "filled: true   dashed: perceived   green: planned".to_owned(),
+        "filled: true   dashed: perceived   green: planned   dotted: came from there".to_owned(),
     ];
     for (index, line) in lines.iter().enumerate() {
-        let y_px = PANEL_PX + 16.0 * (index as f64 + 1.0);
+        let y_px = top_px + PANEL_PX + 16.0 * (index as f64 + 1.0);
         let _ = writeln!(
             svg,
             r##"<text x="{:.0}" y="{y_px:.0}" font-size="12" fill="#202020">{}</text>"##,

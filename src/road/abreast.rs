@@ -7,6 +7,7 @@
 
 use crate::geometry::wrap_angle;
 
+use super::lane_change::Stretch;
 use super::map::LaneIndex;
 use super::map::RoadMap;
 use super::map::Side;
@@ -114,6 +115,13 @@ impl RoadMap {
         let mut permitted = lane.changes_m(side).iter();
         permitted.any(|(from_m, to_m)| (*from_m..=*to_m).contains(&station_m)).then_some(())?;
         lane.neighbour(side).map(|neighbour| neighbour.lane)
+    }
+
+    /// Where on a lane, from a station on, one may begin to change to a side, and how far one may go on
+    /// doing so, into the lanes ahead: stations and lengths, m.
+    pub fn changes_from_m(&self, lane: LaneIndex, side: Side, station_m: f64) -> Vec<(f64, f64)> {
+        let stretches = Stretch::from(self, lane, side, station_m);
+        stretches.iter().map(|stretch| (stretch.pairs[0].from_m, stretch.length_m())).collect()
     }
 
     /// The ways through a junction, by rising index of the lanes they come from and use.

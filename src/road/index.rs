@@ -15,13 +15,18 @@ const CELL_M: f64 = 8.0;
 /// Lanes are entered by stretches of this length, m.
 const STRETCH_M: f64 = 4.0;
 
+/// Where more cells would have to be looked into, whole lanes are projected on: far out, nearly all of
+/// them are in reach anyway, and each in many cells.
+const CELLS_MAX: i64 = 36;
+
 /// Which stretches of which lanes touch which cell.
 #[derive(Debug, Clone, Default)]
 pub struct LaneGrid {
     cells: BTreeMap<(i64, i64), Vec<Stretch>>,
     /// Half the width of the widest lane, m.
     half_width_m: f64,
-    lanes: usize,
+    /// Least and greatest coordinates of each lane's centre line.
+    boxes: Vec<(Vec2, Vec2)>,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -35,7 +40,15 @@ impl LaneGrid {
     pub fn new(lanes: &[Lane]) -> LaneGrid {
         let widths_m = lanes.iter().flat_map(|lane| &lane.widths_m);
         let widest_m = widths_m.copied().fold(0.0, f64::max);
-        let mut grid = LaneGrid { cells: BTreeMap::new(), half_width_m: widest_m / 2.0, lanes: lanes.len() };
+        let boxes = lanes.iter().map(|lane| {
+            let points = lane.centre.points();
+            let corner = |pick: fn(&Vec2, &Vec2) -> Vec2| {
+                points.iter().fold(points[0].position, |found, point| pick(&found, &point.position))
+            };
+            (corner(|a, b| a.inf(b)), corner(|a, b| a.sup(b)))
+        });
+        let boxes = boxes.collect();
+        let mut grid = LaneGrid { cells: BTreeMap::new(), half_width_m: widest_m / 2.0, boxes };
         for (index, lane) in lanes.iter().enumerate() {
             let stretches = (lane.centre.length_m() / STRETCH_M).ceil().max(1.0);
             let step_m = lane.centre.length_m() / stretches;
@@ -72,9 +85,20 @@ impl LaneGrid {
         let margin = Vec2::new(radius_m, radius_m);
         let (low, high) = (cell(point - margin), cell(point + margin));
         let cells = (high.0 - low.0 + 1).saturating_mul(high.1 - low.1 + 1);
-        if cells as f64 > self.lanes as f64 * 64.0 {
-            let all = lanes.iter().enumerate();
-            return all.map(|(index, lane)| (LaneIndex(index), lane.centre.project(point))).collect();
+        if cells > CELLS_MAX {
+            let outside = |from: &Vec2, to: &Vec2| {
+                let beyond = (from - point).sup(&(point - to)).sup(&Vec2::zeros());
+                beyond.norm_squared() > radius_m * radius_m
+            };
+            let in_reach =
+                lanes.iter().zip(&self.boxes).enumerate().filter_map(|(index, (lane, (from, to)))| {
+                    if outside(from, to) {
+                        return None;
+                    }
+                    let projection = lane.centre.project(point);
+                    (projection.distance_m <= radius_m).then_some((LaneIndex(index), projection))
+                });
+            return in_reach.collect();
         }
         let mut found: BTreeMap<LaneIndex, Projection> = BTreeMap::new();
         for x in low.0..=high.0 {

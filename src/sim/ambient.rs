@@ -128,6 +128,7 @@ fn draw(around: &Around, nearest_m: f64, id: u32, rng: &mut Rng) -> Option<Place
         verb: Verb::DriveAhead,
         outline,
         height_m: size.height_m,
+        forward: moved.forward,
         lane_heading_rad: moved.lane_heading_rad,
         velocity_mps: moved.velocity_mps,
         distance_m: distance_m(around.ego_outline, &outline),

@@ -228,7 +228,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::sim::environment::friction;
+    use crate::sim::environment::Grip;
 
     const DT_S: f64 = 0.02;
 
@@ -263,7 +263,7 @@ mod tests {
             let dv_mps = speed_mps / f64::from(slices);
             let slice_m = |slice| {
                 let v_mps = (f64::from(slice) + 0.5) * dv_mps;
-                v_mps * dv_mps / (friction(water_mm, v_mps) * GRAVITY_MPS2).min(6.0)
+                v_mps * dv_mps / (Grip::under(water_mm).friction(v_mps) * GRAVITY_MPS2).min(6.0)
             };
             (0..slices).map(slice_m).sum::<f64>()
         };
@@ -278,7 +278,7 @@ mod tests {
                 let mut ego = Ego::new(Pose::new(0.0, 0.0, 0.0), speed_mps);
                 let control = Control { brake_pct: 100.0, ..Control::default() };
                 while ego.motion.speed_mps > 0.0 {
-                    ego.step(&control, friction(water_mm, ego.motion.speed_mps), DT_S);
+                    ego.step(&control, Grip::under(water_mm).friction(ego.motion.speed_mps), DT_S);
                 }
                 let found_m = ego.motion.rear_axle.position.x;
                 assert!(

@@ -73,13 +73,16 @@ pub(super) struct Environment {
     pub fog: Level,
     pub wetness: Level,
     water_mm: f64,
+    /// What that water leaves of the friction.
+    grip: Grip,
 }
 
 impl Environment {
     /// A road as wet as the wetter of two levels makes it: an episode does not begin with the first
     /// drop.
     pub fn new(time: TimeOfDay, [rain, fog, wetness]: [Level; 3]) -> Environment {
-        Environment { time, rain, fog, wetness, water_mm: WATER_MM[wetness.max(rain) as usize] }
+        let water_mm = WATER_MM[wetness.max(rain) as usize];
+        Environment { time, rain, fog, wetness, water_mm, grip: Grip::under(water_mm) }
     }
 
     pub fn set(&mut self, phenomenon: Phenomenon, level: Level) {
@@ -89,6 +92,7 @@ impl Environment {
             Phenomenon::Wetness => {
                 self.wetness = level;
                 self.water_mm = WATER_MM[level as usize];
+                self.grip = Grip::under(self.water_mm);
             }
         }
     }
@@ -98,10 +102,11 @@ impl Environment {
         let rain_mmph = RAIN_MMPH[self.rain as usize];
         let gain_mmps = (rain_mmph - DRYING_MMPH) / S_PER_H - self.water_mm / DRAIN_S;
         self.water_mm = (self.water_mm + gain_mmps * time_s).max(0.0);
+        self.grip = Grip::under(self.water_mm);
     }
 
-    pub fn water_mm(&self) -> f64 {
-        self.water_mm
+    pub fn grip(&self) -> &Grip {
+        &self.grip
     }
 
     /// What holds for an ego vehicle at a speed.
@@ -111,7 +116,7 @@ impl Environment {
             rain_mmph: RAIN_MMPH[self.rain as usize],
             visibility_m: VISIBILITY_M[self.fog as usize],
             water_mm: self.water_mm,
-            friction: friction(self.water_mm, ego_mps),
+            friction: self.grip.friction(ego_mps),
         }
     }
 
@@ -123,14 +128,26 @@ impl Environment {
     }
 }
 
-/// Coefficient of friction of a tyre on a road with so much water, at a speed: the table, linear
-/// between its entries and held beyond its ends.
-pub(super) fn friction(water_mm: f64, speed_mps: f64) -> f64 {
-    let (column, right) = place(&DEPTHS_MM, water_mm);
-    let (row, below) = place(&SPEEDS_MPS, speed_mps);
-    let along = |row: &[f64; 7]| row[column] + (row[column + 1] - row[column]) * right;
-    let (slow, fast) = (along(&FRICTION[row]), along(&FRICTION[row + 1]));
-    (slow + (fast - slow) * below).max(FRICTION_MIN)
+/// Friction of a tyre on a road with so much water: the table, linear between its entries and held
+/// beyond its ends. Everybody asks for it in every tick, at a speed of their own.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Grip {
+    /// At the speeds of the table's rows.
+    frictions: [f64; 3],
+}
+
+impl Grip {
+    pub fn under(water_mm: f64) -> Grip {
+        let (column, right) = place(&DEPTHS_MM, water_mm);
+        Grip { frictions: FRICTION.map(|row| row[column] + (row[column + 1] - row[column]) * right) }
+    }
+
+    /// Coefficient of friction at a speed.
+    pub fn friction(&self, speed_mps: f64) -> f64 {
+        let (row, below) = place(&SPEEDS_MPS, speed_mps);
+        let (slow, fast) = (self.frictions[row], self.frictions[row + 1]);
+        (slow + (fast - slow) * below).max(FRICTION_MIN)
+    }
 }
 
 /// The entry at or before a value in a rising list, and how far it lies towards the next, in `[0, 1]`.
@@ -179,12 +196,12 @@ mod tests {
         ] {
             for (speed_kmph, expected) in [50.0, 90.0, 130.0].into_iter().zip(frictions) {
                 assert!(
-                    (friction(water_mm, speed_kmph / 3.6) - expected).abs() < 1e-9,
+                    (Grip::under(water_mm).friction(speed_kmph / 3.6) - expected).abs() < 1e-9,
                     "{water_mm} {speed_kmph}"
                 );
             }
         }
-        assert_eq!(friction(9.0, 0.0), 0.50);
+        assert_eq!(Grip::under(9.0).friction(0.0), 0.50);
     }
 
     #[test]

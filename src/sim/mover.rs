@@ -7,7 +7,7 @@ use crate::geometry::Vec2;
 
 use super::body::BodyParameters;
 use super::environment::GRAVITY_MPS2;
-use super::environment::friction;
+use super::environment::Grip;
 use super::npc::Driver;
 use super::pedestrian::Walker;
 use super::sense::EgoMotion;
@@ -25,6 +25,8 @@ pub(super) struct Around<'a> {
     pub scene: &'a Scene,
     pub ego: &'a EgoMotion,
     pub ego_outline: &'a OrientedBox,
+    /// Unit vector along its heading.
+    pub ego_forward: Vec2,
     pub ego_velocity_mps: Vec2,
     pub ego_station_m: f64,
     pub obstacles: &'a [Obstacle],
@@ -34,7 +36,7 @@ pub(super) struct Around<'a> {
     pub tick: u64,
     /// Under the ego vehicle.
     pub friction: f64,
-    pub water_mm: f64,
+    pub grip: &'a Grip,
     pub visibility_m: f64,
     /// Of the choices of other road users.
     pub seed: u64,
@@ -48,6 +50,13 @@ impl Around<'_> {
             .chain(obstacles.map(|obstacle| (&obstacle.outline, obstacle.velocity_mps)))
     }
 
+    /// The same with the unit vectors of their headings: outline, heading, velocity.
+    pub fn others_along(&self, except: u32) -> impl Iterator<Item = (&OrientedBox, Vec2, Vec2)> {
+        let obstacles = self.obstacles.iter().filter(move |obstacle| obstacle.id != except);
+        core::iter::once((self.ego_outline, self.ego_forward, self.ego_velocity_mps))
+            .chain(obstacles.map(|obstacle| (&obstacle.outline, obstacle.forward, obstacle.velocity_mps)))
+    }
+
     /// Outlines and velocities of all vehicles, the ego vehicle first.
     pub fn vehicles(&self) -> impl Iterator<Item = (&OrientedBox, Vec2)> {
         let vehicles = self.obstacles.iter().filter(|obstacle| obstacle.body.is_vehicle());
@@ -55,20 +64,22 @@ impl Around<'_> {
             .chain(vehicles.map(|obstacle| (&obstacle.outline, obstacle.velocity_mps)))
     }
 
-    /// Every driver but one, each with its obstacle, wrecks left out.
-    pub fn drivers(&self, except: u32) -> impl Iterator<Item = (&Obstacle, &Driver)> {
+    /// Every driver but one, each with its obstacle and its body, wrecks left out.
+    pub fn drivers(&self, except: u32) -> impl Iterator<Item = (&Obstacle, &BodyParameters, &Driver)> {
         let [before, after] = self.movers;
         let rest = self.obstacles.get(before.len() + 1..).unwrap_or_default();
         let all = self.obstacles.iter().zip(before).chain(rest.iter().zip(after));
         all.filter_map(move |(obstacle, mover)| match &mover.motion {
-            Motion::Drive(driver) if obstacle.id != except && !mover.is_wreck() => Some((obstacle, driver)),
+            Motion::Drive(driver) if obstacle.id != except && !mover.is_wreck() => {
+                Some((obstacle, &mover.size, driver))
+            }
             Motion::Drive(_) | Motion::Walk(_) | Motion::Stand => None,
         })
     }
 
     /// The hardest braking of a body at a speed on this road, m/s².
     pub fn braking_mps2(&self, size: &BodyParameters, speed_mps: f64) -> f64 {
-        size.deceleration_mps2_max.min(friction(self.water_mm, speed_mps) * GRAVITY_MPS2)
+        size.deceleration_mps2_max.min(self.grip.friction(speed_mps) * GRAVITY_MPS2)
     }
 }
 
@@ -99,15 +110,22 @@ pub(super) enum Motion {
 pub(super) struct Moved {
     /// Centre of the outline.
     pub pose: Pose,
+    /// Unit vector along its heading.
+    pub forward: Vec2,
     /// Heading of the lane that it drives in; its own on foot.
     pub lane_heading_rad: f64,
     pub velocity_mps: Vec2,
 }
 
 impl Moved {
-    /// On foot and standing.
-    pub fn at_rest(pose: Pose) -> Moved {
-        Moved { pose, lane_heading_rad: pose.heading_rad, velocity_mps: Vec2::zeros() }
+    /// Standing where it was.
+    pub fn at_rest(this: &Obstacle) -> Moved {
+        Moved {
+            pose: this.outline.pose,
+            forward: this.forward,
+            lane_heading_rad: this.lane_heading_rad,
+            velocity_mps: Vec2::zeros(),
+        }
     }
 }
 
@@ -129,7 +147,7 @@ impl Mover {
                 return None;
             }
         }
-        let rest = Moved { lane_heading_rad: this.lane_heading_rad, ..Moved::at_rest(this.outline.pose) };
+        let rest = Moved::at_rest(this);
         match &mut self.motion {
             _ if self.crashed => Some(rest),
             Motion::Drive(driver) => driver.step(this, &self.size, self.touched, around),

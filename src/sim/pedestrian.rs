@@ -125,16 +125,14 @@ impl Walker {
         }
         if self.walked_m >= self.way_m {
             self.stayed_ticks += 1;
-            return (f64::from(self.stayed_ticks) * DT_S < STAY_S)
-                .then_some(Moved::at_rest(this.outline.pose));
+            return (f64::from(self.stayed_ticks) * DT_S < STAY_S).then_some(Moved::at_rest(this));
         }
         if around.tick < self.begins_tick {
-            return Some(Moved::at_rest(this.outline.pose));
+            return Some(Moved::at_rest(this));
         }
         if self.pace_mps == 0.0 {
             self.stuck_ticks += 1;
-            return (f64::from(self.stuck_ticks) * DT_S < GIVE_UP_S)
-                .then_some(Moved::at_rest(this.outline.pose));
+            return (f64::from(self.stuck_ticks) * DT_S < GIVE_UP_S).then_some(Moved::at_rest(this));
         }
         self.stuck_ticks = 0;
         self.walked_m = (self.walked_m + self.pace_mps * DT_S).min(self.way_m);
@@ -142,7 +140,7 @@ impl Walker {
         self.aside_m += aside_m;
         let pose = self.from.offset(self.walked_m, self.aside_m);
         let velocity_mps = (pose.position - this.outline.pose.position) / DT_S;
-        Some(Moved { pose, lane_heading_rad: pose.heading_rad, velocity_mps })
+        Some(Moved { pose, forward: this.forward, lane_heading_rad: pose.heading_rad, velocity_mps })
     }
 
     pub fn trace(&self, sink: &mut dyn FnMut(u64)) {

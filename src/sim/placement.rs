@@ -11,6 +11,7 @@ use crate::action::SpawnFacts;
 use crate::action::SpawnRequest;
 use crate::geometry::OrientedBox;
 use crate::geometry::Pose;
+use crate::geometry::Vec2;
 use crate::geometry::distance_m;
 use crate::geometry::wrap_angle;
 use crate::model::vocabulary::LaneChoice;
@@ -21,6 +22,7 @@ use crate::rng;
 use crate::road::Conflict;
 use crate::road::LaneIndex;
 use crate::road::RouteLane;
+use crate::road::Turn;
 
 use super::body;
 use super::body::BodyParameters;
@@ -34,6 +36,7 @@ use super::npc::Driver;
 use super::npc::Manoeuvre;
 use super::npc::Towards;
 use super::npc::When;
+use super::npc::can_change;
 use super::npc::choices;
 use super::npc::lane_beside;
 use super::pedestrian::Walker;
@@ -61,8 +64,10 @@ const CHANGE_AFTER_S: f64 = 1.0;
 const CUT_IN_M: f64 = 5.0;
 /// How far beyond the asked distance a crossing may lie, m.
 const CROSSING_M: f64 = 60.0;
-/// A rendezvous with an ego vehicle slower than this would be too far away, m/s.
-const RENDEZVOUS_MPS_MIN: f64 = 3.0;
+/// How the ego vehicle is expected to gain speed on its way to a rendezvous, m/s², and how it takes bends,
+/// m/s²: ours, the comfort of most planners.
+const EGO_GAINS_MPS2: f64 = 1.5;
+const EGO_LATERAL_MPS2: f64 = 2.0;
 /// Step in which a drive towards a rendezvous is timed, m.
 const TIMING_M: f64 = 1.0;
 
@@ -174,6 +179,7 @@ fn finish(
         outline,
         distance_m: distance_m(around.ego_outline, &outline),
         height_m: mover.size.height_m,
+        forward: moved.forward,
         lane_heading_rad: moved.lane_heading_rad,
         velocity_mps: moved.velocity_mps,
         spawned_tick: around.tick,
@@ -227,7 +233,12 @@ fn on_foot(around: &Around, request: &SpawnRequest, size: BodyParameters, id: u3
             )),
         )
     };
-    let moved = Moved::at_rest(pose);
+    let moved = Moved {
+        pose,
+        forward: pose.forward(),
+        lane_heading_rad: pose.heading_rad,
+        velocity_mps: Vec2::zeros(),
+    };
     finish(around, request, Mover::new(size, motion), id, moved)
 }
 
@@ -238,31 +249,28 @@ fn drive_ahead(
     id: u32,
 ) -> Result<Driver, String> {
     let station_m = ahead_m(around, request, size)?;
-    let own = lane_at(around, station_m);
     let lane = chosen_lane(around, station_m, request.lane)?;
     let mut rng = choices(around.seed, id, 0);
-    let mut plan = Vec::new();
-    if request.then == Then::Change {
-        let towards = match request.lane {
-            LaneChoice::Left => Side::Right,
-            LaneChoice::Right => Side::Left,
-            LaneChoice::Current => {
-                let sides: Vec<Side> = [Side::Left, Side::Right]
-                    .into_iter()
-                    .filter(|side| lane_beside(around, own, *side).is_some())
-                    .collect();
-                if sides.is_empty() {
-                    return Err("no lane to change to".into());
-                }
-                sides[rng::below(&mut rng, sides.len() as u32) as usize]
-            }
-        };
-        let when = When::Tick(around.tick + (CHANGE_AFTER_S / DT_S + 0.5) as u64);
-        plan.push(Manoeuvre { when, towards: Towards::To(towards) });
-    }
     let beside_ego = around.scene.route.path.pose_at(station_m).position;
     let station_m = around.scene.map.lane(lane).centre.project(beside_ego).station_m;
     let way = Way::along(around.scene, &[lane], &mut rng).ok_or("that lane leads nowhere")?;
+    let mut plan = Vec::new();
+    if request.then == Then::Change {
+        let sides: &[Side] = match request.lane {
+            LaneChoice::Left => &[Side::Right],
+            LaneChoice::Right => &[Side::Left],
+            LaneChoice::Current => &[Side::Left, Side::Right],
+        };
+        let begin_m = station_m + request.speed_mps * CHANGE_AFTER_S;
+        let possible = |side: &Side| can_change(around, &way, begin_m, *side, request.speed_mps);
+        let sides: Vec<Side> = sides.iter().copied().filter(possible).collect();
+        if sides.is_empty() {
+            return Err("no room to change lanes before the junction".into());
+        }
+        let towards = Towards::To(sides[rng::below(&mut rng, sides.len() as u32) as usize]);
+        let when = When::Tick(around.tick + (CHANGE_AFTER_S / DT_S + 0.5) as u64);
+        plan.push(Manoeuvre { when, towards });
+    }
     Ok(Driver::new(around.scene, Arc::new(way), station_m, Cruise::Commanded(request.speed_mps), plan, 1))
 }
 
@@ -272,6 +280,9 @@ fn overtake(
     size: &BodyParameters,
     id: u32,
 ) -> Result<Driver, String> {
+    if request.speed_mps <= around.ego.speed_mps {
+        return Err("it would be no faster than the ego vehicle".into());
+    }
     let lane = chosen_lane(around, around.ego_station_m, request.lane)?;
     let mut rng = choices(around.seed, id, 0);
     let mut plan = Vec::new();
@@ -290,8 +301,11 @@ fn overtake(
     // Its front bumper is `distance_m` behind the ego vehicle's rear bumper, measured in its own lane.
     let rear = around.ego.rear_axle.offset(-VehicleParameters::MKZ.rear_axle_to_back_m, 0.0);
     let map = &around.scene.map;
-    let rear_m = map.lane(lane).centre.project(rear.position).station_m;
-    let mut station_m = rear_m - request.distance_m - size.length_m / 2.0;
+    let centre = &map.lane(lane).centre;
+    let beside_m = centre.project(rear.position).station_m;
+    // A lane that begins farther ahead, like a bay for turning, is continued backwards to the ego vehicle.
+    let before_m = centre.pose_at(beside_m).to_local(rear.position).x.min(0.0);
+    let mut station_m = beside_m + before_m - request.distance_m - size.length_m / 2.0;
     let mut lanes = vec![lane];
     while station_m < size.length_m / 2.0 {
         let previous = lane_before(around, lanes[0]).ok_or("the road begins too near behind")?;
@@ -299,6 +313,10 @@ fn overtake(
         lanes.insert(0, previous);
     }
     let way = Way::along(around.scene, &lanes, &mut rng).ok_or("that lane leads nowhere")?;
+    let passes = |side| can_change(around, &way, station_m, side, request.speed_mps);
+    if request.lane == LaneChoice::Current && !passes(Side::Left) && !passes(Side::Right) {
+        return Err("no room to change lanes before the junction".into());
+    }
     Ok(Driver::new(around.scene, Arc::new(way), station_m, Cruise::Commanded(request.speed_mps), plan, 1))
 }
 
@@ -323,6 +341,9 @@ fn drive_opposite(
     let beside_route = around.scene.route.path.pose_at(station_m).position;
     let station_m = map.lane(lane).centre.project(beside_route).station_m;
     let way = Way::along(around.scene, &[lane], &mut rng).ok_or("that lane leads nowhere")?;
+    if request.then == Then::Change && !can_change(around, &way, station_m, Side::Left, request.speed_mps) {
+        return Err("no room to change lanes before the junction".into());
+    }
     Ok(Driver::new(around.scene, Arc::new(way), station_m, Cruise::Commanded(request.speed_mps), plan, 1))
 }
 
@@ -354,7 +375,26 @@ fn cross_road(
     Err(reason)
 }
 
-/// A driver who reaches a conflict when the ego vehicle does, if that keeps its present speed.
+/// Time until the ego vehicle's front is `distance_m` farther on, if nothing is in its way, s.
+fn arrival_s(around: &Around, distance_m: f64) -> f64 {
+    let (map, route) = (&around.scene.map, &around.scene.route);
+    let mut station_m = VehicleParameters::MKZ.front_m(around.ego_station_m);
+    let end_m = station_m + distance_m;
+    let (mut speed_mps, mut time_s) = (around.ego.speed_mps, 0.0);
+    while station_m < end_m {
+        let step_m = TIMING_M.min(end_m - station_m);
+        let gained_mps = (speed_mps * speed_mps + 2.0 * EGO_GAINS_MPS2 * step_m).sqrt();
+        let limit_mps = map.lane(route.lane_at(station_m).lane).speed_limit_mps;
+        let curvature_per_m = route.path.curvature_at(station_m).abs().max(1e-4);
+        let next_mps = gained_mps.min(limit_mps).min((EGO_LATERAL_MPS2 / curvature_per_m).sqrt());
+        time_s += 2.0 * step_m / (speed_mps + next_mps);
+        speed_mps = next_mps;
+        station_m += step_m;
+    }
+    time_s
+}
+
+/// A driver who reaches a conflict when the ego vehicle does, if nothing is in its way.
 fn rendezvous(
     around: &Around,
     request: &SpawnRequest,
@@ -364,14 +404,16 @@ fn rendezvous(
     distance_m: f64,
 ) -> Result<Driver, String> {
     let map = &around.scene.map;
-    let arrival_s = distance_m / around.ego.speed_mps.max(RENDEZVOUS_MPS_MIN);
+    let arrival_s = arrival_s(around, distance_m);
     let needed_m = request.speed_mps * arrival_s + size.length_m;
     let mut lanes = vec![conflict.lane];
     let mut upstream_m = conflict.lane_station_m;
+    let on_route = |lane: LaneIndex| around.scene.route.lanes.iter().any(|part| part.lane == lane);
     while upstream_m < needed_m {
-        let Some(previous) = map.lane(lanes[0]).predecessors.first() else { break };
-        upstream_m += map.lane(*previous).centre.length_m();
-        lanes.insert(0, *previous);
+        let before = &map.lane(lanes[0]).predecessors;
+        let Some(previous) = before.iter().copied().find(|lane| !on_route(*lane)) else { break };
+        upstream_m += map.lane(previous).centre.length_m();
+        lanes.insert(0, previous);
     }
     let mut rng = choices(around.seed, id, 0);
     let way = Way::along(around.scene, &lanes, &mut rng).ok_or("that lane leads nowhere")?;
@@ -417,11 +459,19 @@ fn rendezvous(
     if map.lane(leg).junction.is_some() {
         return Err("too near to the junction for a lane change".into());
     }
-    let beside = lane_beside(around, leg, Side::Right)
-        .or_else(|| lane_beside(around, leg, Side::Left))
-        .ok_or("no second lane in the crossing leg")?;
-    let station_m = map.lane(beside).centre.project(start).station_m;
-    let first = Way::along(around.scene, &[beside], &mut rng).ok_or("that lane leads nowhere")?;
+    let mut reason = "no second lane in the crossing leg";
+    let mut found = None;
+    for (side, back) in [(Side::Right, Side::Left), (Side::Left, Side::Right)] {
+        let Some(beside) = lane_beside(around, leg, side) else { continue };
+        let first = Way::along(around.scene, &[beside], &mut rng).ok_or("that lane leads nowhere")?;
+        let station_m = map.lane(beside).centre.project(start).station_m;
+        if can_change(around, &first, station_m, back, request.speed_mps) {
+            found = Some((first, station_m));
+            break;
+        }
+        reason = "no room to change lanes before the junction";
+    }
+    let (first, station_m) = found.ok_or(reason)?;
     let change = Manoeuvre { when: When::Tick(around.tick), towards: Towards::Way(Arc::new(way)) };
     Ok(Driver::new(
         around.scene,
@@ -494,9 +544,12 @@ fn lane_along(
     through.iter().copied().find(|lane| map.lane(*lane).successors.contains(&to)).ok_or(refusal)
 }
 
-/// The lane from which one comes into a lane: that of the route, if it is one, else the first.
+/// The lane from which one comes into a lane: that of the route, if it is one, else one straight behind,
+/// else the first.
 fn lane_before(around: &Around, lane: LaneIndex) -> Option<LaneIndex> {
-    let route = &around.scene.route.lanes;
-    let on_route = route.windows(2).find(|pair| pair[1].lane == lane).map(|pair| pair[0].lane);
-    on_route.or_else(|| around.scene.map.lane(lane).predecessors.first().copied())
+    let (map, route) = (&around.scene.map, &around.scene.route.lanes);
+    let before = &map.lane(lane).predecessors;
+    let on_route = before.iter().find(|lane| route.iter().any(|part| part.lane == **lane));
+    let straight = || before.iter().find(|lane| map.lane(**lane).turn == Turn::Straight);
+    on_route.or_else(straight).or(before.first()).copied()
 }

@@ -4,10 +4,10 @@
 //! This is the physical side of sensing (line of sight, light, weather). What a driving system makes
 //! of it, with its errors and delays, is `ads`.
 
+use crate::geometry::Frame;
 use crate::geometry::OrientedBox;
 use crate::geometry::Pose;
 use crate::geometry::Vec2;
-use crate::geometry::ray_hit_m;
 use crate::model::vocabulary::Body;
 
 use super::world::Obstacle;
@@ -21,7 +21,7 @@ pub(super) const RANGE_M: f64 = 120.0;
 pub const FRAME_TICKS: u64 = 5;
 
 /// Points of an outline to which a line of sight is tried.
-const RAYS: u32 = 8;
+const RAYS: usize = 8;
 
 /// One look around, made anew for every tick in which the driving system asks.
 #[derive(Debug, Clone, PartialEq)]
@@ -107,20 +107,22 @@ pub(super) fn visible_fraction(eye: Vec2, target: &Obstacle, obstacles: &[Obstac
         return 1.0;
     }
     let (first, last) = silhouette(eye, towards, &target.outline);
-    let mut seen = 0.0;
-    for ray in 0..RAYS {
-        let point = first + (last - first) * ((f64::from(ray) + 0.5) / f64::from(RAYS));
+    let rays: [(Vec2, f64); RAYS] = core::array::from_fn(|ray| {
+        let point = first + (last - first) * ((ray as f64 + 0.5) / RAYS as f64);
         let reach_m = (point - eye).norm();
-        let direction = (point - eye) / reach_m.max(1e-6);
-        let mut shown: f64 = 1.0;
-        for (_, other) in obstacles.iter().enumerate().filter(|(index, _)| hiders >> index & 1 == 1) {
-            if ray_hit_m(eye, direction, reach_m, &other.outline).is_some() {
-                shown = shown.min((1.0 - other.height_m / target.height_m).max(0.0));
+        ((point - eye) / reach_m.max(1e-6), reach_m)
+    });
+    let mut shown = [1.0_f64; RAYS];
+    for (_, other) in obstacles.iter().enumerate().filter(|(index, _)| hiders >> index & 1 == 1) {
+        let above = (1.0 - other.height_m / target.height_m).max(0.0);
+        let other = Frame::along(&other.outline, other.forward);
+        for ((direction, reach_m), shown) in rays.iter().zip(&mut shown) {
+            if *shown > above && other.ray_hit_m(eye, *direction, *reach_m).is_some() {
+                *shown = above;
             }
         }
-        seen += shown / f64::from(RAYS);
     }
-    seen
+    shown.iter().map(|shown| shown / RAYS as f64).sum()
 }
 
 /// Whether a circle around `other` reaches into the cone that holds the target, in front of it.
@@ -171,6 +173,7 @@ mod tests {
             verb: Verb::Stand,
             outline: OrientedBox::new(Pose::new(x_m, y_m, 0.0), size.length_m, size.width_m),
             height_m: size.height_m,
+            forward: Vec2::new(1.0, 0.0),
             lane_heading_rad: 0.0,
             velocity_mps: Vec2::zeros(),
             distance_m: 0.0,

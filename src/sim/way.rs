@@ -23,6 +23,8 @@ const REACH_M: f64 = 400.0;
 pub(super) struct Way {
     pub path: Path,
     lanes: Vec<WayLane>,
+    /// A bit for each lane's index modulo 64: most lanes are not on the way, and this says so at once.
+    lane_bits: u64,
     /// By rising station.
     pub stop_lines: Vec<RouteStopLine>,
     /// Where others may cross or join, by rising station.
@@ -107,8 +109,9 @@ impl Way {
         }
         let open = chain.last().is_some_and(|last| !map.lane(*last).successors.is_empty());
         let speeds_mps_max = bend_speeds_mps(&path);
+        let lane_bits = lanes.iter().fold(0, |bits, part| bits | lane_bit(part.lane));
         areas.sort_by(|a, b| a.from_m.total_cmp(&b.from_m).then(a.other.cmp(&b.other)));
-        Some(Way { path, lanes, stop_lines, areas, speeds_mps_max, open })
+        Some(Way { path, lanes, lane_bits, stop_lines, areas, speeds_mps_max, open })
     }
 
     /// The lane at a station, clamped to the ends, and the station on it.
@@ -118,6 +121,12 @@ impl Way {
         (found.lane, station_m - found.from_m)
     }
 
+    /// The lanes from a station on, each with the station on it from which the way goes on.
+    pub fn lanes_from(&self, station_m: f64) -> impl Iterator<Item = (LaneIndex, f64)> {
+        let first = self.lanes.partition_point(|lane| lane.from_m <= station_m).max(1) - 1;
+        self.lanes[first..].iter().map(move |part| (part.lane, (station_m - part.from_m).max(0.0)))
+    }
+
     /// Station at which a lane begins, if the way takes it.
     pub fn lane_begin_m(&self, lane: LaneIndex) -> Option<f64> {
         self.lanes.iter().find(|part| part.lane == lane).map(|part| part.from_m)
@@ -125,6 +134,9 @@ impl Way {
 
     /// Station at which a lane begins that is not left at `rear_m`, if the way still takes it.
     pub fn lane_ahead_m(&self, lane: LaneIndex, rear_m: f64) -> Option<f64> {
+        if self.lane_bits & lane_bit(lane) == 0 {
+            return None;
+        }
         let first = self.lanes.partition_point(|part| part.from_m <= rear_m).max(1) - 1;
         let mut ahead = self.lanes[first..].iter().take_while(|part| part.from_m < rear_m + AHEAD_M);
         ahead.find(|part| part.lane == lane).map(|part| part.from_m)
@@ -132,8 +144,7 @@ impl Way {
 
     /// Highest speed at a station: what the bend there and the bends ahead allow, m/s.
     pub fn speed_mps_max(&self, station_m: f64) -> f64 {
-        let after = self.path.points().partition_point(|point| point.station_m <= station_m);
-        self.speeds_mps_max[after.min(self.speeds_mps_max.len() - 1)]
+        self.speeds_mps_max[self.path.vertex_after(station_m)]
     }
 
     /// Speed limit of the lane at a station, m/s.
@@ -155,13 +166,17 @@ impl Way {
     }
 }
 
+fn lane_bit(lane: LaneIndex) -> u64 {
+    1 << (lane.0 % 64)
+}
+
 /// A point beside a path, from a guess that is at most a bend away.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Beside {
     pub station_m: f64,
     pub offset_m: f64,
-    /// Of the path there.
-    pub heading_rad: f64,
+    /// Unit vector along the path there.
+    pub forward: Vec2,
 }
 
 /// Where a point lies beside a path, by stepping along its tangents: much quicker than a search,
@@ -170,11 +185,12 @@ pub(super) fn beside(path: &Path, point: Vec2, guess_m: f64) -> Option<Beside> {
     let mut station_m = guess_m;
     for _ in 0..5 {
         let pose = path.pose_at(station_m);
-        let local = pose.to_local(point);
-        if local.x.abs() < 0.02 {
-            return Some(Beside { station_m, offset_m: local.y, heading_rad: pose.heading_rad });
+        let (forward, away) = (pose.forward(), point - pose.position);
+        let ahead_m = forward.dot(&away);
+        if ahead_m.abs() < 0.02 {
+            return Some(Beside { station_m, offset_m: forward.perp(&away), forward });
         }
-        station_m += local.x;
+        station_m += ahead_m;
     }
     None
 }

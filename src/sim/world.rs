@@ -15,6 +15,7 @@ use crate::geometry::Pose;
 use crate::geometry::Sweep;
 use crate::geometry::Vec2;
 use crate::geometry::first_contact;
+use crate::geometry::wrap_angle;
 use crate::model::vocabulary::Body;
 use crate::model::vocabulary::Colour;
 use crate::model::vocabulary::Level;
@@ -35,7 +36,6 @@ use super::ego::Control;
 use super::ego::Ego;
 use super::ego::VehicleParameters;
 use super::environment::Environment;
-use super::environment::friction;
 use super::junction::ConflictAreas;
 use super::mover::Around;
 use super::mover::Moved;
@@ -63,6 +63,10 @@ const START_MPS: f64 = 3.0;
 
 /// Obstacles at a time (published package): the next one removes the oldest.
 const OBSTACLES_MAX: usize = 10;
+
+/// Obstacles whose gap after a tick is at least this are not looked at for contacts, m: far more than
+/// rounding.
+const CLOSE_M: f64 = 1e-3;
 
 /// How far along the route the ego vehicle is looked for from where it was, m. More than it drives
 /// in a tick, so that it is found again after a corner cut, and less than any loop of a route.
@@ -126,6 +130,8 @@ pub struct World {
     ego: Ego,
     /// Outline of the ego vehicle, kept because everybody asks for it.
     ego_outline: OrientedBox,
+    /// The same with its axes worked out.
+    ego_frame: Frame,
     /// Rear axle beside the route.
     ego_station_m: f64,
     ego_offset_m: f64,
@@ -154,6 +160,8 @@ pub struct Obstacle {
     pub colour: Colour,
     pub verb: Verb,
     pub outline: OrientedBox,
+    /// Unit vector along the outline's heading, kept because everybody asks for it.
+    pub forward: Vec2,
     pub height_m: f64,
     /// Heading of the lane that it drives in; its own on foot.
     pub lane_heading_rad: f64,
@@ -205,6 +213,7 @@ impl World {
         let mut world = World {
             ticks: 0,
             ego_outline: ego.outline(),
+            ego_frame: Frame::of(&ego.outline()),
             ego,
             ego_station_m: 0.0,
             ego_offset_m: 0.0,
@@ -239,14 +248,15 @@ impl World {
         self.contacts.clear();
         self.incidents.clear();
         let outline = self.ego_outline;
-        let friction = friction(self.environment.water_mm(), self.ego.motion.speed_mps);
+        let friction = self.environment.grip().friction(self.ego.motion.speed_mps);
         self.ego.step(control, friction, DT_S);
         self.ego_outline = self.ego.outline();
+        self.ego_frame = Frame::of(&self.ego_outline);
         self.follow_route();
         // Taken once: of two contacts in a tick, the second does not see what the first did to the ego.
         let ego = Party {
             sweep: Sweep { start: outline, end: self.ego_outline.pose },
-            velocity_mps: self.ego_outline.pose.forward() * self.ego.motion.speed_mps,
+            velocity_mps: self.ego_frame.forward() * self.ego.motion.speed_mps,
         };
         let ego_mps = self.ego.motion.speed_mps;
         // Taken out for the tick, so that each can move while it looks at the world.
@@ -261,9 +271,9 @@ impl World {
             }
         }
         self.movers = movers;
-        let ego = Frame::of(&self.ego_outline);
         for obstacle in &mut self.obstacles {
-            obstacle.distance_m = ego.distance_m(&Frame::of(&obstacle.outline));
+            let outline = Frame::along(&obstacle.outline, obstacle.forward);
+            obstacle.distance_m = self.ego_frame.distance_m(&outline);
         }
         self.ticks += 1;
         if self.ambient.wanted() > 0 && self.ticks.is_multiple_of(RENEWAL_TICKS) {
@@ -437,14 +447,15 @@ impl World {
             scene: &self.scene,
             ego: &self.ego.motion,
             ego_outline: &self.ego_outline,
-            ego_velocity_mps: self.ego_outline.pose.forward() * self.ego.motion.speed_mps,
+            ego_forward: self.ego_frame.forward(),
+            ego_velocity_mps: self.ego_frame.forward() * self.ego.motion.speed_mps,
             ego_station_m: self.ego_station_m,
             obstacles: &self.obstacles,
             movers,
             signals: &self.signals,
             tick: self.ticks,
             friction: self.conditions.friction,
-            water_mm: self.environment.water_mm(),
+            grip: self.environment.grip(),
             visibility_m: self.conditions.visibility_m,
             seed: self.seed,
         }
@@ -497,8 +508,8 @@ impl World {
         let (earlier, rest) = movers.split_at_mut(index);
         let (mover, later) = rest.split_first_mut().expect("every obstacle has its mover");
         let Some(mut moved) = mover.step(&before, &self.around([&*earlier, &*later])) else { return false };
-        if let Some((other, pose, incident)) = self.bump(index, &before.outline, &moved.pose) {
-            moved = Moved { pose, velocity_mps: Vec2::zeros(), ..moved };
+        if let Some((other, pose, incident)) = self.bump(index, &before, &moved.pose) {
+            moved = Moved { pose, forward: pose.forward(), velocity_mps: Vec2::zeros(), ..moved };
             mover.crash();
             let hit = if other < index { &mut earlier[other] } else { &mut later[other - index - 1] };
             hit.crash();
@@ -507,7 +518,7 @@ impl World {
         }
         let obstacle = &mut self.obstacles[index];
         (obstacle.outline.pose, obstacle.velocity_mps) = (moved.pose, moved.velocity_mps);
-        obstacle.lane_heading_rad = moved.lane_heading_rad;
+        (obstacle.forward, obstacle.lane_heading_rad) = (moved.forward, moved.lane_heading_rad);
         if mover.touched {
             return true;
         }
@@ -516,13 +527,13 @@ impl World {
             velocity_mps: moved.velocity_mps,
         };
         if let Some(contact) = meet(ego, ego_mps, &other, before.id, self.ticks) {
-            let heading = self.ego_outline.pose.forward();
+            let heading = self.ego_frame.forward();
             let along_mps = heading.dot(&moved.velocity_mps);
             // Impacts chain: the second acts on the speed that the first left.
             let common_mps = common_speed_mps(self.ego.motion.speed_mps, along_mps, mover.size.mass_t);
             self.ego.motion.speed_mps = common_mps;
             // Who is pushed forward goes on at what the push gives; who is stopped stays.
-            mover.touch((moved.pose.forward().dot(&heading) * common_mps).max(0.0));
+            mover.touch((moved.forward.dot(&heading) * common_mps).max(0.0));
             self.contacts.push(contact);
         }
         true
@@ -533,18 +544,27 @@ impl World {
     ///
     /// Obstacles move one after another, each among the others as they stand at that moment. So no
     /// two can come to overlap, whatever the size of a step.
-    fn bump(&self, index: usize, outline: &OrientedBox, end: &Pose) -> Option<(usize, Pose, Incident)> {
+    fn bump(&self, index: usize, this: &Obstacle, end: &Pose) -> Option<(usize, Pose, Incident)> {
+        let outline = &this.outline;
         let way = end.position - outline.pose.position;
         if way == Vec2::zeros() && end.heading_rad == outline.pose.heading_rad {
             return None;
         }
         let sweep = Sweep { start: *outline, end: *end };
-        let reach_m = outline.half_length_m + outline.half_width_m + way.norm();
+        let own = Frame::along(outline, this.forward);
+        // No corner moves farther than this.
+        let radius_m = outline.half_length_m + outline.half_width_m;
+        let turn_rad = wrap_angle(end.heading_rad - outline.pose.heading_rad);
+        let most_m = way.norm() + turn_rad.abs() * radius_m;
+        let reach_m = radius_m + most_m;
         let mut first: Option<(usize, FirstContact)> = None;
         for (other, obstacle) in self.obstacles.iter().enumerate() {
             let near_m = reach_m + obstacle.outline.half_length_m + obstacle.outline.half_width_m;
             let away = obstacle.outline.pose.position - outline.pose.position;
-            if other == index || away.norm_squared() > near_m * near_m {
+            if other == index || away.x.abs() > near_m || away.y.abs() > near_m {
+                continue;
+            }
+            if own.is_apart(&Frame::along(&obstacle.outline, obstacle.forward), most_m + CLOSE_M) {
                 continue;
             }
             let still = Sweep { start: obstacle.outline, end: obstacle.outline.pose };

@@ -14,6 +14,7 @@ use crate::agent::Agent;
 use crate::episode;
 use crate::episode::Choice;
 use crate::episode::Moment;
+use crate::model::Road;
 use crate::rng;
 use crate::rng::Stream;
 use crate::sim::Scene;
@@ -85,6 +86,11 @@ impl Arena {
     /// Number of roads.
     pub fn roads(&self) -> usize {
         self.roads.len()
+    }
+
+    /// The nth of the roads.
+    pub fn road(&self, road: usize) -> &Road {
+        &self.table.space().roads[self.roads[road].0]
     }
 
     /// An episode of a seed on the nth of the roads.

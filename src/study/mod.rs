@@ -8,6 +8,7 @@ mod profile;
 mod run;
 mod summary;
 mod train;
+mod trial;
 
 pub use arena::Arena;
 pub use arena::DEFAULT_ADS;
@@ -38,3 +39,9 @@ pub use train::TrainSettings;
 pub use train::TrainedEpisode;
 pub use train::Training;
 pub use train::evaluate;
+pub use trial::Cell;
+pub use trial::Count;
+pub use trial::Outcome as TrialOutcome;
+pub use trial::Sample;
+pub use trial::TrialSettings;
+pub use trial::Trials;

@@ -6,6 +6,7 @@
 //! separating axes, where the code under test works with nearest points.
 
 use avastra::ads::Ads;
+use avastra::ads::ModularConfig;
 use avastra::geometry::OrientedBox;
 use avastra::geometry::Pose;
 use avastra::geometry::Sweep;
@@ -18,6 +19,9 @@ use avastra::sim::Contact;
 use avastra::sim::DT_S;
 use avastra::sim::Obstacle;
 use avastra::sim::World;
+use avastra::study::Profile;
+use avastra::study::Run;
+use avastra::study::RunSettings;
 
 use crate::world::run;
 
@@ -92,6 +96,15 @@ impl Case {
 
     fn separation_m(&self, time_s: f64) -> f64 {
         separation_m(&self.at(0, time_s), &self.at(1, time_s))
+    }
+
+    /// From the corners of each to the other: boxes apart are nearest at a corner, m.
+    fn distance_m(&self, time_s: f64) -> f64 {
+        let [a, b] = [0, 1].map(|which| self.at(which, time_s));
+        let from_corners = |of: &OrientedBox, to: &OrientedBox| {
+            of.corners().iter().map(|corner| from_box_m(to, *corner)).fold(f64::INFINITY, f64::min)
+        };
+        from_corners(&a, &b).min(from_corners(&b, &a))
     }
 
     /// Looks at every fine step, or, if it may skip, at those only in which a gap could be closed that
@@ -334,9 +347,19 @@ fn closing_mps(case: &Case, found: &Found) -> f64 {
 /// Whoever was there after a tick, and what the ego vehicle looked like.
 type Before = (OrientedBox, Vec<Obstacle>);
 
+/// A run against a driving system that sees next to nothing, so that there is something to find.
+fn blind() -> Run {
+    let usual = run(15, 5, &[]);
+    let mut config = ModularConfig::default();
+    config.perception.range_factor = 0.1;
+    config.perception.blind_to_pedestrians = true;
+    let settings = RunSettings { profile: Some(Profile::new(&config)), ..usual.settings().clone() };
+    Run::new(usual.table().clone(), settings).expect("only the settings of the driving system are others")
+}
+
 #[test]
 fn the_contacts_of_whole_episodes_are_the_twins() {
-    let run = run(24, 5, &[]);
+    let run = blind();
     let (mut contacts, mut misses) = (0, 0);
     for number in 0..run.episodes() {
         let log = run.episode(number);
@@ -375,7 +398,7 @@ fn the_contacts_of_whole_episodes_are_the_twins() {
         assert_eq!(again.collisions, log.collisions);
     }
     println!("{contacts} contacts and {misses} ticks without one");
-    assert!(contacts >= 1 && misses > 10_000, "{contacts} {misses}");
+    assert!(contacts >= 20 && misses > 10_000, "{contacts} {misses}");
 }
 
 /// Time, place, side and speed of a contact within a tick.
@@ -387,8 +410,12 @@ fn same(case: &Case, touch: &Touch, contact: &Contact, tick: u64) {
         assert!(from_box_m(shape, contact.point) <= GAP_M, "{contact:?}");
     }
     assert!((ego.pose.to_world(contact.on_ego) - contact.point).norm() < 1e-9, "{contact:?}");
-    let first = first_contact(&case.sweep(0, 0), &case.sweep(1, 0)).expect("it was found before");
-    let found = Found { time_s: within_s, point: first.point, normal: first.normal };
-    let closing_mps = closing_mps(case, &found).max(0.0);
-    assert!((contact.closing_speed_mps - closing_mps).abs() < 0.01, "{contact:?} {closing_mps}");
+    // By differences of the distance just before. A line held fast would not do: where the face that is
+    // met turns, the corner of it that sticks out farthest is not what is met.
+    let step_s = (within_s / 4.0).min(1e-5);
+    if step_s > 0.0 {
+        let gap_m = |steps: f64| case.distance_m(within_s - steps * step_s);
+        let closing_mps = ((gap_m(2.0) - gap_m(1.0)) / step_s).max(0.0);
+        assert!((contact.closing_speed_mps - closing_mps).abs() < 0.01, "{contact:?} {closing_mps}");
+    }
 }

@@ -18,4 +18,5 @@ mod tables;
 mod traces;
 mod torch;
 mod training;
+mod trials;
 mod world;

@@ -100,6 +100,7 @@ mod tests {
                     verb: Verb::DriveAhead,
                     outline: OrientedBox::new(Pose::new(x_m, 0.0, 0.0), 4.8, 1.85),
                     height_m: 1.45,
+                    forward: Vec2::new(1.0, 0.0),
                     lane_heading_rad: 0.0,
                     velocity_mps: Vec2::zeros(),
                     distance_m: 5.0,

@@ -124,9 +124,11 @@ impl Modular {
         }
         let (guide, lateral) = (self.planner.guide(), self.planner.lateral());
         self.status.planned.clear();
-        self.status.planned.extend(self.planner.trajectory().points.iter().map(|point| PlannedPoint {
-            pose: guide.pose_at(point.station_m).offset(0.0, lateral.aside(point.station_m).offset_m),
-            speed_mps: point.speed_mps,
+        self.status.planned.extend(self.planner.trajectory().points.iter().map(|point| {
+            let (on_guide, aside) = (guide.pose_at(point.station_m), lateral.aside(point.station_m));
+            // Most plans are not beside the guide, and to be so takes trigonometry.
+            let pose = if aside.offset_m == 0.0 { on_guide } else { on_guide.offset(0.0, aside.offset_m) };
+            PlannedPoint { pose, speed_mps: point.speed_mps }
         }));
         self.status.reason = self.planner.reason();
         self.status.manoeuvre = self.planner.manoeuvre();

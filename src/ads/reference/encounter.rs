@@ -59,7 +59,8 @@ impl Encounter {
         let reach_m = 10.0 + HORIZON_S * (own_mps + object.velocity_mps.norm());
         let (from_m, to_m) = (front_m - car.length_m - 10.0, front_m + 130.0);
         let forward = unit_vector(object.pose.heading_rad);
-        let beside = guide.project(object.pose.position, from_m, to_m);
+        let beside_m = (object.length_m + object.width_m + car.width_m) / 2.0;
+        let (beside, mut tracer) = guide.trace(object.pose.position, from_m, to_m, beside_m);
         let (along_m, across_m) = extent(&beside.forward, &forward, object);
         if beside.station_m + along_m / 2.0 < front_m - car.length_m {
             return None;
@@ -71,7 +72,7 @@ impl Encounter {
         } else {
             (0..=(HORIZON_S / STEP_S) as usize).map(|step| step as f64 * STEP_S).find(|&time_s| {
                 let position = object.pose.position + object.velocity_mps * time_s;
-                let then = guide.project(position, from_m, to_m);
+                let Some(then) = tracer.next(position) else { return false };
                 let (along_m, across_m) = extent(&then.forward, &forward, object);
                 let ego_front_m = front_m + own_mps * time_s;
                 then.offset_m.abs() <= (across_m + car.width_m) / 2.0

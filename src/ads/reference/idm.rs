@@ -20,6 +20,7 @@ use crate::ads::status::Reason;
 use crate::ads::status::Status;
 use crate::ads::steering::Steering;
 use crate::ads::steering::SteeringConfig;
+use crate::geometry::Vec2;
 use crate::geometry::unit_vector;
 use crate::road::RouteLaneChange;
 use crate::sim::Control;
@@ -54,6 +55,9 @@ const CONFLICT_S: f64 = 1.0;
 /// Gap from the front bumper to a stop line, and to the way of somebody who crosses, m.
 const LINE_GAP_M: f64 = 1.0;
 const CROSSING_GAP_M: f64 = 3.0;
+/// A guide is at most so much longer than the difference of its stations: outside a bend, and where it
+/// goes from lane to lane.
+const GUIDE_STRETCH_MAX: f64 = 1.5;
 /// Acceleration that holds the vehicle at rest, m/s².
 const HOLD_MPS2: f64 = -3.0;
 
@@ -227,28 +231,38 @@ impl Idm {
         let half_way_m = VehicleParameters::MKZ.width_m / 2.0 + SIDE_M;
         let rear_m = front_m - VehicleParameters::MKZ.length_m;
         let forward = unit_vector(object.pose.heading_rad);
-        for step in 0..=(LOOK_AHEAD_S / LOOK_STEP_S) as usize {
+        let taken = |beside: &Beside| beside.taken(forward, object.length_m, object.width_m, half_way_m);
+        let reach_m = half_way_m + (object.length_m + object.width_m) / 2.0;
+        let (beside, mut tracer) =
+            self.guide.trace(object.pose.position, rear_m - 10.0, front_m + SIGHT_M, reach_m);
+        if let Some(span) = taken(&beside) {
+            // On the way now: behind its middle the ego vehicle is past it.
+            return (span.middle_m() > front_m - 1.0).then(|| Ahead {
+                near_m: span.from_m,
+                age_s: 0.0,
+                speed_mps: object.velocity_mps.dot(&beside.forward).max(0.0),
+                reason: Reason::Follow(object.id),
+            });
+        }
+        if object.velocity_mps == Vec2::zeros() {
+            return None;
+        }
+        let front = self.guide.pose_at(front_m).position;
+        for step in 1..=(LOOK_AHEAD_S / LOOK_STEP_S) as usize {
             let time_s = step as f64 * LOOK_STEP_S;
             let position = object.pose.position + object.velocity_mps * time_s;
-            let beside = self.guide.project(position, rear_m - 10.0, front_m + SIGHT_M);
-            let Some(span) = beside.taken(forward, object.length_m, object.width_m, half_way_m) else {
-                continue;
-            };
-            let (near_m, far_m) = (span.from_m, span.to_m);
-            if step == 0 {
-                // On the way now: behind its middle the ego vehicle is past it.
-                return (span.middle_m() > front_m - 1.0).then(|| Ahead {
-                    near_m,
-                    age_s: 0.0,
-                    speed_mps: object.velocity_mps.dot(&beside.forward).max(0.0),
-                    reason: Reason::Follow(object.id),
-                });
-            }
-            let ego_from_m = rear_m + speed_mps * (time_s - CONFLICT_S).max(0.0);
-            // A slow vehicle may speed up meanwhile.
+            // A slow ego vehicle may speed up meanwhile.
             let reach_s = time_s + CONFLICT_S;
             let ego_to_m =
                 front_m + (speed_mps * reach_s + reach_s * reach_s).min(RULES.cruise_mps * reach_s);
+            let within_m = GUIDE_STRETCH_MAX * (ego_to_m - front_m) + reach_m;
+            if (position - front).norm_squared() > within_m * within_m {
+                continue;
+            }
+            let Some(beside) = tracer.next(position) else { continue };
+            let Some(span) = taken(&beside) else { continue };
+            let (near_m, far_m) = (span.from_m, span.to_m);
+            let ego_from_m = rear_m + speed_mps * (time_s - CONFLICT_S).max(0.0);
             if near_m <= ego_to_m && far_m >= ego_from_m && near_m >= front_m {
                 let speed_mps = object.velocity_mps.dot(&beside.forward).max(0.0);
                 let near_m = near_m - speed_mps * time_s - CROSSING_GAP_M + MODEL.gap_m_min;
@@ -348,7 +362,6 @@ mod tests {
     use crate::ads::testing::object;
     use crate::ads::testing::two_lanes;
     use crate::geometry::Pose;
-    use crate::geometry::Vec2;
     use crate::model::vocabulary::Body;
 
     const SOURCE_Y_M: f64 = -5.25;

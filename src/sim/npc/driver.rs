@@ -12,12 +12,12 @@ use crate::geometry::OrientedBox;
 use crate::geometry::Path;
 use crate::geometry::Pose;
 use crate::geometry::Vec2;
-use crate::geometry::unit_vector;
 use crate::geometry::wrap_angle;
 use crate::model::vocabulary::Side;
 use crate::rng;
 use crate::rng::Rng;
 use crate::rng::Stream;
+use crate::road;
 use crate::road::LaneIndex;
 use crate::road::Neighbour;
 
@@ -64,6 +64,8 @@ const CHANGE_M_MAX: f64 = 8.0;
 const STRIP_M_MAX: f64 = 0.5;
 /// Who is slower than this when a wait ends sets out anew, m/s.
 const SETS_OUT_MPS: f64 = 1.0;
+/// A lane change that is allowed from here on begins here, m.
+const AT_ONCE_M: f64 = 0.1;
 /// Who stands at more than this angle to the way stands across it or against it (cosine of 45°).
 const CROSSWISE_COS_MAX: f64 = core::f64::consts::FRAC_1_SQRT_2;
 
@@ -189,8 +191,7 @@ impl Driver {
 
     /// Where it is before its first tick.
     pub fn moved(&self) -> Moved {
-        let pose = self.way.path.pose_at(self.station_m);
-        Moved { pose, lane_heading_rad: pose.heading_rad, velocity_mps: pose.forward() * self.speed_mps }
+        along(self.way.path.pose_at(self.station_m), self.speed_mps)
     }
 
     /// Gap to another outline on its way, m, if that is ahead and in its corridor; and the other's
@@ -202,7 +203,8 @@ impl Driver {
         velocity_mps: Vec2,
     ) -> Option<(f64, f64)> {
         let here = self.way.path.pose_at(self.station_m);
-        in_corridor(&self.way.path, self.station_m, &here, size, other, velocity_mps)
+        let other = (other, other.pose.forward(), velocity_mps);
+        in_corridor(&self.way.path, self.station_m, &here, size, other)
             .map(|leader| (leader.gap_m, leader.speed_mps))
     }
 
@@ -297,21 +299,23 @@ impl Driver {
 
     fn find_leader(&self, this: &Obstacle, size: &BodyParameters, around: &Around) -> Option<Leader> {
         let here = &this.outline.pose;
-        let forward = here.forward();
+        let forward = this.forward;
         let reach_m = LOOK_AHEAD_M
             + self.speed_mps * (TIME_GAP_S + self.speed_mps / (2.0 * COMFORT_MPS2))
             + size.length_m / 2.0;
         let mut nearest: Option<Leader> = None;
-        for (outline, velocity_mps) in around.others(this.id) {
+        for other in around.others_along(this.id) {
+            let outline = other.0;
             let delta = outline.pose.position - here.position;
             let reach_m = reach_m + outline.half_length_m;
             if delta.norm_squared() > reach_m * reach_m || forward.dot(&delta) < 0.0 {
                 continue;
             }
-            let on_own_way = in_corridor(&self.way.path, self.station_m, here, size, outline, velocity_mps);
-            let on_next_way = self.change.as_ref().and_then(|change| {
-                in_corridor(&change.to.path, change.to_station_m, here, size, outline, velocity_mps)
-            });
+            let on_own_way = in_corridor(&self.way.path, self.station_m, here, size, other);
+            let on_next_way = self
+                .change
+                .as_ref()
+                .and_then(|change| in_corridor(&change.to.path, change.to_station_m, here, size, other));
             for leader in on_own_way.into_iter().chain(on_next_way) {
                 if nearest.is_none_or(|found| leader.gap_m < found.gap_m) {
                     nearest = Some(leader);
@@ -418,12 +422,8 @@ impl Driver {
         };
         let Some((to, to_station_m, side)) = begun else { return };
         let aside_m = (to.path.pose_at(to_station_m).position - this.outline.pose.position).norm();
-        self.change = Some(Change {
-            to,
-            to_station_m,
-            progress: 0.0,
-            duration_s: (QUINTIC_PEAK * aside_m / CHANGE_MPS_MAX).max(CHANGE_S_MIN),
-        });
+        self.change =
+            Some(Change { to, to_station_m, progress: 0.0, duration_s: change_duration_s(aside_m) });
         self.last_change = side;
         self.plan.pop();
     }
@@ -437,10 +437,17 @@ impl Driver {
         around: &Around,
     ) -> Option<(Arc<Way>, f64, Option<Side>)> {
         let map = &around.scene.map;
-        let target = lane_beside(around, self.way.lane_at(self.station_m).0, side)?;
+        let (here, here_m) = self.way.lane_at(self.station_m);
+        let target = lane_beside(around, here, side)?;
         let centre = &map.lane(target).centre;
         let there = centre.project(this.outline.pose.position);
-        if there.distance_m > CHANGE_M_MAX || !self.is_free(centre, there.station_m, this, size, around) {
+        // Markings hold for everybody, and nobody changes lanes in a junction, where they part.
+        let room_m = map.changes_from_m(here, on_road(side), here_m);
+        let room_m = room_m.iter().find(|(from_m, _)| from_m - here_m < AT_ONCE_M)?.1;
+        if there.distance_m > CHANGE_M_MAX
+            || room_m < change_length_m(self.speed_mps, there.distance_m)
+            || !self.is_free(centre, there.station_m, this, size, around)
+        {
             return None;
         }
         let mut rng = self.draw(this.id, around);
@@ -459,10 +466,10 @@ impl Driver {
     ) -> bool {
         let here = path.pose_at(station_m);
         let forward = here.forward();
-        around.others(this.id).all(|(outline, velocity_mps)| {
+        around.others_along(this.id).all(|(outline, heading, velocity_mps)| {
             let ahead_m = forward.dot(&(outline.pose.position - here.position));
             let Some(other) = beside(path, outline.pose.position, station_m + ahead_m) else { return true };
-            let (half_length_m, half_width_m) = extent_m(outline, other.heading_rad);
+            let (half_length_m, half_width_m) = extent_m(outline, heading, other.forward);
             let aside_m = other.offset_m.abs() - half_width_m - size.width_m / 2.0;
             let apart_m = (other.station_m - station_m).abs() - half_length_m - size.length_m / 2.0;
             let closing_mps = (velocity_mps.dot(&forward) - self.speed_mps)
@@ -475,8 +482,7 @@ impl Driver {
     fn advance_change(&mut self, way_m: f64, before: Vec2) -> Moved {
         let from = self.way.path.pose_at(self.station_m);
         let Some(change) = &mut self.change else {
-            let velocity_mps = from.forward() * self.speed_mps;
-            return Moved { pose: from, lane_heading_rad: from.heading_rad, velocity_mps };
+            return along(from, self.speed_mps);
         };
         let guess_m = change.to_station_m + way_m;
         change.to_station_m =
@@ -487,8 +493,7 @@ impl Driver {
         if change.progress >= 1.0 {
             (self.way, self.station_m) = (Arc::clone(&change.to), change.to_station_m);
             (self.change, self.hold_m, self.insists_to_m) = (None, None, f64::NEG_INFINITY);
-            let velocity_mps = (to.position - before) / DT_S;
-            return Moved { pose: to, lane_heading_rad: to.heading_rad, velocity_mps };
+            return Moved { velocity_mps: (to.position - before) / DT_S, ..along(to, self.speed_mps) };
         }
         let (blend, slope) = quintic(change.progress);
         let heading_rad = from.heading_rad + wrap_angle(to.heading_rad - from.heading_rad) * blend;
@@ -500,7 +505,7 @@ impl Driver {
         // Measured, because between two lanes in a bend it is neither lane's speed.
         let lane = if change.progress < 0.5 { from } else { to };
         let velocity_mps = (pose.position - before) / DT_S;
-        Moved { pose, lane_heading_rad: lane.heading_rad, velocity_mps }
+        Moved { pose, forward: pose.forward(), lane_heading_rad: lane.heading_rad, velocity_mps }
     }
 
     fn draw(&mut self, id: u32, around: &Around) -> Rng {
@@ -509,9 +514,51 @@ impl Driver {
     }
 }
 
+/// At a pose of a lane, along it.
+fn along(pose: Pose, speed_mps: f64) -> Moved {
+    let forward = pose.forward();
+    Moved { pose, forward, lane_heading_rad: pose.heading_rad, velocity_mps: forward * speed_mps }
+}
+
 /// The stream of one choice of one road user.
 pub(in crate::sim) fn choices(seed: u64, id: u32, draw: u32) -> Rng {
     rng::stream(seed, Stream::Traffic, u64::from(id) << 32 | u64::from(draw))
+}
+
+/// Whether the street on which a way is at a station, or the next one if it is in a junction, has room for
+/// a lane change to a side.
+pub(in crate::sim) fn can_change(
+    around: &Around,
+    way: &Way,
+    station_m: f64,
+    side: Side,
+    speed_mps: f64,
+) -> bool {
+    let map = &around.scene.map;
+    let in_junction = |lane: LaneIndex| map.lane(lane).junction.is_some();
+    let ahead = way.lanes_from(station_m).skip_while(|(lane, _)| in_junction(*lane));
+    ahead.take_while(|(lane, _)| !in_junction(*lane)).any(|(lane, at_m)| {
+        let Some(target) = lane_beside(around, lane, side) else { return false };
+        let here = map.lane(lane).centre.pose_at(at_m).position;
+        let length_m = change_length_m(speed_mps, map.lane(target).centre.project(here).distance_m);
+        map.changes_from_m(lane, on_road(side), at_m).iter().any(|(_, room_m)| *room_m >= length_m)
+    })
+}
+
+fn change_duration_s(aside_m: f64) -> f64 {
+    (QUINTIC_PEAK * aside_m / CHANGE_MPS_MAX).max(CHANGE_S_MIN)
+}
+
+/// Way on which a lane change of so much to the side is done at a speed, m.
+fn change_length_m(speed_mps: f64, aside_m: f64) -> f64 {
+    speed_mps.max(CHANGE_FULL_MPS) * change_duration_s(aside_m)
+}
+
+fn on_road(side: Side) -> road::Side {
+    match side {
+        Side::Left => road::Side::Left,
+        Side::Right => road::Side::Right,
+    }
 }
 
 /// The same-direction lane on a side of a lane, if there is one and no median lies between.
@@ -525,35 +572,35 @@ pub(in crate::sim) fn lane_beside(around: &Around, lane: LaneIndex, side: Side) 
     neighbour.filter(reachable).map(|neighbour| neighbour.lane)
 }
 
-/// An outline as the leader of somebody at a station, if it is ahead and in the corridor.
+/// An outline, with its heading as a unit vector and its velocity, as the leader of somebody at a
+/// station, if it is ahead and in the corridor.
 fn in_corridor(
     path: &Path,
     station_m: f64,
     here: &Pose,
     size: &BodyParameters,
-    outline: &OrientedBox,
-    velocity_mps: Vec2,
+    (outline, heading, velocity_mps): (&OrientedBox, Vec2, Vec2),
 ) -> Option<Leader> {
     let straight_m = (outline.pose.position - here.position).norm();
     let other = beside(path, outline.pose.position, station_m + straight_m)?;
-    let (half_length_m, half_width_m) = extent_m(outline, other.heading_rad);
+    let (half_length_m, half_width_m) = extent_m(outline, heading, other.forward);
     let aside_m = other.offset_m.abs() - half_width_m - size.width_m / 2.0;
     if other.station_m < station_m || aside_m > SIDE_ROOM_M {
         return None;
     }
     Some(Leader {
         gap_m: other.station_m - station_m - half_length_m - size.length_m / 2.0,
-        speed_mps: velocity_mps.dot(&unit_vector(other.heading_rad)),
-        crosswise: libm::cos(outline.pose.heading_rad - other.heading_rad) < CROSSWISE_COS_MAX,
+        speed_mps: velocity_mps.dot(&other.forward),
+        crosswise: heading.dot(&other.forward) < CROSSWISE_COS_MAX,
     })
 }
 
-/// Half extents of an outline along and across a heading, m.
-fn extent_m(outline: &OrientedBox, heading_rad: f64) -> (f64, f64) {
-    let along = unit_vector(outline.pose.heading_rad - heading_rad).abs();
+/// Half extents of an outline that is turned to `heading` along and across another unit vector, m.
+fn extent_m(outline: &OrientedBox, heading: Vec2, along: Vec2) -> (f64, f64) {
+    let (cosine, sine) = (along.dot(&heading).abs(), along.perp(&heading).abs());
     (
-        outline.half_length_m * along.x + outline.half_width_m * along.y,
-        outline.half_length_m * along.y + outline.half_width_m * along.x,
+        outline.half_length_m * cosine + outline.half_width_m * sine,
+        outline.half_length_m * sine + outline.half_width_m * cosine,
     )
 }
 

@@ -6,6 +6,8 @@
 //! whose centre is ahead of their own, and at whoever is slower: a tail swings into those. Commanded
 //! vehicles do not look at the ego vehicle so.
 
+use core::cell::LazyCell;
+
 use crate::geometry::OrientedBox;
 use crate::geometry::Pose;
 use crate::geometry::distance_m;
@@ -39,41 +41,53 @@ impl Driver {
         let matters = |outline: &OrientedBox, speed_mps: f64| {
             let away = outline.pose.position - here.position;
             away.norm_squared() < NEAR_M * NEAR_M
-                && (here.forward().dot(&away) > 0.0 || speed_mps < self.speed_mps)
+                && (this.forward.dot(&away) > 0.0 || speed_mps < self.speed_mps)
         };
+        // Where it would be at those moments itself, worked out once there is somebody to meet.
+        let speed_mps = self.speed_mps.max(CREEP_MPS);
+        let own = LazyCell::new(|| {
+            MOMENTS_S.map(|time_s| self.way.path.pose_at(self.station_m + speed_mps * time_s))
+        });
         let mut free_m = f64::INFINITY;
         if self.yields_to_ego && matters(around.ego_outline, around.ego.speed_mps) {
             let ego = |time_s| Pose {
                 position: around.ego_outline.pose.position + around.ego_velocity_mps * time_s,
                 ..around.ego_outline.pose
             };
-            free_m = free_m.min(self.free_way_m(this, around.ego_outline, ego));
+            free_m = free_m.min(free_way_m(this, &own, speed_mps, around.ego_outline, ego));
         }
-        for (obstacle, driver) in around.drivers(this.id) {
+        for (obstacle, _, driver) in around.drivers(this.id) {
             if driver.change.is_some() || !matters(&obstacle.outline, driver.speed_mps) {
                 continue;
             }
             let other = |time_s| driver.way.path.pose_at(driver.station_m + driver.speed_mps * time_s);
-            free_m = free_m.min(self.free_way_m(this, &obstacle.outline, other));
+            free_m = free_m.min(free_way_m(this, &own, speed_mps, &obstacle.outline, other));
         }
-        free_m.is_finite().then(|| Leader { gap_m: free_m + STOP_M, speed_mps: 0.0, crosswise: true })
+        free_m.is_finite().then_some(Leader { gap_m: free_m + STOP_M, speed_mps: 0.0, crosswise: true })
     }
+}
 
-    /// How far this driver gets before its outline would meet another, m; infinite if it would not.
-    fn free_way_m(&self, this: &Obstacle, outline: &OrientedBox, other_at: impl Fn(f64) -> Pose) -> f64 {
-        let speed_mps = self.speed_mps.max(CREEP_MPS);
-        let mut free_m = 0.0;
-        for time_s in MOMENTS_S {
-            let own = OrientedBox {
-                pose: self.way.path.pose_at(self.station_m + speed_mps * time_s),
-                ..this.outline
-            };
-            let other = OrientedBox { pose: other_at(time_s), ..*outline };
+/// How far somebody gets at a speed, from moment to moment in the poses `own`, before their outline
+/// would meet another, m; infinite if it would not.
+fn free_way_m(
+    this: &Obstacle,
+    own: &[Pose; MOMENTS_S.len()],
+    speed_mps: f64,
+    outline: &OrientedBox,
+    other_at: impl Fn(f64) -> Pose,
+) -> f64 {
+    let near_m = this.outline.radius_m() + outline.radius_m() + ROOM_M;
+    let mut free_m = 0.0;
+    for (time_s, pose) in MOMENTS_S.into_iter().zip(own) {
+        let other = OrientedBox { pose: other_at(time_s), ..*outline };
+        let apart = other.pose.position - pose.position;
+        if apart.norm_squared() < near_m * near_m {
+            let own = OrientedBox { pose: *pose, ..this.outline };
             if distance_m(&own, &other) < ROOM_M {
                 return free_m;
             }
-            free_m = speed_mps * time_s;
         }
-        f64::INFINITY
+        free_m = speed_mps * time_s;
     }
+    f64::INFINITY
 }

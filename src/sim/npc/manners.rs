@@ -19,9 +19,9 @@
 //! ahead of it. Ambient vehicles yield to the ego vehicle as to everybody else, and take it for
 //! somebody who will not stop whenever it moves and no red light holds it.
 
-use crate::model::vocabulary::Body;
+use core::cell::LazyCell;
+
 use crate::road::LaneIndex;
-use crate::sim::body;
 use crate::sim::body::BodyParameters;
 use crate::sim::ego::VehicleParameters;
 use crate::sim::mover::Around;
@@ -151,16 +151,17 @@ impl Driver {
         if self.would_stop_in(area, size) {
             return true;
         }
-        let own = self.passage(area.from_m, area.to_m, size, around);
+        // Most areas are on nobody else's way, and then it is not needed.
+        let own = LazyCell::new(|| self.passage(area.from_m, area.to_m, size, around));
         let impatient = f64::from(self.waited_ticks) * DT_S >= PATIENCE_S;
         let mut others = around.drivers(this.id);
-        let for_others = others.any(|(obstacle, driver)| {
+        let for_others = others.any(|(obstacle, body, driver)| {
             let reach_m = APPROACH_M + JUNCTION_M;
             let away = obstacle.outline.pose.position - this.outline.pose.position;
             if away.norm_squared() > reach_m * reach_m {
                 return false;
             }
-            let other = driver.passage_through(area, obstacle.body, around);
+            let other = driver.passage_through(area, body, around);
             other.is_some_and(|other| waits(&own, &other, area.goes_first, impatient))
         });
         let for_ego = || {
@@ -200,10 +201,9 @@ impl Driver {
     }
 
     /// This driver's passage through the other side of somebody's area, if the way leads there.
-    fn passage_through(&self, area: &WayArea, body: Body, around: &Around) -> Option<Passage> {
-        let size = body::parameters(body);
+    fn passage_through(&self, area: &WayArea, size: &BodyParameters, around: &Around) -> Option<Passage> {
         let begin_m = self.way.lane_ahead_m(area.other, self.station_m - size.length_m / 2.0)?;
-        Some(self.passage(begin_m + area.other_from_m, begin_m + area.other_to_m, &size, around))
+        Some(self.passage(begin_m + area.other_from_m, begin_m + area.other_to_m, size, around))
     }
 }
 

@@ -9,5 +9,6 @@ pub(super) use driver::Driver;
 pub(super) use driver::Manoeuvre;
 pub(super) use driver::Towards;
 pub(super) use driver::When;
+pub(super) use driver::can_change;
 pub(super) use driver::choices;
 pub(super) use driver::lane_beside;

@@ -4,9 +4,9 @@
 //! A recording is the worlds after each tick, in order. Impacts are left out: who plays a recording
 //! back asks whether there is a contact, not what comes of it.
 
+use crate::geometry::Frame;
 use crate::geometry::OrientedBox;
 use crate::geometry::Sweep;
-use crate::geometry::distance_m;
 use crate::sim::contact::Party;
 use crate::sim::contact::meet;
 use crate::sim::ego::Control;
@@ -26,11 +26,13 @@ impl World {
         let ego_before = self.ego_outline;
         self.ego.step(control, self.conditions.friction, DT_S);
         self.ego_outline = self.ego.outline();
+        self.ego_frame = Frame::of(&self.ego_outline);
         self.follow_route();
         let own = self.clone();
         *self = World {
             ego: own.ego,
             ego_outline: own.ego_outline,
+            ego_frame: own.ego_frame,
             ego_station_m: own.ego_station_m,
             ego_offset_m: own.ego_offset_m,
             red_runs: own.red_runs,
@@ -40,10 +42,11 @@ impl World {
         let ego_mps = self.ego.motion.speed_mps;
         let ego = Party {
             sweep: Sweep { start: ego_before, end: self.ego_outline.pose },
-            velocity_mps: self.ego_outline.pose.forward() * ego_mps,
+            velocity_mps: self.ego_frame.forward() * ego_mps,
         };
         for (obstacle, mover) in self.obstacles.iter_mut().zip(&self.movers) {
-            obstacle.distance_m = distance_m(&self.ego_outline, &obstacle.outline);
+            let outline = Frame::along(&obstacle.outline, obstacle.forward);
+            obstacle.distance_m = self.ego_frame.distance_m(&outline);
             if mover.touched {
                 continue;
             }

@@ -60,6 +60,9 @@ impl Claim {
             last: 0,
         };
         let mut forward = forecast.forward;
+        let reach_m = half_way_m + lateral.offset_m_max() + (forecast.length_m + forecast.width_m) / 2.0;
+        let (now, mut tracer) =
+            guide.trace(forecast.positions[0], ahead.start - BEHIND_M, ahead.end, reach_m);
         for step in 0..=STEPS {
             if step > 0 && !forecast.moving {
                 claim.spans[step] = claim.spans[0];
@@ -69,12 +72,18 @@ impl Claim {
             if step > 0 {
                 forward = direction(position - forecast.positions[step - 1], forward);
             }
-            let on_guide = guide.project(position, ahead.start - BEHIND_M, ahead.end);
-            let offset_m = on_guide.offset_m - lateral.aside(on_guide.station_m).offset_m;
-            let beside = Beside { offset_m, ..on_guide };
-            let taken = beside.taken(forward, forecast.length_m, forecast.width_m, half_way_m);
-            let near = |span: &Span| span.from_m < ahead.end && span.to_m > ahead.start - BEHIND_M;
-            let Some(span) = taken.filter(near) else {
+            let on_guide = if step == 0 { Some(now) } else { tracer.next(position) };
+            let beside = on_guide.map(|on_guide| {
+                let offset_m = on_guide.offset_m - lateral.aside(on_guide.station_m).offset_m;
+                Beside { offset_m, ..on_guide }
+            });
+            let taken = beside.and_then(|beside| {
+                let span = beside.taken(forward, forecast.length_m, forecast.width_m, half_way_m)?;
+                Some((beside, span))
+            });
+            let near =
+                |(_, span): &(Beside, Span)| span.from_m < ahead.end && span.to_m > ahead.start - BEHIND_M;
+            let Some((beside, span)) = taken.filter(near) else {
                 // Only the first stay on the way counts: what lies beyond is seen in a later cycle.
                 if claim.first != usize::MAX {
                     break;

@@ -72,6 +72,11 @@ impl LateralPlan {
         }
     }
 
+    /// How far from the guide it lies at most, m.
+    pub fn offset_m_max(&self) -> f64 {
+        self.bump.map_or(0.0, |bump| bump.offset_m.abs())
+    }
+
     /// What is being passed, and where it stands.
     pub fn passing(&self) -> Option<(u32, Span)> {
         self.bump.map(|bump| (bump.id, bump.span))

@@ -1,0 +1,78 @@
+//! `avastra table --try`: every row on every road, carried out and judged.
+
+use std::path::Path;
+
+use crate::action::ActionTable;
+use crate::emit;
+use crate::emit::Provenance;
+use crate::report;
+use crate::study::Arena;
+use crate::study::Cell;
+use crate::study::TrialSettings;
+use crate::study::Trials;
+use crate::syntax;
+
+use super::arguments::TableArguments;
+use super::error::Failure;
+use super::load;
+use super::output::Output;
+use super::run_directory::write;
+
+/// Tries the rows of a table and prints what became of each.
+pub fn trials(output: &Output, arguments: &TableArguments, table: ActionTable) -> Result<(), Failure> {
+    let roads: Vec<String> = match &arguments.road {
+        Some(road) => vec![road.clone()],
+        None => table.space().roads.iter().map(|road| road.name.clone()).collect(),
+    };
+    let wanted = &arguments.trials;
+    let arena = Arena::new(table, &roads, &wanted.ads, (&[], &[]))
+        .map_err(|error| Failure::usage(error.to_string()))?;
+    let settings = TrialSettings { drives: wanted.drives, tries: wanted.tries, seed: wanted.seed };
+    let trials = Trials::new(&arena, settings);
+    let roads: Vec<Vec<Cell>> = std::thread::scope(|scope| {
+        let trials = &trials;
+        let workers: Vec<_> = (0..arena.roads()).map(|road| scope.spawn(move || trials.road(road))).collect();
+        workers.into_iter().map(|worker| worker.join().expect("a worker's panic is ours")).collect()
+    });
+    if let Some(directory) = &wanted.out {
+        for (road, cells) in roads.iter().enumerate() {
+            for cell in cells {
+                emit_sample(&trials, &arena, road, cell, arguments, directory)?;
+            }
+        }
+    }
+    let cells: Vec<&Cell> =
+        (0..arena.table().rows().len()).flat_map(|row| roads.iter().map(move |cells| &cells[row])).collect();
+    output.say(report::trials(&cells).trim_end());
+    output.result("table", serde_json::json!({ "trials": settings, "cells": cells }));
+    Ok(())
+}
+
+/// Writes the first try that failed, or the first.
+fn emit_sample(
+    trials: &Trials,
+    arena: &Arena,
+    road: usize,
+    cell: &Cell,
+    arguments: &TableArguments,
+    directory: &Path,
+) -> Result<(), Failure> {
+    let sample = cell.samples.iter().find(|sample| sample.failure.is_some()).or(cell.samples.first());
+    let Some(sample) = sample else { return Ok(()) };
+    let log = trials.again(road, cell.row, sample);
+    let name = format!("row{:02}_{}", cell.row, cell.road);
+    let path = directory.join(format!("{name}.ava"));
+    std::fs::create_dir_all(directory).map_err(|error| Failure::file("make", directory, error))?;
+    let source = Provenance {
+        command: "table --try",
+        name: &name,
+        space_path: &load::relative(directory, &arguments.file)?,
+        episode: 0,
+        agent: "trial",
+        without: &[],
+        with: &[],
+    };
+    let fate = sample.failure.as_deref().unwrap_or("it does what the row says");
+    let headline = format!("{} in step {}: {fate}.", cell.label, sample.step);
+    write(&path, &syntax::print(&emit::unclaimed(arena.table(), &log, &headline, &source)))
+}

@@ -1,0 +1,58 @@
+//! Whether a road user appeared fairly, judged from the outside.
+//!
+//! Written apart from the rule `no_teleport` and from `sim::placement`, which it is to catch: plain
+//! formulas that leave out the time in which a brake builds up, and so ask for a little less.
+
+use crate::action::SpawnRequest;
+use crate::geometry::distance_m;
+use crate::model::vocabulary::Verb;
+use crate::sim::World;
+
+/// Perception and reaction of the driver of UN R157, s.
+const REACTION_S: f64 = 0.4 + 0.75;
+/// Its full brakes, m/s².
+const BRAKING_MPS2: f64 = 0.774 * 9.80665;
+/// Rounding of figures, m.
+const SLACK_M: f64 = 0.1;
+
+/// What is unfair about the newcomer of an id, in words.
+pub(super) fn complaint(world: &World, request: &SpawnRequest, id: u32) -> Option<String> {
+    let newcomer = world.obstacles().iter().find(|obstacle| obstacle.id == id)?;
+    let overlaps = world
+        .obstacles()
+        .iter()
+        .any(|other| other.id != id && distance_m(&other.outline, &newcomer.outline) <= 0.0);
+    if overlaps || newcomer.distance_m <= 0.0 {
+        return Some("it appears on somebody".to_owned());
+    }
+    let ego_mps = world.ego().speed_mps;
+    let along_mps = world.ego_outline().pose.forward().dot(&newcomer.velocity_mps);
+    let stopping_m = |closing_mps: f64| {
+        let closing_mps = closing_mps.max(0.0);
+        closing_mps * REACTION_S + closing_mps * closing_mps / (2.0 * BRAKING_MPS2)
+    };
+    // Who comes the other way passes in a lane of its own.
+    let zone_m = match request.verb {
+        Verb::DriveAhead => stopping_m(ego_mps - along_mps.max(0.0)),
+        Verb::CrossRoad | Verb::Walk | Verb::Stand => stopping_m(ego_mps),
+        Verb::Overtake | Verb::DriveOpposite => 0.0,
+    };
+    if newcomer.distance_m + SLACK_M < zone_m {
+        return Some(format!(
+            "it appears at {:.1} m, inside the stopping zone of {zone_m:.1} m",
+            newcomer.distance_m
+        ));
+    }
+    let notice_m = ego_mps * REACTION_S;
+    let sensed = world.sensed();
+    let in_view = sensed.objects.iter().any(|object| object.id == id && object.visible_fraction > 0.0);
+    let sight_m = world.conditions().visibility_m;
+    if request.verb != Verb::Overtake
+        && in_view
+        && newcomer.distance_m < sight_m
+        && newcomer.distance_m + SLACK_M < notice_m
+    {
+        return Some(format!("it appears in plain view at {:.1} m of {notice_m:.1} m", newcomer.distance_m));
+    }
+    None
+}

@@ -1,0 +1,13 @@
+//! Trials: does a road user do what its verb says, on every road where its row is legal?
+
+mod fairness;
+mod judge;
+mod survey;
+mod witness;
+
+pub use survey::Cell;
+pub use survey::Count;
+pub use survey::Outcome;
+pub use survey::Sample;
+pub use survey::TrialSettings;
+pub use survey::Trials;

@@ -1,0 +1,75 @@
+//! Every row on every road: it does what it says, or why not.
+
+use avastra::action::ActionTable;
+use avastra::report;
+use avastra::study::Arena;
+use avastra::study::Cell;
+use avastra::study::TrialOutcome;
+use avastra::study::TrialSettings;
+use avastra::study::Trials;
+
+use crate::cases::expect_snapshot;
+use crate::world::space;
+
+/// Cells by row, then by road.
+fn cells(name: &str, settings: TrialSettings) -> Vec<Cell> {
+    let table = ActionTable::new(space(name));
+    let roads: Vec<String> = table.space().roads.iter().map(|road| road.name.clone()).collect();
+    let arena = Arena::new(table, &roads, "modular", (&[], &[])).expect("all of it is there");
+    let trials = Trials::new(&arena, settings);
+    let by_road: Vec<Vec<Cell>> = std::thread::scope(|scope| {
+        let trials = &trials;
+        let workers: Vec<_> = (0..arena.roads()).map(|road| scope.spawn(move || trials.road(road))).collect();
+        workers.into_iter().map(|worker| worker.join().expect("no trial panics")).collect()
+    });
+    let rows = arena.table().rows().len();
+    (0..rows).flat_map(|row| by_road.iter().map(move |cells| cells[row].clone())).collect()
+}
+
+/// Part of the tries of a verb, over all rows and roads, that did what they said before the ego vehicle
+/// arrived, at least. Overtakers may not drive faster than the limit, at which the ego vehicle drives as well;
+/// so most of them have not passed when the time is over.
+const REALISED_PART_MIN: [(&str, f64); 5] = [
+    ("pedestrian", 0.9),
+    ("drive_ahead", 0.9),
+    ("drive_opposite", 0.9),
+    ("cross_road", 0.9),
+    ("overtake", 0.2),
+];
+
+#[test]
+fn every_row_does_what_it_says_or_it_is_said_why_not() {
+    let cells = cells("avastra45.ava", TrialSettings { drives: 6, tries: 3, seed: 1 });
+    for cell in &cells {
+        let who = format!("{} on {}", cell.label, cell.road);
+        let failed: usize = cell.failures.iter().map(|failure| failure.count).sum();
+        let refused: usize = cell.refusals.iter().map(|refusal| refusal.count).sum();
+        assert_eq!(cell.realised + failed, cell.tried, "{who}");
+        assert_eq!(cell.legal + refused, cell.moments, "{who}");
+        assert_eq!(cell.outcome == TrialOutcome::Masked, cell.legal == 0, "{who}");
+        assert!(cell.unfair.is_empty(), "{who}: {:?}", cell.unfair);
+        // What a vehicle must never do, however the scene ends.
+        let wild = |why: &str| why.starts_with("it drives") || why.starts_with("it does not appear");
+        assert!(!cell.failures.iter().any(|failure| wild(&failure.reason)), "{who}: {:?}", cell.failures);
+    }
+    for (verb, part_min) in REALISED_PART_MIN {
+        let of_verb = || cells.iter().filter(|cell| cell.label.starts_with(verb));
+        let arrived = of_verb().flat_map(|cell| &cell.failures);
+        let arrived = arrived.filter(|failure| failure.reason.starts_with("the ego vehicle arrived"));
+        let arrived: usize = arrived.map(|failure| failure.count).sum();
+        let tried = of_verb().map(|cell| cell.tried).sum::<usize>() - arrived;
+        let realised: usize = of_verb().map(|cell| cell.realised).sum();
+        assert!(realised as f64 >= part_min * tried as f64, "{verb}: {realised} of {tried}");
+    }
+    expect_snapshot("tables", "avastra45_trials", &report::trials(&cells.iter().collect::<Vec<_>>()));
+}
+
+#[test]
+fn nobody_comes_across_a_median() {
+    let cells = cells("avastra45.ava", TrialSettings { drives: 2, tries: 1, seed: 3 });
+    let far =
+        cells.iter().filter(|cell| cell.road == "boulevard" && cell.label.starts_with("drive_opposite"));
+    let widths =
+        far.flat_map(|cell| &cell.refusals).filter(|refusal| refusal.reason.contains("a median of 20."));
+    assert!(widths.count() >= 4);
+}
