@@ -6,6 +6,8 @@ use std::path::PathBuf;
 use crate::emit;
 use crate::episode::Outcome;
 use crate::episode::Script;
+use crate::episode::Setup;
+use crate::model::Claim;
 use crate::oracle;
 use crate::study;
 use crate::study::EpisodeSummary;
@@ -48,7 +50,11 @@ pub fn shrink(output: &Output, arguments: &ShrinkArguments) -> Result<(), Failur
         without: &origin.without,
         with: &origin.with,
     };
-    let summary = EpisodeSummary::new(table.space(), source.episode, &shrunk.log, shrunk.judgements);
+    let mut summary = EpisodeSummary::new(table.space(), source.episode, &shrunk.log, shrunk.judgements);
+    if scenario.claims.iter().any(|claim| matches!(claim, Claim::Cause { .. })) {
+        let setup = Setup { start: shrunk.start, ..stage.setup(&ads) };
+        summary.find_causes(&setup, &shrunk.log).map_err(|error| Failure::usage(error.to_string()))?;
+    }
     write(&path, &crate::syntax::print(&emit::scenario(&table, &shrunk.log, &summary, &source)))?;
     let refuted = refuted(output, &path)?;
 

@@ -8,11 +8,12 @@
 //! Several modules may suffice: good brakes make up for bad eyes, and nobody can tell from one crash
 //! which of the two is to blame without knowing how good eyes and brakes should be. A *baseline* says
 //! so: if modules differ from it, and the collision vanishes with one of them as the baseline has it,
-//! only such modules come into question. Then the cause is, in this order, one whose errors alone lead to the collision, all other modules being without any (which says something
-//! only where nothing happens without any errors at all); the one that prevents most of the collisions
-//! under small variations; one that has a documented weakness without which alone the collision
-//! vanishes; and the first on the data's way. Where no variation leads to the collision, it hung by a
-//! hair, and no module is named.
+//! only such modules come into question. Then the cause is, in this order, one whose errors alone lead to
+//! the collision, all other modules being as in the baseline, or without any (which says something only
+//! where nothing happens with all of them so); the one that prevents most of the collisions under small
+//! variations; one that has a documented weakness without which alone the collision vanishes; and the
+//! first on the data's way. Where no variation leads to the collision, it hung by a hair, and no module
+//! is named.
 //!
 //! Left out: what an error before the obstacle appeared has to do with it.
 
@@ -71,7 +72,8 @@ pub struct ModuleFinding {
     pub restored: Option<Fate>,
     /// With this module alone without its errors.
     pub idealised: Fate,
-    /// With the errors of this module alone, all others being without.
+    /// With the errors of this module alone: all others are as in the baseline, if this one differs from
+    /// it, or else without any.
     pub alone: Fate,
     /// Of the collisions under small variations, the share that vanishes with it restored, if that
     /// suffices, or else idealised. Looked at only to tell modules apart.
@@ -115,13 +117,13 @@ pub fn diagnose(
     for module in Module::ALL {
         let others = Module::ALL.into_iter().filter(|other| *other != module);
         let alone = others.fold(own, |config, other| config.idealised(other));
+        let restored = own.with_module_of(module, baseline);
+        let differs = restored != own;
         modules.push(ModuleFinding {
             module,
-            restored: Some(own.with_module_of(module, baseline))
-                .filter(|restored| *restored != own)
-                .map(|restored| inquiry.fate(&restored)),
+            restored: differs.then(|| inquiry.fate(&restored)),
             idealised: inquiry.fate(&own.idealised(module)),
-            alone: inquiry.fate(&alone),
+            alone: inquiry.fate(&if differs { baseline.with_module_of(module, &own) } else { alone }),
             prevented: None,
         });
     }
@@ -141,7 +143,9 @@ pub fn diagnose(
     if best.is_empty() {
         pairs = inquiry.pairs();
     }
-    if ideal == Fate::Vanished {
+    let is_restored = best.iter().any(|&index| modules[index].restored == Some(Fate::Vanished));
+    let flawless = if is_restored { inquiry.fate(baseline) } else { ideal };
+    if flawless == Fate::Vanished {
         prefer(&mut best, |index| modules[index].alone == Fate::Crash);
     }
     let mut varied_crashes = None;
@@ -162,7 +166,8 @@ pub fn diagnose(
         prefer(&mut best, |index| modules[index].prevented >= Some(most));
         let to_blame = |found: &WeaknessFinding| found.without == Fate::Vanished;
         prefer(&mut best, |index| {
-            weaknesses.iter().any(|found| to_blame(found) && owns(modules[index].module, found.weakness))
+            let owned = |found: &WeaknessFinding| owns(modules[index].module, found.weakness);
+            !is_restored && weaknesses.iter().any(|found| to_blame(found) && owned(found))
         });
     }
     let cause = match (best.first(), pairs.first()) {

@@ -38,9 +38,9 @@ impl Database {
     /// If the file cannot be read.
     pub fn groups(&self) -> Result<Vec<Group>, DatabaseError> {
         let mut statement = self.connection.prepare(
-            "SELECT body, verb, approach, side, cause, collision.episode, road, step
+            "SELECT body, verb, approach, side, cause, collision.episode, road, collision.step
              FROM collision JOIN episode ON episode.episode = collision.episode
-             WHERE counted ORDER BY collision.episode, number",
+             WHERE collision.counted ORDER BY collision.episode, number",
         )?;
         let rows = statement.query_map([], |row| {
             let group = Group {

@@ -2,12 +2,13 @@
 //! under `snapshots/`.
 
 mod cases;
-mod causes;
 mod command;
 mod corpus;
 mod contacts;
 mod drives;
 mod emitted;
+mod failures;
+mod faults;
 mod layers;
 mod profiles;
 mod references;

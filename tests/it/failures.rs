@@ -1,0 +1,78 @@
+//! What becomes of a failure that a run found: explained, shrunk, claimed, tested again.
+
+use std::path::PathBuf;
+
+use crate::command::avastra;
+use crate::command::outcome;
+
+#[test]
+fn found_scenarios_are_explained_shrunk_and_tested_again() {
+    let scratch = tempfile::tempdir().expect("a scratch directory");
+    let path = |name: &str| scratch.path().join(name).display().to_string();
+    let out = path("run");
+    let settings = ["--road", "corner", "--episodes", "40", "--seed", "5", "--causes", "--out", &out];
+    let (status, stdout, stderr) =
+        outcome(&mut avastra(&[&["run", "scenarios/avastra45.ava"], &settings[..]].concat()));
+    assert_eq!(status, 0, "{stderr}");
+    assert!(stdout.contains("distinct failure"), "{stdout}");
+    let mut files: Vec<PathBuf> = std::fs::read_dir(scratch.path().join("run/critical"))
+        .expect("the run made it")
+        .map(|entry| entry.expect("it reads").path())
+        .collect();
+    files.sort();
+    let with_cause = files.iter().find_map(|file| {
+        let text = std::fs::read_to_string(file).expect("it is readable");
+        let line = text.lines().find(|line| line.contains("expect cause == "))?.to_owned();
+        Some((file.display().to_string(), text, line))
+    });
+    let (file, text, claim) = with_cause.expect("a crash of forty episodes has a cause");
+    let (status, stdout, stderr) = outcome(&mut avastra(&["replay", &file]));
+    assert_eq!(status, 0, "{stdout}{stderr}");
+    assert!(stdout.contains("delta-v"), "{stdout}");
+
+    // The actuators of this system are without error: they are never the cause.
+    let lie = path("run/critical/lie.ava");
+    let (before, after) = claim.split_once("== ").expect("it is an equation");
+    let (_, with) = after.split_once(" with").expect("it names the obstacle");
+    std::fs::write(&lie, text.replace(&claim, &format!("{before}== control with{with}"))).expect("writable");
+    let (status, stdout, _) = outcome(&mut avastra(&["verify", &lie]));
+    assert!(status == 3 && stdout.contains("claimed cause [control]"), "{stdout}");
+    std::fs::remove_file(&lie).expect("it is there");
+
+    let json = |arguments: &[&str]| -> (i32, serde_json::Value) {
+        let (status, stdout, stderr) =
+            outcome(&mut avastra(&[arguments, &["--format", "json", "--quiet"]].concat()));
+        let line = stdout.lines().next().unwrap_or_else(|| panic!("{stderr}"));
+        (status, serde_json::from_str(line).expect("it is JSON"))
+    };
+    let (status, found) = json(&["diagnose", &file, "--likelihood", "4"]);
+    let cause = found["diagnosis"]["cause"][0].as_str().expect("it has a cause");
+    assert!(status == 0 && claim.contains(cause), "{found}");
+    assert_eq!(found["likelihood"]["variations"], 4);
+
+    let small = path("small.ava");
+    let (status, shrunk) = json(&["shrink", &file, "--output", &small]);
+    assert!(status == 0 && shrunk["refuted"] == 0, "{shrunk}");
+    assert!(shrunk["actions"].as_u64() <= shrunk["actions_before"].as_u64(), "{shrunk}");
+    assert_eq!(outcome(&mut avastra(&["replay", &small])).0, 0);
+    // What is as small as it gets stays so.
+    let (_, again) = json(&["shrink", &small, "--output", &path("smaller.ava")]);
+    assert_eq!((&again["steps"], &again["actions"]), (&shrunk["steps"], &shrunk["actions"]));
+
+    let junit = path("junit.xml");
+    let (status, tested) = json(&["test", &out, "--junit", &junit]);
+    assert_eq!((status, tested["still_fails"].as_u64()), (4, Some(files.len() as u64)), "{tested}");
+    let xml = std::fs::read_to_string(&junit).expect("it was written");
+    let document = roxmltree::Document::parse(&xml).expect("it is well-formed");
+    assert_eq!(document.descendants().filter(|node| node.has_tag_name("failure")).count(), files.len());
+
+    let cases: [(&[&str], &str); 3] = [
+        (&["test", "scenarios/ads"], "no scenario in"),
+        (&["test", &out, "--ads", "apolo"], "no driving system `apolo`"),
+        (&["run", "scenarios/avastra45.ava", "--ads", "idm", "--causes"], "`idm` is not made of modules"),
+    ];
+    for (arguments, message) in cases {
+        let (status, _, stderr) = outcome(&mut avastra(arguments));
+        assert!(status == 1 && stderr.contains(message), "{arguments:?}: {stderr}");
+    }
+}
