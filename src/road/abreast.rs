@@ -124,6 +124,12 @@ impl RoadMap {
         stretches.iter().map(|stretch| (stretch.pairs[0].from_m, stretch.length_m())).collect()
     }
 
+    /// How far a lane change that begins at a station may go on, into the lanes ahead, m; 0 where none may
+    /// begin.
+    pub fn change_room_m(&self, lane: LaneIndex, side: Side, station_m: f64) -> f64 {
+        Stretch::room_m(self, lane, side, station_m)
+    }
+
     /// The ways through a junction, by rising index of the lanes they come from and use.
     pub fn connections(&self, junction: usize) -> Vec<Connection> {
         let inside = |lane: LaneIndex| self.lane(lane).junction == Some(junction);

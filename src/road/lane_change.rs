@@ -39,6 +39,8 @@ const STRETCH_M_MAX: f64 = 2000.0;
 
 /// Ends of lanes and of permitted parts are taken for one within this, m.
 const TOUCH_M: f64 = 0.01;
+/// A lane change that is allowed from here on may begin at once, m.
+const AT_ONCE_M: f64 = 0.1;
 
 /// Part of a lateral shift done at a part of its length, both in `[0, 1]`; its derivatives are 0 at
 /// both ends, to the second.
@@ -135,6 +137,22 @@ pub struct Pair {
     pub to_m: f64,
 }
 
+impl Pair {
+    /// The pair of lanes ahead that goes on side by side without a break, if there is one.
+    fn next(&self, map: &RoadMap, side: Side) -> Option<Pair> {
+        let (source, target) = (map.lane(self.source), map.lane(self.target));
+        if self.to_m < source.centre.length_m() - TOUCH_M {
+            return None;
+        }
+        source.successors.iter().find_map(|source| {
+            let beside = map.lane(*source).neighbour(side)?.lane;
+            let (from_m, to_m) = *map.lane(*source).changes_m(side).first()?;
+            let goes_on = target.successors.contains(&beside) && from_m < TOUCH_M;
+            goes_on.then_some(Pair { source: *source, target: beside, from_m: 0.0, to_m })
+        })
+    }
+}
+
 /// A place on a [`Stretch`]: which pair, and the station of its source lane, m.
 #[derive(Debug, Clone, Copy)]
 pub struct Place {
@@ -155,21 +173,31 @@ impl Stretch {
         begun.collect()
     }
 
+    /// How far a lane change that begins at a station may go on, m; 0 where none may begin. The length of the
+    /// stretch from there, without making it: this is asked in every tick.
+    pub fn room_m(map: &RoadMap, source: LaneIndex, side: Side, station_m: f64) -> f64 {
+        let lane = map.lane(source);
+        let Some(target) = lane.neighbour(side).map(|neighbour| neighbour.lane) else { return 0.0 };
+        let here = |(from_m, to_m): &&(f64, f64)| *from_m < station_m + AT_ONCE_M && *to_m > station_m;
+        let Some((from_m, to_m)) = lane.changes_m(side).iter().find(here) else { return 0.0 };
+        let mut last = Pair { source, target, from_m: from_m.max(station_m), to_m: *to_m };
+        let mut room_m = last.to_m - last.from_m;
+        while room_m < STRETCH_M_MAX {
+            match last.next(map, side) {
+                Some(next) if next.source != source => {
+                    room_m += next.to_m;
+                    last = next;
+                }
+                _ => break,
+            }
+        }
+        room_m
+    }
+
     /// Goes on into the lanes ahead as long as they stay side by side.
     fn extended(mut self, map: &RoadMap) -> Stretch {
         while self.length_m() < STRETCH_M_MAX {
-            let last = self.pairs[self.pairs.len() - 1];
-            let (source, target) = (map.lane(last.source), map.lane(last.target));
-            if last.to_m < source.centre.length_m() - TOUCH_M {
-                break;
-            }
-            let next = source.successors.iter().find_map(|source| {
-                let beside = map.lane(*source).neighbour(self.side)?.lane;
-                let (from_m, to_m) = *map.lane(*source).changes_m(self.side).first()?;
-                let goes_on = target.successors.contains(&beside) && from_m < TOUCH_M;
-                goes_on.then_some(Pair { source: *source, target: beside, from_m: 0.0, to_m })
-            });
-            match next {
+            match self.pairs[self.pairs.len() - 1].next(map, self.side) {
                 Some(next) if self.pairs.iter().all(|pair| pair.source != next.source) => {
                     self.pairs.push(next);
                 }

@@ -2,8 +2,10 @@
 
 use crate::geometry::Path;
 use crate::geometry::Vec2;
+use crate::road::LaneIndex;
 use crate::road::RoadMap;
 use crate::road::Route;
+use crate::road::Side;
 
 use super::survey::Leg;
 use super::survey::lanes_join;
@@ -241,4 +243,22 @@ fn signals_crossing_and_limits_of_the_crossroad() {
     // Between the stop line of J_1 and the one of J_0.
     assert!(matches!(route.crosswalks_m[..], [(from_m, to_m)] if from_m > 189.0 && to_m < 207.0));
     assert!(map.lanes.iter().all(|lane| (lane.speed_limit_mps - 50.0 / 3.6).abs() < 1e-9));
+}
+
+#[test]
+fn the_room_for_a_lane_change_is_the_length_of_its_stretch() {
+    let map = crossroad();
+    let mut with_room = 0;
+    for lane in (0..map.lanes.len()).map(LaneIndex) {
+        for side in [Side::Left, Side::Right] {
+            for station_m in (0..map.lane(lane).centre.length_m() as u32).step_by(3).map(f64::from) {
+                let stretches = map.changes_from_m(lane, side, station_m);
+                let here = stretches.into_iter().find(|(from_m, _)| from_m - station_m < 0.1);
+                let room_m = map.change_room_m(lane, side, station_m);
+                assert_eq!(room_m, here.map_or(0.0, |(_, length_m)| length_m), "{lane:?} {station_m}");
+                with_room += usize::from(room_m > 0.0);
+            }
+        }
+    }
+    assert!(with_room > 500, "{with_room}");
 }

@@ -64,8 +64,6 @@ const CHANGE_M_MAX: f64 = 8.0;
 const STRIP_M_MAX: f64 = 0.5;
 /// Who is slower than this when a wait ends sets out anew, m/s.
 const SETS_OUT_MPS: f64 = 1.0;
-/// A lane change that is allowed from here on begins here, m.
-const AT_ONCE_M: f64 = 0.1;
 /// Who stands at more than this angle to the way stands across it or against it (cosine of 45°).
 const CROSSWISE_COS_MAX: f64 = core::f64::consts::FRAC_1_SQRT_2;
 
@@ -442,8 +440,7 @@ impl Driver {
         let centre = &map.lane(target).centre;
         let there = centre.project(this.outline.pose.position);
         // Markings hold for everybody, and nobody changes lanes in a junction, where they part.
-        let room_m = map.changes_from_m(here, on_road(side), here_m);
-        let room_m = room_m.iter().find(|(from_m, _)| from_m - here_m < AT_ONCE_M)?.1;
+        let room_m = map.change_room_m(here, on_road(side), here_m);
         if there.distance_m > CHANGE_M_MAX
             || room_m < change_length_m(self.speed_mps, there.distance_m)
             || !self.is_free(centre, there.station_m, this, size, around)
