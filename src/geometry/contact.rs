@@ -1,8 +1,8 @@
 //! Distances between oriented boxes, rays, and the first contact of two moving boxes.
 //!
-//! All of it is asked for many times a tick and so is our own, in closed form. The one file that names
-//! `parry2d`, which is the oracle of its tests. That no contact is missed is shown by
-//! `tests/it/contacts.rs`.
+//! All of it is asked for many times a tick and so is our own: distances and rays are closed forms, the
+//! first contact advances along the gap. `parry2d` is the oracle of the tests below and named nowhere
+//! else. That no contact is missed is shown by `tests/it/contacts.rs`.
 
 use super::pose::OrientedBox;
 use super::pose::Pose;

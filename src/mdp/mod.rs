@@ -1,8 +1,8 @@
 //! The Markov decision process of the paper: its 19 state variables, the collision probability and the
 //! reward.
 //!
-//! The paper's equations, and beside them the usual measures of criticality. A space may say by itself what a collision probability is
-//! worth (`reward { … }`): `model` evaluates that.
+//! Beside the paper's equations stand the usual measures of criticality. A space may say by itself what a
+//! collision probability is worth (`reward { … }`): `model` evaluates that.
 
 mod collision_probability;
 mod criticality;

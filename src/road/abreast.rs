@@ -1,7 +1,8 @@
 //! What lies beside a lane, whichever road of the file it belongs to: carriageways of one street are
 //! often roads of their own, with a median between them that no road describes.
 //!
-//! By geometry, not by links. Lane changes stay within a road: see [`Lane::changes_left_m`].
+//! Opposing lanes are found by geometry, not by links; lane changes stay within a road and keep to
+//! markings (see [`Lane::changes_left_m`]); ways through a junction are by links.
 //!
 //! [`Lane::changes_left_m`]: super::map::Lane::changes_left_m
 

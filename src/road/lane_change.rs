@@ -174,7 +174,8 @@ impl Stretch {
     }
 
     /// How far a lane change that begins at a station may go on, m; 0 where none may begin. The length of the
-    /// stretch from there, without making it: this is asked in every tick.
+    /// stretch from there, without making it: drivers ask ten times a second. A loop that leaves out the first
+    /// lane is followed up to [`STRETCH_M_MAX`].
     pub fn room_m(map: &RoadMap, source: LaneIndex, side: Side, station_m: f64) -> f64 {
         let lane = map.lane(source);
         let Some(target) = lane.neighbour(side).map(|neighbour| neighbour.lane) else { return 0.0 };

@@ -17,7 +17,6 @@ mod signals;
 #[cfg(test)]
 mod tests;
 
-pub use abreast::Abreast;
 pub use abreast::Connection;
 pub use abreast::Opposing;
 pub use map::Crosswalk;

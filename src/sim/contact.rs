@@ -2,7 +2,7 @@
 //!
 //! Outlines are swept from tick to tick, so nothing passes through anything. The impact is plastic
 //! and acts along the ego vehicle's heading alone: enough for what follows a first contact, and no
-//! claim about damage. Obstacles do not collide with each other.
+//! claim about damage. Contacts among obstacles are `world`'s (`Incident`).
 
 use crate::geometry::Sweep;
 use crate::geometry::Vec2;

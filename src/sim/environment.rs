@@ -8,7 +8,7 @@
 //! | rain | 2.5, 10, 50 mm/h | bounds of light, moderate, violent rain (WMO) | here |
 //! | fog | meteorological optical range 500, 150, 50 m | classes fog < 1000, thick < 200, dense < 50 m | here |
 //! | wetness | 0.1, 0.5, 1.5 mm of water | ours, within the columns of the friction table | here |
-//! | water on the road | rain fills, drains with [`DRAIN_S`], dries with [`DRYING_MMPH`] | ours, from the two rows above | here |
+//! | water on the road | rain fills, drains with [`DRAIN_S`], dries with [`DRYING_MMPH`] | ours, from the rows of rain and wetness | here |
 //! | friction | new tyres at 50, 90, 130 km/h and 0, 0.2, 1, 2 mm | Bosch, Automotive Handbook; between its columns the mapping 0.1, 0.5, 1.5 mm to 0.70, 0.60, 0.52 is ours | here |
 //! | braking | min(brakes, μ·g), forces inside the friction circle | physics | `ego`, `mover` |
 //! | light | 0.8, 1, 0.15 of a camera's light | ours: a low sun costs contrast, street lamps leave the range of low beams | here |

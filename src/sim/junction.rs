@@ -3,8 +3,8 @@
 //!
 //! Made once for a map from its lanes alone. Where the way of another vehicle passes through the area,
 //! and when, is for the drivers to judge (see `manners`). Lanes that leave the same lane are no
-//! conflict: who is on them follows the one ahead. Priority signs are in no map yet, so nobody has a
-//! priority road; where signals differ, they decide before any of this.
+//! conflict: who is on them follows the one ahead. Stop and yield signs of a map are not obeyed, so nobody
+//! has a priority road; where signals differ, they decide before any of this.
 
 use crate::geometry::Path;
 use crate::geometry::PathPoint;

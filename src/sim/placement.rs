@@ -64,9 +64,10 @@ const CHANGE_AFTER_S: f64 = 1.0;
 const CUT_IN_M: f64 = 5.0;
 /// How far beyond the asked distance a crossing may lie, m.
 const CROSSING_M: f64 = 60.0;
-/// How the ego vehicle is expected to gain speed on its way to a rendezvous, m/s², and how it takes bends,
-/// m/s²: ours, the comfort of most planners.
+/// How the ego vehicle is expected to gain speed on its way to a rendezvous, m/s²: ours, the comfort of most
+/// planners.
 const EGO_GAINS_MPS2: f64 = 1.5;
+/// How it is expected to take bends, m/s²: ours, the same.
 const EGO_LATERAL_MPS2: f64 = 2.0;
 /// Step in which a drive towards a rendezvous is timed, m.
 const TIMING_M: f64 = 1.0;

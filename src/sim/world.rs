@@ -181,14 +181,19 @@ impl Obstacle {
 /// The ego vehicle touched an obstacle that it did not touch in the tick before.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Contact {
+    /// Since the episode began, s.
     pub time_s: f64,
+    /// Id of the obstacle.
     pub obstacle: u32,
+    /// Where they met, in the world, m.
     pub point: Vec2,
     /// The point in the frame of the ego outline's centre: x ahead, y left, m.
     pub on_ego: Vec2,
+    /// Before the contact, m/s.
     pub ego_speed_mps: f64,
+    /// Before the contact, in the world, m/s.
     pub obstacle_velocity_mps: Vec2,
-    /// The same in the frame of the ego outline: x ahead, y left.
+    /// The same in the frame of the ego outline: x ahead, y left, m/s.
     pub obstacle_velocity_on_ego_mps: Vec2,
     /// Speed at which the gap between the outlines closed where they met, m/s, not negative.
     pub closing_speed_mps: f64,
@@ -197,10 +202,12 @@ pub struct Contact {
 /// Two obstacles touched each other. Both stand where it happened, and leave 2 s later.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Incident {
+    /// Since the episode began, s.
     pub time_s: f64,
-    /// Who moved into the other.
+    /// Id of who moved into the other.
     pub obstacle: u32,
     pub other: u32,
+    /// Where they met, in the world, m.
     pub point: Vec2,
 }
 
@@ -492,7 +499,7 @@ impl World {
         if !self.ambient.lacks(present) {
             return;
         }
-        // Taken out for the attempt, which looks at the world.
+        // A copy, because the attempt looks at the world.
         let mut ambient = self.ambient.clone();
         if let Some(placed) = ambient.attempt(&self.around([&self.movers, &[]]), begins) {
             self.obstacles.push(placed.obstacle);

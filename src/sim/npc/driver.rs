@@ -377,15 +377,15 @@ impl Driver {
         let front_m = self.station_m + size.length_m / 2.0;
         let line = self.way.stop_lines.iter().find(|line| line.station_m > front_m)?;
         let gap_m = line.station_m - front_m;
-        let braking_m = self.speed_mps * self.speed_mps / 2.0;
-        if gap_m > LOOK_AHEAD_M + braking_m / COMFORT_MPS2 {
+        let energy_m2ps2 = self.speed_mps * self.speed_mps / 2.0;
+        if gap_m > LOOK_AHEAD_M + energy_m2ps2 / COMFORT_MPS2 {
             return None;
         }
         // Who cannot stop before the line any more does not stop behind it either.
         let stops = match around.signals.colour(&around.scene.map, line.signal, around.tick) {
             SignalColour::Green => false,
-            SignalColour::Yellow => gap_m * YELLOW_BRAKING_MPS2 > braking_m,
-            SignalColour::Red => gap_m * braking_mps2 > braking_m,
+            SignalColour::Yellow => gap_m * YELLOW_BRAKING_MPS2 > energy_m2ps2,
+            SignalColour::Red => gap_m * braking_mps2 > energy_m2ps2,
         };
         stops.then_some(gap_m)
     }

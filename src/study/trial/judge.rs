@@ -53,17 +53,13 @@ const MEETS_M: f64 = 12.0;
 
 /// Whether it did what its verb says; if not, what was wrong, in words.
 pub(super) fn verdict(scene: &Scene, request: &SpawnRequest, seen: &Sighting) -> Result<(), String> {
-    match request.verb {
-        Verb::Walk => return walks(request, seen),
-        Verb::Stand => return stands(seen),
-        Verb::DriveAhead | Verb::Overtake | Verb::DriveOpposite | Verb::CrossRoad => {}
-    }
     let first = &seen.frames[0];
-    for frame in &seen.frames {
-        stays_on_road(scene, frame)?;
-    }
+    let drives = || seen.frames.iter().try_for_each(|frame| stays_on_road(scene, frame));
     match request.verb {
+        Verb::Walk => walks(request, seen),
+        Verb::Stand => stands(seen),
         Verb::DriveAhead => {
+            drives()?;
             appears_ahead(scene, request, first)?;
             let last = &seen.frames[seen.frames.len() - 1];
             let way_m = (last.outline.pose.position - first.outline.pose.position).norm();
@@ -73,6 +69,7 @@ pub(super) fn verdict(scene: &Scene, request: &SpawnRequest, seen: &Sighting) ->
             changes(&scene.map, request, seen, usize::from(request.then == Then::Change), 0)
         }
         Verb::Overtake => {
+            drives()?;
             if ahead_m(first) > 0.0 {
                 return Err("it does not appear behind the ego vehicle".to_owned());
             }
@@ -84,6 +81,7 @@ pub(super) fn verdict(scene: &Scene, request: &SpawnRequest, seen: &Sighting) ->
             changes(&scene.map, request, seen, out + back, if back > 0 { passed } else { 0 })
         }
         Verb::DriveOpposite => {
+            drives()?;
             if turned_rad(first) < OPPOSES_RAD {
                 return Err("it does not appear against the direction of the route".to_owned());
             }
@@ -91,6 +89,7 @@ pub(super) fn verdict(scene: &Scene, request: &SpawnRequest, seen: &Sighting) ->
             changes(&scene.map, request, seen, usize::from(request.then == Then::Change), 0)
         }
         Verb::CrossRoad => {
+            drives()?;
             if let Some((lane, _)) = first.lane
                 && scene.route.lanes.iter().any(|part| part.lane == lane)
             {
@@ -100,7 +99,6 @@ pub(super) fn verdict(scene: &Scene, request: &SpawnRequest, seen: &Sighting) ->
             let until = Sighting { frames: seen.frames[..=crossing].to_vec(), ending: seen.ending };
             changes(&scene.map, request, &until, usize::from(request.then == Then::Change), 0)
         }
-        Verb::Walk | Verb::Stand => Ok(()),
     }
 }
 

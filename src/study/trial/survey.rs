@@ -254,7 +254,7 @@ fn attempt(moment: &Moment, draw: &Draw) -> Try {
             (_, Ok(_)) => {}
         }
     }
-    found.failure = unchanged(&world, &draw.effects);
+    found.failure = unmet(&world, &draw.effects);
     let scene = Arc::clone(world.scene());
     for (request, id) in newcomers {
         found.unfair = found.unfair.or_else(|| fairness::complaint(&world, &request, id));
@@ -275,7 +275,7 @@ fn attempt(moment: &Moment, draw: &Draw) -> Try {
 }
 
 /// What of the last effects on weather and time is not so now.
-fn unchanged(world: &World, effects: &[Effect]) -> Option<String> {
+fn unmet(world: &World, effects: &[Effect]) -> Option<String> {
     let last = |wanted: Phenomenon| {
         effects.iter().rev().find_map(|effect| match effect {
             Effect::Sky(phenomenon, level) if *phenomenon == wanted => Some(*level),
