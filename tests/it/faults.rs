@@ -14,20 +14,21 @@ use crate::world::run;
 
 /// Episodes on each road.
 const EPISODES: u32 = 50;
-/// Faults, and the episode from which on one of the next [`TRIES`] shows a crash of theirs.
-const PLANTED: [(&str, usize); 10] = [
-    ("control_late_steering", 71),
-    ("control_weak_brakes", 134),
-    ("perception_blind_to_large_vehicles", 20),
-    ("perception_blind_to_pedestrians", 1),
-    ("perception_dropouts", 4),
-    ("perception_half_range", 29),
-    ("planning_never_yields", 1),
-    ("prediction_frozen", 4),
-    ("tracking_late", 0),
+/// Faults, and the episode from which on one of the next [`TRIES`] shows a crash of theirs. These nine of the
+/// shipped faults make one in 200 random episodes; for the others (bias and noise of the localization, late
+/// steering, latency, tailgating, lane-bound prediction) scenarios have to be made yet.
+const PLANTED: [(&str, usize); 9] = [
+    ("control_weak_brakes", 150),
+    ("perception_blind_to_large_vehicles", 50),
+    ("perception_blind_to_pedestrians", 0),
+    ("perception_dropouts", 0),
+    ("perception_half_range", 40),
+    ("planning_never_yields", 0),
+    ("prediction_frozen", 0),
+    ("tracking_late", 40),
     ("tracking_no_velocity", 0),
 ];
-const TRIES: usize = 60;
+const TRIES: usize = 40;
 /// Small variations of a crash, half of which at least must crash, too: a fault's crash is no accident.
 const VARIATIONS: u32 = 6;
 
