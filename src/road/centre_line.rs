@@ -52,6 +52,9 @@ struct Sample {
     folded: bool,
 }
 
+/// Cubics that end at zero undershoot a little; narrower than this is a mistake, m.
+const WIDTH_M_MIN: f64 = -0.1;
+
 /// Why a lane has no centre line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum NoCentreLine {
@@ -59,6 +62,8 @@ pub enum NoCentreLine {
     Short,
     /// Its polynomials or curves leave what a road can be.
     Wild,
+    /// Its width falls below zero: its edges would cross, and its centre lie in another lane.
+    Inverted,
 }
 
 /// Samples the centre of a lane of a section.
@@ -101,6 +106,9 @@ pub fn centre_line(
     };
     if samples.len() > SAMPLES_MAX || !samples.iter().all(tame) {
         return Err(NoCentreLine::Wild);
+    }
+    if samples.iter().any(|sample| sample.width_m < WIDTH_M_MIN) {
+        return Err(NoCentreLine::Inverted);
     }
     // Path drops points that coincide; widths and stations must stay in step with it.
     samples.dedup_by(|b, a| (b.position - a.position).norm() < 1e-5);

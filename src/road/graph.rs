@@ -134,6 +134,10 @@ impl<'a> Builder<'a> {
                             self.warn(element.line, format!("ignored {at}: it has no length"));
                             continue;
                         }
+                        Err(NoCentreLine::Inverted) => {
+                            let message = format!("{at} becomes narrower than nothing: look at its widths");
+                            return Err(wrong(element.line, message));
+                        }
                         Err(NoCentreLine::Wild) => {
                             let message = format!("{at} is no road: look at its widths, offsets and curves");
                             return Err(wrong(element.line, message));

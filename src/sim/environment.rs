@@ -85,13 +85,15 @@ impl Environment {
         Environment { time, rain, fog, wetness, water_mm, grip: Grip::under(water_mm) }
     }
 
+    /// Makes it rain, foggy or wet from now on. Water comes at once, but no level takes it away: it drains
+    /// and dries (see [`Environment::pass`]).
     pub fn set(&mut self, phenomenon: Phenomenon, level: Level) {
         match phenomenon {
             Phenomenon::Rain => self.rain = level,
             Phenomenon::Fog => self.fog = level,
             Phenomenon::Wetness => {
                 self.wetness = level;
-                self.water_mm = WATER_MM[level as usize];
+                self.water_mm = self.water_mm.max(WATER_MM[level as usize]);
                 self.grip = Grip::under(self.water_mm);
             }
         }
@@ -183,7 +185,9 @@ mod tests {
         assert_eq!((conditions.friction, conditions.rain_mmph, conditions.visibility_m), (0.52, 50.0, 150.0));
         environment.set(Phenomenon::Rain, Level::None);
         environment.set(Phenomenon::Wetness, Level::None);
-        assert_eq!(environment.conditions(0.0).friction, 0.85);
+        assert_eq!(environment.conditions(0.0).friction, 0.52, "no word takes water away");
+        (0..7200).for_each(|_| environment.pass(0.1));
+        assert!(environment.conditions(0.0).friction > 0.80, "but it drains");
     }
 
     #[test]

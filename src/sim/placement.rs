@@ -69,6 +69,8 @@ const CROSSING_M: f64 = 60.0;
 const EGO_GAINS_MPS2: f64 = 1.5;
 /// How it is expected to take bends, m/s²: ours, the same.
 const EGO_LATERAL_MPS2: f64 = 2.0;
+/// A stop line so far behind a vehicle that appears counts as passed at that moment, m.
+const BEYOND_LINE_M: f64 = 30.0;
 /// Step in which a drive towards a rendezvous is timed, m.
 const TIMING_M: f64 = 1.0;
 
@@ -436,6 +438,10 @@ fn rendezvous(
             return Err("the crossing road is too short".into());
         }
     }
+    // Nobody appears just beyond a line at which they would have had to stop.
+    let behind =
+        way.stop_lines.iter().filter(|line| (front_m - BEYOND_LINE_M..front_m).contains(&line.station_m));
+    passed_lines.extend(behind.map(|line| (line.signal, 0.0)));
     let is_green = |(signal, after_s): &(usize, f64)| {
         let tick = around.tick + (after_s / DT_S) as u64;
         around.signals.colour(map, *signal, tick) == SignalColour::Green

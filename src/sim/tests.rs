@@ -460,8 +460,14 @@ fn rain_makes_the_road_slippery_in_time() {
     assert_eq!(world.conditions().friction, 0.85);
     drive(&mut world, 0.0, 60.0);
     assert!((0.55..0.62).contains(&world.conditions().friction), "{:?}", world.conditions());
-    world.apply(&Effect::Sky(Phenomenon::Wetness, Level::None)).expect("the sky obeys");
-    assert_eq!(world.conditions().water_mm, 0.0);
+    let water_mm = world.conditions().water_mm;
+    for phenomenon in [Phenomenon::Rain, Phenomenon::Wetness] {
+        world.apply(&Effect::Sky(phenomenon, Level::None)).expect("the sky obeys");
+    }
+    assert_eq!(world.conditions().water_mm, water_mm);
+    drive(&mut world, 0.0, 144.0);
+    let left = world.conditions().water_mm / water_mm;
+    assert!((0.30..0.37).contains(&left), "after the time constant a third is left: {left}");
 }
 
 #[test]

@@ -123,6 +123,9 @@ impl Reader {
             speeds.push((kind.number_or("s", 0.0)?, limit.flatten()));
         }
         self.ignore_heights(road)?;
+        if let Some(rule) = road.attribute("rule").filter(|rule| !["LHT", "RHT"].contains(rule)) {
+            self.warn(road, format!("road `{id}` has the rule `{rule}`, taken for RHT"));
+        }
         let lanes =
             road.child("lanes").ok_or_else(|| road.wrong(format!("road `{id}` lacks its `lanes`")))?;
         Ok(RoadElement {

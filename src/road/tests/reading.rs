@@ -394,3 +394,21 @@ proptest! {
         }
     }
 }
+
+#[test]
+fn a_lane_narrower_than_nothing_is_no_lane() {
+    let text = |width: &str| {
+        format!(
+            r#"<OpenDRIVE><header name="x"/><road id="1" length="150" junction="-1" rule="XYZ">
+            <planView><geometry s="0" x="0" y="0" hdg="0" length="150"><line/></geometry></planView>
+            <lanes><laneSection s="0"><right><lane id="-1" type="driving"><width sOffset="0" {width}/></lane>
+            </right></laneSection></lanes></road></OpenDRIVE>"#
+        )
+    };
+    for width in [r#"a="-3.5" b="0" c="0" d="0""#, r#"a="3.5" b="-1" c="0" d="0""#] {
+        let error = RoadMap::from_opendrive("x", &text(width)).unwrap_err();
+        assert!(error.to_string().contains("narrower than nothing"), "{error}");
+    }
+    let map = RoadMap::from_opendrive("x", &text(r#"a="3.5" b="-0.0236" c="0" d="0""#)).unwrap();
+    assert!(map.warnings.iter().any(|warning| warning.contains("rule `XYZ`")), "{:?}", map.warnings);
+}
