@@ -33,6 +33,7 @@ use super::output::remark;
 use super::progress::Progress;
 use super::progress::plural;
 use super::run_directory;
+use super::run_directory::Begun;
 use super::run_directory::RunDirectory;
 use super::run_directory::write;
 use super::verify::acting;
@@ -147,19 +148,9 @@ fn begun(output: &Output, arguments: &RunArguments) -> Result<(Run, RunDirectory
 /// The rest of an interrupted run.
 fn resumed(output: &Output, path: &Path) -> Result<(Run, RunDirectory), Failure> {
     let settings: RunSettings = run_directory::settings(path)?;
-    if (settings.engine.as_str(), settings.avastra.as_str()) != (ENGINE, VERSION) {
-        return Err(Failure::usage(format!(
-            "the run was begun by avastra {} in world `{}`, this is avastra {VERSION} in `{ENGINE}`: begin a new one",
-            settings.avastra, settings.engine
-        )));
-    }
-    let table = load::table(output, &path.join(&settings.space))?;
-    if table.space().digest != settings.space_digest {
-        return Err(Failure::usage(format!(
-            "`{}` has changed since the run was begun: begin a new one",
-            table.space().path.display()
-        )));
-    }
+    let begun =
+        Begun { avastra: &settings.avastra, engine: &settings.engine, space_digest: &settings.space_digest };
+    let table = begun.table(output, "run", &path.join(&settings.space))?;
     let policy = match &settings.policy {
         None => None,
         Some(reference) => {

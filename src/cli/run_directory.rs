@@ -4,10 +4,14 @@ use std::io::ErrorKind;
 use std::path::Path;
 use std::path::PathBuf;
 
+use crate::action::ActionTable;
+use crate::sim::ENGINE;
 use crate::study::Database;
 
 use super::error::Failure;
 use super::load;
+use super::output::Output;
+use super::run::VERSION;
 
 /// A run directory on disk.
 pub struct RunDirectory {
@@ -59,6 +63,33 @@ impl RunDirectory {
     /// Where the critical scenario of an episode is kept.
     pub fn critical(&self, name: &str) -> PathBuf {
         self.path.join("critical").join(format!("{name}.ava"))
+    }
+}
+
+/// What an interrupted run or training was begun with, as its settings tell.
+pub struct Begun<'a> {
+    pub avastra: &'a str,
+    pub engine: &'a str,
+    pub space_digest: &'a str,
+}
+
+impl Begun<'_> {
+    /// The table of the space, if neither it nor avastra has changed since. `what` was begun: a word.
+    pub fn table(&self, output: &Output, what: &str, space: &Path) -> Result<ActionTable, Failure> {
+        if (self.engine, self.avastra) != (ENGINE, VERSION) {
+            return Err(Failure::usage(format!(
+                "the {what} was begun by avastra {} in world `{}`, this is avastra {VERSION} in `{ENGINE}`: begin a new one",
+                self.avastra, self.engine
+            )));
+        }
+        let table = load::table(output, space)?;
+        if table.space().digest != self.space_digest {
+            return Err(Failure::usage(format!(
+                "`{}` has changed since the {what} was begun: begin a new one",
+                table.space().path.display()
+            )));
+        }
+        Ok(table)
     }
 }
 

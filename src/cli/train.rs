@@ -26,6 +26,7 @@ use super::progress::plural;
 use super::run::VERSION;
 use super::run::stop_on_interrupt;
 use super::run_directory;
+use super::run_directory::Begun;
 use super::run_directory::RunDirectory;
 use super::run_directory::write;
 
@@ -113,19 +114,9 @@ fn hyperparameters(arguments: &TrainArguments) -> Result<Hyperparameters, Failur
 /// The rest of an interrupted training.
 fn resumed(output: &Output, path: &Path) -> Result<(Training, RunDirectory), Failure> {
     let settings: TrainSettings = run_directory::settings(path)?;
-    if (settings.engine.as_str(), settings.avastra.as_str()) != (ENGINE, VERSION) {
-        return Err(Failure::usage(format!(
-            "the training was begun by avastra {} in world `{}`, this is avastra {VERSION} in `{ENGINE}`: begin a new one",
-            settings.avastra, settings.engine
-        )));
-    }
-    let table = load::table(output, &path.join(&settings.space))?;
-    if table.space().digest != settings.space_digest {
-        return Err(Failure::usage(format!(
-            "`{}` has changed since the training was begun: begin a new one",
-            table.space().path.display()
-        )));
-    }
+    let begun =
+        Begun { avastra: &settings.avastra, engine: &settings.engine, space_digest: &settings.space_digest };
+    let table = begun.table(output, "training", &path.join(&settings.space))?;
     let mut directory = RunDirectory::open(path.to_owned())?;
     let checkpoint =
         directory.database.return_to_checkpoint().map_err(|error| Failure::file("resume", path, error))?;
