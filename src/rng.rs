@@ -39,6 +39,10 @@ pub enum Stream {
     Replay = 22,
     /// Seeds of the episodes that a trained policy is judged by.
     Evaluation = 23,
+    /// Seeds of the episodes in which rules learn from a network.
+    Distillation = 31,
+    /// The order into which the values of a variable are shuffled; one index a variable and repeat.
+    Permutation = 32,
 }
 
 /// The stream of one consumer; `index` tells apart its uses, for example the step number.

@@ -6,9 +6,12 @@ mod compile;
 mod completions;
 mod diagnose;
 mod diff;
+mod distill;
 mod doc;
 mod error;
 mod explain;
+mod explain_policy;
+mod export_weights;
 mod fmt;
 mod load;
 mod new;
@@ -65,6 +68,9 @@ pub fn main() -> ExitCode {
         Command::Completions(arguments) => completions::completions(&output, arguments),
         Command::Run(arguments) => run::run(&output, arguments),
         Command::Train(arguments) => train::train(&output, arguments),
+        Command::Distill(arguments) => distill::distill(&output, arguments),
+        Command::ExplainPolicy(arguments) => explain_policy::explain_policy(&output, arguments),
+        Command::ExportWeights(arguments) => export_weights::export_weights(&output, arguments),
         Command::Verify(arguments) => verify::verify(&output, arguments),
         Command::Replay(arguments) => replay::replay(&output, arguments),
         Command::Diagnose(arguments) => diagnose::diagnose(&output, arguments),

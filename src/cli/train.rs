@@ -9,15 +9,23 @@ use crate::agent;
 use crate::agent::Hyperparameters;
 use crate::agent::Kind;
 use crate::emit;
+use crate::model::Policy;
 use crate::model::Space;
+use crate::model::digest_text;
+use crate::model::policy::PolicyClaims;
+use crate::model::policy::PolicyOrigin;
 use crate::sim::ENGINE;
+use crate::study::Evaluation;
 use crate::study::TrainSettings;
 use crate::study::TrainedEpisode;
 use crate::study::Training;
 use crate::study::evaluate;
+use crate::study::rounded;
 use crate::syntax::listed;
 
 use super::arguments::TrainArguments;
+use super::distill;
+use super::distill::rules_text;
 use super::error::Failure;
 use super::load;
 use super::output::Output;
@@ -180,7 +188,9 @@ fn finish(output: &Output, training: &Training, directory: &RunDirectory) -> Res
     let evaluation =
         evaluate(table, training.policy(), roads, &settings.ads, rules, (EVALUATION_EPISODES, settings.seed));
     let evaluation = evaluation.map_err(|error| Failure::usage(error.to_string()))?;
-    let path = write_policy(training, &evaluation, &directory.path)?;
+    output.tell("distilling rules from the network");
+    let policy = policy(training, &evaluation)?;
+    let path = write_policy(&policy, training.table().space(), &directory.path)?;
     let totals =
         directory.database.totals().map_err(|error| Failure::file("read", &directory.path, error))?;
     output.say(&format!(
@@ -196,6 +206,9 @@ fn finish(output: &Output, training: &Training, directory: &RunDirectory) -> Res
         plural(evaluation.counted as usize, "collision"),
         plural(evaluation.colliding as usize, "episode"),
     ));
+    if let Some(rules) = policy.claims.as_ref().and_then(|claims| claims.rules.as_ref()) {
+        output.say(&rules_text(policy.rules.len(), evaluation.return_mean, rules));
+    }
     output.say(&format!("{}\nplay it with: avastra run --policy {}", path.display(), path.display()));
     output.result(
         "train",
@@ -204,31 +217,77 @@ fn finish(output: &Output, training: &Training, directory: &RunDirectory) -> Res
             "evaluation": {
                 "episodes": evaluation.episodes * roads.len() as u64, "collisions": evaluation.collisions,
                 "counted": evaluation.counted, "colliding": evaluation.colliding,
+                "return": evaluation.return_mean,
             },
+            "rules": policy.claims.as_ref().map(|claims| &claims.rules),
         }),
     );
     Ok(())
 }
 
-/// Writes `policy/NAME.ava`.
-fn write_policy(
-    training: &Training,
-    evaluation: &crate::study::Evaluation,
-    directory: &Path,
-) -> Result<PathBuf, Failure> {
+/// The policy as it is to be kept, with the rules distilled from it and the claims of both.
+fn policy(training: &Training, evaluation: &Evaluation) -> Result<Policy, Failure> {
     let settings = training.settings();
     let name = match settings.roads.as_slice() {
         [road] => format!("{road}_{}_{}", settings.agent, settings.seed),
         _ => format!("{}_{}", settings.agent, settings.seed),
     };
+    let network = training.policy().network();
+    let policy = Policy {
+        name,
+        docs: vec![headline(settings, evaluation)],
+        origin: PolicyOrigin {
+            agent: settings.agent.clone(),
+            seed: settings.seed,
+            episodes: u64::from(settings.episodes),
+            roads: settings.roads.clone(),
+            ads: settings.ads.clone(),
+            engine: settings.engine.clone(),
+            avastra: settings.avastra.clone(),
+            with: settings.with.clone(),
+            without: settings.without.clone(),
+        },
+        layers: network.shape().layers.clone(),
+        dueling: network.shape().dueling,
+        hyperparameters: training.policy().settings().record(),
+        parameters: network.parameters().to_vec(),
+        claims: Some(PolicyClaims {
+            episodes: evaluation.episodes,
+            seed: evaluation.seed,
+            collisions: evaluation.collisions,
+            counted: evaluation.counted,
+            colliding: evaluation.colliding,
+            return_mean: rounded(evaluation.return_mean),
+            trace: digest_text(&evaluation.trace),
+            rules: None,
+        }),
+        rules: Vec::new(),
+        digest: String::new(),
+    };
+    distill::with_rules(training.table(), training.policy(), policy)
+}
+
+/// Writes `policy/NAME.ava`.
+fn write_policy(policy: &Policy, space: &Space, directory: &Path) -> Result<PathBuf, Failure> {
     let folder = directory.join("policy");
     std::fs::create_dir_all(&folder).map_err(|error| Failure::file("create", &folder, error))?;
-    let space: &Space = training.table().space();
     let space_path = load::relative(&folder, &space.path)?;
-    let text = emit::policy_text(training.policy(), settings, evaluation, &name, &space_path);
-    let path = folder.join(format!("{name}.ava"));
-    write(&path, &text)?;
+    let path = folder.join(format!("{}.ava", policy.name));
+    write(&path, &emit::policy_text(policy, space, &space_path))?;
     Ok(path)
+}
+
+/// What it is, in a sentence for the reader.
+fn headline(settings: &TrainSettings, evaluation: &Evaluation) -> String {
+    format!(
+        "{} ({}) after {} episodes on {}: {} counted collisions in {} episodes of its own.",
+        settings.agent,
+        settings.hyperparameters.preset,
+        settings.episodes,
+        settings.roads.join(", "),
+        evaluation.counted,
+        evaluation.episodes * settings.roads.len() as u64,
+    )
 }
 
 fn heading(training: &Training, directory: &Path) -> String {

@@ -641,5 +641,10 @@ fn policy_line(line: &PolicyLine) -> Layout {
         None => Layout::text("_"),
         Some(condition) => Layout::row([Layout::text("when "), expression(condition)]),
     };
-    Layout::row([condition, Layout::text(" => "), call(&line.action)])
+    let mut parts = vec![condition, Layout::text(" => ")];
+    for (at, action) in line.actions.iter().enumerate() {
+        parts.extend((at > 0).then(|| Layout::text(" | ")));
+        parts.push(call(action));
+    }
+    Layout::Row(parts)
 }

@@ -77,6 +77,15 @@ pub fn scenario(file: &ast::File, space: &Space) -> Result<Scenario, Vec<Diagnos
     }
 }
 
+/// The row that a call names: by name, or in the order of the axes.
+///
+/// # Errors
+/// If there is none.
+pub(in crate::model) fn row<'a>(space: &'a Space, call: &ast::Call) -> Result<&'a Row, Vec<Diagnostic>> {
+    let mut reader = Reader { space, diagnostics: Vec::new() };
+    reader.row(call).ok_or(reader.diagnostics)
+}
+
 struct Reader<'a> {
     space: &'a Space,
     diagnostics: Vec<Diagnostic>,

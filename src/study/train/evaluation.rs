@@ -6,19 +6,20 @@ use sha2::Sha256;
 use crate::action::ActionTable;
 use crate::agent::Agent;
 use crate::agent::QPolicy;
+use crate::agent::Visit;
 use crate::episode;
 use crate::oracle::AvoidabilitySettings;
 use crate::rng;
 use crate::rng::Stream;
 use crate::study::arena::Arena;
-use crate::study::arena::choose;
+use crate::study::policy::visit;
 use crate::study::run::RunError;
 use crate::study::summary::EpisodeSummary;
 
 use super::training::with_period;
 
 /// The outcome of a number of episodes.
-#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Evaluation {
     /// Episodes on each road.
     pub episodes: u64,
@@ -28,6 +29,8 @@ pub struct Evaluation {
     pub counted: u64,
     /// Episodes with a counted collision.
     pub colliding: u64,
+    /// Mean sum of the space's rewards in an episode.
+    pub return_mean: f64,
     /// SHA-256 over the traces of all episodes, in order.
     pub trace: [u8; 32],
 }
@@ -42,25 +45,45 @@ pub fn evaluate(
     roads: &[String],
     ads: &str,
     rules: (&[String], &[String]),
+    test: (u64, u64),
+) -> Result<Evaluation, RunError> {
+    evaluate_visiting(table, policy, roads, ads, rules, test, &mut |_| {})
+}
+
+/// The same; `visited` is shown every state that the policy came to.
+///
+/// # Errors
+/// As [`evaluate`].
+pub(in crate::study) fn evaluate_visiting(
+    table: ActionTable,
+    policy: &QPolicy,
+    roads: &[String],
+    ads: &str,
+    rules: (&[String], &[String]),
     (episodes, seed): (u64, u64),
+    visited: &mut dyn FnMut(Visit),
 ) -> Result<Evaluation, RunError> {
     let table = with_period(table, policy.settings().observation_period_s);
     let arena = Arena::new(table, roads, ads, rules)?;
     let mut traces = Sha256::new();
-    let mut found = Evaluation { episodes, seed, collisions: 0, counted: 0, colliding: 0, trace: [0; 32] };
+    let mut found =
+        Evaluation { episodes, seed, collisions: 0, counted: 0, colliding: 0, return_mean: 0.0, trace: [0; 32] };
+    let mut sum = 0.0;
     for number in 0..episodes * arena.roads() as u64 {
         let seed = rng::child_seed(seed, Stream::Evaluation, number);
         let setup = arena.setup((number % arena.roads() as u64) as usize, seed);
         let mut agent = policy.clone();
         agent.begin();
-        let mut choose = |moment: &episode::Moment| choose(arena.table(), &mut agent, moment);
+        let mut choose = |moment: &episode::Moment| visit(arena.table(), &mut agent, moment, visited);
         let log = episode::run(&setup, &mut choose, &mut |_, _, _| {});
         let settings = AvoidabilitySettings::default();
         let counted = EpisodeSummary::judged(&setup, number as usize, &log, &settings).counted() as u64;
+        sum += log.steps.iter().map(|step| step.reward).sum::<f64>();
         found.collisions += log.collisions.len() as u64;
         found.counted += counted;
         found.colliding += u64::from(counted > 0);
         traces.update(log.trace());
     }
-    Ok(Evaluation { trace: traces.finalize().into(), ..found })
+    let return_mean = sum / (episodes * arena.roads() as u64).max(1) as f64;
+    Ok(Evaluation { return_mean, trace: traces.finalize().into(), ..found })
 }

@@ -249,7 +249,7 @@ fn prepared(table: ActionTable, settings: &TrainSettings) -> Result<(Arena, Arc<
 }
 
 /// The table with another observation period.
-pub(super) fn with_period(table: ActionTable, period_s: Option<f64>) -> ActionTable {
+pub(in crate::study) fn with_period(table: ActionTable, period_s: Option<f64>) -> ActionTable {
     let Some(step_s) = period_s else { return table };
     let mut space = Space::clone(table.space());
     space.episode.step_s = step_s;
