@@ -52,7 +52,10 @@ pub fn distill(output: &Output, arguments: &DistillArguments) -> Result<(), Fail
     }
     output.say(&path.display().to_string());
     let rules = claims.map(|claims| &claims.rules);
-    output.result("distill", serde_json::json!({ "policy": path, "lines": policy.rules.len(), "rules": rules }));
+    output.result(
+        "distill",
+        serde_json::json!({ "policy": path, "lines": policy.rules.len(), "rules": rules }),
+    );
     Ok(())
 }
 

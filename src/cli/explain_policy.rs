@@ -37,12 +37,17 @@ pub fn explain_policy(output: &Output, arguments: &ExplainPolicyArguments) -> Re
     output.say(&rows_text(&found));
     output.say(&state_text(&found, !given.is_empty()));
     output.say(&importance_text(&found));
-    output.result("explain-policy", serde_json::json!({ "policy": policy.name, "roads": roads, "insight": found }));
+    output.result(
+        "explain-policy",
+        serde_json::json!({ "policy": policy.name, "roads": roads, "insight": found }),
+    );
     Ok(())
 }
 
 fn rows_text(found: &Insight) -> String {
-    let mut text = "\nrows that it prefers (share of states, mean Q-value; where it differs from its mean state):".to_owned();
+    let mut text =
+        "\nrows that it prefers (share of states, mean Q-value; where it differs from its mean state):"
+            .to_owned();
     for row in found.rows.iter().take(LISTED_MAX) {
         let share = 100.0 * row.states as f64 / found.states.max(1) as f64;
         text.push_str(&format!("\n  {share:5.1} %  {:7.3}  {}", row.q_value, row.label));
@@ -66,7 +71,9 @@ fn state_text(found: &Insight, is_given: bool) -> String {
     for (_, label, q_value) in found.state.q_values.iter().take(LISTED_MAX) {
         text.push_str(&format!("\n  {q_value:7.3}  {label}"));
     }
-    if let Some((_, label, q_value)) = found.state.q_values.last().filter(|_| found.state.q_values.len() > LISTED_MAX) {
+    if let Some((_, label, q_value)) =
+        found.state.q_values.last().filter(|_| found.state.q_values.len() > LISTED_MAX)
+    {
         text.push_str(&format!("\n  …\n  {q_value:7.3}  {label}"));
     }
     text
@@ -92,8 +99,7 @@ fn importance_text(found: &Insight) -> String {
             one.variable,
         ));
     }
-    let unseen: Vec<&str> =
-        found.importance.iter().filter(|one| !one.seen).map(|one| one.variable).collect();
+    let unseen: Vec<&str> = found.importance.iter().filter(|one| !one.seen).map(|one| one.variable).collect();
     if !unseen.is_empty() {
         text.push_str(&format!("\n  not seen by this policy: {}", unseen.join(", ")));
     }

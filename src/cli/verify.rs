@@ -77,9 +77,12 @@ fn judge(table: &ActionTable, policy: &Policy) -> Result<Vec<String>, Failure> {
         let lines = Arc::new(policy.rules.clone());
         let found = judge_rules(table, &acting, &lines, &origin.roads, &origin.ads, rules, test)
             .map_err(|error| Failure::usage(error.to_string()))?;
-        pairs.extend(figures(claims).into_iter().zip(figures(&found)).map(|((name, claimed), (_, found))| {
-            (format!("rules: {name}"), claimed, found)
-        }));
+        pairs.extend(
+            figures(claims)
+                .into_iter()
+                .zip(figures(&found))
+                .map(|((name, claimed), (_, found))| (format!("rules: {name}"), claimed, found)),
+        );
     }
     let wrong = pairs.into_iter().filter(|(_, claimed, found)| claimed != found);
     Ok(wrong.map(|(name, claimed, found)| format!("{name}: claimed {claimed}, found {found}")).collect())
@@ -121,10 +124,9 @@ pub fn acting(table: &ActionTable, policy: &Policy, face: Face) -> Result<QPolic
         .map_err(|error| Failure::usage(format!("`{}`: {error}", policy.name)))?;
     match face {
         Face::Network => Ok(acting),
-        Face::Rules if policy.rules.is_empty() => Err(Failure::usage(format!(
-            "`{}` has no rules: `avastra distill FILE` makes some",
-            policy.name
-        ))),
+        Face::Rules if policy.rules.is_empty() => {
+            Err(Failure::usage(format!("`{}` has no rules: `avastra distill FILE` makes some", policy.name)))
+        }
         Face::Rules => Ok(acting.with_rules(Arc::new(policy.rules.clone()))),
     }
 }

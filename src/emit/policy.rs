@@ -90,7 +90,8 @@ fn condition(condition: &Condition) -> Expr {
     let variable = &VARIABLES[condition.variable];
     let value = match variable.kind {
         VariableKind::Words { .. } => {
-            let word = variable.word(condition.value as f32).expect("only the words' own values are compared");
+            let word =
+                variable.word(condition.value as f32).expect("only the words' own values are compared");
             tree::name(word)
         }
         VariableKind::Quantity { unit, .. } => {

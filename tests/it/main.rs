@@ -10,6 +10,7 @@ mod emitted;
 mod failures;
 mod faults;
 mod layers;
+mod policies;
 mod profiles;
 mod references;
 mod road;

@@ -12,7 +12,8 @@ use avastra::syntax::ast::FileId;
 use crate::cases::root;
 use crate::world::read;
 
-const SMALL: &str = "learning_starts: 30\nupdates_per_step: 1\nhidden_units: [8]\nbatch_len: 8\n";
+const SMALL: &str = "learning_starts: 30\nupdates_per_step: 1\nhidden_units: [8]\nbatch_len: 8\n\
+                     rules_leaves: 6\nrules_rounds: 2\nrules_episodes: 3\n";
 
 fn avastra(arguments: &[&str]) -> Command {
     let mut command = Command::cargo_bin("avastra").expect("the binary is built with the tests");

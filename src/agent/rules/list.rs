@@ -11,8 +11,8 @@ use crate::model::policy::PolicyRule;
 use crate::model::policy::VARIABLES;
 
 use super::tree::Bounds;
-use super::tree::Visit;
 use super::tree::Tree;
+use super::tree::Visit;
 use super::tree::grow;
 use super::tree::holds;
 
@@ -157,4 +157,55 @@ fn simplify(conditions: &mut Vec<Condition>) {
     };
     let kept = (0..conditions.len()).filter(|&at| !is_implied(at, conditions)).map(|at| conditions[at]);
     *conditions = kept.collect();
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::agent::rules::tree::tests::visit;
+    use crate::model::policy::variable_index;
+
+    #[test]
+    fn a_tree_becomes_a_list_that_says_the_same() {
+        // Fast: row 0; slow by night: row 2, by day: row 1.
+        let wanted = |fast: bool, night: bool| if fast { 0 } else { 1 + usize::from(night) };
+        let visits: Vec<Visit> = (0..40)
+            .map(|at| {
+                let (fast, night) = (at % 2 == 0, at % 4 < 2);
+                visit(if fast { 9.0 } else { 2.0 }, if night { 20.0 } else { 14.0 }, wanted(fast, night), 1.0)
+            })
+            .collect();
+        let variables = ["time", "ego_speed"].map(|name| variable_index(name).unwrap());
+        let rules = distilled(&visits, &variables, 8, 8);
+        assert_eq!(rules.len(), 3);
+        assert!(rules[2].conditions.is_empty());
+        for visit in &visits {
+            assert_eq!(chosen_by(&rules, &visit.observation, &visit.open), Some(visit.best));
+            assert_eq!(chosen_by(&rules, &visit.observation, &[false; 3]), None);
+        }
+    }
+
+    #[test]
+    fn where_a_row_is_closed_the_next_acts() {
+        let mut visits: Vec<Visit> = (0..20).map(|_| visit(5.0, 14.0, 0, 2.0)).collect();
+        for visit in &mut visits[..8] {
+            (visit.open[0], visit.best) = (false, 1);
+            visit.q_values = vec![2.0, 1.0, 0.5];
+        }
+        let rules = distilled(&visits, &[variable_index("ego_speed").unwrap()], 4, 4);
+        assert_eq!(rules, [PolicyRule { conditions: Vec::new(), rows: vec![0, 1] }]);
+        assert_eq!(chosen_by(&rules, &visits[0].observation, &visits[0].open), Some(1));
+    }
+
+    #[test]
+    fn narrower_tests_replace_wider_ones() {
+        let test = |comparison, value| Condition { variable: 18, comparison, value };
+        let mut conditions = vec![
+            test(Comparison::LessEqual, 9.0),
+            test(Comparison::Greater, 1.0),
+            test(Comparison::LessEqual, 5.0),
+        ];
+        simplify(&mut conditions);
+        assert_eq!(conditions, [test(Comparison::Greater, 1.0), test(Comparison::LessEqual, 5.0)]);
+    }
 }

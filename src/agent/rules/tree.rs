@@ -239,11 +239,11 @@ fn shortest(low: f32, high: f32) -> f64 {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::model::policy::variable_index;
 
-    pub(in crate::agent::rules) fn visit(speed_mps: f32, hour: f32, best: usize, stake: f32) -> Visit {
+    pub fn visit(speed_mps: f32, hour: f32, best: usize, stake: f32) -> Visit {
         let mut observation = Observation::zeros();
         observation.state[18] = speed_mps;
         observation.state[1] = hour;

@@ -16,10 +16,10 @@ mod scenario_value;
 mod settings;
 mod unused;
 
-pub(super) use road::Maps;
 pub(super) use expression::exact_digits;
 pub(super) use expression::unknown_unit;
 pub(super) use names::unknown;
+pub(super) use road::Maps;
 pub(super) use scenario::row;
 pub use scenario::scenario;
 

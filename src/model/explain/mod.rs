@@ -94,6 +94,10 @@ pub const PAGES: &[Page] = &[
     page!("AV0702"),
     page!("AV0703"),
     page!("AV0704"),
+    page!("AV0705"),
+    page!("AV0706"),
+    page!("AV0707"),
+    page!("AV0708"),
     page!("AV0801"),
     page!("AV0802"),
 ];

@@ -104,8 +104,7 @@ impl Side {
     fn and(&self, condition: &Condition) -> Side {
         match (self, VARIABLES[condition.variable].kind) {
             (Side::Words(words), VariableKind::Words { words: all, .. }) => {
-                let holds =
-                    |at: &usize| condition.comparison.holds(f64::from(all[*at].1), condition.value);
+                let holds = |at: &usize| condition.comparison.holds(f64::from(all[*at].1), condition.value);
                 Side::Words((0..all.len()).filter(holds).map(|at| 1 << at).sum::<u32>() & words)
             }
             (Side::Numbers(interval), _) => {
@@ -156,8 +155,7 @@ impl Side {
 }
 
 /// No number at all.
-const NOTHING: Interval =
-    Interval { low: End::At(Rational::ONE, true), high: End::At(Rational::ZERO, true) };
+const NOTHING: Interval = Interval { low: End::At(Rational::ONE, true), high: End::At(Rational::ZERO, true) };
 
 #[cfg(test)]
 mod tests {
@@ -179,7 +177,11 @@ mod tests {
         let day = all.and(&condition("time", Comparison::NotEqual, 20.0));
         assert!(all.is_covered(&[low.clone(), high.clone()]));
         assert!(!all.is_covered(&[open.clone(), high.clone()]));
-        assert!(all.is_covered(&[night.clone(), low.clone(), day.and(&condition("ego_speed", Comparison::Greater, 5.0))]));
+        assert!(all.is_covered(&[
+            night.clone(),
+            low.clone(),
+            day.and(&condition("ego_speed", Comparison::Greater, 5.0))
+        ]));
         assert!(!all.is_covered(&[night, low]));
         assert!(all.and(&condition("throttle", Comparison::Greater, 100.0)).is_empty());
         assert!(all.and(&condition("rain", Comparison::Less, 0.0)).is_empty());

@@ -352,7 +352,9 @@ fn illegal(
 fn dead(space: &Space, origin: &PolicyOrigin, row: &Row) -> Option<String> {
     let roads = space.roads.iter().zip(&row.roads).filter(|(road, _)| origin.roads.contains(&road.name));
     let mut reasons = roads.map(|(road, reach)| match reach {
-        Reach::Dead { rules, reason } if !rules.iter().any(|&rule| origin.without.contains(&space.rules[rule].name)) => {
+        Reach::Dead { rules, reason }
+            if !rules.iter().any(|&rule| origin.without.contains(&space.rules[rule].name)) =>
+        {
             Some(format!("on `{}`: {reason}", road.name))
         }
         Reach::Dead { .. } | Reach::Open(_) => None,

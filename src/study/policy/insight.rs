@@ -175,8 +175,9 @@ fn mean(visits: &[&Visit]) -> Observation {
         let value = match described.kind {
             VariableKind::Quantity { .. } => average(visits, variable) as f32,
             VariableKind::Words { words, .. } => {
-                let count =
-                    |value: f32| visits.iter().filter(|visit| visit.observation.get(variable) == value).count();
+                let count = |value: f32| {
+                    visits.iter().filter(|visit| visit.observation.get(variable) == value).count()
+                };
                 let most = |best: f32, value: f32| if count(value) > count(best) { value } else { best };
                 words.iter().map(|(_, value)| *value).reduce(most).unwrap_or(0.0)
             }

@@ -66,8 +66,15 @@ pub(in crate::study) fn evaluate_visiting(
     let table = with_period(table, policy.settings().observation_period_s);
     let arena = Arena::new(table, roads, ads, rules)?;
     let mut traces = Sha256::new();
-    let mut found =
-        Evaluation { episodes, seed, collisions: 0, counted: 0, colliding: 0, return_mean: 0.0, trace: [0; 32] };
+    let mut found = Evaluation {
+        episodes,
+        seed,
+        collisions: 0,
+        counted: 0,
+        colliding: 0,
+        return_mean: 0.0,
+        trace: [0; 32],
+    };
     let mut sum = 0.0;
     for number in 0..episodes * arena.roads() as u64 {
         let seed = rng::child_seed(seed, Stream::Evaluation, number);
