@@ -149,11 +149,20 @@ impl QPolicy {
         self.network.q_values(inputs).index_axis_move(Axis(0), 0)
     }
 
-    /// Rows to choose from, shape `(rows,)`.
-    pub fn open(&self, legal: ArrayView1<bool>) -> Vec<bool> {
-        let masks = self.settings.masks_choice;
-        let rows = self.rows.allowed.iter().zip(legal).enumerate();
-        rows.map(|(row, (&allowed, &legal))| allowed && (legal || !masks) && self.gate_is_open(row)).collect()
+    /// Rows to choose from, shape `(rows,)`. Rules choose among legal rows whatever the settings say.
+    pub(super) fn open(&self, legal: ArrayView1<bool>) -> Vec<bool> {
+        let masks = self.settings.masks_choice || self.rules.is_some();
+        self.allowed_now(legal.iter().map(|&legal| legal || !masks))
+    }
+
+    /// Rows to choose from that are legal, shape `(rows,)`.
+    pub fn legal_rows(&self, legal: ArrayView1<bool>) -> Vec<bool> {
+        self.allowed_now(legal.iter().copied())
+    }
+
+    fn allowed_now(&self, candidates: impl Iterator<Item = bool>) -> Vec<bool> {
+        let rows = self.rows.allowed.iter().zip(candidates).enumerate();
+        rows.map(|(row, (&allowed, candidate))| allowed && candidate && self.gate_is_open(row)).collect()
     }
 
     /// The published package's gate: weather and time change seldom, and never to what they are.
@@ -175,7 +184,7 @@ impl QPolicy {
     }
 
     /// The row that it takes when it does not explore.
-    pub fn decide(&self, observation: &Observation, open: &[bool]) -> Option<usize> {
+    fn decide(&self, observation: &Observation, open: &[bool]) -> Option<usize> {
         match &self.rules {
             Some(rules) => chosen_by(rules, observation, open),
             None => self.greedy(observation, open),

@@ -38,6 +38,10 @@ pub fn distill(output: &Output, arguments: &DistillArguments) -> Result<(), Fail
         return Err(Failure::usage(format!("`{path}` makes no claims: train it with `avastra train`")));
     }
     let acting = acting(&table, &policy, Face::Network)?;
+    if acting.settings().rules_leaves == 0 {
+        let message = "the policy was trained with `rules_leaves: 0`: say how many with `--leaves N`";
+        return Err(Failure::usage(message));
+    }
     let policy = with_rules(&table, &acting, policy)?;
     let path = arguments.output.clone().unwrap_or_else(|| {
         let stem = arguments.file.file_stem().unwrap_or_default().to_string_lossy();

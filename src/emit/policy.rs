@@ -15,6 +15,7 @@ use crate::model::policy::seal;
 use crate::model::policy::weights_to_lines;
 use crate::syntax::LANGUAGE;
 use crate::syntax::ast;
+use crate::syntax::ast::Arg;
 use crate::syntax::ast::BinaryOp;
 use crate::syntax::ast::Call;
 use crate::syntax::ast::Expr;
@@ -103,13 +104,13 @@ fn condition(condition: &Condition) -> Expr {
     Expr::built(ExprKind::Binary { op, op_span: Span::NONE, left, right })
 }
 
-/// The call that names a row.
+/// The call that names a row, its values in the order of the axes.
 fn call(space: &Space, row: usize) -> Call {
     let row = &space.rows[row];
     let action = &space.actions[row.action];
     let axes = action.parameters.iter().filter(|parameter| parameter.axis).zip(&row.axes);
-    let axes = axes.map(|(axis, (name, value))| (name.to_string(), tree::value(space, *value, axis.ty)));
-    tree::call(&action.name, axes.collect())
+    let args = axes.map(|(axis, (_, value))| Arg { name: None, value: tree::value(space, *value, axis.ty) });
+    Call { name: Name::built(&action.name), args: args.collect(), span: Span::NONE }
 }
 
 /// A struct as fields, in its own order.

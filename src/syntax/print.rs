@@ -641,10 +641,9 @@ fn policy_line(line: &PolicyLine) -> Layout {
         None => Layout::text("_"),
         Some(condition) => Layout::row([Layout::text("when "), expression(condition)]),
     };
-    let mut parts = vec![condition, Layout::text(" => ")];
+    let mut actions = Vec::new();
     for (at, action) in line.actions.iter().enumerate() {
-        parts.extend((at > 0).then(|| Layout::text(" | ")));
-        parts.push(call(action));
+        actions.extend([Layout::Line, Layout::text(if at == 0 { "" } else { "| " }), call(action)]);
     }
-    Layout::Row(parts)
+    Layout::group([condition, Layout::text(" =>"), Layout::nest(actions)])
 }

@@ -8,7 +8,7 @@ use crate::mdp::Observation;
 use crate::model::policy::Comparison;
 use crate::model::policy::Condition;
 use crate::model::policy::PolicyRule;
-use crate::model::policy::VARIABLES;
+use crate::model::policy::variable_index;
 
 use super::tree::Bounds;
 use super::tree::Tree;
@@ -41,15 +41,10 @@ pub fn distilled(visits: &[Visit], variables: &[usize], leaves: usize, depth: us
 
 /// The variables that a reader understands: the sky's three in place of the packed number.
 fn readable(variables: &[usize]) -> Vec<usize> {
-    let index = |name| crate::model::policy::variable_index(name).expect("it is a variable");
+    let index = |name| variable_index(name).expect("it is a variable");
     let (packed, sky) = (index("weather"), ["rain", "fog", "wetness"].map(index));
-    let mut readable: Vec<usize> = variables
-        .iter()
-        .flat_map(|&variable| if variable == packed { sky.to_vec() } else { vec![variable] })
-        .collect();
-    readable.dedup();
-    debug_assert!(readable.iter().all(|&variable| variable < VARIABLES.len()));
-    readable
+    let parts = |&variable: &usize| if variable == packed { sky.to_vec() } else { vec![variable] };
+    variables.iter().flat_map(parts).collect()
 }
 
 /// A tree with the rows of its leaves, the dearest first.
@@ -163,7 +158,6 @@ fn simplify(conditions: &mut Vec<Condition>) {
 mod tests {
     use super::*;
     use crate::agent::rules::tree::tests::visit;
-    use crate::model::policy::variable_index;
 
     #[test]
     fn a_tree_becomes_a_list_that_says_the_same() {

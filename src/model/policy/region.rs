@@ -41,7 +41,7 @@ impl Region {
         Region(VARIABLES.iter().map(|variable| side(&variable.kind)).collect())
     }
 
-    /// What a condition leaves of it. Two pieces at most where the condition cuts a hole.
+    /// What a condition leaves of it.
     pub fn and(&self, condition: &Condition) -> Region {
         let mut region = self.clone();
         let side = &mut region.0[condition.variable];

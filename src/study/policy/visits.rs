@@ -13,8 +13,8 @@ use crate::study::arena::Arena;
 use crate::study::arena::carry_out;
 use crate::study::arena::legal;
 
-/// Lets a policy choose, and shows the state that it chooses in. States in which nothing is open are
-/// left out.
+/// Lets a policy choose, and shows the state that it chooses in with its legal rows, also where the policy
+/// itself would not ask what is legal. States in which nothing is legal are left out.
 pub fn visit(
     table: &ActionTable,
     policy: &mut QPolicy,
@@ -23,7 +23,7 @@ pub fn visit(
 ) -> Choice {
     let offers = table.offers(moment.situation);
     let legal = legal(&offers);
-    let open = policy.open(legal.view());
+    let open = policy.legal_rows(legal.view());
     if let Some(best) = policy.greedy(moment.observation, &open) {
         let q_values = policy.q_values(moment.observation).to_vec();
         visited(Visit { observation: moment.observation.clone(), open, q_values, best });
