@@ -13,6 +13,7 @@ mod fmt;
 mod load;
 mod new;
 mod output;
+mod parallel;
 mod progress;
 mod render;
 mod replay;

@@ -11,6 +11,7 @@ use crate::agent::Kind;
 use crate::emit;
 use crate::model::Space;
 use crate::sim::ENGINE;
+use crate::study::Profile;
 use crate::study::TrainSettings;
 use crate::study::TrainedEpisode;
 use crate::study::Training;
@@ -69,6 +70,7 @@ fn begun(output: &Output, arguments: &TrainArguments) -> Result<(Training, RunDi
     } else {
         arguments.road.clone()
     };
+    let profile = arguments.ads_config.as_deref().map(load::profile).transpose()?;
     let settings = TrainSettings {
         avastra: VERSION.to_owned(),
         engine: ENGINE.to_owned(),
@@ -76,6 +78,7 @@ fn begun(output: &Output, arguments: &TrainArguments) -> Result<(Training, RunDi
         space_digest: space.digest.clone(),
         roads,
         ads: arguments.ads.clone(),
+        profile: profile.as_ref().map(Profile::new),
         agent: arguments.agent.clone(),
         episodes: arguments.episodes,
         seed: arguments.seed,
@@ -177,8 +180,8 @@ fn finish(output: &Output, training: &Training, directory: &RunDirectory) -> Res
     let table = training.table().clone();
     let rules = (settings.with.as_slice(), settings.without.as_slice());
     let roads = &settings.roads;
-    let evaluation =
-        evaluate(table, training.policy(), roads, &settings.ads, rules, (EVALUATION_EPISODES, settings.seed));
+    let (ads, test) = (training.arena().ads(), (EVALUATION_EPISODES, settings.seed));
+    let evaluation = evaluate(table, training.policy(), roads, ads, rules, test);
     let evaluation = evaluation.map_err(|error| Failure::usage(error.to_string()))?;
     let path = write_policy(training, &evaluation, &directory.path)?;
     let totals =

@@ -86,6 +86,12 @@ fn origin(settings: &TrainSettings) -> PolicyOrigin {
         episodes: u64::from(settings.episodes),
         roads: settings.roads.clone(),
         ads: settings.ads.clone(),
+        profile: settings
+            .profile
+            .as_ref()
+            .map(|profile| profile.settings.to_line())
+            .filter(|line| !line.is_empty()),
+        profile_digest: settings.profile.as_ref().map(|profile| profile.digest.clone()),
         engine: settings.engine.clone(),
         avastra: settings.avastra.clone(),
         with: settings.with.clone(),

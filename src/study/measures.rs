@@ -1,10 +1,13 @@
-//! Measures of danger, taken while an episode is played.
+//! Measures of danger, and the shapes of ways to collisions, taken while an episode is played.
 
 use crate::episode::EpisodeLog;
 use crate::mdp::Criticality;
 use crate::mdp::Encroachment;
 use crate::sim::Contact;
 use crate::sim::World;
+
+use super::shape::Shape;
+use super::shape::Trail;
 
 /// A watch that takes them.
 #[derive(Debug, Clone, Default)]
@@ -13,11 +16,15 @@ pub struct Measures {
     moments: Vec<(f64, Criticality)>,
     encroachment: Encroachment,
     hit: Vec<u32>,
+    trail: Trail,
+    shapes: Vec<Option<Shape>>,
 }
 
 impl Measures {
     /// Takes in a tick.
     pub fn note(&mut self, world: &World, contacts: &[Contact]) {
+        self.trail.note(world);
+        self.shapes.extend(contacts.iter().map(|_| self.trail.shape()));
         self.hit.extend(contacts.iter().map(|contact| contact.obstacle));
         let mut now = Criticality::default();
         now.note(world, &|id| self.hit.contains(&id));
@@ -39,5 +46,10 @@ impl Measures {
             }
         }
         (steps, self.encroachment.least_s(&|id| self.hit.contains(&id)))
+    }
+
+    /// The shape of the ego vehicle's way to each collision.
+    pub fn shapes(&self) -> &[Option<Shape>] {
+        &self.shapes
     }
 }

@@ -4,6 +4,7 @@ use sha2::Digest;
 use sha2::Sha256;
 
 use crate::action::ActionTable;
+use crate::ads::Selected;
 use crate::agent::Agent;
 use crate::agent::QPolicy;
 use crate::episode;
@@ -35,17 +36,18 @@ pub struct Evaluation {
 /// Plays so many episodes on each road with a policy. `rules` are those switched on and off.
 ///
 /// # Errors
-/// If a road, the driving system or a rule does not exist.
+/// If a road or a rule does not exist.
 pub fn evaluate(
     table: ActionTable,
     policy: &QPolicy,
     roads: &[String],
-    ads: &str,
+    ads: &Selected,
     rules: (&[String], &[String]),
     (episodes, seed): (u64, u64),
 ) -> Result<Evaluation, RunError> {
     let table = with_period(table, policy.settings().observation_period_s);
-    let arena = Arena::new(table, roads, ads, rules)?;
+    let mut arena = Arena::new(table, roads, ads.name(), rules)?;
+    arena.set_ads(ads.clone());
     let mut traces = Sha256::new();
     let mut found = Evaluation { episodes, seed, collisions: 0, counted: 0, colliding: 0, trace: [0; 32] };
     for number in 0..episodes * arena.roads() as u64 {

@@ -33,6 +33,7 @@ use crate::rng::Stream;
 use crate::study::arena::Arena;
 use crate::study::arena::carry_out;
 use crate::study::arena::legal;
+use crate::study::profile::Profile;
 use crate::study::run::RunError;
 use crate::study::run::check_episodes;
 use crate::study::summary::EpisodeSummary;
@@ -53,6 +54,9 @@ pub struct TrainSettings {
     /// Episodes go round them, one each.
     pub roads: Vec<String>,
     pub ads: String,
+    /// Settings of the driving system, if it was given any; without them it is as it comes.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub profile: Option<Profile>,
     pub agent: String,
     /// Episodes on all roads together.
     pub episodes: u32,
@@ -245,7 +249,11 @@ fn prepared(table: ActionTable, settings: &TrainSettings) -> Result<(Arena, Arc<
     let table = with_period(table, settings.hyperparameters.observation_period_s);
     let rows = Arc::new(Rows::new(&table, &settings.hyperparameters.actions)?);
     let rules = (settings.with.as_slice(), settings.without.as_slice());
-    Ok((Arena::new(table, &settings.roads, &settings.ads, rules)?, rows))
+    let mut arena = Arena::new(table, &settings.roads, &settings.ads, rules)?;
+    if let Some(profile) = &settings.profile {
+        arena.set_profile(profile)?;
+    }
+    Ok((arena, rows))
 }
 
 /// The table with another observation period.
