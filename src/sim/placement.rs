@@ -5,8 +5,6 @@
 //! of the published package (its absolute offsets are not: they ignore the lanes). Traffic drives on
 //! the right.
 
-use std::sync::Arc;
-
 use crate::action::SpawnFacts;
 use crate::action::SpawnRequest;
 use crate::geometry::OrientedBox;
@@ -274,7 +272,7 @@ fn drive_ahead(
         let when = When::Tick(around.tick + (CHANGE_AFTER_S / DT_S + 0.5) as u64);
         plan.push(Manoeuvre { when, towards });
     }
-    Ok(Driver::new(around.scene, Arc::new(way), station_m, Cruise::Commanded(request.speed_mps), plan, 1))
+    Ok(Driver::new(around.scene, way, station_m, Cruise::Commanded(request.speed_mps), plan, 1))
 }
 
 fn overtake(
@@ -320,7 +318,7 @@ fn overtake(
     if request.lane == LaneChoice::Current && !passes(Side::Left) && !passes(Side::Right) {
         return Err("no room to change lanes before the junction".into());
     }
-    Ok(Driver::new(around.scene, Arc::new(way), station_m, Cruise::Commanded(request.speed_mps), plan, 1))
+    Ok(Driver::new(around.scene, way, station_m, Cruise::Commanded(request.speed_mps), plan, 1))
 }
 
 fn drive_opposite(
@@ -347,7 +345,7 @@ fn drive_opposite(
     if request.then == Then::Change && !can_change(around, &way, station_m, Side::Left, request.speed_mps) {
         return Err("no room to change lanes before the junction".into());
     }
-    Ok(Driver::new(around.scene, Arc::new(way), station_m, Cruise::Commanded(request.speed_mps), plan, 1))
+    Ok(Driver::new(around.scene, way, station_m, Cruise::Commanded(request.speed_mps), plan, 1))
 }
 
 fn cross_road(
@@ -453,7 +451,7 @@ fn rendezvous(
     if request.then == Then::Keep {
         return Ok(Driver::new(
             around.scene,
-            Arc::new(way),
+            way,
             station_m,
             Cruise::Commanded(request.speed_mps),
             Vec::new(),
@@ -479,15 +477,8 @@ fn rendezvous(
         reason = "no room to change lanes before the junction";
     }
     let (first, station_m) = found.ok_or(reason)?;
-    let change = Manoeuvre { when: When::Tick(around.tick), towards: Towards::Way(Arc::new(way)) };
-    Ok(Driver::new(
-        around.scene,
-        Arc::new(first),
-        station_m,
-        Cruise::Commanded(request.speed_mps),
-        vec![change],
-        1,
-    ))
+    let change = Manoeuvre { when: When::Tick(around.tick), towards: Towards::Way(way) };
+    Ok(Driver::new(around.scene, first, station_m, Cruise::Commanded(request.speed_mps), vec![change], 1))
 }
 
 fn lane_at(around: &Around, station_m: f64) -> LaneIndex {

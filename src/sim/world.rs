@@ -50,6 +50,7 @@ use super::sense::SensedObject;
 use super::sense::SignalColour;
 use super::sense::visible_fraction;
 use super::signals::SignalClock;
+use super::way::Ways;
 
 /// Name of this simulated world. Raised whenever the same seed no longer gives the same episode, so
 /// that an old scenario is told apart from a refuted one.
@@ -79,6 +80,7 @@ pub struct Scene {
     /// Where the ego vehicle is to go.
     pub route: Route,
     areas: ConflictAreas,
+    ways: Ways,
     /// Lanes outside junctions, each with the length of all up to its end, m.
     streets: Vec<(LaneIndex, f64)>,
 }
@@ -91,7 +93,7 @@ impl Scene {
             end_m += lane.centre.length_m();
             streets.push((LaneIndex(index), end_m));
         }
-        Scene { areas: ConflictAreas::new(&map), streets, map, route }
+        Scene { areas: ConflictAreas::new(&map), ways: Ways::default(), streets, map, route }
     }
 
     /// The place at a fraction of all streets laid end to end: every metre is as likely as any other.
@@ -100,6 +102,10 @@ impl Scene {
         let index = self.streets.partition_point(|street| street.1 <= at_m).min(self.streets.len() - 1);
         let begin_m = if index == 0 { 0.0 } else { self.streets[index - 1].1 };
         Some((self.streets[index].0, at_m - begin_m))
+    }
+
+    pub(super) fn ways(&self) -> &Ways {
+        &self.ways
     }
 
     pub(super) fn conflict_areas(&self) -> &ConflictAreas {

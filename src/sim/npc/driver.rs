@@ -275,7 +275,7 @@ impl Driver {
             let mut rng = self.draw(this.id, around);
             if let Some((way, station_m)) = self.way.prolonged(around.scene, self.station_m, &mut rng) {
                 self.insists_to_m += station_m - self.station_m;
-                (self.way, self.station_m) = (Arc::new(way), station_m);
+                (self.way, self.station_m) = (way, station_m);
             }
         }
         if let Some(part) = self.limit_part {
@@ -449,7 +449,7 @@ impl Driver {
         }
         let mut rng = self.draw(this.id, around);
         let way = Way::along(around.scene, &[target], &mut rng)?;
-        Some((Arc::new(way), there.station_m, Some(side)))
+        Some((way, there.station_m, Some(side)))
     }
 
     /// Whether nobody is beside it in another lane, or so fast behind that a second would not do.
