@@ -13,7 +13,8 @@ use crate::rng::Rng;
 use crate::road::LaneIndex;
 use crate::road::RouteStopLine;
 
-use super::world::Scene;
+use super::junction::Area;
+use super::scene::Scene;
 
 /// Lateral acceleration that other drivers accept in a bend, m/s²: upper end of comfort.
 const LATERAL_MPS2: f64 = 3.0;
@@ -35,8 +36,8 @@ pub(super) struct Way {
     lane_bits: u64,
     /// By rising station.
     pub stop_lines: Vec<RouteStopLine>,
-    /// Where others may cross or join, by rising station.
-    pub areas: Vec<WayArea>,
+    /// Where others may cross or join, by rising station on the way.
+    pub areas: Vec<Area>,
     /// Highest speed at each vertex of `path`, m/s.
     speeds_mps_max: Vec<f64>,
     /// Whether lanes go on where it ends.
@@ -45,20 +46,6 @@ pub(super) struct Way {
 
 /// Lanes that begin farther ahead than this matter to nobody yet, m.
 const AHEAD_M: f64 = 150.0;
-
-/// A conflict area on a way.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct WayArea {
-    /// On the way, m.
-    pub from_m: f64,
-    pub to_m: f64,
-    /// The lane that crosses or joins, and where on it, m.
-    pub other: LaneIndex,
-    pub other_from_m: f64,
-    pub other_to_m: f64,
-    /// Whether this way goes before the other lane's.
-    pub goes_first: bool,
-}
 
 #[derive(Debug, Clone, Copy)]
 struct WayLane {
@@ -104,13 +91,11 @@ impl Way {
                     .iter()
                     .map(|line| RouteStopLine { station_m: from_m + line.station_m, signal: line.signal }),
             );
-            areas.extend(scene.conflict_areas().of(*index).iter().map(|area| WayArea {
+            let on_lane = scene.conflict_areas().of(*index).iter();
+            areas.extend(on_lane.map(|area| Area {
                 from_m: from_m + area.from_m,
                 to_m: from_m + area.to_m,
-                other: area.other,
-                other_from_m: area.other_from_m,
-                other_to_m: area.other_to_m,
-                goes_first: area.goes_first,
+                ..*area
             }));
             let tip = centre.points()[centre.points().len() - 1].position;
             end = Some((from_m + centre.length_m(), tip));
