@@ -225,6 +225,7 @@ impl Run {
         let setup = self.setup(number);
         let mut summary = EpisodeSummary::judged(&setup, number, &log, &self.settings.avoidability);
         (summary.criticality, summary.pet_s) = measures.of_steps(&log);
+        summary.manners = measures.manners();
         if self.settings.causes {
             summary.find_causes(&setup, &log).expect("a run with causes is against a system of modules");
         }

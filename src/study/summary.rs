@@ -15,6 +15,8 @@ use crate::oracle::AvoidabilitySettings;
 use crate::oracle::Judgement;
 use crate::oracle::NoModules;
 
+use super::measures::Manners;
+
 /// An episode, judged.
 #[derive(Debug, Clone, PartialEq)]
 pub struct EpisodeSummary {
@@ -25,6 +27,8 @@ pub struct EpisodeSummary {
     pub criticality: Vec<Criticality>,
     /// Least post-encroachment time with anybody who was not hit, s; `None` above 5 s.
     pub pet_s: Option<f64>,
+    /// How the ego vehicle drove, where it was watched.
+    pub manners: Manners,
 }
 
 /// A collision, judged.
@@ -71,7 +75,13 @@ impl EpisodeSummary {
             }
         };
         let collisions = judgements.into_iter().enumerate().map(find).collect();
-        EpisodeSummary { episode: number, collisions, criticality: Vec::new(), pet_s: None }
+        EpisodeSummary {
+            episode: number,
+            collisions,
+            criticality: Vec::new(),
+            pet_s: None,
+            manners: Manners::default(),
+        }
     }
 
     /// Looks for the cause of every counted collision.

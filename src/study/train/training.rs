@@ -33,6 +33,7 @@ use crate::rng::Stream;
 use crate::study::arena::Arena;
 use crate::study::arena::carry_out;
 use crate::study::arena::legal;
+use crate::study::profile::Profile;
 use crate::study::run::RunError;
 use crate::study::run::check_episodes;
 use crate::study::summary::EpisodeSummary;
@@ -53,10 +54,16 @@ pub struct TrainSettings {
     /// Episodes go round them, one each.
     pub roads: Vec<String>,
     pub ads: String,
+    /// Settings of the driving system, if it has any; without them it is as it comes.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub profile: Option<Profile>,
     pub agent: String,
     /// Episodes on all roads together.
     pub episodes: u32,
     pub seed: u64,
+    /// Vehicles of ambient traffic.
+    #[serde(default)]
+    pub ambient: u32,
     /// Rules switched off.
     pub without: Vec<String>,
     /// Optional rules switched on.
@@ -151,7 +158,8 @@ impl Training {
         let Training { arena, settings, learner, next } = self;
         let number = *next;
         let seed = rng::child_seed(settings.seed, Stream::Episode, number as u64);
-        let setup = arena.setup(number % arena.roads(), seed);
+        let mut setup = arena.setup(number % arena.roads(), seed);
+        setup.start.ambient = settings.ambient;
         let exploration_epsilon = learner.exploration_epsilon();
         let mut choices = Vec::new();
         let mut last = None;
@@ -245,11 +253,15 @@ fn prepared(table: ActionTable, settings: &TrainSettings) -> Result<(Arena, Arc<
     let table = with_period(table, settings.hyperparameters.observation_period_s);
     let rows = Arc::new(Rows::new(&table, &settings.hyperparameters.actions)?);
     let rules = (settings.with.as_slice(), settings.without.as_slice());
-    Ok((Arena::new(table, &settings.roads, &settings.ads, rules)?, rows))
+    let mut arena = Arena::new(table, &settings.roads, &settings.ads, rules)?;
+    if let Some(profile) = &settings.profile {
+        arena.set_profile(profile)?;
+    }
+    Ok((arena, rows))
 }
 
 /// The table with another observation period.
-pub(super) fn with_period(table: ActionTable, period_s: Option<f64>) -> ActionTable {
+pub(in crate::study) fn with_period(table: ActionTable, period_s: Option<f64>) -> ActionTable {
     let Some(step_s) = period_s else { return table };
     let mut space = Space::clone(table.space());
     space.episode.step_s = step_s;
