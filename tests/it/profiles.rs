@@ -94,6 +94,8 @@ fn a_profile_with_a_mistake_is_refused_by_name_line_and_remedy() {
             "line 3: `planning.cruise_mps` is 80; write a value from 1 to 40",
         ),
         ("tracking: [1]\n", "line 1: `tracking` is a list; write a section"),
+        ("", "the profile is empty; write what differs"),
+        ("null\n", "the profile is empty; write what differs"),
     ];
     for (text, message) in cases {
         std::fs::write(&file, text).expect("it is writable");
