@@ -37,6 +37,11 @@ pub enum Kind {
 /// Every agent of avastra.
 pub const REGISTRY: &[Entry] = &[
     Entry {
+        name: "none",
+        summary: "nothing happens but ordinary traffic, if there is any",
+        kind: Kind::Ready(|| Box::new(Idle)),
+    },
+    Entry {
         name: "random",
         summary: "uniform over the rows that the rules allow at the moment",
         kind: Kind::Ready(|| Box::new(random::MaskedRandom)),
@@ -57,6 +62,15 @@ pub const REGISTRY: &[Entry] = &[
         kind: Kind::Learning(presets::DEEP_COLLISION),
     },
 ];
+
+/// Never chooses anything.
+struct Idle;
+
+impl Agent for Idle {
+    fn choose(&mut self, _: &Observation, _: ArrayView1<bool>, _: &mut Rng) -> Option<usize> {
+        None
+    }
+}
 
 /// The agent of that name.
 pub fn by_name(name: &str) -> Option<&'static Entry> {
@@ -89,21 +103,26 @@ mod tests {
     }
 
     #[test]
-    fn every_agent_chooses_a_row_and_repeats_itself() {
+    fn every_agent_but_none_chooses_a_row_and_repeats_itself() {
         let legal = Array1::from_vec(vec![false, true, false, true, true]);
         for entry in REGISTRY {
-            let choices = |seed| -> Vec<Vec<usize>> {
+            let choices = |seed| -> Vec<Vec<Option<usize>>> {
                 let choices = |mut agent: Box<dyn Agent>| {
                     let mut rng = stream(seed, Stream::Exploration, 0);
                     agent.begin();
                     let observation = Observation::zeros();
-                    let choose = |_| agent.choose(&observation, legal.view(), &mut rng).unwrap();
+                    let choose = |_| agent.choose(&observation, legal.view(), &mut rng);
                     (0..50).map(choose).collect()
                 };
                 fresh(entry, seed).into_iter().map(choices).collect()
             };
-            assert!(choices(1).iter().flatten().all(|&row| row < legal.len()), "{}", entry.name);
             assert_eq!(choices(1), choices(1), "{}", entry.name);
+            if entry.name == "none" {
+                assert!(choices(1).iter().flatten().all(Option::is_none));
+                continue;
+            }
+            let is_row = |row: &Option<usize>| row.is_some_and(|row| row < legal.len());
+            assert!(choices(1).iter().flatten().all(is_row), "{}", entry.name);
             assert_ne!(choices(1), choices(2), "{}", entry.name);
         }
     }

@@ -22,6 +22,7 @@ mod run;
 mod run_directory;
 mod sarif;
 mod shrink;
+mod study;
 mod test;
 mod train;
 mod trials;
@@ -66,6 +67,7 @@ pub fn main() -> ExitCode {
         Command::Completions(arguments) => completions::completions(&output, arguments),
         Command::Run(arguments) => run::run(&output, arguments),
         Command::Train(arguments) => train::train(&output, arguments),
+        Command::Study(arguments) => study::study(&output, arguments),
         Command::Verify(arguments) => verify::verify(&output, arguments),
         Command::Replay(arguments) => replay::replay(&output, arguments),
         Command::Diagnose(arguments) => diagnose::diagnose(&output, arguments),

@@ -82,6 +82,7 @@ fn begun(output: &Output, arguments: &TrainArguments) -> Result<(Training, RunDi
         agent: arguments.agent.clone(),
         episodes: arguments.episodes,
         seed: arguments.seed,
+        ambient: 0,
         without: arguments.rules.without.clone(),
         with: arguments.rules.with.clone(),
         hyperparameters,

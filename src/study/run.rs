@@ -230,6 +230,7 @@ impl Run {
         for (finding, shape) in summary.collisions.iter_mut().zip(measures.shapes()) {
             finding.shape = *shape;
         }
+        summary.manners = measures.manners();
         if self.settings.causes {
             summary.find_causes(&setup, &log).expect("a run with causes is against a system of modules");
         }

@@ -14,6 +14,7 @@ mod profiles;
 mod references;
 mod road;
 mod rules;
+mod studies;
 mod tables;
 mod traces;
 mod torch;

@@ -61,6 +61,9 @@ pub struct TrainSettings {
     /// Episodes on all roads together.
     pub episodes: u32,
     pub seed: u64,
+    /// Vehicles of ambient traffic.
+    #[serde(default)]
+    pub ambient: u32,
     /// Rules switched off.
     pub without: Vec<String>,
     /// Optional rules switched on.
@@ -155,7 +158,8 @@ impl Training {
         let Training { arena, settings, learner, next } = self;
         let number = *next;
         let seed = rng::child_seed(settings.seed, Stream::Episode, number as u64);
-        let setup = arena.setup(number % arena.roads(), seed);
+        let mut setup = arena.setup(number % arena.roads(), seed);
+        setup.start.ambient = settings.ambient;
         let exploration_epsilon = learner.exploration_epsilon();
         let mut choices = Vec::new();
         let mut last = None;
@@ -257,7 +261,7 @@ fn prepared(table: ActionTable, settings: &TrainSettings) -> Result<(Arena, Arc<
 }
 
 /// The table with another observation period.
-pub(super) fn with_period(table: ActionTable, period_s: Option<f64>) -> ActionTable {
+pub(in crate::study) fn with_period(table: ActionTable, period_s: Option<f64>) -> ActionTable {
     let Some(step_s) = period_s else { return table };
     let mut space = Space::clone(table.space());
     space.episode.step_s = step_s;
