@@ -39,6 +39,8 @@ pub enum Stream {
     Replay = 22,
     /// Seeds of the episodes that a trained policy is judged by.
     Evaluation = 23,
+    /// What a search tries next.
+    Search = 25,
 }
 
 /// The stream of one consumer; `index` tells apart its uses, for example the step number.

@@ -25,6 +25,8 @@ pub struct EpisodeSummary {
     pub criticality: Vec<Criticality>,
     /// Least post-encroachment time with anybody who was not hit, s; `None` above 5 s.
     pub pet_s: Option<f64>,
+    /// Driven in branches, beside the episode, by an agent that tries rows out before it chooses, s.
+    pub branched_s: f64,
 }
 
 /// A collision, judged.
@@ -71,7 +73,7 @@ impl EpisodeSummary {
             }
         };
         let collisions = judgements.into_iter().enumerate().map(find).collect();
-        EpisodeSummary { episode: number, collisions, criticality: Vec::new(), pet_s: None }
+        EpisodeSummary { episode: number, collisions, criticality: Vec::new(), pet_s: None, branched_s: 0.0 }
     }
 
     /// Looks for the cause of every counted collision.
