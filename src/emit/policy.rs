@@ -125,7 +125,7 @@ fn headline(settings: &TrainSettings, evaluation: &Evaluation) -> String {
     format!(
         "{} ({}) after {} episodes on {}: {} counted collisions in {} episodes of its own.",
         settings.agent,
-        settings.hyperparameters.preset,
+        settings.hyperparameters.preset(),
         settings.episodes,
         settings.roads.join(", "),
         evaluation.counted,

@@ -62,6 +62,7 @@ pub use train::TrainSettings;
 pub use train::TrainedEpisode;
 pub use train::Training;
 pub use train::evaluate;
+pub use train::evaluate_agent;
 pub use trial::Cell;
 pub use trial::Count;
 pub use trial::Outcome as TrialOutcome;

@@ -32,6 +32,8 @@ pub struct EpisodeSummary {
     pub pet_s: Option<f64>,
     /// How the ego vehicle drove, where it was watched.
     pub manners: Manners,
+    /// Driven in branches, beside the episode, by an agent that tries rows out before it chooses, s.
+    pub branched_s: f64,
 }
 
 /// A collision, judged.
@@ -93,6 +95,7 @@ impl EpisodeSummary {
             criticality: Vec::new(),
             pet_s: None,
             manners: Manners::default(),
+            branched_s: 0.0,
         }
     }
 
