@@ -110,7 +110,7 @@ impl List<'_> {
             Kind::Variants(of) => self.variants(of, WANTED),
             Kind::Local(name, ty) => {
                 let ty = ty.as_ref().map(Ty::name).unwrap_or_default();
-                self.add(name, VARIABLE, LIKELY, &ty, None);
+                self.add(name, VARIABLE, WANTED, &ty, None);
             }
             Kind::Parameters(action, mode) => {
                 for parameter in declared.actions.get(action).iter().flat_map(|of| &of.of) {

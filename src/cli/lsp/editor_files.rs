@@ -31,6 +31,10 @@ fn grammar() -> Value {
     engine.dedup();
     let facts = [words::SPAWN_FACTS, words::OUTCOME_FACTS, words::STOPS];
     let facts: Vec<Entry> = facts.into_iter().flatten().copied().collect();
+    // These have no name behind them.
+    let nameless = ["language", "use", "optional", "episode", "reward", "expect", "override"];
+    let mut naming = names(words::DECLARATIONS);
+    naming.retain(|word| !nameless.contains(word));
     let rule = |name: &str, pattern: String| json!({ "name": format!("{name}.avastra"), "match": pattern });
     json!({
         "$schema": "https://raw.githubusercontent.com/martinring/tmlanguage/master/tmlanguage.json",
@@ -47,7 +51,7 @@ fn grammar() -> Value {
                 "patterns": [rule("constant.character.escape", r#"\\([\\"nt]|u\{[0-9a-fA-F]+\})"#.to_owned())],
             },
             {
-                "match": format!("{}\\s+([A-Za-z_][A-Za-z0-9_]*)", one_of(names(words::DECLARATIONS))),
+                "match": format!("{}\\s+([A-Za-z_][A-Za-z0-9_]*)", one_of(naming)),
                 "captures": {
                     "1": { "name": "keyword.declaration.avastra" },
                     "2": { "name": "entity.name.avastra" },

@@ -11,6 +11,7 @@ use crate::model::Reach;
 use crate::model::RuleBody;
 use crate::model::Space;
 use crate::syntax::ast::Span;
+use crate::syntax::listed;
 use crate::units;
 use crate::units::Rational;
 
@@ -25,11 +26,19 @@ const LINES_MAX: usize = 12;
 /// The place that is meant by a byte of the document, and Markdown about it.
 pub fn hover(analysis: &Analysis, byte: usize) -> Option<(Span, String)> {
     if let Some(occurrence) = analysis.names.at(Analysis::ROOT, byte) {
-        let texts: Vec<String> =
-            occurrence.symbols.iter().filter_map(|symbol| describe(analysis, symbol)).collect();
-        let first = texts.first()?.clone();
-        // The same parameter of several actions, where a rule names it.
-        let text = if texts.len() > 1 { texts.join("\n\n---\n\n") } else { first };
+        let mut texts: Vec<String> = Vec::new();
+        for symbol in &occurrence.symbols {
+            // A rule names the same parameter of several actions: what is alike is said once.
+            let text = describe(analysis, symbol)?;
+            if !texts.contains(&text) {
+                texts.push(text);
+            }
+        }
+        let mut text = texts.join("\n\n---\n\n");
+        let owners: Vec<&str> = occurrence.symbols.iter().filter_map(owner).collect();
+        if !owners.is_empty() {
+            let _ = write!(text, "\n\nParameter of {}", listed(&owners));
+        }
         return Some((occurrence.span, text));
     }
     let text = analysis.text(Analysis::ROOT);
@@ -37,6 +46,14 @@ pub fn hover(analysis: &Analysis, byte: usize) -> Option<(Span, String)> {
     let meaning = words::keywords().find(|(known, _)| *known == word).map(|(_, meaning)| *meaning)?;
     let span = Span::new(Analysis::ROOT, start, start + word.len());
     Some((span, format!("**{word}**\n\n{meaning}")))
+}
+
+/// The action or function that a parameter is of.
+fn owner(symbol: &Symbol) -> Option<&str> {
+    match symbol {
+        Symbol::Argument(of, _) | Symbol::Parameter(of, _) => Some(of),
+        _ => None,
+    }
 }
 
 /// Markdown about a symbol; `None` where there is nothing to say.
@@ -76,7 +93,7 @@ pub fn describe(analysis: &Analysis, symbol: &Symbol) -> Option<String> {
             let function = declared.functions.get(of)?;
             let (_, ty) = function.of.parameters.iter().find(|(known, _)| known == name)?;
             let ty = ty.as_ref().map_or_else(|| "unknown".to_owned(), super::names::Ty::name);
-            Some(format!("```avastra\n{name}: {ty}\n```\n\nParameter of the function `{of}`"))
+            Some(format!("```avastra\n{name}: {ty}\n```"))
         }
         Symbol::Action(name) => {
             let of = declared.actions.get(name)?;
@@ -139,9 +156,9 @@ fn with_docs(code: &str, docs: &[String]) -> String {
 
 fn parameter(analysis: &Analysis, action: &str, name: &str) -> Option<String> {
     let declared = analysis.names.declared.parameter(action, name)?;
-    let ty = declared.ty.as_ref().map(|ty| format!("Type: `{}`. ", ty.name())).unwrap_or_default();
+    let ty = declared.ty.as_ref().map(|ty| format!("\n\nType: `{}`", ty.name())).unwrap_or_default();
     let code = analysis.slice(declared.span);
-    let mut text = format!("```avastra\n{code}\n```\n\n{ty}Parameter of `{action}`");
+    let mut text = format!("```avastra\n{code}\n```{ty}");
     let Some(space) = analysis.space() else { return Some(text) };
     let Some((index, of)) = find_action(space, action) else { return Some(text) };
     let Some(of) = of.parameters.iter().find(|parameter| *parameter.name == *name) else {
@@ -233,5 +250,6 @@ fn number(digits: &str, word: &str) -> Option<String> {
     let shown = units::decimal((exact.to_f64() * 1e6).round() / 1e6, false);
     let exactly = exact.to_string();
     let exactly = if exactly == shown { String::new() } else { format!(", exactly {exactly}") };
-    Some(format!("`{digits} {word}`: {}\n\n{shown} {si}{exactly}", unit.dimension))
+    let in_si = if word == si { String::new() } else { format!("\n\n{shown} {si}{exactly}") };
+    Some(format!("`{digits} {word}`: {}{in_si}", unit.dimension))
 }

@@ -11,6 +11,7 @@ mod context;
 mod declared;
 mod diagnostics;
 pub mod editor_files;
+mod highlight;
 mod hints;
 mod hover;
 mod names;

@@ -90,6 +90,11 @@ impl Names {
         (before.span.file == file && byte <= before.span.end).then_some(before)
     }
 
+    /// In the order of the text.
+    pub fn in_file(&self, file: FileId) -> impl Iterator<Item = &Occurrence> {
+        self.occurrences.iter().filter(move |occurrence| occurrence.span.file == file)
+    }
+
     /// Where one of the symbols stands.
     pub fn of<'a>(&'a self, symbols: &'a BTreeSet<Symbol>) -> impl Iterator<Item = &'a Occurrence> {
         self.occurrences.iter().filter(|o| o.symbols.iter().any(|symbol| symbols.contains(symbol)))

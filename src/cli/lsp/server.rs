@@ -12,6 +12,7 @@ use crate::syntax;
 
 use super::complete;
 use super::diagnostics;
+use super::highlight;
 use super::hints;
 use super::hover;
 use super::names::Symbol;
@@ -175,6 +176,10 @@ impl Server {
                 let path = self.document(params)?;
                 Ok(outline::symbols(self.analysis(&path)?).into())
             }
+            "textDocument/semanticTokens/full" => {
+                let path = self.document(params)?;
+                Ok(json!({ "data": highlight::tokens(self.analysis(&path)?) }))
+            }
             "textDocument/inlayHint" => {
                 let (path, from, to) = self.span(params)?;
                 Ok(hints::hints(self.analysis(&path)?, from, to).into())
@@ -201,7 +206,7 @@ impl Server {
         }
         let mut spans = analysis.names.declarations(&occurrence.symbols);
         // From an `override` to what it replaces.
-        spans.retain(|span| spans_differ(*span, occurrence.span) || !occurrence.declares);
+        spans.retain(|span| !occurrence.declares || *span != occurrence.span);
         if spans.is_empty() && occurrence.declares {
             spans.push(occurrence.span);
         }
@@ -379,10 +384,6 @@ impl Server {
     }
 }
 
-fn spans_differ(one: syntax::ast::Span, other: syntax::ast::Span) -> bool {
-    one != other
-}
-
 fn byte(analysis: &Analysis, position: &Value, name: &'static str) -> Result<usize, Refusal> {
     let number = |key: &str| position[key].as_u64().and_then(|number| usize::try_from(number).ok());
     let (line, column) = number("line").zip(number("character")).ok_or(Refusal::Params(name))?;
@@ -419,6 +420,10 @@ fn capabilities() -> Value {
             "documentFormattingProvider": true,
             "documentSymbolProvider": true,
             "inlayHintProvider": true,
+            "semanticTokensProvider": {
+                "legend": { "tokenTypes": highlight::TYPES, "tokenModifiers": highlight::MODIFIERS },
+                "full": true,
+            },
             "codeActionProvider": { "codeActionKinds": ["quickfix"] },
         },
         "serverInfo": { "name": "avastra", "version": env!("CARGO_PKG_VERSION") },
