@@ -71,6 +71,11 @@ pub enum Command {
     New(NewArguments),
     /// Print a script by which a shell completes this command line.
     Completions(CompletionsArguments),
+    /// Serve an editor: mistakes as you type, and all else that it asks for, over stdin and stdout.
+    Lsp,
+    /// Write the parts of the VS Code extension that follow from the language.
+    #[command(hide = true)]
+    EditorFiles(EditorFilesArguments),
     /// Play episodes and write the crashes back as scenarios.
     Run(RunArguments),
     /// Train an agent and write what it learned as a policy.
@@ -109,6 +114,12 @@ pub struct CheckArguments {
     /// Make the changes that the diagnostics offer, in the files named here.
     #[arg(long)]
     pub fix: bool,
+}
+
+#[derive(Debug, Args)]
+pub struct EditorFilesArguments {
+    /// The folder of the extension.
+    pub directory: PathBuf,
 }
 
 #[derive(Debug, Args)]

@@ -6,6 +6,7 @@ mod command;
 mod corpus;
 mod contacts;
 mod drives;
+mod editor;
 mod emitted;
 mod failures;
 mod faults;
