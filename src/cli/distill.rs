@@ -67,25 +67,25 @@ pub fn distill(output: &Output, arguments: &DistillArguments) -> Result<(), Fail
 pub fn with_rules(table: &ActionTable, acting: &QPolicy, policy: Policy) -> Result<Policy, Failure> {
     let settings = acting.settings();
     let mut policy = Policy { rules: Vec::new(), ..policy };
-    let Some(claims) = &mut policy.claims else { return Ok(policy) };
+    let Some(mut claims) = policy.claims.take() else { return Ok(policy) };
     claims.rules = None;
     if settings.rules_leaves == 0 {
-        return Ok(policy);
+        return Ok(Policy { claims: Some(claims), ..policy });
     }
     let origin = &policy.origin;
     let rules = (origin.with.as_slice(), origin.without.as_slice());
-    let (roads, ads) = (&origin.roads, &origin.ads);
+    let roads = &origin.roads;
     let failed = |error: study::RunError| Failure::usage(error.to_string());
+    let ads = &study::trained_against(&policy).map_err(failed)?;
     let found = study::distill(table, acting, roads, ads, rules, origin.seed).map_err(failed)?;
     if found.is_empty() {
-        return Ok(policy);
+        return Ok(Policy { claims: Some(claims), ..policy });
     }
     let found = Arc::new(found);
     let test = (claims.episodes, claims.seed);
     let judged = study::judge_rules(table, acting, &found, roads, ads, rules, test).map_err(failed)?;
     claims.rules = Some(judged);
-    policy.rules = found.to_vec();
-    Ok(policy)
+    Ok(Policy { claims: Some(claims), rules: found.to_vec(), ..policy })
 }
 
 /// What the rules are worth, beside the network's return.

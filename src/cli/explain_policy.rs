@@ -4,6 +4,7 @@ use crate::agent::Face;
 use crate::model::policy::values_from;
 use crate::study::Insight;
 use crate::study::insight;
+use crate::study::trained_against;
 
 use super::arguments::ExplainPolicyArguments;
 use super::error::Failure;
@@ -24,7 +25,8 @@ pub fn explain_policy(output: &Output, arguments: &ExplainPolicyArguments) -> Re
     let roads = if arguments.road.is_empty() { &origin.roads } else { &arguments.road };
     let rules = (origin.with.as_slice(), origin.without.as_slice());
     let test = (u64::from(arguments.episodes), arguments.seed, u64::from(arguments.repeats));
-    let found = insight(&table, &acting, &given, roads, &origin.ads, rules, test)
+    let ads = trained_against(&policy).map_err(|error| Failure::usage(error.to_string()))?;
+    let found = insight(&table, &acting, &given, roads, &ads, rules, test)
         .map_err(|error| Failure::usage(error.to_string()))?;
     output.say(&format!(
         "{} on {}: {} of {}, {:.3} of Q-value at stake in each",

@@ -6,8 +6,9 @@ use std::sync::atomic::AtomicBool;
 use std::sync::atomic::Ordering;
 
 use crate::agent;
-use crate::agent::Hyperparameters;
 use crate::agent::Kind;
+use crate::agent::QPolicy;
+use crate::agent::Settings;
 use crate::emit;
 use crate::model::Policy;
 use crate::model::Space;
@@ -16,10 +17,11 @@ use crate::model::policy::PolicyClaims;
 use crate::model::policy::PolicyOrigin;
 use crate::sim::ENGINE;
 use crate::study::Evaluation;
+use crate::study::Profile;
 use crate::study::TrainSettings;
 use crate::study::TrainedEpisode;
 use crate::study::Training;
-use crate::study::evaluate;
+use crate::study::evaluate_agent;
 use crate::study::rounded;
 use crate::syntax::listed;
 
@@ -70,13 +72,14 @@ pub fn train(output: &Output, arguments: &TrainArguments) -> Result<(), Failure>
 fn begun(output: &Output, arguments: &TrainArguments) -> Result<(Training, RunDirectory), Failure> {
     let file = arguments.file.as_ref().expect("clap asks for it where there is no `--resume`");
     let table = load::table(output, file)?;
-    let hyperparameters = hyperparameters(arguments)?;
+    let hyperparameters = settings(arguments)?;
     let space = table.space();
     let roads = if arguments.road.is_empty() {
         space.roads.iter().map(|road| road.name.clone()).collect()
     } else {
         arguments.road.clone()
     };
+    let profile = arguments.ads_config.as_deref().map(load::profile).transpose()?;
     let settings = TrainSettings {
         avastra: VERSION.to_owned(),
         engine: ENGINE.to_owned(),
@@ -84,9 +87,11 @@ fn begun(output: &Output, arguments: &TrainArguments) -> Result<(Training, RunDi
         space_digest: space.digest.clone(),
         roads,
         ads: arguments.ads.clone(),
+        profile: profile.as_ref().map(Profile::new),
         agent: arguments.agent.clone(),
         episodes: arguments.episodes,
         seed: arguments.seed,
+        ambient: 0,
         without: arguments.rules.without.clone(),
         with: arguments.rules.with.clone(),
         hyperparameters,
@@ -98,25 +103,22 @@ fn begun(output: &Output, arguments: &TrainArguments) -> Result<(Training, RunDi
     Ok((training, RunDirectory::open(path)?))
 }
 
-/// The preset that is asked for, as the configuration file changes it.
-fn hyperparameters(arguments: &TrainArguments) -> Result<Hyperparameters, Failure> {
-    let learning = agent::REGISTRY.iter().filter(|entry| matches!(entry.kind, Kind::Learning(_)));
+/// The agent's settings: the preset that is asked for, as the configuration file changes it.
+fn settings(arguments: &TrainArguments) -> Result<Settings, Failure> {
+    let trained = agent::REGISTRY.iter().filter(|entry| !matches!(entry.kind, Kind::Ready(_)));
     let entry = agent::by_name(&arguments.agent).ok_or_else(|| {
-        let known = listed(&learning.map(|entry| entry.name).collect::<Vec<_>>());
+        let known = listed(&trained.map(|entry| entry.name).collect::<Vec<_>>());
         Failure::usage(format!("no agent `{}` that learns: there are {known}", arguments.agent))
     })?;
-    let Kind::Learning(presets) = entry.kind else {
-        let name = entry.name;
-        return Err(Failure::usage(format!(
-            "`{name}` has nothing to learn: `avastra run --agent {name}` plays it"
-        )));
-    };
     let (text, path) = match &arguments.config {
         None => (String::new(), Path::new("--preset")),
         Some(path) => (load::read(path).map_err(|error| Failure::file("read", path, error))?, path.as_path()),
     };
-    Hyperparameters::from_yaml(presets, arguments.preset.as_deref(), &text)
-        .map_err(|error| Failure::file("take", path, error))
+    let settings = Settings::from_yaml(entry, arguments.preset.as_deref(), &text).ok_or_else(|| {
+        let name = entry.name;
+        Failure::usage(format!("`{name}` has nothing to learn: `avastra run --agent {name}` plays it"))
+    })?;
+    settings.map_err(|error| Failure::file("take", path, error))
 }
 
 /// The rest of an interrupted training.
@@ -161,7 +163,7 @@ fn write_critical(
     trained: &TrainedEpisode,
 ) -> Result<(), Failure> {
     let settings = training.settings();
-    if trained.summary.counted() == 0 || settings.hyperparameters.observation_period_s.is_some() {
+    if trained.summary.counted() == 0 || settings.hyperparameters.observation_period_s().is_some() {
         return Ok(());
     }
     let name = format!("{}_{:04}", trained.log.road, trained.summary.episode);
@@ -175,7 +177,8 @@ fn write_critical(
         without: &settings.without,
         with: &settings.with,
     };
-    let file = emit::scenario(training.table(), &trained.log, &trained.summary, &source);
+    let file =
+        emit::scenario(training.table(), &training.log_of_space(&trained.log), &trained.summary, &source);
     write(&directory.critical(&name), &crate::syntax::print(&file))
 }
 
@@ -185,54 +188,67 @@ fn finish(output: &Output, training: &Training, directory: &RunDirectory) -> Res
     let table = training.table().clone();
     let rules = (settings.with.as_slice(), settings.without.as_slice());
     let roads = &settings.roads;
-    let evaluation =
-        evaluate(table, training.policy(), roads, &settings.ads, rules, (EVALUATION_EPISODES, settings.seed));
+    let (ads, test) = (training.arena().ads(), (EVALUATION_EPISODES, settings.seed));
+    let evaluation = evaluate_agent(table, &|| training.actor(), roads, ads, rules, test);
     let evaluation = evaluation.map_err(|error| Failure::usage(error.to_string()))?;
-    output.tell("distilling rules from the network");
-    let policy = policy(training, &evaluation)?;
-    let path = write_policy(&policy, training.table().space(), &directory.path)?;
-    let totals =
-        directory.database.totals().map_err(|error| Failure::file("read", &directory.path, error))?;
+    let kept = training.policy().map(|acting| {
+        output.tell("distilling rules from the network");
+        let policy = policy(training, acting, &evaluation)?;
+        let path = write_policy(&policy, training.table().space(), &directory.path)?;
+        Ok::<_, Failure>((path, policy))
+    });
+    let kept = kept.transpose()?;
+    let read = |error| Failure::file("read", &directory.path, error);
+    let totals = directory.database.totals().map_err(read)?;
+    let simulated_h = directory.database.trained_s().map_err(read)? / 3600.0;
     output.say(&format!(
-        "\n{}: {}, {} counted in {}",
+        "\n{} in {simulated_h:.1} h of simulated time: {}, {} counted in {}",
         plural(totals.episodes as usize, "episode"),
         plural(totals.collisions as usize, "collision"),
         totals.counted,
         plural(totals.episodes_with_counted as usize, "episode"),
     ));
     output.say(&format!(
-        "the policy, on {} of its own: {} counted in {}",
+        "what it learned, on {} of its own: {} counted in {}",
         plural(evaluation.episodes as usize * roads.len(), "episode"),
         plural(evaluation.counted as usize, "collision"),
         plural(evaluation.colliding as usize, "episode"),
     ));
-    if let Some(rules) = policy.claims.as_ref().and_then(|claims| claims.rules.as_ref()) {
-        output.say(&rules_text(policy.rules.len(), evaluation.return_mean, rules));
+    let rules = kept.as_ref().and_then(|(_, policy)| policy.claims.as_ref()?.rules.as_ref());
+    match &kept {
+        Some((path, policy)) => {
+            if let Some(rules) = rules {
+                output.say(&rules_text(policy.rules.len(), evaluation.return_mean, rules));
+            }
+            output.say(&format!("{}\nplay it with: avastra run --policy {}", path.display(), path.display()))
+        }
+        None => output.say(&format!(
+            "a search has no policy file: what it found stands in {}",
+            directory.path.join("critical").display()
+        )),
     }
-    output.say(&format!("{}\nplay it with: avastra run --policy {}", path.display(), path.display()));
     output.result(
         "train",
         serde_json::json!({
-            "directory": directory.path, "totals": totals, "policy": path,
+            "directory": directory.path, "totals": totals, "policy": kept.as_ref().map(|(path, _)| path), "rules": rules, "simulated_h": simulated_h,
             "evaluation": {
                 "episodes": evaluation.episodes * roads.len() as u64, "collisions": evaluation.collisions,
                 "counted": evaluation.counted, "colliding": evaluation.colliding,
-                "return": evaluation.return_mean,
+                "simulated_h": evaluation.simulated_s / 3600.0, "return": evaluation.return_mean,
             },
-            "rules": policy.claims.as_ref().map(|claims| &claims.rules),
         }),
     );
     Ok(())
 }
 
 /// The policy as it is to be kept, with the rules distilled from it and the claims of both.
-fn policy(training: &Training, evaluation: &Evaluation) -> Result<Policy, Failure> {
+fn policy(training: &Training, acting: &QPolicy, evaluation: &Evaluation) -> Result<Policy, Failure> {
     let settings = training.settings();
     let name = match settings.roads.as_slice() {
         [road] => format!("{road}_{}_{}", settings.agent, settings.seed),
         _ => format!("{}_{}", settings.agent, settings.seed),
     };
-    let network = training.policy().network();
+    let network = acting.network();
     let policy = Policy {
         name,
         docs: vec![headline(settings, evaluation)],
@@ -242,6 +258,12 @@ fn policy(training: &Training, evaluation: &Evaluation) -> Result<Policy, Failur
             episodes: u64::from(settings.episodes),
             roads: settings.roads.clone(),
             ads: settings.ads.clone(),
+            profile: settings
+                .profile
+                .as_ref()
+                .map(|profile| profile.settings.to_line())
+                .filter(|line| !line.is_empty()),
+            profile_digest: settings.profile.as_ref().map(|profile| profile.digest.clone()),
             engine: settings.engine.clone(),
             avastra: settings.avastra.clone(),
             with: settings.with.clone(),
@@ -249,7 +271,7 @@ fn policy(training: &Training, evaluation: &Evaluation) -> Result<Policy, Failur
         },
         layers: network.shape().layers.clone(),
         dueling: network.shape().dueling,
-        hyperparameters: training.policy().settings().record(),
+        hyperparameters: acting.settings().record(),
         parameters: network.parameters().to_vec(),
         claims: Some(PolicyClaims {
             episodes: evaluation.episodes,
@@ -264,7 +286,7 @@ fn policy(training: &Training, evaluation: &Evaluation) -> Result<Policy, Failur
         rules: Vec::new(),
         digest: String::new(),
     };
-    distill::with_rules(training.table(), training.policy(), policy)
+    distill::with_rules(training.table(), acting, policy)
 }
 
 /// Writes `policy/NAME.ava`.
@@ -282,7 +304,7 @@ fn headline(settings: &TrainSettings, evaluation: &Evaluation) -> String {
     format!(
         "{} ({}) after {} episodes on {}: {} counted collisions in {} episodes of its own.",
         settings.agent,
-        settings.hyperparameters.preset,
+        settings.hyperparameters.preset(),
         settings.episodes,
         settings.roads.join(", "),
         evaluation.counted,
@@ -292,15 +314,16 @@ fn headline(settings: &TrainSettings, evaluation: &Evaluation) -> String {
 
 fn heading(training: &Training, directory: &Path) -> String {
     let settings = training.settings();
-    let network = training.policy().network();
-    let widths: Vec<String> = network.shape().layers.iter().map(ToString::to_string).collect();
+    let network = training.policy().map_or(String::new(), |policy| {
+        let network = policy.network();
+        let widths: Vec<String> = network.shape().layers.iter().map(ToString::to_string).collect();
+        format!(", network {}, {} parameters", widths.join("-"), network.parameters().len())
+    });
     format!(
-        "{}: {} ({}, network {}, {} parameters) against {}, {} on {}, seed {}, into {}",
+        "{}: {} ({}{network}) against {}, {} on {}, seed {}, into {}",
         training.table().space().path.display(),
         settings.agent,
-        settings.hyperparameters.preset,
-        widths.join("-"),
-        network.parameters().len(),
+        settings.hyperparameters.preset(),
         settings.ads,
         plural(settings.episodes as usize, "episode"),
         settings.roads.join(", "),

@@ -61,7 +61,7 @@ fn file(policy: &Policy, space: &Space, space_path: &str, digest: String) -> Fil
         rules: policy.rules.iter().map(|rule| line(space, rule)).collect(),
     };
     let digest = Some(Text::new(space.digest.clone(), Span::NONE));
-    let space_use = Use { path: Text::new(space_path, Span::NONE), digest };
+    let space_use = Use { path: Text::new(space_path, Span::NONE), digest, without: Vec::new() };
     let docs = policy.docs.iter().map(tree::doc).collect();
     File {
         docs: vec![tree::doc("Emitted by `avastra train`; play it with `avastra run --policy FILE`.")],

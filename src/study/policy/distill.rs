@@ -7,6 +7,8 @@
 use std::sync::Arc;
 
 use crate::action::ActionTable;
+use crate::ads::Selected;
+use crate::agent::Agent;
 use crate::agent::QPolicy;
 use crate::agent::Visit;
 use crate::agent::chosen_by;
@@ -15,28 +17,29 @@ use crate::model::digest_text;
 use crate::model::policy::PolicyRule;
 use crate::model::policy::RulesClaims;
 use crate::rng::Stream;
-use crate::study::arena::Arena;
 use crate::study::run::RunError;
-use crate::study::train::evaluate_visiting;
+use crate::study::train::evaluate_agent;
 use crate::study::train::with_period;
 
+use super::visits::Record;
+use super::visits::arena;
 use super::visits::visits;
 
 /// Rules that imitate a policy, as its settings want them; none if it never came to a choice. `rules`
 /// are those of the space that are switched on and off.
 ///
 /// # Errors
-/// If a road, the driving system or a rule does not exist.
+/// If a road or a rule does not exist.
 pub fn distill(
     table: &ActionTable,
     policy: &QPolicy,
     roads: &[String],
-    ads: &str,
+    ads: &Selected,
     rules: (&[String], &[String]),
     seed: u64,
 ) -> Result<Vec<PolicyRule>, RunError> {
     let settings = policy.settings();
-    let arena = Arena::new(with_period(table.clone(), settings.observation_period_s), roads, ads, rules)?;
+    let arena = arena(table, policy, roads, ads, rules)?;
     let episodes = u64::from(settings.rules_episodes);
     let mut lessons: Vec<Visit> = Vec::new();
     let mut student = policy.clone();
@@ -62,18 +65,22 @@ pub fn judge_rules(
     policy: &QPolicy,
     found: &Arc<Vec<PolicyRule>>,
     roads: &[String],
-    ads: &str,
+    ads: &Selected,
     rules: (&[String], &[String]),
     test: (u64, u64),
 ) -> Result<RulesClaims, RunError> {
-    let (mut states, mut same, mut lost) = (0_u64, 0_u64, 0.0);
     let student = policy.with_rules(found.clone());
-    let evaluation = evaluate_visiting(table.clone(), &student, roads, ads, rules, test, &mut |visit| {
+    let record = Record::default();
+    let at_its_pace = with_period(table.clone(), policy.settings().observation_period_s);
+    let make = || -> Box<dyn Agent> { Box::new(record.of(&student)) };
+    let evaluation = evaluate_agent(at_its_pace, &make, roads, ads, rules, test)?;
+    let (mut states, mut same, mut lost) = (0_u64, 0_u64, 0.0);
+    for visit in record.visits() {
         let row = chosen_by(found, &visit.observation, &visit.open);
         states += 1;
         same += u64::from(row == Some(visit.best));
         lost += visit.loss(row);
-    })?;
+    }
     let count = states.max(1) as f64;
     Ok(RulesClaims {
         states,

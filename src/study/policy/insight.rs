@@ -2,6 +2,7 @@
 //! state, and which variables matter to it.
 
 use crate::action::ActionTable;
+use crate::ads::Selected;
 use crate::agent::QPolicy;
 use crate::agent::Visit;
 use crate::mdp::Observation;
@@ -9,13 +10,12 @@ use crate::model::policy::VARIABLES;
 use crate::model::policy::VariableKind;
 use crate::model::policy::variable_index;
 use crate::rng::Stream;
-use crate::study::arena::Arena;
 use crate::study::run::RunError;
-use crate::study::train::with_period;
 
 use super::importance::Importance;
 use super::importance::importance;
 use super::importance::set;
+use super::visits::arena;
 use super::visits::visits;
 
 /// What was found.
@@ -67,18 +67,17 @@ const TELLING: usize = 3;
 /// `rules` are those of the space that are switched on and off.
 ///
 /// # Errors
-/// If a road, the driving system or a rule does not exist.
+/// If a road or a rule does not exist.
 pub fn insight(
     table: &ActionTable,
     policy: &QPolicy,
     given: &[(usize, f32)],
     roads: &[String],
-    ads: &str,
+    ads: &Selected,
     rules: (&[String], &[String]),
     (episodes, seed, repeats): (u64, u64, u64),
 ) -> Result<Insight, RunError> {
-    let period_s = policy.settings().observation_period_s;
-    let arena = Arena::new(with_period(table.clone(), period_s), roads, ads, rules)?;
+    let arena = arena(table, policy, roads, ads, rules)?;
     let visits = visits(&arena, policy, episodes, (seed, Stream::Evaluation, 0));
     let all: Vec<&Visit> = visits.iter().collect();
     let mut observation = mean(&all);

@@ -13,4 +13,3 @@ pub use insight::Insight;
 pub use insight::RowUse;
 pub use insight::State;
 pub use insight::insight;
-pub(super) use visits::visit;

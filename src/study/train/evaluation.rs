@@ -4,15 +4,15 @@ use sha2::Digest;
 use sha2::Sha256;
 
 use crate::action::ActionTable;
+use crate::ads::Selected;
 use crate::agent::Agent;
 use crate::agent::QPolicy;
-use crate::agent::Visit;
 use crate::episode;
 use crate::oracle::AvoidabilitySettings;
 use crate::rng;
 use crate::rng::Stream;
 use crate::study::arena::Arena;
-use crate::study::policy::visit;
+use crate::study::arena::choose;
 use crate::study::run::RunError;
 use crate::study::summary::EpisodeSummary;
 
@@ -33,38 +33,40 @@ pub struct Evaluation {
     pub return_mean: f64,
     /// SHA-256 over the traces of all episodes, in order.
     pub trace: [u8; 32],
+    /// Time driven, branches included, s.
+    pub simulated_s: f64,
 }
 
 /// Plays so many episodes on each road with a policy. `rules` are those switched on and off.
 ///
 /// # Errors
-/// If a road, the driving system or a rule does not exist.
+/// If a road or a rule does not exist.
 pub fn evaluate(
     table: ActionTable,
     policy: &QPolicy,
     roads: &[String],
-    ads: &str,
+    ads: &Selected,
     rules: (&[String], &[String]),
-    test: (u64, u64),
+    (episodes, seed): (u64, u64),
 ) -> Result<Evaluation, RunError> {
-    evaluate_visiting(table, policy, roads, ads, rules, test, &mut |_| {})
+    let table = with_period(table, policy.settings().observation_period_s);
+    evaluate_agent(table, &|| Box::new(policy.clone()), roads, ads, rules, (episodes, seed))
 }
 
-/// The same; `visited` is shown every state that the policy came to.
+/// The same with any agent: `make` gives a fresh one for each episode.
 ///
 /// # Errors
 /// As [`evaluate`].
-pub(in crate::study) fn evaluate_visiting(
+pub fn evaluate_agent(
     table: ActionTable,
-    policy: &QPolicy,
+    make: &dyn Fn() -> Box<dyn Agent>,
     roads: &[String],
-    ads: &str,
+    ads: &Selected,
     rules: (&[String], &[String]),
     (episodes, seed): (u64, u64),
-    visited: &mut dyn FnMut(Visit),
 ) -> Result<Evaluation, RunError> {
-    let table = with_period(table, policy.settings().observation_period_s);
-    let arena = Arena::new(table, roads, ads, rules)?;
+    let mut arena = Arena::new(table, roads, ads.name(), rules)?;
+    arena.set_ads(ads.clone());
     let mut traces = Sha256::new();
     let mut found = Evaluation {
         episodes,
@@ -74,14 +76,15 @@ pub(in crate::study) fn evaluate_visiting(
         colliding: 0,
         return_mean: 0.0,
         trace: [0; 32],
+        simulated_s: 0.0,
     };
     let mut sum = 0.0;
     for number in 0..episodes * arena.roads() as u64 {
         let seed = rng::child_seed(seed, Stream::Evaluation, number);
         let setup = arena.setup((number % arena.roads() as u64) as usize, seed);
-        let mut agent = policy.clone();
+        let mut agent = make();
         agent.begin();
-        let mut choose = |moment: &episode::Moment| visit(arena.table(), &mut agent, moment, visited);
+        let mut choose = |moment: &episode::Moment| choose(agent.as_mut(), moment);
         let log = episode::run(&setup, &mut choose, &mut |_, _, _| {});
         let settings = AvoidabilitySettings::default();
         let counted = EpisodeSummary::judged(&setup, number as usize, &log, &settings).counted() as u64;
@@ -89,6 +92,7 @@ pub(in crate::study) fn evaluate_visiting(
         found.collisions += log.collisions.len() as u64;
         found.counted += counted;
         found.colliding += u64::from(counted > 0);
+        found.simulated_s += log.duration_s + agent.branched_s();
         traces.update(log.trace());
     }
     let return_mean = sum / (episodes * arena.roads() as u64).max(1) as f64;

@@ -6,7 +6,7 @@ mod training;
 
 pub use evaluation::Evaluation;
 pub use evaluation::evaluate;
-pub(super) use evaluation::evaluate_visiting;
+pub use evaluation::evaluate_agent;
 pub use record::Checkpoint;
 pub use training::TrainSettings;
 pub use training::TrainedEpisode;
