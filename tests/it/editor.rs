@@ -336,6 +336,9 @@ fn hovers_say_what_the_compiler_knows() {
         let said = editor.hover(&text).replace(&root().display().to_string(), "…");
         all.push_str(&format!("## {name}\n\n{said}\n\n"));
     }
+    let exact = editor.hover("language 1\nlet fast = 50 km|/h\n");
+    all.push_str(&format!("## 50 km/h\n\n{exact}\n\n"));
+    editor.write(&space_uri(), &shipped());
     // The name of a parameter itself, and a broken line elsewhere: what was known before still is.
     let broken = marked("any vehicle: Vehicle,\n  any colour: Colour,\n  any sp")
         .replace("group environment =", "group environment = = =");

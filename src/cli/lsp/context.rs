@@ -31,7 +31,8 @@ pub enum Kind {
     Operators,
     /// Variants of an enum.
     Variants(String),
-    Local(String, Option<Ty>),
+    /// A parameter; whether its type is the wanted one.
+    Local(String, Option<Ty>, bool),
     /// Parameters of an action, and how they get their values.
     Parameters(String, ParamMode),
     /// Files with this extension, beside the document; the path so far.
@@ -159,7 +160,12 @@ impl<'a> Place<'a> {
     fn kinds(&self) -> Vec<Kind> {
         match (self.last(0), self.last(1)) {
             ("", _) => return vec![Kind::Declarations],
-            ("override", _) => return vec![Kind::Declarations],
+            ("override", _) => {
+                let fixed = ["language", "use", "expect", "scenario", "policy", "override"];
+                let declarations = words::DECLARATIONS.iter().copied();
+                let open = declarations.filter(|(word, _)| !fixed.contains(word));
+                return vec![Kind::Words(open.collect())];
+            }
             ("optional", _) => return vec![Kind::Keyword("rule")],
             (".", "road") => return vec![Kind::Words(words::ROAD_FACTS.to_vec())],
             _ => {}
@@ -224,8 +230,12 @@ impl<'a> Place<'a> {
                 ":" if self.open.len() == 1 => vec![Kind::Types],
                 "each" | "any" => Vec::new(),
                 _ if self.open.len() == 1 && !self.wants_operand() => {
-                    let mut kinds = vec![Kind::Keyword("in"), Kind::Keyword("where")];
-                    kinds.extend(if self.fresh_line { each_or_any } else { vec![Kind::Operators] });
+                    let colon = self.tokens.iter().rposition(|token| token.text == ":").unwrap_or(0);
+                    let has = |word: &str| self.tokens[colon..].iter().any(|token| token.text == word);
+                    let mut kinds: Vec<Kind> =
+                        ["in", "where"].into_iter().filter(|word| !has(word)).map(Kind::Keyword).collect();
+                    kinds.extend((has("in") || has("where")).then_some(Kind::Operators));
+                    kinds.extend(if self.fresh_line { each_or_any } else { Vec::new() });
                     kinds
                 }
                 _ => self.value(self.declared_type()),
@@ -436,9 +446,14 @@ impl<'a> Place<'a> {
         if !self.wants_operand() {
             return self.after_value();
         }
-        let mut kinds: Vec<Kind> =
-            self.locals.iter().map(|(name, ty)| Kind::Local(name.clone(), ty.clone())).collect();
-        kinds.push(Kind::Value(self.hint().or(ty)));
+        let wanted = self.hint().or(ty);
+        // A condition begins with a value of any type.
+        let is_open = wanted.as_ref().is_none_or(|wanted| *wanted == Ty::Bool);
+        let local = |(name, ty): &(String, Option<Ty>)| {
+            Kind::Local(name.clone(), ty.clone(), is_open || *ty == wanted)
+        };
+        let mut kinds: Vec<Kind> = self.locals.iter().map(local).collect();
+        kinds.push(Kind::Value(wanted));
         kinds
     }
 
