@@ -15,6 +15,7 @@ mod load;
 pub mod lsp;
 mod new;
 mod output;
+mod parallel;
 mod progress;
 mod render;
 mod replay;
@@ -23,6 +24,7 @@ mod run;
 mod run_directory;
 mod sarif;
 mod shrink;
+mod study;
 mod test;
 mod train;
 mod trials;
@@ -69,6 +71,7 @@ pub fn main() -> ExitCode {
         Command::EditorFiles(arguments) => editor_files::editor_files(&output, arguments),
         Command::Run(arguments) => run::run(&output, arguments),
         Command::Train(arguments) => train::train(&output, arguments),
+        Command::Study(arguments) => study::study(&output, arguments),
         Command::Verify(arguments) => verify::verify(&output, arguments),
         Command::Replay(arguments) => replay::replay(&output, arguments),
         Command::Diagnose(arguments) => diagnose::diagnose(&output, arguments),

@@ -161,10 +161,12 @@ fn check_space(
 ) -> (Option<Space>, Vec<Diagnostic>) {
     let declares = |file: &LoadedFile| {
         file.tree.items.iter().any(|item| {
-            !matches!(
-                item.kind,
-                ItemKind::Language(_) | ItemKind::Use(_) | ItemKind::Scenario(_) | ItemKind::Policy(_)
-            )
+            match &item.kind {
+                ItemKind::Language(_) | ItemKind::Scenario(_) | ItemKind::Policy(_) => false,
+                // What leaves something out makes another space.
+                ItemKind::Use(used) => !used.without.is_empty(),
+                _ => true,
+            }
         })
     };
     // A scenario is no space itself: its space is what it uses first.
@@ -229,7 +231,7 @@ fn whole_digest(files: &[LoadedFile], root: &Path, maps: &mut MapReader<'_>) -> 
     Some(digest(lines.as_bytes()))
 }
 
-fn uses(file: &LoadedFile) -> impl Iterator<Item = &ast::Use> {
+pub(super) fn uses(file: &LoadedFile) -> impl Iterator<Item = &ast::Use> {
     file.tree.items.iter().filter_map(|item| match &item.kind {
         ItemKind::Use(used) => Some(used),
         _ => None,
@@ -238,7 +240,12 @@ fn uses(file: &LoadedFile) -> impl Iterator<Item = &ast::Use> {
 
 /// The files that a file uses.
 pub(super) fn used_paths(file: &LoadedFile) -> impl Iterator<Item = PathBuf> {
-    uses(file).map(|used| normal(&folder(&file.path).join(&used.path.value)))
+    uses(file).map(|used| used_path(file, used))
+}
+
+/// The file that a `use` means.
+pub(super) fn used_path(file: &LoadedFile, used: &ast::Use) -> PathBuf {
+    normal(&folder(&file.path).join(&used.path.value))
 }
 
 /// The maps that a file's roads name, as written.
