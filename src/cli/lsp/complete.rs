@@ -100,6 +100,11 @@ impl List<'_> {
                     self.symbol(name, MODULE, WANTED, Symbol::Road(name.clone()));
                 }
             }
+            Kind::Rules => {
+                for name in declared.rules.keys() {
+                    self.symbol(name, OPERATOR, WANTED, Symbol::Rule(name.clone()));
+                }
+            }
             Kind::Verdicts => {
                 for name in declared.verdicts.keys() {
                     self.symbol(name, OPERATOR, WANTED, Symbol::Verdict(name.clone()));

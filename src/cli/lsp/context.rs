@@ -25,6 +25,7 @@ pub enum Kind {
     Groups,
     States,
     Roads,
+    Rules,
     Verdicts,
     /// What a value can be made of, the variants of this type first.
     Value(Option<Ty>),
@@ -179,7 +180,15 @@ impl<'a> Place<'a> {
             return kinds;
         }
         match self.keyword() {
-            "use" => vec![Kind::Keyword("digest")],
+            "use" => match self.has("without") {
+                true => vec![Kind::Actions, Kind::Groups, Kind::Rules],
+                false => vec![Kind::Keyword("digest"), Kind::Keyword("without")],
+            },
+            "odds" => match self.begins_entry() || self.last(0) == "|" {
+                true => vec![Kind::Variants(self.text(1).to_owned()), Kind::Keyword("_")],
+                false if self.last(0) == "odds" => vec![Kind::Enums],
+                false => Vec::new(),
+            },
             "state" => self.in_state(),
             "let" if self.tokens.iter().any(|token| token.text == "=") => self.value(None),
             "fn" => self.in_function(),
@@ -282,6 +291,7 @@ impl<'a> Place<'a> {
                     None => Vec::new(),
                 }
             }
+            (_, Some(_), _) if self.asks_for_road() => vec![Kind::Roads],
             (_, Some(_), _) => {
                 let mut kinds = self.value(Some(Ty::Bool));
                 if self.wants_operand() {
@@ -296,9 +306,16 @@ impl<'a> Place<'a> {
         }
     }
 
+    /// Behind `road ==` or within `road in [`.
+    fn asks_for_road(&self) -> bool {
+        let open = self.open.last().copied().filter(|open| self.text(*open) == "[");
+        let of_list = open.and_then(|open| open.checked_sub(2)).map_or("", |index| self.text(index));
+        matches!(self.last(0), "==" | "!=") && self.last(1) == "road" || of_list == "road"
+    }
+
     fn in_road(&self) -> Vec<Kind> {
         match self.last(0) {
-            ":" if self.last(1) != "map" => vec![Kind::Keyword("lane")],
+            ":" if matches!(self.last(1), "start" | "goal") => vec![Kind::Keyword("lane")],
             _ if self.open.len() == 1 && self.begins_entry() => {
                 vec![Kind::Words(self.unused(words::ROAD_FIELDS))]
             }
@@ -358,9 +375,8 @@ impl<'a> Place<'a> {
             self.tokens.iter().rposition(|token| token.text == "expect").map_or(0, |expect| expect + 1);
         match (self.last(0), self.text(from)) {
             ("expect", _) => {
-                let mut kinds = vec![Kind::Words(words::OUTCOME_FACTS.to_vec()), Kind::Verdicts];
-                kinds.extend(["cause", "end", "trace"].map(Kind::Keyword));
-                kinds
+                let facts = [words::OUTCOME_FACTS, words::SCENARIO_CLAIMS].concat();
+                vec![Kind::Words(facts), Kind::Verdicts]
             }
             ("==" | "[" | ",", claim) => {
                 let words = words::claim_words(claim).iter().map(|word| (*word, ""));
