@@ -325,8 +325,9 @@ fn groups_text(groups: &[Group]) -> String {
             Some("") => ", no cause found".to_owned(),
             Some(modules) => format!(", {}", modules.replace(' ', " and ")),
         };
+        let shape = group.shape.as_ref().map_or(String::new(), |shape| format!(" ({shape})"));
         text.push_str(&format!(
-            "\n  {} × {} ({}, {}), hit by the {}{cause}: {}_{:04}",
+            "\n  {} × {} ({}, {}), hit by the {}{shape}{cause}: {}_{:04}",
             group.count, group.kind, group.manoeuvre, group.approach, group.side, group.road, group.episode
         ));
     }

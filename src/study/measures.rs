@@ -1,4 +1,4 @@
-//! Measures of danger and of manners, taken while an episode is played.
+//! Measures of danger and of manners, and the shapes of ways to collisions, taken while an episode is played.
 
 use crate::episode::EpisodeLog;
 use crate::mdp::Criticality;
@@ -7,6 +7,9 @@ use crate::sim::Contact;
 use crate::sim::DT_S;
 use crate::sim::Scene;
 use crate::sim::World;
+
+use super::shape::Shape;
+use super::shape::Trail;
 
 /// Half the width of a lane marking, m: a wheel on the line has not left the lane.
 const ON_THE_LINE_M: f64 = 0.06;
@@ -29,6 +32,8 @@ pub struct Measures {
     moments: Vec<(f64, Criticality)>,
     encroachment: Encroachment,
     hit: Vec<u32>,
+    trail: Trail,
+    shapes: Vec<Option<Shape>>,
     /// Ticks of the same two times.
     speeding: u64,
     astray: u64,
@@ -37,6 +42,8 @@ pub struct Measures {
 impl Measures {
     /// Takes in a tick.
     pub fn note(&mut self, world: &World, contacts: &[Contact]) {
+        self.trail.note(world);
+        self.shapes.extend(contacts.iter().map(|_| self.trail.shape()));
         self.hit.extend(contacts.iter().map(|contact| contact.obstacle));
         let mut now = Criticality::default();
         now.note(world, &|id| self.hit.contains(&id));
@@ -77,5 +84,10 @@ impl Measures {
             }
         }
         (steps, self.encroachment.least_s(&|id| self.hit.contains(&id)))
+    }
+
+    /// The shape of the ego vehicle's way to each collision.
+    pub fn shapes(&self) -> &[Option<Shape>] {
+        &self.shapes
     }
 }

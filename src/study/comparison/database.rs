@@ -30,12 +30,12 @@ CREATE TABLE cell (
 CREATE TABLE trained (
   cell INTEGER NOT NULL REFERENCES cell, episode INTEGER NOT NULL, return REAL NOT NULL,
   collisions INTEGER NOT NULL, counted INTEGER NOT NULL, epsilon REAL NOT NULL, loss REAL,
-  duration_s REAL NOT NULL, PRIMARY KEY (cell, episode)
+  simulated_s REAL NOT NULL, PRIMARY KEY (cell, episode)
 ) STRICT;
 CREATE TABLE evaluated (
   cell INTEGER NOT NULL REFERENCES cell, episode INTEGER NOT NULL, seed TEXT NOT NULL, number INTEGER NOT NULL,
   ended TEXT NOT NULL, duration_s REAL NOT NULL, distance_m REAL NOT NULL, red_runs INTEGER NOT NULL,
-  speeding_s REAL NOT NULL, astray_s REAL NOT NULL, trace TEXT NOT NULL, PRIMARY KEY (cell, episode)
+  speeding_s REAL NOT NULL, astray_s REAL NOT NULL, branched_s REAL NOT NULL, trace TEXT NOT NULL, PRIMARY KEY (cell, episode)
 ) STRICT;
 CREATE TABLE collision (
   cell INTEGER NOT NULL REFERENCES cell, episode INTEGER NOT NULL, number INTEGER NOT NULL, time_s REAL NOT NULL,
@@ -99,7 +99,7 @@ impl StudyDatabase {
                     episode.counted,
                     episode.exploration_epsilon,
                     episode.loss,
-                    episode.duration_s,
+                    episode.simulated_s,
                 ])?;
             }
             for (index, episode) in record.episodes.iter().enumerate() {
@@ -149,7 +149,7 @@ impl StudyDatabase {
             .into_iter()
             .collect();
         let trained = self.by_cell(
-            "SELECT cell, return, collisions, counted, epsilon, loss, duration_s FROM trained ORDER BY cell, episode",
+            "SELECT cell, return, collisions, counted, epsilon, loss, simulated_s FROM trained ORDER BY cell, episode",
             |row| {
                 Ok(TrainedRecord {
                     sum: row.get(1)?,
@@ -157,7 +157,7 @@ impl StudyDatabase {
                     counted: row.get(3)?,
                     exploration_epsilon: row.get(4)?,
                     loss: row.get(5)?,
-                    duration_s: row.get(6)?,
+                    simulated_s: row.get(6)?,
                 })
             },
         )?;
@@ -165,7 +165,8 @@ impl StudyDatabase {
             cells.entry(cell).and_modify(|cell| cell.trained.push(episode));
         }
         let evaluated = self.by_cell(
-            "SELECT cell, seed, number, ended, duration_s, distance_m, red_runs, speeding_s, astray_s, trace
+            "SELECT cell, seed, number, ended, duration_s, distance_m, red_runs, speeding_s, astray_s, branched_s,
+                    trace
              FROM evaluated ORDER BY cell, episode",
             |row| {
                 Ok(EpisodeRecord {
@@ -177,7 +178,8 @@ impl StudyDatabase {
                     red_runs: row.get(6)?,
                     speeding_s: row.get(7)?,
                     astray_s: row.get(8)?,
-                    trace: row.get(9)?,
+                    branched_s: row.get(9)?,
+                    trace: row.get(10)?,
                     collisions: Vec::new(),
                 })
             },
@@ -218,7 +220,7 @@ fn add_episode(
     index: i64,
     episode: &EpisodeRecord,
 ) -> Result<(), rusqlite::Error> {
-    connection.prepare_cached("INSERT INTO evaluated VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)")?.execute(
+    connection.prepare_cached("INSERT INTO evaluated VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)")?.execute(
         params![
             cell,
             index,
@@ -230,6 +232,7 @@ fn add_episode(
             episode.red_runs,
             episode.speeding_s,
             episode.astray_s,
+            episode.branched_s,
             episode.trace,
         ],
     )?;

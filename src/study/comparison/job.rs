@@ -5,10 +5,6 @@ use std::sync::atomic::AtomicUsize;
 use std::sync::atomic::Ordering;
 use std::sync::mpsc;
 
-use crate::agent::QPolicy;
-use crate::study::Run;
-use crate::study::train::with_period;
-
 use super::record::CellRecord;
 use super::record::EpisodeRecord;
 use super::record::Spent;
@@ -87,9 +83,12 @@ fn play(
 ) -> Option<Vec<CellRecord>> {
     let mut begun = clock();
     let agent = study.agent(job);
-    let (mut trained, mut policy) = (Vec::new(), None);
-    if agent.training.is_some() {
-        let mut training = study.training(job).expect("the study was checked when it was made");
+    let mut trained = Vec::new();
+    let mut training = agent
+        .training
+        .is_some()
+        .then(|| study.training(job).expect("the study was checked when it was made"));
+    if let Some(training) = &mut training {
         while !training.is_done() {
             let episode = training.episode();
             trained.push(TrainedRecord::new(&episode));
@@ -97,16 +96,18 @@ fn play(
                 return None;
             }
         }
-        policy = Some(training.policy().clone());
     }
     let mut cells = Vec::new();
     for &road in &job.roads {
         let road = &study.settings().roads[road];
         let mut episodes = Vec::new();
         for seed in 0..study.settings().evaluation.seeds {
-            let run = evaluation(study, job, seed, road, policy.as_ref());
+            let run = study.evaluation(job, seed, road).expect("the study was checked when it was made");
             for number in 0..run.episodes() {
-                let (summary, log) = run.judged(number);
+                let (summary, log) = match &training {
+                    Some(training) => run.judged_by(number, training.actor().as_mut()),
+                    None => run.judged(number),
+                };
                 episodes.push(EpisodeRecord::new(run.settings().seed, &summary, &log));
                 if !tell(summary.counted()) {
                     return None;
@@ -130,15 +131,4 @@ fn play(
         });
     }
     Some(cells)
-}
-
-fn evaluation(study: &Study, job: &Job, seed: u32, road: &str, policy: Option<&QPolicy>) -> Run {
-    let run = match policy {
-        None => study.run(job, seed, road),
-        Some(policy) => {
-            let table = with_period(study.table().clone(), policy.settings().observation_period_s);
-            Run::with_policy(table, study.run_settings(job, seed, road), policy.clone())
-        }
-    };
-    run.expect("the study was checked when it was made")
 }

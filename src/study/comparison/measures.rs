@@ -124,7 +124,12 @@ pub const MEASURES: &[Measure] = &[
         name: "evaluation_h",
         title: "simulated time of the evaluation, h",
         is_compared: false,
-        of: |cell, _| Some(cell.episodes.iter().map(|episode| episode.duration_s).sum::<f64>() / 3600.0),
+        of: |cell, _| {
+            Some(
+                cell.episodes.iter().map(|episode| episode.duration_s + episode.branched_s).sum::<f64>()
+                    / 3600.0,
+            )
+        },
     },
     Measure {
         name: "training_h",
@@ -132,7 +137,7 @@ pub const MEASURES: &[Measure] = &[
         is_compared: false,
         of: |cell, _| {
             of_training(cell, |cell| {
-                cell.trained.iter().map(|episode| episode.duration_s).sum::<f64>() / 3600.0
+                cell.trained.iter().map(|episode| episode.simulated_s).sum::<f64>() / 3600.0
             })
         },
     },

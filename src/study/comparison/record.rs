@@ -43,7 +43,8 @@ pub struct TrainedRecord {
     pub counted: u32,
     pub exploration_epsilon: f64,
     pub loss: Option<f64>,
-    pub duration_s: f64,
+    /// Time driven for it, s: branches count, what a snapshot saved does not.
+    pub simulated_s: f64,
 }
 
 /// An evaluated episode.
@@ -55,6 +56,8 @@ pub struct EpisodeRecord {
     pub number: u32,
     pub ended: String,
     pub duration_s: f64,
+    /// Driven beside it, by an agent that tries rows out before it chooses, s.
+    pub branched_s: f64,
     pub distance_m: f64,
     pub red_runs: u32,
     /// Time above the speed limit, s.
@@ -101,7 +104,7 @@ impl TrainedRecord {
             counted: episode.summary.counted() as u32,
             exploration_epsilon: episode.exploration_epsilon,
             loss: episode.lesson.loss,
-            duration_s: episode.log.duration_s,
+            simulated_s: episode.simulated_s,
         }
     }
 }
@@ -114,6 +117,7 @@ impl EpisodeRecord {
             number: summary.episode as u32,
             ended: log.end.name().to_owned(),
             duration_s: log.duration_s,
+            branched_s: summary.branched_s,
             distance_m: log.distance_m,
             red_runs: log.red_runs,
             speeding_s: summary.manners.speeding_s,

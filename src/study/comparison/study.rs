@@ -4,8 +4,8 @@ use std::collections::BTreeSet;
 
 use crate::action::ActionTable;
 use crate::agent;
-use crate::agent::Hyperparameters;
 use crate::agent::Kind;
+use crate::agent::Settings;
 use crate::oracle::AvoidabilitySettings;
 use crate::rng;
 use crate::rng::Stream;
@@ -16,6 +16,7 @@ use crate::study::RunError;
 use crate::study::RunSettings;
 use crate::study::TrainSettings;
 use crate::study::Training;
+use crate::study::train::with_period;
 use crate::syntax::listed;
 
 use super::file::AgentFile;
@@ -76,7 +77,7 @@ pub struct TrainingPlan {
     pub episodes: u32,
     /// Roads that a training goes round; none: the one on which it is evaluated.
     pub roads: Vec<String>,
-    pub hyperparameters: Hyperparameters,
+    pub hyperparameters: Settings,
 }
 
 /// Why there cannot be such a study.
@@ -192,7 +193,7 @@ fn agent_settings(
             }
             (file.repeats, None)
         }
-        Kind::Learning(presets) => {
+        Kind::Learning(_) | Kind::Searching(_) => {
             if file.repeats.is_some() {
                 return Err(StudyError::Learning { label, name: file.name });
             }
@@ -206,7 +207,8 @@ fn agent_settings(
                 Some(settings @ serde_json::Value::Object(_)) => settings.to_string(),
                 Some(_) => return Err(StudyError::Config { label }),
             };
-            let hyperparameters = Hyperparameters::from_yaml(presets, file.preset.as_deref(), &text)
+            let hyperparameters = Settings::from_yaml(entry, file.preset.as_deref(), &text)
+                .expect("an agent that is trained has settings")
                 .map_err(|error| refuse(error.to_string()))?;
             let episodes = file.episodes.unwrap_or(750);
             (file.trainings, Some(TrainingPlan { episodes, roads: file.train_roads, hyperparameters }))
@@ -229,16 +231,9 @@ impl Study {
             let refuse = |error| StudyError::Agent { label: agent.label.clone(), error };
             if agent.training.is_some() {
                 study.training(job).map_err(refuse)?;
-            } else {
-                study.run(job, 0, &study.settings.roads[job.roads[0]]).map_err(refuse)?;
             }
-            // What a trained policy will be evaluated on must exist as well.
             for &road in &job.roads {
-                let arena = RunSettings {
-                    agent: "none".to_owned(),
-                    ..study.run_settings(job, 0, &study.settings.roads[road])
-                };
-                Run::new(study.table.clone(), arena).map_err(refuse)?;
+                study.evaluation(job, 0, &study.settings.roads[road]).map_err(refuse)?;
             }
         }
         Ok(study)
@@ -322,12 +317,15 @@ impl Study {
         Training::new(self.table.clone(), settings)
     }
 
-    /// The evaluation, under one seed and on one road, of an agent that has nothing to learn.
-    pub(super) fn run(&self, job: &Job, seed: u32, road: &str) -> Result<Run, RunError> {
-        Run::new(self.table.clone(), self.run_settings(job, seed, road))
+    /// The evaluation under one seed and on one road: by itself, or by who was trained.
+    pub(super) fn evaluation(&self, job: &Job, seed: u32, road: &str) -> Result<Run, RunError> {
+        let settings = self.run_settings(job, seed, road);
+        let Some(plan) = &self.agent(job).training else { return Run::new(self.table.clone(), settings) };
+        let table = with_period(self.table.clone(), plan.hyperparameters.observation_period_s());
+        Run::new(table, RunSettings { agent: "none".to_owned(), ..settings })
     }
 
-    pub(super) fn run_settings(&self, job: &Job, seed: u32, road: &str) -> RunSettings {
+    fn run_settings(&self, job: &Job, seed: u32, road: &str) -> RunSettings {
         let agent = self.agent(job);
         RunSettings {
             avastra: self.settings.avastra.clone(),

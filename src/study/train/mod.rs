@@ -6,6 +6,7 @@ mod training;
 
 pub use evaluation::Evaluation;
 pub use evaluation::evaluate;
+pub use evaluation::evaluate_agent;
 pub use record::Checkpoint;
 pub use training::TrainSettings;
 pub use training::TrainedEpisode;
