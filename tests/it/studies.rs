@@ -39,7 +39,7 @@ fn a_study_depends_on_its_file_alone() {
     let whole = results(&alone);
     assert_eq!(
         (&whole["schema"], &whole["cells"], &whole["cells_wanted"]),
-        (&1.into(), &10.into(), &10.into())
+        (&1.into(), &12.into(), &12.into())
     );
 
     // Interrupted, gone on with by more workers, killed, and gone on with again.
