@@ -117,6 +117,7 @@ impl Declared {
             ItemKind::Language(_)
             | ItemKind::Use(_)
             | ItemKind::Enum(_)
+            | ItemKind::Odds(_)
             | ItemKind::Let(_)
             | ItemKind::Episode(_)
             | ItemKind::Reward(_)

@@ -36,6 +36,7 @@ fn symbol(item: &Item, analysis: &Analysis) -> Option<Value> {
             return None;
         }
         ItemKind::Enum(of) => (ENUM, of.variants.iter().map(|name| leaf(name, ENUM_MEMBER)).collect()),
+        ItemKind::Odds(_) => (ARRAY, Vec::new()),
         ItemKind::State(_) => (VARIABLE, Vec::new()),
         ItemKind::Let(_) => (CONSTANT, Vec::new()),
         ItemKind::Fn(_) => (FUNCTION, Vec::new()),

@@ -98,6 +98,15 @@ impl Walker<'_> {
                     self.declares(variant, |name| Symbol::Variant(declared.name.text.clone(), name));
                 }
             }
+            ItemKind::Odds(declared) => {
+                let of = &declared.name.text;
+                self.uses(declared.name.span, Symbol::Enum(of.clone()));
+                for arm in &declared.arms {
+                    let variant = |name: &Name| (name.span, Symbol::Variant(of.clone(), name.text.clone()));
+                    arm.patterns.iter().map(variant).for_each(|(span, symbol)| self.uses(span, symbol));
+                    self.expr(&arm.value, &Locals::default(), None);
+                }
+            }
             ItemKind::State(declared) => {
                 self.declares(&declared.name, Symbol::State);
                 self.ty(&declared.ty);
