@@ -193,7 +193,7 @@ impl GoExplore {
                 return Some(index);
             }
         }
-        here().last().map(|(index, _)| index)
+        here().next_back().map(|(index, _)| index)
     }
 
     /// Keeps the moments of the episode that are of a new kind. After a collision there is none: who
