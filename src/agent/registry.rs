@@ -68,6 +68,11 @@ pub enum Kind {
 /// Every agent of avastra.
 pub const REGISTRY: &[Entry] = &[
     Entry {
+        name: "none",
+        summary: "nothing happens but ordinary traffic, if there is any",
+        kind: Kind::Ready(|| Box::new(Idle)),
+    },
+    Entry {
         name: "random",
         summary: "uniform over the rows that the rules allow at the moment",
         kind: Kind::Ready(|| Box::new(random::MaskedRandom)),
@@ -103,6 +108,15 @@ pub const REGISTRY: &[Entry] = &[
         kind: Kind::Searching(|| Settings::GoExplore(GoExploreSettings::default())),
     },
 ];
+
+/// Never chooses anything.
+struct Idle;
+
+impl Agent for Idle {
+    fn choose(&mut self, _: &Observation, _: ArrayView1<bool>, _: &mut Rng) -> Option<usize> {
+        None
+    }
+}
 
 /// The agent of that name.
 pub fn by_name(name: &str) -> Option<&'static Entry> {
@@ -150,26 +164,32 @@ mod tests {
     }
 
     #[test]
-    fn every_agent_chooses_a_row_and_repeats_itself() {
+    fn every_agent_but_none_chooses_a_row_and_repeats_itself() {
         let legal = Array1::from_vec(vec![false, true, false, true, true]);
         for entry in REGISTRY {
-            let choices = |seed| -> Vec<Vec<usize>> {
+            let choices = |seed| -> Vec<Vec<Option<usize>>> {
                 let choices = |(mut agent, obeys): (Box<dyn Agent>, bool)| {
                     let mut rng = stream(seed, Stream::Exploration, 0);
                     agent.begin();
                     let observation = Observation::zeros();
                     let choose = |step| {
                         agent.draw_seed(step);
-                        agent.choose(&observation, legal.view(), &mut rng).unwrap()
+                        agent.choose(&observation, legal.view(), &mut rng)
                     };
-                    let chosen: Vec<usize> = (0..50).map(choose).collect();
-                    assert!(chosen.iter().all(|&row| row < ROWS && (legal[row] || !obeys)), "{}", entry.name);
+                    let chosen: Vec<Option<usize>> = (0..50).map(choose).collect();
+                    let fits = |row: &usize| *row < ROWS && (legal[*row] || !obeys);
+                    assert!(chosen.iter().flatten().all(fits), "{}", entry.name);
                     assert_eq!(agent.branched_s(), 0.0, "{}: it has tried nothing", entry.name);
                     chosen
                 };
                 fresh(entry, seed).into_iter().map(choices).collect()
             };
             assert_eq!(choices(1), choices(1), "{}", entry.name);
+            if entry.name == "none" {
+                assert!(choices(1).iter().flatten().all(Option::is_none));
+                continue;
+            }
+            assert!(choices(1).iter().flatten().all(Option::is_some), "{}", entry.name);
             for (one, other) in choices(1).iter().zip(choices(2)) {
                 assert_ne!(*one, other, "{}", entry.name);
             }

@@ -71,10 +71,17 @@ pub enum Command {
     New(NewArguments),
     /// Print a script by which a shell completes this command line.
     Completions(CompletionsArguments),
+    /// Serve an editor: mistakes as you type, and all else that it asks for, over stdin and stdout.
+    Lsp,
+    /// Write the parts of the VS Code extension that follow from the language.
+    #[command(hide = true)]
+    EditorFiles(EditorFilesArguments),
     /// Play episodes and write the crashes back as scenarios.
     Run(RunArguments),
     /// Train an agent and write what it learned as a policy.
     Train(TrainArguments),
+    /// Compare agents over roads and independent trainings, with statistics.
+    Study(StudyArguments),
     /// Run emitted scenarios again and check every claim they make.
     Replay(ReplayArguments),
     /// Check every claim of emitted scenarios and policies.
@@ -107,6 +114,12 @@ pub struct CheckArguments {
     /// Make the changes that the diagnostics offer, in the files named here.
     #[arg(long)]
     pub fix: bool,
+}
+
+#[derive(Debug, Args)]
+pub struct EditorFilesArguments {
+    /// The folder of the extension.
+    pub directory: PathBuf,
 }
 
 #[derive(Debug, Args)]
@@ -280,6 +293,9 @@ pub struct TrainArguments {
     /// Driving system under test.
     #[arg(long, default_value = crate::study::DEFAULT_ADS)]
     pub ads: String,
+    /// Profile of the `modular` driving system [default: as it comes].
+    #[arg(long, value_name = "FILE")]
+    pub ads_config: Option<PathBuf>,
     /// Who learns.
     #[arg(long, default_value = "ddqn")]
     pub agent: String,
@@ -300,14 +316,36 @@ pub struct TrainArguments {
     #[arg(long)]
     pub out: Option<PathBuf>,
     /// Go on with an interrupted run directory; its own settings hold.
-    #[arg(long, value_name = "DIR", conflicts_with_all = ["file", "road", "ads", "agent", "preset", "config", "episodes", "seed", "out", "without", "with"])]
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["file", "road", "ads", "ads_config", "agent", "preset", "config", "episodes", "seed", "out", "without", "with"])]
     pub resume: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+pub struct StudyArguments {
+    /// The study, for example scenarios/studies/rq1.yaml.
+    #[arg(required_unless_present = "resume")]
+    pub file: Option<PathBuf>,
+    /// Directory of the study, new or empty [default: the next free runs/NNNN].
+    #[arg(long)]
+    pub out: Option<PathBuf>,
+    /// Worker threads; the result does not depend on it [default: one for each core].
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=1024))]
+    pub jobs: Option<u32>,
+    /// Go on with an interrupted study; its own settings hold.
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["file", "out", "quick"])]
+    pub resume: Option<PathBuf>,
+    /// Cut it down to see that it works: two short trainings, few episodes. No result.
+    #[arg(long)]
+    pub quick: bool,
 }
 
 #[derive(Debug, Args)]
 pub struct VerifyArguments {
     #[arg(required = true, value_name = "FILE")]
     pub files: Vec<PathBuf>,
+    /// Worker threads over files [default: one for each core].
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=1024))]
+    pub jobs: Option<u32>,
 }
 
 #[derive(Debug, Args)]
@@ -321,28 +359,44 @@ pub struct ReplayArguments {
     /// recorded one.
     #[arg(long, value_name = "FILE")]
     pub ads_config: Option<PathBuf>,
+    /// Worker threads over files [default: one for each core].
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=1024))]
+    pub jobs: Option<u32>,
 }
 
 #[derive(Debug, Args)]
 pub struct DiagnoseArguments {
-    pub file: PathBuf,
+    #[arg(required = true, value_name = "FILE")]
+    pub files: Vec<PathBuf>,
     /// Another profile of `modular` than the recorded one.
     #[arg(long, value_name = "FILE")]
     pub ads_config: Option<PathBuf>,
     /// Profile that says how good each module should be [default: `modular` as it comes].
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", conflicts_with = "mechanisms")]
     pub baseline: Option<PathBuf>,
     /// Say also how many of N small variations of timing, speeds and sensor errors still crash.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000), conflicts_with = "mechanisms")]
     pub likelihood: Option<u32>,
+    /// Instead of modules, the documented weaknesses (a) to (i): the share of the collisions of all files
+    /// that vanish when one alone is switched off, when the obstacle appears (as modules are) or from the
+    /// start.
+    #[arg(long)]
+    pub mechanisms: bool,
+    /// Worker threads over files [default: one for each core].
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=1024))]
+    pub jobs: Option<u32>,
 }
 
 #[derive(Debug, Args)]
 pub struct ShrinkArguments {
-    pub file: PathBuf,
-    /// Where to write [default: STEM.shrunk.ava beside the file].
+    #[arg(required = true, value_name = "FILE")]
+    pub files: Vec<PathBuf>,
+    /// Where to write, if there is one file [default: STEM.shrunk.ava beside each].
     #[arg(long, short)]
     pub output: Option<PathBuf>,
+    /// Worker threads over files [default: one for each core].
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=1024))]
+    pub jobs: Option<u32>,
 }
 
 #[derive(Debug, Args)]
@@ -375,6 +429,9 @@ pub struct RenderArguments {
     /// Draw the drive of another driving system.
     #[arg(long)]
     pub ads: Option<String>,
+    /// Draw the drive of another profile of `modular`.
+    #[arg(long, value_name = "FILE")]
+    pub ads_config: Option<PathBuf>,
 }
 
 #[derive(Debug, Args)]

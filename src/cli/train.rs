@@ -12,6 +12,7 @@ use crate::agent::Settings;
 use crate::emit;
 use crate::model::Space;
 use crate::sim::ENGINE;
+use crate::study::Profile;
 use crate::study::TrainSettings;
 use crate::study::TrainedEpisode;
 use crate::study::Training;
@@ -70,6 +71,7 @@ fn begun(output: &Output, arguments: &TrainArguments) -> Result<(Training, RunDi
     } else {
         arguments.road.clone()
     };
+    let profile = arguments.ads_config.as_deref().map(load::profile).transpose()?;
     let settings = TrainSettings {
         avastra: VERSION.to_owned(),
         engine: ENGINE.to_owned(),
@@ -77,9 +79,11 @@ fn begun(output: &Output, arguments: &TrainArguments) -> Result<(Training, RunDi
         space_digest: space.digest.clone(),
         roads,
         ads: arguments.ads.clone(),
+        profile: profile.as_ref().map(Profile::new),
         agent: arguments.agent.clone(),
         episodes: arguments.episodes,
         seed: arguments.seed,
+        ambient: 0,
         without: arguments.rules.without.clone(),
         with: arguments.rules.with.clone(),
         hyperparameters,
@@ -176,8 +180,8 @@ fn finish(output: &Output, training: &Training, directory: &RunDirectory) -> Res
     let table = training.table().clone();
     let rules = (settings.with.as_slice(), settings.without.as_slice());
     let roads = &settings.roads;
-    let test = (EVALUATION_EPISODES, settings.seed);
-    let evaluation = evaluate_agent(table, &|| training.actor(), roads, &settings.ads, rules, test);
+    let (ads, test) = (training.arena().ads(), (EVALUATION_EPISODES, settings.seed));
+    let evaluation = evaluate_agent(table, &|| training.actor(), roads, ads, rules, test);
     let evaluation = evaluation.map_err(|error| Failure::usage(error.to_string()))?;
     let policy = training.policy().map(|policy| write_policy(training, policy, &evaluation, &directory.path));
     let policy = policy.transpose()?;

@@ -8,6 +8,7 @@ use crate::agent::QPolicy;
 use crate::model::Policy;
 use crate::model::digest_text;
 use crate::sim::ENGINE;
+use crate::study;
 use crate::study::evaluate;
 
 use super::arguments::ReplayArguments;
@@ -38,8 +39,9 @@ pub fn verify(output: &Output, arguments: &VerifyArguments) -> Result<(), Failur
     }
     if !scenarios.is_empty() {
         // Its result comes after the policies': a failure of theirs must not hide it.
-        let outcome =
-            replay::replay(output, &ReplayArguments { files: scenarios, ads: None, ads_config: None });
+        let jobs = arguments.jobs;
+        let recorded = ReplayArguments { files: scenarios, ads: None, ads_config: None, jobs };
+        let outcome = replay::replay(output, &recorded);
         match outcome {
             Err(Failure::Refuted { claims }) => refuted += claims,
             other => other?,
@@ -62,7 +64,8 @@ fn judge(table: &ActionTable, policy: &Policy) -> Result<Vec<String>, Failure> {
     let Some(claims) = &policy.claims else { return Ok(Vec::new()) };
     let rules = (origin.with.as_slice(), origin.without.as_slice());
     let test = (claims.episodes, claims.seed);
-    let found = evaluate(table.clone(), &acting, &origin.roads, &origin.ads, rules, test)
+    let ads = study::trained_against(policy).map_err(|error| Failure::usage(error.to_string()))?;
+    let found = evaluate(table.clone(), &acting, &origin.roads, &ads, rules, test)
         .map_err(|error| Failure::usage(error.to_string()))?;
     let trace = digest_text(&found.trace);
     let pairs = [

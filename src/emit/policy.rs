@@ -67,7 +67,7 @@ fn file(
         rules: Vec::new(),
     };
     let digest = Some(Text::new(settings.space_digest.clone(), Span::NONE));
-    let space_use = Use { path: Text::new(space_path, Span::NONE), digest };
+    let space_use = Use { path: Text::new(space_path, Span::NONE), digest, without: Vec::new() };
     File {
         docs: vec![tree::doc("Emitted by `avastra train`; play it with `avastra run --policy FILE`.")],
         items: vec![
@@ -86,6 +86,12 @@ fn origin(settings: &TrainSettings) -> PolicyOrigin {
         episodes: u64::from(settings.episodes),
         roads: settings.roads.clone(),
         ads: settings.ads.clone(),
+        profile: settings
+            .profile
+            .as_ref()
+            .map(|profile| profile.settings.to_line())
+            .filter(|line| !line.is_empty()),
+        profile_digest: settings.profile.as_ref().map(|profile| profile.digest.clone()),
         engine: settings.engine.clone(),
         avastra: settings.avastra.clone(),
         with: settings.with.clone(),

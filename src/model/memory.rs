@@ -66,6 +66,24 @@ impl Space {
         (time, sky)
     }
 
+    /// The cells that mean weather or time of day, with what is plainest in them: noon, and nothing of any
+    /// phenomenon. Cells whose enum has no such word are left out.
+    pub fn plain_weather(&self) -> Vec<(usize, Value)> {
+        let mut plain = Vec::new();
+        for state in &self.states {
+            let variant = match &state.meaning {
+                StateMeaning::Private => None,
+                StateMeaning::Time(words) => words.iter().position(|word| *word == TimeOfDay::Noon),
+                StateMeaning::Sky(_, levels) => levels.iter().position(|level| *level == Level::None),
+            };
+            if let (Some(variant), Type::Enum(of)) = (variant, state.ty) {
+                let cells = state.first_cell..state.first_cell + state.cells;
+                plain.extend(cells.map(|cell| (cell, Value::Variant(of, variant))));
+            }
+        }
+        plain
+    }
+
     /// The memory after an action with these parameter values.
     pub(crate) fn memory_after(&self, action: usize, locals: &[Value], before: &Memory) -> Memory {
         let mut after = before.clone();
@@ -146,8 +164,16 @@ impl Space {
         match ty {
             Type::Bool => Value::Bool(rng::below(rng, 2) == 1),
             Type::Enum(of) => {
-                let count = self.enums[of.0].variants.len() as u32;
-                Value::Variant(of, rng::below(rng, count) as usize)
+                let odds = &self.enums[of.0].odds;
+                let mut ticket = rng::below(rng, odds.iter().sum());
+                let drawn = odds.iter().position(|odds| match ticket.checked_sub(*odds) {
+                    Some(rest) => {
+                        ticket = rest;
+                        false
+                    }
+                    None => true,
+                });
+                Value::Variant(of, drawn.expect("the ticket is below the sum of the odds"))
             }
             Type::Int | Type::Quantity(_) => Value::Number(0.0),
         }

@@ -248,6 +248,9 @@ fn states_can_be_given_as_text() {
     let memory = space.memory_from("time: Night, sky: { Rain: High }", 0).unwrap();
     let (time, sky) = space.weather(&memory);
     assert_eq!(format!("{time:?} {sky:?}"), "Night [High, None, None]");
+    let plain =
+        space.plain_weather().into_iter().fold(memory, |memory, (cell, value)| memory.with(cell, value));
+    assert_eq!(format!("{:?}", space.weather(&plain)), "(Noon, [None, None, None])");
     let error = space.memory_from("tim: Night", 0).unwrap_err();
     assert_eq!(error, "unknown state `tim`; did you mean `time`?");
     assert!(space.memory_from("}", 0).is_err());

@@ -84,6 +84,16 @@ impl Arena {
         Ok(())
     }
 
+    /// The driving system.
+    pub fn ads(&self) -> &Selected {
+        &self.ads
+    }
+
+    /// From now on against this driving system.
+    pub(super) fn set_ads(&mut self, ads: Selected) {
+        self.ads = ads;
+    }
+
     /// Whether the driving system is made of modules that could be at fault.
     pub(super) fn has_modules(&self) -> bool {
         self.ads.profile().is_some()

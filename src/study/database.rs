@@ -18,6 +18,7 @@ use crate::mdp::STATE_NAMES;
 use crate::model::vocabulary::Word;
 use crate::oracle;
 
+use super::shape::Shape;
 use super::summary::EpisodeSummary;
 use super::summary::Finding;
 
@@ -39,7 +40,7 @@ CREATE TABLE collision (
   repeated INTEGER NOT NULL, sudden INTEGER NOT NULL, struck INTEGER NOT NULL, counted INTEGER NOT NULL,
   avoidability TEXT NOT NULL, hazard_onset_s REAL NOT NULL, avoided_by TEXT NOT NULL, evasion TEXT,
   side TEXT NOT NULL, approach TEXT NOT NULL, relative_speed_mps REAL NOT NULL, delta_v_mps REAL NOT NULL,
-  obstacle_delta_v_mps REAL NOT NULL, cause TEXT,
+  obstacle_delta_v_mps REAL NOT NULL, cause TEXT, shape TEXT,
   PRIMARY KEY (episode, number)
 ) STRICT;
 ";
@@ -320,7 +321,7 @@ fn add_collision(
     let cause = finding.cause.as_ref().map(in_words);
     transaction
         .prepare_cached(
-            "INSERT INTO collision VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+            "INSERT INTO collision VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
         )?
         .execute(params![
             episode as i64,
@@ -348,6 +349,7 @@ fn add_collision(
             severity.delta_v_mps,
             severity.obstacle_delta_v_mps,
             cause,
+            finding.shape.map(Shape::name),
         ])?;
     Ok(())
 }

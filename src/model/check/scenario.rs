@@ -2,6 +2,8 @@
 
 use std::sync::Arc;
 
+use crate::model::bound::Bound;
+use crate::model::bound::bounds;
 use crate::model::check::names::Names;
 use crate::model::check::names::unknown;
 use crate::model::check::scenario_rules::Moment;
@@ -10,6 +12,10 @@ use crate::model::check::scenario_value::figure;
 use crate::model::check::scenario_value::number;
 use crate::model::check::scenario_value::value;
 use crate::model::code;
+use crate::model::eval::Facts;
+use crate::model::eval::evaluate;
+use crate::model::expr::Comparison;
+use crate::model::expr::Expr;
 use crate::model::limits::AMBIENT_MAX;
 use crate::model::limits::SIGNAL_PHASE_S;
 use crate::model::row::Row;
@@ -23,7 +29,7 @@ use crate::model::scenario::Origin;
 use crate::model::scenario::Scenario;
 use crate::model::scenario::ScenarioStart;
 use crate::model::scenario::ScenarioStep;
-use crate::model::space::ActionDef;
+use crate::model::space::Domain;
 use crate::model::space::Initial;
 use crate::model::space::Parameter;
 use crate::model::space::Space;
@@ -102,8 +108,18 @@ impl<'a> Reader<'a> {
     }
 
     fn origin(&mut self, fields: &[ast::Field]) -> Origin {
-        const FIELDS: [&str; 9] =
-            ["seed", "episode", "policy", "ads", "profile", "profile_digest", "engine", "with", "without"];
+        const FIELDS: [&str; 10] = [
+            "seed",
+            "episode",
+            "policy",
+            "ads",
+            "profile",
+            "profile_digest",
+            "engine",
+            "avoidability",
+            "with",
+            "without",
+        ];
         let mut origin = Origin::default();
         self.once("field", fields);
         for field in fields {
@@ -115,6 +131,7 @@ impl<'a> Reader<'a> {
                 "profile" => origin.profile = self.text(&field.value),
                 "profile_digest" => origin.profile_digest = self.text(&field.value),
                 "engine" => origin.engine = self.text(&field.value),
+                "avoidability" => origin.avoidability = self.text(&field.value),
                 "with" => origin.with = self.rule_names(&field.value),
                 "without" => origin.without = self.rule_names(&field.value),
                 other => self.report(unknown("field", other, field.name.span, FIELDS)),
@@ -264,7 +281,7 @@ impl<'a> Reader<'a> {
             }
             let Some(row) = self.row(&step.action) else { continue };
             let action = &self.space.actions[row.action];
-            let Some(drawn) = self.drawn(step, action) else { continue };
+            let Some(drawn) = self.drawn(step, row, road) else { continue };
             let locals = locals(action, row, &drawn);
             let memory = &history[history.len() - 1].1;
             let after = self.space.memory_after(row.action, &locals, memory);
@@ -346,7 +363,8 @@ impl<'a> Reader<'a> {
         row
     }
 
-    fn drawn(&mut self, step: &ast::Step, action: &ActionDef) -> Option<Vec<(Arc<str>, Value)>> {
+    fn drawn(&mut self, step: &ast::Step, row: &Row, road: Option<usize>) -> Option<Vec<(Arc<str>, Value)>> {
+        let action = &self.space.actions[row.action];
         let drawn = || action.parameters.iter().filter(|parameter| !parameter.axis);
         let mut sound = true;
         self.once("drawn value", &step.drawn);
@@ -358,13 +376,10 @@ impl<'a> Reader<'a> {
             }
         }
         let mut values = Vec::new();
+        let mut missing = Vec::new();
         for parameter in drawn() {
             let Some(field) = step.drawn.iter().find(|field| *parameter.name == *field.name.text) else {
-                let message = format!("the drawn value `{}` is missing", parameter.name);
-                let error = Diagnostic::error(code::NOT_DRAWN, message)
-                    .at(step.span, "a scenario leaves nothing to chance");
-                self.report(error.beside(parameter.span, "declared here"));
-                sound = false;
+                missing.push(parameter);
                 continue;
             };
             let Some(value) = self.take(value(self.space, &field.value, parameter.ty)) else {
@@ -382,14 +397,82 @@ impl<'a> Reader<'a> {
             }
             values.push((parameter.name.clone(), value));
         }
+        if !missing.is_empty() {
+            let error = self.missing(step, row, road, &missing, values);
+            self.report(error);
+            return None;
+        }
         sound.then_some(values)
+    }
+
+    /// Drawn values that a step lacks, with an example of each: the first of a list, what a rule sets,
+    /// else the low end of the range.
+    fn missing(
+        &self,
+        step: &ast::Step,
+        row: &Row,
+        road: Option<usize>,
+        missing: &[&Parameter],
+        mut values: Vec<(Arc<str>, Value)>,
+    ) -> Diagnostic {
+        let space = self.space;
+        let action = &space.actions[row.action];
+        let names: Vec<&str> = missing.iter().map(|parameter| &*parameter.name).collect();
+        let (what, is) = if names.len() == 1 { ("value", "is") } else { ("values", "are") };
+        let message = format!("the drawn {what} {} {is} missing", listed(&names));
+        let error =
+            Diagnostic::error(code::NOT_DRAWN, message).at(step.span, "a scenario leaves nothing to chance");
+        let error =
+            missing.iter().fold(error, |error, parameter| error.beside(parameter.span, "declared here"));
+        for parameter in missing {
+            let value = match &parameter.domain {
+                Domain::Values(values) => values[0],
+                Domain::Range(low, _) => Value::Number(low.to_f64()),
+            };
+            values.push((parameter.name.clone(), value));
+        }
+        if let Some(road) = road {
+            let memory = Memory::default();
+            let known = locals(action, row, &values);
+            let facts = Facts { road: Some(&space.roads[road].facts), ..Facts::new(&known, &memory) };
+            let bounds = bounds(space, row.action);
+            let sets = |bound: &&Bound| bound.op == Comparison::Equal && bound.is_known_early();
+            for bound in bounds.iter().filter(sets) {
+                let holds = |guard: &Expr| evaluate(guard, &space.functions, &facts).truth();
+                let parameter = &action.parameters[bound.local];
+                let limit = evaluate(&bound.limit, &space.functions, &facts);
+                if bound.guards.iter().all(holds) && parameter.domain.holds(limit) {
+                    let missing = missing.iter().any(|missing| missing.name == parameter.name);
+                    let slot = values.iter_mut().find(|(name, _)| missing && *name == parameter.name);
+                    slot.into_iter().for_each(|(_, value)| *value = limit);
+                }
+            }
+        }
+        let shown: Vec<String> = missing
+            .iter()
+            .filter_map(|parameter| {
+                let (_, value) = values.iter().find(|(name, _)| *name == parameter.name)?;
+                Some(format!("{}: {}", parameter.name, space.show(*value, parameter.ty)))
+            })
+            .collect();
+        let shown = shown.join(", ");
+        let error = error.help(format!("for example `{shown}`"));
+        let end = |span: ast::Span| ast::Span::new(span.file, span.end, span.end);
+        match step.drawn.last() {
+            Some(last) => error.fix(format!("add `{shown}`"), end(last.span), format!(", {shown}")),
+            None if step.span.end == step.action.span.end => {
+                let text = format!(" with {{ {shown} }}");
+                error.fix(format!("add `{}`", text.trim_start()), end(step.span), text)
+            }
+            None => error,
+        }
     }
 
     fn claim(&mut self, expect: &ast::Expect) -> Option<Claim> {
         let unclear = || {
             Diagnostic::error(code::UNKNOWN_CLAIM, "unknown claim").at(expect.span, "cannot be checked").help(
                 "claims are `collision with npc#2 at 14.22 s`, `proc == [0.5]`, `trace == \"sha256:…\"`, \
-                 `end == arrived`, `avoidable by [cc, fsm]`, `cause == perception`, or the name of a verdict",
+                 `end == arrived`, `avoidable by [cc, fsm]`, `cause == perception`, `minimal`, or the name of a verdict",
             )
         };
         match &expect.claim.kind {
@@ -400,6 +483,10 @@ impl<'a> Reader<'a> {
             ast::ExprKind::Name(name) if self.space.verdicts.iter().any(|verdict| verdict.name == *name) => {
                 let (obstacle, _) = self.clauses(&expect.clauses, false)?;
                 Some(Claim::Verdict { name: name.clone(), obstacle })
+            }
+            ast::ExprKind::Name(name) if name == "minimal" => {
+                let (obstacle, _) = self.clauses(&expect.clauses, false)?;
+                Some(Claim::Minimal { obstacle })
             }
             ast::ExprKind::Name(name) if Avoidability::ALL.iter().any(|class| class.name() == name) => {
                 let class = Avoidability::ALL.into_iter().find(|class| class.name() == name)?;

@@ -46,6 +46,12 @@ pub struct PolicyOrigin {
     pub episodes: u64,
     pub roads: Vec<String>,
     pub ads: String,
+    /// Settings of the driving system that are not its defaults, as one line of YAML.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub profile: Option<String>,
+    /// Digest of all its settings, where it was given any.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub profile_digest: Option<String>,
     pub engine: String,
     pub avastra: String,
     #[serde(default)]

@@ -4,6 +4,7 @@ use sha2::Digest;
 use sha2::Sha256;
 
 use crate::action::ActionTable;
+use crate::ads::Selected;
 use crate::agent::Agent;
 use crate::agent::QPolicy;
 use crate::episode;
@@ -37,12 +38,12 @@ pub struct Evaluation {
 /// Plays so many episodes on each road with a policy. `rules` are those switched on and off.
 ///
 /// # Errors
-/// If a road, the driving system or a rule does not exist.
+/// If a road or a rule does not exist.
 pub fn evaluate(
     table: ActionTable,
     policy: &QPolicy,
     roads: &[String],
-    ads: &str,
+    ads: &Selected,
     rules: (&[String], &[String]),
     (episodes, seed): (u64, u64),
 ) -> Result<Evaluation, RunError> {
@@ -58,11 +59,12 @@ pub fn evaluate_agent(
     table: ActionTable,
     make: &dyn Fn() -> Box<dyn Agent>,
     roads: &[String],
-    ads: &str,
+    ads: &Selected,
     rules: (&[String], &[String]),
     (episodes, seed): (u64, u64),
 ) -> Result<Evaluation, RunError> {
-    let arena = Arena::new(table, roads, ads, rules)?;
+    let mut arena = Arena::new(table, roads, ads.name(), rules)?;
+    arena.set_ads(ads.clone());
     let mut traces = Sha256::new();
     let mut found = Evaluation {
         episodes,

@@ -11,3 +11,4 @@ pub use record::Checkpoint;
 pub use training::TrainSettings;
 pub use training::TrainedEpisode;
 pub use training::Training;
+pub(super) use training::with_period;

@@ -44,6 +44,7 @@ use crate::study::arena::Arena;
 use crate::study::arena::carry_out;
 use crate::study::arena::legal;
 use crate::study::arena::offers;
+use crate::study::profile::Profile;
 use crate::study::run::RunError;
 use crate::study::run::check_episodes;
 use crate::study::summary::EpisodeSummary;
@@ -65,10 +66,16 @@ pub struct TrainSettings {
     /// Episodes go round them, one each.
     pub roads: Vec<String>,
     pub ads: String,
+    /// Settings of the driving system, if it was given any; without them it is as it comes.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub profile: Option<Profile>,
     pub agent: String,
     /// Episodes on all roads together.
     pub episodes: u32,
     pub seed: u64,
+    /// Vehicles of ambient traffic.
+    #[serde(default)]
+    pub ambient: u32,
     /// Rules switched off.
     pub without: Vec<String>,
     /// Optional rules switched on.
@@ -175,6 +182,7 @@ impl Training {
         let beginning = self.agent.beginning(road, fresh);
         let exploration_epsilon = self.agent.exploration_epsilon();
         let mut setup = self.arena.setup(road, beginning.seed);
+        setup.start.ambient = self.settings.ambient;
         setup.proc = self.settings.hyperparameters.proc();
         self.agent.begin();
         let played = play(&setup, self.agent.as_mut(), beginning, &self.moments, &self.settings);
@@ -333,11 +341,15 @@ fn prepared(table: ActionTable, settings: &TrainSettings) -> Result<(Arena, Arc<
     let table = with_period(table, settings.hyperparameters.observation_period_s());
     let rows = Arc::new(Rows::new(&table, settings.hyperparameters.actions())?);
     let rules = (settings.with.as_slice(), settings.without.as_slice());
-    Ok((Arena::new(table, &settings.roads, &settings.ads, rules)?, rows))
+    let mut arena = Arena::new(table, &settings.roads, &settings.ads, rules)?;
+    if let Some(profile) = &settings.profile {
+        arena.set_profile(profile)?;
+    }
+    Ok((arena, rows))
 }
 
 /// The table with another observation period.
-pub(super) fn with_period(table: ActionTable, period_s: Option<f64>) -> ActionTable {
+pub(in crate::study) fn with_period(table: ActionTable, period_s: Option<f64>) -> ActionTable {
     let Some(step_s) = period_s else { return table };
     let mut space = Space::clone(table.space());
     space.episode.step_s = step_s;
