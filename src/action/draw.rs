@@ -357,7 +357,14 @@ impl<'a> Judge<'a> {
         let shown = |value: Value| self.space.show(value, parameter.ty);
         let range = match &parameter.domain {
             Domain::Values(values) => {
-                values.iter().map(|value| shown(*value)).collect::<Vec<_>>().join(" | ")
+                // What is likelier stands there more than once.
+                let mut words: Vec<String> = Vec::new();
+                for word in values.iter().map(|value| shown(*value)) {
+                    if !words.contains(&word) {
+                        words.push(word);
+                    }
+                }
+                words.join(" | ")
             }
             Domain::Range(low, high) => {
                 format!("{} .. {}", shown(Value::Number(low.to_f64())), shown(Value::Number(high.to_f64())))

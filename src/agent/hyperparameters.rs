@@ -5,6 +5,7 @@
 
 use serde_json::Value;
 
+use crate::mdp::ProcKind;
 use crate::mdp::RewardSettings;
 use crate::syntax::listed;
 use crate::syntax::nearest;
@@ -37,6 +38,8 @@ pub struct Hyperparameters {
     // The step and its reward.
     /// Observation period (OTP), s, in place of the space's own (RQ3).
     pub observation_period_s: Option<f64>,
+    /// How collision probabilities are reckoned.
+    pub proc: ProcKind,
     /// Where rewards come from.
     pub reward: RewardSource,
     /// R_col (RQ3).

@@ -3,8 +3,10 @@
 //! An agent sees an observation and which rows are legal; never the world. A learning agent is told
 //! afterwards what its choices were worth.
 
+mod branch;
 mod checkpoint;
 mod features;
+mod greedy;
 mod hyperparameters;
 mod learner;
 mod network;
@@ -13,8 +15,13 @@ mod q_policy;
 mod random;
 mod registry;
 mod replay;
+mod search;
+mod settings;
+mod trainable;
 mod trajectory;
 
+pub use branch::Branch;
+pub use branch::Trial;
 pub use features::Features;
 pub use hyperparameters::Encoding;
 pub use hyperparameters::Exploration;
@@ -41,6 +48,11 @@ pub use replay::Priorities;
 pub use replay::Replay;
 pub use replay::Sample;
 pub use replay::Transition;
+pub use search::AvFuzzerSettings;
+pub use search::GoExploreSettings;
+pub use settings::Settings;
+pub use trainable::Beginning;
+pub use trainable::Trainable;
 pub use trajectory::Experience;
 pub use trajectory::Lesson;
 pub use trajectory::Trajectory;

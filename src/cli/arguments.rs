@@ -71,10 +71,17 @@ pub enum Command {
     New(NewArguments),
     /// Print a script by which a shell completes this command line.
     Completions(CompletionsArguments),
+    /// Serve an editor: mistakes as you type, and all else that it asks for, over stdin and stdout.
+    Lsp,
+    /// Write the parts of the VS Code extension that follow from the language.
+    #[command(hide = true)]
+    EditorFiles(EditorFilesArguments),
     /// Play episodes and write the crashes back as scenarios.
     Run(RunArguments),
     /// Train an agent and write what it learned as a policy.
     Train(TrainArguments),
+    /// Compare agents over roads and independent trainings, with statistics.
+    Study(StudyArguments),
     /// Run emitted scenarios again and check every claim they make.
     Replay(ReplayArguments),
     /// Check every claim of emitted scenarios and policies.
@@ -107,6 +114,12 @@ pub struct CheckArguments {
     /// Make the changes that the diagnostics offer, in the files named here.
     #[arg(long)]
     pub fix: bool,
+}
+
+#[derive(Debug, Args)]
+pub struct EditorFilesArguments {
+    /// The folder of the extension.
+    pub directory: PathBuf,
 }
 
 #[derive(Debug, Args)]
@@ -305,6 +318,25 @@ pub struct TrainArguments {
     /// Go on with an interrupted run directory; its own settings hold.
     #[arg(long, value_name = "DIR", conflicts_with_all = ["file", "road", "ads", "ads_config", "agent", "preset", "config", "episodes", "seed", "out", "without", "with"])]
     pub resume: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+pub struct StudyArguments {
+    /// The study, for example scenarios/studies/rq1.yaml.
+    #[arg(required_unless_present = "resume")]
+    pub file: Option<PathBuf>,
+    /// Directory of the study, new or empty [default: the next free runs/NNNN].
+    #[arg(long)]
+    pub out: Option<PathBuf>,
+    /// Worker threads; the result does not depend on it [default: one for each core].
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=1024))]
+    pub jobs: Option<u32>,
+    /// Go on with an interrupted study; its own settings hold.
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["file", "out", "quick"])]
+    pub resume: Option<PathBuf>,
+    /// Cut it down to see that it works: two short trainings, few episodes. No result.
+    #[arg(long)]
+    pub quick: bool,
 }
 
 #[derive(Debug, Args)]

@@ -7,10 +7,12 @@ mod completions;
 mod diagnose;
 mod diff;
 mod doc;
+mod editor_files;
 mod error;
 mod explain;
 mod fmt;
 mod load;
+pub mod lsp;
 mod new;
 mod output;
 mod parallel;
@@ -22,6 +24,7 @@ mod run;
 mod run_directory;
 mod sarif;
 mod shrink;
+mod study;
 mod test;
 mod train;
 mod trials;
@@ -64,8 +67,11 @@ pub fn main() -> ExitCode {
         Command::Doc(arguments) => doc::doc(&output, arguments),
         Command::New(arguments) => new::new(&output, arguments),
         Command::Completions(arguments) => completions::completions(&output, arguments),
+        Command::Lsp => lsp::serve(),
+        Command::EditorFiles(arguments) => editor_files::editor_files(&output, arguments),
         Command::Run(arguments) => run::run(&output, arguments),
         Command::Train(arguments) => train::train(&output, arguments),
+        Command::Study(arguments) => study::study(&output, arguments),
         Command::Verify(arguments) => verify::verify(&output, arguments),
         Command::Replay(arguments) => replay::replay(&output, arguments),
         Command::Diagnose(arguments) => diagnose::diagnose(&output, arguments),

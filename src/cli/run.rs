@@ -60,7 +60,7 @@ pub fn run(output: &Output, arguments: &RunArguments) -> Result<(), Failure> {
     let mut progress =
         Progress::new(run.episodes() as u64, done.len() as u64, output.quiet || output.is_json());
     let space_path = space_path(&run, &directory)?;
-    play(&run, &todo, jobs(arguments), &stop, &mut |summary, log| {
+    play(&run, &todo, jobs(arguments.jobs), &stop, &mut |summary, log| {
         keep(&run, &mut directory, &space_path, &summary, &log)?;
         progress.episode(summary.counted());
         Ok(())
@@ -229,9 +229,10 @@ fn space_path(run: &Run, directory: &RunDirectory) -> Result<String, Failure> {
     load::relative(&directory.path.join("critical"), &run.space().path)
 }
 
-fn jobs(arguments: &RunArguments) -> usize {
+/// Worker threads: as many as asked for, or one for each core.
+pub fn jobs(asked: Option<u32>) -> usize {
     let cores = || std::thread::available_parallelism().map_or(1, usize::from);
-    arguments.jobs.map_or_else(cores, |jobs| jobs as usize)
+    asked.map_or_else(cores, |jobs| jobs as usize)
 }
 
 /// A flag that the first Ctrl-C sets; the second ends the process at once.

@@ -6,8 +6,9 @@ use std::sync::atomic::AtomicBool;
 use std::sync::atomic::Ordering;
 
 use crate::agent;
-use crate::agent::Hyperparameters;
 use crate::agent::Kind;
+use crate::agent::QPolicy;
+use crate::agent::Settings;
 use crate::emit;
 use crate::model::Space;
 use crate::sim::ENGINE;
@@ -15,7 +16,7 @@ use crate::study::Profile;
 use crate::study::TrainSettings;
 use crate::study::TrainedEpisode;
 use crate::study::Training;
-use crate::study::evaluate;
+use crate::study::evaluate_agent;
 use crate::syntax::listed;
 
 use super::arguments::TrainArguments;
@@ -63,7 +64,7 @@ pub fn train(output: &Output, arguments: &TrainArguments) -> Result<(), Failure>
 fn begun(output: &Output, arguments: &TrainArguments) -> Result<(Training, RunDirectory), Failure> {
     let file = arguments.file.as_ref().expect("clap asks for it where there is no `--resume`");
     let table = load::table(output, file)?;
-    let hyperparameters = hyperparameters(arguments)?;
+    let hyperparameters = settings(arguments)?;
     let space = table.space();
     let roads = if arguments.road.is_empty() {
         space.roads.iter().map(|road| road.name.clone()).collect()
@@ -82,6 +83,7 @@ fn begun(output: &Output, arguments: &TrainArguments) -> Result<(Training, RunDi
         agent: arguments.agent.clone(),
         episodes: arguments.episodes,
         seed: arguments.seed,
+        ambient: 0,
         without: arguments.rules.without.clone(),
         with: arguments.rules.with.clone(),
         hyperparameters,
@@ -93,25 +95,22 @@ fn begun(output: &Output, arguments: &TrainArguments) -> Result<(Training, RunDi
     Ok((training, RunDirectory::open(path)?))
 }
 
-/// The preset that is asked for, as the configuration file changes it.
-fn hyperparameters(arguments: &TrainArguments) -> Result<Hyperparameters, Failure> {
-    let learning = agent::REGISTRY.iter().filter(|entry| matches!(entry.kind, Kind::Learning(_)));
+/// The agent's settings: the preset that is asked for, as the configuration file changes it.
+fn settings(arguments: &TrainArguments) -> Result<Settings, Failure> {
+    let trained = agent::REGISTRY.iter().filter(|entry| !matches!(entry.kind, Kind::Ready(_)));
     let entry = agent::by_name(&arguments.agent).ok_or_else(|| {
-        let known = listed(&learning.map(|entry| entry.name).collect::<Vec<_>>());
+        let known = listed(&trained.map(|entry| entry.name).collect::<Vec<_>>());
         Failure::usage(format!("no agent `{}` that learns: there are {known}", arguments.agent))
     })?;
-    let Kind::Learning(presets) = entry.kind else {
-        let name = entry.name;
-        return Err(Failure::usage(format!(
-            "`{name}` has nothing to learn: `avastra run --agent {name}` plays it"
-        )));
-    };
     let (text, path) = match &arguments.config {
         None => (String::new(), Path::new("--preset")),
         Some(path) => (load::read(path).map_err(|error| Failure::file("read", path, error))?, path.as_path()),
     };
-    Hyperparameters::from_yaml(presets, arguments.preset.as_deref(), &text)
-        .map_err(|error| Failure::file("take", path, error))
+    let settings = Settings::from_yaml(entry, arguments.preset.as_deref(), &text).ok_or_else(|| {
+        let name = entry.name;
+        Failure::usage(format!("`{name}` has nothing to learn: `avastra run --agent {name}` plays it"))
+    })?;
+    settings.map_err(|error| Failure::file("take", path, error))
 }
 
 /// The rest of an interrupted training.
@@ -156,7 +155,7 @@ fn write_critical(
     trained: &TrainedEpisode,
 ) -> Result<(), Failure> {
     let settings = training.settings();
-    if trained.summary.counted() == 0 || settings.hyperparameters.observation_period_s.is_some() {
+    if trained.summary.counted() == 0 || settings.hyperparameters.observation_period_s().is_some() {
         return Ok(());
     }
     let name = format!("{}_{:04}", trained.log.road, trained.summary.episode);
@@ -170,7 +169,8 @@ fn write_critical(
         without: &settings.without,
         with: &settings.with,
     };
-    let file = emit::scenario(training.table(), &trained.log, &trained.summary, &source);
+    let file =
+        emit::scenario(training.table(), &training.log_of_space(&trained.log), &trained.summary, &source);
     write(&directory.critical(&name), &crate::syntax::print(&file))
 }
 
@@ -181,32 +181,43 @@ fn finish(output: &Output, training: &Training, directory: &RunDirectory) -> Res
     let rules = (settings.with.as_slice(), settings.without.as_slice());
     let roads = &settings.roads;
     let (ads, test) = (training.arena().ads(), (EVALUATION_EPISODES, settings.seed));
-    let evaluation = evaluate(table, training.policy(), roads, ads, rules, test);
+    let evaluation = evaluate_agent(table, &|| training.actor(), roads, ads, rules, test);
     let evaluation = evaluation.map_err(|error| Failure::usage(error.to_string()))?;
-    let path = write_policy(training, &evaluation, &directory.path)?;
-    let totals =
-        directory.database.totals().map_err(|error| Failure::file("read", &directory.path, error))?;
+    let policy = training.policy().map(|policy| write_policy(training, policy, &evaluation, &directory.path));
+    let policy = policy.transpose()?;
+    let read = |error| Failure::file("read", &directory.path, error);
+    let totals = directory.database.totals().map_err(read)?;
+    let simulated_h = directory.database.trained_s().map_err(read)? / 3600.0;
     output.say(&format!(
-        "\n{}: {}, {} counted in {}",
+        "\n{} in {simulated_h:.1} h of simulated time: {}, {} counted in {}",
         plural(totals.episodes as usize, "episode"),
         plural(totals.collisions as usize, "collision"),
         totals.counted,
         plural(totals.episodes_with_counted as usize, "episode"),
     ));
     output.say(&format!(
-        "the policy, on {} of its own: {} counted in {}",
+        "what it learned, on {} of its own: {} counted in {}",
         plural(evaluation.episodes as usize * roads.len(), "episode"),
         plural(evaluation.counted as usize, "collision"),
         plural(evaluation.colliding as usize, "episode"),
     ));
-    output.say(&format!("{}\nplay it with: avastra run --policy {}", path.display(), path.display()));
+    match &policy {
+        Some(path) => {
+            output.say(&format!("{}\nplay it with: avastra run --policy {}", path.display(), path.display()))
+        }
+        None => output.say(&format!(
+            "a search has no policy file: what it found stands in {}",
+            directory.path.join("critical").display()
+        )),
+    }
     output.result(
         "train",
         serde_json::json!({
-            "directory": directory.path, "totals": totals, "policy": path,
+            "directory": directory.path, "totals": totals, "policy": policy, "simulated_h": simulated_h,
             "evaluation": {
                 "episodes": evaluation.episodes * roads.len() as u64, "collisions": evaluation.collisions,
                 "counted": evaluation.counted, "colliding": evaluation.colliding,
+                "simulated_h": evaluation.simulated_s / 3600.0,
             },
         }),
     );
@@ -216,6 +227,7 @@ fn finish(output: &Output, training: &Training, directory: &RunDirectory) -> Res
 /// Writes `policy/NAME.ava`.
 fn write_policy(
     training: &Training,
+    policy: &QPolicy,
     evaluation: &crate::study::Evaluation,
     directory: &Path,
 ) -> Result<PathBuf, Failure> {
@@ -228,7 +240,7 @@ fn write_policy(
     std::fs::create_dir_all(&folder).map_err(|error| Failure::file("create", &folder, error))?;
     let space: &Space = training.table().space();
     let space_path = load::relative(&folder, &space.path)?;
-    let text = emit::policy_text(training.policy(), settings, evaluation, &name, &space_path);
+    let text = emit::policy_text(policy, settings, evaluation, &name, &space_path);
     let path = folder.join(format!("{name}.ava"));
     write(&path, &text)?;
     Ok(path)
@@ -236,15 +248,16 @@ fn write_policy(
 
 fn heading(training: &Training, directory: &Path) -> String {
     let settings = training.settings();
-    let network = training.policy().network();
-    let widths: Vec<String> = network.shape().layers.iter().map(ToString::to_string).collect();
+    let network = training.policy().map_or(String::new(), |policy| {
+        let network = policy.network();
+        let widths: Vec<String> = network.shape().layers.iter().map(ToString::to_string).collect();
+        format!(", network {}, {} parameters", widths.join("-"), network.parameters().len())
+    });
     format!(
-        "{}: {} ({}, network {}, {} parameters) against {}, {} on {}, seed {}, into {}",
+        "{}: {} ({}{network}) against {}, {} on {}, seed {}, into {}",
         training.table().space().path.display(),
         settings.agent,
-        settings.hyperparameters.preset,
-        widths.join("-"),
-        network.parameters().len(),
+        settings.hyperparameters.preset(),
         settings.ads,
         plural(settings.episodes as usize, "episode"),
         settings.roads.join(", "),

@@ -67,7 +67,7 @@ fn file(
         rules: Vec::new(),
     };
     let digest = Some(Text::new(settings.space_digest.clone(), Span::NONE));
-    let space_use = Use { path: Text::new(space_path, Span::NONE), digest };
+    let space_use = Use { path: Text::new(space_path, Span::NONE), digest, without: Vec::new() };
     File {
         docs: vec![tree::doc("Emitted by `avastra train`; play it with `avastra run --policy FILE`.")],
         items: vec![
@@ -125,7 +125,7 @@ fn headline(settings: &TrainSettings, evaluation: &Evaluation) -> String {
     format!(
         "{} ({}) after {} episodes on {}: {} counted collisions in {} episodes of its own.",
         settings.agent,
-        settings.hyperparameters.preset,
+        settings.hyperparameters.preset(),
         settings.episodes,
         settings.roads.join(", "),
         evaluation.counted,

@@ -95,7 +95,7 @@ fn file(
         expects,
     };
     let digest = Some(Text::new(space.digest.clone(), Span::NONE));
-    let space_use = Use { path: Text::new(source.space_path, Span::NONE), digest };
+    let space_use = Use { path: Text::new(source.space_path, Span::NONE), digest, without: Vec::new() };
     File {
         docs: vec![tree::doc(emitted)],
         items: vec![

@@ -136,6 +136,10 @@ pub(crate) fn enclose(expr: &Expr, known: &Known<'_>) -> Values {
                 Values::Truth { may_hold, may_fail }
             }
         },
+        ExprKind::OnRoad(names) => match known.road {
+            None => Values::UNKNOWN_TRUTH,
+            Some(road) => Values::truth(names.contains(&road.name)),
+        },
         ExprKind::Match { subject, arm_of, arms } => {
             let chosen = positions(values(subject).variants()).map(|variant| values(&arms[arm_of[variant]]));
             chosen.reduce(Values::union).unwrap_or_else(|| values(&arms[0]))

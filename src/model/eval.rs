@@ -91,6 +91,7 @@ pub fn evaluate(expr: &Expr, functions: &[FnDef], facts: &Facts<'_>) -> Value {
             Value::Bool(list.iter().any(|item| compare(Comparison::Equal, inner, value(item))))
         }
         ExprKind::InLanes(inner, lanes) => Value::Bool(has_lane(facts, lanes[value(inner).variant()])),
+        ExprKind::OnRoad(names) => Value::Bool(facts.road.is_some_and(|road| names.contains(&road.name))),
         ExprKind::Match { subject, arm_of, arms } => value(&arms[arm_of[value(subject).variant()]]),
     }
 }

@@ -41,6 +41,8 @@ pub enum ExprKind {
     InList(Box<Expr>, Vec<Expr>),
     /// Membership in `road.lanes`; the table turns variants of the expression's enum into lanes.
     InLanes(Box<Expr>, Vec<LaneChoice>),
+    /// `road == corner`, `road in [corner, boulevard]`: whether the road is one of these.
+    OnRoad(Vec<String>),
     /// The arm for each variant of the subject's enum is `arms[arm_of[variant]]`.
     Match {
         subject: Box<Expr>,
@@ -126,6 +128,7 @@ impl Expr {
             | ExprKind::Variant(..)
             | ExprKind::Local(_)
             | ExprKind::Cell(_)
+            | ExprKind::OnRoad(_)
             | ExprKind::Fact(_) => {}
             ExprKind::CellAt(_, inner)
             | ExprKind::Not(inner)

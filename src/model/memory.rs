@@ -164,8 +164,16 @@ impl Space {
         match ty {
             Type::Bool => Value::Bool(rng::below(rng, 2) == 1),
             Type::Enum(of) => {
-                let count = self.enums[of.0].variants.len() as u32;
-                Value::Variant(of, rng::below(rng, count) as usize)
+                let odds = &self.enums[of.0].odds;
+                let mut ticket = rng::below(rng, odds.iter().sum());
+                let drawn = odds.iter().position(|odds| match ticket.checked_sub(*odds) {
+                    Some(rest) => {
+                        ticket = rest;
+                        false
+                    }
+                    None => true,
+                });
+                Value::Variant(of, drawn.expect("the ticket is below the sum of the odds"))
             }
             Type::Int | Type::Quantity(_) => Value::Number(0.0),
         }

@@ -1,4 +1,5 @@
-//! `override`: a declaration in place of the one of that kind and name in a used file.
+//! What of the used files holds: `override` puts a declaration in place of the one of that kind and
+//! name, `use … without` leaves actions, groups and rules out.
 //!
 //! The new declaration stands where the old one stood, so that the rows of a table keep their
 //! numbers. What used the old one uses the new one, in the used file too: it is checked anew.
@@ -7,12 +8,19 @@ use std::borrow::Cow;
 use std::collections::BTreeSet;
 use std::path::PathBuf;
 
+use crate::model::check::unknown;
 use crate::model::code;
 use crate::model::load::LoadedFile;
+use crate::model::load::used_path;
 use crate::model::load::used_paths;
+use crate::model::load::uses as uses_of;
 use crate::syntax::Diagnostic;
+use crate::syntax::ast::EffectKind;
 use crate::syntax::ast::Item;
 use crate::syntax::ast::ItemKind;
+use crate::syntax::ast::Name;
+use crate::syntax::ast::RuleBody;
+use crate::syntax::ast::Use;
 use crate::syntax::nearest;
 
 /// A declaration that holds, and the file that it is from.
@@ -26,6 +34,9 @@ pub(super) fn resolve<'a>(files: &'a [LoadedFile], order: &[usize]) -> (Vec<Cow<
     let mut standing: Vec<Standing<'a>> = Vec::new();
     let mut diagnostics = Vec::new();
     for &file in order {
+        for used in uses_of(&files[file]).filter(|used| !used.without.is_empty()) {
+            leave_out(files, &mut standing, file, used, &mut diagnostics);
+        }
         for item in &files[file].tree.items {
             match &item.kind {
                 ItemKind::Override(kind) => match find(files, &standing, file, item, kind) {
@@ -40,6 +51,112 @@ pub(super) fn resolve<'a>(files: &'a [LoadedFile], order: &[usize]) -> (Vec<Cow<
         }
     }
     (standing.into_iter().map(|standing| standing.item).collect(), diagnostics)
+}
+
+/// Takes away what a `use` is without, and what means nothing any more: names in groups and after `on`,
+/// groups and rules without a name left, transitions of a state that nothing sets any more.
+fn leave_out(
+    files: &[LoadedFile],
+    standing: &mut Vec<Standing<'_>>,
+    file: usize,
+    used: &Use,
+    diagnostics: &mut Vec<Diagnostic>,
+) {
+    let path = used_path(&files[file], used);
+    // A file that cannot be read was reported.
+    let Some(target) = files.iter().position(|other| other.path == path) else { return };
+    let offered: Vec<bool> = (0..files.len()).map(|other| uses(files, target, other)).collect();
+    let is_offered = |standing: &Standing<'_>| {
+        offered[standing.file]
+            && matches!(standing.item.kind, ItemKind::Action(_) | ItemKind::Group(_) | ItemKind::Rule(_))
+    };
+    let mut left: BTreeSet<String> = BTreeSet::new();
+    for name in &used.without {
+        let mut open = vec![name.text.clone()];
+        while let Some(next) = open.pop() {
+            let found = |standing: &Standing<'_>| {
+                is_offered(standing) && standing.item.kind.name().is_some_and(|known| known.text == next)
+            };
+            let mut known = false;
+            for member in standing.iter().filter(|standing| found(standing)) {
+                known = true;
+                // A group goes with all its actions.
+                if let ItemKind::Group(group) = &member.item.kind {
+                    open.extend(group.members.iter().map(|member| member.text.clone()));
+                }
+            }
+            if known {
+                left.insert(next);
+            } else if next == name.text && !left.contains(&next) {
+                let candidates: Vec<&str> = standing
+                    .iter()
+                    .filter(|standing| is_offered(standing))
+                    .filter_map(|standing| standing.item.kind.name().map(|name| name.text.as_str()))
+                    .collect();
+                let what = "action, group or rule";
+                diagnostics.push(unknown(what, &name.text, name.span, candidates));
+            }
+        }
+    }
+    let set_before = states_set(standing);
+    standing.retain(|standing| {
+        let name = standing.item.kind.name();
+        !(is_offered(standing) && name.is_some_and(|name| left.contains(&name.text)))
+    });
+    loop {
+        let set_now = states_set(standing);
+        let before = left.len();
+        standing.retain_mut(|standing| {
+            if !is_offered(standing) {
+                return true;
+            }
+            let gone = |name: &Name| left.contains(&name.text);
+            match &standing.item.kind {
+                ItemKind::Group(group) if group.members.iter().any(gone) => {
+                    let mut kept = group.clone();
+                    kept.members.retain(|member| !gone(member));
+                    let is_kept = !kept.members.is_empty();
+                    if !is_kept {
+                        left.insert(kept.name.text.clone());
+                    }
+                    standing.item.to_mut().kind = ItemKind::Group(kept);
+                    is_kept
+                }
+                ItemKind::Rule(rule) => match &rule.body {
+                    RuleBody::Holds { on, .. } if on.iter().any(gone) => {
+                        let mut kept = rule.clone();
+                        let RuleBody::Holds { on, .. } = &mut kept.body else { return true };
+                        on.retain(|target| !left.contains(&target.text));
+                        let is_kept = !on.is_empty();
+                        standing.item.to_mut().kind = ItemKind::Rule(kept);
+                        is_kept
+                    }
+                    RuleBody::Moves { state, .. } => {
+                        !set_before.contains(&state.text) || set_now.contains(&state.text)
+                    }
+                    RuleBody::Holds { .. } => true,
+                },
+                _ => true,
+            }
+        });
+        if left.len() == before {
+            return;
+        }
+    }
+}
+
+/// The states that some action sets.
+fn states_set(standing: &[Standing<'_>]) -> BTreeSet<String> {
+    let effects = standing.iter().flat_map(|standing| match &standing.item.kind {
+        ItemKind::Action(action) => action.effects.as_slice(),
+        _ => &[],
+    });
+    effects
+        .filter_map(|effect| match &effect.kind {
+            EffectKind::Set { state, .. } => Some(state.text.clone()),
+            EffectKind::Spawn { .. } => None,
+        })
+        .collect()
 }
 
 /// Where the declaration stands that is to be replaced.

@@ -178,6 +178,7 @@ impl Prover<'_> {
     /// The same, begun with these values of the parameters and cells.
     pub fn narrow(&self, mut locals: Vec<Values>, before: &[Values], rules: &[usize]) -> Option<Vec<Values>> {
         for _ in 0..ROUNDS {
+            let was = locals.clone();
             let after = self.space.cells_after(self.row.action, &locals, before);
             for bound in self.bounds {
                 if bound.rule.is_some_and(|rule| !rules.contains(&rule)) {
@@ -193,6 +194,10 @@ impl Prover<'_> {
                     return None;
                 }
                 locals[bound.local] = Values::Number(narrowed);
+            }
+            // What changed nothing will change nothing again.
+            if locals == was {
+                break;
             }
         }
         let after = self.space.cells_after(self.row.action, &locals, before);

@@ -63,6 +63,8 @@ pub struct EnumDef {
     pub variants: Vec<String>,
     /// Whether `<` compares its variants.
     pub ordered: bool,
+    /// How often each variant is drawn beside the others; 1 unless `odds` says so.
+    pub odds: Vec<u32>,
     pub span: Span,
 }
 
@@ -139,7 +141,7 @@ pub struct Parameter {
 /// The values that a parameter may have.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Domain {
-    /// In this order.
+    /// In this order. One of the list is drawn: what stands there twice is twice as likely.
     Values(Vec<Value>),
     /// Both ends included, SI.
     Range(Rational, Rational),
@@ -290,6 +292,8 @@ pub struct Road {
 /// What rules may ask about a road.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RoadFacts {
+    /// What the road is called.
+    pub name: String,
     /// The lowest limit of the route's lanes: a drawn speed must be legal on the whole of it, SI.
     pub limit: Rational,
     /// The same, m/s.

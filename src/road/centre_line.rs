@@ -178,54 +178,65 @@ impl Curve<'_> {
         for i in 1..=steps {
             let fraction = i as f64 / steps as f64;
             let to = if i == steps { end } else { self.at(begin.s_m + (end.s_m - begin.s_m) * fraction) };
-            self.refine(from, to, 12, samples);
+            self.refine(from, self.between(from, to), to, 12, samples);
             samples.push(to);
             from = to;
         }
     }
 
-    /// Appends points strictly between two until the chords are near enough.
-    fn refine(&self, begin: Sample, end: Sample, depth: u32, samples: &mut Vec<Sample>) {
-        let near = || self.deviation_m(begin, end) < CHORD_ERROR_M && self.interpolates(begin, end);
-        if depth == 0 || samples.len() > SAMPLES_MAX || near() {
+    /// The point half-way by station.
+    fn between(&self, begin: Sample, end: Sample) -> Sample {
+        self.at((begin.s_m + end.s_m) / 2.0)
+    }
+
+    /// Appends points strictly between two until the chords are near enough; `middle` is the point
+    /// half-way. Points are dear: what one level has looked at the next takes over.
+    fn refine(&self, begin: Sample, middle: Sample, end: Sample, depth: u32, samples: &mut Vec<Sample>) {
+        if depth == 0 || samples.len() > SAMPLES_MAX {
             return;
         }
-        let middle = self.at((begin.s_m + end.s_m) / 2.0);
-        self.refine(begin, middle, depth - 1, samples);
+        let (early, late) = (self.between(begin, middle), self.between(middle, end));
+        let quarters = [early, middle, late];
+        if deviation_m(begin, quarters, end) < CHORD_ERROR_M && interpolates(begin, middle, end) {
+            return;
+        }
+        self.refine(begin, early, middle, depth - 1, samples);
         samples.push(middle);
-        self.refine(middle, end, depth - 1, samples);
+        self.refine(middle, late, end, depth - 1, samples);
     }
 
     fn is_straight(&self, begin: Sample, end: Sample) -> bool {
         let same_heading = |other: Sample| (other.heading_rad - begin.heading_rad).abs() < 1e-9;
-        let middle = self.at((begin.s_m + end.s_m) / 2.0);
-        same_heading(middle) && same_heading(end) && self.deviation_m(begin, end) < 1e-6
-    }
-
-    /// Whether the middle of the chord has nearly the station and the heading of the curve there.
-    fn interpolates(&self, begin: Sample, end: Sample) -> bool {
-        let between = self.at((begin.s_m + end.s_m) / 2.0);
-        let chord = end.position - begin.position;
-        let length_m = chord.norm().max(1e-9);
-        let ahead_m = chord.dot(&(between.position - begin.position)) / length_m;
-        let turned_rad = wrap_angle(end.heading_rad - begin.heading_rad);
-        let heading_rad = begin.heading_rad + turned_rad * (ahead_m / length_m);
-        let aside_rad = wrap_angle(between.heading_rad - heading_rad).abs();
-        between.folded || aside_rad < HEADING_ERROR_RAD && (ahead_m - length_m / 2.0).abs() < STATION_ERROR_M
-    }
-
-    /// How far the curve leaves the chord, or the width its linear interpolation, m.
-    fn deviation_m(&self, begin: Sample, end: Sample) -> f64 {
-        let chord = end.position - begin.position;
-        let length_m = chord.norm().max(1e-9);
-        let mut deviation_m: f64 = 0.0;
-        for fraction in [0.25, 0.5, 0.75] {
-            let between = self.at(begin.s_m + (end.s_m - begin.s_m) * fraction);
-            let delta = between.position - begin.position;
-            let width_m = begin.width_m + (end.width_m - begin.width_m) * fraction;
-            let aside_m = (chord.x * delta.y - chord.y * delta.x).abs() / length_m;
-            deviation_m = deviation_m.max(aside_m).max((between.width_m - width_m).abs());
+        let middle = self.between(begin, end);
+        if !same_heading(middle) || !same_heading(end) {
+            return false;
         }
-        deviation_m
+        let quarters = [self.between(begin, middle), middle, self.between(middle, end)];
+        deviation_m(begin, quarters, end) < 1e-6
     }
+}
+
+/// Whether the middle of the chord has nearly the station and the heading of the curve there.
+fn interpolates(begin: Sample, middle: Sample, end: Sample) -> bool {
+    let chord = end.position - begin.position;
+    let length_m = chord.norm().max(1e-9);
+    let ahead_m = chord.dot(&(middle.position - begin.position)) / length_m;
+    let turned_rad = wrap_angle(end.heading_rad - begin.heading_rad);
+    let heading_rad = begin.heading_rad + turned_rad * (ahead_m / length_m);
+    let aside_rad = wrap_angle(middle.heading_rad - heading_rad).abs();
+    middle.folded || aside_rad < HEADING_ERROR_RAD && (ahead_m - length_m / 2.0).abs() < STATION_ERROR_M
+}
+
+/// How far the curve leaves the chord, or the width its linear interpolation, m.
+fn deviation_m(begin: Sample, quarters: [Sample; 3], end: Sample) -> f64 {
+    let chord = end.position - begin.position;
+    let length_m = chord.norm().max(1e-9);
+    let mut deviation_m: f64 = 0.0;
+    for (fraction, between) in [0.25, 0.5, 0.75].into_iter().zip(quarters) {
+        let delta = between.position - begin.position;
+        let width_m = begin.width_m + (end.width_m - begin.width_m) * fraction;
+        let aside_m = (chord.x * delta.y - chord.y * delta.x).abs() / length_m;
+        deviation_m = deviation_m.max(aside_m).max((between.width_m - width_m).abs());
+    }
+    deviation_m
 }

@@ -90,7 +90,15 @@ fn dense(path: &Path) -> Vec<PathPoint> {
 /// Where two paths cross: (station on the first, station on the second), m.
 fn crossings(a: &Path, b: &Path) -> Vec<(f64, f64)> {
     let mut found: Vec<(f64, f64)> = Vec::new();
+    let (low, high) = extent(b);
     for p in a.points().windows(2) {
+        // Most of a route is nowhere near the other lane.
+        let (from, to) = (p[0].position, p[1].position);
+        let apart =
+            |axis: usize| from[axis].max(to[axis]) < low[axis] || from[axis].min(to[axis]) > high[axis];
+        if apart(0) || apart(1) {
+            continue;
+        }
         for q in b.points().windows(2) {
             let Some((x, y)) = segment_crossing(p[0].position, p[1].position, q[0].position, q[1].position)
             else {
@@ -104,6 +112,17 @@ fn crossings(a: &Path, b: &Path) -> Vec<(f64, f64)> {
         }
     }
     found
+}
+
+/// The corners of a box around a path, with a hair's room for rounding.
+fn extent(path: &Path) -> (Vec2, Vec2) {
+    const ROOM_M: f64 = 1e-3;
+    let (mut low, mut high) = (Vec2::repeat(f64::INFINITY), Vec2::repeat(f64::NEG_INFINITY));
+    for point in path.points() {
+        low = low.inf(&point.position);
+        high = high.sup(&point.position);
+    }
+    (low - Vec2::repeat(ROOM_M), high + Vec2::repeat(ROOM_M))
 }
 
 /// Fractions along two segments at which they cross; `None` also if they are parallel.

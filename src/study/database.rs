@@ -29,7 +29,8 @@ const SCHEMA: &str = "
 CREATE TABLE episode (
   episode INTEGER PRIMARY KEY, road TEXT NOT NULL, seed TEXT NOT NULL, ended TEXT NOT NULL,
   duration_s REAL NOT NULL, distance_m REAL NOT NULL, steps INTEGER NOT NULL, red_runs INTEGER NOT NULL,
-  collisions INTEGER NOT NULL, counted INTEGER NOT NULL, first_counted_s REAL, trace TEXT NOT NULL, pet_s REAL
+  collisions INTEGER NOT NULL, counted INTEGER NOT NULL, first_counted_s REAL, trace TEXT NOT NULL, pet_s REAL,
+  branched_s REAL NOT NULL
 ) STRICT;
 CREATE TABLE collision (
   episode INTEGER NOT NULL REFERENCES episode, number INTEGER NOT NULL, time_s REAL NOT NULL,
@@ -142,7 +143,8 @@ impl Database {
                         (SELECT coalesce(sum(repeated), 0) FROM collision),
                         (SELECT coalesce(sum(avoidability = 'avoidable'), 0) FROM collision),
                         (SELECT coalesce(sum(avoidability = 'beyond_reference'), 0) FROM collision),
-                        (SELECT coalesce(sum(avoidability = 'unavoidable'), 0) FROM collision)
+                        (SELECT coalesce(sum(avoidability = 'unavoidable'), 0) FROM collision),
+                        coalesce(sum(branched_s), 0.0)
                  FROM episode",
             [],
             |row| {
@@ -165,6 +167,7 @@ impl Database {
                     avoidable: row.get(15)?,
                     beyond_reference: row.get(16)?,
                     unavoidable: row.get(17)?,
+                    branched_s: row.get(18)?,
                 })
             },
         )?)
@@ -214,6 +217,8 @@ pub struct Totals {
     pub avoidable: i64,
     pub beyond_reference: i64,
     pub unavoidable: i64,
+    /// Driven in branches, beside the episodes, by agents that look ahead, s.
+    pub branched_s: f64,
 }
 
 fn step_table() -> String {
@@ -283,7 +288,7 @@ fn add_episode(
     log: &EpisodeLog,
 ) -> Result<(), rusqlite::Error> {
     transaction
-        .prepare_cached("INSERT INTO episode VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)")?
+        .prepare_cached("INSERT INTO episode VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)")?
         .execute(params![
             summary.episode as i64,
             log.road,
@@ -298,6 +303,7 @@ fn add_episode(
             summary.first_counted_s(),
             crate::model::digest_text(&log.trace()),
             summary.pet_s,
+            summary.branched_s,
         ])?;
     Ok(())
 }

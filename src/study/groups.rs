@@ -83,7 +83,7 @@ impl Database {
 }
 
 /// The kind of an obstacle by the name of its body.
-fn kind(body: &str) -> &'static str {
+pub(super) fn kind(body: &str) -> &'static str {
     match Body::from_name(body) {
         Some(Body::Pedestrian) => "pedestrian",
         Some(Body::BoxTruck | Body::SchoolBus) => "large vehicle",

@@ -24,6 +24,7 @@ use crate::episode::EpisodeLog;
 use crate::episode::Moment;
 use crate::episode::Script;
 use crate::episode::Watch;
+use crate::mdp::ProcKind;
 use crate::model::Scenario;
 use crate::model::Space;
 use crate::oracle;
@@ -164,7 +165,7 @@ impl Run {
         })?;
         match agent.kind {
             Kind::Ready(build) => Run::with_agent(table, settings, Box::new(build)),
-            Kind::Learning(_) => Err(RunError::Untrained { name: settings.agent }),
+            Kind::Learning(_) | Kind::Searching(_) => Err(RunError::Untrained { name: settings.agent }),
         }
     }
 
@@ -211,25 +212,29 @@ impl Run {
     pub fn episode(&self, number: usize) -> EpisodeLog {
         let mut agent = (self.agent)();
         agent.begin();
-        self.play(number, &mut |moment| choose(self.table(), agent.as_mut(), moment), &mut |_, _, _| {})
+        self.play(number, &mut |moment| choose(agent.as_mut(), moment), &mut |_, _, _| {})
     }
 
     /// Plays one episode and judges its collisions.
     pub fn judged(&self, number: usize) -> (EpisodeSummary, EpisodeLog) {
-        let mut agent = (self.agent)();
+        self.judged_by(number, (self.agent)().as_mut())
+    }
+
+    /// The same with another agent than the run's own.
+    pub fn judged_by(&self, number: usize, agent: &mut dyn Agent) -> (EpisodeSummary, EpisodeLog) {
         agent.begin();
         let mut measures = Measures::default();
-        let log = self.play(
-            number,
-            &mut |moment| choose(self.table(), agent.as_mut(), moment),
-            &mut |world, _, contacts| measures.note(world, contacts),
-        );
+        let log = self.play(number, &mut |moment| choose(agent, moment), &mut |world, _, contacts| {
+            measures.note(world, contacts)
+        });
         let setup = self.setup(number);
         let mut summary = EpisodeSummary::judged(&setup, number, &log, &self.settings.avoidability);
         (summary.criticality, summary.pet_s) = measures.of_steps(&log);
         for (finding, shape) in summary.collisions.iter_mut().zip(measures.shapes()) {
             finding.shape = *shape;
         }
+        summary.manners = measures.manners();
+        summary.branched_s = agent.branched_s();
         if self.settings.causes {
             summary.find_causes(&setup, &log).expect("a run with causes is against a system of modules");
         }
@@ -345,6 +350,7 @@ impl<'a> Stage<'a> {
             },
             memory,
             period_shifts: Vec::new(),
+            proc: ProcKind::default(),
         }
     }
 

@@ -15,6 +15,7 @@ use crate::oracle::AvoidabilitySettings;
 use crate::oracle::Judgement;
 use crate::oracle::NoModules;
 
+use super::measures::Manners;
 use super::shape::Shape;
 
 /// An episode, judged.
@@ -29,6 +30,10 @@ pub struct EpisodeSummary {
     pub criticality: Vec<Criticality>,
     /// Least post-encroachment time with anybody who was not hit, s; `None` above 5 s.
     pub pet_s: Option<f64>,
+    /// How the ego vehicle drove, where it was watched.
+    pub manners: Manners,
+    /// Driven in branches, beside the episode, by an agent that tries rows out before it chooses, s.
+    pub branched_s: f64,
 }
 
 /// A collision, judged.
@@ -83,8 +88,15 @@ impl EpisodeSummary {
             }
         };
         let collisions = judgements.into_iter().enumerate().map(find).collect();
-        let avoidability = AvoidabilitySettings::default();
-        EpisodeSummary { episode: number, collisions, avoidability, criticality: Vec::new(), pet_s: None }
+        EpisodeSummary {
+            episode: number,
+            collisions,
+            avoidability: AvoidabilitySettings::default(),
+            criticality: Vec::new(),
+            pet_s: None,
+            manners: Manners::default(),
+            branched_s: 0.0,
+        }
     }
 
     /// Looks for the cause of every counted collision.

@@ -113,6 +113,7 @@ pub enum ItemKind {
     Language(Number),
     Use(Use),
     Enum(Enum),
+    Odds(Odds),
     State(State),
     Let(Let),
     Fn(Fn),
@@ -146,6 +147,7 @@ impl ItemKind {
             ItemKind::Language(_) => "language",
             ItemKind::Use(_) => "use",
             ItemKind::Enum(_) => "enum",
+            ItemKind::Odds(_) => "odds",
             ItemKind::State(_) => "state",
             ItemKind::Let(_) => "let",
             ItemKind::Fn(_) => "fn",
@@ -167,6 +169,7 @@ impl ItemKind {
     pub fn name(&self) -> Option<&Name> {
         match self {
             ItemKind::Enum(item) => Some(&item.name),
+            ItemKind::Odds(item) => Some(&item.name),
             ItemKind::State(item) => Some(&item.name),
             ItemKind::Let(item) => Some(&item.name),
             ItemKind::Fn(item) => Some(&item.name),
@@ -197,6 +200,8 @@ impl ItemKind {
 pub struct Use {
     pub path: Text,
     pub digest: Option<Text>,
+    /// Actions, groups and rules that are left out of what the file offers.
+    pub without: Vec<Name>,
 }
 
 /// `enum Level = None < Light < High` or `enum Side = Left | Right`. Never empty.
@@ -206,6 +211,14 @@ pub struct Enum {
     /// Whether `<` stood between the variants. A lone variant is not ordered.
     pub ordered: bool,
     pub variants: Vec<Name>,
+}
+
+/// `odds Vehicle { BoxTruck | SchoolBus => 2 }`: how often a variant is drawn, beside the others.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Odds {
+    /// The enum.
+    pub name: Name,
+    pub arms: Vec<Arm>,
 }
 
 /// `state sky: Sky -> Level = None`.

@@ -30,6 +30,7 @@ use crate::syntax::ast::Let;
 use crate::syntax::ast::Move;
 use crate::syntax::ast::Name;
 use crate::syntax::ast::Number;
+use crate::syntax::ast::Odds;
 use crate::syntax::ast::ParamMode;
 use crate::syntax::ast::Place;
 use crate::syntax::ast::Policy;
@@ -144,9 +145,17 @@ impl Builder {
             Rule::use_file => {
                 let path = self.text(parts.next())?;
                 let digest = parts.take(Rule::text).map(|digest| self.text(digest)).transpose()?;
-                ItemKind::Use(Use { path, digest })
+                let without = parts.take(Rule::names).map_or_else(Vec::new, |names| self.names(names));
+                ItemKind::Use(Use { path, digest, without })
             }
             Rule::enumeration => ItemKind::Enum(self.enumeration(parts)),
+            Rule::odds => {
+                let name = self.name(parts.next());
+                ItemKind::Odds(Odds {
+                    name,
+                    arms: parts.rest().map(|arm| self.arm(arm)).collect::<Built<_>>()?,
+                })
+            }
             Rule::state => {
                 let name = self.name(parts.next());
                 let ty = self.type_name(parts.next());

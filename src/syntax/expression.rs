@@ -191,18 +191,20 @@ impl Builder {
     fn match_expression(&self, pair: Pair<'_, Rule>) -> Built<ExprKind> {
         let mut parts = Parts::of(pair);
         let subject = Box::new(self.expression(parts.next())?);
-        let arms = parts.rest().map(|arm| {
-            let span = self.span(&arm);
-            let mut parts = Parts::of(arm);
-            let mut patterns = Vec::new();
-            if parts.take(Rule::otherwise).is_none() {
-                while let Some(pattern) = parts.take(Rule::pattern) {
-                    patterns.push(self.name(pattern));
-                }
-            }
-            Ok(Arm { patterns, value: self.expression(parts.next())?, span })
-        });
+        let arms = parts.rest().map(|arm| self.arm(arm));
         Ok(ExprKind::Match { subject, arms: arms.collect::<Built<_>>()? })
+    }
+
+    pub fn arm(&self, pair: Pair<'_, Rule>) -> Built<Arm> {
+        let span = self.span(&pair);
+        let mut parts = Parts::of(pair);
+        let mut patterns = Vec::new();
+        if parts.take(Rule::otherwise).is_none() {
+            while let Some(pattern) = parts.take(Rule::pattern) {
+                patterns.push(self.name(pattern));
+            }
+        }
+        Ok(Arm { patterns, value: self.expression(parts.next())?, span })
     }
 
     fn lane_point(&self, pair: Pair<'_, Rule>) -> Built<ExprKind> {

@@ -49,6 +49,7 @@ pub fn words(rule: Rule) -> Option<&'static str> {
         Rule::open_bracket | Rule::key => "`[`",
         Rule::close_bracket => "`]`",
         Rule::kw_digest => "`digest`",
+        Rule::kw_without => "`without`",
         Rule::kw_rule => "`rule`",
         Rule::kw_each => "`each`",
         Rule::kw_any | Rule::drawn_initially => "`any`",
@@ -127,7 +128,9 @@ pub fn is_plain_terminal(rule: Rule) -> bool {
             | Rule::kw_language
             | Rule::kw_use
             | Rule::kw_digest
+            | Rule::kw_without
             | Rule::kw_enum
+            | Rule::kw_odds
             | Rule::kw_state
             | Rule::kw_let
             | Rule::kw_fn

@@ -39,15 +39,15 @@ pub const LANGUAGE: u64 = 1;
 const DIAGNOSTICS_MAX: usize = 100;
 
 /// Every word that begins a declaration.
-const DECLARATIONS: [&str; 18] = [
-    "language", "use", "enum", "state", "let", "fn", "action", "group", "optional", "rule", "road",
+const DECLARATIONS: [&str; 19] = [
+    "language", "use", "enum", "odds", "state", "let", "fn", "action", "group", "optional", "rule", "road",
     "episode", "reward", "verdict", "expect", "scenario", "policy", "override",
 ];
 
 /// Words that begin something inside a declaration.
-const CLAUSES: [&str; 22] = [
-    "each", "any", "where", "set", "spawn", "ahead", "behind", "digest", "origin", "start", "steps",
-    "expect", "with", "claims", "net", "rules", "when", "match", "implies", "and", "not", "rule",
+const CLAUSES: [&str; 23] = [
+    "each", "any", "where", "set", "spawn", "ahead", "behind", "digest", "without", "origin", "start",
+    "steps", "expect", "with", "claims", "net", "rules", "when", "match", "implies", "and", "not", "rule",
 ];
 
 /// Reads a text. The tree holds what could be read; it is whole if no diagnostic is an error.

@@ -34,6 +34,7 @@ use crate::syntax::ast::TypeKind;
 use crate::syntax::layout::INDENT;
 use crate::syntax::layout::Layout;
 use crate::syntax::layout::WIDTH;
+use crate::syntax::print_expression::arm;
 use crate::syntax::print_expression::call;
 use crate::syntax::print_expression::expression;
 use crate::syntax::print_expression::expression_on_new_line;
@@ -231,11 +232,22 @@ impl Printer<'_> {
                 if let Some(digest) = &used.digest {
                     self.words(&format!(" digest {}", quoted(&digest.value)));
                 }
+                if !used.without.is_empty() {
+                    self.put(&separated(" without", ",", &used.without));
+                }
             }
             ItemKind::Enum(item) => {
                 let separator = if item.ordered { "<" } else { "|" };
                 let head = format!("enum {} =", item.name.text);
                 self.list(&head, separator, &item.variants, span);
+            }
+            ItemKind::Odds(item) => {
+                self.words(&format!("odds {} ", item.name.text));
+                self.block(span.end, |printer| {
+                    for line in &item.arms {
+                        printer.entry(line.span, &arm(line));
+                    }
+                });
             }
             ItemKind::State(item) => {
                 self.words(&format!("state {}: {} =", item.name.text, type_text(&item.ty)));
@@ -537,6 +549,7 @@ fn one_line(kind: &ItemKind) -> bool {
         ItemKind::Verdict(item) => plain(&item.condition),
         ItemKind::Expect(_) => true,
         ItemKind::Action(_)
+        | ItemKind::Odds(_)
         | ItemKind::Road(_)
         | ItemKind::Episode(_)
         | ItemKind::Reward(_)

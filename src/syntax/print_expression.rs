@@ -147,7 +147,7 @@ fn braced(entries: impl Iterator<Item = Layout>) -> Layout {
     Layout::group([Layout::text("{"), Layout::nest(inside), Layout::Line, Layout::text("}")])
 }
 
-fn arm(arm: &Arm) -> Layout {
+pub fn arm(arm: &Arm) -> Layout {
     Layout::row([Layout::text(format!("{} => ", patterns(arm))), expression(&arm.value)])
 }
 

@@ -2,14 +2,28 @@
 //! one off changes what may happen, and only that.
 //!
 //! The predicates are written here by hand, from the paper and not from the space's file.
+//!
+//! The audit: every rule has a draw that breaks it alone. It is refused by that rule's name, and with
+//! the rule switched off it passes; so whoever takes away a point of enforcement hears of it here.
+
+use std::sync::Arc;
 
 use avastra::action::ActionTable;
+use avastra::action::ActiveRules;
 use avastra::action::Draw;
 use avastra::action::Effect;
+use avastra::action::Enforcement;
 use avastra::action::Offer;
+use avastra::action::Refusal;
+use avastra::action::Situation;
+use avastra::action::SpawnFacts;
 use avastra::action::SpawnRequest;
+use avastra::action::Surroundings;
+use avastra::action::audit;
 use avastra::episode::Choice;
 use avastra::episode::Moment;
+use avastra::model::Type;
+use avastra::model::Value;
 use avastra::model::vocabulary::Body;
 use avastra::model::vocabulary::TimeOfDay;
 use avastra::model::vocabulary::Verb;
@@ -19,6 +33,7 @@ use avastra::study::Run;
 
 use crate::world::assert_replays;
 use crate::world::run;
+use crate::world::space;
 
 const RULES: [&str; 5] = ["chronology", "npc_gap", "npc_speed", "walking_pace", "no_teleport"];
 
@@ -122,5 +137,161 @@ fn appears_too_near(request: &SpawnRequest, moment: &Moment) -> bool {
     match moment.situation.surroundings.survey(request) {
         Ok(facts) => facts.spawn_gap_m < facts.safety_gap_m,
         Err(_) => false,
+    }
+}
+
+/// A draw that breaks one rule alone.
+struct Breach {
+    rule: &'static str,
+    road: &'static str,
+    /// The states before it.
+    states: &'static str,
+    row: &'static str,
+    /// Its drawn values, numbers in SI units.
+    values: &'static [(&'static str, &'static str)],
+    /// What a careful driver would need, m.
+    safety_gap_m: f64,
+    enforced: Enforcement,
+}
+
+const SEDAN: (&str, &str) = ("vehicle", "Sedan");
+const RED: (&str, &str) = ("colour", "Red");
+
+const BREACHES: [Breach; 8] = [
+    Breach {
+        rule: "chronology",
+        road: "corner",
+        states: "time: Noon",
+        row: "set_time(to: Morning)",
+        values: &[],
+        safety_gap_m: 0.0,
+        enforced: Enforcement::Transition,
+    },
+    Breach {
+        rule: "npc_gap",
+        road: "corner",
+        states: "time: Noon",
+        row: "drive_ahead(lane: Current, mode: Near, then: Keep)",
+        values: &[SEDAN, RED, ("speed", "10"), ("distance", "17.5")],
+        safety_gap_m: 0.0,
+        enforced: Enforcement::Draw,
+    },
+    Breach {
+        rule: "ped_gap",
+        road: "corner",
+        states: "time: Noon",
+        row: "pedestrian(from: Left)",
+        values: &[("mode", "Near"), ("speed", "1"), ("distance", "20.5")],
+        safety_gap_m: 0.0,
+        enforced: Enforcement::Draw,
+    },
+    Breach {
+        rule: "npc_speed",
+        road: "corner",
+        states: "time: Noon",
+        row: "drive_ahead(lane: Current, mode: Near, then: Keep)",
+        values: &[SEDAN, RED, ("speed", "12"), ("distance", "18")],
+        safety_gap_m: 0.0,
+        enforced: Enforcement::Draw,
+    },
+    Breach {
+        rule: "walking_pace",
+        road: "corner",
+        states: "time: Noon",
+        row: "pedestrian(from: Right)",
+        values: &[("mode", "Far"), ("speed", "1.5"), ("distance", "40")],
+        safety_gap_m: 0.0,
+        enforced: Enforcement::Draw,
+    },
+    Breach {
+        rule: "lane_exists",
+        road: "boulevard",
+        states: "time: Noon",
+        row: "drive_ahead(lane: Left, mode: Near, then: Keep)",
+        values: &[SEDAN, RED, ("speed", "10"), ("distance", "17")],
+        safety_gap_m: 0.0,
+        enforced: Enforcement::Draw,
+    },
+    Breach {
+        rule: "no_teleport",
+        road: "corner",
+        states: "time: Noon",
+        row: "pedestrian(from: Left)",
+        values: &[("mode", "Near"), ("speed", "1"), ("distance", "20")],
+        safety_gap_m: 20.5,
+        enforced: Enforcement::Survey,
+    },
+    Breach {
+        rule: "wet_needs_cause",
+        road: "corner",
+        states: "time: Noon, sky: None",
+        row: "wet(how: High)",
+        values: &[],
+        safety_gap_m: 0.0,
+        enforced: Enforcement::Draw,
+    },
+];
+
+/// A world in which everything fits, and the gap is the distance asked for.
+struct Wide {
+    safety_gap_m: f64,
+}
+
+impl Surroundings for Wide {
+    fn survey(&self, request: &SpawnRequest) -> Result<SpawnFacts, String> {
+        Ok(SpawnFacts { spawn_gap_m: request.distance_m, safety_gap_m: self.safety_gap_m })
+    }
+}
+
+impl Breach {
+    fn judged(&self, table: &ActionTable, with: &[&str], without: &[&str]) -> Result<Draw, Vec<Refusal>> {
+        let space = table.space();
+        let owned = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect::<Vec<_>>();
+        let rules = ActiveRules::new(space, &owned(with), &owned(without)).expect("the rules exist");
+        let road = space.roads.iter().find(|road| road.name == self.road).expect("the road exists");
+        let row = table.rows().iter().find(|row| row.label == self.row).expect("the row exists");
+        let parameters = &space.actions[row.action].parameters;
+        let value = |(name, text): &(&str, &str)| {
+            let parameter = parameters.iter().find(|known| *known.name == **name).expect("it is drawn");
+            let value = match parameter.ty {
+                Type::Enum(of) => {
+                    let variants = &space.enums[of.0].variants;
+                    let variant = variants.iter().position(|variant| variant == text);
+                    Value::Variant(of, variant.expect("the variant exists"))
+                }
+                _ => Value::Number(text.parse().expect("it is a number")),
+            };
+            (Arc::from(*name), value)
+        };
+        let values: Vec<(Arc<str>, Value)> = self.values.iter().map(value).collect();
+        let memory = space.memory_from(self.states, 1).expect("the states exist");
+        let surroundings = Wide { safety_gap_m: self.safety_gap_m };
+        let situation =
+            Situation { memory: &memory, road, rules: &rules, surroundings: &surroundings, seed: 1, step: 0 };
+        table.check(&situation, row.index, &values)
+    }
+}
+
+#[test]
+fn every_rule_refuses_its_own_breach_and_no_other_does() {
+    let table = ActionTable::new(space("avastra45.ava"));
+    let audit = audit(&table);
+    let mut names: Vec<&str> = audit.rules.iter().map(|rule| rule.name.as_str()).collect();
+    let mut broken: Vec<&str> = BREACHES.iter().map(|breach| breach.rule).collect();
+    names.sort_unstable();
+    broken.sort_unstable();
+    assert_eq!(names, broken, "every rule of the audit has its breach");
+    for breach in &BREACHES {
+        let entry = audit.rules.iter().find(|rule| rule.name == breach.rule).expect("it is in the audit");
+        assert_eq!(entry.enforced, breach.enforced, "{}", breach.rule);
+        let with: &[&str] = if entry.optional { &[breach.rule] } else { &[] };
+        let refusals = breach.judged(&table, with, &[]).expect_err(breach.rule);
+        let by: Vec<Option<&str>> = refusals.iter().map(|refusal| refusal.rule.as_deref()).collect();
+        assert_eq!(by, [Some(breach.rule)], "{refusals:?}");
+        let without: &[&str] = if entry.optional { &[] } else { &[breach.rule] };
+        assert!(breach.judged(&table, &[], without).is_ok(), "{} is switched off", breach.rule);
+        // Every other rule switched off: this one alone refuses.
+        let others: Vec<&str> = names.iter().copied().filter(|name| *name != breach.rule).collect();
+        assert!(breach.judged(&table, with, &others).is_err(), "{} alone", breach.rule);
     }
 }

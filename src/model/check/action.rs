@@ -139,6 +139,10 @@ impl Checker {
                 }
             },
         };
+        let domain = match domain {
+            Domain::Values(values) if !axis => Domain::Values(self.by_odds(values, declared)?),
+            domain => domain,
+        };
         if axis && matches!(domain, Domain::Range(..)) {
             let name = self.type_name(ty);
             let message = format!("`each` over `{}` has no end of rows", declared.name.text);
@@ -158,6 +162,25 @@ impl Checker {
         };
         let name = declared.name.text.as_str().into();
         Some(Parameter { name, ty, axis, domain, condition, span: declared.span })
+    }
+
+    /// The values that are drawn, each as often as its odds say.
+    fn by_odds(&mut self, values: Vec<Value>, declared: &ast::ActionParam) -> Option<Vec<Value>> {
+        let odds = |value: &Value| match value {
+            Value::Variant(of, variant) => self.enums[of.0].odds[*variant] as usize,
+            Value::Bool(_) | Value::Number(_) => 1,
+        };
+        let drawn: Vec<Value> =
+            values.iter().flat_map(|value| core::iter::repeat_n(*value, odds(value))).collect();
+        if drawn.is_empty() && !values.is_empty() {
+            let error = Diagnostic::error(
+                code::EMPTY,
+                format!("nothing is left to draw for `{}`", declared.name.text),
+            );
+            self.report(error.at(declared.span, "the odds of all its values are 0"));
+            return None;
+        }
+        Some(drawn)
     }
 
     fn domain(&mut self, within: &ast::Expr, ty: Type) -> Option<Domain> {

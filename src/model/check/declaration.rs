@@ -44,6 +44,9 @@ struct Cost {
     depth: u32,
 }
 
+/// A variant may be drawn so many times as often as another.
+const ODDS_MAX: u32 = 100;
+
 impl Checker {
     pub(super) fn declare_enums(&mut self, items: &[&ast::Item]) {
         for (item, declared) in each(items, |kind| match kind {
@@ -70,9 +73,76 @@ impl Checker {
                 docs: docs(item),
                 variants: variants_of(declared),
                 ordered: declared.ordered,
+                odds: vec![1; declared.variants.len().min(VARIANTS_MAX)],
                 span: declared.name.span,
             });
         }
+    }
+
+    /// How often variants are drawn: whole numbers, folded like constants.
+    pub(super) fn declare_odds(&mut self, items: &[&ast::Item]) {
+        let mut names = Names::default();
+        for (_, declared) in each(items, |kind| match kind {
+            ItemKind::Odds(declared) => Some(declared),
+            _ => None,
+        }) {
+            if let Err(error) = names.declare("odds of", &declared.name, 0) {
+                self.report(error);
+                continue;
+            }
+            let Some(of) = self.enum_names.get(&declared.name.text) else {
+                let error = unknown("enum", &declared.name.text, declared.name.span, self.enum_names.all());
+                self.report(error);
+                continue;
+            };
+            let variants = self.enums[of].variants.clone();
+            let mut odds: Vec<Option<u32>> = vec![None; variants.len()];
+            for arm in &declared.arms {
+                let value = self.odds_of(&arm.value).unwrap_or(1);
+                let named: Vec<Option<usize>> =
+                    arm.patterns.iter().map(|pattern| self.variant(pattern, &variants)).collect();
+                let taken: Vec<usize> = match arm.patterns.is_empty() {
+                    true => (0..variants.len()).filter(|variant| odds[*variant].is_none()).collect(),
+                    false => named.into_iter().flatten().collect(),
+                };
+                // An unknown variant was reported.
+                let sound = arm.patterns.is_empty() || !taken.is_empty();
+                if sound && !taken.iter().any(|variant| odds[*variant].is_none()) {
+                    let error = Diagnostic::error(code::NEVER_REACHED, "these odds never count");
+                    self.report(error.at(arm.span, "the lines before it say it all").help("remove the line"));
+                }
+                for variant in taken {
+                    odds[variant] = odds[variant].or(Some(value));
+                }
+            }
+            // Whoever is not named is as likely as before.
+            let odds: Vec<u32> = odds.into_iter().map(|odds| odds.unwrap_or(1)).collect();
+            if odds.iter().all(|odds| *odds == 0) {
+                let message = format!("no `{}` is ever drawn", declared.name.text);
+                let error =
+                    Diagnostic::error(code::EMPTY, message).at(declared.name.span, "all its odds are 0");
+                self.report(error.help("give at least one variant odds above 0"));
+                continue;
+            }
+            self.enums[of].odds = odds;
+        }
+    }
+
+    fn odds_of(&mut self, value: &ast::Expr) -> Option<u32> {
+        let expr = self.expr(value, &Place::default(), Some(Type::Int))?;
+        let found = match (expr.ty, self.fold(&expr)?) {
+            (Type::Int, ExprKind::Number(number)) => {
+                number.to_i64().and_then(|odds| u32::try_from(odds).ok())
+            }
+            _ => None,
+        };
+        let odds = found.filter(|odds| *odds <= ODDS_MAX);
+        if odds.is_none() {
+            let error = Diagnostic::error(code::SETTING, "odds are whole numbers");
+            let error = error.at(value.span, format!("wanted a whole number from 0 to {ODDS_MAX}"));
+            self.report(error.help("`BoxTruck => 2` makes trucks twice as likely as what has 1"));
+        }
+        odds
     }
 
     pub(super) fn declare_constants(&mut self, items: &[&ast::Item]) {

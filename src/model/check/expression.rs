@@ -260,10 +260,7 @@ impl Checker {
 
     fn road_field(&mut self, field: &ast::Name, place: &Place<'_>, span: Span) -> Option<Expr> {
         if !place.road {
-            self.report(
-                Diagnostic::error(code::NOT_HERE, "`road` is not known here")
-                    .at(span, "only rules see the road"),
-            );
+            self.report(road_unknown(span));
             return None;
         }
         match field.text.as_str() {
@@ -539,6 +536,19 @@ impl Checker {
         place: &Place<'_>,
         span: Span,
     ) -> Option<Expr> {
+        let road = match (names_road(left, place), names_road(right, place)) {
+            (true, _) => Some(right),
+            (_, true) => Some(left),
+            _ => None,
+        };
+        if let (Some(road), Comparison::Equal | Comparison::NotEqual) = (road, op) {
+            let is_there = self.on_road(core::slice::from_ref(road), place, span)?;
+            let kind = match op {
+                Comparison::NotEqual => ExprKind::Not(Box::new(is_there)),
+                _ => is_there.kind,
+            };
+            return Some(Expr { kind, ty: Type::Bool, span });
+        }
         let (left, right) = self.both_sides(left, right, place)?;
         if !fits(left.ty, right.ty) && !fits(right.ty, left.ty) {
             self.mismatch("cannot be compared", span, &left, &right);
@@ -584,6 +594,9 @@ impl Checker {
         place: &Place<'_>,
         span: Span,
     ) -> Option<Expr> {
+        if let (true, ast::ExprKind::List(roads)) = (names_road(left, place), &right.kind) {
+            return self.on_road(roads, place, span);
+        }
         let value = self.expr(left, place, None)?;
         let ty = value.ty;
         let value = Box::new(value);
@@ -625,6 +638,36 @@ impl Checker {
         Some(Expr { kind, ty: Type::Bool, span })
     }
 
+    /// `road == corner`: whether the road is one of these.
+    fn on_road(&mut self, names: &[ast::Expr], place: &Place<'_>, span: Span) -> Option<Expr> {
+        if !place.road {
+            self.report(road_unknown(span));
+            return None;
+        }
+        let mut roads = Some(Vec::new());
+        for name in names {
+            let found = match &name.kind {
+                ast::ExprKind::Name(text) if self.road_names.contains(text) => Some(text.clone()),
+                ast::ExprKind::Name(text) => {
+                    let known = self.road_names.iter().map(String::as_str);
+                    let error = unknown("road", text, name.span, known);
+                    self.report(error);
+                    None
+                }
+                _ => {
+                    let error = Diagnostic::error(code::TYPE_MISMATCH, "wanted the name of a road");
+                    self.report(error.at(name.span, "not a name").help("write `road == corner`"));
+                    None
+                }
+            };
+            roads = roads.zip(found).map(|(mut roads, found)| {
+                roads.push(found);
+                roads
+            });
+        }
+        Some(Expr { kind: ExprKind::OnRoad(roads?), ty: Type::Bool, span })
+    }
+
     pub(super) fn type_name(&self, ty: Type) -> String {
         match ty {
             Type::Bool => "Bool".to_owned(),
@@ -633,6 +676,16 @@ impl Checker {
             Type::Enum(of) => self.enums[of.0].name.clone(),
         }
     }
+}
+
+/// Whether the expression is the word `road`, and no parameter of that name hides it.
+fn names_road(expr: &ast::Expr, place: &Place<'_>) -> bool {
+    matches!(&expr.kind, ast::ExprKind::Name(name) if name == "road")
+        && !place.locals.iter().any(|(local, _)| local == "road")
+}
+
+fn road_unknown(span: Span) -> Diagnostic {
+    Diagnostic::error(code::NOT_HERE, "`road` is not known here").at(span, "only rules see the road")
 }
 
 /// A word that is no unit.

@@ -16,6 +16,7 @@ mod scenario_value;
 mod settings;
 mod unused;
 
+pub(super) use names::unknown;
 pub(super) use road::Maps;
 pub use scenario::scenario;
 
@@ -60,6 +61,8 @@ pub(super) struct Checker {
     /// Constants are folded: each is a literal. `None` is one that is broken.
     constants: Vec<(String, Option<Expr>)>,
     function_names: Names,
+    /// Every declared road, driven or not.
+    road_names: Vec<String>,
     /// What the functions will be called, while the constants are looked at.
     functions_to_come: Vec<String>,
     /// `None` is a function with a broken header.
@@ -95,7 +98,14 @@ pub(super) fn space(
     let function = |item: &&ast::Item| matches!(item.kind, ItemKind::Fn(_));
     let functions = items.iter().copied().filter(function).filter_map(|item| item.kind.name());
     checker.functions_to_come = functions.map(|name| name.text.clone()).collect();
+    checker.road_names = each(items, |kind| match kind {
+        ItemKind::Road(block) => Some(block),
+        _ => None,
+    })
+    .map(|(_, block)| block.name.text.clone())
+    .collect();
     checker.declare_constants(items);
+    checker.declare_odds(items);
     checker.declare_functions(items);
     checker.declare_states(items);
     checker.declare_actions(items);

@@ -49,7 +49,7 @@ impl Names {
 }
 
 /// A name that is declared nowhere.
-pub(super) fn unknown<'a>(
+pub(in crate::model) fn unknown<'a>(
     kind: &str,
     name: &str,
     span: Span,

@@ -6,9 +6,11 @@ use std::sync::Arc;
 use crate::model::check::Checker;
 use crate::model::check::docs;
 use crate::model::check::each;
+use crate::model::check::expression::Place;
 use crate::model::check::names::Names;
 use crate::model::check::names::unknown;
 use crate::model::code;
+use crate::model::limits::SPAWN_SPEED_MPS;
 use crate::model::space::Road;
 use crate::model::space::RoadFacts;
 use crate::model::value::Type;
@@ -61,7 +63,8 @@ impl Checker {
     }
 
     fn road(&mut self, item: &ast::Item, block: &ast::Block, maps: &mut dyn Maps) -> Option<Road> {
-        const FIELDS: [&str; 3] = ["map", "start", "goal"];
+        const NEEDED: [&str; 3] = ["map", "start", "goal"];
+        const FIELDS: [&str; 4] = ["map", "start", "goal", "limit"];
         let mut names = Names::default();
         for (index, field) in block.fields.iter().enumerate() {
             if let Err(error) = names.declare("field", &field.name, index) {
@@ -72,7 +75,7 @@ impl Checker {
             }
         }
         let find = |name: &str| block.fields.iter().find(|field| field.name.text == name);
-        for name in FIELDS.into_iter().filter(|name| find(name).is_none()) {
+        for name in NEEDED.into_iter().filter(|name| find(name).is_none()) {
             let error =
                 Diagnostic::error(code::MISSING_FIELD, format!("road `{}` has no `{name}`", block.name.text));
             self.report(error.at(block.name.span, format!("`{name}: …` is missing")));
@@ -93,6 +96,10 @@ impl Checker {
                 return None;
             }
         };
+        let map = match find("limit").map(|limit| self.limit(&limit.value)) {
+            None => map,
+            Some(limit_mps) => slowed(&map, limit_mps?),
+        };
         let start = self.lane_point(&start.value, &map);
         let goal = self.lane_point(&goal.value, &map);
         let (start, goal) = (start?, goal?);
@@ -106,9 +113,22 @@ impl Checker {
                 return None;
             }
         };
-        let facts = facts(&map, &route);
+        let facts = facts(&block.name.text, &map, &route);
         let (name, span) = (block.name.text.clone(), block.name.span);
         Some(Road { name, docs: docs(item), map_path, map, start, goal, route, facts, span })
+    }
+
+    /// A limit for the whole road, m/s.
+    fn limit(&mut self, value: &ast::Expr) -> Option<f64> {
+        let limit = self.typed(value, &Place::default(), Type::Quantity(Dimension::SPEED))?;
+        let limit_mps = self.fold_number(&limit)?.to_f64();
+        if limit_mps > 0.0 && limit_mps <= *SPAWN_SPEED_MPS.end() {
+            return Some(limit_mps);
+        }
+        let error = Diagnostic::error(code::SETTING, format!("a limit of {limit_mps} m/s is not possible"));
+        let wanted = format!("must be more than 0 m/s and at most {} m/s", SPAWN_SPEED_MPS.end());
+        self.report(error.at(value.span, wanted).help("write for example `limit: 30 km/h`"));
+        None
     }
 
     fn lane_point(&mut self, value: &ast::Expr, map: &RoadMap) -> Option<LanePlace> {
@@ -139,8 +159,18 @@ impl Checker {
     }
 }
 
+/// The map under a lower limit: where the signs allow less, they still count. Driving systems read the
+/// limit off the lanes, so it stands there.
+fn slowed(map: &RoadMap, limit_mps: f64) -> Arc<RoadMap> {
+    let mut map = map.clone();
+    for lane in &mut map.lanes {
+        lane.speed_limit_mps = lane.speed_limit_mps.min(limit_mps);
+    }
+    Arc::new(map)
+}
+
 /// Reads the facts of a route off its map.
-fn facts(map: &RoadMap, route: &Route) -> RoadFacts {
+fn facts(name: &str, map: &RoadMap, route: &Route) -> RoadFacts {
     let lanes = || route.lanes.iter().map(|part| map.lane(part.lane));
     let limit_mps = lanes().map(|lane| lane.speed_limit_mps).fold(f64::INFINITY, f64::min);
     let limit = exact_limit(limit_mps);
@@ -150,7 +180,8 @@ fn facts(map: &RoadMap, route: &Route) -> RoadFacts {
             neighbour.is_some_and(|neighbour| neighbour.same_direction)
         })
     };
-    RoadFacts { limit, limit_mps: limit.to_f64(), lanes: [beside(true), true, beside(false)] }
+    let name = name.to_owned();
+    RoadFacts { name, limit, limit_mps: limit.to_f64(), lanes: [beside(true), true, beside(false)] }
 }
 
 /// A limit as the road sign has it: whole km/h or mph where the map's f64 is next to one.

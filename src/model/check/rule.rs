@@ -216,7 +216,7 @@ impl Checker {
         Some(RuleBody::Moves { state: index, allowed, actions })
     }
 
-    fn variant(&mut self, name: &ast::Name, variants: &[String]) -> Option<usize> {
+    pub(super) fn variant(&mut self, name: &ast::Name, variants: &[String]) -> Option<usize> {
         let found = variants.iter().position(|variant| *variant == name.text);
         if found.is_none() {
             let candidates = variants.iter().map(String::as_str);

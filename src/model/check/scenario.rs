@@ -2,6 +2,8 @@
 
 use std::sync::Arc;
 
+use crate::model::bound::Bound;
+use crate::model::bound::bounds;
 use crate::model::check::names::Names;
 use crate::model::check::names::unknown;
 use crate::model::check::scenario_rules::Moment;
@@ -10,6 +12,10 @@ use crate::model::check::scenario_value::figure;
 use crate::model::check::scenario_value::number;
 use crate::model::check::scenario_value::value;
 use crate::model::code;
+use crate::model::eval::Facts;
+use crate::model::eval::evaluate;
+use crate::model::expr::Comparison;
+use crate::model::expr::Expr;
 use crate::model::limits::AMBIENT_MAX;
 use crate::model::limits::SIGNAL_PHASE_S;
 use crate::model::row::Row;
@@ -23,7 +29,7 @@ use crate::model::scenario::Origin;
 use crate::model::scenario::Scenario;
 use crate::model::scenario::ScenarioStart;
 use crate::model::scenario::ScenarioStep;
-use crate::model::space::ActionDef;
+use crate::model::space::Domain;
 use crate::model::space::Initial;
 use crate::model::space::Parameter;
 use crate::model::space::Space;
@@ -275,7 +281,7 @@ impl<'a> Reader<'a> {
             }
             let Some(row) = self.row(&step.action) else { continue };
             let action = &self.space.actions[row.action];
-            let Some(drawn) = self.drawn(step, action) else { continue };
+            let Some(drawn) = self.drawn(step, row, road) else { continue };
             let locals = locals(action, row, &drawn);
             let memory = &history[history.len() - 1].1;
             let after = self.space.memory_after(row.action, &locals, memory);
@@ -357,7 +363,8 @@ impl<'a> Reader<'a> {
         row
     }
 
-    fn drawn(&mut self, step: &ast::Step, action: &ActionDef) -> Option<Vec<(Arc<str>, Value)>> {
+    fn drawn(&mut self, step: &ast::Step, row: &Row, road: Option<usize>) -> Option<Vec<(Arc<str>, Value)>> {
+        let action = &self.space.actions[row.action];
         let drawn = || action.parameters.iter().filter(|parameter| !parameter.axis);
         let mut sound = true;
         self.once("drawn value", &step.drawn);
@@ -369,13 +376,10 @@ impl<'a> Reader<'a> {
             }
         }
         let mut values = Vec::new();
+        let mut missing = Vec::new();
         for parameter in drawn() {
             let Some(field) = step.drawn.iter().find(|field| *parameter.name == *field.name.text) else {
-                let message = format!("the drawn value `{}` is missing", parameter.name);
-                let error = Diagnostic::error(code::NOT_DRAWN, message)
-                    .at(step.span, "a scenario leaves nothing to chance");
-                self.report(error.beside(parameter.span, "declared here"));
-                sound = false;
+                missing.push(parameter);
                 continue;
             };
             let Some(value) = self.take(value(self.space, &field.value, parameter.ty)) else {
@@ -393,7 +397,75 @@ impl<'a> Reader<'a> {
             }
             values.push((parameter.name.clone(), value));
         }
+        if !missing.is_empty() {
+            let error = self.missing(step, row, road, &missing, values);
+            self.report(error);
+            return None;
+        }
         sound.then_some(values)
+    }
+
+    /// Drawn values that a step lacks, with an example of each: the first of a list, what a rule sets,
+    /// else the low end of the range.
+    fn missing(
+        &self,
+        step: &ast::Step,
+        row: &Row,
+        road: Option<usize>,
+        missing: &[&Parameter],
+        mut values: Vec<(Arc<str>, Value)>,
+    ) -> Diagnostic {
+        let space = self.space;
+        let action = &space.actions[row.action];
+        let names: Vec<&str> = missing.iter().map(|parameter| &*parameter.name).collect();
+        let (what, is) = if names.len() == 1 { ("value", "is") } else { ("values", "are") };
+        let message = format!("the drawn {what} {} {is} missing", listed(&names));
+        let error =
+            Diagnostic::error(code::NOT_DRAWN, message).at(step.span, "a scenario leaves nothing to chance");
+        let error =
+            missing.iter().fold(error, |error, parameter| error.beside(parameter.span, "declared here"));
+        for parameter in missing {
+            let value = match &parameter.domain {
+                Domain::Values(values) => values[0],
+                Domain::Range(low, _) => Value::Number(low.to_f64()),
+            };
+            values.push((parameter.name.clone(), value));
+        }
+        if let Some(road) = road {
+            let memory = Memory::default();
+            let known = locals(action, row, &values);
+            let facts = Facts { road: Some(&space.roads[road].facts), ..Facts::new(&known, &memory) };
+            let bounds = bounds(space, row.action);
+            let sets = |bound: &&Bound| bound.op == Comparison::Equal && bound.is_known_early();
+            for bound in bounds.iter().filter(sets) {
+                let holds = |guard: &Expr| evaluate(guard, &space.functions, &facts).truth();
+                let parameter = &action.parameters[bound.local];
+                let limit = evaluate(&bound.limit, &space.functions, &facts);
+                if bound.guards.iter().all(holds) && parameter.domain.holds(limit) {
+                    let missing = missing.iter().any(|missing| missing.name == parameter.name);
+                    let slot = values.iter_mut().find(|(name, _)| missing && *name == parameter.name);
+                    slot.into_iter().for_each(|(_, value)| *value = limit);
+                }
+            }
+        }
+        let shown: Vec<String> = missing
+            .iter()
+            .filter_map(|parameter| {
+                let (_, value) = values.iter().find(|(name, _)| *name == parameter.name)?;
+                Some(format!("{}: {}", parameter.name, space.show(*value, parameter.ty)))
+            })
+            .collect();
+        let shown = shown.join(", ");
+        let error = error.help(format!("for example `{shown}`"));
+        let end = |span: ast::Span| ast::Span::new(span.file, span.end, span.end);
+        match step.drawn.last() {
+            Some(last) => error.fix(format!("add `{shown}`"), end(last.span), format!(", {shown}")),
+            None if step.span.end == step.action.span.end => {
+                let text = format!(" with {{ {shown} }}");
+                error.fix(format!("add `{}`", text.trim_start()), end(step.span), text)
+            }
+            None => error,
+        }
     }
 
     fn claim(&mut self, expect: &ast::Expect) -> Option<Claim> {

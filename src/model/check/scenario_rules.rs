@@ -20,6 +20,8 @@ use crate::model::space::RuleDef;
 use crate::model::space::Space;
 use crate::model::value::Memory;
 use crate::model::value::Value;
+use crate::model::vocabulary::LaneChoice;
+use crate::model::vocabulary::Word;
 use crate::syntax::Diagnostic;
 use crate::syntax::ast;
 use crate::syntax::listed;
@@ -168,6 +170,14 @@ fn broken_condition(
             false => format!("{} on `{}`", figures.join(", "), road.name),
         };
         error = error.at(moment.step.span, label);
+    }
+    if condition.any(|kind| matches!(kind, ExprKind::InLanes(..))) {
+        let there: Vec<&str> = LaneChoice::ALL
+            .iter()
+            .filter(|lane| road.facts.has_lane(**lane))
+            .map(|lane| lane.name())
+            .collect();
+        error = error.note(format!("the way through `{}` has the lanes {}", road.name, listed(&there)));
     }
     Some(match nearest {
         Some((field, shown)) => error.help(format!("the nearest legal value is {shown}")).fix(

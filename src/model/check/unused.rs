@@ -122,6 +122,10 @@ fn names_of_item<'a>(kind: &'a ItemKind, used: &mut BTreeSet<&'a str>) {
         }
         ItemKind::Verdict(declared) => names_of_expr(&declared.condition, used),
         ItemKind::Expect(expect) => names_of_expr(&expect.claim, used),
+        ItemKind::Odds(declared) => {
+            used.insert(&declared.name.text);
+            declared.arms.iter().for_each(|arm| names_of_expr(&arm.value, used));
+        }
         ItemKind::Override(inner) => names_of_item(inner, used),
         ItemKind::Language(_)
         | ItemKind::Use(_)

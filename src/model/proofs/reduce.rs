@@ -40,6 +40,7 @@ pub(super) fn reduce(expr: &Expr, functions: &[FnDef], locals: &[Expr]) -> Expr 
         ExprKind::Implies(left, right) => ExprKind::Implies(inner(left), inner(right)),
         ExprKind::InRange(of, low, high) => ExprKind::InRange(inner(of), inner(low), inner(high)),
         ExprKind::InList(of, list) => ExprKind::InList(inner(of), all(list)),
+        ExprKind::OnRoad(names) => ExprKind::OnRoad(names.clone()),
         ExprKind::InLanes(of, lanes) => ExprKind::InLanes(inner(of), lanes.clone()),
         ExprKind::Match { subject, arm_of, arms } => {
             let subject = inner(subject);
@@ -67,6 +68,7 @@ fn fold(expr: Expr) -> Expr {
                 | ExprKind::CellAt(..)
                 | ExprKind::Fact(_)
                 | ExprKind::InLanes(..)
+                | ExprKind::OnRoad(_)
         )
     };
     if expr.any(open) {

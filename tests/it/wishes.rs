@@ -1,0 +1,224 @@
+//! Ten files as a newcomer writes them, each with a wish; here it is seen that the wish came true.
+
+use avastra::action::ActionTable;
+use avastra::action::ActiveRules;
+use avastra::action::Draw;
+use avastra::action::Offer;
+use avastra::action::Situation;
+use avastra::action::SpawnFacts;
+use avastra::action::SpawnRequest;
+use avastra::action::Surroundings;
+use avastra::model::End;
+use avastra::model::Memory;
+use avastra::model::OutcomeFacts;
+use avastra::model::Reach;
+use avastra::model::Value;
+use avastra::model::vocabulary::Level;
+use avastra::model::vocabulary::TimeOfDay;
+use avastra::syntax::Diagnostic;
+use avastra::syntax::ast::FileId;
+use avastra::syntax::format;
+
+use crate::cases::cases;
+use crate::cases::root;
+use crate::command::avastra;
+use crate::command::outcome;
+use crate::world::read;
+use crate::world::space_at;
+
+/// A world with room for everybody.
+struct Room;
+
+impl Surroundings for Room {
+    fn survey(&self, request: &SpawnRequest) -> Result<SpawnFacts, String> {
+        Ok(SpawnFacts { spawn_gap_m: request.distance_m, safety_gap_m: 0.0 })
+    }
+}
+
+fn wish(name: &str) -> ActionTable {
+    ActionTable::new(space_at(&format!("tests/cases/wishes/{name}.ava")))
+}
+
+fn row(table: &ActionTable, label: &str) -> usize {
+    let mut rows = table.rows().iter();
+    rows.position(|row| row.label == label).unwrap_or_else(|| panic!("no row `{label}`"))
+}
+
+/// What a row draws on a road under so many seeds, where it is legal.
+fn draws(table: &ActionTable, row: usize, road: usize, memory: &Memory, seeds: u64) -> Vec<Draw> {
+    let rules = ActiveRules::new(table.space(), &[], &[]).expect("no rule is named");
+    let road = &table.space().roads[road];
+    let offer = |seed| {
+        let situation = Situation { memory, road, rules: &rules, surroundings: &Room, seed, step: 0 };
+        match table.offer(&situation, row) {
+            Offer::Legal(draw) => Some(draw),
+            Offer::Refused(_) => None,
+        }
+    };
+    (0..seeds).filter_map(offer).collect()
+}
+
+fn number(draw: &Draw, name: &str) -> f64 {
+    drawn(draw, name).number()
+}
+
+fn drawn(draw: &Draw, name: &str) -> Value {
+    let found = draw.values.iter().find(|(known, _)| &**known == name);
+    found.unwrap_or_else(|| panic!("no value `{name}`")).1
+}
+
+/// The ends of what is left of a row's range on a road.
+fn left(table: &ActionTable, row: usize, road: usize, name: &str) -> (f64, f64) {
+    let Reach::Open(ranges) = &table.rows()[row].roads[road] else { panic!("row {row} is masked") };
+    let (_, range) = ranges.iter().find(|(known, _)| &**known == name).expect("it is a drawn number");
+    let end = |end: End| match end {
+        End::At(value, _) => value.to_f64(),
+        End::Unbounded => f64::INFINITY,
+    };
+    (end(range.low), end(range.high))
+}
+
+#[test]
+fn ten_wishes_compile_as_they_are_written() {
+    let wishes = cases("wishes");
+    assert_eq!(wishes.len(), 10);
+    for (stem, path) in wishes {
+        let text = read(&path).expect("a case is readable");
+        assert!(text.starts_with("//! Wish: "), "{stem}");
+        assert_eq!(format(FileId(0), &text).expect("it parses"), text, "{stem}");
+        let loaded = avastra::model::load(&path, &read).expect("a case is readable");
+        let messages = |all: &[Diagnostic]| all.iter().map(|found| found.message.clone()).collect::<Vec<_>>();
+        assert!(loaded.diagnostics.is_empty(), "{stem}: {:?}", messages(&loaded.diagnostics));
+    }
+}
+
+#[test]
+fn it_is_always_night() {
+    let table = wish("night_only");
+    assert_eq!(table.rows().len(), 42);
+    assert!(table.rows().iter().all(|row| !row.label.starts_with("set_time")));
+    assert!(table.space().rules.iter().all(|rule| rule.name != "chronology"), "it has nothing to bind");
+    for seed in 0..20 {
+        let memory = table.space().initial_memory(seed);
+        assert_eq!(table.space().weather(&memory).0, TimeOfDay::Night);
+    }
+}
+
+#[test]
+fn nobody_walks_on_the_crossroad_alone() {
+    let table = wish("no_pedestrians_on_one_road");
+    for row in table.rows().iter().filter(|row| row.label.starts_with("pedestrian")) {
+        for (road, reach) in table.space().roads.iter().zip(&row.roads) {
+            let masked = matches!(reach, Reach::Dead { .. });
+            assert_eq!(masked, road.name == "crossroad", "{} on {}", row.label, road.name);
+        }
+        let memory = table.space().initial_memory(1);
+        for (road, there) in table.space().roads.iter().enumerate() {
+            let walked = !draws(&table, row.index, road, &memory, 20).is_empty();
+            assert_eq!(walked, there.name != "crossroad");
+        }
+    }
+}
+
+#[test]
+fn trucks_are_twice_as_likely() {
+    let count = |table: &ActionTable| {
+        let row = row(table, "drive_ahead(lane: Current, mode: Far, then: Keep)");
+        let memory = table.space().initial_memory(1);
+        let all = draws(table, row, 0, &memory, 1400);
+        let is_truck = |draw: &&Draw| drawn(draw, "vehicle").variant() == 4;
+        (all.len(), all.iter().filter(is_truck).count())
+    };
+    // Two of seven instead of one of six; four standard deviations are 68 and 56.
+    let (all, trucks) = count(&wish("more_trucks"));
+    assert!(all == 1400 && trucks.abs_diff(400) < 68, "{trucks} of {all}");
+    let (all, trucks) = count(&ActionTable::new(space_at("scenarios/avastra45.ava")));
+    assert!(all == 1400 && trucks.abs_diff(233) < 56, "{trucks} of {all}");
+}
+
+#[test]
+fn snow_is_seen_and_felt() {
+    let table = wish("snow");
+    let memory = table.space().initial_memory(1);
+    let row = row(&table, "snow(how: Light)");
+    let draw = &draws(&table, row, 0, &memory, 1)[0];
+    assert_eq!(table.space().weather(&draw.memory_after).1, [Level::None, Level::Light, Level::High]);
+}
+
+#[test]
+fn the_limit_of_the_school_binds_everybody() {
+    let table = wish("school_zone");
+    let limit_mps = 30.0 / 3.6;
+    let road = &table.space().roads[0];
+    assert!(road.map.lanes.iter().all(|lane| lane.speed_limit_mps <= limit_mps), "the ADS reads it there");
+    let row = row(&table, "drive_ahead(lane: Current, mode: Far, then: Keep)");
+    let (low, high) = left(&table, row, 0, "speed");
+    assert!(low == 5.0 && (high - limit_mps).abs() < 1e-12, "{low} .. {high}");
+    let memory = table.space().initial_memory(1);
+    let all = draws(&table, row, 0, &memory, 100);
+    assert!(all.len() == 100 && all.iter().all(|draw| number(draw, "speed") <= limit_mps));
+}
+
+#[test]
+fn there_is_a_third_distance() {
+    let table = wish("third_distance");
+    let row = row(&table, "drive_ahead(lane: Current, mode: Middle, then: Keep)");
+    let (low, high) = left(&table, row, 0, "distance");
+    // 30 m and half a second's way, 3 m more for large vehicles.
+    assert!(low >= 30.0 + 0.5 * 10.0 && high <= 33.0 + 0.5 * 20.0, "{low} .. {high}");
+}
+
+#[test]
+fn the_formula_is_the_authors_own() {
+    let table = wish("own_formula");
+    let memory = table.space().initial_memory(1);
+    for (mode, base_m) in [("Near", 12.0), ("Far", 50.0)] {
+        let row = row(&table, &format!("drive_opposite(mode: {mode}, then: Keep)"));
+        let all = draws(&table, row, 3, &memory, 50);
+        assert!(!all.is_empty());
+        for draw in all {
+            let extra_m = if drawn(&draw, "vehicle").variant() >= 4 { 3.0 } else { 0.0 };
+            let wanted_m = 2.0 * base_m + extra_m + number(&draw, "speed");
+            assert!((number(&draw, "distance") - wanted_m).abs() < 1e-9);
+        }
+    }
+}
+
+#[test]
+fn everybody_is_slower_in_the_rain() {
+    let table = wish("slower_in_rain");
+    let row = row(&table, "cross_road(side: Left, mode: Far, then: Keep)");
+    let fastest_mps = |rain: &str| {
+        let memory = table.space().memory_from(&format!("time: Noon, sky: {{ Rain: {rain} }}"), 1);
+        let all = draws(&table, row, 3, &memory.expect("the states are there"), 100);
+        assert_eq!(all.len(), 100);
+        all.iter().map(|draw| number(draw, "speed")).fold(0.0, f64::max)
+    };
+    let limit_mps = 50.0 / 3.6;
+    assert!(fastest_mps("None") > 0.9 * limit_mps && fastest_mps("Light") > 0.9 * limit_mps);
+    assert!(fastest_mps("Moderate") <= 0.9 * limit_mps);
+    assert!(fastest_mps("High") <= limit_mps - 5.0 / 3.6);
+}
+
+#[test]
+fn a_scenario_by_hand_holds_what_it_claims() {
+    let path = root().join("tests/cases/wishes/by_hand.ava").display().to_string();
+    let (status, stdout, stderr) = outcome(&mut avastra(&["verify", &path]));
+    assert_eq!(status, 0, "{stdout}{stderr}");
+}
+
+#[test]
+fn the_reward_is_the_authors_own() {
+    let table = wish("own_reward");
+    let verbs = ["drive_ahead", "overtake", "drive_opposite", "cross_road"];
+    assert!(table.rows().iter().all(|row| !verbs.iter().any(|verb| row.label.starts_with(verb))));
+    assert!(table.space().groups.iter().all(|group| group.name == "environment"));
+    let rules: Vec<&str> = table.space().rules.iter().map(|rule| rule.name.as_str()).collect();
+    assert_eq!(rules, ["chronology", "ped_gap", "walking_pace", "no_teleport", "wet_needs_cause"]);
+    let reward = |collision, struck, proc| {
+        table.space().reward(OutcomeFacts { collision, struck, proc, ..OutcomeFacts::default() })
+    };
+    assert_eq!(reward(true, false, 1.0), 10.0);
+    assert_eq!(reward(true, true, 1.0), 2.0);
+    assert_eq!((reward(false, false, 0.75), reward(false, false, 0.5)), (1.5, 0.0));
+}
