@@ -15,10 +15,10 @@ use crate::sim::World;
 
 /// How far back the way is looked at, s.
 const PAST_S: f64 = 5.0;
-/// Who has turned by more than this makes a turn, rad (30°).
-const TURN_RAD: f64 = core::f64::consts::FRAC_PI_6;
-/// Who has come aside by more than this without turning has changed lanes, or was about to, m: a little
-/// more than half of a lane.
+/// Who has turned by more than this makes a turn, rad (20°).
+const TURN_RAD: f64 = core::f64::consts::PI / 9.0;
+/// Who has come aside by more than this, seen along the heading before and after, has changed lanes or
+/// was about to, m: a little more than half of a lane.
 const ASIDE_M: f64 = 2.0;
 /// Who has kept less than this part of its speed was about to stop.
 const KEPT_PART: f64 = 0.5;
@@ -48,14 +48,18 @@ impl Shape {
     /// The way from one pose and speed (m/s) to another.
     fn between((from, from_mps): (Pose, f64), (to, to_mps): (Pose, f64)) -> Shape {
         let turned_rad = wrap_angle(to.heading_rad - from.heading_rad);
-        // On an arc the chord lies in the middle between the headings, and nothing is aside of it.
-        let middle = unit_vector(from.heading_rad + turned_rad / 2.0);
-        let aside_m = Vec2::new(-middle.y, middle.x).dot(&(to.position - from.position));
+        let left_m = |heading_rad| {
+            let forward = unit_vector(heading_rad);
+            Vec2::new(-forward.y, forward.x).dot(&(to.position - from.position))
+        };
+        // The end of an arc lies on one side of where it began, and its beginning on the same side of its end.
+        let (before_m, after_m) = (left_m(from.heading_rad), left_m(to.heading_rad));
+        let aside_m = if before_m * after_m > 0.0 { before_m.abs().min(after_m.abs()) } else { 0.0 };
         if turned_rad > TURN_RAD {
             Shape::LeftTurn
         } else if turned_rad < -TURN_RAD {
             Shape::RightTurn
-        } else if aside_m.abs() > ASIDE_M {
+        } else if aside_m > ASIDE_M {
             Shape::LaneChange
         } else if to_mps < KEPT_PART * from_mps {
             Shape::Stopping
@@ -103,8 +107,9 @@ mod tests {
         assert_eq!(shape(50.0, -3.5, 0.0, 2.0), "lane change");
         assert_eq!(shape(20.0, 20.0, 1.5, 5.0), "left turn");
         assert_eq!(shape(20.0, -20.0, -1.5, 2.0), "right turn");
-        // A gentle bend of 0.4 rad and 100 m radius.
-        let (sine, cosine) = (libm::sin(0.4), libm::cos(0.4));
-        assert_eq!(shape(100.0 * sine, 100.0 * (1.0 - cosine), 0.4, 10.0), "straight");
+        // A gentle bend of 0.3 rad and 100 m radius, and a turn that has only begun.
+        let (sine, cosine) = (libm::sin(0.3), libm::cos(0.3));
+        assert_eq!(shape(100.0 * sine, 100.0 * (1.0 - cosine), 0.3, 10.0), "straight");
+        assert_eq!(shape(45.0, 1.5, 0.3, 10.0), "straight");
     }
 }

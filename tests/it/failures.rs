@@ -51,15 +51,15 @@ fn found_scenarios_are_explained_shrunk_and_tested_again() {
     assert_eq!(found["likelihood"]["variations"], 4);
 
     // Several files: a line each, and how often each cause was found.
-    let names: Vec<String> = files.iter().map(|file| file.display().to_string()).collect();
-    let all: Vec<&str> = names.iter().map(String::as_str).collect();
-    let (status, found) = json(&[&["diagnose"], &all[..]].concat());
+    let names: Vec<String> = files.iter().take(2).map(|file| file.display().to_string()).collect();
+    let both: Vec<&str> = names.iter().map(String::as_str).collect();
+    let (status, found) = json(&[&["diagnose"], &both[..]].concat());
     let sum: u64 =
         found["causes"].as_array().expect("a list").iter().filter_map(|c| c["count"].as_u64()).sum();
-    assert_eq!((status, sum, found["errors"].as_u64()), (0, files.len() as u64, Some(0)), "{found}");
-    let (status, found) = json(&[&["diagnose", "--mechanisms"], &all[..]].concat());
+    assert_eq!((status, sum, found["errors"].as_u64()), (0, 2, Some(0)), "{found}");
+    let (status, found) = json(&[&["diagnose", "--mechanisms"], &both[..]].concat());
     let shares = found["mechanisms"].as_array().expect("a list");
-    assert_eq!((status, shares.len(), found["crashes"].as_u64()), (0, 9, Some(files.len() as u64)));
+    assert_eq!((status, shares.len(), found["crashes"].as_u64()), (0, 9, Some(2)));
     for share in shares.iter().flat_map(|found| [&found["from_onset"], &found["from_start"]]) {
         let [low, at, high] = ["low", "share", "high"].map(|name| share[name].as_f64().expect("a number"));
         assert!(0.0 <= low && low <= at && at <= high && high <= 1.0, "{share}");
@@ -79,13 +79,15 @@ fn found_scenarios_are_explained_shrunk_and_tested_again() {
     let (status, stdout, _) = outcome(&mut avastra(&["verify", &lie]));
     assert!(status == 3 && stdout.contains("claimed minimal") && stdout.contains("without step"), "{stdout}");
     std::fs::remove_file(&lie).expect("it is there");
-    let (status, both) = json(&["shrink", &small, &all[0]]);
-    assert_eq!((status, both["kept"].as_u64(), both["errors"].as_u64()), (0, Some(2), Some(0)), "{both}");
-    assert!(both["median_steps"].as_f64() <= both["median_steps_before"].as_f64(), "{both}");
-    std::fs::remove_file(all[0].replace(".ava", ".shrunk.ava")).expect("it was written beside");
     // What is as small as it gets stays so.
     let (_, again) = json(&["shrink", &small, "--output", &path("smaller.ava")]);
     assert_eq!((&again["steps"], &again["actions"]), (&shrunk["steps"], &shrunk["actions"]));
+    let (status, several) = json(&["shrink", &small, &path("smaller.ava")]);
+    assert_eq!((status, several["kept"].as_u64(), several["errors"].as_u64()), (0, Some(2), Some(0)));
+    assert_eq!(several["median_steps"].as_f64(), shrunk["steps"].as_f64(), "{several}");
+    assert!(
+        ["small", "smaller"].iter().all(|stem| scratch.path().join(format!("{stem}.shrunk.ava")).is_file())
+    );
 
     let junit = path("junit.xml");
     let (status, tested) = json(&["test", &out, "--junit", &junit]);
