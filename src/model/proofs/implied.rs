@@ -1,5 +1,7 @@
 //! Rules that change nothing: they hold by themselves, or follow from others.
 
+use crate::model::bound::Bound;
+use crate::model::bound::bounds;
 use crate::model::code;
 use crate::model::enclose::enclose;
 use crate::model::reach::Prover;
@@ -17,17 +19,18 @@ const WORK_MAX: usize = 1_000_000;
 pub(super) fn report(space: &Space) -> Vec<Diagnostic> {
     let mut diagnostics = Vec::new();
     let mut work = WORK_MAX;
+    let bounds: Vec<Vec<Bound>> = (0..space.actions.len()).map(|action| bounds(space, action)).collect();
     let mut kept: Vec<usize> = (0..space.rules.len()).filter(|rule| !space.rules[*rule].optional).collect();
     for rule in (0..space.rules.len()).rev() {
         let others: Vec<usize> = kept.iter().copied().filter(|other| *other != rule).collect();
-        if !follows(space, rule, &others, &mut work) {
+        if !follows(space, rule, &others, &bounds, &mut work) {
             continue;
         }
         kept = others.clone();
         let mut reasons = others;
         for other in reasons.clone() {
             let fewer: Vec<usize> = reasons.iter().copied().filter(|known| *known != other).collect();
-            if follows(space, rule, &fewer, &mut work) {
+            if follows(space, rule, &fewer, &bounds, &mut work) {
                 reasons = fewer;
             }
         }
@@ -55,7 +58,7 @@ fn warning(space: &Space, rule: usize, reasons: &[usize]) -> Diagnostic {
 
 /// Whether the rule holds for every row that it binds and every value that `others` leave; false also
 /// where that would be too much work.
-fn follows(space: &Space, rule: usize, others: &[usize], work: &mut usize) -> bool {
+fn follows(space: &Space, rule: usize, others: &[usize], bounds: &[Vec<Bound>], work: &mut usize) -> bool {
     let bound = || space.rows.iter().filter(|row| row.rules.contains(&rule));
     let count = bound().count();
     let Some(left) = work.checked_sub(count * (1 + others.len())) else { return false };
@@ -74,15 +77,14 @@ fn follows(space: &Space, rule: usize, others: &[usize], work: &mut usize) -> bo
                 RuleBody::Holds(_) => false,
             })
         }
-        RuleBody::Holds(_) => bound().all(|row| holds(space, row, rule, others)),
+        RuleBody::Holds(_) => bound().all(|row| holds(space, row, rule, others, &bounds[row.action])),
     }
 }
 
-fn holds(space: &Space, row: &Row, rule: usize, others: &[usize]) -> bool {
+fn holds(space: &Space, row: &Row, rule: usize, others: &[usize], bounds: &[Bound]) -> bool {
     let RuleBody::Holds(bindings) = &space.rules[rule].body else { return false };
     let values = crate::model::row::locals(&space.actions[row.action], row, &[]);
-    let bounds = crate::model::bound::bounds(space, row.action);
-    let prover = Prover { space, row, values: &values, bounds: &bounds, road: None };
+    let prover = Prover { space, row, values: &values, bounds, road: None };
     let in_force: Vec<usize> = others.iter().copied().filter(|other| row.rules.contains(other)).collect();
     // A row that the others leave dead would make everything true of it.
     let Some(locals) = prover.settle(&in_force) else { return false };

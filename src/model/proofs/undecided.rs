@@ -2,6 +2,7 @@
 
 use std::cell::Cell;
 
+use crate::model::bound::bounds;
 use crate::model::code;
 use crate::model::proofs::witness::witness_within;
 use crate::model::reach::numbers;
@@ -19,6 +20,7 @@ pub(super) fn report(space: &Space) -> Vec<Diagnostic> {
     let mut diagnostics = Vec::new();
     let boxes_left = Cell::new(BOXES_MAX);
     for (action, definition) in space.actions.iter().enumerate() {
+        let bounds = bounds(space, action);
         for (index, road) in space.roads.iter().enumerate() {
             let mut unknown: Vec<&Row> = Vec::new();
             for row in space.rows.iter().filter(|row| row.action == action) {
@@ -26,7 +28,7 @@ pub(super) fn report(space: &Space) -> Vec<Diagnostic> {
                     continue;
                 }
                 // A search that was cut short says nothing.
-                if witness_within(space, row, road, &boxes_left).is_none() && boxes_left.get() > 0 {
+                if witness_within(space, row, road, &bounds, &boxes_left).is_none() && boxes_left.get() > 0 {
                     unknown.push(row);
                 }
             }

@@ -55,19 +55,19 @@ pub struct Witness {
 
 /// A witness for a row on a road with the default rules; `None` if the search finds none.
 pub fn witness(space: &Space, row: &Row, road: &Road) -> Option<Witness> {
-    witness_within(space, row, road, &Cell::new(BOXES_IN_ALL_MAX))
+    witness_within(space, row, road, &bounds(space, row.action), &Cell::new(BOXES_IN_ALL_MAX))
 }
 
-/// The same, with so many boxes left to look at.
+/// The same, given the bounds of the row's action, with so many boxes left to look at.
 pub(super) fn witness_within(
     space: &Space,
     row: &Row,
     road: &Road,
+    bounds: &[Bound],
     boxes_left: &Cell<usize>,
 ) -> Option<Witness> {
     let rules: Vec<usize> = row.rules.iter().copied().filter(|rule| !space.rules[*rule].optional).collect();
-    let bounds = bounds(space, row.action);
-    Search { space, row, road, rules, bounds: &bounds, boxes_left }.find(&|_, _| true)
+    Search { space, row, road, rules, bounds, boxes_left }.find(&|_, _| true)
 }
 
 /// A search under given rules.
