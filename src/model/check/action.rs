@@ -203,7 +203,8 @@ impl Checker {
                 let (low, high) = (low?, high?);
                 if low > high {
                     let error = Diagnostic::error(code::EMPTY, "the range is empty");
-                    self.report(error.at(within.span, "its low end lies above its high end"));
+                    let error = error.at(within.span, "its low end lies above its high end");
+                    self.report(error.help("write the low end first"));
                     return None;
                 }
                 if ty == Type::Int {
@@ -368,7 +369,10 @@ impl Checker {
         });
         if let Some((body, verb)) = clash {
             let message = format!("a `{}` cannot `{}`", body.name(), verb.name());
-            self.report(Diagnostic::error(code::IMPOSSIBLE_SPAWN, message).at(span, "spawned here"));
+            let error = Diagnostic::error(code::IMPOSSIBLE_SPAWN, message).at(span, "spawned here");
+            self.report(
+                error.help("`Walk` and `Stand` are for a `Pedestrian`, all other verbs for vehicles"),
+            );
             return;
         }
         for verb in verbs {
