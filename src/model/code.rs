@@ -150,3 +150,10 @@ pub const POLICY_SHADOWED: &str = "AV0708";
 pub const FALSE_CLAIM: &str = "AV0801";
 /// A claim that cannot be made of a space.
 pub const NOT_STATIC: &str = "AV0802";
+
+// Style.
+
+/// A name that looks like another kind of thing.
+pub const NAME_STYLE: &str = "AV0901";
+/// `x == true`.
+pub const COMPARED_WITH_TRUTH: &str = "AV0902";

@@ -100,6 +100,8 @@ pub const PAGES: &[Page] = &[
     page!("AV0708"),
     page!("AV0801"),
     page!("AV0802"),
+    page!("AV0901"),
+    page!("AV0902"),
 ];
 
 /// The page of a code, however its letters are written.
