@@ -87,9 +87,10 @@ pub struct AgentFile {
     /// Independent repetitions of the evaluation, of an agent that has nothing to learn; without a number 10.
     #[serde(default)]
     pub repeats: Option<u32>,
-    /// Profile of the driving system that this agent meets, in place of the study's.
+    /// Profile of the driving system that this agent meets, in place of the study's: a file, or what differs
+    /// from the default.
     #[serde(default)]
-    pub ads_config: Option<String>,
+    pub ads_config: Option<Value>,
     /// Rules switched off for this agent.
     #[serde(default)]
     pub without: Vec<String>,

@@ -99,8 +99,6 @@ pub enum StudyError {
     NotLearning { label: String, name: String, field: &'static str },
     #[error("agent `{label}`: `repeats` is for agents that do not learn, `{name}` does; say `trainings`")]
     Learning { label: String, name: String },
-    #[error("agent `{label}`: `config` is neither the name of a file nor a map of settings")]
-    Config { label: String },
     #[error("agent `{label}`: {error}")]
     Agent { label: String, error: RunError },
     #[error("agent `{label}`: {reason}")]
@@ -202,15 +200,7 @@ fn agent_settings(
                 return Err(StudyError::Learning { label, name: file.name });
             }
             let refuse = |reason: String| StudyError::Settings { label: label.clone(), reason };
-            let text = match &file.config {
-                None => String::new(),
-                Some(serde_json::Value::String(path)) => {
-                    read(path).map_err(|reason| refuse(format!("cannot read `{path}`: {reason}")))?
-                }
-                // JSON is YAML.
-                Some(settings @ serde_json::Value::Object(_)) => settings.to_string(),
-                Some(_) => return Err(StudyError::Config { label }),
-            };
+            let text = settings_text(file.config.as_ref(), read).map_err(refuse)?;
             let hyperparameters = Settings::from_yaml(entry, file.preset.as_deref(), &text)
                 .expect("an agent that is trained has settings")
                 .map_err(|error| refuse(error.to_string()))?;
@@ -218,11 +208,11 @@ fn agent_settings(
             (file.trainings, Some(TrainingPlan { episodes, roads: file.train_roads, hyperparameters }))
         }
     };
+    let refuse = |reason| StudyError::Settings { label: label.clone(), reason };
     let profile = match &file.ads_config {
         None => None,
-        Some(path) => {
-            let refuse = |reason| StudyError::Settings { label: label.clone(), reason };
-            let text = read(path).map_err(|reason| refuse(format!("cannot read `{path}`: {reason}")))?;
+        given => {
+            let text = settings_text(given.as_ref(), read).map_err(refuse)?;
             let settings = ModularConfig::from_yaml(&text).map_err(|error| refuse(error.to_string()))?;
             Some(Profile::new(&settings))
         }
@@ -236,6 +226,22 @@ fn agent_settings(
         without: file.without,
         with: file.with,
     })
+}
+
+/// Settings as text: those of a file that is named, or those that stand there.
+fn settings_text(
+    given: Option<&serde_json::Value>,
+    read: &dyn Fn(&str) -> Result<String, String>,
+) -> Result<String, String> {
+    match given {
+        None => Ok(String::new()),
+        Some(serde_json::Value::String(path)) => {
+            read(path).map_err(|reason| format!("cannot read `{path}`: {reason}"))
+        }
+        // JSON is YAML.
+        Some(settings @ serde_json::Value::Object(_)) => Ok(settings.to_string()),
+        Some(_) => Err("settings are the name of a file, or `{ name: value, … }`".to_owned()),
+    }
 }
 
 impl Study {
