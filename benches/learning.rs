@@ -14,7 +14,9 @@ use avastra::agent::Hyperparameters;
 use avastra::agent::Kind;
 use avastra::agent::Learner;
 use avastra::agent::Rows;
+use avastra::agent::Trainable;
 use avastra::agent::Trajectory;
+use avastra::mdp::Closeness;
 use avastra::mdp::Observation;
 use avastra::rng;
 use avastra::rng::Stream;
@@ -79,12 +81,15 @@ fn episode(rng: &mut rng::Rng, steps: usize) -> Trajectory {
         row: rng::below(rng, ROWS as u32) as usize,
         reward: rng::normal(rng),
         hits: Vec::new(),
+        collided: false,
+        crashes: Vec::new(),
     };
     Trajectory {
         steps: (0..steps).map(|_| step(rng)).collect(),
         last: observation(rng),
         last_legal: Array1::from_elem(ROWS, true),
         terminal: true,
+        closeness: Closeness::default(),
     }
 }
 

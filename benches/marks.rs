@@ -34,6 +34,7 @@ use avastra::action::ActionTable;
 use avastra::action::Effect;
 use avastra::action::SpawnRequest;
 use avastra::ads;
+use avastra::cli::lsp::Server;
 use avastra::episode;
 use avastra::mdp::ProcSettings;
 use avastra::mdp::collision_probability;
@@ -84,6 +85,10 @@ fn main() {
     mark("snapshot", "us", || median(|| seconds(10_000, || drop(black_box(world.clone())))) * 1e6);
     mark("parse_check_table", "ms", || {
         median(|| seconds(1, || drop(black_box(ActionTable::new(load()))))) * 1e3
+    });
+    mark("keystroke_to_diagnostics", "ms", || {
+        let mut editing = Editing::new();
+        median(|| seconds(5, || editing.keystroke())) * 1e3
     });
     let run = run(space);
     mark("episodes_per_s", "episodes/s", || median(|| episodes_per_s(&run)));
@@ -144,6 +149,42 @@ fn crowded(scene: &Arc<Scene>) -> World {
         }
     }
     world
+}
+
+/// Somebody edits the 45-action space, whose four maps are known to the server.
+struct Editing {
+    server: Server,
+    uri: String,
+    text: String,
+    keystrokes: u64,
+}
+
+impl Editing {
+    fn new() -> Editing {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios/avastra45.ava");
+        let text = std::fs::read_to_string(&path).expect("it is shipped");
+        let uri = format!("file://{}", path.display());
+        let mut editing = Editing { server: Server::default(), uri, text, keystrokes: 0 };
+        editing.server.receive(&serde_json::json!({ "id": 0, "method": "initialize", "params": {} }));
+        let document = serde_json::json!({ "uri": editing.uri, "version": 0, "text": editing.text });
+        let open = serde_json::json!({ "textDocument": document });
+        editing.server.receive(&serde_json::json!({ "method": "textDocument/didOpen", "params": open }));
+        black_box(editing.server.publish());
+        editing
+    }
+
+    /// Another digit in the range of a parameter, from the message to the message back. Never inlined,
+    /// so that a profiler can be told to count this and nothing else.
+    #[inline(never)]
+    fn keystroke(&mut self) {
+        self.keystrokes += 1;
+        let text = self.text.replacen("1 m .. 120 m", &format!("1 m .. {} m", 120 + self.keystrokes), 1);
+        let document = serde_json::json!({ "uri": self.uri, "version": self.keystrokes });
+        let change = serde_json::json!({ "textDocument": document, "contentChanges": [{ "text": text }] });
+        self.server.receive(&serde_json::json!({ "method": "textDocument/didChange", "params": change }));
+        let said = self.server.publish();
+        assert_eq!(said.len(), 1, "the document has its list");
+    }
 }
 
 /// Somebody drives in a world of their own.

@@ -39,6 +39,18 @@ pub enum Stream {
     Replay = 22,
     /// Seeds of the episodes that a trained policy is judged by.
     Evaluation = 23,
+    /// What a search tries next.
+    Search = 25,
+    /// Seeds of the trainings of a study, one index each.
+    StudyTraining = 31,
+    /// Seeds of the evaluations of a study, one index each.
+    StudyEvaluation = 32,
+    /// Which values a bootstrap draws again.
+    Bootstrap = 33,
+    /// Seeds of the episodes in which rules learn from a network.
+    Distillation = 41,
+    /// The order into which the values of a variable are shuffled; one index a variable and repeat.
+    Permutation = 42,
 }
 
 /// The stream of one consumer; `index` tells apart its uses, for example the step number.

@@ -16,3 +16,9 @@ pub trait Ads: Send {
     /// A copy that goes on exactly as this one would: part of a snapshot.
     fn clone_box(&self) -> Box<dyn Ads>;
 }
+
+impl Clone for Box<dyn Ads> {
+    fn clone(&self) -> Box<dyn Ads> {
+        self.clone_box()
+    }
+}

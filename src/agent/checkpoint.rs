@@ -17,7 +17,7 @@ const MAGIC: &[u8; 8] = b"avackpt1";
 
 impl Learner {
     /// Everything that the learner has learned and still remembers.
-    pub fn save(&self) -> Vec<u8> {
+    pub(super) fn to_bytes(&self) -> Vec<u8> {
         let mut bytes = Writer(MAGIC.to_vec());
         bytes.u64(self.steps);
         bytes.u64(self.updates);

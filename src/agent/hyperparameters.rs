@@ -5,6 +5,7 @@
 
 use serde_json::Value;
 
+use crate::mdp::ProcKind;
 use crate::mdp::RewardSettings;
 use crate::syntax::listed;
 use crate::syntax::nearest;
@@ -37,6 +38,8 @@ pub struct Hyperparameters {
     // The step and its reward.
     /// Observation period (OTP), s, in place of the space's own (RQ3).
     pub observation_period_s: Option<f64>,
+    /// How collision probabilities are reckoned.
+    pub proc: ProcKind,
     /// Where rewards come from.
     pub reward: RewardSource,
     /// R_col (RQ3).
@@ -117,6 +120,16 @@ pub struct Hyperparameters {
     pub random_decay: f64,
     /// ε of the trained policy.
     pub evaluation_epsilon: f64,
+
+    // The readable rules that are distilled from the network at the end (VIPER, Bastani et al., 2018).
+    /// Leaves of the decision tree, at most, which is lines of rules; 0: none are distilled.
+    pub rules_leaves: usize,
+    /// Its depth, at most.
+    pub rules_depth: usize,
+    /// Rounds of DAgger: in the first the network drives, then the rules of the round before.
+    pub rules_rounds: u32,
+    /// Episodes of a round, on each road.
+    pub rules_episodes: u32,
 }
 
 /// Sets of state variables.
@@ -315,6 +328,12 @@ impl Hyperparameters {
         }
         let begins = (1..=self.replay_capacity).contains(&self.learning_starts);
         require("learning_starts", begins, self.learning_starts.to_string(), "from 1 to `replay_capacity`");
+        require("rules_leaves", self.rules_leaves <= 256, self.rules_leaves.to_string(), "up to 256");
+        let is_right = (1..=32).contains(&self.rules_depth);
+        require("rules_depth", is_right, self.rules_depth.to_string(), "from 1 to 32");
+        for (name, value) in [("rules_rounds", self.rules_rounds), ("rules_episodes", self.rules_episodes)] {
+            require(name, (1..=1000).contains(&value), value.to_string(), "from 1 to 1000");
+        }
         require(
             "updates_per_step",
             self.updates_per_step <= 64,

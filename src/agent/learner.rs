@@ -24,6 +24,7 @@ use super::registry::Agent;
 use super::replay::Priorities;
 use super::replay::Replay;
 use super::replay::Transition;
+use super::trainable::Trainable;
 use super::trajectory::Lesson;
 use super::trajectory::Trajectory;
 
@@ -57,36 +58,6 @@ impl Learner {
             random_weights: vec![1.0; rows.allowed.len()],
             policy: QPolicy::new(settings, rows, network),
         }
-    }
-
-    /// The policy as learned so far.
-    pub fn policy(&self) -> &QPolicy {
-        &self.policy
-    }
-
-    /// Choices made in training.
-    pub fn steps(&self) -> u64 {
-        self.steps
-    }
-
-    /// The exploration rate of the next choice.
-    pub fn exploration_epsilon(&self) -> f64 {
-        let settings = self.policy.settings();
-        if self.steps < settings.random_steps { 1.0 } else { epsilon(settings, self.steps) }
-    }
-
-    /// Keeps what an episode showed, and makes the updates that its steps are worth.
-    pub fn learn(&mut self, episode: &Trajectory, rng: &mut Rng) -> Lesson {
-        for transition in self.transitions(episode) {
-            self.replay.push(transition);
-        }
-        let settings = self.policy.settings.clone();
-        if self.replay.len() < settings.learning_starts {
-            return Lesson::default();
-        }
-        let updates = episode.steps.len() as u64 * u64::from(settings.updates_per_step);
-        let losses: f64 = (0..updates).map(|_| self.update(rng)).sum();
-        Lesson { updates, loss: (updates > 0).then(|| losses / updates as f64) }
     }
 
     /// One transition for each step, with the rewards of up to `n_step` steps.
@@ -184,6 +155,43 @@ impl Agent for Learner {
         let row = if explores { self.explore(&open, rng) } else { self.policy.greedy(observation, &open) }?;
         self.policy.chosen(row);
         Some(row)
+    }
+}
+
+impl Trainable for Learner {
+    /// Keeps what the episode showed, and makes the updates that its steps are worth.
+    fn learn(&mut self, episode: &Trajectory, rng: &mut Rng) -> Lesson {
+        for transition in self.transitions(episode) {
+            self.replay.push(transition);
+        }
+        let settings = self.policy.settings.clone();
+        if self.replay.len() < settings.learning_starts {
+            return Lesson::default();
+        }
+        let updates = episode.steps.len() as u64 * u64::from(settings.updates_per_step);
+        let losses: f64 = (0..updates).map(|_| self.update(rng)).sum();
+        Lesson { updates, loss: (updates > 0).then(|| losses / updates as f64) }
+    }
+
+    fn steps(&self) -> u64 {
+        self.steps
+    }
+
+    fn exploration_epsilon(&self) -> f64 {
+        let settings = self.policy.settings();
+        if self.steps < settings.random_steps { 1.0 } else { epsilon(settings, self.steps) }
+    }
+
+    fn actor(&self) -> Box<dyn Agent> {
+        Box::new(self.policy.clone())
+    }
+
+    fn policy(&self) -> Option<&QPolicy> {
+        Some(&self.policy)
+    }
+
+    fn save(&self) -> Vec<u8> {
+        self.to_bytes()
     }
 }
 

@@ -1,5 +1,7 @@
 //! The presets: what the papers print, what their authors published, and ours.
 
+use crate::mdp::ProcKind;
+
 use super::hyperparameters::Encoding;
 use super::hyperparameters::Exploration;
 use super::hyperparameters::Hyperparameters;
@@ -39,6 +41,7 @@ pub(super) fn paper() -> Hyperparameters {
         masks_target: true,
         environment_gate_steps: 0,
         observation_period_s: None,
+        proc: ProcKind::Paper,
         reward: RewardSource::Equation,
         collision_reward: 7.5,
         // The reward knows of no verdict.
@@ -77,6 +80,10 @@ pub(super) fn paper() -> Hyperparameters {
         exploration_inverted: false,
         random_decay: 0.0,
         evaluation_epsilon: 0.1,
+        rules_leaves: 16,
+        rules_depth: 8,
+        rules_rounds: 5,
+        rules_episodes: 40,
     }
 }
 
@@ -86,6 +93,7 @@ pub(super) fn paper() -> Hyperparameters {
 pub(super) fn released() -> Hyperparameters {
     Hyperparameters {
         preset: "released".to_owned(),
+        proc: ProcKind::Released,
         masks_choice: false,
         masks_target: false,
         environment_gate_steps: 5,
@@ -106,6 +114,7 @@ pub(super) fn released() -> Hyperparameters {
 pub(super) fn avastra() -> Hyperparameters {
     Hyperparameters {
         preset: "avastra".to_owned(),
+        proc: ProcKind::Avastra,
         state: StateSet::Extended,
         encoding: Encoding::Scaled,
         uncounted_reward: 0.0,
@@ -136,6 +145,7 @@ pub(super) fn avastra() -> Hyperparameters {
 fn deep_collision() -> Hyperparameters {
     Hyperparameters {
         preset: "paper".to_owned(),
+        proc: ProcKind::Avastra,
         state: StateSet::DeepCollision,
         collision_reward: 1.0,
         uncounted_reward: 1.0,
@@ -160,6 +170,7 @@ fn deep_collision() -> Hyperparameters {
 fn deep_collision_released() -> Hyperparameters {
     Hyperparameters {
         preset: "released".to_owned(),
+        proc: ProcKind::Released,
         masks_choice: false,
         masks_target: false,
         arrival_is_terminal: false,

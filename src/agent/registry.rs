@@ -6,9 +6,14 @@ use ndarray::ArrayView1;
 use crate::mdp::Observation;
 use crate::rng::Rng;
 
+use super::branch::Branch;
+use super::greedy;
 use super::presets;
 use super::presets::Preset;
 use super::random;
+use super::search::AvFuzzerSettings;
+use super::search::GoExploreSettings;
+use super::settings::Settings;
 
 /// Chooses rows of the action table.
 pub trait Agent: Send {
@@ -17,6 +22,29 @@ pub trait Agent: Send {
 
     /// The row to carry out next, or none. `legal` has shape `(rows,)`; at least one is true.
     fn choose(&mut self, observation: &Observation, legal: ArrayView1<bool>, rng: &mut Rng) -> Option<usize>;
+
+    /// The same for an agent that tries rows out before it chooses.
+    fn choose_ahead(
+        &mut self,
+        observation: &Observation,
+        legal: ArrayView1<bool>,
+        branch: &dyn Branch,
+        rng: &mut Rng,
+    ) -> Option<usize> {
+        let _ = branch;
+        self.choose(observation, legal, rng)
+    }
+
+    /// A step begins: the seed of its draws, if they are not to come from the episode's own.
+    fn draw_seed(&mut self, step: usize) -> Option<u64> {
+        let _ = step;
+        None
+    }
+
+    /// Time driven in branches since the episode began, s.
+    fn branched_s(&self) -> f64 {
+        0.0
+    }
 }
 
 /// An agent that can be asked for by name.
@@ -32,10 +60,18 @@ pub enum Kind {
     Ready(fn() -> Box<dyn Agent>),
     /// It has to be trained: its presets, the default first. See [`super::Learner`].
     Learning(&'static [Preset]),
+    /// It searches over many episodes and leaves something behind to act by: its default settings. See
+    /// [`super::Trainable`].
+    Searching(fn() -> Settings),
 }
 
 /// Every agent of avastra.
 pub const REGISTRY: &[Entry] = &[
+    Entry {
+        name: "none",
+        summary: "nothing happens but ordinary traffic, if there is any",
+        kind: Kind::Ready(|| Box::new(Idle)),
+    },
     Entry {
         name: "random",
         summary: "uniform over the rows that the rules allow at the moment",
@@ -56,7 +92,31 @@ pub const REGISTRY: &[Entry] = &[
         summary: "DeepCollision's agent: plain DQN over 12 variables",
         kind: Kind::Learning(presets::DEEP_COLLISION),
     },
+    Entry {
+        name: "greedy",
+        summary: "one step of lookahead: tries every legal row in a copy of the world, takes the most dangerous",
+        kind: Kind::Ready(|| Box::new(greedy::Greedy::default())),
+    },
+    Entry {
+        name: "av-fuzzer",
+        summary: "AV-Fuzzer's genetic search over scripts of rows",
+        kind: Kind::Searching(|| Settings::AvFuzzer(AvFuzzerSettings::default())),
+    },
+    Entry {
+        name: "go-explore",
+        summary: "returns to promising moments by snapshots and explores from there",
+        kind: Kind::Searching(|| Settings::GoExplore(GoExploreSettings::default())),
+    },
 ];
+
+/// Never chooses anything.
+struct Idle;
+
+impl Agent for Idle {
+    fn choose(&mut self, _: &Observation, _: ArrayView1<bool>, _: &mut Rng) -> Option<usize> {
+        None
+    }
+}
 
 /// The agent of that name.
 pub fn by_name(name: &str) -> Option<&'static Entry> {
@@ -68,43 +128,133 @@ mod tests {
     use std::sync::Arc;
 
     use super::*;
+    use crate::agent::Experience;
     use crate::agent::Learner;
     use crate::agent::Rows;
+    use crate::agent::Trainable;
+    use crate::agent::Trajectory;
+    use crate::mdp::Closeness;
     use crate::rng::Stream;
+    use crate::rng::child_seed;
     use crate::rng::stream;
     use ndarray::Array1;
 
-    /// A fresh agent of an entry, for five rows.
-    fn fresh(entry: &Entry, seed: u64) -> Vec<Box<dyn Agent>> {
-        let rows = || Arc::new(Rows { allowed: vec![true; 5], environment: vec![false; 5] });
+    const ROWS: usize = 5;
+
+    /// Fresh agents of an entry, one for each of its presets, and whether each obeys the mask.
+    fn fresh(entry: &Entry, seed: u64) -> Vec<(Box<dyn Agent>, bool)> {
+        let rows = || Arc::new(Rows { allowed: vec![true; ROWS], environment: vec![false; ROWS] });
         match entry.kind {
-            Kind::Ready(build) => vec![build()],
+            Kind::Ready(build) => vec![(build(), entry.name != "random-raw")],
             Kind::Learning(presets) => {
-                let learner = |preset: &Preset| -> Box<dyn Agent> {
-                    Box::new(Learner::new(Arc::new((preset.settings)()), rows(), seed))
+                let learner = |preset: &Preset| -> (Box<dyn Agent>, bool) {
+                    let settings = (preset.settings)();
+                    let obeys = settings.masks_choice;
+                    (Box::new(Learner::new(Arc::new(settings), rows(), seed)), obeys)
                 };
                 presets.iter().map(learner).collect()
+            }
+            Kind::Searching(settings) => {
+                let mut search = settings().build(rows(), seed);
+                let beginning = search.beginning(0, seed);
+                assert_eq!((beginning.seed, beginning.from), (seed, None), "it knows no other start yet");
+                vec![(search, true)]
             }
         }
     }
 
     #[test]
-    fn every_agent_chooses_a_row_and_repeats_itself() {
+    fn every_agent_but_none_chooses_a_row_and_repeats_itself() {
         let legal = Array1::from_vec(vec![false, true, false, true, true]);
         for entry in REGISTRY {
-            let choices = |seed| -> Vec<Vec<usize>> {
-                let choices = |mut agent: Box<dyn Agent>| {
+            let choices = |seed| -> Vec<Vec<Option<usize>>> {
+                let choices = |(mut agent, obeys): (Box<dyn Agent>, bool)| {
                     let mut rng = stream(seed, Stream::Exploration, 0);
                     agent.begin();
                     let observation = Observation::zeros();
-                    let choose = |_| agent.choose(&observation, legal.view(), &mut rng).unwrap();
-                    (0..50).map(choose).collect()
+                    let choose = |step| {
+                        agent.draw_seed(step);
+                        agent.choose(&observation, legal.view(), &mut rng)
+                    };
+                    let chosen: Vec<Option<usize>> = (0..50).map(choose).collect();
+                    let fits = |row: &usize| *row < ROWS && (legal[*row] || !obeys);
+                    assert!(chosen.iter().flatten().all(fits), "{}", entry.name);
+                    assert_eq!(agent.branched_s(), 0.0, "{}: it has tried nothing", entry.name);
+                    chosen
                 };
                 fresh(entry, seed).into_iter().map(choices).collect()
             };
-            assert!(choices(1).iter().flatten().all(|&row| row < legal.len()), "{}", entry.name);
             assert_eq!(choices(1), choices(1), "{}", entry.name);
-            assert_ne!(choices(1), choices(2), "{}", entry.name);
+            if entry.name == "none" {
+                assert!(choices(1).iter().flatten().all(Option::is_none));
+                continue;
+            }
+            assert!(choices(1).iter().flatten().all(Option::is_some), "{}", entry.name);
+            for (one, other) in choices(1).iter().zip(choices(2)) {
+                assert_ne!(*one, other, "{}", entry.name);
+            }
+        }
+    }
+
+    /// An episode in which the first choice makes an obstacle appear that is hit for good in the last.
+    fn episode(rows: &[usize]) -> Trajectory {
+        let experience = |(at, &row): (usize, &usize)| {
+            let is_last = at + 1 == rows.len();
+            Experience {
+                observation: Observation::zeros(),
+                legal: Array1::from_elem(ROWS, true),
+                row,
+                reward: if is_last { 7.5 } else { -1.0 },
+                hits: if is_last { vec![0] } else { Vec::new() },
+                collided: is_last,
+                crashes: if is_last { vec![Some(0)] } else { Vec::new() },
+            }
+        };
+        Trajectory {
+            steps: rows.iter().enumerate().map(experience).collect(),
+            last: Observation::zeros(),
+            last_legal: Array1::from_elem(ROWS, true),
+            terminal: true,
+            closeness: Closeness { distance_m: 5.0 + rows[0] as f64, margin_m: 0.0 },
+        }
+    }
+
+    #[test]
+    fn every_trained_agent_goes_on_after_a_kill_as_if_there_had_been_none() {
+        let rows = || Arc::new(Rows { allowed: vec![true; ROWS], environment: vec![false; ROWS] });
+        for entry in REGISTRY {
+            let Some(settings) = Settings::from_yaml(entry, None, "") else { continue };
+            let settings = settings.unwrap();
+            let play = |agent: &mut Box<dyn Trainable>, number: u64| {
+                let beginning =
+                    agent.beginning((number % 2) as usize, child_seed(9, Stream::Episode, number));
+                agent.begin();
+                // A moment that has not been kept is played up to, and that is no new choice.
+                let new_from = beginning.from.map_or(0, |(_, step)| step);
+                let mut chosen = Vec::new();
+                for step in 0..6 {
+                    agent.draw_seed(step);
+                    let mut rng = stream(beginning.seed, Stream::Exploration, step as u64);
+                    let legal = Array1::from_elem(ROWS, true);
+                    chosen.push(agent.choose(&Observation::zeros(), legal.view(), &mut rng).unwrap());
+                }
+                let mut rng = stream(9, Stream::Replay, number);
+                agent.learn(&episode(&chosen[new_from..]), &mut rng);
+                agent.keepsakes();
+            };
+            let mut whole = settings.build(rows(), 9);
+            for number in 0..40 {
+                play(&mut whole, number);
+            }
+            let bytes = whole.save();
+            let mut restored = settings.restore(rows(), &bytes).expect("the bytes are its own");
+            assert_eq!(restored.save(), bytes, "{}", entry.name);
+            for number in 40..60 {
+                play(&mut whole, number);
+                play(&mut restored, number);
+            }
+            assert_eq!(whole.save(), restored.save(), "{}", entry.name);
+            assert!(settings.restore(rows(), &bytes[1..]).is_none(), "{}", entry.name);
         }
     }
 

@@ -5,6 +5,7 @@
 
 use ndarray::Array1;
 
+use crate::mdp::Closeness;
 use crate::mdp::Observation;
 
 /// The choices of one episode, in order.
@@ -17,6 +18,8 @@ pub struct Trajectory {
     pub last_legal: Array1<bool>,
     /// Whether the episode came to an end of its own (arrival), as opposed to being cut off.
     pub terminal: bool,
+    /// How close somebody came; measured for searches alone.
+    pub closeness: Closeness,
 }
 
 /// One choice and what it was worth.
@@ -29,6 +32,11 @@ pub struct Experience {
     pub reward: f64,
     /// For each contact of this step: the index, here, of the choice that made the obstacle appear.
     pub hits: Vec<usize>,
+    /// Whether the ego vehicle touched anybody in this step.
+    pub collided: bool,
+    /// For each collision of this step that counts: the index, here, of the choice that made the
+    /// obstacle appear, if one of these did.
+    pub crashes: Vec<Option<usize>>,
 }
 
 /// What learning from an episode did.

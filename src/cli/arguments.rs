@@ -71,10 +71,23 @@ pub enum Command {
     New(NewArguments),
     /// Print a script by which a shell completes this command line.
     Completions(CompletionsArguments),
+    /// Serve an editor: mistakes as you type, and all else that it asks for, over stdin and stdout.
+    Lsp,
+    /// Write the parts of the VS Code extension that follow from the language.
+    #[command(hide = true)]
+    EditorFiles(EditorFilesArguments),
     /// Play episodes and write the crashes back as scenarios.
     Run(RunArguments),
     /// Train an agent and write what it learned as a policy.
     Train(TrainArguments),
+    /// Distil readable rules from a policy's network once more, with other settings.
+    Distill(DistillArguments),
+    /// Say which rows a policy favours and when, what it expects of them, and which variables matter to it.
+    ExplainPolicy(ExplainPolicyArguments),
+    /// Write the weights of a policy's network as safetensors, for other tools.
+    ExportWeights(ExportWeightsArguments),
+    /// Compare agents over roads and independent trainings, with statistics.
+    Study(StudyArguments),
     /// Run emitted scenarios again and check every claim they make.
     Replay(ReplayArguments),
     /// Check every claim of emitted scenarios and policies.
@@ -107,6 +120,12 @@ pub struct CheckArguments {
     /// Make the changes that the diagnostics offer, in the files named here.
     #[arg(long)]
     pub fix: bool,
+}
+
+#[derive(Debug, Args)]
+pub struct EditorFilesArguments {
+    /// The folder of the extension.
+    pub directory: PathBuf,
 }
 
 #[derive(Debug, Args)]
@@ -241,6 +260,9 @@ pub struct RunArguments {
     /// Let a trained policy choose them; without FILE on its own space.
     #[arg(long, value_name = "POLICY", conflicts_with = "agent")]
     pub policy: Option<PathBuf>,
+    /// Which face of the policy acts: its network, or the rules distilled from it.
+    #[arg(long, value_enum, requires = "policy", default_value_t = FaceArgument::Network)]
+    pub face: FaceArgument,
     /// Episodes on each road.
     #[arg(long, default_value_t = 100, value_parser = clap::value_parser!(u32).range(1..=i64::from(crate::study::EPISODES_MAX)))]
     pub episodes: u32,
@@ -262,7 +284,7 @@ pub struct RunArguments {
     #[arg(long)]
     pub out: Option<PathBuf>,
     /// Go on with an interrupted run directory; its own settings hold.
-    #[arg(long, value_name = "DIR", conflicts_with_all = ["file", "road", "ads", "ads_config", "agent", "policy", "episodes", "seed", "ambient", "causes", "out", "without", "with"])]
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["file", "road", "ads", "ads_config", "agent", "policy", "face", "episodes", "seed", "ambient", "causes", "out", "without", "with"])]
     pub resume: Option<PathBuf>,
     /// Exit with status 4 if a counted collision was found.
     #[arg(long)]
@@ -280,6 +302,9 @@ pub struct TrainArguments {
     /// Driving system under test.
     #[arg(long, default_value = crate::study::DEFAULT_ADS)]
     pub ads: String,
+    /// Profile of the `modular` driving system [default: as it comes].
+    #[arg(long, value_name = "FILE")]
+    pub ads_config: Option<PathBuf>,
     /// Who learns.
     #[arg(long, default_value = "ddqn")]
     pub agent: String,
@@ -300,14 +325,93 @@ pub struct TrainArguments {
     #[arg(long)]
     pub out: Option<PathBuf>,
     /// Go on with an interrupted run directory; its own settings hold.
-    #[arg(long, value_name = "DIR", conflicts_with_all = ["file", "road", "ads", "agent", "preset", "config", "episodes", "seed", "out", "without", "with"])]
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["file", "road", "ads", "ads_config", "agent", "preset", "config", "episodes", "seed", "out", "without", "with"])]
     pub resume: Option<PathBuf>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum FaceArgument {
+    Network,
+    Rules,
+}
+
+#[derive(Debug, Args)]
+pub struct DistillArguments {
+    /// The policy.
+    pub file: PathBuf,
+    /// Lines, at most [default: as the policy was trained with, like the others].
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=256))]
+    pub leaves: Option<u32>,
+    /// Tests that a line may take, at most.
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=32))]
+    pub depth: Option<u32>,
+    /// Rounds; the rules of each drive the next.
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    pub rounds: Option<u32>,
+    /// Episodes of a round, on each road.
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    pub episodes: Option<u32>,
+    /// Where to write [default: STEM.distilled.ava beside the file].
+    #[arg(long, short)]
+    pub output: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+pub struct ExplainPolicyArguments {
+    /// The policy.
+    pub file: PathBuf,
+    /// Values in place of the mean state's, for example `ego_speed: 12 m/s, time: Night`.
+    #[arg(long)]
+    pub state: Option<String>,
+    /// Road to drive; may be given several times [default: those of the training].
+    #[arg(long)]
+    pub road: Vec<String>,
+    /// Episodes on each road.
+    #[arg(long, default_value_t = 20, value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    pub episodes: u32,
+    /// Seed of the episodes and of the shuffles.
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+    /// Shuffles of each variable.
+    #[arg(long, default_value_t = 10, value_parser = clap::value_parser!(u32).range(2..=1000))]
+    pub repeats: u32,
+}
+
+#[derive(Debug, Args)]
+pub struct ExportWeightsArguments {
+    /// The policy.
+    pub file: PathBuf,
+    /// Where to write [default: STEM.safetensors beside the file].
+    #[arg(long, short)]
+    pub output: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+pub struct StudyArguments {
+    /// The study, for example scenarios/studies/rq1.yaml.
+    #[arg(required_unless_present = "resume")]
+    pub file: Option<PathBuf>,
+    /// Directory of the study, new or empty [default: the next free runs/NNNN].
+    #[arg(long)]
+    pub out: Option<PathBuf>,
+    /// Worker threads; the result does not depend on it [default: one for each core].
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=1024))]
+    pub jobs: Option<u32>,
+    /// Go on with an interrupted study; its own settings hold.
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["file", "out", "quick"])]
+    pub resume: Option<PathBuf>,
+    /// Cut it down to see that it works: two short trainings, few episodes. No result.
+    #[arg(long)]
+    pub quick: bool,
 }
 
 #[derive(Debug, Args)]
 pub struct VerifyArguments {
     #[arg(required = true, value_name = "FILE")]
     pub files: Vec<PathBuf>,
+    /// Worker threads over files [default: one for each core].
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=1024))]
+    pub jobs: Option<u32>,
 }
 
 #[derive(Debug, Args)]
@@ -321,28 +425,44 @@ pub struct ReplayArguments {
     /// recorded one.
     #[arg(long, value_name = "FILE")]
     pub ads_config: Option<PathBuf>,
+    /// Worker threads over files [default: one for each core].
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=1024))]
+    pub jobs: Option<u32>,
 }
 
 #[derive(Debug, Args)]
 pub struct DiagnoseArguments {
-    pub file: PathBuf,
+    #[arg(required = true, value_name = "FILE")]
+    pub files: Vec<PathBuf>,
     /// Another profile of `modular` than the recorded one.
     #[arg(long, value_name = "FILE")]
     pub ads_config: Option<PathBuf>,
     /// Profile that says how good each module should be [default: `modular` as it comes].
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", conflicts_with = "mechanisms")]
     pub baseline: Option<PathBuf>,
     /// Say also how many of N small variations of timing, speeds and sensor errors still crash.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000), conflicts_with = "mechanisms")]
     pub likelihood: Option<u32>,
+    /// Instead of modules, the documented weaknesses (a) to (i): the share of the collisions of all files
+    /// that vanish when one alone is switched off, when the obstacle appears (as modules are) or from the
+    /// start.
+    #[arg(long)]
+    pub mechanisms: bool,
+    /// Worker threads over files [default: one for each core].
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=1024))]
+    pub jobs: Option<u32>,
 }
 
 #[derive(Debug, Args)]
 pub struct ShrinkArguments {
-    pub file: PathBuf,
-    /// Where to write [default: STEM.shrunk.ava beside the file].
+    #[arg(required = true, value_name = "FILE")]
+    pub files: Vec<PathBuf>,
+    /// Where to write, if there is one file [default: STEM.shrunk.ava beside each].
     #[arg(long, short)]
     pub output: Option<PathBuf>,
+    /// Worker threads over files [default: one for each core].
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=1024))]
+    pub jobs: Option<u32>,
 }
 
 #[derive(Debug, Args)]
@@ -375,6 +495,9 @@ pub struct RenderArguments {
     /// Draw the drive of another driving system.
     #[arg(long)]
     pub ads: Option<String>,
+    /// Draw the drive of another profile of `modular`.
+    #[arg(long, value_name = "FILE")]
+    pub ads_config: Option<PathBuf>,
 }
 
 #[derive(Debug, Args)]

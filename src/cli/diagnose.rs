@@ -1,63 +1,219 @@
 //! `avastra diagnose`: which module of the driving system a scenario's collision is the fault of.
 
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::path::PathBuf;
+
+use crate::action::ActionTable;
+use crate::ads::ModularConfig;
 use crate::ads::Module;
+use crate::ads::Selected;
 use crate::episode::Collision;
+use crate::episode::EpisodeLog;
+use crate::model::Scenario;
 use crate::model::vocabulary::Word;
 use crate::oracle;
 use crate::oracle::Diagnosis;
 use crate::oracle::Likelihood;
+use crate::oracle::MechanismShare;
+use crate::oracle::Share;
 use crate::oracle::WeaknessFinding;
-use crate::study;
+use crate::oracle::WithoutMechanism;
 use crate::study::Stage;
 
 use super::arguments::DiagnoseArguments;
 use super::error::Failure;
 use super::load;
 use super::output::Output;
+use super::parallel::each_file;
+use super::progress::plural;
+use super::replay::driver;
 
-/// Plays the scenario again with one module idealised at a time.
+/// Says of every file's first counted collision which module is at fault, or, with `--mechanisms`, what
+/// each documented weakness has to do with all of them.
 pub fn diagnose(output: &Output, arguments: &DiagnoseArguments) -> Result<(), Failure> {
-    let (table, scenario) = load::scenario(output, &arguments.file)?;
-    let usage = |error: &dyn std::error::Error| Failure::usage(error.to_string());
-    let mut ads = match &arguments.ads_config {
-        Some(_) => study::driving_system(scenario.origin.ads.as_deref().unwrap_or(study::DEFAULT_ADS)),
-        None => study::recorded(&scenario),
+    let profile = arguments.ads_config.as_deref().map(load::profile).transpose()?;
+    if arguments.mechanisms {
+        return mechanisms(output, arguments, profile.as_ref());
     }
-    .map_err(|error| usage(&error))?;
-    if let Some(path) = &arguments.ads_config {
-        ads = ads.with_profile(load::profile(path)?).map_err(|error| usage(&error))?;
-    }
-    let stage = Stage::new(&table, &scenario).map_err(|error| usage(&error))?;
-    let log = stage.play(&ads, &mut |_, _, _| {});
-    let judgements = stage.judge(&ads, &log);
-    let Some(&index) = oracle::counted(table.space(), &log, &judgements).first() else {
-        let count = super::progress::plural(log.collisions.len(), "collision");
-        return Err(Failure::usage(format!(
-            "`{}` has no counted collision to explain with this driving system ({count} in all)",
-            scenario.name
-        )));
-    };
-    let setup = stage.setup(&ads);
     let baseline = arguments.baseline.as_deref().map(load::profile).transpose()?.unwrap_or_default();
-    let diagnosis = oracle::diagnose(&setup, &log, index, &baseline).map_err(|error| usage(&error))?;
-    let likelihood = arguments.likelihood.map(|count| oracle::likelihood(&setup, &log, index, count));
-    let collision = &log.collisions[index];
-    output.tell(&heading(collision));
-    output.say(&table_text(&diagnosis));
-    output.say(&weaknesses_text(&diagnosis.weaknesses));
-    output.say(&sentence(&diagnosis));
-    if let Some(likelihood) = &likelihood {
+    let inquire = |file: &PathBuf| explain(output, arguments, profile.as_ref(), &baseline, file);
+    let [file] = arguments.files.as_slice() else {
+        let found = each_file(&arguments.files, arguments.jobs, inquire);
+        return many(output, &arguments.files, found);
+    };
+    let found = inquire(file)?;
+    output.tell(&heading(&found.collision));
+    output.say(&table_text(&found.diagnosis));
+    output.say(&weaknesses_text(&found.diagnosis.weaknesses));
+    output.say(&format!("\n{}", sentence(&found.diagnosis)));
+    if let Some(likelihood) = &found.likelihood {
         output.say(&likelihood_text(likelihood));
     }
+    output.result("diagnose", found.in_json(file));
+    Ok(())
+}
+
+/// A scenario ready to be asked about: its first counted collision.
+struct Case<'a> {
+    stage: Stage<'a>,
+    ads: Selected,
+    log: EpisodeLog,
+    index: usize,
+}
+
+impl Case<'_> {
+    fn of<'a>(
+        table: &'a ActionTable,
+        scenario: &'a Scenario,
+        profile: Option<&ModularConfig>,
+    ) -> Result<Case<'a>, Failure> {
+        let usage = |error: &dyn std::error::Error| Failure::usage(error.to_string());
+        let (ads, _) = driver(None, profile, scenario).map_err(|error| usage(&error))?;
+        let stage = Stage::new(table, scenario).map_err(|error| usage(&error))?;
+        let log = stage.play(&ads, &mut |_, _, _| {});
+        let judgements = stage.judge(&ads, &log);
+        let Some(&index) = oracle::counted(table.space(), &log, &judgements).first() else {
+            let count = plural(log.collisions.len(), "collision");
+            return Err(Failure::usage(format!(
+                "`{}` has no counted collision to explain with this driving system ({count} in all)",
+                scenario.name
+            )));
+        };
+        Ok(Case { stage, ads, log, index })
+    }
+}
+
+/// What was found about one file.
+struct Explained {
+    scenario: String,
+    ads: &'static str,
+    collision: Collision,
+    diagnosis: Diagnosis,
+    likelihood: Option<Likelihood>,
+}
+
+impl Explained {
+    fn in_json(&self, file: &Path) -> serde_json::Value {
+        serde_json::json!({
+            "file": file, "scenario": self.scenario, "ads": self.ads,
+            "obstacle": self.collision.contact.obstacle, "time_s": self.collision.contact.time_s,
+            "diagnosis": self.diagnosis, "likelihood": self.likelihood,
+        })
+    }
+
+    /// The cause in a word or two.
+    fn cause(&self) -> String {
+        let names: Vec<&str> = self.diagnosis.cause.iter().map(|module| module.name()).collect();
+        if names.is_empty() { "none".to_owned() } else { names.join(" and ") }
+    }
+}
+
+fn explain(
+    output: &Output,
+    arguments: &DiagnoseArguments,
+    profile: Option<&ModularConfig>,
+    baseline: &ModularConfig,
+    file: &Path,
+) -> Result<Explained, Failure> {
+    let (table, scenario) = load::scenario(output, file)?;
+    let Case { stage, ads, log, index } = Case::of(&table, &scenario, profile)?;
+    let setup = stage.setup(&ads);
+    let diagnosis = oracle::diagnose(&setup, &log, index, baseline);
+    let diagnosis = diagnosis.map_err(|error| Failure::usage(error.to_string()))?;
+    let likelihood = arguments.likelihood.map(|count| oracle::likelihood(&setup, &log, index, count));
+    let collision = log.collisions[index];
+    Ok(Explained { scenario: scenario.name.clone(), ads: ads.name(), collision, diagnosis, likelihood })
+}
+
+/// A line for each of several files, and how often each cause was found.
+fn many(output: &Output, files: &[PathBuf], found: Vec<Result<Explained, Failure>>) -> Result<(), Failure> {
+    let mut causes: BTreeMap<String, usize> = BTreeMap::new();
+    let mut results = Vec::new();
+    for (file, found) in files.iter().zip(&found) {
+        match found {
+            Ok(found) => {
+                output.tell(&format!("{}: {}", file.display(), sentence(&found.diagnosis)));
+                results.push(found.in_json(file));
+                *causes.entry(found.cause()).or_default() += 1;
+            }
+            Err(failure) => output.say(&format!("{}: {failure}", file.display())),
+        }
+    }
+    let mut causes: Vec<(String, usize)> = causes.into_iter().collect();
+    causes.sort_by_key(|(_, count)| core::cmp::Reverse(*count));
+    output.say(&format!("\n{}, at fault:", plural(results.len(), "collision")));
+    for (cause, count) in &causes {
+        output.say(&format!("{count:>6}  {cause}"));
+    }
+    let errors = files.len() - results.len();
+    let causes: Vec<serde_json::Value> =
+        causes.iter().map(|(cause, count)| serde_json::json!({ "cause": cause, "count": count })).collect();
+    output
+        .result("diagnose", serde_json::json!({ "causes": causes, "errors": errors, "scenarios": results }));
+    none_left_out(errors)
+}
+
+/// The share of the crashes of all files that each documented weakness makes.
+fn mechanisms(
+    output: &Output,
+    arguments: &DiagnoseArguments,
+    profile: Option<&ModularConfig>,
+) -> Result<(), Failure> {
+    let found = each_file(&arguments.files, arguments.jobs, |file| {
+        let (table, scenario) = load::scenario(output, file)?;
+        let Case { stage, ads, log, index } = Case::of(&table, &scenario, profile)?;
+        let found = oracle::mechanisms(&stage.setup(&ads), &log, index);
+        found.map_err(|error| Failure::usage(error.to_string()))
+    });
+    let mut crashes: Vec<Vec<WithoutMechanism>> = Vec::new();
+    let mut results = Vec::new();
+    for (file, found) in arguments.files.iter().zip(found) {
+        match found {
+            Ok(found) => {
+                results.push(serde_json::json!({ "file": file, "without": found }));
+                crashes.push(found);
+            }
+            Err(failure) => output.say(&format!("{}: {failure}", file.display())),
+        }
+    }
+    let shares = oracle::mechanism_shares(&crashes);
+    output.say(&shares_text(crashes.len(), &shares));
+    let errors = arguments.files.len() - crashes.len();
     output.result(
         "diagnose",
         serde_json::json!({
-            "file": arguments.file, "scenario": scenario.name, "ads": ads.name(),
-            "obstacle": collision.contact.obstacle, "time_s": collision.contact.time_s,
-            "diagnosis": diagnosis, "likelihood": likelihood,
+            "crashes": crashes.len(), "mechanisms": shares, "errors": errors, "scenarios": results,
         }),
     );
-    Ok(())
+    none_left_out(errors)
+}
+
+fn none_left_out(errors: usize) -> Result<(), Failure> {
+    if errors == 0 {
+        return Ok(());
+    }
+    Err(Failure::usage(format!("{} could not be explained", plural(errors, "scenario"))))
+}
+
+fn shares_text(crashes: usize, shares: &[MechanismShare]) -> String {
+    let mut text = format!(
+        "{}; each weakness switched off alone, what vanishes (95 %):\n{:<34}{:<26}{}",
+        plural(crashes, "collision"),
+        "weakness",
+        "when the obstacle appears",
+        "from the start"
+    );
+    let cell = |share: &Share| {
+        let [found, low, high] = [share.share, share.low, share.high].map(|share| share * 100.0);
+        format!("{:>4} {found:>4.0} % ({low:.0} to {high:.0})", share.vanished)
+    };
+    for found in shares {
+        let line =
+            format!("{:<34}{:<26}{}", found.mechanism, cell(&found.from_onset), cell(&found.from_start));
+        text.push_str(&format!("\n{line}"));
+    }
+    text
 }
 
 fn heading(collision: &Collision) -> String {
@@ -118,9 +274,9 @@ fn sentence(diagnosis: &Diagnosis) -> String {
     let finding = |module: Module| diagnosis.modules.iter().find(|found| found.module == module);
     match diagnosis.cause.as_slice() {
         [] if diagnosis.varied_crashes.is_some() => {
-            "\nit hung by a hair: small variations do not crash, and no module can be named".to_owned()
+            "it hung by a hair: small variations do not crash, and no module can be named".to_owned()
         }
-        [] => "\nno module is at fault alone, nor are two together".to_owned(),
+        [] => "no module is at fault alone, nor are two together".to_owned(),
         [module] => {
             let found = finding(*module);
             let alone = found.is_some_and(|found| found.alone == oracle::Fate::Crash);
@@ -138,12 +294,12 @@ fn sentence(diagnosis: &Diagnosis) -> String {
                 names => format!("; {} would have made up for it", names.join(", ")),
             };
             let name = module.name();
-            format!("\n{name} is at fault: {cure}{alone}{others}")
+            format!("{name} is at fault: {cure}{alone}{others}")
         }
         modules => {
             let names: Vec<&str> = modules.iter().map(|module| module.name()).collect();
             let names = names.join(" and ");
-            format!("\n{names} are at fault together: without the errors of both there is no crash")
+            format!("{names} are at fault together: without the errors of both there is no crash")
         }
     }
 }

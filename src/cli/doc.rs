@@ -136,21 +136,24 @@ fn ranges(space: &Space, action: usize, parameter: &Parameter) -> String {
     let Domain::Range(low, high) = &parameter.domain else { return String::new() };
     let declared = Interval::closed(*low, *high);
     let unit = unit(parameter.ty);
-    let mut shown: Vec<String> = Vec::new();
-    for (index, road) in space.roads.iter().enumerate() {
-        let reaches = space.rows.iter().filter(|row| row.action == action).map(|row| &row.roads[index]);
-        let kept = reaches.filter_map(|reach| match reach {
-            Reach::Open(ranges) => {
-                ranges.iter().find(|(name, _)| *name == parameter.name).map(|(_, interval)| *interval)
-            }
-            Reach::Dead { .. } => None,
-        });
-        let Some(kept) = kept.reduce(|all, interval| all.hull(&interval)) else { continue };
-        if kept != declared {
-            shown.push(format!("{kept} {unit} on {}", road.name));
-        }
-    }
+    let roads = space.roads.iter().enumerate();
+    let left = roads.filter_map(|(road, of)| Some((of, range_on(space, action, parameter, road)?)));
+    let shown = left.filter(|(_, kept)| *kept != declared);
+    let shown: Vec<String> = shown.map(|(road, kept)| format!("{kept} {unit} on {}", road.name)).collect();
     shown.join("; ")
+}
+
+/// What the rules leave of a parameter's range on a road, over all rows of its action that can run
+/// there; `None` if none can, or the parameter has no range.
+pub fn range_on(space: &Space, action: usize, parameter: &Parameter, road: usize) -> Option<Interval> {
+    let reaches = space.rows.iter().filter(|row| row.action == action).map(|row| &row.roads[road]);
+    let kept = reaches.filter_map(|reach| match reach {
+        Reach::Open(ranges) => {
+            ranges.iter().find(|(name, _)| *name == parameter.name).map(|(_, interval)| *interval)
+        }
+        Reach::Dead { .. } => None,
+    });
+    kept.reduce(|all, interval| all.hull(&interval))
 }
 
 fn values(space: &Space, domain: &Domain, ty: Type) -> String {
@@ -178,7 +181,8 @@ fn type_name(space: &Space, ty: Type) -> String {
     }
 }
 
-fn unit(ty: Type) -> String {
+/// The SI unit of a type; empty for what has none.
+pub fn unit(ty: Type) -> String {
     match ty {
         Type::Quantity(dimension) => dimension.si_unit(),
         Type::Int | Type::Bool | Type::Enum(_) => String::new(),

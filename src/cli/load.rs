@@ -50,7 +50,7 @@ pub fn read_and_check(path: &Path) -> Result<Loaded, Failure> {
 }
 
 /// Other source files in the directory of a file and in the one above, as it would name them.
-fn nearby(path: &Path) -> Vec<(String, String)> {
+pub fn nearby(path: &Path) -> Vec<(String, String)> {
     let folder = path.parent().unwrap_or(Path::new(""));
     let mut found = Vec::new();
     for prefix in ["", "../"] {

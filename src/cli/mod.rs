@@ -6,13 +6,19 @@ mod compile;
 mod completions;
 mod diagnose;
 mod diff;
+mod distill;
 mod doc;
+mod editor_files;
 mod error;
 mod explain;
+mod explain_policy;
+mod export_weights;
 mod fmt;
 mod load;
+pub mod lsp;
 mod new;
 mod output;
+mod parallel;
 mod progress;
 mod render;
 mod replay;
@@ -21,6 +27,7 @@ mod run;
 mod run_directory;
 mod sarif;
 mod shrink;
+mod study;
 mod test;
 mod train;
 mod trials;
@@ -63,8 +70,14 @@ pub fn main() -> ExitCode {
         Command::Doc(arguments) => doc::doc(&output, arguments),
         Command::New(arguments) => new::new(&output, arguments),
         Command::Completions(arguments) => completions::completions(&output, arguments),
+        Command::Lsp => lsp::serve(),
+        Command::EditorFiles(arguments) => editor_files::editor_files(&output, arguments),
         Command::Run(arguments) => run::run(&output, arguments),
         Command::Train(arguments) => train::train(&output, arguments),
+        Command::Distill(arguments) => distill::distill(&output, arguments),
+        Command::ExplainPolicy(arguments) => explain_policy::explain_policy(&output, arguments),
+        Command::ExportWeights(arguments) => export_weights::export_weights(&output, arguments),
+        Command::Study(arguments) => study::study(&output, arguments),
         Command::Verify(arguments) => verify::verify(&output, arguments),
         Command::Replay(arguments) => replay::replay(&output, arguments),
         Command::Diagnose(arguments) => diagnose::diagnose(&output, arguments),

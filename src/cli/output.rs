@@ -1,8 +1,8 @@
 //! Printing: results on stdout, everything else on stderr, in the form that was asked for.
 
-use std::cell::RefCell;
 use std::io::IsTerminal;
 use std::io::Write;
+use std::sync::Mutex;
 
 use crate::syntax::Diagnostic;
 use crate::syntax::DiagnosticRecord;
@@ -21,7 +21,7 @@ pub struct Output {
     colour: bool,
     pub quiet: bool,
     /// What SARIF wants in one piece at the end.
-    collected: RefCell<Vec<DiagnosticRecord>>,
+    collected: Mutex<Vec<DiagnosticRecord>>,
 }
 
 /// The result of a command in JSON: its last line on stdout.
@@ -45,7 +45,7 @@ impl Output {
                     && std::env::var_os("NO_COLOR").is_none()
             }
         };
-        let collected = RefCell::default();
+        let collected = Mutex::default();
         Output { format: arguments.format, colour, quiet: arguments.quiet, collected }
     }
 
@@ -60,7 +60,7 @@ impl Output {
     /// Ends the command's output.
     pub fn finish(&self) {
         if self.is_sarif() {
-            let log = sarif::log(&self.collected.borrow());
+            let log = sarif::log(&self.collected());
             print(&serde_json::to_string_pretty(&log).expect("it is JSON already"));
         }
     }
@@ -92,7 +92,7 @@ impl Output {
     pub fn diagnostics(&self, sources: &Sources, diagnostics: &[Diagnostic]) {
         for diagnostic in diagnostics {
             if self.is_sarif() {
-                self.collected.borrow_mut().push(crate::syntax::record(diagnostic, sources));
+                self.collected().push(crate::syntax::record(diagnostic, sources));
             } else if self.is_json() {
                 let record = crate::syntax::record(diagnostic, sources);
                 let line = serde_json::to_string(&record).expect("records have string keys only");
@@ -102,6 +102,10 @@ impl Output {
                 remark(&format!("{}\n", crate::syntax::render(diagnostic, sources, style).trim_end()));
             }
         }
+    }
+
+    fn collected(&self) -> std::sync::MutexGuard<'_, Vec<DiagnosticRecord>> {
+        self.collected.lock().expect("nobody panics while collecting")
     }
 
     pub fn failure(&self, failure: &Failure) {
@@ -123,7 +127,7 @@ pub fn usage_in_json(failure: &Failure) {
     let arguments: Vec<String> = std::env::args().collect();
     let asks = |pair: &[String]| pair[0] == "--format" && pair[1] == "json";
     if arguments.windows(2).any(asks) || arguments.iter().any(|argument| argument == "--format=json") {
-        Output { format: Format::Json, colour: false, quiet: false, collected: RefCell::default() }
+        Output { format: Format::Json, colour: false, quiet: false, collected: Mutex::default() }
             .failure(failure);
     }
 }

@@ -4,18 +4,20 @@ use std::path::Path;
 use std::path::PathBuf;
 
 use crate::action::ActionTable;
+use crate::ads::Selected;
 use crate::geometry::Vec2;
 use crate::model::Claim;
 use crate::model::Scenario;
 use crate::report::Snapshot;
 use crate::report::picture;
 use crate::sim::DT_S;
-use crate::study;
+use crate::study::Stage;
 
 use super::arguments::RenderArguments;
 use super::error::Failure;
 use super::load;
 use super::output::Output;
+use super::replay::driver;
 use super::run_directory::write;
 
 /// A contact is marked this long after it happened, s.
@@ -30,8 +32,10 @@ pub fn render(output: &Output, arguments: &RenderArguments) -> Result<(), Failur
     let (table, scenario) = load::scenario(output, &arguments.file)?;
     let scenario = &scenario;
     let times_s = times(arguments, scenario, table.space().episode.step_s)?;
-    let ads = arguments.ads.as_deref();
-    let moments = moments(&table, scenario, ads, &times_s)?;
+    let profile = arguments.ads_config.as_deref().map(load::profile).transpose()?;
+    let (ads, _) = driver(arguments.ads.as_deref(), profile.as_ref(), scenario)
+        .map_err(|error| Failure::usage(error.to_string()))?;
+    let moments = moments(&table, scenario, &ads, &times_s)?;
     // A strip ends where its scenario does.
     if moments.is_empty() || (!arguments.strip && moments.len() < times_s.len()) {
         return Err(Failure::usage(format!(
@@ -94,12 +98,13 @@ fn times(arguments: &RenderArguments, scenario: &Scenario, step_s: f64) -> Resul
 fn moments(
     table: &ActionTable,
     scenario: &Scenario,
-    ads: Option<&str>,
+    ads: &Selected,
     times_s: &[f64],
 ) -> Result<Vec<Snapshot>, Failure> {
     let mut moments: Vec<Snapshot> = Vec::new();
     let mut last_contact: Option<(f64, Vec2)> = None;
-    study::replay(table, scenario, ads, &mut |world, ads, contacts| {
+    let stage = Stage::new(table, scenario).map_err(|error| Failure::usage(error.to_string()))?;
+    stage.play(ads, &mut |world, ads, contacts| {
         if let Some(contact) = contacts.last() {
             last_contact = Some((contact.time_s, contact.point));
         }
@@ -112,7 +117,6 @@ fn moments(
                 contact: fresh.map(|(_, point)| point),
             });
         }
-    })
-    .map_err(|error| Failure::usage(error.to_string()))?;
+    });
     Ok(moments)
 }

@@ -18,58 +18,95 @@ use super::arguments::ReplayArguments;
 use super::error::Failure;
 use super::load;
 use super::output::Output;
+use super::parallel::each_file;
 use super::progress::plural;
 
 /// Replays the scenario of every file; with `--ads` or another profile only tells what happens.
 pub fn replay(output: &Output, arguments: &ReplayArguments) -> Result<(), Failure> {
-    let (mut refuted, mut confirmed) = (0, 0);
-    let mut results = Vec::new();
     let profile = arguments.ads_config.as_deref().map(load::profile).transpose()?;
-    for path in &arguments.files {
-        let (table, scenario) = load::scenario(output, path)?;
-        let (ads, is_recorded) = driver(arguments.ads.as_deref(), profile.as_ref(), &scenario)
-            .map_err(|error| Failure::usage(error.to_string()))?;
-        let name = match &arguments.ads_config {
-            Some(path) => format!("{} with {}", ads.name(), path.display()),
-            None => ads.name().to_owned(),
-        };
-        let stage = Stage::new(&table, &scenario).map_err(|error| Failure::usage(error.to_string()))?;
-        let mut measures = Measures::default();
-        let log = stage.play(&ads, &mut |world, _, contacts| measures.note(world, contacts));
-        let (criticality, pet_s) = measures.of_steps(&log);
-        let severities: Vec<oracle::Severity> = log.collisions.iter().map(oracle::severity).collect();
-        if !is_recorded {
-            let judgements = stage.judge(&ads, &log);
-            let counted = oracle::counted(table.space(), &log, &judgements).len();
-            let collisions = plural(log.collisions.len(), "collision");
-            let avoidable = judgements.iter().filter(|j| j.class == Avoidability::Avoidable).count();
-            output.say(&format!(
-                "{} against {name}: {collisions}, {counted} counted, {avoidable} avoidable",
-                path.display()
-            ));
-            results.push(serde_json::json!({
-                "file": path, "scenario": scenario.name, "ads": name,
-                "collisions": log.collisions.len(), "counted": counted, "judgements": judgements,
-                "severities": severities, "criticality": criticality, "pet_s": pet_s,
-            }));
-            continue;
+    let played =
+        each_file(&arguments.files, arguments.jobs, |path| play(output, arguments, profile.as_ref(), path));
+    let (mut refuted, mut confirmed, mut refuted_files) = (0, 0, 0);
+    let mut results = Vec::new();
+    for (path, played) in arguments.files.iter().zip(played) {
+        let played = played?;
+        match &played.claims {
+            None => output.say(&format!("{} against {}", path.display(), played.told)),
+            Some(verdicts) => {
+                let wrong = verdicts.iter().filter(|verdict| !verdict.confirmed).count();
+                refuted += wrong;
+                confirmed += verdicts.len() - wrong;
+                refuted_files += usize::from(wrong > 0);
+                report(output, path, &played.scenario, verdicts);
+                if !played.told.is_empty() {
+                    output.tell(&played.told);
+                }
+            }
         }
-        let verdicts = stage.verify(&ads, &log);
-        let wrong = verdicts.iter().filter(|verdict| !verdict.confirmed).count();
-        refuted += wrong;
-        confirmed += verdicts.len() - wrong;
-        report(output, path, &scenario, &verdicts);
-        log.collisions.iter().zip(&severities).for_each(|(collision, severity)| {
-            output.tell(&severity_text(collision, severity));
-        });
-        results.push(serde_json::json!({ "file": path, "scenario": scenario.name, "claims": verdicts,
-            "severities": severities, "criticality": criticality, "pet_s": pet_s }));
+        results.push(played.result);
+    }
+    if arguments.files.len() > 1 && confirmed + refuted > 0 {
+        let files = plural(arguments.files.len(), "scenario");
+        output.say(&format!(
+            "\n{files}: {} confirmed, {refuted} refuted in {refuted_files} of them",
+            plural(confirmed, "claim")
+        ));
     }
     output.result(
         "replay",
         serde_json::json!({ "confirmed": confirmed, "refuted": refuted, "scenarios": results }),
     );
     if refuted > 0 { Err(Failure::Refuted { claims: refuted }) } else { Ok(()) }
+}
+
+/// What a replay of one file found.
+struct Played {
+    scenario: Scenario,
+    /// Its claims, if it was played as it was recorded.
+    claims: Option<Vec<oracle::ClaimResult>>,
+    /// What happened, in words.
+    told: String,
+    result: serde_json::Value,
+}
+
+fn play(
+    output: &Output,
+    arguments: &ReplayArguments,
+    profile: Option<&ModularConfig>,
+    path: &Path,
+) -> Result<Played, Failure> {
+    let (table, scenario) = load::scenario(output, path)?;
+    let (ads, is_recorded) = driver(arguments.ads.as_deref(), profile, &scenario)
+        .map_err(|error| Failure::usage(error.to_string()))?;
+    let stage = Stage::new(&table, &scenario).map_err(|error| Failure::usage(error.to_string()))?;
+    let mut measures = Measures::default();
+    let log = stage.play(&ads, &mut |world, _, contacts| measures.note(world, contacts));
+    let (criticality, pet_s) = measures.of_steps(&log);
+    let severities: Vec<oracle::Severity> = log.collisions.iter().map(oracle::severity).collect();
+    if is_recorded {
+        let claims = stage.verify(&ads, &log);
+        let result = serde_json::json!({ "file": path, "scenario": scenario.name, "claims": claims,
+            "severities": severities, "criticality": criticality, "pet_s": pet_s });
+        let lines = log.collisions.iter().zip(&severities);
+        let told = lines.map(|(collision, severity)| severity_text(collision, severity));
+        let told = told.collect::<Vec<_>>().join("\n");
+        return Ok(Played { claims: Some(claims), told, result, scenario });
+    }
+    let name = match &arguments.ads_config {
+        Some(path) => format!("{} with {}", ads.name(), path.display()),
+        None => ads.name().to_owned(),
+    };
+    let judgements = stage.judge(&ads, &log);
+    let counted = oracle::counted(table.space(), &log, &judgements).len();
+    let collisions = plural(log.collisions.len(), "collision");
+    let avoidable = judgements.iter().filter(|j| j.class == Avoidability::Avoidable).count();
+    let told = format!("{name}: {collisions}, {counted} counted, {avoidable} avoidable");
+    let result = serde_json::json!({
+        "file": path, "scenario": scenario.name, "ads": name,
+        "collisions": log.collisions.len(), "counted": counted, "judgements": judgements,
+        "severities": severities, "criticality": criticality, "pet_s": pet_s,
+    });
+    Ok(Played { claims: None, told, result, scenario })
 }
 
 /// Who drives, and whether that is who the scenario was made with.

@@ -20,14 +20,19 @@ pub struct RunDirectory {
 }
 
 /// Makes a new directory, or the next free `runs/NNNN`.
-pub fn create(out: Option<&Path>) -> Result<PathBuf, Failure> {
-    let path = match out {
+pub fn create_empty(out: Option<&Path>) -> Result<PathBuf, Failure> {
+    match out {
         Some(path) => {
             make_empty(path)?;
-            path.to_owned()
+            Ok(path.to_owned())
         }
-        None => next_free(Path::new("runs"))?,
-    };
+        None => next_free(Path::new("runs")),
+    }
+}
+
+/// The same for a run, with a place for its scenarios.
+pub fn create(out: Option<&Path>) -> Result<PathBuf, Failure> {
+    let path = create_empty(out)?;
     let critical = path.join("critical");
     std::fs::create_dir_all(&critical).map_err(|error| Failure::file("create", &critical, error))?;
     Ok(path)
@@ -41,12 +46,19 @@ pub fn write_settings(directory: &Path, settings: &impl serde::Serialize) -> Res
 
 /// The settings that a directory was made with.
 pub fn settings<S: serde::de::DeserializeOwned>(directory: &Path) -> Result<S, Failure> {
-    let path = directory.join("run.yaml");
+    settings_in(directory, "run.yaml", "run")
+}
+
+/// The same of any kind of directory: the file's name, and a word for what it is of.
+pub fn settings_in<S: serde::de::DeserializeOwned>(
+    directory: &Path,
+    name: &str,
+    what: &str,
+) -> Result<S, Failure> {
+    let path = directory.join(name);
     if !path.is_file() {
-        return Err(Failure::usage(format!(
-            "`{}` is no run directory: it has no run.yaml",
-            directory.display()
-        )));
+        let directory = directory.display();
+        return Err(Failure::usage(format!("`{directory}` is no {what} directory: it has no {name}")));
     }
     let text = load::read(&path).map_err(|error| Failure::file("read", &path, error))?;
     serde_yaml::from_str(&text).map_err(|error| Failure::file("read", &path, error))
@@ -96,7 +108,7 @@ impl Begun<'_> {
 /// Writes a file whole or not at all: a kill leaves the old one.
 /// A link is followed, and what is no regular file (a pipe, a terminal, the null device) is
 /// written to rather than replaced.
-pub fn write(path: &Path, text: &str) -> Result<(), Failure> {
+pub fn write(path: &Path, text: &(impl AsRef<[u8]> + ?Sized)) -> Result<(), Failure> {
     let followed = std::fs::canonicalize(path);
     let path = followed.as_deref().unwrap_or(path);
     if path.exists() && !path.is_file() {

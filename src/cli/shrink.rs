@@ -17,13 +17,105 @@ use super::arguments::ShrinkArguments;
 use super::error::Failure;
 use super::load;
 use super::output::Output;
+use super::parallel::each_file;
 use super::progress::plural;
 use super::run_directory::write;
 
-/// Writes the file's scenario as small as it gets, and checks every claim of what it wrote.
+/// Writes each file's scenario as small as it gets, and checks every claim of what it wrote.
 pub fn shrink(output: &Output, arguments: &ShrinkArguments) -> Result<(), Failure> {
+    if let [file] = arguments.files.as_slice() {
+        let path = arguments.output.clone().unwrap_or_else(|| beside(file));
+        let small = smaller(output, file, &path)?;
+        output.say(&small.in_words());
+        small.actions_left.iter().for_each(|action| output.tell(&format!("  {action}")));
+        output.result("shrink", small.in_json());
+        return refutation(small.refuted);
+    }
+    if let Some(path) = &arguments.output {
+        let path = path.display();
+        return Err(Failure::usage(format!(
+            "`--output {path}` is for one file: of several, each is written beside its own"
+        )));
+    }
+    let found = each_file(&arguments.files, arguments.jobs, |file| smaller(output, file, &beside(file)));
+    let mut done: Vec<Small> = Vec::new();
+    for (file, found) in arguments.files.iter().zip(found) {
+        match found {
+            Ok(small) => {
+                output.tell(&small.in_words());
+                done.push(small);
+            }
+            Err(failure) => output.say(&format!("{}: {failure}", file.display())),
+        }
+    }
+    let errors = arguments.files.len() - done.len();
+    let kept = done.iter().filter(|small| small.refuted == 0).count();
+    let before = median(done.iter().map(|small| small.before));
+    let after = median(done.iter().map(|small| small.after));
+    output.say(&format!(
+        "\n{}: median {} with {} became {} with {}; {kept} keep their verdict and every claim",
+        plural(done.len(), "scenario"),
+        counted(before.0, "step"),
+        counted(before.1, "action"),
+        counted(after.0, "step"),
+        counted(after.1, "action"),
+    ));
+    output.result(
+        "shrink",
+        serde_json::json!({
+            "median_steps_before": before.0, "median_actions_before": before.1,
+            "median_steps": after.0, "median_actions": after.1,
+            "kept": kept, "errors": errors,
+            "scenarios": done.iter().map(Small::in_json).collect::<Vec<_>>(),
+        }),
+    );
+    if errors > 0 {
+        return Err(Failure::usage(format!("{} could not be shrunk", plural(errors, "scenario"))));
+    }
+    refutation(done.iter().map(|small| small.refuted).sum())
+}
+
+/// What became of one file. Sizes are steps, and how many of them do something.
+struct Small {
+    file: PathBuf,
+    path: PathBuf,
+    scenario: String,
+    before: (usize, usize),
+    after: (usize, usize),
+    /// The actions that are left.
+    actions_left: Vec<String>,
+    plays: u32,
+    /// Claims of the written file that do not hold.
+    refuted: usize,
+}
+
+impl Small {
+    fn in_words(&self) -> String {
+        format!(
+            "{}: {} with {} became {} with {} ({} played)",
+            self.path.display(),
+            plural(self.before.0, "step"),
+            plural(self.before.1, "action"),
+            plural(self.after.0, "step"),
+            plural(self.after.1, "action"),
+            plural(self.plays as usize, "episode")
+        )
+    }
+
+    fn in_json(&self) -> serde_json::Value {
+        serde_json::json!({
+            "file": self.file, "output": self.path, "scenario": self.scenario,
+            "steps_before": self.before.0, "actions_before": self.before.1,
+            "steps": self.after.0, "actions": self.after.1,
+            "plays": self.plays, "refuted": self.refuted,
+        })
+    }
+}
+
+/// Shrinks the scenario of a file into another.
+fn smaller(output: &Output, file: &Path, path: &Path) -> Result<Small, Failure> {
     let usage = |error: study::RunError| Failure::usage(error.to_string());
-    let (table, scenario) = load::scenario(output, &arguments.file)?;
+    let (table, scenario) = load::scenario(output, file)?;
     let ads = study::recorded(&scenario).map_err(usage)?;
     let stage = Stage::new(&table, &scenario).map_err(usage)?;
     let log = stage.play(&ads, &mut |_, _, _| {});
@@ -32,10 +124,8 @@ pub fn shrink(output: &Output, arguments: &ShrinkArguments) -> Result<(), Failur
         let name = &scenario.name;
         return Err(Failure::usage(format!("`{name}` has no counted collision that could be kept")));
     };
-    let before = Script::of_log(&log);
-    let shrunk = oracle::shrink(&stage.setup(&ads), &log, index, &judgements);
+    let shrunk = oracle::shrink(&stage.setup(&ads), &log, index, &judgements, stage.avoidability());
 
-    let path = arguments.output.clone().unwrap_or_else(|| beside(&arguments.file));
     let folder = path.parent().unwrap_or(Path::new(""));
     if !folder.as_os_str().is_empty() {
         std::fs::create_dir_all(folder).map_err(|error| Failure::file("create", folder, error))?;
@@ -50,39 +140,53 @@ pub fn shrink(output: &Output, arguments: &ShrinkArguments) -> Result<(), Failur
         without: &origin.without,
         with: &origin.with,
     };
+    let setup = Setup { start: shrunk.start, memory: shrunk.memory, ..stage.setup(&ads) };
+    let spare =
+        oracle::spare_steps(&setup, &shrunk.log, shrunk.index, &shrunk.judgements, stage.avoidability());
     let mut summary = EpisodeSummary::new(table.space(), source.episode, &shrunk.log, shrunk.judgements);
+    summary.avoidability = stage.avoidability().clone();
+    summary.collisions[shrunk.index].minimal = spare.is_empty();
     if scenario.claims.iter().any(|claim| matches!(claim, Claim::Cause { .. })) {
-        let setup = Setup { start: shrunk.start, ..stage.setup(&ads) };
         summary.find_causes(&setup, &shrunk.log).map_err(|error| Failure::usage(error.to_string()))?;
     }
-    write(&path, &crate::syntax::print(&emit::scenario(&table, &shrunk.log, &summary, &source)))?;
-    let refuted = refuted(output, &path)?;
+    write(path, &crate::syntax::print(&emit::scenario(&table, &shrunk.log, &summary, &source)))?;
+    let actions = shrunk.log.steps.iter().filter_map(|step| match &step.outcome {
+        Outcome::Done { draw, .. } => Some(emit::action_text(&table, draw)),
+        Outcome::Passed | Outcome::Refused { .. } => None,
+    });
+    Ok(Small {
+        file: file.to_owned(),
+        path: path.to_owned(),
+        scenario: scenario.name.clone(),
+        before: size(&Script::of_log(&log)),
+        after: size(&shrunk.script),
+        actions_left: actions.collect(),
+        plays: shrunk.plays,
+        refuted: refuted(output, path)?,
+    })
+}
 
-    let (steps, actions) = size(&before);
-    let (steps_left, actions_left) = size(&shrunk.script);
-    output.say(&format!(
-        "{}: {} with {} became {} with {} ({} played)",
-        path.display(),
-        plural(steps, "step"),
-        plural(actions, "action"),
-        plural(steps_left, "step"),
-        plural(actions_left, "action"),
-        plural(shrunk.plays as usize, "episode")
-    ));
-    for step in &shrunk.log.steps {
-        if let Outcome::Done { draw, .. } = &step.outcome {
-            output.tell(&format!("  {}", emit::action_text(&table, draw)));
+/// The median of steps and of actions, each by itself.
+fn median(sizes: impl Iterator<Item = (usize, usize)>) -> (f64, f64) {
+    let (mut steps, mut actions): (Vec<usize>, Vec<usize>) = sizes.unzip();
+    let middle = |values: &mut Vec<usize>| {
+        values.sort_unstable();
+        let half = values.len() / 2;
+        match values.as_slice() {
+            [] => 0.0,
+            values if values.len() % 2 == 1 => values[half] as f64,
+            values => (values[half - 1] + values[half]) as f64 / 2.0,
         }
-    }
-    output.result(
-        "shrink",
-        serde_json::json!({
-            "file": arguments.file, "output": path, "scenario": scenario.name,
-            "steps_before": steps, "actions_before": actions,
-            "steps": steps_left, "actions": actions_left,
-            "plays": shrunk.plays, "refuted": refuted,
-        }),
-    );
+    };
+    (middle(&mut steps), middle(&mut actions))
+}
+
+/// A median with its noun.
+fn counted(count: f64, noun: &str) -> String {
+    if count == 1.0 { format!("1 {noun}") } else { format!("{count} {noun}s") }
+}
+
+fn refutation(refuted: usize) -> Result<(), Failure> {
     if refuted > 0 { Err(Failure::Refuted { claims: refuted }) } else { Ok(()) }
 }
 
@@ -105,4 +209,16 @@ fn size(script: &Script) -> (usize, usize) {
 fn beside(file: &Path) -> PathBuf {
     let stem = file.file_stem().unwrap_or_default().to_string_lossy();
     file.with_file_name(format!("{stem}.shrunk.ava"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn medians_are_of_each_size_by_itself() {
+        assert_eq!(median([(3, 1), (1, 1), (8, 2)].into_iter()), (3.0, 1.0));
+        assert_eq!(median([(3, 1), (4, 2)].into_iter()), (3.5, 1.5));
+        assert_eq!(median([].into_iter()), (0.0, 0.0));
+    }
 }

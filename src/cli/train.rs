@@ -6,18 +6,28 @@ use std::sync::atomic::AtomicBool;
 use std::sync::atomic::Ordering;
 
 use crate::agent;
-use crate::agent::Hyperparameters;
 use crate::agent::Kind;
+use crate::agent::QPolicy;
+use crate::agent::Settings;
 use crate::emit;
+use crate::model::Policy;
 use crate::model::Space;
+use crate::model::digest_text;
+use crate::model::policy::PolicyClaims;
+use crate::model::policy::PolicyOrigin;
 use crate::sim::ENGINE;
+use crate::study::Evaluation;
+use crate::study::Profile;
 use crate::study::TrainSettings;
 use crate::study::TrainedEpisode;
 use crate::study::Training;
-use crate::study::evaluate;
+use crate::study::evaluate_agent;
+use crate::study::rounded;
 use crate::syntax::listed;
 
 use super::arguments::TrainArguments;
+use super::distill;
+use super::distill::rules_text;
 use super::error::Failure;
 use super::load;
 use super::output::Output;
@@ -62,13 +72,14 @@ pub fn train(output: &Output, arguments: &TrainArguments) -> Result<(), Failure>
 fn begun(output: &Output, arguments: &TrainArguments) -> Result<(Training, RunDirectory), Failure> {
     let file = arguments.file.as_ref().expect("clap asks for it where there is no `--resume`");
     let table = load::table(output, file)?;
-    let hyperparameters = hyperparameters(arguments)?;
+    let hyperparameters = settings(arguments)?;
     let space = table.space();
     let roads = if arguments.road.is_empty() {
         space.roads.iter().map(|road| road.name.clone()).collect()
     } else {
         arguments.road.clone()
     };
+    let profile = arguments.ads_config.as_deref().map(load::profile).transpose()?;
     let settings = TrainSettings {
         avastra: VERSION.to_owned(),
         engine: ENGINE.to_owned(),
@@ -76,9 +87,11 @@ fn begun(output: &Output, arguments: &TrainArguments) -> Result<(Training, RunDi
         space_digest: space.digest.clone(),
         roads,
         ads: arguments.ads.clone(),
+        profile: profile.as_ref().map(Profile::new),
         agent: arguments.agent.clone(),
         episodes: arguments.episodes,
         seed: arguments.seed,
+        ambient: 0,
         without: arguments.rules.without.clone(),
         with: arguments.rules.with.clone(),
         hyperparameters,
@@ -90,25 +103,22 @@ fn begun(output: &Output, arguments: &TrainArguments) -> Result<(Training, RunDi
     Ok((training, RunDirectory::open(path)?))
 }
 
-/// The preset that is asked for, as the configuration file changes it.
-fn hyperparameters(arguments: &TrainArguments) -> Result<Hyperparameters, Failure> {
-    let learning = agent::REGISTRY.iter().filter(|entry| matches!(entry.kind, Kind::Learning(_)));
+/// The agent's settings: the preset that is asked for, as the configuration file changes it.
+fn settings(arguments: &TrainArguments) -> Result<Settings, Failure> {
+    let trained = agent::REGISTRY.iter().filter(|entry| !matches!(entry.kind, Kind::Ready(_)));
     let entry = agent::by_name(&arguments.agent).ok_or_else(|| {
-        let known = listed(&learning.map(|entry| entry.name).collect::<Vec<_>>());
+        let known = listed(&trained.map(|entry| entry.name).collect::<Vec<_>>());
         Failure::usage(format!("no agent `{}` that learns: there are {known}", arguments.agent))
     })?;
-    let Kind::Learning(presets) = entry.kind else {
-        let name = entry.name;
-        return Err(Failure::usage(format!(
-            "`{name}` has nothing to learn: `avastra run --agent {name}` plays it"
-        )));
-    };
     let (text, path) = match &arguments.config {
         None => (String::new(), Path::new("--preset")),
         Some(path) => (load::read(path).map_err(|error| Failure::file("read", path, error))?, path.as_path()),
     };
-    Hyperparameters::from_yaml(presets, arguments.preset.as_deref(), &text)
-        .map_err(|error| Failure::file("take", path, error))
+    let settings = Settings::from_yaml(entry, arguments.preset.as_deref(), &text).ok_or_else(|| {
+        let name = entry.name;
+        Failure::usage(format!("`{name}` has nothing to learn: `avastra run --agent {name}` plays it"))
+    })?;
+    settings.map_err(|error| Failure::file("take", path, error))
 }
 
 /// The rest of an interrupted training.
@@ -153,7 +163,7 @@ fn write_critical(
     trained: &TrainedEpisode,
 ) -> Result<(), Failure> {
     let settings = training.settings();
-    if trained.summary.counted() == 0 || settings.hyperparameters.observation_period_s.is_some() {
+    if trained.summary.counted() == 0 || settings.hyperparameters.observation_period_s().is_some() {
         return Ok(());
     }
     let name = format!("{}_{:04}", trained.log.road, trained.summary.episode);
@@ -167,7 +177,8 @@ fn write_critical(
         without: &settings.without,
         with: &settings.with,
     };
-    let file = emit::scenario(training.table(), &trained.log, &trained.summary, &source);
+    let file =
+        emit::scenario(training.table(), &training.log_of_space(&trained.log), &trained.summary, &source);
     write(&directory.critical(&name), &crate::syntax::print(&file))
 }
 
@@ -177,71 +188,142 @@ fn finish(output: &Output, training: &Training, directory: &RunDirectory) -> Res
     let table = training.table().clone();
     let rules = (settings.with.as_slice(), settings.without.as_slice());
     let roads = &settings.roads;
-    let evaluation =
-        evaluate(table, training.policy(), roads, &settings.ads, rules, (EVALUATION_EPISODES, settings.seed));
+    let (ads, test) = (training.arena().ads(), (EVALUATION_EPISODES, settings.seed));
+    let evaluation = evaluate_agent(table, &|| training.actor(), roads, ads, rules, test);
     let evaluation = evaluation.map_err(|error| Failure::usage(error.to_string()))?;
-    let path = write_policy(training, &evaluation, &directory.path)?;
-    let totals =
-        directory.database.totals().map_err(|error| Failure::file("read", &directory.path, error))?;
+    let kept = training.policy().map(|acting| {
+        output.tell("distilling rules from the network");
+        let policy = policy(training, acting, &evaluation)?;
+        let path = write_policy(&policy, training.table().space(), &directory.path)?;
+        Ok::<_, Failure>((path, policy))
+    });
+    let kept = kept.transpose()?;
+    let read = |error| Failure::file("read", &directory.path, error);
+    let totals = directory.database.totals().map_err(read)?;
+    let simulated_h = directory.database.trained_s().map_err(read)? / 3600.0;
     output.say(&format!(
-        "\n{}: {}, {} counted in {}",
+        "\n{} in {simulated_h:.1} h of simulated time: {}, {} counted in {}",
         plural(totals.episodes as usize, "episode"),
         plural(totals.collisions as usize, "collision"),
         totals.counted,
         plural(totals.episodes_with_counted as usize, "episode"),
     ));
     output.say(&format!(
-        "the policy, on {} of its own: {} counted in {}",
+        "what it learned, on {} of its own: {} counted in {}",
         plural(evaluation.episodes as usize * roads.len(), "episode"),
         plural(evaluation.counted as usize, "collision"),
         plural(evaluation.colliding as usize, "episode"),
     ));
-    output.say(&format!("{}\nplay it with: avastra run --policy {}", path.display(), path.display()));
+    let rules = kept.as_ref().and_then(|(_, policy)| policy.claims.as_ref()?.rules.as_ref());
+    match &kept {
+        Some((path, policy)) => {
+            if let Some(rules) = rules {
+                output.say(&rules_text(policy.rules.len(), evaluation.return_mean, rules));
+            }
+            output.say(&format!("{}\nplay it with: avastra run --policy {}", path.display(), path.display()))
+        }
+        None => output.say(&format!(
+            "a search has no policy file: what it found stands in {}",
+            directory.path.join("critical").display()
+        )),
+    }
     output.result(
         "train",
         serde_json::json!({
-            "directory": directory.path, "totals": totals, "policy": path,
+            "directory": directory.path, "totals": totals, "policy": kept.as_ref().map(|(path, _)| path), "rules": rules, "simulated_h": simulated_h,
             "evaluation": {
                 "episodes": evaluation.episodes * roads.len() as u64, "collisions": evaluation.collisions,
                 "counted": evaluation.counted, "colliding": evaluation.colliding,
+                "simulated_h": evaluation.simulated_s / 3600.0, "return": evaluation.return_mean,
             },
         }),
     );
     Ok(())
 }
 
-/// Writes `policy/NAME.ava`.
-fn write_policy(
-    training: &Training,
-    evaluation: &crate::study::Evaluation,
-    directory: &Path,
-) -> Result<PathBuf, Failure> {
+/// The policy as it is to be kept, with the rules distilled from it and the claims of both.
+fn policy(training: &Training, acting: &QPolicy, evaluation: &Evaluation) -> Result<Policy, Failure> {
     let settings = training.settings();
     let name = match settings.roads.as_slice() {
         [road] => format!("{road}_{}_{}", settings.agent, settings.seed),
         _ => format!("{}_{}", settings.agent, settings.seed),
     };
+    let network = acting.network();
+    let policy = Policy {
+        name,
+        docs: vec![headline(settings, evaluation)],
+        origin: PolicyOrigin {
+            agent: settings.agent.clone(),
+            seed: settings.seed,
+            episodes: u64::from(settings.episodes),
+            roads: settings.roads.clone(),
+            ads: settings.ads.clone(),
+            profile: settings
+                .profile
+                .as_ref()
+                .map(|profile| profile.settings.to_line())
+                .filter(|line| !line.is_empty()),
+            profile_digest: settings.profile.as_ref().map(|profile| profile.digest.clone()),
+            engine: settings.engine.clone(),
+            avastra: settings.avastra.clone(),
+            with: settings.with.clone(),
+            without: settings.without.clone(),
+        },
+        layers: network.shape().layers.clone(),
+        dueling: network.shape().dueling,
+        hyperparameters: acting.settings().record(),
+        parameters: network.parameters().to_vec(),
+        claims: Some(PolicyClaims {
+            episodes: evaluation.episodes,
+            seed: evaluation.seed,
+            collisions: evaluation.collisions,
+            counted: evaluation.counted,
+            colliding: evaluation.colliding,
+            return_mean: rounded(evaluation.return_mean),
+            trace: digest_text(&evaluation.trace),
+            rules: None,
+        }),
+        rules: Vec::new(),
+        digest: String::new(),
+    };
+    distill::with_rules(training.table(), acting, policy)
+}
+
+/// Writes `policy/NAME.ava`.
+fn write_policy(policy: &Policy, space: &Space, directory: &Path) -> Result<PathBuf, Failure> {
     let folder = directory.join("policy");
     std::fs::create_dir_all(&folder).map_err(|error| Failure::file("create", &folder, error))?;
-    let space: &Space = training.table().space();
     let space_path = load::relative(&folder, &space.path)?;
-    let text = emit::policy_text(training.policy(), settings, evaluation, &name, &space_path);
-    let path = folder.join(format!("{name}.ava"));
-    write(&path, &text)?;
+    let path = folder.join(format!("{}.ava", policy.name));
+    write(&path, &emit::policy_text(policy, space, &space_path))?;
     Ok(path)
+}
+
+/// What it is, in a sentence for the reader.
+fn headline(settings: &TrainSettings, evaluation: &Evaluation) -> String {
+    format!(
+        "{} ({}) after {} episodes on {}: {} counted collisions in {} episodes of its own.",
+        settings.agent,
+        settings.hyperparameters.preset(),
+        settings.episodes,
+        settings.roads.join(", "),
+        evaluation.counted,
+        evaluation.episodes * settings.roads.len() as u64,
+    )
 }
 
 fn heading(training: &Training, directory: &Path) -> String {
     let settings = training.settings();
-    let network = training.policy().network();
-    let widths: Vec<String> = network.shape().layers.iter().map(ToString::to_string).collect();
+    let network = training.policy().map_or(String::new(), |policy| {
+        let network = policy.network();
+        let widths: Vec<String> = network.shape().layers.iter().map(ToString::to_string).collect();
+        format!(", network {}, {} parameters", widths.join("-"), network.parameters().len())
+    });
     format!(
-        "{}: {} ({}, network {}, {} parameters) against {}, {} on {}, seed {}, into {}",
+        "{}: {} ({}{network}) against {}, {} on {}, seed {}, into {}",
         training.table().space().path.display(),
         settings.agent,
-        settings.hyperparameters.preset,
-        widths.join("-"),
-        network.parameters().len(),
+        settings.hyperparameters.preset(),
         settings.ads,
         plural(settings.episodes as usize, "episode"),
         settings.roads.join(", "),

@@ -14,6 +14,7 @@ use crate::model::StateDef;
 use crate::model::Value;
 use crate::model::digest_text;
 use crate::model::vocabulary::Word;
+use crate::oracle::AvoidabilitySettings;
 use crate::sim::ENGINE;
 use crate::study::EpisodeSummary;
 use crate::study::Finding;
@@ -63,20 +64,23 @@ pub fn scenario(
     let steps = last.collision.step + 1;
     let emitted = format!("Emitted by `avastra {}`; replay with `avastra replay FILE`.", source.command);
     let headline = headline(log, &counted[0].collision);
-    file(table, log, source, [&emitted, &headline], steps, expects(log, summary, steps))
+    let origin = origin(log, source, &summary.avoidability);
+    file(table, log, source, origin, [&emitted, &headline], steps, expects(log, summary, steps))
 }
 
 /// All steps of an episode, with a headline, as a scenario that claims nothing: to look at.
 pub fn unclaimed(table: &ActionTable, log: &EpisodeLog, headline: &str, source: &Provenance) -> File {
     let emitted =
         format!("Emitted by `avastra {}`; look at it with `avastra render FILE --strip`.", source.command);
-    file(table, log, source, [&emitted, headline], log.steps.len(), Vec::new())
+    let origin = origin(log, source, &AvoidabilitySettings::default());
+    file(table, log, source, origin, [&emitted, headline], log.steps.len(), Vec::new())
 }
 
 fn file(
     table: &ActionTable,
     log: &EpisodeLog,
     source: &Provenance,
+    origin: Vec<Field>,
     [emitted, headline]: [&str; 2],
     steps: usize,
     expects: Vec<Expect>,
@@ -84,7 +88,7 @@ fn file(
     let space = table.space();
     let item = Scenario {
         name: Name::built(source.name),
-        origin: origin(log, source),
+        origin,
         road: Name::built(log.road.as_str()),
         start: start(space, log),
         steps: (0..steps).map(|number| step(table, log, number)).collect(),
@@ -117,7 +121,7 @@ pub fn action_text(table: &ActionTable, draw: &Draw) -> String {
     format!("{axes} with {{ {} }}", fields.join(", "))
 }
 
-fn origin(log: &EpisodeLog, source: &Provenance) -> Vec<Field> {
+fn origin(log: &EpisodeLog, source: &Provenance, avoidability: &AvoidabilitySettings) -> Vec<Field> {
     let names = |rules: &[String]| tree::list(rules.iter().map(|rule| tree::name(rule)).collect());
     let mut fields = vec![
         tree::field("seed", tree::whole(log.seed)),
@@ -133,6 +137,9 @@ fn origin(log: &EpisodeLog, source: &Provenance) -> Vec<Field> {
         fields.push(tree::field("profile_digest", tree::text(profile.digest())));
     }
     fields.push(tree::field("engine", tree::text(ENGINE)));
+    if *avoidability != AvoidabilitySettings::default() {
+        fields.push(tree::field("avoidability", tree::text(avoidability.to_line())));
+    }
     if !source.without.is_empty() {
         fields.push(tree::field("without", names(source.without)));
     }
@@ -220,6 +227,9 @@ fn expects(log: &EpisodeLog, summary: &EpisodeSummary, steps: usize) -> Vec<Expe
                 _ => tree::list(core::iter::once(first).chain(modules).collect()),
             };
             expects.push(tree::expect(tree::equal(tree::name("cause"), modules), vec![who()]));
+        }
+        if finding.minimal {
+            expects.push(tree::expect(tree::name("minimal"), vec![who()]));
         }
     }
     let proc = log.steps[..steps].iter().map(|step| tree::rounded(step.proc, 3, Dimension::RATIO));

@@ -8,7 +8,6 @@ use crate::action::Situation;
 use crate::ads::Ads;
 use crate::mdp;
 use crate::mdp::Observation;
-use crate::mdp::ProcSettings;
 use crate::model::Memory;
 use crate::model::OutcomeFacts;
 use crate::sim::Contact;
@@ -35,7 +34,33 @@ pub struct Moment<'a> {
     pub step: usize,
     pub observation: &'a Observation,
     pub situation: &'a Situation<'a>,
+    play: &'a Play,
+    setup: &'a Setup<'a>,
 }
+
+impl<'a> Moment<'a> {
+    /// What the episode is made of.
+    pub fn setup(&self) -> &'a Setup<'a> {
+        self.setup
+    }
+
+    /// The episode as it would be one observation period after an action; the world stays as it is.
+    pub fn look_ahead(&self, draw: Draw) -> EpisodeLog {
+        let mut copy = self.play.clone();
+        let outcome = copy.carry_out(draw);
+        copy.observation_period(self.setup, self.observation.clone(), outcome, &mut |_, _, _| {});
+        copy.into_log(self.setup, End::Script)
+    }
+
+    /// This moment, to go on from as often as wanted.
+    pub fn snapshot(&self) -> Snapshot {
+        Snapshot(self.play.clone())
+    }
+}
+
+/// A moment of an episode, kept; see [`go_on`].
+#[derive(Clone)]
+pub struct Snapshot(Play);
 
 /// What is to happen in a step.
 pub enum Choice {
@@ -65,29 +90,50 @@ pub fn run_to_last(
     watch: &mut Watch,
     last: &mut dyn FnMut(&Moment),
 ) -> EpisodeLog {
-    let mut play = Play::new(setup);
+    to_the_end(setup, Play::new(setup), choose, watch, last)
+}
+
+/// The same from a moment of an episode of the same setup. The log is that of the whole episode.
+pub fn go_on(
+    setup: &Setup,
+    from: Snapshot,
+    choose: &mut dyn FnMut(&Moment) -> Choice,
+    watch: &mut Watch,
+    last: &mut dyn FnMut(&Moment),
+) -> EpisodeLog {
+    to_the_end(setup, from.0, choose, watch, last)
+}
+
+fn to_the_end(
+    setup: &Setup,
+    mut play: Play,
+    choose: &mut dyn FnMut(&Moment) -> Choice,
+    watch: &mut Watch,
+    last: &mut dyn FnMut(&Moment),
+) -> EpisodeLog {
     watch(&play.world, play.ads.as_ref(), &[]);
     let end = loop {
         let observation = Observation::new(&play.world, play.ads.status());
-        let choice = choose(&play.moment(&observation, &play.situation()));
+        let choice = choose(&play.moment(setup, &observation, &play.situation(setup)));
         let outcome = match choice {
             Choice::Act(draw) => play.carry_out(draw),
             Choice::Pass => Outcome::Passed,
             Choice::Refused { row, rule, reason } => Outcome::Refused { row, rule, reason },
             Choice::Stop => break End::Script,
         };
-        play.observation_period(observation, outcome, watch);
-        if let Some(end) = play.end() {
+        play.observation_period(setup, observation, outcome, watch);
+        if let Some(end) = play.end(setup) {
             break end;
         }
     };
-    last(&play.moment(&Observation::new(&play.world, play.ads.status()), &play.situation()));
-    play.into_log(end)
+    let observation = Observation::new(&play.world, play.ads.status());
+    last(&play.moment(setup, &observation, &play.situation(setup)));
+    play.into_log(setup, end)
 }
 
 /// An episode under way.
-struct Play<'a> {
-    setup: &'a Setup<'a>,
+#[derive(Clone)]
+struct Play {
     world: World,
     ads: Box<dyn Ads>,
     sensed: Sensed,
@@ -99,11 +145,10 @@ struct Play<'a> {
     distance_m: f64,
     /// Steps without progress up to now.
     stalled: u32,
-    proc: ProcSettings,
 }
 
-impl<'a> Play<'a> {
-    fn new(setup: &'a Setup<'a>) -> Play<'a> {
+impl Play {
+    fn new(setup: &Setup) -> Play {
         let world = World::new(setup.scene.clone(), &setup.start);
         let mut ads = setup.ads.build(&setup.scene, setup.seed);
         let mut sensed = world.sensed();
@@ -111,7 +156,6 @@ impl<'a> Play<'a> {
         ads.drive(&sensed);
         world.sense(&mut sensed);
         Play {
-            setup,
             world,
             ads,
             sensed,
@@ -122,23 +166,27 @@ impl<'a> Play<'a> {
             trace: Sha256::new(),
             distance_m: 0.0,
             stalled: 0,
-            proc: ProcSettings::default(),
         }
     }
 
-    fn situation(&self) -> Situation<'_> {
+    fn situation<'s>(&'s self, setup: &'s Setup) -> Situation<'s> {
         Situation {
             memory: &self.memory,
-            road: self.setup.road,
-            rules: self.setup.rules,
+            road: setup.road,
+            rules: setup.rules,
             surroundings: &self.world,
-            seed: self.setup.seed,
+            seed: setup.seed,
             step: self.steps.len() as u64,
         }
     }
 
-    fn moment<'m>(&self, observation: &'m Observation, situation: &'m Situation<'m>) -> Moment<'m> {
-        Moment { step: self.steps.len(), observation, situation }
+    fn moment<'m>(
+        &'m self,
+        setup: &'m Setup,
+        observation: &'m Observation,
+        situation: &'m Situation<'m>,
+    ) -> Moment<'m> {
+        Moment { step: self.steps.len(), observation, situation, play: self, setup }
     }
 
     /// All of an action or nothing of it: its second spawn may find its first in the way.
@@ -159,25 +207,28 @@ impl<'a> Play<'a> {
     }
 
     /// Drives for one observation period (OTP), or until the goal.
-    fn observation_period(&mut self, observation: Observation, outcome: Outcome, watch: &mut Watch) {
+    fn observation_period(
+        &mut self,
+        setup: &Setup,
+        observation: Observation,
+        outcome: Outcome,
+        watch: &mut Watch,
+    ) {
         let time_s = self.world.time_s();
         let station_m = self.world.ego_station_m();
         let (mut proc, mut collided) = (0.0_f64, false);
-        let shift = self.setup.period_shifts.get(self.steps.len()).copied().unwrap_or(0);
-        let ticks = (self.setup.table.space().episode.step_s / DT_S).round() as i64 + i64::from(shift);
+        let shift = setup.period_shifts.get(self.steps.len()).copied().unwrap_or(0);
+        let ticks = (setup.table.space().episode.step_s / DT_S).round() as i64 + i64::from(shift);
         for _ in 0..ticks {
-            proc = proc.max(self.tick(watch, &mut collided));
-            if self.setup.table.space().episode.stop_arrived && self.world.arrived() {
+            proc = proc.max(self.tick(setup, watch, &mut collided));
+            if setup.table.space().episode.stop_arrived && self.world.arrived() {
                 break;
             }
         }
         let progress_m = self.world.ego_station_m() - station_m;
         self.stalled = if progress_m.abs() < PROGRESS_M_MIN { self.stalled + 1 } else { 0 };
-        let reward = self.setup.table.space().reward(OutcomeFacts {
-            collision: collided,
-            proc,
-            ..OutcomeFacts::default()
-        });
+        let reward =
+            setup.table.space().reward(OutcomeFacts { collision: collided, proc, ..OutcomeFacts::default() });
         let trace = self.trace.clone().finalize().into();
         let state = observation.state;
         let perception = mdp::perception_counts(&self.world, self.ads.status());
@@ -186,7 +237,7 @@ impl<'a> Play<'a> {
 
     /// One physics step; the collision probability after it. Contact is certainty, once: who has been
     /// hit stands against the ego vehicle for a while, and is no danger any more.
-    fn tick(&mut self, watch: &mut Watch, collided: &mut bool) -> f64 {
+    fn tick(&mut self, setup: &Setup, watch: &mut Watch, collided: &mut bool) -> f64 {
         self.world.sense(&mut self.sensed);
         let control = self.ads.drive(&self.sensed);
         let contacts = self.world.tick(&control).to_vec();
@@ -202,7 +253,7 @@ impl<'a> Play<'a> {
             return 1.0;
         }
         let is_hit = |id| self.collisions.iter().any(|collision| collision.contact.obstacle == id);
-        mdp::collision_probability(&self.world, &self.proc, &is_hit)
+        setup.proc.probability(&self.world, &is_hit)
     }
 
     fn collision(&self, contact: Contact) -> Collision {
@@ -220,8 +271,8 @@ impl<'a> Play<'a> {
         }
     }
 
-    fn end(&self) -> Option<End> {
-        let episode = &self.setup.table.space().episode;
+    fn end(&self, setup: &Setup) -> Option<End> {
+        let episode = &setup.table.space().episode;
         if episode.stop_arrived && self.world.arrived() {
             Some(End::Arrived)
         } else if episode.stalled_steps.is_some_and(|limit| self.stalled >= limit) {
@@ -233,14 +284,14 @@ impl<'a> Play<'a> {
         }
     }
 
-    fn into_log(self, end: End) -> EpisodeLog {
+    fn into_log(self, setup: &Setup, end: End) -> EpisodeLog {
         EpisodeLog {
-            road: self.setup.road.name.clone(),
-            ads: self.setup.ads.name().to_owned(),
-            profile: self.setup.ads.profile().copied(),
-            seed: self.setup.seed,
-            start: self.setup.start,
-            memory: self.setup.memory.clone(),
+            road: setup.road.name.clone(),
+            ads: setup.ads.name().to_owned(),
+            profile: setup.ads.profile().copied(),
+            seed: setup.seed,
+            start: setup.start,
+            memory: setup.memory.clone(),
             collisions: self.collisions,
             incidents: self.incidents,
             end,

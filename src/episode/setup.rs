@@ -5,6 +5,7 @@ use std::sync::Arc;
 use crate::action::ActionTable;
 use crate::action::ActiveRules;
 use crate::ads::Selected;
+use crate::mdp::ProcKind;
 use crate::model::Memory;
 use crate::model::Road;
 use crate::model::Space;
@@ -31,6 +32,8 @@ pub struct Setup<'a> {
     /// Ticks by which each observation period is longer than the space says, or shorter; none beyond its
     /// end. Only whoever asks what a little more or less time would have changed has any.
     pub period_shifts: Vec<i32>,
+    /// How collision probabilities are reckoned.
+    pub proc: ProcKind,
 }
 
 /// The world that a road's episodes share.

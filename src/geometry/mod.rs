@@ -6,6 +6,7 @@
 mod contact;
 mod path;
 mod pose;
+mod smooth_step;
 
 pub use contact::Clearance;
 pub use contact::FirstContact;
@@ -23,3 +24,7 @@ pub use pose::Pose;
 pub use pose::Vec2;
 pub use pose::unit_vector;
 pub use pose::wrap_angle;
+pub use smooth_step::SMOOTH_STEP_BEND_MAX;
+pub use smooth_step::SMOOTH_STEP_SLOPE_MAX;
+pub use smooth_step::SmoothStep;
+pub use smooth_step::smooth_step;

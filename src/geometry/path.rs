@@ -38,6 +38,34 @@ pub struct Path {
     /// begin to look for a station.
     cells: Vec<u32>,
     cells_per_m: f64,
+    /// What holds the segments from each multiple of [`BLOCK`] on.
+    blocks: Vec<Bounds>,
+}
+
+/// So many segments share their bounds: a projection looks only into blocks that can hold its answer.
+const BLOCK: usize = 16;
+
+/// An upright box.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Bounds {
+    least: Vec2,
+    most: Vec2,
+}
+
+impl Bounds {
+    fn of(points: &[PathPoint]) -> Bounds {
+        let begin = points[0].position;
+        points.iter().fold(Bounds { least: begin, most: begin }, |bounds, point| Bounds {
+            least: bounds.least.inf(&point.position),
+            most: bounds.most.sup(&point.position),
+        })
+    }
+
+    /// Squared distance to the box, m²; rounded down, so that no point of a segment in it is nearer.
+    fn distance_m2_min(&self, point: Vec2) -> f64 {
+        let outside = (self.least - point).sup(&(point - self.most)).sup(&Vec2::zeros());
+        outside.norm_squared() * (1.0 - 1e-9)
+    }
 }
 
 impl Path {
@@ -73,7 +101,11 @@ impl Path {
             }
             segment as u32
         });
-        Some(Path { cells: cells.collect(), cells_per_m, points })
+        let blocks = (0..points.len() - 1).step_by(BLOCK).map(|first| {
+            let last = (first + BLOCK).min(points.len() - 1);
+            Bounds::of(&points[first..=last])
+        });
+        Some(Path { cells: cells.collect(), cells_per_m, blocks: blocks.collect(), points })
     }
 
     /// A straight path. `None` if the ends coincide.
@@ -149,30 +181,48 @@ impl Path {
         Path::new(points.map(|p| (p.position, p.heading_rad, p.curvature_per_m)))
     }
 
+    /// The nearest point among the segments from `first` up to the vertex `last`.
     fn project_segments(&self, point: Vec2, first: usize, last: usize) -> Projection {
-        // Index, part of the segment, squared distance.
-        let mut best = (first, 0.0, f64::INFINITY);
-        for (index, pair) in self.points[first..=last].windows(2).enumerate() {
-            let (a, b) = (&pair[0], &pair[1]);
+        let blocks = first / BLOCK..=(last - 1) / BLOCK;
+        let within = |block: usize| (block * BLOCK).max(first)..((block + 1) * BLOCK).min(last);
+        let bound = |block: usize| self.blocks[block].distance_m2_min(point);
+        // The least bound is a guess where the nearest point lies; its distance rules out most others.
+        let guess =
+            blocks.clone().min_by(|a, b| bound(*a).total_cmp(&bound(*b))).expect("a path has segments");
+        let reach_m2 = self.nearest(point, within(guess)).distance_m2;
+        let mut best = Nearest { segment: first, fraction: 0.0, distance_m2: f64::INFINITY };
+        for block in blocks.filter(|block| bound(*block) <= reach_m2) {
+            let found = self.nearest(point, within(block));
+            if found.distance_m2 < best.distance_m2 {
+                best = found;
+            }
+        }
+        let (a, b) = (&self.points[best.segment], &self.points[best.segment + 1]);
+        let chord = b.position - a.position;
+        let length_m = b.station_m - a.station_m;
+        let delta = point - (a.position + chord * best.fraction);
+        Projection {
+            station_m: a.station_m + best.fraction * length_m,
+            offset_m: (chord.x * delta.y - chord.y * delta.x) / length_m,
+            distance_m: best.distance_m2.sqrt(),
+        }
+    }
+
+    /// The nearest point of some segments. Of equals, the first.
+    fn nearest(&self, point: Vec2, segments: core::ops::Range<usize>) -> Nearest {
+        let mut best = Nearest { segment: segments.start, fraction: 0.0, distance_m2: f64::INFINITY };
+        for segment in segments {
+            let (a, b) = (&self.points[segment], &self.points[segment + 1]);
             let chord = b.position - a.position;
             let length_m = b.station_m - a.station_m;
             let away = point - a.position;
             let fraction = (away.dot(&chord) / (length_m * length_m)).clamp(0.0, 1.0);
             let distance_m2 = (away - chord * fraction).norm_squared();
-            if distance_m2 < best.2 {
-                best = (first + index, fraction, distance_m2);
+            if distance_m2 < best.distance_m2 {
+                best = Nearest { segment, fraction, distance_m2 };
             }
         }
-        let (index, fraction, distance_m2) = best;
-        let (a, b) = (&self.points[index], &self.points[index + 1]);
-        let chord = b.position - a.position;
-        let length_m = b.station_m - a.station_m;
-        let delta = point - (a.position + chord * fraction);
-        Projection {
-            station_m: a.station_m + fraction * length_m,
-            offset_m: (chord.x * delta.y - chord.y * delta.x) / length_m,
-            distance_m: distance_m2.sqrt(),
-        }
+        best
     }
 
     /// Index of the first vertex beyond a station, or of the last vertex.
@@ -202,8 +252,18 @@ impl Path {
     }
 }
 
+/// A place on a path, and how far from it something is.
+struct Nearest {
+    segment: usize,
+    /// Of the segment, in `[0, 1]`.
+    fraction: f64,
+    distance_m2: f64,
+}
+
 #[cfg(test)]
 mod tests {
+    use proptest::prelude::*;
+
     use super::*;
 
     fn quarter_circle(radius_m: f64, steps: usize) -> Path {
@@ -264,5 +324,31 @@ mod tests {
         let part = path.part(3.0, 9.0).expect("six metres");
         assert!((part.length_m() - 6.0).abs() < 1e-9);
         assert!((part.pose_at(0.0).position - path.pose_at(3.0).position).norm() < 1e-9);
+    }
+
+    proptest! {
+        /// Blocks change how long a projection takes and not a bit of it.
+        #[test]
+        fn blocks_find_what_a_search_of_all_segments_finds(
+            turns in prop::collection::vec((-0.6..0.6_f64, 0.1..9.0_f64), 2..90),
+            x_m in -80.0..80.0_f64, y_m in -80.0..80.0_f64, near_m in 0.0..400.0_f64,
+        ) {
+            let mut at = Pose { position: Vec2::zeros(), heading_rad: 0.0 };
+            let samples: Vec<_> = turns.iter().map(|(turn_rad, step_m)| {
+                at = Pose { heading_rad: at.heading_rad + turn_rad, ..at }.offset(*step_m, 0.0);
+                (at.position, at.heading_rad, 0.0)
+            }).collect();
+            let path = Path::new(samples).expect("many points");
+            let point = Vec2::new(x_m, y_m);
+            let all = path.nearest(point, 0..path.points.len() - 1);
+            let found = path.project(point);
+            prop_assert_eq!(found.distance_m, all.distance_m2.sqrt());
+            let begin = &path.points[all.segment];
+            let length_m = path.points[all.segment + 1].station_m - begin.station_m;
+            prop_assert_eq!(found.station_m, begin.station_m + all.fraction * length_m);
+            let near = path.project_near(point, near_m, 25.0);
+            let part = path.nearest(point, path.segment(near_m - 25.0)..path.segment(near_m + 25.0) + 1);
+            prop_assert_eq!(near.distance_m, part.distance_m2.sqrt());
+        }
     }
 }

@@ -10,6 +10,32 @@ use crate::model::vocabulary::Body;
 use crate::sim::Obstacle;
 use crate::sim::World;
 
+use super::released_probability::released_probability;
+
+/// Which reading of ProC.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ProcKind {
+    /// Ours: the paper's equations, repaired, with a lateral margin.
+    #[default]
+    Avastra,
+    /// The paper's equations, repaired where they cannot run: [`ProcSettings::paper`].
+    Paper,
+    /// What the published package computes: [`super::released_probability`].
+    Released,
+}
+
+impl ProcKind {
+    /// ProC of the ego vehicle at this moment; see [`collision_probability`].
+    pub fn probability(self, world: &World, is_hit: &dyn Fn(u32) -> bool) -> f64 {
+        match self {
+            ProcKind::Avastra => collision_probability(world, &ProcSettings::default(), is_hit),
+            ProcKind::Paper => collision_probability(world, &ProcSettings::paper(), is_hit),
+            ProcKind::Released => released_probability(world, is_hit),
+        }
+    }
+}
+
 /// Constants of ProC. `default()` is avastra's own reading.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ProcSettings {
@@ -32,6 +58,13 @@ impl Default for ProcSettings {
             gap_m_min: 5.0,
             lateral_margin_m: 5.0,
         }
+    }
+}
+
+impl ProcSettings {
+    /// As printed: no lateral margin, so that parallel traffic beside the ego vehicle is no danger.
+    pub fn paper() -> ProcSettings {
+        ProcSettings { lateral_margin_m: 0.0, ..ProcSettings::default() }
     }
 }
 

@@ -4,12 +4,16 @@
 //! Beside the paper's equations stand the usual measures of criticality. A space may say by itself what a
 //! collision probability is worth (`reward { … }`): `model` evaluates that.
 
+mod closeness;
 mod collision_probability;
 mod criticality;
 mod observation;
+mod released_probability;
 mod reward;
 mod state;
 
+pub use closeness::Closeness;
+pub use collision_probability::ProcKind;
 pub use collision_probability::ProcSettings;
 pub use collision_probability::collision_probability;
 pub use collision_probability::combined;
@@ -25,6 +29,7 @@ pub use observation::BEYOND_LEN;
 pub use observation::BEYOND_NAMES;
 pub use observation::Observation;
 pub use observation::variable;
+pub use released_probability::released_probability;
 pub use reward::RewardSettings;
 pub use reward::StepOutcome;
 pub use reward::reward;

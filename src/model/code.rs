@@ -135,6 +135,14 @@ pub const POLICY_DIGEST: &str = "AV0702";
 pub const POLICY_FORM: &str = "AV0703";
 /// A file with two policies.
 pub const ONE_POLICY: &str = "AV0704";
+/// A variable that no policy sees.
+pub const POLICY_VARIABLE: &str = "AV0705";
+/// A row that is never legal where its line applies.
+pub const POLICY_ROW: &str = "AV0706";
+/// A line that applies to no state.
+pub const POLICY_NOWHERE: &str = "AV0707";
+/// A line, or a row of it, that never gets its turn.
+pub const POLICY_SHADOWED: &str = "AV0708";
 
 // Static claims.
 

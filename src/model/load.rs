@@ -70,11 +70,26 @@ pub(super) fn standing_items(loaded: &Loaded) -> Vec<Cow<'_, ast::Item>> {
     overriding::resolve(&loaded.files, &loaded.order).0
 }
 
+/// Maps that were understood before, by name and content: who loads again and again, as an editor's
+/// server does, reads each but once.
+#[derive(Debug, Clone, Default)]
+pub struct MapCache {
+    known: BTreeMap<(String, String), Result<Arc<RoadMap>, String>>,
+}
+
 /// Reads a root file, all it uses, and checks the whole.
 ///
 /// # Errors
 /// If the root itself cannot be read. Whatever else is wrong is among the diagnostics.
 pub fn load(root: &Path, read: &ReadFile<'_>) -> Result<Loaded, ReadError> {
+    load_with(root, read, &mut MapCache::default())
+}
+
+/// The same, with the maps of earlier loads.
+///
+/// # Errors
+/// As [`load`].
+pub fn load_with(root: &Path, read: &ReadFile<'_>, cache: &mut MapCache) -> Result<Loaded, ReadError> {
     let mut loader = Loader {
         read,
         sources: Sources::new(),
@@ -98,7 +113,7 @@ pub fn load(root: &Path, read: &ReadFile<'_>) -> Result<Loaded, ReadError> {
         });
     }
     let folders = files.iter().map(|file| folder(&file.path)).collect();
-    let mut maps = MapReader { read, folders, texts: BTreeMap::new(), known: BTreeMap::new() };
+    let mut maps = MapReader { read, folders, texts: BTreeMap::new(), known: BTreeMap::new(), cache };
     diagnostics.extend(check_digests(&files, &mut maps));
     let (space, found) = check_space(&files, &order, &mut maps);
     let (mut remarks, found): (Vec<_>, Vec<_>) =
@@ -305,6 +320,7 @@ struct MapReader<'a> {
     folders: Vec<PathBuf>,
     texts: BTreeMap<PathBuf, Result<String, ReadError>>,
     known: BTreeMap<PathBuf, Result<Arc<RoadMap>, String>>,
+    cache: &'a mut MapCache,
 }
 
 impl MapReader<'_> {
@@ -322,10 +338,16 @@ impl check::Maps for MapReader<'_> {
         let path = normal(&folder.join(&name.value));
         if !self.known.contains_key(&path) {
             let stem = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
-            let text = self.text(&path).as_ref().map_err(ToString::to_string);
-            let map = text.and_then(|text| {
-                RoadMap::from_opendrive(&stem, text).map(Arc::new).map_err(|error| error.to_string())
-            });
+            let map = match self.text(&path).clone() {
+                Err(error) => Err(error.to_string()),
+                Ok(text) => {
+                    let read = |stem: &str| RoadMap::from_opendrive(stem, &text).map(Arc::new);
+                    let key = (stem, digest(text.as_bytes()));
+                    let found = self.cache.known.get(&key).cloned();
+                    let map = found.unwrap_or_else(|| read(&key.0).map_err(|error| error.to_string()));
+                    self.cache.known.entry(key).or_insert(map).clone()
+                }
+            };
             self.known.insert(path.clone(), map);
         }
         let map = &self.known[&path];

@@ -66,6 +66,24 @@ impl Space {
         (time, sky)
     }
 
+    /// The cells that mean weather or time of day, with what is plainest in them: noon, and nothing of any
+    /// phenomenon. Cells whose enum has no such word are left out.
+    pub fn plain_weather(&self) -> Vec<(usize, Value)> {
+        let mut plain = Vec::new();
+        for state in &self.states {
+            let variant = match &state.meaning {
+                StateMeaning::Private => None,
+                StateMeaning::Time(words) => words.iter().position(|word| *word == TimeOfDay::Noon),
+                StateMeaning::Sky(_, levels) => levels.iter().position(|level| *level == Level::None),
+            };
+            if let (Some(variant), Type::Enum(of)) = (variant, state.ty) {
+                let cells = state.first_cell..state.first_cell + state.cells;
+                plain.extend(cells.map(|cell| (cell, Value::Variant(of, variant))));
+            }
+        }
+        plain
+    }
+
     /// The memory after an action with these parameter values.
     pub(crate) fn memory_after(&self, action: usize, locals: &[Value], before: &Memory) -> Memory {
         let mut after = before.clone();

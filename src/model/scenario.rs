@@ -31,6 +31,8 @@ pub struct Origin {
     /// Digest of all its settings.
     pub profile_digest: Option<String>,
     pub engine: Option<String>,
+    /// By what it was told whether collisions were avoidable, as one line of YAML; the usual way if not given.
+    pub avoidability: Option<String>,
     /// Rules that were asked for (`--with`) and switched off (`--without`).
     pub with: Vec<String>,
     pub without: Vec<String>,
@@ -76,6 +78,9 @@ pub enum Claim {
     /// `expect cause == perception with npc#2`, `expect cause == [tracking, planning]`: the module at
     /// fault, or the two that are at fault together; in words of [`MODULES`].
     Cause { modules: Vec<String>, obstacle: Option<u32> },
+    /// `expect minimal with npc#2`: without any one of the steps, its time left behind or not, there is no
+    /// such collision.
+    Minimal { obstacle: Option<u32> },
     /// `expect end == arrived`: one of [`ENDS`].
     End(String),
 }

@@ -221,7 +221,9 @@ fn mistakes_in_scenarios_have_their_codes() {
         ("11.25 m/s", "21 m", &["AV0201"]),
         ("time: Noon", "time: Morning", &["AV0605"]),
         ("time: Noon, ", "", &["AV0606"]),
-        ("expect end == arrived", "expect minimal", &["AV0607"]),
+        ("expect end == arrived", "expect maximal", &["AV0607"]),
+        ("expect end == arrived", "expect minimal at 14 s", &["AV0607"]),
+        ("expect end == arrived", "expect minimal with npc#2", &[]),
         ("expect end == arrived", "expect end == crashed", &["AV0607"]),
         ("by [cc, fsm]", "by [1]", &["AV0607"]),
         ("by [cc, fsm]", "at 14 s", &["AV0607"]),
@@ -248,6 +250,9 @@ fn states_can_be_given_as_text() {
     let memory = space.memory_from("time: Night, sky: { Rain: High }", 0).unwrap();
     let (time, sky) = space.weather(&memory);
     assert_eq!(format!("{time:?} {sky:?}"), "Night [High, None, None]");
+    let plain =
+        space.plain_weather().into_iter().fold(memory, |memory, (cell, value)| memory.with(cell, value));
+    assert_eq!(format!("{:?}", space.weather(&plain)), "(Noon, [None, None, None])");
     let error = space.memory_from("tim: Night", 0).unwrap_err();
     assert_eq!(error, "unknown state `tim`; did you mean `time`?");
     assert!(space.memory_from("}", 0).is_err());

@@ -62,4 +62,11 @@ impl Memory {
     pub fn cells(&self) -> &[Value] {
         &self.cells
     }
+
+    /// The same with another value in one cell.
+    pub fn with(&self, cell: usize, value: Value) -> Memory {
+        let mut changed = self.clone();
+        changed.cells[cell] = value;
+        changed
+    }
 }

@@ -24,6 +24,7 @@ use crate::sim::DT_S;
 use crate::sim::FRAME_TICKS;
 use crate::sim::VehicleParameters;
 use crate::sim::World;
+use crate::syntax::listed;
 
 use super::facts::struck;
 use super::hazard::onset;
@@ -55,6 +56,45 @@ impl Default for AvoidabilitySettings {
             rewind_s: 8.0,
             watch_s: 2.0,
             after_s: 4.0,
+        }
+    }
+}
+
+/// Why settings of the verdict cannot be used.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum AvoidabilityError {
+    #[error("cannot read how avoidability is told: {reason}")]
+    Yaml { reason: String },
+    #[error("no reference driver `{name}` to tell avoidability by: there are {known}")]
+    Driver { name: String, known: String },
+}
+
+impl AvoidabilitySettings {
+    /// As one line of YAML, for [`AvoidabilitySettings::from_line`].
+    pub fn to_line(&self) -> String {
+        serde_json::to_string(self).expect("settings are plain data")
+    }
+
+    /// Settings from a line of YAML; what it leaves out is as usual.
+    ///
+    /// # Errors
+    /// If it is none, or names a driver that does not exist.
+    pub fn from_line(line: &str) -> Result<AvoidabilitySettings, AvoidabilityError> {
+        let settings: AvoidabilitySettings = serde_yaml::from_str(line)
+            .map_err(|error| AvoidabilityError::Yaml { reason: error.to_string().trim().to_owned() })?;
+        settings.check()?;
+        Ok(settings)
+    }
+
+    /// # Errors
+    /// If they name a driver that does not exist.
+    pub fn check(&self) -> Result<(), AvoidabilityError> {
+        match self.careful.iter().chain(&self.reported).find(|name| ads::by_name(name).is_none()) {
+            None => Ok(()),
+            Some(name) => {
+                let known = listed(&ads::REGISTRY.iter().map(|entry| entry.name).collect::<Vec<_>>());
+                Err(AvoidabilityError::Driver { name: name.clone(), known })
+            }
         }
     }
 }
@@ -202,4 +242,22 @@ fn is_on_road(world: &World) -> bool {
 
 fn ticks(duration_s: f64) -> usize {
     (duration_s / DT_S).round() as usize
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn settings_go_through_a_line_and_name_drivers_that_exist() {
+        let strict = AvoidabilitySettings { careful: vec!["rss".to_owned()], ..Default::default() };
+        assert_eq!(AvoidabilitySettings::from_line(&strict.to_line()), Ok(strict));
+        let told = |line: &str| AvoidabilitySettings::from_line(line).unwrap_err().to_string();
+        assert!(
+            told("{careful: [cd]}").starts_with("no reference driver `cd`"),
+            "{}",
+            told("{careful: [cd]}")
+        );
+        assert!(told("{carefull: [cc]}").starts_with("cannot read how avoidability is told"));
+    }
 }

@@ -202,15 +202,15 @@ fn owns(module: Module, weakness: &str) -> bool {
 }
 
 /// The collision driven up to by its own driving system, and from then on by others.
-struct Inquiry<'a> {
+pub(super) struct Inquiry<'a> {
     crash: &'a Crash<'a>,
-    profile: ModularConfig,
+    pub profile: ModularConfig,
     foresight: Arc<Foresight>,
     from_s: f64,
 }
 
 impl<'a> Inquiry<'a> {
-    fn new(crash: &'a Crash<'a>) -> Result<Inquiry<'a>, NoModules> {
+    pub fn new(crash: &'a Crash<'a>) -> Result<Inquiry<'a>, NoModules> {
         let ads = &crash.setup.ads;
         let profile = *ads.profile().ok_or_else(|| NoModules { ads: ads.name().to_owned() })?;
         let (_, foresight) = play(crash.setup, |moment| crash.script.choose(crash.setup.table, moment));
@@ -219,7 +219,8 @@ impl<'a> Inquiry<'a> {
         Ok(Inquiry { crash, profile, foresight, from_s })
     }
 
-    fn fate(&self, profile: &ModularConfig) -> Fate {
+    /// What becomes of the collision if another profile takes over when its obstacle appears.
+    pub fn fate(&self, profile: &ModularConfig) -> Fate {
         // The same settings make the same drive.
         if *profile == self.profile {
             return Fate::Crash;

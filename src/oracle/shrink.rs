@@ -1,7 +1,7 @@
 //! The smallest scenario that still makes the same crash.
 //!
 //! Fewest actions first (ddmin, Zeller and Hildebrandt 2002), then fewest steps, ambient vehicles and
-//! effects, then the plainest values; over again until nothing changes. Every candidate is played, and
+//! effects, then the plainest start (noon under a clear sky) and values; over again until nothing changes. Every candidate is played, and
 //! every action in it must be legal by the rules of the space. The crash is the same if the ego vehicle
 //! hits an obstacle of the same body that does the same, the class of the verdict is the same, and the
 //! space's verdict still counts it, or still does not. The result is 1-minimal: with any one step
@@ -22,6 +22,7 @@ use crate::episode::ScriptedAction;
 use crate::episode::Setup;
 use crate::model::Avoidability;
 use crate::model::Domain;
+use crate::model::Memory;
 use crate::model::Value;
 use crate::model::vocabulary::Body;
 use crate::model::vocabulary::Verb;
@@ -40,33 +41,34 @@ const ROUNDS_MAX: usize = 8;
 pub struct Shrunk {
     pub script: Script,
     pub start: Start,
+    /// States of the space at the start.
+    pub memory: Memory,
     pub log: EpisodeLog,
     /// One for each collision of the log.
     pub judgements: Vec<Judgement>,
+    /// Index of the crash among the collisions of the log.
+    pub index: usize,
     /// Episodes that were played to find it.
     pub plays: u32,
 }
 
-/// Shrinks what led to the nth collision of a log that was played from `setup`.
-pub fn shrink(setup: &Setup, log: &EpisodeLog, index: usize, judgements: &[Judgement]) -> Shrunk {
-    let collision = &log.collisions[index];
-    let mut script = Script::of_log(log);
-    script.steps.truncate(collision.step + 1);
-    let mut search = Search {
-        setup,
-        body: collision.body,
-        verb: collision.verb,
-        class: judgements[index].class,
-        counts: setup.table.space().counts(facts(log, index, &judgements[index])),
-        plays: 0,
-    };
-    let mut best = Candidate { script, start: setup.start };
+/// Shrinks what led to the nth collision of a log that was played from `setup` and judged by `settings`.
+pub fn shrink(
+    setup: &Setup,
+    log: &EpisodeLog,
+    index: usize,
+    judgements: &[Judgement],
+    settings: &AvoidabilitySettings,
+) -> Shrunk {
+    let mut search = Search::new(setup, log, index, judgements, settings);
+    let mut best = Candidate::of(setup, log, index);
     for _ in 0..ROUNDS_MAX {
         let before = best.clone();
         search.fewest_actions(&mut best);
         search.fewest_steps(&mut best);
         search.fewest_ambient(&mut best);
         search.fewest_effects(&mut best);
+        search.plainest_start(&mut best);
         search.plainest_values(&mut best);
         if best == before {
             break;
@@ -76,10 +78,35 @@ pub fn shrink(setup: &Setup, log: &EpisodeLog, index: usize, judgements: &[Judge
     Shrunk {
         script: best.script,
         start: best.start,
+        memory: best.memory,
         log: kept.log,
         judgements: kept.judgements,
+        index: kept.index,
         plays: search.plays,
     }
+}
+
+/// Steps that could be left out of what led to the nth collision of a log, each by itself, with the same
+/// crash: none, if the scenario is 1-minimal.
+pub fn spare_steps(
+    setup: &Setup,
+    log: &EpisodeLog,
+    index: usize,
+    judgements: &[Judgement],
+    settings: &AvoidabilitySettings,
+) -> Vec<usize> {
+    let mut search = Search::new(setup, log, index, judgements, settings);
+    let whole = Candidate::of(setup, log, index);
+    let steps = whole.script.steps.len();
+    let is_spare = |&step: &usize| {
+        let mut waiting = whole.clone();
+        let acts = waiting.script.steps[step].take().is_some();
+        let mut shorter = whole.clone();
+        shorter.script.steps.remove(step);
+        (acts && search.keeps(&waiting, None).is_some())
+            || (steps > 1 && search.keeps(&shorter, None).is_some())
+    };
+    (0..steps).filter(is_spare).collect()
 }
 
 /// What is made smaller.
@@ -87,17 +114,30 @@ pub fn shrink(setup: &Setup, log: &EpisodeLog, index: usize, judgements: &[Judge
 struct Candidate {
     script: Script,
     start: Start,
+    memory: Memory,
+}
+
+impl Candidate {
+    /// What led to the nth collision of a log.
+    fn of(setup: &Setup, log: &EpisodeLog, index: usize) -> Candidate {
+        let mut script = Script::of_log(log);
+        script.steps.truncate(log.collisions[index].step + 1);
+        Candidate { script, start: setup.start, memory: setup.memory.clone() }
+    }
 }
 
 /// A candidate that makes the crash.
 struct Kept {
     log: EpisodeLog,
     judgements: Vec<Judgement>,
+    /// Index of the crash among the collisions.
+    index: usize,
 }
 
 /// The crash that is to stay, and the number of plays so far.
 struct Search<'a> {
     setup: &'a Setup<'a>,
+    settings: &'a AvoidabilitySettings,
     body: Body,
     verb: Verb,
     class: Avoidability,
@@ -108,7 +148,26 @@ struct Search<'a> {
 /// An action whose values are wishes: rules set what follows from them.
 type Wish<'w> = Option<(usize, &'w ScriptedAction)>;
 
-impl Search<'_> {
+impl<'a> Search<'a> {
+    fn new(
+        setup: &'a Setup<'a>,
+        log: &EpisodeLog,
+        index: usize,
+        judgements: &[Judgement],
+        settings: &'a AvoidabilitySettings,
+    ) -> Search<'a> {
+        let collision = &log.collisions[index];
+        Search {
+            setup,
+            settings,
+            body: collision.body,
+            verb: collision.verb,
+            class: judgements[index].class,
+            counts: setup.table.space().counts(facts(log, index, &judgements[index])),
+            plays: 0,
+        }
+    }
+
     /// Plays a candidate; `None` if the crash is another or none, or an action is not legal. With a wish,
     /// the action of one step is carried out with the legal values nearest to it. The second of the
     /// results is the script as it was carried out, up to the crash.
@@ -121,7 +180,7 @@ impl Search<'_> {
             return None;
         }
         let mut script = Script::of_log(&log);
-        let judgements = judge(&log, &AvoidabilitySettings::default(), &mut |watch| {
+        let judgements = judge(&log, self.settings, &mut |watch| {
             let setup = self.begin(candidate);
             episode::run(&setup, &mut |moment| script.choose(setup.table, moment), watch);
         });
@@ -131,7 +190,7 @@ impl Search<'_> {
         };
         let index = (0..log.collisions.len()).find(same)?;
         script.steps.truncate(log.collisions[index].step + 1);
-        Some((Kept { log, judgements }, script))
+        Some((Kept { log, judgements, index }, script))
     }
 
     fn play(&self, candidate: &Candidate, wish: Wish) -> EpisodeLog {
@@ -144,7 +203,7 @@ impl Search<'_> {
     }
 
     fn begin(&self, candidate: &Candidate) -> Setup<'_> {
-        Setup { start: candidate.start, ..self.setup.clone() }
+        Setup { start: candidate.start, memory: candidate.memory.clone(), ..self.setup.clone() }
     }
 
     /// Takes a candidate if it keeps the crash.
@@ -224,6 +283,26 @@ impl Search<'_> {
                     break;
                 }
             }
+        }
+    }
+
+    /// Noon under a clear sky, or as much of it as keeps the crash.
+    fn plainest_start(&mut self, best: &mut Candidate) {
+        let space = self.setup.table.space();
+        let plain: Vec<(usize, Value)> = space.plain_weather();
+        let all: Vec<&[(usize, Value)]> = core::iter::once(&plain[..]).chain(plain.chunks(1)).collect();
+        for cells in all {
+            let mut candidate = best.clone();
+            for &(cell, value) in cells {
+                candidate.memory = candidate.memory.with(cell, value);
+            }
+            if candidate.memory == best.memory {
+                continue;
+            }
+            let Start { signal_phase_s, seed, ambient, .. } = best.start;
+            let start = episode::start(space, &candidate.memory, self.setup.seed);
+            candidate.start = Start { signal_phase_s, seed, ambient, ..start };
+            self.take(best, candidate, None);
         }
     }
 

@@ -23,14 +23,22 @@ pub struct ClaimResult {
     pub found: String,
 }
 
+/// What a claim may ask for that takes many replays, each of the nth collision of the log.
+pub struct Replays<'a> {
+    /// The modules at fault.
+    pub cause: &'a dyn Fn(usize) -> Result<Vec<Module>, NoModules>,
+    /// Steps that could be left out with the same crash.
+    pub spare_steps: &'a dyn Fn(usize) -> Vec<usize>,
+}
+
 /// Checks every claim of a scenario, and that each of its steps was legal. `judgements` has one for
-/// each collision of the log; `cause` finds the modules at fault for the nth, if a claim asks for them.
+/// each collision of the log.
 pub fn verify(
     space: &Space,
     scenario: &Scenario,
     log: &EpisodeLog,
     judgements: &[Judgement],
-    cause: &dyn Fn(usize) -> Result<Vec<Module>, NoModules>,
+    replays: &Replays,
 ) -> Vec<ClaimResult> {
     let steps = log.steps.iter().enumerate().filter_map(|(number, step)| match &step.outcome {
         Outcome::Refused { rule, reason, .. } => {
@@ -39,7 +47,7 @@ pub fn verify(
         }
         _ => None,
     });
-    let claims = scenario.claims.iter().map(|claim| check(space, claim, log, judgements, cause));
+    let claims = scenario.claims.iter().map(|claim| check(space, claim, log, judgements, replays));
     steps.chain(claims).collect()
 }
 
@@ -48,7 +56,7 @@ fn check(
     claim: &Claim,
     log: &EpisodeLog,
     judgements: &[Judgement],
-    cause: &dyn Fn(usize) -> Result<Vec<Module>, NoModules>,
+    replays: &Replays,
 ) -> ClaimResult {
     match claim {
         Claim::Collision { obstacle, time_s } => {
@@ -88,13 +96,23 @@ fn check(
         }
         Claim::Cause { modules, obstacle } => {
             let judge = |index: usize| {
-                let found = cause(index).map_err(|error| error.to_string())?;
+                let found = (replays.cause)(index).map_err(|error| error.to_string())?;
                 let found: Vec<&str> = found.into_iter().map(Module::name).collect();
                 let same = modules.iter().map(String::as_str).eq(found.iter().copied());
                 if same { Ok(()) } else { Err(format!("[{}]", found.join(", "))) }
             };
             let claim = format!("cause [{}]{}", modules.join(", "), with(*obstacle));
             judged(claim, collision(log, *obstacle).and_then(judge))
+        }
+        Claim::Minimal { obstacle } => {
+            let judge = |index: usize| match (replays.spare_steps)(index).as_slice() {
+                [] => Ok(()),
+                spare => {
+                    let spare: Vec<String> = spare.iter().map(usize::to_string).collect();
+                    Err(format!("the same crash without step {}", spare.join(", or without step ")))
+                }
+            };
+            judged(format!("minimal{}", with(*obstacle)), collision(log, *obstacle).and_then(judge))
         }
         Claim::Proc(claimed) => {
             let found: Vec<f64> = log.steps.iter().map(|step| step.proc).collect();

@@ -3,9 +3,11 @@
 mod canvas;
 mod picture;
 mod road;
+mod study;
 mod trials;
 
 pub use picture::Snapshot;
 pub use picture::picture;
 pub use road::draw;
+pub use study::study;
 pub use trials::trials;

@@ -53,7 +53,9 @@ impl RoadMap {
         let own = self.lane(lane);
         let pose = own.centre.pose_at(station_m);
         let mut found: Vec<Abreast> = Vec::new();
-        for (index, projection) in self.grid.near(&self.lanes, pose.position, reach_m) {
+        // The edge of a lane is at most half the widest lane from its centre.
+        let centre_m = reach_m + self.grid.half_width_m();
+        for (index, projection) in self.grid.beside(&self.lanes, &pose, ABREAST_M, centre_m) {
             let other = self.lane(index);
             if index == lane || other.junction.is_some() && own.junction.is_none() {
                 continue;

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use crate::geometry::Path;
+use crate::geometry::Pose;
 use crate::geometry::Projection;
 use crate::geometry::Vec2;
 
@@ -14,6 +15,9 @@ const CELL_M: f64 = 8.0;
 
 /// Lanes are entered by stretches of this length, m.
 const STRETCH_M: f64 = 4.0;
+
+/// For rounding, m.
+const SLACK_M: f64 = 1e-3;
 
 /// Where more cells would have to be looked into, whole lanes are projected on: far out, nearly all of
 /// them are in reach anyway, and each in many cells.
@@ -60,6 +64,11 @@ impl LaneGrid {
         grid
     }
 
+    /// Half the width of the widest lane, m.
+    pub fn half_width_m(&self) -> f64 {
+        self.half_width_m
+    }
+
     fn insert(&mut self, path: &Path, stretch: Stretch) {
         let (a, b) = (path.pose_at(stretch.from_m).position, path.pose_at(stretch.to_m).position);
         // A curve of this length bulges by less than half of it.
@@ -76,6 +85,27 @@ impl LaneGrid {
                 }
             }
         }
+    }
+
+    /// The nearest point of each lane that may have one within `ahead_m` before or behind a pose and
+    /// `reach_m` beside it, by rising index; others may be among them.
+    pub fn beside(
+        &self,
+        lanes: &[Lane],
+        pose: &Pose,
+        ahead_m: f64,
+        reach_m: f64,
+    ) -> Vec<(LaneIndex, Projection)> {
+        let forward = pose.forward();
+        let left = Vec2::new(-forward.y, forward.x);
+        let may_be = |(from, to): &(Vec2, Vec2)| {
+            let (middle, half) = ((from + to) / 2.0 - pose.position, (to - from) / 2.0);
+            let within =
+                |axis: &Vec2, reach_m: f64| axis.dot(&middle).abs() <= reach_m + axis.abs().dot(&half);
+            within(&forward, ahead_m + SLACK_M) && within(&left, reach_m + SLACK_M)
+        };
+        let candidates = lanes.iter().zip(&self.boxes).enumerate().filter(|(_, (_, bounds))| may_be(bounds));
+        candidates.map(|(index, (lane, _))| (LaneIndex(index), lane.centre.project(pose.position))).collect()
     }
 
     /// The nearest point of each lane whose centre comes within `reach_m` and half a lane width of a

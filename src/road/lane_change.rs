@@ -1,10 +1,12 @@
 //! Lane changes: where markings and widths permit them, and how a path goes from lane to lane.
 //!
-//! The lateral motion is a quintic in the station: no lateral speed, acceleration or jump of curvature
+//! The lateral motion is a smooth step in the station: no lateral speed, acceleration or jump of curvature
 //! at its ends (as in Apollo's and most planners' lane changes). Traffic is nobody's business here.
 
 use crate::geometry::Pose;
+use crate::geometry::SMOOTH_STEP_BEND_MAX;
 use crate::geometry::Vec2;
+use crate::geometry::smooth_step;
 use crate::geometry::wrap_angle;
 
 use super::map::Lane;
@@ -18,8 +20,8 @@ use super::opendrive::SectionElement;
 /// A lane narrower than this cannot be driven in yet, m: bays open from nothing.
 const WIDTH_M_MIN: f64 = 2.0;
 
-/// A strip wider than this between two lanes is no line but a median, m.
-const STRIP_M_MAX: f64 = 0.5;
+/// A strip wider than this between two lanes is no line but a median, which nobody crosses to change lanes, m.
+pub const STRIP_M_MAX: f64 = 0.5;
 
 /// Widths are looked at this often, m.
 const STEP_M: f64 = 1.0;
@@ -27,9 +29,6 @@ const STEP_M: f64 = 1.0;
 /// Largest lateral acceleration of a lane change driven at the limit, m/s²: comfortable, and at 50 km/h
 /// it gives a length of 50 m for a lane of 3.3 m.
 const LATERAL_MPS2: f64 = 1.5;
-
-/// Largest second derivative of the quintic, `10 / √3`.
-const QUINTIC_SECOND_MAX: f64 = 5.773_502_691_896_258;
 
 /// No lane change is shorter, m: at walking pace a car needs it to shift by a lane.
 pub const LENGTH_M_MIN: f64 = 15.0;
@@ -42,27 +41,12 @@ const TOUCH_M: f64 = 0.01;
 /// A lane change that is allowed from here on may begin at once, m.
 const AT_ONCE_M: f64 = 0.1;
 
-/// Part of a lateral shift done at a part of its length, both in `[0, 1]`; its derivatives are 0 at
-/// both ends, to the second.
-pub fn quintic(fraction: f64) -> f64 {
-    let u = fraction.clamp(0.0, 1.0);
-    u * u * u * (10.0 - u * (15.0 - 6.0 * u))
-}
-
-fn quintic_first(u: f64) -> f64 {
-    30.0 * u * u * (1.0 - u) * (1.0 - u)
-}
-
-fn quintic_second(u: f64) -> f64 {
-    60.0 * u * (1.0 - u) * (1.0 - 2.0 * u)
-}
-
 /// Length of a comfortable lane change at a speed over a width, m.
 ///
-/// A quintic of width `w` over the length `L` at the speed `v` accelerates laterally by at most
+/// A smooth step of width `w` over the length `L` at the speed `v` accelerates laterally by at most
 /// `10/√3 w v²/L²`.
 pub fn comfortable_length_m(speed_mps: f64, width_m: f64) -> f64 {
-    (speed_mps * (QUINTIC_SECOND_MAX * width_m / LATERAL_MPS2).sqrt()).max(LENGTH_M_MIN)
+    (speed_mps * (SMOOTH_STEP_BEND_MAX * width_m / LATERAL_MPS2).sqrt()).max(LENGTH_M_MIN)
 }
 
 /// Stations of the reference line between which one may change from the left of two lanes of a section
@@ -243,7 +227,8 @@ impl Stretch {
     pub fn blend(&self, map: &RoadMap, length_m: f64, fraction: f64) -> (Vec2, f64, f64) {
         let place = self.place(length_m * fraction);
         let (source, target) = self.poses(map, place);
-        let part = quintic(fraction);
+        let step = smooth_step(fraction);
+        let part = step.value;
         let shift_m = self.shift_m(map, place);
         let source_per_m = self.lane(map, place).centre.curvature_at(place.station_m);
         let target_lane = map.lane(self.pairs[place.pair].target);
@@ -251,8 +236,8 @@ impl Stretch {
         // The shift is a curve over the source lane, whose own stations shrink towards the inside of a
         // bend by `1 - k t`.
         let ahead = 1.0 - source_per_m * shift_m * part;
-        let slope = quintic_first(fraction) * shift_m / length_m / ahead;
-        let bend_per_m = quintic_second(fraction) * shift_m / (length_m * length_m * ahead * ahead);
+        let slope = step.slope * shift_m / length_m / ahead;
+        let bend_per_m = step.bend * shift_m / (length_m * length_m * ahead * ahead);
         let steepness = 1.0 + slope * slope;
         let heading_rad = source.heading_rad
             + wrap_angle(target.heading_rad - source.heading_rad) * part
@@ -284,18 +269,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_quintic_has_its_derivatives_and_its_largest_acceleration() {
-        let h = 1e-4;
-        let mut largest: f64 = 0.0;
-        for i in 1..1000 {
-            let u = f64::from(i) / 1000.0;
-            let (first, second) = (quintic_first(u), quintic_second(u));
-            assert!(((quintic(u + h) - quintic(u - h)) / (2.0 * h) - first).abs() < 1e-6);
-            assert!(((quintic_first(u + h) - quintic_first(u - h)) / (2.0 * h) - second).abs() < 1e-5);
-            largest = largest.max(second.abs());
-        }
-        assert!((largest - QUINTIC_SECOND_MAX).abs() < 1e-4, "{largest}");
-        assert_eq!((quintic(0.0), quintic(0.5), quintic(1.0)), (0.0, 0.5, 1.0));
+    fn a_change_at_the_limit_takes_fifty_metres_and_one_at_rest_the_least() {
         assert!((comfortable_length_m(50.0 / 3.6, 3.3) - 49.5).abs() < 0.1);
         assert_eq!(comfortable_length_m(0.0, 3.3), LENGTH_M_MIN);
     }

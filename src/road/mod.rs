@@ -19,6 +19,7 @@ mod tests;
 
 pub use abreast::Connection;
 pub use abreast::Opposing;
+pub use lane_change::STRIP_M_MAX;
 pub use map::Crosswalk;
 pub use map::Junction;
 pub use map::Lane;

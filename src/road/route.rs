@@ -3,13 +3,13 @@
 use std::collections::BTreeSet;
 
 use crate::geometry::Path;
+use crate::geometry::smooth_step;
 use crate::geometry::wrap_angle;
 
 use super::conflict::conflicts;
 use super::conflict::spans_inside;
 use super::join::Joined;
 use super::lane_change::LENGTH_M_MIN;
-use super::lane_change::quintic;
 use super::map::LaneIndex;
 use super::map::LanePlace;
 use super::map::RoadError;
@@ -161,7 +161,7 @@ impl RouteLaneChange {
     /// Where the centre of the source lane lies beside the path (within 5 cm), m, positive to the left:
     /// 0 up to the beginning. Behind the stretch on which one may change the last value holds.
     pub fn source_offset_m(&self, station_m: f64) -> f64 {
-        let part = quintic((station_m - self.begin_m) / (self.end_m - self.begin_m));
+        let part = smooth_step((station_m - self.begin_m) / (self.end_m - self.begin_m)).value;
         -self.shift_m(station_m) * part
     }
 
@@ -174,7 +174,7 @@ impl RouteLaneChange {
     /// Where a vehicle drives beside the path that begins the change at another station, m, positive to
     /// the left; in the source lane if that is infinite.
     pub fn postponed_offset_m(&self, station_m: f64, begin_m: f64) -> f64 {
-        let part = quintic((station_m - begin_m) / self.length_from_m(begin_m));
+        let part = smooth_step((station_m - begin_m) / self.length_from_m(begin_m)).value;
         self.source_offset_m(station_m) + self.shift_m(station_m) * part
     }
 

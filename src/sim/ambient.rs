@@ -9,8 +9,6 @@
 //! neither towards the ten obstacles of the published package nor among `npc#1`, `npc#2`, …: their
 //! ids begin above [`COMMANDED_MAX`].
 
-use std::sync::Arc;
-
 use crate::geometry::OrientedBox;
 use crate::geometry::distance_m;
 use crate::model::AMBIENT_MAX;
@@ -115,7 +113,7 @@ fn draw(around: &Around, nearest_m: f64, id: u32, rng: &mut Rng) -> Option<Place
         return None;
     }
     let way = Way::along(around.scene, &[lane], rng)?;
-    let driver = Driver::new(around.scene, Arc::new(way), station_m, cruise, Vec::new(), 1);
+    let driver = Driver::new(around.scene, way, station_m, cruise, Vec::new(), 1);
     let moved = driver.moved();
     let outline = OrientedBox::new(moved.pose, size.length_m, size.width_m);
     if around.others(id).any(|(other, _)| distance_m(&outline, other) < ROOM_M) {

@@ -30,7 +30,7 @@ const ALONGSIDE_RAD_MAX: f64 = 30.0 * core::f64::consts::PI / 180.0;
 /// One lane's part of a conflict.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Area {
-    /// On the own lane, m.
+    /// On the own lane, or on a way along it, m.
     pub from_m: f64,
     pub to_m: f64,
     pub other: LaneIndex,

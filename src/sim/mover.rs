@@ -10,11 +10,11 @@ use super::environment::GRAVITY_MPS2;
 use super::environment::Grip;
 use super::npc::Driver;
 use super::pedestrian::Walker;
+use super::scene::Scene;
 use super::sense::EgoMotion;
 use super::signals::SignalClock;
 use super::world::DT_S;
 use super::world::Obstacle;
-use super::world::Scene;
 
 /// How long somebody who touched anybody stays where they came to rest, s.
 const WRECK_S: f64 = 2.0;

@@ -8,7 +8,7 @@ use crate::model::vocabulary::TimeOfDay;
 use crate::road::RoadMap;
 use crate::road::Route;
 
-use super::world::Scene;
+use super::scene::Scene;
 use super::world::Start;
 use super::world::World;
 

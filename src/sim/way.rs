@@ -1,6 +1,11 @@
 //! Ways: the chain of lanes that a vehicle follows, as one path with its stop lines and the speeds
 //! that its bends allow. Made once and shared; a world's snapshot copies none of it.
 
+use std::collections::BTreeMap;
+use std::sync::Arc;
+use std::sync::Mutex;
+use std::sync::PoisonError;
+
 use crate::geometry::Path;
 use crate::geometry::Vec2;
 use crate::rng;
@@ -8,7 +13,8 @@ use crate::rng::Rng;
 use crate::road::LaneIndex;
 use crate::road::RouteStopLine;
 
-use super::world::Scene;
+use super::junction::Area;
+use super::scene::Scene;
 
 /// Lateral acceleration that other drivers accept in a bend, m/s²: upper end of comfort.
 const LATERAL_MPS2: f64 = 3.0;
@@ -19,6 +25,9 @@ const BEND_BRAKING_MPS2: f64 = 2.0;
 /// A way reaches at least this far beyond the lanes it was asked for, if the road does, m.
 const REACH_M: f64 = 400.0;
 
+/// So many ways are kept for a map, of some 30 kB each.
+const WAYS_MAX: usize = 256;
+
 #[derive(Debug, Clone)]
 pub(super) struct Way {
     pub path: Path,
@@ -27,8 +36,8 @@ pub(super) struct Way {
     lane_bits: u64,
     /// By rising station.
     pub stop_lines: Vec<RouteStopLine>,
-    /// Where others may cross or join, by rising station.
-    pub areas: Vec<WayArea>,
+    /// Where others may cross or join, by rising station on the way.
+    pub areas: Vec<Area>,
     /// Highest speed at each vertex of `path`, m/s.
     speeds_mps_max: Vec<f64>,
     /// Whether lanes go on where it ends.
@@ -37,20 +46,6 @@ pub(super) struct Way {
 
 /// Lanes that begin farther ahead than this matter to nobody yet, m.
 const AHEAD_M: f64 = 150.0;
-
-/// A conflict area on a way.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct WayArea {
-    /// On the way, m.
-    pub from_m: f64,
-    pub to_m: f64,
-    /// The lane that crosses or joins, and where on it, m.
-    pub other: LaneIndex,
-    pub other_from_m: f64,
-    pub other_to_m: f64,
-    /// Whether this way goes before the other lane's.
-    pub goes_first: bool,
-}
 
 #[derive(Debug, Clone, Copy)]
 struct WayLane {
@@ -61,7 +56,7 @@ struct WayLane {
 impl Way {
     /// The way through `lanes`, which must follow each other, and on along successors drawn from
     /// `rng`. `None` without lanes.
-    pub fn along(scene: &Scene, lanes: &[LaneIndex], rng: &mut Rng) -> Option<Way> {
+    pub fn along(scene: &Scene, lanes: &[LaneIndex], rng: &mut Rng) -> Option<Arc<Way>> {
         let map = &scene.map;
         let mut chain = lanes.to_vec();
         let mut last = *lanes.last()?;
@@ -75,7 +70,7 @@ impl Way {
             beyond_m += map.lane(last).centre.length_m();
             chain.push(last);
         }
-        Way::through(scene, &chain)
+        scene.ways().through(scene, chain)
     }
 
     fn through(scene: &Scene, chain: &[LaneIndex]) -> Option<Way> {
@@ -96,13 +91,11 @@ impl Way {
                     .iter()
                     .map(|line| RouteStopLine { station_m: from_m + line.station_m, signal: line.signal }),
             );
-            areas.extend(scene.conflict_areas().of(*index).iter().map(|area| WayArea {
+            let on_lane = scene.conflict_areas().of(*index).iter();
+            areas.extend(on_lane.map(|area| Area {
                 from_m: from_m + area.from_m,
                 to_m: from_m + area.to_m,
-                other: area.other,
-                other_from_m: area.other_from_m,
-                other_to_m: area.other_to_m,
-                goes_first: area.goes_first,
+                ..*area
             }));
             let tip = centre.points()[centre.points().len() - 1].position;
             end = Some((from_m + centre.length_m(), tip));
@@ -158,11 +151,32 @@ impl Way {
     }
 
     /// The same way from the lane at `station_m` on, but longer; and that station on it.
-    pub fn prolonged(&self, scene: &Scene, station_m: f64, rng: &mut Rng) -> Option<(Way, f64)> {
+    pub fn prolonged(&self, scene: &Scene, station_m: f64, rng: &mut Rng) -> Option<(Arc<Way>, f64)> {
         let (here, lane_station_m) = self.lane_at(station_m);
         let first = self.lanes.iter().rposition(|part| part.lane == here && part.from_m <= station_m)?;
         let rest: Vec<LaneIndex> = self.lanes[first..].iter().map(|part| part.lane).collect();
         Some((Way::along(scene, &rest, rng)?, lane_station_m))
+    }
+}
+
+/// The ways that somebody on a map has taken, by their lanes. Every row makes its ways anew at every step;
+/// few of them differ.
+#[derive(Debug, Default)]
+pub(super) struct Ways(Mutex<BTreeMap<Vec<LaneIndex>, Arc<Way>>>);
+
+impl Ways {
+    fn through(&self, scene: &Scene, chain: Vec<LaneIndex>) -> Option<Arc<Way>> {
+        // A thread that panicked while it held the lock left whole ways behind.
+        let mut known = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(way) = known.get(&chain) {
+            return Some(Arc::clone(way));
+        }
+        let way = Arc::new(Way::through(scene, &chain)?);
+        if known.len() >= WAYS_MAX {
+            known.clear();
+        }
+        known.insert(chain, Arc::clone(&way));
+        Some(way)
     }
 }
 

@@ -21,9 +21,6 @@ use crate::model::vocabulary::Colour;
 use crate::model::vocabulary::Level;
 use crate::model::vocabulary::TimeOfDay;
 use crate::model::vocabulary::Verb;
-use crate::road::LaneIndex;
-use crate::road::RoadMap;
-use crate::road::Route;
 
 use super::ambient::Ambient;
 use super::ambient::COMMANDED_MAX;
@@ -36,11 +33,11 @@ use super::ego::Control;
 use super::ego::Ego;
 use super::ego::VehicleParameters;
 use super::environment::Environment;
-use super::junction::ConflictAreas;
 use super::mover::Around;
 use super::mover::Moved;
 use super::mover::Mover;
 use super::placement;
+use super::scene::Scene;
 use super::sense::Conditions;
 use super::sense::EgoMotion;
 use super::sense::FRAME_TICKS;
@@ -53,7 +50,7 @@ use super::signals::SignalClock;
 
 /// Name of this simulated world. Raised whenever the same seed no longer gives the same episode, so
 /// that an old scenario is told apart from a refuted one.
-pub const ENGINE: &str = "plane/2";
+pub const ENGINE: &str = "plane/3";
 
 /// One physics step, s: 50 Hz.
 pub const DT_S: f64 = 0.02;
@@ -71,41 +68,6 @@ const CLOSE_M: f64 = 1e-3;
 /// How far along the route the ego vehicle is looked for from where it was, m. More than it drives
 /// in a tick, so that it is found again after a corner cut, and less than any loop of a route.
 const ROUTE_SEARCH_M: f64 = 2.0;
-
-/// What stays the same during all episodes of one road. Shared, never copied.
-#[derive(Debug)]
-pub struct Scene {
-    pub map: Arc<RoadMap>,
-    /// Where the ego vehicle is to go.
-    pub route: Route,
-    areas: ConflictAreas,
-    /// Lanes outside junctions, each with the length of all up to its end, m.
-    streets: Vec<(LaneIndex, f64)>,
-}
-
-impl Scene {
-    pub fn new(map: Arc<RoadMap>, route: Route) -> Scene {
-        let mut streets = Vec::new();
-        let mut end_m = 0.0;
-        for (index, lane) in map.lanes.iter().enumerate().filter(|(_, lane)| lane.junction.is_none()) {
-            end_m += lane.centre.length_m();
-            streets.push((LaneIndex(index), end_m));
-        }
-        Scene { areas: ConflictAreas::new(&map), streets, map, route }
-    }
-
-    /// The place at a fraction of all streets laid end to end: every metre is as likely as any other.
-    pub(super) fn street_at(&self, fraction: f64) -> Option<(LaneIndex, f64)> {
-        let at_m = fraction * self.streets.last()?.1;
-        let index = self.streets.partition_point(|street| street.1 <= at_m).min(self.streets.len() - 1);
-        let begin_m = if index == 0 { 0.0 } else { self.streets[index - 1].1 };
-        Some((self.streets[index].0, at_m - begin_m))
-    }
-
-    pub(super) fn conflict_areas(&self) -> &ConflictAreas {
-        &self.areas
-    }
-}
 
 /// How an episode begins.
 #[derive(Debug, Clone, Copy, PartialEq)]

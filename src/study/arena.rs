@@ -8,13 +8,18 @@ use ndarray::Array1;
 use crate::action::ActionTable;
 use crate::action::ActiveRules;
 use crate::action::Offer;
+use crate::action::Situation;
 use crate::ads;
 use crate::ads::Selected;
 use crate::agent::Agent;
+use crate::agent::Branch;
+use crate::agent::Trial;
 use crate::episode;
 use crate::episode::Choice;
 use crate::episode::Moment;
+use crate::mdp::ProcKind;
 use crate::model::Road;
+use crate::oracle::AvoidabilitySettings;
 use crate::rng;
 use crate::rng::Stream;
 use crate::sim::Scene;
@@ -22,6 +27,7 @@ use crate::syntax::listed;
 
 use super::profile::Profile;
 use super::run::RunError;
+use super::summary::EpisodeSummary;
 
 /// Everything that the episodes of a run or a training share.
 pub struct Arena {
@@ -78,6 +84,16 @@ impl Arena {
         Ok(())
     }
 
+    /// The driving system.
+    pub fn ads(&self) -> &Selected {
+        &self.ads
+    }
+
+    /// From now on against this driving system.
+    pub(super) fn set_ads(&mut self, ads: Selected) {
+        self.ads = ads;
+    }
+
     /// Whether the driving system is made of modules that could be at fault.
     pub(super) fn has_modules(&self) -> bool {
         self.ads.profile().is_some()
@@ -108,15 +124,22 @@ impl Arena {
             start: episode::start(space, &memory, seed),
             memory,
             period_shifts: Vec::new(),
+            proc: ProcKind::default(),
         }
     }
 }
 
 /// Lets an agent choose among the offers of the moment. With nothing legal, the step passes.
-pub(super) fn choose(table: &ActionTable, agent: &mut dyn Agent, moment: &Moment) -> Choice {
-    let offers = table.offers(moment.situation);
+pub(super) fn choose(agent: &mut dyn Agent, moment: &Moment) -> Choice {
+    let offers = offers(agent, moment);
     let legal = legal(&offers);
     carry_out(offers, legal.view(), agent, moment)
+}
+
+/// What each row would do now, drawn as the agent wants it.
+pub(super) fn offers(agent: &mut dyn Agent, moment: &Moment) -> Vec<Offer> {
+    let seed = agent.draw_seed(moment.step).unwrap_or(moment.situation.seed);
+    moment.setup().table.offers(&Situation { seed, ..*moment.situation })
 }
 
 /// Which of the offers are legal, shape `(rows,)`.
@@ -135,10 +158,39 @@ pub(super) fn carry_out(
         return Choice::Pass;
     }
     let mut rng = rng::stream(moment.situation.seed, Stream::Exploration, moment.step as u64);
-    let Some(row) = agent.choose(moment.observation, legal, &mut rng) else { return Choice::Pass };
+    let branch = Lookahead { offers: &offers, moment };
+    let Some(row) = agent.choose_ahead(moment.observation, legal, &branch, &mut rng) else {
+        return Choice::Pass;
+    };
     match offers.swap_remove(row) {
         Offer::Legal(draw) => Choice::Act(draw),
         Offer::Refused(refusal) => Choice::Refused { row, rule: refusal.rule, reason: refusal.reason },
+    }
+}
+
+/// The offers of a moment, carried out in copies of its world and judged like everything else.
+struct Lookahead<'a> {
+    offers: &'a [Offer],
+    moment: &'a Moment<'a>,
+}
+
+impl Branch for Lookahead<'_> {
+    fn try_row(&self, row: usize) -> Trial {
+        let Offer::Legal(draw) = &self.offers[row] else { return Trial::default() };
+        let log = self.moment.look_ahead(draw.clone());
+        let step = self.moment.step;
+        let collided = log.collisions.iter().any(|collision| collision.step == step);
+        let counts = || {
+            let settings = AvoidabilitySettings::default();
+            let summary = EpisodeSummary::judged(self.moment.setup(), 0, &log, &settings);
+            summary.collisions.iter().any(|finding| finding.counted && finding.collision.step == step)
+        };
+        Trial {
+            proc: log.steps[step].proc,
+            collided,
+            counted: collided && counts(),
+            simulated_s: log.duration_s - log.steps[step].time_s,
+        }
     }
 }
 

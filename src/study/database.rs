@@ -18,17 +18,19 @@ use crate::mdp::STATE_NAMES;
 use crate::model::vocabulary::Word;
 use crate::oracle;
 
+use super::shape::Shape;
 use super::summary::EpisodeSummary;
 use super::summary::Finding;
 
 /// Layout of the tables; raised whenever a column changes.
-const SCHEMA_VERSION: i64 = 3;
+const SCHEMA_VERSION: i64 = 4;
 
 const SCHEMA: &str = "
 CREATE TABLE episode (
   episode INTEGER PRIMARY KEY, road TEXT NOT NULL, seed TEXT NOT NULL, ended TEXT NOT NULL,
   duration_s REAL NOT NULL, distance_m REAL NOT NULL, steps INTEGER NOT NULL, red_runs INTEGER NOT NULL,
-  collisions INTEGER NOT NULL, counted INTEGER NOT NULL, first_counted_s REAL, trace TEXT NOT NULL, pet_s REAL
+  collisions INTEGER NOT NULL, counted INTEGER NOT NULL, first_counted_s REAL, trace TEXT NOT NULL, pet_s REAL,
+  branched_s REAL NOT NULL
 ) STRICT;
 CREATE TABLE collision (
   episode INTEGER NOT NULL REFERENCES episode, number INTEGER NOT NULL, time_s REAL NOT NULL,
@@ -38,7 +40,7 @@ CREATE TABLE collision (
   repeated INTEGER NOT NULL, sudden INTEGER NOT NULL, struck INTEGER NOT NULL, counted INTEGER NOT NULL,
   avoidability TEXT NOT NULL, hazard_onset_s REAL NOT NULL, avoided_by TEXT NOT NULL, evasion TEXT,
   side TEXT NOT NULL, approach TEXT NOT NULL, relative_speed_mps REAL NOT NULL, delta_v_mps REAL NOT NULL,
-  obstacle_delta_v_mps REAL NOT NULL, cause TEXT,
+  obstacle_delta_v_mps REAL NOT NULL, cause TEXT, shape TEXT,
   PRIMARY KEY (episode, number)
 ) STRICT;
 ";
@@ -141,7 +143,8 @@ impl Database {
                         (SELECT coalesce(sum(repeated), 0) FROM collision),
                         (SELECT coalesce(sum(avoidability = 'avoidable'), 0) FROM collision),
                         (SELECT coalesce(sum(avoidability = 'beyond_reference'), 0) FROM collision),
-                        (SELECT coalesce(sum(avoidability = 'unavoidable'), 0) FROM collision)
+                        (SELECT coalesce(sum(avoidability = 'unavoidable'), 0) FROM collision),
+                        coalesce(sum(branched_s), 0.0)
                  FROM episode",
             [],
             |row| {
@@ -164,6 +167,7 @@ impl Database {
                     avoidable: row.get(15)?,
                     beyond_reference: row.get(16)?,
                     unavoidable: row.get(17)?,
+                    branched_s: row.get(18)?,
                 })
             },
         )?)
@@ -213,6 +217,8 @@ pub struct Totals {
     pub avoidable: i64,
     pub beyond_reference: i64,
     pub unavoidable: i64,
+    /// Driven in branches, beside the episodes, by agents that look ahead, s.
+    pub branched_s: f64,
 }
 
 fn step_table() -> String {
@@ -282,7 +288,7 @@ fn add_episode(
     log: &EpisodeLog,
 ) -> Result<(), rusqlite::Error> {
     transaction
-        .prepare_cached("INSERT INTO episode VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)")?
+        .prepare_cached("INSERT INTO episode VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)")?
         .execute(params![
             summary.episode as i64,
             log.road,
@@ -297,6 +303,7 @@ fn add_episode(
             summary.first_counted_s(),
             crate::model::digest_text(&log.trace()),
             summary.pet_s,
+            summary.branched_s,
         ])?;
     Ok(())
 }
@@ -314,7 +321,7 @@ fn add_collision(
     let cause = finding.cause.as_ref().map(in_words);
     transaction
         .prepare_cached(
-            "INSERT INTO collision VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+            "INSERT INTO collision VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
         )?
         .execute(params![
             episode as i64,
@@ -342,6 +349,7 @@ fn add_collision(
             severity.delta_v_mps,
             severity.obstacle_delta_v_mps,
             cause,
+            finding.shape.map(Shape::name),
         ])?;
     Ok(())
 }

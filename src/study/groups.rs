@@ -1,8 +1,8 @@
 //! Failures that are alike: what a run found, told apart by what happened instead of how often.
 //!
 //! Two counted collisions are alike if the kind of obstacle, what it was told to do, how it came, where
-//! the ego vehicle was hit and the modules at fault are the same, the last only where causes were
-//! looked for. Shapes of trajectories are not compared.
+//! the ego vehicle was hit, the shape of its way there (see `shape`) and the modules at fault are the
+//! same, the last two only where they were looked for.
 
 use std::collections::BTreeMap;
 
@@ -23,6 +23,8 @@ pub struct Group {
     pub approach: String,
     /// Where the ego vehicle was hit.
     pub side: String,
+    /// The shape of the ego vehicle's way there, if it was watched: `straight`, `left turn` and so on.
+    pub shape: Option<String>,
     /// Modules at fault, if they were looked for; empty if none was found.
     pub cause: Option<String>,
     pub count: usize,
@@ -38,7 +40,7 @@ impl Database {
     /// If the file cannot be read.
     pub fn groups(&self) -> Result<Vec<Group>, DatabaseError> {
         let mut statement = self.connection.prepare(
-            "SELECT body, verb, approach, side, cause, collision.episode, road, collision.step
+            "SELECT body, verb, approach, side, shape, cause, collision.episode, road, collision.step
              FROM collision JOIN episode ON episode.episode = collision.episode
              WHERE collision.counted ORDER BY collision.episode, number",
         )?;
@@ -48,18 +50,19 @@ impl Database {
                 manoeuvre: row.get(1)?,
                 approach: row.get(2)?,
                 side: row.get(3)?,
-                cause: row.get(4)?,
+                shape: row.get(4)?,
+                cause: row.get(5)?,
                 count: 1,
-                episode: row.get(5)?,
-                road: row.get(6)?,
+                episode: row.get(6)?,
+                road: row.get(7)?,
             };
-            Ok((group, row.get::<_, i64>(7)?))
+            Ok((group, row.get::<_, i64>(8)?))
         })?;
         let mut found: BTreeMap<_, (Group, i64)> = BTreeMap::new();
         for row in rows {
             let (group, step) = row?;
             let key = [&group.kind, &group.manoeuvre, &group.approach, &group.side].map(Clone::clone);
-            match found.entry((key, group.cause.clone())) {
+            match found.entry((key, group.shape.clone(), group.cause.clone())) {
                 std::collections::btree_map::Entry::Vacant(entry) => {
                     entry.insert((group, step));
                 }
@@ -80,7 +83,7 @@ impl Database {
 }
 
 /// The kind of an obstacle by the name of its body.
-fn kind(body: &str) -> &'static str {
+pub(super) fn kind(body: &str) -> &'static str {
     match Body::from_name(body) {
         Some(Body::Pedestrian) => "pedestrian",
         Some(Body::BoxTruck | Body::SchoolBus) => "large vehicle",

@@ -2,6 +2,7 @@
 
 use crate::ads::ModularConfig;
 use crate::ads::Selected;
+use crate::model::Policy;
 use crate::model::Scenario;
 
 use super::arena::DEFAULT_ADS;
@@ -28,16 +29,36 @@ impl Profile {
 /// If there is none of that name, or its settings do not exist any more or mean something else.
 pub fn recorded(scenario: &Scenario) -> Result<Selected, RunError> {
     let origin = &scenario.origin;
-    let mut ads = driving_system(origin.ads.as_deref().unwrap_or(DEFAULT_ADS))?;
-    if let Some(line) = &origin.profile {
+    let ads = origin.ads.as_deref().unwrap_or(DEFAULT_ADS);
+    selected(&scenario.name, ads, origin.profile.as_deref(), origin.profile_digest.as_deref())
+}
+
+/// The driving system that a policy was trained against, and its settings.
+///
+/// # Errors
+/// As [`recorded`].
+pub fn trained_against(policy: &Policy) -> Result<Selected, RunError> {
+    let origin = &policy.origin;
+    selected(&policy.name, &origin.ads, origin.profile.as_deref(), origin.profile_digest.as_deref())
+}
+
+/// A driving system as the file of this name records it.
+fn selected(
+    name: &str,
+    ads: &str,
+    profile: Option<&str>,
+    profile_digest: Option<&str>,
+) -> Result<Selected, RunError> {
+    let mut ads = driving_system(ads)?;
+    if let Some(line) = profile {
         let profile = ModularConfig::from_yaml(line)
-            .map_err(|error| RunError::Profile { scenario: scenario.name.clone(), error })?;
+            .map_err(|error| RunError::Profile { scenario: name.to_owned(), error })?;
         ads = ads.with_profile(profile)?;
     }
     let digest = ads.profile().map(ModularConfig::digest);
-    match &origin.profile_digest {
-        Some(recorded) if Some(recorded) != digest.as_ref() => {
-            Err(RunError::ProfileDigest { what: format!("`{}`", scenario.name), ads: ads.name().to_owned() })
+    match profile_digest {
+        Some(recorded) if Some(recorded) != digest.as_deref() => {
+            Err(RunError::ProfileDigest { what: format!("`{name}`"), ads: ads.name().to_owned() })
         }
         _ => Ok(ads),
     }

@@ -24,12 +24,14 @@ use crate::episode::EpisodeLog;
 use crate::episode::Moment;
 use crate::episode::Script;
 use crate::episode::Watch;
+use crate::mdp::ProcKind;
 use crate::model::Scenario;
 use crate::model::Space;
 use crate::oracle;
 use crate::oracle::AvoidabilitySettings;
 use crate::oracle::ClaimResult;
 use crate::oracle::Judgement;
+use crate::oracle::Replays;
 use crate::rng;
 use crate::rng::Stream;
 use crate::sim::ENGINE;
@@ -39,10 +41,8 @@ use crate::syntax::listed;
 
 use super::arena::Arena;
 use super::arena::choose;
-use super::arena::driving_system;
 use super::measures::Measures;
 use super::profile::Profile;
-use super::profile::recorded;
 use super::summary::EpisodeSummary;
 
 /// Everything that is needed to repeat a run; written to `run.yaml`.
@@ -90,6 +90,9 @@ pub struct RunSettings {
 pub struct PolicyReference {
     pub file: String,
     pub digest: String,
+    /// Which of its faces acts.
+    #[serde(default)]
+    pub face: agent::Face,
 }
 
 /// Why a run or a replay cannot begin.
@@ -115,6 +118,8 @@ pub enum RunError {
     Twice { name: String },
     #[error("{found} episodes a road: from 1 to {EPISODES_MAX} are possible")]
     Episodes { found: u32 },
+    #[error(transparent)]
+    Avoidability(#[from] oracle::AvoidabilityError),
     #[error(transparent)]
     NoModules(#[from] oracle::NoModules),
     #[error(transparent)]
@@ -163,7 +168,7 @@ impl Run {
         })?;
         match agent.kind {
             Kind::Ready(build) => Run::with_agent(table, settings, Box::new(build)),
-            Kind::Learning(_) => Err(RunError::Untrained { name: settings.agent }),
+            Kind::Learning(_) | Kind::Searching(_) => Err(RunError::Untrained { name: settings.agent }),
         }
     }
 
@@ -177,6 +182,7 @@ impl Run {
 
     fn with_agent(table: ActionTable, settings: RunSettings, agent: Box<MakeAgent>) -> Result<Run, RunError> {
         check_episodes(settings.episodes)?;
+        settings.avoidability.check()?;
         let rules = (settings.with.as_slice(), settings.without.as_slice());
         let mut arena = Arena::new(table, &settings.roads, &settings.ads, rules)?;
         if let Some(profile) = &settings.profile {
@@ -209,22 +215,29 @@ impl Run {
     pub fn episode(&self, number: usize) -> EpisodeLog {
         let mut agent = (self.agent)();
         agent.begin();
-        self.play(number, &mut |moment| choose(self.table(), agent.as_mut(), moment), &mut |_, _, _| {})
+        self.play(number, &mut |moment| choose(agent.as_mut(), moment), &mut |_, _, _| {})
     }
 
     /// Plays one episode and judges its collisions.
     pub fn judged(&self, number: usize) -> (EpisodeSummary, EpisodeLog) {
-        let mut agent = (self.agent)();
+        self.judged_by(number, (self.agent)().as_mut())
+    }
+
+    /// The same with another agent than the run's own.
+    pub fn judged_by(&self, number: usize, agent: &mut dyn Agent) -> (EpisodeSummary, EpisodeLog) {
         agent.begin();
         let mut measures = Measures::default();
-        let log = self.play(
-            number,
-            &mut |moment| choose(self.table(), agent.as_mut(), moment),
-            &mut |world, _, contacts| measures.note(world, contacts),
-        );
+        let log = self.play(number, &mut |moment| choose(agent, moment), &mut |world, _, contacts| {
+            measures.note(world, contacts)
+        });
         let setup = self.setup(number);
         let mut summary = EpisodeSummary::judged(&setup, number, &log, &self.settings.avoidability);
         (summary.criticality, summary.pet_s) = measures.of_steps(&log);
+        for (finding, shape) in summary.collisions.iter_mut().zip(measures.shapes()) {
+            finding.shape = *shape;
+        }
+        summary.manners = measures.manners();
+        summary.branched_s = agent.branched_s();
         if self.settings.causes {
             summary.find_causes(&setup, &log).expect("a run with causes is against a system of modules");
         }
@@ -290,34 +303,18 @@ pub fn play<E>(
     })
 }
 
-/// Plays a scenario, with its own driving system or another, under the rules that it was made with.
-///
-/// # Errors
-/// If there is no such driving system, or the scenario is of another world or other rules.
-pub fn replay(
-    table: &ActionTable,
-    scenario: &Scenario,
-    ads: Option<&str>,
-    watch: &mut Watch,
-) -> Result<EpisodeLog, RunError> {
-    let ads = match ads {
-        Some(name) => driving_system(name)?,
-        None => recorded(scenario)?,
-    };
-    replay_with(table, scenario, &ads, watch)
-}
-
 /// A scenario that is ready to play: its road and the rules that it was made with.
 pub struct Stage<'a> {
     table: &'a ActionTable,
     scenario: &'a Scenario,
     rules: ActiveRules,
     scene: Arc<Scene>,
+    avoidability: AvoidabilitySettings,
 }
 
 impl<'a> Stage<'a> {
     /// # Errors
-    /// If the scenario is of another world or other rules.
+    /// If the scenario is of another world or other rules, or does not say how its verdicts are told.
     pub fn new(table: &'a ActionTable, scenario: &'a Scenario) -> Result<Stage<'a>, RunError> {
         let origin = &scenario.origin;
         if let Some(engine) = origin.engine.as_ref().filter(|engine| engine.as_str() != ENGINE) {
@@ -325,7 +322,14 @@ impl<'a> Stage<'a> {
         }
         let rules = ActiveRules::new(table.space(), &origin.with, &origin.without)?;
         let scene = Arc::new(episode::scene(&table.space().roads[scenario.road]));
-        Ok(Stage { table, scenario, rules, scene })
+        let line = origin.avoidability.as_deref();
+        let avoidability = line.map(AvoidabilitySettings::from_line).transpose()?.unwrap_or_default();
+        Ok(Stage { table, scenario, rules, scene, avoidability })
+    }
+
+    /// By what it is told whether a collision was avoidable: as recorded.
+    pub fn avoidability(&self) -> &AvoidabilitySettings {
+        &self.avoidability
     }
 
     /// The beginning of its episode, with any driving system.
@@ -349,6 +353,7 @@ impl<'a> Stage<'a> {
             },
             memory,
             period_shifts: Vec::new(),
+            proc: ProcKind::default(),
         }
     }
 
@@ -361,40 +366,18 @@ impl<'a> Stage<'a> {
     /// Checks its claims against a log of it.
     pub fn verify(&self, ads: &Selected, log: &EpisodeLog) -> Vec<ClaimResult> {
         let setup = self.setup(ads);
-        let cause = |index| Ok(oracle::diagnose(&setup, log, index, &ModularConfig::default())?.cause);
-        oracle::verify(self.table.space(), self.scenario, log, &self.judge(ads, log), &cause)
+        let judgements = self.judge(ads, log);
+        let replays = Replays {
+            cause: &|index| Ok(oracle::diagnose(&setup, log, index, &ModularConfig::default())?.cause),
+            spare_steps: &|index| oracle::spare_steps(&setup, log, index, &judgements, &self.avoidability),
+        };
+        oracle::verify(self.table.space(), self.scenario, log, &judgements, &replays)
     }
 
     /// Judges the collisions of its log, by playing it again.
     pub fn judge(&self, ads: &Selected, log: &EpisodeLog) -> Vec<Judgement> {
-        oracle::judge(log, &AvoidabilitySettings::default(), &mut |watch| {
+        oracle::judge(log, &self.avoidability, &mut |watch| {
             self.play(ads, watch);
         })
     }
-}
-
-/// Plays a scenario with any driving system, under the rules that it was made with.
-///
-/// # Errors
-/// If the scenario is of another world or other rules.
-pub fn replay_with(
-    table: &ActionTable,
-    scenario: &Scenario,
-    ads: &Selected,
-    watch: &mut Watch,
-) -> Result<EpisodeLog, RunError> {
-    Ok(Stage::new(table, scenario)?.play(ads, watch))
-}
-
-/// Judges the collisions of a replay, by playing it again.
-///
-/// # Errors
-/// As [`replay_with`].
-pub fn judge_replay(
-    table: &ActionTable,
-    scenario: &Scenario,
-    ads: &Selected,
-    log: &EpisodeLog,
-) -> Result<Vec<Judgement>, RunError> {
-    Ok(Stage::new(table, scenario)?.judge(ads, log))
 }

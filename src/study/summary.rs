@@ -15,16 +15,25 @@ use crate::oracle::AvoidabilitySettings;
 use crate::oracle::Judgement;
 use crate::oracle::NoModules;
 
+use super::measures::Manners;
+use super::shape::Shape;
+
 /// An episode, judged.
 #[derive(Debug, Clone, PartialEq)]
 pub struct EpisodeSummary {
     /// Number of the episode in its run, from 0.
     pub episode: usize,
     pub collisions: Vec<Finding>,
+    /// By what it was told whether they were avoidable.
+    pub avoidability: AvoidabilitySettings,
     /// Measures of danger in each step, where they were taken.
     pub criticality: Vec<Criticality>,
     /// Least post-encroachment time with anybody who was not hit, s; `None` above 5 s.
     pub pet_s: Option<f64>,
+    /// How the ego vehicle drove, where it was watched.
+    pub manners: Manners,
+    /// Driven in branches, beside the episode, by an agent that tries rows out before it chooses, s.
+    pub branched_s: f64,
 }
 
 /// A collision, judged.
@@ -38,6 +47,10 @@ pub struct Finding {
     /// Modules at fault, if they were looked for.
     pub cause: Option<Vec<Module>>,
     pub counted: bool,
+    /// Whether every step before it is known to be needed for it.
+    pub minimal: bool,
+    /// The shape of the ego vehicle's way to it, where it was watched.
+    pub shape: Option<Shape>,
 }
 
 impl EpisodeSummary {
@@ -53,10 +66,12 @@ impl EpisodeSummary {
         let judgements = oracle::judge(log, settings, &mut |watch| {
             episode::run(setup, &mut |moment| script.choose(setup.table, moment), watch);
         });
-        EpisodeSummary::new(setup.table.space(), number, log, judgements)
+        let summary = EpisodeSummary::new(setup.table.space(), number, log, judgements);
+        EpisodeSummary { avoidability: settings.clone(), ..summary }
     }
 
-    /// Applies the space's verdict to every collision of a log; `judgements` has one for each.
+    /// Applies the space's verdict to every collision of a log; `judgements` has one for each, told in the
+    /// usual way.
     pub fn new(space: &Space, number: usize, log: &EpisodeLog, judgements: Vec<Judgement>) -> EpisodeSummary {
         let find = |(index, judgement)| {
             let facts = oracle::facts(log, index, &judgement);
@@ -68,10 +83,20 @@ impl EpisodeSummary {
                 judgement,
                 cause: None,
                 counted,
+                minimal: false,
+                shape: None,
             }
         };
         let collisions = judgements.into_iter().enumerate().map(find).collect();
-        EpisodeSummary { episode: number, collisions, criticality: Vec::new(), pet_s: None }
+        EpisodeSummary {
+            episode: number,
+            collisions,
+            avoidability: AvoidabilitySettings::default(),
+            criticality: Vec::new(),
+            pet_s: None,
+            manners: Manners::default(),
+            branched_s: 0.0,
+        }
     }
 
     /// Looks for the cause of every counted collision.

@@ -11,6 +11,7 @@ use avastra::episode::Outcome;
 use avastra::episode::Script;
 use avastra::episode::Watch;
 use avastra::oracle;
+use avastra::oracle::Replays;
 use avastra::study::EpisodeSummary;
 use avastra::study::Run;
 use avastra::study::RunSettings;
@@ -95,7 +96,8 @@ fn emitted_scenarios_keep_every_claim() {
         let judgements = oracle::judge(&again, &run.settings().avoidability, &mut |watch| {
             play(watch);
         });
-        for verdict in oracle::verify(run.space(), scenario, &again, &judgements, &|_| Ok(Vec::new())) {
+        let replays = Replays { cause: &|_| Ok(Vec::new()), spare_steps: &|_| Vec::new() };
+        for verdict in oracle::verify(run.space(), scenario, &again, &judgements, &replays) {
             assert!(verdict.confirmed, "{verdict:?}\n{text}");
         }
     }

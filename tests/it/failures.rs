@@ -50,14 +50,44 @@ fn found_scenarios_are_explained_shrunk_and_tested_again() {
     assert!(status == 0 && claim.contains(cause), "{found}");
     assert_eq!(found["likelihood"]["variations"], 4);
 
+    // Several files: a line each, and how often each cause was found.
+    let names: Vec<String> = files.iter().take(2).map(|file| file.display().to_string()).collect();
+    let both: Vec<&str> = names.iter().map(String::as_str).collect();
+    let (status, found) = json(&[&["diagnose"], &both[..]].concat());
+    let sum: u64 =
+        found["causes"].as_array().expect("a list").iter().filter_map(|c| c["count"].as_u64()).sum();
+    assert_eq!((status, sum, found["errors"].as_u64()), (0, 2, Some(0)), "{found}");
+    let (status, found) = json(&[&["diagnose", "--mechanisms"], &both[..]].concat());
+    let shares = found["mechanisms"].as_array().expect("a list");
+    assert_eq!((status, shares.len(), found["crashes"].as_u64()), (0, 9, Some(2)));
+    for share in shares.iter().flat_map(|found| [&found["from_onset"], &found["from_start"]]) {
+        let [low, at, high] = ["low", "share", "high"].map(|name| share[name].as_f64().expect("a number"));
+        assert!(0.0 <= low && low <= at && at <= high && high <= 1.0, "{share}");
+    }
+
     let small = path("small.ava");
     let (status, shrunk) = json(&["shrink", &file, "--output", &small]);
     assert!(status == 0 && shrunk["refuted"] == 0, "{shrunk}");
     assert!(shrunk["actions"].as_u64() <= shrunk["actions_before"].as_u64(), "{shrunk}");
     assert_eq!(outcome(&mut avastra(&["replay", &small])).0, 0);
+    let minimal = std::fs::read_to_string(&small).expect("it was written");
+    let claim = minimal.lines().find(|line| line.contains("expect minimal")).expect("it says so");
+    // What was found has steps that nobody needs, and is refuted when it claims otherwise.
+    assert!(shrunk["actions"].as_u64() < shrunk["actions_before"].as_u64(), "{shrunk}");
+    let claim = format!("{}\n  expect trace", claim.split(" with").next().expect("a first part"));
+    std::fs::write(&lie, text.replace("  expect trace", &claim)).expect("it is writable");
+    let (status, stdout, _) = outcome(&mut avastra(&["verify", &lie]));
+    assert!(status == 3 && stdout.contains("claimed minimal") && stdout.contains("without step"), "{stdout}");
+    std::fs::remove_file(&lie).expect("it is there");
     // What is as small as it gets stays so.
     let (_, again) = json(&["shrink", &small, "--output", &path("smaller.ava")]);
     assert_eq!((&again["steps"], &again["actions"]), (&shrunk["steps"], &shrunk["actions"]));
+    let (status, several) = json(&["shrink", &small, &path("smaller.ava")]);
+    assert_eq!((status, several["kept"].as_u64(), several["errors"].as_u64()), (0, Some(2), Some(0)));
+    assert_eq!(several["median_steps"].as_f64(), shrunk["steps"].as_f64(), "{several}");
+    assert!(
+        ["small", "smaller"].iter().all(|stem| scratch.path().join(format!("{stem}.shrunk.ava")).is_file())
+    );
 
     let junit = path("junit.xml");
     let (status, tested) = json(&["test", &out, "--junit", &junit]);
@@ -66,7 +96,8 @@ fn found_scenarios_are_explained_shrunk_and_tested_again() {
     let document = roxmltree::Document::parse(&xml).expect("it is well-formed");
     assert_eq!(document.descendants().filter(|node| node.has_tag_name("failure")).count(), files.len());
 
-    let cases: [(&[&str], &str); 3] = [
+    let cases: [(&[&str], &str); 4] = [
+        (&["shrink", &small, &small, "--output", &small], "is for one file"),
         (&["test", "scenarios/ads"], "no scenario in"),
         (&["test", &out, "--ads", "apolo"], "no driving system `apolo`"),
         (&["run", "scenarios/avastra45.ava", "--ads", "idm", "--causes"], "`idm` is not made of modules"),

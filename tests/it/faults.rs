@@ -1,8 +1,11 @@
 //! Causes: faults planted in the driving system are found again by the crashes that they make.
 
+use std::sync::Arc;
+
 use avastra::ads::ModularConfig;
 use avastra::ads::Module;
 use avastra::episode::EpisodeLog;
+use avastra::model::Space;
 use avastra::oracle;
 use avastra::oracle::Fate;
 use avastra::study::Profile;
@@ -10,24 +13,45 @@ use avastra::study::Run;
 use avastra::study::RunSettings;
 
 use crate::cases::root;
-use crate::world::run;
+use crate::world::read;
+use crate::world::run_of;
 
 /// Episodes on each road.
 const EPISODES: u32 = 50;
-/// Faults, and an episode at or after which one shows a crash of theirs. These nine of the
-/// shipped faults make one in 200 random episodes; for the others (bias and noise of the localization, late
-/// steering, latency, tailgating, lane-bound prediction) scenarios have to be made yet.
-const PLANTED: [(&str, usize); 9] = [
-    ("control_weak_brakes", 150),
-    ("perception_blind_to_large_vehicles", 50),
-    ("perception_blind_to_pedestrians", 0),
-    ("perception_dropouts", 0),
-    ("perception_half_range", 40),
-    ("planning_never_yields", 0),
-    ("prediction_frozen", 0),
-    ("tracking_late", 40),
-    ("tracking_no_velocity", 0),
+/// Where one of a fault's crashes is found.
+struct Planted {
+    /// Shipped as `scenarios/ads/faults/NAME.yaml`; it begins with the module at fault.
+    name: &'static str,
+    space: &'static str,
+    /// An episode at or after which there is a crash of it.
+    begin: usize,
+}
+
+/// Random search finds nine of them everywhere; the others show where a road is narrow, a leader has to
+/// brake and people step out, which is what the spaces of `tests/cases/faults` are made of. Of the shipped
+/// faults three are missing: noise of the localization crashes here and there, but not again when the
+/// noise is drawn anew; late steering costs a lane's width only in bends; and a vehicle that leaves its lane
+/// is on the way so soon after it could have been predicted that lane-bound prediction decides no crash.
+const PLANTED: [Planted; 12] = [
+    planted("control_weak_brakes", SHIPPED, 150),
+    planted("latency_half_second", "tests/cases/faults/step_out.ava", 0),
+    planted("localization_bias", "tests/cases/faults/oncoming.ava", 40),
+    planted("perception_blind_to_large_vehicles", SHIPPED, 50),
+    planted("perception_blind_to_pedestrians", SHIPPED, 0),
+    planted("perception_dropouts", SHIPPED, 0),
+    planted("perception_half_range", SHIPPED, 40),
+    planted("planning_never_yields", SHIPPED, 0),
+    planted("planning_tailgates", "tests/cases/faults/leader.ava", 0),
+    planted("prediction_frozen", SHIPPED, 0),
+    planted("tracking_late", SHIPPED, 40),
+    planted("tracking_no_velocity", SHIPPED, 0),
 ];
+const SHIPPED: &str = "scenarios/avastra45.ava";
+
+const fn planted(name: &'static str, space: &'static str, begin: usize) -> Planted {
+    Planted { name, space, begin }
+}
+
 /// Small variations of a crash, half of which at least must crash, too: a fault's crash is no accident.
 const VARIATIONS: u32 = 6;
 
@@ -44,10 +68,10 @@ control: { actuators: { brake_mps2_max: 8.0 } }
 #[test]
 fn the_module_at_fault_is_named() {
     let decoys = ModularConfig::from_yaml(DECOYS).expect("they are settings");
-    let usual = run(EPISODES, 3, &[]);
     let mut wrong = Vec::new();
-    for (name, begin) in PLANTED {
+    for Planted { name, space, begin } in PLANTED {
         let module = module_of(name);
+        let usual = run_of(made(space), EPISODES, 3, &[]);
         let planted = decoys.with_module_of(module, &fault(name));
         let settings = RunSettings { profile: Some(Profile::new(&planted)), ..usual.settings().clone() };
         let run = Run::new(usual.table().clone(), settings).expect("the settings name what exists");
@@ -63,6 +87,13 @@ fn the_module_at_fault_is_named() {
         }
     }
     assert!(wrong.is_empty(), "{wrong:#?}");
+}
+
+/// A space in which nobody need be able to avoid what appears: the notes about that are no mistakes here.
+fn made(name: &str) -> Arc<Space> {
+    let loaded = avastra::model::load(&root().join(name), &read).expect("it is there");
+    assert!(!loaded.diagnostics.iter().any(|found| found.is_error()), "{name}: {:?}", loaded.diagnostics);
+    loaded.space.expect("a space without mistakes is a space")
 }
 
 /// The counted collision of an episode, if the fault makes it: it is no accident, and with the faulty

@@ -1,21 +1,25 @@
 //! Tests at the pipeline's edges: a case is a file under `tests/cases/`, its expectation a file
 //! under `snapshots/`.
 
+mod agents;
 mod cases;
 mod command;
 mod corpus;
 mod contacts;
 mod drives;
+mod editor;
 mod emitted;
 mod failures;
 mod faults;
 mod hostile;
 mod language;
 mod layers;
+mod policies;
 mod profiles;
 mod references;
 mod road;
 mod rules;
+mod studies;
 mod tables;
 mod traces;
 mod torch;

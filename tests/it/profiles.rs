@@ -69,8 +69,26 @@ fn a_scenario_keeps_the_profile_that_it_was_found_with() {
     let (status, stdout, _) = outcome(&mut avastra(&["replay", &path, "--ads-config", cautious]));
     assert!(status == 0 && stdout.contains("against modular with scenarios/ads/cautious.yaml"), "{stdout}");
 
-    // A digest that the settings do not have: refused, with what to do.
+    let svg = scratch.path().join("strip.svg").display().to_string();
+    let drawn = ["render", &path, "--strip", "--ads-config", cautious, "--output", &svg];
+    let (status, _, stderr) = outcome(&mut avastra(&drawn));
+    assert!(status == 0 && Path::new(&svg).is_file(), "{stderr}");
+
+    // Verdicts are told as the scenario says, by drivers that exist.
     let other = file.with_file_name("other.ava");
+    let engine = text.lines().find(|line| line.contains("engine: ")).expect("it names its world");
+    let told_by = |driver: &str| {
+        let line = format!("{engine}\n    avoidability: \"{{careful: [{driver}]}}\"");
+        std::fs::write(&other, text.replace(engine, &line)).expect("it is writable");
+        outcome(&mut avastra(&["replay", &other.display().to_string()]))
+    };
+    let (status, _, stderr) = told_by("cd");
+    assert!(status == 1 && stderr.contains("no reference driver `cd`"), "{stderr}");
+    // Of the two careful drivers only one is asked now, so the other is missed.
+    let (status, stdout, stderr) = told_by("fsm");
+    assert!(status == 3 && stdout.contains("claimed avoidable by [cc"), "{stdout}{stderr}");
+
+    // A digest that the settings do not have: refused, with what to do.
     let digest = profile(FAULT).digest();
     assert!(text.contains(&digest));
     std::fs::write(&other, text.replace(&digest, &ModularConfig::default().digest()))
@@ -94,6 +112,8 @@ fn a_profile_with_a_mistake_is_refused_by_name_line_and_remedy() {
             "line 3: `planning.cruise_mps` is 80; write a value from 1 to 40",
         ),
         ("tracking: [1]\n", "line 1: `tracking` is a list; write a section"),
+        ("", "the profile is empty; write what differs"),
+        ("null\n", "the profile is empty; write what differs"),
     ];
     for (text, message) in cases {
         std::fs::write(&file, text).expect("it is writable");
@@ -106,4 +126,22 @@ fn a_profile_with_a_mistake_is_refused_by_name_line_and_remedy() {
     std::fs::write(&file, "planning: {cruise_mps: 8}\n").expect("it is writable");
     let (status, _, stderr) = run(&scratch.path().join("idm"), &["--ads", "idm", "--ads-config", &name]);
     assert!(status == 1 && stderr.contains("`idm` has no settings"), "{stderr}");
+}
+
+#[test]
+fn a_policy_is_verified_against_the_profile_that_it_was_trained_against() {
+    let scratch = tempfile::tempdir().expect("a scratch directory");
+    let config = scratch.path().join("small.yaml");
+    let small = "learning_starts: 30\nupdates_per_step: 1\nhidden_units: [8]\nbatch_len: 8\n";
+    std::fs::write(&config, small).expect("it is writable");
+    let (config, out) = (config.display().to_string(), scratch.path().join("run").display().to_string());
+    let place = ["train", "scenarios/avastra45.ava", "--road", "corner", "--episodes", "12", "--seed", "5"];
+    let how = ["--config", &config, "--out", &out, "--ads-config", FAULT];
+    let (status, _, stderr) = outcome(&mut avastra(&[&place[..], &how].concat()));
+    assert_eq!(status, 0, "{stderr}");
+    let file = scratch.path().join("run/policy/corner_ddqn_5.ava");
+    let text = std::fs::read_to_string(&file).expect("it was written");
+    assert!(text.contains("never_yields: true") && text.contains(&profile(FAULT).digest()), "{text}");
+    let (status, stdout, stderr) = outcome(&mut avastra(&["verify", &file.display().to_string()]));
+    assert_eq!(status, 0, "{stdout}{stderr}");
 }

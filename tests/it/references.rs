@@ -3,6 +3,7 @@
 
 use std::sync::atomic::AtomicBool;
 
+use avastra::model::Avoidability;
 use avastra::study::play;
 
 use crate::world::run_against;
@@ -11,10 +12,11 @@ use crate::world::space;
 /// Episodes on each road.
 const EPISODES: u32 = 12;
 
-/// The models know vehicles on a straight road: at night, in the wet, one of them may meet a
-/// pedestrian whom another avoids. It may happen in one episode of thirty.
+/// Whom one of them does run into, no other careful driver would have avoided; and that happens in one
+/// episode of thirty at most: somebody crosses so late that only swerving at once would help, and the
+/// models brake.
 #[test]
-fn careful_drivers_run_into_almost_nobody_in_random_search() {
+fn careful_drivers_run_into_nobody_whom_another_avoids() {
     let space = space("avastra45.ava");
     for ads in ["cc", "fsm", "rss"] {
         let run = run_against(ads, space.clone(), EPISODES, 19, &[]);
@@ -22,12 +24,15 @@ fn careful_drivers_run_into_almost_nobody_in_random_search() {
         let (mut arrived, mut at_fault) = (0, Vec::new());
         play::<()>(&run, &numbers, 2, &AtomicBool::new(false), &mut |summary, log| {
             arrived += usize::from(log.end.name() == "arrived");
-            at_fault.extend(summary.collisions.into_iter().filter(|finding| !finding.facts.struck));
+            at_fault.extend(summary.collisions.into_iter().filter(|finding| {
+                !finding.facts.struck && finding.judgement.class != Avoidability::Unavoidable
+            }));
             assert_eq!(log.red_runs, 0, "{ads}, episode {}", summary.episode);
             Ok(())
         })
         .expect("nothing here fails");
-        assert!(at_fault.len() * 30 <= numbers.len(), "{ads}: {at_fault:?}");
+        let avoided = at_fault.iter().filter(|finding| finding.facts.avoidable).count();
+        assert!(avoided == 0 && at_fault.len() * 30 <= numbers.len(), "{ads}: {at_fault:?}");
         assert!(arrived * 100 >= 95 * numbers.len(), "{ads}: {arrived} of {} arrive", numbers.len());
     }
 }

@@ -7,6 +7,7 @@ use crate::agent::hyperparameters::Encoding;
 use crate::agent::hyperparameters::StateSet;
 use crate::agent::presets;
 use crate::agent::trajectory::Experience;
+use crate::mdp::Closeness;
 use crate::rng::stream;
 
 use super::*;
@@ -45,7 +46,15 @@ fn all(rows: usize) -> Array1<bool> {
 }
 
 fn experience(state: usize, row: usize, reward: f64, rows: usize) -> Experience {
-    Experience { observation: sight(state), legal: all(rows), row, reward, hits: Vec::new() }
+    Experience {
+        observation: sight(state),
+        legal: all(rows),
+        row,
+        reward,
+        hits: Vec::new(),
+        collided: false,
+        crashes: Vec::new(),
+    }
 }
 
 #[test]
@@ -79,6 +88,7 @@ fn returns_take_n_steps_and_know_the_end() {
         last: sight(9),
         last_legal: array![true, false, false, false],
         terminal,
+        closeness: Closeness::default(),
     };
     let of = |settings: Hyperparameters, terminal| learner(settings, 4, 0).transitions(&episode(terminal));
     let found = of(settings.clone(), true);
@@ -101,6 +111,7 @@ fn credit_goes_back_to_where_the_obstacle_appeared() {
         last: sight(9),
         last_legal: all(2),
         terminal: true,
+        closeness: Closeness::default(),
     };
     episode.steps[2].hits = vec![0];
     episode.steps[1].hits = vec![1];
@@ -172,7 +183,13 @@ fn every_kind_of_the_algorithm_solves_a_known_problem() {
                 terminal = next.is_none();
                 state = next.unwrap_or(state);
             }
-            let trajectory = Trajectory { steps, last: sight(state), last_legal: all(2), terminal };
+            let trajectory = Trajectory {
+                steps,
+                last: sight(state),
+                last_legal: all(2),
+                terminal,
+                closeness: Closeness::default(),
+            };
             learner.learn(&trajectory, &mut stream(episode, Stream::Replay, 0));
         }
         // 0.6⁴ < 0.2 < 0.6³: by the discounted sum, only the leftmost state had better go left.
@@ -212,7 +229,13 @@ fn mean_estimate(double: bool, seed: u64) -> f64 {
         let rows: Vec<usize> = (0..2).map(|_| rng::below(&mut rng, ROWS as u32) as usize).collect();
         let noise = rng::normal(&mut rng);
         let steps = vec![experience(0, rows[0], 0.0, ROWS), experience(1, rows[1], noise, ROWS)];
-        let trajectory = Trajectory { steps, last: sight(2), last_legal: all(ROWS), terminal: true };
+        let trajectory = Trajectory {
+            steps,
+            last: sight(2),
+            last_legal: all(ROWS),
+            terminal: true,
+            closeness: Closeness::default(),
+        };
         learner.learn(&trajectory, &mut stream(seed, Stream::Replay, episode));
         if episode >= 200 {
             sum += f64::from(learner.policy.q_values(&sight(0)).mean().expect("there are rows"));
@@ -241,7 +264,13 @@ fn a_restored_learner_goes_on_alike() {
             experience(at % 5, row, at as f64 * 0.1, 2)
         });
         let steps = steps.collect();
-        let trajectory = Trajectory { steps, last: sight(0), last_legal: all(2), terminal: number % 2 == 0 };
+        let trajectory = Trajectory {
+            steps,
+            last: sight(0),
+            last_legal: all(2),
+            terminal: number % 2 == 0,
+            closeness: Closeness::default(),
+        };
         learner.learn(&trajectory, &mut stream(number, Stream::Replay, 0))
     };
     let settings = Arc::new(settings);

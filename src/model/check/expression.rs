@@ -703,7 +703,7 @@ fn road_unknown(span: Span) -> Diagnostic {
 }
 
 /// A word that is no unit.
-pub(super) fn unknown_unit(word: &ast::Name) -> Diagnostic {
+pub(in crate::model) fn unknown_unit(word: &ast::Name) -> Diagnostic {
     let words = || units::UNITS.iter().map(|unit| unit.word);
     let letters = |word: &str| word.chars().filter(|c| c.is_alphanumeric()).collect::<String>();
     // `kmh` means `km/h` rather than `km`.

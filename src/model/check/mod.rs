@@ -17,8 +17,11 @@ mod settings;
 mod style;
 mod unused;
 
+pub(super) use expression::exact_digits;
+pub(super) use expression::unknown_unit;
 pub(super) use names::unknown;
 pub(super) use road::Maps;
+pub(super) use scenario::row;
 pub use scenario::scenario;
 
 use std::path::PathBuf;

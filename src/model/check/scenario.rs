@@ -84,6 +84,15 @@ pub fn scenario(file: &ast::File, space: &Space) -> Result<Scenario, Vec<Diagnos
     }
 }
 
+/// The row that a call names: by name, or in the order of the axes.
+///
+/// # Errors
+/// If there is none.
+pub(in crate::model) fn row<'a>(space: &'a Space, call: &ast::Call) -> Result<&'a Row, Vec<Diagnostic>> {
+    let mut reader = Reader { space, diagnostics: Vec::new() };
+    reader.row(call).ok_or(reader.diagnostics)
+}
+
 struct Reader<'a> {
     space: &'a Space,
     diagnostics: Vec<Diagnostic>,
@@ -109,8 +118,18 @@ impl<'a> Reader<'a> {
     }
 
     fn origin(&mut self, fields: &[ast::Field]) -> Origin {
-        const FIELDS: [&str; 9] =
-            ["seed", "episode", "policy", "ads", "profile", "profile_digest", "engine", "with", "without"];
+        const FIELDS: [&str; 10] = [
+            "seed",
+            "episode",
+            "policy",
+            "ads",
+            "profile",
+            "profile_digest",
+            "engine",
+            "avoidability",
+            "with",
+            "without",
+        ];
         let mut origin = Origin::default();
         self.once("field", fields);
         for field in fields {
@@ -122,6 +141,7 @@ impl<'a> Reader<'a> {
                 "profile" => origin.profile = self.text(&field.value),
                 "profile_digest" => origin.profile_digest = self.text(&field.value),
                 "engine" => origin.engine = self.text(&field.value),
+                "avoidability" => origin.avoidability = self.text(&field.value),
                 "with" => origin.with = self.rule_names(&field.value),
                 "without" => origin.without = self.rule_names(&field.value),
                 other => self.report(unknown("field", other, field.name.span, FIELDS)),
@@ -473,7 +493,7 @@ impl<'a> Reader<'a> {
         let unclear = || {
             Diagnostic::error(code::UNKNOWN_CLAIM, "unknown claim").at(expect.span, "cannot be checked").help(
                 "claims are `collision with npc#2 at 14.22 s`, `proc == [0.5]`, `trace == \"sha256:…\"`, \
-                 `end == arrived`, `avoidable by [cc, fsm]`, `cause == perception`, or the name of a verdict",
+                 `end == arrived`, `avoidable by [cc, fsm]`, `cause == perception`, `minimal`, or the name of a verdict",
             )
         };
         match &expect.claim.kind {
@@ -484,6 +504,10 @@ impl<'a> Reader<'a> {
             ast::ExprKind::Name(name) if self.space.verdicts.iter().any(|verdict| verdict.name == *name) => {
                 let (obstacle, _) = self.clauses(&expect.clauses, false)?;
                 Some(Claim::Verdict { name: name.clone(), obstacle })
+            }
+            ast::ExprKind::Name(name) if name == "minimal" => {
+                let (obstacle, _) = self.clauses(&expect.clauses, false)?;
+                Some(Claim::Minimal { obstacle })
             }
             ast::ExprKind::Name(name) if Avoidability::ALL.iter().any(|class| class.name() == name) => {
                 let class = Avoidability::ALL.into_iter().find(|class| class.name() == name)?;

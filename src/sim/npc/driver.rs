@@ -1,9 +1,9 @@
-//! Other drivers: along their way by the Intelligent Driver Model, and from lane to lane.
+//! Other drivers: along their way by the Intelligent Driver Model.
 //!
 //! IDM after Treiber, Hennecke and Helbing (2000), with the brakes of the body on the grip of the
 //! road and a kinematic floor, because IDM alone assumes brakes without limit. They stop for red
 //! lights, slow down for bends, follow whoever is in front of them, let others go first at junctions
-//! (see `manners`) and look before they change lanes; what they do to the ego vehicle otherwise is the
+//! (see `manners`) and look before they change lanes (see `change`); what they do to the ego vehicle otherwise is the
 //! scenario's business. Leaders and occasions are looked for ten times a second: reaction time.
 
 use std::sync::Arc;
@@ -12,27 +12,25 @@ use crate::geometry::OrientedBox;
 use crate::geometry::Path;
 use crate::geometry::Pose;
 use crate::geometry::Vec2;
-use crate::geometry::wrap_angle;
 use crate::model::vocabulary::Side;
 use crate::rng;
 use crate::rng::Rng;
 use crate::rng::Stream;
-use crate::road;
-use crate::road::LaneIndex;
-use crate::road::Neighbour;
 
 use crate::sim::body::BodyParameters;
 use crate::sim::following::Following;
 use crate::sim::mover::Around;
 use crate::sim::mover::Moved;
+use crate::sim::scene::Scene;
 use crate::sim::sense::FRAME_TICKS;
 use crate::sim::sense::SignalColour;
 use crate::sim::way::Way;
 use crate::sim::way::beside;
 use crate::sim::world::DT_S;
 use crate::sim::world::Obstacle;
-use crate::sim::world::Scene;
 
+use super::change::Change;
+use super::change::Manoeuvre;
 use super::manners::GIVE_UP_S;
 use super::manners::STANDS_MPS;
 
@@ -45,52 +43,13 @@ const TIME_GAP_S: f64 = 1.2;
 /// What they look ahead beyond the way on which they could stop gently, m.
 pub(super) const LOOK_AHEAD_M: f64 = 25.0;
 /// Room beside the outline that they want to be free, m.
-const SIDE_ROOM_M: f64 = 0.2;
-/// Room in front of and behind them that they want before changing lanes, m.
-const MIRROR_ROOM_M: f64 = 2.0;
+pub(super) const SIDE_ROOM_M: f64 = 0.2;
 /// A yellow light that takes harder braking is passed, m/s².
 const YELLOW_BRAKING_MPS2: f64 = 3.0;
-/// Highest lateral speed of a lane change, m/s: bound of a cut-in in UN R157.
-const CHANGE_MPS_MAX: f64 = 1.8;
-/// Peak of the quintic's rate over its mean.
-const QUINTIC_PEAK: f64 = 1.875;
-/// A lane change takes at least this long, s.
-const CHANGE_S_MIN: f64 = 2.0;
-/// Below this speed a lane change slows down with the vehicle, which cannot slide sideways, m/s.
-const CHANGE_FULL_MPS: f64 = 5.0;
-/// Neighbouring lanes whose centres are farther apart have parted, m.
-const CHANGE_M_MAX: f64 = 8.0;
-/// A wider strip between two lanes is a median, which nobody crosses to change lanes, m.
-const STRIP_M_MAX: f64 = 0.5;
 /// Who is slower than this when a wait ends sets out anew, m/s.
 const SETS_OUT_MPS: f64 = 1.0;
 /// Who stands at more than this angle to the way stands across it or against it (cosine of 45°).
 const CROSSWISE_COS_MAX: f64 = core::f64::consts::FRAC_1_SQRT_2;
-
-/// A lane change that waits for its occasion.
-#[derive(Debug, Clone)]
-pub(in crate::sim) struct Manoeuvre {
-    pub when: When,
-    pub towards: Towards,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(in crate::sim) enum When {
-    /// From this tick on.
-    Tick(u64),
-    /// When its rear is this far in front of the ego vehicle's front, m.
-    AheadOfEgo(f64),
-}
-
-#[derive(Debug, Clone)]
-pub(in crate::sim) enum Towards {
-    To(Side),
-    /// Left if that lane is there and free, else right.
-    Either,
-    /// Against the change before.
-    Back,
-    Way(Arc<Way>),
-}
 
 /// How fast somebody wants to drive, and who they are to the ego vehicle.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -119,9 +78,9 @@ pub(in crate::sim) struct Driver {
     /// Ticks at rest because of others.
     pub(super) waited_ticks: u32,
     pub(super) change: Option<Change>,
-    last_change: Option<Side>,
+    pub(super) last_change: Option<Side>,
     /// In reverse order: the next one is last.
-    plan: Vec<Manoeuvre>,
+    pub(super) plan: Vec<Manoeuvre>,
     /// How often it drew where to go, so that each draw has its own stream.
     draws: u32,
 }
@@ -134,16 +93,6 @@ pub(super) struct Leader {
     pub speed_mps: f64,
     /// Whether it heads across the way or against it.
     pub crosswise: bool,
-}
-
-/// A lane change under way.
-#[derive(Debug, Clone)]
-pub(super) struct Change {
-    to: Arc<Way>,
-    to_station_m: f64,
-    /// In `[0, 1)`.
-    progress: f64,
-    duration_s: f64,
 }
 
 impl Driver {
@@ -275,7 +224,7 @@ impl Driver {
             let mut rng = self.draw(this.id, around);
             if let Some((way, station_m)) = self.way.prolonged(around.scene, self.station_m, &mut rng) {
                 self.insists_to_m += station_m - self.station_m;
-                (self.way, self.station_m) = (Arc::new(way), station_m);
+                (self.way, self.station_m) = (way, station_m);
             }
         }
         if let Some(part) = self.limit_part {
@@ -390,129 +339,14 @@ impl Driver {
         stops.then_some(gap_m)
     }
 
-    /// Begins the next lane change of the plan if it is due, there is a lane, and it is free.
-    fn begin_change(&mut self, this: &Obstacle, size: &BodyParameters, around: &Around) {
-        let Some(next) = self.plan.last() else { return };
-        let due = match next.when {
-            When::Tick(tick) => around.tick >= tick,
-            When::AheadOfEgo(gap_m) => {
-                let ahead_m = around.ego_outline.pose.to_local(this.outline.pose.position).x;
-                ahead_m - size.length_m / 2.0 - around.ego_outline.half_length_m >= gap_m
-            }
-        };
-        if !due {
-            return;
-        }
-        let begun = match next.towards.clone() {
-            Towards::Way(way) => {
-                let to_m = way.path.project(this.outline.pose.position).station_m;
-                Some((way, to_m, None))
-            }
-            Towards::To(side) => self.change_to(side, this, size, around),
-            Towards::Either => self
-                .change_to(Side::Left, this, size, around)
-                .or_else(|| self.change_to(Side::Right, this, size, around)),
-            Towards::Back => match self.last_change {
-                Some(Side::Left) => self.change_to(Side::Right, this, size, around),
-                Some(Side::Right) => self.change_to(Side::Left, this, size, around),
-                None => None,
-            },
-        };
-        let Some((to, to_station_m, side)) = begun else { return };
-        let aside_m = (to.path.pose_at(to_station_m).position - this.outline.pose.position).norm();
-        self.change =
-            Some(Change { to, to_station_m, progress: 0.0, duration_s: change_duration_s(aside_m) });
-        self.last_change = side;
-        self.plan.pop();
-    }
-
-    /// The way in the neighbouring lane, if there is one and room in it, and the own station there.
-    fn change_to(
-        &mut self,
-        side: Side,
-        this: &Obstacle,
-        size: &BodyParameters,
-        around: &Around,
-    ) -> Option<(Arc<Way>, f64, Option<Side>)> {
-        let map = &around.scene.map;
-        let (here, here_m) = self.way.lane_at(self.station_m);
-        let target = lane_beside(around, here, side)?;
-        let centre = &map.lane(target).centre;
-        let there = centre.project(this.outline.pose.position);
-        // Markings hold for everybody, and nobody changes lanes in a junction, where they part.
-        let room_m = map.change_room_m(here, on_road(side), here_m);
-        if there.distance_m > CHANGE_M_MAX
-            || room_m < change_length_m(self.speed_mps, there.distance_m)
-            || !self.is_free(centre, there.station_m, this, size, around)
-        {
-            return None;
-        }
-        let mut rng = self.draw(this.id, around);
-        let way = Way::along(around.scene, &[target], &mut rng)?;
-        Some((Arc::new(way), there.station_m, Some(side)))
-    }
-
-    /// Whether nobody is beside it in another lane, or so fast behind that a second would not do.
-    fn is_free(
-        &self,
-        path: &Path,
-        station_m: f64,
-        this: &Obstacle,
-        size: &BodyParameters,
-        around: &Around,
-    ) -> bool {
-        let here = path.pose_at(station_m);
-        let forward = here.forward();
-        around.others_along(this.id).all(|(outline, heading, velocity_mps)| {
-            let ahead_m = forward.dot(&(outline.pose.position - here.position));
-            let Some(other) = beside(path, outline.pose.position, station_m + ahead_m) else { return true };
-            let (half_length_m, half_width_m) = extent_m(outline, heading, other.forward);
-            let aside_m = other.offset_m.abs() - half_width_m - size.width_m / 2.0;
-            let apart_m = (other.station_m - station_m).abs() - half_length_m - size.length_m / 2.0;
-            let closing_mps = (velocity_mps.dot(&forward) - self.speed_mps)
-                * if other.station_m < station_m { 1.0 } else { -1.0 };
-            aside_m > SIDE_ROOM_M || apart_m > MIRROR_ROOM_M + closing_mps.max(0.0)
-        })
-    }
-
-    /// Moves the lane change on by a tick in which `way_m` were driven, from where it was `before`.
-    fn advance_change(&mut self, way_m: f64, before: Vec2) -> Moved {
-        let from = self.way.path.pose_at(self.station_m);
-        let Some(change) = &mut self.change else {
-            return along(from, self.speed_mps);
-        };
-        let guess_m = change.to_station_m + way_m;
-        change.to_station_m =
-            beside(&change.to.path, from.position, guess_m).map_or(guess_m, |found| found.station_m);
-        let to = change.to.path.pose_at(change.to_station_m);
-        let progress_per_m = 1.0 / (self.speed_mps.max(CHANGE_FULL_MPS) * change.duration_s);
-        change.progress += progress_per_m * way_m;
-        if change.progress >= 1.0 {
-            (self.way, self.station_m) = (Arc::clone(&change.to), change.to_station_m);
-            (self.change, self.hold_m, self.insists_to_m) = (None, None, f64::NEG_INFINITY);
-            return Moved { velocity_mps: (to.position - before) / DT_S, ..along(to, self.speed_mps) };
-        }
-        let (blend, slope) = quintic(change.progress);
-        let heading_rad = from.heading_rad + wrap_angle(to.heading_rad - from.heading_rad) * blend;
-        let turned_rad = libm::atan(from.to_local(to.position).y * slope * progress_per_m);
-        let pose = Pose {
-            position: from.position + (to.position - from.position) * blend,
-            heading_rad: wrap_angle(heading_rad + turned_rad),
-        };
-        // Measured, because between two lanes in a bend it is neither lane's speed.
-        let lane = if change.progress < 0.5 { from } else { to };
-        let velocity_mps = (pose.position - before) / DT_S;
-        Moved { pose, forward: pose.forward(), lane_heading_rad: lane.heading_rad, velocity_mps }
-    }
-
-    fn draw(&mut self, id: u32, around: &Around) -> Rng {
+    pub(super) fn draw(&mut self, id: u32, around: &Around) -> Rng {
         self.draws += 1;
         choices(around.seed, id, self.draws - 1)
     }
 }
 
 /// At a pose of a lane, along it.
-fn along(pose: Pose, speed_mps: f64) -> Moved {
+pub(super) fn along(pose: Pose, speed_mps: f64) -> Moved {
     let forward = pose.forward();
     Moved { pose, forward, lane_heading_rad: pose.heading_rad, velocity_mps: forward * speed_mps }
 }
@@ -520,53 +354,6 @@ fn along(pose: Pose, speed_mps: f64) -> Moved {
 /// The stream of one choice of one road user.
 pub(in crate::sim) fn choices(seed: u64, id: u32, draw: u32) -> Rng {
     rng::stream(seed, Stream::Traffic, u64::from(id) << 32 | u64::from(draw))
-}
-
-/// Whether the street on which a way is at a station, or the next one if it is in a junction, has room for
-/// a lane change to a side.
-pub(in crate::sim) fn can_change(
-    around: &Around,
-    way: &Way,
-    station_m: f64,
-    side: Side,
-    speed_mps: f64,
-) -> bool {
-    let map = &around.scene.map;
-    let in_junction = |lane: LaneIndex| map.lane(lane).junction.is_some();
-    let ahead = way.lanes_from(station_m).skip_while(|(lane, _)| in_junction(*lane));
-    ahead.take_while(|(lane, _)| !in_junction(*lane)).any(|(lane, at_m)| {
-        let Some(target) = lane_beside(around, lane, side) else { return false };
-        let here = map.lane(lane).centre.pose_at(at_m).position;
-        let length_m = change_length_m(speed_mps, map.lane(target).centre.project(here).distance_m);
-        map.changes_from_m(lane, on_road(side), at_m).iter().any(|(_, room_m)| *room_m >= length_m)
-    })
-}
-
-fn change_duration_s(aside_m: f64) -> f64 {
-    (QUINTIC_PEAK * aside_m / CHANGE_MPS_MAX).max(CHANGE_S_MIN)
-}
-
-/// Way on which a lane change of so much to the side is done at a speed, m.
-fn change_length_m(speed_mps: f64, aside_m: f64) -> f64 {
-    speed_mps.max(CHANGE_FULL_MPS) * change_duration_s(aside_m)
-}
-
-fn on_road(side: Side) -> road::Side {
-    match side {
-        Side::Left => road::Side::Left,
-        Side::Right => road::Side::Right,
-    }
-}
-
-/// The same-direction lane on a side of a lane, if there is one and no median lies between.
-pub(in crate::sim) fn lane_beside(around: &Around, lane: LaneIndex, side: Side) -> Option<LaneIndex> {
-    let lane = around.scene.map.lane(lane);
-    let neighbour = match side {
-        Side::Left => lane.left,
-        Side::Right => lane.right,
-    };
-    let reachable = |neighbour: &Neighbour| neighbour.same_direction && neighbour.gap_m <= STRIP_M_MAX;
-    neighbour.filter(reachable).map(|neighbour| neighbour.lane)
 }
 
 /// An outline, with its heading as a unit vector and its velocity, as the leader of somebody at a
@@ -593,17 +380,10 @@ fn in_corridor(
 }
 
 /// Half extents of an outline that is turned to `heading` along and across another unit vector, m.
-fn extent_m(outline: &OrientedBox, heading: Vec2, along: Vec2) -> (f64, f64) {
+pub(super) fn extent_m(outline: &OrientedBox, heading: Vec2, along: Vec2) -> (f64, f64) {
     let (cosine, sine) = (along.dot(&heading).abs(), along.perp(&heading).abs());
     (
         outline.half_length_m * cosine + outline.half_width_m * sine,
         outline.half_length_m * sine + outline.half_width_m * cosine,
     )
-}
-
-/// The smooth step with no acceleration at its ends, and its slope.
-fn quintic(x: f64) -> (f64, f64) {
-    let value = x * x * x * (10.0 + x * (6.0 * x - 15.0));
-    let rest = x * (1.0 - x);
-    (value, 30.0 * rest * rest)
 }

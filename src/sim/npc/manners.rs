@@ -24,9 +24,9 @@ use core::cell::LazyCell;
 use crate::road::LaneIndex;
 use crate::sim::body::BodyParameters;
 use crate::sim::ego::VehicleParameters;
+use crate::sim::junction::Area;
 use crate::sim::mover::Around;
 use crate::sim::sense::SignalColour;
-use crate::sim::way::WayArea;
 use crate::sim::world::DT_S;
 use crate::sim::world::Obstacle;
 
@@ -125,7 +125,7 @@ impl Driver {
         let reach_m = LOOK_AHEAD_M + self.speed_mps * self.speed_mps / (2.0 * COMFORT_MPS2);
         let areas = &self.way.areas;
         let open = areas.partition_point(|area| area.from_m <= front_m);
-        let near = |area: &&WayArea| area.from_m <= front_m + reach_m;
+        let near = |area: &&Area| area.from_m <= front_m + reach_m;
         let waited_for = areas[open..]
             .iter()
             .take_while(near)
@@ -147,7 +147,7 @@ impl Driver {
         ahead.fold(f64::NEG_INFINITY, |end_m, area| end_m.max(area.to_m))
     }
 
-    fn must_wait(&self, area: &WayArea, this: &Obstacle, size: &BodyParameters, around: &Around) -> bool {
+    fn must_wait(&self, area: &Area, this: &Obstacle, size: &BodyParameters, around: &Around) -> bool {
         if self.would_stop_in(area, size) {
             return true;
         }
@@ -172,7 +172,7 @@ impl Driver {
     }
 
     /// Whether the one ahead stands so near behind an area that there is no room for both.
-    fn would_stop_in(&self, area: &WayArea, size: &BodyParameters) -> bool {
+    fn would_stop_in(&self, area: &Area, size: &BodyParameters) -> bool {
         let front_m = self.station_m + size.length_m / 2.0;
         self.leader.as_ref().is_some_and(|leader| {
             let stop_m = front_m + leader.gap_m - GAP_M_MIN;
@@ -201,14 +201,14 @@ impl Driver {
     }
 
     /// This driver's passage through the other side of somebody's area, if the way leads there.
-    fn passage_through(&self, area: &WayArea, size: &BodyParameters, around: &Around) -> Option<Passage> {
+    fn passage_through(&self, area: &Area, size: &BodyParameters, around: &Around) -> Option<Passage> {
         let begin_m = self.way.lane_ahead_m(area.other, self.station_m - size.length_m / 2.0)?;
         Some(self.passage(begin_m + area.other_from_m, begin_m + area.other_to_m, size, around))
     }
 }
 
 /// The ego vehicle's passage along its route, in the eyes of others.
-fn ego_passage(area: &WayArea, around: &Around) -> Option<Passage> {
+fn ego_passage(area: &Area, around: &Around) -> Option<Passage> {
     let begin_m = ego_lane_begin_m(area.other, around)?;
     let car = &VehicleParameters::MKZ;
     let (front_m, rear_m) = (car.front_m(around.ego_station_m), car.rear_m(around.ego_station_m));

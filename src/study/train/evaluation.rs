@@ -4,6 +4,7 @@ use sha2::Digest;
 use sha2::Sha256;
 
 use crate::action::ActionTable;
+use crate::ads::Selected;
 use crate::agent::Agent;
 use crate::agent::QPolicy;
 use crate::episode;
@@ -18,7 +19,7 @@ use crate::study::summary::EpisodeSummary;
 use super::training::with_period;
 
 /// The outcome of a number of episodes.
-#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Evaluation {
     /// Episodes on each road.
     pub episodes: u64,
@@ -28,39 +29,72 @@ pub struct Evaluation {
     pub counted: u64,
     /// Episodes with a counted collision.
     pub colliding: u64,
+    /// Mean sum of the space's rewards in an episode.
+    pub return_mean: f64,
     /// SHA-256 over the traces of all episodes, in order.
     pub trace: [u8; 32],
+    /// Time driven, branches included, s.
+    pub simulated_s: f64,
 }
 
 /// Plays so many episodes on each road with a policy. `rules` are those switched on and off.
 ///
 /// # Errors
-/// If a road, the driving system or a rule does not exist.
+/// If a road or a rule does not exist.
 pub fn evaluate(
     table: ActionTable,
     policy: &QPolicy,
     roads: &[String],
-    ads: &str,
+    ads: &Selected,
     rules: (&[String], &[String]),
     (episodes, seed): (u64, u64),
 ) -> Result<Evaluation, RunError> {
     let table = with_period(table, policy.settings().observation_period_s);
-    let arena = Arena::new(table, roads, ads, rules)?;
+    evaluate_agent(table, &|| Box::new(policy.clone()), roads, ads, rules, (episodes, seed))
+}
+
+/// The same with any agent: `make` gives a fresh one for each episode.
+///
+/// # Errors
+/// As [`evaluate`].
+pub fn evaluate_agent(
+    table: ActionTable,
+    make: &dyn Fn() -> Box<dyn Agent>,
+    roads: &[String],
+    ads: &Selected,
+    rules: (&[String], &[String]),
+    (episodes, seed): (u64, u64),
+) -> Result<Evaluation, RunError> {
+    let mut arena = Arena::new(table, roads, ads.name(), rules)?;
+    arena.set_ads(ads.clone());
     let mut traces = Sha256::new();
-    let mut found = Evaluation { episodes, seed, collisions: 0, counted: 0, colliding: 0, trace: [0; 32] };
+    let mut found = Evaluation {
+        episodes,
+        seed,
+        collisions: 0,
+        counted: 0,
+        colliding: 0,
+        return_mean: 0.0,
+        trace: [0; 32],
+        simulated_s: 0.0,
+    };
+    let mut sum = 0.0;
     for number in 0..episodes * arena.roads() as u64 {
         let seed = rng::child_seed(seed, Stream::Evaluation, number);
         let setup = arena.setup((number % arena.roads() as u64) as usize, seed);
-        let mut agent = policy.clone();
+        let mut agent = make();
         agent.begin();
-        let mut choose = |moment: &episode::Moment| choose(arena.table(), &mut agent, moment);
+        let mut choose = |moment: &episode::Moment| choose(agent.as_mut(), moment);
         let log = episode::run(&setup, &mut choose, &mut |_, _, _| {});
         let settings = AvoidabilitySettings::default();
         let counted = EpisodeSummary::judged(&setup, number as usize, &log, &settings).counted() as u64;
+        sum += log.steps.iter().map(|step| step.reward).sum::<f64>();
         found.collisions += log.collisions.len() as u64;
         found.counted += counted;
         found.colliding += u64::from(counted > 0);
+        found.simulated_s += log.duration_s + agent.branched_s();
         traces.update(log.trace());
     }
-    Ok(Evaluation { trace: traces.finalize().into(), ..found })
+    let return_mean = sum / (episodes * arena.roads() as u64).max(1) as f64;
+    Ok(Evaluation { return_mean, trace: traces.finalize().into(), ..found })
 }

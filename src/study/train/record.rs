@@ -18,14 +18,14 @@ const TABLES: &str = "
     CREATE TABLE IF NOT EXISTS learning (
         episode INTEGER PRIMARY KEY REFERENCES episode, return REAL NOT NULL, collisions INTEGER NOT NULL,
         counted INTEGER NOT NULL, epsilon REAL NOT NULL, loss REAL, updates INTEGER NOT NULL,
-        steps INTEGER NOT NULL
+        steps INTEGER NOT NULL, simulated_s REAL NOT NULL
     ) STRICT;
     CREATE TABLE IF NOT EXISTS checkpoint (
         only INTEGER PRIMARY KEY CHECK (only = 1), episodes INTEGER NOT NULL, digest TEXT NOT NULL,
         learner BLOB NOT NULL
     ) STRICT;";
 
-/// A learner as it was after so many episodes.
+/// An agent as it was after so many episodes.
 pub struct Checkpoint {
     pub episodes: usize,
     pub learner: Vec<u8>,
@@ -46,7 +46,7 @@ impl Database {
         let episode = trained.summary.episode;
         add_all(&transaction, &trained.summary, &trained.log, in_words)?;
         transaction.execute_batch(TABLES)?;
-        transaction.prepare_cached("INSERT INTO learning VALUES (?, ?, ?, ?, ?, ?, ?, ?)")?.execute(
+        transaction.prepare_cached("INSERT INTO learning VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)")?.execute(
             params![
                 episode as i64,
                 trained.sum,
@@ -56,6 +56,7 @@ impl Database {
                 trained.lesson.loss,
                 trained.lesson.updates as i64,
                 trained.steps as i64,
+                trained.simulated_s,
             ],
         )?;
         if let Some(learner) = checkpoint {
@@ -66,6 +67,15 @@ impl Database {
         }
         transaction.commit()?;
         Ok(())
+    }
+
+    /// Time driven for the episodes of a training so far, s.
+    ///
+    /// # Errors
+    /// If the file cannot be read.
+    pub fn trained_s(&self) -> Result<f64, DatabaseError> {
+        let sum = "SELECT coalesce(sum(simulated_s), 0.0) FROM learning";
+        Ok(self.connection.query_row(sum, [], |row| row.get(0))?)
     }
 
     /// The last checkpoint, with everything after it forgotten; none if there has been none, and then

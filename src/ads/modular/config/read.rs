@@ -24,6 +24,8 @@ use super::sensing::TrackingConfig;
 pub enum ConfigError {
     #[error("no YAML: {reason}")]
     Yaml { reason: String },
+    #[error("the profile is empty; write what differs from `scenarios/ads/default.yaml`, or `{{}}`")]
+    Empty,
     #[error("{}`{key}` is no setting{hint}", at(*line))]
     Unknown { line: Option<usize>, key: String, hint: String },
     #[error("{}`{key}` is {found}; write {wanted}", at(*line))]
@@ -55,16 +57,18 @@ impl ModularConfig {
     /// Reads a profile; see `scenarios/ads/default.yaml`. What it leaves out keeps its default.
     ///
     /// # Errors
-    /// Text that is no YAML, a key that does not exist, a value of the wrong type or out of its range.
+    /// Text that is no YAML or says nothing at all, a key that does not exist, a value of the wrong type
+    /// or out of its range.
     pub fn from_yaml(text: &str) -> Result<ModularConfig, ConfigError> {
         let file: Value = serde_yaml::from_str(text)
             .map_err(|error| ConfigError::Yaml { reason: error.to_string().trim().to_owned() })?;
         let mut whole =
             serde_json::to_value(ModularConfig::default()).expect("a configuration is plain data");
-        // A file of comments alone is the default.
-        if !file.is_null() {
-            overlay(text, "", &file, &mut whole)?;
+        // More likely a slip, or a file that was cut off, than a wish for the default.
+        if file.is_null() {
+            return Err(ConfigError::Empty);
         }
+        overlay(text, "", &file, &mut whole)?;
         Ok(serde_json::from_value(whole).expect("every value has been checked against the default's"))
     }
 
@@ -266,6 +270,9 @@ mod tests {
         for (text, message) in cases {
             assert_eq!(told(text), message);
         }
+        for text in ["", "null", "~\n", "# nothing yet\n"] {
+            assert!(told(text).starts_with("the profile is empty; write"), "{text}: {}", told(text));
+        }
         assert!(told("planning: [").starts_with("no YAML: "), "{}", told("planning: ["));
         assert!(told("planning:\n  cruise_mps: .nan\n").contains("cruise_mps"));
     }
@@ -283,6 +290,6 @@ mod tests {
         assert_eq!((again, again.digest()), (config, config.digest()));
         assert_ne!(config.digest(), ModularConfig::default().digest());
         assert_eq!(ModularConfig::default().to_line(), "");
-        assert_eq!(ModularConfig::from_yaml("").unwrap(), ModularConfig::default());
+        assert_eq!(ModularConfig::from_yaml("{}").unwrap(), ModularConfig::default());
     }
 }

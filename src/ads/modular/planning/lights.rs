@@ -1,8 +1,9 @@
 //! Traffic lights: where to stop, and when it is too late to.
 //!
-//! A light that would need harder braking than `red_light_mps2_max` is passed, and stays passed until
-//! it is green again (Apollo's traffic-light rule, weakness (g)). One whose colour is not known is
-//! taken for red, as in Apollo.
+//! A light that would need harder braking than `red_light_mps2_max` is passed for as long as it would
+//! (Apollo's traffic-light rule, weakness (g)). A stop once decided holds until the light is green,
+//! also for a vehicle that has come to rest beyond the line, unless it is in the junction already. A
+//! light whose colour is not known is taken for red, as in Apollo.
 
 use std::sync::Arc;
 
@@ -16,8 +17,11 @@ use super::planner::HORIZON_M;
 use super::rules::can_stop;
 use super::speed::Constraint;
 
-/// A bumper this far over the line has passed it, m.
+/// A bumper this far over the line while the light let it go has passed it, m. Ours.
 const PASSED_M: f64 = 0.5;
+/// A bumper this far over the line is in the junction, and whoever is there clears it, m. Apollo's
+/// traffic-light rule, `min_pass_s_distance`: 4.0.
+const INSIDE_M: f64 = 4.0;
 
 #[derive(Debug, Clone)]
 pub struct Lights {
@@ -52,14 +56,14 @@ impl Lights {
         let lines = self.scene.route.stop_lines.iter().zip(lights);
         for ((line, light), choice) in lines.zip(&mut self.choices) {
             let distance_m = line.station_m - VehicleParameters::MKZ.front_m(station_m);
-            if !(-PASSED_M..HORIZON_M).contains(&distance_m) {
+            if !(-INSIDE_M..HORIZON_M).contains(&distance_m) {
                 continue;
             }
             if *light == Some(SignalColour::Green) {
                 *choice = Choice::Open;
                 continue;
             }
-            if *choice == Choice::Open {
+            if *choice != Choice::Stop && distance_m >= -PASSED_M {
                 let stops = can_stop(&self.config, self.config.red_light_mps2_max, distance_m, speed_mps);
                 *choice = if stops { Choice::Stop } else { Choice::Pass };
             }
@@ -68,5 +72,44 @@ impl Lights {
                 constraints.push(Constraint::line(Reason::RedLight, stop_m));
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ads::testing::straight;
+
+    /// The line of the test road, m.
+    const LINE_M: f64 = 100.0;
+
+    /// Whether a light lets the vehicle go on with its front this far over the line, from moment to
+    /// moment.
+    fn goes_on(moments: &[(f64, f64, SignalColour)]) -> Vec<bool> {
+        let mut lights = Lights::new(&PlanningConfig::default(), &straight());
+        let front_m = VehicleParameters::MKZ.front_m(0.0);
+        let goes_on = |&(over_m, speed_mps, colour): &(f64, f64, SignalColour)| {
+            let mut constraints = Vec::new();
+            lights.constrain(LINE_M + over_m - front_m, speed_mps, &[Some(colour)], &mut constraints);
+            constraints.is_empty()
+        };
+        moments.iter().map(goes_on).collect()
+    }
+
+    #[test]
+    fn a_stop_is_kept_beyond_the_line_until_the_light_is_green() {
+        use SignalColour::Green;
+        use SignalColour::Red;
+        assert_eq!(goes_on(&[(-40.0, 8.0, Red), (1.5, 1.0, Red), (1.6, 0.0, Red)]), [false; 3]);
+        assert_eq!(goes_on(&[(-40.0, 8.0, Red), (1.6, 0.0, Red), (1.6, 0.0, Green)]), [false, false, true]);
+        assert_eq!(goes_on(&[(-40.0, 8.0, Red), (4.1, 2.0, Red)]), [false, true], "in the junction");
+        assert_eq!(goes_on(&[(1.5, 8.0, Green), (1.6, 8.0, Red)]), [true; 2], "was let go");
+    }
+
+    #[test]
+    fn a_light_is_passed_only_as_long_as_stopping_would_be_hard() {
+        use SignalColour::Red;
+        assert_eq!(goes_on(&[(-10.0, 11.0, Red), (-5.0, 11.0, Red), (1.0, 11.0, Red)]), [true; 3]);
+        assert_eq!(goes_on(&[(-10.0, 11.0, Red), (-4.0, 2.0, Red)]), [true, false], "slowed down by others");
     }
 }

@@ -7,6 +7,7 @@
 use crate::ads::guide::Guide;
 use crate::ads::guide::Span;
 use crate::ads::steering::Aside;
+use crate::geometry::smooth_step;
 use crate::sim::Scene;
 use crate::sim::VehicleParameters;
 
@@ -64,11 +65,11 @@ impl LateralPlan {
         } else {
             (bump.down_m.1, bump.down_m.1 - bump.down_m.0, -1.0)
         };
-        let u = sign * (station_m - from_m) / length_m;
+        let step = smooth_step(sign * (station_m - from_m) / length_m);
         Aside {
-            offset_m: bump.offset_m * u * u * u * (10.0 - u * (15.0 - 6.0 * u)),
-            slope: sign * bump.offset_m * 30.0 * u * u * (1.0 - u) * (1.0 - u) / length_m,
-            curvature_per_m: bump.offset_m * 60.0 * u * (1.0 - u) * (1.0 - 2.0 * u) / (length_m * length_m),
+            offset_m: bump.offset_m * step.value,
+            slope: sign * bump.offset_m * step.slope / length_m,
+            curvature_per_m: bump.offset_m * step.bend / (length_m * length_m),
         }
     }
 

@@ -1,0 +1,333 @@
+//! Go-Explore (Ecoffet et al., Nature 2021) over the deterministic world: return to a promising moment,
+//! then explore from there.
+//!
+//! Moments are told apart by coarse cells. A moment is returned to by a snapshot, which costs nothing,
+//! or, after a kill, by playing its choices again. From there rows are random or, for a share of the
+//! choices, those that have led to most crashes in such a situation ([`Worth`]). That record is also what
+//! the search leaves behind to act by, on starts that it has never seen; the original trains a policy by
+//! imitation at this point.
+
+use std::collections::BTreeSet;
+
+use ndarray::ArrayView1;
+
+use crate::agent::hyperparameters::SettingsError;
+use crate::agent::registry::Agent;
+use crate::agent::trainable::Beginning;
+use crate::agent::trainable::Trainable;
+use crate::agent::trajectory::Lesson;
+use crate::agent::trajectory::Trajectory;
+use crate::mdp::Observation;
+use crate::rng;
+use crate::rng::Rng;
+use crate::rng::Stream;
+
+use super::played::Gene;
+use super::played::Genes;
+use super::played::any_legal;
+use super::played::note;
+use super::situation::cell;
+use super::situation::situation;
+use super::worth::Doubt;
+use super::worth::Worth;
+use super::worth::worths;
+
+/// Settings of [`GoExplore`]; all ours.
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct GoExploreSettings {
+    /// Share of the episodes that begin at a new start, in `[0, 1]`.
+    pub fresh_share: f64,
+    /// Share of the choices that follow the record of what has led to crashes, in `[0, 1]`.
+    pub record_share: f64,
+    /// How much a short record is doubted: the spread of what one choice is worth, at least 0. In the
+    /// search doubtful rows are tried, afterwards they are avoided.
+    pub doubt: f64,
+    /// What a choice is worth that was made a step before the one that made the obstacle appear, in
+    /// `[0, 1]`; two steps before, its square.
+    pub credit_discount: f64,
+    /// A situation's own record counts as much as that of all situations from so many choices on.
+    pub prior_choices: f64,
+    /// Cells that are kept for each road.
+    pub cells_max: usize,
+    /// Random choices of what acts in the end, in `[0, 1]`.
+    pub evaluation_epsilon: f64,
+}
+
+impl Default for GoExploreSettings {
+    fn default() -> GoExploreSettings {
+        GoExploreSettings {
+            fresh_share: 0.5,
+            record_share: 0.75,
+            doubt: 0.3,
+            credit_discount: 0.5,
+            prior_choices: 10.0,
+            cells_max: 2000,
+            evaluation_epsilon: 0.05,
+        }
+    }
+}
+
+impl GoExploreSettings {
+    /// # Errors
+    /// If a value is out of range.
+    pub fn check(&self) -> Result<(), SettingsError> {
+        let unit = 0.0..=1.0;
+        let shares = [
+            ("fresh_share", self.fresh_share),
+            ("record_share", self.record_share),
+            ("credit_discount", self.credit_discount),
+            ("evaluation_epsilon", self.evaluation_epsilon),
+        ];
+        let share =
+            shares.into_iter().map(|(name, value)| (name, unit.contains(&value), value, "from 0 to 1"));
+        let others = [
+            ("doubt", (0.0..=100.0).contains(&self.doubt), self.doubt, "from 0 to 100"),
+            (
+                "prior_choices",
+                self.prior_choices > 0.0 && self.prior_choices <= 1e6,
+                self.prior_choices,
+                "above 0, and at most 1e6",
+            ),
+            ("cells_max", self.cells_max <= 100_000, self.cells_max as f64, "up to 100000"),
+        ];
+        match share.chain(others).find(|(_, is_right, _, _)| !is_right) {
+            Some((name, _, value, wanted)) => {
+                Err(SettingsError::Range { name, value: value.to_string(), wanted })
+            }
+            None => Ok(()),
+        }
+    }
+}
+
+/// The search.
+pub struct GoExplore {
+    settings: GoExploreSettings,
+    memory: Memory,
+    // Of the episode under way.
+    road: usize,
+    /// What nobody has drawn from yet.
+    fresh: u64,
+    beginning: Beginning,
+    /// Choices from the start of the episode on, those that are made again included.
+    genes: Genes,
+    step: usize,
+    /// The new choices.
+    made: Vec<Made>,
+    keepsakes: Vec<(usize, usize)>,
+}
+
+/// A new choice: its step, where it was made, and what.
+struct Made {
+    step: usize,
+    cell: u32,
+    situation: u32,
+    row: u32,
+}
+
+/// What outlasts an episode.
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
+struct Memory {
+    steps: u64,
+    cells: Vec<Cell>,
+    worth: Worth,
+}
+
+/// A moment to return to.
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
+struct Cell {
+    road: usize,
+    cell: u32,
+    seed: u64,
+    /// The choices that lead there.
+    genes: Genes,
+    /// Episodes that went on from here, and those of them with a collision that counted.
+    visits: u32,
+    crashes: u32,
+}
+
+impl Cell {
+    /// How much the search is drawn to it: by the share of visits that ended in a crash, squared, as if
+    /// one of three had before there was any.
+    fn promise(&self) -> f64 {
+        let share = (f64::from(self.crashes) + 1.0) / (f64::from(self.visits) + 3.0);
+        share * share
+    }
+}
+
+impl GoExplore {
+    /// A search over so many rows.
+    pub fn new(settings: &GoExploreSettings, rows: usize) -> GoExplore {
+        GoExplore {
+            settings: settings.clone(),
+            memory: Memory { steps: 0, cells: Vec::new(), worth: Worth::new(rows) },
+            road: 0,
+            fresh: 0,
+            beginning: Beginning { seed: 0, from: None },
+            genes: Genes::new(),
+            step: 0,
+            made: Vec::new(),
+            keepsakes: Vec::new(),
+        }
+    }
+
+    /// The search that was saved; `None` if the bytes are not those of one over so many rows.
+    pub fn restore(settings: &GoExploreSettings, rows: usize, bytes: &[u8]) -> Option<GoExplore> {
+        let memory: Memory = serde_json::from_slice(bytes).ok()?;
+        let genes = || memory.cells.iter().flat_map(|cell| &cell.genes).flatten();
+        let fits = memory.worth.is_of(rows) && genes().all(|gene| (gene.row as usize) < rows);
+        fits.then(|| GoExplore { memory, ..GoExplore::new(settings, rows) })
+    }
+
+    /// The step up to which choices are made again.
+    fn depth(&self) -> usize {
+        self.beginning.from.map_or(0, |(_, step)| step)
+    }
+
+    /// A cell of the road, by its promise.
+    fn promising(&self, rng: &mut Rng) -> Option<usize> {
+        let here = || self.memory.cells.iter().enumerate().filter(|(_, cell)| cell.road == self.road);
+        let total: f64 = here().map(|(_, cell)| cell.promise()).sum();
+        let mut mass = rng::unit(rng) * total;
+        for (index, cell) in here() {
+            mass -= cell.promise();
+            if mass < 0.0 {
+                return Some(index);
+            }
+        }
+        here().next_back().map(|(index, _)| index)
+    }
+
+    /// Keeps the moments of the episode that are of a new kind. After a collision there is none: who
+    /// returned there would count it again.
+    fn remember(&mut self, episode: &Trajectory) {
+        let here = self.memory.cells.iter().filter(|cell| cell.road == self.road);
+        let mut known: BTreeSet<u32> = here.map(|cell| cell.cell).collect();
+        for (made, experience) in self.made.iter().zip(&episode.steps) {
+            if made.step > 0 && known.len() < self.settings.cells_max && known.insert(made.cell) {
+                self.keepsakes.push((self.memory.cells.len(), made.step));
+                self.memory.cells.push(Cell {
+                    road: self.road,
+                    cell: made.cell,
+                    seed: self.beginning.seed,
+                    genes: self.genes[..made.step].to_vec(),
+                    visits: 0,
+                    crashes: 0,
+                });
+            }
+            if experience.collided {
+                break;
+            }
+        }
+    }
+}
+
+impl Agent for GoExplore {
+    fn begin(&mut self) {
+        self.genes.truncate(self.depth());
+        self.made.clear();
+        self.step = 0;
+    }
+
+    fn draw_seed(&mut self, step: usize) -> Option<u64> {
+        self.step = step;
+        let again = self.genes.get(step).copied().flatten().filter(|_| step < self.depth());
+        Some(again.map_or(self.fresh, |gene| gene.draw_seed))
+    }
+
+    fn choose(&mut self, observation: &Observation, legal: ArrayView1<bool>, _: &mut Rng) -> Option<usize> {
+        if self.step < self.depth() {
+            return self.genes[self.step].map(|gene| gene.row as usize);
+        }
+        // Of its own, so that it makes no difference whether the steps before were played again.
+        let mut rng = rng::stream(self.fresh, Stream::Search, 1 + self.step as u64);
+        let here = situation(observation);
+        let by_record = rng::unit(&mut rng) < self.settings.record_share;
+        let row = if by_record {
+            self.memory.worth.best(
+                here,
+                legal,
+                self.settings.prior_choices,
+                Doubt::Try(self.settings.doubt),
+                &mut rng,
+            )
+        } else {
+            any_legal(legal, &mut rng)
+        }?;
+        self.memory.steps += 1;
+        note(&mut self.genes, self.step, Gene { row: row as u32, draw_seed: self.fresh });
+        self.made.push(Made { step: self.step, cell: cell(observation), situation: here, row: row as u32 });
+        Some(row)
+    }
+}
+
+impl Trainable for GoExplore {
+    fn beginning(&mut self, road: usize, fresh: u64) -> Beginning {
+        self.road = road;
+        self.fresh = fresh;
+        let mut rng = rng::stream(fresh, Stream::Search, 0);
+        let begins_anew = rng::unit(&mut rng) < self.settings.fresh_share;
+        let cell = if begins_anew { None } else { self.promising(&mut rng) };
+        self.beginning = match cell {
+            None => Beginning { seed: fresh, from: None },
+            Some(index) => {
+                let cell = &self.memory.cells[index];
+                self.genes.clone_from(&cell.genes);
+                Beginning { seed: cell.seed, from: Some((index, cell.genes.len())) }
+            }
+        };
+        self.beginning
+    }
+
+    fn learn(&mut self, episode: &Trajectory, _: &mut Rng) -> Lesson {
+        assert_eq!(self.made.len(), episode.steps.len(), "each new choice is an experience");
+        for (made, worth) in self.made.iter().zip(worths(episode, self.settings.credit_discount)) {
+            self.memory.worth.note(made.situation, made.row as usize, worth);
+        }
+        if let Some((index, _)) = self.beginning.from {
+            let cell = &mut self.memory.cells[index];
+            cell.visits += 1;
+            cell.crashes += u32::from(episode.steps.iter().any(|step| !step.crashes.is_empty()));
+        }
+        self.keepsakes.clear();
+        self.remember(episode);
+        Lesson::default()
+    }
+
+    fn keepsakes(&mut self) -> Vec<(usize, usize)> {
+        core::mem::take(&mut self.keepsakes)
+    }
+
+    fn steps(&self) -> u64 {
+        self.memory.steps
+    }
+
+    fn exploration_epsilon(&self) -> f64 {
+        1.0 - self.settings.record_share
+    }
+
+    fn actor(&self) -> Box<dyn Agent> {
+        Box::new(Recorded { settings: self.settings.clone(), worth: self.memory.worth.clone() })
+    }
+
+    fn save(&self) -> Vec<u8> {
+        serde_json::to_vec(&self.memory).expect("a search is plain data")
+    }
+}
+
+/// Acts by the record alone.
+#[derive(Debug, Clone)]
+struct Recorded {
+    settings: GoExploreSettings,
+    worth: Worth,
+}
+
+impl Agent for Recorded {
+    fn choose(&mut self, observation: &Observation, legal: ArrayView1<bool>, rng: &mut Rng) -> Option<usize> {
+        if rng::unit(rng) < self.settings.evaluation_epsilon {
+            return any_legal(legal, rng);
+        }
+        let GoExploreSettings { prior_choices, doubt, .. } = self.settings;
+        self.worth.best(situation(observation), legal, prior_choices, Doubt::Avoid(doubt), rng)
+    }
+}

@@ -1,0 +1,82 @@
+//! Coarse views of a moment: what a search takes to be alike. All bounds are ours.
+
+use crate::mdp::Observation;
+use crate::mdp::variable;
+
+/// A kind of moment, to tell those worth returning to apart: where on the route, how fast, who is near,
+/// what weather.
+pub fn cell(observation: &Observation) -> u32 {
+    let value = |name: &str| f64::from(observation.get(variable(name).expect("it is a variable")));
+    let place = (value("routeLeft") / 20.0).clamp(0.0, 99.0) as u32;
+    let speed = (value("speed") / 3.0).clamp(0.0, 9.0) as u32;
+    let others = value("numObs").clamp(0.0, 4.0) as u32;
+    (((place * 10 + speed) * 5 + others) * 4 + nearest(observation)) * 3 + weather(observation)
+}
+
+/// A kind of situation, to tell what was done in it: how fast, how far from a junction, who is near,
+/// what weather.
+pub fn situation(observation: &Observation) -> u32 {
+    let value = |name: &str| f64::from(observation.get(variable(name).expect("it is a variable")));
+    let speed = below(value("speed"), &[1.0, 5.0, 9.0]);
+    let junction = below(value("junctionAhead"), &[1.0, 40.0]);
+    ((speed * 3 + junction) * 4 + nearest(observation)) * 3 + weather(observation)
+}
+
+/// Kinds of [`situation`].
+pub const SITUATIONS: usize = 4 * 3 * 4 * 3;
+
+/// The number of bounds that a value is not below.
+fn below(value: f64, bounds: &[f64]) -> u32 {
+    bounds.iter().filter(|&&bound| value >= bound).count() as u32
+}
+
+/// Nobody near, somebody in front, beside, or behind.
+fn nearest(observation: &Observation) -> u32 {
+    let value = |name: &str| f64::from(observation.get(variable(name).expect("it is a variable")));
+    let (ahead_m, left_m) = (value("nearestAhead"), value("nearestLeft"));
+    if ahead_m * ahead_m + left_m * left_m > 30.0 * 30.0 {
+        0
+    } else if left_m.abs() > 2.0 {
+        2
+    } else if ahead_m > 0.0 {
+        1
+    } else {
+        3
+    }
+}
+
+/// Dry, wet, fog.
+fn weather(observation: &Observation) -> u32 {
+    let value = |name: &str| observation.get(variable(name).expect("it is a variable"));
+    if value("fog") > 0.3 { 2 } else { u32::from(value("wetness") > 0.3 || value("rain") > 0.3) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mdp::STATE_LEN;
+
+    #[test]
+    fn situations_are_numbered_without_gaps_and_differ_where_it_matters() {
+        let look = |values: &[(&str, f32)]| {
+            let mut observation = Observation::zeros();
+            for (name, value) in values {
+                match variable(name).unwrap() {
+                    at if at < STATE_LEN => observation.state[at] = *value,
+                    at => observation.beyond[at - STATE_LEN] = *value,
+                }
+            }
+            observation
+        };
+        let most = look(&[("speed", 50.0), ("junctionAhead", 100.0), ("nearestAhead", -5.0), ("fog", 1.0)]);
+        assert_eq!(situation(&most) as usize, SITUATIONS - 1);
+        let far = look(&[("nearestAhead", 100.0)]);
+        let kinds = [&[][..], &[("speed", 6.0)], &[("wetness", 1.0)], &[("junctionAhead", 20.0)]];
+        for kind in &kinds[1..] {
+            assert_ne!(situation(&look(kind)), situation(&look(&[])));
+        }
+        assert_eq!(situation(&far), 0);
+        assert_ne!(cell(&look(&[("routeLeft", 100.0)])), cell(&look(&[("routeLeft", 130.0)])));
+        assert_eq!(cell(&look(&[("routeLeft", 101.0)])), cell(&look(&[("routeLeft", 109.0)])));
+    }
+}

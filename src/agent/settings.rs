@@ -1,0 +1,138 @@
+//! Settings of any agent that is trained, and how to come by the agent from them.
+
+use std::sync::Arc;
+
+use serde::de::DeserializeOwned;
+
+use crate::mdp::ProcKind;
+use crate::mdp::RewardSettings;
+
+use super::hyperparameters::Hyperparameters;
+use super::hyperparameters::RewardSource;
+use super::hyperparameters::SettingsError;
+use super::learner::Learner;
+use super::q_policy::Rows;
+use super::registry::Entry;
+use super::registry::Kind;
+use super::search::AvFuzzer;
+use super::search::AvFuzzerSettings;
+use super::search::GoExplore;
+use super::search::GoExploreSettings;
+use super::trainable::Trainable;
+
+/// All settings of one agent; which agent is told by their names.
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(untagged)]
+pub enum Settings {
+    Learning(Box<Hyperparameters>),
+    AvFuzzer(AvFuzzerSettings),
+    GoExplore(GoExploreSettings),
+}
+
+impl Settings {
+    /// The settings of an agent, as a YAML text changes them; `None` if it has nothing to learn.
+    ///
+    /// # Errors
+    /// A preset of an agent that has none, and as [`Hyperparameters::from_yaml`].
+    pub fn from_yaml(
+        entry: &Entry,
+        preset: Option<&str>,
+        text: &str,
+    ) -> Option<Result<Settings, SettingsError>> {
+        let default = match entry.kind {
+            Kind::Ready(_) => return None,
+            Kind::Learning(presets) => {
+                return Some(
+                    Hyperparameters::from_yaml(presets, preset, text).map(Box::new).map(Settings::Learning),
+                );
+            }
+            Kind::Searching(default) => default(),
+        };
+        Some(match preset {
+            Some(preset) => {
+                Err(SettingsError::Text(format!("no preset `{preset}`: `{}` has none", entry.name)))
+            }
+            None => default.changed(text),
+        })
+    }
+
+    /// The same search with what a text changes.
+    fn changed(self, text: &str) -> Result<Settings, SettingsError> {
+        fn read<T: DeserializeOwned + Default>(text: &str) -> Result<T, SettingsError> {
+            let read: Option<T> =
+                serde_yaml::from_str(text).map_err(|error| SettingsError::Text(error.to_string()))?;
+            Ok(read.unwrap_or_default())
+        }
+        let settings = match self {
+            Settings::Learning(_) => return Ok(self),
+            Settings::AvFuzzer(_) => Settings::AvFuzzer(read(text)?),
+            Settings::GoExplore(_) => Settings::GoExplore(read(text)?),
+        };
+        match &settings {
+            Settings::Learning(_) => {}
+            Settings::AvFuzzer(search) => search.check()?,
+            Settings::GoExplore(search) => search.check()?,
+        }
+        Ok(settings)
+    }
+
+    /// An agent that knows nothing yet.
+    pub fn build(&self, rows: Arc<Rows>, seed: u64) -> Box<dyn Trainable> {
+        match self {
+            Settings::Learning(settings) => {
+                Box::new(Learner::new(Arc::new(Hyperparameters::clone(settings)), rows, seed))
+            }
+            Settings::AvFuzzer(settings) => Box::new(AvFuzzer::new(settings, rows.allowed.len())),
+            Settings::GoExplore(settings) => Box::new(GoExplore::new(settings, rows.allowed.len())),
+        }
+    }
+
+    /// The agent that was saved; `None` if the bytes are not those of an agent with such settings.
+    pub fn restore(&self, rows: Arc<Rows>, bytes: &[u8]) -> Option<Box<dyn Trainable>> {
+        Some(match self {
+            Settings::Learning(settings) => {
+                Box::new(Learner::restore(Arc::new(Hyperparameters::clone(settings)), rows, bytes)?)
+            }
+            Settings::AvFuzzer(settings) => Box::new(AvFuzzer::restore(settings, rows.allowed.len(), bytes)?),
+            Settings::GoExplore(settings) => {
+                Box::new(GoExplore::restore(settings, rows.allowed.len(), bytes)?)
+            }
+        })
+    }
+
+    /// Settings of a learner, if it is one.
+    pub fn hyperparameters(&self) -> Option<&Hyperparameters> {
+        match self {
+            Settings::Learning(settings) => Some(settings.as_ref()),
+            Settings::AvFuzzer(_) | Settings::GoExplore(_) => None,
+        }
+    }
+
+    /// What the settings began as.
+    pub fn preset(&self) -> &str {
+        self.hyperparameters().map_or("search", |settings| &settings.preset)
+    }
+
+    /// Names of the actions and groups that it may choose from; empty: all.
+    pub fn actions(&self) -> &[String] {
+        self.hyperparameters().map_or(&[], |settings| &settings.actions)
+    }
+
+    /// Observation period in place of the space's own, s.
+    pub fn observation_period_s(&self) -> Option<f64> {
+        self.hyperparameters().and_then(|settings| settings.observation_period_s)
+    }
+
+    /// How collision probabilities are reckoned.
+    pub fn proc(&self) -> ProcKind {
+        self.hyperparameters().map_or(ProcKind::Avastra, |settings| settings.proc)
+    }
+
+    /// Constants of the reward; `None`: the space's own. Searches are not paid by it, but show it.
+    pub fn reward(&self) -> Option<RewardSettings> {
+        match self.hyperparameters() {
+            Some(settings) if settings.reward == RewardSource::Equation => Some(settings.reward_settings()),
+            _ => None,
+        }
+    }
+}

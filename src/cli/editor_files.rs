@@ -1,0 +1,20 @@
+//! `avastra editor-files`: the parts of the VS Code extension that follow from the language.
+
+use super::arguments::EditorFilesArguments;
+use super::error::Failure;
+use super::lsp::editor_files::files;
+use super::output::Output;
+use super::run_directory::write;
+
+/// Writes the files, in place of older ones.
+pub fn editor_files(output: &Output, arguments: &EditorFilesArguments) -> Result<(), Failure> {
+    let mut paths = Vec::new();
+    for (name, text) in files() {
+        let path = arguments.directory.join(name);
+        write(&path, &text)?;
+        output.tell(&path.display().to_string());
+        paths.push(path);
+    }
+    output.result("editor-files", serde_json::json!({ "files": paths }));
+    Ok(())
+}

@@ -1,0 +1,138 @@
+//! Mistakes and quick fixes, as an editor takes them.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::path::PathBuf;
+
+use serde_json::Value;
+use serde_json::json;
+
+use crate::model;
+use crate::syntax::Diagnostic;
+use crate::syntax::Severity;
+use crate::syntax::ast::FileId;
+use crate::syntax::ast::Span;
+
+use super::workspace::Analysis;
+use super::workspace::Workspace;
+
+/// The mistakes of all open documents and of what they use, by file. Every open document has an
+/// entry.
+pub fn all(workspace: &mut Workspace) -> BTreeMap<PathBuf, Vec<Value>> {
+    let paths = workspace.paths();
+    let mut found: BTreeMap<PathBuf, Vec<Value>> =
+        paths.iter().map(|path| (path.clone(), Vec::new())).collect();
+    for path in &paths {
+        workspace.analysis(path);
+    }
+    for path in &paths {
+        let Some(analysis) = workspace.known(path) else { continue };
+        for diagnostic in analysis.loaded.diagnostics.iter().chain(&analysis.loaded.remarks) {
+            let file = diagnostic.place().map_or(Analysis::ROOT, |place| place.file);
+            let of = analysis.path(file).unwrap_or(path);
+            let shown = to_json(diagnostic, analysis, workspace);
+            // A mistake in a file that several documents use is shown once.
+            let list = found.entry(of.to_owned()).or_default();
+            if !list.contains(&shown) {
+                list.push(shown);
+            }
+        }
+    }
+    found
+}
+
+fn to_json(diagnostic: &Diagnostic, analysis: &Analysis, workspace: &Workspace) -> Value {
+    let severity = match diagnostic.severity {
+        Severity::Error => 1,
+        Severity::Warning => 2,
+        // A hint: what asks for no change should not look like a mistake.
+        Severity::Note => 4,
+    };
+    let place = diagnostic.place().unwrap_or(Span::NONE);
+    let mut message = diagnostic.message.clone();
+    let mut add = |before: &str, text: &str| {
+        if !text.is_empty() {
+            message.push('\n');
+            message.push_str(before);
+            message.push_str(text);
+        }
+    };
+    let said = diagnostic.labels.iter().find(|label| label.span == place);
+    add("", said.map_or("", |label| &label.text));
+    diagnostic.notes.iter().for_each(|note| add("note: ", note));
+    add("help: ", diagnostic.help.as_deref().unwrap_or_default());
+    let related: Vec<Value> = diagnostic
+        .labels
+        .iter()
+        .filter(|label| Some(*label) != said)
+        .filter_map(|label| {
+            let location = location(label.span, analysis, workspace)?;
+            let text = if label.text.is_empty() { "here" } else { &label.text };
+            Some(json!({ "location": location, "message": text }))
+        })
+        .collect();
+    let mut shown = json!({
+        "range": analysis.range(place),
+        "severity": severity,
+        "code": diagnostic.code,
+        "source": "avastra",
+        "message": message,
+        "relatedInformation": related,
+    });
+    if diagnostic.code == model::code::UNUSED {
+        // 1: unnecessary. Editors fade it.
+        shown["tags"] = json!([1]);
+    }
+    shown
+}
+
+/// Where a span is, for the editor; `None` if it lies nowhere.
+pub fn location(span: Span, analysis: &Analysis, workspace: &Workspace) -> Option<Value> {
+    let path = analysis.path(span.file)?;
+    Some(json!({ "uri": workspace.uri(path), "range": analysis.range(span) }))
+}
+
+/// The changes that mistakes between two bytes of the document offer.
+pub fn fixes(analysis: &Analysis, workspace: &Workspace, from: usize, to: usize) -> Vec<Value> {
+    let touches = |diagnostic: &&Diagnostic| {
+        let of_root = diagnostic.labels.iter().filter(|label| label.span.file == Analysis::ROOT);
+        of_root.clone().any(|label| label.span.start <= to && from <= label.span.end)
+    };
+    let mut actions = Vec::new();
+    for diagnostic in analysis.loaded.diagnostics.iter().filter(touches) {
+        let shown = to_json(diagnostic, analysis, workspace);
+        for fix in &diagnostic.fixes {
+            let edits = fix.edits.iter().map(|edit| (edit.span, edit.text.as_str()));
+            let Some(edit) = edit(edits, analysis, workspace) else { continue };
+            actions.push(json!({
+                "title": fix.title,
+                "kind": "quickfix",
+                "diagnostics": [shown],
+                "isPreferred": diagnostic.fixes.len() == 1,
+                "edit": edit,
+            }));
+        }
+    }
+    actions
+}
+
+/// Changes of several files, as an editor takes them; `None` if one of them lies nowhere.
+pub fn edit<'a>(
+    edits: impl Iterator<Item = (Span, &'a str)>,
+    analysis: &Analysis,
+    workspace: &Workspace,
+) -> Option<Value> {
+    let mut changes: BTreeMap<String, Vec<Value>> = BTreeMap::new();
+    for (span, text) in edits {
+        let path = analysis.path(span.file)?;
+        let edit = json!({ "range": analysis.range(span), "newText": text });
+        changes.entry(workspace.uri(path)).or_default().push(edit);
+    }
+    Some(json!({ "changes": changes }))
+}
+
+/// The file of an analysis with that path.
+pub fn file_of(analysis: &Analysis, path: &Path) -> Option<FileId> {
+    let index = analysis.loaded.files.iter().position(|file| file.path == path)?;
+    u32::try_from(index).ok().map(FileId)
+}

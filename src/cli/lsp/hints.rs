@@ -1,0 +1,69 @@
+//! What the compiler knows and the text does not say: the rows of an action behind its name, and what
+//! the rules leave of a drawn range behind it.
+//!
+//! Only while the space is sound: numbers of rows that have moved would mislead.
+
+use serde_json::Value;
+use serde_json::json;
+
+use crate::cli::doc::range_on;
+use crate::cli::doc::unit;
+use crate::model::Domain;
+use crate::model::Interval;
+use crate::model::Space;
+use crate::syntax::ast::Action;
+use crate::syntax::ast::ActionParam;
+use crate::syntax::ast::ItemKind;
+use crate::syntax::ast::ParamMode;
+
+use super::hover::find_action;
+use super::hover::row_numbers;
+use super::workspace::Analysis;
+
+/// The hints between two bytes of the document.
+pub fn hints(analysis: &Analysis, from: usize, to: usize) -> Vec<Value> {
+    let Some(space) = analysis.space().filter(|_| analysis.is_sound()) else { return Vec::new() };
+    let mut found = Vec::new();
+    for item in &analysis.loaded.files[0].tree.items {
+        let ItemKind::Action(action) = item.kind.plain() else { continue };
+        if item.span.end < from || to < item.span.start {
+            continue;
+        }
+        let Some((index, _)) = find_action(space, &action.name.text) else { continue };
+        found.push(hint(
+            analysis,
+            action.name.span.end,
+            &row_numbers(space, index),
+            "rows of the action table",
+        ));
+        let drawn = action.params.iter().filter(|param| param.mode == ParamMode::Any);
+        found.extend(drawn.filter_map(|param| range(analysis, space, action, param)));
+    }
+    found
+}
+
+/// What all roads together leave of a range, if it is less than what is written; road by road in the
+/// tooltip.
+fn range(analysis: &Analysis, space: &Space, action: &Action, param: &ActionParam) -> Option<Value> {
+    let (index, of) = find_action(space, &action.name.text)?;
+    let of = of.parameters.iter().find(|parameter| *parameter.name == *param.name.text)?;
+    let Domain::Range(low, high) = &of.domain else { return None };
+    let unit = unit(of.ty);
+    let roads = space.roads.iter().enumerate();
+    let left: Vec<(&str, Interval)> = roads
+        .filter_map(|(road, known)| Some((known.name.as_str(), range_on(space, index, of, road)?)))
+        .collect();
+    let all = left.iter().map(|(_, interval)| *interval).reduce(|all, interval| all.hull(&interval))?;
+    if left.iter().all(|(_, interval)| *interval == Interval::closed(*low, *high)) {
+        return None;
+    }
+    let tooltip: Vec<String> = left.iter().map(|(road, left)| format!("{road}: {left} {unit}")).collect();
+    let tooltip = format!("after the rules\n{}", tooltip.join("\n"));
+    Some(hint(analysis, param.span.end, &format!("{all} {unit}"), &tooltip))
+}
+
+fn hint(analysis: &Analysis, byte: usize, label: &str, tooltip: &str) -> Value {
+    let text = analysis.text(Analysis::ROOT);
+    let place = analysis.lines(Analysis::ROOT).map(|lines| lines.to_json(text, byte));
+    json!({ "position": place, "label": label, "tooltip": tooltip, "paddingLeft": true })
+}

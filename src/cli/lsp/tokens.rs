@@ -1,0 +1,113 @@
+//! A text cut into words and marks, for what must be told from unfinished text, where no tree is.
+//!
+//! Texts and comments are skipped by the rules of the grammar. Units are not put together: `m/s` is
+//! three tokens.
+
+/// A word, a number, a text or a mark.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Token<'a> {
+    pub start: usize,
+    pub text: &'a str,
+}
+
+impl Token<'_> {
+    pub fn is_word(&self) -> bool {
+        self.text.starts_with(|first: char| first.is_ascii_alphabetic() || first == '_')
+    }
+
+    pub fn is_number(&self) -> bool {
+        self.text.starts_with(|first: char| first.is_ascii_digit())
+    }
+
+    pub fn end(&self) -> usize {
+        self.start + self.text.len()
+    }
+}
+
+/// The tokens of a text, and what it ends in.
+pub fn tokens(text: &str) -> (Vec<Token<'_>>, Ending) {
+    let mut found = Vec::new();
+    let mut at = 0;
+    while let Some(first) = text[at..].chars().next() {
+        let rest = &text[at..];
+        let len = if rest.starts_with("//") {
+            let Some(newline) = rest.find('\n') else { return (found, Ending::Comment) };
+            at += newline;
+            continue;
+        } else if first == '"' {
+            match end_of_text(rest) {
+                Some(len) => len,
+                None if rest.contains('\n') => 1,
+                None => return (found, Ending::Text(at + 1)),
+            }
+        } else if is_word(first) {
+            rest.find(|next: char| !is_word(next)).unwrap_or(rest.len())
+        } else if first.is_whitespace() {
+            at += first.len_utf8();
+            continue;
+        } else {
+            let marks = ["->", "=>", "==", "!=", "<=", ">=", ".."];
+            marks.iter().find(|mark| rest.starts_with(**mark)).map_or(first.len_utf8(), |mark| mark.len())
+        };
+        found.push(Token { start: at, text: &rest[..len] });
+        at += len;
+    }
+    (found, Ending::Code)
+}
+
+/// Where a text breaks off.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Ending {
+    Code,
+    Comment,
+    /// Within a text literal, which begins at this byte.
+    Text(usize),
+}
+
+/// The word around a byte, or before it, and where it begins; none in a comment.
+pub fn word_at(text: &str, byte: usize) -> Option<(usize, &str)> {
+    let line_start = text[..byte.min(text.len())].rfind('\n').map_or(0, |newline| newline + 1);
+    let line_end = text[line_start..].find('\n').map_or(text.len(), |newline| line_start + newline);
+    let (tokens, _) = tokens(&text[line_start..line_end]);
+    let around = |token: &&Token<'_>| line_start + token.start <= byte && byte <= line_start + token.end();
+    let token = tokens.iter().filter(|token| token.is_word()).find(around)?;
+    Some((line_start + token.start, token.text))
+}
+
+fn is_word(character: char) -> bool {
+    character.is_ascii_alphanumeric() || character == '_'
+}
+
+/// Length of the literal at the beginning of a text, quotes included; `None` if it does not end on its
+/// line.
+fn end_of_text(text: &str) -> Option<usize> {
+    let mut escaped = false;
+    for (at, character) in text.char_indices().skip(1) {
+        match character {
+            '\n' => return None,
+            _ if escaped => escaped = false,
+            '\\' => escaped = true,
+            '"' => return Some(at + 1),
+            _ => {}
+        }
+    }
+    None
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn words_marks_and_endings() {
+        let words = |text| tokens(text).0.iter().map(|token| token.text).collect::<Vec<_>>();
+        assert_eq!(
+            words("a->b // c\n\"x \\\" y\"<=12 m/s"),
+            ["a", "->", "b", "\"x \\\" y\"", "<=", "12", "m", "/", "s"]
+        );
+        assert_eq!(tokens("use \"ro").1, Ending::Text(5));
+        assert_eq!(tokens("a // b").1, Ending::Comment);
+        assert_eq!(word_at("set time = to", 5), Some((4, "time")));
+        assert_eq!(word_at("// set", 4), None);
+    }
+}

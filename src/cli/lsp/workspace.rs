@@ -1,0 +1,192 @@
+//! What the editor has open, and what is known of it.
+//!
+//! Every open document is the root of a load, with all that it uses: as `avastra check` would read it,
+//! but what is open is read from the editor. A load is done again only when one of the files that it
+//! read has changed; maps are understood once for each content.
+
+use std::cell::RefCell;
+use std::collections::BTreeMap;
+use std::collections::BTreeSet;
+use std::path::Path;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use crate::cli::load;
+use crate::model;
+use crate::model::Loaded;
+use crate::model::MapCache;
+use crate::model::ReadError;
+use crate::model::Space;
+use crate::syntax::Diagnostic;
+use crate::syntax::ast::FileId;
+use crate::syntax::ast::Span;
+
+use super::names::Names;
+use super::position::Lines;
+use super::uri;
+
+/// A text in the editor.
+#[derive(Debug, Clone)]
+pub struct Document {
+    /// As the editor spells it.
+    pub uri: String,
+    pub version: i64,
+    pub text: String,
+}
+
+/// A document with all that it uses.
+#[derive(Debug)]
+pub struct Analysis {
+    pub loaded: Loaded,
+    pub names: Names,
+    /// By [`FileId`].
+    lines: Vec<Lines>,
+    /// Every file that was asked for, maps and absent ones included.
+    inputs: BTreeSet<PathBuf>,
+    /// The space as it was when it was last sound.
+    sound: Option<Arc<Space>>,
+    /// Whether an input has changed since.
+    stale: bool,
+}
+
+#[derive(Debug, Default)]
+pub struct Workspace {
+    documents: BTreeMap<PathBuf, Document>,
+    analyses: BTreeMap<PathBuf, Analysis>,
+    maps: MapCache,
+}
+
+impl Workspace {
+    pub fn open(&mut self, path: PathBuf, document: Document) {
+        self.changed(&path);
+        self.documents.insert(path, document);
+    }
+
+    pub fn close(&mut self, path: &Path) {
+        self.documents.remove(path);
+        self.analyses.remove(path);
+        self.changed(path);
+    }
+
+    /// Notes that a file is not what it was.
+    pub fn changed(&mut self, path: &Path) {
+        for analysis in self.analyses.values_mut().filter(|analysis| analysis.inputs.contains(path)) {
+            analysis.stale = true;
+        }
+    }
+
+    pub fn document(&self, path: &Path) -> Option<&Document> {
+        self.documents.get(path)
+    }
+
+    /// Every open document.
+    pub fn paths(&self) -> Vec<PathBuf> {
+        self.documents.keys().cloned().collect()
+    }
+
+    /// The name by which the editor knows a file.
+    pub fn uri(&self, path: &Path) -> String {
+        self.documents.get(path).map_or_else(|| uri::from_path(path), |document| document.uri.clone())
+    }
+
+    /// What is known of an open document, up to date.
+    pub fn analysis(&mut self, path: &Path) -> Option<&Analysis> {
+        if self.analyses.get(path).is_none_or(|known| known.stale) {
+            let before = self.analyses.remove(path).and_then(|known| known.sound);
+            let mut analysis = self.analyse(path)?;
+            analysis.sound = analysis.loaded.space.clone().or(before);
+            self.analyses.insert(path.to_owned(), analysis);
+        }
+        self.analyses.get(path)
+    }
+
+    /// The same, of a document whose analysis is known to be up to date.
+    pub fn known(&self, path: &Path) -> Option<&Analysis> {
+        self.analyses.get(path)
+    }
+
+    fn analyse(&mut self, path: &Path) -> Option<Analysis> {
+        let documents = &self.documents;
+        documents.get(path)?;
+        let inputs = RefCell::new(BTreeSet::new());
+        let read = |path: &Path| {
+            inputs.borrow_mut().insert(path.to_owned());
+            read(documents, path)
+        };
+        let mut loaded = model::load_with(path, &read, &mut self.maps).ok()?;
+        let is_unknown = |found: &Diagnostic| found.is_error() && found.code == model::code::UNKNOWN;
+        if loaded.diagnostics.iter().any(is_unknown) {
+            model::suggest_uses(&mut loaded, &load::nearby(path));
+        }
+        let names = Names::new(&loaded.files, &loaded.sources);
+        let ids = 0..u32::try_from(loaded.files.len()).expect("a file's id is its position");
+        let lines = ids.map(|id| Lines::new(loaded.sources.text(FileId(id)))).collect();
+        let inputs = inputs.into_inner();
+        Some(Analysis { loaded, names, lines, inputs, sound: None, stale: false })
+    }
+
+    /// The mistakes of a document with other texts in place of some, and nothing kept: how many errors
+    /// there are, and the first of them.
+    pub fn trial(&mut self, path: &Path, texts: &BTreeMap<PathBuf, String>) -> (usize, Option<Diagnostic>) {
+        let documents = &self.documents;
+        let read = |path: &Path| match texts.get(path) {
+            Some(text) => Ok(text.clone()),
+            None => read(documents, path),
+        };
+        let Ok(loaded) = model::load_with(path, &read, &mut self.maps) else { return (0, None) };
+        let errors: Vec<Diagnostic> = loaded.diagnostics.into_iter().filter(Diagnostic::is_error).collect();
+        (errors.len(), errors.into_iter().next())
+    }
+}
+
+/// A text from the editor, else from the disk.
+fn read(documents: &BTreeMap<PathBuf, Document>, path: &Path) -> Result<String, ReadError> {
+    match documents.get(path) {
+        Some(document) => Ok(document.text.clone()),
+        None => load::read(path),
+    }
+}
+
+impl Analysis {
+    /// The document itself.
+    pub const ROOT: FileId = FileId(0);
+
+    pub fn text(&self, file: FileId) -> &str {
+        self.loaded.sources.text(file)
+    }
+
+    /// The text of a span; empty if it lies nowhere.
+    pub fn slice(&self, span: Span) -> &str {
+        self.text(span.file).get(span.start..span.end).unwrap_or_default()
+    }
+
+    pub fn path(&self, file: FileId) -> Option<&Path> {
+        self.loaded.files.get(file.0 as usize).map(|file| file.path.as_path())
+    }
+
+    pub fn lines(&self, file: FileId) -> Option<&Lines> {
+        self.lines.get(file.0 as usize)
+    }
+
+    /// The range of a span, in JSON.
+    pub fn range(&self, span: Span) -> serde_json::Value {
+        match self.lines(span.file) {
+            Some(lines) => lines.range(self.text(span.file), span),
+            None => Lines::new("").range("", Span::NONE),
+        }
+    }
+
+    /// The byte of the document at a place in the editor.
+    pub fn byte(&self, line: usize, column: usize) -> usize {
+        self.lines[0].byte(self.text(Analysis::ROOT), line, column)
+    }
+
+    /// The space; while the files are broken, as it was when it was last sound.
+    pub fn space(&self) -> Option<&Space> {
+        self.sound.as_deref()
+    }
+
+    pub fn is_sound(&self) -> bool {
+        self.loaded.space.is_some()
+    }
+}

@@ -1,0 +1,175 @@
+//! `avastra study`: agents compared, with statistics.
+
+use std::path::Path;
+use std::sync::atomic::Ordering;
+use std::time::Instant;
+
+use crate::report;
+use crate::sim::ENGINE;
+use crate::study::CellRecord;
+use crate::study::Event;
+use crate::study::Profile;
+use crate::study::Spent;
+use crate::study::Study;
+use crate::study::StudyDatabase;
+use crate::study::StudyFile;
+use crate::study::StudyResults;
+use crate::study::StudySettings;
+use crate::study::driving_system;
+use crate::study::play_jobs;
+
+use super::arguments::StudyArguments;
+use super::error::Failure;
+use super::load;
+use super::output::Output;
+use super::progress::Progress;
+use super::progress::plural;
+use super::run::VERSION;
+use super::run::jobs;
+use super::run::stop_on_interrupt;
+use super::run_directory;
+use super::run_directory::Begun;
+use super::run_directory::write;
+
+/// Plays what a study still lacks and prints its result.
+pub fn study(output: &Output, arguments: &StudyArguments) -> Result<(), Failure> {
+    let (study, path) = match &arguments.resume {
+        Some(path) => (resumed(output, path)?, path.clone()),
+        None => {
+            let file = arguments.file.as_ref().expect("clap asks for it where there is no `--resume`");
+            let study = begun(output, file, arguments.quick)?;
+            let path = run_directory::create_empty(arguments.out.as_deref())?;
+            let space = load::relative(&path, &study.table().space().path)?;
+            let settings = StudySettings { space, ..study.settings().clone() };
+            let text = serde_yaml::to_string(&settings).expect("settings are plain strings and numbers");
+            write(&path.join("study.yaml"), &text)?;
+            (study, path)
+        }
+    };
+    let stop = stop_on_interrupt()?;
+    let file = path.join("study.db");
+    let mut database = StudyDatabase::open(&file).map_err(|error| Failure::file("open", &file, error))?;
+    let todo = database.missing(&study).map_err(|error| Failure::file("read", &file, error))?;
+    output.tell(&heading(&study, &path));
+
+    let episodes = |jobs: &[_]| jobs.iter().map(|job| study.episodes(job)).sum::<u64>();
+    let (all, left) = (episodes(&study.jobs()), episodes(&todo));
+    let mut progress = Progress::new(all, all - left, output.quiet || output.is_json());
+    play_jobs(&study, &todo, jobs(arguments.jobs), &stop, &spent, &mut |event| match event {
+        Event::Episode { counted } => {
+            progress.episode(counted);
+            Ok(())
+        }
+        Event::Done(cells) => database.add(&cells).map_err(|error| Failure::file("write", &file, error)),
+    })?;
+    drop(progress);
+
+    let cells = database.cells().map_err(|error| Failure::file("read", &file, error))?;
+    let results = StudyResults::new(study.settings(), &cells);
+    let text = serde_json::to_string_pretty(&results).expect("results have string keys only");
+    write(&path.join("results.json"), &format!("{text}\n"))?;
+    output.say(&report::study(&results));
+    let timing = timing(&cells);
+    output.say(&timing_text(&path, &timing));
+    output.result("study", serde_json::json!({ "directory": path, "results": results, "timing": timing }));
+    if stop.load(Ordering::Relaxed) && results.cells < results.cells_wanted {
+        return Err(Failure::Interrupted { command: "study", directory: path });
+    }
+    Ok(())
+}
+
+/// A new study, from its file.
+fn begun(output: &Output, path: &Path, quick: bool) -> Result<Study, Failure> {
+    let refuse = |reason: String| Failure::file("use", path, reason);
+    let text = load::read(path).map_err(|error| Failure::file("read", path, error))?;
+    let file = StudyFile::from_yaml(&text).map_err(refuse)?;
+    let beside = |name: &str| path.parent().unwrap_or(Path::new("")).join(name);
+    let table = load::table(output, &beside(&file.space))?;
+    let profile = match &file.ads_config {
+        Some(name) => Some(load::profile(&beside(name))?),
+        None => driving_system(&file.ads).ok().and_then(|ads| ads.profile().copied()),
+    };
+    let profile = profile.as_ref().map(Profile::new);
+    let read = |name: &str| load::read(&beside(name)).map_err(|error| error.to_string());
+    let settings = StudySettings::new(file, &table, profile, (VERSION, ENGINE), &read);
+    let settings = settings.map_err(|error| refuse(error.to_string()))?;
+    let settings = if quick { settings.quick() } else { settings };
+    Study::new(table, settings).map_err(|error| refuse(error.to_string()))
+}
+
+/// The rest of an interrupted study.
+fn resumed(output: &Output, path: &Path) -> Result<Study, Failure> {
+    let settings: StudySettings = run_directory::settings_in(path, "study.yaml", "study")?;
+    let begun =
+        Begun { avastra: &settings.avastra, engine: &settings.engine, space_digest: &settings.space_digest };
+    let table = begun.table(output, "study", &path.join(&settings.space))?;
+    Study::new(table, settings).map_err(|error| Failure::usage(error.to_string()))
+}
+
+fn heading(study: &Study, directory: &Path) -> String {
+    let settings = study.settings();
+    let labels: Vec<&str> = settings.agents.iter().map(|agent| agent.label.as_str()).collect();
+    format!(
+        "{}: {} against {} on {}, {} a seed, {}, first seed {}, into {}",
+        study.table().space().path.display(),
+        labels.join(", "),
+        settings.ads,
+        settings.roads.join(", "),
+        plural(settings.evaluation.episodes as usize, "episode"),
+        plural(settings.evaluation.seeds as usize, "seed"),
+        settings.first_seed,
+        directory.display()
+    )
+}
+
+/// What the thread that asks has spent so far.
+fn spent() -> Spent {
+    #[allow(
+        clippy::disallowed_methods,
+        reason = "this is cli, and the time goes nowhere but beside the result"
+    )]
+    let now = Instant::now();
+    // Linux keeps the nanoseconds that a thread was on a processor in the first word of this file.
+    let schedule = std::fs::read_to_string("/proc/thread-self/schedstat").ok();
+    let on_cpu_ns = schedule.and_then(|text| text.split(' ').next()?.parse::<f64>().ok());
+    Spent { wall_s: now.duration_since(*BEGAN).as_secs_f64(), cpu_s: on_cpu_ns.map(|ns| ns / 1e9) }
+}
+
+#[allow(clippy::disallowed_methods, reason = "as above")]
+static BEGAN: std::sync::LazyLock<Instant> = std::sync::LazyLock::new(Instant::now);
+
+/// What an agent's cells took on average.
+#[derive(serde::Serialize)]
+struct Timing {
+    agent: String,
+    cells: usize,
+    wall_s: f64,
+    cpu_s: Option<f64>,
+}
+
+fn timing(cells: &[CellRecord]) -> Vec<Timing> {
+    let mut labels: Vec<&str> = cells.iter().map(|cell| cell.agent.as_str()).collect();
+    labels.sort_unstable();
+    labels.dedup();
+    let of = |label: &str| {
+        let own: Vec<Spent> =
+            cells.iter().filter(|cell| cell.agent == label).map(|cell| cell.spent).collect();
+        let count = own.len() as f64;
+        Timing {
+            agent: label.to_owned(),
+            cells: own.len(),
+            wall_s: own.iter().map(|spent| spent.wall_s).sum::<f64>() / count,
+            cpu_s: own.iter().map(|spent| spent.cpu_s).sum::<Option<f64>>().map(|sum| sum / count),
+        }
+    };
+    labels.into_iter().map(of).collect()
+}
+
+fn timing_text(directory: &Path, timing: &[Timing]) -> String {
+    let mut text = format!("\nall figures: {}", directory.join("results.json").display());
+    for Timing { agent, cells, wall_s, cpu_s } in timing {
+        let cpu = cpu_s.map_or(String::new(), |cpu_s| format!(", {cpu_s:.1} s of a processor"));
+        text.push_str(&format!("\n{agent}: {} of {wall_s:.1} s{cpu} on average", plural(*cells, "cell")));
+    }
+    text
+}

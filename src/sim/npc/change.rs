@@ -1,0 +1,240 @@
+//! Lane changes of other drivers: what they plan, when they dare, and how they move over.
+//!
+//! A change is a smooth step from the way in one lane to that in another; its length depends on the speed and
+//! the distance. Markings hold for everybody, and nobody changes lanes inside a junction.
+
+use std::sync::Arc;
+
+use crate::geometry::Path;
+use crate::geometry::Pose;
+use crate::geometry::SMOOTH_STEP_SLOPE_MAX;
+use crate::geometry::SmoothStep;
+use crate::geometry::Vec2;
+use crate::geometry::smooth_step;
+use crate::geometry::wrap_angle;
+use crate::model::vocabulary::Side;
+use crate::road;
+use crate::road::LaneIndex;
+use crate::road::Neighbour;
+
+use crate::sim::body::BodyParameters;
+use crate::sim::mover::Around;
+use crate::sim::mover::Moved;
+use crate::sim::way::Way;
+use crate::sim::way::beside;
+use crate::sim::world::DT_S;
+use crate::sim::world::Obstacle;
+
+use super::driver::Driver;
+use super::driver::SIDE_ROOM_M;
+use super::driver::along;
+use super::driver::extent_m;
+/// Room in front of and behind them that they want before changing lanes, m.
+const MIRROR_ROOM_M: f64 = 2.0;
+/// Highest lateral speed of a lane change, m/s: bound of a cut-in in UN R157.
+const CHANGE_MPS_MAX: f64 = 1.8;
+/// A lane change takes at least this long, s.
+const CHANGE_S_MIN: f64 = 2.0;
+/// Below this speed a lane change slows down with the vehicle, which cannot slide sideways, m/s.
+const CHANGE_FULL_MPS: f64 = 5.0;
+/// Neighbouring lanes whose centres are farther apart have parted, m.
+const CHANGE_M_MAX: f64 = 8.0;
+
+/// A lane change that waits for its occasion.
+#[derive(Debug, Clone)]
+pub(in crate::sim) struct Manoeuvre {
+    pub when: When,
+    pub towards: Towards,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(in crate::sim) enum When {
+    /// From this tick on.
+    Tick(u64),
+    /// When its rear is this far in front of the ego vehicle's front, m.
+    AheadOfEgo(f64),
+}
+
+#[derive(Debug, Clone)]
+pub(in crate::sim) enum Towards {
+    To(Side),
+    /// Left if that lane is there and free, else right.
+    Either,
+    /// Against the change before.
+    Back,
+    Way(Arc<Way>),
+}
+
+/// A lane change under way.
+#[derive(Debug, Clone)]
+pub(super) struct Change {
+    pub to: Arc<Way>,
+    pub to_station_m: f64,
+    /// In `[0, 1)`.
+    pub progress: f64,
+    pub duration_s: f64,
+}
+
+impl Driver {
+    /// Begins the next lane change of the plan if it is due, there is a lane, and it is free.
+    pub(super) fn begin_change(&mut self, this: &Obstacle, size: &BodyParameters, around: &Around) {
+        let Some(next) = self.plan.last() else { return };
+        let due = match next.when {
+            When::Tick(tick) => around.tick >= tick,
+            When::AheadOfEgo(gap_m) => {
+                let ahead_m = around.ego_outline.pose.to_local(this.outline.pose.position).x;
+                ahead_m - size.length_m / 2.0 - around.ego_outline.half_length_m >= gap_m
+            }
+        };
+        if !due {
+            return;
+        }
+        let begun = match next.towards.clone() {
+            Towards::Way(way) => {
+                let to_m = way.path.project(this.outline.pose.position).station_m;
+                Some((way, to_m, None))
+            }
+            Towards::To(side) => self.change_to(side, this, size, around),
+            Towards::Either => self
+                .change_to(Side::Left, this, size, around)
+                .or_else(|| self.change_to(Side::Right, this, size, around)),
+            Towards::Back => match self.last_change {
+                Some(Side::Left) => self.change_to(Side::Right, this, size, around),
+                Some(Side::Right) => self.change_to(Side::Left, this, size, around),
+                None => None,
+            },
+        };
+        let Some((to, to_station_m, side)) = begun else { return };
+        let aside_m = (to.path.pose_at(to_station_m).position - this.outline.pose.position).norm();
+        self.change =
+            Some(Change { to, to_station_m, progress: 0.0, duration_s: change_duration_s(aside_m) });
+        self.last_change = side;
+        self.plan.pop();
+    }
+
+    /// The way in the neighbouring lane, if there is one and room in it, and the own station there.
+    fn change_to(
+        &mut self,
+        side: Side,
+        this: &Obstacle,
+        size: &BodyParameters,
+        around: &Around,
+    ) -> Option<(Arc<Way>, f64, Option<Side>)> {
+        let map = &around.scene.map;
+        let (here, here_m) = self.way.lane_at(self.station_m);
+        let target = lane_beside(around, here, side)?;
+        let centre = &map.lane(target).centre;
+        let there = centre.project(this.outline.pose.position);
+        // Markings hold for everybody, and nobody changes lanes in a junction, where they part.
+        let room_m = map.change_room_m(here, on_road(side), here_m);
+        if there.distance_m > CHANGE_M_MAX
+            || room_m < change_length_m(self.speed_mps, there.distance_m)
+            || !self.is_free(centre, there.station_m, this, size, around)
+        {
+            return None;
+        }
+        let mut rng = self.draw(this.id, around);
+        let way = Way::along(around.scene, &[target], &mut rng)?;
+        Some((way, there.station_m, Some(side)))
+    }
+
+    /// Whether nobody is beside it in another lane, or so fast behind that a second would not do.
+    fn is_free(
+        &self,
+        path: &Path,
+        station_m: f64,
+        this: &Obstacle,
+        size: &BodyParameters,
+        around: &Around,
+    ) -> bool {
+        let here = path.pose_at(station_m);
+        let forward = here.forward();
+        around.others_along(this.id).all(|(outline, heading, velocity_mps)| {
+            let ahead_m = forward.dot(&(outline.pose.position - here.position));
+            let Some(other) = beside(path, outline.pose.position, station_m + ahead_m) else { return true };
+            let (half_length_m, half_width_m) = extent_m(outline, heading, other.forward);
+            let aside_m = other.offset_m.abs() - half_width_m - size.width_m / 2.0;
+            let apart_m = (other.station_m - station_m).abs() - half_length_m - size.length_m / 2.0;
+            let closing_mps = (velocity_mps.dot(&forward) - self.speed_mps)
+                * if other.station_m < station_m { 1.0 } else { -1.0 };
+            aside_m > SIDE_ROOM_M || apart_m > MIRROR_ROOM_M + closing_mps.max(0.0)
+        })
+    }
+
+    /// Moves the lane change on by a tick in which `way_m` were driven, from where it was `before`.
+    pub(super) fn advance_change(&mut self, way_m: f64, before: Vec2) -> Moved {
+        let from = self.way.path.pose_at(self.station_m);
+        let Some(change) = &mut self.change else {
+            return along(from, self.speed_mps);
+        };
+        let guess_m = change.to_station_m + way_m;
+        change.to_station_m =
+            beside(&change.to.path, from.position, guess_m).map_or(guess_m, |found| found.station_m);
+        let to = change.to.path.pose_at(change.to_station_m);
+        let progress_per_m = 1.0 / (self.speed_mps.max(CHANGE_FULL_MPS) * change.duration_s);
+        change.progress += progress_per_m * way_m;
+        if change.progress >= 1.0 {
+            (self.way, self.station_m) = (Arc::clone(&change.to), change.to_station_m);
+            (self.change, self.hold_m, self.insists_to_m) = (None, None, f64::NEG_INFINITY);
+            return Moved { velocity_mps: (to.position - before) / DT_S, ..along(to, self.speed_mps) };
+        }
+        let SmoothStep { value: blend, slope, .. } = smooth_step(change.progress);
+        let heading_rad = from.heading_rad + wrap_angle(to.heading_rad - from.heading_rad) * blend;
+        let turned_rad = libm::atan(from.to_local(to.position).y * slope * progress_per_m);
+        let pose = Pose {
+            position: from.position + (to.position - from.position) * blend,
+            heading_rad: wrap_angle(heading_rad + turned_rad),
+        };
+        // Measured, because between two lanes in a bend it is neither lane's speed.
+        let lane = if change.progress < 0.5 { from } else { to };
+        let velocity_mps = (pose.position - before) / DT_S;
+        Moved { pose, forward: pose.forward(), lane_heading_rad: lane.heading_rad, velocity_mps }
+    }
+}
+
+/// Whether the street on which a way is at a station, or the next one if it is in a junction, has room for
+/// a lane change to a side.
+pub(in crate::sim) fn can_change(
+    around: &Around,
+    way: &Way,
+    station_m: f64,
+    side: Side,
+    speed_mps: f64,
+) -> bool {
+    let map = &around.scene.map;
+    let in_junction = |lane: LaneIndex| map.lane(lane).junction.is_some();
+    let ahead = way.lanes_from(station_m).skip_while(|(lane, _)| in_junction(*lane));
+    ahead.take_while(|(lane, _)| !in_junction(*lane)).any(|(lane, at_m)| {
+        let Some(target) = lane_beside(around, lane, side) else { return false };
+        let here = map.lane(lane).centre.pose_at(at_m).position;
+        let length_m = change_length_m(speed_mps, map.lane(target).centre.project(here).distance_m);
+        map.changes_from_m(lane, on_road(side), at_m).iter().any(|(_, room_m)| *room_m >= length_m)
+    })
+}
+
+fn change_duration_s(aside_m: f64) -> f64 {
+    (SMOOTH_STEP_SLOPE_MAX * aside_m / CHANGE_MPS_MAX).max(CHANGE_S_MIN)
+}
+
+/// Way on which a lane change of so much to the side is done at a speed, m.
+fn change_length_m(speed_mps: f64, aside_m: f64) -> f64 {
+    speed_mps.max(CHANGE_FULL_MPS) * change_duration_s(aside_m)
+}
+
+fn on_road(side: Side) -> road::Side {
+    match side {
+        Side::Left => road::Side::Left,
+        Side::Right => road::Side::Right,
+    }
+}
+
+/// The same-direction lane on a side of a lane, if there is one and no median lies between.
+pub(in crate::sim) fn lane_beside(around: &Around, lane: LaneIndex, side: Side) -> Option<LaneIndex> {
+    let lane = around.scene.map.lane(lane);
+    let neighbour = match side {
+        Side::Left => lane.left,
+        Side::Right => lane.right,
+    };
+    let reachable = |neighbour: &Neighbour| neighbour.same_direction && neighbour.gap_m <= road::STRIP_M_MAX;
+    neighbour.filter(reachable).map(|neighbour| neighbour.lane)
+}

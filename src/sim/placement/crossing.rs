@@ -1,0 +1,178 @@
+//! Crossing traffic: a rendezvous with the ego vehicle at a conflict of its route, on a leg whose signal will be
+//! green.
+
+use crate::action::SpawnRequest;
+use crate::model::vocabulary::Side;
+use crate::model::vocabulary::Then;
+use crate::road::Conflict;
+use crate::road::LaneIndex;
+
+use crate::sim::body::BodyParameters;
+use crate::sim::ego::VehicleParameters;
+use crate::sim::mover::Around;
+use crate::sim::npc::Driver;
+use crate::sim::npc::Manoeuvre;
+use crate::sim::npc::Towards;
+use crate::sim::npc::When;
+use crate::sim::npc::can_change;
+use crate::sim::npc::choices;
+use crate::sim::npc::lane_beside;
+use crate::sim::sense::SignalColour;
+use crate::sim::way::Way;
+use crate::sim::world::DT_S;
+
+use super::commanded;
+
+/// How far beyond the asked distance a crossing may lie, m.
+const CROSSING_M: f64 = 60.0;
+/// How the ego vehicle is expected to gain speed on its way to a rendezvous, m/s²: ours, the comfort of most
+/// planners.
+const EGO_GAINS_MPS2: f64 = 1.5;
+/// How it is expected to take bends, m/s²: ours, the same.
+const EGO_LATERAL_MPS2: f64 = 2.0;
+/// A stop line so far behind a vehicle that appears counts as passed at that moment, m.
+const BEYOND_LINE_M: f64 = 30.0;
+/// Step in which a drive towards a rendezvous is timed, m.
+const TIMING_M: f64 = 1.0;
+
+pub(super) fn cross_road(
+    around: &Around,
+    request: &SpawnRequest,
+    size: &BodyParameters,
+    id: u32,
+) -> Result<Driver, String> {
+    let front_m = VehicleParameters::MKZ.front_m(around.ego_station_m);
+    let side = match request.side {
+        Side::Left => "left",
+        Side::Right => "right",
+    };
+    let mut reason = format!("no crossing leg from the {side} within {CROSSING_M} m");
+    for conflict in &around.scene.route.conflicts {
+        let distance_m = conflict.station_m - front_m;
+        let from_right = conflict.angle_rad > 0.0;
+        if !(request.distance_m..=request.distance_m + CROSSING_M).contains(&distance_m)
+            || from_right != (request.side == Side::Right)
+        {
+            continue;
+        }
+        match rendezvous(around, request, size, id, conflict, distance_m) {
+            Ok(driver) => return Ok(driver),
+            Err(why) => reason = why,
+        }
+    }
+    Err(reason)
+}
+
+/// Time until the ego vehicle's front is `distance_m` farther on, if nothing is in its way, s.
+fn arrival_s(around: &Around, distance_m: f64) -> f64 {
+    let (map, route) = (&around.scene.map, &around.scene.route);
+    let mut station_m = VehicleParameters::MKZ.front_m(around.ego_station_m);
+    let end_m = station_m + distance_m;
+    let (mut speed_mps, mut time_s) = (around.ego.speed_mps, 0.0);
+    while station_m < end_m {
+        let step_m = TIMING_M.min(end_m - station_m);
+        let gained_mps = (speed_mps * speed_mps + 2.0 * EGO_GAINS_MPS2 * step_m).sqrt();
+        let limit_mps = map.lane(route.lane_at(station_m).lane).speed_limit_mps;
+        let curvature_per_m = route.path.curvature_at(station_m).abs().max(1e-4);
+        let next_mps = gained_mps.min(limit_mps).min((EGO_LATERAL_MPS2 / curvature_per_m).sqrt());
+        time_s += 2.0 * step_m / (speed_mps + next_mps);
+        speed_mps = next_mps;
+        station_m += step_m;
+    }
+    time_s
+}
+
+/// A driver who reaches a conflict when the ego vehicle does, if nothing is in its way.
+fn rendezvous(
+    around: &Around,
+    request: &SpawnRequest,
+    size: &BodyParameters,
+    id: u32,
+    conflict: &Conflict,
+    distance_m: f64,
+) -> Result<Driver, String> {
+    let map = &around.scene.map;
+    let arrival_s = arrival_s(around, distance_m);
+    let needed_m = request.speed_mps * arrival_s + size.length_m;
+    let mut lanes = vec![conflict.lane];
+    let mut upstream_m = conflict.lane_station_m;
+    let on_route = |lane: LaneIndex| around.scene.route.lanes.iter().any(|part| part.lane == lane);
+    while upstream_m < needed_m {
+        let before = &map.lane(lanes[0]).predecessors;
+        let Some(previous) = before.iter().copied().find(|lane| !on_route(*lane)) else { break };
+        upstream_m += map.lane(previous).centre.length_m();
+        lanes.insert(0, previous);
+    }
+    let mut rng = choices(around.seed, id, 0);
+    let way = Way::along(around.scene, &lanes, &mut rng).ok_or("that lane leads nowhere")?;
+    let meeting_m = way.lane_begin_m(conflict.lane).expect("the way was made through this lane")
+        + conflict.lane_station_m;
+    let front_m = approach_m(around, request, size, &way, meeting_m, arrival_s)?;
+    let station_m = front_m - size.length_m / 2.0;
+    if request.then == Then::Keep {
+        return Ok(commanded(around, request, way, station_m, Vec::new()));
+    }
+    // It starts beside its way and changes into it on the approach.
+    let start = way.path.pose_at(station_m).position;
+    let (leg, _) = way.lane_at(station_m);
+    if map.lane(leg).junction.is_some() {
+        return Err("too near to the junction for a lane change".into());
+    }
+    let mut reason = "no second lane in the crossing leg";
+    let mut found = None;
+    for (side, back) in [(Side::Right, Side::Left), (Side::Left, Side::Right)] {
+        let Some(beside) = lane_beside(around, leg, side) else { continue };
+        let first = Way::along(around.scene, &[beside], &mut rng).ok_or("that lane leads nowhere")?;
+        let station_m = map.lane(beside).centre.project(start).station_m;
+        if can_change(around, &first, station_m, back, request.speed_mps) {
+            found = Some((first, station_m));
+            break;
+        }
+        reason = "no room to change lanes before the junction";
+    }
+    let (first, station_m) = found.ok_or(reason)?;
+    let change = Manoeuvre { when: When::Tick(around.tick), towards: Towards::Way(way) };
+    Ok(commanded(around, request, first, station_m, vec![change]))
+}
+
+/// Where the front is that reaches a meeting on a way in time: backwards from there at the speed that each
+/// bend allows, m.
+///
+/// # Errors
+/// If the way begins nearer, or a signal on it will not be green.
+fn approach_m(
+    around: &Around,
+    request: &SpawnRequest,
+    size: &BodyParameters,
+    way: &Way,
+    meeting_m: f64,
+    arrival_s: f64,
+) -> Result<f64, String> {
+    let mut front_m = meeting_m;
+    let mut left_s = arrival_s;
+    let mut passed_lines: Vec<(usize, f64)> = Vec::new();
+    while left_s > 1e-9 {
+        let speed_mps = request.speed_mps.min(way.speed_mps_max(front_m)).max(0.1);
+        let step_m = TIMING_M.min(speed_mps * left_s);
+        front_m -= step_m;
+        left_s -= step_m / speed_mps;
+        let lines =
+            way.stop_lines.iter().filter(|line| (front_m..front_m + step_m).contains(&line.station_m));
+        passed_lines.extend(lines.map(|line| (line.signal, left_s.max(0.0))));
+        if front_m < size.length_m {
+            return Err("the crossing road is too short".into());
+        }
+    }
+    // Nobody appears just beyond a line at which they would have had to stop.
+    let behind =
+        way.stop_lines.iter().filter(|line| (front_m - BEYOND_LINE_M..front_m).contains(&line.station_m));
+    passed_lines.extend(behind.map(|line| (line.signal, 0.0)));
+    let is_green = |(signal, after_s): &(usize, f64)| {
+        let tick = around.tick + (after_s / DT_S) as u64;
+        around.signals.colour(&around.scene.map, *signal, tick) == SignalColour::Green
+    };
+    if !passed_lines.iter().all(is_green) {
+        return Err("its signal will not be green".into());
+    }
+    Ok(front_m)
+}

@@ -1,0 +1,237 @@
+//! Where a spawn puts its road user, and whether there is room.
+//!
+//! `distance_m` is always the gap between the outlines along the ego vehicle's route. What lies at
+//! that distance is each verb's business; the offsets at the roadside and the waiting times are those
+//! of the published package (its absolute offsets are not: they ignore the lanes). Traffic drives on
+//! the right.
+
+mod crossing;
+mod driving;
+mod lanes;
+
+use std::sync::Arc;
+
+use crate::action::SpawnFacts;
+use crate::action::SpawnRequest;
+use crate::geometry::OrientedBox;
+use crate::geometry::Pose;
+use crate::geometry::Vec2;
+use crate::geometry::distance_m;
+use crate::geometry::wrap_angle;
+use crate::model::vocabulary::Side;
+use crate::model::vocabulary::Verb;
+
+use crate::sim::body;
+use crate::sim::body::BodyParameters;
+use crate::sim::ego::VehicleParameters;
+use crate::sim::mover::Around;
+use crate::sim::mover::Motion;
+use crate::sim::mover::Moved;
+use crate::sim::mover::Mover;
+use crate::sim::npc::Cruise;
+use crate::sim::npc::Driver;
+use crate::sim::npc::Manoeuvre;
+use crate::sim::npc::choices;
+use crate::sim::pedestrian::Walker;
+use crate::sim::safety;
+use crate::sim::sense::RANGE_M;
+use crate::sim::sense::visible_fraction;
+use crate::sim::way::Way;
+use crate::sim::world::Obstacle;
+
+use crossing::cross_road;
+use driving::drive_ahead;
+use driving::drive_opposite;
+use driving::overtake;
+
+/// Where pedestrians begin and end, beside the middle of the ego vehicle's lane, m.
+const KERB_M: f64 = 5.0;
+/// Fastest and farthest that a request may ask for, m/s and m: beyond any road of a scenario, and
+/// small enough for every sum that is made of them.
+const SPEED_MPS_MAX: f64 = 70.0;
+const DISTANCE_M_MAX: f64 = 1000.0;
+/// Nobody appears nearer to anybody else, m.
+const ROOM_M: f64 = 0.5;
+
+/// A road user ready to appear.
+pub(super) struct Placed {
+    pub obstacle: Obstacle,
+    pub mover: Mover,
+}
+
+/// Where a request would put its road user, and what it would be, under a new id.
+///
+/// # Errors
+/// Why it cannot, in words that complete "cannot spawn: …".
+pub(super) fn place(around: &Around, request: &SpawnRequest, id: u32) -> Result<Placed, String> {
+    check(request)?;
+    let size = body::parameters(request.body);
+    let driver = match request.verb {
+        Verb::DriveAhead => drive_ahead(around, request, &size, id)?,
+        Verb::Overtake => overtake(around, request, &size, id)?,
+        Verb::DriveOpposite => drive_opposite(around, request, &size, id)?,
+        Verb::CrossRoad => cross_road(around, request, &size, id)?,
+        Verb::Walk | Verb::Stand => return on_foot(around, request, size, id),
+    };
+    check_way(around, &driver, &size)?;
+    let moved = driver.moved();
+    finish(around, request, Mover::new(size, Motion::Drive(driver)), id, moved)
+}
+
+/// Whether a request is one that anybody could carry out. Scripts come from outside, so nothing is
+/// taken for granted; NaN is in no range.
+fn check(request: &SpawnRequest) -> Result<(), String> {
+    if !(0.0..=SPEED_MPS_MAX).contains(&request.speed_mps) {
+        return Err(format!("the speed is not between 0 and {SPEED_MPS_MAX} m/s"));
+    }
+    if !(0.0..=DISTANCE_M_MAX).contains(&request.distance_m) {
+        return Err(format!("the distance is not between 0 and {DISTANCE_M_MAX} m"));
+    }
+    match request.verb {
+        Verb::Walk | Verb::Stand if request.body.is_vehicle() => Err("only a pedestrian walks".into()),
+        Verb::Walk | Verb::Stand => Ok(()),
+        Verb::DriveAhead | Verb::Overtake | Verb::DriveOpposite | Verb::CrossRoad => {
+            if request.body.is_vehicle() { Ok(()) } else { Err("a pedestrian does not drive".into()) }
+        }
+    }
+}
+
+/// The distances that rules ask for.
+///
+/// The gap at the spawn is between the outlines. The gap that a careful driver needs (see `safety`) is
+/// to slow down to one ahead, or to rest for one who crosses, walks or stands: their stopping zone.
+/// For one from behind it is what the newcomer needs to slow down to the ego vehicle. One that comes
+/// the other way stays in its own lanes and needs none, unless its way crosses the route at a junction.
+///
+/// Nobody but those from behind appears in plain view nearer than the way that the ego vehicle drives
+/// while a careful driver perceives and reacts, even if they would be no danger: who is in sight, and
+/// not hidden by others, fog or distance, did not come from nowhere.
+pub(super) fn facts(around: &Around, request: &SpawnRequest, placed: &Placed) -> SpawnFacts {
+    let along_mps = around.ego_outline.pose.forward().dot(&placed.obstacle.velocity_mps);
+    let (ego_mps, friction) = (around.ego.speed_mps, around.friction);
+    let braking_gap_m = match request.verb {
+        Verb::DriveAhead => safety::behind_leader_m(ego_mps, along_mps, friction),
+        Verb::Overtake => {
+            let braking_mps2 = around.braking_mps2(&placed.mover.size, along_mps.max(0.0));
+            safety::from_behind_m(along_mps, ego_mps, braking_mps2)
+        }
+        Verb::DriveOpposite if meets_route(around, &placed.mover) => {
+            safety::oncoming_m(ego_mps, -along_mps, friction)
+        }
+        Verb::DriveOpposite => 0.0,
+        Verb::CrossRoad | Verb::Walk | Verb::Stand => safety::behind_leader_m(ego_mps, 0.0, friction),
+    };
+    let spawn_gap_m = placed.obstacle.distance_m;
+    let is_behind = request.verb == Verb::Overtake;
+    let sight_m = RANGE_M.min(around.visibility_m);
+    let in_view = || {
+        let eye = around.ego_outline.pose.position;
+        spawn_gap_m < sight_m && visible_fraction(eye, &placed.obstacle, around.obstacles) > 0.0
+    };
+    let noticing_m = safety::noticing_m(ego_mps);
+    let is_sudden = !is_behind && noticing_m > braking_gap_m && in_view();
+    let safety_gap_m = if is_sudden { noticing_m } else { braking_gap_m };
+    SpawnFacts { spawn_gap_m, safety_gap_m }
+}
+
+/// Whether the way of a driver crosses or joins what the ego vehicle has before it.
+fn meets_route(around: &Around, mover: &Mover) -> bool {
+    let Motion::Drive(driver) = &mover.motion else { return false };
+    let mut ahead =
+        around.scene.route.conflicts.iter().filter(|conflict| conflict.station_m > around.ego_station_m);
+    ahead.any(|conflict| driver.way().lane_begin_m(conflict.lane).is_some())
+}
+
+/// A driver at the speed that was asked for.
+fn commanded(
+    around: &Around,
+    request: &SpawnRequest,
+    way: Arc<Way>,
+    station_m: f64,
+    plan: Vec<Manoeuvre>,
+) -> Driver {
+    // The way was the first of its choices.
+    Driver::new(around.scene, way, station_m, Cruise::Commanded(request.speed_mps), plan, 1)
+}
+
+fn finish(
+    around: &Around,
+    request: &SpawnRequest,
+    mover: Mover,
+    id: u32,
+    moved: Moved,
+) -> Result<Placed, String> {
+    let outline = OrientedBox::new(moved.pose, mover.size.length_m, mover.size.width_m);
+    if around.others(id).any(|(other, _)| distance_m(&outline, other) < ROOM_M) {
+        return Err("another road user is there".into());
+    }
+    let obstacle = Obstacle {
+        id,
+        body: request.body,
+        colour: request.colour,
+        verb: request.verb,
+        outline,
+        distance_m: distance_m(around.ego_outline, &outline),
+        height_m: mover.size.height_m,
+        forward: moved.forward,
+        lane_heading_rad: moved.lane_heading_rad,
+        velocity_mps: moved.velocity_mps,
+        spawned_tick: around.tick,
+    };
+    Ok(Placed { obstacle, mover })
+}
+
+/// A newcomer must be able to brake for those before it. The ego vehicle is not among them: how near
+/// to it a newcomer may appear is for the rules of the space to say.
+fn check_way(around: &Around, driver: &Driver, size: &BodyParameters) -> Result<(), String> {
+    let braking_mps2 = around.braking_mps2(size, driver.speed_mps);
+    let blocked = around.obstacles.iter().any(|other| {
+        driver.gap_to(size, &other.outline, other.velocity_mps).is_some_and(|(gap_m, speed_mps)| {
+            let closing_mps = (driver.speed_mps - speed_mps).max(0.0);
+            gap_m < 1.0 + closing_mps * closing_mps / (2.0 * braking_mps2) + 0.1 * closing_mps
+        })
+    });
+    if blocked { Err("another road user is too near in its lane".into()) } else { Ok(()) }
+}
+
+/// Station on the route of a centre that lies `distance_m` before the ego vehicle's front.
+fn ahead_m(around: &Around, request: &SpawnRequest, size: &BodyParameters) -> Result<f64, String> {
+    let front_m = VehicleParameters::MKZ.front_m(around.ego_station_m);
+    let station_m = front_m + request.distance_m + size.length_m / 2.0;
+    if station_m > around.scene.route.path.length_m() {
+        return Err("the route ends before that distance".into());
+    }
+    Ok(station_m)
+}
+
+fn on_foot(around: &Around, request: &SpawnRequest, size: BodyParameters, id: u32) -> Result<Placed, String> {
+    let station_m = ahead_m(around, request, &size)?;
+    let lane = around.scene.route.path.pose_at(station_m);
+    let (left_m, turn_rad) = match request.side {
+        Side::Left => (KERB_M, -core::f64::consts::FRAC_PI_2),
+        Side::Right => (-KERB_M, core::f64::consts::FRAC_PI_2),
+    };
+    let facing = |at: Pose| Pose { heading_rad: wrap_angle(at.heading_rad + turn_rad), ..at };
+    let (pose, motion) = if request.verb == Verb::Stand {
+        (facing(lane), Motion::Stand)
+    } else {
+        let from = facing(lane.offset(0.0, left_m));
+        (
+            from,
+            Motion::Walk(Walker::new(
+                from,
+                2.0 * KERB_M,
+                request.speed_mps,
+                around.tick,
+                &mut choices(around.seed, id, 0),
+            )),
+        )
+    };
+    let moved = Moved {
+        pose,
+        forward: pose.forward(),
+        lane_heading_rad: pose.heading_rad,
+        velocity_mps: Vec2::zeros(),
+    };
+    finish(around, request, Mover::new(size, motion), id, moved)
+}

@@ -1,0 +1,50 @@
+//! A road as the world needs it: the map, the ego vehicle's route, and what follows from both.
+
+use std::sync::Arc;
+
+use crate::road::LaneIndex;
+use crate::road::RoadMap;
+use crate::road::Route;
+
+use super::junction::ConflictAreas;
+use super::way::Ways;
+
+/// What stays the same during all episodes of one road. Shared, never copied.
+#[derive(Debug)]
+pub struct Scene {
+    pub map: Arc<RoadMap>,
+    /// Where the ego vehicle is to go.
+    pub route: Route,
+    areas: ConflictAreas,
+    ways: Ways,
+    /// Lanes outside junctions, each with the length of all up to its end, m.
+    streets: Vec<(LaneIndex, f64)>,
+}
+
+impl Scene {
+    pub fn new(map: Arc<RoadMap>, route: Route) -> Scene {
+        let mut streets = Vec::new();
+        let mut end_m = 0.0;
+        for (index, lane) in map.lanes.iter().enumerate().filter(|(_, lane)| lane.junction.is_none()) {
+            end_m += lane.centre.length_m();
+            streets.push((LaneIndex(index), end_m));
+        }
+        Scene { areas: ConflictAreas::new(&map), ways: Ways::default(), streets, map, route }
+    }
+
+    /// The place at a fraction of all streets laid end to end: every metre is as likely as any other.
+    pub(super) fn street_at(&self, fraction: f64) -> Option<(LaneIndex, f64)> {
+        let at_m = fraction * self.streets.last()?.1;
+        let index = self.streets.partition_point(|street| street.1 <= at_m).min(self.streets.len() - 1);
+        let begin_m = if index == 0 { 0.0 } else { self.streets[index - 1].1 };
+        Some((self.streets[index].0, at_m - begin_m))
+    }
+
+    pub(super) fn ways(&self) -> &Ways {
+        &self.ways
+    }
+
+    pub(super) fn conflict_areas(&self) -> &ConflictAreas {
+        &self.areas
+    }
+}

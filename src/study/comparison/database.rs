@@ -1,0 +1,283 @@
+//! `study.db`: the cells of a study, in SQLite. The cells of one job are one transaction.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use rusqlite::Connection;
+use rusqlite::Row;
+use rusqlite::params;
+
+use crate::study::DatabaseError;
+
+use super::job::Job;
+use super::record::CellRecord;
+use super::record::CollisionRecord;
+use super::record::EpisodeRecord;
+use super::record::Failure;
+use super::record::Spent;
+use super::record::TrainedRecord;
+use super::study::Study;
+
+/// Layout of the tables; raised whenever a column changes. Apart from that of `run.db`.
+const SCHEMA_VERSION: i64 = 1001;
+
+/// Seeds are text: SQLite's integers have a sign.
+const SCHEMA: &str = "
+CREATE TABLE cell (
+  cell INTEGER PRIMARY KEY, agent TEXT NOT NULL, road TEXT NOT NULL, number INTEGER NOT NULL,
+  training_seed TEXT, wall_s REAL NOT NULL, cpu_s REAL, UNIQUE (agent, road, number)
+) STRICT;
+CREATE TABLE trained (
+  cell INTEGER NOT NULL REFERENCES cell, episode INTEGER NOT NULL, return REAL NOT NULL,
+  collisions INTEGER NOT NULL, counted INTEGER NOT NULL, epsilon REAL NOT NULL, loss REAL,
+  simulated_s REAL NOT NULL, PRIMARY KEY (cell, episode)
+) STRICT;
+CREATE TABLE evaluated (
+  cell INTEGER NOT NULL REFERENCES cell, episode INTEGER NOT NULL, seed TEXT NOT NULL, number INTEGER NOT NULL,
+  ended TEXT NOT NULL, duration_s REAL NOT NULL, distance_m REAL NOT NULL, red_runs INTEGER NOT NULL,
+  speeding_s REAL NOT NULL, astray_s REAL NOT NULL, branched_s REAL NOT NULL, trace TEXT NOT NULL, PRIMARY KEY (cell, episode)
+) STRICT;
+CREATE TABLE collision (
+  cell INTEGER NOT NULL REFERENCES cell, episode INTEGER NOT NULL, number INTEGER NOT NULL, time_s REAL NOT NULL,
+  counted INTEGER NOT NULL, repeated INTEGER NOT NULL, sudden INTEGER NOT NULL, struck INTEGER NOT NULL,
+  avoidability TEXT NOT NULL, kind TEXT NOT NULL, manoeuvre TEXT NOT NULL, approach TEXT NOT NULL,
+  side TEXT NOT NULL, cause TEXT, PRIMARY KEY (cell, episode, number)
+) STRICT;
+";
+
+/// An open study database.
+pub struct StudyDatabase {
+    connection: Connection,
+}
+
+impl StudyDatabase {
+    /// Opens the file, making the tables if it is new.
+    ///
+    /// # Errors
+    /// If the file cannot be opened or is a database of another layout.
+    pub fn open(path: &Path) -> Result<StudyDatabase, DatabaseError> {
+        let mut connection = Connection::open(path)?;
+        let version: i64 = connection.pragma_query_value(None, "user_version", |row| row.get(0))?;
+        if version == 0 {
+            let transaction = connection.transaction()?;
+            transaction.execute_batch(SCHEMA)?;
+            transaction.pragma_update(None, "user_version", SCHEMA_VERSION)?;
+            transaction.commit()?;
+        } else if version != SCHEMA_VERSION {
+            return Err(DatabaseError::Layout { found: version });
+        }
+        Ok(StudyDatabase { connection })
+    }
+
+    /// Adds all cells of a job, or nothing.
+    ///
+    /// # Errors
+    /// If the file cannot be written.
+    pub fn add(&mut self, cells: &[CellRecord]) -> Result<(), DatabaseError> {
+        let transaction = self.connection.transaction()?;
+        for record in cells {
+            transaction.execute(
+                "INSERT INTO cell (agent, road, number, training_seed, wall_s, cpu_s) VALUES (?, ?, ?, ?, ?, ?)",
+                params![
+                    record.agent,
+                    record.road,
+                    record.number,
+                    record.training_seed.map(|seed| seed.to_string()),
+                    record.spent.wall_s,
+                    record.spent.cpu_s,
+                ],
+            )?;
+            let cell = transaction.last_insert_rowid();
+            let mut insert =
+                transaction.prepare_cached("INSERT INTO trained VALUES (?, ?, ?, ?, ?, ?, ?, ?)")?;
+            for (index, episode) in record.trained.iter().enumerate() {
+                insert.execute(params![
+                    cell,
+                    index as i64,
+                    episode.sum,
+                    episode.collisions,
+                    episode.counted,
+                    episode.exploration_epsilon,
+                    episode.loss,
+                    episode.simulated_s,
+                ])?;
+            }
+            for (index, episode) in record.episodes.iter().enumerate() {
+                add_episode(&transaction, cell, index as i64, episode)?;
+            }
+        }
+        transaction.commit()?;
+        Ok(())
+    }
+
+    /// The jobs of a study that are not done yet, in order.
+    ///
+    /// # Errors
+    /// If the file cannot be read.
+    pub fn missing(&self, study: &Study) -> Result<Vec<Job>, DatabaseError> {
+        let mut is_there =
+            self.connection.prepare("SELECT 1 FROM cell WHERE agent = ? AND road = ? AND number = ?")?;
+        let mut jobs = Vec::new();
+        for job in study.jobs() {
+            let settings = study.settings();
+            // All cells of a job come together.
+            let (agent, road) = (&settings.agents[job.agent].label, &settings.roads[job.roads[0]]);
+            if !is_there.exists(params![agent, road, job.number])? {
+                jobs.push(job);
+            }
+        }
+        Ok(jobs)
+    }
+
+    /// All cells so far, in the order in which they ended.
+    ///
+    /// # Errors
+    /// If the file cannot be read.
+    pub fn cells(&self) -> Result<Vec<CellRecord>, DatabaseError> {
+        let mut cells: BTreeMap<i64, CellRecord> = self
+            .by_cell("SELECT cell, agent, road, number, training_seed, wall_s, cpu_s FROM cell", |row| {
+                Ok(CellRecord {
+                    agent: row.get(1)?,
+                    road: row.get(2)?,
+                    number: row.get(3)?,
+                    training_seed: row.get::<_, Option<String>>(4)?.map(|seed| seed_of(&seed)).transpose()?,
+                    trained: Vec::new(),
+                    episodes: Vec::new(),
+                    spent: Spent { wall_s: row.get(5)?, cpu_s: row.get(6)? },
+                })
+            })?
+            .into_iter()
+            .collect();
+        let trained = self.by_cell(
+            "SELECT cell, return, collisions, counted, epsilon, loss, simulated_s FROM trained ORDER BY cell, episode",
+            |row| {
+                Ok(TrainedRecord {
+                    sum: row.get(1)?,
+                    collisions: row.get(2)?,
+                    counted: row.get(3)?,
+                    exploration_epsilon: row.get(4)?,
+                    loss: row.get(5)?,
+                    simulated_s: row.get(6)?,
+                })
+            },
+        )?;
+        for (cell, episode) in trained {
+            cells.entry(cell).and_modify(|cell| cell.trained.push(episode));
+        }
+        let evaluated = self.by_cell(
+            "SELECT cell, seed, number, ended, duration_s, distance_m, red_runs, speeding_s, astray_s, branched_s,
+                    trace
+             FROM evaluated ORDER BY cell, episode",
+            |row| {
+                Ok(EpisodeRecord {
+                    seed: seed_of(&row.get::<_, String>(1)?)?,
+                    number: row.get(2)?,
+                    ended: row.get(3)?,
+                    duration_s: row.get(4)?,
+                    distance_m: row.get(5)?,
+                    red_runs: row.get(6)?,
+                    speeding_s: row.get(7)?,
+                    astray_s: row.get(8)?,
+                    branched_s: row.get(9)?,
+                    trace: row.get(10)?,
+                    collisions: Vec::new(),
+                })
+            },
+        )?;
+        for (cell, episode) in evaluated {
+            cells.entry(cell).and_modify(|cell| cell.episodes.push(episode));
+        }
+        let collisions = self.by_cell(
+            "SELECT cell, episode, time_s, counted, repeated, sudden, struck, avoidability, kind, manoeuvre,
+                    approach, side, cause
+             FROM collision ORDER BY cell, episode, number",
+            |row| Ok((row.get::<_, u32>(1)? as usize, collision(row)?)),
+        )?;
+        for (cell, (episode, collision)) in collisions {
+            let episode = cells.get_mut(&cell).and_then(|cell| cell.episodes.get_mut(episode));
+            if let Some(episode) = episode {
+                episode.collisions.push(collision);
+            }
+        }
+        Ok(cells.into_values().collect())
+    }
+
+    /// The rows of a query, each with the cell that its first column names.
+    fn by_cell<T>(
+        &self,
+        query: &str,
+        read: impl Fn(&Row) -> Result<T, rusqlite::Error>,
+    ) -> Result<Vec<(i64, T)>, DatabaseError> {
+        let mut statement = self.connection.prepare(query)?;
+        let rows = statement.query_map([], |row| Ok((row.get(0)?, read(row)?)))?;
+        Ok(rows.collect::<Result<_, _>>()?)
+    }
+}
+
+fn add_episode(
+    connection: &Connection,
+    cell: i64,
+    index: i64,
+    episode: &EpisodeRecord,
+) -> Result<(), rusqlite::Error> {
+    connection.prepare_cached("INSERT INTO evaluated VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)")?.execute(
+        params![
+            cell,
+            index,
+            episode.seed.to_string(),
+            episode.number,
+            episode.ended,
+            episode.duration_s,
+            episode.distance_m,
+            episode.red_runs,
+            episode.speeding_s,
+            episode.astray_s,
+            episode.branched_s,
+            episode.trace,
+        ],
+    )?;
+    let mut insert = connection
+        .prepare_cached("INSERT INTO collision VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)")?;
+    for (number, found) in episode.collisions.iter().enumerate() {
+        let Failure { kind, manoeuvre, approach, side, cause } = &found.failure;
+        insert.execute(params![
+            cell,
+            index,
+            number as i64,
+            found.time_s,
+            found.counted,
+            found.repeated,
+            found.sudden,
+            found.struck,
+            found.avoidability,
+            kind,
+            manoeuvre,
+            approach,
+            side,
+            cause,
+        ])?;
+    }
+    Ok(())
+}
+
+fn collision(row: &Row) -> Result<CollisionRecord, rusqlite::Error> {
+    Ok(CollisionRecord {
+        time_s: row.get(2)?,
+        counted: row.get(3)?,
+        repeated: row.get(4)?,
+        sudden: row.get(5)?,
+        struck: row.get(6)?,
+        avoidability: row.get(7)?,
+        failure: Failure {
+            kind: row.get(8)?,
+            manoeuvre: row.get(9)?,
+            approach: row.get(10)?,
+            side: row.get(11)?,
+            cause: row.get(12)?,
+        },
+    })
+}
+
+fn seed_of(text: &str) -> Result<u64, rusqlite::Error> {
+    text.parse().map_err(|_| rusqlite::Error::InvalidColumnName(format!("`{text}` is no seed")))
+}

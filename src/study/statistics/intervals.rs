@@ -1,0 +1,187 @@
+//! Intervals of means, of ratios of means, and of numbers of events.
+
+use crate::rng;
+use crate::rng::Rng;
+
+use super::bisect;
+
+/// An interval that covers the true value in 95 of 100 samples.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+pub struct Interval {
+    pub low: f64,
+    /// None: no bound.
+    pub high: Option<f64>,
+}
+
+/// A mean with what is known of its precision.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct Estimate {
+    pub mean: f64,
+    /// None of fewer than two values, and of values that are all alike: they say nothing of how far others
+    /// would lie apart.
+    #[serde(flatten)]
+    pub interval: Option<Interval>,
+    /// The sample.
+    pub values: Vec<f64>,
+}
+
+/// Mean and Student's interval of a sample; none of an empty one.
+///
+/// Student's and not the bootstrap's: of ten values the latter's intervals are too short.
+pub fn mean(values: &[f64]) -> Option<Estimate> {
+    if values.is_empty() {
+        return None;
+    }
+    let count = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / count;
+    let is_constant = values.iter().all(|value| *value == values[0]);
+    let interval = (!is_constant).then(|| {
+        let squares: f64 = values.iter().map(|value| (value - mean) * (value - mean)).sum();
+        let half = student_quantile(values.len() - 1) * (squares / (count - 1.0) / count).sqrt();
+        Interval { low: mean - half, high: Some(mean + half) }
+    });
+    Some(Estimate { mean, interval, values: values.to_vec() })
+}
+
+/// The number that a Student variable's magnitude stays below with probability 0.95.
+fn student_quantile(degrees: usize) -> f64 {
+    bisect(0.0, 1000.0, |quantile| student_within(quantile, degrees) >= 0.95)
+}
+
+/// Probability that a Student variable's magnitude is at most `bound`. Abramowitz and Stegun 26.7.3 and 26.7.4.
+fn student_within(bound: f64, degrees: usize) -> f64 {
+    let angle_rad = libm::atan(bound / (degrees as f64).sqrt());
+    let (sine, cosine) = (libm::sin(angle_rad), libm::cos(angle_rad));
+    let is_odd = degrees % 2 == 1;
+    // Each term is the one before it times cos² and a fraction: 2/3, 4/5 … or 1/2, 3/4 ….
+    let mut term = if is_odd { cosine } else { 1.0 };
+    let first = if is_odd { 2 } else { 1 };
+    let mut sum = if degrees == 1 { 0.0 } else { term };
+    for numerator in (first..degrees.saturating_sub(2)).step_by(2) {
+        term *= cosine * cosine * numerator as f64 / (numerator + 1) as f64;
+        sum += term;
+    }
+    if is_odd { core::f64::consts::FRAC_2_PI * (angle_rad + sine * sum) } else { sine * sum }
+}
+
+/// The exact interval of a Poisson variable's mean, of which `count` was seen (Garwood 1936).
+pub fn poisson(count: u64) -> Interval {
+    // Far enough on both sides: ten standard deviations and some more.
+    let far = count as f64 + 10.0 * (count as f64).sqrt() + 20.0;
+    let at_most = |events: u64, mean: f64| poisson_at_most(events, mean);
+    let low = match count.checked_sub(1) {
+        None => 0.0,
+        Some(fewer) => bisect(0.0, far, |mean| 1.0 - at_most(fewer, mean) >= 0.025),
+    };
+    Interval { low, high: Some(bisect(0.0, far, |mean| at_most(count, mean) <= 0.025)) }
+}
+
+/// Probability that a Poisson variable is at most `count`.
+fn poisson_at_most(count: u64, mean: f64) -> f64 {
+    if mean <= 0.0 {
+        return 1.0;
+    }
+    let logarithm = libm::log(mean);
+    let chance = |events: u64| {
+        let events = events as f64;
+        libm::exp(events * logarithm - mean - libm::lgamma(events + 1.0))
+    };
+    (0..=count).map(chance).sum::<f64>().min(1.0)
+}
+
+/// Resamples of a bootstrap.
+const RESAMPLES: usize = 10_000;
+
+/// Ratio of two samples' means with its percentile bootstrap interval; none if one is empty or the second's
+/// mean is 0. Resamples whose denominator is 0 count as beyond every bound.
+pub fn ratio_of_means(numerator: &[f64], denominator: &[f64], rng: &mut Rng) -> Option<(f64, Interval)> {
+    let ratio = |above: f64, below: f64| if below == 0.0 { f64::INFINITY } else { above / below };
+    let (above, below) = (mean(numerator)?.mean, mean(denominator)?.mean);
+    if below == 0.0 {
+        return None;
+    }
+    let mut ratios: Vec<f64> = (0..RESAMPLES)
+        .map(|_| ratio(resampled_mean(numerator, rng), resampled_mean(denominator, rng)))
+        .collect();
+    ratios.sort_by(f64::total_cmp);
+    let tail = RESAMPLES / 40;
+    let (low, high) = (ratios[tail], ratios[RESAMPLES - 1 - tail]);
+    // Where even the lower bound is infinite, nothing at all is known.
+    let low = if low.is_finite() { low } else { 0.0 };
+    Some((above / below, Interval { low, high: high.is_finite().then_some(high) }))
+}
+
+fn resampled_mean(values: &[f64], rng: &mut Rng) -> f64 {
+    let count = values.len() as u32;
+    (0..count).map(|_| values[rng::below(rng, count) as usize]).sum::<f64>() / f64::from(count)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::rng::Stream;
+    use crate::rng::stream;
+
+    /// `scipy.stats.t.ppf(0.975, n)`.
+    #[test]
+    fn quantiles_are_students() {
+        let known = [
+            (1, 12.706204736174694),
+            (2, 4.302652729749462),
+            (3, 3.1824463052837078),
+            (4, 2.7764451051977934),
+            (9, 2.262157162798205),
+            (29, 2.045229642132703),
+            (100, 1.9839715185235518),
+        ];
+        for (degrees, expected) in known {
+            let found = student_quantile(degrees);
+            assert!((found - expected).abs() < 1e-9, "{degrees}: {found}");
+        }
+    }
+
+    /// `scipy.stats.t.interval(0.95, 4, numpy.mean(x), scipy.stats.sem(x))` of 3, 5, 4, 8, 6.
+    #[test]
+    fn a_mean_has_its_interval() {
+        let found = mean(&[3.0, 5.0, 4.0, 8.0, 6.0]).unwrap();
+        let Interval { low, high } = found.interval.unwrap();
+        assert_eq!(found.mean, 5.2);
+        assert!(
+            (low - 2.81161161190002).abs() < 1e-9 && (high.unwrap() - 7.588388388099981).abs() < 1e-9,
+            "{low} {high:?}"
+        );
+        assert_eq!(mean(&[4.0]).unwrap().interval, None);
+        assert_eq!(mean(&[0.0, 0.0, 0.0]).unwrap().interval, None);
+        assert_eq!(mean(&[]), None);
+    }
+
+    /// `chi2.ppf(0.025, 2 * n) / 2` and `chi2.ppf(0.975, 2 * n + 2) / 2` of `scipy.stats`.
+    #[test]
+    fn intervals_of_counts_are_garwoods() {
+        let known = [
+            (0, 0.0, 3.6888794541139363),
+            (1, 0.025317807984289876, 5.571643390938898),
+            (5, 1.6234863901184207, 11.66833207932267),
+            (40, 28.576586441788965, 54.468646963984064),
+            (1000, 938.9730184076952, 1063.952136016302),
+        ];
+        for (count, low, high) in known {
+            let found = poisson(count);
+            assert!((found.low - low).abs() < 1e-6 * (1.0 + low), "{count}: {found:?}");
+            assert!((found.high.unwrap() - high).abs() < 1e-6 * high, "{count}: {found:?}");
+        }
+    }
+
+    #[test]
+    fn ratios_of_means() {
+        let mut rng = stream(1, Stream::Bootstrap, 0);
+        let (ratio, interval) =
+            ratio_of_means(&[4.0, 6.0, 5.0, 5.0], &[2.0, 3.0, 2.0, 3.0], &mut rng).unwrap();
+        assert_eq!(ratio, 2.0);
+        assert!(interval.low > 1.5 && interval.high.unwrap() < 2.6, "{interval:?}");
+        assert_eq!(ratio_of_means(&[4.0], &[0.0], &mut rng), None);
+        // One in eight resamples of three values, one of which is not 0, has nothing in it: no upper bound.
+        let (_, interval) = ratio_of_means(&[4.0], &[0.0, 0.0, 3.0], &mut rng).unwrap();
+        assert_eq!((interval.low, interval.high), (4.0 / 3.0, None));
+    }
+}

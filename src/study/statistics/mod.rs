@@ -1,0 +1,34 @@
+//! Statistics of samples: intervals, rank tests, survival. Pure functions that know no driving.
+//!
+//! Written here and not taken from a crate because results must be the same bytes on every machine:
+//! those at hand use the platform's logarithm and exponential function. All intervals are 95 %.
+
+mod intervals;
+mod ranks;
+mod survival;
+
+pub use intervals::Estimate;
+pub use intervals::Interval;
+pub use intervals::mean;
+pub use intervals::poisson;
+pub use intervals::ratio_of_means;
+pub use ranks::RankTest;
+pub use ranks::holm;
+pub use ranks::mann_whitney;
+pub use ranks::superiority;
+pub use survival::Lifetime;
+pub use survival::restricted_mean;
+
+/// Where `is_above` turns true, by bisection; it must be false at `low` and true at `high`.
+fn bisect(mut low: f64, mut high: f64, is_above: impl Fn(f64) -> bool) -> f64 {
+    // 200 halvings exhaust an f64, wherever the two begin.
+    for _ in 0..200 {
+        let middle = low + (high - low) / 2.0;
+        if is_above(middle) {
+            high = middle;
+        } else {
+            low = middle;
+        }
+    }
+    high
+}

@@ -1,0 +1,708 @@
+//! The server as an editor meets it: messages over pipes, in documents that are never finished.
+
+use std::io::BufRead;
+use std::io::BufReader;
+use std::io::Read;
+use std::io::Write;
+use std::path::Path;
+use std::process::Child;
+use std::process::ChildStdin;
+use std::process::ChildStdout;
+use std::process::Command;
+use std::process::Stdio;
+
+use serde_json::Value;
+use serde_json::json;
+
+use crate::cases::expect_snapshot;
+use crate::cases::root;
+
+/// An editor with a server.
+struct Editor {
+    process: Child,
+    input: Option<ChildStdin>,
+    output: BufReader<ChildStdout>,
+    requests: u64,
+    version: i64,
+}
+
+impl Editor {
+    /// A server that nobody has spoken to.
+    fn start() -> Editor {
+        let mut process = Command::new(env!("CARGO_BIN_EXE_avastra"))
+            .arg("lsp")
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .expect("it starts");
+        let input = process.stdin.take();
+        let output = BufReader::new(process.stdout.take().expect("stdout is piped"));
+        Editor { process, input, output, requests: 0, version: 0 }
+    }
+
+    /// A server that is ready.
+    fn ready() -> Editor {
+        let mut editor = Editor::start();
+        editor.ask("initialize", json!({ "capabilities": {} })).expect("it can be initialized");
+        editor.tell("initialized", json!({}));
+        editor
+    }
+
+    fn raw(&mut self, bytes: &[u8]) {
+        let input = self.input.as_mut().expect("the input is open");
+        input.write_all(bytes).expect("the server reads");
+        input.flush().expect("the server reads");
+    }
+
+    fn send(&mut self, body: &str) {
+        self.raw(format!("Content-Length: {}\r\n\r\n{body}", body.len()).as_bytes());
+    }
+
+    fn tell(&mut self, method: &str, params: Value) {
+        self.send(&json!({ "jsonrpc": "2.0", "method": method, "params": params }).to_string());
+    }
+
+    /// The next message of the server.
+    fn hear(&mut self) -> Value {
+        let mut length = 0;
+        loop {
+            let mut line = String::new();
+            assert_ne!(self.output.read_line(&mut line).expect("the server writes UTF-8"), 0, "it ended");
+            match line.trim_end().split_once(": ") {
+                Some(("Content-Length", value)) => length = value.parse().expect("a length"),
+                _ => break,
+            }
+        }
+        let mut body = vec![0; length];
+        self.output.read_exact(&mut body).expect("the body is as long as it says");
+        serde_json::from_slice(&body).expect("the server writes JSON")
+    }
+
+    /// The result of a request, or its error.
+    fn ask(&mut self, method: &str, params: Value) -> Result<Value, Value> {
+        self.requests += 1;
+        let id = self.requests;
+        self.send(&json!({ "jsonrpc": "2.0", "id": id, "method": method, "params": params }).to_string());
+        loop {
+            let answer = self.hear();
+            if answer["id"] == id {
+                return match answer.get("error") {
+                    Some(error) => Err(error.clone()),
+                    None => Ok(answer["result"].clone()),
+                };
+            }
+        }
+    }
+
+    /// Opens a document, or gives it another text; its mistakes.
+    fn write(&mut self, uri: &str, text: &str) -> Vec<Value> {
+        self.version += 1;
+        if self.version == 1 || text.is_empty() {
+            let document =
+                json!({ "uri": uri, "languageId": "avastra", "version": self.version, "text": text });
+            self.tell("textDocument/didOpen", json!({ "textDocument": document }));
+        } else {
+            let document = json!({ "uri": uri, "version": self.version });
+            let changes = json!([{ "text": text }]);
+            self.tell(
+                "textDocument/didChange",
+                json!({ "textDocument": document, "contentChanges": changes }),
+            );
+        }
+        self.mistakes(uri)
+    }
+
+    /// The next list of mistakes of a document.
+    fn mistakes(&mut self, uri: &str) -> Vec<Value> {
+        loop {
+            let message = self.hear();
+            if message["method"] == "textDocument/publishDiagnostics" && message["params"]["uri"] == uri {
+                return message["params"]["diagnostics"].as_array().expect("a list").clone();
+            }
+        }
+    }
+
+    /// Asks about the place of `|` in a text, which is written without it.
+    fn ask_at(&mut self, method: &str, uri: &str, marked: &str, more: Value) -> Result<Value, Value> {
+        let (text, position) = unmarked(marked);
+        self.write(uri, &text);
+        let mut params = json!({ "textDocument": { "uri": uri }, "position": position });
+        for (key, value) in more.as_object().into_iter().flatten() {
+            params[key] = value.clone();
+        }
+        self.ask(method, params)
+    }
+
+    /// The labels that are proposed at `|`, best first.
+    fn proposals(&mut self, marked: &str) -> Vec<String> {
+        let list = self.ask_at("textDocument/completion", &space_uri(), marked, json!({}));
+        let list = list.expect("proposals need nothing");
+        let mut items: Vec<(String, String)> = list["items"]
+            .as_array()
+            .expect("a list")
+            .iter()
+            .map(|item| (text(&item["sortText"]), text(&item["label"])))
+            .collect();
+        items.sort();
+        items.into_iter().map(|(_, label)| label).collect()
+    }
+
+    fn hover(&mut self, marked: &str) -> String {
+        let found = self.ask_at("textDocument/hover", &space_uri(), marked, json!({}));
+        text(&found.expect("it can be asked")["contents"]["value"])
+    }
+
+    /// Ends the input; exit status and what was said on stderr.
+    fn end(mut self) -> (i32, String) {
+        drop(self.input.take());
+        let mut said = String::new();
+        let stderr = self.process.stderr.take();
+        stderr.expect("stderr is piped").read_to_string(&mut said).expect("it is text");
+        let status = self.process.wait().expect("it ends");
+        (status.code().expect("no signal ends it"), said)
+    }
+}
+
+fn text(value: &Value) -> String {
+    value.as_str().unwrap_or_default().to_owned()
+}
+
+fn uri(path: &Path) -> String {
+    format!("file://{}", path.display())
+}
+
+/// A document beside the shipped roads.
+fn space_uri() -> String {
+    uri(&root().join("scenarios/unsaved.ava"))
+}
+
+fn shipped() -> String {
+    std::fs::read_to_string(root().join("scenarios/avastra45.ava")).expect("it is shipped")
+}
+
+/// The text without its one `|`, and where that was. `||` stands for a `|` of the text.
+fn unmarked(marked: &str) -> (String, Value) {
+    let plain = marked.replace("||", "\u{1}");
+    let at = plain.find('|').expect("a place is marked");
+    let before = plain[..at].replace('\u{1}', "|");
+    let line = before.matches('\n').count();
+    let column = before.rsplit('\n').next().unwrap_or_default().encode_utf16().count();
+    let text = plain.replacen('|', "", 1).replace('\u{1}', "|");
+    (text, json!({ "line": line, "character": column }))
+}
+
+/// The shipped space with a mark behind the first `before`.
+fn marked(before: &str) -> String {
+    let text = shipped().replace('|', "||");
+    let before = before.replace('|', "||");
+    assert!(text.contains(&before), "{before}");
+    text.replacen(&before, &format!("{before}|"), 1)
+}
+
+/// A text after the edits of one document.
+fn edited(text: &str, edits: &Value) -> String {
+    let starts: Vec<usize> =
+        std::iter::once(0).chain(text.match_indices('\n').map(|(at, _)| at + 1)).collect();
+    let byte = |place: &Value| {
+        let line = place["line"].as_u64().expect("a line") as usize;
+        let column = place["character"].as_u64().expect("a column") as usize;
+        let start = starts[line];
+        let units: Vec<u16> = text[start..].encode_utf16().take(column).collect();
+        start + String::from_utf16(&units).expect("between characters").len()
+    };
+    let mut edits: Vec<(usize, usize, String)> = edits
+        .as_array()
+        .expect("a list")
+        .iter()
+        .map(|edit| {
+            let range = &edit["range"];
+            (byte(&range["start"]), byte(&range["end"]), self::text(&edit["newText"]))
+        })
+        .collect();
+    edits.sort();
+    let mut text = text.to_owned();
+    for (from, to, new) in edits.into_iter().rev() {
+        text.replace_range(from..to, &new);
+    }
+    text
+}
+
+/// One line for each mistake.
+fn shown(mistakes: &[Value]) -> String {
+    let line = |mistake: &Value| {
+        let (start, end) = (&mistake["range"]["start"], &mistake["range"]["end"]);
+        let related = mistake["relatedInformation"].as_array().map_or(0, Vec::len);
+        format!(
+            "{}:{}..{}:{} {} {} {} (+{related})\n",
+            start["line"],
+            start["character"],
+            end["line"],
+            end["character"],
+            mistake["severity"],
+            text(&mistake["code"]),
+            text(&mistake["message"]).replace('\n', " / "),
+        )
+    };
+    mistakes.iter().map(line).collect()
+}
+
+#[test]
+fn mistakes_appear_and_vanish_as_one_types() {
+    let mut editor = Editor::ready();
+    let uri = space_uri();
+    let sound = editor.write(&uri, &shipped());
+    assert!(sound.iter().all(|found| found["severity"] == 4), "{}", shown(&sound));
+    // Four mistakes far apart.
+    let broken = shipped()
+        .replace("let weight_size = 1.0", "let weight_size = 12 m + 3 s")
+        .replace("rule walking_pace on pedestrian: speed", "rule walking_pace on pedestrain: speed")
+        .replace("speed <= 1.4 m/s", "speed <= 1.4 furlong")
+        .replace("rule ped_gap on", "rule npc_gap on");
+    let found = editor.write(&uri, &broken);
+    // A character of two UTF-16 units before a mistake on the same line.
+    let odd = shipped().replace("rule no_teleport:", "rule no_teleport 🚗 £ :");
+    let all = format!("{}\n{}", shown(&found), shown(&editor.write(&uri, &odd)));
+    expect_snapshot("editor", "mistakes", &all);
+    let unfinished = shipped().replace("limit: 20 steps", "limit: 20 steps stop");
+    let found = editor.write(&uri, &unfinished);
+    assert_eq!(found.len(), 1, "{}", shown(&found));
+    assert_eq!(editor.write(&uri, &shipped()), sound);
+    editor.tell("textDocument/didClose", json!({ "textDocument": { "uri": uri } }));
+    assert_eq!(editor.mistakes(&uri), Vec::<Value>::new());
+}
+
+#[test]
+fn a_used_file_is_read_from_the_editor() {
+    let scratch = tempfile::tempdir().expect("a scratch directory");
+    let (a, b) = (uri(&scratch.path().join("a.ava")), uri(&scratch.path().join("b.ava")));
+    std::fs::write(scratch.path().join("b.ava"), "language 1\nlet far = 50 m\n").expect("it is writable");
+    let text = "language 1\nuse \"b.ava\"\nfn twice() -> Length = far * 2\n";
+    let mut editor = Editor::ready();
+    assert_eq!(editor.write(&a, text), Vec::<Value>::new());
+    // In the editor it says something else than on the disk.
+    let document = json!({ "uri": b, "version": 7, "text": "language 1\nlet far = 50 s\n" });
+    editor.tell("textDocument/didOpen", json!({ "textDocument": document }));
+    let found = editor.mistakes(&a);
+    assert_eq!(text_of(&found), ["AV0201"], "{}", shown(&found));
+    // A mistake in it stands in it.
+    let document = json!({ "uri": b, "version": 8 });
+    let changes = json!([{ "text": "language 1\nlet far = \n" }]);
+    editor.tell("textDocument/didChange", json!({ "textDocument": document, "contentChanges": changes }));
+    assert_eq!(editor.mistakes(&a), Vec::<Value>::new());
+    assert_eq!(text_of(&editor.mistakes(&b)), ["AV0001"]);
+    // Closed, it is what the disk says.
+    editor.tell("textDocument/didClose", json!({ "textDocument": { "uri": b } }));
+    assert_eq!(editor.mistakes(&b), Vec::<Value>::new());
+    // Changed on the disk behind the editor's back.
+    std::fs::write(scratch.path().join("b.ava"), "language 1\nlet fur = 50 m\n").expect("it is writable");
+    editor.tell("workspace/didChangeWatchedFiles", json!({ "changes": [{ "uri": b, "type": 2 }] }));
+    assert_eq!(text_of(&editor.mistakes(&a)), ["AV0101"]);
+}
+
+fn text_of(mistakes: &[Value]) -> Vec<String> {
+    mistakes.iter().map(|mistake| text(&mistake["code"])).collect()
+}
+
+#[test]
+fn hovers_say_what_the_compiler_knows() {
+    let mut editor = Editor::ready();
+    let places = [
+        "any distance: Length in 1 m",
+        "action drive_ah",
+        "rule npc_sp",
+        "rule npc_speed on vehicles: sp",
+        "on vehicles: speed <= road.lim",
+        "gap(mode, size(vehicle), sp",
+        "fn lea",
+        "what counts",
+        "drive_ahead(\n  each lane: La",
+        "state sk",
+        "roads: [residential, corn",
+        "does: DriveAh",
+        "spa",
+        "set sky[Rain] = ho",
+        "use \"roads",
+    ];
+    let mut all = String::new();
+    for place in places {
+        let text = marked(match place {
+            "what counts" => "/// What counts",
+            "spa" => "{\n  spa",
+            place => place,
+        });
+        let name = place.replace('\n', " ");
+        let said = editor.hover(&text).replace(&root().display().to_string(), "…");
+        all.push_str(&format!("## {name}\n\n{said}\n\n"));
+    }
+    let exact = editor.hover("language 1\nlet fast = 50 km|/h\n");
+    all.push_str(&format!("## 50 km/h\n\n{exact}\n\n"));
+    editor.write(&space_uri(), &shipped());
+    // The name of a parameter itself, and a broken line elsewhere: what was known before still is.
+    let broken = marked("any vehicle: Vehicle,\n  any colour: Colour,\n  any sp")
+        .replace("group environment =", "group environment = = =");
+    all.push_str(&format!("## in a broken file\n\n{}\n", editor.hover(&broken)));
+    expect_snapshot("editor", "hover", &all);
+}
+
+#[test]
+fn proposals_fit_their_place() {
+    let mut editor = Editor::ready();
+    editor.write(&space_uri(), "");
+    let head = "language 1\nenum Side = Left || Right\nenum Level = None < High\nenum Sky = Rain || Fog\n\
+                state sky: Sky -> Level = None\nlet far = 50 m\nfn near(s: Side) -> Length = far\n\
+                action cross(each from: Side, any pace: Speed in 1 m/s .. 2 m/s) {\n  \
+                spawn Pedestrian ahead far { side: from, speed: pace, does: Walk }\n}\n\
+                group all = cross\nroad corner { map: \"roads/corner.xodr\" start: lane 1/-1 at 5 m goal: lane 5/-3 at 7 m }\n";
+    let places = [
+        "|",
+        "ru|",
+        "state other: |",
+        "state other: Side = |",
+        "action a(|",
+        "action a(each x: |",
+        "action a(each x: Side |",
+        "action a(each x: Level where x > |",
+        "action a(any x: Speed in 10 |",
+        "action a(each x: Side) {\n  |",
+        "action a(each x: Side) {\n  set |",
+        "action a(each x: Side) {\n  set sky[|",
+        "action a(each x: Side) {\n  set sky = |",
+        "action a(each x: Side) {\n  spawn |",
+        "action a(each x: Side) {\n  spawn Sedan ahead 5 m { lane: Current, |",
+        "action a(each x: Side) {\n  spawn Sedan ahead 5 m { does: |",
+        "action a(each x: Side) {\n  spawn Sedan ahead 5 m { side: |",
+        "rule r |",
+        "rule r on |",
+        "rule r on all: |",
+        "rule r on all: pace |",
+        "rule r on all: pace <= road.|",
+        "rule r on all: from == |",
+        "rule r: sky[Rain] == |",
+        "rule r: road == |",
+        "rule r: road in [|",
+        "odds Level {\n  |",
+        "use \"roads.ava\" without |",
+        "fn f(s: Side) -> Length = match s { |",
+        "fn f(s: Side) -> Length = near(|",
+        "episode {\n  step: 6 s\n  |",
+        "episode { roads: [|",
+        "episode { stop: |",
+        "verdict v: |",
+        "expect count(|",
+        "road r { map: \"a.xodr\", |",
+        "scenario s {\n  |",
+        "scenario s { road: |",
+        "scenario s { road: corner steps { 0: |",
+        "scenario s { road: corner steps { 0: cross(|",
+        "scenario s { road: corner steps { 0: cross(from: |",
+        "scenario s { road: corner steps { 0: cross(from: Left) with { |",
+        "scenario s { road: corner start { sky: { Rain: |",
+        "scenario s { road: corner steps { } expect end == |",
+        "policy p { rules {\n    when from == Left => |",
+        "override |",
+        "// nothing in a comment |",
+    ];
+    let mut all = String::new();
+    for place in places {
+        let proposals = editor.proposals(&format!("{head}{place}"));
+        let rest =
+            if proposals.len() > 9 { format!(" … {} in all", proposals.len()) } else { String::new() };
+        let first: Vec<&str> = proposals.iter().take(9).map(String::as_str).collect();
+        all.push_str(&format!("{}\n    {}{rest}\n", place.replace('\n', "⏎"), first.join(" ")));
+    }
+    expect_snapshot("editor", "proposals", &all);
+    // Files beside the document, as far as they fit.
+    let files = editor.proposals(&format!("{head}use \"ro|"));
+    assert!(files.iter().any(|file| file == "roads.ava"), "{files:?}");
+    let maps = editor.proposals("language 1\nroad r { map: \"roads/|\" }\n");
+    assert!(maps.iter().any(|map| map == "roads/corner.xodr"), "{maps:?}");
+}
+
+#[test]
+fn definitions_and_references_cross_files() {
+    let mut editor = Editor::ready();
+    let uri = space_uri();
+    let roads = self::uri(&root().join("scenarios/roads.ava"));
+    let found =
+        editor.ask_at("textDocument/definition", &uri, &marked("roads: [residential, corn"), json!({}));
+    let found = found.expect("it can be asked");
+    assert_eq!(found[0]["uri"], roads.as_str());
+    assert_eq!(found[0]["range"]["start"], json!({ "line": 4, "character": 5 }));
+    let found = editor.ask_at("textDocument/definition", &uri, &marked("use \"roads"), json!({}));
+    assert_eq!(found.expect("it can be asked")[0]["uri"], roads.as_str());
+    // A variant of two enums is told apart by its type.
+    let found = editor.ask_at("textDocument/references", &uri, &marked("enum Lane = Le"), json!({}));
+    assert_eq!(found.expect("it can be asked").as_array().map(Vec::len), Some(1));
+    // A rule over a group names a parameter of each of its actions.
+    let found =
+        editor.ask_at("textDocument/definition", &uri, &marked("rule npc_speed on vehicles: sp"), json!({}));
+    assert_eq!(found.expect("it can be asked").as_array().map(Vec::len), Some(4));
+    let context = json!({ "context": { "includeDeclaration": false } });
+    let found = editor.ask_at("textDocument/references", &uri, &marked("fn si"), context);
+    assert_eq!(found.expect("it can be asked").as_array().map(Vec::len), Some(1));
+    let found = editor.ask_at("textDocument/documentHighlight", &uri, &marked("state sk"), json!({}));
+    assert_eq!(found.expect("it can be asked").as_array().map(Vec::len), Some(12));
+    let found = editor.ask_at("textDocument/definition", &uri, &marked("\nlangua"), json!({}));
+    assert_eq!(found, Ok(Value::Null));
+}
+
+#[test]
+fn odds_and_roads_in_rules_are_names_too() {
+    let mut editor = Editor::ready();
+    let uri = space_uri();
+    let own = "language 1\nuse \"avastra45.ava\" without set_time, chronology\nodds Vehicle { BoxTruck => 2 }\n\
+               rule quiet on pedestrian: road == corner implies speed <= 1 m/s\n";
+    let mut lines = |before: &str| {
+        let marked = own.replacen(before, &format!("{before}|"), 1);
+        let found = editor.ask_at("textDocument/definition", &uri, &marked, json!({}));
+        text(&found.expect("it can be asked")[0]["uri"]).rsplit('/').next().unwrap_or_default().to_owned()
+    };
+    for before in ["without set_", "chrono", "odds Veh", "BoxTr", "on pedes"] {
+        assert_eq!(lines(before), "avastra45.ava", "{before}");
+    }
+    assert_eq!(lines("road == cor"), "roads.ava");
+}
+
+#[test]
+fn renames_are_tried_first() {
+    let mut editor = Editor::ready();
+    let uri = space_uri();
+    let mut rename = |before: &str, name: &str| {
+        editor.ask_at("textDocument/rename", &uri, &marked(before), json!({ "newName": name }))
+    };
+    // One parameter of four actions, and its uses in rules and effects.
+    let found = rename("rule npc_speed on vehicles: sp", "pace").expect("it can be renamed");
+    let edits = &found["changes"][&uri];
+    assert_eq!(edits.as_array().map(Vec::len), Some(10));
+    let renamed = edited(&shipped(), edits);
+    assert!(renamed.contains("rule npc_speed on vehicles: pace <= road.limit"), "{renamed}");
+    assert!(renamed.contains("rule walking_pace on pedestrian: speed <= 1.4 m/s"), "{renamed}");
+    // Into a used file.
+    let found = rename("roads: [residential, corn", "bend").expect("it can be renamed");
+    let roads = self::uri(&root().join("scenarios/roads.ava"));
+    assert_eq!(found["changes"][&roads].as_array().map(Vec::len), Some(1), "{found}");
+    assert_eq!(found["changes"][&uri].as_array().map(Vec::len), Some(1));
+
+    let refused = [
+        ("does: DriveAh", "x", "`DriveAhead` is a word of the engine"),
+        ("state ti", "clock", "the world reads the state `time` by this name"),
+        ("each lane: La", "x y", "`x y` is no name"),
+        ("each lane: La", "match", "`Lane` cannot be called `match`"),
+        ("enum Colour = Pi", "Rose", "`Pink` cannot be called `Rose`"),
+        ("fn si", "base", "`size` cannot be called `base`"),
+        ("any speed: Spe", "x", "`Speed` is a type of the language"),
+        ("any distance: Length in 1 m", "x", "a number has no name"),
+        ("\nacti", "x", "`action` is a word of the language"),
+        ("verdict coun", "x", "`counted` is the verdict by which collisions count"),
+    ];
+    for (before, name, reason) in refused {
+        let error = rename(before, name).expect_err(before);
+        assert_eq!(error["code"], -32803, "{error}");
+        assert!(text(&error["message"]).contains(reason), "{error}");
+    }
+    let broken = marked("fn si").replace("group environment =", "group environment = =");
+    let error = editor.ask_at("textDocument/rename", &uri, &broken, json!({ "newName": "bulk" }));
+    assert!(text(&error.expect_err("it is broken")["message"]).contains("repair the syntax"));
+    let range = editor.ask_at("textDocument/prepareRename", &uri, &marked("fn si"), json!({}));
+    assert_eq!(range.expect("it can be renamed")["end"]["character"], 7);
+}
+
+#[test]
+fn formatting_is_that_of_fmt() {
+    let mut editor = Editor::ready();
+    let uri = space_uri();
+    let ask = |editor: &mut Editor, text: &str| {
+        editor.write(&uri, text);
+        editor.ask("textDocument/formatting", json!({ "textDocument": { "uri": uri }, "options": {} }))
+    };
+    let wild = shipped().replace("fn size(v: Vehicle)", "fn   size( v:Vehicle )  ").replace('\n', "\r\n");
+    let edits = ask(&mut editor, &shipped().replace("fn size(v: Vehicle)", "fn   size( v:Vehicle )  "));
+    let edits = edits.expect("it can be formatted");
+    assert_eq!(edits.as_array().map(Vec::len), Some(1));
+    let text = shipped().replace("fn size(v: Vehicle)", "fn   size( v:Vehicle )  ");
+    assert_eq!(edited(&text, &edits), shipped());
+    assert_eq!(ask(&mut editor, &shipped()), Ok(json!([])));
+    assert_eq!(ask(&mut editor, "language 1\nlet x = \n"), Ok(Value::Null), "a broken file stays as it is");
+    assert!(ask(&mut editor, &wild).is_ok_and(|edits| edits.as_array().map(Vec::len) == Some(1)));
+}
+
+#[test]
+fn outlines_hints_and_quick_fixes() {
+    let mut editor = Editor::ready();
+    let uri = space_uri();
+    editor.write(&uri, &shipped());
+    let document = json!({ "textDocument": { "uri": uri } });
+    let symbols = editor.ask("textDocument/documentSymbol", document).expect("it has an outline");
+    let mut outline = String::new();
+    for symbol in symbols.as_array().expect("a list") {
+        let children: Vec<String> =
+            symbol["children"].as_array().into_iter().flatten().map(|child| text(&child["name"])).collect();
+        let line = &symbol["selectionRange"]["start"]["line"];
+        let (kind, name) = (&symbol["kind"], text(&symbol["name"]));
+        outline.push_str(&format!("{line} {kind} {name} [{}]\n", children.join(" ")));
+    }
+    let all = json!({ "start": { "line": 0, "character": 0 }, "end": { "line": 9999, "character": 0 } });
+    let params = json!({ "textDocument": { "uri": uri }, "range": all });
+    let hints = editor.ask("textDocument/inlayHint", params).expect("it has hints");
+    for hint in hints.as_array().expect("a list") {
+        let place = &hint["position"];
+        let tooltip = text(&hint["tooltip"]).replace('\n', " / ");
+        let (line, column, label) = (&place["line"], &place["character"], text(&hint["label"]));
+        outline.push_str(&format!("hint {line}:{column} {label} ({tooltip})\n"));
+    }
+    expect_snapshot("editor", "outline", &outline);
+
+    let document = json!({ "textDocument": { "uri": uri } });
+    let data =
+        editor.ask("textDocument/semanticTokens/full", document).expect("it has tokens")["data"].clone();
+    let data: Vec<u64> = serde_json::from_value(data).expect("numbers");
+    // `Time`, a declared enum, and `Morning`, its first variant, on line 8.
+    assert_eq!(data[..10], [8, 5, 4, 0, 1, 0, 7, 7, 1, 1]);
+
+    let broken = shipped().replace("rule npc_speed on vehicles", "rule npc_speed on vehicels");
+    let found = editor.write(&uri, &broken);
+    let params = json!({ "textDocument": { "uri": uri }, "range": found[0]["range"], "context": { "diagnostics": found } });
+    let actions = editor.ask("textDocument/codeAction", params).expect("it can be asked");
+    assert_eq!(actions[0]["title"], "write `vehicles`");
+    assert_eq!(actions[0]["kind"], "quickfix");
+    assert_eq!(edited(&broken, &actions[0]["edit"]["changes"][&uri]), shipped());
+}
+
+#[test]
+fn whatever_comes_is_answered() {
+    let mut editor = Editor::start();
+    let code = |answer: Result<Value, Value>| answer.map_err(|error| error["code"].clone());
+    assert_eq!(code(editor.ask("textDocument/hover", json!({}))), Err(json!(-32002)));
+    editor.ask("initialize", json!({})).expect("it can be initialized");
+    assert_eq!(code(editor.ask("initialize", json!({}))), Err(json!(-32600)));
+    assert_eq!(code(editor.ask("textDocument/moonPhase", json!({}))), Err(json!(-32601)));
+    let hover = "textDocument/hover";
+    assert_eq!(code(editor.ask(hover, json!({}))), Err(json!(-32602)));
+    assert_eq!(code(editor.ask(hover, json!([1]))), Err(json!(-32602)));
+    let closed = json!({ "textDocument": { "uri": "file:///nowhere.ava" }, "position": { "line": 0, "character": 0 } });
+    assert_eq!(code(editor.ask(hover, closed)), Err(json!(-32602)));
+    editor.write(&space_uri(), "language 1\n");
+    for place in
+        [json!({ "line": -1, "character": 0 }), json!({ "line": 1e30, "character": "x" }), json!(null)]
+    {
+        let params = json!({ "textDocument": { "uri": space_uri() }, "position": place });
+        assert_eq!(code(editor.ask(hover, params)), Err(json!(-32602)));
+    }
+    let far = json!({ "textDocument": { "uri": space_uri() }, "position": { "line": 4_000_000_000_u32, "character": 9 } });
+    assert_eq!(code(editor.ask(hover, far)), Ok(Value::Null));
+    for (garbage, wanted) in [
+        ("no JSON", -32700),
+        ("{\"jsonrpc\":", -32700),
+        ("[]", -32600),
+        ("7", -32600),
+        ("{\"id\":1}", -32600),
+        ("{\"id\":{},\"method\":\"x\"}", -32600),
+    ] {
+        editor.send(garbage);
+        let answer = editor.hear();
+        assert_eq!((&answer["error"]["code"], &answer["id"]), (&json!(wanted), &Value::Null), "{garbage}");
+    }
+    editor.send(&"[".repeat(100_000));
+    assert_eq!(editor.hear()["error"]["code"], -32700);
+    editor.raw(b"Content-Length: 2\r\n\r\n\xff\xfe");
+    assert_eq!(editor.hear()["error"]["code"], -32700);
+    // Notices that are unknown, answers that nobody asked for, documents that lack their text.
+    editor.tell("$/setTrace", json!({ "value": "off" }));
+    editor.tell("textDocument/didOpen", json!({ "textDocument": { "uri": "file:///x.ava" } }));
+    editor.tell("textDocument/didChange", json!({ "textDocument": { "uri": 7 }, "contentChanges": 3 }));
+    editor.send("{\"jsonrpc\":\"2.0\",\"id\":99,\"result\":null}");
+    assert_eq!(editor.ask("shutdown", Value::Null), Ok(Value::Null));
+    assert_eq!(code(editor.ask("textDocument/hover", json!({}))), Err(json!(-32600)));
+    editor.tell("exit", Value::Null);
+    assert_eq!(editor.end(), (0, String::new()));
+}
+
+#[test]
+fn the_server_ends_with_its_editor() {
+    let (status, said) = Editor::ready().end();
+    assert_eq!(status, 1);
+    assert!(said.contains("ended without `shutdown`"), "{said}");
+    let mut editor = Editor::ready();
+    editor.tell("exit", Value::Null);
+    assert_eq!(editor.end().0, 1);
+    for garbage in ["GET / HTTP/1.1\r\n\r\n", "Content-Length: 99\r\n\r\n{}", "Content-Length: many\r\n\r\n"]
+    {
+        let mut editor = Editor::start();
+        editor.raw(garbage.as_bytes());
+        let (status, said) = editor.end();
+        assert_eq!(status, 1, "{garbage}");
+        assert!(said.starts_with("error: "), "{said}");
+    }
+}
+
+#[test]
+fn a_request_can_be_cancelled_while_it_waits() {
+    let mut editor = Editor::ready();
+    editor.write(&space_uri(), &shipped());
+    let mut burst = String::new();
+    let mut add = |message: Value| {
+        let body = message.to_string();
+        burst.push_str(&format!("Content-Length: {}\r\n\r\n{body}", body.len()));
+    };
+    let range = json!({ "start": { "line": 0, "character": 0 }, "end": { "line": 0, "character": 0 } });
+    let params = json!({ "textDocument": { "uri": space_uri() }, "range": range });
+    add(json!({ "id": 900, "method": "textDocument/inlayHint", "params": params }));
+    add(json!({ "id": 901, "method": "textDocument/inlayHint", "params": params }));
+    add(json!({ "method": "$/cancelRequest", "params": { "id": 901 } }));
+    editor.raw(burst.as_bytes());
+    // The first may be done before the burst is read to its end; the second is done or cancelled, and
+    // each has one answer.
+    let mut answers = vec![editor.hear(), editor.hear()];
+    answers.sort_by_key(|answer| answer["id"].as_u64());
+    assert_eq!(answers[0]["id"], 900);
+    assert_eq!(answers[1]["id"], 901);
+    let code = &answers[1]["error"]["code"];
+    assert!(*code == -32800 || answers[1].get("result").is_some(), "{answers:?}");
+}
+
+#[test]
+fn no_prefix_of_a_file_breaks_anything() {
+    let mut editor = Editor::ready();
+    let uri = space_uri();
+    let text = shipped();
+    let ends = text.char_indices().map(|(at, _)| at).filter(|at| at % 97 == 0);
+    for end in ends {
+        let prefix = &text[..end];
+        let (line, column) = (prefix.matches('\n').count(), prefix.rsplit('\n').next().unwrap_or_default());
+        let position = json!({ "line": line, "character": column.encode_utf16().count() });
+        editor.write(&uri, if prefix.is_empty() { " " } else { prefix });
+        for method in ["completion", "hover", "definition", "references", "prepareRename"] {
+            let params = json!({ "textDocument": { "uri": uri }, "position": position });
+            let answer = editor.ask(&format!("textDocument/{method}"), params);
+            assert!(
+                answer.is_ok() || answer.is_err_and(|error| error["code"] == -32803),
+                "{method} at {end}"
+            );
+        }
+    }
+}
+
+#[test]
+fn the_extension_is_that_of_the_language() {
+    let scratch = tempfile::tempdir().expect("a scratch directory");
+    let folder = scratch.path().display().to_string();
+    let (status, _, stderr) =
+        crate::command::outcome(&mut crate::command::avastra(&["editor-files", &folder]));
+    assert_eq!(status, 0, "{stderr}");
+    let shipped = root().join("editors/vscode");
+    for name in ["syntaxes/avastra.tmLanguage.json", "language-configuration.json"] {
+        let read = |folder: &Path| std::fs::read_to_string(folder.join(name)).expect("it is readable");
+        assert_eq!(
+            read(&shipped),
+            read(scratch.path()),
+            "write it anew: `avastra editor-files editors/vscode`"
+        );
+    }
+    let package = std::fs::read_to_string(shipped.join("package.json")).expect("it is readable");
+    let package: Value = serde_json::from_str(&package).expect("it is JSON");
+    assert_eq!(package["version"], env!("CARGO_PKG_VERSION"));
+    for path in [&package["main"], &package["contributes"]["grammars"][0]["path"]] {
+        assert!(shipped.join(text(path)).is_file(), "{path}");
+    }
+}

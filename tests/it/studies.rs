@@ -1,0 +1,221 @@
+//! Studies at their edges: what they find, that nothing but their file decides it, and what is refused.
+
+use std::path::Path;
+use std::process::Stdio;
+use std::time::Duration;
+
+use serde_json::Value;
+
+use crate::cases::expect_snapshot;
+use crate::cases::root;
+use crate::command::avastra;
+use crate::command::outcome;
+
+/// Plays the smoke study into a directory.
+fn smoke(out: &Path, jobs: &str) -> (i32, String, String) {
+    let out = out.display().to_string();
+    let study = ["study", "scenarios/studies/smoke.yaml", "--format", "plain"];
+    outcome(&mut avastra(&[&study[..], &["--out", &out, "--jobs", jobs]].concat()))
+}
+
+fn results(directory: &Path) -> Value {
+    let text = std::fs::read_to_string(directory.join("results.json")).expect("every study writes it");
+    serde_json::from_str(&text).expect("it is JSON")
+}
+
+/// What is printed above the machine's own figures.
+fn tables(stdout: &str) -> String {
+    let (_, rest) = stdout.split_once('\n').expect("a line of settings with the directory comes first");
+    rest.split("\nall figures: ").next().expect("split has a first part").to_owned()
+}
+
+#[test]
+fn a_study_depends_on_its_file_alone() {
+    let scratch = tempfile::tempdir().expect("a scratch directory");
+    let alone = scratch.path().join("alone");
+    let (status, stdout, stderr) = smoke(&alone, "1");
+    assert_eq!(status, 0, "{stderr}");
+    expect_snapshot("studies", "smoke", &tables(&stdout));
+    let whole = results(&alone);
+    assert_eq!(
+        (&whole["schema"], &whole["cells"], &whole["cells_wanted"]),
+        (&1.into(), &12.into(), &12.into())
+    );
+
+    // Interrupted, gone on with by more workers, killed, and gone on with again.
+    let broken = scratch.path().join("broken");
+    if interrupted(&broken, &whole) {
+        let mut child = background(&["--jobs", "2", "--resume"], &broken);
+        std::thread::sleep(Duration::from_millis(900));
+        child.kill().expect("it is ours to kill");
+        child.wait().expect("it ends");
+        let resume = ["study", "--jobs", "2", "--resume", &broken.display().to_string()];
+        avastra(&resume).assert().success();
+    }
+    assert_eq!(results(&broken), whole);
+
+    cells_are_runs(&whole);
+}
+
+/// A study under way; the last argument is its directory.
+fn background(arguments: &[&str], directory: &Path) -> std::process::Child {
+    std::process::Command::new(avastra(&[]).get_program())
+        .current_dir(root())
+        .arg("study")
+        .args(arguments)
+        .arg(directory)
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("it starts")
+}
+
+/// Ctrl-C ends a study in good order. Whether there was time for it: on a fast machine it was over before.
+fn interrupted(directory: &Path, whole: &Value) -> bool {
+    let child = background(&["scenarios/studies/smoke.yaml", "--jobs", "1", "--out"], directory);
+    // Once there is a database it listens.
+    for _ in 0..1200 {
+        if directory.join("study.db").is_file() {
+            break;
+        }
+        std::thread::sleep(Duration::from_millis(50));
+    }
+    std::thread::sleep(Duration::from_millis(700));
+    // SAFETY: a signal to a child that has not been waited for.
+    unsafe { libc::kill(child.id() as i32, libc::SIGINT) };
+    let output = child.wait_with_output().expect("it ends");
+    let stderr = String::from_utf8_lossy(&output.stderr);
+    if output.status.success() {
+        return false;
+    }
+    assert_eq!(output.status.code(), Some(130), "{stderr}");
+    assert!(stderr.contains("go on with `avastra study --resume"), "{stderr}");
+    assert!(results(directory)["cells"].as_u64() < whole["cells"].as_u64());
+    true
+}
+
+/// The seeds in the result are those with which `run` plays the same episodes.
+fn cells_are_runs(whole: &Value) {
+    let corner = &whole["roads"][0];
+    assert_eq!(corner["road"], "corner");
+    let random = &corner["agents"][0];
+    let counted: f64 = random["measures"]["collisions"]["values"][1].as_f64().expect("a number");
+    let scratch = tempfile::tempdir().expect("a scratch directory");
+    let mut found = 0;
+    for (number, seed) in random["seeds"][1]["evaluation"].as_array().expect("a list").iter().enumerate() {
+        let out = scratch.path().join(number.to_string()).display().to_string();
+        let run =
+            ["run", "scenarios/avastra45.ava", "--road", "corner", "--episodes", "3", "--format", "json"];
+        let seed = seed.as_str().expect("a text");
+        let (status, stdout, stderr) =
+            outcome(&mut avastra(&[&run[..], &["--seed", seed, "--out", &out]].concat()));
+        assert_eq!(status, 0, "{stderr}");
+        let line: Value = serde_json::from_str(stdout.lines().last().expect("a result")).expect("JSON");
+        found += line["totals"]["collisions"].as_u64().expect("a number");
+    }
+    assert_eq!(counted, found as f64 / 2.0);
+}
+
+#[test]
+fn a_quick_study_says_that_it_is_none() {
+    let scratch = tempfile::tempdir().expect("a scratch directory");
+    let out = scratch.path().join("quick").display().to_string();
+    let study = ["study", "scenarios/studies/healthy.yaml", "--quick", "--format", "json", "--out", &out];
+    let (status, stdout, stderr) = outcome(&mut avastra(&study));
+    assert_eq!(status, 0, "{stderr}");
+    let line = stdout.lines().last().expect("a result");
+    assert!(line.starts_with("{\"schema\":1,\"command\":\"study\""), "{line}");
+    let result: Value = serde_json::from_str(line).expect("JSON");
+    let results = &result["results"];
+    assert_eq!((&results["quick"], &results["cells"]), (&true.into(), &8.into()));
+    let rate = &results["together"][0]["episodes"]["collisions_per_1000_km"];
+    assert_eq!(rate["events"], 0, "nobody is there to be hit: {rate}");
+    assert!(rate["high"].as_f64().expect("a bound") > 0.0);
+    assert!(result["timing"][0]["wall_s"].as_f64().is_some_and(|wall_s| wall_s > 0.0));
+}
+
+#[test]
+fn what_no_study_can_be_is_said_so() {
+    let scratch = tempfile::tempdir().expect("a scratch directory");
+    let file = scratch.path().join("study.yaml");
+    let space = root().join("scenarios/avastra45.ava").display().to_string();
+    let cases = [
+        ("agents: [{ name: random, repats: 3 }]", "unknown field `repats`"),
+        ("agents: [{ name: random }]\nseed: 3", "unknown field `seed`"),
+        ("agents: []", "no agent is named"),
+        ("agents: [{ name: rnadom }]", "agent `rnadom`: no agent `rnadom`"),
+        ("agents: [{ name: random }, { name: random }]", "two agents are called `random`"),
+        ("agents: [{ name: random, trainings: 3 }]", "`trainings` is for agents that learn"),
+        ("agents: [{ name: ddqn, repeats: 3 }]", "`ddqn` does; say `trainings`"),
+        ("agents: [{ name: ddqn, label: mine, preset: papre }]", "agent `mine`: no preset `papre`"),
+        ("agents: [{ name: ddqn, config: { discuont: 1 } }]", "did you mean `discount`?"),
+        ("agents: [{ name: ddqn, config: nowhere.yaml }]", "cannot read `nowhere.yaml`"),
+        ("agents: [{ name: ddqn, config: 3 }]", "neither the name of a file nor a map"),
+        ("agents: [{ name: ddqn, config: { actions: [walkers] } }]", "agent `ddqn`: "),
+        ("agents: [{ name: ddqn, train_roads: [moon] }]", "no road `moon`"),
+        ("agents: [{ name: random, without: [gravity] }]", "agent `random`: "),
+        ("agents: [{ name: random }]\nroads: [moon]", "no road `moon`"),
+        ("agents: [{ name: random }]\nbaselines: [ddqn]", "no agent is called `ddqn`"),
+        ("agents: [{ name: random, repeats: 0 }]", "`repeats` is 0"),
+        ("agents: [{ name: random }]\nevaluation: { episodes: 0 }", "`evaluation.episodes` is 0"),
+        ("agents: [{ name: random }]\nads: apolo", "no driving system `apolo`"),
+        ("agents: [{ name: random }]\nads: idm\ncauses: true", "`idm` is not made of modules"),
+        ("agents: [{ name: random }]\nambient: 100000", "`ambient` is 100000"),
+        ("agents: [{ name: random }]\nads_config: nowhere.yaml", "nowhere.yaml"),
+    ];
+    for (text, reason) in cases {
+        std::fs::write(&file, format!("space: {space}\n{text}\n")).expect("it is writable");
+        let out = scratch.path().join("out");
+        let arguments = ["study", &file.display().to_string(), "--out", &out.display().to_string()];
+        let (status, _, stderr) = outcome(&mut avastra(&arguments));
+        assert!(status == 1 && stderr.contains(reason), "{text}: {stderr}");
+        assert!(!out.exists(), "{text}: nothing is left behind");
+    }
+    // Mistakes of form are said with their place.
+    std::fs::write(&file, format!("space: {space}\nagents:\n  - {{ name: random, repats: 3 }}\n"))
+        .expect("writable");
+    let (_, _, stderr) = outcome(&mut avastra(&["study", &file.display().to_string()]));
+    assert!(stderr.contains("line 3"), "{stderr}");
+    let (status, _, stderr) = outcome(&mut avastra(&["study", "--resume", "scenarios"]));
+    assert!(status == 1 && stderr.contains("it has no study.yaml"), "{stderr}");
+}
+
+#[test]
+fn every_shipped_study_can_begin() {
+    let folder = root().join("scenarios/studies");
+    for entry in std::fs::read_dir(folder).expect("it is there").flatten() {
+        let text = std::fs::read_to_string(entry.path()).expect("it is readable");
+        let study = loaded(&text);
+        // No episode of an evaluation is one of a training.
+        let settings = study.settings();
+        let seeds = |begin: u64, count: u32| -> Vec<u64> {
+            let number = |number| avastra::rng::child_seed(begin, avastra::rng::Stream::Episode, number);
+            (0..u64::from(count)).map(number).collect()
+        };
+        let mut all = Vec::new();
+        for number in 0..settings.agents.iter().map(|agent| agent.repeats).max().unwrap_or(0) {
+            let plans = settings.agents.iter().filter_map(|agent| agent.training.as_ref());
+            let longest = plans.map(|plan| plan.episodes).max().unwrap_or(0);
+            all.extend(seeds(study.training_seed(number), longest));
+            for seed in 0..settings.evaluation.seeds {
+                all.extend(seeds(study.evaluation_seed(number, seed), settings.evaluation.episodes));
+            }
+        }
+        let count = all.len();
+        all.sort_unstable();
+        all.dedup();
+        assert_eq!(all.len(), count, "{}", entry.path().display());
+    }
+}
+
+/// A shipped study, ready to play.
+fn loaded(text: &str) -> avastra::study::Study {
+    let file = avastra::study::StudyFile::from_yaml(text).expect("it is a study");
+    let name = file.space.trim_start_matches("../").to_owned();
+    let table = avastra::action::ActionTable::new(crate::world::space(&name));
+    let read = |name: &str| Err(format!("no shipped study names the file {name}"));
+    let versions = ("test", avastra::sim::ENGINE);
+    let settings =
+        avastra::study::StudySettings::new(file, &table, None, versions, &read).expect("it is sound");
+    avastra::study::Study::new(table, settings).expect("all that it names is there")
+}
