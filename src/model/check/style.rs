@@ -137,6 +137,7 @@ fn compared(expr: &Expr, into: &mut Vec<Diagnostic>) {
             into.push(
                 Diagnostic::warning(code::COMPARED_WITH_TRUTH, message)
                     .at(expr.span, "true or false already")
+                    .help(format!("write `{better}`"))
                     .fix(format!("write `{better}`"), expr.span, better),
             );
         }
