@@ -47,6 +47,10 @@ pub enum Stream {
     StudyEvaluation = 32,
     /// Which values a bootstrap draws again.
     Bootstrap = 33,
+    /// Seeds of the episodes in which rules learn from a network.
+    Distillation = 41,
+    /// The order into which the values of a variable are shuffled; one index a variable and repeat.
+    Permutation = 42,
 }
 
 /// The stream of one consumer; `index` tells apart its uses, for example the step number.

@@ -458,3 +458,39 @@ fn refuse(rule: Option<String>, reason: String) -> Refusal {
 fn first(refusals: Vec<Refusal>) -> Refusal {
     refusals.into_iter().next().expect("a judgement that fails names its reason")
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::vocabulary::Body;
+    use crate::model::vocabulary::Colour;
+    use crate::model::vocabulary::LaneChoice;
+    use crate::model::vocabulary::Side;
+    use crate::model::vocabulary::Then;
+    use crate::model::vocabulary::Verb;
+
+    #[test]
+    fn no_spawn_lies_out_of_bounds() {
+        let request = |speed_mps, distance_m| SpawnRequest {
+            body: Body::Sedan,
+            colour: Colour::Red,
+            verb: Verb::DriveAhead,
+            lane: LaneChoice::Current,
+            side: Side::Left,
+            then: Then::Keep,
+            speed_mps,
+            distance_m,
+        };
+        for (speed_mps, distance_m) in [(0.0, 0.0), (70.0, 1000.0)] {
+            assert_eq!(out_of_bounds(&request(speed_mps, distance_m)), None);
+        }
+        for speed_mps in [-0.1, 70.1, f64::NAN] {
+            assert!(out_of_bounds(&request(speed_mps, 10.0)).is_some_and(|reason| reason.contains("speed")));
+        }
+        for distance_m in [-0.1, 1000.1, f64::NAN] {
+            assert!(
+                out_of_bounds(&request(5.0, distance_m)).is_some_and(|reason| reason.contains("distance"))
+            );
+        }
+    }
+}

@@ -86,6 +86,11 @@ impl Features {
         self.len == 0
     }
 
+    /// The variables that go in, by index.
+    pub fn variables(&self) -> &[usize] {
+        &self.variables
+    }
+
     /// Network inputs, shape `(len,)`.
     pub fn encode(&self, observation: &Observation) -> Vec<f32> {
         let mut inputs = Vec::with_capacity(self.len);

@@ -120,6 +120,16 @@ pub struct Hyperparameters {
     pub random_decay: f64,
     /// ε of the trained policy.
     pub evaluation_epsilon: f64,
+
+    // The readable rules that are distilled from the network at the end (VIPER, Bastani et al., 2018).
+    /// Leaves of the decision tree, at most, which is lines of rules; 0: none are distilled.
+    pub rules_leaves: usize,
+    /// Its depth, at most.
+    pub rules_depth: usize,
+    /// Rounds of DAgger: in the first the network drives, then the rules of the round before.
+    pub rules_rounds: u32,
+    /// Episodes of a round, on each road.
+    pub rules_episodes: u32,
 }
 
 /// Sets of state variables.
@@ -318,6 +328,12 @@ impl Hyperparameters {
         }
         let begins = (1..=self.replay_capacity).contains(&self.learning_starts);
         require("learning_starts", begins, self.learning_starts.to_string(), "from 1 to `replay_capacity`");
+        require("rules_leaves", self.rules_leaves <= 256, self.rules_leaves.to_string(), "up to 256");
+        let is_right = (1..=32).contains(&self.rules_depth);
+        require("rules_depth", is_right, self.rules_depth.to_string(), "from 1 to 32");
+        for (name, value) in [("rules_rounds", self.rules_rounds), ("rules_episodes", self.rules_episodes)] {
+            require(name, (1..=1000).contains(&value), value.to_string(), "from 1 to 1000");
+        }
         require(
             "updates_per_step",
             self.updates_per_step <= 64,

@@ -80,6 +80,10 @@ pub(super) fn paper() -> Hyperparameters {
         exploration_inverted: false,
         random_decay: 0.0,
         evaluation_epsilon: 0.1,
+        rules_leaves: 16,
+        rules_depth: 8,
+        rules_rounds: 5,
+        rules_episodes: 40,
     }
 }
 

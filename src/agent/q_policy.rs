@@ -1,4 +1,4 @@
-//! A network that acts: ε-greedy over the rows that are open to it.
+//! A policy that acts: ε-greedy over the rows that are open to it, by its network or by its rules.
 
 use std::sync::Arc;
 
@@ -11,6 +11,7 @@ use crate::action::ActionTable;
 use crate::mdp::Observation;
 use crate::model::EffectDef;
 use crate::model::Policy;
+use crate::model::policy::PolicyRule;
 use crate::rng;
 use crate::rng::Rng;
 use crate::syntax::nearest;
@@ -21,6 +22,7 @@ use super::hyperparameters::SettingsError;
 use super::network::Network;
 use super::network::Shape;
 use super::registry::Agent;
+use super::rules::chosen_by;
 
 /// What is known of the rows before any episode.
 #[derive(Debug, Clone, PartialEq)]
@@ -65,6 +67,17 @@ impl Rows {
     }
 }
 
+/// Which of the two faces of a policy acts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Face {
+    /// The exact network.
+    #[default]
+    Network,
+    /// The readable rules that were distilled from it.
+    Rules,
+}
+
 /// A Q-network with everything that it takes to act.
 #[derive(Debug, Clone)]
 pub struct QPolicy {
@@ -72,6 +85,8 @@ pub struct QPolicy {
     pub(super) features: Features,
     pub(super) rows: Arc<Rows>,
     pub(super) network: Network,
+    /// What acts in the network's place.
+    rules: Option<Arc<Vec<PolicyRule>>>,
     /// The last row that changed weather or time in this episode, and the steps since then.
     last_environment: Option<(usize, u32)>,
 }
@@ -89,7 +104,7 @@ impl QPolicy {
     pub fn new(settings: Arc<Hyperparameters>, rows: Arc<Rows>, network: Network) -> QPolicy {
         assert_eq!(*network.shape(), QPolicy::shape(&settings, rows.allowed.len()), "the network fits");
         let features = Features::new(settings.state, settings.encoding);
-        QPolicy { settings, features, rows, network, last_environment: None }
+        QPolicy { settings, features, rows, network, rules: None, last_environment: None }
     }
 
     /// The policy that a file describes, for the table that it is to choose from.
@@ -109,12 +124,22 @@ impl QPolicy {
         Ok(QPolicy::new(Arc::new(settings), Arc::new(rows), network))
     }
 
+    /// The same policy, but that rules choose where the network did. Exploration, gate and masks stay.
+    pub fn with_rules(&self, rules: Arc<Vec<PolicyRule>>) -> QPolicy {
+        QPolicy { rules: Some(rules), ..self.clone() }
+    }
+
     pub fn settings(&self) -> &Hyperparameters {
         &self.settings
     }
 
     pub fn network(&self) -> &Network {
         &self.network
+    }
+
+    /// The variables that the network sees, by index.
+    pub fn variables(&self) -> &[usize] {
+        self.features.variables()
     }
 
     /// Q-values of a state, shape `(rows,)`.
@@ -124,11 +149,20 @@ impl QPolicy {
         self.network.q_values(inputs).index_axis_move(Axis(0), 0)
     }
 
-    /// Rows to choose from, shape `(rows,)`.
+    /// Rows to choose from, shape `(rows,)`. Rules choose among legal rows whatever the settings say.
     pub(super) fn open(&self, legal: ArrayView1<bool>) -> Vec<bool> {
-        let masks = self.settings.masks_choice;
-        let rows = self.rows.allowed.iter().zip(legal).enumerate();
-        rows.map(|(row, (&allowed, &legal))| allowed && (legal || !masks) && self.gate_is_open(row)).collect()
+        let masks = self.settings.masks_choice || self.rules.is_some();
+        self.allowed_now(legal.iter().map(|&legal| legal || !masks))
+    }
+
+    /// Rows to choose from that are legal, shape `(rows,)`.
+    pub fn legal_rows(&self, legal: ArrayView1<bool>) -> Vec<bool> {
+        self.allowed_now(legal.iter().copied())
+    }
+
+    fn allowed_now(&self, candidates: impl Iterator<Item = bool>) -> Vec<bool> {
+        let rows = self.rows.allowed.iter().zip(candidates).enumerate();
+        rows.map(|(row, (&allowed, candidate))| allowed && candidate && self.gate_is_open(row)).collect()
     }
 
     /// The published package's gate: weather and time change seldom, and never to what they are.
@@ -149,8 +183,16 @@ impl QPolicy {
         }
     }
 
+    /// The row that it takes when it does not explore.
+    fn decide(&self, observation: &Observation, open: &[bool]) -> Option<usize> {
+        match &self.rules {
+            Some(rules) => chosen_by(rules, observation, open),
+            None => self.greedy(observation, open),
+        }
+    }
+
     /// The open row of the highest Q-value, the first of equals.
-    pub(super) fn greedy(&self, observation: &Observation, open: &[bool]) -> Option<usize> {
+    pub fn greedy(&self, observation: &Observation, open: &[bool]) -> Option<usize> {
         best(self.q_values(observation).view(), open)
     }
 }
@@ -164,7 +206,7 @@ impl Agent for QPolicy {
     fn choose(&mut self, observation: &Observation, legal: ArrayView1<bool>, rng: &mut Rng) -> Option<usize> {
         let open = self.open(legal);
         let explores = rng::unit(rng) < self.settings.evaluation_epsilon;
-        let row = if explores { any(&open, rng) } else { self.greedy(observation, &open) }?;
+        let row = if explores { any(&open, rng) } else { self.decide(observation, &open) }?;
         self.chosen(row);
         Some(row)
     }

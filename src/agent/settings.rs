@@ -24,7 +24,7 @@ use super::trainable::Trainable;
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(untagged)]
 pub enum Settings {
-    Learning(Hyperparameters),
+    Learning(Box<Hyperparameters>),
     AvFuzzer(AvFuzzerSettings),
     GoExplore(GoExploreSettings),
 }
@@ -42,7 +42,9 @@ impl Settings {
         let default = match entry.kind {
             Kind::Ready(_) => return None,
             Kind::Learning(presets) => {
-                return Some(Hyperparameters::from_yaml(presets, preset, text).map(Settings::Learning));
+                return Some(
+                    Hyperparameters::from_yaml(presets, preset, text).map(Box::new).map(Settings::Learning),
+                );
             }
             Kind::Searching(default) => default(),
         };
@@ -77,7 +79,9 @@ impl Settings {
     /// An agent that knows nothing yet.
     pub fn build(&self, rows: Arc<Rows>, seed: u64) -> Box<dyn Trainable> {
         match self {
-            Settings::Learning(settings) => Box::new(Learner::new(Arc::new(settings.clone()), rows, seed)),
+            Settings::Learning(settings) => {
+                Box::new(Learner::new(Arc::new(Hyperparameters::clone(settings)), rows, seed))
+            }
             Settings::AvFuzzer(settings) => Box::new(AvFuzzer::new(settings, rows.allowed.len())),
             Settings::GoExplore(settings) => Box::new(GoExplore::new(settings, rows.allowed.len())),
         }
@@ -87,7 +91,7 @@ impl Settings {
     pub fn restore(&self, rows: Arc<Rows>, bytes: &[u8]) -> Option<Box<dyn Trainable>> {
         Some(match self {
             Settings::Learning(settings) => {
-                Box::new(Learner::restore(Arc::new(settings.clone()), rows, bytes)?)
+                Box::new(Learner::restore(Arc::new(Hyperparameters::clone(settings)), rows, bytes)?)
             }
             Settings::AvFuzzer(settings) => Box::new(AvFuzzer::restore(settings, rows.allowed.len(), bytes)?),
             Settings::GoExplore(settings) => {
@@ -99,7 +103,7 @@ impl Settings {
     /// Settings of a learner, if it is one.
     pub fn hyperparameters(&self) -> Option<&Hyperparameters> {
         match self {
-            Settings::Learning(settings) => Some(settings),
+            Settings::Learning(settings) => Some(settings.as_ref()),
             Settings::AvFuzzer(_) | Settings::GoExplore(_) => None,
         }
     }

@@ -80,6 +80,12 @@ pub enum Command {
     Run(RunArguments),
     /// Train an agent and write what it learned as a policy.
     Train(TrainArguments),
+    /// Distil readable rules from a policy's network once more, with other settings.
+    Distill(DistillArguments),
+    /// Say which rows a policy favours and when, what it expects of them, and which variables matter to it.
+    ExplainPolicy(ExplainPolicyArguments),
+    /// Write the weights of a policy's network as safetensors, for other tools.
+    ExportWeights(ExportWeightsArguments),
     /// Compare agents over roads and independent trainings, with statistics.
     Study(StudyArguments),
     /// Run emitted scenarios again and check every claim they make.
@@ -254,6 +260,9 @@ pub struct RunArguments {
     /// Let a trained policy choose them; without FILE on its own space.
     #[arg(long, value_name = "POLICY", conflicts_with = "agent")]
     pub policy: Option<PathBuf>,
+    /// Which face of the policy acts: its network, or the rules distilled from it.
+    #[arg(long, value_enum, requires = "policy", default_value_t = FaceArgument::Network)]
+    pub face: FaceArgument,
     /// Episodes on each road.
     #[arg(long, default_value_t = 100, value_parser = clap::value_parser!(u32).range(1..=i64::from(crate::study::EPISODES_MAX)))]
     pub episodes: u32,
@@ -275,7 +284,7 @@ pub struct RunArguments {
     #[arg(long)]
     pub out: Option<PathBuf>,
     /// Go on with an interrupted run directory; its own settings hold.
-    #[arg(long, value_name = "DIR", conflicts_with_all = ["file", "road", "ads", "ads_config", "agent", "policy", "episodes", "seed", "ambient", "causes", "out", "without", "with"])]
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["file", "road", "ads", "ads_config", "agent", "policy", "face", "episodes", "seed", "ambient", "causes", "out", "without", "with"])]
     pub resume: Option<PathBuf>,
     /// Exit with status 4 if a counted collision was found.
     #[arg(long)]
@@ -318,6 +327,63 @@ pub struct TrainArguments {
     /// Go on with an interrupted run directory; its own settings hold.
     #[arg(long, value_name = "DIR", conflicts_with_all = ["file", "road", "ads", "ads_config", "agent", "preset", "config", "episodes", "seed", "out", "without", "with"])]
     pub resume: Option<PathBuf>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum FaceArgument {
+    Network,
+    Rules,
+}
+
+#[derive(Debug, Args)]
+pub struct DistillArguments {
+    /// The policy.
+    pub file: PathBuf,
+    /// Lines, at most [default: as the policy was trained with, like the others].
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=256))]
+    pub leaves: Option<u32>,
+    /// Tests that a line may take, at most.
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=32))]
+    pub depth: Option<u32>,
+    /// Rounds; the rules of each drive the next.
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    pub rounds: Option<u32>,
+    /// Episodes of a round, on each road.
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    pub episodes: Option<u32>,
+    /// Where to write [default: STEM.distilled.ava beside the file].
+    #[arg(long, short)]
+    pub output: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+pub struct ExplainPolicyArguments {
+    /// The policy.
+    pub file: PathBuf,
+    /// Values in place of the mean state's, for example `ego_speed: 12 m/s, time: Night`.
+    #[arg(long)]
+    pub state: Option<String>,
+    /// Road to drive; may be given several times [default: those of the training].
+    #[arg(long)]
+    pub road: Vec<String>,
+    /// Episodes on each road.
+    #[arg(long, default_value_t = 20, value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    pub episodes: u32,
+    /// Seed of the episodes and of the shuffles.
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+    /// Shuffles of each variable.
+    #[arg(long, default_value_t = 10, value_parser = clap::value_parser!(u32).range(2..=1000))]
+    pub repeats: u32,
+}
+
+#[derive(Debug, Args)]
+pub struct ExportWeightsArguments {
+    /// The policy.
+    pub file: PathBuf,
+    /// Where to write [default: STEM.safetensors beside the file].
+    #[arg(long, short)]
+    pub output: Option<PathBuf>,
 }
 
 #[derive(Debug, Args)]

@@ -6,10 +6,13 @@ mod compile;
 mod completions;
 mod diagnose;
 mod diff;
+mod distill;
 mod doc;
 mod editor_files;
 mod error;
 mod explain;
+mod explain_policy;
+mod export_weights;
 mod fmt;
 mod load;
 pub mod lsp;
@@ -71,6 +74,9 @@ pub fn main() -> ExitCode {
         Command::EditorFiles(arguments) => editor_files::editor_files(&output, arguments),
         Command::Run(arguments) => run::run(&output, arguments),
         Command::Train(arguments) => train::train(&output, arguments),
+        Command::Distill(arguments) => distill::distill(&output, arguments),
+        Command::ExplainPolicy(arguments) => explain_policy::explain_policy(&output, arguments),
+        Command::ExportWeights(arguments) => export_weights::export_weights(&output, arguments),
         Command::Study(arguments) => study::study(&output, arguments),
         Command::Verify(arguments) => verify::verify(&output, arguments),
         Command::Replay(arguments) => replay::replay(&output, arguments),

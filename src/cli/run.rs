@@ -8,6 +8,7 @@ use std::sync::atomic::Ordering;
 use std::time::Instant;
 
 use crate::action::ActionTable;
+use crate::agent::Face;
 use crate::emit;
 use crate::episode::EpisodeLog;
 use crate::model::Policy;
@@ -24,6 +25,7 @@ use crate::study::RunSettings;
 use crate::study::Totals;
 use crate::study::play;
 
+use super::arguments::FaceArgument;
 use super::arguments::RunArguments;
 use super::compile;
 use super::error::Failure;
@@ -131,12 +133,16 @@ fn begun(output: &Output, arguments: &RunArguments) -> Result<(Run, RunDirectory
         with: arguments.rules.with.clone(),
         avoidability: AvoidabilitySettings::default(),
     };
-    let run = ready(table, settings, policy.as_ref())?;
+    let face = match arguments.face {
+        FaceArgument::Network => Face::Network,
+        FaceArgument::Rules => Face::Rules,
+    };
+    let run = ready(table, settings, policy.as_ref(), face)?;
     let path = run_directory::create(arguments.out.as_deref())?;
     let space = load::relative(&path, &run.space().path)?;
     let reference = match (&arguments.policy, &policy) {
         (Some(file), Some((_, policy))) => {
-            Some(PolicyReference { file: load::relative(&path, file)?, digest: policy.digest.clone() })
+            Some(PolicyReference { file: load::relative(&path, file)?, digest: policy.digest.clone(), face })
         }
         _ => None,
     };
@@ -164,7 +170,8 @@ fn resumed(output: &Output, path: &Path) -> Result<(Run, RunDirectory), Failure>
             Some((own, policy))
         }
     };
-    Ok((ready(table, settings, policy.as_ref())?, RunDirectory::open(path.to_owned())?))
+    let face = settings.policy.as_ref().map_or(Face::Network, |reference| reference.face);
+    Ok((ready(table, settings, policy.as_ref(), face)?, RunDirectory::open(path.to_owned())?))
 }
 
 /// A run of the agent that the settings name, or of a policy, which comes with its own table.
@@ -172,6 +179,7 @@ fn ready(
     table: ActionTable,
     settings: RunSettings,
     policy: Option<&(ActionTable, Policy)>,
+    face: Face,
 ) -> Result<Run, Failure> {
     let Some((own, policy)) = policy else {
         return Run::new(table, settings).map_err(|error| Failure::usage(error.to_string()));
@@ -184,7 +192,7 @@ fn ready(
             "`{name}` was trained for another action table than that of `{path}`"
         )));
     }
-    let acting = acting(&table, policy)?;
+    let acting = acting(&table, policy, face)?;
     let (period_s, step_s) = (acting.settings().observation_period_s, table.space().episode.step_s);
     if let Some(period_s) = period_s.filter(|&period_s| period_s != step_s) {
         return Err(Failure::usage(format!(

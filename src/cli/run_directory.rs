@@ -108,7 +108,7 @@ impl Begun<'_> {
 /// Writes a file whole or not at all: a kill leaves the old one.
 /// A link is followed, and what is no regular file (a pipe, a terminal, the null device) is
 /// written to rather than replaced.
-pub fn write(path: &Path, text: &str) -> Result<(), Failure> {
+pub fn write(path: &Path, text: &(impl AsRef<[u8]> + ?Sized)) -> Result<(), Failure> {
     let followed = std::fs::canonicalize(path);
     let path = followed.as_deref().unwrap_or(path);
     if path.exists() && !path.is_file() {

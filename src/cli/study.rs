@@ -46,12 +46,12 @@ pub fn study(output: &Output, arguments: &StudyArguments) -> Result<(), Failure>
             (study, path)
         }
     };
+    let stop = stop_on_interrupt()?;
     let file = path.join("study.db");
     let mut database = StudyDatabase::open(&file).map_err(|error| Failure::file("open", &file, error))?;
     let todo = database.missing(&study).map_err(|error| Failure::file("read", &file, error))?;
     output.tell(&heading(&study, &path));
 
-    let stop = stop_on_interrupt()?;
     let episodes = |jobs: &[_]| jobs.iter().map(|job| study.episodes(job)).sum::<u64>();
     let (all, left) = (episodes(&study.jobs()), episodes(&todo));
     let mut progress = Progress::new(all, all - left, output.quiet || output.is_json());

@@ -10,16 +10,24 @@ use crate::agent::Kind;
 use crate::agent::QPolicy;
 use crate::agent::Settings;
 use crate::emit;
+use crate::model::Policy;
 use crate::model::Space;
+use crate::model::digest_text;
+use crate::model::policy::PolicyClaims;
+use crate::model::policy::PolicyOrigin;
 use crate::sim::ENGINE;
+use crate::study::Evaluation;
 use crate::study::Profile;
 use crate::study::TrainSettings;
 use crate::study::TrainedEpisode;
 use crate::study::Training;
 use crate::study::evaluate_agent;
+use crate::study::rounded;
 use crate::syntax::listed;
 
 use super::arguments::TrainArguments;
+use super::distill;
+use super::distill::rules_text;
 use super::error::Failure;
 use super::load;
 use super::output::Output;
@@ -183,8 +191,13 @@ fn finish(output: &Output, training: &Training, directory: &RunDirectory) -> Res
     let (ads, test) = (training.arena().ads(), (EVALUATION_EPISODES, settings.seed));
     let evaluation = evaluate_agent(table, &|| training.actor(), roads, ads, rules, test);
     let evaluation = evaluation.map_err(|error| Failure::usage(error.to_string()))?;
-    let policy = training.policy().map(|policy| write_policy(training, policy, &evaluation, &directory.path));
-    let policy = policy.transpose()?;
+    let kept = training.policy().map(|acting| {
+        output.tell("distilling rules from the network");
+        let policy = policy(training, acting, &evaluation)?;
+        let path = write_policy(&policy, training.table().space(), &directory.path)?;
+        Ok::<_, Failure>((path, policy))
+    });
+    let kept = kept.transpose()?;
     let read = |error| Failure::file("read", &directory.path, error);
     let totals = directory.database.totals().map_err(read)?;
     let simulated_h = directory.database.trained_s().map_err(read)? / 3600.0;
@@ -201,8 +214,12 @@ fn finish(output: &Output, training: &Training, directory: &RunDirectory) -> Res
         plural(evaluation.counted as usize, "collision"),
         plural(evaluation.colliding as usize, "episode"),
     ));
-    match &policy {
-        Some(path) => {
+    let rules = kept.as_ref().and_then(|(_, policy)| policy.claims.as_ref()?.rules.as_ref());
+    match &kept {
+        Some((path, policy)) => {
+            if let Some(rules) = rules {
+                output.say(&rules_text(policy.rules.len(), evaluation.return_mean, rules));
+            }
             output.say(&format!("{}\nplay it with: avastra run --policy {}", path.display(), path.display()))
         }
         None => output.say(&format!(
@@ -213,37 +230,86 @@ fn finish(output: &Output, training: &Training, directory: &RunDirectory) -> Res
     output.result(
         "train",
         serde_json::json!({
-            "directory": directory.path, "totals": totals, "policy": policy, "simulated_h": simulated_h,
+            "directory": directory.path, "totals": totals, "policy": kept.as_ref().map(|(path, _)| path), "rules": rules, "simulated_h": simulated_h,
             "evaluation": {
                 "episodes": evaluation.episodes * roads.len() as u64, "collisions": evaluation.collisions,
                 "counted": evaluation.counted, "colliding": evaluation.colliding,
-                "simulated_h": evaluation.simulated_s / 3600.0,
+                "simulated_h": evaluation.simulated_s / 3600.0, "return": evaluation.return_mean,
             },
         }),
     );
     Ok(())
 }
 
-/// Writes `policy/NAME.ava`.
-fn write_policy(
-    training: &Training,
-    policy: &QPolicy,
-    evaluation: &crate::study::Evaluation,
-    directory: &Path,
-) -> Result<PathBuf, Failure> {
+/// The policy as it is to be kept, with the rules distilled from it and the claims of both.
+fn policy(training: &Training, acting: &QPolicy, evaluation: &Evaluation) -> Result<Policy, Failure> {
     let settings = training.settings();
     let name = match settings.roads.as_slice() {
         [road] => format!("{road}_{}_{}", settings.agent, settings.seed),
         _ => format!("{}_{}", settings.agent, settings.seed),
     };
+    let network = acting.network();
+    let policy = Policy {
+        name,
+        docs: vec![headline(settings, evaluation)],
+        origin: PolicyOrigin {
+            agent: settings.agent.clone(),
+            seed: settings.seed,
+            episodes: u64::from(settings.episodes),
+            roads: settings.roads.clone(),
+            ads: settings.ads.clone(),
+            profile: settings
+                .profile
+                .as_ref()
+                .map(|profile| profile.settings.to_line())
+                .filter(|line| !line.is_empty()),
+            profile_digest: settings.profile.as_ref().map(|profile| profile.digest.clone()),
+            engine: settings.engine.clone(),
+            avastra: settings.avastra.clone(),
+            with: settings.with.clone(),
+            without: settings.without.clone(),
+        },
+        layers: network.shape().layers.clone(),
+        dueling: network.shape().dueling,
+        hyperparameters: acting.settings().record(),
+        parameters: network.parameters().to_vec(),
+        claims: Some(PolicyClaims {
+            episodes: evaluation.episodes,
+            seed: evaluation.seed,
+            collisions: evaluation.collisions,
+            counted: evaluation.counted,
+            colliding: evaluation.colliding,
+            return_mean: rounded(evaluation.return_mean),
+            trace: digest_text(&evaluation.trace),
+            rules: None,
+        }),
+        rules: Vec::new(),
+        digest: String::new(),
+    };
+    distill::with_rules(training.table(), acting, policy)
+}
+
+/// Writes `policy/NAME.ava`.
+fn write_policy(policy: &Policy, space: &Space, directory: &Path) -> Result<PathBuf, Failure> {
     let folder = directory.join("policy");
     std::fs::create_dir_all(&folder).map_err(|error| Failure::file("create", &folder, error))?;
-    let space: &Space = training.table().space();
     let space_path = load::relative(&folder, &space.path)?;
-    let text = emit::policy_text(policy, settings, evaluation, &name, &space_path);
-    let path = folder.join(format!("{name}.ava"));
-    write(&path, &text)?;
+    let path = folder.join(format!("{}.ava", policy.name));
+    write(&path, &emit::policy_text(policy, space, &space_path))?;
     Ok(path)
+}
+
+/// What it is, in a sentence for the reader.
+fn headline(settings: &TrainSettings, evaluation: &Evaluation) -> String {
+    format!(
+        "{} ({}) after {} episodes on {}: {} counted collisions in {} episodes of its own.",
+        settings.agent,
+        settings.hyperparameters.preset(),
+        settings.episodes,
+        settings.roads.join(", "),
+        evaluation.counted,
+        evaluation.episodes * settings.roads.len() as u64,
+    )
 }
 
 fn heading(training: &Training, directory: &Path) -> String {

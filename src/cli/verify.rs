@@ -2,14 +2,19 @@
 
 use std::path::Path;
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use crate::action::ActionTable;
+use crate::agent::Face;
 use crate::agent::QPolicy;
 use crate::model::Policy;
 use crate::model::digest_text;
+use crate::model::policy::RulesClaims;
 use crate::sim::ENGINE;
 use crate::study;
 use crate::study::evaluate;
+use crate::study::judge_rules;
+use crate::study::rounded;
 
 use super::arguments::ReplayArguments;
 use super::arguments::VerifyArguments;
@@ -53,14 +58,9 @@ pub fn verify(output: &Output, arguments: &VerifyArguments) -> Result<(), Failur
 
 /// The claims that do not hold, each with what was found.
 fn judge(table: &ActionTable, policy: &Policy) -> Result<Vec<String>, Failure> {
+    same_world(policy)?;
     let origin = &policy.origin;
-    if origin.engine != ENGINE {
-        let (name, engine) = (&policy.name, &origin.engine);
-        return Err(Failure::usage(format!(
-            "`{name}` was trained in world `{engine}`; this is `{ENGINE}`, where nothing need happen alike"
-        )));
-    }
-    let acting = acting(table, policy)?;
+    let acting = acting(table, policy, Face::Network)?;
     let Some(claims) = &policy.claims else { return Ok(Vec::new()) };
     let rules = (origin.with.as_slice(), origin.without.as_slice());
     let test = (claims.episodes, claims.seed);
@@ -72,18 +72,66 @@ fn judge(table: &ActionTable, policy: &Policy) -> Result<Vec<String>, Failure> {
         ("collisions", claims.collisions.to_string(), found.collisions.to_string()),
         ("counted", claims.counted.to_string(), found.counted.to_string()),
         ("colliding", claims.colliding.to_string(), found.colliding.to_string()),
+        ("return", claims.return_mean.to_string(), rounded(found.return_mean).to_string()),
         ("trace", claims.trace.clone(), trace),
     ];
+    let mut pairs = Vec::from(pairs.map(|(name, claimed, found)| (name.to_owned(), claimed, found)));
+    if let Some(claims) = &claims.rules {
+        let lines = Arc::new(policy.rules.clone());
+        let found = judge_rules(table, &acting, &lines, &origin.roads, &ads, rules, test)
+            .map_err(|error| Failure::usage(error.to_string()))?;
+        pairs.extend(
+            figures(claims)
+                .into_iter()
+                .zip(figures(&found))
+                .map(|((name, claimed), (_, found))| (format!("rules: {name}"), claimed, found)),
+        );
+    }
     let wrong = pairs.into_iter().filter(|(_, claimed, found)| claimed != found);
     Ok(wrong.map(|(name, claimed, found)| format!("{name}: claimed {claimed}, found {found}")).collect())
 }
 
-/// A policy that can act on a table.
+/// The claims about rules by name, as text.
+fn figures(claims: &RulesClaims) -> [(&'static str, String); 8] {
+    [
+        ("states", claims.states.to_string()),
+        ("fidelity", claims.fidelity.to_string()),
+        ("regret", claims.regret.to_string()),
+        ("collisions", claims.collisions.to_string()),
+        ("counted", claims.counted.to_string()),
+        ("colliding", claims.colliding.to_string()),
+        ("return", claims.return_mean.to_string()),
+        ("trace", claims.trace.clone()),
+    ]
+}
+
+/// # Errors
+/// If the policy was trained in another world than this.
+pub fn same_world(policy: &Policy) -> Result<(), Failure> {
+    let (name, engine) = (&policy.name, &policy.origin.engine);
+    if engine == ENGINE {
+        return Ok(());
+    }
+    Err(Failure::usage(format!(
+        "`{name}` was trained in world `{engine}`; this is `{ENGINE}`, where nothing need happen alike"
+    )))
+}
+
+/// A policy that can act on a table, by one of its faces.
 ///
 /// # Errors
-/// If its settings cannot be read, or its network is not what they describe.
-pub fn acting(table: &ActionTable, policy: &Policy) -> Result<QPolicy, Failure> {
-    QPolicy::read(policy, table).map_err(|error| Failure::usage(format!("`{}`: {error}", policy.name)))
+/// If its settings cannot be read, its network is not what they describe, or it has no rules where
+/// those are to act.
+pub fn acting(table: &ActionTable, policy: &Policy, face: Face) -> Result<QPolicy, Failure> {
+    let acting = QPolicy::read(policy, table)
+        .map_err(|error| Failure::usage(format!("`{}`: {error}", policy.name)))?;
+    match face {
+        Face::Network => Ok(acting),
+        Face::Rules if policy.rules.is_empty() => {
+            Err(Failure::usage(format!("`{}` has no rules: `avastra distill FILE` makes some", policy.name)))
+        }
+        Face::Rules => Ok(acting.with_rules(Arc::new(policy.rules.clone()))),
+    }
 }
 
 fn report(output: &Output, path: &Path, policy: &Policy, wrong: &[String]) {
@@ -93,7 +141,8 @@ fn report(output: &Output, path: &Path, policy: &Policy, wrong: &[String]) {
         (Some(claims), []) => {
             let episodes = claims.episodes as usize * policy.origin.roads.len();
             let text = plural(episodes, "episode");
-            output.tell(&format!("{}: {} holds, {text} played again", path.display(), policy.name));
+            let faces = if claims.rules.is_some() { " by each of its faces" } else { "" };
+            output.tell(&format!("{}: {} holds, {text} played again{faces}", path.display(), policy.name));
         }
         (Some(_), wrong) => {
             output.say(&format!("{}: {} is refuted", path.display(), policy.name));

@@ -47,7 +47,7 @@ pub fn why(output: &Output, arguments: &WhyArguments) -> Result<(), Failure> {
     let offer = table.offer(&situation, arguments.row);
 
     output.say(&format!("row {}: {} on {}", row.index, row.label, road.name));
-    for &rule in &row.rules {
+    for &rule in row.rules.iter() {
         let state = if rules.is_active(rule) { "" } else { " (off)" };
         output.say(&format!("  bound by {}{state}", space.rules[rule].name));
     }

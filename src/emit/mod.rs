@@ -4,10 +4,12 @@
 //! Builds syntax trees and leaves the spelling to `syntax::format`; prints no concrete syntax itself.
 
 mod policy;
+mod safetensors;
 mod scenario;
 mod tree;
 
 pub use policy::policy_text;
+pub use safetensors::safetensors;
 pub use scenario::Provenance;
 pub use scenario::action_text;
 pub use scenario::scenario;

@@ -1,113 +1,116 @@
-//! A policy as a file: the network bit by bit, every setting, where it comes from and what it claims.
+//! A policy as a file: the network bit by bit, every setting, where it comes from, what it claims, and
+//! its rules.
 
 use serde_json::Value;
 
-use crate::agent::QPolicy;
-use crate::model::digest_text;
+use crate::model::Policy;
+use crate::model::Space;
+use crate::model::policy::Condition;
 use crate::model::policy::Net;
-use crate::model::policy::PolicyClaims;
-use crate::model::policy::PolicyOrigin;
+use crate::model::policy::PolicyRule;
+use crate::model::policy::VARIABLES;
+use crate::model::policy::VariableKind;
 use crate::model::policy::expression;
 use crate::model::policy::seal;
 use crate::model::policy::weights_to_lines;
-use crate::study::Evaluation;
-use crate::study::TrainSettings;
 use crate::syntax::LANGUAGE;
+use crate::syntax::ast;
+use crate::syntax::ast::Arg;
+use crate::syntax::ast::BinaryOp;
+use crate::syntax::ast::Call;
+use crate::syntax::ast::Expr;
 use crate::syntax::ast::ExprKind;
 use crate::syntax::ast::Field;
 use crate::syntax::ast::File;
 use crate::syntax::ast::FileId;
 use crate::syntax::ast::ItemKind;
 use crate::syntax::ast::Name;
-use crate::syntax::ast::Policy;
+use crate::syntax::ast::PolicyLine;
 use crate::syntax::ast::Span;
 use crate::syntax::ast::Text;
 use crate::syntax::ast::Use;
 use crate::syntax::parse;
 use crate::syntax::print;
+use crate::units::decimal;
 
 use super::tree;
 
-/// The text of a policy file. `space_path` is the way from the file to its space.
-pub fn policy_text(
-    policy: &QPolicy,
-    settings: &TrainSettings,
-    evaluation: &Evaluation,
-    name: &str,
-    space_path: &str,
-) -> String {
+/// The text of a policy file, sealed; the policy's own digest is not looked at. `space_path` is the way
+/// from the file to its space.
+pub fn policy_text(policy: &Policy, space: &Space, space_path: &str) -> String {
     // The seal is over the text, so the text comes first.
-    let open = print(&file(policy, settings, evaluation, name, space_path, String::new()));
+    let open = print(&file(policy, space, space_path, String::new()));
     let (tree, mistakes) = parse(FileId(0), &open);
     debug_assert!(mistakes.is_empty(), "what is printed can be read");
-    print(&file(policy, settings, evaluation, name, space_path, seal(&open, &tree)))
+    print(&file(policy, space, space_path, seal(&open, &tree)))
 }
 
-fn file(
-    policy: &QPolicy,
-    settings: &TrainSettings,
-    evaluation: &Evaluation,
-    name: &str,
-    space_path: &str,
-    digest: String,
-) -> File {
-    let shape = policy.network().shape();
+fn file(policy: &Policy, space: &Space, space_path: &str, digest: String) -> File {
     let net = Net {
-        layers: shape.layers.clone(),
-        dueling: shape.dueling,
-        hyperparameters: policy.settings().record(),
-        weights: weights_to_lines(policy.network().parameters()),
+        layers: policy.layers.clone(),
+        dueling: policy.dueling,
+        hyperparameters: policy.hyperparameters.clone(),
+        weights: weights_to_lines(&policy.parameters),
         digest,
     };
-    let item = Policy {
-        name: Name::built(name),
-        origin: fields(&origin(settings)),
+    let item = ast::Policy {
+        name: Name::built(&policy.name),
+        origin: fields(&policy.origin),
         net: fields(&net),
-        claims: fields(&claims(evaluation)),
-        rules: Vec::new(),
+        claims: policy.claims.as_ref().map_or(Vec::new(), fields),
+        rules: policy.rules.iter().map(|rule| line(space, rule)).collect(),
     };
-    let digest = Some(Text::new(settings.space_digest.clone(), Span::NONE));
+    let digest = Some(Text::new(space.digest.clone(), Span::NONE));
     let space_use = Use { path: Text::new(space_path, Span::NONE), digest, without: Vec::new() };
+    let docs = policy.docs.iter().map(tree::doc).collect();
     File {
         docs: vec![tree::doc("Emitted by `avastra train`; play it with `avastra run --policy FILE`.")],
         items: vec![
             tree::item(Vec::new(), ItemKind::Language(tree::digits(LANGUAGE.to_string()))),
             tree::item(Vec::new(), ItemKind::Use(space_use)),
-            tree::item(vec![tree::doc(headline(settings, evaluation))], ItemKind::Policy(item)),
+            tree::item(docs, ItemKind::Policy(item)),
         ],
         span: Span::NONE,
     }
 }
 
-fn origin(settings: &TrainSettings) -> PolicyOrigin {
-    PolicyOrigin {
-        agent: settings.agent.clone(),
-        seed: settings.seed,
-        episodes: u64::from(settings.episodes),
-        roads: settings.roads.clone(),
-        ads: settings.ads.clone(),
-        profile: settings
-            .profile
-            .as_ref()
-            .map(|profile| profile.settings.to_line())
-            .filter(|line| !line.is_empty()),
-        profile_digest: settings.profile.as_ref().map(|profile| profile.digest.clone()),
-        engine: settings.engine.clone(),
-        avastra: settings.avastra.clone(),
-        with: settings.with.clone(),
-        without: settings.without.clone(),
+/// `when ego_speed > 8.25 m/s and time == Night => pedestrian(from: Left)`.
+fn line(space: &Space, rule: &PolicyRule) -> PolicyLine {
+    let and = |left: Expr, right: Expr| {
+        let (left, right) = (Box::new(left), Box::new(right));
+        Expr::built(ExprKind::Binary { op: BinaryOp::And, op_span: Span::NONE, left, right })
+    };
+    PolicyLine {
+        condition: rule.conditions.iter().map(condition).reduce(and),
+        actions: rule.rows.iter().map(|&row| call(space, row)).collect(),
+        span: Span::NONE,
     }
 }
 
-fn claims(evaluation: &Evaluation) -> PolicyClaims {
-    PolicyClaims {
-        episodes: evaluation.episodes,
-        seed: evaluation.seed,
-        collisions: evaluation.collisions,
-        counted: evaluation.counted,
-        colliding: evaluation.colliding,
-        trace: digest_text(&evaluation.trace),
-    }
+fn condition(condition: &Condition) -> Expr {
+    let variable = &VARIABLES[condition.variable];
+    let value = match variable.kind {
+        VariableKind::Words { .. } => {
+            let word =
+                variable.word(condition.value as f32).expect("only the words' own values are compared");
+            tree::name(word)
+        }
+        VariableKind::Quantity { unit, .. } => {
+            tree::signed(decimal(condition.value.abs(), false), condition.value < 0.0, unit)
+        }
+    };
+    let (left, right) = (Box::new(tree::name(variable.name)), Box::new(value));
+    let op = condition.comparison.operator();
+    Expr::built(ExprKind::Binary { op, op_span: Span::NONE, left, right })
+}
+
+/// The call that names a row, its values in the order of the axes.
+fn call(space: &Space, row: usize) -> Call {
+    let row = &space.rows[row];
+    let action = &space.actions[row.action];
+    let axes = action.parameters.iter().filter(|parameter| parameter.axis).zip(&row.axes);
+    let args = axes.map(|(axis, (_, value))| Arg { name: None, value: tree::value(space, *value, axis.ty) });
+    Call { name: Name::built(&action.name), args: args.collect(), span: Span::NONE }
 }
 
 /// A struct as fields, in its own order.
@@ -117,18 +120,4 @@ fn fields(value: &impl serde::Serialize) -> Vec<Field> {
         ExprKind::Record(fields) => fields,
         _ => unreachable!("a struct is a record"),
     }
-}
-
-/// What it is, in a sentence for the reader.
-fn headline(settings: &TrainSettings, evaluation: &Evaluation) -> String {
-    let roads = settings.roads.len() as u64;
-    format!(
-        "{} ({}) after {} episodes on {}: {} counted collisions in {} episodes of its own.",
-        settings.agent,
-        settings.hyperparameters.preset(),
-        settings.episodes,
-        settings.roads.join(", "),
-        evaluation.counted,
-        evaluation.episodes * roads,
-    )
 }

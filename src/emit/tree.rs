@@ -57,7 +57,11 @@ pub fn rounded(value: f64, decimals: usize, dimension: Dimension) -> Expr {
 }
 
 fn written(digits: String, negative: bool, dimension: Dimension) -> Expr {
-    let unit = dimension.si_unit();
+    signed(digits, negative, &dimension.si_unit())
+}
+
+/// A number of digits with its sign and its unit word, empty for none.
+pub fn signed(digits: String, negative: bool, unit: &str) -> Expr {
     let unit = (!unit.is_empty()).then(|| Name::built(unit));
     let number = Expr::built(ExprKind::Number(Number { digits, unit, span: Span::NONE }));
     if negative {

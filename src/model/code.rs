@@ -135,6 +135,14 @@ pub const POLICY_DIGEST: &str = "AV0702";
 pub const POLICY_FORM: &str = "AV0703";
 /// A file with two policies.
 pub const ONE_POLICY: &str = "AV0704";
+/// A variable that no policy sees.
+pub const POLICY_VARIABLE: &str = "AV0705";
+/// A row that is never legal where its line applies.
+pub const POLICY_ROW: &str = "AV0706";
+/// A line that applies to no state.
+pub const POLICY_NOWHERE: &str = "AV0707";
+/// A line, or a row of it, that never gets its turn.
+pub const POLICY_SHADOWED: &str = "AV0708";
 
 // Static claims.
 
@@ -142,3 +150,10 @@ pub const ONE_POLICY: &str = "AV0704";
 pub const FALSE_CLAIM: &str = "AV0801";
 /// A claim that cannot be made of a space.
 pub const NOT_STATIC: &str = "AV0802";
+
+// Style.
+
+/// A name that looks like another kind of thing.
+pub const NAME_STYLE: &str = "AV0901";
+/// `x == true`.
+pub const COMPARED_WITH_TRUTH: &str = "AV0902";

@@ -298,7 +298,8 @@ impl Loader<'_> {
                     way[begin..].iter().map(|step| step.display().to_string()).collect();
                 let error = Diagnostic::error(code::IMPORT_CYCLE, "files use each other in a circle");
                 let error = error.at(used.path.span, "this closes the circle");
-                self.diagnostics.push(error.note(format!("{} → {}", circle.join(" → "), target.display())));
+                let error = error.note(format!("{} → {}", circle.join(" → "), target.display()));
+                self.diagnostics.push(error.help("move what both need into a file that uses neither"));
                 continue;
             }
             if let Err(error) = self.read_file(&target, way) {

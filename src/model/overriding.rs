@@ -185,7 +185,8 @@ fn find(
         if let Some(other) = other {
             let is = other.item.kind.keyword();
             let note = format!("this is of another kind: `{is}`");
-            return Err(Box::new(error.beside(other.item.span, note)));
+            let help = format!("write `override {is} {}`", wanted.as_deref().unwrap_or_default());
+            return Err(Box::new(error.beside(other.item.span, note).help(help)));
         }
         let alike = standing.iter().filter(|standing| same_kind(&standing.item.kind));
         let names: Vec<String> = alike.filter_map(|standing| name(&standing.item.kind)).collect();

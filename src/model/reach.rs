@@ -47,7 +47,7 @@ pub(crate) fn rows(space: &Space) -> Vec<Row> {
     let mut rows = Vec::new();
     for (index, action) in space.actions.iter().enumerate() {
         let bounds = bounds(space, index);
-        let rules: Vec<usize> =
+        let rules: Arc<[usize]> =
             (0..space.rules.len()).filter(|rule| space.rules[*rule].body.binds(index)).collect();
         for values in products(space, action) {
             let axes: Vec<(Arc<str>, Value)> = action

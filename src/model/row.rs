@@ -18,7 +18,7 @@ pub struct Row {
     /// `drive_ahead(lane: Left, mode: Near, then: Change)`.
     pub label: String,
     /// Indices in `Space::rules` of the rules that bind it, optional ones included.
-    pub rules: Vec<usize>,
+    pub rules: Arc<[usize]>,
     /// What can be said of it beforehand on each road of `Space::roads`, with the default rules.
     pub roads: Vec<Reach>,
 }

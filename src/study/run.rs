@@ -90,6 +90,9 @@ pub struct RunSettings {
 pub struct PolicyReference {
     pub file: String,
     pub digest: String,
+    /// Which of its faces acts.
+    #[serde(default)]
+    pub face: agent::Face,
 }
 
 /// Why a run or a replay cannot begin.

@@ -466,17 +466,18 @@ pub struct Policy {
     pub origin: Vec<Field>,
     /// The exact face; empty if the file has none.
     pub net: Vec<Field>,
-    /// What the readable face says of itself: fidelity, regret, return, number of states.
+    /// What it says that it achieves, for either face.
     pub claims: Vec<Field>,
     /// The readable face: the first line that applies acts. Empty if the file has none.
     pub rules: Vec<PolicyLine>,
 }
 
-/// `when condition => action(arguments)`; `_` has no condition.
+/// `when condition => action(arguments) | …`; `_` has no condition.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PolicyLine {
     pub condition: Option<Expr>,
-    pub action: Call,
+    /// At least one: the first that is legal acts.
+    pub actions: Vec<Call>,
     #[serde(skip)]
     pub span: Span,
 }

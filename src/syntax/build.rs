@@ -399,7 +399,8 @@ impl Builder {
             Some(_) => None,
             None => Some(self.expression(parts.next())?),
         };
-        Ok(PolicyLine { condition, action: self.call(parts.next())?, span })
+        let actions = parts.rest().map(|call| self.call(call)).collect::<Built<_>>()?;
+        Ok(PolicyLine { condition, actions, span })
     }
 }
 

@@ -654,5 +654,9 @@ fn policy_line(line: &PolicyLine) -> Layout {
         None => Layout::text("_"),
         Some(condition) => Layout::row([Layout::text("when "), expression(condition)]),
     };
-    Layout::row([condition, Layout::text(" => "), call(&line.action)])
+    let mut actions = Vec::new();
+    for (at, action) in line.actions.iter().enumerate() {
+        actions.extend([Layout::Line, Layout::text(if at == 0 { "" } else { "| " }), call(action)]);
+    }
+    Layout::group([condition, Layout::text(" =>"), Layout::nest(actions)])
 }

@@ -22,11 +22,13 @@ use crate::syntax::ast::ItemKind;
 use crate::syntax::ast::Let;
 use crate::syntax::ast::Name;
 use crate::syntax::ast::Number;
+use crate::syntax::ast::Odds;
 use crate::syntax::ast::Scenario;
 use crate::syntax::ast::Span;
 use crate::syntax::ast::Step;
 use crate::syntax::ast::Text;
 use crate::syntax::ast::UnaryOp;
+use crate::syntax::ast::Use;
 use crate::syntax::ast::Verdict;
 use crate::syntax::format;
 use crate::syntax::parse;
@@ -309,6 +311,11 @@ fn item() -> impl Strategy<Value = ItemKind> {
         value,
         span: Span::NONE,
     });
+    let arm = (prop::collection::vec(name(), 0..3), expr()).prop_map(|(patterns, value)| Arm {
+        patterns,
+        value,
+        span: Span::NONE,
+    });
     let entry = || (name(), expr()).prop_map(|(name, value)| Field { name, value, span: Span::NONE });
     let entries = || prop::collection::vec(entry(), 0..3);
     let scenario =
@@ -326,6 +333,14 @@ fn item() -> impl Strategy<Value = ItemKind> {
             .prop_map(|(name, value)| { ItemKind::Override(Box::new(ItemKind::Let(Let { name, value }))) }),
         (name(), expr()).prop_map(|(name, condition)| ItemKind::Verdict(Verdict { name, condition })),
         prop::collection::vec(case, 0..4).prop_map(ItemKind::Reward),
+        (name(), prop::collection::vec(arm, 0..3))
+            .prop_map(|(name, arms)| ItemKind::Odds(Odds { name, arms })),
+        ("\\PC{0,5}", proptest::option::of("[a-f0-9]{0,4}"), prop::collection::vec(name(), 0..3)).prop_map(
+            |(path, digest, without)| {
+                let text = |value: String| Text::new(value, Span::NONE);
+                ItemKind::Use(Use { path: text(path), digest: digest.map(text), without })
+            }
+        ),
         entries().prop_map(ItemKind::Episode),
         scenario,
     ]

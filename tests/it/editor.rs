@@ -336,6 +336,9 @@ fn hovers_say_what_the_compiler_knows() {
         let said = editor.hover(&text).replace(&root().display().to_string(), "…");
         all.push_str(&format!("## {name}\n\n{said}\n\n"));
     }
+    let exact = editor.hover("language 1\nlet fast = 50 km|/h\n");
+    all.push_str(&format!("## 50 km/h\n\n{exact}\n\n"));
+    editor.write(&space_uri(), &shipped());
     // The name of a parameter itself, and a broken line elsewhere: what was known before still is.
     let broken = marked("any vehicle: Vehicle,\n  any colour: Colour,\n  any sp")
         .replace("group environment =", "group environment = = =");
@@ -377,6 +380,10 @@ fn proposals_fit_their_place() {
         "rule r on all: pace <= road.|",
         "rule r on all: from == |",
         "rule r: sky[Rain] == |",
+        "rule r: road == |",
+        "rule r: road in [|",
+        "odds Level {\n  |",
+        "use \"roads.ava\" without |",
         "fn f(s: Side) -> Length = match s { |",
         "fn f(s: Side) -> Length = near(|",
         "episode {\n  step: 6 s\n  |",
@@ -435,6 +442,23 @@ fn definitions_and_references_cross_files() {
     assert_eq!(found.expect("it can be asked").as_array().map(Vec::len), Some(12));
     let found = editor.ask_at("textDocument/definition", &uri, &marked("\nlangua"), json!({}));
     assert_eq!(found, Ok(Value::Null));
+}
+
+#[test]
+fn odds_and_roads_in_rules_are_names_too() {
+    let mut editor = Editor::ready();
+    let uri = space_uri();
+    let own = "language 1\nuse \"avastra45.ava\" without set_time, chronology\nodds Vehicle { BoxTruck => 2 }\n\
+               rule quiet on pedestrian: road == corner implies speed <= 1 m/s\n";
+    let mut lines = |before: &str| {
+        let marked = own.replacen(before, &format!("{before}|"), 1);
+        let found = editor.ask_at("textDocument/definition", &uri, &marked, json!({}));
+        text(&found.expect("it can be asked")[0]["uri"]).rsplit('/').next().unwrap_or_default().to_owned()
+    };
+    for before in ["without set_", "chrono", "odds Veh", "BoxTr", "on pedes"] {
+        assert_eq!(lines(before), "avastra45.ava", "{before}");
+    }
+    assert_eq!(lines("road == cor"), "roads.ava");
 }
 
 #[test]

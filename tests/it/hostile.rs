@@ -93,6 +93,22 @@ fn texts_made_to_be_slow_are_not() {
             full("enum E = A | B", &|n| format!("state s{n}: E = any\naction a{n}() {{ set s{n} = B }}\n")),
         ),
         ("texts", full("", &|n| format!("use \"{n}.ava\"\n"))),
+        ("rows without a witness", {
+            let roads = root().join("scenarios/roads.ava").display().to_string();
+            let action = "action a(each x: Int in 1 .. 60, each y: Int in 1 .. 60, any e: E, any f: E, any d: Length in 1 m .. 9 m)";
+            let spawn = "spawn Sedan ahead d { lane: Current, speed: 5 m/s, does: DriveAhead }\n set s = e";
+            format!(
+                "language 1\nuse \"{roads}\"\nenum E = {variants}\nstate s: E = any\n{action} {{ {spawn} }}\nrule r on a: d * d == x * y * (7 m * 1 m) and e == f implies s == e and d * d == 3 m * 1 m"
+            )
+        }),
+        ("a fair spawn with many choices", {
+            let roads = root().join("scenarios/roads.ava").display().to_string();
+            let action = "action a(each x: Int in 1 .. 90, each y: Int in 1 .. 90, any e: E, any f: E, any d: Length in 90 m .. 99 m)";
+            let spawn = "spawn Sedan ahead d { lane: Current, speed: 5 m/s, does: DriveAhead }\n set s = e";
+            format!(
+                "language 1\nuse \"{roads}\"\nenum E = {variants}\nstate s: E = any\n{action} {{ {spawn} }}\nrule r on a: e == f or s == e"
+            )
+        }),
         ("one long list", full("let a = [1", &|_| ", 1".to_owned())),
     ];
     let scratch = tempfile::tempdir().expect("a scratch directory");

@@ -1,6 +1,7 @@
 //! Tests at the pipeline's edges: a case is a file under `tests/cases/`, its expectation a file
 //! under `snapshots/`.
 
+mod agents;
 mod cases;
 mod command;
 mod corpus;
@@ -13,6 +14,7 @@ mod faults;
 mod hostile;
 mod language;
 mod layers;
+mod policies;
 mod profiles;
 mod references;
 mod road;

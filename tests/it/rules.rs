@@ -6,6 +6,7 @@
 //! The audit: every rule has a draw that breaks it alone. It is refused by that rule's name, and with
 //! the rule switched off it passes; so whoever takes away a point of enforcement hears of it here.
 
+use std::path::Path;
 use std::sync::Arc;
 
 use avastra::action::ActionTable;
@@ -24,6 +25,7 @@ use avastra::episode::Choice;
 use avastra::episode::Moment;
 use avastra::model::Type;
 use avastra::model::Value;
+use avastra::model::load;
 use avastra::model::vocabulary::Body;
 use avastra::model::vocabulary::TimeOfDay;
 use avastra::model::vocabulary::Verb;
@@ -31,7 +33,9 @@ use avastra::rng;
 use avastra::rng::Stream;
 use avastra::study::Run;
 
+use crate::cases::root;
 use crate::world::assert_replays;
+use crate::world::read;
 use crate::world::run;
 use crate::world::space;
 
@@ -293,5 +297,101 @@ fn every_rule_refuses_its_own_breach_and_no_other_does() {
         // Every other rule switched off: this one alone refuses.
         let others: Vec<&str> = names.iter().copied().filter(|name| *name != breach.rule).collect();
         assert!(breach.judged(&table, with, &others).is_err(), "{} alone", breach.rule);
+    }
+}
+
+/// The checker of scenarios says the same, before anything is driven. What asks the world is left to
+/// the replay.
+#[test]
+fn a_scenario_with_a_breach_does_not_compile() {
+    let compiled = |breach: &Breach, origin: &str| -> Vec<String> {
+        let unit = |name: &str| match name {
+            "speed" => " m/s",
+            "distance" => " m",
+            _ => "",
+        };
+        let values: Vec<String> =
+            breach.values.iter().map(|(name, text)| format!("{name}: {text}{}", unit(name))).collect();
+        let drawn =
+            if values.is_empty() { String::new() } else { format!("with {{ {} }}", values.join(", ")) };
+        let text = format!(
+            "language 1\nuse \"avastra45.ava\"\nscenario s {{\n{origin}\nroad: {}\nstart {{ {} }}\nsteps {{ 0: {} {drawn} }}\n}}\n",
+            breach.road, breach.states, breach.row
+        );
+        let loaded = load(Path::new("s.ava"), &|path| match path.to_str() {
+            Some("s.ava") => Ok(text.clone()),
+            _ => read(&root().join("scenarios").join(path)),
+        });
+        let loaded = loaded.expect("its text is known");
+        assert_eq!(loaded.scenario.is_some(), loaded.diagnostics.is_empty());
+        loaded.diagnostics.iter().map(|found| format!("{} {}", found.code, found.message)).collect()
+    };
+    for breach in &BREACHES {
+        let rule = breach.rule;
+        let optional = rule == "wet_needs_cause";
+        let on = if optional { format!("origin {{ with: [{rule}] }}") } else { String::new() };
+        let off = if optional { String::new() } else { format!("origin {{ without: [{rule}] }}") };
+        let wanted = match breach.enforced {
+            Enforcement::Survey => Vec::new(),
+            Enforcement::Draw | Enforcement::Transition => {
+                vec![format!("AV0605 step 0 breaks rule `{rule}`")]
+            }
+        };
+        assert_eq!(compiled(breach, &on), wanted, "{rule}");
+        assert_eq!(compiled(breach, &off), Vec::<String>::new(), "{rule} is switched off");
+    }
+}
+
+/// What is enforced though no rule says so: ranges, lists, `where`, and that nothing is left out.
+#[test]
+fn what_an_action_says_of_its_values_is_enforced() {
+    const TEXT: &str = "language 1
+use \"roads.ava\"
+enum Body = Jeep | SUV | Sedan
+action a(any d: Length in 1 m .. 9 m where d < 5 m, any body: Body in [Jeep, SUV]) {
+  spawn body ahead 40 m + d { lane: Current, speed: 5 m/s, does: DriveAhead }
+}";
+    let loaded = load(Path::new("a.ava"), &|path| match path.to_str() {
+        Some("a.ava") => Ok(TEXT.to_owned()),
+        _ => read(&root().join("scenarios").join(path)),
+    });
+    let table = ActionTable::new(loaded.expect("its text is known").space.expect("it is sound"));
+    let space = table.space();
+    let rules = ActiveRules::new(space, &[], &[]).expect("no rule is named");
+    let memory = space.initial_memory(1);
+    let (roomy, full) = (Wide { safety_gap_m: 0.0 }, Full);
+    let judged = |values: &[(&str, Value)], surroundings: &dyn Surroundings| {
+        let values: Vec<(Arc<str>, Value)> =
+            values.iter().map(|(name, value)| (Arc::from(*name), *value)).collect();
+        let road = &space.roads[0];
+        let situation = Situation { memory: &memory, road, rules: &rules, surroundings, seed: 1, step: 0 };
+        table.check(&situation, 0, &values).map_err(|refusals| {
+            assert!(refusals.iter().all(|refusal| refusal.rule.is_none()));
+            refusals.into_iter().map(|refusal| refusal.reason).collect::<Vec<_>>().join("; ")
+        })
+    };
+    let Type::Enum(of) = space.actions[0].parameters[1].ty else { panic!("a body is of an enum") };
+    let (d, jeep, sedan) = (Value::Number, Value::Variant(of, 0), Value::Variant(of, 2));
+    assert!(judged(&[("d", d(4.0)), ("body", jeep)], &roomy).is_ok());
+    let cases: [(&[(&str, Value)], &str); 5] = [
+        (&[("d", d(5.0)), ("body", jeep)], "the `where` of `d` does not hold"),
+        (&[("d", d(0.5)), ("body", jeep)], "`d` is 0.5 m, its range is 1 m .. 9 m"),
+        (&[("d", d(4.0)), ("body", sedan)], "`body` is Sedan, its range is Jeep | SUV"),
+        (&[("d", d(4.0))], "`body` is missing"),
+        (&[("d", d(4.0)), ("body", jeep), ("e", jeep)], "`a` draws no `e`"),
+    ];
+    for (values, reason) in cases {
+        assert_eq!(judged(values, &roomy).expect_err(reason), reason);
+    }
+    let crowded = judged(&[("d", d(4.0)), ("body", jeep)], &full).expect_err("there is no room");
+    assert_eq!(crowded, "cannot spawn: no room");
+}
+
+/// A world without room for anybody.
+struct Full;
+
+impl Surroundings for Full {
+    fn survey(&self, _request: &SpawnRequest) -> Result<SpawnFacts, String> {
+        Err("no room".to_owned())
     }
 }

@@ -7,12 +7,17 @@ use std::time::Duration;
 use assert_cmd::Command;
 use avastra::model::policy::Policy;
 use avastra::model::policy::seal;
+use avastra::rng::Stream;
+use avastra::rng::below;
+use avastra::rng::stream;
+use avastra::study::Database;
 use avastra::syntax::ast::FileId;
 
 use crate::cases::root;
 use crate::world::read;
 
-const SMALL: &str = "learning_starts: 30\nupdates_per_step: 1\nhidden_units: [8]\nbatch_len: 8\n";
+const SMALL: &str = "learning_starts: 30\nupdates_per_step: 1\nhidden_units: [8]\nbatch_len: 8\n\
+                     rules_leaves: 6\nrules_rounds: 2\nrules_episodes: 3\n";
 
 fn avastra(arguments: &[&str]) -> Command {
     let mut command = Command::cargo_bin("avastra").expect("the binary is built with the tests");
@@ -59,23 +64,19 @@ fn beside_the_space(text: &str) -> String {
     format!("{}avastra45.ava{}", &text[..begin], &text[end..])
 }
 
-#[test]
-fn a_killed_training_resumes_to_the_same_bytes() {
-    let scratch = tempfile::tempdir().expect("a scratch directory");
-    let whole = trained(&scratch.path().join("whole"));
-    let out = scratch.path().join("killed");
-    let arguments = training(&out);
+/// Kills a training after each of the waiting times, resumes it every time, and lets it end.
+fn killed(arguments: &[String], out: &Path, waits_ms: impl IntoIterator<Item = u64>) {
     let binary = avastra(&[]).get_program().to_owned();
     let resume = ["train".to_owned(), "--resume".to_owned(), out.display().to_string()];
-    for (kill, wait_ms) in [150_u64, 450, 900, 1300].into_iter().enumerate() {
-        let begins = kill == 0 || !out.join("run.yaml").is_file();
+    for wait_ms in waits_ms {
+        let begins = !out.join("run.yaml").is_file();
         if begins {
             // Killed before it had written its settings, it is as if it had never been.
-            let _ = std::fs::remove_dir_all(&out);
+            let _ = std::fs::remove_dir_all(out);
         }
         let mut child = std::process::Command::new(&binary)
             .current_dir(root())
-            .args(if begins { &arguments[..] } else { &resume[..] })
+            .args(if begins { arguments } else { &resume[..] })
             .stdout(Stdio::null())
             .stderr(Stdio::null())
             .spawn()
@@ -84,8 +85,64 @@ fn a_killed_training_resumes_to_the_same_bytes() {
         child.kill().expect("it is ours to kill");
         child.wait().expect("it ends");
     }
-    avastra(&resume.iter().map(String::as_str).collect::<Vec<_>>()).assert().success();
+    avastra(&resume.each_ref().map(String::as_str)).assert().success();
+}
+
+#[test]
+fn a_killed_training_resumes_to_the_same_bytes() {
+    let scratch = tempfile::tempdir().expect("a scratch directory");
+    let whole = trained(&scratch.path().join("whole"));
+    let out = scratch.path().join("killed");
+    killed(&training(&out), &out, [150, 450, 900, 1300]);
     assert_eq!(policy_of(&out), whole);
+}
+
+/// The long form: twenty kills at random moments, of a learner and of both searches. About two minutes:
+/// `cargo test --test it -- --ignored twenty_kills`.
+#[test]
+#[ignore = "takes minutes"]
+fn twenty_kills_change_nothing() {
+    for agent in ["ddqn", "go-explore", "av-fuzzer"] {
+        let scratch = tempfile::tempdir().expect("a scratch directory");
+        let begun = |name: &str| {
+            let out = scratch.path().join(name);
+            let mut arguments = training(&out);
+            arguments.extend(["--agent".to_owned(), agent.to_owned()]);
+            let episodes = arguments.iter().position(|word| word == "30").expect("it has so many");
+            arguments[episodes] = "300".to_owned();
+            if agent != "ddqn" {
+                let config = arguments.iter().position(|word| word == "--config").expect("it has one");
+                arguments.drain(config..config + 2);
+            }
+            (arguments, out)
+        };
+        let (arguments, whole) = begun("whole");
+        avastra(&arguments.iter().map(String::as_str).collect::<Vec<_>>()).assert().success();
+        let (arguments, out) = begun("killed");
+        let mut rng = stream(2026, Stream::Reset, 0);
+        let moments: Vec<u64> = (0..20).map(|_| 100 + u64::from(below(&mut rng, 1400))).collect();
+        killed(&arguments, &out, moments);
+        assert_eq!(kept(&out), kept(&whole), "{agent}");
+    }
+}
+
+/// What a training leaves: its policy, or the search itself, and every scenario.
+fn kept(out: &Path) -> Vec<(String, Vec<u8>)> {
+    let mut files = Vec::new();
+    for folder in ["policy", "critical"] {
+        for entry in std::fs::read_dir(out.join(folder)).into_iter().flatten() {
+            let path = entry.expect("it is readable").path();
+            files.push((path.display().to_string(), std::fs::read(&path).expect("it is readable")));
+        }
+    }
+    for (name, _) in &mut files {
+        *name = name.rsplit('/').next().expect("it has a name").to_owned();
+    }
+    files.sort();
+    let mut database = Database::open(&out.join("run.db")).expect("it is a run database");
+    let checkpoint = database.return_to_checkpoint().expect("it is sound").expect("it has ended");
+    files.push(("checkpoint".to_owned(), checkpoint.learner));
+    files
 }
 
 #[test]
@@ -158,9 +215,12 @@ fn what_cannot_be_trained_is_said_so() {
     std::fs::write(&config, "discuont: 0.9\n").expect("it is writable");
     let config = config.display().to_string();
     let space = "scenarios/avastra45.ava";
-    let cases: [(&[&str], &str); 7] = [
+    let cases: [(&[&str], &str); 10] = [
+        (&["train", space, "--agent", "greedy"], "nothing to learn"),
+        (&["train", space, "--agent", "go-explore", "--preset", "paper"], "`go-explore` has none"),
+        (&["run", space, "--agent", "av-fuzzer"], "has to be trained first"),
         (&["train", space, "--agent", "random"], "nothing to learn"),
-        (&["train", space, "--agent", "dqn"], "`ddqn` and `deep_collision`"),
+        (&["train", space, "--agent", "dqn"], "`ddqn`, `deep_collision`, `av-fuzzer` and `go-explore`"),
         (&["train", space, "--preset", "realesed"], "`avastra`, `paper` and `released`"),
         (&["train", space, "--config", &config], "did you mean `discount`?"),
         (&["run", space, "--agent", "ddqn"], "has to be trained first"),

@@ -149,6 +149,29 @@ proptest! {
                     prop_assert!(!blamed, "{}\n{}", idle.message, text);
                 }
             }
+            // What follows from others refuses nothing that they let pass.
+            for draw in 0..64 {
+                let memory = loose.initial_memory(seed + draw);
+                let situation =
+                    Situation { memory: &memory, road, rules: &rules, surroundings: &world, seed, step: 0 };
+                let share = [draw % 8, draw / 8].map(|part| part as f64 / 7.0);
+                let numbers = loose.actions[row.action].parameters.iter().filter(|parameter| !parameter.axis);
+                let values: Vec<(Arc<str>, Value)> = numbers
+                    .zip(share)
+                    .map(|(parameter, share)| {
+                        let (low, high) = parameter.domain.ends();
+                        (parameter.name.clone(), Value::Number(low + (high - low) * share))
+                    })
+                    .collect();
+                let refusals = table.check(&situation, row.index, &values).err().unwrap_or_default();
+                let by = |rule: &str| refusals.iter().any(|refusal| refusal.rule.as_deref() == Some(rule));
+                let implied = |found: &&crate::syntax::Diagnostic| found.code == crate::model::code::IMPLIED;
+                for found in verdicts.diagnostics.iter().filter(implied) {
+                    let mut named = found.message.split('`').skip(1).step_by(2);
+                    let rule = named.next().unwrap_or_default();
+                    prop_assert!(!by(rule) || named.any(by), "{}\n{}", found.message, text);
+                }
+            }
             if let Some(space) = &verdicts.space
                 && let Some(found) = witness(space, &space.rows[row.index], &space.roads[0])
             {

@@ -196,7 +196,7 @@ impl Network {
     }
 
     /// Weights `(inputs, outputs)` and biases of each layer.
-    fn layers(&self) -> Vec<(ArrayView2<'_, f32>, ArrayView1<'_, f32>)> {
+    pub fn layers(&self) -> Vec<(ArrayView2<'_, f32>, ArrayView1<'_, f32>)> {
         let mut rest = self.parameters.as_slice();
         let layers = self.shape.weights().map(|(inputs, outputs)| {
             let (weights, others) = rest.split_at(inputs * outputs);

@@ -28,6 +28,7 @@ use super::played::any_legal;
 use super::played::note;
 use super::situation::cell;
 use super::situation::situation;
+use super::worth::Doubt;
 use super::worth::Worth;
 use super::worth::worths;
 
@@ -39,7 +40,8 @@ pub struct GoExploreSettings {
     pub fresh_share: f64,
     /// Share of the choices that follow the record of what has led to crashes, in `[0, 1]`.
     pub record_share: f64,
-    /// Spread of the noise by which the record is doubted while it is short, at least 0.
+    /// How much a short record is doubted: the spread of what one choice is worth, at least 0. In the
+    /// search doubtful rows are tried, afterwards they are avoided.
     pub doubt: f64,
     /// What a choice is worth that was made a step before the one that made the obstacle appear, in
     /// `[0, 1]`; two steps before, its square.
@@ -56,7 +58,7 @@ impl Default for GoExploreSettings {
     fn default() -> GoExploreSettings {
         GoExploreSettings {
             fresh_share: 0.5,
-            record_share: 0.5,
+            record_share: 0.75,
             doubt: 0.3,
             credit_discount: 0.5,
             prior_choices: 10.0,
@@ -193,7 +195,7 @@ impl GoExplore {
                 return Some(index);
             }
         }
-        here().last().map(|(index, _)| index)
+        here().next_back().map(|(index, _)| index)
     }
 
     /// Keeps the moments of the episode that are of a new kind. After a collision there is none: who
@@ -242,7 +244,13 @@ impl Agent for GoExplore {
         let here = situation(observation);
         let by_record = rng::unit(&mut rng) < self.settings.record_share;
         let row = if by_record {
-            self.memory.worth.best(here, legal, self.settings.prior_choices, self.settings.doubt, &mut rng)
+            self.memory.worth.best(
+                here,
+                legal,
+                self.settings.prior_choices,
+                Doubt::Try(self.settings.doubt),
+                &mut rng,
+            )
         } else {
             any_legal(legal, &mut rng)
         }?;
@@ -319,6 +327,7 @@ impl Agent for Recorded {
         if rng::unit(rng) < self.settings.evaluation_epsilon {
             return any_legal(legal, rng);
         }
-        self.worth.best(situation(observation), legal, self.settings.prior_choices, 0.0, rng)
+        let GoExploreSettings { prior_choices, doubt, .. } = self.settings;
+        self.worth.best(situation(observation), legal, prior_choices, Doubt::Avoid(doubt), rng)
     }
 }

@@ -30,6 +30,15 @@ impl Tally {
     }
 }
 
+/// What becomes of a row whose record is short. The number is the spread of the worth of one choice.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Doubt {
+    /// It is worth trying: its mean is taken with noise.
+    Try(f64),
+    /// It may have been luck: its mean is taken for less. Of many rows the best is a lucky one else.
+    Avoid(f64),
+}
+
 /// The record.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Worth {
@@ -64,22 +73,25 @@ impl Worth {
         own.mean(self.of_row[row].mean(self.all.mean(0.0, 1.0), weight), weight)
     }
 
-    /// The legal row of the highest expected worth, with noise that falls as the record of the row
-    /// grows; any of the highest if there are several.
+    /// The legal row of the highest expected worth after doubt; any of the highest if there are several.
     pub fn best(
         &self,
         situation: u32,
         legal: ArrayView1<bool>,
         weight: f64,
-        doubt: f64,
+        doubt: Doubt,
         rng: &mut Rng,
     ) -> Option<usize> {
         let mut most = f64::NEG_INFINITY;
         let mut best = Vec::new();
         for row in (0..self.rows).filter(|&row| legal[row]) {
             let count = self.own[situation as usize * self.rows + row].count;
-            let noise = if doubt > 0.0 { doubt * rng::normal(rng) / (count + weight).sqrt() } else { 0.0 };
-            let value = self.expected(situation, row, weight) + noise;
+            let error = 1.0 / (count + weight).sqrt();
+            let value = self.expected(situation, row, weight)
+                + match doubt {
+                    Doubt::Try(spread) => spread * error * rng::normal(rng),
+                    Doubt::Avoid(spread) => -spread * error,
+                };
             if value > most {
                 best.clear();
                 most = value;
@@ -121,7 +133,7 @@ mod tests {
         let mut rng = stream(1, Stream::Search, 0);
         let legal = Array1::from_elem(3, true);
         let best = |worth: &Worth, situation, rng: &mut Rng| {
-            worth.best(situation, legal.view(), 10.0, 0.0, rng).unwrap()
+            worth.best(situation, legal.view(), 10.0, Doubt::Avoid(0.3), rng).unwrap()
         };
         for _ in 0..50 {
             worth.note(4, 1, 0.5);
@@ -134,7 +146,10 @@ mod tests {
             worth.note(9, 2, 0.4);
         }
         assert_eq!((best(&worth, 9, &mut rng), best(&worth, 4, &mut rng)), (2, 1));
+        // One lucky choice is not yet better than fifty good ones.
+        worth.note(4, 0, 1.0);
+        assert_eq!(best(&worth, 4, &mut rng), 1);
         let masked = Array1::from_vec(vec![true, false, false]);
-        assert_eq!(worth.best(4, masked.view(), 10.0, 0.3, &mut rng), Some(0));
+        assert_eq!(worth.best(4, masked.view(), 10.0, Doubt::Try(0.3), &mut rng), Some(0));
     }
 }

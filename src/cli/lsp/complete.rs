@@ -100,6 +100,11 @@ impl List<'_> {
                     self.symbol(name, MODULE, WANTED, Symbol::Road(name.clone()));
                 }
             }
+            Kind::Rules => {
+                for name in declared.rules.keys() {
+                    self.symbol(name, OPERATOR, WANTED, Symbol::Rule(name.clone()));
+                }
+            }
             Kind::Verdicts => {
                 for name in declared.verdicts.keys() {
                     self.symbol(name, OPERATOR, WANTED, Symbol::Verdict(name.clone()));
@@ -108,9 +113,9 @@ impl List<'_> {
             Kind::Value(ty) => self.value(ty.as_ref()),
             Kind::Operators => self.words(words::OPERATORS, OPERATOR, POSSIBLE),
             Kind::Variants(of) => self.variants(of, WANTED),
-            Kind::Local(name, ty) => {
+            Kind::Local(name, ty, fits) => {
                 let ty = ty.as_ref().map(Ty::name).unwrap_or_default();
-                self.add(name, VARIABLE, WANTED, &ty, None);
+                self.add(name, VARIABLE, if *fits { WANTED } else { LIKELY }, &ty, None);
             }
             Kind::Parameters(action, mode) => {
                 for parameter in declared.actions.get(action).iter().flat_map(|of| &of.of) {

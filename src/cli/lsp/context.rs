@@ -25,13 +25,15 @@ pub enum Kind {
     Groups,
     States,
     Roads,
+    Rules,
     Verdicts,
     /// What a value can be made of, the variants of this type first.
     Value(Option<Ty>),
     Operators,
     /// Variants of an enum.
     Variants(String),
-    Local(String, Option<Ty>),
+    /// A parameter; whether its type is the wanted one.
+    Local(String, Option<Ty>, bool),
     /// Parameters of an action, and how they get their values.
     Parameters(String, ParamMode),
     /// Files with this extension, beside the document; the path so far.
@@ -159,7 +161,12 @@ impl<'a> Place<'a> {
     fn kinds(&self) -> Vec<Kind> {
         match (self.last(0), self.last(1)) {
             ("", _) => return vec![Kind::Declarations],
-            ("override", _) => return vec![Kind::Declarations],
+            ("override", _) => {
+                let fixed = ["language", "use", "expect", "scenario", "policy", "override"];
+                let declarations = words::DECLARATIONS.iter().copied();
+                let open = declarations.filter(|(word, _)| !fixed.contains(word));
+                return vec![Kind::Words(open.collect())];
+            }
             ("optional", _) => return vec![Kind::Keyword("rule")],
             (".", "road") => return vec![Kind::Words(words::ROAD_FACTS.to_vec())],
             _ => {}
@@ -173,7 +180,15 @@ impl<'a> Place<'a> {
             return kinds;
         }
         match self.keyword() {
-            "use" => vec![Kind::Keyword("digest")],
+            "use" => match self.has("without") {
+                true => vec![Kind::Actions, Kind::Groups, Kind::Rules],
+                false => vec![Kind::Keyword("digest"), Kind::Keyword("without")],
+            },
+            "odds" => match self.begins_entry() || self.last(0) == "|" {
+                true => vec![Kind::Variants(self.text(1).to_owned()), Kind::Keyword("_")],
+                false if self.last(0) == "odds" => vec![Kind::Enums],
+                false => Vec::new(),
+            },
             "state" => self.in_state(),
             "let" if self.tokens.iter().any(|token| token.text == "=") => self.value(None),
             "fn" => self.in_function(),
@@ -224,8 +239,12 @@ impl<'a> Place<'a> {
                 ":" if self.open.len() == 1 => vec![Kind::Types],
                 "each" | "any" => Vec::new(),
                 _ if self.open.len() == 1 && !self.wants_operand() => {
-                    let mut kinds = vec![Kind::Keyword("in"), Kind::Keyword("where")];
-                    kinds.extend(if self.fresh_line { each_or_any } else { vec![Kind::Operators] });
+                    let colon = self.tokens.iter().rposition(|token| token.text == ":").unwrap_or(0);
+                    let has = |word: &str| self.tokens[colon..].iter().any(|token| token.text == word);
+                    let mut kinds: Vec<Kind> =
+                        ["in", "where"].into_iter().filter(|word| !has(word)).map(Kind::Keyword).collect();
+                    kinds.extend((has("in") || has("where")).then_some(Kind::Operators));
+                    kinds.extend(if self.fresh_line { each_or_any } else { Vec::new() });
                     kinds
                 }
                 _ => self.value(self.declared_type()),
@@ -272,6 +291,7 @@ impl<'a> Place<'a> {
                     None => Vec::new(),
                 }
             }
+            (_, Some(_), _) if self.asks_for_road() => vec![Kind::Roads],
             (_, Some(_), _) => {
                 let mut kinds = self.value(Some(Ty::Bool));
                 if self.wants_operand() {
@@ -286,9 +306,16 @@ impl<'a> Place<'a> {
         }
     }
 
+    /// Behind `road ==` or within `road in [`.
+    fn asks_for_road(&self) -> bool {
+        let open = self.open.last().copied().filter(|open| self.text(*open) == "[");
+        let of_list = open.and_then(|open| open.checked_sub(2)).map_or("", |index| self.text(index));
+        matches!(self.last(0), "==" | "!=") && self.last(1) == "road" || of_list == "road"
+    }
+
     fn in_road(&self) -> Vec<Kind> {
         match self.last(0) {
-            ":" if self.last(1) != "map" => vec![Kind::Keyword("lane")],
+            ":" if matches!(self.last(1), "start" | "goal") => vec![Kind::Keyword("lane")],
             _ if self.open.len() == 1 && self.begins_entry() => {
                 vec![Kind::Words(self.unused(words::ROAD_FIELDS))]
             }
@@ -348,9 +375,8 @@ impl<'a> Place<'a> {
             self.tokens.iter().rposition(|token| token.text == "expect").map_or(0, |expect| expect + 1);
         match (self.last(0), self.text(from)) {
             ("expect", _) => {
-                let mut kinds = vec![Kind::Words(words::OUTCOME_FACTS.to_vec()), Kind::Verdicts];
-                kinds.extend(["cause", "end", "trace"].map(Kind::Keyword));
-                kinds
+                let facts = [words::OUTCOME_FACTS, words::SCENARIO_CLAIMS].concat();
+                vec![Kind::Words(facts), Kind::Verdicts]
             }
             ("==" | "[" | ",", claim) => {
                 let words = words::claim_words(claim).iter().map(|word| (*word, ""));
@@ -436,9 +462,14 @@ impl<'a> Place<'a> {
         if !self.wants_operand() {
             return self.after_value();
         }
-        let mut kinds: Vec<Kind> =
-            self.locals.iter().map(|(name, ty)| Kind::Local(name.clone(), ty.clone())).collect();
-        kinds.push(Kind::Value(self.hint().or(ty)));
+        let wanted = self.hint().or(ty);
+        // A condition begins with a value of any type.
+        let is_open = wanted.as_ref().is_none_or(|wanted| *wanted == Ty::Bool);
+        let local = |(name, ty): &(String, Option<Ty>)| {
+            Kind::Local(name.clone(), ty.clone(), is_open || *ty == wanted)
+        };
+        let mut kinds: Vec<Kind> = self.locals.iter().map(local).collect();
+        kinds.push(Kind::Value(wanted));
         kinds
     }
 

@@ -101,7 +101,7 @@ pub fn describe(analysis: &Analysis, symbol: &Symbol) -> Option<String> {
                 Some(last) => format!("{})", analysis.slice(Span { end: last.span.end, ..of.span })),
                 None => format!("action {name}()"),
             };
-            let rows = space.and_then(|space| rows_of(space, name)).unwrap_or_default();
+            let rows = space.and_then(|space| rows_of(space, name, when(analysis))).unwrap_or_default();
             Some(with_docs(&header, &of.docs) + &rows)
         }
         Symbol::Parameter(action, name) => parameter(analysis, action, name),
@@ -154,6 +154,11 @@ fn with_docs(code: &str, docs: &[String]) -> String {
     format!("```avastra\n{code}\n```{docs}")
 }
 
+/// What was proved holds for the last sound state of the files, and should say so.
+fn when(analysis: &Analysis) -> &'static str {
+    if analysis.is_sound() { "" } else { " (when the file was last sound)" }
+}
+
 fn parameter(analysis: &Analysis, action: &str, name: &str) -> Option<String> {
     let declared = analysis.names.declared.parameter(action, name)?;
     let ty = declared.ty.as_ref().map(|ty| format!("\n\nType: `{}`", ty.name())).unwrap_or_default();
@@ -172,8 +177,7 @@ fn parameter(analysis: &Analysis, action: &str, name: &str) -> Option<String> {
         }
     }
     if !lines.is_empty() {
-        let when = if analysis.is_sound() { "" } else { " (when the file was last sound)" };
-        let _ = write!(text, "\n\nAfter the rules{when}:\n{lines}");
+        let _ = write!(text, "\n\nAfter the rules{}:\n{lines}", when(analysis));
     }
     Some(text)
 }
@@ -193,9 +197,9 @@ pub fn row_numbers(space: &Space, action: usize) -> String {
     }
 }
 
-fn rows_of(space: &Space, name: &str) -> Option<String> {
+fn rows_of(space: &Space, name: &str, when: &str) -> Option<String> {
     let (index, _) = find_action(space, name)?;
-    let mut text = format!("\n\n{}", row_numbers(space, index));
+    let mut text = format!("\n\n{}{when}", row_numbers(space, index));
     for (road, known) in space.roads.iter().enumerate() {
         let rows = space.rows.iter().filter(|row| row.action == index);
         let dead: Vec<String> = rows

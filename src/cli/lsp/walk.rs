@@ -91,6 +91,12 @@ impl Walker<'_> {
             ItemKind::Use(used) => {
                 let path = self.path(&used.path.value);
                 self.uses(used.path.span, Symbol::File(path));
+                for name in &used.without {
+                    self.target(name);
+                    if self.declared.rules.contains_key(&name.text) {
+                        self.uses(name.span, Symbol::Rule(name.text.clone()));
+                    }
+                }
             }
             ItemKind::Enum(declared) => {
                 self.declares(&declared.name, Symbol::Enum);
@@ -102,8 +108,8 @@ impl Walker<'_> {
                 let of = &declared.name.text;
                 self.uses(declared.name.span, Symbol::Enum(of.clone()));
                 for arm in &declared.arms {
-                    let variant = |name: &Name| (name.span, Symbol::Variant(of.clone(), name.text.clone()));
-                    arm.patterns.iter().map(variant).for_each(|(span, symbol)| self.uses(span, symbol));
+                    let ty = Ty::Enum(of.clone());
+                    arm.patterns.iter().for_each(|pattern| self.variant(pattern, Some(&ty)));
                     self.expr(&arm.value, &Locals::default(), None);
                 }
             }
@@ -382,6 +388,9 @@ impl Walker<'_> {
             ExprKind::Name(name) if self.declared.verdicts.contains_key(name) => {
                 self.uses(self.name_span(name, claim.span), Symbol::Verdict(name.clone()));
             }
+            ExprKind::Name(name) if words::meaning(words::SCENARIO_CLAIMS, name).is_some() => {
+                self.engine(name, self.name_span(name, claim.span), words::SCENARIO_CLAIMS);
+            }
             _ => {
                 self.expr(claim, &Locals::default(), None);
             }
@@ -465,7 +474,7 @@ impl Walker<'_> {
             if let Some(condition) = &line.condition {
                 self.expr(condition, &Locals::default(), Some(Ty::Bool));
             }
-            self.step(&line.action);
+            line.actions.iter().for_each(|action| self.step(action));
         }
     }
 
@@ -583,6 +592,14 @@ impl Walker<'_> {
             | BinaryOp::Greater
             | BinaryOp::GreaterEqual
             | BinaryOp::In => {
+                let is_road = |side: &Expr| matches!(&side.kind, ExprKind::Name(name) if name == "road");
+                if let Some(of) = [(left, right), (right, left)].into_iter().find(|(side, _)| is_road(side)) {
+                    match &of.1.kind {
+                        ExprKind::List(roads) => self.listed(roads, Symbol::Road),
+                        _ => self.listed(core::slice::from_ref(of.1), Symbol::Road),
+                    }
+                    return Some(Ty::Bool);
+                }
                 // The side that is no bare variant tells the type of the other.
                 let bare = matches!(&left.kind, ExprKind::Name(name) if !self.is_variable(name, locals));
                 let (first, second) = if bare { (right, left) } else { (left, right) };

@@ -22,6 +22,7 @@ pub const DECLARATIONS: &[Entry] = &[
     ("language", "The version of the language that the file is written in; its first line: `language 1`."),
     ("use", "Takes everything that another file declares: `use \"roads.ava\"`."),
     ("enum", "A finite type: `enum Side = Left | Right`, or ordered: `enum Level = None < Light < High`."),
+    ("odds", "How often variants are drawn, beside each other: `odds Vehicle { BoxTruck => 2 }`."),
     ("state", "What is remembered between steps: `state time: Time = any`."),
     ("let", "A constant: `let weight = 1.5`."),
     ("fn", "A pure function: `fn lead(v: Speed) -> Length = v * 0.5 s`."),
@@ -45,6 +46,7 @@ pub const DECLARATIONS: &[Entry] = &[
 /// What begins or joins a part of a declaration.
 pub const CLAUSES: &[Entry] = &[
     ("digest", "The content that a used file must have: `use \"a.ava\" digest \"sha256:…\"`."),
+    ("without", "What is left out of a used file: `use \"a.ava\" without set_time`."),
     ("each", "A parameter with a row of the action table for each of its values."),
     ("any", "A parameter, or the first value of a state, that is drawn from a seeded stream."),
     ("where", "A condition on a parameter and those before it."),
@@ -102,6 +104,7 @@ pub const ROAD_FIELDS: &[Entry] = &[
     ("map", "The OpenDRIVE file, relative to this file: `map: \"roads/corner.xodr\"`."),
     ("start", "Where the ego vehicle starts: `start: lane 1/-1 at 12 m`."),
     ("goal", "Where it is to arrive: `goal: lane 7/-1 at 80 m`."),
+    ("limit", "A lower limit for the whole road: `limit: 30 km/h`."),
 ];
 
 pub const SPAWN_FIELDS: &[Entry] = &[
@@ -151,6 +154,14 @@ pub const CLAIMS: &[Entry] = &[
     ("every", "`every(actions, realisable)`: each row can run on some road."),
     ("actions", "All actions."),
     ("realisable", "Not proved dead on every road."),
+];
+
+/// What a scenario may claim beside facts and verdicts.
+pub const SCENARIO_CLAIMS: &[Entry] = &[
+    ("cause", "The module at fault: `expect cause == perception`."),
+    ("end", "How the episode ends: `expect end == arrived`."),
+    ("minimal", "Without any one of its steps the scenario loses its crash."),
+    ("trace", "The digest of the whole state stream: `expect trace == \"sha256:…\"`."),
 ];
 
 /// A step without an action.

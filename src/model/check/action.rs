@@ -19,6 +19,7 @@ use crate::model::space::Domain;
 use crate::model::space::EffectDef;
 use crate::model::space::GroupDef;
 use crate::model::space::Parameter;
+use crate::model::space::RuleDef;
 use crate::model::space::SetDef;
 use crate::model::space::SpawnDef;
 use crate::model::space::WordExpr;
@@ -43,6 +44,9 @@ use crate::units::Rational;
 
 /// A table may have so many rows.
 pub(crate) const ROWS_MAX: u64 = 100_000;
+
+/// Rows times the rules that bind them times roads: what takes a moment to prove.
+const PROOFS_MAX: u64 = 500_000;
 
 /// An `Int` range may be spelt out into so many values.
 const VALUES_MAX: i64 = 100_000;
@@ -199,7 +203,8 @@ impl Checker {
                 let (low, high) = (low?, high?);
                 if low > high {
                     let error = Diagnostic::error(code::EMPTY, "the range is empty");
-                    self.report(error.at(within.span, "its low end lies above its high end"));
+                    let error = error.at(within.span, "its low end lies above its high end");
+                    self.report(error.help("write the low end first"));
                     return None;
                 }
                 if ty == Type::Int {
@@ -364,7 +369,10 @@ impl Checker {
         });
         if let Some((body, verb)) = clash {
             let message = format!("a `{}` cannot `{}`", body.name(), verb.name());
-            self.report(Diagnostic::error(code::IMPOSSIBLE_SPAWN, message).at(span, "spawned here"));
+            let error = Diagnostic::error(code::IMPOSSIBLE_SPAWN, message).at(span, "spawned here");
+            self.report(
+                error.help("`Walk` and `Stand` are for a `Pedestrian`, all other verbs for vehicles"),
+            );
             return;
         }
         for verb in verbs {
@@ -443,7 +451,7 @@ impl Checker {
     }
 
     /// Counts the rows of every action and refuses a table that is too long, before it is made.
-    pub(super) fn count_rows(&mut self) {
+    pub(super) fn count_rows(&mut self, rules: &[RuleDef], roads: usize) {
         let mut total = 0_u64;
         for action in self.actions.clone() {
             // No row at all: an axis is broken, and that is reported where it stands.
@@ -466,6 +474,20 @@ impl Checker {
             let error =
                 Diagnostic::error(code::TOO_MANY_ROWS, format!("the actions multiply to {total} rows"));
             self.report(error.help(format!("at most {ROWS_MAX} are possible")));
+            return;
+        }
+        // Every row is proved on every road under every rule that binds it.
+        let bound = |action: usize| rules.iter().filter(|rule| rule.body.binds(action)).count() as u64;
+        let counts = self.row_counts.iter().enumerate();
+        let work: u64 = counts
+            .map(|(action, count)| count.unwrap_or(0) * (1 + bound(action)) * roads.max(1) as u64)
+            .sum();
+        if work > PROOFS_MAX {
+            let message = format!("rows, rules and roads multiply to {work} proofs");
+            let error = Diagnostic::error(code::TOO_MANY_ROWS, message);
+            self.report(error.help(format!(
+                "at most {PROOFS_MAX} are possible; draw some parameters with `any`, or bind fewer actions"
+            )));
         }
     }
 }

@@ -66,7 +66,8 @@ impl Checker {
             if declared.variants.len() > VARIANTS_MAX {
                 let message = format!("`{}` has {} variants", declared.name.text, declared.variants.len());
                 let error = Diagnostic::error(code::TOO_MANY_VARIANTS, message);
-                self.report(error.at(declared.name.span, format!("at most {VARIANTS_MAX} are possible")));
+                let error = error.at(declared.name.span, format!("at most {VARIANTS_MAX} are possible"));
+                self.report(error.help("make two enums of it, or take an `Int` with a range"));
             }
             self.enums.push(EnumDef {
                 name: declared.name.text.clone(),
@@ -247,9 +248,10 @@ impl Checker {
                 let message = format!("`{}` calls too much", function.name);
                 let error =
                     Diagnostic::error(code::TOO_LARGE, message).at(function.span, "with all that it calls");
-                self.report(error.note(format!(
+                let error = error.note(format!(
                     "at most {OPERATIONS_MAX} operations and {CALLS_MAX} calls within calls are possible"
-                )));
+                ));
+                self.report(error.help("compute what is needed twice once, and pass it on as a parameter"));
                 self.functions.clear();
                 return;
             }
@@ -430,7 +432,10 @@ pub(super) fn unknown_state(checker: &Checker, name: &ast::Name) -> Diagnostic {
     let states = checker.states.iter().map(|state| state.name.as_str());
     let mut error = unknown("state", &name.text, name.span, states);
     error.code = code::UNKNOWN_STATE;
-    error
+    match error.help {
+        Some(_) => error,
+        None => error.help(format!("declare it with `state {}: …`", name.text)),
+    }
 }
 
 fn calls_of(body: &Expr) -> Vec<usize> {

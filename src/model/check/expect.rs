@@ -76,7 +76,10 @@ impl Checker {
                     return Some(());
                 }
                 let message = format!("{left} {} {right} does not hold", op.symbol());
-                self.report(Diagnostic::error(code::FALSE_CLAIM, message).at(claim.span, "this is false"));
+                let error = Diagnostic::error(code::FALSE_CLAIM, message).at(claim.span, "this is false");
+                self.report(
+                    error.help("`avastra table FILE` lists the rows: correct the claim, or what makes them"),
+                );
                 None
             }
             _ => {

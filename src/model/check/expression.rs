@@ -75,10 +75,16 @@ impl Checker {
         let both_numbers = is_number(wanted) && is_number(found.ty);
         let (code, what) =
             if both_numbers { (code::UNIT_MISMATCH, "unit") } else { (code::TYPE_MISMATCH, "type") };
-        self.report(
+        let error =
             Diagnostic::error(code, format!("{what} mismatch: wanted `{wanted_name}`, found `{found_name}`"))
-                .at(found.span, format!("this is {}", article(&found_name))),
-        );
+                .at(found.span, format!("this is {}", article(&found_name)));
+        self.report(match wanted {
+            Type::Enum(of) if self.enums[of.0].variants.len() <= 12 => {
+                let variants: Vec<&str> = self.enums[of.0].variants.iter().map(String::as_str).collect();
+                error.help(format!("a `{wanted_name}` is {}", one_of(&variants)))
+            }
+            Type::Enum(_) | Type::Bool | Type::Int | Type::Quantity(_) => error,
+        });
         None
     }
 
@@ -159,7 +165,8 @@ impl Checker {
         if value.is_none() {
             self.report(
                 Diagnostic::error(code::NUMBER, "the number is too large or too fine to be held exactly")
-                    .at(span, "about 38 digits are possible"),
+                    .at(span, "about 38 digits are possible")
+                    .help("round it, or take a unit that is larger or smaller"),
             );
         }
         value
@@ -207,7 +214,8 @@ impl Checker {
                     code::AMBIGUOUS,
                     format!("`{name}` is a variant of {}", listed(&enums)),
                 );
-                self.report(error.at(span, "which one is meant does not follow from here"));
+                let error = error.at(span, "which one is meant does not follow from here");
+                self.report(error.help("compare it with what has the wanted type, or rename one of the two"));
                 return None;
             }
         };
@@ -558,7 +566,11 @@ impl Checker {
         match left.ty {
             Type::Bool if orders => {
                 let error = Diagnostic::error(code::UNORDERED, "truth values have no order");
-                self.report(error.at(span, format!("`{}` needs one", op.symbol())));
+                self.report(
+                    error
+                        .at(span, format!("`{}` needs one", op.symbol()))
+                        .help("compare them with `==` or `!=`, or join them with `and`, `or`, `implies`"),
+                );
                 return None;
             }
             Type::Enum(of) if orders && !self.enums[of.0].ordered => {
@@ -685,11 +697,13 @@ fn names_road(expr: &ast::Expr, place: &Place<'_>) -> bool {
 }
 
 fn road_unknown(span: Span) -> Diagnostic {
-    Diagnostic::error(code::NOT_HERE, "`road` is not known here").at(span, "only rules see the road")
+    Diagnostic::error(code::NOT_HERE, "`road` is not known here")
+        .at(span, "only rules see the road")
+        .help("write a rule, or pass a function what it needs: `f(road.limit)`")
 }
 
 /// A word that is no unit.
-pub(super) fn unknown_unit(word: &ast::Name) -> Diagnostic {
+pub(in crate::model) fn unknown_unit(word: &ast::Name) -> Diagnostic {
     let words = || units::UNITS.iter().map(|unit| unit.word);
     let letters = |word: &str| word.chars().filter(|c| c.is_alphanumeric()).collect::<String>();
     // `kmh` means `km/h` rather than `km`.
@@ -729,6 +743,15 @@ pub(super) fn dimension(ty: Type) -> Dimension {
 /// A whole number may stand for a ratio; otherwise types must be equal.
 pub(super) fn fits(found: Type, wanted: Type) -> bool {
     found == wanted || found == Type::Int && wanted == Type::Quantity(Dimension::RATIO)
+}
+
+/// `a`, `b` or `c`.
+fn one_of(words: &[&str]) -> String {
+    let quoted: Vec<String> = words.iter().map(|word| format!("`{word}`")).collect();
+    match quoted.split_last() {
+        Some((last, rest)) if !rest.is_empty() => format!("{} or {last}", rest.join(", ")),
+        _ => quoted.concat(),
+    }
 }
 
 fn article(name: &str) -> String {

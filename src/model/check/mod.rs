@@ -14,10 +14,14 @@ mod scenario;
 mod scenario_rules;
 mod scenario_value;
 mod settings;
+mod style;
 mod unused;
 
+pub(super) use expression::exact_digits;
+pub(super) use expression::unknown_unit;
 pub(super) use names::unknown;
 pub(super) use road::Maps;
+pub(super) use scenario::row;
 pub use scenario::scenario;
 
 use std::path::PathBuf;
@@ -115,7 +119,7 @@ pub(super) fn space(
     let verdicts = checker.verdicts(items);
     let (episode, road_names) = checker.episode(items);
     let roads = checker.roads(items, road_names, maps);
-    checker.count_rows();
+    checker.count_rows(&rules, roads.len());
 
     let own: Vec<&ast::Item> = items.iter().copied().filter(|item| item.span.file == root.file).collect();
 
@@ -146,6 +150,7 @@ pub(super) fn space(
     checker.diagnostics.extend(limits::report(&space));
     space.expects = checker.expects(&own, &space);
     checker.diagnostics.extend(unused::report(&own, items));
+    checker.diagnostics.extend(style::report(&own));
     checker.diagnostics.extend(proofs::report(&space));
     let sound = !checker.has_errors();
     (sound.then_some(space), checker.finish())

@@ -107,9 +107,8 @@ impl Checker {
             Ok(route) => route,
             Err(error) => {
                 let message = format!("road `{}` has no route", block.name.text);
-                self.report(
-                    Diagnostic::error(code::NO_ROUTE, message).at(block.name.span, error.to_string()),
-                );
+                let error = Diagnostic::error(code::NO_ROUTE, message).at(block.name.span, error.to_string());
+                self.report(error.help("`avastra road MAP` tells which lane leads where"));
                 return None;
             }
         };
@@ -152,7 +151,10 @@ impl Checker {
             Ok(place) => Some(place),
             Err(error) => {
                 let message = format!("there is no such place on map `{}`", map.name);
-                self.report(Diagnostic::error(code::NO_ROUTE, message).at(value.span, error.to_string()));
+                let error = Diagnostic::error(code::NO_ROUTE, message).at(value.span, error.to_string());
+                self.report(
+                    error.help("`avastra road MAP` tells which lanes there are, and how long they are"),
+                );
                 None
             }
         }

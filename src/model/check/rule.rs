@@ -241,9 +241,19 @@ impl Checker {
         if !unreachable.is_empty() && variants.len() > 1 {
             let message = format!("rule `{}` never leads to {}", rule.name.text, listed(&unreachable));
             let warning = Diagnostic::warning(code::UNREACHABLE, message);
-            self.report(warning.at(rule.name.span, "only an episode that begins there ever sees it"));
+            let warning = warning.at(rule.name.span, "only an episode that begins there ever sees it");
+            self.report(warning.help(format!(
+                "add a move to it, for example `{} -> {}`",
+                first_other(variants, unreachable[0]),
+                unreachable[0]
+            )));
         }
     }
+}
+
+/// A value other than this one.
+fn first_other<'a>(variants: &'a [String], value: &'a str) -> &'a str {
+    variants.iter().map(String::as_str).find(|other| *other != value).unwrap_or(value)
 }
 
 /// The parameters of an action as locals of an expression.

@@ -45,6 +45,7 @@ use crate::syntax::ast::ItemKind;
 use crate::syntax::listed;
 use crate::syntax::parse;
 use crate::units::Dimension;
+use crate::units::Rational;
 
 /// Numbers of steps stay below this.
 const STEPS_MAX: u64 = 100_000;
@@ -81,6 +82,15 @@ pub fn scenario(file: &ast::File, space: &Space) -> Result<Scenario, Vec<Diagnos
         }
         _ => Err(reader.diagnostics),
     }
+}
+
+/// The row that a call names: by name, or in the order of the axes.
+///
+/// # Errors
+/// If there is none.
+pub(in crate::model) fn row<'a>(space: &'a Space, call: &ast::Call) -> Result<&'a Row, Vec<Diagnostic>> {
+    let mut reader = Reader { space, diagnostics: Vec::new() };
+    reader.row(call).ok_or(reader.diagnostics)
 }
 
 struct Reader<'a> {
@@ -358,7 +368,13 @@ impl<'a> Reader<'a> {
             let message = format!("`{}` has no such row", call.name.text);
             let error = Diagnostic::error(code::NO_SUCH_ROW, message)
                 .at(call.span, "excluded by a `where` or an `in`");
-            self.report(error.beside(space.actions[action].span, "declared here"));
+            let error = error.beside(space.actions[action].span, "declared here");
+            let labels: Vec<&str> =
+                space.rows.iter().filter(|row| row.action == action).map(|row| row.label.as_str()).collect();
+            self.report(match labels.len() {
+                1..=6 => error.help(format!("there is {}", listed(&labels))),
+                _ => error.help("`avastra table FILE` lists the rows"),
+            });
         }
         row
     }
@@ -390,9 +406,14 @@ impl<'a> Reader<'a> {
                 let shown = self.space.show(value, parameter.ty);
                 let error =
                     Diagnostic::error(code::OUT_OF_RANGE, format!("`{}` cannot be {shown}", parameter.name));
-                self.report(
-                    error.at(field.value.span, "out of range").beside(parameter.span, "declared here"),
-                );
+                let label = match &parameter.domain {
+                    Domain::Range(low, high) => {
+                        let end = |end: &Rational| self.space.show(Value::Number(end.to_f64()), parameter.ty);
+                        format!("must lie within {} .. {}", end(low), end(high))
+                    }
+                    Domain::Values(_) => "is not among its values".to_owned(),
+                };
+                self.report(error.at(field.value.span, label).beside(parameter.span, "declared here"));
                 sound = false;
             }
             values.push((parameter.name.clone(), value));

@@ -51,7 +51,7 @@ impl Moment<'_> {
 /// One error for each rule in force that the step breaks.
 pub(super) fn breaches(space: &Space, moment: &Moment<'_>, origin: &Origin) -> Vec<Diagnostic> {
     let mut diagnostics = Vec::new();
-    for rule in &moment.row.rules {
+    for rule in moment.row.rules.iter() {
         let definition = &space.rules[*rule];
         let asked = !definition.optional || origin.with.contains(&definition.name);
         if !asked || origin.without.contains(&definition.name) {

@@ -168,7 +168,8 @@ impl Checker {
             for case in declared {
                 if closed {
                     let error = Diagnostic::error(code::NEVER_REACHED, "this case is never reached");
-                    self.report(error.at(case.span, "`_` before it takes everything"));
+                    let error = error.at(case.span, "`_` before it takes everything");
+                    self.report(error.help("let `_` be the last line, or remove this one"));
                 }
                 let condition = case.condition.as_ref().map(|c| self.typed(c, &place, Type::Bool));
                 let value = self.typed(&case.value, &place, Type::Quantity(Dimension::RATIO));

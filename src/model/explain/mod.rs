@@ -94,8 +94,14 @@ pub const PAGES: &[Page] = &[
     page!("AV0702"),
     page!("AV0703"),
     page!("AV0704"),
+    page!("AV0705"),
+    page!("AV0706"),
+    page!("AV0707"),
+    page!("AV0708"),
     page!("AV0801"),
     page!("AV0802"),
+    page!("AV0901"),
+    page!("AV0902"),
 ];
 
 /// The page of a code, however its letters are written.

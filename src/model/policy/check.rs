@@ -6,16 +6,21 @@ use serde_json::Value;
 use crate::model::code;
 use crate::model::space::Space;
 use crate::syntax::Diagnostic;
+use crate::syntax::LANGUAGE;
 use crate::syntax::ast;
 use crate::syntax::ast::Field;
+use crate::syntax::ast::FileId;
 use crate::syntax::ast::ItemKind;
 use crate::syntax::ast::Span;
+use crate::syntax::parse;
 
 use super::Net;
 use super::Policy;
 use super::PolicyClaims;
 use super::PolicyOrigin;
 use super::plain;
+use super::rules::rules;
+use super::rules::value_of;
 use super::seal::seal;
 use super::weights::weights_from_lines;
 
@@ -33,11 +38,6 @@ pub fn policy(text: &str, file: &ast::File, space: &Space) -> Result<Policy, Vec
         let error = Diagnostic::error(code::ONE_POLICY, "the file holds two policies");
         return Err(vec![error.at(second.span, "the second").help("one file, one policy")]);
     }
-    if let Some(line) = declared.rules.first() {
-        let error = Diagnostic::error(code::POLICY_FORM, "the rules of a policy cannot be played");
-        let help = "this version plays the `net` of a policy: remove `rules`, and train it again";
-        return Err(vec![error.at(line.span, "the first of them").help(help)]);
-    }
     let whole = item.span;
     let net: Net = block(&declared.net, "net", whole)?;
     let found = seal(text, file);
@@ -52,6 +52,13 @@ pub fn policy(text: &str, file: &ast::File, space: &Space) -> Result<Policy, Vec
     let claims: Option<PolicyClaims> =
         if declared.claims.is_empty() { None } else { Some(block(&declared.claims, "claims", whole)?) };
     let parameters = parameters(&net, declared, whole, space)?;
+    let rules = rules(&declared.rules, space, &origin)?;
+    if claims.as_ref().is_some_and(|claims| claims.rules.is_some() == rules.is_empty()) {
+        let message = "the rules of the policy and the claims about them do not belong together";
+        let error = Diagnostic::error(code::POLICY_FORM, message);
+        let span = field_span(&declared.claims, "rules", whole);
+        return Err(vec![error.at(span, "one is there without the other")]);
+    }
     Ok(Policy {
         name: declared.name.text.clone(),
         docs: item.docs.iter().map(|doc| doc.text.clone()).collect(),
@@ -61,6 +68,7 @@ pub fn policy(text: &str, file: &ast::File, space: &Space) -> Result<Policy, Vec
         hyperparameters: net.hyperparameters,
         parameters,
         claims,
+        rules,
         digest: net.digest,
     })
 }
@@ -120,4 +128,28 @@ fn wanted(layers: &[usize], dueling: bool) -> Option<usize> {
 
 fn field_span(fields: &[Field], name: &str, otherwise: Span) -> Span {
     fields.iter().find(|field| field.name.text == name).map_or(otherwise, |field| field.value.span)
+}
+
+/// Values of variables as somebody gives them, `ego_speed: 12 m/s, time: Night`: the index of each, and
+/// what an observation would hold. A number may do without its unit.
+///
+/// # Errors
+/// What is wrong, in words.
+pub fn values_from(text: &str) -> Result<Vec<(usize, f32)>, String> {
+    let around = format!("language {LANGUAGE}\npolicy given {{ origin {{ {text} }} }}\n");
+    let (file, mistakes) = parse(FileId(0), &around);
+    let fields = file.items.iter().find_map(|item| match &item.kind {
+        ItemKind::Policy(policy) => Some(&policy.origin),
+        _ => None,
+    });
+    let Some(fields) = fields.filter(|_| mistakes.is_empty()) else {
+        return Err(format!("cannot read `{text}` as a state: write `ego_speed: 12 m/s, time: Night`"));
+    };
+    let value = |field: &Field| {
+        value_of(&field.name, &field.value).map_err(|error| match error.help {
+            Some(help) => format!("{}; {help}", error.message),
+            None => error.message,
+        })
+    };
+    fields.iter().map(value).collect()
 }

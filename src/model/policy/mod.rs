@@ -2,16 +2,27 @@
 //!
 //! The network's numbers are opaque here: that they are as many as the shape wants, and that the file
 //! is as it was written, is checked; what they mean is `agent`'s business. The readable face (`rules`)
-//! is not read yet.
+//! is understood whole, and proofs tell which of its lines can never act.
 
 mod check;
 mod plain;
+mod region;
+mod rules;
 mod seal;
+mod variable;
 mod weights;
 
 pub use check::policy;
+pub use check::values_from;
 pub use plain::expression;
+pub use rules::Comparison;
+pub use rules::Condition;
+pub use rules::PolicyRule;
 pub use seal::seal;
+pub use variable::VARIABLES;
+pub use variable::Variable;
+pub use variable::VariableKind;
+pub use variable::variable_index;
 pub use weights::weights_from_lines;
 pub use weights::weights_to_lines;
 
@@ -33,6 +44,8 @@ pub struct Policy {
     /// All weights and biases.
     pub parameters: Vec<f32>,
     pub claims: Option<PolicyClaims>,
+    /// The readable face, the first line first; empty if there is none.
+    pub rules: Vec<PolicyRule>,
     /// Digest of the whole file but the paths in it.
     pub digest: String,
 }
@@ -61,7 +74,7 @@ pub struct PolicyOrigin {
 }
 
 /// What a policy says that it achieves, on episodes that anybody can play again.
-#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PolicyClaims {
     /// Episodes on each road.
@@ -71,6 +84,33 @@ pub struct PolicyClaims {
     pub counted: u64,
     /// Episodes with a counted collision.
     pub colliding: u64,
+    /// Mean sum of the space's rewards in an episode, rounded to four decimals.
+    #[serde(rename = "return")]
+    pub return_mean: f64,
+    /// SHA-256 over the traces of all episodes, in order.
+    pub trace: String,
+    /// What the readable face achieves on the same episodes.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rules: Option<RulesClaims>,
+}
+
+/// What the readable face of a policy says of itself. Shares and means are rounded to four decimals.
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RulesClaims {
+    /// States in which it was compared with the network: all that it came to.
+    pub states: u64,
+    /// Share of the states in which both choose the same row.
+    pub fidelity: f64,
+    /// Mean Q-value lost by its choice, as the network sees it.
+    pub regret: f64,
+    pub collisions: u64,
+    pub counted: u64,
+    /// Episodes with a counted collision.
+    pub colliding: u64,
+    /// Mean sum of the space's rewards in an episode.
+    #[serde(rename = "return")]
+    pub return_mean: f64,
     /// SHA-256 over the traces of all episodes, in order.
     pub trace: String,
 }

@@ -94,6 +94,13 @@ pub(crate) fn next_rows<'a>(space: &'a Space, rule: &'a RuleDef, from: Value) ->
     graph.rows.iter().filter(|(_, sets)| allowed(*sets)).map(|(row, _)| *row).collect()
 }
 
+/// Whether a transition rule forbids a row wherever the state has one of these values (bits).
+pub(crate) fn forbids(space: &Space, rule: &RuleDef, row: &Row, from: u128) -> bool {
+    let Some(graph) = graph(space, rule) else { return false };
+    let sets = graph.rows.iter().find(|(other, _)| other.index == row.index).map_or(0, |(_, sets)| *sets);
+    sets != 0 && !bits(from).any(|from| bits(sets).any(|to| graph.allowed[from][to]))
+}
+
 fn graph<'a>(space: &'a Space, rule: &'a RuleDef) -> Option<Graph<'a>> {
     let RuleBody::Moves { state, allowed, actions } = &rule.body else { return None };
     let definition = &space.states[*state];

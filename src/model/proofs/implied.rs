@@ -1,5 +1,7 @@
 //! Rules that change nothing: they hold by themselves, or follow from others.
 
+use crate::model::bound::Bound;
+use crate::model::bound::bounds;
 use crate::model::code;
 use crate::model::enclose::enclose;
 use crate::model::reach::Prover;
@@ -9,24 +11,26 @@ use crate::model::space::Space;
 use crate::syntax::Diagnostic;
 use crate::syntax::listed;
 
-/// Rows looked at for one rule, at most: a rule on more is not judged.
-const ROWS_MAX: usize = 10_000;
+/// Rows times rules looked at for all rules together, at most: what is left then is not judged.
+const WORK_MAX: usize = 1_000_000;
 
 /// One warning for each rule that could never refuse anything, whatever the road and the memory. Of
 /// two that follow from each other the later one is named.
 pub(super) fn report(space: &Space) -> Vec<Diagnostic> {
     let mut diagnostics = Vec::new();
+    let mut work = WORK_MAX;
+    let bounds: Vec<Vec<Bound>> = (0..space.actions.len()).map(|action| bounds(space, action)).collect();
     let mut kept: Vec<usize> = (0..space.rules.len()).filter(|rule| !space.rules[*rule].optional).collect();
     for rule in (0..space.rules.len()).rev() {
         let others: Vec<usize> = kept.iter().copied().filter(|other| *other != rule).collect();
-        if !follows(space, rule, &others) {
+        if !follows(space, rule, &others, &bounds, &mut work) {
             continue;
         }
         kept = others.clone();
         let mut reasons = others;
         for other in reasons.clone() {
             let fewer: Vec<usize> = reasons.iter().copied().filter(|known| *known != other).collect();
-            if follows(space, rule, &fewer) {
+            if follows(space, rule, &fewer, &bounds, &mut work) {
                 reasons = fewer;
             }
         }
@@ -52,11 +56,14 @@ fn warning(space: &Space, rule: usize, reasons: &[usize]) -> Diagnostic {
     warning.help("remove it, or make it the stricter one")
 }
 
-/// Whether the rule holds for every row that it binds and every value that `others` leave.
-fn follows(space: &Space, rule: usize, others: &[usize]) -> bool {
+/// Whether the rule holds for every row that it binds and every value that `others` leave; false also
+/// where that would be too much work.
+fn follows(space: &Space, rule: usize, others: &[usize], bounds: &[Vec<Bound>], work: &mut usize) -> bool {
     let bound = || space.rows.iter().filter(|row| row.rules.contains(&rule));
     let count = bound().count();
-    if count == 0 || count > ROWS_MAX {
+    let Some(left) = work.checked_sub(count * (1 + others.len())) else { return false };
+    *work = left;
+    if count == 0 {
         return false;
     }
     match &space.rules[rule].body {
@@ -70,15 +77,14 @@ fn follows(space: &Space, rule: usize, others: &[usize]) -> bool {
                 RuleBody::Holds(_) => false,
             })
         }
-        RuleBody::Holds(_) => bound().all(|row| holds(space, row, rule, others)),
+        RuleBody::Holds(_) => bound().all(|row| holds(space, row, rule, others, &bounds[row.action])),
     }
 }
 
-fn holds(space: &Space, row: &Row, rule: usize, others: &[usize]) -> bool {
+fn holds(space: &Space, row: &Row, rule: usize, others: &[usize], bounds: &[Bound]) -> bool {
     let RuleBody::Holds(bindings) = &space.rules[rule].body else { return false };
     let values = crate::model::row::locals(&space.actions[row.action], row, &[]);
-    let bounds = crate::model::bound::bounds(space, row.action);
-    let prover = Prover { space, row, values: &values, bounds: &bounds, road: None };
+    let prover = Prover { space, row, values: &values, bounds, road: None };
     let in_force: Vec<usize> = others.iter().copied().filter(|other| row.rules.contains(other)).collect();
     // A row that the others leave dead would make everything true of it.
     let Some(locals) = prover.settle(&in_force) else { return false };

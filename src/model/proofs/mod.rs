@@ -12,6 +12,7 @@ mod undecided;
 mod unfair;
 mod witness;
 
+pub(crate) use clock::forbids;
 pub(crate) use clock::next_rows;
 pub(crate) use clock::shortest_way;
 pub use cut::Removal;

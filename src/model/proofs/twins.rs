@@ -109,7 +109,7 @@ fn form(space: &Space, row: &Row) -> String {
             EffectDef::Spawn(spawn) => spawn_form(spawn, &reduced),
         });
     }
-    for rule in &row.rules {
+    for rule in row.rules.iter() {
         match &space.rules[*rule].body {
             RuleBody::Moves { .. } => parts.push(format!("rule {rule}")),
             RuleBody::Holds(bindings) => {

@@ -1,7 +1,10 @@
 //! Rows of which nothing is known: neither proved dead nor seen to run.
 
+use std::cell::Cell;
+
+use crate::model::bound::bounds;
 use crate::model::code;
-use crate::model::proofs::witness::witness;
+use crate::model::proofs::witness::witness_within;
 use crate::model::reach::numbers;
 use crate::model::row::Reach;
 use crate::model::row::Row;
@@ -9,22 +12,23 @@ use crate::model::space::Space;
 use crate::syntax::Diagnostic;
 use crate::syntax::listed;
 
-/// Rows times roads that are searched for witnesses, at most.
-const SEARCHES_MAX: usize = 20_000;
+/// Boxes of ranges looked at in the search for witnesses, at most; most rows need one for each road.
+const BOXES_MAX: usize = 20_000;
 
 /// One warning for each action and road with such rows.
 pub(super) fn report(space: &Space) -> Vec<Diagnostic> {
     let mut diagnostics = Vec::new();
-    let mut left = SEARCHES_MAX;
+    let boxes_left = Cell::new(BOXES_MAX);
     for (action, definition) in space.actions.iter().enumerate() {
+        let bounds = bounds(space, action);
         for (index, road) in space.roads.iter().enumerate() {
             let mut unknown: Vec<&Row> = Vec::new();
             for row in space.rows.iter().filter(|row| row.action == action) {
-                if matches!(row.roads[index], Reach::Dead { .. }) || left == 0 {
+                if matches!(row.roads[index], Reach::Dead { .. }) || boxes_left.get() == 0 {
                     continue;
                 }
-                left -= 1;
-                if witness(space, row, road).is_none() {
+                // A search that was cut short says nothing.
+                if witness_within(space, row, road, &bounds, &boxes_left).is_none() && boxes_left.get() > 0 {
                     unknown.push(row);
                 }
             }

@@ -5,6 +5,8 @@
 //! 0.774 g. What the brake takes to build up is left out here: it only adds to the distance, and a
 //! lower bound is what a proof needs. The world has the whole of it (`spawn_gap >= safety_gap`).
 
+use std::cell::Cell;
+
 use crate::model::bound::bounds;
 use crate::model::code;
 use crate::model::eval::Facts;
@@ -25,6 +27,9 @@ use crate::model::vocabulary::Word;
 use crate::syntax::Diagnostic;
 use crate::units::decimal;
 
+/// Boxes of ranges looked at for all actions together, at most, each having its share.
+const BOXES_MAX: usize = 100_000;
+
 /// Perception and reaction, s.
 const REACTION_S: f64 = 0.4 + 0.75;
 /// 0.774 g, m/s².
@@ -36,13 +41,14 @@ const MARGIN_M: f64 = 0.01;
 pub(super) fn report(space: &Space) -> Vec<Diagnostic> {
     let mut diagnostics = Vec::new();
     for (index, action) in space.actions.iter().enumerate() {
+        let boxes_left = Cell::new(BOXES_MAX / space.actions.len());
         for effect in &action.effects {
             let EffectDef::Spawn(spawn) = effect else { continue };
             let found = space.rows.iter().filter(|row| row.action == index).find_map(|row| {
                 let roads = space.roads.iter().zip(&row.roads);
                 let open = roads.filter(|(_, reach)| matches!(reach, Reach::Open(_)));
                 open.map(|(road, _)| road)
-                    .find_map(|road| Some((row, road, unfair(space, row, road, spawn)?)))
+                    .find_map(|road| Some((row, road, unfair(space, row, road, spawn, &boxes_left)?)))
             });
             if let Some((row, road, found)) = found {
                 diagnostics.push(remark(space, row, road, spawn, &found));
@@ -54,7 +60,13 @@ pub(super) fn report(space: &Space) -> Vec<Diagnostic> {
 
 /// Values with which a row spawns within the stopping distance on a road; `None` if a rule asks the
 /// world about the gap, which then decides, or if none are found.
-pub(super) fn unfair(space: &Space, row: &Row, road: &Road, spawn: &SpawnDef) -> Option<Witness> {
+pub(super) fn unfair(
+    space: &Space,
+    row: &Row,
+    road: &Road,
+    spawn: &SpawnDef,
+    boxes_left: &Cell<usize>,
+) -> Option<Witness> {
     let rules: Vec<usize> = row.rules.iter().copied().filter(|rule| !space.rules[*rule].optional).collect();
     let asks = |rule: &usize| match &space.rules[*rule].body {
         RuleBody::Holds(bindings) => {
@@ -66,7 +78,7 @@ pub(super) fn unfair(space: &Space, row: &Row, road: &Road, spawn: &SpawnDef) ->
         return None;
     }
     let bounds = bounds(space, row.action);
-    let search = Search { space, row, road, rules, bounds: &bounds };
+    let search = Search { space, row, road, rules, bounds: &bounds, boxes_left };
     search.find(&|values, memory| {
         let figures = figures(space, road, spawn, values, memory);
         figures.needed_m > figures.distance_m + MARGIN_M

@@ -5,6 +5,7 @@
 //! uses. The world around is taken to be empty: a spawn lands where it was asked to, and nobody needs
 //! room. What it does not find may exist all the same.
 
+use std::cell::Cell;
 use std::collections::VecDeque;
 use std::sync::Arc;
 
@@ -38,6 +39,8 @@ use crate::units::Rational;
 
 /// Boxes of ranges looked at for one choice of the listed values and one memory.
 const BOXES_MAX: usize = 24;
+/// Boxes looked at in one search for a single witness.
+const BOXES_IN_ALL_MAX: usize = 20_000;
 /// Choices of listed values, and memories, at most.
 const CHOICES_MAX: usize = 256;
 const MEMORIES_MAX: usize = 64;
@@ -52,9 +55,19 @@ pub struct Witness {
 
 /// A witness for a row on a road with the default rules; `None` if the search finds none.
 pub fn witness(space: &Space, row: &Row, road: &Road) -> Option<Witness> {
+    witness_within(space, row, road, &bounds(space, row.action), &Cell::new(BOXES_IN_ALL_MAX))
+}
+
+/// The same, given the bounds of the row's action, with so many boxes left to look at.
+pub(super) fn witness_within(
+    space: &Space,
+    row: &Row,
+    road: &Road,
+    bounds: &[Bound],
+    boxes_left: &Cell<usize>,
+) -> Option<Witness> {
     let rules: Vec<usize> = row.rules.iter().copied().filter(|rule| !space.rules[*rule].optional).collect();
-    let bounds = bounds(space, row.action);
-    Search { space, row, road, rules, bounds: &bounds }.find(&|_, _| true)
+    Search { space, row, road, rules, bounds, boxes_left }.find(&|_, _| true)
 }
 
 /// A search under given rules.
@@ -64,6 +77,8 @@ pub(super) struct Search<'a> {
     pub road: &'a Road,
     pub rules: Vec<usize>,
     pub bounds: &'a [Bound],
+    /// Boxes that may still be looked at; at 0 a search finds nothing more.
+    pub boxes_left: &'a Cell<usize>,
 }
 
 /// What is asked of a witness beyond the rules: of all parameters, and the memory after.
@@ -76,6 +91,9 @@ impl Search<'_> {
         let choices = choices(action, &locals(action, self.row, &[]));
         for memory in self.memories() {
             for chosen in &choices {
+                if self.boxes_left.get() == 0 {
+                    return None;
+                }
                 if let Some(values) = self.numbers(action, chosen, &memory, wish) {
                     let drawn = action.parameters.iter().zip(values).filter(|(parameter, _)| !parameter.axis);
                     let values = drawn.map(|(parameter, value)| (parameter.name.clone(), value)).collect();
@@ -117,7 +135,8 @@ impl Search<'_> {
             road: Some(self.road),
         };
         let mut boxes = VecDeque::from([declared]);
-        for _ in 0..BOXES_MAX {
+        for _ in 0..BOXES_MAX.min(self.boxes_left.get()) {
+            self.boxes_left.set(self.boxes_left.get() - 1);
             let Some(narrowed) = prover.narrow(boxes.pop_front()?, &before, &self.rules) else { continue };
             for pick in 0..1_usize << open.len().min(3) {
                 if let Some(found) = self.candidate(action, chosen, &open, &narrowed, pick, memory, wish) {

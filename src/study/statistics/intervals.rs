@@ -17,7 +17,8 @@ pub struct Interval {
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Estimate {
     pub mean: f64,
-    /// None of fewer than two values.
+    /// None of fewer than two values, and of values that are all alike: they say nothing of how far others
+    /// would lie apart.
     #[serde(flatten)]
     pub interval: Option<Interval>,
     /// The sample.
@@ -33,7 +34,8 @@ pub fn mean(values: &[f64]) -> Option<Estimate> {
     }
     let count = values.len() as f64;
     let mean = values.iter().sum::<f64>() / count;
-    let interval = (values.len() > 1).then(|| {
+    let is_constant = values.iter().all(|value| *value == values[0]);
+    let interval = (!is_constant).then(|| {
         let squares: f64 = values.iter().map(|value| (value - mean) * (value - mean)).sum();
         let half = student_quantile(values.len() - 1) * (squares / (count - 1.0) / count).sqrt();
         Interval { low: mean - half, high: Some(mean + half) }
@@ -149,6 +151,7 @@ mod tests {
             "{low} {high:?}"
         );
         assert_eq!(mean(&[4.0]).unwrap().interval, None);
+        assert_eq!(mean(&[0.0, 0.0, 0.0]).unwrap().interval, None);
         assert_eq!(mean(&[]), None);
     }
 

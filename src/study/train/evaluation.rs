@@ -29,6 +29,8 @@ pub struct Evaluation {
     pub counted: u64,
     /// Episodes with a counted collision.
     pub colliding: u64,
+    /// Mean sum of the space's rewards in an episode.
+    pub return_mean: f64,
     /// SHA-256 over the traces of all episodes, in order.
     pub trace: [u8; 32],
     /// Time driven, branches included, s.
@@ -72,9 +74,11 @@ pub fn evaluate_agent(
         collisions: 0,
         counted: 0,
         colliding: 0,
+        return_mean: 0.0,
         trace: [0; 32],
         simulated_s: 0.0,
     };
+    let mut sum = 0.0;
     for number in 0..episodes * arena.roads() as u64 {
         let seed = rng::child_seed(seed, Stream::Evaluation, number);
         let setup = arena.setup((number % arena.roads() as u64) as usize, seed);
@@ -84,11 +88,13 @@ pub fn evaluate_agent(
         let log = episode::run(&setup, &mut choose, &mut |_, _, _| {});
         let settings = AvoidabilitySettings::default();
         let counted = EpisodeSummary::judged(&setup, number as usize, &log, &settings).counted() as u64;
+        sum += log.steps.iter().map(|step| step.reward).sum::<f64>();
         found.collisions += log.collisions.len() as u64;
         found.counted += counted;
         found.colliding += u64::from(counted > 0);
         found.simulated_s += log.duration_s + agent.branched_s();
         traces.update(log.trace());
     }
-    Ok(Evaluation { trace: traces.finalize().into(), ..found })
+    let return_mean = sum / (episodes * arena.roads() as u64).max(1) as f64;
+    Ok(Evaluation { return_mean, trace: traces.finalize().into(), ..found })
 }

@@ -1,0 +1,104 @@
+//! `avastra distill`: readable rules for a trained policy, beside its network.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use crate::action::ActionTable;
+use crate::agent::Face;
+use crate::agent::QPolicy;
+use crate::emit;
+use crate::model::Policy;
+use crate::model::policy::RulesClaims;
+use crate::study;
+
+use super::arguments::DistillArguments;
+use super::error::Failure;
+use super::load;
+use super::output::Output;
+use super::run_directory::write;
+use super::verify::acting;
+use super::verify::same_world;
+
+/// Distils rules anew, with other settings than those of the training, and writes the policy with them.
+pub fn distill(output: &Output, arguments: &DistillArguments) -> Result<(), Failure> {
+    let (table, mut policy) = load::policy(output, &arguments.file)?;
+    same_world(&policy)?;
+    for (name, value) in [
+        ("rules_leaves", arguments.leaves),
+        ("rules_depth", arguments.depth),
+        ("rules_rounds", arguments.rounds),
+        ("rules_episodes", arguments.episodes),
+    ] {
+        if let Some(value) = value {
+            policy.hyperparameters.insert(name.to_owned(), value.into());
+        }
+    }
+    if policy.claims.is_none() {
+        let path = arguments.file.display();
+        return Err(Failure::usage(format!("`{path}` makes no claims: train it with `avastra train`")));
+    }
+    let acting = acting(&table, &policy, Face::Network)?;
+    if acting.settings().rules_leaves == 0 {
+        let message = "the policy was trained with `rules_leaves: 0`: say how many with `--leaves N`";
+        return Err(Failure::usage(message));
+    }
+    let policy = with_rules(&table, &acting, policy)?;
+    let path = arguments.output.clone().unwrap_or_else(|| {
+        let stem = arguments.file.file_stem().unwrap_or_default().to_string_lossy();
+        arguments.file.with_file_name(format!("{stem}.distilled.ava"))
+    });
+    let folder = path.parent().map_or(PathBuf::new(), PathBuf::from);
+    let space_path = load::relative(&folder, &table.space().path)?;
+    write(&path, &emit::policy_text(&policy, table.space(), &space_path))?;
+    let claims = policy.claims.as_ref();
+    if let Some((claims, rules)) = claims.and_then(|claims| Some((claims, claims.rules.as_ref()?))) {
+        output.say(&rules_text(policy.rules.len(), claims.return_mean, rules));
+    }
+    output.say(&path.display().to_string());
+    let rules = claims.map(|claims| &claims.rules);
+    output.result(
+        "distill",
+        serde_json::json!({ "policy": path, "lines": policy.rules.len(), "rules": rules }),
+    );
+    Ok(())
+}
+
+/// The policy with rules distilled as its settings want them, and with the claims about them.
+pub fn with_rules(table: &ActionTable, acting: &QPolicy, policy: Policy) -> Result<Policy, Failure> {
+    let settings = acting.settings();
+    let mut policy = Policy { rules: Vec::new(), ..policy };
+    let Some(mut claims) = policy.claims.take() else { return Ok(policy) };
+    claims.rules = None;
+    if settings.rules_leaves == 0 {
+        return Ok(Policy { claims: Some(claims), ..policy });
+    }
+    let origin = &policy.origin;
+    let rules = (origin.with.as_slice(), origin.without.as_slice());
+    let roads = &origin.roads;
+    let failed = |error: study::RunError| Failure::usage(error.to_string());
+    let ads = &study::trained_against(&policy).map_err(failed)?;
+    let found = study::distill(table, acting, roads, ads, rules, origin.seed).map_err(failed)?;
+    if found.is_empty() {
+        return Ok(Policy { claims: Some(claims), ..policy });
+    }
+    let found = Arc::new(found);
+    let test = (claims.episodes, claims.seed);
+    let judged = study::judge_rules(table, acting, &found, roads, ads, rules, test).map_err(failed)?;
+    claims.rules = Some(judged);
+    Ok(Policy { claims: Some(claims), rules: found.to_vec(), ..policy })
+}
+
+/// What the rules are worth, beside the network's return.
+pub fn rules_text(lines: usize, network_return: f64, rules: &RulesClaims) -> String {
+    format!(
+        "its {lines} rules choose as the network in {:.1} % of {} states and lose {:.3} of Q-value in each; \
+         by themselves: {} counted in {} episodes, return {:.2} where the network has {:.2}",
+        100.0 * rules.fidelity,
+        rules.states,
+        rules.regret,
+        rules.counted,
+        rules.colliding,
+        rules.return_mean,
+        network_return,
+    )
+}

@@ -1,0 +1,28 @@
+//! `avastra export-weights`: a policy's network for other tools.
+
+use crate::agent::Face;
+use crate::emit;
+
+use super::arguments::ExportWeightsArguments;
+use super::error::Failure;
+use super::load;
+use super::output::Output;
+use super::run_directory::write;
+use super::verify::acting;
+
+/// Writes the weights as safetensors.
+pub fn export_weights(output: &Output, arguments: &ExportWeightsArguments) -> Result<(), Failure> {
+    let (table, policy) = load::policy(output, &arguments.file)?;
+    let acting = acting(&table, &policy, Face::Network)?;
+    let path = arguments.output.clone().unwrap_or_else(|| arguments.file.with_extension("safetensors"));
+    write(&path, &emit::safetensors(acting.network()))?;
+    let (shape, count) = (acting.network().shape(), acting.network().parameters().len());
+    let widths: Vec<String> = shape.layers.iter().map(ToString::to_string).collect();
+    let head = if shape.dueling { ", and the state's value as the last output" } else { "" };
+    output.say(&format!("{}: {count} numbers of {}{head}", path.display(), widths.join("-")));
+    output.result(
+        "export-weights",
+        serde_json::json!({ "file": path, "layers": shape.layers, "dueling": shape.dueling }),
+    );
+    Ok(())
+}

@@ -1,0 +1,147 @@
+//! Style: what is right and yet harder to read than it need be. Only a space's own file is looked at.
+//!
+//! Layout is `fmt`'s business, not ours.
+
+use crate::model::code;
+use crate::syntax::Diagnostic;
+use crate::syntax::ast;
+use crate::syntax::ast::BinaryOp;
+use crate::syntax::ast::Expr;
+use crate::syntax::ast::ExprKind;
+use crate::syntax::ast::ItemKind;
+use crate::syntax::ast::Name;
+use crate::syntax::print_expr;
+
+/// One warning for each oddity.
+pub(super) fn report(own: &[&ast::Item]) -> Vec<Diagnostic> {
+    let mut diagnostics = Vec::new();
+    for item in own {
+        names(&item.kind, &mut diagnostics);
+        conditions(&item.kind, &mut diagnostics);
+    }
+    diagnostics
+}
+
+/// Types and their variants begin with a capital letter, everything else is in small letters: so a
+/// reader knows a variant from a parameter.
+fn names(kind: &ItemKind, into: &mut Vec<Diagnostic>) {
+    match kind {
+        ItemKind::Enum(declared) => {
+            for name in core::iter::once(&declared.name).chain(&declared.variants) {
+                if name.text.starts_with(|first: char| first.is_ascii_lowercase()) {
+                    into.push(named(
+                        name,
+                        "types and variants begin with a capital letter",
+                        capital(&name.text),
+                    ));
+                }
+            }
+        }
+        // It bears the name of an enum.
+        ItemKind::Odds(_) => {}
+        _ => {
+            let params: Vec<&Name> = match kind {
+                ItemKind::Fn(declared) => declared.params.iter().map(|param| &param.name).collect(),
+                ItemKind::Action(declared) => declared.params.iter().map(|param| &param.name).collect(),
+                _ => Vec::new(),
+            };
+            for name in kind.name().into_iter().chain(params) {
+                if name.text.contains(|c: char| c.is_ascii_uppercase()) {
+                    into.push(named(
+                        name,
+                        "names other than types and variants are in small letters",
+                        small(&name.text),
+                    ));
+                }
+            }
+        }
+    }
+}
+
+fn named(name: &Name, rule: &str, better: String) -> Diagnostic {
+    Diagnostic::warning(code::NAME_STYLE, format!("`{}` looks like something else", name.text))
+        .at(name.span, rule)
+        .help(format!("call it `{better}`"))
+}
+
+/// `near_by` as `NearBy`.
+fn capital(name: &str) -> String {
+    let part = |part: &str| {
+        let mut letters = part.chars();
+        letters
+            .next()
+            .map_or(String::new(), |first| first.to_ascii_uppercase().to_string() + letters.as_str())
+    };
+    name.split('_').map(part).collect()
+}
+
+/// `NearBy` as `near_by`.
+fn small(name: &str) -> String {
+    let mut text = String::new();
+    let mut after_small = false;
+    for letter in name.chars() {
+        if letter.is_ascii_uppercase() && after_small {
+            text.push('_');
+        }
+        after_small = letter.is_ascii_lowercase() || letter.is_ascii_digit();
+        text.push(letter.to_ascii_lowercase());
+    }
+    text
+}
+
+/// `x == true`, wherever a condition stands.
+fn conditions(kind: &ItemKind, into: &mut Vec<Diagnostic>) {
+    match kind {
+        ItemKind::Rule(declared) => {
+            if let ast::RuleBody::Holds { condition, .. } = &declared.body {
+                compared(condition, into);
+            }
+        }
+        ItemKind::Verdict(declared) => compared(&declared.condition, into),
+        ItemKind::Fn(declared) => compared(&declared.body, into),
+        ItemKind::Reward(cases) => {
+            cases.iter().filter_map(|case| case.condition.as_ref()).for_each(|c| compared(c, into));
+        }
+        ItemKind::Action(declared) => {
+            declared
+                .params
+                .iter()
+                .filter_map(|param| param.condition.as_ref())
+                .for_each(|c| compared(c, into));
+        }
+        _ => {}
+    }
+}
+
+fn compared(expr: &Expr, into: &mut Vec<Diagnostic>) {
+    match &expr.kind {
+        ExprKind::Binary { op, left, right, .. } => {
+            compared(left, into);
+            compared(right, into);
+            let (truth, other) = match (&left.kind, &right.kind) {
+                (_, ExprKind::Bool(truth)) => (*truth, left),
+                (ExprKind::Bool(truth), _) => (*truth, right),
+                _ => return,
+            };
+            let holds = match op {
+                BinaryOp::Equal => truth,
+                BinaryOp::NotEqual => !truth,
+                _ => return,
+            };
+            let other = match &other.kind {
+                ExprKind::Binary { .. } | ExprKind::Range { .. } => format!("({})", print_expr(other)),
+                _ => print_expr(other),
+            };
+            let better = if holds { other } else { format!("not {other}") };
+            let message = format!("comparing with `{truth}` says nothing more");
+            into.push(
+                Diagnostic::warning(code::COMPARED_WITH_TRUTH, message)
+                    .at(expr.span, "true or false already")
+                    .fix(format!("write `{better}`"), expr.span, better),
+            );
+        }
+        ExprKind::Unary { operand, .. } => compared(operand, into),
+        ExprKind::Match { arms, .. } => arms.iter().for_each(|arm| compared(&arm.value, into)),
+        _ => {}
+    }
+}

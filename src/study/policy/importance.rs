@@ -1,0 +1,117 @@
+//! Permutation importance (Breiman, 2001; Fisher et al., 2019): what a policy's choices lose when the
+//! values of one variable are shuffled over the states that it came to.
+//!
+//! States are weighted by what is at stake there, so a choice that makes no difference counts for
+//! nothing. What the shuffled states do not know is that variables go together: of two that say the same
+//! neither seems important.
+
+use crate::agent::QPolicy;
+use crate::agent::Visit;
+use crate::mdp::Observation;
+use crate::mdp::STATE_LEN;
+use crate::model::policy::VARIABLES;
+use crate::model::policy::variable_index;
+use crate::rng;
+use crate::rng::Stream;
+
+/// How much a policy's choices depend on a variable.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct Importance {
+    /// As the rules of a policy call it.
+    pub variable: &'static str,
+    /// As the paper calls it, or an observation what is beyond the paper.
+    pub observed_as: &'static str,
+    /// Whether it is one of the paper's 19.
+    pub of_paper: bool,
+    /// Whether the network sees it at all.
+    pub seen: bool,
+    /// Share of the stake on which the shuffled choice is another, mean over the repeats, in `[0, 1]`.
+    pub change: f64,
+    /// Its standard deviation over the repeats.
+    pub change_deviation: f64,
+    /// Mean Q-value that the shuffled choice loses in a state.
+    pub loss: f64,
+    /// Its standard deviation over the repeats.
+    pub loss_deviation: f64,
+}
+
+/// The importance of the paper's 19 variables and of all others that the policy sees, most important
+/// first.
+pub(super) fn importance(policy: &QPolicy, visits: &[Visit], repeats: u64, seed: u64) -> Vec<Importance> {
+    let seen = |variable: usize| policy.variables().contains(&variable);
+    let variables = (0..VARIABLES.len()).filter(|&variable| variable < STATE_LEN || seen(variable));
+    let mut all: Vec<Importance> = variables
+        .map(|variable| {
+            let measured: Vec<(f64, f64)> = (0..repeats)
+                .map(|repeat| {
+                    let index = variable as u64 * repeats + repeat;
+                    shuffled(policy, visits, variable, rng::stream(seed, Stream::Permutation, index))
+                })
+                .collect();
+            let (change, change_deviation) = mean_and_deviation(measured.iter().map(|pair| pair.0));
+            let (loss, loss_deviation) = mean_and_deviation(measured.iter().map(|pair| pair.1));
+            Importance {
+                variable: VARIABLES[variable].name,
+                observed_as: VARIABLES[variable].observed_as,
+                of_paper: variable < STATE_LEN,
+                seen: seen(variable),
+                change,
+                change_deviation,
+                loss,
+                loss_deviation,
+            }
+        })
+        .collect();
+    all.sort_by(|a, b| b.loss.total_cmp(&a.loss).then(b.change.total_cmp(&a.change)));
+    all
+}
+
+/// Share of the stake on which the choice changes, and mean Q-value lost.
+fn shuffled(policy: &QPolicy, visits: &[Visit], variable: usize, mut rng: rng::Rng) -> (f64, f64) {
+    let mut order: Vec<usize> = (0..visits.len()).collect();
+    for at in (1..order.len()).rev() {
+        order.swap(at, rng::below(&mut rng, at as u32 + 1) as usize);
+    }
+    let together = together(variable);
+    let (mut changed, mut stakes, mut lost) = (0.0, 0.0, 0.0);
+    for (visit, &from) in visits.iter().zip(&order) {
+        let mut observation = visit.observation.clone();
+        for &one in &together {
+            set(&mut observation, one, visits[from].observation.get(one));
+        }
+        let row = policy.greedy(&observation, &visit.open);
+        stakes += visit.stake();
+        if row != Some(visit.best) {
+            changed += visit.stake();
+            lost += visit.loss(row);
+        }
+    }
+    (if stakes > 0.0 { changed / stakes } else { 0.0 }, lost / visits.len().max(1) as f64)
+}
+
+/// What must move with a variable because it is the same thing: the paper's one number for the weather
+/// and its three parts, which go into a network in its place.
+fn together(variable: usize) -> Vec<usize> {
+    let index = |name| variable_index(name).expect("it is a variable");
+    let mut all = vec![variable];
+    if variable == index("weather") {
+        all.extend(["rain", "fog", "wetness"].map(index));
+    }
+    all
+}
+
+/// Puts a value in the place of a variable.
+pub(super) fn set(observation: &mut Observation, variable: usize, value: f32) {
+    if variable < STATE_LEN {
+        observation.state[variable] = value;
+    } else {
+        observation.beyond[variable - STATE_LEN] = value;
+    }
+}
+
+fn mean_and_deviation(values: impl Iterator<Item = f64> + Clone) -> (f64, f64) {
+    let count = values.clone().count().max(1) as f64;
+    let mean = values.clone().sum::<f64>() / count;
+    let squares: f64 = values.map(|value| (value - mean) * (value - mean)).sum();
+    (mean, libm::sqrt(squares / (count - 1.0).max(1.0)))
+}

@@ -1,0 +1,131 @@
+//! Every agent of the registry in whole episodes: it replays, it does not depend on the number of
+//! workers, and a search that was cut short goes on as if it had not been.
+
+use std::sync::atomic::AtomicBool;
+
+use avastra::action::Offer;
+use avastra::agent;
+use avastra::agent::Entry;
+use avastra::agent::Kind;
+use avastra::agent::Settings;
+use avastra::episode;
+use avastra::episode::Choice;
+use avastra::study;
+use avastra::study::EpisodeSummary;
+use avastra::study::Run;
+use avastra::study::RunSettings;
+use avastra::study::TrainSettings;
+use avastra::study::TrainedEpisode;
+use avastra::study::Training;
+
+use crate::world::assert_replays;
+use crate::world::run;
+
+/// A run of an agent that can act at once, two episodes on one road.
+fn run_of(entry: &Entry, seed: u64) -> Run {
+    let usual = run(2, seed, &[]);
+    let roads = vec!["corner".to_owned()];
+    let settings = RunSettings { agent: entry.name.to_owned(), roads, ..usual.settings().clone() };
+    Run::new(usual.table().clone(), settings).expect("it can act at once")
+}
+
+/// A training of a few episodes on two roads, with a network of a few neurons where there is one.
+fn training(entry: &Entry, checkpoint: Option<(usize, &[u8])>) -> Option<Training> {
+    let text = match entry.kind {
+        Kind::Ready(_) => return None,
+        Kind::Learning(_) => "learning_starts: 30\nupdates_per_step: 1\nhidden_units: [8]\nbatch_len: 8\n",
+        Kind::Searching(_) => "",
+    };
+    let usual = run(1, 1, &[]);
+    let settings = usual.settings().clone();
+    let settings = TrainSettings {
+        avastra: settings.avastra,
+        engine: settings.engine,
+        space: settings.space,
+        space_digest: settings.space_digest,
+        roads: vec!["corner".to_owned(), "residential".to_owned()],
+        ads: settings.ads,
+        agent: entry.name.to_owned(),
+        episodes: 24,
+        seed: 3,
+        without: Vec::new(),
+        with: Vec::new(),
+        hyperparameters: Settings::from_yaml(entry, None, text)?.expect("the settings are sound"),
+    };
+    let table = usual.table().clone();
+    let training = match checkpoint {
+        None => Training::new(table, settings),
+        Some((episodes, bytes)) => Training::resumed(table, settings, episodes, bytes),
+    };
+    Some(training.expect("the settings name what exists"))
+}
+
+#[test]
+fn whoever_can_act_at_once_replays_and_does_not_depend_on_the_workers() {
+    for entry in agent::REGISTRY.iter().filter(|entry| matches!(entry.kind, Kind::Ready(_))) {
+        let run = run_of(entry, 5);
+        let judged = |jobs| {
+            let mut episodes: Vec<EpisodeSummary> = Vec::new();
+            let stop = AtomicBool::new(false);
+            let done = study::play(&run, &[0, 1], jobs, &stop, &mut |summary, log| {
+                assert_replays(&run, summary.episode, &log);
+                episodes.push(summary);
+                Ok::<(), ()>(())
+            });
+            done.expect("nothing fails");
+            episodes.sort_by_key(|summary| summary.episode);
+            episodes
+        };
+        let alone = judged(1);
+        assert_eq!(alone, judged(2), "{}", entry.name);
+        let looks_ahead = alone.iter().all(|summary| summary.branched_s > 0.0);
+        assert_eq!(looks_ahead, entry.name == "greedy", "{}: {}", entry.name, alone[0].branched_s);
+    }
+}
+
+#[test]
+fn what_is_trained_goes_on_from_a_checkpoint_to_the_same_episodes() {
+    for entry in agent::REGISTRY {
+        let Some(mut whole) = training(entry, None) else { continue };
+        for _ in 0..14 {
+            whole.episode();
+        }
+        let checkpoint = whole.checkpoint();
+        let mut resumed = training(entry, Some((14, &checkpoint))).expect("it is trained");
+        while !whole.is_done() {
+            let (one, other): (TrainedEpisode, TrainedEpisode) = (whole.episode(), resumed.episode());
+            let name = entry.name;
+            assert_eq!(one.log, other.log, "{name}");
+            assert_eq!((one.sum, one.simulated_s), (other.sum, other.simulated_s), "{name}");
+            assert!(one.simulated_s > 0.0 && one.simulated_s <= one.log.duration_s, "{name}");
+        }
+        assert_eq!(whole.checkpoint(), resumed.checkpoint(), "{}", entry.name);
+    }
+}
+
+#[test]
+fn a_branch_shows_what_then_comes_to_pass() {
+    let run = run(1, 7, &[]);
+    let setup = run.setup(0);
+    let mut ahead = Vec::new();
+    let log = episode::run(
+        &setup,
+        &mut |moment| {
+            let offers = run.table().offers(moment.situation);
+            let mut draws = offers.into_iter().filter_map(|offer| match offer {
+                Offer::Legal(draw) => Some(draw),
+                Offer::Refused(_) => None,
+            });
+            let Some(draw) = draws.nth(moment.step % 3) else { return Choice::Pass };
+            // Others are tried as well, and leave nothing behind.
+            draws.take(2).for_each(|other| drop(moment.look_ahead(other)));
+            ahead.push(moment.look_ahead(draw.clone()));
+            Choice::Act(draw)
+        },
+        &mut |_, _, _| {},
+    );
+    assert!(ahead.len() > 3);
+    for branch in ahead {
+        assert_eq!(branch.steps, log.steps[..branch.steps.len()]);
+    }
+}
