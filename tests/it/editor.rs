@@ -308,7 +308,7 @@ fn text_of(mistakes: &[Value]) -> Vec<String> {
 fn hovers_say_what_the_compiler_knows() {
     let mut editor = Editor::ready();
     let places = [
-        "any speed: Speed in 10 m/s",
+        "any distance: Length in 1 m",
         "action drive_ah",
         "rule npc_sp",
         "rule npc_speed on vehicles: sp",
@@ -329,7 +329,6 @@ fn hovers_say_what_the_compiler_knows() {
         let text = marked(match place {
             "what counts" => "/// What counts",
             "spa" => "{\n  spa",
-            "any speed: Speed in 10 m/s" => "any speed: Speed in 10 m",
             place => place,
         });
         let name = place.replace('\n', " ");
@@ -403,7 +402,6 @@ fn proposals_fit_their_place() {
         "policy p { rules {\n    when from == Left => |",
         "override |",
         "// nothing in a comment |",
-        "use \"ro|",
     ];
     let mut all = String::new();
     for place in places {
@@ -414,6 +412,11 @@ fn proposals_fit_their_place() {
         all.push_str(&format!("{}\n    {}{rest}\n", place.replace('\n', "⏎"), first.join(" ")));
     }
     expect_snapshot("editor", "proposals", &all);
+    // Files beside the document, as far as they fit.
+    let files = editor.proposals(&format!("{head}use \"ro|"));
+    assert!(files.iter().any(|file| file == "roads.ava"), "{files:?}");
+    let maps = editor.proposals("language 1\nroad r { map: \"roads/|\" }\n");
+    assert!(maps.iter().any(|map| map == "roads/corner.xodr"), "{maps:?}");
 }
 
 #[test]
@@ -489,7 +492,7 @@ fn renames_are_tried_first() {
         ("enum Colour = Pi", "Rose", "`Pink` cannot be called `Rose`"),
         ("fn si", "base", "`size` cannot be called `base`"),
         ("any speed: Spe", "x", "`Speed` is a type of the language"),
-        ("any speed: Speed in 10 m", "x", "a number has no name"),
+        ("any distance: Length in 1 m", "x", "a number has no name"),
         ("\nacti", "x", "`action` is a word of the language"),
         ("verdict coun", "x", "`counted` is the verdict by which collisions count"),
     ];

@@ -87,6 +87,9 @@ pub struct AgentFile {
     /// Independent repetitions of the evaluation, of an agent that has nothing to learn; without a number 10.
     #[serde(default)]
     pub repeats: Option<u32>,
+    /// Profile of the driving system that this agent meets, in place of the study's.
+    #[serde(default)]
+    pub ads_config: Option<String>,
     /// Rules switched off for this agent.
     #[serde(default)]
     pub without: Vec<String>,

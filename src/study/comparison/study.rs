@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 
 use crate::action::ActionTable;
+use crate::ads::ModularConfig;
 use crate::agent;
 use crate::agent::Kind;
 use crate::agent::Settings;
@@ -65,6 +66,9 @@ pub struct AgentSettings {
     /// How it learns, if it does.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub training: Option<TrainingPlan>,
+    /// The profile of the driving system that this agent meets, in place of the study's.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub profile: Option<Profile>,
     pub without: Vec<String>,
     pub with: Vec<String>,
 }
@@ -214,8 +218,24 @@ fn agent_settings(
             (file.trainings, Some(TrainingPlan { episodes, roads: file.train_roads, hyperparameters }))
         }
     };
-    let repeats = repeats.unwrap_or(10);
-    Ok(AgentSettings { label, name: file.name, repeats, training, without: file.without, with: file.with })
+    let profile = match &file.ads_config {
+        None => None,
+        Some(path) => {
+            let refuse = |reason| StudyError::Settings { label: label.clone(), reason };
+            let text = read(path).map_err(|reason| refuse(format!("cannot read `{path}`: {reason}")))?;
+            let settings = ModularConfig::from_yaml(&text).map_err(|error| refuse(error.to_string()))?;
+            Some(Profile::new(&settings))
+        }
+    };
+    Ok(AgentSettings {
+        label,
+        name: file.name,
+        repeats: repeats.unwrap_or(10),
+        training,
+        profile,
+        without: file.without,
+        with: file.with,
+    })
 }
 
 impl Study {
@@ -305,7 +325,7 @@ impl Study {
             space_digest: self.settings.space_digest.clone(),
             roads,
             ads: self.settings.ads.clone(),
-            profile: self.settings.profile.clone(),
+            profile: agent.profile.as_ref().or(self.settings.profile.as_ref()).cloned(),
             agent: agent.name.clone(),
             episodes: plan.episodes,
             seed: self.training_seed(job.number),
@@ -334,7 +354,7 @@ impl Study {
             space_digest: self.settings.space_digest.clone(),
             roads: vec![road.to_owned()],
             ads: self.settings.ads.clone(),
-            profile: self.settings.profile.clone(),
+            profile: agent.profile.as_ref().or(self.settings.profile.as_ref()).cloned(),
             agent: agent.name.clone(),
             policy: None,
             episodes: self.settings.evaluation.episodes,
