@@ -9,8 +9,9 @@ use std::process::Command;
 use crate::cases::cases;
 use crate::cases::root;
 
-/// What a text of 64 KB may cost, processor time in s and memory in MB.
-const CPU_S_MAX: f64 = 1.0;
+/// What a text of 64 KB may cost, processor time in s and memory in MB. The mark is 1 s, and `fuzz/run.sh` holds an
+/// optimised build to it; this bound is for what grows without bound, on any build and a busy machine.
+const CPU_S_MAX: f64 = 10.0;
 const PEAK_MB_MAX: f64 = 256.0;
 
 #[test]

@@ -127,7 +127,7 @@ fn a_quick_study_says_that_it_is_none() {
     assert!(line.starts_with("{\"schema\":1,\"command\":\"study\""), "{line}");
     let result: Value = serde_json::from_str(line).expect("JSON");
     let results = &result["results"];
-    assert_eq!((&results["quick"], &results["cells"]), (&true.into(), &8.into()));
+    assert_eq!((&results["quick"], &results["cells"]), (&true.into(), &16.into()));
     let rate = &results["together"][0]["episodes"]["collisions_per_1000_km"];
     assert_eq!(rate["events"], 0, "nobody is there to be hit: {rate}");
     assert!(rate["high"].as_f64().expect("a bound") > 0.0);
@@ -150,7 +150,7 @@ fn what_no_study_can_be_is_said_so() {
         ("agents: [{ name: ddqn, label: mine, preset: papre }]", "agent `mine`: no preset `papre`"),
         ("agents: [{ name: ddqn, config: { discuont: 1 } }]", "did you mean `discount`?"),
         ("agents: [{ name: ddqn, config: nowhere.yaml }]", "cannot read `nowhere.yaml`"),
-        ("agents: [{ name: ddqn, config: 3 }]", "neither the name of a file nor a map"),
+        ("agents: [{ name: ddqn, config: 3 }]", "settings are the name of a file"),
         ("agents: [{ name: ddqn, config: { actions: [walkers] } }]", "agent `ddqn`: "),
         ("agents: [{ name: ddqn, train_roads: [moon] }]", "no road `moon`"),
         ("agents: [{ name: random, without: [gravity] }]", "agent `random`: "),
@@ -213,7 +213,10 @@ fn loaded(text: &str) -> avastra::study::Study {
     let file = avastra::study::StudyFile::from_yaml(text).expect("it is a study");
     let name = file.space.trim_start_matches("../").to_owned();
     let table = avastra::action::ActionTable::new(crate::world::space(&name));
-    let read = |name: &str| Err(format!("no shipped study names the file {name}"));
+    let read = |name: &str| {
+        std::fs::read_to_string(root().join("scenarios/studies").join(name))
+            .map_err(|error| error.to_string())
+    };
     let versions = ("test", avastra::sim::ENGINE);
     let settings =
         avastra::study::StudySettings::new(file, &table, None, versions, &read).expect("it is sound");

@@ -228,7 +228,8 @@ fn shortest(low: f32, high: f32) -> f64 {
     let middle = low + (high - low) / 2.0;
     let mut scale = 1.0;
     for _ in 0..9 {
-        let rounded = (middle * scale).round() / scale;
+        let (least, most) = ((low * scale).ceil(), (high * scale).ceil() - 1.0);
+        let rounded = (middle * scale).round().min(most).max(least) / scale;
         if rounded >= low && rounded < high {
             return rounded;
         }

@@ -63,7 +63,7 @@ impl Region {
 
     /// Whether other boxes together hold all of it; no, where that takes too long to tell.
     pub fn is_covered(&self, others: &[Region]) -> bool {
-        let mut rest = vec![self.clone()];
+        let mut rest = if self.is_empty() { Vec::new() } else { vec![self.clone()] };
         for other in others {
             rest = rest.iter().flat_map(|piece| piece.without(other)).collect();
             if rest.len() > PIECES_MAX {
