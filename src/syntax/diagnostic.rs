@@ -260,12 +260,16 @@ fn floor_boundary(text: &str, offset: usize) -> usize {
     text.floor_char_boundary(offset.min(text.len()))
 }
 
+/// So many names are looked at for one that was misspelt: a file with thousands of both would take long.
+const CANDIDATES_MAX: usize = 1000;
+
 /// The candidate that the author may have meant by `word`, if one is near enough.
 pub fn nearest<'a>(word: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     // A third of the word may be wrong: more, and the guess is noise.
     let distance_max = (word.chars().count() / 3).max(1);
     candidates
         .into_iter()
+        .take(CANDIDATES_MAX)
         .map(|candidate| (strsim::damerau_levenshtein(word, candidate), candidate))
         .filter(|(distance, candidate)| *distance <= distance_max && *candidate != word)
         .min_by_key(|(distance, _)| *distance)

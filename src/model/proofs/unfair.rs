@@ -28,7 +28,7 @@ use crate::syntax::Diagnostic;
 use crate::units::decimal;
 
 /// Boxes of ranges looked at for all actions together, at most, each having its share.
-const BOXES_MAX: usize = 100_000;
+const BOXES_MAX: usize = 50_000;
 
 /// Perception and reaction, s.
 const REACTION_S: f64 = 0.4 + 0.75;
