@@ -8,6 +8,7 @@ use std::borrow::Cow;
 use std::collections::BTreeSet;
 use std::path::PathBuf;
 
+use crate::model::check::names_of_expr;
 use crate::model::check::unknown;
 use crate::model::code;
 use crate::model::load::LoadedFile;
@@ -22,6 +23,9 @@ use crate::syntax::ast::Name;
 use crate::syntax::ast::RuleBody;
 use crate::syntax::ast::Use;
 use crate::syntax::nearest;
+
+/// What a rule may ask about a spawn.
+const GAPS: [&str; 2] = ["spawn_gap", "safety_gap"];
 
 /// A declaration that holds, and the file that it is from.
 struct Standing<'a> {
@@ -54,7 +58,7 @@ pub(super) fn resolve<'a>(files: &'a [LoadedFile], order: &[usize]) -> (Vec<Cow<
 }
 
 /// Takes away what a `use` is without, and what means nothing any more: names in groups and after `on`,
-/// groups and rules without a name left, transitions of a state that nothing sets any more.
+/// groups and rules without a name left, rules on a state or a gap that no action touches any more.
 fn leave_out(
     files: &[LoadedFile],
     standing: &mut Vec<Standing<'_>>,
@@ -66,78 +70,29 @@ fn leave_out(
     // A file that cannot be read was reported.
     let Some(target) = files.iter().position(|other| other.path == path) else { return };
     let offered: Vec<bool> = (0..files.len()).map(|other| uses(files, target, other)).collect();
-    let is_offered = |standing: &Standing<'_>| {
-        offered[standing.file]
-            && matches!(standing.item.kind, ItemKind::Action(_) | ItemKind::Group(_) | ItemKind::Rule(_))
+    let mut left = left_names(standing, &offered, used, diagnostics);
+    // What other files declare can give a rule something to bind again.
+    let others = files.iter().zip(&offered).filter(|(_, is_offered)| !**is_offered);
+    let others = touched(others.flat_map(|(file, _)| &file.tree.items));
+    let touched_now = |standing: &[Standing<'_>]| {
+        let mut touched = touched(standing.iter().map(|standing| standing.item.as_ref()));
+        touched.extend(others.iter().cloned());
+        touched
     };
-    let mut left: BTreeSet<String> = BTreeSet::new();
-    for name in &used.without {
-        let mut open = vec![name.text.clone()];
-        while let Some(next) = open.pop() {
-            let found = |standing: &Standing<'_>| {
-                is_offered(standing) && standing.item.kind.name().is_some_and(|known| known.text == next)
-            };
-            let mut known = false;
-            for member in standing.iter().filter(|standing| found(standing)) {
-                known = true;
-                // A group goes with all its actions.
-                if let ItemKind::Group(group) = &member.item.kind {
-                    open.extend(group.members.iter().map(|member| member.text.clone()));
-                }
-            }
-            if known {
-                left.insert(next);
-            } else if next == name.text && !left.contains(&next) {
-                let candidates: Vec<&str> = standing
-                    .iter()
-                    .filter(|standing| is_offered(standing))
-                    .filter_map(|standing| standing.item.kind.name().map(|name| name.text.as_str()))
-                    .collect();
-                let what = "action, group or rule";
-                diagnostics.push(unknown(what, &name.text, name.span, candidates));
-            }
-        }
-    }
-    let set_before = states_set(standing);
+    let touched_before = touched_now(standing);
     standing.retain(|standing| {
         let name = standing.item.kind.name();
-        !(is_offered(standing) && name.is_some_and(|name| left.contains(&name.text)))
+        !(is_offered(standing, &offered) && name.is_some_and(|name| left.contains(&name.text)))
     });
+    let touched_after = touched_now(standing);
+    let has_lost = |named: &BTreeSet<&str>| {
+        let among = |touched: &BTreeSet<String>| named.iter().any(|name| touched.contains(*name));
+        among(&touched_before) && !among(&touched_after)
+    };
     loop {
-        let set_now = states_set(standing);
         let before = left.len();
         standing.retain_mut(|standing| {
-            if !is_offered(standing) {
-                return true;
-            }
-            let gone = |name: &Name| left.contains(&name.text);
-            match &standing.item.kind {
-                ItemKind::Group(group) if group.members.iter().any(gone) => {
-                    let mut kept = group.clone();
-                    kept.members.retain(|member| !gone(member));
-                    let is_kept = !kept.members.is_empty();
-                    if !is_kept {
-                        left.insert(kept.name.text.clone());
-                    }
-                    standing.item.to_mut().kind = ItemKind::Group(kept);
-                    is_kept
-                }
-                ItemKind::Rule(rule) => match &rule.body {
-                    RuleBody::Holds { on, .. } if on.iter().any(gone) => {
-                        let mut kept = rule.clone();
-                        let RuleBody::Holds { on, .. } = &mut kept.body else { return true };
-                        on.retain(|target| !left.contains(&target.text));
-                        let is_kept = !on.is_empty();
-                        standing.item.to_mut().kind = ItemKind::Rule(kept);
-                        is_kept
-                    }
-                    RuleBody::Moves { state, .. } => {
-                        !set_before.contains(&state.text) || set_now.contains(&state.text)
-                    }
-                    RuleBody::Holds { .. } => true,
-                },
-                _ => true,
-            }
+            !is_offered(standing, &offered) || keeps_something(&mut standing.item, &mut left, &has_lost)
         });
         if left.len() == before {
             return;
@@ -145,16 +100,101 @@ fn leave_out(
     }
 }
 
-/// The states that some action sets.
-fn states_set(standing: &[Standing<'_>]) -> BTreeSet<String> {
-    let effects = standing.iter().flat_map(|standing| match &standing.item.kind {
-        ItemKind::Action(action) => action.effects.as_slice(),
-        _ => &[],
+/// Whether a `use` can leave it out.
+fn is_offered(standing: &Standing<'_>, offered: &[bool]) -> bool {
+    offered[standing.file]
+        && matches!(standing.item.kind, ItemKind::Action(_) | ItemKind::Group(_) | ItemKind::Rule(_))
+}
+
+/// The names that a `use` is without, a group's members with it.
+fn left_names(
+    standing: &[Standing<'_>],
+    offered: &[bool],
+    used: &Use,
+    diagnostics: &mut Vec<Diagnostic>,
+) -> BTreeSet<String> {
+    let members = || standing.iter().filter(|standing| is_offered(standing, offered));
+    let mut left = BTreeSet::new();
+    for name in &used.without {
+        let mut open = vec![name.text.clone()];
+        while let Some(next) = open.pop() {
+            // A broken text may put a group into itself.
+            if left.contains(&next) {
+                continue;
+            }
+            let is_next =
+                |standing: &&Standing<'_>| standing.item.kind.name().is_some_and(|known| known.text == next);
+            let mut known = false;
+            for member in members().filter(is_next) {
+                known = true;
+                if let ItemKind::Group(group) = &member.item.kind {
+                    open.extend(group.members.iter().map(|member| member.text.clone()));
+                }
+            }
+            if known {
+                left.insert(next);
+            } else if next == name.text {
+                let candidates = members().filter_map(|standing| standing.item.kind.name());
+                let candidates: Vec<&str> = candidates.map(|name| name.text.as_str()).collect();
+                diagnostics.push(unknown("action, group or rule", &name.text, name.span, candidates));
+            }
+        }
+    }
+    left
+}
+
+/// Takes names that are gone out of a group or a rule; whether anything is left of it. A group of which
+/// nothing is left is gone, too.
+fn keeps_something(
+    item: &mut Cow<'_, Item>,
+    left: &mut BTreeSet<String>,
+    has_lost: &dyn Fn(&BTreeSet<&str>) -> bool,
+) -> bool {
+    let gone = |name: &Name| left.contains(&name.text);
+    match &item.kind {
+        ItemKind::Group(group) if group.members.iter().any(gone) => {
+            let mut kept = group.clone();
+            kept.members.retain(|member| !gone(member));
+            let is_kept = !kept.members.is_empty();
+            if !is_kept {
+                left.insert(kept.name.text.clone());
+            }
+            item.to_mut().kind = ItemKind::Group(kept);
+            is_kept
+        }
+        ItemKind::Rule(rule) => match &rule.body {
+            RuleBody::Holds { on, condition } if on.is_empty() => {
+                let mut named = BTreeSet::new();
+                names_of_expr(condition, &mut named);
+                !has_lost(&named)
+            }
+            RuleBody::Holds { on, .. } if on.iter().any(gone) => {
+                let mut kept = rule.clone();
+                let RuleBody::Holds { on, .. } = &mut kept.body else { return true };
+                on.retain(|target| !gone(target));
+                let is_kept = !on.is_empty();
+                item.to_mut().kind = ItemKind::Rule(kept);
+                is_kept
+            }
+            RuleBody::Holds { .. } => true,
+            RuleBody::Moves { state, .. } => !has_lost(&BTreeSet::from([state.text.as_str()])),
+        },
+        _ => true,
+    }
+}
+
+/// What rules without an action's name bind by: the states that some action sets, and the gaps if some
+/// action spawns.
+fn touched<'a>(items: impl Iterator<Item = &'a Item>) -> BTreeSet<String> {
+    let actions = items.filter_map(|item| match item.kind.plain() {
+        ItemKind::Action(action) => Some(action),
+        _ => None,
     });
+    let effects = actions.flat_map(|action| &action.effects);
     effects
-        .filter_map(|effect| match &effect.kind {
-            EffectKind::Set { state, .. } => Some(state.text.clone()),
-            EffectKind::Spawn { .. } => None,
+        .flat_map(|effect| match &effect.kind {
+            EffectKind::Set { state, .. } => vec![state.text.clone()],
+            EffectKind::Spawn { .. } => GAPS.map(str::to_owned).to_vec(),
         })
         .collect()
 }

@@ -355,6 +355,25 @@ fn digests_cover_everything_that_is_used() {
 }
 
 #[test]
+fn what_is_left_out_takes_with_it_what_it_leaves_empty() {
+    let base = format!("{BASE}{CLOCK}rule awake: time != Night\n");
+    let own = |base: &str, text: &str| {
+        let text = format!("language 1\nuse \"base.ava\" without {text}\n");
+        load_files(&[("own.ava", &text), ("base.ava", base)])
+    };
+    let names = |loaded: &Loaded| -> Vec<String> {
+        let space = loaded.space.clone().unwrap_or_else(|| panic!("{}", shown(loaded)));
+        space.rules.iter().map(|rule| rule.name.clone()).collect()
+    };
+    assert!(names(&own(&base, "set_time")).iter().all(|name| name != "chronology" && name != "awake"));
+    // An action of one's own is bound by what bound the old one.
+    let kept = names(&own(&base, "set_time\naction noon() { set time = Noon }"));
+    assert!(["chronology", "awake"].iter().all(|rule| kept.iter().any(|name| name == rule)), "{kept:?}");
+    let circle = format!("{base}group one = two\ngroup two = one\n");
+    assert!(codes(&own(&circle, "one")).iter().all(|code| *code != "AV0101"));
+}
+
+#[test]
 fn overrides_stand_where_the_old_one_stood() {
     let base = format!("{BASE}let far = 12 m\nlet near = far / 2\n{CLOCK}expect count(actions) == 6\n");
     let own = |text: &str| {

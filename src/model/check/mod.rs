@@ -23,6 +23,7 @@ pub(super) use names::unknown;
 pub(super) use road::Maps;
 pub(super) use scenario::row;
 pub use scenario::scenario;
+pub(super) use unused::names_of_expr;
 
 use std::path::PathBuf;
 

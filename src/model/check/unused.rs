@@ -163,7 +163,8 @@ fn names_of_fields<'a>(fields: &'a [ast::Field], used: &mut BTreeSet<&'a str>) {
     fields.iter().for_each(|field| names_of_expr(&field.value, used));
 }
 
-fn names_of_expr<'a>(expr: &'a ast::Expr, used: &mut BTreeSet<&'a str>) {
+/// Every name in an expression, whatever it stands for.
+pub(in crate::model) fn names_of_expr<'a>(expr: &'a ast::Expr, used: &mut BTreeSet<&'a str>) {
     match &expr.kind {
         ast::ExprKind::Name(name) => {
             used.insert(name);
