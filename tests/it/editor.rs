@@ -501,6 +501,11 @@ fn renames_are_tried_first() {
         assert_eq!(error["code"], -32803, "{error}");
         assert!(text(&error["message"]).contains(reason), "{error}");
     }
+    // Without a mistake, but the rule would compare the parameter with itself.
+    let own = "language 1\nuse \"avastra45.ava\"\nlet fa|st = 12 m/s\nrule slow on vehicles: speed <= fast\n";
+    let error = editor.ask_at("textDocument/rename", &uri, own, json!({ "newName": "speed" }));
+    let error = error.expect_err("the parameter hides it");
+    assert!(text(&error["message"]).contains("would stand for something else"), "{error}");
     let broken = marked("fn si").replace("group environment =", "group environment = =");
     let error = editor.ask_at("textDocument/rename", &uri, &broken, json!({ "newName": "bulk" }));
     assert!(text(&error.expect_err("it is broken")["message"]).contains("repair the syntax"));

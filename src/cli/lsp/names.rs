@@ -114,6 +114,14 @@ impl Names {
         }
     }
 
+    /// Which names stand for the same, whatever they are called: for each, in the order of the text, the
+    /// number of the first one with its meaning.
+    pub fn pattern(&self) -> Vec<usize> {
+        let mut first: BTreeMap<&[Symbol], usize> = BTreeMap::new();
+        let numbered = self.occurrences.iter().enumerate();
+        numbered.map(|(number, o)| *first.entry(o.symbols.as_slice()).or_insert(number)).collect()
+    }
+
     /// Where the symbols are declared; an `override` before what it replaces.
     pub fn declarations(&self, symbols: &[Symbol]) -> Vec<Span> {
         let wanted: BTreeSet<Symbol> = symbols.iter().cloned().collect();

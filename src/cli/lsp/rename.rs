@@ -1,7 +1,7 @@
 //! Another name for what the author declared, wherever it stands.
 //!
-//! A rename is tried before it is offered: the files with the new name are checked, and what would
-//! bring a mistake is refused with the compiler's own words.
+//! A rename is tried before it is offered: the files with the new name are checked. What would bring a
+//! mistake is refused with the compiler's own words, and so is what would give a name another meaning.
 
 use std::collections::BTreeMap;
 use std::collections::BTreeSet;
@@ -109,10 +109,14 @@ pub fn rename(workspace: &mut Workspace, path: &Path, byte: usize, name: &str) -
         texts.insert(file.clone(), text);
     }
     for path in &touched {
-        let (before, _) = workspace.trial(path, &BTreeMap::new());
-        let (after, first) = workspace.trial(path, &texts);
-        if after > before {
-            let reason = first.map(|first| first.message).unwrap_or_default();
+        let trials = (workspace.trial(path, &BTreeMap::new()), workspace.trial(path, &texts));
+        let (Some(before), Some(after)) = trials else { continue };
+        if after.errors.len() > before.errors.len() {
+            let reason = after.errors.into_iter().next().map(|first| first.message).unwrap_or_default();
+            return Err(format!("`{old}` cannot be called `{name}`: {reason}"));
+        }
+        if after.names.pattern() != before.names.pattern() {
+            let reason = "a name would stand for something else";
             return Err(format!("`{old}` cannot be called `{name}`: {reason}"));
         }
     }

@@ -251,7 +251,7 @@ impl Server {
         Ok(here.map(|o| json!({ "range": analysis.range(o.span) })).collect())
     }
 
-    /// One change of the lines that differ; none of a broken file, which stays as it is.
+    /// One change, from the first character that differs to the last; none of a broken file, which stays as it is.
     fn formatting(&mut self, params: &Value) -> Result<Value, Refusal> {
         let path = self.document(params)?;
         let analysis = self.analysis(&path)?;
@@ -265,11 +265,15 @@ impl Server {
             return Ok(json!([]));
         }
         let same = |(a, b): &(char, char)| a == b;
-        let before: usize =
+        let mut before: usize =
             text.chars().zip(formatted.chars()).take_while(same).map(|(a, _)| a.len_utf8()).sum();
         let rest = (&text[before..], &formatted[before..]);
-        let after: usize =
+        let mut after: usize =
             rest.0.chars().rev().zip(rest.1.chars().rev()).take_while(same).map(|(a, _)| a.len_utf8()).sum();
+        // No place in an editor lies between the two characters of a line's end.
+        let splits = |at: usize| text[..at].ends_with('\r') && text[at..].starts_with('\n');
+        before -= usize::from(splits(before));
+        after -= usize::from(splits(text.len() - after));
         let span = syntax::ast::Span::new(Analysis::ROOT, before, text.len() - after);
         let text = &formatted[before..formatted.len() - after];
         Ok(json!([{ "range": analysis.range(span), "newText": text }]))

@@ -49,6 +49,13 @@ pub struct Analysis {
     stale: bool,
 }
 
+/// What a document would be with other texts.
+#[derive(Debug)]
+pub struct Trial {
+    pub errors: Vec<Diagnostic>,
+    pub names: Names,
+}
+
 #[derive(Debug, Default)]
 pub struct Workspace {
     documents: BTreeMap<PathBuf, Document>,
@@ -125,17 +132,17 @@ impl Workspace {
         Some(Analysis { loaded, names, lines, inputs, sound: None, stale: false })
     }
 
-    /// The mistakes of a document with other texts in place of some, and nothing kept: how many errors
-    /// there are, and the first of them.
-    pub fn trial(&mut self, path: &Path, texts: &BTreeMap<PathBuf, String>) -> (usize, Option<Diagnostic>) {
+    /// A document with other texts in place of some, and nothing kept.
+    pub fn trial(&mut self, path: &Path, texts: &BTreeMap<PathBuf, String>) -> Option<Trial> {
         let documents = &self.documents;
         let read = |path: &Path| match texts.get(path) {
             Some(text) => Ok(text.clone()),
             None => read(documents, path),
         };
-        let Ok(loaded) = model::load_with(path, &read, &mut self.maps) else { return (0, None) };
-        let errors: Vec<Diagnostic> = loaded.diagnostics.into_iter().filter(Diagnostic::is_error).collect();
-        (errors.len(), errors.into_iter().next())
+        let loaded = model::load_with(path, &read, &mut self.maps).ok()?;
+        let names = Names::new(&loaded.files, &loaded.sources);
+        let errors = loaded.diagnostics.into_iter().filter(Diagnostic::is_error).collect();
+        Some(Trial { errors, names })
     }
 }
 
