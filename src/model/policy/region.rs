@@ -49,6 +49,12 @@ impl Region {
         region
     }
 
+    /// Whether [`Region::and`] leaves exactly what fulfils the condition. A threshold that is too small or
+    /// too large for an exact number leaves everything.
+    pub fn is_exact(condition: &Condition) -> bool {
+        Rational::from_f64(condition.value).is_some()
+    }
+
     pub fn is_empty(&self) -> bool {
         self.0.iter().any(Side::is_empty)
     }
@@ -185,6 +191,8 @@ mod tests {
         assert!(!all.is_covered(&[night, low]));
         assert!(all.and(&condition("throttle", Comparison::Greater, 100.0)).is_empty());
         assert!(all.and(&condition("rain", Comparison::Less, 0.0)).is_empty());
+        assert!(Region::is_exact(&condition("ego_speed", Comparison::Less, 0.1)));
+        assert!(!Region::is_exact(&condition("ego_speed", Comparison::Less, 1e-30)));
     }
 
     proptest! {

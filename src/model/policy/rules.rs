@@ -130,7 +130,10 @@ pub(super) fn rules(
                     let calls = rule.rows.iter().zip(&line.actions);
                     diagnostics
                         .extend(calls.filter_map(|(&row, call)| illegal(space, origin, row, &region, call)));
-                    above.push((region, line.span));
+                    // Of a larger box than the line's own, "covered" would be no proof.
+                    if rule.conditions.iter().all(Region::is_exact) {
+                        above.push((region, line.span));
+                    }
                 }
                 rules.push(rule);
             }
