@@ -181,7 +181,8 @@ impl Checker {
                 code::EMPTY,
                 format!("nothing is left to draw for `{}`", declared.name.text),
             );
-            self.report(error.at(declared.span, "the odds of all its values are 0"));
+            let error = error.at(declared.span, "the odds of all its values are 0");
+            self.report(error.help("give at least one of them odds above 0"));
             return None;
         }
         Some(drawn)

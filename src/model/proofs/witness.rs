@@ -295,8 +295,15 @@ fn choices(action: &ActionDef, values: &[Value]) -> Vec<Vec<Value>> {
     for (local, parameter) in action.parameters.iter().enumerate().filter(|(_, p)| !p.axis) {
         let Domain::Values(values) = &parameter.domain else { continue };
         let room = (CHOICES_MAX / chosen.len()).max(1);
+        // What is likelier stands there more than once, and would use up the room.
+        let mut different: Vec<Value> = Vec::new();
+        for value in values {
+            if different.len() < room && !different.contains(value) {
+                different.push(*value);
+            }
+        }
         let longer = chosen.iter().flat_map(|locals| {
-            values.iter().take(room).map(move |value| {
+            different.iter().map(move |value| {
                 let mut locals = locals.clone();
                 locals[local] = *value;
                 locals
