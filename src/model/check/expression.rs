@@ -225,6 +225,10 @@ impl Checker {
 
     /// A name that exists, but not here.
     fn lacking(&self, name: &str, place: &Place<'_>) -> Option<String> {
+        if name == "road" && place.road {
+            let asked = "`road.limit`, `road.lanes`, `road == corner` or `road in [corner, boulevard]`";
+            return Some(format!("`road` is no value: ask for {asked}"));
+        }
         if FACTS.iter().any(|fact| fact.0 == name) && place.fact(name).is_none() {
             return Some(format!("`{name}` is known to the engine, but not in this place"));
         }
@@ -544,12 +548,18 @@ impl Checker {
         place: &Place<'_>,
         span: Span,
     ) -> Option<Expr> {
-        let road = match (names_road(left, place), names_road(right, place)) {
+        let road = match (self.names_road(left, place), self.names_road(right, place)) {
             (true, _) => Some(right),
             (_, true) => Some(left),
             _ => None,
         };
-        if let (Some(road), Comparison::Equal | Comparison::NotEqual) = (road, op) {
+        if let Some(road) = road {
+            if !matches!(op, Comparison::Equal | Comparison::NotEqual) {
+                let error = Diagnostic::error(code::UNORDERED, "roads have no order");
+                let error = error.at(span, format!("`{}` needs one", op.symbol()));
+                self.report(error.help("write `road == corner`, or `road in [corner, boulevard]`"));
+                return None;
+            }
             let is_there = self.on_road(core::slice::from_ref(road), place, span)?;
             let kind = match op {
                 Comparison::NotEqual => ExprKind::Not(Box::new(is_there)),
@@ -606,7 +616,7 @@ impl Checker {
         place: &Place<'_>,
         span: Span,
     ) -> Option<Expr> {
-        if let (true, ast::ExprKind::List(roads)) = (names_road(left, place), &right.kind) {
+        if let (true, ast::ExprKind::List(roads)) = (self.names_road(left, place), &right.kind) {
             return self.on_road(roads, place, span);
         }
         let value = self.expr(left, place, None)?;
@@ -680,6 +690,14 @@ impl Checker {
         Some(Expr { kind: ExprKind::OnRoad(roads?), ty: Type::Bool, span })
     }
 
+    /// Whether the expression is the word `road`, and no parameter, constant or state of that name hides it.
+    fn names_road(&self, expr: &ast::Expr, place: &Place<'_>) -> bool {
+        matches!(&expr.kind, ast::ExprKind::Name(name) if name == "road")
+            && !place.locals.iter().any(|(local, _)| local == "road")
+            && !self.constants.iter().any(|(constant, _)| constant == "road")
+            && !self.states.iter().any(|state| state.name == "road")
+    }
+
     pub(super) fn type_name(&self, ty: Type) -> String {
         match ty {
             Type::Bool => "Bool".to_owned(),
@@ -688,12 +706,6 @@ impl Checker {
             Type::Enum(of) => self.enums[of.0].name.clone(),
         }
     }
-}
-
-/// Whether the expression is the word `road`, and no parameter of that name hides it.
-fn names_road(expr: &ast::Expr, place: &Place<'_>) -> bool {
-    matches!(&expr.kind, ast::ExprKind::Name(name) if name == "road")
-        && !place.locals.iter().any(|(local, _)| local == "road")
 }
 
 fn road_unknown(span: Span) -> Diagnostic {

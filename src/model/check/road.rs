@@ -20,6 +20,7 @@ use crate::road::Route;
 use crate::syntax::Diagnostic;
 use crate::syntax::ast;
 use crate::syntax::ast::ItemKind;
+use crate::syntax::print_expr;
 use crate::units::Dimension;
 use crate::units::Rational;
 
@@ -124,7 +125,8 @@ impl Checker {
         if limit_mps > 0.0 && limit_mps <= *SPAWN_SPEED_MPS.end() {
             return Some(limit_mps);
         }
-        let error = Diagnostic::error(code::SETTING, format!("a limit of {limit_mps} m/s is not possible"));
+        let error =
+            Diagnostic::error(code::SETTING, format!("a limit of `{}` is not possible", print_expr(value)));
         let wanted = format!("must be more than 0 m/s and at most {} m/s", SPAWN_SPEED_MPS.end());
         self.report(error.at(value.span, wanted).help("write for example `limit: 30 km/h`"));
         None
