@@ -142,6 +142,7 @@ fn compared(expr: &Expr, into: &mut Vec<Diagnostic>) {
             );
         }
         ExprKind::Unary { operand, .. } => compared(operand, into),
+        ExprKind::Call(call) => call.args.iter().for_each(|argument| compared(&argument.value, into)),
         ExprKind::Match { arms, .. } => arms.iter().for_each(|arm| compared(&arm.value, into)),
         _ => {}
     }
