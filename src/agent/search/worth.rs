@@ -30,12 +30,13 @@ impl Tally {
     }
 }
 
-/// What becomes of a row whose record is short. The number is the spread of the worth of one choice.
+/// How a row is treated whose record is short. The number is the standard deviation that the worth of one
+/// choice is taken to have.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Doubt {
     /// It is worth trying: its mean is taken with noise.
     Try(f64),
-    /// It may have been luck: its mean is taken for less. Of many rows the best is a lucky one else.
+    /// It may have been luck: its mean is taken for less. Otherwise the best of many rows is a lucky one.
     Avoid(f64),
 }
 
@@ -105,7 +106,8 @@ impl Worth {
 }
 
 /// What each choice of an episode was worth: 1 for each crash that counts whose obstacle it made appear,
-/// and the less the more steps it came before such a choice.
+/// and `discount` to the power of n if it came n choices before such a one. A crash with an obstacle that
+/// none of these choices made appear is credited to the choice at which it happened.
 pub fn worths(episode: &Trajectory, discount: f64) -> Vec<f64> {
     let mut worths = vec![0.0; episode.steps.len()];
     for (at, step) in episode.steps.iter().enumerate() {

@@ -56,7 +56,8 @@ pub fn distill(
     Ok(found)
 }
 
-/// What rules achieve on so many episodes of each road, and how near they come to their network there.
+/// What rules achieve, and how near they come to their network there. `test` is the number of episodes on
+/// each road and their seed.
 ///
 /// # Errors
 /// As [`distill`].
