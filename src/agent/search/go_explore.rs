@@ -46,9 +46,9 @@ pub struct GoExploreSettings {
     /// What a choice is worth that was made a step before the one that made the obstacle appear, in
     /// `[0, 1]`; two steps before, its square.
     pub credit_discount: f64,
-    /// A situation's own record counts as much as that of all situations from so many choices on.
+    /// Choices after which a situation's own record counts as much as that of all situations, above 0.
     pub prior_choices: f64,
-    /// Cells that are kept for each road.
+    /// Cells that are kept for each road, at most 100000.
     pub cells_max: usize,
     /// Random choices of what acts in the end, in `[0, 1]`.
     pub evaluation_epsilon: f64,

@@ -1,7 +1,7 @@
 //! The record of what choices have led to, by situation and row: a crash that counts is worth 1.
 //!
-//! A situation's own record is short, so it is drawn to that of the row in all situations, and that to
-//! the mean of all rows, as a mean is towards a prior of so many observations.
+//! A situation's own record is short, so the mean of a row in it is shrunk towards the row's mean in all
+//! situations, and that towards the mean of all rows.
 
 use ndarray::ArrayView1;
 
@@ -11,7 +11,7 @@ use crate::rng::Rng;
 
 use super::situation::SITUATIONS;
 
-/// Number and sum of worths.
+/// How many worths were noted, and their sum.
 #[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
 struct Tally {
     count: f64,
@@ -24,7 +24,7 @@ impl Tally {
         self.sum += worth;
     }
 
-    /// The mean, drawn to `prior`, which weighs as much as `weight` observations.
+    /// The mean, shrunk towards `prior`, which weighs as much as `weight` observations.
     fn mean(&self, prior: f64, weight: f64) -> f64 {
         (self.sum + prior * weight) / (self.count + weight)
     }

@@ -95,7 +95,7 @@ pub fn judge_rules(
     })
 }
 
-/// As a claim holds it: four decimals.
+/// A figure as a claim states it: to four decimals.
 pub fn rounded(value: f64) -> f64 {
     (value * 1e4).round() / 1e4
 }
