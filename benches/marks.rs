@@ -2,8 +2,7 @@
 //!
 //! A mark is the median of several repeats, per CPU second of this process where there is such a clock,
 //! so that a busy machine changes little; only what two cores make of episodes goes by the wall clock.
-//! `cargo bench --bench marks -- WORD` measures only those
-//! whose name holds the word. Build time and memory of a whole process are not measured here.
+//! `cargo bench --bench marks -- WORD` measures only those whose name holds the word. Build time and memory of a whole process are not measured here.
 //!
 //! For comparison, on one core of the same kind of machine (Zen 3, 2.4 GHz nominal), per CPU second.
 //! What a tick includes differs; ours is sensing, the driving system, ten obstacles with their

@@ -121,7 +121,8 @@ pub struct Hyperparameters {
     /// ε of the trained policy.
     pub evaluation_epsilon: f64,
 
-    // The readable rules that are distilled from the network at the end (VIPER, Bastani et al., 2018).
+    // The readable rules that are distilled from the network at the end (VIPER, Bastani et al., 2018). The
+    // numbers are ours.
     /// Leaves of the decision tree, at most, which is lines of rules; 0: none are distilled.
     pub rules_leaves: usize,
     /// Its depth, at most.

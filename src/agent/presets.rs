@@ -145,6 +145,7 @@ pub(super) fn avastra() -> Hyperparameters {
 fn deep_collision() -> Hyperparameters {
     Hyperparameters {
         preset: "paper".to_owned(),
+        // Its lateral safety distance has the margin that the later paper left out, and ours has.
         proc: ProcKind::Avastra,
         state: StateSet::DeepCollision,
         collision_reward: 1.0,

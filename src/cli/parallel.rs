@@ -5,18 +5,22 @@ use std::sync::Mutex;
 use std::sync::atomic::AtomicUsize;
 use std::sync::atomic::Ordering;
 
-/// Does `work` for every file on `jobs` threads, or on one for each core.
+/// Worker threads: as many as asked for, or one for each core.
+pub fn jobs(asked: Option<u32>) -> usize {
+    let cores = || std::thread::available_parallelism().map_or(1, usize::from);
+    asked.map_or_else(cores, |jobs| jobs as usize)
+}
+
+/// Does `work` for every file on as many threads as [`jobs`] says.
 pub fn each_file<T: Send>(
     files: &[PathBuf],
-    jobs: Option<u32>,
+    asked: Option<u32>,
     work: impl Fn(&PathBuf) -> T + Sync,
 ) -> Vec<T> {
-    let cores = || std::thread::available_parallelism().map_or(1, usize::from);
-    let jobs = jobs.map_or_else(cores, |jobs| jobs as usize);
     let next = AtomicUsize::new(0);
     let done: Mutex<Vec<(usize, T)>> = Mutex::new(Vec::with_capacity(files.len()));
     std::thread::scope(|scope| {
-        for _ in 0..jobs.min(files.len()) {
+        for _ in 0..jobs(asked).min(files.len()) {
             scope.spawn(|| {
                 loop {
                     let number = next.fetch_add(1, Ordering::Relaxed);

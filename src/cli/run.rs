@@ -32,6 +32,7 @@ use super::error::Failure;
 use super::load;
 use super::output::Output;
 use super::output::remark;
+use super::parallel::jobs;
 use super::progress::Progress;
 use super::progress::plural;
 use super::run_directory;
@@ -235,12 +236,6 @@ fn keep(
 /// The space as a file in `critical/` must name it.
 fn space_path(run: &Run, directory: &RunDirectory) -> Result<String, Failure> {
     load::relative(&directory.path.join("critical"), &run.space().path)
-}
-
-/// Worker threads: as many as asked for, or one for each core.
-pub fn jobs(asked: Option<u32>) -> usize {
-    let cores = || std::thread::available_parallelism().map_or(1, usize::from);
-    asked.map_or_else(cores, |jobs| jobs as usize)
 }
 
 /// A flag that the first Ctrl-C sets; the second ends the process at once.

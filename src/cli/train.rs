@@ -230,7 +230,8 @@ fn finish(output: &Output, training: &Training, directory: &RunDirectory) -> Res
     output.result(
         "train",
         serde_json::json!({
-            "directory": directory.path, "totals": totals, "policy": kept.as_ref().map(|(path, _)| path), "rules": rules, "simulated_h": simulated_h,
+            "directory": directory.path, "totals": totals, "policy": kept.as_ref().map(|(path, _)| path),
+            "rules": rules, "simulated_h": simulated_h,
             "evaluation": {
                 "episodes": evaluation.episodes * roads.len() as u64, "collisions": evaluation.collisions,
                 "counted": evaluation.counted, "colliding": evaluation.colliding,

@@ -15,7 +15,7 @@ use super::collision_probability::probability;
 
 /// Ticks between two looks: 0.5 s.
 const PERIOD_TICKS: u64 = 25;
-/// Slopes that differ by less are of one direction.
+/// Slopes that differ by less are of one direction. This and all that follows is the package's.
 const SLOPE_DIFFERENCE_MAX: f64 = 0.6;
 /// Stands for a velocity of 0.
 const LEAST: f64 = 1e-4;

@@ -1,8 +1,9 @@
 //! The smallest scenario that still makes the same crash.
 //!
 //! Fewest actions first (ddmin, Zeller and Hildebrandt 2002), then fewest steps, ambient vehicles and
-//! effects, then the plainest start (noon under a clear sky) and values; over again until nothing changes. Every candidate is played, and
-//! every action in it must be legal by the rules of the space. The crash is the same if the ego vehicle
+//! effects, then the plainest start (noon under a clear sky) and values; over again until nothing changes.
+//! Every candidate is played, and every action in it must be legal by the rules of the space. The crash is
+//! the same if the ego vehicle
 //! hits an obstacle of the same body that does the same, the class of the verdict is the same, and the
 //! space's verdict still counts it, or still does not. The result is 1-minimal: with any one step
 //! left out, whether it leaves its time behind or not, the crash is gone or another one.

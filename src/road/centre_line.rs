@@ -190,7 +190,7 @@ impl Curve<'_> {
     }
 
     /// Appends points strictly between two until the chords are near enough; `middle` is the point
-    /// half-way. Points are dear: what one level has looked at the next takes over.
+    /// half-way. A point takes long to compute: what one level has looked at the next takes over.
     fn refine(&self, begin: Sample, middle: Sample, end: Sample, depth: u32, samples: &mut Vec<Sample>) {
         if depth == 0 || samples.len() > SAMPLES_MAX {
             return;

@@ -20,7 +20,8 @@ use super::opendrive::SectionElement;
 /// A lane narrower than this cannot be driven in yet, m: bays open from nothing.
 const WIDTH_M_MIN: f64 = 2.0;
 
-/// A strip wider than this between two lanes is no line but a median, which nobody crosses to change lanes, m.
+/// A strip wider than this between two lanes is no line but a median, which nobody crosses to change
+/// lanes, m.
 pub const STRIP_M_MAX: f64 = 0.5;
 
 /// Widths are looked at this often, m.

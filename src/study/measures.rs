@@ -1,4 +1,5 @@
-//! Measures of danger and of manners, and the shapes of ways to collisions, taken while an episode is played.
+//! Measures of danger and of manners, and the shapes of the ways to collisions, taken while an episode is
+//! played.
 
 use crate::episode::EpisodeLog;
 use crate::mdp::Criticality;
@@ -11,7 +12,7 @@ use crate::sim::World;
 use super::shape::Shape;
 use super::shape::Trail;
 
-/// Half the width of a lane marking, m: a wheel on the line has not left the lane.
+/// Half the width of a lane marking of 12 cm, m: a wheel on the line has not left the lane. Ours.
 const ON_THE_LINE_M: f64 = 0.06;
 /// A speed this far above the limit is above it: less is the controller's overshoot. Ours.
 const SPEEDING_FACTOR: f64 = 1.05;

@@ -52,7 +52,7 @@ fn selected(
     let mut ads = driving_system(ads)?;
     if let Some(line) = profile {
         let profile = ModularConfig::from_yaml(line)
-            .map_err(|error| RunError::Profile { scenario: name.to_owned(), error })?;
+            .map_err(|error| RunError::Profile { name: name.to_owned(), error })?;
         ads = ads.with_profile(profile)?;
     }
     let digest = ads.profile().map(ModularConfig::digest);

@@ -124,8 +124,8 @@ pub enum RunError {
     NoModules(#[from] oracle::NoModules),
     #[error(transparent)]
     NoSettings(#[from] ads::NoSettings),
-    #[error("the profile of `{scenario}`: {error}")]
-    Profile { scenario: String, error: ads::ConfigError },
+    #[error("the profile of `{name}`: {error}")]
+    Profile { name: String, error: ads::ConfigError },
     #[error(
         "{what} was made with settings of `{ads}` that mean something else in this version: nothing need \
          happen alike; name a profile with `--ads-config FILE` to see what happens with that"

@@ -1,4 +1,4 @@
-//! Where the ego vehicle believes to be: the truth, a little late and a little beside.
+//! Where the ego vehicle believes it is: the truth, a little late and a little beside.
 //!
 //! RTK and LiDAR map matching leave an error that is correlated over seconds (multipath, a map a few
 //! centimetres off): an Ornstein–Uhlenbeck process per axis. Its white part is small, and a Kalman

@@ -42,7 +42,7 @@ pub struct Modular {
     planner: Planner,
     controller: Controller,
     ticks: u64,
-    /// Where it believes to be on the route, m.
+    /// Where it believes it is on the route, m.
     station_m: f64,
     steer_rad: f64,
     status: Status,

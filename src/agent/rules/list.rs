@@ -1,8 +1,8 @@
 //! A tree as a first-match list, and a list that acts.
 //!
 //! Of a split the smaller side comes first, with the test; the other side needs none any more. Of a
-//! leaf the row comes first that most of the stake wants, then what most of the rest wants where that
-//! one is not open, and so on: which rows are legal at a moment the variables do not tell.
+//! leaf the row comes first that most of the stake wants; where that one is not open, the row that most of
+//! the rest wants, and so on. Which rows are legal at a moment the variables do not tell.
 
 use crate::mdp::Observation;
 use crate::model::policy::Comparison;
@@ -16,9 +16,9 @@ use super::tree::Visit;
 use super::tree::grow;
 use super::tree::holds;
 
-/// Rows of a line, at most, besides the one that is always open.
+/// Rows of a line, at most, besides the one that is always open. Ours.
 const ALTERNATIVES_MAX: usize = 4;
-/// A leaf holds at least this share of the visits.
+/// A leaf holds at least this share of the visits. Ours: less is noise.
 const LEAF_SHARE_MIN: f64 = 0.005;
 
 /// The row of the first line that applies, if one of its rows is open.
@@ -47,7 +47,7 @@ fn readable(variables: &[usize]) -> Vec<usize> {
     variables.iter().flat_map(parts).collect()
 }
 
-/// A tree with the rows of its leaves, the dearest first.
+/// A tree with the rows of its leaves, the one that most of the stake wants first.
 enum Ranked {
     Leaf(Vec<usize>),
     Split(Condition, Box<Ranked>, Box<Ranked>),

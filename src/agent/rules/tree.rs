@@ -264,7 +264,7 @@ pub(super) mod tests {
 
     #[test]
     fn dear_mistakes_decide_the_first_split() {
-        // Speed tells rows 0 and 1 apart, which is dear; the hour rows 1 and 2, which is cheap.
+        // Speed tells rows 0 and 1 apart, where a mistake costs much; the hour rows 1 and 2, where it costs little.
         let mut visits = Vec::new();
         for at in 0..40 {
             let (fast, night) = (at % 2 == 0, at % 4 < 2);

@@ -43,17 +43,18 @@ pub struct AvFuzzerSettings {
     pub mutation_probability: f64,
     /// Generations over whose best the search must have got better, or it restarts; at least 1.
     pub restart_generations: usize,
-    /// Random scripts from which a restart takes those that are least like all before.
+    /// Random scripts from which a restart takes those that are least like all before; from `population`
+    /// to 100000.
     pub restart_candidates: usize,
     /// Generations after a restart before the local search may begin.
     pub local_after_generations: usize,
     /// Generations of the local search around the best individual; 0: none.
     pub local_generations: usize,
-    /// By how much more likely a change is there.
+    /// How many times as likely a change is there, from 0 to 100.
     pub local_mutation_factor: f64,
     /// Steps of a script, from 1 to 1000; it begins anew after its end. Ours: the space's limit.
     pub script_steps: usize,
-    /// Scripts for each start that are kept to act by. Ours.
+    /// Scripts for each start that are kept to act by, from 1 to 1000. Ours.
     pub kept_scripts: usize,
 }
 
@@ -79,9 +80,9 @@ impl AvFuzzerSettings {
     /// If a value is out of range.
     pub fn check(&self) -> Result<(), SettingsError> {
         let unit = 0.0..=1.0;
-        let within = |value: usize, most: usize, least: usize| (least..=most).contains(&value);
+        let within = |value: usize, least: usize, most: usize| (least..=most).contains(&value);
         let rules = [
-            ("population", within(self.population, 1000, 2), self.population as f64, "from 2 to 1000"),
+            ("population", within(self.population, 2, 1000), self.population as f64, "from 2 to 1000"),
             (
                 "crossover_probability",
                 unit.contains(&self.crossover_probability),
@@ -102,18 +103,18 @@ impl AvFuzzerSettings {
             ),
             (
                 "restart_generations",
-                within(self.restart_generations, 100_000, 1),
+                within(self.restart_generations, 1, 100_000),
                 self.restart_generations as f64,
                 "from 1 to 100000",
             ),
             (
                 "restart_candidates",
-                within(self.restart_candidates, 100_000, self.population),
+                within(self.restart_candidates, self.population, 100_000),
                 self.restart_candidates as f64,
                 "from `population` to 100000",
             ),
-            ("script_steps", within(self.script_steps, 1000, 1), self.script_steps as f64, "from 1 to 1000"),
-            ("kept_scripts", within(self.kept_scripts, 1000, 1), self.kept_scripts as f64, "from 1 to 1000"),
+            ("script_steps", within(self.script_steps, 1, 1000), self.script_steps as f64, "from 1 to 1000"),
+            ("kept_scripts", within(self.kept_scripts, 1, 1000), self.kept_scripts as f64, "from 1 to 1000"),
         ];
         match rules.into_iter().find(|(_, is_right, _, _)| !is_right) {
             Some((name, _, value, wanted)) => {
@@ -283,6 +284,9 @@ impl AvFuzzer {
                 && !hunt.queue.is_empty()
                 && hunt.queue.iter().all(|&index| index < size)
         });
+        let can_act =
+            |found: &Found| !found.rows.is_empty() && found.rows.iter().all(|&row| (row as usize) < rows);
+        let fits = fits && memory.best.iter().all(can_act);
         fits.then(|| AvFuzzer { memory, ..AvFuzzer::new(settings, rows) })
     }
 

@@ -40,15 +40,15 @@ pub struct GoExploreSettings {
     pub fresh_share: f64,
     /// Share of the choices that follow the record of what has led to crashes, in `[0, 1]`.
     pub record_share: f64,
-    /// How much a short record is doubted: the spread of what one choice is worth, at least 0. In the
-    /// search doubtful rows are tried, afterwards they are avoided.
+    /// How much a short record is doubted: the standard deviation that the worth of one choice is taken to
+    /// have, at least 0. In the search doubtful rows are tried, afterwards they are avoided.
     pub doubt: f64,
     /// What a choice is worth that was made a step before the one that made the obstacle appear, in
     /// `[0, 1]`; two steps before, its square.
     pub credit_discount: f64,
-    /// A situation's own record counts as much as that of all situations from so many choices on.
+    /// Choices after which a situation's own record counts as much as that of all situations, above 0.
     pub prior_choices: f64,
-    /// Cells that are kept for each road.
+    /// Cells that are kept for each road, at most 100000.
     pub cells_max: usize,
     /// Random choices of what acts in the end, in `[0, 1]`.
     pub evaluation_epsilon: f64,
@@ -106,7 +106,7 @@ pub struct GoExplore {
     memory: Memory,
     // Of the episode under way.
     road: usize,
-    /// What nobody has drawn from yet.
+    /// A seed that no episode had before.
     fresh: u64,
     beginning: Beginning,
     /// Choices from the start of the episode on, those that are made again included.
@@ -147,8 +147,8 @@ struct Cell {
 }
 
 impl Cell {
-    /// How much the search is drawn to it: by the share of visits that ended in a crash, squared, as if
-    /// one of three had before there was any.
+    /// How much the search is drawn to it: the share of visits with a crash, squared, with one crash in
+    /// three visits added, so that a cell without visits has a chance. Ours.
     fn promise(&self) -> f64 {
         let share = (f64::from(self.crashes) + 1.0) / (f64::from(self.visits) + 3.0);
         share * share

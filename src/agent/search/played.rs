@@ -2,6 +2,7 @@
 
 use ndarray::ArrayView1;
 
+use crate::agent::q_policy::any;
 use crate::mdp::Observation;
 use crate::mdp::variable;
 use crate::rng;
@@ -46,6 +47,5 @@ pub fn start_of(observation: &Observation) -> [f32; 2] {
 
 /// Any of the legal rows, each as likely.
 pub fn any_legal(legal: ArrayView1<bool>, rng: &mut Rng) -> Option<usize> {
-    let rows: Vec<usize> = (0..legal.len()).filter(|&row| legal[row]).collect();
-    (!rows.is_empty()).then(|| rows[rng::below(rng, rows.len() as u32) as usize])
+    any(&legal.to_vec(), rng)
 }

@@ -6,7 +6,7 @@ use crate::mdp::variable;
 /// A kind of moment, to tell those worth returning to apart: where on the route, how fast, who is near,
 /// what weather.
 pub fn cell(observation: &Observation) -> u32 {
-    let value = |name: &str| f64::from(observation.get(variable(name).expect("it is a variable")));
+    let value = |name| value(observation, name);
     let place = (value("routeLeft") / 20.0).clamp(0.0, 99.0) as u32;
     let speed = (value("speed") / 3.0).clamp(0.0, 9.0) as u32;
     let others = value("numObs").clamp(0.0, 4.0) as u32;
@@ -16,7 +16,7 @@ pub fn cell(observation: &Observation) -> u32 {
 /// A kind of situation, to tell what was done in it: how fast, how far from a junction, who is near,
 /// what weather.
 pub fn situation(observation: &Observation) -> u32 {
-    let value = |name: &str| f64::from(observation.get(variable(name).expect("it is a variable")));
+    let value = |name| value(observation, name);
     let speed = below(value("speed"), &[1.0, 5.0, 9.0]);
     let junction = below(value("junctionAhead"), &[1.0, 40.0]);
     ((speed * 3 + junction) * 4 + nearest(observation)) * 3 + weather(observation)
@@ -32,7 +32,7 @@ fn below(value: f64, bounds: &[f64]) -> u32 {
 
 /// Nobody near, somebody in front, beside, or behind.
 fn nearest(observation: &Observation) -> u32 {
-    let value = |name: &str| f64::from(observation.get(variable(name).expect("it is a variable")));
+    let value = |name| value(observation, name);
     let (ahead_m, left_m) = (value("nearestAhead"), value("nearestLeft"));
     if ahead_m * ahead_m + left_m * left_m > 30.0 * 30.0 {
         0
@@ -47,8 +47,13 @@ fn nearest(observation: &Observation) -> u32 {
 
 /// Dry, wet, fog.
 fn weather(observation: &Observation) -> u32 {
-    let value = |name: &str| observation.get(variable(name).expect("it is a variable"));
-    if value("fog") > 0.3 { 2 } else { u32::from(value("wetness") > 0.3 || value("rain") > 0.3) }
+    let is_some = |name| value(observation, name) as f32 > 0.3;
+    if is_some("fog") { 2 } else { u32::from(is_some("wetness") || is_some("rain")) }
+}
+
+/// The value of a variable that is known to exist.
+fn value(observation: &Observation, name: &str) -> f64 {
+    f64::from(observation.get(variable(name).expect("it is a variable")))
 }
 
 #[cfg(test)]

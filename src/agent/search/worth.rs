@@ -1,7 +1,7 @@
 //! The record of what choices have led to, by situation and row: a crash that counts is worth 1.
 //!
-//! A situation's own record is short, so it is drawn to that of the row in all situations, and that to
-//! the mean of all rows, as a mean is towards a prior of so many observations.
+//! A situation's own record is short, so the mean of a row in it is shrunk towards the row's mean in all
+//! situations, and that towards the mean of all rows.
 
 use ndarray::ArrayView1;
 
@@ -11,7 +11,7 @@ use crate::rng::Rng;
 
 use super::situation::SITUATIONS;
 
-/// Number and sum of worths.
+/// How many worths were noted, and their sum.
 #[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
 struct Tally {
     count: f64,
@@ -24,18 +24,19 @@ impl Tally {
         self.sum += worth;
     }
 
-    /// The mean, drawn to `prior`, which weighs as much as `weight` observations.
+    /// The mean, shrunk towards `prior`, which weighs as much as `weight` observations.
     fn mean(&self, prior: f64, weight: f64) -> f64 {
         (self.sum + prior * weight) / (self.count + weight)
     }
 }
 
-/// What becomes of a row whose record is short. The number is the spread of the worth of one choice.
+/// How a row is treated whose record is short. The number is the standard deviation that the worth of one
+/// choice is taken to have.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Doubt {
     /// It is worth trying: its mean is taken with noise.
     Try(f64),
-    /// It may have been luck: its mean is taken for less. Of many rows the best is a lucky one else.
+    /// It may have been luck: its mean is taken for less. Otherwise the best of many rows is a lucky one.
     Avoid(f64),
 }
 
@@ -105,7 +106,8 @@ impl Worth {
 }
 
 /// What each choice of an episode was worth: 1 for each crash that counts whose obstacle it made appear,
-/// and the less the more steps it came before such a choice.
+/// and `discount` to the power of n if it came n choices before such a one. A crash with an obstacle that
+/// none of these choices made appear is credited to the choice at which it happened.
 pub fn worths(episode: &Trajectory, discount: f64) -> Vec<f64> {
     let mut worths = vec![0.0; episode.steps.len()];
     for (at, step) in episode.steps.iter().enumerate() {

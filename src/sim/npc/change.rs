@@ -29,6 +29,7 @@ use super::driver::Driver;
 use super::driver::SIDE_ROOM_M;
 use super::driver::along;
 use super::driver::extent_m;
+
 /// Room in front of and behind them that they want before changing lanes, m.
 const MIRROR_ROOM_M: f64 = 2.0;
 /// Highest lateral speed of a lane change, m/s: bound of a cut-in in UN R157.

@@ -1,5 +1,5 @@
-//! Crossing traffic: a rendezvous with the ego vehicle at a conflict of its route, on a leg whose signal will be
-//! green.
+//! Crossing traffic: a rendezvous with the ego vehicle at a conflict of its route, on a leg whose signal will
+//! be green.
 
 use crate::action::SpawnRequest;
 use crate::model::vocabulary::Side;

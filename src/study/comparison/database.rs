@@ -18,7 +18,8 @@ use super::record::Spent;
 use super::record::TrainedRecord;
 use super::study::Study;
 
-/// Layout of the tables; raised whenever a column changes. Apart from that of `run.db`.
+/// Layout of the tables; raised whenever a column changes. Begins at 1001, so that it is
+/// never taken for that of `run.db`.
 const SCHEMA_VERSION: i64 = 1001;
 
 /// Seeds are text: SQLite's integers have a sign.
@@ -150,16 +151,7 @@ impl StudyDatabase {
             .collect();
         let trained = self.by_cell(
             "SELECT cell, return, collisions, counted, epsilon, loss, simulated_s FROM trained ORDER BY cell, episode",
-            |row| {
-                Ok(TrainedRecord {
-                    sum: row.get(1)?,
-                    collisions: row.get(2)?,
-                    counted: row.get(3)?,
-                    exploration_epsilon: row.get(4)?,
-                    loss: row.get(5)?,
-                    simulated_s: row.get(6)?,
-                })
-            },
+            trained_episode,
         )?;
         for (cell, episode) in trained {
             cells.entry(cell).and_modify(|cell| cell.trained.push(episode));
@@ -168,21 +160,7 @@ impl StudyDatabase {
             "SELECT cell, seed, number, ended, duration_s, distance_m, red_runs, speeding_s, astray_s, branched_s,
                     trace
              FROM evaluated ORDER BY cell, episode",
-            |row| {
-                Ok(EpisodeRecord {
-                    seed: seed_of(&row.get::<_, String>(1)?)?,
-                    number: row.get(2)?,
-                    ended: row.get(3)?,
-                    duration_s: row.get(4)?,
-                    distance_m: row.get(5)?,
-                    red_runs: row.get(6)?,
-                    speeding_s: row.get(7)?,
-                    astray_s: row.get(8)?,
-                    branched_s: row.get(9)?,
-                    trace: row.get(10)?,
-                    collisions: Vec::new(),
-                })
-            },
+            evaluated_episode,
         )?;
         for (cell, episode) in evaluated {
             cells.entry(cell).and_modify(|cell| cell.episodes.push(episode));
@@ -258,6 +236,34 @@ fn add_episode(
         ])?;
     }
     Ok(())
+}
+
+fn trained_episode(row: &Row) -> Result<TrainedRecord, rusqlite::Error> {
+    Ok(TrainedRecord {
+        sum: row.get(1)?,
+        collisions: row.get(2)?,
+        counted: row.get(3)?,
+        exploration_epsilon: row.get(4)?,
+        loss: row.get(5)?,
+        simulated_s: row.get(6)?,
+    })
+}
+
+/// An episode without its collisions, which are rows of their own.
+fn evaluated_episode(row: &Row) -> Result<EpisodeRecord, rusqlite::Error> {
+    Ok(EpisodeRecord {
+        seed: seed_of(&row.get::<_, String>(1)?)?,
+        number: row.get(2)?,
+        ended: row.get(3)?,
+        duration_s: row.get(4)?,
+        distance_m: row.get(5)?,
+        red_runs: row.get(6)?,
+        speeding_s: row.get(7)?,
+        astray_s: row.get(8)?,
+        branched_s: row.get(9)?,
+        trace: row.get(10)?,
+        collisions: Vec::new(),
+    })
 }
 
 fn collision(row: &Row) -> Result<CollisionRecord, rusqlite::Error> {

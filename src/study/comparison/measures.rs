@@ -9,6 +9,7 @@ use super::file::EvaluationPlan;
 use super::record::CellRecord;
 use super::record::CollisionRecord;
 use super::record::EpisodeRecord;
+use super::record::Failure;
 
 /// Something that is measured of a cell.
 pub struct Measure {
@@ -17,7 +18,7 @@ pub struct Measure {
     pub title: &'static str,
     /// Whether agents are compared by it.
     pub is_compared: bool,
-    /// None where it does not exist.
+    /// None where there is none: a training of an agent that learns nothing, a time of no collision.
     pub of: fn(&CellRecord, &EvaluationPlan) -> Option<f64>,
 }
 
@@ -27,49 +28,49 @@ pub const MEASURES: &[Measure] = &[
         name: "counted",
         title: "counted collisions",
         is_compared: true,
-        of: |cell, plan| share(cell, plan, |found| found.counted),
+        of: |cell, plan| number(cell, plan, |found| found.counted),
     },
     Measure {
         name: "collisions",
         title: "all collisions",
         is_compared: true,
-        of: |cell, plan| share(cell, plan, |_| true),
+        of: |cell, plan| number(cell, plan, |_| true),
     },
     Measure {
         name: "avoidable",
         title: "avoidable by a careful driver",
         is_compared: false,
-        of: |cell, plan| share(cell, plan, |found| found.avoidability == "avoidable"),
+        of: |cell, plan| number(cell, plan, |found| found.avoidability == "avoidable"),
     },
     Measure {
         name: "beyond_reference",
         title: "avoidable without any delay only",
         is_compared: false,
-        of: |cell, plan| share(cell, plan, |found| found.avoidability == "beyond_reference"),
+        of: |cell, plan| number(cell, plan, |found| found.avoidability == "beyond_reference"),
     },
     Measure {
         name: "unavoidable",
         title: "unavoidable",
         is_compared: false,
-        of: |cell, plan| share(cell, plan, |found| found.avoidability == "unavoidable"),
+        of: |cell, plan| number(cell, plan, |found| found.avoidability == "unavoidable"),
     },
     Measure {
         name: "repeated",
         title: "with an obstacle hit before",
         is_compared: false,
-        of: |cell, plan| share(cell, plan, |found| found.repeated),
+        of: |cell, plan| number(cell, plan, |found| found.repeated),
     },
     Measure {
         name: "sudden",
         title: "just after it appeared",
         is_compared: false,
-        of: |cell, plan| share(cell, plan, |found| found.sudden),
+        of: |cell, plan| number(cell, plan, |found| found.sudden),
     },
     Measure {
         name: "struck",
         title: "the other ran into the ego vehicle",
         is_compared: false,
-        of: |cell, plan| share(cell, plan, |found| found.struck),
+        of: |cell, plan| number(cell, plan, |found| found.struck),
     },
     Measure {
         name: "colliding",
@@ -152,9 +153,7 @@ pub const MEASURES: &[Measure] = &[
 ];
 
 /// Failures that differ among the counted collisions of episodes.
-pub(super) fn failures<'a>(
-    episodes: impl IntoIterator<Item = &'a EpisodeRecord>,
-) -> BTreeSet<&'a super::record::Failure> {
+pub(super) fn failures<'a>(episodes: impl IntoIterator<Item = &'a EpisodeRecord>) -> BTreeSet<&'a Failure> {
     let collisions = episodes.into_iter().flat_map(|episode| &episode.collisions);
     collisions.filter(|found| found.counted).map(|found| &found.failure).collect()
 }
@@ -177,7 +176,8 @@ fn per_seed(cell: &CellRecord, plan: &EvaluationPlan, of: impl Fn(&EpisodeRecord
     Some(cell.episodes.iter().map(of).sum::<f64>() / f64::from(plan.seeds))
 }
 
-fn share(
+/// Collisions of a kind.
+fn number(
     cell: &CellRecord,
     plan: &EvaluationPlan,
     is_meant: impl Fn(&CollisionRecord) -> bool,

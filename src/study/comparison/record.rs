@@ -37,9 +37,10 @@ pub struct Spent {
 /// An episode of a training.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TrainedRecord {
-    /// Sum of its rewards.
+    /// Sum of its rewards, not discounted.
     pub sum: f64,
     pub collisions: u32,
+    /// Those of them that the verdict counts.
     pub counted: u32,
     pub exploration_epsilon: f64,
     pub loss: Option<f64>,
@@ -81,7 +82,8 @@ pub struct CollisionRecord {
     pub failure: Failure,
 }
 
-/// What makes two collisions alike, as in the groups of a run.
+/// What makes two collisions alike: as in the groups of a run (see `study::groups`), but for the shape of the
+/// ego vehicle's way, which is not asked about here.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, serde::Serialize)]
 pub struct Failure {
     /// `pedestrian`, `car` or `large vehicle`.

@@ -26,7 +26,7 @@ use super::record::EpisodeRecord;
 use super::record::Failure;
 use super::study::StudySettings;
 
-/// Points of a learning curve.
+/// Points of a learning curve. Ours: few enough to read.
 const CURVE_POINTS: usize = 15;
 
 /// The result of a study; written to `results.json`.
@@ -82,8 +82,9 @@ pub struct Together {
     pub episodes: Pooled,
 }
 
-/// Rates over episodes taken together. Their intervals take events to be independent: collisions of one
-/// episode, or of one trained policy, are so only more or less.
+/// Rates over episodes taken together. Their intervals take events to be independent. Collisions of one
+/// episode, or of one trained policy, are not quite, so these intervals are rather too short; those of
+/// [`AgentResults::measures`], of which each value is of a training of its own, are not.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Pooled {
     pub episodes: usize,

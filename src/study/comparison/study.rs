@@ -107,8 +107,12 @@ pub enum StudyError {
     Range { field: &'static str, found: String, wanted: &'static str },
 }
 
-/// Trainings or repetitions of one agent, at most.
+/// Trainings or repetitions of one agent, at most. Ours.
 const REPEATS_MAX: u32 = 10_000;
+/// The same where the file gives no number. Ours.
+const REPEATS: u32 = 10;
+/// Episodes of a training where the file gives no number: the default of `avastra train`.
+const TRAINING_EPISODES: u32 = 750;
 
 /// A study that is ready to play.
 pub struct Study {
@@ -204,7 +208,7 @@ fn agent_settings(
             let hyperparameters = Settings::from_yaml(entry, file.preset.as_deref(), &text)
                 .expect("an agent that is trained has settings")
                 .map_err(|error| refuse(error.to_string()))?;
-            let episodes = file.episodes.unwrap_or(750);
+            let episodes = file.episodes.unwrap_or(TRAINING_EPISODES);
             (file.trainings, Some(TrainingPlan { episodes, roads: file.train_roads, hyperparameters }))
         }
     };
@@ -220,7 +224,7 @@ fn agent_settings(
     Ok(AgentSettings {
         label,
         name: file.name,
-        repeats: repeats.unwrap_or(10),
+        repeats: repeats.unwrap_or(REPEATS),
         training,
         profile,
         without: file.without,

@@ -56,7 +56,8 @@ pub fn distill(
     Ok(found)
 }
 
-/// What rules achieve on so many episodes of each road, and how near they come to their network there.
+/// What rules achieve, and how near they come to their network there. `test` is the number of episodes on
+/// each road and their seed.
 ///
 /// # Errors
 /// As [`distill`].
@@ -94,7 +95,7 @@ pub fn judge_rules(
     })
 }
 
-/// As a claim holds it: four decimals.
+/// A figure as a claim states it: to four decimals.
 pub fn rounded(value: f64) -> f64 {
     (value * 1e4).round() / 1e4
 }

@@ -2,8 +2,7 @@
 //! values of one variable are shuffled over the states that it came to.
 //!
 //! States are weighted by what is at stake there, so a choice that makes no difference counts for
-//! nothing. What the shuffled states do not know is that variables go together: of two that say the same
-//! neither seems important.
+//! nothing. Variables are shuffled one at a time, so of two that say the same neither seems important.
 
 use crate::agent::QPolicy;
 use crate::agent::Visit;

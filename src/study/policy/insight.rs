@@ -60,8 +60,10 @@ pub struct State {
     pub q_values: Vec<(usize, String, f32)>,
 }
 
-/// Variables that tell when a row is chosen, for each row.
+/// Variables that tell when a row is chosen, for each row. Ours.
 const TELLING: usize = 3;
+/// A mean that is off by fewer standard deviations tells nothing. Ours.
+const TELLING_DEVIATIONS: f64 = 0.25;
 
 /// Looks at a policy over so many episodes on each road. `given` are values in place of the mean state's.
 /// `rules` are those of the space that are switched on and off.
@@ -141,7 +143,7 @@ impl Spread {
         Spread { variables, mean: mean(visits), deviations }
     }
 
-    /// The variables whose mean is off by most deviations.
+    /// The variables whose mean over some visits is off by most standard deviations.
     fn telling(&self, own: &[&Visit]) -> Vec<(&'static str, String, String)> {
         let here = mean(own);
         let mut telling: Vec<(f64, usize)> = self
@@ -158,7 +160,7 @@ impl Spread {
         let text = |&(_, variable): &(f64, usize)| {
             (VARIABLES[variable].name, show(&here, variable), show(&self.mean, variable))
         };
-        telling.iter().filter(|(off, _)| *off >= 0.25).take(TELLING).map(text).collect()
+        telling.iter().filter(|(off, _)| *off >= TELLING_DEVIATIONS).take(TELLING).map(text).collect()
     }
 }
 

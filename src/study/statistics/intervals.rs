@@ -27,7 +27,7 @@ pub struct Estimate {
 
 /// Mean and Student's interval of a sample; none of an empty one.
 ///
-/// Student's and not the bootstrap's: of ten values the latter's intervals are too short.
+/// Student's and not the bootstrap's, whose intervals are too short where there are only ten values.
 pub fn mean(values: &[f64]) -> Option<Estimate> {
     if values.is_empty() {
         return None;
@@ -64,7 +64,7 @@ fn student_within(bound: f64, degrees: usize) -> f64 {
     if is_odd { core::f64::consts::FRAC_2_PI * (angle_rad + sine * sum) } else { sine * sum }
 }
 
-/// The exact interval of a Poisson variable's mean, of which `count` was seen (Garwood 1936).
+/// The exact interval of the mean of a Poisson variable that was seen to be `count` (Garwood 1936).
 pub fn poisson(count: u64) -> Interval {
     // Far enough on both sides: ten standard deviations and some more.
     let far = count as f64 + 10.0 * (count as f64).sqrt() + 20.0;
@@ -89,11 +89,14 @@ fn poisson_at_most(count: u64, mean: f64) -> f64 {
     (0..=count).map(chance).sum::<f64>().min(1.0)
 }
 
-/// Resamples of a bootstrap.
+/// Resamples of a bootstrap. Ours.
 const RESAMPLES: usize = 10_000;
 
 /// Ratio of two samples' means with its percentile bootstrap interval; none if one is empty or the second's
 /// mean is 0. Resamples whose denominator is 0 count as beyond every bound.
+///
+/// Of ten values such an interval is too short, as is said at [`mean`]: it shows how large a difference is, and
+/// whether there is one is for the rank test to say.
 pub fn ratio_of_means(numerator: &[f64], denominator: &[f64], rng: &mut Rng) -> Option<(f64, Interval)> {
     let ratio = |above: f64, below: f64| if below == 0.0 { f64::INFINITY } else { above / below };
     let (above, below) = (mean(numerator)?.mean, mean(denominator)?.mean);

@@ -3,16 +3,18 @@
 use super::Interval;
 use super::bisect;
 
-/// Samples up to this size are compared exactly, if no value comes twice.
+/// Samples up to this size are compared exactly, if no value comes twice. Ours: beyond it the normal
+/// distribution is as good.
 const EXACT_MAX: usize = 50;
 /// Normal quantile of a two-sided 95 %.
 const Z: f64 = 1.959963984540054;
 
-/// Outcome of a Mann–Whitney U test, two-sided.
+/// Outcome of a two-sided Mann–Whitney U test (1947).
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct RankTest {
     /// Pairs in which the first sample's value is the larger; a tie is half a pair.
     pub u: f64,
+    /// In `[0, 1]`.
     pub p: f64,
     /// Whether `p` is from the exact distribution; else from the normal one, with the variance corrected
     /// for ties and a continuity correction of one half.
@@ -52,7 +54,7 @@ fn tie_sizes(first: &[f64], second: &[f64]) -> Vec<usize> {
     all.chunk_by(|one, other| one == other).map(<[f64]>::len).filter(|&size| size > 1).collect()
 }
 
-/// Probability that U is at least `u` if both samples are alike.
+/// Probability that U is at least `u` if both samples are of one distribution, without ties.
 fn exact_tail(first: usize, second: usize, u: usize) -> f64 {
     // orders[m][v]: in how many orders of m values of the first sample and the values of the second so far
     // U is v. The largest value is either of the first sample, and beats all of the second, or of the second.
@@ -73,6 +75,7 @@ fn exact_tail(first: usize, second: usize, u: usize) -> f64 {
     orders[first][u..].iter().sum::<f64>() / all
 }
 
+/// The same from the normal distribution; `ties` are the sizes of the groups of equal values.
 fn normal_tail(first: usize, second: usize, u: f64, ties: &[usize]) -> f64 {
     let pairs = (first * second) as f64;
     let all = (first + second) as f64;
@@ -105,7 +108,7 @@ pub fn superiority(first: &[f64], second: &[f64]) -> Option<(f64, Interval)> {
     Some((found, Interval { low, high: Some(high) }))
 }
 
-/// Holm's correction: each p-value as it counts among all of a family.
+/// Holm's correction (1979): each p-value of a family, corrected for the number of its members.
 pub fn holm(p: &[f64]) -> Vec<f64> {
     let mut order: Vec<usize> = (0..p.len()).collect();
     order.sort_by(|&one, &other| p[one].total_cmp(&p[other]));

@@ -10,8 +10,8 @@ pub struct Lifetime {
 /// Restricted mean time to failure: the area below the Kaplan–Meier curve up to `horizon_s`; none of no
 /// lifetimes.
 ///
-/// Whoever was watched to the end without a failure is censored then. Where the last of all is censored before
-/// the horizon, the curve goes on level (Gill 1980).
+/// Whoever was watched to the end without a failure is censored then, as if the end had nothing to do with
+/// failing. Where the last of all is censored before the horizon, the curve goes on level (Gill 1980).
 pub fn restricted_mean(lifetimes: &[Lifetime], horizon_s: f64) -> Option<f64> {
     if lifetimes.is_empty() {
         return None;

@@ -224,7 +224,8 @@ impl Training {
             return log.clone();
         }
         let road = (0..self.arena.roads()).find(|&road| self.arena.road(road).name == log.road);
-        let setup = self.arena.setup(road.expect("it was played here"), log.seed);
+        let mut setup = self.arena.setup(road.expect("it was played here"), log.seed);
+        setup.start = log.start;
         let script = Script::of_log(log);
         let again = episode::run(&setup, &mut |moment| script.choose(setup.table, moment), &mut |_, _, _| {});
         EpisodeLog { end: log.end, ..again }

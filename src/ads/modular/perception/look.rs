@@ -164,7 +164,7 @@ impl Watched {
     }
 }
 
-/// The object as it is, placed on the map from where the vehicle believes to be.
+/// The object as it is, placed on the map from where the vehicle believes it is.
 fn exactly(object: &SensedObject, sensed: &Sensed, localized: &Pose) -> Detection {
     let from_ego = sensed.ego.rear_axle.to_local(object.pose.position);
     let turned_rad = object.pose.heading_rad - sensed.ego.rear_axle.heading_rad;

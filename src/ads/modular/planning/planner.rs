@@ -57,7 +57,7 @@ pub struct Planner {
 /// What a cycle plans from.
 #[derive(Debug)]
 pub struct Outlook<'a> {
-    /// Where the vehicle believes to be.
+    /// Where the vehicle believes it is.
     pub localized: &'a Pose,
     pub station_m: f64,
     pub speed_mps: f64,
