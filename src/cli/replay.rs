@@ -27,9 +27,19 @@ pub fn replay(output: &Output, arguments: &ReplayArguments) -> Result<(), Failur
     let played =
         each_file(&arguments.files, arguments.jobs, |path| play(output, arguments, profile.as_ref(), path));
     let (mut refuted, mut confirmed, mut refuted_files) = (0, 0, 0);
-    let mut results = Vec::new();
+    let (mut results, mut failed) = (Vec::new(), None);
     for (path, played) in arguments.files.iter().zip(played) {
-        let played = played?;
+        let played = match played {
+            Ok(played) => played,
+            // One broken file of many hides nothing of the others.
+            Err(failure) => {
+                if arguments.files.len() > 1 {
+                    output.tell(&format!("{}: {failure}", path.display()));
+                }
+                failed = failed.or(Some(failure));
+                continue;
+            }
+        };
         match &played.claims {
             None => output.say(&format!("{} against {}", path.display(), played.told)),
             Some(verdicts) => {
@@ -46,7 +56,7 @@ pub fn replay(output: &Output, arguments: &ReplayArguments) -> Result<(), Failur
         results.push(played.result);
     }
     if arguments.files.len() > 1 && confirmed + refuted > 0 {
-        let files = plural(arguments.files.len(), "scenario");
+        let files = plural(results.len(), "scenario");
         output.say(&format!(
             "\n{files}: {} confirmed, {refuted} refuted in {refuted_files} of them",
             plural(confirmed, "claim")
@@ -56,6 +66,9 @@ pub fn replay(output: &Output, arguments: &ReplayArguments) -> Result<(), Failur
         "replay",
         serde_json::json!({ "confirmed": confirmed, "refuted": refuted, "scenarios": results }),
     );
+    if let Some(failure) = failed {
+        return Err(failure);
+    }
     if refuted > 0 { Err(Failure::Refuted { claims: refuted }) } else { Ok(()) }
 }
 

@@ -27,11 +27,18 @@ use super::replay;
 
 /// Replays scenarios, and lets policies show again what they claim.
 pub fn verify(output: &Output, arguments: &VerifyArguments) -> Result<(), Failure> {
-    let (mut scenarios, mut policies) = (Vec::new(), Vec::new());
+    let (mut scenarios, mut policies, mut failed) = (Vec::new(), Vec::new(), None);
     for path in &arguments.files {
-        match load::emitted(output, path)? {
-            Emitted::Scenario => scenarios.push(path.clone()),
-            Emitted::Policy(table, policy) => policies.push((path, table, *policy)),
+        match load::emitted(output, path) {
+            Ok(Emitted::Scenario) => scenarios.push(path.clone()),
+            Ok(Emitted::Policy(table, policy)) => policies.push((path, table, *policy)),
+            // One broken file of many hides nothing of the others.
+            Err(failure) => {
+                if arguments.files.len() > 1 {
+                    output.tell(&format!("{}: {failure}", path.display()));
+                }
+                failed = failed.or(Some(failure));
+            }
         }
     }
     let mut refuted = 0;
@@ -49,10 +56,14 @@ pub fn verify(output: &Output, arguments: &VerifyArguments) -> Result<(), Failur
         let outcome = replay::replay(output, &recorded);
         match outcome {
             Err(Failure::Refuted { claims }) => refuted += claims,
-            other => other?,
+            Err(failure) => failed = failed.or(Some(failure)),
+            Ok(()) => {}
         }
     }
     output.result("verify", serde_json::json!({ "refuted": refuted, "policies": results }));
+    if let Some(failure) = failed {
+        return Err(failure);
+    }
     if refuted > 0 { Err(Failure::Refuted { claims: refuted }) } else { Ok(()) }
 }
 

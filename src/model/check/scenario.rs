@@ -521,6 +521,12 @@ impl<'a> Reader<'a> {
                     values.map(Claim::Proc)
                 }
                 (ast::ExprKind::Name(name), ast::ExprKind::Text(text)) if name == "trace" => {
+                    if !is_digest(text) {
+                        let error = Diagnostic::error(code::UNKNOWN_CLAIM, "this is the digest of no trace");
+                        let error = error.at(right.span, "not `sha256:` and 64 digits from 0 to f");
+                        self.report(error.help("`avastra replay FILE` says which digest was found"));
+                        return None;
+                    }
                     Some(Claim::Trace(text.clone()))
                 }
                 (ast::ExprKind::Name(name), _) if name == "cause" => {
@@ -597,16 +603,29 @@ impl<'a> Reader<'a> {
         for clause in clauses {
             match (clause.kind, &clause.value.kind) {
                 (ClauseKind::With, ast::ExprKind::Numbered { number, .. })
-                    if number.parse::<u32>().is_ok() =>
+                    if number.parse::<u32>().is_ok_and(|number| number > 0) =>
                 {
                     obstacle = number.parse().ok();
                 }
                 (ClauseKind::At, _) if timed => {
-                    time_s = Some(self.take(figure(&clause.value, Dimension::DURATION))?);
+                    let time = self.take(figure(&clause.value, Dimension::DURATION))?;
+                    if time.value < 0.0 {
+                        let error =
+                            Diagnostic::error(code::UNKNOWN_CLAIM, "no time of an episode is negative");
+                        self.report(
+                            error.at(clause.value.span, "before its beginning").help("count from 0 s"),
+                        );
+                        return None;
+                    }
+                    time_s = Some(time);
                 }
                 _ => {
                     let error = Diagnostic::error(code::UNKNOWN_CLAIM, "unknown clause of this claim");
-                    self.report(error.at(clause.span, "").help("write `collision with npc#2 at 14.22 s`"));
+                    self.report(
+                        error
+                            .at(clause.span, "")
+                            .help("write `collision with npc#2 at 14.22 s`; obstacles are numbered from 1"),
+                    );
                     return None;
                 }
             }
@@ -686,4 +705,10 @@ fn driver(expr: &ast::Expr) -> Option<String> {
         ast::ExprKind::Name(name) => Some(name.clone()),
         _ => None,
     }
+}
+
+/// Whether a text has the form of a SHA-256 as avastra prints it.
+fn is_digest(text: &str) -> bool {
+    let digits = text.strip_prefix("sha256:").unwrap_or("");
+    digits.len() == 64 && digits.bytes().all(|byte| matches!(byte, b'0'..=b'9' | b'a'..=b'f'))
 }
