@@ -176,7 +176,7 @@ scenario s {
   expect counted with npc#2
   expect avoidable by [cc, fsm] with npc#2
   expect proc == [0.0, 0.125]
-  expect trace == \"sha256:ab\"
+  expect trace == \"sha256:abababababababababababababababababababababababababababababababab\"
   expect end == arrived
 }
 ";
