@@ -134,6 +134,7 @@ fn texts_made_to_be_slow_are_not() {
 
 /// Processor time (s) and peak memory (MB) of a command; it must end by itself.
 fn cost(command: &mut Command) -> (f64, f64) {
+    #[expect(clippy::zombie_processes, reason = "`wait4` waits for it, and tells what it took")]
     let child = command
         .stdout(std::process::Stdio::null())
         .stderr(std::process::Stdio::null())
