@@ -7,19 +7,10 @@ use std::hint::black_box;
 use std::sync::Arc;
 use std::time::Instant;
 
-use avastra::agent;
-use avastra::agent::Agent;
-use avastra::agent::Experience;
-use avastra::agent::Hyperparameters;
-use avastra::agent::Kind;
-use avastra::agent::Learner;
-use avastra::agent::Rows;
-use avastra::agent::Trainable;
-use avastra::agent::Trajectory;
-use avastra::mdp::Closeness;
-use avastra::mdp::Observation;
-use avastra::rng;
+use avastra::agent::{Agent, Experience, Hyperparameters, Kind, Learner, Rows, Trainable, Trajectory};
+use avastra::mdp::{Closeness, Observation};
 use avastra::rng::Stream;
+use avastra::{agent, rng};
 use ndarray::Array1;
 
 const ROWS: usize = 45;

@@ -18,42 +18,21 @@
 //! | GPUDrive | agents x steps, on one GPU | 1,000,000 | arXiv 2408.01584 |
 //! | this machine's floor | 10 bicycles and 45 pairs of boxes, nothing else, f64 with libm | 4,000,000 | measured |
 
-use std::alloc::GlobalAlloc;
-use std::alloc::Layout;
-use std::alloc::System;
+use std::alloc::{GlobalAlloc, Layout, System};
 use std::hint::black_box;
 use std::path::Path;
 use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
-use std::sync::atomic::AtomicU64;
-use std::sync::atomic::Ordering;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Instant;
 
-use avastra::action::ActionTable;
-use avastra::action::Effect;
-use avastra::action::SpawnRequest;
-use avastra::ads;
+use avastra::action::{ActionTable, Effect, SpawnRequest};
 use avastra::cli::lsp::Server;
-use avastra::episode;
-use avastra::mdp::ProcSettings;
-use avastra::mdp::collision_probability;
-use avastra::model::ReadError;
-use avastra::model::Space;
-use avastra::model::vocabulary::Body;
-use avastra::model::vocabulary::Colour;
-use avastra::model::vocabulary::LaneChoice;
-use avastra::model::vocabulary::Level;
-use avastra::model::vocabulary::Side;
-use avastra::model::vocabulary::Then;
-use avastra::model::vocabulary::TimeOfDay;
-use avastra::model::vocabulary::Verb;
-use avastra::sim::Scene;
-use avastra::sim::Sensed;
-use avastra::sim::Start;
-use avastra::sim::World;
-use avastra::study;
-use avastra::study::Run;
-use avastra::study::RunSettings;
+use avastra::mdp::{ProcSettings, collision_probability};
+use avastra::model::vocabulary::{Body, Colour, LaneChoice, Level, Side, Then, TimeOfDay, Verb};
+use avastra::model::{ReadError, Space};
+use avastra::sim::{Scene, Sensed, Start, World};
+use avastra::study::{Run, RunSettings};
+use avastra::{ads, episode, study};
 
 const REPEATS: usize = 7;
 /// Ticks of one repeat: six seconds of traffic.

@@ -6,18 +6,9 @@
 
 use std::path::Path;
 
-use avastra::model::ReadError;
-use avastra::model::load;
-use avastra::syntax::Diagnostic;
-use avastra::syntax::Style;
-use avastra::syntax::apply_fixes;
+use avastra::model::{ReadError, load};
 use avastra::syntax::ast::FileId;
-use avastra::syntax::format;
-use avastra::syntax::parse;
-use avastra::syntax::print;
-use avastra::syntax::record;
-use avastra::syntax::render;
-use avastra::syntax::same_meaning;
+use avastra::syntax::{Diagnostic, Style, apply_fixes, format, parse, print, record, render, same_meaning};
 
 /// The shipped space; its roads are those of [`ROADS`].
 const AVASTRA: &str = include_str!("../scenarios/avastra45.ava");

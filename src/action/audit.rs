@@ -3,10 +3,7 @@
 use core::fmt;
 
 use crate::action::table::ActionTable;
-use crate::model::Reach;
-use crate::model::Removal;
-use crate::model::RuleBody;
-use crate::model::removals;
+use crate::model::{Reach, Removal, RuleBody, removals};
 
 /// Every rule of a space.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]

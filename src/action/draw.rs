@@ -2,35 +2,15 @@
 
 use std::sync::Arc;
 
-use crate::action::Effect;
-use crate::action::SpawnRequest;
-use crate::action::table::ActionTable;
-use crate::action::table::Draw;
-use crate::action::table::Refusal;
-use crate::action::table::Situation;
-use crate::model::ActionDef;
-use crate::model::Bound;
-use crate::model::Domain;
-use crate::model::EffectDef;
-use crate::model::Facts;
-use crate::model::Memory;
-use crate::model::Parameter;
-use crate::model::Row;
-use crate::model::RuleBody;
-use crate::model::SPAWN_DISTANCE_M;
-use crate::model::SPAWN_SPEED_MPS;
-use crate::model::Space;
-use crate::model::SpawnDef;
-use crate::model::StateMeaning;
-use crate::model::Value;
-use crate::model::evaluate;
-use crate::model::expr::Comparison;
-use crate::model::expr::Expr;
-use crate::model::expr::ExprKind;
-use crate::model::locals;
+use crate::action::table::{ActionTable, Draw, Refusal, Situation};
+use crate::action::{Effect, SpawnRequest};
+use crate::model::expr::{Comparison, Expr, ExprKind};
+use crate::model::{
+    ActionDef, Bound, Domain, EffectDef, Facts, Memory, Parameter, Row, RuleBody, SPAWN_DISTANCE_M,
+    SPAWN_SPEED_MPS, Space, SpawnDef, StateMeaning, Value, evaluate, locals,
+};
 use crate::rng;
-use crate::rng::Rng;
-use crate::rng::Stream;
+use crate::rng::{Rng, Stream};
 
 /// Draws before a row is refused.
 const DRAWS_MAX: usize = 16;
@@ -462,12 +442,7 @@ fn first(refusals: Vec<Refusal>) -> Refusal {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::vocabulary::Body;
-    use crate::model::vocabulary::Colour;
-    use crate::model::vocabulary::LaneChoice;
-    use crate::model::vocabulary::Side;
-    use crate::model::vocabulary::Then;
-    use crate::model::vocabulary::Verb;
+    use crate::model::vocabulary::{Body, Colour, LaneChoice, Side, Then, Verb};
 
     #[test]
     fn no_spawn_lies_out_of_bounds() {

@@ -1,14 +1,6 @@
 //! What a row does to the world once its parameters are drawn.
 
-use crate::model::vocabulary::Body;
-use crate::model::vocabulary::Colour;
-use crate::model::vocabulary::LaneChoice;
-use crate::model::vocabulary::Level;
-use crate::model::vocabulary::Phenomenon;
-use crate::model::vocabulary::Side;
-use crate::model::vocabulary::Then;
-use crate::model::vocabulary::TimeOfDay;
-use crate::model::vocabulary::Verb;
+use crate::model::vocabulary::{Body, Colour, LaneChoice, Level, Phenomenon, Side, Then, TimeOfDay, Verb};
 
 /// One change of the world. A row has one or more, applied in order.
 #[derive(Debug, Clone, Copy, PartialEq)]

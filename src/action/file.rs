@@ -1,16 +1,9 @@
 //! The action table as data and as text: what `avastra compile` writes and `avastra table` prints.
 
-use serde::Deserialize;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::action::table::ActionTable;
-use crate::model::Domain;
-use crate::model::End;
-use crate::model::Interval;
-use crate::model::Parameter;
-use crate::model::Reach;
-use crate::model::Row;
-use crate::model::Type;
+use crate::model::{Domain, End, Interval, Parameter, Reach, Row, Type};
 
 /// Version of the file's fields. It rises when a field changes its meaning.
 const VERSION: u32 = 1;

@@ -10,27 +10,11 @@ mod file;
 mod rules;
 mod table;
 
-pub use audit::Audit;
-pub use audit::Enforcement;
-pub use audit::RuleAudit;
-pub use audit::audit;
-pub use effect::Effect;
-pub use effect::SpawnFacts;
-pub use effect::SpawnRequest;
-pub use effect::Surroundings;
-pub use file::AxisRecord;
-pub use file::DrawRecord;
-pub use file::RoadRecord;
-pub use file::RowRecord;
-pub use file::RuleRecord;
-pub use file::TableFile;
-pub use rules::ActiveRules;
-pub use rules::UnknownRule;
-pub use table::ActionTable;
-pub use table::Draw;
-pub use table::Offer;
-pub use table::Refusal;
-pub use table::Situation;
+pub use audit::{Audit, Enforcement, RuleAudit, audit};
+pub use effect::{Effect, SpawnFacts, SpawnRequest, Surroundings};
+pub use file::{AxisRecord, DrawRecord, RoadRecord, RowRecord, RuleRecord, TableFile};
+pub use rules::{ActiveRules, UnknownRule};
+pub use table::{ActionTable, Draw, Offer, Refusal, Situation};
 
 #[cfg(test)]
 mod tests;

@@ -1,9 +1,7 @@
 //! Which rules are in force: `--with` and `--without`.
 
-use crate::model::RuleDef;
-use crate::model::Space;
-use crate::syntax::listed;
-use crate::syntax::nearest;
+use crate::model::{RuleDef, Space};
+use crate::syntax::{listed, nearest};
 
 /// The rules in force, by index in `Space::rules`.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -2,17 +2,10 @@
 
 use std::sync::Arc;
 
-use crate::action::Effect;
-use crate::action::Surroundings;
 use crate::action::draw::Judge;
 use crate::action::rules::ActiveRules;
-use crate::model::Bound;
-use crate::model::Memory;
-use crate::model::Road;
-use crate::model::Row;
-use crate::model::Space;
-use crate::model::Value;
-use crate::model::bounds;
+use crate::action::{Effect, Surroundings};
+use crate::model::{Bound, Memory, Road, Row, Space, Value, bounds};
 
 /// The rows that an agent chooses from.
 #[derive(Debug, Clone)]

@@ -1,7 +1,6 @@
 //! What every driving system can do.
 
-use crate::sim::Control;
-use crate::sim::Sensed;
+use crate::sim::{Control, Sensed};
 
 use super::status::Status;
 

@@ -4,10 +4,7 @@
 //! Even samples make look-ups and projections cheap enough to be done for every predicted position
 //! of every object. No signals and no obstacles here.
 
-use crate::geometry::Pose;
-use crate::geometry::Vec2;
-use crate::geometry::unit_vector;
-use crate::geometry::wrap_angle;
+use crate::geometry::{Pose, Vec2, unit_vector, wrap_angle};
 use crate::sim::Scene;
 
 /// Distance between samples, m. On the tightest bend a car can drive (5 m) the chord is 6 mm off.

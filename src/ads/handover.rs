@@ -3,8 +3,7 @@
 //! Whoever asks what another driver would have made of a hazard lets the first drive up to it, so
 //! that the hazard is the same to the bit, and the second from there on, with all that it has seen.
 
-use crate::sim::Control;
-use crate::sim::Sensed;
+use crate::sim::{Control, Sensed};
 
 use super::driver::Ads;
 use super::status::Status;

@@ -5,14 +5,8 @@ use std::sync::Arc;
 use crate::sim::Scene;
 
 use super::driver::Ads;
-use super::modular::Modular;
-use super::modular::ModularConfig;
-use super::reference::CarefulHuman;
-use super::reference::FuzzySafety;
-use super::reference::Idm;
-use super::reference::MinimalPerformance;
-use super::reference::Reference;
-use super::reference::Rss;
+use super::modular::{Modular, ModularConfig};
+use super::reference::{CarefulHuman, FuzzySafety, Idm, MinimalPerformance, Reference, Rss};
 
 /// A driving system that can be asked for by name.
 #[derive(Debug)]

@@ -6,9 +6,7 @@ use crate::sim::Scene;
 
 use super::driver::Ads;
 use super::handover::Handover;
-use super::modular::Foresight;
-use super::modular::Modular;
-use super::modular::ModularConfig;
+use super::modular::{Foresight, Modular, ModularConfig};
 use super::registry::Entry;
 
 /// A driving system and, if it is `modular`, its profile.

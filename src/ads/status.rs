@@ -2,8 +2,7 @@
 
 use core::fmt;
 
-use crate::geometry::Pose;
-use crate::geometry::Vec2;
+use crate::geometry::{Pose, Vec2};
 use crate::model::vocabulary::Body;
 use crate::sim::Control;
 

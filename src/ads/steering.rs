@@ -4,19 +4,13 @@
 //! of mass, bilinear discretisation, Riccati iteration, weights scheduled over speed. Apollo solves
 //! it anew each cycle; here it is solved once for each whole m/s and interpolated between.
 
-use std::sync::Arc;
-use std::sync::LazyLock;
+use std::sync::{Arc, LazyLock};
 
-use nalgebra::Matrix4;
-use nalgebra::Vector4;
-use serde::Deserialize;
-use serde::Serialize;
+use nalgebra::{Matrix4, Vector4};
+use serde::{Deserialize, Serialize};
 
-use crate::geometry::Pose;
-use crate::geometry::wrap_angle;
-use crate::sim::DT_S;
-use crate::sim::EgoMotion;
-use crate::sim::VehicleParameters;
+use crate::geometry::{Pose, wrap_angle};
+use crate::sim::{DT_S, EgoMotion, VehicleParameters};
 
 use super::guide::Guide;
 

@@ -2,27 +2,13 @@
 
 use std::sync::Arc;
 
-use crate::geometry::OrientedBox;
-use crate::geometry::Pose;
-use crate::geometry::Vec2;
-use crate::geometry::distance_m;
-use crate::geometry::unit_vector;
-use crate::geometry::wrap_angle;
+use crate::geometry::{OrientedBox, Pose, Vec2, distance_m, unit_vector, wrap_angle};
 use crate::model::vocabulary::Body;
-use crate::road::RoadMap;
-use crate::road::Route;
-use crate::road::RouteStopLine;
-use crate::road::Signal;
-use crate::sim::Conditions;
-use crate::sim::Control;
-use crate::sim::DT_S;
-use crate::sim::EgoMotion;
-use crate::sim::Scene;
-use crate::sim::Sensed;
-use crate::sim::SensedObject;
-use crate::sim::SignalColour;
-use crate::sim::VehicleParameters;
-use crate::sim::pedal_acceleration_mps2;
+use crate::road::{RoadMap, Route, RouteStopLine, Signal};
+use crate::sim::{
+    Conditions, Control, DT_S, EgoMotion, Scene, Sensed, SensedObject, SignalColour, VehicleParameters,
+    pedal_acceleration_mps2,
+};
 
 use super::driver::Ads;
 

@@ -4,22 +4,12 @@ use core::f64::consts::PI;
 use std::sync::Arc;
 
 use crate::geometry::Pose;
-use crate::model::vocabulary::Body;
-use crate::model::vocabulary::Level;
-use crate::model::vocabulary::TimeOfDay;
-use crate::model::vocabulary::Word;
-use crate::sim::Scene;
-use crate::sim::SignalColour;
-use crate::sim::Start;
-use crate::sim::VehicleParameters;
-use crate::sim::World;
+use crate::model::vocabulary::{Body, Level, TimeOfDay, Word};
+use crate::sim::{Scene, SignalColour, Start, VehicleParameters, World};
 
 use super::driver::Ads;
 use super::registry::REGISTRY;
-use super::testing::Rig;
-use super::testing::corner;
-use super::testing::object;
-use super::testing::straight;
+use super::testing::{Rig, corner, object, straight};
 
 /// What a drive without obstacles came to.
 #[derive(Debug)]

@@ -5,12 +5,10 @@
 use std::sync::Arc;
 
 use super::hyperparameters::Hyperparameters;
-use super::learner::Learner;
-use super::learner::priorities;
+use super::learner::{Learner, priorities};
 use super::network::Adam;
 use super::q_policy::Rows;
-use super::replay::Replay;
-use super::replay::Transition;
+use super::replay::{Replay, Transition};
 
 /// Begins every checkpoint; raised when the layout changes.
 const MAGIC: &[u8; 8] = b"avackpt1";

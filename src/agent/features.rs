@@ -3,13 +3,9 @@
 //! Scales are fixed, so that a policy means the same on every road and there is no running mean to be
 //! frozen. They bring the usual range of a variable to about one; rare values may exceed it.
 
-use crate::mdp::Observation;
-use crate::mdp::STATE_LEN;
-use crate::mdp::STATE_NAMES;
-use crate::mdp::variable;
+use crate::mdp::{Observation, STATE_LEN, STATE_NAMES, variable};
 
-use super::hyperparameters::Encoding;
-use super::hyperparameters::StateSet;
+use super::hyperparameters::{Encoding, StateSet};
 
 /// How many of the paper's variables are of the surroundings; they come first.
 const EXTERNAL_LEN: usize = 7;

@@ -9,8 +9,7 @@ use ndarray::ArrayView1;
 use crate::mdp::Observation;
 use crate::rng::Rng;
 
-use super::branch::Branch;
-use super::branch::Trial;
+use super::branch::{Branch, Trial};
 use super::q_policy::any;
 use super::registry::Agent;
 
@@ -69,8 +68,7 @@ fn danger(trial: &Trial) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::rng::Stream;
-    use crate::rng::stream;
+    use crate::rng::{Stream, stream};
     use ndarray::Array1;
 
     /// What each row would come to.

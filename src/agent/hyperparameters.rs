@@ -5,10 +5,8 @@
 
 use serde_json::Value;
 
-use crate::mdp::ProcKind;
-use crate::mdp::RewardSettings;
-use crate::syntax::listed;
-use crate::syntax::nearest;
+use crate::mdp::{ProcKind, RewardSettings};
+use crate::syntax::{listed, nearest};
 
 use super::network::Initialization;
 use super::presets;
@@ -358,8 +356,7 @@ impl Hyperparameters {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use presets::DDQN;
-    use presets::DEEP_COLLISION;
+    use presets::{DDQN, DEEP_COLLISION};
 
     #[test]
     fn every_preset_is_sound_and_survives_its_record() {

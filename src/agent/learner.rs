@@ -3,30 +3,19 @@
 
 use std::sync::Arc;
 
-use ndarray::Array2;
-use ndarray::ArrayView1;
+use ndarray::{Array2, ArrayView1};
 
 use crate::mdp::Observation;
 use crate::rng;
-use crate::rng::Rng;
-use crate::rng::Stream;
+use crate::rng::{Rng, Stream};
 
-use super::hyperparameters::Exploration;
-use super::hyperparameters::Hyperparameters;
-use super::hyperparameters::Loss;
-use super::network::Adam;
-use super::network::Network;
-use super::q_policy::QPolicy;
-use super::q_policy::Rows;
-use super::q_policy::any;
-use super::q_policy::best;
+use super::hyperparameters::{Exploration, Hyperparameters, Loss};
+use super::network::{Adam, Network};
+use super::q_policy::{QPolicy, Rows, any, best};
 use super::registry::Agent;
-use super::replay::Priorities;
-use super::replay::Replay;
-use super::replay::Transition;
+use super::replay::{Priorities, Replay, Transition};
 use super::trainable::Trainable;
-use super::trajectory::Lesson;
-use super::trajectory::Trajectory;
+use super::trajectory::{Lesson, Trajectory};
 
 /// A learning agent.
 pub struct Learner {

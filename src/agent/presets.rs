@@ -2,12 +2,7 @@
 
 use crate::mdp::ProcKind;
 
-use super::hyperparameters::Encoding;
-use super::hyperparameters::Exploration;
-use super::hyperparameters::Hyperparameters;
-use super::hyperparameters::Loss;
-use super::hyperparameters::RewardSource;
-use super::hyperparameters::StateSet;
+use super::hyperparameters::{Encoding, Exploration, Hyperparameters, Loss, RewardSource, StateSet};
 use super::network::Initialization;
 
 /// Settings with a name.

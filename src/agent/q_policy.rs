@@ -2,25 +2,19 @@
 
 use std::sync::Arc;
 
-use ndarray::Array1;
-use ndarray::ArrayView1;
-use ndarray::ArrayView2;
-use ndarray::Axis;
+use ndarray::{Array1, ArrayView1, ArrayView2, Axis};
 
 use crate::action::ActionTable;
 use crate::mdp::Observation;
-use crate::model::EffectDef;
-use crate::model::Policy;
 use crate::model::policy::PolicyRule;
+use crate::model::{EffectDef, Policy};
 use crate::rng;
 use crate::rng::Rng;
 use crate::syntax::nearest;
 
 use super::features::Features;
-use super::hyperparameters::Hyperparameters;
-use super::hyperparameters::SettingsError;
-use super::network::Network;
-use super::network::Shape;
+use super::hyperparameters::{Hyperparameters, SettingsError};
+use super::network::{Network, Shape};
 use super::registry::Agent;
 use super::rules::chosen_by;
 

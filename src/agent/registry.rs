@@ -7,13 +7,10 @@ use crate::mdp::Observation;
 use crate::rng::Rng;
 
 use super::branch::Branch;
-use super::greedy;
-use super::presets;
 use super::presets::Preset;
-use super::random;
-use super::search::AvFuzzerSettings;
-use super::search::GoExploreSettings;
+use super::search::{AvFuzzerSettings, GoExploreSettings};
 use super::settings::Settings;
+use super::{greedy, presets, random};
 
 /// Chooses rows of the action table.
 pub trait Agent: Send {
@@ -128,15 +125,9 @@ mod tests {
     use std::sync::Arc;
 
     use super::*;
-    use crate::agent::Experience;
-    use crate::agent::Learner;
-    use crate::agent::Rows;
-    use crate::agent::Trainable;
-    use crate::agent::Trajectory;
+    use crate::agent::{Experience, Learner, Rows, Trainable, Trajectory};
     use crate::mdp::Closeness;
-    use crate::rng::Stream;
-    use crate::rng::child_seed;
-    use crate::rng::stream;
+    use crate::rng::{Stream, child_seed, stream};
     use ndarray::Array1;
 
     const ROWS: usize = 5;

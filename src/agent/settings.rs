@@ -4,20 +4,13 @@ use std::sync::Arc;
 
 use serde::de::DeserializeOwned;
 
-use crate::mdp::ProcKind;
-use crate::mdp::RewardSettings;
+use crate::mdp::{ProcKind, RewardSettings};
 
-use super::hyperparameters::Hyperparameters;
-use super::hyperparameters::RewardSource;
-use super::hyperparameters::SettingsError;
+use super::hyperparameters::{Hyperparameters, RewardSource, SettingsError};
 use super::learner::Learner;
 use super::q_policy::Rows;
-use super::registry::Entry;
-use super::registry::Kind;
-use super::search::AvFuzzer;
-use super::search::AvFuzzerSettings;
-use super::search::GoExplore;
-use super::search::GoExploreSettings;
+use super::registry::{Entry, Kind};
+use super::search::{AvFuzzer, AvFuzzerSettings, GoExplore, GoExploreSettings};
 use super::trainable::Trainable;
 
 /// All settings of one agent; which agent is told by their names.

@@ -4,8 +4,7 @@ use crate::rng::Rng;
 
 use super::q_policy::QPolicy;
 use super::registry::Agent;
-use super::trajectory::Lesson;
-use super::trajectory::Trajectory;
+use super::trajectory::{Lesson, Trajectory};
 
 /// An agent in training. An episode is: `beginning`, [`Agent::begin`], a choice for each step, `learn`.
 pub trait Trainable: Agent {

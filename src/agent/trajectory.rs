@@ -5,8 +5,7 @@
 
 use ndarray::Array1;
 
-use crate::mdp::Closeness;
-use crate::mdp::Observation;
+use crate::mdp::{Closeness, Observation};
 
 /// The choices of one episode, in order.
 #[derive(Debug, Clone, PartialEq)]

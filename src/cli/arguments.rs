@@ -2,10 +2,7 @@
 
 use std::path::PathBuf;
 
-use clap::Args;
-use clap::Parser;
-use clap::Subcommand;
-use clap::ValueEnum;
+use clap::{Args, Parser, Subcommand, ValueEnum};
 
 /// Finds out which of the things that may happen around a self-driving car make it crash.
 #[derive(Debug, Parser)]

@@ -2,14 +2,12 @@
 
 use std::path::Path;
 
-use crate::action::ActionTable;
-use crate::action::audit;
+use crate::action::{ActionTable, audit};
 use crate::model::Loaded;
 use crate::syntax::apply_fixes;
 use crate::syntax::ast::FileId;
 
-use super::arguments::CheckArguments;
-use super::arguments::Stage;
+use super::arguments::{CheckArguments, Stage};
 use super::error::Failure;
 use super::load;
 use super::output::Output;

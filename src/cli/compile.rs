@@ -1,20 +1,16 @@
 //! `avastra compile` and `avastra table`: the typed action table as a file and as text.
 
-use std::path::Path;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-use crate::action::ActionTable;
-use crate::action::TableFile;
+use crate::action::{ActionTable, TableFile};
 use crate::syntax::listed;
 
-use super::arguments::CompileArguments;
-use super::arguments::TableArguments;
+use super::arguments::{CompileArguments, TableArguments};
 use super::error::Failure;
-use super::load;
 use super::output::Output;
 use super::progress::plural;
 use super::run_directory::write;
-use super::trials;
+use super::{load, trials};
 
 /// Names the table that `avastra run` takes when it is given none.
 const LAST: &str = "build/last";

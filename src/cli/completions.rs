@@ -2,8 +2,7 @@
 
 use clap::CommandFactory;
 
-use super::arguments::Arguments;
-use super::arguments::CompletionsArguments;
+use super::arguments::{Arguments, CompletionsArguments};
 use super::error::Failure;
 use super::output::Output;
 

@@ -1,24 +1,15 @@
 //! `avastra diagnose`: which module of the driving system a scenario's collision is the fault of.
 
 use std::collections::BTreeMap;
-use std::path::Path;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use crate::action::ActionTable;
-use crate::ads::ModularConfig;
-use crate::ads::Module;
-use crate::ads::Selected;
-use crate::episode::Collision;
-use crate::episode::EpisodeLog;
+use crate::ads::{ModularConfig, Module, Selected};
+use crate::episode::{Collision, EpisodeLog};
 use crate::model::Scenario;
 use crate::model::vocabulary::Word;
 use crate::oracle;
-use crate::oracle::Diagnosis;
-use crate::oracle::Likelihood;
-use crate::oracle::MechanismShare;
-use crate::oracle::Share;
-use crate::oracle::WeaknessFinding;
-use crate::oracle::WithoutMechanism;
+use crate::oracle::{Diagnosis, Likelihood, MechanismShare, Share, WeaknessFinding, WithoutMechanism};
 use crate::study::Stage;
 
 use super::arguments::DiagnoseArguments;

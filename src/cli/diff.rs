@@ -2,8 +2,7 @@
 
 use core::fmt::Write;
 
-use crate::model::Difference;
-use crate::model::differences;
+use crate::model::{Difference, differences};
 
 use super::arguments::DiffArguments;
 use super::error::Failure;

@@ -4,8 +4,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use crate::action::ActionTable;
-use crate::agent::Face;
-use crate::agent::QPolicy;
+use crate::agent::{Face, QPolicy};
 use crate::emit;
 use crate::model::Policy;
 use crate::model::policy::RulesClaims;
@@ -16,8 +15,7 @@ use super::error::Failure;
 use super::load;
 use super::output::Output;
 use super::run_directory::write;
-use super::verify::acting;
-use super::verify::same_world;
+use super::verify::{acting, same_world};
 
 /// Distils rules anew, with other settings than those of the training, and writes the policy with them.
 pub fn distill(output: &Output, arguments: &DistillArguments) -> Result<(), Failure> {

@@ -2,16 +2,7 @@
 
 use core::fmt::Write;
 
-use crate::model::ActionDef;
-use crate::model::Domain;
-use crate::model::Interval;
-use crate::model::Parameter;
-use crate::model::Reach;
-use crate::model::RuleBody;
-use crate::model::RuleDef;
-use crate::model::Space;
-use crate::model::Type;
-use crate::model::Value;
+use crate::model::{ActionDef, Domain, Interval, Parameter, Reach, RuleBody, RuleDef, Space, Type, Value};
 
 use super::arguments::DocArguments;
 use super::error::Failure;

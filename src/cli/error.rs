@@ -1,7 +1,6 @@
 //! Why a command failed, and the exit status that says so.
 
-use std::path::Path;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Every way in which a command can end but well.
 #[derive(Debug, thiserror::Error)]

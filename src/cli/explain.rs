@@ -1,8 +1,6 @@
 //! `avastra explain`: what a code means.
 
-use crate::model::explain::PAGES;
-use crate::model::explain::Page;
-use crate::model::explain::page;
+use crate::model::explain::{PAGES, Page, page};
 use crate::syntax::nearest;
 
 use super::arguments::ExplainArguments;

@@ -2,9 +2,7 @@
 
 use crate::agent::Face;
 use crate::model::policy::values_from;
-use crate::study::Insight;
-use crate::study::insight;
-use crate::study::trained_against;
+use crate::study::{Insight, insight, trained_against};
 
 use super::arguments::ExplainPolicyArguments;
 use super::error::Failure;

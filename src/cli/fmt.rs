@@ -3,8 +3,7 @@
 use std::io::Read;
 use std::path::Path;
 
-use crate::syntax::FormatError;
-use crate::syntax::Sources;
+use crate::syntax::{FormatError, Sources};
 
 use super::arguments::FmtArguments;
 use super::error::Failure;

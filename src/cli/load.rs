@@ -1,18 +1,12 @@
 //! Files into checked programs, with their diagnostics printed.
 
-use std::path::Component;
-use std::path::Path;
-use std::path::PathBuf;
+use std::path::{Component, Path, PathBuf};
 use std::sync::Arc;
 
 use crate::action::ActionTable;
 use crate::ads::ModularConfig;
 use crate::model;
-use crate::model::Loaded;
-use crate::model::Policy;
-use crate::model::ReadError;
-use crate::model::Scenario;
-use crate::model::Space;
+use crate::model::{Loaded, Policy, ReadError, Scenario, Space};
 
 use super::error::Failure;
 use super::output::Output;

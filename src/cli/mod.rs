@@ -38,8 +38,7 @@ use std::process::ExitCode;
 
 use clap::Parser;
 
-use arguments::Arguments;
-use arguments::Command;
+use arguments::{Arguments, Command};
 use error::Failure;
 use output::Output;
 

@@ -1,17 +1,11 @@
 //! Printing: results on stdout, everything else on stderr, in the form that was asked for.
 
-use std::io::IsTerminal;
-use std::io::Write;
+use std::io::{IsTerminal, Write};
 use std::sync::Mutex;
 
-use crate::syntax::Diagnostic;
-use crate::syntax::DiagnosticRecord;
-use crate::syntax::Sources;
-use crate::syntax::Style;
+use crate::syntax::{Diagnostic, DiagnosticRecord, Sources, Style};
 
-use super::arguments::Format;
-use super::arguments::OutputArguments;
-use super::arguments::When;
+use super::arguments::{Format, OutputArguments, When};
 use super::error::Failure;
 use super::sarif;
 

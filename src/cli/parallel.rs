@@ -2,8 +2,7 @@
 
 use std::path::PathBuf;
 use std::sync::Mutex;
-use std::sync::atomic::AtomicUsize;
-use std::sync::atomic::Ordering;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Worker threads: as many as asked for, or one for each core.
 pub fn jobs(asked: Option<u32>) -> usize {

@@ -3,8 +3,7 @@
 use std::collections::VecDeque;
 use std::io::IsTerminal;
 
-use indicatif::ProgressBar;
-use indicatif::ProgressStyle;
+use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::study::TrainedEpisode;
 

@@ -1,15 +1,12 @@
 //! `avastra render`: moments of an emitted scenario as a picture.
 
-use std::path::Path;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use crate::action::ActionTable;
 use crate::ads::Selected;
 use crate::geometry::Vec2;
-use crate::model::Claim;
-use crate::model::Scenario;
-use crate::report::Snapshot;
-use crate::report::picture;
+use crate::model::{Claim, Scenario};
+use crate::report::{Snapshot, picture};
 use crate::sim::DT_S;
 use crate::study::Stage;
 

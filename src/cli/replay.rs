@@ -2,17 +2,13 @@
 
 use std::path::Path;
 
-use crate::ads::ModularConfig;
-use crate::ads::Selected;
+use crate::ads::{ModularConfig, Selected};
 use crate::episode::Collision;
-use crate::model::Avoidability;
-use crate::model::Scenario;
 use crate::model::vocabulary::Word;
+use crate::model::{Avoidability, Scenario};
 use crate::oracle;
 use crate::study;
-use crate::study::Measures;
-use crate::study::RunError;
-use crate::study::Stage;
+use crate::study::{Measures, RunError, Stage};
 
 use super::arguments::ReplayArguments;
 use super::error::Failure;

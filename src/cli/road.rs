@@ -6,17 +6,10 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use serde_json::Value;
-use serde_json::json;
+use serde_json::{Value, json};
 
 use crate::report::draw;
-use crate::road::Lane;
-use crate::road::LaneIndex;
-use crate::road::LanePlace;
-use crate::road::Neighbour;
-use crate::road::RoadMap;
-use crate::road::Route;
-use crate::road::Side;
+use crate::road::{Lane, LaneIndex, LanePlace, Neighbour, RoadMap, Route, Side};
 
 use super::arguments::RoadArguments;
 use super::error::Failure;

@@ -1,10 +1,8 @@
 //! `avastra run`: episodes in, crashes out.
 
-use std::path::Path;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
-use std::sync::atomic::Ordering;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 use crate::action::ActionTable;
@@ -15,31 +13,18 @@ use crate::model::Policy;
 use crate::oracle::AvoidabilitySettings;
 use crate::sim::ENGINE;
 use crate::study;
-use crate::study::EpisodeSummary;
-use crate::study::Group;
-use crate::study::PolicyReference;
-use crate::study::Profile;
-use crate::study::RefusalCount;
-use crate::study::Run;
-use crate::study::RunSettings;
-use crate::study::Totals;
-use crate::study::play;
+use crate::study::{
+    EpisodeSummary, Group, PolicyReference, Profile, RefusalCount, Run, RunSettings, Totals, play,
+};
 
-use super::arguments::FaceArgument;
-use super::arguments::RunArguments;
-use super::compile;
+use super::arguments::{FaceArgument, RunArguments};
 use super::error::Failure;
-use super::load;
-use super::output::Output;
-use super::output::remark;
+use super::output::{Output, remark};
 use super::parallel::jobs;
-use super::progress::Progress;
-use super::progress::plural;
-use super::run_directory;
-use super::run_directory::Begun;
-use super::run_directory::RunDirectory;
-use super::run_directory::write;
+use super::progress::{Progress, plural};
+use super::run_directory::{Begun, RunDirectory, write};
 use super::verify::acting;
+use super::{compile, load, run_directory};
 
 pub const VERSION: &str = env!("CARGO_PKG_VERSION");
 

@@ -1,8 +1,7 @@
 //! Run directories: `run.yaml`, `run.db` and `critical/*.ava`.
 
 use std::io::ErrorKind;
-use std::path::Path;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use crate::action::ActionTable;
 use crate::sim::ENGINE;

@@ -3,13 +3,10 @@
 //! One run of one tool; every diagnostic is a result, every code that occurs a rule. Columns count
 //! characters, as SARIF's `unicodeCodePoints` says.
 
-use serde_json::Value;
-use serde_json::json;
+use serde_json::{Value, json};
 
 use crate::model::explain::page;
-use crate::syntax::DiagnosticRecord;
-use crate::syntax::PlaceRecord;
-use crate::syntax::Severity;
+use crate::syntax::{DiagnosticRecord, PlaceRecord, Severity};
 
 /// The whole log.
 pub fn log(records: &[DiagnosticRecord]) -> Value {

@@ -1,17 +1,13 @@
 //! `avastra shrink`: the smallest scenario that still makes the same crash.
 
-use std::path::Path;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use crate::emit;
-use crate::episode::Outcome;
-use crate::episode::Script;
-use crate::episode::Setup;
+use crate::episode::{Outcome, Script, Setup};
 use crate::model::Claim;
 use crate::oracle;
 use crate::study;
-use crate::study::EpisodeSummary;
-use crate::study::Stage;
+use crate::study::{EpisodeSummary, Stage};
 
 use super::arguments::ShrinkArguments;
 use super::error::Failure;

@@ -6,30 +6,19 @@ use std::time::Instant;
 
 use crate::report;
 use crate::sim::ENGINE;
-use crate::study::CellRecord;
-use crate::study::Event;
-use crate::study::Profile;
-use crate::study::Spent;
-use crate::study::Study;
-use crate::study::StudyDatabase;
-use crate::study::StudyFile;
-use crate::study::StudyResults;
-use crate::study::StudySettings;
-use crate::study::driving_system;
-use crate::study::play_jobs;
+use crate::study::{
+    CellRecord, Event, Profile, Spent, Study, StudyDatabase, StudyFile, StudyResults, StudySettings,
+    driving_system, play_jobs,
+};
 
 use super::arguments::StudyArguments;
 use super::error::Failure;
-use super::load;
 use super::output::Output;
 use super::parallel::jobs;
-use super::progress::Progress;
-use super::progress::plural;
-use super::run::VERSION;
-use super::run::stop_on_interrupt;
-use super::run_directory;
-use super::run_directory::Begun;
-use super::run_directory::write;
+use super::progress::{Progress, plural};
+use super::run::{VERSION, stop_on_interrupt};
+use super::run_directory::{Begun, write};
+use super::{load, run_directory};
 
 /// Plays what a study still lacks and prints its result.
 pub fn study(output: &Output, arguments: &StudyArguments) -> Result<(), Failure> {

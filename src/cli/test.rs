@@ -1,8 +1,7 @@
 //! `avastra test`: emitted scenarios as a regression suite for a driving system.
 
 use std::fmt::Write as _;
-use std::path::Path;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use crate::ads::ModularConfig;

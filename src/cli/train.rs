@@ -1,44 +1,25 @@
 //! `avastra train`: an agent learns where the crashes are, and is kept as a policy.
 
-use std::path::Path;
-use std::path::PathBuf;
-use std::sync::atomic::AtomicBool;
-use std::sync::atomic::Ordering;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::agent;
-use crate::agent::Kind;
-use crate::agent::QPolicy;
-use crate::agent::Settings;
+use crate::agent::{Kind, QPolicy, Settings};
 use crate::emit;
-use crate::model::Policy;
-use crate::model::Space;
-use crate::model::digest_text;
-use crate::model::policy::PolicyClaims;
-use crate::model::policy::PolicyOrigin;
+use crate::model::policy::{PolicyClaims, PolicyOrigin};
+use crate::model::{Policy, Space, digest_text};
 use crate::sim::ENGINE;
-use crate::study::Evaluation;
-use crate::study::Profile;
-use crate::study::TrainSettings;
-use crate::study::TrainedEpisode;
-use crate::study::Training;
-use crate::study::evaluate_agent;
-use crate::study::rounded;
+use crate::study::{Evaluation, Profile, TrainSettings, TrainedEpisode, Training, evaluate_agent, rounded};
 use crate::syntax::listed;
 
 use super::arguments::TrainArguments;
-use super::distill;
 use super::distill::rules_text;
 use super::error::Failure;
-use super::load;
 use super::output::Output;
-use super::progress::TrainingProgress;
-use super::progress::plural;
-use super::run::VERSION;
-use super::run::stop_on_interrupt;
-use super::run_directory;
-use super::run_directory::Begun;
-use super::run_directory::RunDirectory;
-use super::run_directory::write;
+use super::progress::{TrainingProgress, plural};
+use super::run::{VERSION, stop_on_interrupt};
+use super::run_directory::{Begun, RunDirectory, write};
+use super::{distill, load, run_directory};
 
 /// Episodes between two checkpoints: what a kill may cost to play again.
 const CHECKPOINT_EPISODES: usize = 25;

@@ -6,10 +6,7 @@ use crate::action::ActionTable;
 use crate::emit;
 use crate::emit::Provenance;
 use crate::report;
-use crate::study::Arena;
-use crate::study::Cell;
-use crate::study::TrialSettings;
-use crate::study::Trials;
+use crate::study::{Arena, Cell, TrialSettings, Trials};
 use crate::syntax;
 
 use super::arguments::TableArguments;

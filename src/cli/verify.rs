@@ -1,29 +1,22 @@
 //! `avastra verify`: emitted files, scenarios and policies alike, every claim checked.
 
-use std::path::Path;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use crate::action::ActionTable;
-use crate::agent::Face;
-use crate::agent::QPolicy;
-use crate::model::Policy;
-use crate::model::digest_text;
+use crate::agent::{Face, QPolicy};
 use crate::model::policy::RulesClaims;
+use crate::model::{Policy, digest_text};
 use crate::sim::ENGINE;
 use crate::study;
-use crate::study::evaluate;
-use crate::study::judge_rules;
-use crate::study::rounded;
+use crate::study::{evaluate, judge_rules, rounded};
 
-use super::arguments::ReplayArguments;
-use super::arguments::VerifyArguments;
+use super::arguments::{ReplayArguments, VerifyArguments};
 use super::error::Failure;
-use super::load;
 use super::load::Emitted;
 use super::output::Output;
 use super::progress::plural;
-use super::replay;
+use super::{load, replay};
 
 /// Replays scenarios, and lets policies show again what they claim.
 pub fn verify(output: &Output, arguments: &VerifyArguments) -> Result<(), Failure> {

@@ -2,9 +2,7 @@
 
 use std::sync::Arc;
 
-use crate::action::ActiveRules;
-use crate::action::Offer;
-use crate::action::Situation;
+use crate::action::{ActiveRules, Offer, Situation};
 use crate::emit;
 use crate::episode;
 use crate::sim::World;

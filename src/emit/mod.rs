@@ -10,7 +10,4 @@ mod tree;
 
 pub use policy::policy_text;
 pub use safetensors::safetensors;
-pub use scenario::Provenance;
-pub use scenario::action_text;
-pub use scenario::scenario;
-pub use scenario::unclaimed;
+pub use scenario::{Provenance, action_text, scenario, unclaimed};

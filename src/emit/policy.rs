@@ -3,34 +3,14 @@
 
 use serde_json::Value;
 
-use crate::model::Policy;
-use crate::model::Space;
-use crate::model::policy::Condition;
-use crate::model::policy::Net;
-use crate::model::policy::PolicyRule;
-use crate::model::policy::VARIABLES;
-use crate::model::policy::VariableKind;
-use crate::model::policy::expression;
-use crate::model::policy::seal;
-use crate::model::policy::weights_to_lines;
-use crate::syntax::LANGUAGE;
-use crate::syntax::ast;
-use crate::syntax::ast::Arg;
-use crate::syntax::ast::BinaryOp;
-use crate::syntax::ast::Call;
-use crate::syntax::ast::Expr;
-use crate::syntax::ast::ExprKind;
-use crate::syntax::ast::Field;
-use crate::syntax::ast::File;
-use crate::syntax::ast::FileId;
-use crate::syntax::ast::ItemKind;
-use crate::syntax::ast::Name;
-use crate::syntax::ast::PolicyLine;
-use crate::syntax::ast::Span;
-use crate::syntax::ast::Text;
-use crate::syntax::ast::Use;
-use crate::syntax::parse;
-use crate::syntax::print;
+use crate::model::policy::{
+    Condition, Net, PolicyRule, VARIABLES, VariableKind, expression, seal, weights_to_lines,
+};
+use crate::model::{Policy, Space};
+use crate::syntax::ast::{
+    Arg, BinaryOp, Call, Expr, ExprKind, Field, File, FileId, ItemKind, Name, PolicyLine, Span, Text, Use,
+};
+use crate::syntax::{LANGUAGE, ast, parse, print};
 use crate::units::decimal;
 
 use super::tree;

@@ -4,9 +4,8 @@
 //! (outputs, inputs), `0.bias`, then `2.weight`, and so on. The value of a dueling head is the last
 //! output of the last layer.
 
-use safetensors::Dtype;
-use safetensors::serialize;
 use safetensors::tensor::TensorView;
+use safetensors::{Dtype, serialize};
 
 use crate::agent::Network;
 

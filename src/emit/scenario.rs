@@ -3,34 +3,17 @@
 
 use std::sync::Arc;
 
-use crate::action::ActionTable;
-use crate::action::Draw;
-use crate::episode::Collision;
-use crate::episode::EpisodeLog;
-use crate::episode::Outcome;
-use crate::model::ActionDef;
-use crate::model::Space;
-use crate::model::StateDef;
-use crate::model::Value;
-use crate::model::digest_text;
+use crate::action::{ActionTable, Draw};
+use crate::episode::{Collision, EpisodeLog, Outcome};
 use crate::model::vocabulary::Word;
+use crate::model::{ActionDef, Space, StateDef, Value, digest_text};
 use crate::oracle::AvoidabilitySettings;
 use crate::sim::ENGINE;
-use crate::study::EpisodeSummary;
-use crate::study::Finding;
+use crate::study::{EpisodeSummary, Finding};
 use crate::syntax::LANGUAGE;
-use crate::syntax::ast::ClauseKind;
-use crate::syntax::ast::Expect;
-use crate::syntax::ast::Expr;
-use crate::syntax::ast::Field;
-use crate::syntax::ast::File;
-use crate::syntax::ast::ItemKind;
-use crate::syntax::ast::Name;
-use crate::syntax::ast::Scenario;
-use crate::syntax::ast::Span;
-use crate::syntax::ast::Step;
-use crate::syntax::ast::Text;
-use crate::syntax::ast::Use;
+use crate::syntax::ast::{
+    ClauseKind, Expect, Expr, Field, File, ItemKind, Name, Scenario, Span, Step, Text, Use,
+};
 use crate::units::Dimension;
 
 use super::tree;

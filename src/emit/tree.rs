@@ -1,25 +1,11 @@
 //! Small constructors for syntax trees that were never text.
 
-use crate::model::Space;
-use crate::model::Type;
-use crate::model::Value;
-use crate::syntax::ast::Arg;
-use crate::syntax::ast::BinaryOp;
-use crate::syntax::ast::Call;
-use crate::syntax::ast::Clause;
-use crate::syntax::ast::ClauseKind;
-use crate::syntax::ast::Doc;
-use crate::syntax::ast::Expect;
-use crate::syntax::ast::Expr;
-use crate::syntax::ast::ExprKind;
-use crate::syntax::ast::Field;
-use crate::syntax::ast::Item;
-use crate::syntax::ast::ItemKind;
-use crate::syntax::ast::Name;
-use crate::syntax::ast::Number;
-use crate::syntax::ast::Span;
-use crate::units::Dimension;
-use crate::units::decimal;
+use crate::model::{Space, Type, Value};
+use crate::syntax::ast::{
+    Arg, BinaryOp, Call, Clause, ClauseKind, Doc, Expect, Expr, ExprKind, Field, Item, ItemKind, Name,
+    Number, Span,
+};
+use crate::units::{Dimension, decimal};
 
 pub fn item(docs: Vec<Doc>, kind: ItemKind) -> Item {
     Item { docs, kind, span: Span::NONE }

@@ -2,14 +2,10 @@
 
 use crate::action::Draw;
 use crate::ads::ModularConfig;
-use crate::mdp::PerceptionCounts;
-use crate::mdp::StateVector;
+use crate::mdp::{PerceptionCounts, StateVector};
 use crate::model::Memory;
-use crate::model::vocabulary::Body;
-use crate::model::vocabulary::Verb;
-use crate::sim::Contact;
-use crate::sim::Incident;
-use crate::sim::Start;
+use crate::model::vocabulary::{Body, Verb};
+use crate::sim::{Contact, Incident, Start};
 
 /// One episode, from start to end.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,26 +1,15 @@
 //! The loop: act, drive for one observation period, look what happened.
 
-use sha2::Digest;
-use sha2::Sha256;
+use sha2::{Digest, Sha256};
 
-use crate::action::Draw;
-use crate::action::Situation;
+use crate::action::{Draw, Situation};
 use crate::ads::Ads;
 use crate::mdp;
 use crate::mdp::Observation;
-use crate::model::Memory;
-use crate::model::OutcomeFacts;
-use crate::sim::Contact;
-use crate::sim::DT_S;
-use crate::sim::Incident;
-use crate::sim::Sensed;
-use crate::sim::World;
+use crate::model::{Memory, OutcomeFacts};
+use crate::sim::{Contact, DT_S, Incident, Sensed, World};
 
-use super::log::Collision;
-use super::log::End;
-use super::log::EpisodeLog;
-use super::log::Outcome;
-use super::log::StepLog;
+use super::log::{Collision, End, EpisodeLog, Outcome, StepLog};
 use super::setup::Setup;
 
 /// Less progress than this in a step is none, m. The published package: 3 m in five steps.

@@ -3,13 +3,10 @@
 use std::sync::Arc;
 
 use crate::action::ActionTable;
-use crate::model::Scenario;
-use crate::model::Value;
+use crate::model::{Scenario, Value};
 
-use super::log::EpisodeLog;
-use super::log::Outcome;
-use super::run::Choice;
-use super::run::Moment;
+use super::log::{EpisodeLog, Outcome};
+use super::run::{Choice, Moment};
 
 /// What happens in each step, from step 0; `None` is a step without an action.
 #[derive(Debug, Clone, PartialEq, Default)]

@@ -2,17 +2,13 @@
 
 use std::sync::Arc;
 
-use crate::action::ActionTable;
-use crate::action::ActiveRules;
+use crate::action::{ActionTable, ActiveRules};
 use crate::ads::Selected;
 use crate::mdp::ProcKind;
-use crate::model::Memory;
-use crate::model::Road;
-use crate::model::Space;
+use crate::model::{Memory, Road, Space};
 use crate::rng;
 use crate::rng::Stream;
-use crate::sim::Scene;
-use crate::sim::Start;
+use crate::sim::{Scene, Start};
 
 /// Signals begin anywhere in this span, s: a whole number of cycles of two, three and four groups.
 const SIGNAL_PHASE_S: f64 = 204.0;

@@ -4,10 +4,7 @@
 //! first contact advances along the gap. `parry2d` is the oracle of the tests below and named nowhere
 //! else. That no contact is missed is shown by `tests/it/contacts.rs`.
 
-use super::pose::OrientedBox;
-use super::pose::Pose;
-use super::pose::Vec2;
-use super::pose::wrap_angle;
+use super::pose::{OrientedBox, Pose, Vec2, wrap_angle};
 
 /// Boxes nearer than this touch, m. What it adds to the time of a contact is below a millisecond for
 /// gaps that close with at least a millimetre a second.

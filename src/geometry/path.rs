@@ -4,9 +4,7 @@
 //! chord with the heading interpolated; makers sample so densely that the chord is within a
 //! millimetre of the curve (see `road`), so nobody downstream needs the curve itself.
 
-use super::pose::Pose;
-use super::pose::Vec2;
-use super::pose::wrap_angle;
+use super::pose::{Pose, Vec2, wrap_angle};
 
 /// A vertex of a [`Path`].
 #[derive(Debug, Clone, Copy, PartialEq)]

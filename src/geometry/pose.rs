@@ -1,9 +1,6 @@
 //! Vectors, poses and oriented boxes.
 
-use core::f64::consts::FRAC_2_PI;
-use core::f64::consts::FRAC_PI_2;
-use core::f64::consts::PI;
-use core::f64::consts::TAU;
+use core::f64::consts::{FRAC_2_PI, FRAC_PI_2, PI, TAU};
 
 /// A point or a displacement in the plane, m.
 pub type Vec2 = nalgebra::Vector2<f64>;

@@ -7,8 +7,7 @@
 
 use crate::geometry::wrap_angle;
 use crate::model::vocabulary::Body;
-use crate::sim::Obstacle;
-use crate::sim::World;
+use crate::sim::{Obstacle, World};
 
 use super::released_probability::released_probability;
 

@@ -5,17 +5,8 @@
 //! system believes, and take road users to keep velocity and heading. Looked at ten times a second.
 
 use crate::ads::Rss;
-use crate::geometry::OrientedBox;
-use crate::geometry::Pose;
-use crate::geometry::Sweep;
-use crate::geometry::Vec2;
-use crate::geometry::distance_m;
-use crate::geometry::first_contact;
-use crate::geometry::wrap_angle;
-use crate::sim::DT_S;
-use crate::sim::FRAME_TICKS;
-use crate::sim::Obstacle;
-use crate::sim::World;
+use crate::geometry::{OrientedBox, Pose, Sweep, Vec2, distance_m, first_contact, wrap_angle};
+use crate::sim::{DT_S, FRAME_TICKS, Obstacle, World};
 
 /// Contacts later than this are not looked for, s.
 const HORIZON_S: f64 = 8.0;

@@ -9,10 +9,7 @@ use ndarray::Array1;
 use crate::ads::Status;
 use crate::sim::World;
 
-use super::state::STATE_LEN;
-use super::state::STATE_NAMES;
-use super::state::StateVector;
-use super::state::observe;
+use super::state::{STATE_LEN, STATE_NAMES, StateVector, observe};
 
 /// Number of the variables beyond the paper's.
 pub const BEYOND_LEN: usize = 17;

@@ -10,8 +10,7 @@ use crate::geometry::Vec2;
 use crate::model::vocabulary::Body;
 use crate::sim::World;
 
-use super::collision_probability::combined;
-use super::collision_probability::probability;
+use super::collision_probability::{combined, probability};
 
 /// Ticks between two looks: 0.5 s.
 const PERIOD_TICKS: u64 = 25;

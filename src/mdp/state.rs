@@ -10,14 +10,10 @@
 
 use ndarray::Array1;
 
-use crate::ads::PerceivedObject;
-use crate::ads::Status;
-use crate::geometry::Vec2;
-use crate::geometry::wrap_angle;
+use crate::ads::{PerceivedObject, Status};
+use crate::geometry::{Vec2, wrap_angle};
 use crate::model::vocabulary::TimeOfDay;
-use crate::sim::Obstacle;
-use crate::sim::SignalColour;
-use crate::sim::World;
+use crate::sim::{Obstacle, SignalColour, World};
 
 /// Number of state variables.
 pub const STATE_LEN: usize = 19;
@@ -217,11 +213,8 @@ fn perception_differences(real: &[Obstacle], perceived: &[PerceivedObject]) -> D
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::OrientedBox;
-    use crate::geometry::Pose;
-    use crate::model::vocabulary::Body;
-    use crate::model::vocabulary::Colour;
-    use crate::model::vocabulary::Verb;
+    use crate::geometry::{OrientedBox, Pose};
+    use crate::model::vocabulary::{Body, Colour, Verb};
 
     #[test]
     fn a_direction_needs_a_deviation() {

@@ -1,12 +1,8 @@
 //! What a condition says about one number: the bounds from which drawing and proving both start.
 
-use crate::model::expr::Comparison;
-use crate::model::expr::Expr;
-use crate::model::expr::ExprKind;
-use crate::model::interval::End;
-use crate::model::interval::Interval;
-use crate::model::space::RuleBody;
-use crate::model::space::Space;
+use crate::model::expr::{Comparison, Expr, ExprKind};
+use crate::model::interval::{End, Interval};
+use crate::model::space::{RuleBody, Space};
 use crate::model::value::Type;
 
 /// `local op limit`, wherever all guards hold.

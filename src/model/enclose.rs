@@ -3,14 +3,9 @@
 //! The static counterpart of `eval`, over exact numbers. It over-approximates, so "never true" is a
 //! proof and "may be true" is not.
 
-use crate::model::expr::Arithmetic;
-use crate::model::expr::Comparison;
-use crate::model::expr::Expr;
-use crate::model::expr::ExprKind;
-use crate::model::expr::Fact;
+use crate::model::expr::{Arithmetic, Comparison, Expr, ExprKind, Fact};
 use crate::model::interval::Interval;
-use crate::model::space::FnDef;
-use crate::model::space::RoadFacts;
+use crate::model::space::{FnDef, RoadFacts};
 use crate::units::Rational;
 
 /// Enums have at most so many variants, so that a set of them is one integer.

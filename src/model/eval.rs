@@ -3,18 +3,9 @@
 //! Total: the checker has seen to names and types, functions cannot recurse, and a division by 0
 //! gives infinity or NaN, which satisfies no comparison but `!=`.
 
-use crate::model::expr::Arithmetic;
-use crate::model::expr::Comparison;
-use crate::model::expr::Expr;
-use crate::model::expr::ExprKind;
-use crate::model::expr::Fact;
-use crate::model::space::COUNTED;
-use crate::model::space::FnDef;
-use crate::model::space::RoadFacts;
-use crate::model::space::Space;
-use crate::model::space::WordExpr;
-use crate::model::value::Memory;
-use crate::model::value::Value;
+use crate::model::expr::{Arithmetic, Comparison, Expr, ExprKind, Fact};
+use crate::model::space::{COUNTED, FnDef, RoadFacts, Space, WordExpr};
+use crate::model::value::{Memory, Value};
 use crate::model::vocabulary::LaneChoice;
 
 /// Numbers that differ by less than this part of the larger one are `==`: it forgives the digits

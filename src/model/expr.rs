@@ -1,7 +1,6 @@
 //! Typed expressions: names are resolved, units are gone (all numbers are SI), every type fits.
 
-use crate::model::value::EnumIndex;
-use crate::model::value::Type;
+use crate::model::value::{EnumIndex, Type};
 use crate::model::vocabulary::LaneChoice;
 use crate::syntax::ast::Span;
 use crate::units::Rational;

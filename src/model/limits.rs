@@ -9,8 +9,7 @@ use crate::model::code;
 use crate::model::expr::Expr;
 use crate::model::interval::Interval;
 use crate::model::reach::spawn_figures;
-use crate::model::space::EffectDef;
-use crate::model::space::Space;
+use crate::model::space::{EffectDef, Space};
 use crate::syntax::Diagnostic;
 use crate::units::Rational;
 

@@ -4,29 +4,18 @@
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
-use std::path::Component;
-use std::path::Path;
-use std::path::PathBuf;
+use std::path::{Component, Path, PathBuf};
 use std::sync::Arc;
 
-use sha2::Digest;
-use sha2::Sha256;
+use sha2::{Digest, Sha256};
 
-use crate::model::check;
-use crate::model::code;
-use crate::model::overriding;
-use crate::model::policy;
 use crate::model::policy::Policy;
 use crate::model::scenario::Scenario;
 use crate::model::space::Space;
+use crate::model::{check, code, overriding, policy};
 use crate::road::RoadMap;
-use crate::syntax::Diagnostic;
-use crate::syntax::Severity;
-use crate::syntax::Sources;
-use crate::syntax::ast;
-use crate::syntax::ast::FileId;
-use crate::syntax::ast::ItemKind;
-use crate::syntax::parse;
+use crate::syntax::ast::{FileId, ItemKind};
+use crate::syntax::{Diagnostic, Severity, Sources, ast, parse};
 
 /// Why a file cannot be read, in a few words: `no such file`, `a directory`, `not text`.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]

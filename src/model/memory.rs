@@ -1,27 +1,13 @@
 //! How the memory begins and how actions change it.
 
-use crate::model::enclose::Known;
-use crate::model::enclose::Values;
-use crate::model::enclose::enclose;
-use crate::model::eval::Facts;
-use crate::model::eval::evaluate;
+use crate::model::enclose::{Known, Values, enclose};
+use crate::model::eval::{Facts, evaluate};
 use crate::model::interval::Interval;
-use crate::model::space::EffectDef;
-use crate::model::space::Initial;
-use crate::model::space::RuleBody;
-use crate::model::space::RuleDef;
-use crate::model::space::SetDef;
-use crate::model::space::Space;
-use crate::model::space::StateDef;
-use crate::model::space::StateMeaning;
-use crate::model::value::Memory;
-use crate::model::value::Type;
-use crate::model::value::Value;
-use crate::model::vocabulary::Level;
-use crate::model::vocabulary::TimeOfDay;
+use crate::model::space::{EffectDef, Initial, RuleBody, RuleDef, SetDef, Space, StateDef, StateMeaning};
+use crate::model::value::{Memory, Type, Value};
+use crate::model::vocabulary::{Level, TimeOfDay};
 use crate::rng;
-use crate::rng::Rng;
-use crate::rng::Stream;
+use crate::rng::{Rng, Stream};
 
 impl Space {
     /// The memory at the beginning of an episode; what is `any` is drawn from [`Stream::Reset`].

@@ -23,76 +23,27 @@ mod suggest;
 mod value;
 pub mod vocabulary;
 
-pub(crate) use bound::Bound;
-pub(crate) use bound::bounds;
+pub(crate) use bound::{Bound, bounds};
 pub use check::scenario;
-pub use difference::Change;
-pub use difference::Difference;
-pub use difference::differences;
-pub use eval::Facts;
-pub use eval::OutcomeFacts;
-pub use eval::evaluate;
-pub use interval::End;
-pub use interval::Interval;
-pub use limits::AMBIENT_MAX;
-pub use limits::SPAWN_DISTANCE_M;
-pub use limits::SPAWN_SPEED_MPS;
-pub use limits::TICK_MS;
-pub use load::Loaded;
-pub use load::LoadedFile;
-pub use load::MapCache;
-pub use load::ReadError;
-pub use load::ReadFile;
-pub use load::digest;
-pub use load::digest_text;
-pub use load::load;
-pub use load::load_with;
+pub use difference::{Change, Difference, differences};
+pub use eval::{Facts, OutcomeFacts, evaluate};
+pub use interval::{End, Interval};
+pub use limits::{AMBIENT_MAX, SPAWN_DISTANCE_M, SPAWN_SPEED_MPS, TICK_MS};
+pub use load::{Loaded, LoadedFile, MapCache, ReadError, ReadFile, digest, digest_text, load, load_with};
 pub use policy::Policy;
-pub use proofs::Removal;
-pub use proofs::Witness;
-pub use proofs::removals;
-pub use proofs::witness;
-pub use row::Reach;
-pub use row::Row;
+pub use proofs::{Removal, Witness, removals, witness};
 pub(crate) use row::locals;
-pub use scenario::Avoidability;
-pub use scenario::Claim;
-pub use scenario::ENDS;
-pub use scenario::Figure;
-pub use scenario::MODULES;
-pub use scenario::Origin;
-pub use scenario::Scenario;
-pub use scenario::ScenarioStart;
-pub use scenario::ScenarioStep;
-pub use space::ActionDef;
-pub use space::COUNTED;
-pub use space::Domain;
-pub use space::EffectDef;
-pub use space::EnumDef;
-pub use space::EpisodeDef;
-pub use space::ExpectDef;
-pub use space::FnDef;
-pub use space::GroupDef;
-pub use space::Initial;
-pub use space::Parameter;
-pub use space::RewardCase;
-pub use space::Road;
-pub use space::RoadFacts;
-pub use space::RuleBinding;
-pub use space::RuleBody;
-pub use space::RuleDef;
-pub use space::SetDef;
-pub use space::Space;
-pub use space::SpawnDef;
-pub use space::StateDef;
-pub use space::StateMeaning;
-pub use space::VerdictDef;
-pub use space::WordExpr;
+pub use row::{Reach, Row};
+pub use scenario::{
+    Avoidability, Claim, ENDS, Figure, MODULES, Origin, Scenario, ScenarioStart, ScenarioStep,
+};
+pub use space::{
+    ActionDef, COUNTED, Domain, EffectDef, EnumDef, EpisodeDef, ExpectDef, FnDef, GroupDef, Initial,
+    Parameter, RewardCase, Road, RoadFacts, RuleBinding, RuleBody, RuleDef, SetDef, Space, SpawnDef,
+    StateDef, StateMeaning, VerdictDef, WordExpr,
+};
 pub use suggest::suggest_uses;
-pub use value::EnumIndex;
-pub use value::Memory;
-pub use value::Type;
-pub use value::Value;
+pub use value::{EnumIndex, Memory, Type, Value};
 
 #[cfg(test)]
 mod tests;

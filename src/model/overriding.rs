@@ -8,21 +8,11 @@ use std::borrow::Cow;
 use std::collections::BTreeSet;
 use std::path::PathBuf;
 
-use crate::model::check::names_of_expr;
-use crate::model::check::unknown;
+use crate::model::check::{names_of_expr, unknown};
 use crate::model::code;
-use crate::model::load::LoadedFile;
-use crate::model::load::used_path;
-use crate::model::load::used_paths;
-use crate::model::load::uses as uses_of;
-use crate::syntax::Diagnostic;
-use crate::syntax::ast::EffectKind;
-use crate::syntax::ast::Item;
-use crate::syntax::ast::ItemKind;
-use crate::syntax::ast::Name;
-use crate::syntax::ast::RuleBody;
-use crate::syntax::ast::Use;
-use crate::syntax::nearest;
+use crate::model::load::{LoadedFile, used_path, used_paths, uses as uses_of};
+use crate::syntax::ast::{EffectKind, Item, ItemKind, Name, RuleBody, Use};
+use crate::syntax::{Diagnostic, nearest};
 
 /// What a rule may ask about a spawn.
 const GAPS: [&str; 2] = ["spawn_gap", "safety_gap"];

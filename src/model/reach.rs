@@ -5,29 +5,16 @@
 
 use std::sync::Arc;
 
-use crate::model::bound::Bound;
-use crate::model::bound::allowed;
-use crate::model::bound::bounds;
+use crate::model::bound::{Bound, allowed, bounds};
 use crate::model::code;
-use crate::model::enclose::Known;
-use crate::model::enclose::Values;
-use crate::model::enclose::enclose;
-use crate::model::eval::Facts;
-use crate::model::eval::evaluate;
+use crate::model::enclose::{Known, Values, enclose};
+use crate::model::eval::{Facts, evaluate};
 use crate::model::expr::Expr;
 use crate::model::interval::Interval;
-use crate::model::row::Reach;
-use crate::model::row::Row;
-use crate::model::space::ActionDef;
-use crate::model::space::Domain;
-use crate::model::space::Road;
-use crate::model::space::RuleBody;
-use crate::model::space::Space;
-use crate::model::value::Memory;
-use crate::model::value::Type;
-use crate::model::value::Value;
-use crate::syntax::Diagnostic;
-use crate::syntax::listed;
+use crate::model::row::{Reach, Row};
+use crate::model::space::{ActionDef, Domain, Road, RuleBody, Space};
+use crate::model::value::{Memory, Type, Value};
+use crate::syntax::{Diagnostic, listed};
 use crate::units::Rational;
 
 /// Rounds of narrowing: a bound may wait for another one, rarely for two.

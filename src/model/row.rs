@@ -3,8 +3,7 @@
 use std::sync::Arc;
 
 use crate::model::interval::Interval;
-use crate::model::space::ActionDef;
-use crate::model::space::Parameter;
+use crate::model::space::{ActionDef, Parameter};
 use crate::model::value::Value;
 
 /// One row. Its number is the index of the network's output.

@@ -3,8 +3,7 @@
 use core::fmt;
 use std::sync::Arc;
 
-use crate::model::value::Memory;
-use crate::model::value::Value;
+use crate::model::value::{Memory, Value};
 
 /// One timeline over a space.
 #[derive(Debug, Clone, PartialEq)]

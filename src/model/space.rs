@@ -6,21 +6,9 @@ use std::sync::Arc;
 
 use crate::model::expr::Expr;
 use crate::model::row::Row;
-use crate::model::value::EnumIndex;
-use crate::model::value::Type;
-use crate::model::value::Value;
-use crate::model::vocabulary::Body;
-use crate::model::vocabulary::Colour;
-use crate::model::vocabulary::LaneChoice;
-use crate::model::vocabulary::Level;
-use crate::model::vocabulary::Phenomenon;
-use crate::model::vocabulary::Side;
-use crate::model::vocabulary::Then;
-use crate::model::vocabulary::TimeOfDay;
-use crate::model::vocabulary::Verb;
-use crate::road::LanePlace;
-use crate::road::RoadMap;
-use crate::road::Route;
+use crate::model::value::{EnumIndex, Type, Value};
+use crate::model::vocabulary::{Body, Colour, LaneChoice, Level, Phenomenon, Side, Then, TimeOfDay, Verb};
+use crate::road::{LanePlace, RoadMap, Route};
 use crate::syntax::ast::Span;
 use crate::units::Rational;
 

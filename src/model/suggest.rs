@@ -4,12 +4,8 @@ use std::path::Path;
 
 use crate::model::code;
 use crate::model::load::Loaded;
-use crate::syntax::Diagnostic;
-use crate::syntax::ast::File;
-use crate::syntax::ast::FileId;
-use crate::syntax::ast::ItemKind;
-use crate::syntax::ast::Span;
-use crate::syntax::parse;
+use crate::syntax::ast::{File, FileId, ItemKind, Span};
+use crate::syntax::{Diagnostic, parse};
 
 /// Says of every unknown name which of the files nearby declares it, and offers to use that file.
 ///

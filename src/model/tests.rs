@@ -2,13 +2,8 @@
 
 use std::path::Path;
 
-use crate::model::Avoidability;
-use crate::model::Claim;
-use crate::model::Loaded;
-use crate::model::ReadError;
-use crate::model::load;
-use crate::syntax::Style;
-use crate::syntax::render;
+use crate::model::{Avoidability, Claim, Loaded, ReadError, load};
+use crate::syntax::{Style, render};
 
 /// A small sound space; cases put their own mistake after it.
 const BASE: &str = "language 1

@@ -13,17 +13,11 @@
 use std::collections::VecDeque;
 
 use crate::ads;
-use crate::ads::Ads;
-use crate::ads::Evasion;
-use crate::episode::EpisodeLog;
-use crate::episode::Watch;
+use crate::ads::{Ads, Evasion};
+use crate::episode::{EpisodeLog, Watch};
 use crate::geometry::OrientedBox;
 use crate::model::Avoidability;
-use crate::sim::Contact;
-use crate::sim::DT_S;
-use crate::sim::FRAME_TICKS;
-use crate::sim::VehicleParameters;
-use crate::sim::World;
+use crate::sim::{Contact, DT_S, FRAME_TICKS, VehicleParameters, World};
 use crate::syntax::listed;
 
 use super::facts::struck;

@@ -19,16 +19,10 @@
 
 use std::sync::Arc;
 
-use crate::ads::Foresight;
-use crate::ads::ModularConfig;
-use crate::ads::Module;
-use crate::ads::Selected;
-use crate::episode::EpisodeLog;
-use crate::episode::Setup;
+use crate::ads::{Foresight, ModularConfig, Module, Selected};
+use crate::episode::{EpisodeLog, Setup};
 
-use super::crash::Crash;
-use super::crash::Fate;
-use super::crash::play;
+use super::crash::{Crash, Fate, play};
 use super::variation::Variation;
 
 /// Variations by which modules that suffice alike are told apart.

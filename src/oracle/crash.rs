@@ -6,16 +6,9 @@
 
 use std::sync::Arc;
 
-use crate::ads::Foresight;
-use crate::ads::Selected;
+use crate::ads::{Foresight, Selected};
 use crate::episode;
-use crate::episode::Choice;
-use crate::episode::Collision;
-use crate::episode::EpisodeLog;
-use crate::episode::Moment;
-use crate::episode::Outcome;
-use crate::episode::Script;
-use crate::episode::Setup;
+use crate::episode::{Choice, Collision, EpisodeLog, Moment, Outcome, Script, Setup};
 use crate::sim::VehicleParameters;
 
 use super::facts::struck;

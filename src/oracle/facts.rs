@@ -9,11 +9,8 @@
 
 use crate::episode::EpisodeLog;
 use crate::geometry::Vec2;
-use crate::model::Avoidability;
-use crate::model::OutcomeFacts;
-use crate::model::Space;
-use crate::sim::Contact;
-use crate::sim::VehicleParameters;
+use crate::model::{Avoidability, OutcomeFacts, Space};
+use crate::sim::{Contact, VehicleParameters};
 
 use super::avoidable::Judgement;
 
@@ -117,8 +114,7 @@ fn face(point: Vec2, ego: &VehicleParameters) -> Face {
 mod tests {
     use super::*;
     use crate::episode::Collision;
-    use crate::model::vocabulary::Body;
-    use crate::model::vocabulary::Verb;
+    use crate::model::vocabulary::{Body, Verb};
 
     fn collision(x_m: f64, y_m: f64, ego_speed_mps: f64, obstacle_left_mps: f64) -> Collision {
         let contact = Contact {

@@ -8,11 +8,8 @@
 //! it is plain who will be there first.
 
 use crate::ads::in_sight;
-use crate::geometry::OrientedBox;
-use crate::geometry::distance_m;
-use crate::sim::DT_S;
-use crate::sim::FRAME_TICKS;
-use crate::sim::World;
+use crate::geometry::{OrientedBox, distance_m};
+use crate::sim::{DT_S, FRAME_TICKS, World};
 
 /// By how much drivers wander in their lane, m.
 const WANDER_M: f64 = 0.375;

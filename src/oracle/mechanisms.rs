@@ -5,15 +5,11 @@
 //! it may well be elsewhere by then. A play that ends in another crash, or in which the obstacle never
 //! appears, is none in which the crash vanishes.
 
-use crate::ads::ModularConfig;
-use crate::ads::Weaknesses;
-use crate::episode::EpisodeLog;
-use crate::episode::Setup;
+use crate::ads::{ModularConfig, Weaknesses};
+use crate::episode::{EpisodeLog, Setup};
 
-use super::cause::Inquiry;
-use super::cause::NoModules;
-use super::crash::Crash;
-use super::crash::Fate;
+use super::cause::{Inquiry, NoModules};
+use super::crash::{Crash, Fate};
 use super::variation::wilson;
 
 /// A crash with one documented weakness switched off.

@@ -5,8 +5,7 @@
 
 use crate::episode::Collision;
 use crate::geometry::Vec2;
-use crate::sim::VehicleParameters;
-use crate::sim::body_mass_t;
+use crate::sim::{VehicleParameters, body_mass_t};
 
 use super::facts::side;
 
@@ -64,8 +63,7 @@ fn approach(velocity_mps: Vec2) -> &'static str {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::vocabulary::Body;
-    use crate::model::vocabulary::Verb;
+    use crate::model::vocabulary::{Body, Verb};
     use crate::sim::Contact;
 
     #[test]

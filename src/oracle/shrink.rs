@@ -10,28 +10,14 @@
 
 use std::sync::Arc;
 
-use crate::action::ActionTable;
-use crate::action::Draw;
+use crate::action::{ActionTable, Draw};
 use crate::episode;
-use crate::episode::Choice;
-use crate::episode::Collision;
-use crate::episode::EpisodeLog;
-use crate::episode::Moment;
-use crate::episode::Outcome;
-use crate::episode::Script;
-use crate::episode::ScriptedAction;
-use crate::episode::Setup;
-use crate::model::Avoidability;
-use crate::model::Domain;
-use crate::model::Memory;
-use crate::model::Value;
-use crate::model::vocabulary::Body;
-use crate::model::vocabulary::Verb;
+use crate::episode::{Choice, Collision, EpisodeLog, Moment, Outcome, Script, ScriptedAction, Setup};
+use crate::model::vocabulary::{Body, Verb};
+use crate::model::{Avoidability, Domain, Memory, Value};
 use crate::sim::Start;
 
-use super::avoidable::AvoidabilitySettings;
-use super::avoidable::Judgement;
-use super::avoidable::judge;
+use super::avoidable::{AvoidabilitySettings, Judgement, judge};
 use super::facts::facts;
 
 /// Rounds of all passes, at most: each makes something smaller or plainer, and most need two.

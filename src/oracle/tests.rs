@@ -2,32 +2,15 @@
 
 use std::sync::Arc;
 
-use crate::action::Effect;
-use crate::action::SpawnRequest;
+use crate::action::{Effect, SpawnRequest};
 use crate::ads;
-use crate::ads::Ads;
-use crate::ads::Status;
+use crate::ads::{Ads, Status};
 use crate::model::Avoidability;
-use crate::model::vocabulary::Body;
-use crate::model::vocabulary::Colour;
-use crate::model::vocabulary::LaneChoice;
-use crate::model::vocabulary::Level;
-use crate::model::vocabulary::Side;
-use crate::model::vocabulary::Then;
-use crate::model::vocabulary::TimeOfDay;
-use crate::model::vocabulary::Verb;
-use crate::road::RoadMap;
-use crate::road::Route;
-use crate::sim::Control;
-use crate::sim::DT_S;
-use crate::sim::Scene;
-use crate::sim::Sensed;
-use crate::sim::Start;
-use crate::sim::World;
+use crate::model::vocabulary::{Body, Colour, LaneChoice, Level, Side, Then, TimeOfDay, Verb};
+use crate::road::{RoadMap, Route};
+use crate::sim::{Control, DT_S, Scene, Sensed, Start, World};
 
-use super::avoidable::AvoidabilitySettings;
-use super::avoidable::Judgement;
-use super::avoidable::judge_one;
+use super::avoidable::{AvoidabilitySettings, Judgement, judge_one};
 use super::hazard::onset;
 
 /// A lane each way along +x for 800 m, 3 m wide: too narrow to pass anybody in it.

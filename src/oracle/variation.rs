@@ -9,22 +9,15 @@
 
 use std::sync::Arc;
 
-use crate::ads::Foresight;
-use crate::ads::Selected;
-use crate::episode::Choice;
-use crate::episode::EpisodeLog;
-use crate::episode::Moment;
-use crate::episode::Setup;
-use crate::model::Type;
-use crate::model::Value;
+use crate::ads::{Foresight, Selected};
+use crate::episode::{Choice, EpisodeLog, Moment, Setup};
+use crate::model::{Type, Value};
 use crate::rng;
-use crate::rng::Rng;
-use crate::rng::Stream;
+use crate::rng::{Rng, Stream};
 use crate::sim::DT_S;
 use crate::units::Dimension;
 
-use super::crash::Crash;
-use super::crash::play;
+use super::crash::{Crash, play};
 
 /// Standard deviation of times, s.
 const TIME_S: f64 = 0.1;

@@ -1,13 +1,8 @@
 //! The claims of an emitted scenario against what a replay finds.
 
 use crate::ads::Module;
-use crate::episode::Collision;
-use crate::episode::EpisodeLog;
-use crate::episode::Outcome;
-use crate::model::Claim;
-use crate::model::Scenario;
-use crate::model::Space;
-use crate::model::digest_text;
+use crate::episode::{Collision, EpisodeLog, Outcome};
+use crate::model::{Claim, Scenario, Space, digest_text};
 
 use super::avoidable::Judgement;
 use super::cause::NoModules;

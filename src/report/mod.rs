@@ -6,8 +6,7 @@ mod road;
 mod study;
 mod trials;
 
-pub use picture::Snapshot;
-pub use picture::picture;
+pub use picture::{Snapshot, picture};
 pub use road::draw;
 pub use study::study;
 pub use trials::trials;

@@ -7,25 +7,13 @@
 
 use std::fmt::Write;
 
-use crate::ads::PerceivedObject;
-use crate::ads::Status;
-use crate::geometry::OrientedBox;
-use crate::geometry::Pose;
-use crate::geometry::Vec2;
-use crate::model::vocabulary::Body;
-use crate::model::vocabulary::Colour;
-use crate::model::vocabulary::Phenomenon;
-use crate::model::vocabulary::Word;
+use crate::ads::{PerceivedObject, Status};
+use crate::geometry::{OrientedBox, Pose, Vec2};
+use crate::model::vocabulary::{Body, Colour, Phenomenon, Word};
 use crate::road::Lane;
-use crate::sim::Obstacle;
-use crate::sim::SignalColour;
-use crate::sim::World;
+use crate::sim::{Obstacle, SignalColour, World};
 
-use super::canvas::Canvas;
-use super::canvas::across;
-use super::canvas::escape;
-use super::canvas::lane_edge;
-use super::canvas::lane_outline;
+use super::canvas::{Canvas, across, escape, lane_edge, lane_outline};
 
 /// Edge of a panel, px.
 const PANEL_PX: f64 = 480.0;

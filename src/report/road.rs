@@ -6,20 +6,10 @@
 
 use std::fmt::Write;
 
-use crate::geometry::Path;
-use crate::geometry::Vec2;
-use crate::road::Junction;
-use crate::road::Lane;
-use crate::road::LaneIndex;
-use crate::road::Neighbour;
-use crate::road::RoadMap;
-use crate::road::Route;
+use crate::geometry::{Path, Vec2};
+use crate::road::{Junction, Lane, LaneIndex, Neighbour, RoadMap, Route};
 
-use super::canvas::Canvas;
-use super::canvas::across;
-use super::canvas::escape;
-use super::canvas::lane_edge;
-use super::canvas::lane_outline;
+use super::canvas::{Canvas, across, escape, lane_edge, lane_outline};
 
 /// The longer edge of the picture, px.
 const LONGER_PX: f64 = 1600.0;

@@ -1,12 +1,7 @@
 //! The result of a study as tables for people. Everything else that it holds is in `results.json`.
 
-use crate::study::AgentResults;
-use crate::study::Comparison;
-use crate::study::Rate;
-use crate::study::RoadResults;
-use crate::study::StudyResults;
-use crate::study::statistics::Estimate;
-use crate::study::statistics::Interval;
+use crate::study::statistics::{Estimate, Interval};
+use crate::study::{AgentResults, Comparison, Rate, RoadResults, StudyResults};
 
 /// Measures by which comparisons are printed.
 const PRINTED_COMPARISONS: [&str; 2] = ["counted", "distinct"];

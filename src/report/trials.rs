@@ -1,8 +1,6 @@
 //! What became of every row on every road, as text.
 
-use crate::study::Cell;
-use crate::study::Count;
-use crate::study::TrialOutcome;
+use crate::study::{Cell, Count, TrialOutcome};
 
 /// One line a row, and under it one for each road. `cells` are by row, then by road.
 pub fn trials(cells: &[&Cell]) -> String {

@@ -9,9 +9,7 @@
 use crate::geometry::wrap_angle;
 
 use super::lane_change::Stretch;
-use super::map::LaneIndex;
-use super::map::RoadMap;
-use super::map::Side;
+use super::map::{LaneIndex, RoadMap, Side};
 
 /// Lanes are parallel if their headings, or one and the reverse of the other, are this near, rad.
 const PARALLEL_RAD: f64 = 0.35;

@@ -1,11 +1,8 @@
 //! Centre lines of lanes: the exact offset curve of a reference line, sampled.
 
-use crate::geometry::Path;
-use crate::geometry::Vec2;
-use crate::geometry::wrap_angle;
+use crate::geometry::{Path, Vec2, wrap_angle};
 
-use super::opendrive::RoadElement;
-use super::opendrive::SectionElement;
+use super::opendrive::{RoadElement, SectionElement};
 
 /// Chords stay this near to the curve, m; half of what the rest may rely on.
 const CHORD_ERROR_M: f64 = 5e-4;

@@ -1,14 +1,9 @@
 //! Where other lanes cross or join a route inside junctions, and where it meets crosswalks.
 
-use crate::geometry::Path;
-use crate::geometry::PathPoint;
-use crate::geometry::Vec2;
-use crate::geometry::wrap_angle;
+use crate::geometry::{Path, PathPoint, Vec2, wrap_angle};
 
-use super::map::LaneIndex;
-use super::map::RoadMap;
-use super::route::Conflict;
-use super::route::RouteLane;
+use super::map::{LaneIndex, RoadMap};
+use super::route::{Conflict, RouteLane};
 
 /// A lane that joins the route does so where the centre lines have come this near, m.
 const MERGE_M: f64 = 1.5;

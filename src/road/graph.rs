@@ -2,29 +2,14 @@
 
 use std::collections::BTreeMap;
 
-use crate::geometry::Path;
-use crate::geometry::wrap_angle;
+use crate::geometry::{Path, wrap_angle};
 
-use super::centre_line::CentreLine;
-use super::centre_line::NoCentreLine;
-use super::centre_line::centre_line;
+use super::centre_line::{CentreLine, NoCentreLine, centre_line};
 use super::index::LaneGrid;
 use super::lane_change::permitted;
-use super::map::Junction;
-use super::map::Lane;
-use super::map::LaneIndex;
-use super::map::LaneKey;
-use super::map::Neighbour;
-use super::map::RoadError;
-use super::map::RoadMap;
-use super::map::Turn;
-use super::opendrive::Contact;
-use super::opendrive::Document;
-use super::opendrive::RoadElement;
-use super::opendrive::RoadLink;
-use super::opendrive::SectionElement;
-use super::signals::add_crosswalks;
-use super::signals::add_signals;
+use super::map::{Junction, Lane, LaneIndex, LaneKey, Neighbour, RoadError, RoadMap, Turn};
+use super::opendrive::{Contact, Document, RoadElement, RoadLink, SectionElement};
+use super::signals::{add_crosswalks, add_signals};
 
 /// Where a file states no limit: 50 km/h, the usual one in towns.
 const LIMIT_MPS_DEFAULT: f64 = 50.0 / 3.6;

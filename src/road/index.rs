@@ -2,13 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use crate::geometry::Path;
-use crate::geometry::Pose;
-use crate::geometry::Projection;
-use crate::geometry::Vec2;
+use crate::geometry::{Path, Pose, Projection, Vec2};
 
-use super::map::Lane;
-use super::map::LaneIndex;
+use super::map::{Lane, LaneIndex};
 
 /// Side of a cell, m.
 const CELL_M: f64 = 8.0;

@@ -1,16 +1,11 @@
 //! From the moves of a way to one path, with the place of each lane and each lane change on it.
 
-use crate::geometry::Path;
-use crate::geometry::Vec2;
+use crate::geometry::{Path, Vec2};
 
-use super::lane_change::Place;
-use super::lane_change::Stretch;
-use super::map::LanePlace;
-use super::map::RoadMap;
-use super::route::RouteLane;
-use super::route::RouteLaneChange;
-use super::search::Change;
-use super::search::Move;
+use super::lane_change::{Place, Stretch};
+use super::map::{LanePlace, RoadMap};
+use super::route::{RouteLane, RouteLaneChange};
+use super::search::{Change, Move};
 
 /// Lanes are joined over this length, m: a millimetre between the end of one and the beginning of the
 /// next would otherwise become a segment across the road.

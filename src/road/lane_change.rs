@@ -3,19 +3,10 @@
 //! The lateral motion is a smooth step in the station: no lateral speed, acceleration or jump of curvature
 //! at its ends (as in Apollo's and most planners' lane changes). Traffic is nobody's business here.
 
-use crate::geometry::Pose;
-use crate::geometry::SMOOTH_STEP_BEND_MAX;
-use crate::geometry::Vec2;
-use crate::geometry::smooth_step;
-use crate::geometry::wrap_angle;
+use crate::geometry::{Pose, SMOOTH_STEP_BEND_MAX, Vec2, smooth_step, wrap_angle};
 
-use super::map::Lane;
-use super::map::LaneIndex;
-use super::map::RoadMap;
-use super::map::Side;
-use super::opendrive::MarkRule;
-use super::opendrive::RoadElement;
-use super::opendrive::SectionElement;
+use super::map::{Lane, LaneIndex, RoadMap, Side};
+use super::opendrive::{MarkRule, RoadElement, SectionElement};
 
 /// A lane narrower than this cannot be driven in yet, m: bays open from nothing.
 const WIDTH_M_MIN: f64 = 2.0;

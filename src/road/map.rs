@@ -2,13 +2,10 @@
 
 use std::collections::BTreeSet;
 
-use crate::geometry::Path;
-use crate::geometry::Vec2;
-use crate::geometry::wrap_angle;
+use crate::geometry::{Path, Vec2, wrap_angle};
 
-use super::graph;
 use super::index::LaneGrid;
-use super::opendrive;
+use super::{graph, opendrive};
 
 /// Index of a lane in [`RoadMap::lanes`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]

@@ -17,26 +17,10 @@ mod signals;
 #[cfg(test)]
 mod tests;
 
-pub use abreast::Connection;
-pub use abreast::Opposing;
+pub use abreast::{Connection, Opposing};
 pub use lane_change::STRIP_M_MAX;
-pub use map::Crosswalk;
-pub use map::Junction;
-pub use map::Lane;
-pub use map::LaneIndex;
-pub use map::LaneKey;
-pub use map::LanePlace;
-pub use map::Neighbour;
-pub use map::RoadError;
-pub use map::RoadMap;
-pub use map::Side;
-pub use map::Sign;
-pub use map::SignKind;
-pub use map::Signal;
-pub use map::StopLine;
-pub use map::Turn;
-pub use route::Conflict;
-pub use route::Route;
-pub use route::RouteLane;
-pub use route::RouteLaneChange;
-pub use route::RouteStopLine;
+pub use map::{
+    Crosswalk, Junction, Lane, LaneIndex, LaneKey, LanePlace, Neighbour, RoadError, RoadMap, Side, Sign,
+    SignKind, Signal, StopLine, Turn,
+};
+pub use route::{Conflict, Route, RouteLane, RouteLaneChange, RouteStopLine};

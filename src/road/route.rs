@@ -2,20 +2,13 @@
 
 use std::collections::BTreeSet;
 
-use crate::geometry::Path;
-use crate::geometry::smooth_step;
-use crate::geometry::wrap_angle;
+use crate::geometry::{Path, smooth_step, wrap_angle};
 
-use super::conflict::conflicts;
-use super::conflict::spans_inside;
+use super::conflict::{conflicts, spans_inside};
 use super::join::Joined;
 use super::lane_change::LENGTH_M_MIN;
-use super::map::LaneIndex;
-use super::map::LanePlace;
-use super::map::RoadError;
-use super::map::RoadMap;
-use super::search::Move;
-use super::search::cheapest_way;
+use super::map::{LaneIndex, LanePlace, RoadError, RoadMap};
+use super::search::{Move, cheapest_way};
 
 /// A way from a start to a goal along lane centres and from lane to lane.
 #[derive(Debug, Clone)]

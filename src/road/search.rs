@@ -4,16 +4,10 @@
 //! a lane change into it.
 
 use std::cmp::Reverse;
-use std::collections::BTreeMap;
-use std::collections::BinaryHeap;
+use std::collections::{BTreeMap, BinaryHeap};
 
-use super::lane_change::LENGTH_M_MIN;
-use super::lane_change::Stretch;
-use super::lane_change::comfortable_length_m;
-use super::map::LaneIndex;
-use super::map::LanePlace;
-use super::map::RoadMap;
-use super::map::Side;
+use super::lane_change::{LENGTH_M_MIN, Stretch, comfortable_length_m};
+use super::map::{LaneIndex, LanePlace, RoadMap, Side};
 
 /// What a lane change costs beside its length, m of detour. Ours: drivers take a block's detour rather
 /// than cut through traffic, but no more.

@@ -2,24 +2,11 @@
 
 use std::collections::BTreeMap;
 
-use crate::geometry::Pose;
-use crate::geometry::Vec2;
+use crate::geometry::{Pose, Vec2};
 
-use super::graph::Builder;
-use super::graph::wrong;
-use super::map::Crosswalk;
-use super::map::LaneIndex;
-use super::map::RoadError;
-use super::map::Sign;
-use super::map::SignKind;
-use super::map::Signal;
-use super::map::StopLine;
-use super::opendrive::Meaning;
-use super::opendrive::Orientation;
-use super::opendrive::Outline;
-use super::opendrive::RoadElement;
-use super::opendrive::RoadLink;
-use super::opendrive::SignalElement;
+use super::graph::{Builder, wrong};
+use super::map::{Crosswalk, LaneIndex, RoadError, Sign, SignKind, Signal, StopLine};
+use super::opendrive::{Meaning, Orientation, Outline, RoadElement, RoadLink, SignalElement};
 
 /// Heads of one group nearer than this share a stop line, m.
 const SHARED_LINE_M: f64 = 1.0;

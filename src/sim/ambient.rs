@@ -9,23 +9,15 @@
 //! neither towards the ten obstacles of the published package nor among `npc#1`, `npc#2`, …: their
 //! ids begin above [`COMMANDED_MAX`].
 
-use crate::geometry::OrientedBox;
-use crate::geometry::distance_m;
+use crate::geometry::{OrientedBox, distance_m};
 use crate::model::AMBIENT_MAX;
-use crate::model::vocabulary::Body;
-use crate::model::vocabulary::Colour;
-use crate::model::vocabulary::Verb;
-use crate::model::vocabulary::Word;
+use crate::model::vocabulary::{Body, Colour, Verb, Word};
 use crate::rng;
-use crate::rng::Rng;
-use crate::rng::Stream;
+use crate::rng::{Rng, Stream};
 
 use super::body;
-use super::mover::Around;
-use super::mover::Motion;
-use super::mover::Mover;
-use super::npc::Cruise;
-use super::npc::Driver;
+use super::mover::{Around, Motion, Mover};
+use super::npc::{Cruise, Driver};
 use super::placement::Placed;
 use super::sense::RANGE_M;
 use super::way::Way;

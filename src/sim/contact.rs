@@ -4,13 +4,10 @@
 //! and acts along the ego vehicle's heading alone: enough for what follows a first contact, and no
 //! claim about damage. Contacts among obstacles are `world`'s (`Incident`).
 
-use crate::geometry::Sweep;
-use crate::geometry::Vec2;
-use crate::geometry::first_contact;
+use crate::geometry::{Sweep, Vec2, first_contact};
 
 use super::ego::VehicleParameters;
-use super::world::Contact;
-use super::world::DT_S;
+use super::world::{Contact, DT_S};
 
 /// One party of a possible contact during one tick.
 #[derive(Debug, Clone, Copy)]

@@ -5,10 +5,7 @@
 //! ours, from the published range of 0.1 to 0.3 s. No reverse gear, no load transfer, no tyre slip
 //! angles: what the tyres cannot give is cut off instead.
 
-use crate::geometry::OrientedBox;
-use crate::geometry::Pose;
-use crate::geometry::unit_vector;
-use crate::geometry::wrap_angle;
+use crate::geometry::{OrientedBox, Pose, unit_vector, wrap_angle};
 
 use super::environment::GRAVITY_MPS2;
 use super::sense::EgoMotion;

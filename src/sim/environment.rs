@@ -22,9 +22,7 @@
 //! Left out: temperature, ice, wind, spray, drifting fog, glare, puddles that lie in places: the water
 //! is the same everywhere.
 
-use crate::model::vocabulary::Level;
-use crate::model::vocabulary::Phenomenon;
-use crate::model::vocabulary::TimeOfDay;
+use crate::model::vocabulary::{Level, Phenomenon, TimeOfDay};
 
 use super::sense::Conditions;
 
@@ -210,10 +208,7 @@ mod tests {
 
     #[test]
     fn rain_wets_and_a_road_dries() {
-        use Level::High;
-        use Level::Light;
-        use Level::Moderate;
-        use Level::None;
+        use Level::{High, Light, Moderate, None};
         // Rain alone fills the road in minutes, up to puddles.
         let mut downpour = noon([None; 3]);
         downpour.set(Phenomenon::Rain, High);

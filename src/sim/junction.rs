@@ -6,13 +6,8 @@
 //! conflict: who is on them follows the one ahead. Stop and yield signs of a map are not obeyed, so nobody
 //! has a priority road; where signals differ, they decide before any of this.
 
-use crate::geometry::Path;
-use crate::geometry::PathPoint;
-use crate::geometry::Vec2;
-use crate::geometry::wrap_angle;
-use crate::road::LaneIndex;
-use crate::road::RoadMap;
-use crate::road::Turn;
+use crate::geometry::{Path, PathPoint, Vec2, wrap_angle};
+use crate::road::{LaneIndex, RoadMap, Turn};
 
 /// Centre lines nearer than this are in conflict, m: two of the widest bodies (2.44 m) and 0.36 m of
 /// air.

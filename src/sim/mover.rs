@@ -1,20 +1,16 @@
 //! What moves an obstacle: a driver, two legs, or nothing. And what everybody may look at while
 //! deciding how.
 
-use crate::geometry::OrientedBox;
-use crate::geometry::Pose;
-use crate::geometry::Vec2;
+use crate::geometry::{OrientedBox, Pose, Vec2};
 
 use super::body::BodyParameters;
-use super::environment::GRAVITY_MPS2;
-use super::environment::Grip;
+use super::environment::{GRAVITY_MPS2, Grip};
 use super::npc::Driver;
 use super::pedestrian::Walker;
 use super::scene::Scene;
 use super::sense::EgoMotion;
 use super::signals::SignalClock;
-use super::world::DT_S;
-use super::world::Obstacle;
+use super::world::{DT_S, Obstacle};
 
 /// How long somebody who touched anybody stays where they came to rest, s.
 const WRECK_S: f64 = 2.0;

@@ -14,18 +14,13 @@
 //! walks into the side of a vehicle: they wait before it, pass each other on the right, and leave after
 //! 10 s without a way on. One who is hit stops (see `mover`).
 
-use crate::geometry::OrientedBox;
-use crate::geometry::Pose;
-use crate::geometry::Vec2;
-use crate::geometry::distance_m;
+use crate::geometry::{OrientedBox, Pose, Vec2, distance_m};
 use crate::rng;
 use crate::rng::Rng;
 
-use super::mover::Around;
-use super::mover::Moved;
+use super::mover::{Around, Moved};
 use super::sense::FRAME_TICKS;
-use super::world::DT_S;
-use super::world::Obstacle;
+use super::world::{DT_S, Obstacle};
 
 /// At the kerb before setting out, s (published package).
 const WAIT_S: f64 = 1.0;

@@ -2,9 +2,7 @@
 
 use std::sync::Arc;
 
-use crate::road::LaneIndex;
-use crate::road::RoadMap;
-use crate::road::Route;
+use crate::road::{LaneIndex, RoadMap, Route};
 
 use super::junction::ConflictAreas;
 use super::way::Ways;

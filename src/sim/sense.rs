@@ -4,10 +4,7 @@
 //! This is the physical side of sensing (line of sight, light, weather). What a driving system makes
 //! of it, with its errors and delays, is `ads`.
 
-use crate::geometry::Frame;
-use crate::geometry::OrientedBox;
-use crate::geometry::Pose;
-use crate::geometry::Vec2;
+use crate::geometry::{Frame, OrientedBox, Pose, Vec2};
 use crate::model::vocabulary::Body;
 
 use super::world::Obstacle;
@@ -161,8 +158,7 @@ fn silhouette(eye: Vec2, towards: Vec2, outline: &OrientedBox) -> (Vec2, Vec2) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::vocabulary::Colour;
-    use crate::model::vocabulary::Verb;
+    use crate::model::vocabulary::{Colour, Verb};
 
     fn obstacle(id: u32, body: Body, x_m: f64, y_m: f64) -> Obstacle {
         let size = crate::sim::body::parameters(body);

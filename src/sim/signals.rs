@@ -67,9 +67,7 @@ mod tests {
             let tick = (time_s / DT_S + 0.5) as u64;
             [clock.colour(&map, 0, tick), clock.colour(&map, 1, tick)]
         };
-        use SignalColour::Green;
-        use SignalColour::Red;
-        use SignalColour::Yellow;
+        use SignalColour::{Green, Red, Yellow};
         for (time_s, expected) in [
             (0.0, [Green, Red]),
             (11.98, [Green, Red]),

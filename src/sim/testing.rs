@@ -3,14 +3,11 @@
 use std::sync::Arc;
 
 use crate::geometry::Vec2;
-use crate::model::vocabulary::Level;
-use crate::model::vocabulary::TimeOfDay;
-use crate::road::RoadMap;
-use crate::road::Route;
+use crate::model::vocabulary::{Level, TimeOfDay};
+use crate::road::{RoadMap, Route};
 
 use super::scene::Scene;
-use super::world::Start;
-use super::world::World;
+use super::world::{Start, World};
 
 /// Two lanes each way along +x for 600 m, 3.5 m wide.
 const STRAIGHT: &str = r#"<OpenDRIVE><header name="straight"/>

@@ -4,31 +4,12 @@ use std::sync::Arc;
 
 use proptest::prelude::*;
 
-use super::Contact;
-use super::Control;
-use super::DT_S;
-use super::Incident;
-use super::Obstacle;
-use super::Scene;
-use super::Start;
-use super::VehicleParameters;
-use super::World;
-use super::pedals_for;
-use super::testing;
-use crate::action::Effect;
-use crate::action::SpawnRequest;
-use crate::action::Surroundings;
-use crate::geometry::distance_m;
-use crate::geometry::wrap_angle;
-use crate::model::vocabulary::Body;
-use crate::model::vocabulary::Colour;
-use crate::model::vocabulary::LaneChoice;
-use crate::model::vocabulary::Level;
-use crate::model::vocabulary::Phenomenon;
-use crate::model::vocabulary::Side;
-use crate::model::vocabulary::Then;
-use crate::model::vocabulary::Verb;
-use crate::model::vocabulary::Word;
+use super::{
+    Contact, Control, DT_S, Incident, Obstacle, Scene, Start, VehicleParameters, World, pedals_for, testing,
+};
+use crate::action::{Effect, SpawnRequest, Surroundings};
+use crate::geometry::{distance_m, wrap_angle};
+use crate::model::vocabulary::{Body, Colour, LaneChoice, Level, Phenomenon, Side, Then, Verb, Word};
 
 fn request(verb: Verb, distance_m: f64, speed_mps: f64) -> SpawnRequest {
     let on_foot = matches!(verb, Verb::Walk | Verb::Stand);

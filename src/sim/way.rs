@@ -2,16 +2,12 @@
 //! that its bends allow. Made once and shared; a world's snapshot copies none of it.
 
 use std::collections::BTreeMap;
-use std::sync::Arc;
-use std::sync::Mutex;
-use std::sync::PoisonError;
+use std::sync::{Arc, Mutex, PoisonError};
 
-use crate::geometry::Path;
-use crate::geometry::Vec2;
+use crate::geometry::{Path, Vec2};
 use crate::rng;
 use crate::rng::Rng;
-use crate::road::LaneIndex;
-use crate::road::RouteStopLine;
+use crate::road::{LaneIndex, RouteStopLine};
 
 use super::junction::Area;
 use super::scene::Scene;

@@ -4,48 +4,20 @@ mod playback;
 
 use std::sync::Arc;
 
-use crate::action::Effect;
-use crate::action::SpawnFacts;
-use crate::action::SpawnRequest;
-use crate::action::Surroundings;
-use crate::geometry::FirstContact;
-use crate::geometry::Frame;
-use crate::geometry::OrientedBox;
-use crate::geometry::Pose;
-use crate::geometry::Sweep;
-use crate::geometry::Vec2;
-use crate::geometry::first_contact;
-use crate::geometry::wrap_angle;
-use crate::model::vocabulary::Body;
-use crate::model::vocabulary::Colour;
-use crate::model::vocabulary::Level;
-use crate::model::vocabulary::TimeOfDay;
-use crate::model::vocabulary::Verb;
+use crate::action::{Effect, SpawnFacts, SpawnRequest, Surroundings};
+use crate::geometry::{FirstContact, Frame, OrientedBox, Pose, Sweep, Vec2, first_contact, wrap_angle};
+use crate::model::vocabulary::{Body, Colour, Level, TimeOfDay, Verb};
 
-use super::ambient::Ambient;
-use super::ambient::COMMANDED_MAX;
-use super::ambient::RENEWAL_TICKS;
-use super::ambient::is_gone;
-use super::contact::Party;
-use super::contact::common_speed_mps;
-use super::contact::meet;
-use super::ego::Control;
-use super::ego::Ego;
-use super::ego::VehicleParameters;
+use super::ambient::{Ambient, COMMANDED_MAX, RENEWAL_TICKS, is_gone};
+use super::contact::{Party, common_speed_mps, meet};
+use super::ego::{Control, Ego, VehicleParameters};
 use super::environment::Environment;
-use super::mover::Around;
-use super::mover::Moved;
-use super::mover::Mover;
+use super::mover::{Around, Moved, Mover};
 use super::placement;
 use super::scene::Scene;
-use super::sense::Conditions;
-use super::sense::EgoMotion;
-use super::sense::FRAME_TICKS;
-use super::sense::RANGE_M;
-use super::sense::Sensed;
-use super::sense::SensedObject;
-use super::sense::SignalColour;
-use super::sense::visible_fraction;
+use super::sense::{
+    Conditions, EgoMotion, FRAME_TICKS, RANGE_M, Sensed, SensedObject, SignalColour, visible_fraction,
+};
 use super::signals::SignalClock;
 
 /// Name of this simulated world. Raised whenever the same seed no longer gives the same episode, so
@@ -589,9 +561,7 @@ impl Surroundings for World {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::vocabulary::LaneChoice;
-    use crate::model::vocabulary::Side;
-    use crate::model::vocabulary::Then;
+    use crate::model::vocabulary::{LaneChoice, Side, Then};
     use crate::sim::testing;
 
     #[test]

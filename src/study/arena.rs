@@ -5,18 +5,12 @@ use std::sync::Arc;
 
 use ndarray::Array1;
 
-use crate::action::ActionTable;
-use crate::action::ActiveRules;
-use crate::action::Offer;
-use crate::action::Situation;
+use crate::action::{ActionTable, ActiveRules, Offer, Situation};
 use crate::ads;
 use crate::ads::Selected;
-use crate::agent::Agent;
-use crate::agent::Branch;
-use crate::agent::Trial;
+use crate::agent::{Agent, Branch, Trial};
 use crate::episode;
-use crate::episode::Choice;
-use crate::episode::Moment;
+use crate::episode::{Choice, Moment};
 use crate::mdp::ProcKind;
 use crate::model::Road;
 use crate::oracle::AvoidabilitySettings;

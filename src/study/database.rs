@@ -2,25 +2,20 @@
 //!
 //! Each episode is one transaction, so a kill at any moment loses at most the episode under way.
 
-use std::collections::BTreeMap;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
-use rusqlite::Connection;
-use rusqlite::Transaction;
-use rusqlite::params;
+use rusqlite::{Connection, Transaction, params};
 
 use crate::action::Draw;
 use crate::ads::Module;
-use crate::episode::EpisodeLog;
-use crate::episode::Outcome;
+use crate::episode::{EpisodeLog, Outcome};
 use crate::mdp::STATE_NAMES;
 use crate::model::vocabulary::Word;
 use crate::oracle;
 
 use super::shape::Shape;
-use super::summary::EpisodeSummary;
-use super::summary::Finding;
+use super::summary::{EpisodeSummary, Finding};
 
 /// Layout of the tables; raised whenever a column changes.
 const SCHEMA_VERSION: i64 = 4;

@@ -6,11 +6,9 @@
 
 use std::collections::BTreeMap;
 
-use crate::model::vocabulary::Body;
-use crate::model::vocabulary::Word;
+use crate::model::vocabulary::{Body, Word};
 
-use super::database::Database;
-use super::database::DatabaseError;
+use super::database::{Database, DatabaseError};
 
 /// Counted collisions that are alike.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]

@@ -2,15 +2,10 @@
 //! played.
 
 use crate::episode::EpisodeLog;
-use crate::mdp::Criticality;
-use crate::mdp::Encroachment;
-use crate::sim::Contact;
-use crate::sim::DT_S;
-use crate::sim::Scene;
-use crate::sim::World;
+use crate::mdp::{Criticality, Encroachment};
+use crate::sim::{Contact, DT_S, Scene, World};
 
-use super::shape::Shape;
-use super::shape::Trail;
+use super::shape::{Shape, Trail};
 
 /// Half the width of a lane marking of 12 cm, m: a wheel on the line has not left the lane. Ours.
 const ON_THE_LINE_M: f64 = 0.06;

@@ -1,12 +1,9 @@
 //! Profiles of driving systems as runs and scenarios record them.
 
-use crate::ads::ModularConfig;
-use crate::ads::Selected;
-use crate::model::Policy;
-use crate::model::Scenario;
+use crate::ads::{ModularConfig, Selected};
+use crate::model::{Policy, Scenario};
 
-use super::arena::DEFAULT_ADS;
-use super::arena::driving_system;
+use super::arena::{DEFAULT_ADS, driving_system};
 use super::run::RunError;
 
 /// Settings of a driving system, and a digest that tells whether they still mean the same.

@@ -3,44 +3,26 @@
 //! Episodes are independent of each other and of the number of workers; each has its own seed,
 //! derived from the run's.
 
-use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
-use std::sync::atomic::AtomicUsize;
-use std::sync::atomic::Ordering;
-use std::sync::mpsc;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::{Arc, mpsc};
 
-use crate::action::ActionTable;
-use crate::action::ActiveRules;
+use crate::action::{ActionTable, ActiveRules};
 use crate::ads;
-use crate::ads::ModularConfig;
-use crate::ads::Selected;
+use crate::ads::{ModularConfig, Selected};
 use crate::agent;
-use crate::agent::Agent;
-use crate::agent::Kind;
-use crate::agent::QPolicy;
+use crate::agent::{Agent, Kind, QPolicy};
 use crate::episode;
-use crate::episode::Choice;
-use crate::episode::EpisodeLog;
-use crate::episode::Moment;
-use crate::episode::Script;
-use crate::episode::Watch;
+use crate::episode::{Choice, EpisodeLog, Moment, Script, Watch};
 use crate::mdp::ProcKind;
-use crate::model::Scenario;
-use crate::model::Space;
+use crate::model::{Scenario, Space};
 use crate::oracle;
-use crate::oracle::AvoidabilitySettings;
-use crate::oracle::ClaimResult;
-use crate::oracle::Judgement;
-use crate::oracle::Replays;
+use crate::oracle::{AvoidabilitySettings, ClaimResult, Judgement, Replays};
 use crate::rng;
 use crate::rng::Stream;
-use crate::sim::ENGINE;
-use crate::sim::Scene;
-use crate::sim::Start;
+use crate::sim::{ENGINE, Scene, Start};
 use crate::syntax::listed;
 
-use super::arena::Arena;
-use super::arena::choose;
+use super::arena::{Arena, choose};
 use super::measures::Measures;
 use super::profile::Profile;
 use super::summary::EpisodeSummary;

@@ -6,12 +6,8 @@
 
 use std::collections::VecDeque;
 
-use crate::geometry::Pose;
-use crate::geometry::Vec2;
-use crate::geometry::unit_vector;
-use crate::geometry::wrap_angle;
-use crate::sim::DT_S;
-use crate::sim::World;
+use crate::geometry::{Pose, Vec2, unit_vector, wrap_angle};
+use crate::sim::{DT_S, World};
 
 /// How far back the way is looked at, s.
 const PAST_S: f64 = 5.0;

@@ -1,19 +1,12 @@
 //! What an episode amounts to: its collisions, each with the facts of its verdict.
 
-use crate::ads::ModularConfig;
-use crate::ads::Module;
+use crate::ads::{ModularConfig, Module};
 use crate::episode;
-use crate::episode::Collision;
-use crate::episode::EpisodeLog;
-use crate::episode::Script;
-use crate::episode::Setup;
+use crate::episode::{Collision, EpisodeLog, Script, Setup};
 use crate::mdp::Criticality;
-use crate::model::OutcomeFacts;
-use crate::model::Space;
+use crate::model::{OutcomeFacts, Space};
 use crate::oracle;
-use crate::oracle::AvoidabilitySettings;
-use crate::oracle::Judgement;
-use crate::oracle::NoModules;
+use crate::oracle::{AvoidabilitySettings, Judgement, NoModules};
 
 use super::measures::Manners;
 use super::shape::Shape;

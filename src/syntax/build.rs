@@ -7,48 +7,13 @@ use std::cell::Cell;
 
 use pest::iterators::Pair;
 
-use crate::syntax::Diagnostic;
-use crate::syntax::ast::Action;
-use crate::syntax::ast::ActionParam;
-use crate::syntax::ast::Block;
-use crate::syntax::ast::Case;
-use crate::syntax::ast::Clause;
-use crate::syntax::ast::ClauseKind;
-use crate::syntax::ast::Effect;
-use crate::syntax::ast::EffectKind;
-use crate::syntax::ast::Enum;
-use crate::syntax::ast::Expect;
-use crate::syntax::ast::Expr;
-use crate::syntax::ast::Field;
-use crate::syntax::ast::FileId;
-use crate::syntax::ast::Fn;
-use crate::syntax::ast::FnParam;
-use crate::syntax::ast::Group;
-use crate::syntax::ast::Initial;
-use crate::syntax::ast::ItemKind;
-use crate::syntax::ast::Let;
-use crate::syntax::ast::Move;
-use crate::syntax::ast::Name;
-use crate::syntax::ast::Number;
-use crate::syntax::ast::Odds;
-use crate::syntax::ast::ParamMode;
-use crate::syntax::ast::Place;
-use crate::syntax::ast::Policy;
-use crate::syntax::ast::PolicyLine;
-use crate::syntax::ast::Rule as NamedRule;
-use crate::syntax::ast::RuleBody;
-use crate::syntax::ast::Scenario;
-use crate::syntax::ast::Span;
-use crate::syntax::ast::State;
-use crate::syntax::ast::Step;
-use crate::syntax::ast::Text;
-use crate::syntax::ast::Type;
-use crate::syntax::ast::TypeKind;
-use crate::syntax::ast::Use;
-use crate::syntax::ast::Verdict;
-use crate::syntax::code;
-use crate::syntax::grammar::Rule;
-use crate::syntax::grammar::is_plain_terminal;
+use crate::syntax::ast::{
+    Action, ActionParam, Block, Case, Clause, ClauseKind, Effect, EffectKind, Enum, Expect, Expr, Field,
+    FileId, Fn, FnParam, Group, Initial, ItemKind, Let, Move, Name, Number, Odds, ParamMode, Place, Policy,
+    PolicyLine, Rule as NamedRule, RuleBody, Scenario, Span, State, Step, Text, Type, TypeKind, Use, Verdict,
+};
+use crate::syntax::grammar::{Rule, is_plain_terminal};
+use crate::syntax::{Diagnostic, code};
 
 /// A node, or the mistake that keeps its whole declaration out of the tree.
 pub type Built<T> = Result<T, Box<Diagnostic>>;

@@ -4,17 +4,10 @@
 //! are drawn. Codes are never reused or renumbered. When to stop and what to exit with is the
 //! caller's business.
 
-use annotate_snippets::Annotation;
-use annotate_snippets::AnnotationKind;
-use annotate_snippets::Group;
-use annotate_snippets::Level;
-use annotate_snippets::Origin;
-use annotate_snippets::Renderer;
-use annotate_snippets::Snippet;
+use annotate_snippets::{Annotation, AnnotationKind, Group, Level, Origin, Renderer, Snippet};
 use serde::Serialize;
 
-use crate::syntax::ast::FileId;
-use crate::syntax::ast::Span;
+use crate::syntax::ast::{FileId, Span};
 
 /// How bad it is. Errors stop a compilation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]

@@ -2,22 +2,10 @@
 
 use pest::iterators::Pair;
 
-use crate::syntax::DEPTH_MAX;
-use crate::syntax::Diagnostic;
-use crate::syntax::ast::Arg;
-use crate::syntax::ast::Arm;
-use crate::syntax::ast::BinaryOp;
-use crate::syntax::ast::Call;
-use crate::syntax::ast::Expr;
-use crate::syntax::ast::ExprKind;
-use crate::syntax::ast::Span;
-use crate::syntax::ast::Text;
-use crate::syntax::ast::UnaryOp;
-use crate::syntax::build::Builder;
-use crate::syntax::build::Built;
-use crate::syntax::build::Parts;
-use crate::syntax::code;
+use crate::syntax::ast::{Arg, Arm, BinaryOp, Call, Expr, ExprKind, Span, Text, UnaryOp};
+use crate::syntax::build::{Builder, Built, Parts};
 use crate::syntax::grammar::Rule;
+use crate::syntax::{DEPTH_MAX, Diagnostic, code};
 
 /// Binding strength of what is not a [`BinaryOp`]; see [`BinaryOp::precedence`].
 pub const NOT_PRECEDENCE: u8 = 8;

@@ -1,12 +1,9 @@
 //! One style for every file, without options, and never at the cost of what the file says.
 
-use crate::syntax::Diagnostic;
-use crate::syntax::ast::File;
-use crate::syntax::ast::FileId;
-use crate::syntax::parse;
+use crate::syntax::ast::{File, FileId};
 use crate::syntax::print::print_with;
-use crate::syntax::scan::Comment;
-use crate::syntax::scan::scan;
+use crate::syntax::scan::{Comment, scan};
+use crate::syntax::{Diagnostic, parse};
 
 /// Why a text was not formatted.
 #[derive(Debug, thiserror::Error)]

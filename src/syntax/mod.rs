@@ -16,33 +16,13 @@ mod print_expression;
 mod record;
 mod scan;
 
-pub use diagnostic::Diagnostic;
-pub use diagnostic::Edit;
-pub use diagnostic::Fix;
-pub use diagnostic::Label;
-pub use diagnostic::Severity;
-pub use diagnostic::Sources;
-pub use diagnostic::Style;
-pub use diagnostic::listed;
-pub use diagnostic::nearest;
-pub use diagnostic::render;
-pub use format::FormatError;
-pub use format::format;
-pub use format::same_meaning;
-pub use parse::DEPTH_MAX;
-pub use parse::LANGUAGE;
-pub use parse::parse;
-pub use print::print;
-pub use print::print_expr;
-pub use print::print_item;
-pub use record::DiagnosticRecord;
-pub use record::EditRecord;
-pub use record::FixRecord;
-pub use record::LabelRecord;
-pub use record::PlaceRecord;
-pub use record::SCHEMA;
-pub use record::apply_fixes;
-pub use record::record;
+pub use diagnostic::{Diagnostic, Edit, Fix, Label, Severity, Sources, Style, listed, nearest, render};
+pub use format::{FormatError, format, same_meaning};
+pub use parse::{DEPTH_MAX, LANGUAGE, parse};
+pub use print::{print, print_expr, print_item};
+pub use record::{
+    DiagnosticRecord, EditRecord, FixRecord, LabelRecord, PlaceRecord, SCHEMA, apply_fixes, record,
+};
 
 #[cfg(test)]
 mod tests;

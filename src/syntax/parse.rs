@@ -5,29 +5,15 @@
 //! is then read by itself for its own message. What could be read is in the tree all the same.
 
 use pest::Parser;
-use pest::error::ErrorVariant;
-use pest::error::InputLocation;
+use pest::error::{ErrorVariant, InputLocation};
 use pest::iterators::Pair;
 
-use crate::syntax::Diagnostic;
-use crate::syntax::ast::Doc;
-use crate::syntax::ast::File;
-use crate::syntax::ast::FileId;
-use crate::syntax::ast::Item;
-use crate::syntax::ast::ItemKind;
-use crate::syntax::ast::Span;
-use crate::syntax::build::Builder;
-use crate::syntax::build::end_of;
-use crate::syntax::code;
+use crate::syntax::ast::{Doc, File, FileId, Item, ItemKind, Span};
+use crate::syntax::build::{Builder, end_of};
 use crate::syntax::diagnostic::enumerated;
-use crate::syntax::grammar::AvaParser;
-use crate::syntax::grammar::Rule;
-use crate::syntax::grammar::continues_expression;
-use crate::syntax::grammar::words;
-use crate::syntax::nearest;
-use crate::syntax::scan::Comment;
-use crate::syntax::scan::Scan;
-use crate::syntax::scan::scan;
+use crate::syntax::grammar::{AvaParser, Rule, continues_expression, words};
+use crate::syntax::scan::{Comment, Scan, scan};
+use crate::syntax::{Diagnostic, code, nearest};
 
 /// Brackets and operators within one another, at most.
 pub const DEPTH_MAX: usize = 64;

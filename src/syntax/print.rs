@@ -5,44 +5,15 @@
 //! it, a comment at the end of its line stays there, and a comment in the middle of an entry moves
 //! before it. One blank line between entries is kept; more are not.
 
-use crate::syntax::ast::Action;
-use crate::syntax::ast::ActionParam;
-use crate::syntax::ast::ClauseKind;
-use crate::syntax::ast::Doc;
-use crate::syntax::ast::Effect;
-use crate::syntax::ast::EffectKind;
-use crate::syntax::ast::Expect;
-use crate::syntax::ast::Expr;
-use crate::syntax::ast::ExprKind;
-use crate::syntax::ast::Field;
-use crate::syntax::ast::File;
-use crate::syntax::ast::Initial;
-use crate::syntax::ast::Item;
-use crate::syntax::ast::ItemKind;
-use crate::syntax::ast::Name;
-use crate::syntax::ast::ParamMode;
-use crate::syntax::ast::Place;
-use crate::syntax::ast::Policy;
-use crate::syntax::ast::PolicyLine;
-use crate::syntax::ast::Rule;
-use crate::syntax::ast::RuleBody;
-use crate::syntax::ast::Scenario;
-use crate::syntax::ast::Span;
-use crate::syntax::ast::Step;
-use crate::syntax::ast::Type;
-use crate::syntax::ast::TypeKind;
-use crate::syntax::layout::INDENT;
-use crate::syntax::layout::Layout;
-use crate::syntax::layout::WIDTH;
-use crate::syntax::print_expression::arm;
-use crate::syntax::print_expression::call;
-use crate::syntax::print_expression::expression;
-use crate::syntax::print_expression::expression_on_new_line;
-use crate::syntax::print_expression::field;
-use crate::syntax::print_expression::fields;
-use crate::syntax::print_expression::number;
-use crate::syntax::print_expression::patterns;
-use crate::syntax::print_expression::quoted;
+use crate::syntax::ast::{
+    Action, ActionParam, ClauseKind, Doc, Effect, EffectKind, Expect, Expr, ExprKind, Field, File, Initial,
+    Item, ItemKind, Name, ParamMode, Place, Policy, PolicyLine, Rule, RuleBody, Scenario, Span, Step, Type,
+    TypeKind,
+};
+use crate::syntax::layout::{INDENT, Layout, WIDTH};
+use crate::syntax::print_expression::{
+    arm, call, expression, expression_on_new_line, field, fields, number, patterns, quoted,
+};
 use crate::syntax::scan::Comment;
 
 /// The text of a tree that was built, not read: documentation is in the tree, other comments do not

@@ -1,18 +1,7 @@
 //! Expressions as text: parentheses where precedence needs them, and nowhere else.
 
-use crate::syntax::ast::Arg;
-use crate::syntax::ast::Arm;
-use crate::syntax::ast::BinaryOp;
-use crate::syntax::ast::Call;
-use crate::syntax::ast::Expr;
-use crate::syntax::ast::ExprKind;
-use crate::syntax::ast::Field;
-use crate::syntax::ast::Number;
-use crate::syntax::ast::UnaryOp;
-use crate::syntax::expression::NEGATE_PRECEDENCE;
-use crate::syntax::expression::NOT_PRECEDENCE;
-use crate::syntax::expression::RANGE_PRECEDENCE;
-use crate::syntax::expression::strength;
+use crate::syntax::ast::{Arg, Arm, BinaryOp, Call, Expr, ExprKind, Field, Number, UnaryOp};
+use crate::syntax::expression::{NEGATE_PRECEDENCE, NOT_PRECEDENCE, RANGE_PRECEDENCE, strength};
 use crate::syntax::layout::Layout;
 
 /// Binding strength of what needs no parentheses anywhere but before `.` and `[`.

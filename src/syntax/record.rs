@@ -3,12 +3,9 @@
 
 use serde::Serialize;
 
-use crate::syntax::Diagnostic;
-use crate::syntax::Severity;
-use crate::syntax::Sources;
-use crate::syntax::ast::FileId;
-use crate::syntax::ast::Span;
+use crate::syntax::ast::{FileId, Span};
 use crate::syntax::diagnostic::Edit;
+use crate::syntax::{Diagnostic, Severity, Sources};
 
 /// Version of the records' fields.
 pub const SCHEMA: u32 = 1;

@@ -4,11 +4,8 @@
 //! The grammar recurses only through brackets, so their depth, which is measured here, bounds its
 //! stack whatever the input. Texts and comments are skipped by the same rules as in `ava.pest`.
 
-use crate::syntax::DEPTH_MAX;
-use crate::syntax::Diagnostic;
-use crate::syntax::ast::FileId;
-use crate::syntax::ast::Span;
-use crate::syntax::code;
+use crate::syntax::ast::{FileId, Span};
+use crate::syntax::{DEPTH_MAX, Diagnostic, code};
 
 /// A `//` comment, markers included, up to but without the line break.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -3,38 +3,11 @@
 
 use proptest::prelude::*;
 
-use crate::syntax::DEPTH_MAX;
-use crate::syntax::FormatError;
-use crate::syntax::Sources;
-use crate::syntax::Style;
-use crate::syntax::ast::Arg;
-use crate::syntax::ast::Arm;
-use crate::syntax::ast::BinaryOp;
-use crate::syntax::ast::Call;
-use crate::syntax::ast::Case;
-use crate::syntax::ast::Expr;
-use crate::syntax::ast::ExprKind;
-use crate::syntax::ast::Field;
-use crate::syntax::ast::File;
-use crate::syntax::ast::FileId;
-use crate::syntax::ast::Item;
-use crate::syntax::ast::ItemKind;
-use crate::syntax::ast::Let;
-use crate::syntax::ast::Name;
-use crate::syntax::ast::Number;
-use crate::syntax::ast::Odds;
-use crate::syntax::ast::Scenario;
-use crate::syntax::ast::Span;
-use crate::syntax::ast::Step;
-use crate::syntax::ast::Text;
-use crate::syntax::ast::UnaryOp;
-use crate::syntax::ast::Use;
-use crate::syntax::ast::Verdict;
-use crate::syntax::format;
-use crate::syntax::parse;
-use crate::syntax::print;
-use crate::syntax::render;
-use crate::syntax::same_meaning;
+use crate::syntax::ast::{
+    Arg, Arm, BinaryOp, Call, Case, Expr, ExprKind, Field, File, FileId, Item, ItemKind, Let, Name, Number,
+    Odds, Scenario, Span, Step, Text, UnaryOp, Use, Verdict,
+};
+use crate::syntax::{DEPTH_MAX, FormatError, Sources, Style, format, parse, print, render, same_meaning};
 
 const AVASTRA: &str = include_str!("../../scenarios/avastra45.ava");
 const DEEP_COLLISION: &str = include_str!("../../scenarios/deepcollision52.ava");

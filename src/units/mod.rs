@@ -9,9 +9,6 @@ mod rational;
 mod unit;
 
 pub use dimension::Dimension;
-pub use number::decimal;
-pub use number::quantity;
+pub use number::{decimal, quantity};
 pub use rational::Rational;
-pub use unit::UNITS;
-pub use unit::Unit;
-pub use unit::unit;
+pub use unit::{UNITS, Unit, unit};

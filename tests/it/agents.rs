@@ -4,22 +4,12 @@
 use std::sync::atomic::AtomicBool;
 
 use avastra::action::Offer;
-use avastra::agent;
-use avastra::agent::Entry;
-use avastra::agent::Kind;
-use avastra::agent::Settings;
-use avastra::episode;
+use avastra::agent::{Entry, Kind, Settings};
 use avastra::episode::Choice;
-use avastra::study;
-use avastra::study::EpisodeSummary;
-use avastra::study::Run;
-use avastra::study::RunSettings;
-use avastra::study::TrainSettings;
-use avastra::study::TrainedEpisode;
-use avastra::study::Training;
+use avastra::study::{EpisodeSummary, Run, RunSettings, TrainSettings, TrainedEpisode, Training};
+use avastra::{agent, episode, study};
 
-use crate::world::assert_replays;
-use crate::world::run;
+use crate::world::{assert_replays, run};
 
 /// A run of an agent that can act at once, two episodes on one road.
 fn run_of(entry: &Entry, seed: u64) -> Run {

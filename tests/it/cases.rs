@@ -1,7 +1,6 @@
 //! Cases: every file of a directory, rendered and compared with its snapshot.
 
-use std::path::Path;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// The repository.
 pub fn root() -> PathBuf {

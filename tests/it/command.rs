@@ -4,9 +4,7 @@ use std::path::Path;
 
 use assert_cmd::Command;
 
-use crate::cases::cases;
-use crate::cases::each_case;
-use crate::cases::root;
+use crate::cases::{cases, each_case, root};
 
 /// `avastra` with arguments, in the repository.
 pub fn avastra(arguments: &[&str]) -> Command {

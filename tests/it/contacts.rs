@@ -5,23 +5,12 @@
 //! ticks boxes move straight and turn evenly. It has no broad phase, and it tells overlap from gap by
 //! separating axes, where the code under test works with nearest points.
 
-use avastra::ads::Ads;
-use avastra::ads::ModularConfig;
-use avastra::geometry::OrientedBox;
-use avastra::geometry::Pose;
-use avastra::geometry::Sweep;
-use avastra::geometry::Vec2;
-use avastra::geometry::first_contact;
+use avastra::ads::{Ads, ModularConfig};
+use avastra::geometry::{OrientedBox, Pose, Sweep, Vec2, first_contact};
 use avastra::rng;
-use avastra::rng::Rng;
-use avastra::rng::Stream;
-use avastra::sim::Contact;
-use avastra::sim::DT_S;
-use avastra::sim::Obstacle;
-use avastra::sim::World;
-use avastra::study::Profile;
-use avastra::study::Run;
-use avastra::study::RunSettings;
+use avastra::rng::{Rng, Stream};
+use avastra::sim::{Contact, DT_S, Obstacle, World};
+use avastra::study::{Profile, Run, RunSettings};
 
 use crate::world::run;
 

@@ -4,20 +4,13 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use avastra::model::Loaded;
-use avastra::model::ReadError;
 use avastra::model::explain::PAGES;
-use avastra::model::load;
-use avastra::syntax::Diagnostic;
-use avastra::syntax::Severity;
-use avastra::syntax::apply_fixes;
+use avastra::model::{Loaded, ReadError, load};
 use avastra::syntax::ast::FileId;
+use avastra::syntax::{Diagnostic, Severity, apply_fixes};
 
-use crate::cases::cases;
-use crate::cases::each_case;
-use crate::cases::root;
-use crate::command::avastra;
-use crate::command::outcome;
+use crate::cases::{cases, each_case, root};
+use crate::command::{avastra, outcome};
 
 /// Reads a case; its own text may be another than the file's.
 fn loaded(path: &Path, text: Option<&str>) -> Loaded {

@@ -2,14 +2,9 @@
 
 use std::sync::Arc;
 
-use avastra::ads;
-use avastra::episode;
-use avastra::model::vocabulary::Level;
-use avastra::model::vocabulary::TimeOfDay;
-use avastra::model::vocabulary::Word;
-use avastra::sim::Scene;
-use avastra::sim::Start;
-use avastra::sim::World;
+use avastra::model::vocabulary::{Level, TimeOfDay, Word};
+use avastra::sim::{Scene, Start, World};
+use avastra::{ads, episode};
 
 use crate::world::space;
 

@@ -1,21 +1,12 @@
 //! The server as an editor meets it: messages over pipes, in documents that are never finished.
 
-use std::io::BufRead;
-use std::io::BufReader;
-use std::io::Read;
-use std::io::Write;
+use std::io::{BufRead, BufReader, Read, Write};
 use std::path::Path;
-use std::process::Child;
-use std::process::ChildStdin;
-use std::process::ChildStdout;
-use std::process::Command;
-use std::process::Stdio;
+use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 
-use serde_json::Value;
-use serde_json::json;
+use serde_json::{Value, json};
 
-use crate::cases::expect_snapshot;
-use crate::cases::root;
+use crate::cases::{expect_snapshot, root};
 
 /// An editor with a server.
 struct Editor {

@@ -5,25 +5,13 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
-use avastra::emit;
-use avastra::episode::EpisodeLog;
-use avastra::episode::Outcome;
-use avastra::episode::Script;
-use avastra::episode::Watch;
-use avastra::oracle;
+use avastra::episode::{EpisodeLog, Outcome, Script, Watch};
 use avastra::oracle::Replays;
-use avastra::study::EpisodeSummary;
-use avastra::study::Run;
-use avastra::study::RunSettings;
-use avastra::study::play;
+use avastra::study::{EpisodeSummary, Run, RunSettings, play};
+use avastra::{emit, oracle};
 
-use crate::cases::expect_snapshot;
-use crate::cases::root;
-use crate::world::assert_replays;
-use crate::world::read;
-use crate::world::run;
-use crate::world::run_of;
-use crate::world::space_at;
+use crate::cases::{expect_snapshot, root};
+use crate::world::{assert_replays, read, run, run_of, space_at};
 
 const EPISODES: u32 = 12;
 

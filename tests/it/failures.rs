@@ -2,8 +2,7 @@
 
 use std::path::PathBuf;
 
-use crate::command::avastra;
-use crate::command::outcome;
+use crate::command::{avastra, outcome};
 
 #[test]
 fn found_scenarios_are_explained_shrunk_and_tested_again() {

@@ -2,19 +2,15 @@
 
 use std::sync::Arc;
 
-use avastra::ads::ModularConfig;
-use avastra::ads::Module;
+use avastra::ads::{ModularConfig, Module};
 use avastra::episode::EpisodeLog;
 use avastra::model::Space;
 use avastra::oracle;
 use avastra::oracle::Fate;
-use avastra::study::Profile;
-use avastra::study::Run;
-use avastra::study::RunSettings;
+use avastra::study::{Profile, Run, RunSettings};
 
 use crate::cases::root;
-use crate::world::read;
-use crate::world::run_of;
+use crate::world::{read, run_of};
 
 /// Episodes on each road.
 const EPISODES: u32 = 50;

@@ -6,8 +6,7 @@ mod examine;
 
 use std::process::Command;
 
-use crate::cases::cases;
-use crate::cases::root;
+use crate::cases::{cases, root};
 
 /// What a text of 64 KB may cost, processor time in s and memory in MB. The mark is 1 s, and `fuzz/run.sh` holds an
 /// optimised build to it; this bound is for what grows without bound, on any build and a busy machine.

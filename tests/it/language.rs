@@ -3,20 +3,10 @@
 use std::collections::BTreeSet;
 use std::path::Path;
 
-use avastra::model::ENDS;
-use avastra::model::Loaded;
-use avastra::model::MODULES;
-use avastra::model::load;
-use avastra::model::vocabulary::Body;
-use avastra::model::vocabulary::Colour;
-use avastra::model::vocabulary::LaneChoice;
-use avastra::model::vocabulary::Level;
-use avastra::model::vocabulary::Phenomenon;
-use avastra::model::vocabulary::Side;
-use avastra::model::vocabulary::Then;
-use avastra::model::vocabulary::TimeOfDay;
-use avastra::model::vocabulary::Verb;
-use avastra::model::vocabulary::Word;
+use avastra::model::vocabulary::{
+    Body, Colour, LaneChoice, Level, Phenomenon, Side, Then, TimeOfDay, Verb, Word,
+};
+use avastra::model::{ENDS, Loaded, MODULES, load};
 use avastra::syntax::Diagnostic;
 use avastra::units::UNITS;
 

@@ -1,7 +1,6 @@
 //! The order of the modules: each may use only those to its left.
 
-use std::path::Path;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use crate::cases::root;
 

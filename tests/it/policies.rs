@@ -1,28 +1,20 @@
 //! Policies as files: both faces are played and verified, a flipped byte is noticed wherever it is, and
 //! what is emitted is read back to the same value.
 
-use std::path::Path;
-use std::path::PathBuf;
-use std::sync::Arc;
-use std::sync::OnceLock;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, OnceLock};
 
-use avastra::agent::Visit;
-use avastra::agent::distilled;
+use avastra::agent::{Visit, distilled};
 use avastra::emit::policy_text;
 use avastra::mdp::Observation;
-use avastra::model::Policy;
-use avastra::model::Space;
-use avastra::model::policy::RulesClaims;
-use avastra::model::policy::VARIABLES;
-use avastra::model::policy::VariableKind;
-use avastra::model::policy::seal;
+use avastra::model::policy::{RulesClaims, VARIABLES, VariableKind, seal};
+use avastra::model::{Policy, Space};
 use avastra::syntax::ast::FileId;
 use proptest::prelude::*;
 use safetensors::SafeTensors;
 
 use crate::cases::root;
-use crate::command::avastra;
-use crate::command::outcome;
+use crate::command::{avastra, outcome};
 use crate::world::read;
 
 const SMALL: &str = "learning_starts: 30\nupdates_per_step: 1\nhidden_units: [8]\nbatch_len: 8\n\

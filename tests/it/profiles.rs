@@ -6,8 +6,7 @@ use avastra::ads::ModularConfig;
 use avastra::study::RunSettings;
 
 use crate::cases::root;
-use crate::command::avastra;
-use crate::command::outcome;
+use crate::command::{avastra, outcome};
 
 const FAULT: &str = "scenarios/ads/faults/planning_never_yields.yaml";
 

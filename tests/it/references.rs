@@ -6,8 +6,7 @@ use std::sync::atomic::AtomicBool;
 use avastra::model::Avoidability;
 use avastra::study::play;
 
-use crate::world::run_against;
-use crate::world::space;
+use crate::world::{run_against, space};
 
 /// Episodes on each road.
 const EPISODES: u32 = 12;

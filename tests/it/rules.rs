@@ -9,35 +9,19 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use avastra::action::ActionTable;
-use avastra::action::ActiveRules;
-use avastra::action::Draw;
-use avastra::action::Effect;
-use avastra::action::Enforcement;
-use avastra::action::Offer;
-use avastra::action::Refusal;
-use avastra::action::Situation;
-use avastra::action::SpawnFacts;
-use avastra::action::SpawnRequest;
-use avastra::action::Surroundings;
-use avastra::action::audit;
-use avastra::episode::Choice;
-use avastra::episode::Moment;
-use avastra::model::Type;
-use avastra::model::Value;
-use avastra::model::load;
-use avastra::model::vocabulary::Body;
-use avastra::model::vocabulary::TimeOfDay;
-use avastra::model::vocabulary::Verb;
+use avastra::action::{
+    ActionTable, ActiveRules, Draw, Effect, Enforcement, Offer, Refusal, Situation, SpawnFacts, SpawnRequest,
+    Surroundings, audit,
+};
+use avastra::episode::{Choice, Moment};
+use avastra::model::vocabulary::{Body, TimeOfDay, Verb};
+use avastra::model::{Type, Value, load};
 use avastra::rng;
 use avastra::rng::Stream;
 use avastra::study::Run;
 
 use crate::cases::root;
-use crate::world::assert_replays;
-use crate::world::read;
-use crate::world::run;
-use crate::world::space;
+use crate::world::{assert_replays, read, run, space};
 
 const RULES: [&str; 5] = ["chronology", "npc_gap", "npc_speed", "walking_pace", "no_teleport"];
 
@@ -124,9 +108,7 @@ fn judge(
 }
 
 fn follows(time: TimeOfDay, next: TimeOfDay) -> bool {
-    use TimeOfDay::Morning;
-    use TimeOfDay::Night;
-    use TimeOfDay::Noon;
+    use TimeOfDay::{Morning, Night, Noon};
     matches!((time, next), (Morning, Morning | Noon) | (Noon, Noon | Night) | (Night, Night | Morning))
 }
 

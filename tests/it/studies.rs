@@ -6,10 +6,8 @@ use std::time::Duration;
 
 use serde_json::Value;
 
-use crate::cases::expect_snapshot;
-use crate::cases::root;
-use crate::command::avastra;
-use crate::command::outcome;
+use crate::cases::{expect_snapshot, root};
+use crate::command::{avastra, outcome};
 
 /// Plays the smoke study into a directory.
 fn smoke(out: &Path, jobs: &str) -> (i32, String, String) {

@@ -1,14 +1,8 @@
 //! Updates of the learner on made-up transitions, written for PyTorch to do again: `tests/interop/torch.sh`.
 
-use avastra::agent;
-use avastra::agent::Adam;
-use avastra::agent::Hyperparameters;
-use avastra::agent::Kind;
-use avastra::agent::Network;
-use avastra::agent::Shape;
-use avastra::agent::Transition;
-use avastra::rng;
+use avastra::agent::{Adam, Hyperparameters, Kind, Network, Shape, Transition};
 use avastra::rng::Stream;
+use avastra::{agent, rng};
 use serde_json::json;
 
 use crate::cases::root;

@@ -5,11 +5,8 @@ use std::process::Stdio;
 use std::time::Duration;
 
 use assert_cmd::Command;
-use avastra::model::policy::Policy;
-use avastra::model::policy::seal;
-use avastra::rng::Stream;
-use avastra::rng::below;
-use avastra::rng::stream;
+use avastra::model::policy::{Policy, seal};
+use avastra::rng::{Stream, below, stream};
 use avastra::study::Database;
 use avastra::syntax::ast::FileId;
 

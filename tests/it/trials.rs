@@ -2,11 +2,7 @@
 
 use avastra::action::ActionTable;
 use avastra::report;
-use avastra::study::Arena;
-use avastra::study::Cell;
-use avastra::study::TrialOutcome;
-use avastra::study::TrialSettings;
-use avastra::study::Trials;
+use avastra::study::{Arena, Cell, TrialOutcome, TrialSettings, Trials};
 
 use crate::cases::expect_snapshot;
 use crate::world::space;

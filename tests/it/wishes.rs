@@ -1,30 +1,16 @@
 //! Ten files as a newcomer writes them, each with a wish; here it is seen that the wish came true.
 
-use avastra::action::ActionTable;
-use avastra::action::ActiveRules;
-use avastra::action::Draw;
-use avastra::action::Offer;
-use avastra::action::Situation;
-use avastra::action::SpawnFacts;
-use avastra::action::SpawnRequest;
-use avastra::action::Surroundings;
-use avastra::model::End;
-use avastra::model::Memory;
-use avastra::model::OutcomeFacts;
-use avastra::model::Reach;
-use avastra::model::Value;
-use avastra::model::vocabulary::Level;
-use avastra::model::vocabulary::TimeOfDay;
-use avastra::syntax::Diagnostic;
+use avastra::action::{
+    ActionTable, ActiveRules, Draw, Offer, Situation, SpawnFacts, SpawnRequest, Surroundings,
+};
+use avastra::model::vocabulary::{Level, TimeOfDay};
+use avastra::model::{End, Memory, OutcomeFacts, Reach, Value};
 use avastra::syntax::ast::FileId;
-use avastra::syntax::format;
+use avastra::syntax::{Diagnostic, format};
 
-use crate::cases::cases;
-use crate::cases::root;
-use crate::command::avastra;
-use crate::command::outcome;
-use crate::world::read;
-use crate::world::space_at;
+use crate::cases::{cases, root};
+use crate::command::{avastra, outcome};
+use crate::world::{read, space_at};
 
 /// A world with room for everybody.
 struct Room;

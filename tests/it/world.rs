@@ -4,12 +4,9 @@ use std::path::Path;
 use std::sync::Arc;
 
 use avastra::action::ActionTable;
-use avastra::episode::EpisodeLog;
-use avastra::episode::Script;
-use avastra::model::ReadError;
-use avastra::model::Space;
-use avastra::study::Run;
-use avastra::study::RunSettings;
+use avastra::episode::{EpisodeLog, Script};
+use avastra::model::{ReadError, Space};
+use avastra::study::{Run, RunSettings};
 
 use crate::cases::root;
 

@@ -7,14 +7,9 @@ mod table;
 use std::path::Path;
 use std::sync::Arc;
 
-use crate::action::ActionTable;
-use crate::action::SpawnFacts;
-use crate::action::SpawnRequest;
-use crate::action::Surroundings;
-use crate::model::ReadError;
-use crate::model::load;
-use crate::syntax::Style;
-use crate::syntax::render;
+use crate::action::{ActionTable, SpawnFacts, SpawnRequest, Surroundings};
+use crate::model::{ReadError, load};
+use crate::syntax::{Style, render};
 
 /// The table of a shipped space on Road 2.
 fn table(path: &str) -> ActionTable {

@@ -1,21 +1,9 @@
 use proptest::prelude::*;
 
-use super::Full;
-use super::Plain;
-use super::named;
-use super::table;
-use super::value_of;
-use crate::action::ActionTable;
-use crate::action::ActiveRules;
-use crate::action::Draw;
-use crate::action::Effect;
-use crate::action::Offer;
-use crate::action::Situation;
-use crate::action::Surroundings;
+use super::{Full, Plain, named, table, value_of};
+use crate::action::{ActionTable, ActiveRules, Draw, Effect, Offer, Situation, Surroundings};
 use crate::model::Memory;
-use crate::model::vocabulary::Body;
-use crate::model::vocabulary::TimeOfDay;
-use crate::model::vocabulary::Verb;
+use crate::model::vocabulary::{Body, TimeOfDay, Verb};
 
 const SAFETY_GAP_M: f64 = 19.0;
 

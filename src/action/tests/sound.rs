@@ -6,17 +6,9 @@ use std::sync::Arc;
 
 use proptest::prelude::*;
 
-use crate::action::ActionTable;
-use crate::action::ActiveRules;
-use crate::action::Offer;
-use crate::action::Situation;
 use crate::action::tests::Plain;
-use crate::model::Loaded;
-use crate::model::Reach;
-use crate::model::ReadError;
-use crate::model::Value;
-use crate::model::load;
-use crate::model::witness;
+use crate::action::{ActionTable, ActiveRules, Offer, Situation};
+use crate::model::{Loaded, Reach, ReadError, Value, load, witness};
 
 const HEAD: &str = "language 1
 enum Mode = Near | Far

@@ -10,14 +10,10 @@ use std::sync::Arc;
 
 use crate::ads::steering::Steering;
 use crate::geometry::Pose;
-use crate::sim::Control;
-use crate::sim::DT_S;
-use crate::sim::EgoMotion;
-use crate::sim::pedals_for;
+use crate::sim::{Control, DT_S, EgoMotion, pedals_for};
 
 use super::config::ControlConfig;
-use super::planning::Planner;
-use super::planning::Trajectory;
+use super::planning::{Planner, Trajectory};
 
 #[derive(Debug, Clone)]
 pub struct Controller {

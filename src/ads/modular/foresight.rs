@@ -5,8 +5,7 @@
 //! may differ from the recording: it is right up to the first difference that matters.
 
 use crate::geometry::Vec2;
-use crate::sim::FRAME_TICKS;
-use crate::sim::Obstacle;
+use crate::sim::{FRAME_TICKS, Obstacle};
 
 use super::perception::FRAME_S;
 
@@ -80,11 +79,8 @@ impl Course {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::OrientedBox;
-    use crate::geometry::Pose;
-    use crate::model::vocabulary::Body;
-    use crate::model::vocabulary::Colour;
-    use crate::model::vocabulary::Verb;
+    use crate::geometry::{OrientedBox, Pose};
+    use crate::model::vocabulary::{Body, Colour, Verb};
 
     #[test]
     fn what_was_recorded_is_foreseen() {

@@ -42,8 +42,7 @@ impl Junctions {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ads::testing::corner;
-    use crate::ads::testing::straight;
+    use crate::ads::testing::{corner, straight};
 
     #[test]
     fn the_corner_has_junctions_and_a_straight_road_none() {

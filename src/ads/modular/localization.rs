@@ -6,14 +6,10 @@
 //! remains after fusion. Its size depends on the surroundings, rain and water. Maps say nothing of
 //! houses, so the sky counts as open inside junctions and as partly hidden in the streets between.
 
-use crate::geometry::Pose;
-use crate::geometry::Vec2;
-use crate::geometry::wrap_angle;
+use crate::geometry::{Pose, Vec2, wrap_angle};
 use crate::rng;
-use crate::rng::Rng;
-use crate::rng::Stream;
-use crate::sim::DT_S;
-use crate::sim::Sensed;
+use crate::rng::{Rng, Stream};
+use crate::sim::{DT_S, Sensed};
 
 use super::config::LocalizationConfig;
 
@@ -77,11 +73,9 @@ impl Localization {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ads::modular::ModularConfig;
-    use crate::ads::modular::Module;
+    use crate::ads::modular::{ModularConfig, Module};
     use crate::ads::testing::CLEAR_DAY;
-    use crate::sim::Conditions;
-    use crate::sim::EgoMotion;
+    use crate::sim::{Conditions, EgoMotion};
 
     fn sensed(speed_mps: f64, conditions: Conditions) -> Sensed {
         let ego = EgoMotion {

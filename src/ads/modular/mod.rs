@@ -17,9 +17,6 @@ mod stack;
 mod tests;
 mod tracking;
 
-pub use config::ConfigError;
-pub use config::ModularConfig;
-pub use config::Module;
-pub use config::Weaknesses;
+pub use config::{ConfigError, ModularConfig, Module, Weaknesses};
 pub use foresight::Foresight;
 pub use stack::Modular;

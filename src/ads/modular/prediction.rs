@@ -9,13 +9,9 @@
 
 use std::sync::Arc;
 
-use crate::geometry::Vec2;
-use crate::geometry::unit_vector;
-use crate::geometry::wrap_angle;
+use crate::geometry::{Vec2, unit_vector, wrap_angle};
 use crate::model::vocabulary::Body;
-use crate::road::LaneIndex;
-use crate::road::LanePlace;
-use crate::road::RoadMap;
+use crate::road::{LaneIndex, LanePlace, RoadMap};
 use crate::sim::Scene;
 
 use super::config::PredictionConfig;

@@ -6,27 +6,17 @@
 use std::sync::Arc;
 
 use crate::ads::driver::Ads;
-use crate::ads::status::GHOST_ID_MIN;
-use crate::ads::status::PerceivedObject;
-use crate::ads::status::PlannedPoint;
-use crate::ads::status::Status;
+use crate::ads::status::{GHOST_ID_MIN, PerceivedObject, PlannedPoint, Status};
 use crate::geometry::Pose;
-use crate::sim::Control;
-use crate::sim::DT_S;
-use crate::sim::FRAME_TICKS;
-use crate::sim::Scene;
-use crate::sim::Sensed;
+use crate::sim::{Control, DT_S, FRAME_TICKS, Scene, Sensed};
 
 use super::config::ModularConfig;
 use super::control::Controller;
 use super::foresight::Foresight;
 use super::junctions::Junctions;
 use super::localization::Localization;
-use super::perception::FRAME_S;
-use super::perception::LightReader;
-use super::perception::Perception;
-use super::planning::Outlook;
-use super::planning::Planner;
+use super::perception::{FRAME_S, LightReader, Perception};
+use super::planning::{Outlook, Planner};
 use super::prediction::Prediction;
 use super::tracking::Tracking;
 

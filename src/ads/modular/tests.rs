@@ -2,23 +2,14 @@
 
 use std::sync::Arc;
 
-use crate::ads::status::Manoeuvre;
-use crate::ads::status::Reason;
-use crate::ads::testing::Rig;
-use crate::ads::testing::object;
-use crate::ads::testing::straight;
-use crate::ads::testing::two_lanes;
-use crate::ads::testing::winding;
-use crate::geometry::Pose;
-use crate::geometry::Vec2;
+use crate::ads::status::{Manoeuvre, Reason};
+use crate::ads::testing::{Rig, object, straight, two_lanes, winding};
+use crate::geometry::{Pose, Vec2};
 use crate::model::vocabulary::Body;
 use crate::road::RouteLaneChange;
-use crate::sim::Scene;
-use crate::sim::SignalColour;
+use crate::sim::{Scene, SignalColour};
 
-use super::Modular;
-use super::ModularConfig;
-use super::Module;
+use super::{Modular, ModularConfig, Module};
 
 fn rig(scene: &Arc<Scene>, seed: u64) -> Rig {
     Rig::new(scene, Box::new(Modular::new(scene, &ModularConfig::default(), seed)), 0.0)

@@ -6,15 +6,11 @@
 
 use std::collections::VecDeque;
 
-use crate::geometry::Pose;
-use crate::geometry::Vec2;
-use crate::geometry::unit_vector;
-use crate::geometry::wrap_angle;
+use crate::geometry::{Pose, Vec2, unit_vector, wrap_angle};
 use crate::model::vocabulary::Body;
 
 use super::config::TrackingConfig;
-use super::perception::Detection;
-use super::perception::FRAME_S;
+use super::perception::{Detection, FRAME_S};
 
 /// Standard deviation of a velocity nobody has measured yet, m/s.
 const UNKNOWN_VELOCITY_MPS: f64 = 10.0;

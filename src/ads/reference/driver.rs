@@ -8,22 +8,13 @@
 //! the fog, it knows as it truly is. Darkness and rain do not blind it, nobody behind it concerns it,
 //! and it does not swerve: the published models brake.
 
-use std::collections::BTreeMap;
-use std::collections::VecDeque;
+use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
 
 use crate::ads::driver::Ads;
 use crate::ads::guide::Guide;
-use crate::ads::status::Reason;
-use crate::ads::status::Status;
-use crate::sim::Conditions;
-use crate::sim::Control;
-use crate::sim::DT_S;
-use crate::sim::FRAME_TICKS;
-use crate::sim::Scene;
-use crate::sim::Sensed;
-use crate::sim::SensedObject;
-use crate::sim::VehicleParameters;
+use crate::ads::status::{Reason, Status};
+use crate::sim::{Conditions, Control, DT_S, FRAME_TICKS, Scene, Sensed, SensedObject, VehicleParameters};
 
 use super::encounter::Encounter;
 use super::idm::Idm;

@@ -7,10 +7,8 @@
 //! road users that cross or come towards.
 
 use crate::ads::guide::Guide;
-use crate::geometry::Vec2;
-use crate::geometry::unit_vector;
-use crate::sim::SensedObject;
-use crate::sim::VehicleParameters;
+use crate::geometry::{Vec2, unit_vector};
+use crate::sim::{SensedObject, VehicleParameters};
 
 /// Meetings are looked for this far ahead, in steps, s. Longer than any model's threshold.
 const HORIZON_S: f64 = 4.0;

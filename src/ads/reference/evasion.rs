@@ -8,16 +8,10 @@
 use std::sync::Arc;
 
 use crate::ads::driver::Ads;
-use crate::ads::guide::Guide;
-use crate::ads::guide::SpeedRules;
-use crate::ads::status::Reason;
-use crate::ads::status::Status;
-use crate::ads::steering::Steering;
-use crate::ads::steering::SteeringConfig;
-use crate::sim::Control;
-use crate::sim::Scene;
-use crate::sim::Sensed;
-use crate::sim::pedals_for;
+use crate::ads::guide::{Guide, SpeedRules};
+use crate::ads::status::{Reason, Status};
+use crate::ads::steering::{Steering, SteeringConfig};
+use crate::sim::{Control, Scene, Sensed, pedals_for};
 
 /// The guide's speeds are not used: a manoeuvre has its pedal.
 const RULES: SpeedRules =

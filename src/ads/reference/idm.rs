@@ -12,27 +12,15 @@
 use std::sync::Arc;
 
 use crate::ads::driver::Ads;
-use crate::ads::guide::Beside;
-use crate::ads::guide::Guide;
-use crate::ads::guide::SpeedRules;
-use crate::ads::status::PerceivedObject;
-use crate::ads::status::Reason;
-use crate::ads::status::Status;
-use crate::ads::steering::Steering;
-use crate::ads::steering::SteeringConfig;
-use crate::geometry::Vec2;
-use crate::geometry::unit_vector;
+use crate::ads::guide::{Beside, Guide, SpeedRules};
+use crate::ads::status::{PerceivedObject, Reason, Status};
+use crate::ads::steering::{Steering, SteeringConfig};
+use crate::geometry::{Vec2, unit_vector};
 use crate::road::RouteLaneChange;
-use crate::sim::Control;
-use crate::sim::DT_S;
-use crate::sim::FRAME_TICKS;
-use crate::sim::Following;
-use crate::sim::Scene;
-use crate::sim::Sensed;
-use crate::sim::SensedObject;
-use crate::sim::SignalColour;
-use crate::sim::VehicleParameters;
-use crate::sim::pedals_for;
+use crate::sim::{
+    Control, DT_S, FRAME_TICKS, Following, Scene, Sensed, SensedObject, SignalColour, VehicleParameters,
+    pedals_for,
+};
 
 /// The model's parameters, for towns.
 const MODEL: Following =
@@ -358,9 +346,7 @@ fn model_mps2(speed_mps: f64, allowed_mps: f64, ahead: Option<(f64, f64)>) -> f6
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ads::testing::Rig;
-    use crate::ads::testing::object;
-    use crate::ads::testing::two_lanes;
+    use crate::ads::testing::{Rig, object, two_lanes};
     use crate::geometry::Pose;
     use crate::model::vocabulary::Body;
 

@@ -14,8 +14,7 @@ mod rss;
 mod tests;
 
 pub use cc::CarefulHuman;
-pub use driver::Reference;
-pub use driver::in_sight;
+pub use driver::{Reference, in_sight};
 pub use evasion::Evasion;
 pub use fsm::FuzzySafety;
 pub use idm::Idm;

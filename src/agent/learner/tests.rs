@@ -1,10 +1,8 @@
 //! Learning on problems whose answer is known.
 
-use ndarray::Array1;
-use ndarray::array;
+use ndarray::{Array1, array};
 
-use crate::agent::hyperparameters::Encoding;
-use crate::agent::hyperparameters::StateSet;
+use crate::agent::hyperparameters::{Encoding, StateSet};
 use crate::agent::presets;
 use crate::agent::trajectory::Experience;
 use crate::mdp::Closeness;

@@ -5,6 +5,4 @@ mod perceptron;
 mod product;
 
 pub use adam::Adam;
-pub use perceptron::Initialization;
-pub use perceptron::Network;
-pub use perceptron::Shape;
+pub use perceptron::{Initialization, Network, Shape};

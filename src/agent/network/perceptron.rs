@@ -6,11 +6,7 @@
 //! The dueling head (Wang et al., 2016, Eq. 9) is one more output that holds the state's value; the
 //! streams share all hidden layers, which is all that networks of this size need.
 
-use ndarray::Array2;
-use ndarray::ArrayView1;
-use ndarray::ArrayView2;
-use ndarray::Axis;
-use ndarray::s;
+use ndarray::{Array2, ArrayView1, ArrayView2, Axis, s};
 
 use crate::rng;
 use crate::rng::Rng;
@@ -212,8 +208,7 @@ impl Network {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::rng::Stream;
-    use crate::rng::stream;
+    use crate::rng::{Stream, stream};
 
     fn network(dueling: bool) -> Network {
         let shape = Shape { layers: vec![4, 8, 6, 3], dueling };

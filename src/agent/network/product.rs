@@ -4,10 +4,7 @@
 //! element of the result adds its terms by rising inner index, each a multiplication and then an
 //! addition. Wide registers hold different elements, so their width changes nothing but the time.
 
-use ndarray::ArrayView2;
-use ndarray::ArrayViewMut2;
-use ndarray::Axis;
-use ndarray::s;
+use ndarray::{ArrayView2, ArrayViewMut2, Axis, s};
 
 /// Rows and columns of the tile that stays in registers: eight registers of eight numbers.
 const TILE_ROWS: usize = 4;

@@ -142,8 +142,7 @@ impl Replay {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::rng::Stream;
-    use crate::rng::stream;
+    use crate::rng::{Stream, stream};
 
     fn transition(reward: f32) -> Transition {
         let (inputs, next_inputs) = (vec![0.0], vec![0.0]);

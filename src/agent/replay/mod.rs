@@ -3,7 +3,4 @@
 mod buffer;
 mod sum_tree;
 
-pub use buffer::Priorities;
-pub use buffer::Replay;
-pub use buffer::Sample;
-pub use buffer::Transition;
+pub use buffer::{Priorities, Replay, Sample, Transition};

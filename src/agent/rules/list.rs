@@ -5,16 +5,9 @@
 //! the rest wants, and so on. Which rows are legal at a moment the variables do not tell.
 
 use crate::mdp::Observation;
-use crate::model::policy::Comparison;
-use crate::model::policy::Condition;
-use crate::model::policy::PolicyRule;
-use crate::model::policy::variable_index;
+use crate::model::policy::{Comparison, Condition, PolicyRule, variable_index};
 
-use super::tree::Bounds;
-use super::tree::Tree;
-use super::tree::Visit;
-use super::tree::grow;
-use super::tree::holds;
+use super::tree::{Bounds, Tree, Visit, grow, holds};
 
 /// Rows of a line, at most, besides the one that is always open. Ours.
 const ALTERNATIVES_MAX: usize = 4;

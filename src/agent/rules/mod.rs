@@ -6,6 +6,5 @@
 mod list;
 mod tree;
 
-pub use list::chosen_by;
-pub use list::distilled;
+pub use list::{chosen_by, distilled};
 pub use tree::Visit;

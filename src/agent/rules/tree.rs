@@ -4,10 +4,7 @@
 //! are to read them. Equal gains go to the first variable and the lowest threshold.
 
 use crate::mdp::Observation;
-use crate::model::policy::Comparison;
-use crate::model::policy::Condition;
-use crate::model::policy::VARIABLES;
-use crate::model::policy::VariableKind;
+use crate::model::policy::{Comparison, Condition, VARIABLES, VariableKind};
 
 /// One state, and what the network thinks of it.
 #[derive(Debug, Clone)]

@@ -12,24 +12,15 @@ use ndarray::ArrayView1;
 
 use crate::agent::hyperparameters::SettingsError;
 use crate::agent::registry::Agent;
-use crate::agent::trainable::Beginning;
-use crate::agent::trainable::Trainable;
-use crate::agent::trajectory::Lesson;
-use crate::agent::trajectory::Trajectory;
+use crate::agent::trainable::{Beginning, Trainable};
+use crate::agent::trajectory::{Lesson, Trajectory};
 use crate::mdp::Observation;
 use crate::rng;
-use crate::rng::Rng;
-use crate::rng::Stream;
+use crate::rng::{Rng, Stream};
 
-use super::played::Gene;
-use super::played::any_legal;
-use super::played::seed;
-use super::played::start_of;
-use super::population::Individual;
-use super::population::Population;
-use super::scripts::Found;
-use super::scripts::Scripts;
-use super::scripts::keep;
+use super::played::{Gene, any_legal, seed, start_of};
+use super::population::{Individual, Population};
+use super::scripts::{Found, Scripts, keep};
 
 /// Settings of [`AvFuzzer`]. `default()` is as published; "ours" marks what our actions ask for.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]

@@ -13,24 +13,15 @@ use ndarray::ArrayView1;
 
 use crate::agent::hyperparameters::SettingsError;
 use crate::agent::registry::Agent;
-use crate::agent::trainable::Beginning;
-use crate::agent::trainable::Trainable;
-use crate::agent::trajectory::Lesson;
-use crate::agent::trajectory::Trajectory;
+use crate::agent::trainable::{Beginning, Trainable};
+use crate::agent::trajectory::{Lesson, Trajectory};
 use crate::mdp::Observation;
 use crate::rng;
-use crate::rng::Rng;
-use crate::rng::Stream;
+use crate::rng::{Rng, Stream};
 
-use super::played::Gene;
-use super::played::Genes;
-use super::played::any_legal;
-use super::played::note;
-use super::situation::cell;
-use super::situation::situation;
-use super::worth::Doubt;
-use super::worth::Worth;
-use super::worth::worths;
+use super::played::{Gene, Genes, any_legal, note};
+use super::situation::{cell, situation};
+use super::worth::{Doubt, Worth, worths};
 
 /// Settings of [`GoExplore`]; all ours.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]

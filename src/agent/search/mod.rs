@@ -11,7 +11,5 @@ mod scripts;
 mod situation;
 mod worth;
 
-pub use av_fuzzer::AvFuzzer;
-pub use av_fuzzer::AvFuzzerSettings;
-pub use go_explore::GoExplore;
-pub use go_explore::GoExploreSettings;
+pub use av_fuzzer::{AvFuzzer, AvFuzzerSettings};
+pub use go_explore::{GoExplore, GoExploreSettings};

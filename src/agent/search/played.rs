@@ -3,8 +3,7 @@
 use ndarray::ArrayView1;
 
 use crate::agent::q_policy::any;
-use crate::mdp::Observation;
-use crate::mdp::variable;
+use crate::mdp::{Observation, variable};
 use crate::rng;
 use crate::rng::Rng;
 

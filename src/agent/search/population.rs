@@ -5,8 +5,7 @@ use std::collections::BTreeSet;
 use crate::rng;
 use crate::rng::Rng;
 
-use super::played::Gene;
-use super::played::seed;
+use super::played::{Gene, seed};
 
 /// A script and how good it is.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -155,8 +154,7 @@ impl Population {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::rng::Stream;
-    use crate::rng::stream;
+    use crate::rng::{Stream, stream};
 
     #[test]
     fn operators_keep_scripts_whole_and_say_what_they_change() {

@@ -9,8 +9,7 @@ use crate::mdp::Observation;
 use crate::rng;
 use crate::rng::Rng;
 
-use super::played::any_legal;
-use super::played::start_of;
+use super::played::{any_legal, start_of};
 
 /// A script and what came of it when it was played.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -88,8 +87,7 @@ impl Agent for Scripts {
 mod tests {
     use super::*;
     use crate::mdp::variable;
-    use crate::rng::Stream;
-    use crate::rng::stream;
+    use crate::rng::{Stream, stream};
     use ndarray::Array1;
 
     #[test]

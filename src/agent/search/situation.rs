@@ -1,7 +1,6 @@
 //! Coarse views of a moment: what a search takes to be alike. All bounds are ours.
 
-use crate::mdp::Observation;
-use crate::mdp::variable;
+use crate::mdp::{Observation, variable};
 
 /// A kind of moment, to tell those worth returning to apart: where on the route, how fast, who is near,
 /// what weather.

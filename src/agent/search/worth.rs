@@ -125,8 +125,7 @@ pub fn worths(episode: &Trajectory, discount: f64) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::rng::Stream;
-    use crate::rng::stream;
+    use crate::rng::{Stream, stream};
     use ndarray::Array1;
 
     #[test]

@@ -3,20 +3,15 @@
 use std::collections::BTreeSet;
 use std::path::Path;
 
-use serde_json::Value;
-use serde_json::json;
+use serde_json::{Value, json};
 
 use crate::units;
 
-use super::context;
 use super::context::Kind;
-use super::hover;
-use super::names::Symbol;
-use super::names::Ty;
-use super::uri;
-use super::words;
+use super::names::{Symbol, Ty};
 use super::words::Entry;
 use super::workspace::Analysis;
+use super::{context, hover, uri, words};
 
 // Kinds of completions, by the protocol's numbers.
 const FUNCTION: u32 = 3;

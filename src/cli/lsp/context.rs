@@ -3,11 +3,8 @@
 
 use crate::syntax::ast::ParamMode;
 
-use super::names::Names;
-use super::names::Ty;
-use super::tokens::Ending;
-use super::tokens::Token;
-use super::tokens::tokens;
+use super::names::{Names, Ty};
+use super::tokens::{Ending, Token, tokens};
 use super::words;
 use super::words::Entry;
 

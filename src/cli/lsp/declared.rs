@@ -1,15 +1,11 @@
 //! What a set of files declares, by kind and name. Where two declarations share a name, the one that
 //! overrides the other counts, else the first.
 
-use std::collections::BTreeMap;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use crate::model::LoadedFile;
 use crate::syntax::ast;
-use crate::syntax::ast::ItemKind;
-use crate::syntax::ast::ParamMode;
-use crate::syntax::ast::Span;
-use crate::syntax::ast::TypeKind;
+use crate::syntax::ast::{ItemKind, ParamMode, Span, TypeKind};
 use crate::units::Dimension;
 
 use super::names::Ty;

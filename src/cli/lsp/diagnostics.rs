@@ -1,20 +1,15 @@
 //! Mistakes and quick fixes, as an editor takes them.
 
 use std::collections::BTreeMap;
-use std::path::Path;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-use serde_json::Value;
-use serde_json::json;
+use serde_json::{Value, json};
 
 use crate::model;
-use crate::syntax::Diagnostic;
-use crate::syntax::Severity;
-use crate::syntax::ast::FileId;
-use crate::syntax::ast::Span;
+use crate::syntax::ast::{FileId, Span};
+use crate::syntax::{Diagnostic, Severity};
 
-use super::workspace::Analysis;
-use super::workspace::Workspace;
+use super::workspace::{Analysis, Workspace};
 
 /// The mistakes of all open documents and of what they use, by file. Every open document has an
 /// entry.

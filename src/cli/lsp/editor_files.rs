@@ -3,8 +3,7 @@
 //!
 //! `avastra editor-files DIR` writes them; a test compares what is shipped with what would be written.
 
-use serde_json::Value;
-use serde_json::json;
+use serde_json::{Value, json};
 
 use crate::units;
 

@@ -3,21 +3,13 @@
 //!
 //! Only while the space is sound: numbers of rows that have moved would mislead.
 
-use serde_json::Value;
-use serde_json::json;
+use serde_json::{Value, json};
 
-use crate::cli::doc::range_on;
-use crate::cli::doc::unit;
-use crate::model::Domain;
-use crate::model::Interval;
-use crate::model::Space;
-use crate::syntax::ast::Action;
-use crate::syntax::ast::ActionParam;
-use crate::syntax::ast::ItemKind;
-use crate::syntax::ast::ParamMode;
+use crate::cli::doc::{range_on, unit};
+use crate::model::{Domain, Interval, Space};
+use crate::syntax::ast::{Action, ActionParam, ItemKind, ParamMode};
 
-use super::hover::find_action;
-use super::hover::row_numbers;
+use super::hover::{find_action, row_numbers};
 use super::workspace::Analysis;
 
 /// The hints between two bytes of the document.

@@ -3,22 +3,17 @@
 
 use core::fmt::Write;
 
-use crate::cli::doc::range_on;
-use crate::cli::doc::unit;
+use crate::cli::doc::{range_on, unit};
 use crate::cli::progress::plural;
-use crate::model::ActionDef;
-use crate::model::Reach;
-use crate::model::RuleBody;
-use crate::model::Space;
+use crate::model::{ActionDef, Reach, RuleBody, Space};
 use crate::syntax::ast::Span;
 use crate::syntax::listed;
 use crate::units;
 use crate::units::Rational;
 
 use super::names::Symbol;
-use super::tokens;
-use super::words;
 use super::workspace::Analysis;
+use super::{tokens, words};
 
 /// Longer declarations are cut.
 const LINES_MAX: usize = 12;

@@ -4,12 +4,10 @@
 //! trees that hold what could be read, reports nothing, and lets what is unknown be. `declared` knows
 //! what there is; `walk` goes through the trees.
 
-use std::collections::BTreeMap;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 
-use crate::syntax::ast::FileId;
-use crate::syntax::ast::Span;
+use crate::syntax::ast::{FileId, Span};
 use crate::units::Dimension;
 
 use super::declared::Declared;

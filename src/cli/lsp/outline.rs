@@ -1,12 +1,8 @@
 //! The declarations of a document, as a tree for the editor's outline.
 
-use serde_json::Value;
-use serde_json::json;
+use serde_json::{Value, json};
 
-use crate::syntax::ast::Item;
-use crate::syntax::ast::ItemKind;
-use crate::syntax::ast::Name;
-use crate::syntax::ast::Span;
+use crate::syntax::ast::{Item, ItemKind, Name, Span};
 
 use super::workspace::Analysis;
 

@@ -1,7 +1,6 @@
 //! Places in a text: bytes here, lines and UTF-16 code units in an editor.
 
-use serde_json::Value;
-use serde_json::json;
+use serde_json::{Value, json};
 
 use crate::syntax::ast::Span;
 

@@ -3,10 +3,8 @@
 //! A rename is tried before it is offered: the files with the new name are checked. What would bring a
 //! mistake is refused with the compiler's own words, and so is what would give a name another meaning.
 
-use std::collections::BTreeMap;
-use std::collections::BTreeSet;
-use std::path::Path;
-use std::path::PathBuf;
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
@@ -14,12 +12,9 @@ use crate::model::COUNTED;
 use crate::syntax::Diagnostic;
 use crate::syntax::ast::Span;
 
-use super::diagnostics;
 use super::names::Symbol;
-use super::tokens;
-use super::words;
-use super::workspace::Analysis;
-use super::workspace::Workspace;
+use super::workspace::{Analysis, Workspace};
+use super::{diagnostics, tokens, words};
 
 /// Where the name stands that would be renamed.
 ///

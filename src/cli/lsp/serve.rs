@@ -9,9 +9,7 @@ use serde_json::Value;
 
 use crate::cli::error::Failure;
 
-use super::server::Server;
-use super::server::error_reply;
-use super::server::parsed;
+use super::server::{Server, error_reply, parsed};
 use super::transport;
 use super::transport::TransportError;
 

@@ -1,27 +1,16 @@
 //! The server without input and output: messages in, messages out.
 
-use std::collections::BTreeMap;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::panic::AssertUnwindSafe;
 use std::path::PathBuf;
 
-use serde_json::Value;
-use serde_json::json;
+use serde_json::{Value, json};
 
 use crate::syntax;
 
-use super::complete;
-use super::diagnostics;
-use super::highlight;
-use super::hints;
-use super::hover;
 use super::names::Symbol;
-use super::outline;
-use super::rename;
-use super::uri;
-use super::workspace::Analysis;
-use super::workspace::Document;
-use super::workspace::Workspace;
+use super::workspace::{Analysis, Document, Workspace};
+use super::{complete, diagnostics, highlight, hints, hover, outline, rename, uri};
 
 // Codes of JSON-RPC and of the protocol.
 const PARSE_ERROR: i64 = -32700;

@@ -4,9 +4,7 @@
 //! A body that is no JSON can be answered, because its length is known. A header that cannot be read
 //! cannot: where the next message begins is lost.
 
-use std::io::BufRead;
-use std::io::Read;
-use std::io::Write;
+use std::io::{BufRead, Read, Write};
 
 use serde_json::Value;
 

@@ -3,9 +3,7 @@
 //! A document that is no file (`untitled:…`) keeps its URI for a path: it can be read from the editor
 //! alone, and what it uses is looked for beside nothing.
 
-use std::path::Component;
-use std::path::Path;
-use std::path::PathBuf;
+use std::path::{Component, Path, PathBuf};
 
 /// The path that a URI names.
 pub fn to_path(uri: &str) -> PathBuf {

@@ -1,29 +1,17 @@
 //! Through the trees of a set of files, from name to name.
 
-use std::path::Path;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use crate::model::LoadedFile;
-use crate::syntax::Sources;
-use crate::syntax::ast;
-use crate::syntax::ast::BinaryOp;
-use crate::syntax::ast::Expr;
-use crate::syntax::ast::ExprKind;
-use crate::syntax::ast::FileId;
-use crate::syntax::ast::ItemKind;
-use crate::syntax::ast::Name;
-use crate::syntax::ast::Span;
+use crate::syntax::ast::{BinaryOp, Expr, ExprKind, FileId, ItemKind, Name, Span};
+use crate::syntax::{Sources, ast};
 use crate::units;
 use crate::units::Dimension;
 
 use super::declared::Declared;
-use super::names::Locals;
-use super::names::Occurrence;
-use super::names::Symbol;
-use super::names::Ty;
-use super::uri;
-use super::words;
+use super::names::{Locals, Occurrence, Symbol, Ty};
 use super::words::Entry;
+use super::{uri, words};
 
 /// Every name of the files that stands for something.
 pub fn occurrences(files: &[LoadedFile], sources: &Sources, declared: &Declared) -> Vec<Occurrence> {

@@ -4,15 +4,8 @@
 //! Keywords follow `grammar/ava.pest`, fields the checker in `model::check`; a test here compares the
 //! keywords with the grammar. Whatever the author declares is in the files and not here.
 
-use crate::model::ENDS;
-use crate::model::MODULES;
-use crate::model::vocabulary::Body;
-use crate::model::vocabulary::Colour;
-use crate::model::vocabulary::LaneChoice;
-use crate::model::vocabulary::Side;
-use crate::model::vocabulary::Then;
-use crate::model::vocabulary::Verb;
-use crate::model::vocabulary::Word;
+use crate::model::vocabulary::{Body, Colour, LaneChoice, Side, Then, Verb, Word};
+use crate::model::{ENDS, MODULES};
 
 /// A word and what it means.
 pub type Entry = (&'static str, &'static str);

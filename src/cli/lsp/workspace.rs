@@ -5,21 +5,15 @@
 //! read has changed; maps are understood once for each content.
 
 use std::cell::RefCell;
-use std::collections::BTreeMap;
-use std::collections::BTreeSet;
-use std::path::Path;
-use std::path::PathBuf;
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use crate::cli::load;
 use crate::model;
-use crate::model::Loaded;
-use crate::model::MapCache;
-use crate::model::ReadError;
-use crate::model::Space;
+use crate::model::{Loaded, MapCache, ReadError, Space};
 use crate::syntax::Diagnostic;
-use crate::syntax::ast::FileId;
-use crate::syntax::ast::Span;
+use crate::syntax::ast::{FileId, Span};
 
 use super::names::Names;
 use super::position::Lines;

@@ -1,46 +1,19 @@
 //! Actions and groups: parameters with their values, effects with their words.
 
-use crate::model::check::Checker;
-use crate::model::check::declaration::unknown_state;
-use crate::model::check::declaration::unknown_word;
-use crate::model::check::docs;
-use crate::model::check::each;
-use crate::model::check::expression::Place;
-use crate::model::check::expression::is_number;
-use crate::model::check::literal;
-use crate::model::check::names::Names;
-use crate::model::check::names::unknown;
-use crate::model::code;
-use crate::model::expr::Expr;
-use crate::model::expr::ExprKind;
-use crate::model::reach;
-use crate::model::space::ActionDef;
-use crate::model::space::Domain;
-use crate::model::space::EffectDef;
-use crate::model::space::GroupDef;
-use crate::model::space::Parameter;
-use crate::model::space::RuleDef;
-use crate::model::space::SetDef;
-use crate::model::space::SpawnDef;
-use crate::model::space::WordExpr;
-use crate::model::value::Type;
-use crate::model::value::Value;
-use crate::model::vocabulary::Body;
-use crate::model::vocabulary::Colour;
-use crate::model::vocabulary::LaneChoice;
-use crate::model::vocabulary::Side;
-use crate::model::vocabulary::Then;
-use crate::model::vocabulary::Verb;
-use crate::model::vocabulary::Word;
-use crate::syntax::Diagnostic;
-use crate::syntax::ast;
-use crate::syntax::ast::ItemKind;
-use crate::syntax::ast::ParamMode;
-use crate::syntax::ast::Span;
-use crate::syntax::listed;
-use crate::syntax::nearest;
-use crate::units::Dimension;
-use crate::units::Rational;
+use crate::model::check::declaration::{unknown_state, unknown_word};
+use crate::model::check::expression::{Place, is_number};
+use crate::model::check::names::{Names, unknown};
+use crate::model::check::{Checker, docs, each, literal};
+use crate::model::expr::{Expr, ExprKind};
+use crate::model::space::{
+    ActionDef, Domain, EffectDef, GroupDef, Parameter, RuleDef, SetDef, SpawnDef, WordExpr,
+};
+use crate::model::value::{Type, Value};
+use crate::model::vocabulary::{Body, Colour, LaneChoice, Side, Then, Verb, Word};
+use crate::model::{code, reach};
+use crate::syntax::ast::{ItemKind, ParamMode, Span};
+use crate::syntax::{Diagnostic, ast, listed, nearest};
+use crate::units::{Dimension, Rational};
 
 /// A table may have so many rows.
 pub(crate) const ROWS_MAX: u64 = 100_000;

@@ -1,33 +1,17 @@
 //! Enums, constants, functions and states.
 
-use crate::model::check::Checker;
-use crate::model::check::docs;
-use crate::model::check::each;
 use crate::model::check::expression::Place;
-use crate::model::check::names::Names;
-use crate::model::check::names::unknown;
+use crate::model::check::names::{Names, unknown};
 use crate::model::check::rule::names_in;
+use crate::model::check::{Checker, docs, each};
 use crate::model::code;
 use crate::model::enclose::VARIANTS_MAX;
-use crate::model::expr::Expr;
-use crate::model::expr::ExprKind;
-use crate::model::space::EnumDef;
-use crate::model::space::FnDef;
-use crate::model::space::Initial;
-use crate::model::space::StateDef;
-use crate::model::space::StateMeaning;
-use crate::model::value::EnumIndex;
-use crate::model::value::Type;
-use crate::model::vocabulary::Level;
-use crate::model::vocabulary::Phenomenon;
-use crate::model::vocabulary::TimeOfDay;
-use crate::model::vocabulary::Word;
-use crate::syntax::Diagnostic;
-use crate::syntax::ast;
-use crate::syntax::ast::ItemKind;
-use crate::syntax::ast::Span;
-use crate::syntax::listed;
-use crate::syntax::nearest;
+use crate::model::expr::{Expr, ExprKind};
+use crate::model::space::{EnumDef, FnDef, Initial, StateDef, StateMeaning};
+use crate::model::value::{EnumIndex, Type};
+use crate::model::vocabulary::{Level, Phenomenon, TimeOfDay, Word};
+use crate::syntax::ast::{ItemKind, Span};
+use crate::syntax::{Diagnostic, ast, listed, nearest};
 
 /// A function may come to so many operations, those of the functions it calls included: each call
 /// stands for a copy, and copies of copies grow fast.

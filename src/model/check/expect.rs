@@ -1,18 +1,12 @@
 //! Static claims of a space: `expect count(actions) == 45`, `expect every(actions, realisable)`.
 
-use crate::model::check::Checker;
-use crate::model::check::each;
 use crate::model::check::names::unknown;
+use crate::model::check::{Checker, each};
 use crate::model::code;
-use crate::model::row::Reach;
-use crate::model::row::Row;
-use crate::model::space::ExpectDef;
-use crate::model::space::Space;
-use crate::syntax::Diagnostic;
-use crate::syntax::ast;
-use crate::syntax::ast::BinaryOp;
-use crate::syntax::ast::ItemKind;
-use crate::syntax::ast::Span;
+use crate::model::row::{Reach, Row};
+use crate::model::space::{ExpectDef, Space};
+use crate::syntax::ast::{BinaryOp, ItemKind, Span};
+use crate::syntax::{Diagnostic, ast};
 
 impl Checker {
     /// Judges every claim; gives those that hold.

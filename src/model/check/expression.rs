@@ -3,24 +3,13 @@
 use crate::model::check::Checker;
 use crate::model::check::names::unknown;
 use crate::model::code;
-use crate::model::expr::Arithmetic;
-use crate::model::expr::Comparison;
-use crate::model::expr::Expr;
-use crate::model::expr::ExprKind;
-use crate::model::expr::Fact;
-use crate::model::value::EnumIndex;
-use crate::model::value::Type;
+use crate::model::expr::{Arithmetic, Comparison, Expr, ExprKind, Fact};
+use crate::model::value::{EnumIndex, Type};
 use crate::model::vocabulary::LaneChoice;
-use crate::syntax::Diagnostic;
-use crate::syntax::ast;
-use crate::syntax::ast::BinaryOp;
-use crate::syntax::ast::Span;
-use crate::syntax::ast::UnaryOp;
-use crate::syntax::listed;
-use crate::syntax::nearest;
+use crate::syntax::ast::{BinaryOp, Span, UnaryOp};
+use crate::syntax::{Diagnostic, ast, listed, nearest};
 use crate::units;
-use crate::units::Dimension;
-use crate::units::Rational;
+use crate::units::{Dimension, Rational};
 
 /// What an expression may name where it stands, apart from constants and functions.
 #[derive(Debug, Clone, Copy, Default)]

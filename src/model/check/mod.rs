@@ -17,8 +17,7 @@ mod settings;
 mod style;
 mod unused;
 
-pub(super) use expression::exact_digits;
-pub(super) use expression::unknown_unit;
+pub(super) use expression::{exact_digits, unknown_unit};
 pub(super) use names::unknown;
 pub(super) use road::Maps;
 pub(super) use scenario::row;
@@ -28,29 +27,13 @@ pub(super) use unused::names_of_expr;
 use std::path::PathBuf;
 
 use crate::model::check::names::Names;
-use crate::model::code;
-use crate::model::enclose::Known;
-use crate::model::enclose::Values;
-use crate::model::enclose::enclose;
-use crate::model::expr::Expr;
-use crate::model::expr::ExprKind;
-use crate::model::limits;
-use crate::model::proofs;
-use crate::model::reach;
-use crate::model::space::ActionDef;
-use crate::model::space::EnumDef;
-use crate::model::space::FnDef;
-use crate::model::space::GroupDef;
-use crate::model::space::Space;
-use crate::model::space::StateDef;
-use crate::model::value::EnumIndex;
-use crate::model::value::Type;
-use crate::model::value::Value;
-use crate::syntax::Diagnostic;
-use crate::syntax::ast;
-use crate::syntax::ast::FileId;
-use crate::syntax::ast::ItemKind;
-use crate::syntax::ast::Span;
+use crate::model::enclose::{Known, Values, enclose};
+use crate::model::expr::{Expr, ExprKind};
+use crate::model::space::{ActionDef, EnumDef, FnDef, GroupDef, Space, StateDef};
+use crate::model::value::{EnumIndex, Type, Value};
+use crate::model::{code, limits, proofs, reach};
+use crate::syntax::ast::{FileId, ItemKind, Span};
+use crate::syntax::{Diagnostic, ast};
 use crate::units::Rational;
 
 /// Where the parameters, the result and the header of a function are.

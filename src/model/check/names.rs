@@ -3,11 +3,8 @@
 use std::collections::BTreeMap;
 
 use crate::model::code;
-use crate::syntax::Diagnostic;
-use crate::syntax::ast::Name;
-use crate::syntax::ast::Span;
-use crate::syntax::listed;
-use crate::syntax::nearest;
+use crate::syntax::ast::{Name, Span};
+use crate::syntax::{Diagnostic, listed, nearest};
 
 /// The declarations of one kind, by name.
 #[derive(Debug, Default)]

@@ -3,26 +3,17 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use crate::model::check::Checker;
-use crate::model::check::docs;
-use crate::model::check::each;
 use crate::model::check::expression::Place;
-use crate::model::check::names::Names;
-use crate::model::check::names::unknown;
+use crate::model::check::names::{Names, unknown};
+use crate::model::check::{Checker, docs, each};
 use crate::model::code;
 use crate::model::limits::SPAWN_SPEED_MPS;
-use crate::model::space::Road;
-use crate::model::space::RoadFacts;
+use crate::model::space::{Road, RoadFacts};
 use crate::model::value::Type;
-use crate::road::LanePlace;
-use crate::road::RoadMap;
-use crate::road::Route;
-use crate::syntax::Diagnostic;
-use crate::syntax::ast;
+use crate::road::{LanePlace, RoadMap, Route};
 use crate::syntax::ast::ItemKind;
-use crate::syntax::print_expr;
-use crate::units::Dimension;
-use crate::units::Rational;
+use crate::syntax::{Diagnostic, ast, print_expr};
+use crate::units::{Dimension, Rational};
 
 /// Where maps come from: the reader of files knows the folder of the file that names one.
 pub(in crate::model) trait Maps {

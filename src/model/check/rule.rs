@@ -1,25 +1,15 @@
 //! Rules: which actions each binds, and its condition compiled for every one of them.
 
-use crate::model::check::Checker;
 use crate::model::check::declaration::unknown_state;
-use crate::model::check::docs;
-use crate::model::check::each;
 use crate::model::check::expression::Place;
-use crate::model::check::names::Names;
-use crate::model::check::names::unknown;
+use crate::model::check::names::{Names, unknown};
+use crate::model::check::{Checker, docs, each};
 use crate::model::code;
-use crate::model::expr::Expr;
-use crate::model::expr::ExprKind;
-use crate::model::space::ActionDef;
-use crate::model::space::EffectDef;
-use crate::model::space::RuleBinding;
-use crate::model::space::RuleBody;
-use crate::model::space::RuleDef;
+use crate::model::expr::{Expr, ExprKind};
+use crate::model::space::{ActionDef, EffectDef, RuleBinding, RuleBody, RuleDef};
 use crate::model::value::Type;
-use crate::syntax::Diagnostic;
-use crate::syntax::ast;
 use crate::syntax::ast::ItemKind;
-use crate::syntax::listed;
+use crate::syntax::{Diagnostic, ast, listed};
 
 impl Checker {
     pub(super) fn rules(&mut self, items: &[&ast::Item]) -> Vec<RuleDef> {

@@ -2,50 +2,23 @@
 
 use std::sync::Arc;
 
-use crate::model::bound::Bound;
-use crate::model::bound::bounds;
-use crate::model::check::names::Names;
-use crate::model::check::names::unknown;
-use crate::model::check::scenario_rules::Moment;
-use crate::model::check::scenario_rules::breaches;
-use crate::model::check::scenario_value::figure;
-use crate::model::check::scenario_value::number;
-use crate::model::check::scenario_value::value;
+use crate::model::bound::{Bound, bounds};
+use crate::model::check::names::{Names, unknown};
+use crate::model::check::scenario_rules::{Moment, breaches};
+use crate::model::check::scenario_value::{figure, number, value};
 use crate::model::code;
-use crate::model::eval::Facts;
-use crate::model::eval::evaluate;
-use crate::model::expr::Comparison;
-use crate::model::expr::Expr;
-use crate::model::limits::AMBIENT_MAX;
-use crate::model::limits::SIGNAL_PHASE_S;
-use crate::model::row::Row;
-use crate::model::row::locals;
-use crate::model::scenario::Avoidability;
-use crate::model::scenario::Claim;
-use crate::model::scenario::ENDS;
-use crate::model::scenario::Figure;
-use crate::model::scenario::MODULES;
-use crate::model::scenario::Origin;
-use crate::model::scenario::Scenario;
-use crate::model::scenario::ScenarioStart;
-use crate::model::scenario::ScenarioStep;
-use crate::model::space::Domain;
-use crate::model::space::Initial;
-use crate::model::space::Parameter;
-use crate::model::space::Space;
-use crate::model::value::Memory;
-use crate::model::value::Value;
-use crate::syntax::Diagnostic;
-use crate::syntax::LANGUAGE;
-use crate::syntax::ast;
-use crate::syntax::ast::BinaryOp;
-use crate::syntax::ast::ClauseKind;
-use crate::syntax::ast::FileId;
-use crate::syntax::ast::ItemKind;
-use crate::syntax::listed;
-use crate::syntax::parse;
-use crate::units::Dimension;
-use crate::units::Rational;
+use crate::model::eval::{Facts, evaluate};
+use crate::model::expr::{Comparison, Expr};
+use crate::model::limits::{AMBIENT_MAX, SIGNAL_PHASE_S};
+use crate::model::row::{Row, locals};
+use crate::model::scenario::{
+    Avoidability, Claim, ENDS, Figure, MODULES, Origin, Scenario, ScenarioStart, ScenarioStep,
+};
+use crate::model::space::{Domain, Initial, Parameter, Space};
+use crate::model::value::{Memory, Value};
+use crate::syntax::ast::{BinaryOp, ClauseKind, FileId, ItemKind};
+use crate::syntax::{Diagnostic, LANGUAGE, ast, listed, parse};
+use crate::units::{Dimension, Rational};
 
 /// Numbers of steps stay below this.
 const STEPS_MAX: u64 = 100_000;

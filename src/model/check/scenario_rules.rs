@@ -5,26 +5,15 @@
 
 use crate::model::bound::bounds;
 use crate::model::code;
-use crate::model::eval::Facts;
-use crate::model::eval::compare;
-use crate::model::eval::evaluate;
-use crate::model::expr::Comparison;
-use crate::model::expr::Expr;
-use crate::model::expr::ExprKind;
-use crate::model::proofs::next_rows;
-use crate::model::proofs::shortest_way;
+use crate::model::eval::{Facts, compare, evaluate};
+use crate::model::expr::{Comparison, Expr, ExprKind};
+use crate::model::proofs::{next_rows, shortest_way};
 use crate::model::row::Row;
 use crate::model::scenario::Origin;
-use crate::model::space::RuleBody;
-use crate::model::space::RuleDef;
-use crate::model::space::Space;
-use crate::model::value::Memory;
-use crate::model::value::Value;
-use crate::model::vocabulary::LaneChoice;
-use crate::model::vocabulary::Word;
-use crate::syntax::Diagnostic;
-use crate::syntax::ast;
-use crate::syntax::listed;
+use crate::model::space::{RuleBody, RuleDef, Space};
+use crate::model::value::{Memory, Value};
+use crate::model::vocabulary::{LaneChoice, Word};
+use crate::syntax::{Diagnostic, ast, listed};
 
 /// Legal rows listed for one step, at most.
 const ROWS_SHOWN: usize = 6;

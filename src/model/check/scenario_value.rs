@@ -1,19 +1,15 @@
 //! Values in scenarios: literals only, read back to the very f64 that was written.
 
-use crate::model::check::expression::exact_digits;
-use crate::model::check::expression::unknown_unit;
+use crate::model::check::expression::{exact_digits, unknown_unit};
 use crate::model::check::names::unknown;
 use crate::model::code;
 use crate::model::scenario::Figure;
 use crate::model::space::Space;
-use crate::model::value::Type;
-use crate::model::value::Value;
-use crate::syntax::Diagnostic;
-use crate::syntax::ast;
+use crate::model::value::{Type, Value};
 use crate::syntax::ast::UnaryOp;
+use crate::syntax::{Diagnostic, ast};
 use crate::units;
-use crate::units::Dimension;
-use crate::units::Rational;
+use crate::units::{Dimension, Rational};
 
 /// The literal as a value of that type.
 ///

@@ -1,28 +1,16 @@
 //! Episode, reward and verdicts.
 
-use crate::model::check::Checker;
-use crate::model::check::docs;
-use crate::model::check::each;
 use crate::model::check::expression::Place;
-use crate::model::check::names::Names;
-use crate::model::check::names::unknown;
+use crate::model::check::names::{Names, unknown};
+use crate::model::check::{Checker, docs, each};
 use crate::model::code;
-use crate::model::expr::Expr;
-use crate::model::expr::ExprKind;
-use crate::model::expr::Fact;
+use crate::model::expr::{Expr, ExprKind, Fact};
 use crate::model::limits::TICK_MS;
-use crate::model::space::COUNTED;
-use crate::model::space::EpisodeDef;
-use crate::model::space::RewardCase;
-use crate::model::space::VerdictDef;
+use crate::model::space::{COUNTED, EpisodeDef, RewardCase, VerdictDef};
 use crate::model::value::Type;
-use crate::syntax::Diagnostic;
-use crate::syntax::ast;
-use crate::syntax::ast::BinaryOp;
-use crate::syntax::ast::ItemKind;
-use crate::syntax::ast::Span;
-use crate::units::Dimension;
-use crate::units::Rational;
+use crate::syntax::ast::{BinaryOp, ItemKind, Span};
+use crate::syntax::{Diagnostic, ast};
+use crate::units::{Dimension, Rational};
 
 /// The paper's observation period, s.
 const STEP_S: f64 = 6.0;

@@ -3,14 +3,8 @@
 //! Layout is `fmt`'s business, not ours.
 
 use crate::model::code;
-use crate::syntax::Diagnostic;
-use crate::syntax::ast;
-use crate::syntax::ast::BinaryOp;
-use crate::syntax::ast::Expr;
-use crate::syntax::ast::ExprKind;
-use crate::syntax::ast::ItemKind;
-use crate::syntax::ast::Name;
-use crate::syntax::print_expr;
+use crate::syntax::ast::{BinaryOp, Expr, ExprKind, ItemKind, Name};
+use crate::syntax::{Diagnostic, ast, print_expr};
 
 /// One warning for each oddity.
 pub(super) fn report(own: &[&ast::Item]) -> Vec<Diagnostic> {

@@ -7,11 +7,8 @@
 use std::collections::BTreeSet;
 
 use crate::model::code;
-use crate::syntax::Diagnostic;
-use crate::syntax::ast;
-use crate::syntax::ast::ItemKind;
-use crate::syntax::ast::Name;
-use crate::syntax::ast::ParamMode;
+use crate::syntax::ast::{ItemKind, Name, ParamMode};
+use crate::syntax::{Diagnostic, ast};
 
 /// One warning for each declaration of `own` that no declaration of `all` names.
 pub(super) fn report(own: &[&ast::Item], all: &[&ast::Item]) -> Vec<Diagnostic> {

@@ -3,13 +3,9 @@
 
 use std::path::Path;
 
-use crate::model::Loaded;
-use crate::model::ReadError;
-use crate::model::explain::PAGES;
-use crate::model::explain::page;
-use crate::model::load;
-use crate::syntax::Style;
-use crate::syntax::render;
+use crate::model::explain::{PAGES, page};
+use crate::model::{Loaded, ReadError, load};
+use crate::syntax::{Style, render};
 
 /// Compiles an example as if it stood beside the shipped files.
 fn compiled(text: &str) -> Loaded {

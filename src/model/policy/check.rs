@@ -5,24 +5,13 @@ use serde_json::Value;
 
 use crate::model::code;
 use crate::model::space::Space;
-use crate::syntax::Diagnostic;
-use crate::syntax::LANGUAGE;
-use crate::syntax::ast;
-use crate::syntax::ast::Field;
-use crate::syntax::ast::FileId;
-use crate::syntax::ast::ItemKind;
-use crate::syntax::ast::Span;
-use crate::syntax::parse;
+use crate::syntax::ast::{Field, FileId, ItemKind, Span};
+use crate::syntax::{Diagnostic, LANGUAGE, ast, parse};
 
-use super::Net;
-use super::Policy;
-use super::PolicyClaims;
-use super::PolicyOrigin;
-use super::plain;
-use super::rules::rules;
-use super::rules::value_of;
+use super::rules::{rules, value_of};
 use super::seal::seal;
 use super::weights::weights_from_lines;
+use super::{Net, Policy, PolicyClaims, PolicyOrigin, plain};
 
 /// The policy of a file, checked against the space that it uses. `text` is what the tree was read from.
 ///

@@ -12,22 +12,14 @@ mod seal;
 mod variable;
 mod weights;
 
-pub use check::policy;
-pub use check::values_from;
+pub use check::{policy, values_from};
 pub use plain::expression;
-pub use rules::Comparison;
-pub use rules::Condition;
-pub use rules::PolicyRule;
+pub use rules::{Comparison, Condition, PolicyRule};
 pub use seal::seal;
-pub use variable::VARIABLES;
-pub use variable::Variable;
-pub use variable::VariableKind;
-pub use variable::variable_index;
-pub use weights::weights_from_lines;
-pub use weights::weights_to_lines;
+pub use variable::{VARIABLES, Variable, VariableKind, variable_index};
+pub use weights::{weights_from_lines, weights_to_lines};
 
-use serde_json::Map;
-use serde_json::Value;
+use serde_json::{Map, Value};
 
 /// A policy, read and checked.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,15 +1,8 @@
 //! Plain data in the language: records, lists, texts, numbers, truth values and `none`.
 
-use serde_json::Map;
-use serde_json::Value;
+use serde_json::{Map, Value};
 
-use crate::syntax::ast::Expr;
-use crate::syntax::ast::ExprKind;
-use crate::syntax::ast::Field;
-use crate::syntax::ast::Name;
-use crate::syntax::ast::Number;
-use crate::syntax::ast::Span;
-use crate::syntax::ast::UnaryOp;
+use crate::syntax::ast::{Expr, ExprKind, Field, Name, Number, Span, UnaryOp};
 
 /// What stands for "not given".
 const NONE: &str = "none";

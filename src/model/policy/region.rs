@@ -2,14 +2,11 @@
 //!
 //! "Empty" and "covered" are proofs. Of whole numbers (`obstacles`) it knows no more than of others.
 
-use crate::model::interval::End;
-use crate::model::interval::Interval;
+use crate::model::interval::{End, Interval};
 use crate::units::Rational;
 
-use super::rules::Comparison;
-use super::rules::Condition;
-use super::variable::VARIABLES;
-use super::variable::VariableKind;
+use super::rules::{Comparison, Condition};
+use super::variable::{VARIABLES, VariableKind};
 
 /// A box: what is left of each variable, in the order of [`VARIABLES`].
 #[derive(Debug, Clone, PartialEq)]

@@ -4,32 +4,18 @@
 //! the rows of a line the first that is legal at the moment acts; if none is, the step passes. The
 //! checks are proofs over boxes: what they say of a line is true of every state.
 
-use crate::model::check;
-use crate::model::code;
 use crate::model::proofs::forbids;
-use crate::model::row::Reach;
-use crate::model::row::Row;
-use crate::model::space::Space;
-use crate::model::space::StateMeaning;
-use crate::syntax::Diagnostic;
-use crate::syntax::ast;
-use crate::syntax::ast::BinaryOp;
-use crate::syntax::ast::Expr;
-use crate::syntax::ast::ExprKind;
-use crate::syntax::ast::Span;
-use crate::syntax::ast::UnaryOp;
-use crate::syntax::listed;
-use crate::syntax::nearest;
+use crate::model::row::{Reach, Row};
+use crate::model::space::{Space, StateMeaning};
+use crate::model::{check, code};
+use crate::syntax::ast::{BinaryOp, Expr, ExprKind, Span, UnaryOp};
+use crate::syntax::{Diagnostic, ast, listed, nearest};
 use crate::units;
-use crate::units::Dimension;
-use crate::units::Rational;
+use crate::units::{Dimension, Rational};
 
 use super::PolicyOrigin;
 use super::region::Region;
-use super::variable::VARIABLES;
-use super::variable::Variable;
-use super::variable::VariableKind;
-use super::variable::variable_index;
+use super::variable::{VARIABLES, Variable, VariableKind, variable_index};
 
 /// A line: where all conditions hold, the first of the rows that is legal.
 #[derive(Debug, Clone, PartialEq)]

@@ -3,13 +3,11 @@
 //! Left out are the digest itself and the paths of the files that it uses, so that a policy can move to
 //! another directory. What stands at the end of a path has its own digest.
 
-use sha2::Digest;
-use sha2::Sha256;
+use sha2::{Digest, Sha256};
 
 use crate::model::load::digest_text;
 use crate::syntax::ast;
-use crate::syntax::ast::ItemKind;
-use crate::syntax::ast::Span;
+use crate::syntax::ast::{ItemKind, Span};
 
 /// The seal that a policy file ought to have. `tree` is what was read from `text`.
 pub fn seal(text: &str, tree: &ast::File) -> String {

@@ -4,8 +4,7 @@
 //! words here. The names are ours, in the spelling of the language; the paper's stand beside them.
 
 use crate::units;
-use crate::units::Dimension;
-use crate::units::Rational;
+use crate::units::{Dimension, Rational};
 
 /// One variable.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -139,9 +138,7 @@ pub const VARIABLES: &[Variable] = &[
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::vocabulary::Level;
-    use crate::model::vocabulary::TimeOfDay;
-    use crate::model::vocabulary::Word;
+    use crate::model::vocabulary::{Level, TimeOfDay, Word};
 
     #[test]
     fn words_are_the_engines() {

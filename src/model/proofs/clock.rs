@@ -4,18 +4,11 @@ use std::collections::VecDeque;
 
 use crate::model::code;
 use crate::model::enclose::Values;
-use crate::model::reach::Prover;
-use crate::model::reach::numbers;
-use crate::model::row::Reach;
-use crate::model::row::Row;
-use crate::model::space::Initial;
-use crate::model::space::RuleBody;
-use crate::model::space::RuleDef;
-use crate::model::space::Space;
-use crate::model::value::Type;
-use crate::model::value::Value;
-use crate::syntax::Diagnostic;
-use crate::syntax::listed;
+use crate::model::reach::{Prover, numbers};
+use crate::model::row::{Reach, Row};
+use crate::model::space::{Initial, RuleBody, RuleDef, Space};
+use crate::model::value::{Type, Value};
+use crate::syntax::{Diagnostic, listed};
 
 /// The graph of one rule.
 struct Graph<'a> {

@@ -3,17 +3,12 @@
 use crate::model::bound::bounds;
 use crate::model::code;
 use crate::model::expr::Comparison;
-use crate::model::interval::End;
-use crate::model::interval::Interval;
+use crate::model::interval::{End, Interval};
 use crate::model::reach::Prover;
-use crate::model::row::Reach;
-use crate::model::row::locals;
-use crate::model::space::Domain;
-use crate::model::space::Parameter;
-use crate::model::space::Space;
+use crate::model::row::{Reach, locals};
+use crate::model::space::{Domain, Parameter, Space};
 use crate::model::value::Type;
-use crate::syntax::Diagnostic;
-use crate::syntax::listed;
+use crate::syntax::{Diagnostic, listed};
 use crate::units::Rational;
 
 /// One remark for each rule and range that is cut alike, naming the actions and roads.

@@ -1,15 +1,12 @@
 //! Rules that change nothing: they hold by themselves, or follow from others.
 
-use crate::model::bound::Bound;
-use crate::model::bound::bounds;
+use crate::model::bound::{Bound, bounds};
 use crate::model::code;
 use crate::model::enclose::enclose;
 use crate::model::reach::Prover;
 use crate::model::row::Row;
-use crate::model::space::RuleBody;
-use crate::model::space::Space;
-use crate::syntax::Diagnostic;
-use crate::syntax::listed;
+use crate::model::space::{RuleBody, Space};
+use crate::syntax::{Diagnostic, listed};
 
 /// Rows times rules looked at for all rules together, at most: what is left then is not judged.
 const WORK_MAX: usize = 1_000_000;

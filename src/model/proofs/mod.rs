@@ -12,13 +12,9 @@ mod undecided;
 mod unfair;
 mod witness;
 
-pub(crate) use clock::forbids;
-pub(crate) use clock::next_rows;
-pub(crate) use clock::shortest_way;
-pub use cut::Removal;
-pub use cut::removals;
-pub use witness::Witness;
-pub use witness::witness;
+pub(crate) use clock::{forbids, next_rows, shortest_way};
+pub use cut::{Removal, removals};
+pub use witness::{Witness, witness};
 
 use crate::model::space::Space;
 use crate::syntax::Diagnostic;

@@ -1,10 +1,7 @@
 //! Expressions as far as they can be computed beforehand: calls opened, constants folded.
 
-use crate::model::enclose::Known;
-use crate::model::enclose::Values;
-use crate::model::enclose::enclose;
-use crate::model::expr::Expr;
-use crate::model::expr::ExprKind;
+use crate::model::enclose::{Known, Values, enclose};
+use crate::model::expr::{Expr, ExprKind};
 use crate::model::space::FnDef;
 use crate::model::value::Type;
 use crate::syntax::ast::Span;

@@ -6,15 +6,10 @@
 use std::collections::BTreeMap;
 
 use crate::model::code;
-use crate::model::expr::Expr;
-use crate::model::expr::ExprKind;
+use crate::model::expr::{Expr, ExprKind};
 use crate::model::proofs::reduce::reduce;
 use crate::model::row::Row;
-use crate::model::space::EffectDef;
-use crate::model::space::RuleBody;
-use crate::model::space::Space;
-use crate::model::space::SpawnDef;
-use crate::model::space::WordExpr;
+use crate::model::space::{EffectDef, RuleBody, Space, SpawnDef, WordExpr};
 use crate::model::value::Value;
 use crate::syntax::Diagnostic;
 use crate::syntax::ast::Span;

@@ -6,11 +6,9 @@ use crate::model::bound::bounds;
 use crate::model::code;
 use crate::model::proofs::witness::witness_within;
 use crate::model::reach::numbers;
-use crate::model::row::Reach;
-use crate::model::row::Row;
+use crate::model::row::{Reach, Row};
 use crate::model::space::Space;
-use crate::syntax::Diagnostic;
-use crate::syntax::listed;
+use crate::syntax::{Diagnostic, listed};
 
 /// Boxes of ranges looked at in the search for witnesses, at most; most rows need one for each road.
 const BOXES_MAX: usize = 20_000;

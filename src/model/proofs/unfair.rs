@@ -9,21 +9,12 @@ use std::cell::Cell;
 
 use crate::model::bound::bounds;
 use crate::model::code;
-use crate::model::eval::Facts;
-use crate::model::eval::evaluate;
-use crate::model::proofs::witness::Search;
-use crate::model::proofs::witness::Witness;
-use crate::model::row::Reach;
-use crate::model::row::Row;
-use crate::model::space::EffectDef;
-use crate::model::space::Road;
-use crate::model::space::RuleBody;
-use crate::model::space::Space;
-use crate::model::space::SpawnDef;
-use crate::model::value::Memory;
-use crate::model::value::Value;
-use crate::model::vocabulary::Verb;
-use crate::model::vocabulary::Word;
+use crate::model::eval::{Facts, evaluate};
+use crate::model::proofs::witness::{Search, Witness};
+use crate::model::row::{Reach, Row};
+use crate::model::space::{EffectDef, Road, RuleBody, Space, SpawnDef};
+use crate::model::value::{Memory, Value};
+use crate::model::vocabulary::{Verb, Word};
 use crate::syntax::Diagnostic;
 use crate::units::decimal;
 

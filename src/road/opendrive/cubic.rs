@@ -1,8 +1,6 @@
 //! Piecewise cubic polynomials along a road: widths, borders and lane offsets.
 
-use core::ops::Add;
-use core::ops::Mul;
-use core::ops::Sub;
+use core::ops::{Add, Mul, Sub};
 
 /// A function value with its first and second derivative by the station.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]

@@ -1,7 +1,6 @@
 //! What is read of an OpenDRIVE file, still in its own terms.
 
-use super::cubic::Cubics;
-use super::cubic::Jet;
+use super::cubic::{Cubics, Jet};
 use super::geometry::ReferenceLine;
 
 /// A whole file.

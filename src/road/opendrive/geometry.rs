@@ -1,7 +1,6 @@
 //! Reference lines: lines, arcs, spirals and parametric cubics, with exact heading and curvature.
 
-use crate::geometry::Vec2;
-use crate::geometry::unit_vector;
+use crate::geometry::{Vec2, unit_vector};
 
 /// A chain of curves over the road's station.
 #[derive(Debug, Clone)]

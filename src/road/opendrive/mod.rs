@@ -9,14 +9,8 @@ mod geometry;
 mod read;
 mod xml;
 
-pub use elements::Contact;
-pub use elements::Document;
-pub use elements::MarkRule;
-pub use elements::Meaning;
-pub use elements::Orientation;
-pub use elements::Outline;
-pub use elements::RoadElement;
-pub use elements::RoadLink;
-pub use elements::SectionElement;
-pub use elements::SignalElement;
+pub use elements::{
+    Contact, Document, MarkRule, Meaning, Orientation, Outline, RoadElement, RoadLink, SectionElement,
+    SignalElement,
+};
 pub use read::read;

@@ -5,30 +5,14 @@ use std::collections::BTreeMap;
 use crate::geometry::Vec2;
 use crate::road::RoadError;
 
-use super::cubic::Cubic;
-use super::cubic::Cubics;
-use super::elements::ConnectionElement;
-use super::elements::Contact;
-use super::elements::ControllerElement;
-use super::elements::Document;
-use super::elements::JunctionElement;
-use super::elements::LaneElement;
-use super::elements::MarkElement;
-use super::elements::MarkRule;
-use super::elements::Meaning;
-use super::elements::ObjectElement;
-use super::elements::Orientation;
-use super::elements::Outline;
-use super::elements::RoadElement;
-use super::elements::RoadLink;
-use super::elements::SectionElement;
-use super::elements::SignalElement;
-use super::geometry::Piece;
-use super::geometry::ReferenceLine;
-use super::geometry::Shape;
-use super::xml::Element;
-use super::xml::Lines;
-use super::xml::wrong;
+use super::cubic::{Cubic, Cubics};
+use super::elements::{
+    ConnectionElement, Contact, ControllerElement, Document, JunctionElement, LaneElement, MarkElement,
+    MarkRule, Meaning, ObjectElement, Orientation, Outline, RoadElement, RoadLink, SectionElement,
+    SignalElement,
+};
+use super::geometry::{Piece, ReferenceLine, Shape};
+use super::xml::{Element, Lines, wrong};
 
 /// Longer than any road; keeps the sampling of lanes within bounds.
 const ROAD_M_MAX: f64 = 100_000.0;

@@ -1,9 +1,6 @@
 //! What lies beside a lane: on its own road, across a median, in a junction.
 
-use crate::road::LaneIndex;
-use crate::road::RoadMap;
-use crate::road::Route;
-use crate::road::Side;
+use crate::road::{LaneIndex, RoadMap, Route, Side};
 
 use super::corner;
 

@@ -1,11 +1,8 @@
 //! Routes with lane changes: where they may be, what their path is like, what they leave untouched.
 
-use crate::geometry::Path;
-use crate::geometry::wrap_angle;
+use crate::geometry::{Path, wrap_angle};
 
-use crate::road::RoadError;
-use crate::road::RoadMap;
-use crate::road::Route;
+use crate::road::{RoadError, RoadMap, Route};
 
 /// A one-way road of three lanes, 300 m long: 150 m straight, a bend to the left of 100 m radius, two lane
 /// sections, a stop line at the end. `mark` is the marking between lanes -1 and -2, `bay` the widths of

@@ -1,14 +1,8 @@
 //! Road 2 as authored in `scenarios/roads/corner.xodr`, held against its survey.
 
-use crate::geometry::Path;
-use crate::geometry::Vec2;
-use crate::geometry::wrap_angle;
+use crate::geometry::{Path, Vec2, wrap_angle};
 
-use crate::road::LaneIndex;
-use crate::road::RoadError;
-use crate::road::RoadMap;
-use crate::road::Route;
-use crate::road::Turn;
+use crate::road::{LaneIndex, RoadError, RoadMap, Route, Turn};
 
 const CORNER: &str = include_str!("../../../scenarios/roads/corner.xodr");
 

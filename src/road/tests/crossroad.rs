@@ -1,16 +1,9 @@
 //! Road 3 as authored in `scenarios/roads/crossroad.xodr`, held against its survey.
 
-use crate::geometry::Path;
-use crate::geometry::Vec2;
-use crate::road::LaneIndex;
-use crate::road::RoadMap;
-use crate::road::Route;
-use crate::road::Side;
+use crate::geometry::{Path, Vec2};
+use crate::road::{LaneIndex, RoadMap, Route, Side};
 
-use super::survey::Leg;
-use super::survey::lanes_join;
-use super::survey::lights;
-use super::survey::ways;
+use super::survey::{Leg, lanes_join, lights, ways};
 
 const CROSSROAD: &str = include_str!("../../../scenarios/roads/crossroad.xodr");
 

@@ -2,14 +2,8 @@
 
 use proptest::prelude::*;
 
-use crate::geometry::Vec2;
-use crate::geometry::unit_vector;
-use crate::geometry::wrap_angle;
-use crate::road::Lane;
-use crate::road::RoadError;
-use crate::road::RoadMap;
-use crate::road::Route;
-use crate::road::SignKind;
+use crate::geometry::{Vec2, unit_vector, wrap_angle};
+use crate::road::{Lane, RoadError, RoadMap, Route, SignKind};
 
 const CORNER: &str = include_str!("../../../scenarios/roads/corner.xodr");
 

@@ -1,15 +1,9 @@
 //! Road 1 as authored in `scenarios/roads/residential.xodr`, held against its survey.
 
 use crate::geometry::Vec2;
-use crate::road::RoadMap;
-use crate::road::Route;
-use crate::road::Turn;
+use crate::road::{RoadMap, Route, Turn};
 
-use super::survey::Leg;
-use super::survey::lanes_join;
-use super::survey::lights;
-use super::survey::route_agrees;
-use super::survey::ways;
+use super::survey::{Leg, lanes_join, lights, route_agrees, ways};
 
 const RESIDENTIAL: &str = include_str!("../../../scenarios/roads/residential.xodr");
 

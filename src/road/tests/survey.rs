@@ -1,12 +1,8 @@
 //! What the tests of the authored roads share: the comparison of a map with its survey.
 
-use crate::geometry::Path;
-use crate::geometry::Pose;
-use crate::geometry::Vec2;
-use crate::geometry::wrap_angle;
+use crate::geometry::{Path, Pose, Vec2, wrap_angle};
 
-use crate::road::RoadMap;
-use crate::road::Route;
+use crate::road::{RoadMap, Route};
 
 /// The agreement that is asked for, m.
 const AGREEMENT_M: f64 = 0.3;

@@ -5,30 +5,17 @@
 
 use std::sync::Arc;
 
-use crate::geometry::Path;
-use crate::geometry::Pose;
-use crate::geometry::SMOOTH_STEP_SLOPE_MAX;
-use crate::geometry::SmoothStep;
-use crate::geometry::Vec2;
-use crate::geometry::smooth_step;
-use crate::geometry::wrap_angle;
+use crate::geometry::{Path, Pose, SMOOTH_STEP_SLOPE_MAX, SmoothStep, Vec2, smooth_step, wrap_angle};
 use crate::model::vocabulary::Side;
 use crate::road;
-use crate::road::LaneIndex;
-use crate::road::Neighbour;
+use crate::road::{LaneIndex, Neighbour};
 
 use crate::sim::body::BodyParameters;
-use crate::sim::mover::Around;
-use crate::sim::mover::Moved;
-use crate::sim::way::Way;
-use crate::sim::way::beside;
-use crate::sim::world::DT_S;
-use crate::sim::world::Obstacle;
+use crate::sim::mover::{Around, Moved};
+use crate::sim::way::{Way, beside};
+use crate::sim::world::{DT_S, Obstacle};
 
-use super::driver::Driver;
-use super::driver::SIDE_ROOM_M;
-use super::driver::along;
-use super::driver::extent_m;
+use super::driver::{Driver, SIDE_ROOM_M, along, extent_m};
 
 /// Room in front of and behind them that they want before changing lanes, m.
 const MIRROR_ROOM_M: f64 = 2.0;

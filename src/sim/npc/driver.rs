@@ -8,31 +8,21 @@
 
 use std::sync::Arc;
 
-use crate::geometry::OrientedBox;
-use crate::geometry::Path;
-use crate::geometry::Pose;
-use crate::geometry::Vec2;
+use crate::geometry::{OrientedBox, Path, Pose, Vec2};
 use crate::model::vocabulary::Side;
 use crate::rng;
-use crate::rng::Rng;
-use crate::rng::Stream;
+use crate::rng::{Rng, Stream};
 
 use crate::sim::body::BodyParameters;
 use crate::sim::following::Following;
-use crate::sim::mover::Around;
-use crate::sim::mover::Moved;
+use crate::sim::mover::{Around, Moved};
 use crate::sim::scene::Scene;
-use crate::sim::sense::FRAME_TICKS;
-use crate::sim::sense::SignalColour;
-use crate::sim::way::Way;
-use crate::sim::way::beside;
-use crate::sim::world::DT_S;
-use crate::sim::world::Obstacle;
+use crate::sim::sense::{FRAME_TICKS, SignalColour};
+use crate::sim::way::{Way, beside};
+use crate::sim::world::{DT_S, Obstacle};
 
-use super::change::Change;
-use super::change::Manoeuvre;
-use super::manners::GIVE_UP_S;
-use super::manners::STANDS_MPS;
+use super::change::{Change, Manoeuvre};
+use super::manners::{GIVE_UP_S, STANDS_MPS};
 
 /// IDM: comfortable deceleration, m/s².
 pub(super) const COMFORT_MPS2: f64 = 2.0;

@@ -8,15 +8,12 @@
 
 use core::cell::LazyCell;
 
-use crate::geometry::OrientedBox;
-use crate::geometry::Pose;
-use crate::geometry::distance_m;
+use crate::geometry::{OrientedBox, Pose, distance_m};
 use crate::sim::body::BodyParameters;
 use crate::sim::mover::Around;
 use crate::sim::world::Obstacle;
 
-use super::driver::Driver;
-use super::driver::Leader;
+use super::driver::{Driver, Leader};
 
 /// Moments that are looked at, s.
 const MOMENTS_S: [f64; 5] = [0.4, 0.8, 1.2, 1.6, 2.0];

@@ -27,13 +27,9 @@ use crate::sim::ego::VehicleParameters;
 use crate::sim::junction::Area;
 use crate::sim::mover::Around;
 use crate::sim::sense::SignalColour;
-use crate::sim::world::DT_S;
-use crate::sim::world::Obstacle;
+use crate::sim::world::{DT_S, Obstacle};
 
-use super::driver::COMFORT_MPS2;
-use super::driver::Driver;
-use super::driver::GAP_M_MIN;
-use super::driver::LOOK_AHEAD_M;
+use super::driver::{COMFORT_MPS2, Driver, GAP_M_MIN, LOOK_AHEAD_M};
 
 /// After so long at rest nobody who stands is waited for any more, s. Ours.
 const PATIENCE_S: f64 = 8.0;

@@ -2,21 +2,13 @@
 //! be green.
 
 use crate::action::SpawnRequest;
-use crate::model::vocabulary::Side;
-use crate::model::vocabulary::Then;
-use crate::road::Conflict;
-use crate::road::LaneIndex;
+use crate::model::vocabulary::{Side, Then};
+use crate::road::{Conflict, LaneIndex};
 
 use crate::sim::body::BodyParameters;
 use crate::sim::ego::VehicleParameters;
 use crate::sim::mover::Around;
-use crate::sim::npc::Driver;
-use crate::sim::npc::Manoeuvre;
-use crate::sim::npc::Towards;
-use crate::sim::npc::When;
-use crate::sim::npc::can_change;
-use crate::sim::npc::choices;
-use crate::sim::npc::lane_beside;
+use crate::sim::npc::{Driver, Manoeuvre, Towards, When, can_change, choices, lane_beside};
 use crate::sim::sense::SignalColour;
 use crate::sim::way::Way;
 use crate::sim::world::DT_S;

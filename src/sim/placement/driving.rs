@@ -1,30 +1,18 @@
 //! Drivers ahead, from behind and from the front.
 
 use crate::action::SpawnRequest;
-use crate::model::vocabulary::LaneChoice;
-use crate::model::vocabulary::Side;
-use crate::model::vocabulary::Then;
+use crate::model::vocabulary::{LaneChoice, Side, Then};
 use crate::rng;
 
 use crate::sim::body::BodyParameters;
 use crate::sim::ego::VehicleParameters;
 use crate::sim::mover::Around;
-use crate::sim::npc::Driver;
-use crate::sim::npc::Manoeuvre;
-use crate::sim::npc::Towards;
-use crate::sim::npc::When;
-use crate::sim::npc::can_change;
-use crate::sim::npc::choices;
-use crate::sim::npc::lane_beside;
+use crate::sim::npc::{Driver, Manoeuvre, Towards, When, can_change, choices, lane_beside};
 use crate::sim::way::Way;
 use crate::sim::world::DT_S;
 
-use super::ahead_m;
-use super::commanded;
-use super::lanes::chosen_lane;
-use super::lanes::lane_along;
-use super::lanes::lane_before;
-use super::lanes::opposing_lane;
+use super::lanes::{chosen_lane, lane_along, lane_before, opposing_lane};
+use super::{ahead_m, commanded};
 
 /// Before somebody ahead changes lanes, s.
 const CHANGE_AFTER_S: f64 = 1.0;

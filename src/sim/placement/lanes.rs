@@ -1,10 +1,7 @@
 //! Which lane a request means: the ego vehicle's, one beside it, the one that comes the other way.
 
-use crate::model::vocabulary::LaneChoice;
-use crate::model::vocabulary::Side;
-use crate::road::LaneIndex;
-use crate::road::RouteLane;
-use crate::road::Turn;
+use crate::model::vocabulary::{LaneChoice, Side};
+use crate::road::{LaneIndex, RouteLane, Turn};
 
 use crate::sim::mover::Around;
 use crate::sim::npc::lane_beside;

@@ -11,38 +11,22 @@ mod lanes;
 
 use std::sync::Arc;
 
-use crate::action::SpawnFacts;
-use crate::action::SpawnRequest;
-use crate::geometry::OrientedBox;
-use crate::geometry::Pose;
-use crate::geometry::Vec2;
-use crate::geometry::distance_m;
-use crate::geometry::wrap_angle;
-use crate::model::vocabulary::Side;
-use crate::model::vocabulary::Verb;
+use crate::action::{SpawnFacts, SpawnRequest};
+use crate::geometry::{OrientedBox, Pose, Vec2, distance_m, wrap_angle};
+use crate::model::vocabulary::{Side, Verb};
 
-use crate::sim::body;
 use crate::sim::body::BodyParameters;
 use crate::sim::ego::VehicleParameters;
-use crate::sim::mover::Around;
-use crate::sim::mover::Motion;
-use crate::sim::mover::Moved;
-use crate::sim::mover::Mover;
-use crate::sim::npc::Cruise;
-use crate::sim::npc::Driver;
-use crate::sim::npc::Manoeuvre;
-use crate::sim::npc::choices;
+use crate::sim::mover::{Around, Motion, Moved, Mover};
+use crate::sim::npc::{Cruise, Driver, Manoeuvre, choices};
 use crate::sim::pedestrian::Walker;
-use crate::sim::safety;
-use crate::sim::sense::RANGE_M;
-use crate::sim::sense::visible_fraction;
+use crate::sim::sense::{RANGE_M, visible_fraction};
 use crate::sim::way::Way;
 use crate::sim::world::Obstacle;
+use crate::sim::{body, safety};
 
 use crossing::cross_road;
-use driving::drive_ahead;
-use driving::drive_opposite;
-use driving::overtake;
+use driving::{drive_ahead, drive_opposite, overtake};
 
 /// Where pedestrians begin and end, beside the middle of the ego vehicle's lane, m.
 const KERB_M: f64 = 5.0;

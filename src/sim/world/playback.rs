@@ -4,17 +4,11 @@
 //! A recording is the worlds after each tick, in order. Impacts are left out: who plays a recording
 //! back asks whether there is a contact, not what comes of it.
 
-use crate::geometry::Frame;
-use crate::geometry::OrientedBox;
-use crate::geometry::Sweep;
-use crate::sim::contact::Party;
-use crate::sim::contact::meet;
+use crate::geometry::{Frame, OrientedBox, Sweep};
+use crate::sim::contact::{Party, meet};
 use crate::sim::ego::Control;
 
-use super::Contact;
-use super::DT_S;
-use super::FRAME_TICKS;
-use super::World;
+use super::{Contact, DT_S, FRAME_TICKS, World};
 
 impl World {
     /// Advances by [`DT_S`]: the ego vehicle by its command, everything else to where `recorded`, the
@@ -69,14 +63,8 @@ impl World {
 
 #[cfg(test)]
 mod tests {
-    use crate::action::Effect;
-    use crate::action::SpawnRequest;
-    use crate::model::vocabulary::Body;
-    use crate::model::vocabulary::Colour;
-    use crate::model::vocabulary::LaneChoice;
-    use crate::model::vocabulary::Side;
-    use crate::model::vocabulary::Then;
-    use crate::model::vocabulary::Verb;
+    use crate::action::{Effect, SpawnRequest};
+    use crate::model::vocabulary::{Body, Colour, LaneChoice, Side, Then, Verb};
     use crate::sim::testing;
 
     use super::*;

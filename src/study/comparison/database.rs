@@ -3,19 +3,12 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use rusqlite::Connection;
-use rusqlite::Row;
-use rusqlite::params;
+use rusqlite::{Connection, Row, params};
 
 use crate::study::DatabaseError;
 
 use super::job::Job;
-use super::record::CellRecord;
-use super::record::CollisionRecord;
-use super::record::EpisodeRecord;
-use super::record::Failure;
-use super::record::Spent;
-use super::record::TrainedRecord;
+use super::record::{CellRecord, CollisionRecord, EpisodeRecord, Failure, Spent, TrainedRecord};
 use super::study::Study;
 
 /// Layout of the tables; raised whenever a column changes. Begins at 1001, so that it is

@@ -1,14 +1,9 @@
 //! Jobs: what a study consists of, played on any number of threads.
 
-use std::sync::atomic::AtomicBool;
-use std::sync::atomic::AtomicUsize;
-use std::sync::atomic::Ordering;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc;
 
-use super::record::CellRecord;
-use super::record::EpisodeRecord;
-use super::record::Spent;
-use super::record::TrainedRecord;
+use super::record::{CellRecord, EpisodeRecord, Spent, TrainedRecord};
 use super::study::Study;
 
 /// One training, or one repetition of an agent that has nothing to learn, with its evaluation.

@@ -2,14 +2,10 @@
 
 use std::collections::BTreeSet;
 
-use crate::study::statistics::Lifetime;
-use crate::study::statistics::restricted_mean;
+use crate::study::statistics::{Lifetime, restricted_mean};
 
 use super::file::EvaluationPlan;
-use super::record::CellRecord;
-use super::record::CollisionRecord;
-use super::record::EpisodeRecord;
-use super::record::Failure;
+use super::record::{CellRecord, CollisionRecord, EpisodeRecord, Failure};
 
 /// Something that is measured of a cell.
 pub struct Measure {

@@ -5,8 +5,7 @@ use crate::episode::EpisodeLog;
 use crate::model::vocabulary::Word;
 use crate::oracle;
 use crate::study::groups::kind;
-use crate::study::summary::EpisodeSummary;
-use crate::study::summary::Finding;
+use crate::study::summary::{EpisodeSummary, Finding};
 use crate::study::train::TrainedEpisode;
 
 /// One agent on one road, once trained or once repeated.

@@ -7,23 +7,13 @@ use std::collections::BTreeMap;
 use crate::oracle::wilson;
 use crate::rng;
 use crate::rng::Stream;
-use crate::study::statistics::Estimate;
-use crate::study::statistics::Interval;
-use crate::study::statistics::RankTest;
-use crate::study::statistics::holm;
-use crate::study::statistics::mann_whitney;
-use crate::study::statistics::mean;
-use crate::study::statistics::poisson;
-use crate::study::statistics::ratio_of_means;
-use crate::study::statistics::superiority;
+use crate::study::statistics::{
+    Estimate, Interval, RankTest, holm, mann_whitney, mean, poisson, ratio_of_means, superiority,
+};
 
 use super::file::EvaluationPlan;
-use super::measures::MEASURES;
-use super::measures::Measure;
-use super::measures::failures;
-use super::record::CellRecord;
-use super::record::EpisodeRecord;
-use super::record::Failure;
+use super::measures::{MEASURES, Measure, failures};
+use super::record::{CellRecord, EpisodeRecord, Failure};
 use super::study::StudySettings;
 
 /// Points of a learning curve. Ours: few enough to read.

@@ -5,24 +5,15 @@ use std::collections::BTreeSet;
 use crate::action::ActionTable;
 use crate::ads::ModularConfig;
 use crate::agent;
-use crate::agent::Kind;
-use crate::agent::Settings;
+use crate::agent::{Kind, Settings};
 use crate::oracle::AvoidabilitySettings;
 use crate::rng;
 use crate::rng::Stream;
-use crate::study::EPISODES_MAX;
-use crate::study::Profile;
-use crate::study::Run;
-use crate::study::RunError;
-use crate::study::RunSettings;
-use crate::study::TrainSettings;
-use crate::study::Training;
 use crate::study::train::with_period;
+use crate::study::{EPISODES_MAX, Profile, Run, RunError, RunSettings, TrainSettings, Training};
 use crate::syntax::listed;
 
-use super::file::AgentFile;
-use super::file::EvaluationPlan;
-use super::file::StudyFile;
+use super::file::{AgentFile, EvaluationPlan, StudyFile};
 use super::job::Job;
 
 /// Everything that is needed to repeat a study; written to `study.yaml`.

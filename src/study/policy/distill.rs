@@ -8,22 +8,14 @@ use std::sync::Arc;
 
 use crate::action::ActionTable;
 use crate::ads::Selected;
-use crate::agent::Agent;
-use crate::agent::QPolicy;
-use crate::agent::Visit;
-use crate::agent::chosen_by;
-use crate::agent::distilled;
+use crate::agent::{Agent, QPolicy, Visit, chosen_by, distilled};
 use crate::model::digest_text;
-use crate::model::policy::PolicyRule;
-use crate::model::policy::RulesClaims;
+use crate::model::policy::{PolicyRule, RulesClaims};
 use crate::rng::Stream;
 use crate::study::run::RunError;
-use crate::study::train::evaluate_agent;
-use crate::study::train::with_period;
+use crate::study::train::{evaluate_agent, with_period};
 
-use super::visits::Record;
-use super::visits::arena;
-use super::visits::visits;
+use super::visits::{Record, arena, visits};
 
 /// Rules that imitate a policy, as its settings want them; none if it never came to a choice. `rules`
 /// are those of the space that are switched on and off.

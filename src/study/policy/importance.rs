@@ -4,12 +4,9 @@
 //! States are weighted by what is at stake there, so a choice that makes no difference counts for
 //! nothing. Variables are shuffled one at a time, so of two that say the same neither seems important.
 
-use crate::agent::QPolicy;
-use crate::agent::Visit;
-use crate::mdp::Observation;
-use crate::mdp::STATE_LEN;
-use crate::model::policy::VARIABLES;
-use crate::model::policy::variable_index;
+use crate::agent::{QPolicy, Visit};
+use crate::mdp::{Observation, STATE_LEN};
+use crate::model::policy::{VARIABLES, variable_index};
 use crate::rng;
 use crate::rng::Stream;
 

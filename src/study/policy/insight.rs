@@ -3,20 +3,14 @@
 
 use crate::action::ActionTable;
 use crate::ads::Selected;
-use crate::agent::QPolicy;
-use crate::agent::Visit;
+use crate::agent::{QPolicy, Visit};
 use crate::mdp::Observation;
-use crate::model::policy::VARIABLES;
-use crate::model::policy::VariableKind;
-use crate::model::policy::variable_index;
+use crate::model::policy::{VARIABLES, VariableKind, variable_index};
 use crate::rng::Stream;
 use crate::study::run::RunError;
 
-use super::importance::Importance;
-use super::importance::importance;
-use super::importance::set;
-use super::visits::arena;
-use super::visits::visits;
+use super::importance::{Importance, importance, set};
+use super::visits::{arena, visits};
 
 /// What was found.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]

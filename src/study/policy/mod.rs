@@ -5,11 +5,6 @@ mod importance;
 mod insight;
 mod visits;
 
-pub use distill::distill;
-pub use distill::judge_rules;
-pub use distill::rounded;
+pub use distill::{distill, judge_rules, rounded};
 pub use importance::Importance;
-pub use insight::Insight;
-pub use insight::RowUse;
-pub use insight::State;
-pub use insight::insight;
+pub use insight::{Insight, RowUse, State, insight};

@@ -1,24 +1,18 @@
 //! The states that a policy comes to, and what its network thinks of each.
 
-use std::sync::Arc;
-use std::sync::Mutex;
-use std::sync::PoisonError;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use ndarray::ArrayView1;
 
 use crate::action::ActionTable;
 use crate::ads::Selected;
-use crate::agent::Agent;
-use crate::agent::QPolicy;
-use crate::agent::Visit;
+use crate::agent::{Agent, QPolicy, Visit};
 use crate::episode;
 use crate::episode::Moment;
 use crate::mdp::Observation;
 use crate::rng;
-use crate::rng::Rng;
-use crate::rng::Stream;
-use crate::study::arena::Arena;
-use crate::study::arena::choose;
+use crate::rng::{Rng, Stream};
+use crate::study::arena::{Arena, choose};
 use crate::study::run::RunError;
 use crate::study::train::with_period;
 

@@ -122,8 +122,7 @@ fn resampled_mean(values: &[f64], rng: &mut Rng) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::rng::Stream;
-    use crate::rng::stream;
+    use crate::rng::{Stream, stream};
 
     /// `scipy.stats.t.ppf(0.975, n)`.
     #[test]

@@ -7,17 +7,9 @@ mod intervals;
 mod ranks;
 mod survival;
 
-pub use intervals::Estimate;
-pub use intervals::Interval;
-pub use intervals::mean;
-pub use intervals::poisson;
-pub use intervals::ratio_of_means;
-pub use ranks::RankTest;
-pub use ranks::holm;
-pub use ranks::mann_whitney;
-pub use ranks::superiority;
-pub use survival::Lifetime;
-pub use survival::restricted_mean;
+pub use intervals::{Estimate, Interval, mean, poisson, ratio_of_means};
+pub use ranks::{RankTest, holm, mann_whitney, superiority};
+pub use survival::{Lifetime, restricted_mean};
 
 /// Where `is_above` turns true, by bisection; it must be false at `low` and true at `high`.
 fn bisect(mut low: f64, mut high: f64, is_above: impl Fn(f64) -> bool) -> f64 {

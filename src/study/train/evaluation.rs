@@ -1,18 +1,15 @@
 //! What a policy achieves without learning any more, in figures that anybody can check.
 
-use sha2::Digest;
-use sha2::Sha256;
+use sha2::{Digest, Sha256};
 
 use crate::action::ActionTable;
 use crate::ads::Selected;
-use crate::agent::Agent;
-use crate::agent::QPolicy;
+use crate::agent::{Agent, QPolicy};
 use crate::episode;
 use crate::oracle::AvoidabilitySettings;
 use crate::rng;
 use crate::rng::Stream;
-use crate::study::arena::Arena;
-use crate::study::arena::choose;
+use crate::study::arena::{Arena, choose};
 use crate::study::run::RunError;
 use crate::study::summary::EpisodeSummary;
 

@@ -3,14 +3,11 @@
 //! A checkpoint and the episodes up to it are committed together. What was kept after the last one is
 //! forgotten when a training is resumed: it is played again, to the same bytes.
 
-use rusqlite::OptionalExtension;
-use rusqlite::params;
+use rusqlite::{OptionalExtension, params};
 
 use crate::action::Draw;
 use crate::model::digest;
-use crate::study::database::Database;
-use crate::study::database::DatabaseError;
-use crate::study::database::add_all;
+use crate::study::database::{Database, DatabaseError, add_all};
 
 use super::training::TrainedEpisode;
 

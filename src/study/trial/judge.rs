@@ -20,18 +20,11 @@
 
 use crate::action::SpawnRequest;
 use crate::geometry::wrap_angle;
-use crate::model::vocabulary::LaneChoice;
-use crate::model::vocabulary::Side;
-use crate::model::vocabulary::Then;
-use crate::model::vocabulary::Verb;
-use crate::road::LaneIndex;
-use crate::road::RoadMap;
-use crate::sim::Scene;
-use crate::sim::VehicleParameters;
+use crate::model::vocabulary::{LaneChoice, Side, Then, Verb};
+use crate::road::{LaneIndex, RoadMap};
+use crate::sim::{Scene, VehicleParameters};
 
-use super::witness::Ending;
-use super::witness::Frame;
-use super::witness::Sighting;
+use super::witness::{Ending, Frame, Sighting};
 
 /// A vehicle has this long to do what its verb says: four observation periods, s.
 pub(super) const HORIZON_S: f64 = 24.0;

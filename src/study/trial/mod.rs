@@ -5,9 +5,4 @@ mod judge;
 mod survey;
 mod witness;
 
-pub use survey::Cell;
-pub use survey::Count;
-pub use survey::Outcome;
-pub use survey::Sample;
-pub use survey::TrialSettings;
-pub use survey::Trials;
+pub use survey::{Cell, Count, Outcome, Sample, TrialSettings, Trials};

@@ -7,23 +7,16 @@
 
 use std::sync::Arc;
 
-use crate::action::Draw;
-use crate::action::Effect;
-use crate::action::Offer;
-use crate::action::Refusal;
+use crate::action::{Draw, Effect, Offer, Refusal};
 use crate::ads::Ads;
 use crate::episode;
-use crate::episode::Choice;
-use crate::episode::EpisodeLog;
+use crate::episode::{Choice, EpisodeLog};
 use crate::model::vocabulary::Phenomenon;
 use crate::rng;
 use crate::rng::Stream;
-use crate::sim::Sensed;
-use crate::sim::World;
+use crate::sim::{Sensed, World};
 
-use super::fairness;
-use super::judge;
-use super::witness;
+use super::{fairness, judge, witness};
 use crate::study::Arena;
 
 /// How much is tried.

@@ -1,15 +1,9 @@
 //! What is seen of a road user after an action made it appear: its frames, ten a second.
 
 use crate::ads::Ads;
-use crate::geometry::OrientedBox;
-use crate::geometry::Vec2;
+use crate::geometry::{OrientedBox, Vec2};
 use crate::road::LaneIndex;
-use crate::sim::Contact;
-use crate::sim::DT_S;
-use crate::sim::FRAME_TICKS;
-use crate::sim::Scene;
-use crate::sim::Sensed;
-use crate::sim::World;
+use crate::sim::{Contact, DT_S, FRAME_TICKS, Scene, Sensed, World};
 
 /// How far beside its nearest lane a vehicle still counts as on the road, m.
 const LANE_REACH_M: f64 = 5.0;

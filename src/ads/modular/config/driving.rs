@@ -1,7 +1,6 @@
 //! Settings of the parts that decide and act: prediction, planning, control.
 
-use serde::Deserialize;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::ads::guide::SpeedRules;
 use crate::ads::steering::SteeringConfig;

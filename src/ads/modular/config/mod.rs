@@ -12,17 +12,12 @@ mod sensing;
 mod settings;
 mod weaknesses;
 
-use serde::Deserialize;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
-pub use driving::ControlConfig;
-pub use driving::PlanningConfig;
-pub use driving::PredictionConfig;
+pub use driving::{ControlConfig, PlanningConfig, PredictionConfig};
 pub use module::Module;
 pub use read::ConfigError;
-pub use sensing::LocalizationConfig;
-pub use sensing::PerceptionConfig;
-pub use sensing::TrackingConfig;
+pub use sensing::{LocalizationConfig, PerceptionConfig, TrackingConfig};
 pub use weaknesses::Weaknesses;
 
 /// Settings of [`Modular`](super::Modular). Keys that a file leaves out keep their default.

@@ -1,12 +1,8 @@
 //! The modules of the system, and what each of them would be without error.
 
 use super::ModularConfig;
-use super::driving::ControlConfig;
-use super::driving::PlanningConfig;
-use super::driving::PredictionConfig;
-use super::sensing::LocalizationConfig;
-use super::sensing::PerceptionConfig;
-use super::sensing::TrackingConfig;
+use super::driving::{ControlConfig, PlanningConfig, PredictionConfig};
+use super::sensing::{LocalizationConfig, PerceptionConfig, TrackingConfig};
 use super::weaknesses::Weaknesses;
 
 /// A part of the modular driving system that a failure can be blamed on.

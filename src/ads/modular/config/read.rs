@@ -2,22 +2,15 @@
 
 use std::fmt::Write as _;
 
-use serde_json::Map;
-use serde_json::Value;
-use sha2::Digest;
-use sha2::Sha256;
+use serde_json::{Map, Value};
+use sha2::{Digest, Sha256};
 
 use crate::ads::steering::SteeringConfig;
 use crate::syntax::nearest;
 
 use super::ModularConfig;
-use super::driving::ActuatorsConfig;
-use super::driving::PedalsConfig;
-use super::driving::PlanningConfig;
-use super::driving::PredictionConfig;
-use super::sensing::LocalizationConfig;
-use super::sensing::PerceptionConfig;
-use super::sensing::TrackingConfig;
+use super::driving::{ActuatorsConfig, PedalsConfig, PlanningConfig, PredictionConfig};
+use super::sensing::{LocalizationConfig, PerceptionConfig, TrackingConfig};
 
 /// Why a profile cannot be used. Whoever shows it says before it which file is meant.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

@@ -1,7 +1,6 @@
 //! The documented weaknesses of the system modelled, each a switch. None is random.
 
-use serde::Deserialize;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// Weaknesses (a) to (i). With a switch off, the part does what its original should have done.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]

@@ -1,7 +1,6 @@
 //! One object as a detector reports it in one frame.
 
-use crate::geometry::Pose;
-use crate::geometry::Vec2;
+use crate::geometry::{Pose, Vec2};
 use crate::model::vocabulary::Body;
 
 /// One object in one frame, on the map.

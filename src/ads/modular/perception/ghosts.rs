@@ -4,12 +4,10 @@
 //! and how large they are is ours: in front of the vehicle, where they matter.
 
 use crate::ads::status::GHOST_ID_MIN;
-use crate::geometry::Pose;
-use crate::geometry::Vec2;
+use crate::geometry::{Pose, Vec2};
 use crate::model::vocabulary::Body;
 use crate::rng;
-use crate::rng::Rng;
-use crate::rng::Stream;
+use crate::rng::{Rng, Stream};
 use crate::sim::Conditions;
 
 use super::super::config::PerceptionConfig;

@@ -8,14 +8,8 @@
 
 use std::sync::Arc;
 
-use crate::geometry::OrientedBox;
-use crate::geometry::Vec2;
-use crate::geometry::ray_hit_m;
-use crate::sim::Scene;
-use crate::sim::Sensed;
-use crate::sim::SensedObject;
-use crate::sim::SignalColour;
-use crate::sim::VehicleParameters;
+use crate::geometry::{OrientedBox, Vec2, ray_hit_m};
+use crate::sim::{Scene, Sensed, SensedObject, SignalColour, VehicleParameters};
 
 use super::super::config::PerceptionConfig;
 use super::look::FRAME_S;
@@ -85,12 +79,9 @@ fn hides(object: &SensedObject, eye: Vec2, lamp: Vec2, distance_m: f64) -> bool 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ads::testing::CLEAR_DAY;
-    use crate::ads::testing::corner;
-    use crate::ads::testing::object;
+    use crate::ads::testing::{CLEAR_DAY, corner, object};
     use crate::model::vocabulary::Body;
-    use crate::sim::Conditions;
-    use crate::sim::EgoMotion;
+    use crate::sim::{Conditions, EgoMotion};
 
     /// What is known of the corner's first light from `before_m` before its line.
     fn read(

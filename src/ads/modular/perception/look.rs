@@ -7,19 +7,11 @@
 //! Left out: confusion of identities and of classes beside the flicker of large vehicles, headings
 //! turned round, and a latency that grows with the number of objects.
 
-use crate::geometry::Pose;
-use crate::geometry::Vec2;
-use crate::geometry::unit_vector;
-use crate::geometry::wrap_angle;
+use crate::geometry::{Pose, Vec2, unit_vector, wrap_angle};
 use crate::model::vocabulary::Body;
 use crate::rng;
-use crate::rng::Rng;
-use crate::rng::Stream;
-use crate::sim::Conditions;
-use crate::sim::DT_S;
-use crate::sim::FRAME_TICKS;
-use crate::sim::Sensed;
-use crate::sim::SensedObject;
+use crate::rng::{Rng, Stream};
+use crate::sim::{Conditions, DT_S, FRAME_TICKS, Sensed, SensedObject};
 
 use super::super::config::PerceptionConfig;
 use super::detection::Detection;
@@ -223,8 +215,7 @@ fn measure(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ads::testing::CLEAR_DAY;
-    use crate::ads::testing::object;
+    use crate::ads::testing::{CLEAR_DAY, object};
     use crate::sim::EgoMotion;
 
     fn sensed(objects: Vec<SensedObject>) -> Sensed {

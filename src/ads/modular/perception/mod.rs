@@ -8,5 +8,4 @@ mod ranges;
 
 pub use detection::Detection;
 pub use lights::LightReader;
-pub use look::FRAME_S;
-pub use look::Perception;
+pub use look::{FRAME_S, Perception};

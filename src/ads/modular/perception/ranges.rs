@@ -4,8 +4,7 @@
 //! camera sees fades once. Left out: radar (in Apollo it begins no track), spray, snow, and the low
 //! sun, of whose azimuth the world knows nothing.
 
-use crate::sim::Conditions;
-use crate::sim::SensedObject;
+use crate::sim::{Conditions, SensedObject};
 
 use super::super::config::PerceptionConfig;
 
@@ -104,8 +103,7 @@ fn attenuated_m(clear_m: f64, extinction_per_m: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ads::testing::CLEAR_DAY;
-    use crate::ads::testing::object;
+    use crate::ads::testing::{CLEAR_DAY, object};
     use crate::geometry::Pose;
     use crate::model::vocabulary::Body;
 

@@ -2,15 +2,11 @@
 
 use core::ops::Range;
 
-use crate::ads::guide::Beside;
-use crate::ads::guide::Guide;
-use crate::ads::guide::Span;
+use crate::ads::guide::{Beside, Guide, Span};
 use crate::geometry::Vec2;
 use crate::sim::VehicleParameters;
 
-use super::super::prediction::Forecast;
-use super::super::prediction::STEP_S;
-use super::super::prediction::STEPS;
+use super::super::prediction::{Forecast, STEP_S, STEPS};
 use super::nudge::LateralPlan;
 use super::speed::Trajectory;
 

@@ -6,12 +6,10 @@
 
 use std::sync::Arc;
 
-use crate::ads::guide::Beside;
-use crate::ads::guide::Guide;
+use crate::ads::guide::{Beside, Guide};
 use crate::ads::status::Reason;
 use crate::road::RouteLaneChange;
-use crate::sim::Scene;
-use crate::sim::VehicleParameters;
+use crate::sim::{Scene, VehicleParameters};
 
 use super::super::config::PlanningConfig;
 use super::super::perception::FRAME_S;
@@ -137,8 +135,7 @@ mod tests {
     use crate::ads::modular::prediction::Prediction;
     use crate::ads::modular::tracking::Track;
     use crate::ads::testing::two_lanes;
-    use crate::geometry::Pose;
-    use crate::geometry::Vec2;
+    use crate::geometry::{Pose, Vec2};
     use crate::model::vocabulary::Body;
 
     /// Whether the left-hand lane is clear for a vehicle at 10 m/s whose rear axle is at 100 m.

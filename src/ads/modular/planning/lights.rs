@@ -8,9 +8,7 @@
 use std::sync::Arc;
 
 use crate::ads::status::Reason;
-use crate::sim::Scene;
-use crate::sim::SignalColour;
-use crate::sim::VehicleParameters;
+use crate::sim::{Scene, SignalColour, VehicleParameters};
 
 use super::super::config::PlanningConfig;
 use super::planner::HORIZON_M;
@@ -98,8 +96,7 @@ mod tests {
 
     #[test]
     fn a_stop_is_kept_beyond_the_line_until_the_light_is_green() {
-        use SignalColour::Green;
-        use SignalColour::Red;
+        use SignalColour::{Green, Red};
         assert_eq!(goes_on(&[(-40.0, 8.0, Red), (1.5, 1.0, Red), (1.6, 0.0, Red)]), [false; 3]);
         assert_eq!(goes_on(&[(-40.0, 8.0, Red), (1.6, 0.0, Red), (1.6, 0.0, Green)]), [false, false, true]);
         assert_eq!(goes_on(&[(-40.0, 8.0, Red), (4.1, 2.0, Red)]), [false, true], "in the junction");

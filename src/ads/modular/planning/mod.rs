@@ -14,6 +14,5 @@ mod rules;
 mod speed;
 mod standing;
 
-pub use planner::Outlook;
-pub use planner::Planner;
+pub use planner::{Outlook, Planner};
 pub use speed::Trajectory;

@@ -4,12 +4,10 @@
 //! piecewise-jerk optimiser is replaced by a quintic shift of bounded lateral acceleration. Pedestrians
 //! and whatever moves are not nudged round.
 
-use crate::ads::guide::Guide;
-use crate::ads::guide::Span;
+use crate::ads::guide::{Guide, Span};
 use crate::ads::steering::Aside;
 use crate::geometry::smooth_step;
-use crate::sim::Scene;
-use crate::sim::VehicleParameters;
+use crate::sim::{Scene, VehicleParameters};
 
 use super::super::config::PlanningConfig;
 use super::super::prediction::Forecast;
@@ -170,8 +168,7 @@ mod tests {
     use crate::ads::modular::prediction::Prediction;
     use crate::ads::modular::tracking::Track;
     use crate::ads::testing::straight;
-    use crate::geometry::Pose;
-    use crate::geometry::Vec2;
+    use crate::geometry::{Pose, Vec2};
     use crate::model::vocabulary::Body;
 
     fn planned(places: &[(Body, f64, f64)]) -> LateralPlan {

@@ -5,30 +5,21 @@
 
 use std::sync::Arc;
 
-use crate::ads::guide::Guide;
-use crate::ads::guide::Span;
-use crate::ads::status::Manoeuvre;
-use crate::ads::status::Reason;
+use crate::ads::guide::{Guide, Span};
+use crate::ads::status::{Manoeuvre, Reason};
 use crate::geometry::Pose;
-use crate::sim::Scene;
-use crate::sim::SignalColour;
-use crate::sim::VehicleParameters;
+use crate::sim::{Scene, SignalColour, VehicleParameters};
 
-use super::super::config::ModularConfig;
-use super::super::config::PlanningConfig;
-use super::super::config::Weaknesses;
+use super::super::config::{ModularConfig, PlanningConfig, Weaknesses};
 use super::super::junctions::Junctions;
 use super::super::prediction::Forecast;
 use super::corridor::Claim;
 use super::lane_change::LaneChanges;
 use super::lights::Lights;
 use super::nudge::LateralPlan;
-use super::rules;
-use super::speed;
-use super::speed::Constraint;
-use super::speed::Point;
-use super::speed::Trajectory;
+use super::speed::{Constraint, Point, Trajectory};
 use super::standing::Standing;
+use super::{rules, speed};
 
 /// Claims and lights that begin farther ahead do not matter yet, m. Apollo's ST graph ends at 100.
 pub(super) const HORIZON_M: f64 = 100.0;

@@ -3,16 +3,14 @@
 
 use crate::ads::guide::Guide;
 use crate::ads::status::Reason;
-use crate::sim::Scene;
-use crate::sim::VehicleParameters;
+use crate::sim::{Scene, VehicleParameters};
 
 use super::super::config::PlanningConfig;
 use super::super::junctions::Junctions;
 use super::super::prediction::Forecast;
 use super::corridor::Claim;
 use super::planner::HORIZON_M;
-use super::speed::Constraint;
-use super::speed::Point;
+use super::speed::{Constraint, Point};
 use super::standing::Standing;
 
 /// A pedestrian this little beside a crosswalk is on it, m. Apollo expands it by 2.
@@ -105,8 +103,7 @@ mod tests {
     use crate::ads::modular::prediction::Prediction;
     use crate::ads::modular::tracking::Track;
     use crate::ads::testing::straight;
-    use crate::geometry::Pose;
-    use crate::geometry::Vec2;
+    use crate::geometry::{Pose, Vec2};
     use crate::model::vocabulary::Body;
 
     const START: Point = Point { station_m: 40.0, speed_mps: 8.0, acceleration_mps2: 0.0 };

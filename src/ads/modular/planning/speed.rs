@@ -6,8 +6,7 @@
 
 use crate::ads::guide::Guide;
 use crate::ads::status::Reason;
-use crate::sim::Following;
-use crate::sim::VehicleParameters;
+use crate::sim::{Following, VehicleParameters};
 
 use super::super::config::PlanningConfig;
 use super::corridor::Claim;
