@@ -26,13 +26,14 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Instant;
 
 use avastra::action::{ActionTable, Effect, SpawnRequest};
+use avastra::check::ReadError;
 use avastra::cli::lsp::Server;
 use avastra::mdp::{ProcSettings, collision_probability};
+use avastra::model::Space;
 use avastra::model::vocabulary::{Body, Colour, LaneChoice, Level, Side, Then, TimeOfDay, Verb};
-use avastra::model::{ReadError, Space};
+use avastra::run::{Run, RunSettings};
 use avastra::sim::{Scene, Sensed, Start, World};
-use avastra::study::{Run, RunSettings};
-use avastra::{ads, episode, study};
+use avastra::{ads, episode};
 
 const REPEATS: usize = 7;
 /// Ticks of one repeat: six seconds of traffic.
@@ -89,7 +90,7 @@ fn mark(name: &str, unit: &str, measure: impl FnOnce() -> f64) {
 fn load() -> Arc<Space> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios/avastra45.ava");
     let read = |path: &Path| std::fs::read_to_string(path).map_err(|error| ReadError(error.to_string()));
-    avastra::model::load(&path, &read).expect("it is shipped").space.expect("the shipped space is sound")
+    avastra::check::load(&path, &read).expect("it is shipped").space.expect("the shipped space is sound")
 }
 
 /// A world with as many obstacles as find room, at most ten.
@@ -278,7 +279,7 @@ fn two_cores_over_one(run: &Run) -> f64 {
 
 fn play(run: &Run, jobs: usize) {
     let numbers: Vec<usize> = (0..EPISODES as usize).collect();
-    study::play::<()>(run, &numbers, jobs, &AtomicBool::new(false), &mut |_, _| Ok(()))
+    avastra::run::play::<()>(run, &numbers, jobs, &AtomicBool::new(false), &mut |_, _| Ok(()))
         .expect("nothing here fails");
 }
 

@@ -6,7 +6,7 @@
 
 use std::path::Path;
 
-use avastra::model::{ReadError, load};
+use avastra::check::{ReadError, load};
 use avastra::syntax::ast::FileId;
 use avastra::syntax::{Diagnostic, Style, apply_fixes, format, parse, print, record, render, same_meaning};
 

@@ -5,8 +5,8 @@
 set -eu
 cd "$(dirname "$0")/.."
 if [ "$#" -eq 0 ]; then
-    set -- -f 'src/action/*.rs' -f 'src/model/check/rule.rs' -f 'src/model/check/scenario_rules.rs' \
-        -f 'src/model/reach.rs' -f 'src/model/bound.rs'
+    set -- -f 'src/action/*.rs' -f 'src/check/rule.rs' -f 'src/check/scenario_rules.rs' \
+        -f 'src/prove/reach.rs' -f 'src/model/bound.rs'
 fi
 exec cargo mutants --output target/mutants --baseline skip --timeout 300 "$@" -- --lib --test it \
-    -- action:: model:: rules:: corpus:: wishes:: command::every_broken
+    -- action:: model:: prove:: check:: rules:: corpus:: wishes:: command::every_broken

@@ -3,7 +3,8 @@
 use core::fmt;
 
 use crate::action::table::ActionTable;
-use crate::model::{Reach, Removal, RuleBody, removals};
+use crate::model::{Reach, RuleBody};
+use crate::prove::{Removal, removals};
 
 /// Every rule of a space.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]

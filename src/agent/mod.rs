@@ -15,13 +15,14 @@ mod q_policy;
 mod random;
 mod registry;
 mod replay;
-mod rules;
+mod decision;
 mod search;
 mod settings;
 mod trainable;
 mod trajectory;
 
 pub use branch::{Branch, Trial};
+pub use decision::{Visit, chosen_by, distilled};
 pub use features::Features;
 pub use hyperparameters::{
     Encoding, Exploration, Hyperparameters, Loss, RewardSource, SettingsError, StateSet,
@@ -32,7 +33,6 @@ pub use presets::Preset;
 pub use q_policy::{Face, QPolicy, Rows};
 pub use registry::{Agent, Entry, Kind, REGISTRY, by_name};
 pub use replay::{Priorities, Replay, Sample, Transition};
-pub use rules::{Visit, chosen_by, distilled};
 pub use search::{AvFuzzerSettings, GoExploreSettings};
 pub use settings::Settings;
 pub use trainable::{Beginning, Trainable};

@@ -12,11 +12,11 @@ use crate::rng;
 use crate::rng::Rng;
 use crate::syntax::nearest;
 
+use super::decision::chosen_by;
 use super::features::Features;
 use super::hyperparameters::{Hyperparameters, SettingsError};
 use super::network::{Network, Shape};
 use super::registry::Agent;
-use super::rules::chosen_by;
 
 /// What is known of the rows before any episode.
 #[derive(Debug, Clone, PartialEq)]

@@ -193,7 +193,7 @@ pub struct TrialArguments {
     #[arg(long, requires = "try", default_value_t = 8, value_parser = clap::value_parser!(u32).range(1..=1000))]
     pub drives: u32,
     /// Driving system of the ego vehicle.
-    #[arg(long, requires = "try", default_value = crate::study::DEFAULT_ADS)]
+    #[arg(long, requires = "try", default_value = crate::run::DEFAULT_ADS)]
     pub ads: String,
     #[arg(long, requires = "try", default_value_t = 1)]
     pub seed: u64,
@@ -246,7 +246,7 @@ pub struct RunArguments {
     #[arg(long)]
     pub road: Vec<String>,
     /// Driving system under test.
-    #[arg(long, default_value = crate::study::DEFAULT_ADS)]
+    #[arg(long, default_value = crate::run::DEFAULT_ADS)]
     pub ads: String,
     /// Profile of the `modular` driving system, for example scenarios/ads/cautious.yaml [default: as it comes].
     #[arg(long, value_name = "FILE")]
@@ -261,7 +261,7 @@ pub struct RunArguments {
     #[arg(long, value_enum, requires = "policy", default_value_t = FaceArgument::Network)]
     pub face: FaceArgument,
     /// Episodes on each road.
-    #[arg(long, default_value_t = 100, value_parser = clap::value_parser!(u32).range(1..=i64::from(crate::study::EPISODES_MAX)))]
+    #[arg(long, default_value_t = 100, value_parser = clap::value_parser!(u32).range(1..=i64::from(crate::run::EPISODES_MAX)))]
     pub episodes: u32,
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
@@ -297,7 +297,7 @@ pub struct TrainArguments {
     #[arg(long)]
     pub road: Vec<String>,
     /// Driving system under test.
-    #[arg(long, default_value = crate::study::DEFAULT_ADS)]
+    #[arg(long, default_value = crate::run::DEFAULT_ADS)]
     pub ads: String,
     /// Profile of the `modular` driving system [default: as it comes].
     #[arg(long, value_name = "FILE")]
@@ -312,7 +312,7 @@ pub struct TrainArguments {
     #[arg(long, value_name = "YAML")]
     pub config: Option<PathBuf>,
     /// Episodes on all roads together.
-    #[arg(long, default_value_t = 750, value_parser = clap::value_parser!(u32).range(1..=i64::from(crate::study::EPISODES_MAX)))]
+    #[arg(long, default_value_t = 750, value_parser = clap::value_parser!(u32).range(1..=i64::from(crate::run::EPISODES_MAX)))]
     pub episodes: u32,
     #[arg(long, default_value_t = 1)]
     pub seed: u64,

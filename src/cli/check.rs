@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use crate::action::{ActionTable, audit};
-use crate::model::Loaded;
+use crate::check::Loaded;
 use crate::syntax::apply_fixes;
 use crate::syntax::ast::FileId;
 

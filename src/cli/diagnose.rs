@@ -10,7 +10,7 @@ use crate::model::Scenario;
 use crate::model::vocabulary::Word;
 use crate::oracle;
 use crate::oracle::{Diagnosis, Likelihood, MechanismShare, Share, WeaknessFinding, WithoutMechanism};
-use crate::study::Stage;
+use crate::run::Stage;
 
 use super::arguments::DiagnoseArguments;
 use super::error::Failure;

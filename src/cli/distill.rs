@@ -8,7 +8,8 @@ use crate::agent::{Face, QPolicy};
 use crate::emit;
 use crate::model::Policy;
 use crate::model::policy::RulesClaims;
-use crate::study;
+use crate::run;
+use crate::train;
 
 use super::arguments::DistillArguments;
 use super::error::Failure;
@@ -73,15 +74,15 @@ pub fn with_rules(table: &ActionTable, acting: &QPolicy, policy: Policy) -> Resu
     let origin = &policy.origin;
     let rules = (origin.with.as_slice(), origin.without.as_slice());
     let roads = &origin.roads;
-    let failed = |error: study::RunError| Failure::usage(error.to_string());
-    let ads = &study::trained_against(&policy).map_err(failed)?;
-    let found = study::distill(table, acting, roads, ads, rules, origin.seed).map_err(failed)?;
+    let failed = |error: run::RunError| Failure::usage(error.to_string());
+    let ads = &run::trained_against(&policy).map_err(failed)?;
+    let found = train::distill(table, acting, roads, ads, rules, origin.seed).map_err(failed)?;
     if found.is_empty() {
         return Ok(Policy { claims: Some(claims), ..policy });
     }
     let found = Arc::new(found);
     let test = (claims.episodes, claims.seed);
-    let judged = study::judge_rules(table, acting, &found, roads, ads, rules, test).map_err(failed)?;
+    let judged = train::judge_rules(table, acting, &found, roads, ads, rules, test).map_err(failed)?;
     claims.rules = Some(judged);
     Ok(Policy { claims: Some(claims), rules: found.to_vec(), ..policy })
 }

@@ -1,6 +1,6 @@
 //! `avastra explain`: what a code means.
 
-use crate::model::explain::{PAGES, Page, page};
+use crate::check::explain::{PAGES, Page, page};
 use crate::syntax::nearest;
 
 use super::arguments::ExplainArguments;

@@ -1,8 +1,9 @@
 //! `avastra explain-policy`: what a policy favours, expects and looks at.
 
 use crate::agent::Face;
-use crate::model::policy::values_from;
-use crate::study::{Insight, insight, trained_against};
+use crate::check::policy::values_from;
+use crate::run::trained_against;
+use crate::train::{Insight, insight};
 
 use super::arguments::ExplainPolicyArguments;
 use super::error::Failure;

@@ -5,8 +5,9 @@ use std::sync::Arc;
 
 use crate::action::ActionTable;
 use crate::ads::ModularConfig;
-use crate::model;
-use crate::model::{Loaded, Policy, ReadError, Scenario, Space};
+use crate::check;
+use crate::check::{Loaded, ReadError};
+use crate::model::{Policy, Scenario, Space};
 
 use super::error::Failure;
 use super::output::Output;
@@ -36,9 +37,9 @@ pub fn load(output: &Output, path: &Path) -> Result<Loaded, Failure> {
 /// # Errors
 /// If the file cannot be read.
 pub fn read_and_check(path: &Path) -> Result<Loaded, Failure> {
-    let mut loaded = model::load(path, &read).map_err(|error| Failure::file("read", path, error))?;
+    let mut loaded = check::load(path, &read).map_err(|error| Failure::file("read", path, error))?;
     if loaded.diagnostics.iter().any(crate::syntax::Diagnostic::is_error) {
-        model::suggest_uses(&mut loaded, &nearby(path));
+        check::suggest_uses(&mut loaded, &nearby(path));
     }
     Ok(loaded)
 }

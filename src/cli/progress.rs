@@ -5,7 +5,7 @@ use std::io::IsTerminal;
 
 use indicatif::{ProgressBar, ProgressStyle};
 
-use crate::study::TrainedEpisode;
+use crate::train::TrainedEpisode;
 
 use super::output::remark;
 

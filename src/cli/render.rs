@@ -7,8 +7,8 @@ use crate::ads::Selected;
 use crate::geometry::Vec2;
 use crate::model::{Claim, Scenario};
 use crate::report::{Snapshot, picture};
+use crate::run::Stage;
 use crate::sim::DT_S;
-use crate::study::Stage;
 
 use super::arguments::RenderArguments;
 use super::error::Failure;

@@ -7,8 +7,8 @@ use crate::episode::Collision;
 use crate::model::vocabulary::Word;
 use crate::model::{Avoidability, Scenario};
 use crate::oracle;
-use crate::study;
-use crate::study::{Measures, RunError, Stage};
+use crate::run;
+use crate::run::{Gauges, RunError, Stage};
 
 use super::arguments::ReplayArguments;
 use super::error::Failure;
@@ -88,7 +88,7 @@ fn play(
     let (ads, is_recorded) = driver(arguments.ads.as_deref(), profile, &scenario)
         .map_err(|error| Failure::usage(error.to_string()))?;
     let stage = Stage::new(&table, &scenario).map_err(|error| Failure::usage(error.to_string()))?;
-    let mut measures = Measures::default();
+    let mut measures = Gauges::default();
     let log = stage.play(&ads, &mut |world, _, contacts| measures.note(world, contacts));
     let (criticality, pet_s) = measures.of_steps(&log);
     let severities: Vec<oracle::Severity> = log.collisions.iter().map(oracle::severity).collect();
@@ -125,10 +125,10 @@ pub fn driver(
     scenario: &Scenario,
 ) -> Result<(Selected, bool), RunError> {
     if ads.is_none() && profile.is_none() {
-        return Ok((study::recorded(scenario)?, true));
+        return Ok((run::recorded(scenario)?, true));
     }
-    let recorded = scenario.origin.ads.as_deref().unwrap_or(study::DEFAULT_ADS);
-    let selected = study::driving_system(ads.unwrap_or(recorded))?;
+    let recorded = scenario.origin.ads.as_deref().unwrap_or(run::DEFAULT_ADS);
+    let selected = run::driving_system(ads.unwrap_or(recorded))?;
     let Some(profile) = profile else { return Ok((selected, false)) };
     let same = ads.is_none() && scenario.origin.profile_digest == Some(profile.digest());
     Ok((selected.with_profile(*profile)?, same))

@@ -11,11 +11,11 @@ use crate::emit;
 use crate::episode::EpisodeLog;
 use crate::model::Policy;
 use crate::oracle::AvoidabilitySettings;
-use crate::sim::ENGINE;
-use crate::study;
-use crate::study::{
+use crate::run;
+use crate::run::{
     EpisodeSummary, Group, PolicyReference, Profile, RefusalCount, Run, RunSettings, Totals, play,
 };
+use crate::sim::ENGINE;
 
 use super::arguments::{FaceArgument, RunArguments};
 use super::error::Failure;
@@ -99,7 +99,7 @@ fn begun(output: &Output, arguments: &RunArguments) -> Result<(Run, RunDirectory
     };
     let profile = match &arguments.ads_config {
         Some(path) => Some(load::profile(path)?),
-        None => study::driving_system(&arguments.ads).ok().and_then(|ads| ads.profile().copied()),
+        None => run::driving_system(&arguments.ads).ok().and_then(|ads| ads.profile().copied()),
     };
     let settings = RunSettings {
         avastra: VERSION.to_owned(),

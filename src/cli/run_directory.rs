@@ -4,8 +4,8 @@ use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 use crate::action::ActionTable;
+use crate::run::Database;
 use crate::sim::ENGINE;
-use crate::study::Database;
 
 use super::error::Failure;
 use super::load;

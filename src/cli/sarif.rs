@@ -5,7 +5,7 @@
 
 use serde_json::{Value, json};
 
-use crate::model::explain::page;
+use crate::check::explain::page;
 use crate::syntax::{DiagnosticRecord, PlaceRecord, Severity};
 
 /// The whole log.

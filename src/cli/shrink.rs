@@ -6,8 +6,8 @@ use crate::emit;
 use crate::episode::{Outcome, Script, Setup};
 use crate::model::Claim;
 use crate::oracle;
-use crate::study;
-use crate::study::{EpisodeSummary, Stage};
+use crate::run;
+use crate::run::{EpisodeSummary, Stage};
 
 use super::arguments::ShrinkArguments;
 use super::error::Failure;
@@ -110,9 +110,9 @@ impl Small {
 
 /// Shrinks the scenario of a file into another.
 fn smaller(output: &Output, file: &Path, path: &Path) -> Result<Small, Failure> {
-    let usage = |error: study::RunError| Failure::usage(error.to_string());
+    let usage = |error: run::RunError| Failure::usage(error.to_string());
     let (table, scenario) = load::scenario(output, file)?;
-    let ads = study::recorded(&scenario).map_err(usage)?;
+    let ads = run::recorded(&scenario).map_err(usage)?;
     let stage = Stage::new(&table, &scenario).map_err(usage)?;
     let log = stage.play(&ads, &mut |_, _, _| {});
     let judgements = stage.judge(&ads, &log);
@@ -188,9 +188,9 @@ fn refutation(refuted: usize) -> Result<(), Failure> {
 
 /// Number of claims of a written file that do not hold.
 fn refuted(output: &Output, path: &Path) -> Result<usize, Failure> {
-    let usage = |error: study::RunError| Failure::usage(error.to_string());
+    let usage = |error: run::RunError| Failure::usage(error.to_string());
     let (table, scenario) = load::scenario(output, path)?;
-    let ads = study::recorded(&scenario).map_err(usage)?;
+    let ads = run::recorded(&scenario).map_err(usage)?;
     let stage = Stage::new(&table, &scenario).map_err(usage)?;
     let log = stage.play(&ads, &mut |_, _, _| {});
     let claims = stage.verify(&ads, &log);

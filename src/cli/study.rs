@@ -5,10 +5,10 @@ use std::sync::atomic::Ordering;
 use std::time::Instant;
 
 use crate::report;
+use crate::run::{Profile, driving_system};
 use crate::sim::ENGINE;
 use crate::study::{
-    CellRecord, Event, Profile, Spent, Study, StudyDatabase, StudyFile, StudyResults, StudySettings,
-    driving_system, play_jobs,
+    CellRecord, Event, Spent, Study, StudyDatabase, StudyFile, StudyResults, StudySettings, play_jobs,
 };
 
 use super::arguments::StudyArguments;

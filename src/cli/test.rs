@@ -7,8 +7,8 @@ use std::time::Instant;
 use crate::ads::ModularConfig;
 use crate::oracle;
 use crate::oracle::Regression;
-use crate::study;
-use crate::study::Stage;
+use crate::run;
+use crate::run::Stage;
 
 use super::arguments::TestArguments;
 use super::error::Failure;
@@ -33,7 +33,7 @@ struct Case {
 pub fn test(output: &Output, arguments: &TestArguments) -> Result<(), Failure> {
     let profile = arguments.ads_config.as_deref().map(load::profile).transpose()?;
     if let Some(name) = &arguments.ads {
-        study::driving_system(name).map_err(|error| Failure::usage(error.to_string()))?;
+        run::driving_system(name).map_err(|error| Failure::usage(error.to_string()))?;
     }
     let mut cases = Vec::new();
     for file in scenario_files(&arguments.directory)? {
@@ -112,7 +112,7 @@ fn compare(
     let (table, scenario) = load::scenario(output, file).map_err(|failure| failure.to_string())?;
     case.scenario.clone_from(&scenario.name);
     case.road.clone_from(&table.space().roads[scenario.road].name);
-    let recorded = study::recorded(&scenario).map_err(|error| error.to_string())?;
+    let recorded = run::recorded(&scenario).map_err(|error| error.to_string())?;
     let (ads, _) = driver(arguments.ads.as_deref(), profile, &scenario).map_err(|error| error.to_string())?;
     let stage = Stage::new(&table, &scenario).map_err(|error| error.to_string())?;
     let log = stage.play(&recorded, &mut |_, _, _| {});

@@ -8,9 +8,10 @@ use crate::agent::{Kind, QPolicy, Settings};
 use crate::emit;
 use crate::model::policy::{PolicyClaims, PolicyOrigin};
 use crate::model::{Policy, Space, digest_text};
+use crate::run::Profile;
 use crate::sim::ENGINE;
-use crate::study::{Evaluation, Profile, TrainSettings, TrainedEpisode, Training, evaluate_agent, rounded};
 use crate::syntax::listed;
+use crate::train::{Evaluation, TrainSettings, TrainedEpisode, Training, evaluate_agent, rounded};
 
 use super::arguments::TrainArguments;
 use super::distill::rules_text;

@@ -6,8 +6,9 @@ use crate::action::ActionTable;
 use crate::emit;
 use crate::emit::Provenance;
 use crate::report;
-use crate::study::{Arena, Cell, TrialSettings, Trials};
+use crate::run::Arena;
 use crate::syntax;
+use crate::trial::{Cell, TrialSettings, Trials};
 
 use super::arguments::TableArguments;
 use super::error::Failure;

@@ -7,9 +7,9 @@ use crate::action::ActionTable;
 use crate::agent::{Face, QPolicy};
 use crate::model::policy::RulesClaims;
 use crate::model::{Policy, digest_text};
+use crate::run;
 use crate::sim::ENGINE;
-use crate::study;
-use crate::study::{evaluate, judge_rules, rounded};
+use crate::train::{evaluate, judge_rules, rounded};
 
 use super::arguments::{ReplayArguments, VerifyArguments};
 use super::error::Failure;
@@ -68,7 +68,7 @@ fn judge(table: &ActionTable, policy: &Policy) -> Result<Vec<String>, Failure> {
     let Some(claims) = &policy.claims else { return Ok(Vec::new()) };
     let rules = (origin.with.as_slice(), origin.without.as_slice());
     let test = (claims.episodes, claims.seed);
-    let ads = study::trained_against(policy).map_err(|error| Failure::usage(error.to_string()))?;
+    let ads = run::trained_against(policy).map_err(|error| Failure::usage(error.to_string()))?;
     let found = evaluate(table.clone(), &acting, &origin.roads, &ads, rules, test)
         .map_err(|error| Failure::usage(error.to_string()))?;
     let trace = digest_text(&found.trace);

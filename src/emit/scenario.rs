@@ -8,8 +8,8 @@ use crate::episode::{Collision, EpisodeLog, Outcome};
 use crate::model::vocabulary::Word;
 use crate::model::{ActionDef, Space, StateDef, Value, digest_text};
 use crate::oracle::AvoidabilitySettings;
+use crate::run::{EpisodeSummary, Finding};
 use crate::sim::ENGINE;
-use crate::study::{EpisodeSummary, Finding};
 use crate::syntax::LANGUAGE;
 use crate::syntax::ast::{
     ClauseKind, Expect, Expr, Field, File, ItemKind, Name, Scenario, Span, Step, Text, Use,

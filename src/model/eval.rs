@@ -118,8 +118,8 @@ fn arithmetic(op: Arithmetic, left: f64, right: f64) -> f64 {
 pub(crate) fn compare(op: Comparison, left: Value, right: Value) -> bool {
     match (left, right) {
         (Value::Number(left), Value::Number(right)) => compare_numbers(op, left, right),
-        (Value::Variant(_, left), Value::Variant(_, right)) => compare_positions(op, left, right),
-        (left, right) => compare_positions(op, usize::from(left.truth()), usize::from(right.truth())),
+        (Value::Variant(_, left), Value::Variant(_, right)) => op.holds(left, right),
+        (left, right) => op.holds(left.truth(), right.truth()),
     }
 }
 
@@ -128,21 +128,7 @@ fn compare_numbers(op: Comparison, left: f64, right: f64) -> bool {
     match op {
         Comparison::Equal => equal,
         Comparison::NotEqual => !equal,
-        Comparison::Less => left < right,
-        Comparison::LessEqual => left <= right,
-        Comparison::Greater => left > right,
-        Comparison::GreaterEqual => left >= right,
-    }
-}
-
-fn compare_positions(op: Comparison, left: usize, right: usize) -> bool {
-    match op {
-        Comparison::Equal => left == right,
-        Comparison::NotEqual => left != right,
-        Comparison::Less => left < right,
-        Comparison::LessEqual => left <= right,
-        Comparison::Greater => left > right,
-        Comparison::GreaterEqual => left >= right,
+        other => other.holds(left, right),
     }
 }
 

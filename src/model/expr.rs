@@ -2,7 +2,7 @@
 
 use crate::model::value::{EnumIndex, Type};
 use crate::model::vocabulary::LaneChoice;
-use crate::syntax::ast::Span;
+use crate::syntax::ast::{BinaryOp, Span};
 use crate::units::Rational;
 
 /// An expression with its type and the place where it was written.
@@ -101,6 +101,50 @@ impl Comparison {
             Comparison::LessEqual => Comparison::GreaterEqual,
             Comparison::Greater => Comparison::Less,
             Comparison::GreaterEqual => Comparison::LessEqual,
+        }
+    }
+
+    /// Whether it holds, compared exactly.
+    pub fn holds<T: PartialOrd>(self, left: T, right: T) -> bool {
+        match self {
+            Comparison::Equal => left == right,
+            Comparison::NotEqual => left != right,
+            Comparison::Less => left < right,
+            Comparison::LessEqual => left <= right,
+            Comparison::Greater => left > right,
+            Comparison::GreaterEqual => left >= right,
+        }
+    }
+
+    /// The operator that it is written with.
+    pub fn operator(self) -> BinaryOp {
+        match self {
+            Comparison::Equal => BinaryOp::Equal,
+            Comparison::NotEqual => BinaryOp::NotEqual,
+            Comparison::Less => BinaryOp::Less,
+            Comparison::LessEqual => BinaryOp::LessEqual,
+            Comparison::Greater => BinaryOp::Greater,
+            Comparison::GreaterEqual => BinaryOp::GreaterEqual,
+        }
+    }
+
+    /// The comparison that the operator stands for; `None` for the other operators.
+    pub fn from_operator(operator: BinaryOp) -> Option<Comparison> {
+        match operator {
+            BinaryOp::Equal => Some(Comparison::Equal),
+            BinaryOp::NotEqual => Some(Comparison::NotEqual),
+            BinaryOp::Less => Some(Comparison::Less),
+            BinaryOp::LessEqual => Some(Comparison::LessEqual),
+            BinaryOp::Greater => Some(Comparison::Greater),
+            BinaryOp::GreaterEqual => Some(Comparison::GreaterEqual),
+            BinaryOp::Implies
+            | BinaryOp::Or
+            | BinaryOp::And
+            | BinaryOp::In
+            | BinaryOp::Add
+            | BinaryOp::Subtract
+            | BinaryOp::Multiply
+            | BinaryOp::Divide => None,
         }
     }
 

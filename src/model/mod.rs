@@ -1,37 +1,32 @@
-//! From tree to meaning: a checked [`Space`] or [`Scenario`], or diagnostics.
+//! What a space, a scenario and a policy *are*, once they are checked. `check` builds them, `prove` reasons
+//! about them, and everything to the right only reads them.
+//!
+//! Read [`Space`] first: actions, rules, states and roads, with every name resolved and every number in SI.
+//! Its expressions are [`expr::Expr`], and [`evaluate`] is their one evaluator. A [`Row`] is one entry of the
+//! action table; [`Memory`] holds the values of the states during an episode.
 
 mod bound;
-mod check;
 pub mod code;
-mod difference;
-mod enclose;
+mod digest;
 mod eval;
-pub mod explain;
 pub mod expr;
 mod interval;
 mod limits;
-mod load;
 mod memory;
-mod overriding;
-mod proofs;
 pub mod policy;
-mod reach;
 mod row;
-mod scenario;
+pub mod scenario;
 mod space;
-mod suggest;
 mod value;
 pub mod vocabulary;
 
-pub(crate) use bound::{Bound, bounds};
-pub use check::scenario;
-pub use difference::{Change, Difference, differences};
+pub(crate) use bound::{Bound, allowed, bounds};
+pub use digest::{digest, digest_text};
+pub(crate) use eval::compare;
 pub use eval::{Facts, OutcomeFacts, evaluate};
 pub use interval::{End, Interval};
-pub use limits::{AMBIENT_MAX, SPAWN_DISTANCE_M, SPAWN_SPEED_MPS, TICK_MS};
-pub use load::{Loaded, LoadedFile, MapCache, ReadError, ReadFile, digest, digest_text, load, load_with};
+pub use limits::{AMBIENT_MAX, SIGNAL_PHASE_S, SPAWN_DISTANCE_M, SPAWN_SPEED_MPS, TICK_MS};
 pub use policy::Policy;
-pub use proofs::{Removal, Witness, removals, witness};
 pub(crate) use row::locals;
 pub use row::{Reach, Row};
 pub use scenario::{
@@ -42,8 +37,4 @@ pub use space::{
     Parameter, RewardCase, Road, RoadFacts, RuleBinding, RuleBody, RuleDef, SetDef, Space, SpawnDef,
     StateDef, StateMeaning, VerdictDef, WordExpr,
 };
-pub use suggest::suggest_uses;
 pub use value::{EnumIndex, Memory, Type, Value};
-
-#[cfg(test)]
-mod tests;

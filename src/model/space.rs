@@ -296,3 +296,25 @@ impl RoadFacts {
         self.lanes[lane as usize]
     }
 }
+
+impl RuleBody {
+    /// Whether the rule binds the action.
+    pub fn binds(&self, action: usize) -> bool {
+        match self {
+            RuleBody::Holds(bindings) => bindings.iter().any(|binding| binding.action == action),
+            RuleBody::Moves { actions, .. } => actions.contains(&action),
+        }
+    }
+}
+
+impl Space {
+    /// A value as the language spells it.
+    pub fn show(&self, value: Value, ty: Type) -> String {
+        match (value, ty) {
+            (Value::Bool(truth), _) => truth.to_string(),
+            (Value::Variant(of, variant), _) => self.enums[of.0].variants[variant].clone(),
+            (Value::Number(number), Type::Quantity(dimension)) => crate::units::quantity(number, dimension),
+            (Value::Number(number), _) => crate::units::decimal(number, false),
+        }
+    }
+}

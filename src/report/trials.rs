@@ -1,6 +1,6 @@
 //! What became of every row on every road, as text.
 
-use crate::study::{Cell, Count, TrialOutcome};
+use crate::trial::{Cell, Count, Outcome};
 
 /// One line a row, and under it one for each road. `cells` are by row, then by road.
 pub fn trials(cells: &[&Cell]) -> String {
@@ -21,12 +21,12 @@ pub fn trials(cells: &[&Cell]) -> String {
 fn fate(cell: &Cell) -> String {
     let Cell { realised, tried, legal, moments, .. } = cell;
     let head = match cell.outcome {
-        TrialOutcome::Masked => return format!("masked: {}", reasons(&cell.refusals)),
-        TrialOutcome::Realised => format!("realised ({realised} of {tried} tries)"),
-        TrialOutcome::Partly => {
+        Outcome::Masked => return format!("masked: {}", reasons(&cell.refusals)),
+        Outcome::Realised => format!("realised ({realised} of {tried} tries)"),
+        Outcome::Partly => {
             format!("realised ({realised} of {tried} tries), else {}", reasons(&cell.failures))
         }
-        TrialOutcome::NotRealised => {
+        Outcome::NotRealised => {
             format!("not realised (0 of {tried} tries): {}", reasons(&cell.failures))
         }
     };

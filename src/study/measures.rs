@@ -1,89 +1,202 @@
-//! Measures of danger and of manners, and the shapes of the ways to collisions, taken while an episode is
-//! played.
+//! What is measured of a cell: one number each, over whose trainings or repetitions the statistics go.
 
-use crate::episode::EpisodeLog;
-use crate::mdp::{Criticality, Encroachment};
-use crate::sim::{Contact, DT_S, Scene, World};
+use std::collections::BTreeSet;
 
-use super::shape::{Shape, Trail};
+use crate::study::statistics::{Lifetime, restricted_mean};
 
-/// Half the width of a lane marking of 12 cm, m: a wheel on the line has not left the lane. Ours.
-const ON_THE_LINE_M: f64 = 0.06;
-/// A speed this far above the limit is above it: less is the controller's overshoot. Ours.
-const SPEEDING_FACTOR: f64 = 1.05;
+use crate::study::file::EvaluationPlan;
+use crate::study::record::{CellRecord, CollisionRecord, EpisodeRecord, Failure};
 
-/// How the ego vehicle kept to what every vehicle has to keep to.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Manners {
-    /// Time more than 5 % above the speed limit of its lane, s.
-    pub speeding_s: f64,
-    /// Time with a side beyond the edge of its lane, s. Where the route may change lanes, nothing counts.
-    pub astray_s: f64,
+/// Something that is measured of a cell.
+pub struct Measure {
+    pub name: &'static str,
+    /// For people, with its unit.
+    pub title: &'static str,
+    /// Whether agents are compared by it.
+    pub is_compared: bool,
+    /// None where there is none: a training of an agent that learns nothing, a time of no collision.
+    pub of: fn(&CellRecord, &EvaluationPlan) -> Option<f64>,
 }
 
-/// A watch that takes them.
-#[derive(Debug, Clone, Default)]
-pub struct Measures {
-    /// By tick of ten in a second, with its time, s.
-    moments: Vec<(f64, Criticality)>,
-    encroachment: Encroachment,
-    hit: Vec<u32>,
-    trail: Trail,
-    shapes: Vec<Option<Shape>>,
-    /// Ticks of the same two times.
-    speeding: u64,
-    astray: u64,
+/// Every measure. Where not said otherwise, a number is of the episodes of one seed, averaged over the seeds.
+pub const MEASURES: &[Measure] = &[
+    Measure {
+        name: "counted",
+        title: "counted collisions",
+        is_compared: true,
+        of: |cell, plan| number(cell, plan, |found| found.counted),
+    },
+    Measure {
+        name: "collisions",
+        title: "all collisions",
+        is_compared: true,
+        of: |cell, plan| number(cell, plan, |_| true),
+    },
+    Measure {
+        name: "avoidable",
+        title: "avoidable by a careful driver",
+        is_compared: false,
+        of: |cell, plan| number(cell, plan, |found| found.avoidability == "avoidable"),
+    },
+    Measure {
+        name: "beyond_reference",
+        title: "avoidable without any delay only",
+        is_compared: false,
+        of: |cell, plan| number(cell, plan, |found| found.avoidability == "beyond_reference"),
+    },
+    Measure {
+        name: "unavoidable",
+        title: "unavoidable",
+        is_compared: false,
+        of: |cell, plan| number(cell, plan, |found| found.avoidability == "unavoidable"),
+    },
+    Measure {
+        name: "repeated",
+        title: "with an obstacle hit before",
+        is_compared: false,
+        of: |cell, plan| number(cell, plan, |found| found.repeated),
+    },
+    Measure {
+        name: "sudden",
+        title: "just after it appeared",
+        is_compared: false,
+        of: |cell, plan| number(cell, plan, |found| found.sudden),
+    },
+    Measure {
+        name: "struck",
+        title: "the other ran into the ego vehicle",
+        is_compared: false,
+        of: |cell, plan| number(cell, plan, |found| found.struck),
+    },
+    Measure {
+        name: "colliding",
+        title: "episodes with a counted collision",
+        is_compared: true,
+        of: |cell, plan| per_seed(cell, plan, |episode| f64::from(episode.counted() > 0)),
+    },
+    Measure { name: "distinct", title: "distinct failures", is_compared: true, of: distinct },
+    Measure {
+        name: "distinct_all",
+        title: "distinct failures under all seeds together",
+        is_compared: false,
+        of: |cell, _| Some(failures(&cell.episodes).len() as f64),
+    },
+    Measure {
+        name: "ttfc_s",
+        title: "time to the first counted collision, where there is one, s",
+        is_compared: false,
+        of: |cell, _| ttfc_s(cell),
+    },
+    Measure {
+        name: "ttfc_restricted_s",
+        title: "time to the first counted collision, restricted mean, s",
+        is_compared: true,
+        of: |cell, plan| restricted_mean(&lifetimes(&cell.episodes), plan.horizon_s),
+    },
+    Measure {
+        name: "red_runs",
+        title: "red lights run",
+        is_compared: false,
+        of: |cell, plan| per_seed(cell, plan, |episode| f64::from(episode.red_runs)),
+    },
+    Measure {
+        name: "speeding_share",
+        title: "share of time above the speed limit",
+        is_compared: false,
+        of: |cell, _| time_share(cell, |episode| episode.speeding_s),
+    },
+    Measure {
+        name: "astray_share",
+        title: "share of time beside the lane",
+        is_compared: false,
+        of: |cell, _| time_share(cell, |episode| episode.astray_s),
+    },
+    Measure {
+        name: "arrived_share",
+        title: "share of episodes that end at the goal",
+        is_compared: false,
+        of: |cell, _| Some(mean(cell.episodes.iter().map(|episode| f64::from(episode.ended == "arrived")))),
+    },
+    Measure {
+        name: "evaluation_h",
+        title: "simulated time of the evaluation, h",
+        is_compared: false,
+        of: |cell, _| {
+            Some(
+                cell.episodes.iter().map(|episode| episode.duration_s + episode.branched_s).sum::<f64>()
+                    / 3600.0,
+            )
+        },
+    },
+    Measure {
+        name: "training_h",
+        title: "simulated time of the training, h",
+        is_compared: false,
+        of: |cell, _| {
+            of_training(cell, |cell| {
+                cell.trained.iter().map(|episode| episode.simulated_s).sum::<f64>() / 3600.0
+            })
+        },
+    },
+    Measure {
+        name: "training_counted",
+        title: "counted collisions of the training",
+        is_compared: false,
+        of: |cell, _| {
+            of_training(cell, |cell| cell.trained.iter().map(|episode| f64::from(episode.counted)).sum())
+        },
+    },
+];
+
+/// Failures that differ among the counted collisions of episodes.
+pub(super) fn failures<'a>(episodes: impl IntoIterator<Item = &'a EpisodeRecord>) -> BTreeSet<&'a Failure> {
+    let collisions = episodes.into_iter().flat_map(|episode| &episode.collisions);
+    collisions.filter(|found| found.counted).map(|found| &found.failure).collect()
 }
 
-impl Measures {
-    /// Takes in a tick.
-    pub fn note(&mut self, world: &World, contacts: &[Contact]) {
-        self.trail.note(world);
-        self.shapes.extend(contacts.iter().map(|_| self.trail.shape()));
-        self.hit.extend(contacts.iter().map(|contact| contact.obstacle));
-        let mut now = Criticality::default();
-        now.note(world, &|id| self.hit.contains(&id));
-        if now != Criticality::default() {
-            self.moments.push((world.time_s(), now));
-        }
-        self.encroachment.note(world);
-        self.note_manners(world);
-    }
+/// How long each episode lasted, or until its first counted collision.
+pub(super) fn lifetimes<'a>(episodes: impl IntoIterator<Item = &'a EpisodeRecord>) -> Vec<Lifetime> {
+    let lifetime = |episode: &EpisodeRecord| match episode.first_counted_s() {
+        Some(time_s) => Lifetime { time_s, failed: true },
+        None => Lifetime { time_s: episode.duration_s, failed: false },
+    };
+    episodes.into_iter().map(lifetime).collect()
+}
 
-    fn note_manners(&mut self, world: &World) {
-        let Scene { map, route, .. } = world.scene().as_ref();
-        let station_m = world.ego_station_m();
-        let here = route.lane_at(station_m);
-        let lane = map.lane(here.lane);
-        self.speeding += u64::from(world.ego().speed_mps > SPEEDING_FACTOR * lane.speed_limit_mps);
-        let is_changing =
-            route.changes.iter().any(|change| (change.begin_m..change.latest_m).contains(&station_m));
-        let half_m = lane.width_at(station_m - here.from_m) / 2.0 + ON_THE_LINE_M;
-        let beyond_m = world.ego_offset_m().abs() + world.ego_outline().half_width_m - half_m;
-        self.astray += u64::from(!is_changing && beyond_m > 0.0);
-    }
+fn mean(values: impl ExactSizeIterator<Item = f64>) -> f64 {
+    let count = values.len();
+    values.sum::<f64>() / count as f64
+}
 
-    /// How the ego vehicle drove so far.
-    pub fn manners(&self) -> Manners {
-        Manners { speeding_s: self.speeding as f64 * DT_S, astray_s: self.astray as f64 * DT_S }
-    }
+fn per_seed(cell: &CellRecord, plan: &EvaluationPlan, of: impl Fn(&EpisodeRecord) -> f64) -> Option<f64> {
+    Some(cell.episodes.iter().map(of).sum::<f64>() / f64::from(plan.seeds))
+}
 
-    /// The most critical values of each step of the log that was watched, and the least
-    /// post-encroachment time, s.
-    pub fn of_steps(&self, log: &EpisodeLog) -> (Vec<Criticality>, Option<f64>) {
-        let mut steps = vec![Criticality::default(); log.steps.len()];
-        for (time_s, moment) in &self.moments {
-            // The last moment of a period belongs to its own step, whatever its last bit says.
-            let after = log.steps.partition_point(|step| step.time_s + 1e-6 < *time_s);
-            if let Some(step) = after.checked_sub(1) {
-                steps[step] = steps[step].and(moment);
-            }
-        }
-        (steps, self.encroachment.least_s(&|id| self.hit.contains(&id)))
-    }
+/// Collisions of a kind.
+fn number(
+    cell: &CellRecord,
+    plan: &EvaluationPlan,
+    is_meant: impl Fn(&CollisionRecord) -> bool,
+) -> Option<f64> {
+    per_seed(cell, plan, |episode| episode.collisions.iter().filter(|found| is_meant(found)).count() as f64)
+}
 
-    /// The shape of the ego vehicle's way to each collision.
-    pub fn shapes(&self) -> &[Option<Shape>] {
-        &self.shapes
-    }
+fn distinct(cell: &CellRecord, plan: &EvaluationPlan) -> Option<f64> {
+    let of_seeds = cell.episodes.chunk_by(|one, other| one.seed == other.seed);
+    Some(of_seeds.map(|episodes| failures(episodes).len() as f64).sum::<f64>() / f64::from(plan.seeds))
+}
+
+/// The paper's mean: over the episodes that collide.
+fn ttfc_s(cell: &CellRecord) -> Option<f64> {
+    let times: Vec<f64> = cell.episodes.iter().filter_map(EpisodeRecord::first_counted_s).collect();
+    (!times.is_empty()).then(|| mean(times.iter().copied()))
+}
+
+fn time_share(cell: &CellRecord, of: impl Fn(&EpisodeRecord) -> f64) -> Option<f64> {
+    let all_s: f64 = cell.episodes.iter().map(|episode| episode.duration_s).sum();
+    (all_s > 0.0).then(|| cell.episodes.iter().map(of).sum::<f64>() / all_s)
+}
+
+fn of_training(cell: &CellRecord, of: impl Fn(&CellRecord) -> f64) -> Option<f64> {
+    cell.training_seed.map(|_| of(cell))
 }

@@ -1,32 +1,22 @@
-//! Runs and trainings: many episodes, judged, counted and kept.
+//! Studies: agents compared over roads and independent repetitions, with statistics.
+//!
+//! A study is cut into jobs (one training and its evaluation, or one repetition of an agent that has nothing
+//! to learn). Jobs know nothing of each other, so the result depends neither on how many are under way at a
+//! time nor on how often the study was interrupted.
 
-mod arena;
-mod comparison;
 mod database;
-mod groups;
+mod file;
+mod job;
 mod measures;
-mod policy;
-mod profile;
-mod run;
-mod shape;
+mod record;
+mod results;
 pub mod statistics;
-mod summary;
-mod train;
-mod trial;
+mod study;
 
-pub use arena::{Arena, DEFAULT_ADS, driving_system};
-pub use comparison::{
-    AgentFile, AgentResults, AgentSettings, CellRecord, Comparison, EvaluationPlan, Event, Job, MEASURES,
-    Pooled, Rate, RoadResults, Spent, Study, StudyDatabase, StudyError, StudyFile, StudyResults,
-    StudySettings, TrainingPlan, play_jobs,
-};
-pub use database::{Database, DatabaseError, RefusalCount, Totals};
-pub use groups::Group;
-pub use measures::Measures;
-pub use policy::{Importance, Insight, RowUse, State, distill, insight, judge_rules, rounded};
-pub use profile::{Profile, recorded, trained_against};
-pub use run::{EPISODES_MAX, PolicyReference, Run, RunError, RunSettings, Stage, play};
-pub use shape::Shape;
-pub use summary::{EpisodeSummary, Finding};
-pub use train::{Checkpoint, Evaluation, TrainSettings, TrainedEpisode, Training, evaluate, evaluate_agent};
-pub use trial::{Cell, Count, Outcome as TrialOutcome, Sample, TrialSettings, Trials};
+pub use database::StudyDatabase;
+pub use file::{AgentFile, EvaluationPlan, StudyFile};
+pub use job::{Event, Job, play_jobs};
+pub use measures::MEASURES;
+pub use record::{CellRecord, Spent};
+pub use results::{AgentResults, Comparison, Pooled, Rate, RoadResults, StudyResults};
+pub use study::{AgentSettings, Study, StudyError, StudySettings, TrainingPlan};

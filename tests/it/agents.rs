@@ -6,8 +6,9 @@ use std::sync::atomic::AtomicBool;
 use avastra::action::Offer;
 use avastra::agent::{Entry, Kind, Settings};
 use avastra::episode::Choice;
-use avastra::study::{EpisodeSummary, Run, RunSettings, TrainSettings, TrainedEpisode, Training};
-use avastra::{agent, episode, study};
+use avastra::run::{EpisodeSummary, Run, RunSettings};
+use avastra::train::{TrainSettings, TrainedEpisode, Training};
+use avastra::{agent, episode, run};
 
 use crate::world::{assert_replays, run};
 
@@ -59,7 +60,7 @@ fn whoever_can_act_at_once_replays_and_does_not_depend_on_the_workers() {
         let judged = |jobs| {
             let mut episodes: Vec<EpisodeSummary> = Vec::new();
             let stop = AtomicBool::new(false);
-            let done = study::play(&run, &[0, 1], jobs, &stop, &mut |summary, log| {
+            let done = run::play(&run, &[0, 1], jobs, &stop, &mut |summary, log| {
                 assert_replays(&run, summary.episode, &log);
                 episodes.push(summary);
                 Ok::<(), ()>(())

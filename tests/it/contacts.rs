@@ -9,8 +9,8 @@ use avastra::ads::{Ads, ModularConfig};
 use avastra::geometry::{OrientedBox, Pose, Sweep, Vec2, first_contact};
 use avastra::rng;
 use avastra::rng::{Rng, Stream};
+use avastra::run::{Profile, Run, RunSettings};
 use avastra::sim::{Contact, DT_S, Obstacle, World};
-use avastra::study::{Profile, Run, RunSettings};
 
 use crate::world::run;
 

@@ -4,8 +4,8 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use avastra::model::explain::PAGES;
-use avastra::model::{Loaded, ReadError, load};
+use avastra::check::explain::PAGES;
+use avastra::check::{Loaded, ReadError, load};
 use avastra::syntax::ast::FileId;
 use avastra::syntax::{Diagnostic, Severity, apply_fixes};
 

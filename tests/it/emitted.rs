@@ -7,7 +7,7 @@ use std::sync::atomic::AtomicBool;
 
 use avastra::episode::{EpisodeLog, Outcome, Script, Watch};
 use avastra::oracle::Replays;
-use avastra::study::{EpisodeSummary, Run, RunSettings, play};
+use avastra::run::{EpisodeSummary, Run, RunSettings, play};
 use avastra::{emit, oracle};
 
 use crate::cases::{expect_snapshot, root};
@@ -74,7 +74,7 @@ fn emitted_scenarios_keep_every_claim() {
         let with_it = |path: &Path| -> Result<String, _> {
             if path.ends_with("emitted.ava") { Ok(text.clone()) } else { read(path) }
         };
-        let loaded = avastra::model::load(&path, &with_it).expect("it is there");
+        let loaded = avastra::check::load(&path, &with_it).expect("it is there");
         assert!(loaded.diagnostics.is_empty(), "{text}\n{:?}", loaded.diagnostics);
         let scenario = loaded.scenario.as_ref().expect("it has a scenario");
         let script = Script::of_scenario(scenario);

@@ -7,7 +7,7 @@ use avastra::episode::EpisodeLog;
 use avastra::model::Space;
 use avastra::oracle;
 use avastra::oracle::Fate;
-use avastra::study::{Profile, Run, RunSettings};
+use avastra::run::{Profile, Run, RunSettings};
 
 use crate::cases::root;
 use crate::world::{read, run_of};
@@ -87,7 +87,7 @@ fn the_module_at_fault_is_named() {
 
 /// A space in which nobody need be able to avoid what appears: the notes about that are no mistakes here.
 fn made(name: &str) -> Arc<Space> {
-    let loaded = avastra::model::load(&root().join(name), &read).expect("it is there");
+    let loaded = avastra::check::load(&root().join(name), &read).expect("it is there");
     assert!(!loaded.diagnostics.iter().any(|found| found.is_error()), "{name}: {:?}", loaded.diagnostics);
     loaded.space.expect("a space without mistakes is a space")
 }

@@ -3,10 +3,11 @@
 use std::collections::BTreeSet;
 use std::path::Path;
 
+use avastra::check::{Loaded, load};
 use avastra::model::vocabulary::{
     Body, Colour, LaneChoice, Level, Phenomenon, Side, Then, TimeOfDay, Verb, Word,
 };
-use avastra::model::{ENDS, Loaded, MODULES, load};
+use avastra::model::{ENDS, MODULES};
 use avastra::syntax::Diagnostic;
 use avastra::units::UNITS;
 
@@ -68,7 +69,7 @@ fn quoted(text: &str) -> impl Iterator<Item = &str> {
 
 /// The words of the lists that the checker declares as constants: fields, settings, facts.
 fn words_of_the_checker() -> Vec<String> {
-    let folder = root().join("src/model/check");
+    let folder = root().join("src/check");
     let mut words = Vec::new();
     for entry in std::fs::read_dir(folder).expect("the checker is there").flatten() {
         let text = std::fs::read_to_string(entry.path()).expect("a source file is readable");

@@ -52,7 +52,7 @@ fn beside(name: &str, bytes: &[u8]) -> String {
 fn load(text: &str) -> Result<Policy, Vec<String>> {
     let path = root().join("scenarios/policy_under_test.ava");
     let read = |asked: &Path| if asked == path { Ok(text.to_owned()) } else { read(asked) };
-    let loaded = avastra::model::load(&path, &read).expect("the root can be read");
+    let loaded = avastra::check::load(&path, &read).expect("the root can be read");
     let messages = loaded.diagnostics.iter().map(|found| format!("{}: {}", found.code, found.message));
     loaded.policy.ok_or_else(|| messages.collect())
 }
@@ -61,7 +61,7 @@ fn space() -> &'static Arc<Space> {
     static SPACE: OnceLock<Arc<Space>> = OnceLock::new();
     SPACE.get_or_init(|| {
         let path = root().join("scenarios/avastra45.ava");
-        avastra::model::load(&path, &read).expect("it can be read").space.expect("it is sound")
+        avastra::check::load(&path, &read).expect("it can be read").space.expect("it is sound")
     })
 }
 

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use avastra::ads::ModularConfig;
-use avastra::study::RunSettings;
+use avastra::run::RunSettings;
 
 use crate::cases::root;
 use crate::command::{avastra, outcome};

@@ -4,7 +4,7 @@
 use std::sync::atomic::AtomicBool;
 
 use avastra::model::Avoidability;
-use avastra::study::play;
+use avastra::run::play;
 
 use crate::world::{run_against, space};
 

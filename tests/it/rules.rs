@@ -13,12 +13,13 @@ use avastra::action::{
     ActionTable, ActiveRules, Draw, Effect, Enforcement, Offer, Refusal, Situation, SpawnFacts, SpawnRequest,
     Surroundings, audit,
 };
+use avastra::check::load;
 use avastra::episode::{Choice, Moment};
 use avastra::model::vocabulary::{Body, TimeOfDay, Verb};
-use avastra::model::{Type, Value, load};
+use avastra::model::{Type, Value};
 use avastra::rng;
 use avastra::rng::Stream;
-use avastra::study::Run;
+use avastra::run::Run;
 
 use crate::cases::root;
 use crate::world::{assert_replays, read, run, space};

@@ -3,7 +3,7 @@
 //! `tests/interop/builds.sh` runs this in the debug and in the release profile. After a change of the
 //! engine: `INSTA_UPDATE=always cargo test --test it traces`, and raise `sim::ENGINE`.
 
-use avastra::study::{Run, RunSettings};
+use avastra::run::{Run, RunSettings};
 
 use crate::cases::expect_snapshot;
 use crate::world::run;

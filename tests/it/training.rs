@@ -7,7 +7,7 @@ use std::time::Duration;
 use assert_cmd::Command;
 use avastra::model::policy::{Policy, seal};
 use avastra::rng::{Stream, below, stream};
-use avastra::study::Database;
+use avastra::run::Database;
 use avastra::syntax::ast::FileId;
 
 use crate::cases::root;
@@ -50,7 +50,7 @@ fn trained(out: &Path) -> String {
 fn load(text: &str) -> Result<Policy, Vec<&'static str>> {
     let path = root().join("scenarios/policy_under_test.ava");
     let read = |asked: &Path| if asked == path { Ok(text.to_owned()) } else { read(asked) };
-    let loaded = avastra::model::load(&path, &read).expect("the root can be read");
+    let loaded = avastra::check::load(&path, &read).expect("the root can be read");
     loaded.policy.ok_or_else(|| loaded.diagnostics.iter().map(|diagnostic| diagnostic.code).collect())
 }
 

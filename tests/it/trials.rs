@@ -2,7 +2,8 @@
 
 use avastra::action::ActionTable;
 use avastra::report;
-use avastra::study::{Arena, Cell, TrialOutcome, TrialSettings, Trials};
+use avastra::run::Arena;
+use avastra::trial::{Cell, Outcome, TrialSettings, Trials};
 
 use crate::cases::expect_snapshot;
 use crate::world::space;
@@ -42,7 +43,7 @@ fn every_row_does_what_it_says_or_it_is_said_why_not() {
         let refused: usize = cell.refusals.iter().map(|refusal| refusal.count).sum();
         assert_eq!(cell.realised + failed, cell.tried, "{who}");
         assert_eq!(cell.legal + refused, cell.moments, "{who}");
-        assert_eq!(cell.outcome == TrialOutcome::Masked, cell.legal == 0, "{who}");
+        assert_eq!(cell.outcome == Outcome::Masked, cell.legal == 0, "{who}");
         assert!(cell.unfair.is_empty(), "{who}: {:?}", cell.unfair);
         // What a vehicle must never do, however the scene ends.
         let wild = |why: &str| why.starts_with("it drives") || why.starts_with("it does not appear");

@@ -72,7 +72,7 @@ fn ten_wishes_compile_as_they_are_written() {
         let text = read(&path).expect("a case is readable");
         assert!(text.starts_with("//! Wish: "), "{stem}");
         assert_eq!(format(FileId(0), &text).expect("it parses"), text, "{stem}");
-        let loaded = avastra::model::load(&path, &read).expect("a case is readable");
+        let loaded = avastra::check::load(&path, &read).expect("a case is readable");
         let messages = |all: &[Diagnostic]| all.iter().map(|found| found.message.clone()).collect::<Vec<_>>();
         assert!(loaded.diagnostics.is_empty(), "{stem}: {:?}", messages(&loaded.diagnostics));
     }

@@ -4,9 +4,10 @@ use std::path::Path;
 use std::sync::Arc;
 
 use avastra::action::ActionTable;
+use avastra::check::ReadError;
 use avastra::episode::{EpisodeLog, Script};
-use avastra::model::{ReadError, Space};
-use avastra::study::{Run, RunSettings};
+use avastra::model::Space;
+use avastra::run::{Run, RunSettings};
 
 use crate::cases::root;
 
@@ -22,7 +23,7 @@ pub fn space(name: &str) -> Arc<Space> {
 
 /// A space by its path in the repository.
 pub fn space_at(name: &str) -> Arc<Space> {
-    let loaded = avastra::model::load(&root().join(name), &read).expect("it is there");
+    let loaded = avastra::check::load(&root().join(name), &read).expect("it is there");
     assert!(loaded.diagnostics.is_empty(), "{name}: {:?}", loaded.diagnostics);
     loaded.space.expect("a space without mistakes is a space")
 }

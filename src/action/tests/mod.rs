@@ -8,7 +8,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use crate::action::{ActionTable, SpawnFacts, SpawnRequest, Surroundings};
-use crate::model::{ReadError, load};
+use crate::check::{ReadError, load};
 use crate::syntax::{Style, render};
 
 /// The table of a shipped space on Road 2.

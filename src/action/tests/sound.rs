@@ -8,7 +8,9 @@ use proptest::prelude::*;
 
 use crate::action::tests::Plain;
 use crate::action::{ActionTable, ActiveRules, Offer, Situation};
-use crate::model::{Loaded, Reach, ReadError, Value, load, witness};
+use crate::check::{Loaded, ReadError, load};
+use crate::model::{Reach, Value};
+use crate::prove::witness;
 
 const HEAD: &str = "language 1
 enum Mode = Near | Far

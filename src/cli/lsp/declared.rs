@@ -3,7 +3,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::model::LoadedFile;
+use crate::check::LoadedFile;
 use crate::syntax::ast;
 use crate::syntax::ast::{ItemKind, ParamMode, Span, TypeKind};
 use crate::units::Dimension;

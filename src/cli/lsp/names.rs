@@ -12,7 +12,7 @@ use crate::units::Dimension;
 
 use super::declared::Declared;
 use super::walk;
-use crate::model::LoadedFile;
+use crate::check::LoadedFile;
 use crate::syntax::Sources;
 
 /// What a name stands for.

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::model::LoadedFile;
+use crate::check::LoadedFile;
 use crate::syntax::ast::{BinaryOp, Expr, ExprKind, FileId, ItemKind, Name, Span};
 use crate::syntax::{Sources, ast};
 use crate::units;

@@ -9,9 +9,11 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use crate::check;
+use crate::check::{Loaded, MapCache, ReadError};
 use crate::cli::load;
 use crate::model;
-use crate::model::{Loaded, MapCache, ReadError, Space};
+use crate::model::Space;
 use crate::syntax::Diagnostic;
 use crate::syntax::ast::{FileId, Span};
 
@@ -114,10 +116,10 @@ impl Workspace {
             inputs.borrow_mut().insert(path.to_owned());
             read(documents, path)
         };
-        let mut loaded = model::load_with(path, &read, &mut self.maps).ok()?;
+        let mut loaded = check::load_with(path, &read, &mut self.maps).ok()?;
         let is_unknown = |found: &Diagnostic| found.is_error() && found.code == model::code::UNKNOWN;
         if loaded.diagnostics.iter().any(is_unknown) {
-            model::suggest_uses(&mut loaded, &load::nearby(path));
+            check::suggest_uses(&mut loaded, &load::nearby(path));
         }
         let names = Names::new(&loaded.files, &loaded.sources);
         let ids = 0..u32::try_from(loaded.files.len()).expect("a file's id is its position");
@@ -133,7 +135,7 @@ impl Workspace {
             Some(text) => Ok(text.clone()),
             None => read(documents, path),
         };
-        let loaded = model::load_with(path, &read, &mut self.maps).ok()?;
+        let loaded = check::load_with(path, &read, &mut self.maps).ok()?;
         let names = Names::new(&loaded.files, &loaded.sources);
         let errors = loaded.diagnostics.into_iter().filter(Diagnostic::is_error).collect();
         Some(Trial { errors, names })

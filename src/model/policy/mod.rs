@@ -1,20 +1,18 @@
 //! Policies: what an agent has learned, as a file says it.
 //!
 //! The network's numbers are opaque here: that they are as many as the shape wants, and that the file
-//! is as it was written, is checked; what they mean is `agent`'s business. The readable face (`rules`)
-//! is understood whole, and proofs tell which of its lines can never act.
+//! is as it was written, is checked; what they mean is `agent`'s business. The readable face (`line`)
+//! is understood whole.
 
-mod check;
+mod line;
 mod plain;
-mod region;
-mod rules;
 mod seal;
 mod variable;
 mod weights;
 
-pub use check::{policy, values_from};
+pub use line::{Condition, PolicyRule};
 pub use plain::expression;
-pub use rules::{Comparison, Condition, PolicyRule};
+pub(crate) use plain::record;
 pub use seal::seal;
 pub use variable::{VARIABLES, Variable, VariableKind, variable_index};
 pub use weights::{weights_from_lines, weights_to_lines};

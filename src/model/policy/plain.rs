@@ -37,7 +37,7 @@ pub fn expression(value: &Value) -> Expr {
 ///
 /// # Errors
 /// What is wrong, and where.
-pub(super) fn record(fields: &[Field]) -> Result<Map<String, Value>, (Span, &'static str)> {
+pub(crate) fn record(fields: &[Field]) -> Result<Map<String, Value>, (Span, &'static str)> {
     let mut entries = Map::new();
     for field in fields {
         let value = data(&field.value)?;

@@ -5,7 +5,7 @@
 
 use sha2::{Digest, Sha256};
 
-use crate::model::load::digest_text;
+use crate::model::digest_text;
 use crate::syntax::ast;
 use crate::syntax::ast::{ItemKind, Span};
 

@@ -3,7 +3,7 @@
 use crate::rng;
 use crate::rng::Rng;
 
-use super::bisect;
+use crate::study::statistics::bisect;
 
 /// An interval that covers the true value in 95 of 100 samples.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]

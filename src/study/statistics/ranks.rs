@@ -1,6 +1,6 @@
 //! Two samples compared by ranks alone, so that no shape of distribution is assumed.
 
-use super::{Interval, bisect};
+use crate::study::statistics::{Interval, bisect};
 
 /// Samples up to this size are compared exactly, if no value comes twice. Ours: beyond it the normal
 /// distribution is as good.

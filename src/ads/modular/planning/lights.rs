@@ -11,8 +11,8 @@ use crate::ads::status::Reason;
 use crate::sim::{Scene, SignalColour, VehicleParameters};
 
 use super::super::config::PlanningConfig;
+use super::kept_clear::can_stop;
 use super::planner::HORIZON_M;
-use super::rules::can_stop;
 use super::speed::Constraint;
 
 /// A bumper this far over the line while the light let it go has passed it, m. Ours.

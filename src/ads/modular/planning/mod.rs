@@ -10,7 +10,7 @@ mod lane_change;
 mod lights;
 mod nudge;
 mod planner;
-mod rules;
+mod kept_clear;
 mod speed;
 mod standing;
 

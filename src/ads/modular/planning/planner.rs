@@ -19,7 +19,7 @@ use super::lights::Lights;
 use super::nudge::LateralPlan;
 use super::speed::{Constraint, Point, Trajectory};
 use super::standing::Standing;
-use super::{rules, speed};
+use super::{kept_clear, speed};
 
 /// Claims and lights that begin farther ahead do not matter yet, m. Apollo's ST graph ends at 100.
 pub(super) const HORIZON_M: f64 = 100.0;
@@ -160,7 +160,7 @@ impl Planner {
         self.lights.constrain(station_m, speed_mps, outlook.lights, constraints);
         self.changes.constrain(constraints);
         let (config, scene, guide) = (&self.config, &self.scene, &self.guide);
-        rules::crosswalks(config, scene, guide, start, forecasts, &self.standing, constraints);
+        kept_clear::crosswalks(config, scene, guide, start, forecasts, &self.standing, constraints);
         self.claims.clear();
         let passed = self.lateral.passing().map(|(id, _)| id);
         for forecast in forecasts {
@@ -177,7 +177,7 @@ impl Planner {
         if self.weaknesses.e_closest_static_only {
             self.keep_closest_static(station_m);
         }
-        rules::keep_clear(&self.config, &self.junctions, start, &self.claims, &mut self.constraints);
+        kept_clear::keep_clear(&self.config, &self.junctions, start, &self.claims, &mut self.constraints);
         for (index, claim) in self.claims.iter().enumerate().filter(|(_, claim)| claim.is_now()) {
             self.constraints.extend(self.in_the_way(claim, index, start));
         }

@@ -1,0 +1,199 @@
+//! A tree as a first-match list, and a list that acts.
+//!
+//! Of a split the smaller side comes first, with the test; the other side needs none any more. Of a
+//! leaf the row comes first that most of the stake wants; where that one is not open, the row that most of
+//! the rest wants, and so on. Which rows are legal at a moment the variables do not tell.
+
+use crate::mdp::Observation;
+use crate::model::expr::Comparison;
+use crate::model::policy::{Condition, PolicyRule, variable_index};
+
+use crate::agent::decision::tree::{Bounds, Tree, Visit, grow, holds};
+
+/// Rows of a line, at most, besides the one that is always open. Ours.
+const ALTERNATIVES_MAX: usize = 4;
+/// A leaf holds at least this share of the visits. Ours: less is noise.
+const LEAF_SHARE_MIN: f64 = 0.005;
+
+/// The row of the first line that applies, if one of its rows is open.
+pub fn chosen_by(rules: &[PolicyRule], observation: &Observation, open: &[bool]) -> Option<usize> {
+    let applies = |rule: &&PolicyRule| rule.conditions.iter().all(|condition| holds(condition, observation));
+    let rule = rules.iter().find(applies)?;
+    rule.rows.iter().copied().find(|&row| open[row])
+}
+
+/// Rules that imitate the visits, of so many lines and tests in a line at most. There must be a visit.
+pub fn distilled(visits: &[Visit], variables: &[usize], leaves: usize, depth: usize) -> Vec<PolicyRule> {
+    let fewest = (visits.len() as f64 * LEAF_SHARE_MIN).ceil() as usize;
+    let tree = grow(visits, &readable(variables), Bounds { leaves, depth, visits: fewest.max(2) });
+    let rows = visits[0].open.len();
+    let always: Vec<bool> = (0..rows).map(|row| visits.iter().all(|visit| visit.open[row])).collect();
+    let mut rules = lines(&merged(ranked(&tree, visits, &always)));
+    rules.iter_mut().for_each(|rule| simplify(&mut rule.conditions));
+    rules
+}
+
+/// The variables that a reader understands: the sky's three in place of the packed number.
+fn readable(variables: &[usize]) -> Vec<usize> {
+    let index = |name| variable_index(name).expect("it is a variable");
+    let (packed, sky) = (index("weather"), ["rain", "fog", "wetness"].map(index));
+    let parts = |&variable: &usize| if variable == packed { sky.to_vec() } else { vec![variable] };
+    variables.iter().flat_map(parts).collect()
+}
+
+/// A tree with the rows of its leaves, the one that most of the stake wants first.
+enum Ranked {
+    Leaf(Vec<usize>),
+    Split(Condition, Box<Ranked>, Box<Ranked>),
+}
+
+fn ranked(tree: &Tree, visits: &[Visit], always: &[bool]) -> Ranked {
+    match tree {
+        Tree::Leaf(own) => {
+            let own: Vec<&Visit> = own.iter().map(|&visit| &visits[visit]).collect();
+            Ranked::Leaf(alternatives(&own, always))
+        }
+        Tree::Split(condition, inside, outside) => Ranked::Split(
+            *condition,
+            Box::new(ranked(inside, visits, always)),
+            Box::new(ranked(outside, visits, always)),
+        ),
+    }
+}
+
+fn alternatives(visits: &[&Visit], always: &[bool]) -> Vec<usize> {
+    let mut rest = visits.to_vec();
+    let mut rows = Vec::new();
+    while !rest.is_empty() && rows.len() < ALTERNATIVES_MAX {
+        let mut wanted = vec![0.0; always.len()];
+        // A visit without any stake counts a little, or it would have no say anywhere.
+        rest.iter().for_each(|visit| wanted[visit.best] += visit.stake() + 1e-9);
+        let row = first_largest(&wanted);
+        rows.push(row);
+        rest.retain(|visit| !visit.open[row]);
+    }
+    if !rows.iter().any(|&row| always[row]) {
+        // Something is to happen where all of these are closed: what costs least of what never is.
+        let cost = |row: usize| -> f64 { visits.iter().map(|visit| visit.loss(Some(row))).sum() };
+        let costs: Vec<f64> =
+            (0..always.len()).map(|row| if always[row] { -cost(row) } else { f64::NEG_INFINITY }).collect();
+        if always.contains(&true) {
+            rows.push(first_largest(&costs));
+        }
+    }
+    rows
+}
+
+fn first_largest(values: &[f64]) -> usize {
+    (0..values.len()).fold(0, |best, at| if values[at] > values[best] { at } else { best })
+}
+
+/// Two leaves that say the same become one.
+fn merged(tree: Ranked) -> Ranked {
+    match tree {
+        Ranked::Leaf(rows) => Ranked::Leaf(rows),
+        Ranked::Split(condition, inside, outside) => match (merged(*inside), merged(*outside)) {
+            (Ranked::Leaf(rows), Ranked::Leaf(others)) if rows == others => Ranked::Leaf(rows),
+            (inside, outside) => Ranked::Split(condition, Box::new(inside), Box::new(outside)),
+        },
+    }
+}
+
+fn leaves(tree: &Ranked) -> usize {
+    match tree {
+        Ranked::Leaf(_) => 1,
+        Ranked::Split(_, inside, outside) => leaves(inside) + leaves(outside),
+    }
+}
+
+fn lines(tree: &Ranked) -> Vec<PolicyRule> {
+    match tree {
+        Ranked::Leaf(rows) => vec![PolicyRule { conditions: Vec::new(), rows: rows.clone() }],
+        Ranked::Split(condition, inside, outside) => {
+            let (condition, first, second) = match leaves(inside) <= leaves(outside) {
+                true => (*condition, inside, outside),
+                false => (opposite(condition), outside, inside),
+            };
+            let mut rules = lines(first);
+            rules.iter_mut().for_each(|rule| rule.conditions.insert(0, condition));
+            rules.extend(lines(second));
+            rules
+        }
+    }
+}
+
+fn opposite(condition: &Condition) -> Condition {
+    let comparison = match condition.comparison {
+        Comparison::Equal => Comparison::NotEqual,
+        Comparison::NotEqual => Comparison::Equal,
+        Comparison::Less => Comparison::GreaterEqual,
+        Comparison::LessEqual => Comparison::Greater,
+        Comparison::Greater => Comparison::LessEqual,
+        Comparison::GreaterEqual => Comparison::Less,
+    };
+    Condition { comparison, ..*condition }
+}
+
+/// Of two tests of one variable in one direction the later is the narrower, and implies the other.
+fn simplify(conditions: &mut Vec<Condition>) {
+    let is_implied = |at: usize, all: &[Condition]| {
+        let this = all[at];
+        all[at + 1..].iter().any(|later| {
+            later.variable == this.variable
+                && (later.comparison == this.comparison && this.comparison != Comparison::NotEqual
+                    || later.comparison == Comparison::Equal)
+        })
+    };
+    let kept = (0..conditions.len()).filter(|&at| !is_implied(at, conditions)).map(|at| conditions[at]);
+    *conditions = kept.collect();
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::agent::decision::tree::tests::visit;
+
+    #[test]
+    fn a_tree_becomes_a_list_that_says_the_same() {
+        // Fast: row 0; slow by night: row 2, by day: row 1.
+        let wanted = |fast: bool, night: bool| if fast { 0 } else { 1 + usize::from(night) };
+        let visits: Vec<Visit> = (0..40)
+            .map(|at| {
+                let (fast, night) = (at % 2 == 0, at % 4 < 2);
+                visit(if fast { 9.0 } else { 2.0 }, if night { 20.0 } else { 14.0 }, wanted(fast, night), 1.0)
+            })
+            .collect();
+        let variables = ["time", "ego_speed"].map(|name| variable_index(name).unwrap());
+        let rules = distilled(&visits, &variables, 8, 8);
+        assert_eq!(rules.len(), 3);
+        assert!(rules[2].conditions.is_empty());
+        for visit in &visits {
+            assert_eq!(chosen_by(&rules, &visit.observation, &visit.open), Some(visit.best));
+            assert_eq!(chosen_by(&rules, &visit.observation, &[false; 3]), None);
+        }
+    }
+
+    #[test]
+    fn where_a_row_is_closed_the_next_acts() {
+        let mut visits: Vec<Visit> = (0..20).map(|_| visit(5.0, 14.0, 0, 2.0)).collect();
+        for visit in &mut visits[..8] {
+            (visit.open[0], visit.best) = (false, 1);
+            visit.q_values = vec![2.0, 1.0, 0.5];
+        }
+        let rules = distilled(&visits, &[variable_index("ego_speed").unwrap()], 4, 4);
+        assert_eq!(rules, [PolicyRule { conditions: Vec::new(), rows: vec![0, 1] }]);
+        assert_eq!(chosen_by(&rules, &visits[0].observation, &visits[0].open), Some(1));
+    }
+
+    #[test]
+    fn narrower_tests_replace_wider_ones() {
+        let test = |comparison, value| Condition { variable: 18, comparison, value };
+        let mut conditions = vec![
+            test(Comparison::LessEqual, 9.0),
+            test(Comparison::Greater, 1.0),
+            test(Comparison::LessEqual, 5.0),
+        ];
+        simplify(&mut conditions);
+        assert_eq!(conditions, [test(Comparison::Greater, 1.0), test(Comparison::LessEqual, 5.0)]);
+    }
+}

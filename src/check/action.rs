@@ -1,0 +1,474 @@
+//! Actions and groups: parameters with their values, effects with their words.
+
+use crate::check::checker::{Checker, docs, each, literal};
+use crate::check::declaration::{unknown_state, unknown_word};
+use crate::check::expression::{Place, is_number};
+use crate::check::names::{Names, unknown};
+use crate::model::expr::{Expr, ExprKind};
+use crate::model::vocabulary::{Body, Colour, LaneChoice, Side, Then, Verb, Word};
+use crate::model::{
+    ActionDef, Domain, EffectDef, GroupDef, Parameter, RuleDef, SetDef, SpawnDef, Type, Value, WordExpr, code,
+};
+use crate::prove::product_size;
+use crate::syntax::ast::{ItemKind, ParamMode, Span};
+use crate::syntax::{Diagnostic, ast, listed, nearest};
+use crate::units::{Dimension, Rational};
+
+/// A table may have so many rows.
+pub(crate) const ROWS_MAX: u64 = 100_000;
+
+/// Rows times the rules that bind them times roads: what takes a moment to prove.
+const PROOFS_MAX: u64 = 500_000;
+
+/// An `Int` range may be spelt out into so many values.
+const VALUES_MAX: i64 = 100_000;
+
+impl Checker {
+    pub(super) fn declare_actions(&mut self, items: &[&ast::Item]) {
+        let actions: Vec<(&ast::Item, &ast::Action)> = each(items, |kind| match kind {
+            ItemKind::Action(action) => Some(action),
+            _ => None,
+        })
+        .collect();
+        for (item, declared) in actions {
+            if let Err(error) = self.action_names.declare("action", &declared.name, self.actions.len()) {
+                self.report(error);
+                continue;
+            }
+            let action = self.action(item, declared);
+            self.actions.push(action);
+        }
+    }
+
+    fn action(&mut self, item: &ast::Item, declared: &ast::Action) -> Option<ActionDef> {
+        let mut names = Names::default();
+        let mut locals: Vec<(String, Type)> = Vec::new();
+        let mut parameters = Vec::new();
+        let mut sound = true;
+        for (index, parameter) in declared.params.iter().enumerate() {
+            if let Err(error) = names.declare("parameter", &parameter.name, index) {
+                self.report(error);
+            }
+            let Some(ty) = self.plain_type(&parameter.ty) else {
+                // Keep its name, so that uses of it are not reported as unknown.
+                locals.push((parameter.name.text.clone(), Type::Bool));
+                sound = false;
+                continue;
+            };
+            // What is wrong with its values is reported; its type is enough for looking further.
+            parameters.push(self.parameter(parameter, ty, &locals).unwrap_or_else(|| Parameter {
+                name: parameter.name.text.as_str().into(),
+                ty,
+                axis: parameter.mode == ParamMode::Each,
+                domain: Domain::Values(Vec::new()),
+                condition: None,
+                span: parameter.span,
+            }));
+            locals.push((parameter.name.text.clone(), ty));
+        }
+        if !sound {
+            return None;
+        }
+        if declared.effects.is_empty() {
+            let message = format!("`{}` has no effect", declared.name.text);
+            let error = Diagnostic::error(code::NO_EFFECT, message).at(declared.name.span, "does nothing");
+            self.report(error.help("give it a `set` or a `spawn`, or remove it"));
+        }
+        let place = Place { locals: &locals, states: true, ..Place::default() };
+        let effects: Vec<Option<EffectDef>> =
+            declared.effects.iter().map(|effect| self.effect(effect, &place)).collect();
+        if effects.iter().any(Option::is_none) {
+            // What is sound of it is kept, so that rules on it are looked at all the same.
+            self.half_broken.push(self.actions.len());
+        }
+        Some(ActionDef {
+            name: declared.name.text.clone(),
+            docs: docs(item),
+            parameters,
+            effects: effects.into_iter().flatten().collect(),
+            span: declared.name.span,
+        })
+    }
+
+    fn parameter(
+        &mut self,
+        declared: &ast::ActionParam,
+        ty: Type,
+        before: &[(String, Type)],
+    ) -> Option<Parameter> {
+        let axis = declared.mode == ParamMode::Each;
+        let domain = match &declared.within {
+            Some(within) => self.domain(within, ty)?,
+            None => match ty {
+                Type::Bool => Domain::Values(vec![Value::Bool(false), Value::Bool(true)]),
+                Type::Enum(of) => {
+                    let count = self.enums[of.0].variants.len();
+                    Domain::Values((0..count).map(|variant| Value::Variant(of, variant)).collect())
+                }
+                Type::Int | Type::Quantity(_) => {
+                    let name = self.type_name(ty);
+                    let message = format!("`{}` has no end of values", declared.name.text);
+                    let error = Diagnostic::error(code::INFINITE, message)
+                        .at(declared.ty.span, format!("any `{name}`"));
+                    self.report(error.help("say from where to where: `in low .. high`"));
+                    return None;
+                }
+            },
+        };
+        let domain = match domain {
+            Domain::Values(values) if !axis => Domain::Values(self.by_odds(values, declared)?),
+            domain => domain,
+        };
+        if axis && matches!(domain, Domain::Range(..)) {
+            let name = self.type_name(ty);
+            let message = format!("`each` over `{}` has no end of rows", declared.name.text);
+            let error = Diagnostic::error(code::INFINITE, message)
+                .at(declared.ty.span, format!("a range of `{name}`"));
+            self.report(error.help("list the values, `in [1 m, 2 m]`, or draw one with `any`"));
+            return None;
+        }
+        let mut locals = before.to_vec();
+        locals.push((declared.name.text.clone(), ty));
+        let condition = match &declared.condition {
+            None => None,
+            Some(condition) => {
+                let place = Place { locals: &locals, ..Place::default() };
+                Some(self.typed(condition, &place, Type::Bool)?)
+            }
+        };
+        let name = declared.name.text.as_str().into();
+        Some(Parameter { name, ty, axis, domain, condition, span: declared.span })
+    }
+
+    /// The values that are drawn, each as often as its odds say.
+    fn by_odds(&mut self, values: Vec<Value>, declared: &ast::ActionParam) -> Option<Vec<Value>> {
+        let odds = |value: &Value| match value {
+            Value::Variant(of, variant) => self.enums[of.0].odds[*variant] as usize,
+            Value::Bool(_) | Value::Number(_) => 1,
+        };
+        let drawn: Vec<Value> =
+            values.iter().flat_map(|value| core::iter::repeat_n(*value, odds(value))).collect();
+        if drawn.is_empty() && !values.is_empty() {
+            let error = Diagnostic::error(
+                code::EMPTY,
+                format!("nothing is left to draw for `{}`", declared.name.text),
+            );
+            let error = error.at(declared.span, "the odds of all its values are 0");
+            self.report(error.help("give at least one of them odds above 0"));
+            return None;
+        }
+        Some(drawn)
+    }
+
+    fn domain(&mut self, within: &ast::Expr, ty: Type) -> Option<Domain> {
+        let place = Place::default();
+        match &within.kind {
+            ast::ExprKind::Range { low, high } => {
+                if !is_number(ty) {
+                    let name = self.type_name(ty);
+                    let error = Diagnostic::error(code::TYPE_MISMATCH, format!("`{name}` has no ranges"));
+                    self.report(error.at(within.span, "a range of numbers"));
+                    return None;
+                }
+                let (low, high) = (self.typed(low, &place, ty), self.typed(high, &place, ty));
+                let (low, high) = (low?, high?);
+                let (low, high) = (self.fold_number(&low), self.fold_number(&high));
+                let (low, high) = (low?, high?);
+                if low > high {
+                    let error = Diagnostic::error(code::EMPTY, "the range is empty");
+                    let error = error.at(within.span, "its low end lies above its high end");
+                    self.report(error.help("write the low end first"));
+                    return None;
+                }
+                if ty == Type::Int {
+                    self.whole_values(low, high, within.span)
+                } else {
+                    Some(Domain::Range(low, high))
+                }
+            }
+            ast::ExprKind::List(items) => {
+                let values: Vec<Option<Value>> = items
+                    .iter()
+                    .map(|item| {
+                        let item = self.typed(item, &place, ty)?;
+                        literal(&self.fold(&item)?)
+                    })
+                    .collect();
+                let values: Option<Vec<Value>> = values.into_iter().collect();
+                let values = values?;
+                if values.is_empty() {
+                    self.report(
+                        Diagnostic::error(code::EMPTY, "the list is empty")
+                            .at(within.span, "no value is left"),
+                    );
+                    return None;
+                }
+                Some(Domain::Values(values))
+            }
+            _ => {
+                let error = Diagnostic::error(code::TYPE_MISMATCH, "`in` needs a range or a list here");
+                self.report(error.at(within.span, "neither"));
+                None
+            }
+        }
+    }
+
+    fn whole_values(&mut self, low: Rational, high: Rational, span: Span) -> Option<Domain> {
+        match (low.to_i64(), high.to_i64()) {
+            (Some(low), Some(high)) if high.checked_sub(low).is_some_and(|count| count < VALUES_MAX) => {
+                Some(Domain::Values((low..=high).map(|value| Value::Number(value as f64)).collect()))
+            }
+            _ => {
+                let error = Diagnostic::error(
+                    code::TOO_MANY_ROWS,
+                    format!("the range holds more than {VALUES_MAX} numbers"),
+                );
+                self.report(error.at(span, "too many"));
+                None
+            }
+        }
+    }
+
+    fn effect(&mut self, effect: &ast::Effect, place: &Place<'_>) -> Option<EffectDef> {
+        match &effect.kind {
+            ast::EffectKind::Set { state, key, value } => {
+                let Some(index) = self.states.iter().position(|known| known.name == state.text) else {
+                    let error = unknown_state(self, state);
+                    self.report(error);
+                    return None;
+                };
+                let (key_of, ty) = (self.states[index].key, self.states[index].ty);
+                let key = match (key, key_of) {
+                    (None, _) => None,
+                    (Some(key), Some(of)) => Some(self.typed(key, place, Type::Enum(of))?),
+                    (Some(key), None) => {
+                        let error =
+                            Diagnostic::error(code::TYPE_MISMATCH, format!("`{}` is not a map", state.text));
+                        self.report(error.at(key.span, "takes no key"));
+                        return None;
+                    }
+                };
+                let value = self.typed(value, place, ty)?;
+                Some(EffectDef::Set(Box::new(SetDef { state: index, key, value, span: effect.span })))
+            }
+            ast::EffectKind::Spawn { body, place: side, distance, fields } => {
+                let behind = *side == ast::Place::Behind;
+                let spawn = self.spawn(body, behind, distance, fields, place, effect.span)?;
+                Some(EffectDef::Spawn(Box::new(spawn)))
+            }
+        }
+    }
+
+    fn spawn(
+        &mut self,
+        body: &ast::Expr,
+        behind: bool,
+        distance: &ast::Expr,
+        fields: &[ast::Field],
+        place: &Place<'_>,
+        span: Span,
+    ) -> Option<SpawnDef> {
+        const FIELDS: [&str; 6] = ["does", "lane", "side", "then", "speed", "colour"];
+        let mut names = Names::default();
+        for (index, field) in fields.iter().enumerate() {
+            if let Err(error) = names.declare("field", &field.name, index) {
+                self.report(error);
+            }
+            if !FIELDS.contains(&field.name.text.as_str()) {
+                self.report(unknown("field", &field.name.text, field.name.span, FIELDS));
+            }
+        }
+        let find = |name: &str| fields.iter().find(|field| field.name.text == name).map(|field| &field.value);
+        let body_word = self.word::<Body>("body", body, place);
+        let distance = self.typed(distance, place, Type::Quantity(Dimension::LENGTH));
+        let verb = match find("does") {
+            Some(value) => self.word::<Verb>("verb", value, place),
+            None => self.missing_field("does", "what it does", span),
+        };
+        let verb_words: Vec<Verb> = verb.as_ref().map(possible).unwrap_or_default();
+        let needs = |verbs: &[Verb]| verb_words.iter().any(|verb| verbs.contains(verb));
+        let lane = match find("lane") {
+            Some(value) => self.word::<LaneChoice>("lane", value, place),
+            None if needs(&[Verb::DriveAhead, Verb::Overtake]) => {
+                self.missing_field("lane", "its lane", span)
+            }
+            None => Some(WordExpr::Fixed(LaneChoice::Current)),
+        };
+        let side = match find("side") {
+            Some(value) => self.word::<Side>("side", value, place),
+            None if needs(&[Verb::CrossRoad, Verb::Walk]) => {
+                self.missing_field("side", "where it comes from", span)
+            }
+            None => Some(WordExpr::Fixed(Side::Right)),
+        };
+        let then = match find("then") {
+            Some(value) => self.word::<Then>("word for `then`", value, place),
+            None => Some(WordExpr::Fixed(Then::Keep)),
+        };
+        let colour = match find("colour") {
+            Some(value) => self.word::<Colour>("colour", value, place),
+            None => Some(WordExpr::Fixed(Colour::Black)),
+        };
+        let speed_type = Type::Quantity(Dimension::SPEED);
+        let speed = match find("speed") {
+            Some(value) => self.typed(value, place, speed_type),
+            None if verb_words == [Verb::Stand] => {
+                Some(Expr { kind: ExprKind::Number(Rational::ZERO), ty: speed_type, span })
+            }
+            None => self.missing_field("speed", "how fast it is", span),
+        };
+        let (body, verb) = (body_word?, verb?);
+        self.check_verb(&body, &verb, behind, span);
+        Some(SpawnDef {
+            body,
+            colour: colour?,
+            verb,
+            lane: lane?,
+            side: side?,
+            then: then?,
+            speed: speed?,
+            distance: distance?,
+            behind,
+            span,
+        })
+    }
+
+    /// Vehicles do not walk, and only who overtakes comes from behind.
+    fn check_verb(&mut self, body: &WordExpr<Body>, verb: &WordExpr<Verb>, behind: bool, span: Span) {
+        let on_foot = |verb: &Verb| matches!(verb, Verb::Walk | Verb::Stand);
+        let verbs = possible(verb);
+        let clash = possible(body).into_iter().find_map(|body| {
+            verbs.iter().find(|verb| on_foot(verb) == body.is_vehicle()).map(|verb| (body, *verb))
+        });
+        if let Some((body, verb)) = clash {
+            let message = format!("a `{}` cannot `{}`", body.name(), verb.name());
+            let error = Diagnostic::error(code::IMPOSSIBLE_SPAWN, message).at(span, "spawned here");
+            self.report(
+                error.help("`Walk` and `Stand` are for a `Pedestrian`, all other verbs for vehicles"),
+            );
+            return;
+        }
+        for verb in verbs {
+            if (verb == Verb::Overtake) != behind {
+                let (is, should) = if behind { ("behind", "ahead") } else { ("ahead", "behind") };
+                let message = format!("`{}` does not begin {is} the ego vehicle", verb.name());
+                let error = Diagnostic::error(code::IMPOSSIBLE_SPAWN, message).at(span, "spawned here");
+                self.report(error.help(format!("write `{should}`")));
+                return;
+            }
+        }
+    }
+
+    fn missing_field<T>(&mut self, field: &str, what: &str, span: Span) -> Option<T> {
+        let error = Diagnostic::error(code::MISSING_FIELD, format!("the spawn does not say {what}"));
+        self.report(error.at(span, format!("`{field}: …` is missing")));
+        None
+    }
+
+    /// A word of the engine: its own spelling, or an expression whose enum is spelt like it.
+    fn word<W: Word>(&mut self, kind: &str, expr: &ast::Expr, place: &Place<'_>) -> Option<WordExpr<W>> {
+        if let ast::ExprKind::Name(name) = &expr.kind
+            && self.is_bare_variant(expr, place)
+        {
+            let word = W::from_name(name);
+            if word.is_none() {
+                let locals = place.locals.iter().map(|(local, _)| local.as_str());
+                let error = match nearest(name, locals) {
+                    Some(near) => Diagnostic::error(code::UNKNOWN, format!("unknown name `{name}`"))
+                        .at(expr.span, "not declared")
+                        .meant(expr.span, near),
+                    None => unknown_word::<W>(kind, name, expr.span),
+                };
+                self.report(error);
+            }
+            return word.map(WordExpr::Fixed);
+        }
+        let expr = self.expr(expr, place, None)?;
+        let words = self.words::<W>(kind, expr.ty, expr.span)?;
+        Some(WordExpr::Of(expr, words))
+    }
+
+    pub(super) fn declare_groups(&mut self, items: &[&ast::Item]) {
+        for (item, declared) in each(items, |kind| match kind {
+            ItemKind::Group(declared) => Some(declared),
+            _ => None,
+        }) {
+            let taken = self.groups.iter().any(|group| group.name == declared.name.text);
+            if taken || self.action_names.get(&declared.name.text).is_some() {
+                let message = format!("the name `{}` is taken", declared.name.text);
+                let error = Diagnostic::error(code::DUPLICATE, message).at(declared.name.span, "again here");
+                self.report(error.help("groups and actions share their names"));
+                continue;
+            }
+            let mut actions = Vec::new();
+            for member in &declared.members {
+                actions.extend(self.targets(member));
+            }
+            let name = declared.name.text.clone();
+            self.groups.push(GroupDef { name, docs: docs(item), actions });
+        }
+    }
+
+    /// The actions of a name: an action or a group.
+    pub(super) fn targets(&mut self, name: &ast::Name) -> Vec<usize> {
+        if let Some(action) = self.action_names.get(&name.text) {
+            return vec![action];
+        }
+        if let Some(group) = self.groups.iter().find(|group| group.name == name.text) {
+            return group.actions.clone();
+        }
+        let groups = self.groups.iter().map(|group| group.name.as_str());
+        let error = unknown("action", &name.text, name.span, self.action_names.all().chain(groups));
+        self.report(error);
+        Vec::new()
+    }
+
+    /// Counts the rows of every action and refuses a table that is too long, before it is made.
+    pub(super) fn count_rows(&mut self, rules: &[RuleDef], roads: usize) {
+        let mut total = 0_u64;
+        for action in self.actions.clone() {
+            // No row at all: an axis is broken, and that is reported where it stands.
+            let count = action.as_ref().map(product_size).filter(|count| *count > 0);
+            if let (Some(count), Some(action)) = (count, &action) {
+                total = total.saturating_add(count);
+                if count > ROWS_MAX {
+                    let message = format!("`{}` multiplies to {count} rows", action.name);
+                    let axes = action.parameters.iter().filter(|parameter| parameter.axis);
+                    let axes: Vec<String> = axes.map(|parameter| parameter.name.to_string()).collect();
+                    let error = Diagnostic::error(code::TOO_MANY_ROWS, message)
+                        .at(action.span, format!("the product of {}", listed(&axes)));
+                    self.report(error.help(format!("at most {ROWS_MAX} are possible; draw some with `any`")));
+                    return;
+                }
+            }
+            self.row_counts.push(count);
+        }
+        if total > ROWS_MAX {
+            let error =
+                Diagnostic::error(code::TOO_MANY_ROWS, format!("the actions multiply to {total} rows"));
+            self.report(error.help(format!("at most {ROWS_MAX} are possible")));
+            return;
+        }
+        // Every row is proved on every road under every rule that binds it.
+        let bound = |action: usize| rules.iter().filter(|rule| rule.body.binds(action)).count() as u64;
+        let counts = self.row_counts.iter().enumerate();
+        let work: u64 = counts
+            .map(|(action, count)| count.unwrap_or(0) * (1 + bound(action)) * roads.max(1) as u64)
+            .sum();
+        if work > PROOFS_MAX {
+            let message = format!("rows, rules and roads multiply to {work} proofs");
+            let error = Diagnostic::error(code::TOO_MANY_ROWS, message);
+            self.report(error.help(format!(
+                "at most {PROOFS_MAX} are possible; draw some parameters with `any`, or bind fewer actions"
+            )));
+        }
+    }
+}
+
+/// Every word that the expression may come to.
+fn possible<W: Copy>(word: &WordExpr<W>) -> Vec<W> {
+    match word {
+        WordExpr::Fixed(word) => vec![*word],
+        WordExpr::Of(_, words) => words.clone(),
+    }
+}

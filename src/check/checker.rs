@@ -1,0 +1,226 @@
+//! The checker: declarations in, a sound [`Space`] or diagnostics out.
+//!
+//! It goes on after a mistake, so that one run shows them all: what is broken becomes `None`, and
+//! whatever depends on it stays silent.
+
+use std::path::PathBuf;
+
+use crate::check::road::Maps;
+use crate::check::{style, unused};
+
+use crate::check::names::{Names, unknown};
+use crate::model::expr::{Expr, ExprKind};
+use crate::model::{ActionDef, EnumDef, EnumIndex, FnDef, GroupDef, Space, StateDef, Type, Value, code};
+use crate::prove;
+use crate::prove::{Known, Values, enclose};
+use crate::syntax::ast::{FileId, ItemKind, Span};
+use crate::syntax::{Diagnostic, ast};
+use crate::units::Rational;
+
+/// Where the parameters, the result and the header of a function are.
+pub(super) type Signature = (Vec<(String, Type)>, Type, Span);
+
+/// What is known so far.
+#[derive(Default)]
+pub(super) struct Checker {
+    pub(super) diagnostics: Vec<Diagnostic>,
+    pub(super) enum_names: Names,
+    pub(super) enums: Vec<EnumDef>,
+    pub(super) states: Vec<StateDef>,
+    /// Constants are folded: each is a literal. `None` is one that is broken.
+    pub(super) constants: Vec<(String, Option<Expr>)>,
+    pub(super) function_names: Names,
+    /// Every declared road, driven or not.
+    pub(super) road_names: Vec<String>,
+    /// What the functions will be called, while the constants are looked at.
+    pub(super) functions_to_come: Vec<String>,
+    /// `None` is a function with a broken header.
+    pub(super) signatures: Vec<Option<Signature>>,
+    pub(super) functions: Vec<FnDef>,
+    pub(super) action_names: Names,
+    pub(super) actions: Vec<Option<ActionDef>>,
+    /// Actions with an effect that is broken: nothing is to be said of what they lack.
+    pub(super) half_broken: Vec<usize>,
+    pub(super) groups: Vec<GroupDef>,
+    /// Number of rows of each action, where its axes are sound.
+    pub(super) row_counts: Vec<Option<u64>>,
+}
+
+/// What the reader of files knows about the root of a space.
+pub(super) struct Root {
+    /// Claims are judged, and unused declarations looked for, in this file alone: those of a used
+    /// file are about that file as it is by itself.
+    pub file: FileId,
+    pub path: PathBuf,
+    pub digest: String,
+    pub docs: Vec<String>,
+}
+
+/// Checks the declarations of a space: those of all its files, imports first.
+pub(super) fn space(
+    root: Root,
+    items: &[&ast::Item],
+    maps: &mut dyn Maps,
+) -> (Option<Space>, Vec<Diagnostic>) {
+    let mut checker = Checker::default();
+    checker.declare_enums(items);
+    let function = |item: &&ast::Item| matches!(item.kind, ItemKind::Fn(_));
+    let functions = items.iter().copied().filter(function).filter_map(|item| item.kind.name());
+    checker.functions_to_come = functions.map(|name| name.text.clone()).collect();
+    checker.road_names = each(items, |kind| match kind {
+        ItemKind::Road(block) => Some(block),
+        _ => None,
+    })
+    .map(|(_, block)| block.name.text.clone())
+    .collect();
+    checker.declare_constants(items);
+    checker.declare_odds(items);
+    checker.declare_functions(items);
+    checker.declare_states(items);
+    checker.declare_actions(items);
+    checker.declare_groups(items);
+    let rules = checker.rules(items);
+    let reward = checker.reward(items);
+    let verdicts = checker.verdicts(items);
+    let (episode, road_names) = checker.episode(items);
+    let roads = checker.roads(items, road_names, maps);
+    checker.count_rows(&rules, roads.len());
+
+    let own: Vec<&ast::Item> = items.iter().copied().filter(|item| item.span.file == root.file).collect();
+
+    // What was broken is missing, and indices would be off: without errors nothing is missing.
+    if checker.has_errors() {
+        checker.look_at_expects(&own);
+        return (None, checker.finish());
+    }
+    let mut space = Space {
+        path: root.path,
+        digest: root.digest,
+        docs: root.docs,
+        enums: core::mem::take(&mut checker.enums),
+        states: core::mem::take(&mut checker.states),
+        functions: core::mem::take(&mut checker.functions),
+        actions: core::mem::take(&mut checker.actions).into_iter().flatten().collect(),
+        groups: core::mem::take(&mut checker.groups),
+        rules,
+        episode,
+        reward,
+        verdicts,
+        expects: Vec::new(),
+        roads,
+        rows: Vec::new(),
+    };
+    space.rows = prove::rows(&space);
+    space.expects = checker.expects(&own, &space);
+    checker.diagnostics.extend(unused::report(&own, items));
+    checker.diagnostics.extend(style::report(&own));
+    checker.diagnostics.extend(prove::report(&space));
+    let sound = !checker.has_errors();
+    (sound.then_some(space), checker.finish())
+}
+
+impl Checker {
+    pub(super) fn report(&mut self, diagnostic: Diagnostic) {
+        self.diagnostics.push(diagnostic);
+    }
+
+    pub(super) fn has_errors(&self) -> bool {
+        self.diagnostics.iter().any(Diagnostic::is_error)
+    }
+
+    /// The diagnostics in reading order; a rule over several actions says the same thing once.
+    fn finish(self) -> Vec<Diagnostic> {
+        let mut kept: Vec<Diagnostic> = Vec::new();
+        for diagnostic in self.diagnostics {
+            if !kept.contains(&diagnostic) {
+                kept.push(diagnostic);
+            }
+        }
+        kept.sort_by_key(Diagnostic::place);
+        kept
+    }
+
+    /// The type of that name.
+    pub(super) fn named_type(&mut self, name: &ast::Name) -> Option<Type> {
+        let builtin = match name.text.as_str() {
+            "Bool" => Some(Type::Bool),
+            "Int" => Some(Type::Int),
+            other => crate::units::Dimension::from_name(other).map(Type::Quantity),
+        };
+        let found = builtin.or(self.enum_names.get(&name.text).map(|index| Type::Enum(EnumIndex(index))));
+        if found.is_none() {
+            let builtin = ["Bool", "Int", "Length", "Duration", "Speed", "Accel", "Angle", "Ratio"];
+            let error =
+                unknown("type", &name.text, name.span, builtin.into_iter().chain(self.enum_names.all()));
+            self.report(error);
+        }
+        found
+    }
+
+    pub(super) fn plain_type(&mut self, ty: &ast::Type) -> Option<Type> {
+        match &ty.kind {
+            ast::TypeKind::Named(name) => self.named_type(name),
+            ast::TypeKind::Map { .. } => {
+                let error = Diagnostic::error(code::TYPE_MISMATCH, "only a state can be a map");
+                self.report(error.at(ty.span, "a map"));
+                None
+            }
+        }
+    }
+
+    /// The value of an expression that names nothing but constants, functions and literals.
+    pub(super) fn fold(&mut self, expr: &Expr) -> Option<ExprKind> {
+        let calls = expr.any(|kind| matches!(kind, ExprKind::Call(..)));
+        if calls && self.functions.len() != self.signatures.len() {
+            // A broken function was reported where it stands.
+            return None;
+        }
+        let known = Known { functions: &self.functions, locals: &[], cells: &[], road: None };
+        let folded = match enclose(expr, &known) {
+            Values::Number(interval) => interval.single().map(ExprKind::Number),
+            Values::Variants(set) => match expr.ty {
+                Type::Enum(of) if set.is_power_of_two() => {
+                    Some(ExprKind::Variant(of, set.trailing_zeros() as usize))
+                }
+                _ => None,
+            },
+            Values::Truth { may_hold, may_fail } if may_hold != may_fail => Some(ExprKind::Bool(may_hold)),
+            Values::Truth { .. } => None,
+        };
+        if folded.is_none() {
+            let error = Diagnostic::error(code::NUMBER, "the value cannot be computed exactly");
+            self.report(error.at(expr.span, "too large, or a division by 0"));
+        }
+        folded
+    }
+
+    /// The same for a number.
+    pub(super) fn fold_number(&mut self, expr: &Expr) -> Option<Rational> {
+        match self.fold(expr)? {
+            ExprKind::Number(value) => Some(value),
+            _ => None,
+        }
+    }
+}
+
+/// The literal as a value at run time.
+pub(super) fn literal(kind: &ExprKind) -> Option<Value> {
+    match kind {
+        ExprKind::Bool(truth) => Some(Value::Bool(*truth)),
+        ExprKind::Number(number) => Some(Value::Number(number.to_f64())),
+        ExprKind::Variant(of, index) => Some(Value::Variant(*of, *index)),
+        _ => None,
+    }
+}
+
+/// The declarations of one kind, with their documentation.
+pub(super) fn each<'a, T: 'a>(
+    items: &'a [&'a ast::Item],
+    pick: impl Fn(&'a ItemKind) -> Option<&'a T> + 'a,
+) -> impl Iterator<Item = (&'a ast::Item, &'a T)> {
+    items.iter().filter_map(move |item| pick(&item.kind).map(|found| (*item, found)))
+}
+
+pub(super) fn docs(item: &ast::Item) -> Vec<String> {
+    item.docs.iter().map(|doc| doc.text.clone()).collect()
+}

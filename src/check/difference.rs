@@ -1,0 +1,326 @@
+//! What one space says that another does not: rows, ranges, rules and declarations by meaning.
+//!
+//! Rows are compared by their labels, rules by what they leave of each range that both spaces know.
+//! Where ranges do not tell, a rule whose text differs is called changed.
+
+use core::fmt;
+use std::collections::BTreeMap;
+
+use crate::check::load::{Loaded, standing_items};
+use crate::model::{Interval, Reach, Road, Row, RuleBody, Space, Type, bounds, locals};
+use crate::prove::{Prover, Values};
+use crate::syntax::ast::ItemKind;
+use crate::syntax::print_item;
+
+/// One difference, as a sentence in parts.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct Difference {
+    pub change: Change,
+    /// ``rule `npc_speed` ``, ``row `rain(how: High)` ``.
+    pub subject: String,
+    /// Figures; may be empty.
+    pub detail: String,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Change {
+    Added,
+    Removed,
+    /// Another row number.
+    Moved,
+    /// Forbids more.
+    Tightened,
+    /// Forbids less.
+    Loosened,
+    Changed,
+}
+
+impl fmt::Display for Change {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            Change::Added => "added",
+            Change::Removed => "removed",
+            Change::Moved => "moved",
+            Change::Tightened => "tightened",
+            Change::Loosened => "loosened",
+            Change::Changed => "changed",
+        })
+    }
+}
+
+/// Every difference from one space to another, declarations first; `None` if one is unsound.
+pub fn differences(old: &Loaded, new: &Loaded) -> Option<Vec<Difference>> {
+    let (old_space, new_space) = (old.space.as_deref()?, new.space.as_deref()?);
+    let mut found = declarations(old, new);
+    found.extend(rules(old, new, old_space, new_space));
+    found.extend(rows(old_space, new_space));
+    found.extend(reaches(old_space, new_space));
+    Some(found)
+}
+
+fn difference(change: Change, subject: String, detail: impl Into<String>) -> Difference {
+    Difference { change, subject, detail: detail.into() }
+}
+
+/// Every declaration by keyword and name, with its text in the one style.
+fn texts(loaded: &Loaded) -> BTreeMap<(String, String), String> {
+    let items = standing_items(loaded);
+    let named = items.iter().filter(|item| {
+        !matches!(
+            item.kind,
+            ItemKind::Language(_)
+                | ItemKind::Use(_)
+                | ItemKind::Expect(_)
+                | ItemKind::Scenario(_)
+                | ItemKind::Policy(_)
+        )
+    });
+    named
+        .map(|item| {
+            let name = item.kind.name().map_or(String::new(), |name| format!(" `{}`", name.text));
+            ((item.kind.keyword().to_owned(), name), print_item(&item.kind))
+        })
+        .collect()
+}
+
+/// Declarations other than rules and actions, whose meaning is compared below.
+fn declarations(old: &Loaded, new: &Loaded) -> Vec<Difference> {
+    let (old, new) = (texts(old), texts(new));
+    let mut found = Vec::new();
+    let of_table = |keyword: &str| matches!(keyword, "rule" | "action");
+    for ((keyword, name), text) in old.iter().filter(|((keyword, _), _)| !of_table(keyword)) {
+        let subject = format!("{keyword}{name}");
+        match new.get(&(keyword.clone(), name.clone())) {
+            None => found.push(difference(Change::Removed, subject, "")),
+            Some(other) if other != text => {
+                found.push(difference(Change::Changed, subject, format!("{} → {}", flat(text), flat(other))));
+            }
+            Some(_) => {}
+        }
+    }
+    for (key @ (keyword, name), text) in new.iter().filter(|((keyword, _), _)| !of_table(keyword)) {
+        if !old.contains_key(key) {
+            found.push(difference(Change::Added, format!("{keyword}{name}"), flat(text)));
+        }
+    }
+    found
+}
+
+/// A declaration on one line.
+fn flat(text: &str) -> String {
+    text.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+fn rules(old: &Loaded, new: &Loaded, old_space: &Space, new_space: &Space) -> Vec<Difference> {
+    let (old_texts, new_texts) = (texts(old), texts(new));
+    let text = |texts: &BTreeMap<(String, String), String>, name: &str| {
+        texts.get(&("rule".to_owned(), format!(" `{name}`"))).cloned().unwrap_or_default()
+    };
+    let mut found = Vec::new();
+    for (index, rule) in old_space.rules.iter().enumerate() {
+        let subject = format!("rule `{}`", rule.name);
+        let Some(other) = new_space.rules.iter().position(|known| known.name == rule.name) else {
+            found.push(difference(Change::Removed, subject, flat(&text(&old_texts, &rule.name))));
+            continue;
+        };
+        let optional = new_space.rules[other].optional;
+        if optional != rule.optional {
+            let (change, detail) = match optional {
+                true => (Change::Loosened, "it is optional now"),
+                false => (Change::Tightened, "it is no longer optional"),
+            };
+            found.push(difference(change, subject.clone(), detail));
+        }
+        let (before, after) = (flat(&text(&old_texts, &rule.name)), flat(&text(&new_texts, &rule.name)));
+        let written = || format!("{before} → {after}");
+        match compared((old_space, index), (new_space, other)) {
+            Some((change, detail)) => found.push(difference(change, subject, detail)),
+            None if before != after => found.push(difference(Change::Changed, subject, written())),
+            None => {}
+        }
+    }
+    for rule in &new_space.rules {
+        if !old_space.rules.iter().any(|known| known.name == rule.name) {
+            let subject = format!("rule `{}`", rule.name);
+            found.push(difference(Change::Added, subject, flat(&text(&new_texts, &rule.name))));
+        }
+    }
+    found
+}
+
+/// Whether a rule forbids more or less than before, by its moves or by what it leaves of each range.
+fn compared(old: (&Space, usize), new: (&Space, usize)) -> Option<(Change, String)> {
+    let mut tighter = Vec::new();
+    let mut looser = Vec::new();
+    if let (
+        RuleBody::Moves { state, allowed: before, .. },
+        RuleBody::Moves { state: other, allowed: after, .. },
+    ) = (&old.0.rules[old.1].body, &new.0.rules[new.1].body)
+    {
+        let variants = |space: &Space, state: usize| match space.states[state].ty {
+            Type::Enum(of) => space.enums[of.0].variants.clone(),
+            Type::Bool | Type::Int | Type::Quantity(_) => Vec::new(),
+        };
+        let (names, others) = (variants(old.0, *state), variants(new.0, *other));
+        for (from, from_name) in names.iter().enumerate() {
+            for (to, to_name) in names.iter().enumerate() {
+                let find = |name: &String| others.iter().position(|other| other == name);
+                let (Some(from_now), Some(to_now)) = (find(from_name), find(to_name)) else { continue };
+                let word = format!("{from_name} -> {to_name}");
+                match (before[from][to], after[from_now][to_now]) {
+                    (true, false) => tighter.push(word),
+                    (false, true) => looser.push(word),
+                    _ => {}
+                }
+            }
+        }
+    } else {
+        for row in old.0.rows.iter().filter(|row| row.rules.contains(&old.1)) {
+            let Some(other) = new.0.rows.iter().find(|other| other.label == row.label) else { continue };
+            let unbound = !other.rules.contains(&new.1);
+            if unbound {
+                looser.push(format!("binds `{}` no longer", row.label));
+                continue;
+            }
+            for (road, same) in shared_roads(old.0, new.0) {
+                let (before, after) = (left(old, row, road), left(new, other, same));
+                judge(&before, &after, &road.name, &mut tighter, &mut looser);
+            }
+        }
+        for row in new.0.rows.iter().filter(|row| row.rules.contains(&new.1)) {
+            let known = old.0.rows.iter().find(|other| other.label == row.label);
+            if known.is_some_and(|known| !known.rules.contains(&old.1)) {
+                tighter.push(format!("binds `{}`", row.label));
+            }
+        }
+    }
+    let shown = |parts: &mut Vec<String>| {
+        let mut kept: Vec<String> = Vec::new();
+        parts.drain(..).for_each(|part| {
+            if !kept.contains(&part) {
+                kept.push(part)
+            }
+        });
+        match kept.len() {
+            0..=4 => kept.join("; "),
+            more => format!("{}; and {} more", kept[..4].join("; "), more - 4),
+        }
+    };
+    match (tighter.is_empty(), looser.is_empty()) {
+        (true, true) => None,
+        (false, true) => Some((Change::Tightened, shown(&mut tighter))),
+        (true, false) => Some((Change::Loosened, shown(&mut looser))),
+        (false, false) => Some((
+            Change::Changed,
+            format!("tighter: {}; looser: {}", shown(&mut tighter), shown(&mut looser)),
+        )),
+    }
+}
+
+/// What a rule alone leaves of each range of a row; `None` if nothing.
+fn left((space, rule): (&Space, usize), row: &Row, road: &Road) -> Option<Vec<(String, Interval)>> {
+    let values = locals(&space.actions[row.action], row, &[]);
+    let bounds = bounds(space, row.action);
+    let prover = Prover { space, row, values: &values, bounds: &bounds, road: Some(road) };
+    let settled = prover.settle(&[rule])?;
+    let drawn = space.actions[row.action].parameters.iter().zip(settled).filter(|(p, _)| !p.axis);
+    let ranges = drawn.filter_map(|(parameter, values)| match values {
+        Values::Number(interval) => Some((parameter.name.to_string(), interval)),
+        Values::Truth { .. } | Values::Variants(_) => None,
+    });
+    Some(ranges.collect())
+}
+
+fn judge(
+    before: &Option<Vec<(String, Interval)>>,
+    after: &Option<Vec<(String, Interval)>>,
+    road: &str,
+    tighter: &mut Vec<String>,
+    looser: &mut Vec<String>,
+) {
+    match (before, after) {
+        (None, Some(_)) => looser.push(format!("no longer forbids everything on {road}")),
+        (Some(_), None) => tighter.push(format!("forbids everything on {road}")),
+        (None, None) => {}
+        (Some(before), Some(after)) => {
+            for (name, was) in before {
+                let Some((_, is)) = after.iter().find(|(known, _)| known == name) else { continue };
+                let shared = was.intersect(is);
+                let word = format!("{name} {was} → {is} on {road}");
+                match (shared == *is, shared == *was) {
+                    (true, true) => {}
+                    (true, false) => tighter.push(word),
+                    (false, true) => looser.push(word),
+                    (false, false) => {
+                        tighter.push(word.clone());
+                        looser.push(word);
+                    }
+                }
+            }
+        }
+    }
+}
+
+fn shared_roads<'a>(old: &'a Space, new: &'a Space) -> Vec<(&'a Road, &'a Road)> {
+    let same = |road: &'a Road| Some((road, new.roads.iter().find(|other| other.name == road.name)?));
+    old.roads.iter().filter_map(same).collect()
+}
+
+fn rows(old: &Space, new: &Space) -> Vec<Difference> {
+    let index: BTreeMap<&str, usize> = new.rows.iter().map(|row| (row.label.as_str(), row.index)).collect();
+    let known: BTreeMap<&str, usize> = old.rows.iter().map(|row| (row.label.as_str(), row.index)).collect();
+    let subject = |row: &Row| format!("row `{}`", row.label);
+    let mut found = Vec::new();
+    let mut moved = 0;
+    for row in &old.rows {
+        match index.get(row.label.as_str()) {
+            None => found.push(difference(Change::Removed, subject(row), format!("it was {}", row.index))),
+            Some(now) if *now != row.index => moved += 1,
+            Some(_) => {}
+        }
+    }
+    let added = new.rows.iter().filter(|row| !known.contains_key(row.label.as_str()));
+    found.extend(added.map(|row| difference(Change::Added, subject(row), format!("it is {}", row.index))));
+    if moved > 0 {
+        let detail = "a policy learned on the old table does not fit the new one";
+        found.push(difference(Change::Moved, format!("{moved} rows"), detail));
+    }
+    found
+}
+
+/// What all rules together leave, where it differs.
+fn reaches(old: &Space, new: &Space) -> Vec<Difference> {
+    let mut found: Vec<Difference> = Vec::new();
+    for row in &old.rows {
+        let Some(other) = new.rows.iter().find(|other| other.label == row.label) else { continue };
+        for (index, road) in old.roads.iter().enumerate() {
+            let Some(same) = new.roads.iter().position(|known| known.name == road.name) else { continue };
+            let action = &old.actions[row.action].name;
+            let (mut tighter, mut looser) = (Vec::new(), Vec::new());
+            let ranges = |reach: &Reach| match reach {
+                Reach::Open(ranges) => Some(ranges.iter().map(|(name, i)| (name.to_string(), *i)).collect()),
+                Reach::Dead { .. } => None,
+            };
+            judge(
+                &ranges(&row.roads[index]),
+                &ranges(&other.roads[same]),
+                &road.name,
+                &mut tighter,
+                &mut looser,
+            );
+            let change = match (tighter.is_empty(), looser.is_empty()) {
+                (true, true) => continue,
+                (false, true) => Change::Tightened,
+                (true, false) => Change::Loosened,
+                (false, false) => Change::Changed,
+            };
+            let detail = if tighter.is_empty() { looser.join("; ") } else { tighter.join("; ") };
+            let difference = difference(change, format!("draws of `{action}`"), detail);
+            if !found.contains(&difference) {
+                found.push(difference);
+            }
+        }
+    }
+    found
+}

@@ -1,0 +1,760 @@
+//! Expressions: every name found, every type and unit fitted.
+
+use crate::check::checker::Checker;
+use crate::check::names::unknown;
+use crate::model::expr::{Arithmetic, Comparison, Expr, ExprKind, Fact};
+use crate::model::vocabulary::LaneChoice;
+use crate::model::{EnumIndex, Type, code};
+use crate::syntax::ast::{BinaryOp, Span, UnaryOp};
+use crate::syntax::{Diagnostic, ast, listed, nearest};
+use crate::units;
+use crate::units::{Dimension, Rational};
+
+/// What an expression may name where it stands, apart from constants and functions.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Place<'a> {
+    pub locals: &'a [(String, Type)],
+    pub states: bool,
+    pub road: bool,
+    pub spawn: bool,
+    pub outcome: bool,
+    /// Whether the collision has been judged: true of verdicts, not of rewards.
+    pub judged: bool,
+}
+
+/// The facts of the world by their spelling; which are on offer is the place's business.
+const FACTS: &[(&str, Fact, Type)] = &[
+    ("spawn_gap", Fact::SpawnGap, Type::Quantity(Dimension::LENGTH)),
+    ("safety_gap", Fact::SafetyGap, Type::Quantity(Dimension::LENGTH)),
+    ("proc", Fact::Proc, Type::Quantity(Dimension::RATIO)),
+    ("collision", Fact::Collision, Type::Bool),
+    ("repeated", Fact::Repeated, Type::Bool),
+    ("sudden", Fact::Sudden, Type::Bool),
+    ("struck", Fact::Struck, Type::Bool),
+    ("avoidable", Fact::Avoidable, Type::Bool),
+];
+
+impl Place<'_> {
+    fn fact(&self, name: &str) -> Option<(Fact, Type)> {
+        let (_, fact, ty) = FACTS.iter().find(|(spelling, _, _)| *spelling == name)?;
+        let offered = match fact {
+            Fact::RoadLimit => self.road,
+            Fact::SpawnGap | Fact::SafetyGap => self.spawn,
+            Fact::Proc | Fact::Collision | Fact::Repeated | Fact::Sudden | Fact::Struck => self.outcome,
+            Fact::Avoidable => self.judged,
+        };
+        offered.then_some((*fact, *ty))
+    }
+}
+
+impl Checker {
+    /// An expression of a wanted type; `None` once the mistake is reported.
+    pub(super) fn typed(&mut self, expr: &ast::Expr, place: &Place<'_>, wanted: Type) -> Option<Expr> {
+        let found = self.expr(expr, place, Some(wanted))?;
+        self.fit(found, wanted)
+    }
+
+    /// Reports an expression that is not of the wanted type.
+    pub(super) fn fit(&mut self, found: Expr, wanted: Type) -> Option<Expr> {
+        if fits(found.ty, wanted) {
+            return Some(found);
+        }
+        let (wanted_name, found_name) = (self.type_name(wanted), self.type_name(found.ty));
+        let both_numbers = is_number(wanted) && is_number(found.ty);
+        let (code, what) =
+            if both_numbers { (code::UNIT_MISMATCH, "unit") } else { (code::TYPE_MISMATCH, "type") };
+        let error =
+            Diagnostic::error(code, format!("{what} mismatch: wanted `{wanted_name}`, found `{found_name}`"))
+                .at(found.span, format!("this is {}", article(&found_name)));
+        self.report(match wanted {
+            Type::Enum(of) if self.enums[of.0].variants.len() <= 12 => {
+                let variants: Vec<&str> = self.enums[of.0].variants.iter().map(String::as_str).collect();
+                error.help(format!("a `{wanted_name}` is {}", one_of(&variants)))
+            }
+            Type::Enum(_) | Type::Bool | Type::Int | Type::Quantity(_) => error,
+        });
+        None
+    }
+
+    /// An expression of any type. `hint` decides between variants of the same name.
+    pub(super) fn expr(&mut self, expr: &ast::Expr, place: &Place<'_>, hint: Option<Type>) -> Option<Expr> {
+        let span = expr.span;
+        let make = |kind, ty| Some(Expr { kind, ty, span });
+        match &expr.kind {
+            ast::ExprKind::Number(number) => self.number(number),
+            ast::ExprKind::Bool(truth) => make(ExprKind::Bool(*truth), Type::Bool),
+            ast::ExprKind::Name(name) => self.name(name, span, place, hint),
+            ast::ExprKind::Unary { op: UnaryOp::Not, operand } => {
+                let inner = self.typed(operand, place, Type::Bool)?;
+                make(ExprKind::Not(Box::new(inner)), Type::Bool)
+            }
+            ast::ExprKind::Unary { op: UnaryOp::Negate, operand } => {
+                let inner = self.numeric(operand, place)?;
+                let ty = inner.ty;
+                match inner.kind {
+                    ExprKind::Number(value) => {
+                        make(ExprKind::Number(self.exact(value.checked_neg(), span)?), ty)
+                    }
+                    _ => make(ExprKind::Negate(Box::new(inner)), ty),
+                }
+            }
+            ast::ExprKind::Binary { op, op_span, left, right } => {
+                self.binary(*op, *op_span, left, right, place, span)
+            }
+            ast::ExprKind::Field { base, field } => {
+                if !matches!(&base.kind, ast::ExprKind::Name(name) if name == "road") {
+                    self.report(
+                        Diagnostic::error(code::UNKNOWN, "only `road` has fields")
+                            .at(base.span, "not `road`"),
+                    );
+                    return None;
+                }
+                self.road_field(field, place, span)
+            }
+            ast::ExprKind::Index { base, index } => self.index(base, index, place, span),
+            ast::ExprKind::Call(call) => self.call(call, place),
+            ast::ExprKind::Match { subject, arms } => self.matching(subject, arms, place, hint, span),
+            ast::ExprKind::Text(_) => self.misplaced("a text", span),
+            ast::ExprKind::List(_) => self.misplaced("a list", span),
+            ast::ExprKind::Record(_) => self.misplaced("a record", span),
+            ast::ExprKind::Range { .. } => self.misplaced("a range", span),
+            ast::ExprKind::LanePoint { .. } => self.misplaced("a lane point", span),
+            ast::ExprKind::Numbered { .. } => self.misplaced("a numbered road user", span),
+        }
+    }
+
+    fn misplaced(&mut self, what: &str, span: Span) -> Option<Expr> {
+        let error = Diagnostic::error(code::TYPE_MISMATCH, format!("{what} cannot be computed with"));
+        self.report(error.at(span, "not a value of an expression"));
+        None
+    }
+
+    /// A number literal in SI units.
+    pub(super) fn number(&mut self, number: &ast::Number) -> Option<Expr> {
+        let value = self.exact(exact_digits(&number.digits), number.span)?;
+        let (value, ty) = match &number.unit {
+            None if value.is_integer() && !number.digits.contains(['.', 'e', 'E']) => {
+                (Some(value), Type::Int)
+            }
+            None => (Some(value), Type::Quantity(Dimension::RATIO)),
+            Some(word) => match units::unit(&word.text) {
+                Some(unit) => (value.checked_mul(unit.factor()), Type::Quantity(unit.dimension)),
+                None => {
+                    self.report(unknown_unit(word));
+                    return None;
+                }
+            },
+        };
+        let value = self.exact(value, number.span)?;
+        Some(Expr { kind: ExprKind::Number(value), ty, span: number.span })
+    }
+
+    fn exact(&mut self, value: Option<Rational>, span: Span) -> Option<Rational> {
+        if value.is_none() {
+            self.report(
+                Diagnostic::error(code::NUMBER, "the number is too large or too fine to be held exactly")
+                    .at(span, "about 38 digits are possible")
+                    .help("round it, or take a unit that is larger or smaller"),
+            );
+        }
+        value
+    }
+
+    /// Resolves a name: parameters first, then constants, states, facts and variants.
+    fn name(&mut self, name: &str, span: Span, place: &Place<'_>, hint: Option<Type>) -> Option<Expr> {
+        if let Some(found) = self.variable(name, span, place) {
+            return found;
+        }
+        let owners: Vec<usize> = (0..self.enums.len())
+            .filter(|of| self.enums[*of].variants.iter().any(|variant| variant == name))
+            .collect();
+        let wanted = match hint {
+            Some(Type::Enum(of)) => Some(of.0),
+            _ => None,
+        };
+        let of = match (wanted, owners.as_slice()) {
+            (Some(of), owners) if owners.contains(&of) => of,
+            (_, [of]) => *of,
+            (_, []) => {
+                let mut candidates: Vec<&str> = place.locals.iter().map(|(name, _)| name.as_str()).collect();
+                match wanted {
+                    Some(of) => candidates.extend(self.enums[of].variants.iter().map(String::as_str)),
+                    None => candidates
+                        .extend(self.enums.iter().flat_map(|e| e.variants.iter().map(String::as_str))),
+                }
+                candidates.extend(self.constants.iter().map(|(name, _)| name.as_str()));
+                if place.states {
+                    candidates.extend(self.states.iter().map(|state| state.name.as_str()));
+                }
+                candidates
+                    .extend(FACTS.iter().filter(|fact| place.fact(fact.0).is_some()).map(|fact| fact.0));
+                let error = unknown("name", name, span, candidates);
+                let error = match self.lacking(name, place) {
+                    Some(note) => error.note(note),
+                    None => error,
+                };
+                self.report(error);
+                return None;
+            }
+            (_, owners) => {
+                let enums: Vec<&str> = owners.iter().map(|of| self.enums[*of].name.as_str()).collect();
+                let error = Diagnostic::error(
+                    code::AMBIGUOUS,
+                    format!("`{name}` is a variant of {}", listed(&enums)),
+                );
+                let error = error.at(span, "which one is meant does not follow from here");
+                self.report(error.help("compare it with what has the wanted type, or rename one of the two"));
+                return None;
+            }
+        };
+        let index = self.enums[of].variants.iter().position(|variant| variant == name)?;
+        Some(Expr { kind: ExprKind::Variant(EnumIndex(of), index), ty: Type::Enum(EnumIndex(of)), span })
+    }
+
+    /// A name that exists, but not here.
+    fn lacking(&self, name: &str, place: &Place<'_>) -> Option<String> {
+        if name == "road" && place.road {
+            let asked = "`road.limit`, `road.lanes`, `road == corner` or `road in [corner, boulevard]`";
+            return Some(format!("`road` is no value: ask for {asked}"));
+        }
+        if FACTS.iter().any(|fact| fact.0 == name) && place.fact(name).is_none() {
+            return Some(format!("`{name}` is known to the engine, but not in this place"));
+        }
+        if !place.states && self.states.iter().any(|state| state.name == name) {
+            return Some(format!(
+                "`{name}` is a state, and functions and constants see none: pass it as a parameter"
+            ));
+        }
+        None
+    }
+
+    /// A parameter, constant, plain state or fact; `Some(None)` once a mistake is reported.
+    fn variable(&mut self, name: &str, span: Span, place: &Place<'_>) -> Option<Option<Expr>> {
+        if let Some(index) = place.locals.iter().position(|(local, _)| local == name) {
+            return Some(Some(Expr { kind: ExprKind::Local(index), ty: place.locals[index].1, span }));
+        }
+        if let Some((_, value)) = self.constants.iter().find(|(constant, _)| constant == name) {
+            return Some(value.clone().map(|value| Expr { span, ..value }));
+        }
+        if let Some(state) = self.states.iter().find(|state| state.name == name && place.states) {
+            if state.key.is_some() {
+                let error = Diagnostic::error(code::TYPE_MISMATCH, format!("`{name}` is a map"));
+                self.report(error.at(span, "a key is missing").help(format!("write `{name}[key]`")));
+                return Some(None);
+            }
+            return Some(Some(Expr { kind: ExprKind::Cell(state.first_cell), ty: state.ty, span }));
+        }
+        let (fact, ty) = place.fact(name)?;
+        Some(Some(Expr { kind: ExprKind::Fact(fact), ty, span }))
+    }
+
+    /// Whether a name can only be a variant here, so that its type must come from elsewhere.
+    pub(super) fn is_bare_variant(&self, expr: &ast::Expr, place: &Place<'_>) -> bool {
+        let ast::ExprKind::Name(name) = &expr.kind else { return false };
+        let is_state = place.states && self.states.iter().any(|state| state.name == *name);
+        let is_local = place.locals.iter().any(|(local, _)| local == name);
+        let is_constant = self.constants.iter().any(|(constant, _)| constant == name);
+        let is_variable = is_local || is_constant || is_state || place.fact(name).is_some();
+        !is_variable
+    }
+
+    fn road_field(&mut self, field: &ast::Name, place: &Place<'_>, span: Span) -> Option<Expr> {
+        if !place.road {
+            self.report(road_unknown(span));
+            return None;
+        }
+        match field.text.as_str() {
+            "limit" => Some(Expr {
+                kind: ExprKind::Fact(Fact::RoadLimit),
+                ty: Type::Quantity(Dimension::SPEED),
+                span,
+            }),
+            "lanes" => {
+                let error = Diagnostic::error(code::TYPE_MISMATCH, "`road.lanes` is a set of lanes");
+                self.report(error.at(span, "not a value").help("write `lane in road.lanes`"));
+                None
+            }
+            other => {
+                self.report(unknown("road fact", other, field.span, ["limit", "lanes"]));
+                None
+            }
+        }
+    }
+
+    fn index(&mut self, base: &ast::Expr, index: &ast::Expr, place: &Place<'_>, span: Span) -> Option<Expr> {
+        let state = match &base.kind {
+            ast::ExprKind::Name(name) if place.states => {
+                self.states.iter().find(|state| state.name == *name).cloned()
+            }
+            _ => None,
+        };
+        let Some(state) = state else {
+            let maps =
+                || self.states.iter().filter(|state| state.key.is_some()).map(|state| state.name.as_str());
+            let error = match &base.kind {
+                ast::ExprKind::Name(name) => unknown("map", name, base.span, maps()),
+                _ => Diagnostic::error(code::TYPE_MISMATCH, "only a state can have a key")
+                    .at(base.span, "not a state"),
+            };
+            self.report(error);
+            return None;
+        };
+        let Some(key_of) = state.key else {
+            let error = Diagnostic::error(code::TYPE_MISMATCH, format!("`{}` is not a map", state.name));
+            self.report(error.at(span, "takes no key").beside(state.span, "declared here"));
+            return None;
+        };
+        let key = self.typed(index, place, Type::Enum(key_of))?;
+        let kind = match key.kind {
+            ExprKind::Variant(_, key) => ExprKind::Cell(state.first_cell + key),
+            _ => ExprKind::CellAt(state.first_cell, Box::new(key)),
+        };
+        Some(Expr { kind, ty: state.ty, span })
+    }
+
+    fn call(&mut self, call: &ast::Call, place: &Place<'_>) -> Option<Expr> {
+        let Some(index) = self.function_names.get(&call.name.text) else {
+            if self.functions_to_come.contains(&call.name.text) {
+                let error = Diagnostic::error(code::NOT_HERE, "a constant cannot call functions");
+                self.report(error.at(call.span, "called here").help("make it a `fn` without parameters"));
+                return None;
+            }
+            let error = unknown("function", &call.name.text, call.name.span, self.function_names.all());
+            self.report(error);
+            return None;
+        };
+        // A function whose own header is broken was reported there.
+        let (parameters, result, header) = self.signatures.get(index).cloned().flatten()?;
+        if call.args.len() != parameters.len() {
+            let message = format!(
+                "`{}` takes {} argument{}, not {}",
+                call.name.text,
+                parameters.len(),
+                if parameters.len() == 1 { "" } else { "s" },
+                call.args.len()
+            );
+            self.report(
+                Diagnostic::error(code::ARGUMENTS, message).at(call.span, "").beside(header, "declared here"),
+            );
+            return None;
+        }
+        let mut arguments: Vec<Option<Expr>> = vec![None; parameters.len()];
+        for (position, argument) in call.args.iter().enumerate() {
+            let slot = match &argument.name {
+                None => position,
+                Some(name) => match parameters.iter().position(|(parameter, _)| *parameter == name.text) {
+                    Some(slot) => slot,
+                    None => {
+                        let names = parameters.iter().map(|(parameter, _)| parameter.as_str());
+                        let error = unknown("argument", &name.text, name.span, names);
+                        self.report(error);
+                        return None;
+                    }
+                },
+            };
+            arguments[slot] = self.typed(&argument.value, place, parameters[slot].1);
+        }
+        let arguments: Option<Vec<Expr>> = arguments.into_iter().collect();
+        Some(Expr { kind: ExprKind::Call(index, arguments?), ty: result, span: call.span })
+    }
+
+    fn matching(
+        &mut self,
+        subject: &ast::Expr,
+        arms: &[ast::Arm],
+        place: &Place<'_>,
+        hint: Option<Type>,
+        span: Span,
+    ) -> Option<Expr> {
+        let subject = self.expr(subject, place, None)?;
+        let variants: Vec<String> = match subject.ty {
+            Type::Enum(of) => self.enums[of.0].variants.clone(),
+            Type::Bool => vec!["false".to_owned(), "true".to_owned()],
+            Type::Int | Type::Quantity(_) => {
+                let error = Diagnostic::error(code::TYPE_MISMATCH, "`match` needs an enum or a truth value");
+                self.report(error.at(subject.span, "this is a number"));
+                return None;
+            }
+        };
+        let mut arm_of: Vec<Option<usize>> = vec![None; variants.len()];
+        let mut bodies: Vec<Option<Expr>> = Vec::new();
+        let mut ty = hint;
+        for (index, arm) in arms.iter().enumerate() {
+            self.cover(arm, index, &variants, &mut arm_of);
+            let body = self.expr(&arm.value, place, ty);
+            let body = match (body, ty) {
+                (Some(body), Some(ty)) if index > 0 || hint.is_some() => self.fit(body, ty),
+                (body, _) => body,
+            };
+            ty = ty.or(body.as_ref().map(|body| body.ty));
+            bodies.push(body);
+        }
+        let missing: Vec<&str> = (0..variants.len())
+            .filter(|variant| arm_of[*variant].is_none())
+            .map(|variant| variants[variant].as_str())
+            .collect();
+        if !missing.is_empty() {
+            let error = Diagnostic::error(code::NOT_EXHAUSTIVE, "`match` does not cover every case");
+            let error = error.at(span, format!("missing: {}", listed(&missing)));
+            self.report(error.help("add an arm for each, or `_ => …` for the rest"));
+            return None;
+        }
+        let arms: Option<Vec<Expr>> = bodies.into_iter().collect();
+        let arms = arms?;
+        let ty = arms.first()?.ty;
+        let arm_of = arm_of.into_iter().flatten().collect();
+        Some(Expr { kind: ExprKind::Match { subject: Box::new(subject), arm_of, arms }, ty, span })
+    }
+
+    /// Notes which variants an arm takes, and reports the arm if it takes none.
+    fn cover(&mut self, arm: &ast::Arm, index: usize, variants: &[String], arm_of: &mut [Option<usize>]) {
+        let mut reached = false;
+        let mut sound = true;
+        if arm.patterns.is_empty() {
+            for slot in arm_of.iter_mut().filter(|slot| slot.is_none()) {
+                *slot = Some(index);
+                reached = true;
+            }
+        }
+        for pattern in &arm.patterns {
+            match variants.iter().position(|variant| *variant == pattern.text) {
+                None => {
+                    sound = false;
+                    let candidates = variants.iter().map(String::as_str);
+                    self.report(unknown("variant", &pattern.text, pattern.span, candidates));
+                }
+                Some(variant) if arm_of[variant].is_none() => {
+                    arm_of[variant] = Some(index);
+                    reached = true;
+                }
+                Some(_) => {}
+            }
+        }
+        if !reached && sound {
+            let error = Diagnostic::error(code::NEVER_REACHED, "this arm is never reached");
+            self.report(error.at(arm.span, "earlier arms take everything it names").help("remove it"));
+        }
+    }
+
+    fn numeric(&mut self, expr: &ast::Expr, place: &Place<'_>) -> Option<Expr> {
+        let found = self.expr(expr, place, None)?;
+        if is_number(found.ty) {
+            return Some(found);
+        }
+        let name = self.type_name(found.ty);
+        let error =
+            Diagnostic::error(code::TYPE_MISMATCH, format!("type mismatch: wanted a number, found `{name}`"));
+        self.report(error.at(found.span, format!("this is {}", article(&name))));
+        None
+    }
+
+    fn binary(
+        &mut self,
+        op: BinaryOp,
+        op_span: Span,
+        left: &ast::Expr,
+        right: &ast::Expr,
+        place: &Place<'_>,
+        span: Span,
+    ) -> Option<Expr> {
+        let logic: fn(Box<Expr>, Box<Expr>) -> ExprKind = match op {
+            BinaryOp::Implies => ExprKind::Implies,
+            BinaryOp::Or => ExprKind::Or,
+            BinaryOp::And => ExprKind::And,
+            BinaryOp::Equal => return self.comparison(Comparison::Equal, left, right, place, span),
+            BinaryOp::NotEqual => return self.comparison(Comparison::NotEqual, left, right, place, span),
+            BinaryOp::Less => return self.comparison(Comparison::Less, left, right, place, span),
+            BinaryOp::LessEqual => return self.comparison(Comparison::LessEqual, left, right, place, span),
+            BinaryOp::Greater => return self.comparison(Comparison::Greater, left, right, place, span),
+            BinaryOp::GreaterEqual => {
+                return self.comparison(Comparison::GreaterEqual, left, right, place, span);
+            }
+            BinaryOp::In => return self.membership(left, right, place, span),
+            BinaryOp::Add => return self.arithmetic(Arithmetic::Add, op_span, left, right, place, span),
+            BinaryOp::Subtract => {
+                return self.arithmetic(Arithmetic::Subtract, op_span, left, right, place, span);
+            }
+            BinaryOp::Multiply => {
+                return self.arithmetic(Arithmetic::Multiply, op_span, left, right, place, span);
+            }
+            BinaryOp::Divide => {
+                return self.arithmetic(Arithmetic::Divide, op_span, left, right, place, span);
+            }
+        };
+        // Both sides are looked at, so that mistakes in both are reported.
+        let left = self.typed(left, place, Type::Bool);
+        let right = self.typed(right, place, Type::Bool);
+        Some(Expr { kind: logic(Box::new(left?), Box::new(right?)), ty: Type::Bool, span })
+    }
+
+    fn arithmetic(
+        &mut self,
+        op: Arithmetic,
+        op_span: Span,
+        left: &ast::Expr,
+        right: &ast::Expr,
+        place: &Place<'_>,
+        span: Span,
+    ) -> Option<Expr> {
+        let left = self.numeric(left, place);
+        let right = self.numeric(right, place);
+        let (left, right) = (left?, right?);
+        let (a, b) = (dimension(left.ty), dimension(right.ty));
+        let both_whole = left.ty == Type::Int && right.ty == Type::Int;
+        let result = match op {
+            Arithmetic::Add | Arithmetic::Subtract if a == b => Some(a),
+            Arithmetic::Add | Arithmetic::Subtract => {
+                let verb = if op == Arithmetic::Add { "added" } else { "subtracted" };
+                self.mismatch(&format!("cannot be {verb}"), op_span, &left, &right);
+                return None;
+            }
+            Arithmetic::Multiply => a.times(b),
+            Arithmetic::Divide => a.per(b),
+        };
+        let Some(result) = result else {
+            self.report(Diagnostic::error(code::UNIT_MISMATCH, "the dimension is out of range").at(span, ""));
+            return None;
+        };
+        let ty = if both_whole && op != Arithmetic::Divide { Type::Int } else { Type::Quantity(result) };
+        Some(Expr { kind: ExprKind::Arithmetic(op, Box::new(left), Box::new(right)), ty, span })
+    }
+
+    /// Two sides of different dimension or type.
+    fn mismatch(&mut self, what: &str, at: Span, left: &Expr, right: &Expr) {
+        let (a, b) = (self.type_name(left.ty), self.type_name(right.ty));
+        let code =
+            if is_number(left.ty) && is_number(right.ty) { code::UNIT_MISMATCH } else { code::TYPE_MISMATCH };
+        let error = Diagnostic::error(code, format!("`{a}` and `{b}` {what}")).at(at, "");
+        self.report(error.beside(left.span, article(&a)).beside(right.span, article(&b)));
+    }
+
+    fn comparison(
+        &mut self,
+        op: Comparison,
+        left: &ast::Expr,
+        right: &ast::Expr,
+        place: &Place<'_>,
+        span: Span,
+    ) -> Option<Expr> {
+        let road = match (self.names_road(left, place), self.names_road(right, place)) {
+            (true, _) => Some(right),
+            (_, true) => Some(left),
+            _ => None,
+        };
+        if let Some(road) = road {
+            if !matches!(op, Comparison::Equal | Comparison::NotEqual) {
+                let error = Diagnostic::error(code::UNORDERED, "roads have no order");
+                let error = error.at(span, format!("`{}` needs one", op.symbol()));
+                self.report(error.help("write `road == corner`, or `road in [corner, boulevard]`"));
+                return None;
+            }
+            let is_there = self.on_road(core::slice::from_ref(road), place, span)?;
+            let kind = match op {
+                Comparison::NotEqual => ExprKind::Not(Box::new(is_there)),
+                _ => is_there.kind,
+            };
+            return Some(Expr { kind, ty: Type::Bool, span });
+        }
+        let (left, right) = self.both_sides(left, right, place)?;
+        if !fits(left.ty, right.ty) && !fits(right.ty, left.ty) {
+            self.mismatch("cannot be compared", span, &left, &right);
+            return None;
+        }
+        let orders = !matches!(op, Comparison::Equal | Comparison::NotEqual);
+        match left.ty {
+            Type::Bool if orders => {
+                let error = Diagnostic::error(code::UNORDERED, "truth values have no order");
+                self.report(
+                    error
+                        .at(span, format!("`{}` needs one", op.symbol()))
+                        .help("compare them with `==` or `!=`, or join them with `and`, `or`, `implies`"),
+                );
+                return None;
+            }
+            Type::Enum(of) if orders && !self.enums[of.0].ordered => {
+                let of = &self.enums[of.0];
+                let error = Diagnostic::error(code::UNORDERED, format!("`{}` has no order", of.name))
+                    .at(span, format!("`{}` needs one", op.symbol()))
+                    .beside(of.span, "declared with `|`")
+                    .help("declare its variants with `<` between them, or compare with `==` or `in [..]`");
+                self.report(error);
+                return None;
+            }
+            Type::Bool | Type::Enum(_) | Type::Int | Type::Quantity(_) => {}
+        }
+        Some(Expr { kind: ExprKind::Compare(op, Box::new(left), Box::new(right)), ty: Type::Bool, span })
+    }
+
+    /// Checks first the side that tells the type of the other.
+    fn both_sides(&mut self, left: &ast::Expr, right: &ast::Expr, place: &Place<'_>) -> Option<(Expr, Expr)> {
+        if self.is_bare_variant(left, place) {
+            let right = self.expr(right, place, None)?;
+            let left = self.expr(left, place, Some(right.ty))?;
+            return Some((left, right));
+        }
+        let left = self.expr(left, place, None);
+        let right = self.expr(right, place, left.as_ref().map(|left| left.ty));
+        Some((left?, right?))
+    }
+
+    fn membership(
+        &mut self,
+        left: &ast::Expr,
+        right: &ast::Expr,
+        place: &Place<'_>,
+        span: Span,
+    ) -> Option<Expr> {
+        if let (true, ast::ExprKind::List(roads)) = (self.names_road(left, place), &right.kind) {
+            return self.on_road(roads, place, span);
+        }
+        let value = self.expr(left, place, None)?;
+        let ty = value.ty;
+        let value = Box::new(value);
+        let kind = match &right.kind {
+            ast::ExprKind::Range { low, high } => {
+                let low = self.typed(low, place, ty);
+                let high = self.typed(high, place, ty);
+                if !is_number(ty) {
+                    self.report(
+                        Diagnostic::error(code::TYPE_MISMATCH, "a range holds numbers")
+                            .at(value.span, "not a number"),
+                    );
+                    return None;
+                }
+                ExprKind::InRange(value, Box::new(low?), Box::new(high?))
+            }
+            ast::ExprKind::List(items) => {
+                let items: Vec<Option<Expr>> = items.iter().map(|item| self.typed(item, place, ty)).collect();
+                let items: Option<Vec<Expr>> = items.into_iter().collect();
+                ExprKind::InList(value, items?)
+            }
+            ast::ExprKind::Field { base, field }
+                if field.text == "lanes"
+                    && matches!(&base.kind, ast::ExprKind::Name(name) if name == "road") =>
+            {
+                if !place.road {
+                    return self.road_field(field, place, right.span);
+                }
+                let lanes = self.words::<LaneChoice>("lane", ty, value.span)?;
+                ExprKind::InLanes(value, lanes)
+            }
+            _ => {
+                let error =
+                    Diagnostic::error(code::TYPE_MISMATCH, "`in` needs a list, a range or `road.lanes`");
+                self.report(error.at(right.span, "none of them"));
+                return None;
+            }
+        };
+        Some(Expr { kind, ty: Type::Bool, span })
+    }
+
+    /// `road == corner`: whether the road is one of these.
+    fn on_road(&mut self, names: &[ast::Expr], place: &Place<'_>, span: Span) -> Option<Expr> {
+        if !place.road {
+            self.report(road_unknown(span));
+            return None;
+        }
+        let mut roads = Some(Vec::new());
+        for name in names {
+            let found = match &name.kind {
+                ast::ExprKind::Name(text) if self.road_names.contains(text) => Some(text.clone()),
+                ast::ExprKind::Name(text) => {
+                    let known = self.road_names.iter().map(String::as_str);
+                    let error = unknown("road", text, name.span, known);
+                    self.report(error);
+                    None
+                }
+                _ => {
+                    let error = Diagnostic::error(code::TYPE_MISMATCH, "wanted the name of a road");
+                    self.report(error.at(name.span, "not a name").help("write `road == corner`"));
+                    None
+                }
+            };
+            roads = roads.zip(found).map(|(mut roads, found)| {
+                roads.push(found);
+                roads
+            });
+        }
+        Some(Expr { kind: ExprKind::OnRoad(roads?), ty: Type::Bool, span })
+    }
+
+    /// Whether the expression is the word `road`, and no parameter, constant or state of that name hides it.
+    fn names_road(&self, expr: &ast::Expr, place: &Place<'_>) -> bool {
+        matches!(&expr.kind, ast::ExprKind::Name(name) if name == "road")
+            && !place.locals.iter().any(|(local, _)| local == "road")
+            && !self.constants.iter().any(|(constant, _)| constant == "road")
+            && !self.states.iter().any(|state| state.name == "road")
+    }
+
+    pub(super) fn type_name(&self, ty: Type) -> String {
+        match ty {
+            Type::Bool => "Bool".to_owned(),
+            Type::Int => "Int".to_owned(),
+            Type::Quantity(dimension) => dimension.to_string(),
+            Type::Enum(of) => self.enums[of.0].name.clone(),
+        }
+    }
+}
+
+fn road_unknown(span: Span) -> Diagnostic {
+    Diagnostic::error(code::NOT_HERE, "`road` is not known here")
+        .at(span, "only rules see the road")
+        .help("write a rule, or pass a function what it needs: `f(road.limit)`")
+}
+
+/// A word that is no unit.
+pub(crate) fn unknown_unit(word: &ast::Name) -> Diagnostic {
+    let words = || units::UNITS.iter().map(|unit| unit.word);
+    let letters = |word: &str| word.chars().filter(|c| c.is_alphanumeric()).collect::<String>();
+    // `kmh` means `km/h` rather than `km`.
+    let meant = words().find(|unit| letters(unit) == letters(&word.text) && !letters(unit).is_empty());
+    let error = Diagnostic::error(code::UNKNOWN_UNIT, format!("unknown unit `{}`", word.text))
+        .at(word.span, "not a unit");
+    match meant.or(nearest(&word.text, words())) {
+        Some(near) => error.meant(word.span, near),
+        None => error.help(format!("the units are {}", words().collect::<Vec<_>>().join(", "))),
+    }
+}
+
+/// Reads `12`, `0.50` and `1e-9` exactly, if they fit.
+pub(crate) fn exact_digits(digits: &str) -> Option<Rational> {
+    let (mantissa, exponent) = digits.split_once(['e', 'E']).unwrap_or((digits, "0"));
+    let exponent: i32 = exponent.parse().ok()?;
+    let power = 10_i128.checked_pow(exponent.unsigned_abs())?;
+    let mantissa = Rational::from_decimal(mantissa)?;
+    if exponent >= 0 {
+        mantissa.checked_mul(Rational::new(power, 1)?)
+    } else {
+        mantissa.checked_mul(Rational::new(1, power)?)
+    }
+}
+
+pub(super) fn is_number(ty: Type) -> bool {
+    matches!(ty, Type::Int | Type::Quantity(_))
+}
+
+pub(super) fn dimension(ty: Type) -> Dimension {
+    match ty {
+        Type::Quantity(dimension) => dimension,
+        Type::Int | Type::Bool | Type::Enum(_) => Dimension::RATIO,
+    }
+}
+
+/// A whole number may stand for a ratio; otherwise types must be equal.
+pub(super) fn fits(found: Type, wanted: Type) -> bool {
+    found == wanted || found == Type::Int && wanted == Type::Quantity(Dimension::RATIO)
+}
+
+/// `a`, `b` or `c`.
+fn one_of(words: &[&str]) -> String {
+    let quoted: Vec<String> = words.iter().map(|word| format!("`{word}`")).collect();
+    match quoted.split_last() {
+        Some((last, rest)) if !rest.is_empty() => format!("{} or {last}", rest.join(", ")),
+        _ => quoted.concat(),
+    }
+}
+
+fn article(name: &str) -> String {
+    let vowel = name.starts_with(['A', 'E', 'I', 'O', 'U']);
+    format!("{} `{name}`", if vowel { "an" } else { "a" })
+}

@@ -1,0 +1,353 @@
+//! From a root file to everything it says: imports, digests, maps, and the checks.
+//!
+//! Files are read through a function that `cli` hands in; nothing here touches a disk.
+
+use std::borrow::Cow;
+use std::collections::BTreeMap;
+use std::path::{Component, Path, PathBuf};
+use std::sync::Arc;
+
+use crate::check::checker::Root;
+use crate::check::road::Maps;
+use crate::check::{checker, overriding, policy, scenario};
+use crate::model::policy::Policy;
+use crate::model::scenario::Scenario;
+use crate::model::{Space, code, digest};
+use crate::road::RoadMap;
+use crate::syntax::ast::{FileId, ItemKind};
+use crate::syntax::{Diagnostic, Severity, Sources, ast, parse};
+
+/// Why a file cannot be read, in a few words: `no such file`, `a directory`, `not text`.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{0}")]
+pub struct ReadError(pub String);
+
+/// Gives the text of a file.
+pub type ReadFile<'a> = dyn Fn(&Path) -> Result<String, ReadError> + 'a;
+
+/// One file that was read.
+#[derive(Debug, Clone)]
+pub struct LoadedFile {
+    pub path: PathBuf,
+    /// `sha256:` and the hexadecimal digest of its bytes.
+    pub digest: String,
+    pub tree: ast::File,
+}
+
+/// A root file with all it uses, checked.
+#[derive(Debug, Clone)]
+pub struct Loaded {
+    /// The texts that the diagnostics point into.
+    pub sources: Sources,
+    pub diagnostics: Vec<Diagnostic>,
+    /// What is worth knowing of a sound space and asks for no change: `check` prints it.
+    pub remarks: Vec<Diagnostic>,
+    /// In order of reading, the root first, so never empty; a file's [`FileId`] is its position.
+    pub files: Vec<LoadedFile>,
+    /// The space that the root is or uses, if it is sound.
+    pub space: Option<Arc<Space>>,
+    /// The scenario of the root, if it has one and it is sound.
+    pub scenario: Option<Scenario>,
+    /// The policy of the root, if it has one and it is sound.
+    pub policy: Option<Policy>,
+    /// Files by index, imports before those that use them.
+    order: Vec<usize>,
+}
+
+/// The declarations that hold, overridden ones replaced, in the order of the files' reading.
+pub(super) fn standing_items(loaded: &Loaded) -> Vec<Cow<'_, ast::Item>> {
+    overriding::resolve(&loaded.files, &loaded.order).0
+}
+
+/// Maps that were understood before, by name and content: who loads again and again, as an editor's
+/// server does, reads each but once.
+#[derive(Debug, Clone, Default)]
+pub struct MapCache {
+    known: BTreeMap<(String, String), Result<Arc<RoadMap>, String>>,
+}
+
+/// Reads a root file, all it uses, and checks the whole.
+///
+/// # Errors
+/// If the root itself cannot be read. Whatever else is wrong is among the diagnostics.
+pub fn load(root: &Path, read: &ReadFile<'_>) -> Result<Loaded, ReadError> {
+    load_with(root, read, &mut MapCache::default())
+}
+
+/// The same, with the maps of earlier loads.
+///
+/// # Errors
+/// As [`load`].
+pub fn load_with(root: &Path, read: &ReadFile<'_>, cache: &mut MapCache) -> Result<Loaded, ReadError> {
+    let mut loader = Loader {
+        read,
+        sources: Sources::new(),
+        files: Vec::new(),
+        order: Vec::new(),
+        diagnostics: Vec::new(),
+    };
+    loader.read_file(&normal(root), &mut Vec::new())?;
+    let Loader { sources, files, order, mut diagnostics, .. } = loader;
+    // A file that does not parse lacks declarations, and everything else would look unknown.
+    if diagnostics.iter().any(Diagnostic::is_error) {
+        return Ok(Loaded {
+            sources,
+            diagnostics,
+            remarks: Vec::new(),
+            files,
+            space: None,
+            scenario: None,
+            policy: None,
+            order,
+        });
+    }
+    let folders = files.iter().map(|file| folder(&file.path)).collect();
+    let mut maps = MapReader { read, folders, texts: BTreeMap::new(), known: BTreeMap::new(), cache };
+    diagnostics.extend(check_digests(&files, &mut maps));
+    let (space, found) = check_space(&files, &order, &mut maps);
+    let (mut remarks, found): (Vec<_>, Vec<_>) =
+        found.into_iter().partition(|found| found.severity == Severity::Note);
+    diagnostics.extend(found);
+    let space = space.filter(|_| !diagnostics.iter().any(Diagnostic::is_error));
+    let mut scenario = None;
+    let has_scenario = files[0].tree.items.iter().any(|item| matches!(item.kind, ItemKind::Scenario(_)));
+    if let (Some(space), true) = (&space, has_scenario) {
+        match scenario::scenario(&files[0].tree, space) {
+            Ok(found) => scenario = Some(found),
+            Err(found) => diagnostics.extend(found),
+        }
+    }
+    let mut policy = None;
+    let has_policy = files[0].tree.items.iter().any(|item| matches!(item.kind, ItemKind::Policy(_)));
+    if let (Some(space), true) = (&space, has_policy) {
+        match policy::policy(sources.text(FileId(0)), &files[0].tree, space) {
+            Ok(found) => policy = Some(found),
+            Err(found) => diagnostics.extend(found),
+        }
+    }
+    // Remarks are about spaces; who reads a scenario or a policy knows its space.
+    if has_scenario || has_policy || diagnostics.iter().any(Diagnostic::is_error) {
+        remarks.clear();
+    }
+    Ok(Loaded { sources, diagnostics, remarks, files, space: space.map(Arc::new), scenario, policy, order })
+}
+
+fn check_space(
+    files: &[LoadedFile],
+    order: &[usize],
+    maps: &mut MapReader<'_>,
+) -> (Option<Space>, Vec<Diagnostic>) {
+    let declares = |file: &LoadedFile| {
+        file.tree.items.iter().any(|item| {
+            match &item.kind {
+                ItemKind::Language(_) | ItemKind::Scenario(_) | ItemKind::Policy(_) => false,
+                // What leaves something out makes another space.
+                ItemKind::Use(used) => !used.without.is_empty(),
+                _ => true,
+            }
+        })
+    };
+    // A scenario is no space itself: its space is what it uses first.
+    let index = files.iter().position(declares).unwrap_or(0);
+    let root = &files[index];
+    let root = Root {
+        file: FileId(u32::try_from(index).expect("a file's id is its position")),
+        path: root.path.clone(),
+        // Where a map cannot be read there is no space either.
+        digest: whole_digest(files, &root.path, maps).unwrap_or_default(),
+        docs: root.tree.docs.iter().map(|doc| doc.text.clone()).collect(),
+    };
+    let (items, mut diagnostics) = overriding::resolve(files, order);
+    let items: Vec<&ast::Item> = items.iter().map(core::convert::AsRef::as_ref).collect();
+    let (space, found) = checker::space(root, &items, maps);
+    diagnostics.extend(found);
+    (space, diagnostics)
+}
+
+/// Compares every `use … digest` with what was read.
+fn check_digests(files: &[LoadedFile], maps: &mut MapReader<'_>) -> Vec<Diagnostic> {
+    let mut diagnostics = Vec::new();
+    for file in files {
+        for used in uses(file) {
+            let Some(wanted) = &used.digest else { continue };
+            let target = normal(&folder(&file.path).join(&used.path.value));
+            // A map that cannot be read is reported where it is named.
+            let Some(found) = whole_digest(files, &target, maps) else { continue };
+            if wanted.value != found {
+                let message = "the imported file, or what it uses, is not what was meant";
+                let error = Diagnostic::error(code::DIGEST, message).at(wanted.span, "its digest differs");
+                let error = error.note(format!("the file with all it uses has {found}"));
+                diagnostics.push(error.help(
+                    "get back the files as they were, or accept the change by writing its digest here",
+                ));
+            }
+        }
+    }
+    diagnostics
+}
+
+/// Digest of a file with everything it uses and every map named there, as [`ast::Use`] defines it;
+/// `None` if one of them cannot be read.
+fn whole_digest(files: &[LoadedFile], root: &Path, maps: &mut MapReader<'_>) -> Option<String> {
+    let name = root.file_name().map(PathBuf::from).unwrap_or_default();
+    let mut found: BTreeMap<String, String> = BTreeMap::new();
+    let mut open = vec![(name, root.to_owned())];
+    while let Some((name, path)) = open.pop() {
+        let file = files.iter().find(|file| file.path == path)?;
+        if found.insert(spelt(&name), file.digest.clone()).is_some() {
+            continue;
+        }
+        let beside = |other: &str| (normal(&folder(&name).join(other)), normal(&folder(&path).join(other)));
+        open.extend(uses(file).map(|used| beside(&used.path.value)));
+        for map in maps_named(file) {
+            let (name, path) = beside(map);
+            let text = maps.text(&path).as_ref().ok()?;
+            found.insert(spelt(&name), digest(text.as_bytes()));
+        }
+    }
+    let lines: String = found.iter().map(|(name, digest)| format!("{digest} {name}\n")).collect();
+    Some(digest(lines.as_bytes()))
+}
+
+pub(super) fn uses(file: &LoadedFile) -> impl Iterator<Item = &ast::Use> {
+    file.tree.items.iter().filter_map(|item| match &item.kind {
+        ItemKind::Use(used) => Some(used),
+        _ => None,
+    })
+}
+
+/// The files that a file uses.
+pub(super) fn used_paths(file: &LoadedFile) -> impl Iterator<Item = PathBuf> {
+    uses(file).map(|used| used_path(file, used))
+}
+
+/// The file that a `use` means.
+pub(super) fn used_path(file: &LoadedFile, used: &ast::Use) -> PathBuf {
+    normal(&folder(&file.path).join(&used.path.value))
+}
+
+/// The maps that a file's roads name, as written.
+fn maps_named(file: &LoadedFile) -> impl Iterator<Item = &str> {
+    let roads = file.tree.items.iter().filter_map(|item| match item.kind.plain() {
+        ItemKind::Road(block) => Some(block),
+        _ => None,
+    });
+    let fields = roads.flat_map(|block| block.fields.iter().filter(|field| field.name.text == "map"));
+    fields.filter_map(|field| match &field.value.kind {
+        ast::ExprKind::Text(path) => Some(path.as_str()),
+        _ => None,
+    })
+}
+
+/// A path with `/` between its parts, whatever the system.
+fn spelt(path: &Path) -> String {
+    let parts: Vec<_> = path.components().map(|part| part.as_os_str().to_string_lossy()).collect();
+    parts.join("/")
+}
+
+struct Loader<'a> {
+    read: &'a ReadFile<'a>,
+    sources: Sources,
+    files: Vec<LoadedFile>,
+    /// Files by index, imports before those that use them.
+    order: Vec<usize>,
+    diagnostics: Vec<Diagnostic>,
+}
+
+impl Loader<'_> {
+    /// Reads a file and what it uses. `path` is the way from the root to here.
+    fn read_file(&mut self, path: &Path, way: &mut Vec<PathBuf>) -> Result<(), ReadError> {
+        if self.files.iter().any(|file| file.path == path) {
+            return Ok(());
+        }
+        let text = (self.read)(path)?;
+        let digest = digest(text.as_bytes());
+        let file = self.sources.add(path.display().to_string(), text);
+        let (tree, found) = parse(file, self.sources.text(file));
+        self.diagnostics.extend(found);
+        let index = self.files.len();
+        self.files.push(LoadedFile { path: path.to_owned(), digest, tree });
+        let uses: Vec<ast::Use> = uses(&self.files[index]).cloned().collect();
+        way.push(path.to_owned());
+        for used in uses {
+            let target = normal(&folder(path).join(&used.path.value));
+            if let Some(begin) = way.iter().position(|step| *step == target) {
+                let circle: Vec<String> =
+                    way[begin..].iter().map(|step| step.display().to_string()).collect();
+                let error = Diagnostic::error(code::IMPORT_CYCLE, "files use each other in a circle");
+                let error = error.at(used.path.span, "this closes the circle");
+                let error = error.note(format!("{} → {}", circle.join(" → "), target.display()));
+                self.diagnostics.push(error.help("move what both need into a file that uses neither"));
+                continue;
+            }
+            if let Err(error) = self.read_file(&target, way) {
+                let message = format!("cannot read `{}`", target.display());
+                self.diagnostics
+                    .push(Diagnostic::error(code::UNREADABLE, message).at(used.path.span, error.to_string()));
+            }
+        }
+        way.pop();
+        self.order.push(index);
+        Ok(())
+    }
+}
+
+struct MapReader<'a> {
+    read: &'a ReadFile<'a>,
+    /// Folder of each file, by [`FileId`].
+    folders: Vec<PathBuf>,
+    texts: BTreeMap<PathBuf, Result<String, ReadError>>,
+    known: BTreeMap<PathBuf, Result<Arc<RoadMap>, String>>,
+    cache: &'a mut MapCache,
+}
+
+impl MapReader<'_> {
+    /// The text of a map, read once.
+    fn text(&mut self, path: &Path) -> &Result<String, ReadError> {
+        let read = self.read;
+        self.texts.entry(path.to_owned()).or_insert_with(|| read(path))
+    }
+}
+
+impl Maps for MapReader<'_> {
+    fn map(&mut self, name: &ast::Text) -> Result<(PathBuf, Arc<RoadMap>), String> {
+        let FileId(file) = name.span.file;
+        let folder = self.folders.get(file as usize).cloned().unwrap_or_default();
+        let path = normal(&folder.join(&name.value));
+        if !self.known.contains_key(&path) {
+            let stem = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
+            let map = match self.text(&path).clone() {
+                Err(error) => Err(error.to_string()),
+                Ok(text) => {
+                    let read = |stem: &str| RoadMap::from_opendrive(stem, &text).map(Arc::new);
+                    let key = (stem, digest(text.as_bytes()));
+                    let found = self.cache.known.get(&key).cloned();
+                    let map = found.unwrap_or_else(|| read(&key.0).map_err(|error| error.to_string()));
+                    self.cache.known.entry(key).or_insert(map).clone()
+                }
+            };
+            self.known.insert(path.clone(), map);
+        }
+        let map = &self.known[&path];
+        map.clone().map(|map| (path, map))
+    }
+}
+
+fn folder(path: &Path) -> PathBuf {
+    path.parent().map(Path::to_owned).unwrap_or_default()
+}
+
+/// The path without `.` and, where it can be seen, without `..`: two spellings of a file are one.
+fn normal(path: &Path) -> PathBuf {
+    let mut parts: Vec<Component<'_>> = Vec::new();
+    for part in path.components() {
+        match (part, parts.last()) {
+            (Component::CurDir, _) => {}
+            (Component::ParentDir, Some(Component::Normal(_))) => {
+                parts.pop();
+            }
+            _ => parts.push(part),
+        }
+    }
+    parts.iter().collect()
+}

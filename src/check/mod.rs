@@ -1,0 +1,36 @@
+//! From text to meaning: reads a file with all that it uses and gives a sound [`Space`](crate::model::Space),
+//! [`Scenario`](crate::model::Scenario) or [`Policy`](crate::model::Policy), or diagnostics.
+//!
+//! [`load`] is the entry. It reads and parses the files, decides which declarations stand (`overriding`), and
+//! hands them to the checker. The checker (`checker`, with a file for each kind of declaration) goes on after a
+//! mistake, so that one run shows every mistake. A sound space then goes through `prove`.
+//! `explain` has a page for each diagnostic code.
+
+mod action;
+mod checker;
+mod declaration;
+mod difference;
+mod expect;
+pub mod explain;
+mod expression;
+mod load;
+mod names;
+mod overriding;
+pub mod policy;
+mod road;
+mod rule;
+mod scenario;
+mod scenario_rules;
+mod scenario_value;
+mod settings;
+mod style;
+mod suggest;
+mod unused;
+
+pub use difference::{Change, Difference, differences};
+pub use load::{Loaded, LoadedFile, MapCache, ReadError, ReadFile, load, load_with};
+pub use scenario::scenario;
+pub use suggest::suggest_uses;
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,64 @@
+//! Names: where each is declared, and what an author may have meant by one that is not.
+
+use std::collections::BTreeMap;
+
+use crate::model::code;
+use crate::syntax::ast::{Name, Span};
+use crate::syntax::{Diagnostic, listed, nearest};
+
+/// The declarations of one kind, by name.
+#[derive(Debug, Default)]
+pub(super) struct Names {
+    /// Index among the declarations of the kind, and where it was declared.
+    found: BTreeMap<String, (usize, Span)>,
+}
+
+impl Names {
+    /// Notes a declaration.
+    ///
+    /// # Errors
+    /// If the name is taken.
+    pub fn declare(&mut self, kind: &str, name: &Name, index: usize) -> Result<(), Diagnostic> {
+        if let Some((_, first)) = self.found.get(&name.text) {
+            let help = match first.file == name.span.file {
+                true => "rename or remove one of them",
+                false => "rename one of them, or write `override` before the later one to replace the other",
+            };
+            return Err(Diagnostic::error(
+                code::DUPLICATE,
+                format!("the {kind} `{}` is declared twice", name.text),
+            )
+            .at(name.span, "again here")
+            .beside(*first, "first here")
+            .help(help));
+        }
+        self.found.insert(name.text.clone(), (index, name.span));
+        Ok(())
+    }
+
+    pub fn get(&self, name: &str) -> Option<usize> {
+        self.found.get(name).map(|(index, _)| *index)
+    }
+
+    pub fn all(&self) -> impl Iterator<Item = &str> {
+        self.found.keys().map(String::as_str)
+    }
+}
+
+/// A name that is declared nowhere.
+pub(crate) fn unknown<'a>(
+    kind: &str,
+    name: &str,
+    span: Span,
+    candidates: impl IntoIterator<Item = &'a str>,
+) -> Diagnostic {
+    let candidates: Vec<&str> = candidates.into_iter().collect();
+    let error = Diagnostic::error(code::UNKNOWN, format!("unknown {kind} `{name}`")).at(span, "not declared");
+    match nearest(name, candidates.iter().copied()) {
+        Some(near) => error.meant(span, near),
+        None if !candidates.is_empty() && candidates.len() <= 12 => {
+            error.help(format!("there is {}", listed(&candidates)))
+        }
+        None => error,
+    }
+}

@@ -1,0 +1,264 @@
+//! What of the used files holds: `override` puts a declaration in place of the one of that kind and
+//! name, `use … without` leaves actions, groups and rules out.
+//!
+//! The new declaration stands where the old one stood, so that the rows of a table keep their
+//! numbers. What used the old one uses the new one, in the used file too: it is checked anew.
+
+use std::borrow::Cow;
+use std::collections::BTreeSet;
+use std::path::PathBuf;
+
+use crate::check::load::{LoadedFile, used_path, used_paths, uses as uses_of};
+use crate::check::names::unknown;
+use crate::check::unused::names_of_expr;
+use crate::model::code;
+use crate::syntax::ast::{EffectKind, Item, ItemKind, Name, RuleBody, Use};
+use crate::syntax::{Diagnostic, nearest};
+
+/// What a rule may ask about a spawn.
+const GAPS: [&str; 2] = ["spawn_gap", "safety_gap"];
+
+/// A declaration that holds, and the file that it is from.
+struct Standing<'a> {
+    file: usize,
+    item: Cow<'a, Item>,
+}
+
+/// Every declaration of the files in that order (imports first), overridden ones replaced.
+pub(super) fn resolve<'a>(files: &'a [LoadedFile], order: &[usize]) -> (Vec<Cow<'a, Item>>, Vec<Diagnostic>) {
+    let mut standing: Vec<Standing<'a>> = Vec::new();
+    let mut diagnostics = Vec::new();
+    for &file in order {
+        for used in uses_of(&files[file]).filter(|used| !used.without.is_empty()) {
+            leave_out(files, &mut standing, file, used, &mut diagnostics);
+        }
+        for item in &files[file].tree.items {
+            match &item.kind {
+                ItemKind::Override(kind) => match find(files, &standing, file, item, kind) {
+                    Ok(place) => {
+                        let item = Item { docs: item.docs.clone(), kind: (**kind).clone(), span: item.span };
+                        standing[place] = Standing { file, item: Cow::Owned(item) };
+                    }
+                    Err(error) => diagnostics.push(*error),
+                },
+                _ => standing.push(Standing { file, item: Cow::Borrowed(item) }),
+            }
+        }
+    }
+    (standing.into_iter().map(|standing| standing.item).collect(), diagnostics)
+}
+
+/// Takes away what a `use` is without, and what means nothing any more: names in groups and after `on`,
+/// groups and rules without a name left, rules on a state or a gap that no action touches any more.
+fn leave_out(
+    files: &[LoadedFile],
+    standing: &mut Vec<Standing<'_>>,
+    file: usize,
+    used: &Use,
+    diagnostics: &mut Vec<Diagnostic>,
+) {
+    let path = used_path(&files[file], used);
+    // A file that cannot be read was reported.
+    let Some(target) = files.iter().position(|other| other.path == path) else { return };
+    let offered: Vec<bool> = (0..files.len()).map(|other| uses(files, target, other)).collect();
+    let mut left = left_names(standing, &offered, used, diagnostics);
+    // What other files declare can give a rule something to bind again.
+    let others = files.iter().zip(&offered).filter(|(_, is_offered)| !**is_offered);
+    let others = touched(others.flat_map(|(file, _)| &file.tree.items));
+    let touched_now = |standing: &[Standing<'_>]| {
+        let mut touched = touched(standing.iter().map(|standing| standing.item.as_ref()));
+        touched.extend(others.iter().cloned());
+        touched
+    };
+    let touched_before = touched_now(standing);
+    standing.retain(|standing| {
+        let name = standing.item.kind.name();
+        !(is_offered(standing, &offered) && name.is_some_and(|name| left.contains(&name.text)))
+    });
+    let touched_after = touched_now(standing);
+    let has_lost = |named: &BTreeSet<&str>| {
+        let among = |touched: &BTreeSet<String>| named.iter().any(|name| touched.contains(*name));
+        among(&touched_before) && !among(&touched_after)
+    };
+    loop {
+        let before = left.len();
+        standing.retain_mut(|standing| {
+            !is_offered(standing, &offered) || keeps_something(&mut standing.item, &mut left, &has_lost)
+        });
+        if left.len() == before {
+            return;
+        }
+    }
+}
+
+/// Whether a `use` can leave it out.
+fn is_offered(standing: &Standing<'_>, offered: &[bool]) -> bool {
+    offered[standing.file]
+        && matches!(standing.item.kind, ItemKind::Action(_) | ItemKind::Group(_) | ItemKind::Rule(_))
+}
+
+/// The names that a `use` is without, a group's members with it.
+fn left_names(
+    standing: &[Standing<'_>],
+    offered: &[bool],
+    used: &Use,
+    diagnostics: &mut Vec<Diagnostic>,
+) -> BTreeSet<String> {
+    let members = || standing.iter().filter(|standing| is_offered(standing, offered));
+    let mut left = BTreeSet::new();
+    for name in &used.without {
+        let mut open = vec![name.text.clone()];
+        while let Some(next) = open.pop() {
+            // A broken text may put a group into itself.
+            if left.contains(&next) {
+                continue;
+            }
+            let is_next =
+                |standing: &&Standing<'_>| standing.item.kind.name().is_some_and(|known| known.text == next);
+            let mut known = false;
+            for member in members().filter(is_next) {
+                known = true;
+                if let ItemKind::Group(group) = &member.item.kind {
+                    open.extend(group.members.iter().map(|member| member.text.clone()));
+                }
+            }
+            if known {
+                left.insert(next);
+            } else if next == name.text {
+                let candidates = members().filter_map(|standing| standing.item.kind.name());
+                let candidates: Vec<&str> = candidates.map(|name| name.text.as_str()).collect();
+                diagnostics.push(unknown("action, group or rule", &name.text, name.span, candidates));
+            }
+        }
+    }
+    left
+}
+
+/// Takes names that are gone out of a group or a rule; whether anything is left of it. A group of which
+/// nothing is left is gone, too.
+fn keeps_something(
+    item: &mut Cow<'_, Item>,
+    left: &mut BTreeSet<String>,
+    has_lost: &dyn Fn(&BTreeSet<&str>) -> bool,
+) -> bool {
+    let gone = |name: &Name| left.contains(&name.text);
+    match &item.kind {
+        ItemKind::Group(group) if group.members.iter().any(gone) => {
+            let mut kept = group.clone();
+            kept.members.retain(|member| !gone(member));
+            let is_kept = !kept.members.is_empty();
+            if !is_kept {
+                left.insert(kept.name.text.clone());
+            }
+            item.to_mut().kind = ItemKind::Group(kept);
+            is_kept
+        }
+        ItemKind::Rule(rule) => match &rule.body {
+            RuleBody::Holds { on, condition } if on.is_empty() => {
+                let mut named = BTreeSet::new();
+                names_of_expr(condition, &mut named);
+                !has_lost(&named)
+            }
+            RuleBody::Holds { on, .. } if on.iter().any(gone) => {
+                let mut kept = rule.clone();
+                let RuleBody::Holds { on, .. } = &mut kept.body else { return true };
+                on.retain(|target| !gone(target));
+                let is_kept = !on.is_empty();
+                item.to_mut().kind = ItemKind::Rule(kept);
+                is_kept
+            }
+            RuleBody::Holds { .. } => true,
+            RuleBody::Moves { state, .. } => !has_lost(&BTreeSet::from([state.text.as_str()])),
+        },
+        _ => true,
+    }
+}
+
+/// What rules without an action's name bind by: the states that some action sets, and the gaps if some
+/// action spawns.
+fn touched<'a>(items: impl Iterator<Item = &'a Item>) -> BTreeSet<String> {
+    let actions = items.filter_map(|item| match item.kind.plain() {
+        ItemKind::Action(action) => Some(action),
+        _ => None,
+    });
+    let effects = actions.flat_map(|action| &action.effects);
+    effects
+        .flat_map(|effect| match &effect.kind {
+            EffectKind::Set { state, .. } => vec![state.text.clone()],
+            EffectKind::Spawn { .. } => GAPS.map(str::to_owned).to_vec(),
+        })
+        .collect()
+}
+
+/// Where the declaration stands that is to be replaced.
+fn find(
+    files: &[LoadedFile],
+    standing: &[Standing<'_>],
+    file: usize,
+    item: &Item,
+    kind: &ItemKind,
+) -> Result<usize, Box<Diagnostic>> {
+    let name = |kind: &ItemKind| kind.name().map(|name| name.text.clone());
+    let same_kind = |other: &ItemKind| core::mem::discriminant(other) == core::mem::discriminant(kind);
+    let wanted = name(kind);
+    let what = match &wanted {
+        Some(name) => format!("{} `{name}`", kind.keyword()),
+        None => format!("`{}`", kind.keyword()),
+    };
+    let span = kind.name().map_or(item.span, |name| name.span);
+    let error = |message: String| Diagnostic::error(code::OVERRIDE, message);
+    let place = standing
+        .iter()
+        .rposition(|standing| same_kind(&standing.item.kind) && name(&standing.item.kind) == wanted);
+    let Some(place) = place else {
+        let error = error(format!("there is no {what} to override")).at(span, "no used file declares it");
+        let other = standing.iter().find(|standing| wanted.is_some() && name(&standing.item.kind) == wanted);
+        if let Some(other) = other {
+            let is = other.item.kind.keyword();
+            let note = format!("this is of another kind: `{is}`");
+            let help = format!("write `override {is} {}`", wanted.as_deref().unwrap_or_default());
+            return Err(Box::new(error.beside(other.item.span, note).help(help)));
+        }
+        let alike = standing.iter().filter(|standing| same_kind(&standing.item.kind));
+        let names: Vec<String> = alike.filter_map(|standing| name(&standing.item.kind)).collect();
+        let near = wanted.as_deref().and_then(|wanted| nearest(wanted, names.iter().map(String::as_str)));
+        return Err(Box::new(match near {
+            Some(near) => error.meant(span, near),
+            None => error.help("leave out `override`, or `use` the file that declares it"),
+        }));
+    };
+    let old = &standing[place];
+    let old_span = old.item.kind.name().map_or(old.item.span, |name| name.span);
+    if old.file == file {
+        let error = error(format!("{what} is declared in this very file")).at(span, "overridden here");
+        return Err(Box::new(
+            error
+                .beside(old_span, "declared here")
+                .help("change the declaration itself, and remove this one"),
+        ));
+    }
+    if !uses(files, file, old.file) {
+        let error = error(format!("{what} is overridden by two files that do not know each other"));
+        let error = error.at(span, "overridden here").beside(old_span, "and here");
+        return Err(Box::new(
+            error.help("let one of the two `use` the other: then its override is the last"),
+        ));
+    }
+    Ok(place)
+}
+
+/// Whether a file uses the other, by whatever way.
+fn uses(files: &[LoadedFile], from: usize, to: usize) -> bool {
+    let mut seen: BTreeSet<PathBuf> = BTreeSet::new();
+    let mut open = vec![files[from].path.clone()];
+    while let Some(path) = open.pop() {
+        if path == files[to].path {
+            return true;
+        }
+        if !seen.insert(path.clone()) {
+            continue;
+        }
+        open.extend(files.iter().filter(|file| file.path == path).flat_map(used_paths));
+    }
+    false
+}

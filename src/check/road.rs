@@ -1,0 +1,193 @@
+//! Roads: a map, two places on it, the way between them, and what rules may ask about it.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use crate::check::checker::{Checker, docs, each};
+use crate::check::expression::Place;
+use crate::check::names::{Names, unknown};
+use crate::model::{Road, RoadFacts, SPAWN_SPEED_MPS, Type, code};
+use crate::road::{LanePlace, RoadMap, Route};
+use crate::syntax::ast::ItemKind;
+use crate::syntax::{Diagnostic, ast, print_expr};
+use crate::units::{Dimension, Rational};
+
+/// Where maps come from: the reader of files knows the folder of the file that names one.
+pub(crate) trait Maps {
+    /// The map's path and the map, or what is wrong with it.
+    fn map(&mut self, name: &ast::Text) -> Result<(PathBuf, Arc<RoadMap>), String>;
+}
+
+impl Checker {
+    /// The roads of `episode.roads`, or all.
+    pub(super) fn roads(
+        &mut self,
+        items: &[&ast::Item],
+        chosen: Option<Vec<ast::Name>>,
+        maps: &mut dyn Maps,
+    ) -> Vec<Road> {
+        let mut names = Names::default();
+        let mut declared = Vec::new();
+        for (item, block) in each(items, |kind| match kind {
+            ItemKind::Road(block) => Some(block),
+            _ => None,
+        }) {
+            match names.declare("road", &block.name, declared.len()) {
+                Ok(()) => declared.push((item, block)),
+                Err(error) => self.report(error),
+            }
+        }
+        let mut roads: Vec<Option<Road>> =
+            declared.into_iter().map(|(item, block)| self.road(item, block, maps)).collect();
+        let Some(chosen) = chosen else { return roads.into_iter().flatten().collect() };
+        let mut picked = Vec::new();
+        for name in &chosen {
+            match names.get(&name.text) {
+                None => self.report(unknown("road", &name.text, name.span, names.all())),
+                // Naming a road twice would only repeat it.
+                Some(index) => picked.extend(roads[index].take()),
+            }
+        }
+        picked
+    }
+
+    fn road(&mut self, item: &ast::Item, block: &ast::Block, maps: &mut dyn Maps) -> Option<Road> {
+        const NEEDED: [&str; 3] = ["map", "start", "goal"];
+        const FIELDS: [&str; 4] = ["map", "start", "goal", "limit"];
+        let mut names = Names::default();
+        for (index, field) in block.fields.iter().enumerate() {
+            if let Err(error) = names.declare("field", &field.name, index) {
+                self.report(error);
+            }
+            if !FIELDS.contains(&field.name.text.as_str()) {
+                self.report(unknown("field", &field.name.text, field.name.span, FIELDS));
+            }
+        }
+        let find = |name: &str| block.fields.iter().find(|field| field.name.text == name);
+        for name in NEEDED.into_iter().filter(|name| find(name).is_none()) {
+            let error =
+                Diagnostic::error(code::MISSING_FIELD, format!("road `{}` has no `{name}`", block.name.text));
+            self.report(error.at(block.name.span, format!("`{name}: …` is missing")));
+        }
+        let (map, start, goal) = (find("map")?, find("start")?, find("goal")?);
+        let ast::ExprKind::Text(path) = &map.value.kind else {
+            self.report(
+                Diagnostic::error(code::TYPE_MISMATCH, "`map` needs a path in quotes")
+                    .at(map.value.span, "not a text"),
+            );
+            return None;
+        };
+        let (map_path, map) = match maps.map(&ast::Text::new(path.clone(), map.value.span)) {
+            Ok(found) => found,
+            Err(reason) => {
+                let error = Diagnostic::error(code::UNREADABLE, format!("cannot use map `{path}`"));
+                self.report(error.at(map.value.span, reason));
+                return None;
+            }
+        };
+        let map = match find("limit").map(|limit| self.limit(&limit.value)) {
+            None => map,
+            Some(limit_mps) => slowed(&map, limit_mps?),
+        };
+        let start = self.lane_point(&start.value, &map);
+        let goal = self.lane_point(&goal.value, &map);
+        let (start, goal) = (start?, goal?);
+        let route = match Route::find(&map, start, goal) {
+            Ok(route) => route,
+            Err(error) => {
+                let message = format!("road `{}` has no route", block.name.text);
+                let error = Diagnostic::error(code::NO_ROUTE, message).at(block.name.span, error.to_string());
+                self.report(error.help("`avastra road MAP` tells which lane leads where"));
+                return None;
+            }
+        };
+        let facts = facts(&block.name.text, &map, &route);
+        let (name, span) = (block.name.text.clone(), block.name.span);
+        Some(Road { name, docs: docs(item), map_path, map, start, goal, route, facts, span })
+    }
+
+    /// A limit for the whole road, m/s.
+    fn limit(&mut self, value: &ast::Expr) -> Option<f64> {
+        let limit = self.typed(value, &Place::default(), Type::Quantity(Dimension::SPEED))?;
+        let limit_mps = self.fold_number(&limit)?.to_f64();
+        if limit_mps > 0.0 && limit_mps <= *SPAWN_SPEED_MPS.end() {
+            return Some(limit_mps);
+        }
+        let error =
+            Diagnostic::error(code::SETTING, format!("a limit of `{}` is not possible", print_expr(value)));
+        let wanted = format!("must be more than 0 m/s and at most {} m/s", SPAWN_SPEED_MPS.end());
+        self.report(error.at(value.span, wanted).help("write for example `limit: 30 km/h`"));
+        None
+    }
+
+    fn lane_point(&mut self, value: &ast::Expr, map: &RoadMap) -> Option<LanePlace> {
+        let ast::ExprKind::LanePoint { road, lane, station } = &value.kind else {
+            let error = Diagnostic::error(code::TYPE_MISMATCH, "wanted a place on a lane");
+            self.report(
+                error.at(value.span, "not a place").help("write `lane 1/-1 at 12 m`: road, lane and station"),
+            );
+            return None;
+        };
+        let station_expr = self.number(station)?;
+        let station = self.fit(station_expr, Type::Quantity(Dimension::LENGTH))?;
+        let station_m = self.fold_number(&station)?.to_f64();
+        let Ok(lane_id) = lane.text.parse::<i32>() else {
+            self.report(
+                Diagnostic::error(code::NO_ROUTE, "the lane's number is too large").at(lane.span, ""),
+            );
+            return None;
+        };
+        match map.place(&road.value, lane_id, station_m) {
+            Ok(place) => Some(place),
+            Err(error) => {
+                let message = format!("there is no such place on map `{}`", map.name);
+                let error = Diagnostic::error(code::NO_ROUTE, message).at(value.span, error.to_string());
+                self.report(
+                    error.help("`avastra road MAP` tells which lanes there are, and how long they are"),
+                );
+                None
+            }
+        }
+    }
+}
+
+/// The map under a lower limit: where the signs allow less, they still count. Driving systems read the
+/// limit off the lanes, so it stands there.
+fn slowed(map: &RoadMap, limit_mps: f64) -> Arc<RoadMap> {
+    let mut map = map.clone();
+    for lane in &mut map.lanes {
+        lane.speed_limit_mps = lane.speed_limit_mps.min(limit_mps);
+    }
+    Arc::new(map)
+}
+
+/// Reads the facts of a route off its map.
+fn facts(name: &str, map: &RoadMap, route: &Route) -> RoadFacts {
+    let lanes = || route.lanes.iter().map(|part| map.lane(part.lane));
+    let limit_mps = lanes().map(|lane| lane.speed_limit_mps).fold(f64::INFINITY, f64::min);
+    let limit = exact_limit(limit_mps);
+    let beside = |left: bool| {
+        lanes().any(|lane| {
+            let neighbour = if left { lane.left } else { lane.right };
+            neighbour.is_some_and(|neighbour| neighbour.same_direction)
+        })
+    };
+    let name = name.to_owned();
+    RoadFacts { name, limit, limit_mps: limit.to_f64(), lanes: [beside(true), true, beside(false)] }
+}
+
+/// A limit as the road sign has it: whole km/h or mph where the map's f64 is next to one.
+fn exact_limit(limit_mps: f64) -> Rational {
+    for unit in ["km/h", "mph"] {
+        let Some(unit) = crate::units::unit(unit) else { continue };
+        let shown = (limit_mps / unit.factor().to_f64()).round();
+        if (0.0..1e4).contains(&shown) {
+            let exact = Rational::integer(shown as i64).checked_mul(unit.factor());
+            if let Some(exact) = exact.filter(|exact| (exact.to_f64() - limit_mps).abs() < 1e-3) {
+                return exact;
+            }
+        }
+    }
+    // No limit at all is read as a limit that nothing reaches.
+    Rational::from_f64(limit_mps).unwrap_or(Rational::integer(1000))
+}

@@ -1,0 +1,300 @@
+//! Rules: which actions each binds, and its condition compiled for every one of them.
+
+use crate::check::checker::{Checker, docs, each};
+use crate::check::declaration::unknown_state;
+use crate::check::expression::Place;
+use crate::check::names::{Names, unknown};
+use crate::model::expr::{Expr, ExprKind};
+use crate::model::{ActionDef, EffectDef, RuleBinding, RuleBody, RuleDef, Type, code};
+use crate::syntax::ast::ItemKind;
+use crate::syntax::{Diagnostic, ast, listed};
+
+impl Checker {
+    pub(super) fn rules(&mut self, items: &[&ast::Item]) -> Vec<RuleDef> {
+        let mut names = Names::default();
+        let mut rules = Vec::new();
+        for (item, declared) in each(items, |kind| match kind {
+            ItemKind::Rule(declared) => Some(declared),
+            _ => None,
+        }) {
+            if let Err(error) = names.declare("rule", &declared.name, rules.len()) {
+                self.report(error);
+                continue;
+            }
+            let body = match &declared.body {
+                ast::RuleBody::Holds { on, condition } => self.holds(declared, on, condition),
+                ast::RuleBody::Moves { state, moves } => self.moves(declared, state, moves),
+            };
+            if let Some(body) = body {
+                let name = declared.name.text.clone();
+                let span = declared.name.span;
+                rules.push(RuleDef { name, docs: docs(item), optional: declared.optional, body, span });
+            }
+        }
+        rules
+    }
+
+    fn holds(&mut self, rule: &ast::Rule, on: &[ast::Name], condition: &ast::Expr) -> Option<RuleBody> {
+        let mut targets: Vec<usize> = Vec::new();
+        for name in on {
+            for action in self.targets(name) {
+                if !targets.contains(&action) {
+                    targets.push(action);
+                }
+            }
+        }
+        if on.is_empty() {
+            targets = self.targets_of_global(rule, condition)?;
+        }
+        targets.sort_unstable();
+        let lacking = self.lacking_parameters(&rule.name, &targets, condition);
+        let mut bindings = Vec::new();
+        for action in targets {
+            // A broken action was reported where it stands.
+            let Some(definition) = self.actions[action].clone() else { continue };
+            if lacking.contains(&action) {
+                continue;
+            }
+            let locals = locals(&definition);
+            let spawns = definition.effects.iter().any(|effect| matches!(effect, EffectDef::Spawn(_)));
+            let place = Place { locals: &locals, states: true, road: true, spawn: true, ..Place::default() };
+            let Some(condition) = self.typed(condition, &place, Type::Bool) else { continue };
+            if condition.needs_survey() && !spawns && !self.half_broken.contains(&action) {
+                let message =
+                    format!("`{}` asks about a spawn, and `{}` has none", rule.name.text, definition.name);
+                let error = Diagnostic::error(code::NO_SPAWN, message).at(condition.span, "needs a spawn");
+                self.report(
+                    error.beside(definition.span, "spawns nothing").help("name other actions after `on`"),
+                );
+                continue;
+            }
+            bindings.push(RuleBinding { action, condition });
+        }
+        if bindings.is_empty() && !self.has_errors() {
+            let message = format!("`{}` binds no action", rule.name.text);
+            let error =
+                Diagnostic::error(code::BINDS_NOTHING, message).at(rule.name.span, "would never be enforced");
+            self.report(
+                error.help("a rule without `on` binds the actions that spawn, or that set a state it names"),
+            );
+        }
+        Some(RuleBody::Holds(bindings))
+    }
+
+    /// Without `on`, a rule binds the actions that could break it: those that spawn, if it asks about
+    /// spawns; those that set a state which it reads; else all.
+    fn targets_of_global(&mut self, rule: &ast::Rule, condition: &ast::Expr) -> Option<Vec<usize>> {
+        let named = names_in(condition);
+        let parameter = self.actions.iter().flatten().find_map(|action| {
+            let found = action.parameters.iter().find(|p| named.iter().any(|name| name.text == *p.name))?;
+            Some((found.name.clone(), action.name.clone()))
+        });
+        let is_state = |name: &str| self.states.iter().any(|state| state.name == name);
+        if let Some((parameter, action)) = parameter.filter(|(name, _)| !is_state(name)) {
+            let named_at = named.iter().find(|name| name.text == *parameter).map(|name| name.span)?;
+            let message = format!("`{}` names the parameter `{parameter}` but no action", rule.name.text);
+            let error = Diagnostic::error(code::LACKING_PARAMETER, message)
+                .at(named_at, "a parameter of which action?");
+            self.report(error.help(format!("write `rule {} on {action}: …`", rule.name.text)));
+            return None;
+        }
+        let place = Place { locals: &[], states: true, road: true, spawn: true, ..Place::default() };
+        let compiled = self.typed(condition, &place, Type::Bool)?;
+        let binds = |action: &ActionDef| {
+            action.effects.iter().any(|effect| match effect {
+                EffectDef::Spawn(_) => compiled.needs_survey(),
+                EffectDef::Set(set) => reads_state(&compiled, &self.states[set.state]),
+            })
+        };
+        let open = !compiled.needs_survey() && !compiled.reads_memory();
+        let all = self.actions.iter().enumerate();
+        Some(
+            all.filter(|(index, a)| {
+                a.as_ref().is_some_and(|a| open || binds(a) || self.half_broken.contains(index))
+            })
+            .map(|(index, _)| index)
+            .collect(),
+        )
+    }
+
+    /// Reports names that are parameters of some bound action but not of others; gives the others.
+    fn lacking_parameters(
+        &mut self,
+        rule: &ast::Name,
+        targets: &[usize],
+        condition: &ast::Expr,
+    ) -> Vec<usize> {
+        let mut lacking = Vec::new();
+        for name in names_in(condition) {
+            let is_parameter =
+                |action: &ActionDef| action.parameters.iter().any(|parameter| *parameter.name == *name.text);
+            let known_elsewhere = self.states.iter().any(|state| state.name == name.text)
+                || self.constants.iter().any(|(constant, _)| *constant == name.text)
+                || self.enums.iter().any(|e| e.variants.contains(&name.text));
+            if known_elsewhere || !self.actions.iter().flatten().any(is_parameter) {
+                continue;
+            }
+            let without: Vec<usize> = targets
+                .iter()
+                .copied()
+                .filter(|action| self.actions[*action].as_ref().is_some_and(|action| !is_parameter(action)))
+                .collect();
+            if without.is_empty() {
+                continue;
+            }
+            let names: Vec<&str> =
+                without.iter().filter_map(|a| self.actions[*a].as_ref()).map(|a| a.name.as_str()).collect();
+            let verb = if names.len() == 1 { "has" } else { "have" };
+            let message =
+                format!("rule `{}` names `{}`, which {} {verb} not", rule.text, name.text, listed(&names));
+            let error = Diagnostic::error(code::LACKING_PARAMETER, message)
+                .at(name.span, "not a parameter of every action it binds");
+            self.report(
+                error.beside(rule.span, "").help("bind only actions that have it, or give it to the others"),
+            );
+            lacking.extend(without);
+        }
+        lacking
+    }
+
+    fn moves(&mut self, rule: &ast::Rule, state: &ast::Name, moves: &[ast::Move]) -> Option<RuleBody> {
+        let Some(index) = self.states.iter().position(|known| known.name == state.text) else {
+            let error = unknown_state(self, state);
+            self.report(error);
+            return None;
+        };
+        let definition = self.states[index].clone();
+        let (Type::Enum(of), None) = (definition.ty, definition.key) else {
+            let error = Diagnostic::error(
+                code::TYPE_MISMATCH,
+                format!("`{}` does not move from value to value", state.text),
+            );
+            self.report(error.at(state.span, "must be a plain state of an enum").beside(definition.span, ""));
+            return None;
+        };
+        let variants = self.enums[of.0].variants.clone();
+        let mut allowed = vec![vec![false; variants.len()]; variants.len()];
+        let mut sound = true;
+        for line in moves {
+            let from = self.variant(&line.from, &variants);
+            let to: Vec<Option<usize>> = line.to.iter().map(|to| self.variant(to, &variants)).collect();
+            for to in to {
+                match (from, to) {
+                    (Some(from), Some(to)) => allowed[from][to] = true,
+                    _ => sound = false,
+                }
+            }
+        }
+        if !sound {
+            return None;
+        }
+        self.check_graph(rule, &variants, &allowed);
+        let sets = |action: &ActionDef| {
+            action.effects.iter().any(|effect| matches!(effect, EffectDef::Set(set) if set.state == index))
+        };
+        let all = self.actions.iter().enumerate();
+        let actions: Vec<usize> =
+            all.filter(|(_, a)| a.as_ref().is_some_and(sets)).map(|(index, _)| index).collect();
+        if actions.is_empty() && !self.has_errors() {
+            let message = format!("`{}` binds no action", rule.name.text);
+            let error =
+                Diagnostic::error(code::BINDS_NOTHING, message).at(rule.name.span, "would never be enforced");
+            self.report(error.help(format!("no action sets `{}`: give one the effect", definition.name)));
+        }
+        Some(RuleBody::Moves { state: index, allowed, actions })
+    }
+
+    pub(super) fn variant(&mut self, name: &ast::Name, variants: &[String]) -> Option<usize> {
+        let found = variants.iter().position(|variant| *variant == name.text);
+        if found.is_none() {
+            let candidates = variants.iter().map(String::as_str);
+            self.report(unknown("variant", &name.text, name.span, candidates));
+        }
+        found
+    }
+
+    /// Every value must lead somewhere, and something else must lead to it.
+    fn check_graph(&mut self, rule: &ast::Rule, variants: &[String], allowed: &[Vec<bool>]) {
+        let rows = |test: &dyn Fn(usize) -> bool| -> Vec<&str> {
+            (0..variants.len()).filter(|v| test(*v)).map(|v| variants[v].as_str()).collect()
+        };
+        let stuck = rows(&|from| !allowed[from].contains(&true));
+        if !stuck.is_empty() {
+            let message = format!("rule `{}` says nothing of {}", rule.name.text, listed(&stuck));
+            let error = Diagnostic::error(code::DEADLOCK, message)
+                .at(rule.name.span, "from there no move is allowed, not even to stay");
+            self.report(error.help(format!("add `{0} -> {0}` or another move", stuck[0])));
+        }
+        let unreachable = rows(&|to| (0..variants.len()).all(|from| from == to || !allowed[from][to]));
+        if !unreachable.is_empty() && variants.len() > 1 {
+            let message = format!("rule `{}` never leads to {}", rule.name.text, listed(&unreachable));
+            let warning = Diagnostic::warning(code::UNREACHABLE, message);
+            let warning = warning.at(rule.name.span, "only an episode that begins there ever sees it");
+            self.report(warning.help(format!(
+                "add a move to it, for example `{} -> {}`",
+                first_other(variants, unreachable[0]),
+                unreachable[0]
+            )));
+        }
+    }
+}
+
+/// A value other than this one.
+fn first_other<'a>(variants: &'a [String], value: &'a str) -> &'a str {
+    variants.iter().map(String::as_str).find(|other| *other != value).unwrap_or(value)
+}
+
+/// The parameters of an action as locals of an expression.
+pub(super) fn locals(action: &ActionDef) -> Vec<(String, Type)> {
+    action.parameters.iter().map(|parameter| (parameter.name.to_string(), parameter.ty)).collect()
+}
+
+fn reads_state(condition: &Expr, state: &crate::model::StateDef) -> bool {
+    condition.any(|kind| match kind {
+        ExprKind::Cell(cell) => (state.first_cell..state.first_cell + state.cells).contains(cell),
+        ExprKind::CellAt(first, _) => *first == state.first_cell,
+        _ => false,
+    })
+}
+
+/// Every bare name in an expression, in order.
+pub(super) fn names_in(expr: &ast::Expr) -> Vec<ast::Name> {
+    let mut names = Vec::new();
+    collect_names(expr, &mut names);
+    names
+}
+
+fn collect_names(expr: &ast::Expr, into: &mut Vec<ast::Name>) {
+    match &expr.kind {
+        ast::ExprKind::Name(name) => into.push(ast::Name::new(name.clone(), expr.span)),
+        ast::ExprKind::Unary { operand, .. } => collect_names(operand, into),
+        ast::ExprKind::Binary { left, right, .. } => {
+            collect_names(left, into);
+            collect_names(right, into);
+        }
+        ast::ExprKind::Range { low, high } => {
+            collect_names(low, into);
+            collect_names(high, into);
+        }
+        ast::ExprKind::Index { base, index } => {
+            collect_names(base, into);
+            collect_names(index, into);
+        }
+        ast::ExprKind::Call(call) => {
+            call.args.iter().for_each(|argument| collect_names(&argument.value, into))
+        }
+        ast::ExprKind::List(items) => items.iter().for_each(|item| collect_names(item, into)),
+        ast::ExprKind::Match { subject, arms } => {
+            collect_names(subject, into);
+            arms.iter().for_each(|arm| collect_names(&arm.value, into));
+        }
+        // The base of a field is `road`, no variable.
+        ast::ExprKind::Field { .. }
+        | ast::ExprKind::Number(_)
+        | ast::ExprKind::Text(_)
+        | ast::ExprKind::Bool(_)
+        | ast::ExprKind::Record(_)
+        | ast::ExprKind::LanePoint { .. }
+        | ast::ExprKind::Numbered { .. } => {}
+    }
+}

@@ -1,0 +1,684 @@
+//! Scenarios: one timeline over a space, with every value in its place and every claim understood.
+
+use std::sync::Arc;
+
+use crate::check::names::{Names, unknown};
+use crate::check::scenario_rules::{Moment, breaches};
+use crate::check::scenario_value::{figure, number, value};
+use crate::model::expr::{Comparison, Expr};
+use crate::model::scenario::{
+    Avoidability, Claim, ENDS, Figure, MODULES, Origin, Scenario, ScenarioStart, ScenarioStep,
+};
+use crate::model::{
+    AMBIENT_MAX, Bound, Domain, Facts, Initial, Memory, Parameter, Row, SIGNAL_PHASE_S, Space, Value, bounds,
+    code, evaluate, locals,
+};
+use crate::syntax::ast::{BinaryOp, ClauseKind, FileId, ItemKind};
+use crate::syntax::{Diagnostic, LANGUAGE, ast, listed, parse};
+use crate::units::{Dimension, Rational};
+
+/// Numbers of steps stay below this.
+const STEPS_MAX: u64 = 100_000;
+
+/// The scenario of a file, checked against the space that it uses.
+///
+/// # Errors
+/// Everything that is wrong with it. A file without a scenario, or with two, is an error too.
+pub fn scenario(file: &ast::File, space: &Space) -> Result<Scenario, Vec<Diagnostic>> {
+    let mut found = file.items.iter().filter_map(|item| match &item.kind {
+        ItemKind::Scenario(scenario) => Some((item, scenario)),
+        _ => None,
+    });
+    let Some((item, declared)) = found.next() else {
+        return Err(vec![
+            Diagnostic::error(code::ONE_SCENARIO, "the file holds no scenario").at(file.span, ""),
+        ]);
+    };
+    if let Some((second, _)) = found.next() {
+        let error = Diagnostic::error(code::ONE_SCENARIO, "the file holds two scenarios");
+        return Err(vec![error.at(second.span, "the second").help("one file, one scenario")]);
+    }
+    let mut reader = Reader { space, diagnostics: Vec::new() };
+    let origin = reader.origin(&declared.origin);
+    let road = reader.road(&declared.road);
+    let start = reader.start(declared);
+    let steps = reader.steps(&declared.steps, &start.memory, &origin, road);
+    let claims = declared.expects.iter().filter_map(|expect| reader.claim(expect)).collect();
+    let docs = item.docs.iter().map(|doc| doc.text.clone()).collect();
+    let name = declared.name.text.clone();
+    match road {
+        Some(road) if reader.diagnostics.is_empty() => {
+            Ok(Scenario { name, docs, origin, road, start, steps, claims })
+        }
+        _ => Err(reader.diagnostics),
+    }
+}
+
+/// The row that a call names: by name, or in the order of the axes.
+///
+/// # Errors
+/// If there is none.
+pub(crate) fn row<'a>(space: &'a Space, call: &ast::Call) -> Result<&'a Row, Vec<Diagnostic>> {
+    let mut reader = Reader { space, diagnostics: Vec::new() };
+    reader.row(call).ok_or(reader.diagnostics)
+}
+
+struct Reader<'a> {
+    space: &'a Space,
+    diagnostics: Vec<Diagnostic>,
+}
+
+impl<'a> Reader<'a> {
+    fn report(&mut self, diagnostic: Diagnostic) {
+        self.diagnostics.push(diagnostic);
+    }
+
+    /// The value, or `None` once the mistake is reported.
+    fn take<T>(&mut self, value: Result<T, Diagnostic>) -> Option<T> {
+        value.map_err(|error| self.report(error)).ok()
+    }
+
+    /// Reports every field that is given twice: the first would be lost.
+    fn once(&mut self, kind: &str, fields: &[ast::Field]) {
+        let mut names = Names::default();
+        for (index, field) in fields.iter().enumerate() {
+            let declared = names.declare(kind, &field.name, index);
+            self.take(declared);
+        }
+    }
+
+    fn origin(&mut self, fields: &[ast::Field]) -> Origin {
+        const FIELDS: [&str; 10] = [
+            "seed",
+            "episode",
+            "policy",
+            "ads",
+            "profile",
+            "profile_digest",
+            "engine",
+            "avoidability",
+            "with",
+            "without",
+        ];
+        let mut origin = Origin::default();
+        self.once("field", fields);
+        for field in fields {
+            match field.name.text.as_str() {
+                "seed" => origin.seed = self.whole(&field.value),
+                "episode" => origin.episode = self.whole(&field.value),
+                "policy" => origin.policy = self.text(&field.value),
+                "ads" => origin.ads = self.text(&field.value),
+                "profile" => origin.profile = self.text(&field.value),
+                "profile_digest" => origin.profile_digest = self.text(&field.value),
+                "engine" => origin.engine = self.text(&field.value),
+                "avoidability" => origin.avoidability = self.text(&field.value),
+                "with" => origin.with = self.rule_names(&field.value),
+                "without" => origin.without = self.rule_names(&field.value),
+                other => self.report(unknown("field", other, field.name.span, FIELDS)),
+            }
+        }
+        origin
+    }
+
+    fn rule_names(&mut self, list: &ast::Expr) -> Vec<String> {
+        let ast::ExprKind::List(items) = &list.kind else {
+            self.report(
+                Diagnostic::error(code::TYPE_MISMATCH, "wanted a list of rules").at(list.span, "not a list"),
+            );
+            return Vec::new();
+        };
+        let mut names = Vec::new();
+        for item in items {
+            match &item.kind {
+                ast::ExprKind::Name(name) if self.space.rules.iter().any(|rule| rule.name == *name) => {
+                    names.push(name.clone());
+                }
+                ast::ExprKind::Name(name) => {
+                    let rules = self.space.rules.iter().map(|rule| rule.name.as_str());
+                    self.report(unknown("rule", name, item.span, rules));
+                }
+                _ => self.report(
+                    Diagnostic::error(code::TYPE_MISMATCH, "wanted a rule").at(item.span, "not a name"),
+                ),
+            }
+        }
+        names
+    }
+
+    fn road(&mut self, name: &ast::Name) -> Option<usize> {
+        let found = self.space.roads.iter().position(|road| road.name == name.text);
+        if found.is_none() {
+            let roads = self.space.roads.iter().map(|road| road.name.as_str());
+            self.report(unknown("road", &name.text, name.span, roads));
+        }
+        found
+    }
+
+    fn start(&mut self, declared: &ast::Scenario) -> ScenarioStart {
+        let space = self.space;
+        // The seed is arbitrary: what it draws is replaced below, or reported as missing.
+        let mut memory = space.initial_memory(0);
+        let mut start = (0.0, None, 0);
+        self.once("field", &declared.start);
+        for field in &declared.start {
+            match field.name.text.as_str() {
+                "signal_phase" => {
+                    let seconds = number(&field.value, Dimension::DURATION);
+                    start.0 = self.take(seconds).unwrap_or(0.0);
+                    if !SIGNAL_PHASE_S.contains(&start.0) {
+                        let message = format!("a signal phase of {} s is not possible", start.0);
+                        let range = format!("{} .. {} s", SIGNAL_PHASE_S.start(), SIGNAL_PHASE_S.end());
+                        let error = Diagnostic::error(code::OUT_OF_RANGE, message);
+                        self.report(error.at(field.value.span, format!("must lie within {range}")));
+                    }
+                }
+                "traffic_seed" => start.1 = self.whole(&field.value),
+                "ambient" => {
+                    let wanted = self.whole(&field.value).unwrap_or(0);
+                    if wanted > u64::from(AMBIENT_MAX) {
+                        let message = format!("{wanted} ambient vehicles are not possible");
+                        let error = Diagnostic::error(code::OUT_OF_RANGE, message);
+                        self.report(
+                            error.at(field.value.span, format!("must lie within 0 .. {AMBIENT_MAX}")),
+                        );
+                    }
+                    start.2 = wanted.min(u64::from(AMBIENT_MAX)) as u32;
+                }
+                name => match space.state(name) {
+                    Some(state) => self.start_state(state, &field.value, &mut memory),
+                    None => {
+                        let states = space.states.iter().map(|state| state.name.as_str());
+                        let names = states.chain(["signal_phase", "traffic_seed", "ambient"]);
+                        self.report(unknown("field", name, field.name.span, names));
+                    }
+                },
+            }
+        }
+        for state in space.states.iter().filter(|state| state.initial == Initial::Any) {
+            if !declared.start.iter().any(|field| field.name.text == state.name) {
+                let error =
+                    Diagnostic::error(code::OPEN_START, format!("the start does not say `{}`", state.name));
+                let error = error.at(declared.name.span, "a scenario leaves nothing to chance");
+                self.report(error.help(format!("add `start {{ {}: … }}`", state.name)));
+            }
+        }
+        ScenarioStart { memory, signal_phase_s: start.0, traffic_seed: start.1, ambient: start.2 }
+    }
+
+    /// `time: Noon`, `sky: None` for all keys, `sky: { Rain: High }` for some.
+    fn start_state(&mut self, state: &crate::model::StateDef, given: &ast::Expr, memory: &mut Memory) {
+        let space = self.space;
+        if let (ast::ExprKind::Record(fields), Some(of)) = (&given.kind, state.key) {
+            let keys = &space.enums[of.0].variants;
+            self.once("key", fields);
+            for field in fields {
+                match keys.iter().position(|key| *key == field.name.text) {
+                    Some(key) => {
+                        if let Some(value) = self.take(value(space, &field.value, state.ty)) {
+                            memory.cells[state.first_cell + key] = value;
+                        }
+                    }
+                    None => {
+                        let keys = keys.iter().map(String::as_str);
+                        self.report(unknown("key", &field.name.text, field.name.span, keys));
+                    }
+                }
+            }
+        } else if let Some(value) = self.take(value(space, given, state.ty)) {
+            memory.cells[state.first_cell..][..state.cells].fill(value);
+        }
+    }
+
+    fn steps(
+        &mut self,
+        declared: &[ast::Step],
+        start: &Memory,
+        origin: &Origin,
+        road: Option<usize>,
+    ) -> Vec<ScenarioStep> {
+        let mut steps: Vec<ScenarioStep> = Vec::new();
+        let mut history = vec![(0, start.clone())];
+        for step in declared {
+            let number = step.number.digits.parse::<u64>();
+            let Ok(number) = number else {
+                let error = Diagnostic::error(code::STEP_ORDER, "the number of the step is too large");
+                self.report(error.at(step.number.span, ""));
+                continue;
+            };
+            if let Some(last) = steps.last().filter(|last| last.number >= number) {
+                let message = format!("step {number} stands after step {}", last.number);
+                let error = Diagnostic::error(code::STEP_ORDER, message).at(step.number.span, "out of order");
+                self.report(error.help("number the steps upwards"));
+            }
+            if number >= STEPS_MAX {
+                let error = Diagnostic::error(code::STEP_ORDER, format!("step {number} lies too far ahead"));
+                self.report(error.at(step.number.span, format!("less than {STEPS_MAX} is possible")));
+                continue;
+            }
+            if self.is_wait(step) {
+                steps.push(ScenarioStep { number, row: None, drawn: Vec::new() });
+                continue;
+            }
+            let Some(row) = self.row(&step.action) else { continue };
+            let action = &self.space.actions[row.action];
+            let Some(drawn) = self.drawn(step, row, road) else { continue };
+            let locals = locals(action, row, &drawn);
+            let memory = &history[history.len() - 1].1;
+            let after = self.space.memory_after(row.action, &locals, memory);
+            let moment = Moment { step, row, locals: &locals, after: &after, history: &history, road };
+            self.diagnostics.extend(breaches(self.space, &moment, origin));
+            history.push((number, after));
+            steps.push(ScenarioStep { number, row: Some(row.index), drawn });
+        }
+        steps
+    }
+
+    /// `wait()` is a step without an action, unless the space has an action of that name.
+    fn is_wait(&self, step: &ast::Step) -> bool {
+        step.action.name.text == "wait"
+            && step.action.args.is_empty()
+            && step.drawn.is_empty()
+            && !self.space.actions.iter().any(|action| action.name == "wait")
+    }
+
+    /// The row that a call names: by name, or in the order of the axes.
+    fn row(&mut self, call: &ast::Call) -> Option<&'a Row> {
+        let space = self.space;
+        let Some(action) = space.actions.iter().position(|action| action.name == call.name.text) else {
+            let actions = space.actions.iter().map(|action| action.name.as_str());
+            self.report(unknown("action", &call.name.text, call.name.span, actions));
+            return None;
+        };
+        let axes: Vec<&Parameter> = space.actions[action].parameters.iter().filter(|p| p.axis).collect();
+        let mut values: Vec<Option<Value>> = vec![None; axes.len()];
+        let mut given: Vec<Option<ast::Span>> = vec![None; axes.len()];
+        let mut sound = true;
+        for (position, argument) in call.args.iter().enumerate() {
+            let slot = match &argument.name {
+                None => Some(position).filter(|position| *position < axes.len()),
+                Some(name) => axes.iter().position(|axis| *axis.name == *name.text),
+            };
+            let Some(slot) = slot else {
+                let name = argument.name.as_ref().map_or("", |name| name.text.as_str());
+                let span = argument.name.as_ref().map_or(argument.value.span, |name| name.span);
+                let error = unknown("argument", name, span, axes.iter().map(|axis| &*axis.name));
+                self.report(if name.is_empty() {
+                    let message = format!("`{}` takes {} arguments", call.name.text, axes.len());
+                    Diagnostic::error(code::ARGUMENTS, message).at(span, "one too many")
+                } else {
+                    error
+                });
+                sound = false;
+                continue;
+            };
+            if let Some(first) = given[slot].replace(argument.value.span) {
+                let message = format!("`{}` is given twice", axes[slot].name);
+                let error = Diagnostic::error(code::DUPLICATE, message).at(argument.value.span, "again here");
+                self.report(error.beside(first, "first here").help("remove one of them"));
+                sound = false;
+                continue;
+            }
+            values[slot] = self.take(value(space, &argument.value, axes[slot].ty));
+            sound &= values[slot].is_some();
+        }
+        let mut missing = axes.iter().zip(&values).filter(|(_, value)| value.is_none() && sound);
+        if let Some((axis, _)) = missing.next() {
+            let message = format!("`{}` is missing", axis.name);
+            let error = Diagnostic::error(code::ARGUMENTS, message).at(call.span, "which row is meant?");
+            self.report(error.beside(axis.span, "declared here"));
+            return None;
+        }
+        let values: Option<Vec<Value>> = values.into_iter().collect();
+        let values = values?;
+        let same = |row: &&Row| {
+            row.action == action && row.axes.iter().zip(&values).all(|((_, axis), value)| axis == value)
+        };
+        let row = space.rows.iter().find(same);
+        if row.is_none() {
+            let message = format!("`{}` has no such row", call.name.text);
+            let error = Diagnostic::error(code::NO_SUCH_ROW, message)
+                .at(call.span, "excluded by a `where` or an `in`");
+            let error = error.beside(space.actions[action].span, "declared here");
+            let labels: Vec<&str> =
+                space.rows.iter().filter(|row| row.action == action).map(|row| row.label.as_str()).collect();
+            self.report(match labels.len() {
+                1..=6 => error.help(format!("there is {}", listed(&labels))),
+                _ => error.help("`avastra table FILE` lists the rows"),
+            });
+        }
+        row
+    }
+
+    fn drawn(&mut self, step: &ast::Step, row: &Row, road: Option<usize>) -> Option<Vec<(Arc<str>, Value)>> {
+        let action = &self.space.actions[row.action];
+        let drawn = || action.parameters.iter().filter(|parameter| !parameter.axis);
+        let mut sound = true;
+        self.once("drawn value", &step.drawn);
+        for field in &step.drawn {
+            if !drawn().any(|parameter| *parameter.name == *field.name.text) {
+                let names = drawn().map(|parameter| &*parameter.name);
+                self.report(unknown("drawn value", &field.name.text, field.name.span, names));
+                sound = false;
+            }
+        }
+        let mut values = Vec::new();
+        let mut missing = Vec::new();
+        for parameter in drawn() {
+            let Some(field) = step.drawn.iter().find(|field| *parameter.name == *field.name.text) else {
+                missing.push(parameter);
+                continue;
+            };
+            let Some(value) = self.take(value(self.space, &field.value, parameter.ty)) else {
+                sound = false;
+                continue;
+            };
+            if !parameter.domain.holds(value) {
+                let shown = self.space.show(value, parameter.ty);
+                let error =
+                    Diagnostic::error(code::OUT_OF_RANGE, format!("`{}` cannot be {shown}", parameter.name));
+                let label = match &parameter.domain {
+                    Domain::Range(low, high) => {
+                        let end = |end: &Rational| self.space.show(Value::Number(end.to_f64()), parameter.ty);
+                        format!("must lie within {} .. {}", end(low), end(high))
+                    }
+                    Domain::Values(_) => "is not among its values".to_owned(),
+                };
+                self.report(error.at(field.value.span, label).beside(parameter.span, "declared here"));
+                sound = false;
+            }
+            values.push((parameter.name.clone(), value));
+        }
+        if !missing.is_empty() {
+            let error = self.missing(step, row, road, &missing, values);
+            self.report(error);
+            return None;
+        }
+        sound.then_some(values)
+    }
+
+    /// Drawn values that a step lacks, with an example of each: the first of a list, what a rule sets,
+    /// else the low end of the range.
+    fn missing(
+        &self,
+        step: &ast::Step,
+        row: &Row,
+        road: Option<usize>,
+        missing: &[&Parameter],
+        mut values: Vec<(Arc<str>, Value)>,
+    ) -> Diagnostic {
+        let space = self.space;
+        let action = &space.actions[row.action];
+        let names: Vec<&str> = missing.iter().map(|parameter| &*parameter.name).collect();
+        let (what, is) = if names.len() == 1 { ("value", "is") } else { ("values", "are") };
+        let message = format!("the drawn {what} {} {is} missing", listed(&names));
+        let error =
+            Diagnostic::error(code::NOT_DRAWN, message).at(step.span, "a scenario leaves nothing to chance");
+        let error =
+            missing.iter().fold(error, |error, parameter| error.beside(parameter.span, "declared here"));
+        for parameter in missing {
+            let value = match &parameter.domain {
+                Domain::Values(values) => values[0],
+                Domain::Range(low, _) => Value::Number(low.to_f64()),
+            };
+            values.push((parameter.name.clone(), value));
+        }
+        if let Some(road) = road {
+            let memory = Memory::default();
+            let known = locals(action, row, &values);
+            let facts = Facts { road: Some(&space.roads[road].facts), ..Facts::new(&known, &memory) };
+            let bounds = bounds(space, row.action);
+            let sets = |bound: &&Bound| bound.op == Comparison::Equal && bound.is_known_early();
+            for bound in bounds.iter().filter(sets) {
+                let holds = |guard: &Expr| evaluate(guard, &space.functions, &facts).truth();
+                let parameter = &action.parameters[bound.local];
+                let limit = evaluate(&bound.limit, &space.functions, &facts);
+                if bound.guards.iter().all(holds) && parameter.domain.holds(limit) {
+                    let missing = missing.iter().any(|missing| missing.name == parameter.name);
+                    let slot = values.iter_mut().find(|(name, _)| missing && *name == parameter.name);
+                    slot.into_iter().for_each(|(_, value)| *value = limit);
+                }
+            }
+        }
+        let shown: Vec<String> = missing
+            .iter()
+            .filter_map(|parameter| {
+                let (_, value) = values.iter().find(|(name, _)| *name == parameter.name)?;
+                Some(format!("{}: {}", parameter.name, space.show(*value, parameter.ty)))
+            })
+            .collect();
+        let shown = shown.join(", ");
+        let error = error.help(format!("for example `{shown}`"));
+        let end = |span: ast::Span| ast::Span::new(span.file, span.end, span.end);
+        match step.drawn.last() {
+            Some(last) => error.fix(format!("add `{shown}`"), end(last.span), format!(", {shown}")),
+            None if step.span.end == step.action.span.end => {
+                let text = format!(" with {{ {shown} }}");
+                error.fix(format!("add `{}`", text.trim_start()), end(step.span), text)
+            }
+            None => error,
+        }
+    }
+
+    fn claim(&mut self, expect: &ast::Expect) -> Option<Claim> {
+        let unclear = || {
+            Diagnostic::error(code::UNKNOWN_CLAIM, "unknown claim").at(expect.span, "cannot be checked").help(
+                "claims are `collision with npc#2 at 14.22 s`, `proc == [0.5]`, `trace == \"sha256:…\"`, \
+                 `end == arrived`, `avoidable by [cc, fsm]`, `cause == perception`, `minimal`, or the name of a verdict",
+            )
+        };
+        match &expect.claim.kind {
+            ast::ExprKind::Name(name) if name == "collision" => {
+                let (obstacle, time_s) = self.clauses(&expect.clauses, true)?;
+                Some(Claim::Collision { obstacle, time_s })
+            }
+            ast::ExprKind::Name(name) if self.space.verdicts.iter().any(|verdict| verdict.name == *name) => {
+                let (obstacle, _) = self.clauses(&expect.clauses, false)?;
+                Some(Claim::Verdict { name: name.clone(), obstacle })
+            }
+            ast::ExprKind::Name(name) if name == "minimal" => {
+                let (obstacle, _) = self.clauses(&expect.clauses, false)?;
+                Some(Claim::Minimal { obstacle })
+            }
+            ast::ExprKind::Name(name) if Avoidability::ALL.iter().any(|class| class.name() == name) => {
+                let class = Avoidability::ALL.into_iter().find(|class| class.name() == name)?;
+                self.avoidability(class, expect)
+            }
+            ast::ExprKind::Binary { op: BinaryOp::Equal, left, right, .. } => match (&left.kind, &right.kind)
+            {
+                (ast::ExprKind::Name(name), ast::ExprKind::List(items)) if name == "proc" => {
+                    let values: Option<Vec<Figure>> =
+                        items.iter().map(|item| self.take(figure(item, Dimension::RATIO))).collect();
+                    values.map(Claim::Proc)
+                }
+                (ast::ExprKind::Name(name), ast::ExprKind::Text(text)) if name == "trace" => {
+                    if !is_digest(text) {
+                        let error = Diagnostic::error(code::UNKNOWN_CLAIM, "this is the digest of no trace");
+                        let error = error.at(right.span, "not `sha256:` and 64 digits from 0 to f");
+                        self.report(error.help("`avastra replay FILE` says which digest was found"));
+                        return None;
+                    }
+                    Some(Claim::Trace(text.clone()))
+                }
+                (ast::ExprKind::Name(name), _) if name == "cause" => {
+                    let modules = self.modules(right)?;
+                    let (obstacle, _) = self.clauses(&expect.clauses, false)?;
+                    Some(Claim::Cause { modules, obstacle })
+                }
+                (ast::ExprKind::Name(name), ast::ExprKind::Name(end)) if name == "end" => {
+                    if !ENDS.contains(&end.as_str()) {
+                        let message = format!("an episode does not end `{end}`");
+                        let error = Diagnostic::error(code::UNKNOWN_CLAIM, message);
+                        let error = error.at(right.span, "unknown end");
+                        self.report(error.help(format!("ends are {}", listed(&ENDS))));
+                        return None;
+                    }
+                    Some(Claim::End(end.clone()))
+                }
+                _ => {
+                    self.report(unclear());
+                    None
+                }
+            },
+            _ => {
+                self.report(unclear());
+                None
+            }
+        }
+    }
+
+    /// `perception`, or `[tracking, planning]`.
+    fn modules(&mut self, value: &ast::Expr) -> Option<Vec<String>> {
+        let items = match &value.kind {
+            ast::ExprKind::List(items) => items.as_slice(),
+            _ => core::slice::from_ref(value),
+        };
+        let mut modules = Vec::new();
+        for item in items {
+            let ast::ExprKind::Name(name) = &item.kind else {
+                let error = Diagnostic::error(code::TYPE_MISMATCH, "wanted a module of the driving system");
+                self.report(error.at(item.span, "not a name"));
+                return None;
+            };
+            if !MODULES.contains(&name.as_str()) {
+                self.report(unknown("module", name, item.span, MODULES));
+                return None;
+            }
+            modules.push(name.clone());
+        }
+        Some(modules)
+    }
+
+    /// `avoidable by [cc, fsm] with npc#2`; the drivers' names are the oracle's business.
+    fn avoidability(&mut self, class: Avoidability, expect: &ast::Expect) -> Option<Claim> {
+        let (by, others): (Vec<&ast::Clause>, Vec<&ast::Clause>) =
+            expect.clauses.iter().partition(|clause| clause.kind == ClauseKind::By);
+        let drivers = by.iter().map(|clause| match &clause.value.kind {
+            ast::ExprKind::List(items) => items.iter().map(driver).collect(),
+            _ => None,
+        });
+        let drivers: Option<Vec<Vec<String>>> = drivers.collect();
+        let Some(drivers) = drivers.filter(|lists| lists.len() <= 1) else {
+            let error = Diagnostic::error(code::UNKNOWN_CLAIM, "wanted one list of reference drivers");
+            self.report(error.at(by[0].span, "not one").help("write `avoidable by [cc, fsm]`"));
+            return None;
+        };
+        let others: Vec<ast::Clause> = others.into_iter().cloned().collect();
+        let (obstacle, _) = self.clauses(&others, false)?;
+        Some(Claim::Avoidability { class, by: drivers.into_iter().next(), obstacle })
+    }
+
+    /// `with npc#2` and, if the claim has a time, `at 14.22 s`.
+    fn clauses(&mut self, clauses: &[ast::Clause], timed: bool) -> Option<(Option<u32>, Option<Figure>)> {
+        let (mut obstacle, mut time_s) = (None, None);
+        for clause in clauses {
+            match (clause.kind, &clause.value.kind) {
+                (ClauseKind::With, ast::ExprKind::Numbered { number, .. })
+                    if number.parse::<u32>().is_ok_and(|number| number > 0) =>
+                {
+                    obstacle = number.parse().ok();
+                }
+                (ClauseKind::At, _) if timed => {
+                    let time = self.take(figure(&clause.value, Dimension::DURATION))?;
+                    if time.value < 0.0 {
+                        let error =
+                            Diagnostic::error(code::UNKNOWN_CLAIM, "no time of an episode is negative");
+                        self.report(
+                            error.at(clause.value.span, "before its beginning").help("count from 0 s"),
+                        );
+                        return None;
+                    }
+                    time_s = Some(time);
+                }
+                _ => {
+                    let error = Diagnostic::error(code::UNKNOWN_CLAIM, "unknown clause of this claim");
+                    self.report(
+                        error
+                            .at(clause.span, "")
+                            .help("write `collision with npc#2 at 14.22 s`; obstacles are numbered from 1"),
+                    );
+                    return None;
+                }
+            }
+        }
+        Some((obstacle, time_s))
+    }
+
+    fn whole(&mut self, value: &ast::Expr) -> Option<u64> {
+        let found = match &value.kind {
+            ast::ExprKind::Number(number) if number.unit.is_none() => number.digits.parse().ok(),
+            _ => None,
+        };
+        if found.is_none() {
+            self.report(
+                Diagnostic::error(code::TYPE_MISMATCH, "wanted a whole number").at(value.span, "not one"),
+            );
+        }
+        found
+    }
+
+    fn text(&mut self, value: &ast::Expr) -> Option<String> {
+        match &value.kind {
+            ast::ExprKind::Text(text) => Some(text.clone()),
+            _ => {
+                self.report(
+                    Diagnostic::error(code::TYPE_MISMATCH, "wanted a text in quotes")
+                        .at(value.span, "not a text"),
+                );
+                None
+            }
+        }
+    }
+}
+
+impl Space {
+    /// The memory that a text describes as the `start` of a scenario does, for example
+    /// `time: Night, sky: { Rain: High }`; what it leaves out is as [`Space::initial_memory`] says.
+    ///
+    /// # Errors
+    /// The first mistake, in words.
+    pub fn memory_from(&self, text: &str, seed: u64) -> Result<Memory, String> {
+        let around = format!(
+            "language {LANGUAGE}\nscenario given {{\nroad: any_road\nstart {{ {text} }}\nsteps {{ }}\n}}\n"
+        );
+        let (file, mistakes) = parse(FileId(0), &around);
+        let scenario = file.items.iter().find_map(|item| match &item.kind {
+            ItemKind::Scenario(scenario) => Some(scenario),
+            _ => None,
+        });
+        let Some(scenario) = scenario.filter(|_| mistakes.is_empty()) else {
+            return Err(format!(
+                "cannot read `{text}` as states: write `time: Night, sky: {{ Rain: High }}`"
+            ));
+        };
+        let mut reader = Reader { space: self, diagnostics: Vec::new() };
+        let mut memory = self.initial_memory(seed);
+        for field in &scenario.start {
+            match self.state(&field.name.text) {
+                Some(state) => reader.start_state(state, &field.value, &mut memory),
+                None => {
+                    let states = self.states.iter().map(|state| state.name.as_str());
+                    reader.report(unknown("state", &field.name.text, field.name.span, states));
+                }
+            }
+        }
+        match reader.diagnostics.into_iter().next() {
+            None => Ok(memory),
+            Some(Diagnostic { message, help: Some(help), .. }) => Err(format!("{message}; {help}")),
+            Some(Diagnostic { message, .. }) => Err(message),
+        }
+    }
+}
+
+/// The name of a reference driver.
+fn driver(expr: &ast::Expr) -> Option<String> {
+    match &expr.kind {
+        ast::ExprKind::Name(name) => Some(name.clone()),
+        _ => None,
+    }
+}
+
+/// Whether a text has the form of a SHA-256 as avastra prints it.
+fn is_digest(text: &str) -> bool {
+    let digits = text.strip_prefix("sha256:").unwrap_or("");
+    digits.len() == 64 && digits.bytes().all(|byte| matches!(byte, b'0'..=b'9' | b'a'..=b'f'))
+}

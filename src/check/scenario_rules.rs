@@ -1,0 +1,174 @@
+//! Which rules a scenario's steps break: the same conditions that are enforced when actions are
+//! drawn, said earlier, with the way to it and the way out.
+//!
+//! A rule that asks the world about a gap is left to the replay.
+
+use crate::model::expr::{Comparison, Expr, ExprKind};
+use crate::model::scenario::Origin;
+use crate::model::vocabulary::{LaneChoice, Word};
+use crate::model::{Facts, Memory, Row, RuleBody, RuleDef, Space, Value, bounds, code, compare, evaluate};
+use crate::prove::{next_rows, shortest_way};
+use crate::syntax::{Diagnostic, ast, listed};
+
+/// Legal rows listed for one step, at most.
+const ROWS_SHOWN: usize = 6;
+
+/// One step, and how it came to it.
+pub(super) struct Moment<'a> {
+    pub step: &'a ast::Step,
+    pub row: &'a Row,
+    /// Values of all parameters of the row's action.
+    pub locals: &'a [Value],
+    pub after: &'a Memory,
+    /// The memory at the start, then after each step with its number.
+    pub history: &'a [(u64, Memory)],
+    /// Index in `Space::roads`; `None` if the road is unknown.
+    pub road: Option<usize>,
+}
+
+impl Moment<'_> {
+    fn before(&self) -> &Memory {
+        &self.history[self.history.len() - 1].1
+    }
+}
+
+/// One error for each rule in force that the step breaks.
+pub(super) fn breaches(space: &Space, moment: &Moment<'_>, origin: &Origin) -> Vec<Diagnostic> {
+    let mut diagnostics = Vec::new();
+    for rule in moment.row.rules.iter() {
+        let definition = &space.rules[*rule];
+        let asked = !definition.optional || origin.with.contains(&definition.name);
+        if !asked || origin.without.contains(&definition.name) {
+            continue;
+        }
+        let message = format!("step {} breaks rule `{}`", moment.step.number.digits, definition.name);
+        let error = Diagnostic::error(code::BROKEN_RULE, message);
+        diagnostics.extend(match &definition.body {
+            RuleBody::Moves { state, .. } => forbidden_move(space, definition, *state, moment, error),
+            RuleBody::Holds(bindings) => {
+                let mut bindings = bindings.iter().filter(|binding| binding.action == moment.row.action);
+                bindings.find_map(|binding| {
+                    broken_condition(space, *rule, &binding.condition, moment, error.clone())
+                })
+            }
+        });
+    }
+    diagnostics
+}
+
+/// The timeline of the state up to the step, and the shortest legal way to where the step wants it.
+fn forbidden_move(
+    space: &Space,
+    rule: &RuleDef,
+    state: usize,
+    moment: &Moment<'_>,
+    error: Diagnostic,
+) -> Option<Diagnostic> {
+    let reason = space.forbidden_move(rule, moment.before(), moment.after)?;
+    let state = &space.states[state];
+    let shown = |memory: &Memory| space.show(memory.cells()[state.first_cell], state.ty);
+    let mut timeline = vec![format!("{} at the start", shown(&moment.history[0].1))];
+    for pair in moment.history.windows(2) {
+        let (before, (number, after)) = (&pair[0].1, &pair[1]);
+        if shown(before) != shown(after) {
+            timeline.push(format!("{} from step {number}", shown(after)));
+        }
+    }
+    let error = error.at(moment.step.span, reason).beside(rule.span, "does not allow it").note(format!(
+        "`{}` is {}",
+        state.name,
+        timeline.join(", ")
+    ));
+    let (from, to) = (moment.before().cells()[state.first_cell], moment.after.cells()[state.first_cell]);
+    let legal = next_rows(space, rule, from);
+    let labels: Vec<&str> = legal.iter().take(ROWS_SHOWN).map(|row| row.label.as_str()).collect();
+    let error = match labels.as_slice() {
+        [] => error,
+        labels => error.note(format!("the rule allows {} here", listed(labels))),
+    };
+    let way = shortest_way(space, rule, from, to);
+    Some(match way.as_slice() {
+        [] => error.help(format!(
+            "no steps lead from {} to {}",
+            space.show(from, state.ty),
+            space.show(to, state.ty)
+        )),
+        way => {
+            let steps: Vec<String> = way.iter().map(|row| format!("`{}`", row.label)).collect();
+            error.help(format!("the shortest legal way there is {}", steps.join(", then ")))
+        }
+    })
+}
+
+/// The figures of a condition that fails, and the nearest value that would be legal.
+fn broken_condition(
+    space: &Space,
+    rule: usize,
+    condition: &Expr,
+    moment: &Moment<'_>,
+    error: Diagnostic,
+) -> Option<Diagnostic> {
+    // What a road has is not known where the road is not.
+    let road = &space.roads[moment.road?];
+    let facts = Facts { road: Some(&road.facts), ..Facts::new(moment.locals, moment.after) };
+    if condition.needs_survey() || evaluate(condition, &space.functions, &facts).truth() {
+        return None;
+    }
+    let action = &space.actions[moment.row.action];
+    let mut error = error.beside(space.rules[rule].span, "does not allow it");
+    let mut nearest = None;
+    for bound in bounds(space, moment.row.action).iter().filter(|bound| bound.rule == Some(rule)) {
+        let holds = |guard: &Expr| evaluate(guard, &space.functions, &facts).truth();
+        if !bound.guards.iter().all(holds) {
+            continue;
+        }
+        let parameter = &action.parameters[bound.local];
+        let limit = evaluate(&bound.limit, &space.functions, &facts);
+        if compare(bound.op, moment.locals[bound.local], limit) {
+            continue;
+        }
+        let field = moment.step.drawn.iter().find(|field| *field.name.text == *parameter.name);
+        let Some(field) = field.filter(|_| !parameter.axis) else { continue };
+        let shown = space.show(limit, parameter.ty);
+        error = error.at(
+            field.value.span,
+            format!("`{}` must be {} {shown} on `{}`", parameter.name, bound.op.symbol(), road.name),
+        );
+        let reaches =
+            matches!(bound.op, Comparison::Equal | Comparison::LessEqual | Comparison::GreaterEqual);
+        if reaches && parameter.domain.holds(limit) && nearest.is_none() {
+            nearest = Some((field, shown));
+        }
+    }
+    if error.labels.iter().all(|label| !label.primary) {
+        let named = action.parameters.iter().enumerate().filter(|(local, _)| {
+            condition.any(|kind| matches!(kind, ExprKind::Local(named) if named == local))
+        });
+        let figures: Vec<String> = named
+            .map(|(local, parameter)| {
+                format!("`{}` is {}", parameter.name, space.show(moment.locals[local], parameter.ty))
+            })
+            .collect();
+        let label = match figures.is_empty() {
+            true => format!("its condition does not hold on `{}`", road.name),
+            false => format!("{} on `{}`", figures.join(", "), road.name),
+        };
+        error = error.at(moment.step.span, label);
+    }
+    if condition.any(|kind| matches!(kind, ExprKind::InLanes(..))) {
+        let there: Vec<&str> = LaneChoice::ALL
+            .iter()
+            .filter(|lane| road.facts.has_lane(**lane))
+            .map(|lane| lane.name())
+            .collect();
+        error = error.note(format!("the way through `{}` has the lanes {}", road.name, listed(&there)));
+    }
+    Some(match nearest {
+        Some((field, shown)) => error.help(format!("the nearest legal value is {shown}")).fix(
+            format!("write `{shown}`"),
+            field.value.span,
+            shown,
+        ),
+        None => error,
+    })
+}

@@ -1,0 +1,108 @@
+//! Values in scenarios: literals only, read back to the very f64 that was written.
+
+use crate::check::expression::{exact_digits, unknown_unit};
+use crate::check::names::unknown;
+use crate::model::scenario::Figure;
+use crate::model::{Space, Type, Value, code};
+use crate::syntax::ast::UnaryOp;
+use crate::syntax::{Diagnostic, ast};
+use crate::units;
+use crate::units::{Dimension, Rational};
+
+/// The literal as a value of that type.
+///
+/// # Errors
+/// If it is no literal, or not of that type.
+pub(super) fn value(space: &Space, expr: &ast::Expr, ty: Type) -> Result<Value, Diagnostic> {
+    match (ty, &expr.kind) {
+        (Type::Enum(of), ast::ExprKind::Name(name)) => {
+            let variants = &space.enums[of.0].variants;
+            match variants.iter().position(|variant| variant == name) {
+                Some(variant) => Ok(Value::Variant(of, variant)),
+                None => Err(unknown("variant", name, expr.span, variants.iter().map(String::as_str))),
+            }
+        }
+        (Type::Bool, ast::ExprKind::Bool(truth)) => Ok(Value::Bool(*truth)),
+        (Type::Int, _) => {
+            let found = number(expr, Dimension::RATIO)?;
+            if found.floor() == found {
+                return Ok(Value::Number(found));
+            }
+            Err(Diagnostic::error(code::TYPE_MISMATCH, "wanted a whole number").at(expr.span, "not one"))
+        }
+        (Type::Quantity(dimension), _) => number(expr, dimension).map(Value::Number),
+        (Type::Enum(of), _) => {
+            let message = format!("wanted a `{}`", space.enums[of.0].name);
+            Err(Diagnostic::error(code::TYPE_MISMATCH, message).at(expr.span, "not one"))
+        }
+        (Type::Bool, _) => {
+            Err(Diagnostic::error(code::TYPE_MISMATCH, "wanted `true` or `false`").at(expr.span, "neither"))
+        }
+    }
+}
+
+/// A number in SI units.
+///
+/// # Errors
+/// If it is no number, its unit is unknown or of another dimension.
+pub(super) fn number(expr: &ast::Expr, dimension: Dimension) -> Result<f64, Diagnostic> {
+    match &expr.kind {
+        ast::ExprKind::Unary { op: UnaryOp::Negate, operand } => {
+            number(operand, dimension).map(|value| -value)
+        }
+        ast::ExprKind::Number(literal) => read(literal, dimension),
+        _ => Err(Diagnostic::error(code::TYPE_MISMATCH, "wanted a number").at(expr.span, "not one")),
+    }
+}
+
+/// A number in SI units with the precision to which it was written.
+///
+/// # Errors
+/// As [`number`].
+pub(super) fn figure(expr: &ast::Expr, dimension: Dimension) -> Result<Figure, Diagnostic> {
+    let value = number(expr, dimension)?;
+    let decimals = match &expr.kind {
+        ast::ExprKind::Unary { operand, .. } => decimals(operand),
+        _ => decimals(expr),
+    };
+    Ok(Figure { value, decimals })
+}
+
+/// Places after the point of a literal in its SI unit; all that f64 has for any other.
+fn decimals(expr: &ast::Expr) -> usize {
+    const ALL: usize = 17;
+    match &expr.kind {
+        ast::ExprKind::Number(literal)
+            if literal.unit.as_ref().is_none_or(|unit| unit.text == "s")
+                && !literal.digits.contains(['e', 'E']) =>
+        {
+            literal.digits.split_once('.').map_or(0, |(_, fraction)| fraction.len().min(ALL))
+        }
+        _ => ALL,
+    }
+}
+
+fn read(literal: &ast::Number, dimension: Dimension) -> Result<f64, Diagnostic> {
+    let (found, factor) = match &literal.unit {
+        None => (Dimension::RATIO, Rational::ONE),
+        Some(word) => match units::unit(&word.text) {
+            Some(unit) => (unit.dimension, unit.factor()),
+            None => return Err(unknown_unit(word)),
+        },
+    };
+    if found != dimension {
+        let message = format!("unit mismatch: wanted `{dimension}`, found `{found}`");
+        return Err(
+            Diagnostic::error(code::UNIT_MISMATCH, message).at(literal.span, format!("this is `{found}`"))
+        );
+    }
+    let too_large = || Diagnostic::error(code::NUMBER, "the number is too large").at(literal.span, "");
+    if factor == Rational::ONE {
+        // As text gives f64: what was written to the last bit is read to the last bit.
+        return literal.digits.parse::<f64>().ok().filter(|value| value.is_finite()).ok_or_else(too_large);
+    }
+    exact_digits(&literal.digits)
+        .and_then(|digits| digits.checked_mul(factor))
+        .map(Rational::to_f64)
+        .ok_or_else(too_large)
+}

@@ -1,0 +1,205 @@
+//! Episode, reward and verdicts.
+
+use crate::check::checker::{Checker, docs, each};
+use crate::check::expression::Place;
+use crate::check::names::{Names, unknown};
+use crate::model::expr::{Expr, ExprKind, Fact};
+use crate::model::{COUNTED, EpisodeDef, RewardCase, TICK_MS, Type, VerdictDef, code};
+use crate::syntax::ast::{BinaryOp, ItemKind, Span};
+use crate::syntax::{Diagnostic, ast};
+use crate::units::{Dimension, Rational};
+
+/// The paper's observation period, s.
+const STEP_S: f64 = 6.0;
+
+/// An observation period may last so long, s.
+const STEP_S_MAX: f64 = 600.0;
+
+/// Steps of an episode, if the space does not say.
+const STEP_LIMIT: u32 = 20;
+
+impl Checker {
+    /// The settings, and the names of the roads if the block gives them.
+    pub(super) fn episode(&mut self, items: &[&ast::Item]) -> (EpisodeDef, Option<Vec<ast::Name>>) {
+        const FIELDS: [&str; 4] = ["roads", "step", "stop", "limit"];
+        let mut episode =
+            EpisodeDef { step_s: STEP_S, stop_arrived: true, stalled_steps: None, step_limit: STEP_LIMIT };
+        let mut roads = None;
+        let mut first: Option<Span> = None;
+        let blocks = each(items, |kind| match kind {
+            ItemKind::Episode(fields) => Some(fields),
+            _ => None,
+        });
+        for (item, fields) in blocks {
+            if let Some(first) = first.replace(item.span) {
+                let error = Diagnostic::error(code::DUPLICATE, "`episode` is declared twice");
+                let error = error.at(item.span, "again here").beside(first, "first here");
+                self.report(match first.file == item.span.file {
+                    true => error.help("remove one of them"),
+                    false => error.help("write `override` before the later one to replace the other"),
+                });
+                continue;
+            }
+            let mut names = Names::default();
+            for (index, field) in fields.iter().enumerate() {
+                if let Err(error) = names.declare("field", &field.name, index) {
+                    self.report(error);
+                }
+                match field.name.text.as_str() {
+                    "roads" => roads = self.road_list(&field.value),
+                    "step" => episode.step_s = self.step(&field.value).unwrap_or(STEP_S),
+                    "stop" => self.stop(&field.value, &mut episode),
+                    "limit" => episode.step_limit = self.count_of_steps(&field.value).unwrap_or(STEP_LIMIT),
+                    _ => self.report(unknown("field", &field.name.text, field.name.span, FIELDS)),
+                }
+            }
+        }
+        (episode, roads)
+    }
+
+    fn road_list(&mut self, value: &ast::Expr) -> Option<Vec<ast::Name>> {
+        let ast::ExprKind::List(items) = &value.kind else {
+            let error = Diagnostic::error(code::TYPE_MISMATCH, "`roads` needs a list of roads");
+            self.report(error.at(value.span, "not a list").help("write `roads: [name, name]`"));
+            return None;
+        };
+        let mut roads = Vec::new();
+        for item in items {
+            match &item.kind {
+                ast::ExprKind::Name(name) => roads.push(ast::Name::new(name.clone(), item.span)),
+                _ => self.report(
+                    Diagnostic::error(code::TYPE_MISMATCH, "`roads` needs names").at(item.span, "not a name"),
+                ),
+            }
+        }
+        Some(roads)
+    }
+
+    fn step(&mut self, value: &ast::Expr) -> Option<f64> {
+        let step = self.typed(value, &Place::default(), Type::Quantity(Dimension::DURATION))?;
+        let exact_s = self.fold_number(&step)?;
+        let seconds = exact_s.to_f64();
+        let ticks = exact_s.checked_mul(Rational::integer(1000)).and_then(|ms| ms.to_i64());
+        let is_whole = ticks.is_some_and(|ms| ms % i64::from(TICK_MS) == 0);
+        if is_whole && seconds > 0.0 && seconds <= STEP_S_MAX {
+            return Some(seconds);
+        }
+        let error = Diagnostic::error(code::SETTING, format!("a step of {seconds} s is not possible"));
+        let wanted = format!("must be a multiple of {TICK_MS} ms, more than 0 s and at most {STEP_S_MAX} s");
+        self.report(error.at(value.span, wanted).help("time passes in ticks; write for example `6 s`"));
+        None
+    }
+
+    /// `20`, or `20 steps`.
+    fn count_of_steps(&mut self, value: &ast::Expr) -> Option<u32> {
+        let count = match &value.kind {
+            ast::ExprKind::Number(number)
+                if number.unit.as_ref().is_none_or(|unit| matches!(unit.text.as_str(), "steps" | "step")) =>
+            {
+                number.digits.parse::<u32>().ok().filter(|count| *count > 0)
+            }
+            _ => None,
+        };
+        if count.is_none() {
+            let error = Diagnostic::error(code::SETTING, "wanted a number of steps");
+            self.report(error.at(value.span, "not a whole number from 1").help("write `20 steps`"));
+        }
+        count
+    }
+
+    /// `arrived`, `stalled >= 4`, or both with `or` between them.
+    fn stop(&mut self, value: &ast::Expr, episode: &mut EpisodeDef) {
+        episode.stop_arrived = false;
+        let mut parts = vec![value];
+        while let Some(part) = parts.pop() {
+            match &part.kind {
+                ast::ExprKind::Binary { op: BinaryOp::Or, left, right, .. } => {
+                    parts.extend([&**left, &**right])
+                }
+                ast::ExprKind::Name(name) if name == "arrived" => episode.stop_arrived = true,
+                ast::ExprKind::Binary { op: BinaryOp::GreaterEqual, left, right, .. } if matches!(&left.kind, ast::ExprKind::Name(name) if name == "stalled") =>
+                {
+                    episode.stalled_steps = self.count_of_steps(right);
+                }
+                _ => {
+                    let error = Diagnostic::error(code::STOP, "an episode cannot be stopped by this");
+                    self.report(error.at(part.span, "unknown reason").help(
+                        "reasons are `arrived` and `stalled >= 4` (steps without progress), joined by `or`",
+                    ));
+                }
+            }
+        }
+    }
+
+    pub(super) fn reward(&mut self, items: &[&ast::Item]) -> Vec<RewardCase> {
+        let place = Place { outcome: true, ..Place::default() };
+        let mut cases = Vec::new();
+        let mut first: Option<Span> = None;
+        let blocks = each(items, |kind| match kind {
+            ItemKind::Reward(cases) => Some(cases),
+            _ => None,
+        });
+        for (item, declared) in blocks {
+            if let Some(first) = first.replace(item.span) {
+                let error = Diagnostic::error(code::DUPLICATE, "`reward` is declared twice");
+                let error = error.at(item.span, "again here").beside(first, "first here");
+                self.report(match first.file == item.span.file {
+                    true => error.help("remove one of them"),
+                    false => error.help("write `override` before the later one to replace the other"),
+                });
+                continue;
+            }
+            let mut closed = false;
+            for case in declared {
+                if closed {
+                    let error = Diagnostic::error(code::NEVER_REACHED, "this case is never reached");
+                    let error = error.at(case.span, "`_` before it takes everything");
+                    self.report(error.help("let `_` be the last line, or remove this one"));
+                }
+                let condition = case.condition.as_ref().map(|c| self.typed(c, &place, Type::Bool));
+                let value = self.typed(&case.value, &place, Type::Quantity(Dimension::RATIO));
+                closed |= condition.is_none();
+                if let (Some(value), false) = (value, matches!(condition, Some(None))) {
+                    cases.push(RewardCase { condition: condition.flatten(), value });
+                }
+            }
+            if !closed {
+                let error = Diagnostic::error(code::NOT_EXHAUSTIVE, "`reward` does not cover every case");
+                self.report(error.at(item.span, "the rest is missing").help("end with `_ => 0`"));
+            }
+        }
+        cases
+    }
+
+    pub(super) fn verdicts(&mut self, items: &[&ast::Item]) -> Vec<VerdictDef> {
+        let place = Place { outcome: true, judged: true, ..Place::default() };
+        let mut names = Names::default();
+        let mut verdicts = Vec::new();
+        for (item, declared) in each(items, |kind| match kind {
+            ItemKind::Verdict(declared) => Some(declared),
+            _ => None,
+        }) {
+            if let Err(error) = names.declare("verdict", &declared.name, verdicts.len()) {
+                self.report(error);
+            }
+            if let Some(condition) = self.typed(&declared.condition, &place, Type::Bool) {
+                verdicts.push(VerdictDef { name: declared.name.text.clone(), docs: docs(item), condition });
+            }
+        }
+        if names.get(COUNTED).is_none() {
+            verdicts.push(counted());
+        }
+        verdicts
+    }
+}
+
+/// The verdict of a space that declares none of that name, as the paper counts:
+/// `collision and not repeated and not sudden`.
+fn counted() -> VerdictDef {
+    let expr = |kind| Expr { kind, ty: Type::Bool, span: Span::NONE };
+    let fact = |fact| Box::new(expr(ExprKind::Fact(fact)));
+    let not = |of| Box::new(expr(ExprKind::Not(fact(of))));
+    let first = Box::new(expr(ExprKind::And(fact(Fact::Collision), not(Fact::Repeated))));
+    let condition = expr(ExprKind::And(first, not(Fact::Sudden)));
+    VerdictDef { name: COUNTED.to_owned(), docs: Vec::new(), condition }
+}

@@ -1,0 +1,202 @@
+//! Declarations that nothing names.
+//!
+//! Only those of the space's own file are looked at: a used file offers more than each user takes.
+//! Names are compared, not scopes: what shares its name with something used is let pass. A name that
+//! begins with `_` is unused on purpose.
+
+use std::collections::BTreeSet;
+
+use crate::model::code;
+use crate::syntax::ast::{ItemKind, Name, ParamMode};
+use crate::syntax::{Diagnostic, ast};
+
+/// One warning for each declaration of `own` that no declaration of `all` names.
+pub(super) fn report(own: &[&ast::Item], all: &[&ast::Item]) -> Vec<Diagnostic> {
+    // A file without actions is there to be used by others.
+    if !all.iter().any(|item| matches!(item.kind, ItemKind::Action(_))) {
+        return Vec::new();
+    }
+    let mut used = BTreeSet::new();
+    all.iter().for_each(|item| names_of_item(&item.kind, &mut used));
+    let is_unused = |name: &Name| !name.text.starts_with('_') && !used.contains(name.text.as_str());
+    let warning = |what: &str, name: &Name| {
+        Diagnostic::warning(code::UNUSED, format!("{what} `{}` is never used", name.text))
+            .at(name.span, "nothing names it")
+            .help(format!("remove it, or call it `_{}` if it is meant to be there", name.text))
+    };
+    let mut diagnostics = Vec::new();
+    for item in own {
+        match &item.kind {
+            ItemKind::Enum(declared)
+                if is_unused(&declared.name) && declared.variants.iter().all(is_unused) =>
+            {
+                diagnostics.push(warning("enum", &declared.name));
+            }
+            ItemKind::Let(declared) if is_unused(&declared.name) => {
+                diagnostics.push(warning("constant", &declared.name));
+            }
+            ItemKind::Fn(declared) => {
+                if is_unused(&declared.name) {
+                    diagnostics.push(warning("function", &declared.name));
+                }
+                let mut inside = BTreeSet::new();
+                names_of_expr(&declared.body, &mut inside);
+                let params = declared.params.iter().map(|param| &param.name);
+                let unused = params.filter(|name| !inside.contains(name.text.as_str()));
+                diagnostics
+                    .extend(unused.filter(|name| is_unused(name)).map(|name| warning("parameter", name)));
+            }
+            ItemKind::Group(declared) if is_unused(&declared.name) => {
+                diagnostics.push(warning("group", &declared.name));
+            }
+            // The world reads `time` and `sky`, whether the file does or not.
+            ItemKind::State(declared)
+                if is_unused(&declared.name) && !matches!(declared.name.text.as_str(), "time" | "sky") =>
+            {
+                diagnostics.push(warning("state", &declared.name));
+            }
+            ItemKind::Action(declared) => {
+                let drawn = declared.params.iter().filter(|param| param.mode == ParamMode::Any);
+                let unused = drawn.filter(|param| is_unused(&param.name));
+                diagnostics.extend(unused.map(|param| warning("drawn parameter", &param.name)));
+            }
+            _ => {}
+        }
+    }
+    diagnostics
+}
+
+/// What a declaration names, its own names left out.
+fn names_of_item<'a>(kind: &'a ItemKind, used: &mut BTreeSet<&'a str>) {
+    match kind {
+        ItemKind::State(declared) => {
+            names_of_type(&declared.ty, used);
+            if let ast::Initial::Value(value) = &declared.initial {
+                names_of_expr(value, used);
+            }
+        }
+        ItemKind::Let(declared) => names_of_expr(&declared.value, used),
+        ItemKind::Fn(declared) => {
+            declared.params.iter().for_each(|param| names_of_type(&param.ty, used));
+            names_of_type(&declared.result, used);
+            names_of_expr(&declared.body, used);
+        }
+        ItemKind::Action(declared) => {
+            for param in &declared.params {
+                names_of_type(&param.ty, used);
+                param.within.iter().for_each(|within| names_of_expr(within, used));
+                // A parameter whose own `where` alone names it is used for nothing.
+                if let Some(condition) = &param.condition {
+                    let mut inside = BTreeSet::new();
+                    names_of_expr(condition, &mut inside);
+                    inside.remove(param.name.text.as_str());
+                    used.extend(inside);
+                }
+            }
+            declared.effects.iter().for_each(|effect| names_of_effect(effect, used));
+        }
+        ItemKind::Group(declared) => used.extend(declared.members.iter().map(|name| name.text.as_str())),
+        ItemKind::Rule(declared) => match &declared.body {
+            ast::RuleBody::Holds { on, condition } => {
+                used.extend(on.iter().map(|name| name.text.as_str()));
+                names_of_expr(condition, used);
+            }
+            ast::RuleBody::Moves { state, moves } => {
+                used.insert(&state.text);
+                for line in moves {
+                    used.insert(&line.from.text);
+                    used.extend(line.to.iter().map(|name| name.text.as_str()));
+                }
+            }
+        },
+        ItemKind::Road(block) => names_of_fields(&block.fields, used),
+        ItemKind::Episode(fields) => names_of_fields(fields, used),
+        ItemKind::Reward(cases) => {
+            for case in cases {
+                case.condition.iter().for_each(|condition| names_of_expr(condition, used));
+                names_of_expr(&case.value, used);
+            }
+        }
+        ItemKind::Verdict(declared) => names_of_expr(&declared.condition, used),
+        ItemKind::Expect(expect) => names_of_expr(&expect.claim, used),
+        ItemKind::Odds(declared) => {
+            used.insert(&declared.name.text);
+            declared.arms.iter().for_each(|arm| names_of_expr(&arm.value, used));
+        }
+        ItemKind::Override(inner) => names_of_item(inner, used),
+        ItemKind::Language(_)
+        | ItemKind::Use(_)
+        | ItemKind::Enum(_)
+        | ItemKind::Scenario(_)
+        | ItemKind::Policy(_) => {}
+    }
+}
+
+fn names_of_type<'a>(ty: &'a ast::Type, used: &mut BTreeSet<&'a str>) {
+    match &ty.kind {
+        ast::TypeKind::Named(name) => {
+            used.insert(&name.text);
+        }
+        ast::TypeKind::Map { key, value } => used.extend([key.text.as_str(), value.text.as_str()]),
+    }
+}
+
+fn names_of_effect<'a>(effect: &'a ast::Effect, used: &mut BTreeSet<&'a str>) {
+    match &effect.kind {
+        ast::EffectKind::Set { state, key, value } => {
+            used.insert(&state.text);
+            key.iter().for_each(|key| names_of_expr(key, used));
+            names_of_expr(value, used);
+        }
+        ast::EffectKind::Spawn { body, distance, fields, .. } => {
+            names_of_expr(body, used);
+            names_of_expr(distance, used);
+            names_of_fields(fields, used);
+        }
+    }
+}
+
+fn names_of_fields<'a>(fields: &'a [ast::Field], used: &mut BTreeSet<&'a str>) {
+    fields.iter().for_each(|field| names_of_expr(&field.value, used));
+}
+
+/// Every name in an expression, whatever it stands for.
+pub(crate) fn names_of_expr<'a>(expr: &'a ast::Expr, used: &mut BTreeSet<&'a str>) {
+    match &expr.kind {
+        ast::ExprKind::Name(name) => {
+            used.insert(name);
+        }
+        ast::ExprKind::Unary { operand, .. } => names_of_expr(operand, used),
+        ast::ExprKind::Binary { left, right, .. } => {
+            names_of_expr(left, used);
+            names_of_expr(right, used);
+        }
+        ast::ExprKind::Range { low, high } => {
+            names_of_expr(low, used);
+            names_of_expr(high, used);
+        }
+        ast::ExprKind::Field { base, .. } => names_of_expr(base, used),
+        ast::ExprKind::Index { base, index } => {
+            names_of_expr(base, used);
+            names_of_expr(index, used);
+        }
+        ast::ExprKind::Call(call) => {
+            used.insert(&call.name.text);
+            call.args.iter().for_each(|argument| names_of_expr(&argument.value, used));
+        }
+        ast::ExprKind::List(items) => items.iter().for_each(|item| names_of_expr(item, used)),
+        ast::ExprKind::Record(fields) => names_of_fields(fields, used),
+        ast::ExprKind::Match { subject, arms } => {
+            names_of_expr(subject, used);
+            for arm in arms {
+                used.extend(arm.patterns.iter().map(|pattern| pattern.text.as_str()));
+                names_of_expr(&arm.value, used);
+            }
+        }
+        ast::ExprKind::Number(_)
+        | ast::ExprKind::Text(_)
+        | ast::ExprKind::Bool(_)
+        | ast::ExprKind::LanePoint { .. }
+        | ast::ExprKind::Numbered { .. } => {}
+    }
+}

@@ -1,0 +1,50 @@
+//! The memory as sets of values: what each cell may hold, and how an action changes that.
+
+use crate::model::{EffectDef, Interval, SetDef, Space, StateDef, Type};
+use crate::prove::enclose::{Known, Values, enclose};
+
+impl Space {
+    /// [`Space::memory_after`] for sets of values.
+    pub(crate) fn cells_after(&self, action: usize, locals: &[Values], before: &[Values]) -> Vec<Values> {
+        let mut after = before.to_vec();
+        for effect in &self.actions[action].effects {
+            let EffectDef::Set(set) = effect else { continue };
+            let SetDef { state, key, value, .. } = &**set;
+            let known = Known { functions: &self.functions, locals, cells: &after, road: None };
+            let value = enclose(value, &known);
+            let key = key.as_ref().map(|key| enclose(key, &known));
+            let state = &self.states[*state];
+            let cells = &mut after[state.first_cell..][..state.cells];
+            match key {
+                None => cells.fill(value),
+                Some(Values::Variants(set)) if set.is_power_of_two() => {
+                    cells[set.trailing_zeros() as usize] = value;
+                }
+                Some(Values::Variants(set)) => {
+                    let hit = cells.iter_mut().enumerate().filter(|(key, _)| set >> key & 1 == 1);
+                    hit.for_each(|(_, cell)| *cell = cell.union(value));
+                }
+                Some(Values::Truth { .. } | Values::Number(_)) => {}
+            }
+        }
+        after
+    }
+
+    /// Every value of every cell.
+    pub(crate) fn cells_unknown(&self) -> Vec<Values> {
+        let unknown = |state: &StateDef| core::iter::repeat_n(self.all_values(state.ty), state.cells);
+        self.states.iter().flat_map(unknown).collect()
+    }
+
+    /// Every value of a type.
+    pub(crate) fn all_values(&self, ty: Type) -> Values {
+        match ty {
+            Type::Bool => Values::UNKNOWN_TRUTH,
+            Type::Int | Type::Quantity(_) => Values::Number(Interval::ALL),
+            Type::Enum(of) => {
+                let count = self.enums[of.0].variants.len();
+                Values::Variants(u128::MAX >> (128 - count))
+            }
+        }
+    }
+}

@@ -1,0 +1,170 @@
+//! A state with a transition rule as a graph: which values an episode can come to, and how.
+
+use std::collections::VecDeque;
+
+use crate::model::{Initial, Reach, Row, RuleBody, RuleDef, Space, Type, Value, code};
+use crate::prove::enclose::Values;
+use crate::prove::reach::{Prover, numbers};
+use crate::syntax::{Diagnostic, listed};
+
+/// The graph of one rule.
+struct Graph<'a> {
+    allowed: &'a [Vec<bool>],
+    /// Rows that set the state, and the values that each may set, as bits.
+    rows: Vec<(&'a Row, u128)>,
+    /// Values that an episode may begin with, as bits.
+    begin: u128,
+}
+
+/// Values that cannot be left, or not be reached from where episodes begin; rows never enabled.
+pub(crate) fn report(space: &Space) -> Vec<Diagnostic> {
+    let mut diagnostics = Vec::new();
+    for rule in &space.rules {
+        let Some(graph) = graph(space, rule) else { continue };
+        let RuleBody::Moves { state, .. } = &rule.body else { continue };
+        let state = &space.states[*state];
+        let Type::Enum(of) = state.ty else { continue };
+        let variants = &space.enums[of.0].variants;
+        let names = |set: u128| -> Vec<&str> { bits(set).map(|value| variants[value].as_str()).collect() };
+        let reached = graph.reached();
+        let all = u128::MAX >> (128 - variants.len());
+        let stuck: u128 = bits(reached).filter(|from| graph.is_stuck(*from)).map(|value| 1 << value).sum();
+        if stuck != 0 && variants.len() > 1 && graph.rows.len() > 1 {
+            let names = names(stuck);
+            let message = format!("`{}` can never leave {}", state.name, listed(&names));
+            let warning = Diagnostic::warning(code::STUCK, message)
+                .at(rule.span, "allows no move from there to another value")
+                .help(format!("add `{} -> …` with another value, if an episode should go on", names[0]));
+            diagnostics.push(warning);
+        }
+        // Values that nothing leads to were named with the rule itself.
+        let led_to =
+            |value: &usize| (0..variants.len()).any(|from| from != *value && graph.allowed[from][*value]);
+        let unreached: u128 = bits(all & !reached).filter(led_to).map(|value| 1 << value).sum();
+        if unreached != 0 {
+            let begin = names(graph.begin);
+            let message = format!("`{}` never comes to {}", state.name, listed(&names(unreached)));
+            let warning = Diagnostic::warning(code::UNREACHABLE, message)
+                .at(rule.span, format!("no actions lead there from {}", listed(&begin)))
+                .beside(state.span, "begins here");
+            diagnostics
+                .push(warning.help("begin elsewhere, allow more moves, or add an action that sets it"));
+        }
+        let never: Vec<&Row> = graph
+            .rows
+            .iter()
+            .filter(|(row, _)| row.roads.iter().any(|reach| matches!(reach, Reach::Open(_))))
+            .filter(|(_, sets)| !bits(reached).any(|from| bits(*sets).any(|to| graph.allowed[from][to])))
+            .map(|(row, _)| *row)
+            .collect();
+        if let Some(first) = never.first() {
+            let message = format!("`{}` is never enabled", first.label);
+            let warning = Diagnostic::warning(code::NEVER_ENABLED, message)
+                .at(space.actions[first.action].span, numbers(&never))
+                .beside(rule.span, format!("forbids it wherever `{}` can be", state.name));
+            diagnostics.push(warning.help("allow the move, or remove the rows with `where`"));
+        }
+    }
+    diagnostics
+}
+
+/// The shortest way of one row after another by which a state may come from one value to another
+/// under a transition rule; empty if there is none, or it is there already.
+pub(crate) fn shortest_way<'a>(space: &'a Space, rule: &'a RuleDef, from: Value, to: Value) -> Vec<&'a Row> {
+    let Some(graph) = graph(space, rule) else { return Vec::new() };
+    graph.way(from.variant(), to.variant()).into_iter().map(|index| graph.rows[index].0).collect()
+}
+
+/// The rows that a transition rule allows where the state has that value, and whose own value is
+/// certain.
+pub(crate) fn next_rows<'a>(space: &'a Space, rule: &'a RuleDef, from: Value) -> Vec<&'a Row> {
+    let Some(graph) = graph(space, rule) else { return Vec::new() };
+    let allowed =
+        |sets: u128| sets.is_power_of_two() && graph.allowed[from.variant()][sets.trailing_zeros() as usize];
+    graph.rows.iter().filter(|(_, sets)| allowed(*sets)).map(|(row, _)| *row).collect()
+}
+
+/// Whether a transition rule forbids a row wherever the state has one of these values (bits).
+pub(crate) fn forbids(space: &Space, rule: &RuleDef, row: &Row, from: u128) -> bool {
+    let Some(graph) = graph(space, rule) else { return false };
+    let sets = graph.rows.iter().find(|(other, _)| other.index == row.index).map_or(0, |(_, sets)| *sets);
+    sets != 0 && !bits(from).any(|from| bits(sets).any(|to| graph.allowed[from][to]))
+}
+
+fn graph<'a>(space: &'a Space, rule: &'a RuleDef) -> Option<Graph<'a>> {
+    let RuleBody::Moves { state, allowed, actions } = &rule.body else { return None };
+    let definition = &space.states[*state];
+    let begin = match &definition.initial {
+        Initial::Any => u128::MAX >> (128 - allowed.len()),
+        Initial::Value(expr) => match &expr.kind {
+            crate::model::expr::ExprKind::Variant(_, value) => 1 << value,
+            _ => u128::MAX >> (128 - allowed.len()),
+        },
+    };
+    let rows = space.rows.iter().filter(|row| actions.contains(&row.action)).map(|row| {
+        let values = crate::model::locals(&space.actions[row.action], row, &[]);
+        let prover = Prover { space, row, values: &values, bounds: &[], road: None };
+        let after = space.cells_after(row.action, &prover.declared(), &space.cells_unknown());
+        match after[definition.first_cell] {
+            Values::Variants(set) => (row, set),
+            Values::Truth { .. } | Values::Number(_) => (row, 0),
+        }
+    });
+    Some(Graph { allowed, rows: rows.collect(), begin })
+}
+
+impl Graph<'_> {
+    /// Every value to which moves and rows together lead.
+    fn reached(&self) -> u128 {
+        let mut reached = self.begin;
+        loop {
+            let sets = self.rows.iter().fold(0, |all, (_, sets)| all | sets);
+            let next = bits(reached)
+                .flat_map(|from| bits(sets).filter(move |to| self.allowed[from][*to]))
+                .fold(reached, |all, to| all | 1 << to);
+            if next == reached {
+                return reached;
+            }
+            reached = next;
+        }
+    }
+
+    /// Whether a value leads to itself alone, though to itself it does.
+    fn is_stuck(&self, from: usize) -> bool {
+        self.allowed[from].iter().enumerate().all(|(to, allowed)| *allowed == (to == from))
+    }
+
+    /// Breadth first, over rows whose value is certain.
+    fn way(&self, from: usize, to: usize) -> Vec<usize> {
+        let mut came_by: Vec<Option<(usize, usize)>> = vec![None; self.allowed.len()];
+        let mut open = VecDeque::from([from]);
+        while let Some(value) = open.pop_front() {
+            if value == to {
+                break;
+            }
+            for (index, (_, sets)) in self.rows.iter().enumerate() {
+                let next = sets.trailing_zeros() as usize;
+                if sets.is_power_of_two()
+                    && self.allowed[value][next]
+                    && next != from
+                    && came_by[next].is_none()
+                {
+                    came_by[next] = Some((value, index));
+                    open.push_back(next);
+                }
+            }
+        }
+        let mut way = Vec::new();
+        let mut at = to;
+        while let Some((before, row)) = came_by[at].filter(|_| at != from) {
+            way.push(row);
+            at = before;
+        }
+        way.reverse();
+        way
+    }
+}
+
+fn bits(set: u128) -> impl Iterator<Item = usize> {
+    (0..128).filter(move |bit| set >> bit & 1 == 1)
+}

@@ -1,0 +1,153 @@
+//! Ranges of which the rules leave less than half: usually meant, sometimes a slip of the pen.
+
+use crate::model::expr::Comparison;
+use crate::model::{Domain, End, Interval, Parameter, Reach, Space, Type, bounds, code, locals};
+use crate::prove::reach::Prover;
+use crate::syntax::{Diagnostic, listed};
+use crate::units::Rational;
+
+/// One remark for each rule and range that is cut alike, naming the actions and roads.
+pub(super) fn report(space: &Space) -> Vec<Diagnostic> {
+    let mut found: Vec<Cut<'_>> = Vec::new();
+    for row in &space.rows {
+        for (road, reach) in space.roads.iter().zip(&row.roads) {
+            let Reach::Open(ranges) = reach else { continue };
+            for (name, kept) in ranges {
+                let action = &space.actions[row.action];
+                let parameter = action.parameters.iter().find(|parameter| parameter.name == *name);
+                let Some(parameter) = parameter else { continue };
+                let Some(percent) = kept_percent(&parameter.domain, kept) else { continue };
+                let rules = cutting_rules(space, row.action, parameter);
+                if rules.is_empty() {
+                    continue;
+                }
+                let cut = Cut { parameter, kept: *kept, percent, rules, road: &road.name };
+                let alike = |known: &&mut Cut<'_>| {
+                    known.parameter.name == cut.parameter.name
+                        && (known.road, known.kept, &known.rules) == (cut.road, cut.kept, &cut.rules)
+                        && known.parameter.domain == cut.parameter.domain
+                };
+                if found.iter_mut().find(alike).is_none() {
+                    found.push(cut);
+                }
+            }
+        }
+    }
+    found.into_iter().map(|cut| cut.remark(space)).collect()
+}
+
+struct Cut<'a> {
+    parameter: &'a Parameter,
+    kept: Interval,
+    /// Of the declared range.
+    percent: f64,
+    rules: Vec<usize>,
+    road: &'a str,
+}
+
+impl Cut<'_> {
+    fn remark(self, space: &Space) -> Diagnostic {
+        let Type::Quantity(dimension) = self.parameter.ty else {
+            unreachable!("whole numbers are lists of values")
+        };
+        let names: Vec<&str> = self.rules.iter().map(|rule| space.rules[*rule].name.as_str()).collect();
+        let message = format!(
+            "{} {} {:.0} % of the range of `{}` on `{}`",
+            listed(&names),
+            if names.len() == 1 { "leaves" } else { "leave" },
+            self.percent,
+            self.parameter.name,
+            self.road,
+        );
+        let remark = Diagnostic::remark(code::CUT, message)
+            .at(self.parameter.span, format!("{} {} is left", self.kept, dimension.si_unit()));
+        self.rules
+            .iter()
+            .fold(remark, |remark, rule| remark.beside(space.rules[*rule].span, "by this rule"))
+            .help("if that is meant, all is well; else narrow the range or loosen the rule")
+    }
+}
+
+/// How much of a range is left, if less than half, and more than nothing.
+fn kept_percent(domain: &Domain, kept: &Interval) -> Option<f64> {
+    let (Domain::Range(low, high), End::At(from, _), End::At(to, _)) = (domain, kept.low, kept.high) else {
+        return None;
+    };
+    let (whole, left) = (high.checked_sub(*low)?, to.checked_sub(from)?);
+    let share = left.checked_div(whole)?;
+    let half = Rational::new(1, 2).expect("2 is not 0");
+    // A single value is what an equality asks for, and no accident.
+    (share > Rational::ZERO && share < half).then(|| share.to_f64() * 100.0)
+}
+
+/// Rules in force that bound the parameter, none of them by an equality.
+fn cutting_rules(space: &Space, action: usize, parameter: &Parameter) -> Vec<usize> {
+    let local = space.actions[action].parameters.iter().position(|known| known.name == parameter.name);
+    let bounds = bounds(space, action);
+    let on_it = || bounds.iter().filter(|bound| Some(bound.local) == local);
+    if on_it().any(|bound| bound.op == Comparison::Equal) {
+        return Vec::new();
+    }
+    let mut rules: Vec<usize> =
+        on_it().filter_map(|bound| bound.rule).filter(|rule| !space.rules[*rule].optional).collect();
+    rules.sort_unstable();
+    rules.dedup();
+    rules
+}
+
+/// How much of the range of a parameter a rule takes away by itself on a road, in percent: the least
+/// and the most among the rows that it binds.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct Removal {
+    pub parameter: String,
+    pub road: String,
+    pub percent_min: f64,
+    pub percent_max: f64,
+}
+
+/// What a rule by itself removes from the ranges of the rows that it binds; nothing for a rule that
+/// bounds no range.
+pub fn removals(space: &Space, rule: usize) -> Vec<Removal> {
+    let mut found: Vec<Removal> = Vec::new();
+    for row in space.rows.iter().filter(|row| row.rules.contains(&rule)) {
+        let action = &space.actions[row.action];
+        let bounds = bounds(space, row.action);
+        let values = locals(action, row, &[]);
+        for road in &space.roads {
+            let prover = Prover { space, row, values: &values, bounds: &bounds, road: Some(road) };
+            let settled = prover.settle(&[rule]);
+            for bound in bounds.iter().filter(|bound| bound.rule == Some(rule)) {
+                let parameter = &action.parameters[bound.local];
+                let kept = settled.as_ref().map(|settled| settled[bound.local].interval());
+                let Some(percent) = removed_percent(&parameter.domain, kept) else { continue };
+                let same =
+                    |known: &&mut Removal| known.parameter == *parameter.name && known.road == road.name;
+                match found.iter_mut().find(same) {
+                    Some(known) => {
+                        known.percent_min = known.percent_min.min(percent);
+                        known.percent_max = known.percent_max.max(percent);
+                    }
+                    None => found.push(Removal {
+                        parameter: parameter.name.to_string(),
+                        road: road.name.clone(),
+                        percent_min: percent,
+                        percent_max: percent,
+                    }),
+                }
+            }
+        }
+    }
+    found
+}
+
+/// `None` for what is no range, or a range of one number; all of it if nothing is kept.
+fn removed_percent(domain: &Domain, kept: Option<Interval>) -> Option<f64> {
+    let Domain::Range(low, high) = domain else { return None };
+    let whole = high.checked_sub(*low).filter(|whole| *whole > Rational::ZERO)?;
+    let left = match kept.map(|kept| (kept.low, kept.high)) {
+        Some((End::At(from, _), End::At(to, _))) => to.checked_sub(from)?,
+        Some(_) => return None,
+        None => Rational::ZERO,
+    };
+    Some(100.0 - left.checked_div(whole)?.to_f64() * 100.0)
+}

@@ -1,0 +1,217 @@
+//! Interval evaluation: all values that an expression may have, given all values of what it names.
+//!
+//! The static counterpart of `eval`, over exact numbers. It over-approximates, so "never true" is a
+//! proof and "may be true" is not.
+
+use crate::model::expr::{Arithmetic, Comparison, Expr, ExprKind, Fact};
+use crate::model::{FnDef, Interval, RoadFacts};
+use crate::units::Rational;
+
+/// Enums have at most so many variants, so that a set of them is one integer.
+pub(crate) const VARIANTS_MAX: usize = 128;
+
+/// A set of values of one type.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Values {
+    Truth {
+        may_hold: bool,
+        may_fail: bool,
+    },
+    Number(Interval),
+    /// Bit `i` is variant `i`.
+    Variants(u128),
+}
+
+/// What is known where an expression stands.
+#[derive(Clone, Copy)]
+pub(crate) struct Known<'a> {
+    pub functions: &'a [FnDef],
+    pub locals: &'a [Values],
+    pub cells: &'a [Values],
+    /// `None`: any road.
+    pub road: Option<&'a RoadFacts>,
+}
+
+impl Values {
+    pub const UNKNOWN_TRUTH: Values = Values::Truth { may_hold: true, may_fail: true };
+
+    pub fn truth(value: bool) -> Values {
+        Values::Truth { may_hold: value, may_fail: !value }
+    }
+
+    pub fn may_hold(self) -> bool {
+        matches!(self, Values::Truth { may_hold: true, .. })
+    }
+
+    pub fn may_fail(self) -> bool {
+        matches!(self, Values::Truth { may_fail: true, .. })
+    }
+
+    pub fn interval(self) -> Interval {
+        match self {
+            Values::Number(interval) => interval,
+            Values::Truth { .. } | Values::Variants(_) => Interval::ALL,
+        }
+    }
+
+    /// The positions as bits; `false` is bit 0 and `true` is bit 1.
+    fn variants(self) -> u128 {
+        match self {
+            Values::Variants(set) => set,
+            Values::Truth { may_hold, may_fail } => u128::from(may_fail) | u128::from(may_hold) << 1,
+            Values::Number(_) => 0,
+        }
+    }
+
+    /// Everything in either.
+    pub fn union(self, other: Values) -> Values {
+        match (self, other) {
+            (Values::Number(a), Values::Number(b)) => Values::Number(a.hull(&b)),
+            (Values::Variants(a), Values::Variants(b)) => Values::Variants(a | b),
+            (a, b) => Values::Truth {
+                may_hold: a.may_hold() || b.may_hold(),
+                may_fail: a.may_fail() || b.may_fail(),
+            },
+        }
+    }
+}
+
+/// All values that the expression may have.
+pub(crate) fn enclose(expr: &Expr, known: &Known<'_>) -> Values {
+    let values = |expr: &Expr| enclose(expr, known);
+    match &expr.kind {
+        ExprKind::Bool(truth) => Values::truth(*truth),
+        ExprKind::Number(number) => Values::Number(Interval::point(*number)),
+        ExprKind::Variant(_, index) => Values::Variants(1 << index),
+        ExprKind::Local(index) => known.locals[*index],
+        ExprKind::Cell(cell) => known.cells[*cell],
+        ExprKind::CellAt(first, key) => {
+            let chosen = positions(values(key).variants()).map(|key| known.cells[first + key]);
+            chosen.reduce(Values::union).unwrap_or(Values::Variants(0))
+        }
+        ExprKind::Fact(fact) => fact_values(*fact, known),
+        ExprKind::Call(function, arguments) => {
+            let locals: Vec<Values> = arguments.iter().map(values).collect();
+            enclose(&known.functions[*function].body, &Known { locals: &locals, ..*known })
+        }
+        ExprKind::Not(inner) => {
+            let inner = values(inner);
+            Values::Truth { may_hold: inner.may_fail(), may_fail: inner.may_hold() }
+        }
+        ExprKind::Negate(inner) => Values::Number(values(inner).interval().neg()),
+        ExprKind::Arithmetic(op, left, right) => {
+            Values::Number(arithmetic(*op, &values(left).interval(), &values(right).interval()))
+        }
+        ExprKind::Compare(op, left, right) => compare(*op, values(left), values(right)),
+        ExprKind::And(left, right) => and(values(left), values(right)),
+        ExprKind::Or(left, right) => or(values(left), values(right)),
+        ExprKind::Implies(left, right) => {
+            let left = values(left);
+            or(Values::Truth { may_hold: left.may_fail(), may_fail: left.may_hold() }, values(right))
+        }
+        ExprKind::InRange(inner, low, high) => {
+            let inner = values(inner);
+            and(
+                compare(Comparison::GreaterEqual, inner, values(low)),
+                compare(Comparison::LessEqual, inner, values(high)),
+            )
+        }
+        ExprKind::InList(inner, list) => {
+            let inner = values(inner);
+            let equals = list.iter().map(|item| compare(Comparison::Equal, inner, values(item)));
+            equals.reduce(or).unwrap_or(Values::truth(false))
+        }
+        ExprKind::InLanes(inner, lanes) => match known.road {
+            None => Values::UNKNOWN_TRUTH,
+            Some(road) => {
+                let inside = positions(values(inner).variants()).map(|v| road.has_lane(lanes[v]));
+                let (may_hold, may_fail) =
+                    inside.fold((false, false), |(hold, fail), inside| (hold || inside, fail || !inside));
+                Values::Truth { may_hold, may_fail }
+            }
+        },
+        ExprKind::OnRoad(names) => match known.road {
+            None => Values::UNKNOWN_TRUTH,
+            Some(road) => Values::truth(names.contains(&road.name)),
+        },
+        ExprKind::Match { subject, arm_of, arms } => {
+            let chosen = positions(values(subject).variants()).map(|variant| values(&arms[arm_of[variant]]));
+            chosen.reduce(Values::union).unwrap_or_else(|| values(&arms[0]))
+        }
+    }
+}
+
+fn fact_values(fact: Fact, known: &Known<'_>) -> Values {
+    match fact {
+        Fact::RoadLimit => match known.road {
+            Some(road) => Values::Number(Interval::point(road.limit)),
+            None => Values::Number(Interval::NOT_NEGATIVE),
+        },
+        Fact::SpawnGap | Fact::SafetyGap => Values::Number(Interval::NOT_NEGATIVE),
+        Fact::Proc => Values::Number(Interval::closed(Rational::ZERO, Rational::ONE)),
+        Fact::Collision | Fact::Repeated | Fact::Sudden | Fact::Struck | Fact::Avoidable => {
+            Values::UNKNOWN_TRUTH
+        }
+    }
+}
+
+fn positions(set: u128) -> impl Iterator<Item = usize> {
+    (0..VARIANTS_MAX).filter(move |position| set >> position & 1 == 1)
+}
+
+fn and(left: Values, right: Values) -> Values {
+    Values::Truth {
+        may_hold: left.may_hold() && right.may_hold(),
+        may_fail: left.may_fail() || right.may_fail(),
+    }
+}
+
+fn or(left: Values, right: Values) -> Values {
+    Values::Truth {
+        may_hold: left.may_hold() || right.may_hold(),
+        may_fail: left.may_fail() && right.may_fail(),
+    }
+}
+
+fn arithmetic(op: Arithmetic, left: &Interval, right: &Interval) -> Interval {
+    match op {
+        Arithmetic::Add => left.add(right),
+        Arithmetic::Subtract => left.add(&right.neg()),
+        Arithmetic::Multiply => left.mul(right),
+        Arithmetic::Divide => left.div(right),
+    }
+}
+
+fn compare(op: Comparison, left: Values, right: Values) -> Values {
+    // `(may hold, may fail)` of equality, of less, and of less or equal.
+    let (less, at_most, equal) = match (left, right) {
+        (Values::Number(a), Values::Number(b)) => (
+            (!b.is_at_most(&a), !a.is_below(&b)),
+            (!b.is_below(&a), !a.is_at_most(&b)),
+            (!a.intersect(&b).is_empty(), a.single().is_none() || a.single() != b.single()),
+        ),
+        (Values::Variants(a), Values::Variants(b)) if a != 0 && b != 0 => {
+            let (low, high) = (u128::trailing_zeros, |set: u128| 127 - set.leading_zeros());
+            (
+                (low(a) < high(b), high(a) >= low(b)),
+                (low(a) <= high(b), high(a) > low(b)),
+                (a & b != 0, !(a == b && a.is_power_of_two())),
+            )
+        }
+        (Values::Variants(_), Values::Variants(_)) => ((false, true), (false, true), (false, true)),
+        (a, b) => {
+            let same = a.may_hold() && b.may_hold() || a.may_fail() && b.may_fail();
+            let differ = a.may_hold() && b.may_fail() || a.may_fail() && b.may_hold();
+            ((true, true), (true, true), (same, differ))
+        }
+    };
+    let (may_hold, may_fail) = match op {
+        Comparison::Equal => equal,
+        Comparison::NotEqual => (equal.1, equal.0),
+        Comparison::Less => less,
+        Comparison::LessEqual => at_most,
+        Comparison::Greater => (at_most.1, at_most.0),
+        Comparison::GreaterEqual => (less.1, less.0),
+    };
+    Values::Truth { may_hold, may_fail }
+}

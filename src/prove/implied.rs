@@ -1,0 +1,89 @@
+//! Rules that change nothing: they hold by themselves, or follow from others.
+
+use crate::model::{Bound, Row, RuleBody, Space, bounds, code};
+use crate::prove::enclose::enclose;
+use crate::prove::reach::Prover;
+use crate::syntax::{Diagnostic, listed};
+
+/// Rows times rules looked at for all rules together, at most: what is left then is not judged.
+const WORK_MAX: usize = 1_000_000;
+
+/// One warning for each rule that could never refuse anything, whatever the road and the memory. Of
+/// two that follow from each other the later one is named.
+pub(super) fn report(space: &Space) -> Vec<Diagnostic> {
+    let mut diagnostics = Vec::new();
+    let mut work = WORK_MAX;
+    let bounds: Vec<Vec<Bound>> = (0..space.actions.len()).map(|action| bounds(space, action)).collect();
+    let mut kept: Vec<usize> = (0..space.rules.len()).filter(|rule| !space.rules[*rule].optional).collect();
+    for rule in (0..space.rules.len()).rev() {
+        let others: Vec<usize> = kept.iter().copied().filter(|other| *other != rule).collect();
+        if !follows(space, rule, &others, &bounds, &mut work) {
+            continue;
+        }
+        kept = others.clone();
+        let mut reasons = others;
+        for other in reasons.clone() {
+            let fewer: Vec<usize> = reasons.iter().copied().filter(|known| *known != other).collect();
+            if follows(space, rule, &fewer, &bounds, &mut work) {
+                reasons = fewer;
+            }
+        }
+        diagnostics.push(warning(space, rule, &reasons));
+    }
+    diagnostics
+}
+
+fn warning(space: &Space, rule: usize, reasons: &[usize]) -> Diagnostic {
+    let definition = &space.rules[rule];
+    if reasons.is_empty() {
+        let message = format!("rule `{}` can never refuse anything", definition.name);
+        return Diagnostic::warning(code::NEVER_ACTS, message)
+            .at(definition.span, "holds for every value that its actions can have")
+            .help("remove it, or say what it should forbid");
+    }
+    let names: Vec<&str> = reasons.iter().map(|rule| space.rules[*rule].name.as_str()).collect();
+    let message = format!("rule `{}` follows from {}", definition.name, listed(&names));
+    let warning = Diagnostic::warning(code::IMPLIED, message).at(definition.span, "forbids nothing more");
+    let warning = reasons
+        .iter()
+        .fold(warning, |warning, rule| warning.beside(space.rules[*rule].span, "forbids it already"));
+    warning.help("remove it, or make it the stricter one")
+}
+
+/// Whether the rule holds for every row that it binds and every value that `others` leave; false also
+/// where that would be too much work.
+fn follows(space: &Space, rule: usize, others: &[usize], bounds: &[Vec<Bound>], work: &mut usize) -> bool {
+    let bound = || space.rows.iter().filter(|row| row.rules.contains(&rule));
+    let count = bound().count();
+    let Some(left) = work.checked_sub(count * (1 + others.len())) else { return false };
+    *work = left;
+    if count == 0 {
+        return false;
+    }
+    match &space.rules[rule].body {
+        RuleBody::Moves { state, allowed, .. } => {
+            let all = allowed.iter().flatten().all(|allowed| *allowed);
+            all || others.iter().any(|other| match &space.rules[*other].body {
+                RuleBody::Moves { state: same, allowed: stricter, .. } => {
+                    let pairs = stricter.iter().flatten().zip(allowed.iter().flatten());
+                    same == state && pairs.into_iter().all(|(stricter, allowed)| *allowed || !*stricter)
+                }
+                RuleBody::Holds(_) => false,
+            })
+        }
+        RuleBody::Holds(_) => bound().all(|row| holds(space, row, rule, others, &bounds[row.action])),
+    }
+}
+
+fn holds(space: &Space, row: &Row, rule: usize, others: &[usize], bounds: &[Bound]) -> bool {
+    let RuleBody::Holds(bindings) = &space.rules[rule].body else { return false };
+    let values = crate::model::locals(&space.actions[row.action], row, &[]);
+    let prover = Prover { space, row, values: &values, bounds, road: None };
+    let in_force: Vec<usize> = others.iter().copied().filter(|other| row.rules.contains(other)).collect();
+    // A row that the others leave dead would make everything true of it.
+    let Some(locals) = prover.settle(&in_force) else { return false };
+    let after = space.cells_after(row.action, &locals, &space.cells_unknown());
+    let known = prover.known(&locals, &after);
+    let mut conditions = bindings.iter().filter(|binding| binding.action == row.action);
+    conditions.all(|binding| !enclose(&binding.condition, &known).may_fail())
+}

@@ -1,0 +1,39 @@
+//! What can be proved of a sound space beyond which rows are dead, and what only a search can show.
+//!
+//! A proof goes over exact intervals (`reach`, `enclose`), so it may say too little, never too much.
+//! A witness is found by search and judged by the evaluator that drawing uses.
+
+mod cells;
+mod clock;
+mod cut;
+mod enclose;
+mod implied;
+mod reach;
+mod reduce;
+mod spawn_bounds;
+mod twins;
+mod undecided;
+mod unfair;
+mod witness;
+
+pub(crate) use clock::{forbids, next_rows, shortest_way};
+pub use cut::{Removal, removals};
+pub(crate) use enclose::{Known, VARIANTS_MAX, Values, enclose};
+pub(crate) use reach::{Prover, product_size, rows};
+pub use witness::{Witness, witness};
+
+use crate::model::Space;
+use crate::syntax::Diagnostic;
+
+/// Errors, warnings and remarks about a space whose names and types are right.
+pub(crate) fn report(space: &Space) -> Vec<Diagnostic> {
+    let mut diagnostics = reach::report(space);
+    diagnostics.extend(spawn_bounds::report(space));
+    diagnostics.extend(twins::report(space));
+    diagnostics.extend(undecided::report(space));
+    diagnostics.extend(cut::report(space));
+    diagnostics.extend(implied::report(space));
+    diagnostics.extend(unfair::report(space));
+    diagnostics.extend(clock::report(space));
+    diagnostics
+}

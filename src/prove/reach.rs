@@ -1,0 +1,328 @@
+//! The rows of the action table, and what can be proved of each on each road.
+//!
+//! A row is dead on a road if no draw can satisfy the rules there: a proof by intervals. A row that
+//! is not proved dead is open, which promises nothing: what lies around the car is not known here.
+
+use std::sync::Arc;
+
+use crate::model::expr::Expr;
+use crate::model::{
+    ActionDef, Bound, Domain, Facts, Interval, Memory, Reach, Road, Row, RuleBody, Space, Type, Value,
+    allowed, bounds, code, evaluate,
+};
+use crate::prove::enclose::{Known, Values, enclose};
+use crate::syntax::{Diagnostic, listed};
+use crate::units::Rational;
+
+/// Rounds of narrowing: a bound may wait for another one, rarely for two.
+const ROUNDS: usize = 3;
+
+/// The rows that an action multiplies to, its conditions left aside.
+pub(crate) fn product_size(action: &ActionDef) -> u64 {
+    let sizes = action.parameters.iter().filter(|parameter| parameter.axis).map(|axis| match &axis.domain {
+        Domain::Values(values) => values.len() as u64,
+        Domain::Range(..) => u64::MAX,
+    });
+    sizes.fold(1, u64::saturating_mul)
+}
+
+/// All rows, in order.
+pub(crate) fn rows(space: &Space) -> Vec<Row> {
+    let mut rows = Vec::new();
+    for (index, action) in space.actions.iter().enumerate() {
+        let bounds = bounds(space, index);
+        let rules: Arc<[usize]> =
+            (0..space.rules.len()).filter(|rule| space.rules[*rule].body.binds(index)).collect();
+        for values in products(space, action) {
+            let axes: Vec<(Arc<str>, Value)> = action
+                .parameters
+                .iter()
+                .zip(&values)
+                .filter(|(parameter, _)| parameter.axis)
+                .map(|(parameter, value)| (parameter.name.clone(), *value))
+                .collect();
+            let shown = axes.iter().zip(action.parameters.iter().filter(|p| p.axis));
+            let shown: Vec<String> =
+                shown.map(|((name, value), p)| format!("{name}: {}", space.show(*value, p.ty))).collect();
+            let label = format!("{}({})", action.name, shown.join(", "));
+            let rules = rules.clone();
+            let row = Row { index: rows.len(), action: index, axes, label, rules, roads: Vec::new() };
+            let reach = |road: &Road| {
+                Prover { space, row: &row, values: &values, bounds: &bounds, road: Some(road) }.reach()
+            };
+            let roads = space.roads.iter().map(reach).collect();
+            rows.push(Row { roads, ..row });
+        }
+    }
+    rows
+}
+
+/// All values that an expression of the row's action may have by the parameters' own ranges and
+/// conditions, whatever the road and the memory; `None` if they leave no value.
+pub(crate) fn spawn_figures(space: &Space, row: &Row, bounds: &[Bound], expr: &Expr) -> Option<Interval> {
+    let values = crate::model::locals(&space.actions[row.action], row, &[]);
+    let prover = Prover { space, row, values: &values, bounds, road: None };
+    let locals = prover.settle(&[])?;
+    let after = space.cells_after(row.action, &locals, &space.cells_unknown());
+    Some(enclose(expr, &prover.known(&locals, &after)).interval())
+}
+
+/// The values of all parameters for each row of an action; those that are drawn hold a placeholder.
+fn products(space: &Space, action: &ActionDef) -> Vec<Vec<Value>> {
+    let mut rows: Vec<Vec<Value>> = vec![Vec::new()];
+    for parameter in &action.parameters {
+        let values = match (&parameter.domain, parameter.axis) {
+            (Domain::Values(values), true) => values.as_slice(),
+            _ => &[Value::Bool(false)],
+        };
+        let mut longer = Vec::with_capacity(rows.len() * values.len());
+        for row in &rows {
+            for value in values {
+                let mut locals = row.clone();
+                locals.push(*value);
+                let kept = match (&parameter.condition, parameter.axis) {
+                    (Some(condition), true) => {
+                        evaluate(condition, &space.functions, &Facts::new(&locals, &Memory::default()))
+                            .truth()
+                    }
+                    _ => true,
+                };
+                if kept {
+                    longer.push(locals);
+                }
+            }
+        }
+        rows = longer;
+    }
+    rows
+}
+
+/// One row on one road.
+pub(crate) struct Prover<'a> {
+    pub space: &'a Space,
+    pub row: &'a Row,
+    /// Values of all parameters; only those of axes mean something.
+    pub values: &'a [Value],
+    pub bounds: &'a [Bound],
+    /// `None`: any road.
+    pub road: Option<&'a Road>,
+}
+
+impl Prover<'_> {
+    fn reach(&self) -> Reach {
+        let parameters = &self.space.actions[self.row.action].parameters;
+        let in_force: Vec<usize> =
+            self.row.rules.iter().copied().filter(|rule| !self.space.rules[*rule].optional).collect();
+        if let Some(locals) = self.settle(&in_force) {
+            let drawn = parameters.iter().zip(locals).filter(|(parameter, _)| !parameter.axis);
+            let ranges = drawn.filter_map(|(parameter, values)| match values {
+                Values::Number(interval) => Some((parameter.name.clone(), interval)),
+                Values::Truth { .. } | Values::Variants(_) => None,
+            });
+            return Reach::Open(ranges.collect());
+        }
+        // A minimal conflict: drop every rule without which the row is dead all the same.
+        let mut rules = in_force;
+        for rule in rules.clone() {
+            let without: Vec<usize> = rules.iter().copied().filter(|kept| *kept != rule).collect();
+            if self.settle(&without).is_none() {
+                rules = without;
+            }
+        }
+        Reach::Dead { reason: self.reason(&rules), rules }
+    }
+
+    /// All values that the drawn parameters may have under these rules; `None` if there are none.
+    pub fn settle(&self, rules: &[usize]) -> Option<Vec<Values>> {
+        self.narrow(self.declared(), &self.space.cells_unknown(), rules)
+    }
+
+    /// The same, begun with these values of the parameters and cells.
+    pub fn narrow(&self, mut locals: Vec<Values>, before: &[Values], rules: &[usize]) -> Option<Vec<Values>> {
+        for _ in 0..ROUNDS {
+            let was = locals.clone();
+            let after = self.space.cells_after(self.row.action, &locals, before);
+            for bound in self.bounds {
+                if bound.rule.is_some_and(|rule| !rules.contains(&rule)) {
+                    continue;
+                }
+                let known = self.known(&locals, &after);
+                if bound.guards.iter().any(|guard| enclose(guard, &known).may_fail()) {
+                    continue;
+                }
+                let limit = enclose(&bound.limit, &known).interval();
+                let narrowed = locals[bound.local].interval().intersect(&allowed(bound.op, &limit));
+                if narrowed.is_empty() {
+                    return None;
+                }
+                locals[bound.local] = Values::Number(narrowed);
+            }
+            // What changed nothing will change nothing again.
+            if locals == was {
+                break;
+            }
+        }
+        let after = self.space.cells_after(self.row.action, &locals, before);
+        let possible = rules.iter().all(|rule| match &self.space.rules[*rule].body {
+            RuleBody::Holds(bindings) => bindings
+                .iter()
+                .filter(|binding| binding.action == self.row.action)
+                .all(|binding| enclose(&binding.condition, &self.known(&locals, &after)).may_hold()),
+            RuleBody::Moves { state, allowed, .. } => match after[self.space.states[*state].first_cell] {
+                Values::Variants(set) => {
+                    (0..allowed.len()).any(|to| set >> to & 1 == 1 && allowed.iter().any(|from| from[to]))
+                }
+                Values::Truth { .. } | Values::Number(_) => true,
+            },
+        });
+        possible.then_some(locals)
+    }
+
+    pub fn known<'a>(&'a self, locals: &'a [Values], cells: &'a [Values]) -> Known<'a> {
+        Known { functions: &self.space.functions, locals, cells, road: self.road.map(|road| &road.facts) }
+    }
+
+    /// What the parameters may be before any rule.
+    pub fn declared(&self) -> Vec<Values> {
+        let parameters = &self.space.actions[self.row.action].parameters;
+        let point = |value: &Value| match value {
+            Value::Bool(truth) => Values::truth(*truth),
+            Value::Variant(_, variant) => Values::Variants(1 << variant),
+            Value::Number(number) => {
+                Values::Number(Rational::from_f64(*number).map_or(Interval::ALL, Interval::point))
+            }
+        };
+        let all = |(parameter, value): (&crate::model::Parameter, &Value)| match &parameter.domain {
+            _ if parameter.axis => point(value),
+            Domain::Range(low, high) => Values::Number(Interval::closed(*low, *high)),
+            Domain::Values(values) => {
+                values.iter().map(point).reduce(Values::union).unwrap_or(Values::UNKNOWN_TRUTH)
+            }
+        };
+        parameters.iter().zip(self.values).map(all).collect()
+    }
+
+    /// What each rule of a conflict leaves, in words.
+    fn reason(&self, rules: &[usize]) -> String {
+        let parameters = &self.space.actions[self.row.action].parameters;
+        let locals = self.declared();
+        let before = self.space.cells_unknown();
+        let after = self.space.cells_after(self.row.action, &locals, &before);
+        let known = self.known(&locals, &after);
+        let mut parts = Vec::new();
+        for rule in rules {
+            let name = &self.space.rules[*rule].name;
+            let mut figures = Vec::new();
+            for bound in self.bounds.iter().filter(|bound| bound.rule == Some(*rule)) {
+                let parameter = &parameters[bound.local];
+                let limit = allowed(bound.op, &enclose(&bound.limit, &known).interval());
+                let unit = match parameter.ty {
+                    Type::Quantity(dimension) => dimension.si_unit(),
+                    Type::Int | Type::Bool | Type::Enum(_) => String::new(),
+                };
+                let declared = locals[bound.local].interval();
+                figures.push(format!(
+                    "`{}` wants {limit} {unit}, its range is {declared} {unit}",
+                    parameter.name
+                ));
+            }
+            match figures.as_slice() {
+                [] => parts.push(self.without_figures(name)),
+                figures => parts.push(format!("rule `{name}`: {}", figures.join("; "))),
+            }
+        }
+        match parts.as_slice() {
+            [] => "its own ranges and conditions leave no value".to_owned(),
+            parts => match self.road {
+                Some(road) => format!("{} (road `{}`)", parts.join("; "), road.name),
+                None => parts.join("; "),
+            },
+        }
+    }
+}
+
+impl Prover<'_> {
+    /// What a rule that bounds no number says of the row.
+    fn without_figures(&self, name: &str) -> String {
+        match self.row.axes.is_empty() {
+            true => format!("rule `{name}` never holds"),
+            // Other rows of the action may well obey it.
+            false => format!("rule `{name}` cannot hold in `{}`", self.row.label),
+        }
+    }
+}
+
+/// What is to be said about rows: actions without any, dead rows, masked rows.
+pub(crate) fn report(space: &Space) -> Vec<Diagnostic> {
+    let mut diagnostics = Vec::new();
+    for (index, action) in space.actions.iter().enumerate() {
+        let rows: Vec<&Row> = space.rows.iter().filter(|row| row.action == index).collect();
+        if rows.is_empty() {
+            let conditions = action.parameters.iter().filter(|p| p.axis && p.condition.is_some());
+            let error = Diagnostic::error(code::EMPTY, format!("`{}` has no rows", action.name))
+                .at(action.span, "its conditions leave no value");
+            diagnostics.push(conditions.fold(error, |error, p| error.beside(p.span, "by this `where`")));
+        }
+        diagnostics.extend(report_dead(space, action, &rows));
+    }
+    diagnostics
+}
+
+/// One error for the rows of an action that are dead everywhere, and one warning for each road on
+/// which others are masked.
+fn report_dead(space: &Space, action: &ActionDef, rows: &[&Row]) -> Vec<Diagnostic> {
+    let mut diagnostics = Vec::new();
+    let dead_on = |row: &Row, road: usize| matches!(row.roads[road], Reach::Dead { .. });
+    let everywhere = |row: &Row| !row.roads.is_empty() && (0..row.roads.len()).all(|road| dead_on(row, road));
+    let (gone, left): (Vec<&Row>, Vec<&Row>) = rows.iter().copied().partition(|row| everywhere(row));
+    if let Some(Reach::Dead { rules, reason }) = gone.first().and_then(|row| row.roads.first()) {
+        let what = match gone.len() == rows.len() {
+            true => format!("`{}`", action.name),
+            false => format!("{} of `{}`", numbers(&gone), action.name),
+        };
+        let message = match space.roads.as_slice() {
+            [road] => format!("{what} can never run on `{}`", road.name),
+            _ => format!("{what} can never run on any road"),
+        };
+        let error =
+            Diagnostic::error(code::DEAD, message).at(action.span, numbers(&gone)).note(reason.clone());
+        let error = error.help("widen a range, change a rule, or remove the rows with `where`");
+        let error =
+            rules.iter().fold(error, |error, rule| error.beside(space.rules[*rule].span, "by this rule"));
+        let bounded = bounds(space, gone[0].action);
+        let is_bounded = |local: usize| {
+            let of_conflict = |bound: &Bound| bound.rule.is_some_and(|rule| rules.contains(&rule));
+            bounded.iter().any(|bound| bound.local == local && of_conflict(bound))
+        };
+        let ranges = action.parameters.iter().enumerate().filter(|(local, _)| is_bounded(*local));
+        diagnostics.push(ranges.fold(error, |error, (_, parameter)| match &parameter.domain {
+            Domain::Range(low, high) => {
+                let [low, high] =
+                    [low, high].map(|end| space.show(Value::Number(end.to_f64()), parameter.ty));
+                error.beside(parameter.span, format!("`{}` is {low} .. {high}", parameter.name))
+            }
+            Domain::Values(_) => error,
+        }));
+    }
+    for (index, road) in space.roads.iter().enumerate() {
+        let masked: Vec<&Row> = left.iter().copied().filter(|row| dead_on(row, index)).collect();
+        let Some(Reach::Dead { rules, reason }) = masked.first().map(|row| &row.roads[index]) else {
+            continue;
+        };
+        let names: Vec<&str> = rules.iter().map(|rule| space.rules[*rule].name.as_str()).collect();
+        let message = format!("`{}` is masked on `{}` by {}", action.name, road.name, listed(&names));
+        let remark = Diagnostic::remark(code::MASKED, message).at(action.span, numbers(&masked));
+        diagnostics.push(remark.note(reason.clone()));
+    }
+    diagnostics
+}
+
+/// `row 15`, `rows 15..27`, `rows 3, 7 and 9`.
+pub(crate) fn numbers(rows: &[&Row]) -> String {
+    let indices: Vec<usize> = rows.iter().map(|row| row.index).collect();
+    match indices.as_slice() {
+        [only] => format!("row {only}"),
+        [first, .., last] if last - first + 1 == indices.len() => format!("rows {first}..{last}"),
+        indices => format!("rows {}", indices.iter().map(usize::to_string).collect::<Vec<_>>().join(", ")),
+    }
+}

@@ -1,0 +1,86 @@
+//! Expressions as far as they can be computed beforehand: calls opened, constants folded.
+
+use crate::model::expr::{Expr, ExprKind};
+use crate::model::{FnDef, Type};
+use crate::prove::enclose::{Known, Values, enclose};
+use crate::syntax::ast::Span;
+
+/// The expression with its locals replaced, without calls and without places in a text, so that two
+/// of the same form are equal.
+pub(super) fn reduce(expr: &Expr, functions: &[FnDef], locals: &[Expr]) -> Expr {
+    let inner = |expr: &Expr| Box::new(reduce(expr, functions, locals));
+    let all = |exprs: &[Expr]| exprs.iter().map(|expr| reduce(expr, functions, locals)).collect::<Vec<_>>();
+    let kind = match &expr.kind {
+        ExprKind::Local(index) => return locals[*index].clone(),
+        ExprKind::Call(function, arguments) => {
+            return reduce(&functions[*function].body, functions, &all(arguments));
+        }
+        ExprKind::Bool(_)
+        | ExprKind::Number(_)
+        | ExprKind::Variant(..)
+        | ExprKind::Cell(_)
+        | ExprKind::Fact(_) => expr.kind.clone(),
+        ExprKind::CellAt(first, key) => {
+            let key = inner(key);
+            match key.kind {
+                ExprKind::Variant(_, key) => ExprKind::Cell(first + key),
+                _ => ExprKind::CellAt(*first, key),
+            }
+        }
+        ExprKind::Not(of) => ExprKind::Not(inner(of)),
+        ExprKind::Negate(of) => ExprKind::Negate(inner(of)),
+        ExprKind::Arithmetic(op, left, right) => ExprKind::Arithmetic(*op, inner(left), inner(right)),
+        ExprKind::Compare(op, left, right) => ExprKind::Compare(*op, inner(left), inner(right)),
+        ExprKind::And(left, right) => ExprKind::And(inner(left), inner(right)),
+        ExprKind::Or(left, right) => ExprKind::Or(inner(left), inner(right)),
+        ExprKind::Implies(left, right) => ExprKind::Implies(inner(left), inner(right)),
+        ExprKind::InRange(of, low, high) => ExprKind::InRange(inner(of), inner(low), inner(high)),
+        ExprKind::InList(of, list) => ExprKind::InList(inner(of), all(list)),
+        ExprKind::OnRoad(names) => ExprKind::OnRoad(names.clone()),
+        ExprKind::InLanes(of, lanes) => ExprKind::InLanes(inner(of), lanes.clone()),
+        ExprKind::Match { subject, arm_of, arms } => {
+            let subject = inner(subject);
+            let chosen = match subject.kind {
+                ExprKind::Variant(_, variant) => Some(variant),
+                ExprKind::Bool(truth) => Some(usize::from(truth)),
+                _ => None,
+            };
+            if let Some(variant) = chosen {
+                return reduce(&arms[arm_of[variant]], functions, locals);
+            }
+            ExprKind::Match { subject, arm_of: arm_of.clone(), arms: all(arms) }
+        }
+    };
+    fold(Expr { kind, ty: expr.ty, span: Span::NONE })
+}
+
+/// A literal, where the value is certain without knowing anything.
+fn fold(expr: Expr) -> Expr {
+    let open = |kind: &ExprKind| {
+        matches!(
+            kind,
+            ExprKind::Local(_)
+                | ExprKind::Cell(_)
+                | ExprKind::CellAt(..)
+                | ExprKind::Fact(_)
+                | ExprKind::InLanes(..)
+                | ExprKind::OnRoad(_)
+        )
+    };
+    if expr.any(open) {
+        return expr;
+    }
+    let known = Known { functions: &[], locals: &[], cells: &[], road: None };
+    let kind = match (enclose(&expr, &known), expr.ty) {
+        (Values::Number(interval), _) => interval.single().map(ExprKind::Number),
+        (Values::Variants(set), Type::Enum(of)) if set.is_power_of_two() => {
+            Some(ExprKind::Variant(of, set.trailing_zeros() as usize))
+        }
+        (Values::Truth { may_hold, may_fail }, _) if may_hold != may_fail => Some(ExprKind::Bool(may_hold)),
+        _ => None,
+    };
+    match kind {
+        Some(kind) => Expr { kind, ..expr },
+        None => expr,
+    }
+}

@@ -1,0 +1,152 @@
+//! Rows that are the same action under two names.
+//!
+//! Two rows are the same if, with their axes put in, they draw the same, do the same and are bound
+//! by the same conditions. Compared is the form, so equal rows in different words may be missed.
+
+use std::collections::BTreeMap;
+
+use crate::model::expr::{Expr, ExprKind};
+use crate::model::{EffectDef, Row, RuleBody, Space, SpawnDef, Value, WordExpr, code};
+use crate::prove::reduce::reduce;
+use crate::syntax::Diagnostic;
+use crate::syntax::ast::Span;
+use crate::units::Rational;
+
+/// Longer tables are not searched for equal rows.
+const ROWS_MAX: usize = 10_000;
+
+/// Pairs listed for two actions, at most.
+const PAIRS_SHOWN: usize = 6;
+
+/// One warning for each two actions that share rows.
+pub(super) fn report(space: &Space) -> Vec<Diagnostic> {
+    if space.rows.len() > ROWS_MAX {
+        return Vec::new();
+    }
+    let mut first_of: BTreeMap<String, usize> = BTreeMap::new();
+    let mut pairs: BTreeMap<(usize, usize), Vec<(usize, usize)>> = BTreeMap::new();
+    for row in &space.rows {
+        match first_of.entry(form(space, row)) {
+            std::collections::btree_map::Entry::Vacant(entry) => {
+                entry.insert(row.index);
+            }
+            std::collections::btree_map::Entry::Occupied(entry) => {
+                let first = *entry.get();
+                let actions = (space.rows[first].action, row.action);
+                pairs.entry(actions).or_default().push((first, row.index));
+            }
+        }
+    }
+    let warning = |((first, again), pairs): ((usize, usize), Vec<(usize, usize)>)| {
+        let (one, other) = (&space.actions[first], &space.actions[again]);
+        let label = |row: usize| format!("`{}`", space.rows[row].label);
+        let (a, b) = pairs[0];
+        let message = format!("{} and {} are the same action", label(a), label(b));
+        let mut warning = Diagnostic::warning(code::TWINS, message).at(other.span, format!("row {b}"));
+        if first != again {
+            warning = warning.beside(one.span, format!("row {a}"));
+        } else {
+            let axes = other.parameters.iter().filter(|parameter| parameter.axis);
+            let differs = |name: &str| {
+                let value = |row: usize| space.rows[row].axes.iter().find(|(known, _)| &**known == name);
+                value(a) != value(b)
+            };
+            let axes = axes.filter(|parameter| differs(&parameter.name));
+            warning = axes.fold(warning, |warning, axis| {
+                warning.beside(axis.span, format!("`{}` makes no difference", axis.name))
+            });
+        }
+        for (a, b) in pairs.iter().skip(1).take(PAIRS_SHOWN) {
+            warning = warning.note(format!("so are rows {a} and {b}: {} and {}", label(*a), label(*b)));
+        }
+        if pairs.len() > PAIRS_SHOWN + 1 {
+            warning = warning.note(format!("and {} more", pairs.len() - PAIRS_SHOWN - 1));
+        }
+        warning.help("remove one of the two: an agent would have to learn the same thing twice")
+    };
+    pairs.into_iter().map(warning).collect()
+}
+
+/// Everything that a row is, as text: equal for equal rows.
+fn form(space: &Space, row: &Row) -> String {
+    let action = &space.actions[row.action];
+    let functions = &space.functions;
+    let mut drawn = 0;
+    let locals: Vec<Expr> = action
+        .parameters
+        .iter()
+        .map(|parameter| {
+            let axis = row.axes.iter().find(|(name, _)| *name == parameter.name);
+            let kind = match axis {
+                Some((_, value)) => literal(*value),
+                None => {
+                    drawn += 1;
+                    ExprKind::Local(drawn - 1)
+                }
+            };
+            Expr { kind, ty: parameter.ty, span: Span::NONE }
+        })
+        .collect();
+    let reduced = |expr: &Expr| reduce(expr, functions, &locals);
+    let mut parts: Vec<String> = Vec::new();
+    for parameter in action.parameters.iter().filter(|parameter| !parameter.axis) {
+        let condition = parameter.condition.as_ref().map(reduced);
+        parts.push(format!("any {:?} {:?} {condition:?}", parameter.ty, parameter.domain));
+    }
+    for effect in &action.effects {
+        parts.push(match effect {
+            EffectDef::Set(set) => {
+                format!("set {} {:?} {:?}", set.state, set.key.as_ref().map(reduced), reduced(&set.value))
+            }
+            EffectDef::Spawn(spawn) => spawn_form(spawn, &reduced),
+        });
+    }
+    for rule in row.rules.iter() {
+        match &space.rules[*rule].body {
+            RuleBody::Moves { .. } => parts.push(format!("rule {rule}")),
+            RuleBody::Holds(bindings) => {
+                for binding in bindings.iter().filter(|binding| binding.action == row.action) {
+                    let condition = reduced(&binding.condition);
+                    if condition.kind != ExprKind::Bool(true) {
+                        parts.push(format!("rule {rule} {:?}", condition.kind));
+                    }
+                }
+            }
+        }
+    }
+    parts.join("\n")
+}
+
+fn spawn_form(spawn: &SpawnDef, reduced: &impl Fn(&Expr) -> Expr) -> String {
+    fn word<W: Copy + core::fmt::Debug>(word: &WordExpr<W>, reduced: &impl Fn(&Expr) -> Expr) -> String {
+        match word {
+            WordExpr::Fixed(word) => format!("{word:?}"),
+            WordExpr::Of(expr, words) => match reduced(expr) {
+                Expr { kind: ExprKind::Variant(_, variant), .. } => format!("{:?}", words[variant]),
+                expr => format!("{:?} of {words:?}", expr.kind),
+            },
+        }
+    }
+    format!(
+        "spawn {} {} {} {} {} {} {:?} {:?} {}",
+        word(&spawn.body, reduced),
+        word(&spawn.colour, reduced),
+        word(&spawn.verb, reduced),
+        word(&spawn.lane, reduced),
+        word(&spawn.side, reduced),
+        word(&spawn.then, reduced),
+        reduced(&spawn.speed).kind,
+        reduced(&spawn.distance).kind,
+        spawn.behind,
+    )
+}
+
+fn literal(value: Value) -> ExprKind {
+    match value {
+        Value::Bool(truth) => ExprKind::Bool(truth),
+        Value::Variant(of, variant) => ExprKind::Variant(of, variant),
+        Value::Number(number) => {
+            ExprKind::Number(Rational::from_f64(number).expect("an axis holds a number from a source text"))
+        }
+    }
+}

@@ -1,0 +1,136 @@
+//! Spawns that nobody could avoid: at some legal speed they lie within the stopping distance of a
+//! careful driver.
+//!
+//! The driver is that of UN R157 (Annex 4, Appendix 3): 0.4 s of perception, 0.75 s of reaction, then
+//! 0.774 g. What the brake takes to build up is left out here: it only adds to the distance, and a
+//! lower bound is what a proof needs. The world has the whole of it (`spawn_gap >= safety_gap`).
+
+use std::cell::Cell;
+
+use crate::model::vocabulary::{Verb, Word};
+use crate::model::{
+    EffectDef, Facts, Memory, Reach, Road, Row, RuleBody, Space, SpawnDef, Value, bounds, code, evaluate,
+};
+use crate::prove::witness::{Search, Witness};
+use crate::syntax::Diagnostic;
+use crate::units::decimal;
+
+/// Boxes of ranges looked at for all actions together, at most, each having its share.
+const BOXES_MAX: usize = 50_000;
+
+/// Perception and reaction, s.
+const REACTION_S: f64 = 0.4 + 0.75;
+/// 0.774 g, m/s².
+const BRAKING_MPS2: f64 = 0.774 * 9.80665;
+/// What is nearer than that by less is a matter of rounding, m.
+const MARGIN_M: f64 = 0.01;
+
+/// One remark for each action that can spawn unfairly on some road, with the speeds that show it.
+pub(super) fn report(space: &Space) -> Vec<Diagnostic> {
+    let mut diagnostics = Vec::new();
+    for (index, action) in space.actions.iter().enumerate() {
+        let boxes_left = Cell::new(BOXES_MAX / space.actions.len());
+        for effect in &action.effects {
+            let EffectDef::Spawn(spawn) = effect else { continue };
+            let found = space.rows.iter().filter(|row| row.action == index).find_map(|row| {
+                let roads = space.roads.iter().zip(&row.roads);
+                let open = roads.filter(|(_, reach)| matches!(reach, Reach::Open(_)));
+                open.map(|(road, _)| road)
+                    .find_map(|road| Some((row, road, unfair(space, row, road, spawn, &boxes_left)?)))
+            });
+            if let Some((row, road, found)) = found {
+                diagnostics.push(remark(space, row, road, spawn, &found));
+            }
+        }
+    }
+    diagnostics
+}
+
+/// Values with which a row spawns within the stopping distance on a road; `None` if a rule asks the
+/// world about the gap, which then decides, or if none are found.
+pub(super) fn unfair(
+    space: &Space,
+    row: &Row,
+    road: &Road,
+    spawn: &SpawnDef,
+    boxes_left: &Cell<usize>,
+) -> Option<Witness> {
+    let rules: Vec<usize> = row.rules.iter().copied().filter(|rule| !space.rules[*rule].optional).collect();
+    let asks = |rule: &usize| match &space.rules[*rule].body {
+        RuleBody::Holds(bindings) => {
+            bindings.iter().any(|binding| binding.action == row.action && binding.condition.needs_survey())
+        }
+        RuleBody::Moves { .. } => false,
+    };
+    if rules.iter().any(asks) {
+        return None;
+    }
+    let bounds = bounds(space, row.action);
+    let search = Search { space, row, road, rules, bounds: &bounds, boxes_left };
+    search.find(&|values, memory| {
+        let figures = figures(space, road, spawn, values, memory);
+        figures.needed_m > figures.distance_m + MARGIN_M
+    })
+}
+
+/// What a driver at the road's limit meets.
+struct Figures {
+    speed_mps: f64,
+    distance_m: f64,
+    /// At least.
+    needed_m: f64,
+}
+
+fn figures(space: &Space, road: &Road, spawn: &SpawnDef, values: &[Value], memory: &Memory) -> Figures {
+    let facts = Facts { road: Some(&road.facts), ..Facts::new(values, memory) };
+    let number = |expr| evaluate(expr, &space.functions, &facts).number();
+    let (speed_mps, distance_m) = (number(&spawn.speed), number(&spawn.distance));
+    let ego_mps = road.facts.limit_mps;
+    let braked_m = |mps: f64| mps * REACTION_S + mps * mps / (2.0 * BRAKING_MPS2);
+    let needed_m = match spawn.verb.word(&space.functions, &facts) {
+        Verb::DriveAhead => braked_m((ego_mps - speed_mps).max(0.0)),
+        Verb::DriveOpposite => braked_m(ego_mps) + speed_mps * (REACTION_S + ego_mps / BRAKING_MPS2),
+        Verb::CrossRoad | Verb::Walk | Verb::Stand => braked_m(ego_mps),
+        // Who comes from behind sees the ego vehicle, which need do nothing.
+        Verb::Overtake => 0.0,
+    };
+    Figures { speed_mps, distance_m, needed_m }
+}
+
+fn remark(space: &Space, row: &Row, road: &Road, spawn: &SpawnDef, found: &Witness) -> Diagnostic {
+    let action = &space.actions[row.action];
+    let values = crate::model::locals(action, row, &found.values);
+    let after = space.memory_after(row.action, &values, &found.memory);
+    let figures = figures(space, road, spawn, &values, &after);
+    let facts = Facts { road: Some(&road.facts), ..Facts::new(&values, &after) };
+    let verb = spawn.verb.word(&space.functions, &facts);
+    let rounded = |value: f64| decimal((value * 100.0).round() / 100.0, false);
+    let message = format!("`{}` can appear where nobody could avoid it", action.name);
+    Diagnostic::remark(code::UNFAIR, message)
+        .at(spawn.distance.span, format!("{} m in `{}`", rounded(figures.distance_m), row.label))
+        .note(format!(
+            "a careful driver at {} m/s, the limit of `{}`, needs {} m for a `{}` at {} m/s",
+            rounded(road.facts.limit_mps),
+            road.name,
+            rounded(figures.needed_m),
+            verb.name(),
+            rounded(figures.speed_mps),
+        ))
+        .help("forbid it with `rule no_teleport: spawn_gap >= safety_gap`, or begin farther away")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The published distances of the regulation's driver include the time in which the brake builds
+    /// up; ours must lie below them, and not by much.
+    #[test]
+    fn the_bound_lies_just_below_the_published_distances() {
+        for (speed_kmph, distance_m) in [(10.0, 4.4), (30.0, 16.5), (50.0, 32.7), (60.0, 42.4)] {
+            let speed_mps: f64 = speed_kmph / 3.6;
+            let bound_m = speed_mps * REACTION_S + speed_mps * speed_mps / (2.0 * BRAKING_MPS2);
+            assert!(bound_m < distance_m && bound_m > 0.8 * distance_m, "{speed_kmph} km/h: {bound_m}");
+        }
+    }
+}

@@ -1,0 +1,209 @@
+//! Where episodes are played: a space with its roads, a driving system and the rules in force.
+
+use std::collections::BTreeSet;
+use std::sync::Arc;
+
+use ndarray::Array1;
+
+use crate::action::{ActionTable, ActiveRules, Offer, Situation};
+use crate::ads;
+use crate::ads::Selected;
+use crate::agent::{Agent, Branch, Trial};
+use crate::episode;
+use crate::episode::{Choice, Moment};
+use crate::mdp::ProcKind;
+use crate::model::Road;
+use crate::oracle::AvoidabilitySettings;
+use crate::rng;
+use crate::rng::Stream;
+use crate::sim::Scene;
+use crate::syntax::listed;
+
+use crate::run::play::RunError;
+use crate::run::profile::Profile;
+use crate::run::summary::EpisodeSummary;
+
+/// Everything that the episodes of a run or a training share.
+pub struct Arena {
+    table: ActionTable,
+    rules: ActiveRules,
+    ads: Selected,
+    /// Index of each road in the space, with its scene.
+    roads: Vec<(usize, Arc<Scene>)>,
+}
+
+impl Arena {
+    /// Looks the names up. `rules` are those switched on and those switched off.
+    ///
+    /// # Errors
+    /// If a road, a driving system or a rule does not exist, or is named twice.
+    pub fn new(
+        table: ActionTable,
+        roads: &[String],
+        ads: &str,
+        (with, without): (&[String], &[String]),
+    ) -> Result<Arena, RunError> {
+        if let Some(name) = twice(roads).or_else(|| twice(with.iter().chain(without))) {
+            return Err(RunError::Twice { name });
+        }
+        let space = table.space();
+        let roads = roads.iter().map(|name| {
+            let index = space.roads.iter().position(|road| &road.name == name);
+            let index = index.ok_or_else(|| {
+                let known = listed(&space.roads.iter().map(|road| road.name.as_str()).collect::<Vec<_>>());
+                RunError::Road { name: name.clone(), known }
+            })?;
+            Ok((index, Arc::new(episode::scene(&space.roads[index]))))
+        });
+        let roads = roads.collect::<Result<_, RunError>>()?;
+        let ads = driving_system(ads)?;
+        let rules = ActiveRules::new(space, with, without)?;
+        Ok(Arena { table, rules, ads, roads })
+    }
+
+    pub fn table(&self) -> &ActionTable {
+        &self.table
+    }
+
+    /// From now on with these settings of the driving system.
+    ///
+    /// # Errors
+    /// If it has none, or they mean something else in this version.
+    pub(crate) fn set_profile(&mut self, profile: &Profile) -> Result<(), RunError> {
+        if profile.settings.digest() != profile.digest {
+            let ads = self.ads.name().to_owned();
+            return Err(RunError::ProfileDigest { what: "the run".to_owned(), ads });
+        }
+        self.ads = self.ads.clone().with_profile(profile.settings)?;
+        Ok(())
+    }
+
+    /// The driving system.
+    pub fn ads(&self) -> &Selected {
+        &self.ads
+    }
+
+    /// From now on against this driving system.
+    pub(crate) fn set_ads(&mut self, ads: Selected) {
+        self.ads = ads;
+    }
+
+    /// Whether the driving system is made of modules that could be at fault.
+    pub(crate) fn has_modules(&self) -> bool {
+        self.ads.profile().is_some()
+    }
+
+    /// Number of roads.
+    pub fn roads(&self) -> usize {
+        self.roads.len()
+    }
+
+    /// The nth of the roads.
+    pub fn road(&self, road: usize) -> &Road {
+        &self.table.space().roads[self.roads[road].0]
+    }
+
+    /// An episode of a seed on the nth of the roads.
+    pub fn setup(&self, road: usize, seed: u64) -> episode::Setup<'_> {
+        let (index, scene) = &self.roads[road];
+        let space = self.table.space();
+        let memory = space.initial_memory(seed);
+        episode::Setup {
+            table: &self.table,
+            road: &space.roads[*index],
+            scene: scene.clone(),
+            rules: &self.rules,
+            ads: self.ads.clone(),
+            seed,
+            start: episode::start(space, &memory, seed),
+            memory,
+            period_shifts: Vec::new(),
+            proc: ProcKind::default(),
+        }
+    }
+}
+
+/// Lets an agent choose among the offers of the moment. With nothing legal, the step passes.
+pub(crate) fn choose(agent: &mut dyn Agent, moment: &Moment) -> Choice {
+    let offers = offers(agent, moment);
+    let legal = legal(&offers);
+    carry_out(offers, legal.view(), agent, moment)
+}
+
+/// What each row would do now, drawn as the agent wants it.
+pub(crate) fn offers(agent: &mut dyn Agent, moment: &Moment) -> Vec<Offer> {
+    let seed = agent.draw_seed(moment.step).unwrap_or(moment.situation.seed);
+    moment.setup().table.offers(&Situation { seed, ..*moment.situation })
+}
+
+/// Which of the offers are legal, shape `(rows,)`.
+pub(crate) fn legal(offers: &[Offer]) -> Array1<bool> {
+    offers.iter().map(|offer| matches!(offer, Offer::Legal(_))).collect()
+}
+
+/// What the agent makes of the offers.
+pub(crate) fn carry_out(
+    mut offers: Vec<Offer>,
+    legal: ndarray::ArrayView1<bool>,
+    agent: &mut dyn Agent,
+    moment: &Moment,
+) -> Choice {
+    if !legal.iter().any(|&is_legal| is_legal) {
+        return Choice::Pass;
+    }
+    let mut rng = rng::stream(moment.situation.seed, Stream::Exploration, moment.step as u64);
+    let branch = Lookahead { offers: &offers, moment };
+    let Some(row) = agent.choose_ahead(moment.observation, legal, &branch, &mut rng) else {
+        return Choice::Pass;
+    };
+    match offers.swap_remove(row) {
+        Offer::Legal(draw) => Choice::Act(draw),
+        Offer::Refused(refusal) => Choice::Refused { row, rule: refusal.rule, reason: refusal.reason },
+    }
+}
+
+/// The offers of a moment, carried out in copies of its world and judged like everything else.
+struct Lookahead<'a> {
+    offers: &'a [Offer],
+    moment: &'a Moment<'a>,
+}
+
+impl Branch for Lookahead<'_> {
+    fn try_row(&self, row: usize) -> Trial {
+        let Offer::Legal(draw) = &self.offers[row] else { return Trial::default() };
+        let log = self.moment.look_ahead(draw.clone());
+        let step = self.moment.step;
+        let collided = log.collisions.iter().any(|collision| collision.step == step);
+        let counts = || {
+            let settings = AvoidabilitySettings::default();
+            let summary = EpisodeSummary::judged(self.moment.setup(), 0, &log, &settings);
+            summary.collisions.iter().any(|finding| finding.counted && finding.collision.step == step)
+        };
+        Trial {
+            proc: log.steps[step].proc,
+            collided,
+            counted: collided && counts(),
+            simulated_s: log.duration_s - log.steps[step].time_s,
+        }
+    }
+}
+
+/// Who drives where nobody is named.
+pub const DEFAULT_ADS: &str = "modular";
+
+/// The driving system of that name, as it comes.
+///
+/// # Errors
+/// If there is none.
+pub fn driving_system(name: &str) -> Result<Selected, RunError> {
+    ads::by_name(name).map(Selected::new).ok_or_else(|| {
+        let known = listed(&ads::REGISTRY.iter().map(|entry| entry.name).collect::<Vec<_>>());
+        RunError::Ads { name: name.to_owned(), known }
+    })
+}
+
+/// The first name that comes a second time.
+fn twice<'a>(names: impl IntoIterator<Item = &'a String>) -> Option<String> {
+    let mut seen = BTreeSet::new();
+    names.into_iter().find(|name| !seen.insert(*name)).cloned()
+}

@@ -1,0 +1,362 @@
+//! `run.db`: one row an episode, a step and a collision, in SQLite.
+//!
+//! Each episode is one transaction, so a kill at any moment loses at most the episode under way.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
+
+use rusqlite::{Connection, Transaction, params};
+
+use crate::action::Draw;
+use crate::ads::Module;
+use crate::episode::{EpisodeLog, Outcome};
+use crate::mdp::STATE_NAMES;
+use crate::model::vocabulary::Word;
+use crate::oracle;
+
+use crate::run::shape::Shape;
+use crate::run::summary::{EpisodeSummary, Finding};
+
+/// Layout of the tables; raised whenever a column changes.
+const SCHEMA_VERSION: i64 = 4;
+
+const SCHEMA: &str = "
+CREATE TABLE episode (
+  episode INTEGER PRIMARY KEY, road TEXT NOT NULL, seed TEXT NOT NULL, ended TEXT NOT NULL,
+  duration_s REAL NOT NULL, distance_m REAL NOT NULL, steps INTEGER NOT NULL, red_runs INTEGER NOT NULL,
+  collisions INTEGER NOT NULL, counted INTEGER NOT NULL, first_counted_s REAL, trace TEXT NOT NULL, pet_s REAL,
+  branched_s REAL NOT NULL
+) STRICT;
+CREATE TABLE collision (
+  episode INTEGER NOT NULL REFERENCES episode, number INTEGER NOT NULL, time_s REAL NOT NULL,
+  step INTEGER NOT NULL, obstacle INTEGER NOT NULL, body TEXT NOT NULL, verb TEXT NOT NULL,
+  ego_speed_mps REAL NOT NULL, closing_speed_mps REAL NOT NULL,
+  on_ego_ahead_m REAL NOT NULL, on_ego_left_m REAL NOT NULL,
+  repeated INTEGER NOT NULL, sudden INTEGER NOT NULL, struck INTEGER NOT NULL, counted INTEGER NOT NULL,
+  avoidability TEXT NOT NULL, hazard_onset_s REAL NOT NULL, avoided_by TEXT NOT NULL, evasion TEXT,
+  side TEXT NOT NULL, approach TEXT NOT NULL, relative_speed_mps REAL NOT NULL, delta_v_mps REAL NOT NULL,
+  obstacle_delta_v_mps REAL NOT NULL, cause TEXT, shape TEXT,
+  PRIMARY KEY (episode, number)
+) STRICT;
+";
+
+/// Why a run database cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum DatabaseError {
+    #[error("it has layout {found}, this version of avastra reads {SCHEMA_VERSION}")]
+    Layout { found: i64 },
+    #[error("it names an episode {found}")]
+    Episode { found: i64 },
+    #[error("its checkpoint is damaged: begin a new training")]
+    Checkpoint,
+    #[error(transparent)]
+    Sqlite(#[from] rusqlite::Error),
+}
+
+/// An open run database.
+pub struct Database {
+    pub(crate) connection: Connection,
+}
+
+impl Database {
+    /// Opens the file, making the tables if it is new.
+    ///
+    /// # Errors
+    /// If the file cannot be opened or is a database of another layout.
+    pub fn open(path: &Path) -> Result<Database, DatabaseError> {
+        let mut connection = Connection::open(path)?;
+        let version: i64 = connection.pragma_query_value(None, "user_version", |row| row.get(0))?;
+        if version == 0 {
+            let transaction = connection.transaction()?;
+            transaction.execute_batch(SCHEMA)?;
+            transaction.execute_batch(&step_table())?;
+            transaction.pragma_update(None, "user_version", SCHEMA_VERSION)?;
+            transaction.commit()?;
+        } else if version != SCHEMA_VERSION {
+            return Err(DatabaseError::Layout { found: version });
+        }
+        Ok(Database { connection })
+    }
+
+    /// Adds a whole episode, or nothing. `in_words` says what a draw does in the space's own words.
+    ///
+    /// # Errors
+    /// If the file cannot be written.
+    pub fn add(
+        &mut self,
+        summary: &EpisodeSummary,
+        log: &EpisodeLog,
+        in_words: impl Fn(&Draw) -> String,
+    ) -> Result<(), DatabaseError> {
+        let transaction = self.connection.transaction()?;
+        add_all(&transaction, summary, log, in_words)?;
+        transaction.commit()?;
+        Ok(())
+    }
+
+    /// The numbers of all episodes so far.
+    ///
+    /// # Errors
+    /// If the file cannot be read, or holds a number that is none of an episode.
+    pub fn episodes(&self) -> Result<BTreeSet<usize>, DatabaseError> {
+        let mut statement = self.connection.prepare("SELECT episode FROM episode")?;
+        let numbers = statement.query_map([], |row| row.get::<_, i64>(0))?;
+        let number = |found: i64| usize::try_from(found).map_err(|_| DatabaseError::Episode { found });
+        numbers.map(|found| number(found?)).collect()
+    }
+
+    /// Why steps passed although something was asked for, and how often; the most frequent first.
+    /// Figures in a reason are left out, so that reasons can be told apart.
+    ///
+    /// # Errors
+    /// If the file cannot be read.
+    pub fn refusals(&self) -> Result<Vec<RefusalCount>, DatabaseError> {
+        let mut statement = self.connection.prepare("SELECT refused FROM step WHERE refused IS NOT NULL")?;
+        let mut counts: BTreeMap<String, i64> = BTreeMap::new();
+        for reason in statement.query_map([], |row| row.get::<_, String>(0))? {
+            *counts.entry(without_figures(&reason?)).or_default() += 1;
+        }
+        let mut refusals: Vec<RefusalCount> =
+            counts.into_iter().map(|(reason, times)| RefusalCount { reason, times }).collect();
+        refusals.sort_by_key(|refusal| -refusal.times);
+        Ok(refusals)
+    }
+
+    /// Totals over all episodes.
+    ///
+    /// # Errors
+    /// If the file cannot be read.
+    pub fn totals(&self) -> Result<Totals, DatabaseError> {
+        Ok(self.connection.query_row(
+            "SELECT count(*), coalesce(sum(collisions), 0), coalesce(sum(counted), 0),
+                        coalesce(sum(collisions > 0), 0), coalesce(sum(counted > 0), 0),
+                        coalesce(sum(ended = 'arrived'), 0), coalesce(sum(ended = 'stalled'), 0),
+                        coalesce(sum(ended = 'limit'), 0), coalesce(sum(duration_s), 0.0),
+                        coalesce(sum(distance_m), 0.0), coalesce(sum(red_runs), 0), avg(first_counted_s),
+                        (SELECT coalesce(sum(sudden), 0) FROM collision),
+                        (SELECT coalesce(sum(struck), 0) FROM collision),
+                        (SELECT coalesce(sum(repeated), 0) FROM collision),
+                        (SELECT coalesce(sum(avoidability = 'avoidable'), 0) FROM collision),
+                        (SELECT coalesce(sum(avoidability = 'beyond_reference'), 0) FROM collision),
+                        (SELECT coalesce(sum(avoidability = 'unavoidable'), 0) FROM collision),
+                        coalesce(sum(branched_s), 0.0)
+                 FROM episode",
+            [],
+            |row| {
+                Ok(Totals {
+                    episodes: row.get(0)?,
+                    collisions: row.get(1)?,
+                    counted: row.get(2)?,
+                    episodes_with_collision: row.get(3)?,
+                    episodes_with_counted: row.get(4)?,
+                    arrived: row.get(5)?,
+                    stalled: row.get(6)?,
+                    step_limit: row.get(7)?,
+                    simulated_s: row.get(8)?,
+                    driven_m: row.get(9)?,
+                    red_runs: row.get(10)?,
+                    first_counted_s_mean: row.get(11)?,
+                    sudden: row.get(12)?,
+                    struck: row.get(13)?,
+                    repeated: row.get(14)?,
+                    avoidable: row.get(15)?,
+                    beyond_reference: row.get(16)?,
+                    unavoidable: row.get(17)?,
+                    branched_s: row.get(18)?,
+                })
+            },
+        )?)
+    }
+}
+
+/// How often a reason kept an action from being carried out.
+#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
+pub struct RefusalCount {
+    pub reason: String,
+    pub times: i64,
+}
+
+/// A reason with `…` for each number.
+fn without_figures(reason: &str) -> String {
+    let is_figure = |word: &str| word.parse::<f64>().is_ok();
+    let shown = reason.split(' ').map(|word| {
+        let bare = word.trim_end_matches([',', ';']);
+        if is_figure(bare) { word.replace(bare, "…") } else { word.to_owned() }
+    });
+    shown.collect::<Vec<_>>().join(" ")
+}
+
+/// What a run has found so far.
+#[derive(Debug, Clone, Default, PartialEq, serde::Serialize)]
+pub struct Totals {
+    pub episodes: i64,
+    pub collisions: i64,
+    /// Collisions that the space's verdict counts.
+    pub counted: i64,
+    pub episodes_with_collision: i64,
+    pub episodes_with_counted: i64,
+    pub arrived: i64,
+    pub stalled: i64,
+    pub step_limit: i64,
+    pub simulated_s: f64,
+    pub driven_m: f64,
+    pub red_runs: i64,
+    /// Mean time to the first counted collision over the episodes that have one, s: the paper's
+    /// "TTC" (survivorship-biased, like the paper's).
+    pub first_counted_s_mean: Option<f64>,
+    /// Collisions with each of the facts that a verdict may exclude; one may have several.
+    pub sudden: i64,
+    pub struck: i64,
+    pub repeated: i64,
+    /// Collisions by what careful drivers make of them: their sum is `collisions`.
+    pub avoidable: i64,
+    pub beyond_reference: i64,
+    pub unavoidable: i64,
+    /// Driven in branches, beside the episodes, by agents that look ahead, s.
+    pub branched_s: f64,
+}
+
+fn step_table() -> String {
+    let states: Vec<String> = STATE_NAMES.iter().map(|name| format!("{name} REAL NOT NULL")).collect();
+    format!(
+        "CREATE TABLE step (
+           episode INTEGER NOT NULL REFERENCES episode, step INTEGER NOT NULL, time_s REAL NOT NULL,
+           action_row INTEGER, action TEXT, refused TEXT, proc REAL NOT NULL, reward REAL NOT NULL,
+           ttc_s REAL, thw_s REAL, drac_mps2 REAL, required_mps2 REAL, rss_unsafe_s REAL,
+           {}, PRIMARY KEY (episode, step)) STRICT;",
+        states.join(", ")
+    )
+}
+
+/// An episode with its steps and collisions.
+pub(crate) fn add_all(
+    transaction: &Transaction,
+    summary: &EpisodeSummary,
+    log: &EpisodeLog,
+    in_words: impl Fn(&Draw) -> String,
+) -> Result<(), DatabaseError> {
+    add_episode(transaction, summary, log)?;
+    for (index, step) in log.steps.iter().enumerate() {
+        let (row, action, refused) = match &step.outcome {
+            Outcome::Done { draw, .. } => (Some(draw.row), Some(in_words(draw)), None),
+            Outcome::Passed => (None, None, None),
+            Outcome::Refused { row, rule, reason } => (
+                Some(*row),
+                None,
+                Some(rule.as_ref().map_or(reason.clone(), |rule| format!("{rule}: {reason}"))),
+            ),
+        };
+        let mut values: Vec<rusqlite::types::Value> = vec![
+            (summary.episode as i64).into(),
+            (index as i64).into(),
+            step.time_s.into(),
+            row.map(|row| row as i64).into(),
+            action.into(),
+            refused.into(),
+            step.proc.into(),
+            step.reward.into(),
+        ];
+        // Only runs measure; trainings do not.
+        let measured = summary.criticality.get(index);
+        values.extend([
+            measured.and_then(|step| step.ttc_s).into(),
+            measured.and_then(|step| step.thw_s).into(),
+            measured.map(|step| step.drac_mps2).into(),
+            measured.map(|step| step.required_mps2).into(),
+            measured.map(|step| step.rss_unsafe_s).into(),
+        ]);
+        values.extend(step.state.iter().map(|&value| f64::from(value).into()));
+        let places = vec!["?"; values.len()].join(", ");
+        transaction
+            .prepare_cached(&format!("INSERT INTO step VALUES ({places})"))?
+            .execute(rusqlite::params_from_iter(values))?;
+    }
+    for finding in &summary.collisions {
+        add_collision(transaction, summary.episode, finding)?;
+    }
+    Ok(())
+}
+
+fn add_episode(
+    transaction: &Transaction,
+    summary: &EpisodeSummary,
+    log: &EpisodeLog,
+) -> Result<(), rusqlite::Error> {
+    transaction
+        .prepare_cached("INSERT INTO episode VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)")?
+        .execute(params![
+            summary.episode as i64,
+            log.road,
+            log.seed.to_string(),
+            log.end.name(),
+            log.duration_s,
+            log.distance_m,
+            log.steps.len() as i64,
+            log.red_runs,
+            log.collisions.len() as i64,
+            summary.counted() as i64,
+            summary.first_counted_s(),
+            crate::model::digest_text(&log.trace()),
+            summary.pet_s,
+            summary.branched_s,
+        ])?;
+    Ok(())
+}
+
+fn add_collision(
+    transaction: &Transaction,
+    episode: usize,
+    finding: &Finding,
+) -> Result<(), rusqlite::Error> {
+    let Finding { collision, facts, judgement, .. } = finding;
+    let contact = &collision.contact;
+    let severity = oracle::severity(collision);
+    let in_words =
+        |modules: &Vec<Module>| modules.iter().map(|module| module.name()).collect::<Vec<_>>().join(" ");
+    let cause = finding.cause.as_ref().map(in_words);
+    transaction
+        .prepare_cached(
+            "INSERT INTO collision VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+        )?
+        .execute(params![
+            episode as i64,
+            finding.number as i64,
+            contact.time_s,
+            collision.step as i64,
+            contact.obstacle,
+            collision.body.name(),
+            collision.verb.name(),
+            contact.ego_speed_mps,
+            contact.closing_speed_mps,
+            contact.on_ego.x,
+            contact.on_ego.y,
+            facts.repeated,
+            facts.sudden,
+            facts.struck,
+            finding.counted,
+            judgement.class.name(),
+            judgement.onset_s,
+            judgement.avoided_by.join(" "),
+            judgement.evasion,
+            severity.side,
+            severity.approach,
+            severity.relative_speed_mps,
+            severity.delta_v_mps,
+            severity.obstacle_delta_v_mps,
+            cause,
+            finding.shape.map(Shape::name),
+        ])?;
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn reasons_differ_by_their_words() {
+        let reason = "no_teleport: the gap would be 12.5 m, a fair one is 17 m";
+        assert_eq!(without_figures(reason), "no_teleport: the gap would be … m, a fair one is … m");
+        assert_eq!(without_figures("cannot spawn: no lane on the left"), "cannot spawn: no lane on the left");
+    }
+}

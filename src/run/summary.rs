@@ -1,0 +1,117 @@
+//! What an episode amounts to: its collisions, each with the facts of its verdict.
+
+use crate::ads::{ModularConfig, Module};
+use crate::episode;
+use crate::episode::{Collision, EpisodeLog, Script, Setup};
+use crate::mdp::Criticality;
+use crate::model::{OutcomeFacts, Space};
+use crate::oracle;
+use crate::oracle::{AvoidabilitySettings, Judgement, NoModules};
+
+use crate::run::gauges::Manners;
+use crate::run::shape::Shape;
+
+/// An episode, judged.
+#[derive(Debug, Clone, PartialEq)]
+pub struct EpisodeSummary {
+    /// Number of the episode in its run, from 0.
+    pub episode: usize,
+    pub collisions: Vec<Finding>,
+    /// By what it was told whether they were avoidable.
+    pub avoidability: AvoidabilitySettings,
+    /// Measures of danger in each step, where they were taken.
+    pub criticality: Vec<Criticality>,
+    /// Least post-encroachment time with anybody who was not hit, s; `None` above 5 s.
+    pub pet_s: Option<f64>,
+    /// How the ego vehicle drove, where it was watched.
+    pub manners: Manners,
+    /// Driven in branches, beside the episode, by an agent that tries rows out before it chooses, s.
+    pub branched_s: f64,
+}
+
+/// A collision, judged.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Finding {
+    /// Index among the collisions of its episode.
+    pub number: usize,
+    pub collision: Collision,
+    pub facts: OutcomeFacts,
+    pub judgement: Judgement,
+    /// Modules at fault, if they were looked for.
+    pub cause: Option<Vec<Module>>,
+    pub counted: bool,
+    /// Whether every step before it is known to be needed for it.
+    pub minimal: bool,
+    /// The shape of the ego vehicle's way to it, where it was watched.
+    pub shape: Option<Shape>,
+}
+
+impl EpisodeSummary {
+    /// Judges every collision of a log, by playing it again from its setup, and applies the space's
+    /// verdict.
+    pub fn judged(
+        setup: &Setup,
+        number: usize,
+        log: &EpisodeLog,
+        settings: &AvoidabilitySettings,
+    ) -> EpisodeSummary {
+        let script = Script::of_log(log);
+        let judgements = oracle::judge(log, settings, &mut |watch| {
+            episode::run(setup, &mut |moment| script.choose(setup.table, moment), watch);
+        });
+        let summary = EpisodeSummary::new(setup.table.space(), number, log, judgements);
+        EpisodeSummary { avoidability: settings.clone(), ..summary }
+    }
+
+    /// Applies the space's verdict to every collision of a log; `judgements` has one for each, told in the
+    /// usual way.
+    pub fn new(space: &Space, number: usize, log: &EpisodeLog, judgements: Vec<Judgement>) -> EpisodeSummary {
+        let find = |(index, judgement)| {
+            let facts = oracle::facts(log, index, &judgement);
+            let counted = space.counts(facts);
+            Finding {
+                number: index,
+                collision: log.collisions[index],
+                facts,
+                judgement,
+                cause: None,
+                counted,
+                minimal: false,
+                shape: None,
+            }
+        };
+        let collisions = judgements.into_iter().enumerate().map(find).collect();
+        EpisodeSummary {
+            episode: number,
+            collisions,
+            avoidability: AvoidabilitySettings::default(),
+            criticality: Vec::new(),
+            pet_s: None,
+            manners: Manners::default(),
+            branched_s: 0.0,
+        }
+    }
+
+    /// Looks for the cause of every counted collision.
+    ///
+    /// # Errors
+    /// If the driving system has no modules.
+    pub fn find_causes(&mut self, setup: &Setup, log: &EpisodeLog) -> Result<(), NoModules> {
+        for finding in self.collisions.iter_mut().filter(|finding| finding.counted) {
+            let diagnosis = oracle::diagnose(setup, log, finding.number, &ModularConfig::default())?;
+            finding.cause = Some(diagnosis.cause);
+        }
+        Ok(())
+    }
+
+    /// Number of counted collisions.
+    pub fn counted(&self) -> usize {
+        self.collisions.iter().filter(|finding| finding.counted).count()
+    }
+
+    /// Time to the first counted collision (TTFC), s.
+    pub fn first_counted_s(&self) -> Option<f64> {
+        let counted = self.collisions.iter().find(|finding| finding.counted)?;
+        Some(counted.collision.contact.time_s)
+    }
+}

@@ -1,0 +1,116 @@
+//! What a study file says, field by field. Unknown fields are refused.
+
+use serde_json::Value;
+
+use crate::run::DEFAULT_ADS;
+
+/// A study file. Paths are relative to it.
+#[derive(Debug, Clone, PartialEq, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct StudyFile {
+    /// What it is to answer, in a sentence; printed above the result.
+    #[serde(default)]
+    pub question: Option<String>,
+    /// The space (`.ava`).
+    pub space: String,
+    /// Roads of the space, each compared by itself; none named: all.
+    #[serde(default)]
+    pub roads: Vec<String>,
+    /// Driving system under test.
+    #[serde(default = "default_ads")]
+    pub ads: String,
+    /// Profile of the `modular` driving system; without one it is as it comes.
+    #[serde(default)]
+    pub ads_config: Option<String>,
+    /// Vehicles of ambient traffic around the ego vehicle.
+    #[serde(default)]
+    pub ambient: u32,
+    /// All seeds of trainings and evaluations come of it, each kind by a stream of its own.
+    #[serde(default = "default_seed")]
+    pub first_seed: u64,
+    #[serde(default)]
+    pub evaluation: EvaluationPlan,
+    /// Whether the cause of each counted collision is looked for; takes some twenty replays for each.
+    #[serde(default)]
+    pub causes: bool,
+    /// Who is compared. The labels must differ.
+    pub agents: Vec<AgentFile>,
+    /// Labels of the agents that each other agent is compared with.
+    #[serde(default)]
+    pub baselines: Vec<String>,
+}
+
+/// How an agent is judged once it is ready.
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct EvaluationPlan {
+    /// Episodes of one seed: what a number of collisions refers to. Paper: 15.
+    pub episodes: u32,
+    /// Seeds over which a number is averaged, for each training or repetition. Paper: 5.
+    pub seeds: u32,
+    /// The time to the first counted collision is looked at up to here, s (restricted mean). Ours: most
+    /// episodes have ended by then.
+    pub horizon_s: f64,
+}
+
+impl Default for EvaluationPlan {
+    fn default() -> EvaluationPlan {
+        EvaluationPlan { episodes: 15, seeds: 5, horizon_s: 60.0 }
+    }
+}
+
+/// One agent of a study.
+#[derive(Debug, Clone, PartialEq, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct AgentFile {
+    /// As in `avastra run --agent` and `avastra train --agent`.
+    pub name: String,
+    /// What the result calls it; without one its name.
+    #[serde(default)]
+    pub label: Option<String>,
+    /// Settings that a learning agent begins with; without one its own.
+    #[serde(default)]
+    pub preset: Option<String>,
+    /// What differs from them: a file, or the settings themselves.
+    #[serde(default)]
+    pub config: Option<Value>,
+    /// Independent trainings of a learning agent; without a number 10.
+    #[serde(default)]
+    pub trainings: Option<u32>,
+    /// Episodes of a training, on all its roads together; without a number 750.
+    #[serde(default)]
+    pub episodes: Option<u32>,
+    /// Roads that one training goes round, to be evaluated on each road of the study; none named: a training
+    /// for each road of the study, on that road alone.
+    #[serde(default)]
+    pub train_roads: Vec<String>,
+    /// Independent repetitions of the evaluation, of an agent that has nothing to learn; without a number 10.
+    #[serde(default)]
+    pub repeats: Option<u32>,
+    /// Profile of the driving system that this agent meets, in place of the study's: a file, or what differs
+    /// from the default.
+    #[serde(default)]
+    pub ads_config: Option<Value>,
+    /// Rules switched off for this agent.
+    #[serde(default)]
+    pub without: Vec<String>,
+    /// Optional rules switched on for this agent.
+    #[serde(default)]
+    pub with: Vec<String>,
+}
+
+fn default_ads() -> String {
+    DEFAULT_ADS.to_owned()
+}
+
+fn default_seed() -> u64 {
+    1
+}
+
+impl StudyFile {
+    /// # Errors
+    /// Text that is no such map: the reason, with its place.
+    pub fn from_yaml(text: &str) -> Result<StudyFile, String> {
+        serde_yaml::from_str(text).map_err(|error| error.to_string())
+    }
+}

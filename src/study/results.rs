@@ -1,0 +1,350 @@
+//! What a study found: measures with intervals, comparisons with tests.
+//!
+//! Depends on the cells alone. While cells are missing it is of those that are there, and says so.
+
+use std::collections::BTreeMap;
+
+use crate::oracle::wilson;
+use crate::rng;
+use crate::rng::Stream;
+use crate::study::statistics::{
+    Estimate, Interval, RankTest, holm, mann_whitney, mean, poisson, ratio_of_means, superiority,
+};
+
+use crate::study::file::EvaluationPlan;
+use crate::study::measures::{MEASURES, Measure, failures};
+use crate::study::record::{CellRecord, EpisodeRecord, Failure};
+use crate::study::study::StudySettings;
+
+/// Points of a learning curve. Ours: few enough to read.
+const CURVE_POINTS: usize = 15;
+
+/// The result of a study; written to `results.json`.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct StudyResults {
+    /// Raised whenever a field changes its meaning or goes away.
+    pub schema: u32,
+    pub question: Option<String>,
+    /// Whether it was cut down: no result then, but a sign that it works.
+    pub quick: bool,
+    /// What a number of collisions refers to.
+    pub evaluation: EvaluationPlan,
+    /// Cells that are there, and how many there will be.
+    pub cells: usize,
+    pub cells_wanted: usize,
+    pub roads: Vec<RoadResults>,
+    /// Each agent on all roads together.
+    pub together: Vec<Together>,
+}
+
+/// All agents on one road.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct RoadResults {
+    pub road: String,
+    pub agents: Vec<AgentResults>,
+    pub comparisons: Vec<Comparison>,
+}
+
+/// One agent on one road.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct AgentResults {
+    pub agent: String,
+    /// Trainings or repetitions.
+    pub cells: usize,
+    /// Of each training or repetition, by the names of [`MEASURES`].
+    pub measures: BTreeMap<&'static str, Estimate>,
+    /// Over all episodes together.
+    pub episodes: Pooled,
+    /// Counted collisions by cause, if causes were looked for; modules that only together are at fault
+    /// stand side by side.
+    pub causes: BTreeMap<String, usize>,
+    /// Distinct failures of all cells together, with how often each was found.
+    pub failures: Vec<FoundFailure>,
+    /// The learning curve, if there was anything to learn.
+    pub curve: Vec<CurvePoint>,
+    pub seeds: Vec<CellSeeds>,
+}
+
+/// An agent on all roads together.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct Together {
+    pub agent: String,
+    pub episodes: Pooled,
+}
+
+/// Rates over episodes taken together. Their intervals take events to be independent. Collisions of one
+/// episode, or of one trained policy, are not quite, so these intervals are rather too short; those of
+/// [`AgentResults::measures`], of which each value is of a training of its own, are not.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct Pooled {
+    pub episodes: usize,
+    pub driven_km: f64,
+    pub simulated_h: f64,
+    /// Share of episodes with a counted collision, with Wilson's interval.
+    pub colliding: Rate,
+    /// Events in 1,000 km, with Garwood's exact interval.
+    pub collisions_per_1000_km: Rate,
+    pub counted_per_1000_km: Rate,
+    pub red_runs_per_1000_km: Rate,
+}
+
+/// A rate with its interval.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct Rate {
+    pub events: u64,
+    /// None of nothing.
+    pub rate: Option<f64>,
+    #[serde(flatten)]
+    pub interval: Option<Interval>,
+}
+
+/// A failure and how often it was found.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct FoundFailure {
+    #[serde(flatten)]
+    pub failure: Failure,
+    pub count: usize,
+}
+
+/// Some episodes of all trainings.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct CurvePoint {
+    /// The last of them, from 1.
+    pub episode: usize,
+    /// Means of an episode.
+    pub reward: f64,
+    pub counted: f64,
+    pub exploration_epsilon: f64,
+}
+
+/// By which seeds a cell can be repeated.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct CellSeeds {
+    pub number: u32,
+    /// For `avastra train --seed`. As text: JSON's numbers are too short.
+    pub training: Option<String>,
+    /// For `avastra run --seed`.
+    pub evaluation: Vec<String>,
+}
+
+/// An agent against a baseline by one measure.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct Comparison {
+    pub agent: String,
+    pub baseline: String,
+    pub measure: &'static str,
+    /// Mean of the agent over mean of the baseline, with a percentile bootstrap interval; none where the
+    /// baseline's is 0.
+    pub ratio: Option<f64>,
+    pub ratio_interval: Option<Interval>,
+    /// Mann–Whitney.
+    #[serde(flatten)]
+    pub test: RankTest,
+    /// `p` after Holm's correction; its family are all comparisons of the study by the same measure.
+    pub p_holm: f64,
+    /// Â12: how probable it is that a value of the agent is larger than one of the baseline.
+    pub superiority: f64,
+    pub superiority_interval: Interval,
+}
+
+impl StudyResults {
+    /// The result over cells, which may stand in any order.
+    pub fn new(settings: &StudySettings, cells: &[CellRecord]) -> StudyResults {
+        let of = |agent: &str, road: &str| -> Vec<&CellRecord> {
+            let mut own: Vec<_> =
+                cells.iter().filter(|cell| cell.agent == agent && cell.road == road).collect();
+            own.sort_by_key(|cell| cell.number);
+            own
+        };
+        let mut roads: Vec<RoadResults> = Vec::new();
+        for road in &settings.roads {
+            let groups: Vec<_> =
+                settings.agents.iter().map(|agent| (agent.label.as_str(), of(&agent.label, road))).collect();
+            let agents = groups.iter().filter(|(_, cells)| !cells.is_empty());
+            roads.push(RoadResults {
+                road: road.clone(),
+                agents: agents.map(|(label, cells)| agent_results(settings, label, cells)).collect(),
+                comparisons: comparisons(settings, &groups),
+            });
+        }
+        correct(&mut roads);
+        let together = settings.agents.iter().map(|agent| {
+            let own = cells.iter().filter(|cell| cell.agent == agent.label);
+            let mut own: Vec<_> = own.collect();
+            own.sort_by_key(|cell| (settings.roads.iter().position(|road| *road == cell.road), cell.number));
+            Together {
+                agent: agent.label.clone(),
+                episodes: Pooled::new(own.into_iter().flat_map(|cell| &cell.episodes)),
+            }
+        });
+        let repeats: usize = settings.agents.iter().map(|agent| agent.repeats as usize).sum();
+        StudyResults {
+            schema: 1,
+            question: settings.question.clone(),
+            quick: settings.quick,
+            evaluation: settings.evaluation.clone(),
+            cells: cells.len(),
+            cells_wanted: repeats * settings.roads.len(),
+            together: together.collect(),
+            roads,
+        }
+    }
+}
+
+fn agent_results(settings: &StudySettings, label: &str, cells: &[&CellRecord]) -> AgentResults {
+    let episodes = || cells.iter().flat_map(|cell| &cell.episodes);
+    let measures = MEASURES
+        .iter()
+        .filter_map(|measure| Some((measure.name, not_negative(mean(&values(settings, measure, cells))?))))
+        .collect();
+    let counted = || episodes().flat_map(|episode| &episode.collisions).filter(|found| found.counted);
+    let mut causes: BTreeMap<String, usize> = BTreeMap::new();
+    for cause in counted().filter_map(|found| found.failure.cause.as_ref()) {
+        let name = if cause.is_empty() { "none found" } else { cause };
+        *causes.entry(name.to_owned()).or_default() += 1;
+    }
+    let mut found: Vec<FoundFailure> = failures(episodes())
+        .into_iter()
+        .map(|failure| FoundFailure {
+            failure: failure.clone(),
+            count: counted().filter(|found| found.failure == *failure).count(),
+        })
+        .collect();
+    found.sort_by_key(|failure| core::cmp::Reverse(failure.count));
+    AgentResults {
+        agent: label.to_owned(),
+        cells: cells.len(),
+        measures,
+        episodes: Pooled::new(episodes()),
+        causes,
+        failures: found,
+        curve: curve(cells),
+        seeds: cells.iter().map(|cell| seeds(cell)).collect(),
+    }
+}
+
+/// No measure is below 0, so neither is its mean.
+fn not_negative(estimate: Estimate) -> Estimate {
+    let interval = estimate.interval.map(|interval| Interval { low: interval.low.max(0.0), ..interval });
+    Estimate { interval, ..estimate }
+}
+
+fn values(settings: &StudySettings, measure: &Measure, cells: &[&CellRecord]) -> Vec<f64> {
+    cells.iter().filter_map(|cell| (measure.of)(cell, &settings.evaluation)).collect()
+}
+
+fn seeds(cell: &CellRecord) -> CellSeeds {
+    let by_seed = cell.episodes.chunk_by(|one, other| one.seed == other.seed);
+    CellSeeds {
+        number: cell.number,
+        training: cell.training_seed.map(|seed| seed.to_string()),
+        evaluation: by_seed.map(|episodes| episodes[0].seed.to_string()).collect(),
+    }
+}
+
+impl Pooled {
+    fn new<'a>(episodes: impl Iterator<Item = &'a EpisodeRecord>) -> Pooled {
+        let episodes: Vec<&EpisodeRecord> = episodes.collect();
+        let driven_km = episodes.iter().map(|episode| episode.distance_m).sum::<f64>() / 1000.0;
+        let total = |of: &dyn Fn(&EpisodeRecord) -> usize| -> u64 {
+            episodes.iter().map(|episode| of(episode) as u64).sum()
+        };
+        let colliding = total(&|episode| usize::from(episode.counted() > 0));
+        let (low, high) = wilson(colliding as u32, episodes.len() as u32);
+        let count = episodes.len();
+        Pooled {
+            episodes: count,
+            driven_km,
+            simulated_h: episodes.iter().map(|episode| episode.duration_s).sum::<f64>() / 3600.0,
+            colliding: Rate {
+                events: colliding,
+                rate: (count > 0).then(|| colliding as f64 / count as f64),
+                interval: (count > 0).then_some(Interval { low, high: Some(high) }),
+            },
+            collisions_per_1000_km: per_1000_km(total(&|episode| episode.collisions.len()), driven_km),
+            counted_per_1000_km: per_1000_km(total(&EpisodeRecord::counted), driven_km),
+            red_runs_per_1000_km: per_1000_km(total(&|episode| episode.red_runs as usize), driven_km),
+        }
+    }
+}
+
+fn per_1000_km(events: u64, driven_km: f64) -> Rate {
+    if driven_km <= 0.0 {
+        return Rate { events, rate: None, interval: None };
+    }
+    let scaled = |count: f64| count * 1000.0 / driven_km;
+    let Interval { low, high } = poisson(events);
+    let interval = Interval { low: scaled(low), high: high.map(scaled) };
+    Rate { events, rate: Some(scaled(events as f64)), interval: Some(interval) }
+}
+
+fn curve(cells: &[&CellRecord]) -> Vec<CurvePoint> {
+    let episodes = cells.iter().map(|cell| cell.trained.len()).min().unwrap_or(0);
+    let points = CURVE_POINTS.min(episodes);
+    let point = |number: usize| {
+        let span = number * episodes / points..(number + 1) * episodes / points;
+        let of_span = || cells.iter().flat_map(|cell| &cell.trained[span.clone()]);
+        let count = (span.len() * cells.len()) as f64;
+        CurvePoint {
+            episode: span.end,
+            reward: of_span().map(|episode| episode.sum).sum::<f64>() / count,
+            counted: of_span().map(|episode| f64::from(episode.counted)).sum::<f64>() / count,
+            exploration_epsilon: of_span().map(|episode| episode.exploration_epsilon).sum::<f64>() / count,
+        }
+    };
+    (0..points).map(point).collect()
+}
+
+/// Every agent against every baseline but itself, not yet corrected.
+fn comparisons(settings: &StudySettings, groups: &[(&str, Vec<&CellRecord>)]) -> Vec<Comparison> {
+    let mut found = Vec::new();
+    for baseline in &settings.baselines {
+        let Some((_, theirs)) = groups.iter().find(|(label, _)| label == baseline) else { continue };
+        for (label, own) in groups.iter().filter(|(label, _)| label != baseline) {
+            for measure in MEASURES.iter().filter(|measure| measure.is_compared) {
+                let samples = (values(settings, measure, own), values(settings, measure, theirs));
+                found.extend(comparison(settings, (label, baseline), measure.name, samples));
+            }
+        }
+    }
+    found
+}
+
+/// None if there is nothing to compare yet.
+fn comparison(
+    settings: &StudySettings,
+    (agent, baseline): (&str, &str),
+    measure: &'static str,
+    (own, theirs): (Vec<f64>, Vec<f64>),
+) -> Option<Comparison> {
+    let test = mann_whitney(&own, &theirs)?;
+    let (superiority, superiority_interval) = superiority(&own, &theirs)?;
+    let mut rng = rng::stream(settings.first_seed, Stream::Bootstrap, 0);
+    let ratio = ratio_of_means(&own, &theirs, &mut rng);
+    Some(Comparison {
+        agent: agent.to_owned(),
+        baseline: baseline.to_owned(),
+        measure,
+        ratio: ratio.map(|(ratio, _)| ratio),
+        ratio_interval: ratio.map(|(_, interval)| interval),
+        test,
+        p_holm: test.p,
+        superiority,
+        superiority_interval,
+    })
+}
+
+/// Holm's correction over all roads, agents and baselines, for each measure by itself.
+fn correct(roads: &mut [RoadResults]) {
+    for measure in MEASURES {
+        let mut family: Vec<&mut Comparison> = roads
+            .iter_mut()
+            .flat_map(|road| &mut road.comparisons)
+            .filter(|comparison| comparison.measure == measure.name)
+            .collect();
+        let corrected = holm(&family.iter().map(|comparison| comparison.test.p).collect::<Vec<_>>());
+        for (comparison, p) in family.iter_mut().zip(corrected) {
+            comparison.p_holm = p;
+        }
+    }
+}

@@ -1,0 +1,95 @@
+//! What a policy achieves without learning any more, in figures that anybody can check.
+
+use sha2::{Digest, Sha256};
+
+use crate::action::ActionTable;
+use crate::ads::Selected;
+use crate::agent::{Agent, QPolicy};
+use crate::episode;
+use crate::oracle::AvoidabilitySettings;
+use crate::rng;
+use crate::rng::Stream;
+use crate::run::{Arena, EpisodeSummary, RunError, choose};
+
+use crate::train::training::with_period;
+
+/// The outcome of a number of episodes.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct Evaluation {
+    /// Episodes on each road.
+    pub episodes: u64,
+    pub seed: u64,
+    pub collisions: u64,
+    /// Collisions that the space's verdict counts.
+    pub counted: u64,
+    /// Episodes with a counted collision.
+    pub colliding: u64,
+    /// Mean sum of the space's rewards in an episode.
+    pub return_mean: f64,
+    /// SHA-256 over the traces of all episodes, in order.
+    pub trace: [u8; 32],
+    /// Time driven, branches included, s.
+    pub simulated_s: f64,
+}
+
+/// Plays so many episodes on each road with a policy. `rules` are those switched on and off.
+///
+/// # Errors
+/// If a road or a rule does not exist.
+pub fn evaluate(
+    table: ActionTable,
+    policy: &QPolicy,
+    roads: &[String],
+    ads: &Selected,
+    rules: (&[String], &[String]),
+    (episodes, seed): (u64, u64),
+) -> Result<Evaluation, RunError> {
+    let table = with_period(table, policy.settings().observation_period_s);
+    evaluate_agent(table, &|| Box::new(policy.clone()), roads, ads, rules, (episodes, seed))
+}
+
+/// The same with any agent: `make` gives a fresh one for each episode.
+///
+/// # Errors
+/// As [`evaluate`].
+pub fn evaluate_agent(
+    table: ActionTable,
+    make: &dyn Fn() -> Box<dyn Agent>,
+    roads: &[String],
+    ads: &Selected,
+    rules: (&[String], &[String]),
+    (episodes, seed): (u64, u64),
+) -> Result<Evaluation, RunError> {
+    let mut arena = Arena::new(table, roads, ads.name(), rules)?;
+    arena.set_ads(ads.clone());
+    let mut traces = Sha256::new();
+    let mut found = Evaluation {
+        episodes,
+        seed,
+        collisions: 0,
+        counted: 0,
+        colliding: 0,
+        return_mean: 0.0,
+        trace: [0; 32],
+        simulated_s: 0.0,
+    };
+    let mut sum = 0.0;
+    for number in 0..episodes * arena.roads() as u64 {
+        let seed = rng::child_seed(seed, Stream::Evaluation, number);
+        let setup = arena.setup((number % arena.roads() as u64) as usize, seed);
+        let mut agent = make();
+        agent.begin();
+        let mut choose = |moment: &episode::Moment| choose(agent.as_mut(), moment);
+        let log = episode::run(&setup, &mut choose, &mut |_, _, _| {});
+        let settings = AvoidabilitySettings::default();
+        let counted = EpisodeSummary::judged(&setup, number as usize, &log, &settings).counted() as u64;
+        sum += log.steps.iter().map(|step| step.reward).sum::<f64>();
+        found.collisions += log.collisions.len() as u64;
+        found.counted += counted;
+        found.colliding += u64::from(counted > 0);
+        found.simulated_s += log.duration_s + agent.branched_s();
+        traces.update(log.trace());
+    }
+    let return_mean = sum / (episodes * arena.roads() as u64).max(1) as f64;
+    Ok(Evaluation { return_mean, trace: traces.finalize().into(), ..found })
+}

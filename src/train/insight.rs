@@ -1,0 +1,218 @@
+//! How a policy comes to its choices: which rows it favours and when, what it expects of each row in a
+//! state, and which variables matter to it.
+
+use crate::action::ActionTable;
+use crate::ads::Selected;
+use crate::agent::{QPolicy, Visit};
+use crate::mdp::Observation;
+use crate::model::policy::{VARIABLES, VariableKind, variable_index};
+use crate::rng::Stream;
+use crate::run::RunError;
+
+use crate::train::importance::{Importance, importance, set};
+use crate::train::visits::{arena, visits};
+
+/// What was found.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct Insight {
+    /// States that the policy came to.
+    pub states: usize,
+    /// Mean of what is at stake in them: highest less lowest Q-value of the open rows.
+    pub stake: f64,
+    /// The rows that it chose, the most frequent first.
+    pub rows: Vec<RowUse>,
+    /// The state that was asked for, over the mean of those visited.
+    pub state: State,
+    /// The most important first.
+    pub importance: Vec<Importance>,
+    /// Shuffles of each variable.
+    pub repeats: u64,
+}
+
+/// How often and when a row is chosen.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct RowUse {
+    pub row: usize,
+    pub label: String,
+    pub states: usize,
+    /// Share of the states in which it was open.
+    pub open: f64,
+    /// Mean Q-value where it is chosen.
+    pub q_value: f64,
+    /// The variables in which the states of its choice differ most from all states: name, mean there and
+    /// mean of all, as text in the variable's unit.
+    pub when: Vec<(&'static str, String, String)>,
+}
+
+/// One state and what the network expects in it.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct State {
+    /// Every variable that the network sees, with its value as text.
+    pub variables: Vec<(&'static str, String)>,
+    /// Row, its name and Q-value, the highest first. No rule is asked: which rows are legal a state does
+    /// not tell.
+    pub q_values: Vec<(usize, String, f32)>,
+}
+
+/// Variables that tell when a row is chosen, for each row. Ours.
+const TELLING: usize = 3;
+/// A mean that is off by fewer standard deviations tells nothing. Ours.
+const TELLING_DEVIATIONS: f64 = 0.25;
+
+/// Looks at a policy over so many episodes on each road. `given` are values in place of the mean state's.
+/// `rules` are those of the space that are switched on and off.
+///
+/// # Errors
+/// If a road or a rule does not exist.
+pub fn insight(
+    table: &ActionTable,
+    policy: &QPolicy,
+    given: &[(usize, f32)],
+    roads: &[String],
+    ads: &Selected,
+    rules: (&[String], &[String]),
+    (episodes, seed, repeats): (u64, u64, u64),
+) -> Result<Insight, RunError> {
+    let arena = arena(table, policy, roads, ads, rules)?;
+    let visits = visits(&arena, policy, episodes, (seed, Stream::Evaluation, 0));
+    let all: Vec<&Visit> = visits.iter().collect();
+    let mut observation = mean(&all);
+    for &(variable, value) in given {
+        set(&mut observation, variable, value);
+    }
+    pack_weather(&mut observation);
+    Ok(Insight {
+        states: visits.len(),
+        stake: visits.iter().map(Visit::stake).sum::<f64>() / visits.len().max(1) as f64,
+        rows: rows(table, policy, &visits),
+        state: state(table, policy, &observation),
+        importance: importance(policy, &visits, repeats, seed),
+        repeats,
+    })
+}
+
+fn rows(table: &ActionTable, policy: &QPolicy, visits: &[Visit]) -> Vec<RowUse> {
+    let all: Vec<&Visit> = visits.iter().collect();
+    let everywhere = Spread::new(policy, &all);
+    let mut rows: Vec<RowUse> = Vec::new();
+    for row in table.rows() {
+        let own: Vec<&Visit> = visits.iter().filter(|visit| visit.best == row.index).collect();
+        if own.is_empty() {
+            continue;
+        }
+        let open = visits.iter().filter(|visit| visit.open[row.index]).count();
+        let q_values = own.iter().map(|visit| f64::from(visit.q_values[row.index]));
+        rows.push(RowUse {
+            row: row.index,
+            label: row.label.clone(),
+            states: own.len(),
+            open: open as f64 / visits.len() as f64,
+            q_value: q_values.sum::<f64>() / own.len() as f64,
+            when: everywhere.telling(&own),
+        });
+    }
+    rows.sort_by(|a, b| b.states.cmp(&a.states).then(a.row.cmp(&b.row)));
+    rows
+}
+
+/// Means and deviations of the variables that a policy sees.
+struct Spread {
+    variables: Vec<usize>,
+    mean: Observation,
+    deviations: Vec<f64>,
+}
+
+impl Spread {
+    fn new(policy: &QPolicy, visits: &[&Visit]) -> Spread {
+        let variables = policy.variables().to_vec();
+        let deviation = |&variable: &usize| {
+            let mean = average(visits, variable);
+            let squares = visits.iter().map(|visit| {
+                let off = f64::from(visit.observation.get(variable)) - mean;
+                off * off
+            });
+            libm::sqrt(squares.sum::<f64>() / visits.len().max(1) as f64)
+        };
+        let deviations = variables.iter().map(deviation).collect();
+        Spread { variables, mean: mean(visits), deviations }
+    }
+
+    /// The variables whose mean over some visits is off by most standard deviations.
+    fn telling(&self, own: &[&Visit]) -> Vec<(&'static str, String, String)> {
+        let here = mean(own);
+        let mut telling: Vec<(f64, usize)> = self
+            .variables
+            .iter()
+            .zip(&self.deviations)
+            .filter(|(_, deviation)| **deviation > 0.0)
+            .map(|(&variable, deviation)| {
+                let off = f64::from(here.get(variable)) - f64::from(self.mean.get(variable));
+                (off.abs() / deviation, variable)
+            })
+            .collect();
+        telling.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+        let text = |&(_, variable): &(f64, usize)| {
+            (VARIABLES[variable].name, show(&here, variable), show(&self.mean, variable))
+        };
+        telling.iter().filter(|(off, _)| *off >= TELLING_DEVIATIONS).take(TELLING).map(text).collect()
+    }
+}
+
+fn average(visits: &[&Visit], variable: usize) -> f64 {
+    let sum: f64 = visits.iter().map(|visit| f64::from(visit.observation.get(variable))).sum();
+    sum / visits.len().max(1) as f64
+}
+
+/// The mean of states: of quantities the mean, of words the most frequent.
+fn mean(visits: &[&Visit]) -> Observation {
+    let mut observation = Observation::zeros();
+    for (variable, described) in VARIABLES.iter().enumerate() {
+        let value = match described.kind {
+            VariableKind::Quantity { .. } => average(visits, variable) as f32,
+            VariableKind::Words { words, .. } => {
+                let count = |value: f32| {
+                    visits.iter().filter(|visit| visit.observation.get(variable) == value).count()
+                };
+                let most = |best: f32, value: f32| if count(value) > count(best) { value } else { best };
+                words.iter().map(|(_, value)| *value).reduce(most).unwrap_or(0.0)
+            }
+        };
+        set(&mut observation, variable, value);
+    }
+    observation
+}
+
+/// The paper's one number for the weather follows from its parts.
+fn pack_weather(observation: &mut Observation) {
+    let index = |name| variable_index(name).expect("it is a variable");
+    let [rain, fog, wetness] = ["rain", "fog", "wetness"].map(|name| observation.get(index(name)));
+    set(observation, index("weather"), 100.0 * rain + 10.0 * fog + wetness);
+}
+
+fn state(table: &ActionTable, policy: &QPolicy, observation: &Observation) -> State {
+    let variables = policy.variables().iter();
+    let q_values = policy.q_values(observation);
+    let mut q_values: Vec<(usize, String, f32)> =
+        table.rows().iter().zip(&q_values).map(|(row, &q)| (row.index, row.label.clone(), q)).collect();
+    q_values.sort_by(|a, b| b.2.total_cmp(&a.2).then(a.0.cmp(&b.0)));
+    State {
+        variables: variables.map(|&one| (VARIABLES[one].name, show(observation, one))).collect(),
+        q_values,
+    }
+}
+
+/// A variable's value in its unit, to two decimals.
+fn show(observation: &Observation, variable: usize) -> String {
+    let value = observation.get(variable);
+    match VARIABLES[variable].kind {
+        VariableKind::Words { .. } => match VARIABLES[variable].word(value) {
+            Some(word) => word.to_owned(),
+            None => format!("{value:.2}"),
+        },
+        VariableKind::Quantity { unit, .. } => {
+            // Minus zero is no value that anybody means.
+            let value = (f64::from(value) * 100.0).round() / 100.0 + 0.0;
+            format!("{value:.2} {unit}").trim_end().to_owned()
+        }
+    }
+}

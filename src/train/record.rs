@@ -1,0 +1,109 @@
+//! A training in the run database: learning curves, and checkpoints to go on from.
+//!
+//! A checkpoint and the episodes up to it are committed together. What was kept after the last one is
+//! forgotten when a training is resumed: it is played again, to the same bytes.
+
+use rusqlite::{OptionalExtension, params};
+
+use crate::action::Draw;
+use crate::model::digest;
+use crate::run::{Database, DatabaseError, add_all};
+
+use crate::train::training::TrainedEpisode;
+
+const TABLES: &str = "
+    CREATE TABLE IF NOT EXISTS learning (
+        episode INTEGER PRIMARY KEY REFERENCES episode, return REAL NOT NULL, collisions INTEGER NOT NULL,
+        counted INTEGER NOT NULL, epsilon REAL NOT NULL, loss REAL, updates INTEGER NOT NULL,
+        steps INTEGER NOT NULL, simulated_s REAL NOT NULL
+    ) STRICT;
+    CREATE TABLE IF NOT EXISTS checkpoint (
+        only INTEGER PRIMARY KEY CHECK (only = 1), episodes INTEGER NOT NULL, digest TEXT NOT NULL,
+        learner BLOB NOT NULL
+    ) STRICT;";
+
+/// An agent as it was after so many episodes.
+pub struct Checkpoint {
+    pub episodes: usize,
+    pub learner: Vec<u8>,
+}
+
+impl Database {
+    /// Adds an episode of a training, and with it a checkpoint if there is one to keep.
+    ///
+    /// # Errors
+    /// If the file cannot be written.
+    pub fn add_trained(
+        &mut self,
+        trained: &TrainedEpisode,
+        checkpoint: Option<&[u8]>,
+        in_words: impl Fn(&Draw) -> String,
+    ) -> Result<(), DatabaseError> {
+        let transaction = self.connection.transaction()?;
+        let episode = trained.summary.episode;
+        add_all(&transaction, &trained.summary, &trained.log, in_words)?;
+        transaction.execute_batch(TABLES)?;
+        transaction.prepare_cached("INSERT INTO learning VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)")?.execute(
+            params![
+                episode as i64,
+                trained.sum,
+                trained.log.collisions.len() as i64,
+                trained.summary.counted() as i64,
+                trained.exploration_epsilon,
+                trained.lesson.loss,
+                trained.lesson.updates as i64,
+                trained.steps as i64,
+                trained.simulated_s,
+            ],
+        )?;
+        if let Some(learner) = checkpoint {
+            transaction.execute(
+                "INSERT OR REPLACE INTO checkpoint VALUES (1, ?, ?, ?)",
+                params![episode as i64 + 1, digest(learner), learner],
+            )?;
+        }
+        transaction.commit()?;
+        Ok(())
+    }
+
+    /// Time driven for the episodes of a training so far, s.
+    ///
+    /// # Errors
+    /// If the file cannot be read.
+    pub fn trained_s(&self) -> Result<f64, DatabaseError> {
+        let sum = "SELECT coalesce(sum(simulated_s), 0.0) FROM learning";
+        Ok(self.connection.query_row(sum, [], |row| row.get(0))?)
+    }
+
+    /// The last checkpoint, with everything after it forgotten; none if there has been none, and then
+    /// no episode is left.
+    ///
+    /// # Errors
+    /// If the file cannot be read or written, or the checkpoint is damaged.
+    pub fn return_to_checkpoint(&mut self) -> Result<Option<Checkpoint>, DatabaseError> {
+        let transaction = self.connection.transaction()?;
+        transaction.execute_batch(TABLES)?;
+        let kept: Option<(i64, String, Vec<u8>)> = transaction
+            .query_row("SELECT episodes, digest, learner FROM checkpoint", [], |row| {
+                Ok((row.get(0)?, row.get(1)?, row.get(2)?))
+            })
+            .optional()?;
+        let checkpoint = match kept {
+            None => None,
+            Some((episodes, claimed, learner)) => {
+                let episodes =
+                    usize::try_from(episodes).map_err(|_| DatabaseError::Episode { found: episodes })?;
+                if digest(&learner) != claimed {
+                    return Err(DatabaseError::Checkpoint);
+                }
+                Some(Checkpoint { episodes, learner })
+            }
+        };
+        let first = checkpoint.as_ref().map_or(0, |checkpoint| checkpoint.episodes) as i64;
+        for table in ["step", "collision", "learning", "episode"] {
+            transaction.execute(&format!("DELETE FROM {table} WHERE episode >= ?"), [first])?;
+        }
+        transaction.commit()?;
+        Ok(checkpoint)
+    }
+}

@@ -1,0 +1,334 @@
+//! The training loop, one episode at a time, and what an episode teaches.
+//!
+//! Single-threaded: every episode depends on all before it. Whoever calls it keeps the records.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use ndarray::Array1;
+
+use crate::action::ActionTable;
+use crate::ads::Ads;
+use crate::agent;
+use crate::agent::{
+    Agent, Beginning, Experience, Kind, Lesson, QPolicy, Rows, Settings, Trainable, Trajectory,
+};
+use crate::episode;
+use crate::episode::{Choice, End, EpisodeLog, Moment, Outcome, Script, Setup, Snapshot};
+use crate::mdp;
+use crate::mdp::{Closeness, Observation, ProcKind, StepOutcome};
+use crate::model::Space;
+use crate::oracle::AvoidabilitySettings;
+use crate::rng;
+use crate::rng::Stream;
+use crate::run::{
+    Arena, EpisodeSummary, Finding, Profile, RunError, carry_out, check_episodes, legal, offers,
+};
+use crate::sim::{Contact, World};
+use crate::syntax::listed;
+
+/// Everything that is needed to repeat a training; written to `run.yaml`.
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TrainSettings {
+    /// Version of avastra that wrote it.
+    pub avastra: String,
+    /// Version of the simulated world.
+    pub engine: String,
+    /// Path of the space, from the run directory.
+    pub space: String,
+    /// Digest of the space with all that it uses.
+    pub space_digest: String,
+    /// Episodes go round them, one each.
+    pub roads: Vec<String>,
+    pub ads: String,
+    /// Settings of the driving system, if it was given any; without them it is as it comes.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub profile: Option<Profile>,
+    pub agent: String,
+    /// Episodes on all roads together.
+    pub episodes: u32,
+    pub seed: u64,
+    /// Vehicles of ambient traffic.
+    #[serde(default)]
+    pub ambient: u32,
+    /// Rules switched off.
+    pub without: Vec<String>,
+    /// Optional rules switched on.
+    pub with: Vec<String>,
+    /// Of the agent.
+    pub hyperparameters: Settings,
+}
+
+/// A training that is ready to go on.
+pub struct Training {
+    arena: Arena,
+    settings: TrainSettings,
+    agent: Box<dyn Trainable>,
+    /// Moments that the agent may want to return to, by the numbers that it gave them. What is missing
+    /// after a kill is played again.
+    moments: BTreeMap<usize, Snapshot>,
+    /// Number of the next episode.
+    next: usize,
+}
+
+/// An episode, and what it taught.
+pub struct TrainedEpisode {
+    pub log: EpisodeLog,
+    pub summary: EpisodeSummary,
+    /// Sum of its rewards.
+    pub sum: f64,
+    /// The exploration rate at its beginning.
+    pub exploration_epsilon: f64,
+    pub lesson: Lesson,
+    /// Choices made in the training up to its end.
+    pub steps: u64,
+    /// Time driven for it, s: what was driven in branches counts, what a snapshot saved does not.
+    pub simulated_s: f64,
+}
+
+impl Training {
+    /// A training from the beginning.
+    ///
+    /// # Errors
+    /// If the settings name something that does not exist, name it twice, or name an agent that has
+    /// nothing to learn.
+    pub fn new(table: ActionTable, settings: TrainSettings) -> Result<Training, RunError> {
+        let (arena, rows) = prepared(table, &settings)?;
+        let agent = settings.hyperparameters.build(rows, settings.seed);
+        Ok(Training { arena, settings, agent, moments: BTreeMap::new(), next: 0 })
+    }
+
+    /// A training as a checkpoint left it after so many episodes.
+    ///
+    /// # Errors
+    /// As [`Training::new`], and if the checkpoint is not of such a training.
+    pub fn resumed(
+        table: ActionTable,
+        settings: TrainSettings,
+        episodes: usize,
+        checkpoint: &[u8],
+    ) -> Result<Training, RunError> {
+        let (arena, rows) = prepared(table, &settings)?;
+        let agent = settings.hyperparameters.restore(rows, checkpoint).ok_or(RunError::Checkpoint)?;
+        Ok(Training { arena, settings, agent, moments: BTreeMap::new(), next: episodes })
+    }
+
+    pub fn settings(&self) -> &TrainSettings {
+        &self.settings
+    }
+
+    pub fn arena(&self) -> &Arena {
+        &self.arena
+    }
+
+    pub fn table(&self) -> &ActionTable {
+        self.arena.table()
+    }
+
+    /// The network as learned so far, if the agent has one.
+    pub fn policy(&self) -> Option<&QPolicy> {
+        self.agent.policy()
+    }
+
+    /// What the agent has learned so far, ready to act for one episode.
+    pub fn actor(&self) -> Box<dyn Agent> {
+        self.agent.actor()
+    }
+
+    /// Episodes done.
+    pub fn episodes(&self) -> usize {
+        self.next
+    }
+
+    pub fn is_done(&self) -> bool {
+        self.next >= self.settings.episodes as usize
+    }
+
+    /// The agent as bytes, for [`Training::resumed`].
+    pub fn checkpoint(&self) -> Vec<u8> {
+        self.agent.save()
+    }
+
+    /// Plays the next episode and learns from it.
+    pub fn episode(&mut self) -> TrainedEpisode {
+        let number = self.next;
+        let road = number % self.arena.roads();
+        let fresh = rng::child_seed(self.settings.seed, Stream::Episode, number as u64);
+        let beginning = self.agent.beginning(road, fresh);
+        let exploration_epsilon = self.agent.exploration_epsilon();
+        let mut setup = self.arena.setup(road, beginning.seed);
+        setup.start.ambient = self.settings.ambient;
+        setup.proc = self.settings.hyperparameters.proc();
+        self.agent.begin();
+        let played = play(&setup, self.agent.as_mut(), beginning, &self.moments, &self.settings);
+
+        let log = played.log;
+        let summary = EpisodeSummary {
+            branched_s: self.agent.branched_s(),
+            ..EpisodeSummary::judged(&setup, number, &log, &AvoidabilitySettings::default())
+        };
+        let (last, last_legal) = played.last.expect("every episode has a last moment");
+        let trajectory = Trajectory {
+            steps: experiences(&self.settings.hyperparameters, played.choices, &log, &summary),
+            last,
+            last_legal,
+            terminal: log.end == End::Arrived,
+            closeness: played.closeness,
+        };
+        let mut rng = rng::stream(self.settings.seed, Stream::Replay, number as u64);
+        let lesson = self.agent.learn(&trajectory, &mut rng);
+        for (key, step) in self.agent.keepsakes() {
+            self.moments.extend(played.snapshots.get(&step).map(|snapshot| (key, snapshot.clone())));
+        }
+        self.next += 1;
+        let returned_s = beginning.from.map_or(0.0, |(_, step)| log.steps[step].time_s);
+        TrainedEpisode {
+            sum: trajectory.sum(),
+            exploration_epsilon,
+            lesson,
+            steps: self.agent.steps(),
+            simulated_s: log.duration_s - returned_s + summary.branched_s,
+            log,
+            summary,
+        }
+    }
+
+    /// The log of an episode as the space itself would have it: with its own collision probabilities.
+    pub fn log_of_space(&self, log: &EpisodeLog) -> EpisodeLog {
+        if self.settings.hyperparameters.proc() == ProcKind::default() {
+            return log.clone();
+        }
+        let road = (0..self.arena.roads()).find(|&road| self.arena.road(road).name == log.road);
+        let mut setup = self.arena.setup(road.expect("it was played here"), log.seed);
+        setup.start = log.start;
+        let script = Script::of_log(log);
+        let again = episode::run(&setup, &mut |moment| script.choose(setup.table, moment), &mut |_, _, _| {});
+        EpisodeLog { end: log.end, ..again }
+    }
+}
+
+/// An episode of a training, before it is judged.
+struct Played {
+    log: EpisodeLog,
+    /// The choices that were made anew.
+    choices: Vec<Chosen>,
+    /// What would have been seen next, and what would have been legal.
+    last: Option<(Observation, Array1<bool>)>,
+    /// By step, for an agent that returns.
+    snapshots: BTreeMap<usize, Snapshot>,
+    closeness: Closeness,
+}
+
+fn play(
+    setup: &Setup,
+    agent: &mut dyn Trainable,
+    beginning: Beginning,
+    moments: &BTreeMap<usize, Snapshot>,
+    settings: &TrainSettings,
+) -> Played {
+    let searches = settings.hyperparameters.hyperparameters().is_none();
+    let first_new = beginning.from.map_or(0, |(_, step)| step);
+    let from = beginning.from.and_then(|(key, _)| moments.get(&key));
+    let mut choices = Vec::new();
+    let mut snapshots = BTreeMap::new();
+    let mut last = None;
+    let mut closeness = Closeness::default();
+    let mut choose = |moment: &Moment| {
+        if searches {
+            snapshots.insert(moment.step, moment.snapshot());
+        }
+        let offers = offers(agent, moment);
+        let legal = legal(&offers);
+        let choice = carry_out(offers, legal.view(), agent, moment);
+        let row = match &choice {
+            Choice::Act(draw) => Some(draw.row),
+            Choice::Refused { row, .. } => Some(*row),
+            Choice::Pass | Choice::Stop => None,
+        };
+        let observation = moment.observation.clone();
+        let row = row.filter(|_| moment.step >= first_new);
+        choices.extend(row.map(|row| Chosen { step: moment.step, observation, legal, row }));
+        choice
+    };
+    let mut watch = |world: &World, _: &dyn Ads, _: &[Contact]| {
+        if searches {
+            closeness.note(world);
+        }
+    };
+    let mut at_last = |moment: &Moment| {
+        let legal = legal(&moment.setup().table.offers(moment.situation));
+        last = Some((moment.observation.clone(), legal));
+    };
+    let log = match from {
+        Some(snapshot) => episode::go_on(setup, snapshot.clone(), &mut choose, &mut watch, &mut at_last),
+        None => episode::run_to_last(setup, &mut choose, &mut watch, &mut at_last),
+    };
+    Played { log, choices, last, snapshots, closeness }
+}
+
+/// A choice of the agent and what it was made on.
+struct Chosen {
+    step: usize,
+    observation: Observation,
+    legal: Array1<bool>,
+    row: usize,
+}
+
+/// What each choice was worth. Steps in which nothing could be chosen teach nothing.
+fn experiences(
+    settings: &Settings,
+    choices: Vec<Chosen>,
+    log: &EpisodeLog,
+    summary: &EpisodeSummary,
+) -> Vec<Experience> {
+    let steps: Vec<usize> = choices.iter().map(|choice| choice.step).collect();
+    let made_by = |obstacle: u32| {
+        let made = |outcome: &Outcome| matches!(outcome, Outcome::Done { spawned, .. } if spawned.contains(&obstacle));
+        steps.iter().position(|&step| made(&log.steps[step].outcome))
+    };
+    let experience = |choice: Chosen| {
+        let step = &log.steps[choice.step];
+        let findings = || summary.collisions.iter().filter(|one| one.collision.step == choice.step);
+        let outcome = StepOutcome {
+            proc: step.proc,
+            collided: findings().next().is_some(),
+            counted: findings().any(|finding| finding.counted),
+        };
+        let reward = settings.reward().map_or(step.reward, |constants| mdp::reward(&constants, outcome));
+        let makers = |finding: &Finding| made_by(finding.collision.contact.obstacle);
+        let hits = findings().filter_map(makers).collect();
+        let crashes = findings().filter(|finding| finding.counted).map(makers).collect();
+        let Chosen { observation, legal, row, .. } = choice;
+        Experience { observation, legal, row, reward, hits, collided: outcome.collided, crashes }
+    };
+    choices.into_iter().map(experience).collect()
+}
+
+/// Looks everything up that the settings name.
+fn prepared(table: ActionTable, settings: &TrainSettings) -> Result<(Arena, Arc<Rows>), RunError> {
+    check_episodes(settings.episodes)?;
+    let agent = agent::by_name(&settings.agent).ok_or_else(|| {
+        let known = listed(&agent::REGISTRY.iter().map(|entry| entry.name).collect::<Vec<_>>());
+        RunError::Agent { name: settings.agent.clone(), known }
+    })?;
+    if matches!(agent.kind, Kind::Ready(_)) {
+        return Err(RunError::Unteachable { name: settings.agent.clone() });
+    }
+    let table = with_period(table, settings.hyperparameters.observation_period_s());
+    let rows = Arc::new(Rows::new(&table, settings.hyperparameters.actions())?);
+    let rules = (settings.with.as_slice(), settings.without.as_slice());
+    let mut arena = Arena::new(table, &settings.roads, &settings.ads, rules)?;
+    if let Some(profile) = &settings.profile {
+        arena.set_profile(profile)?;
+    }
+    Ok((arena, rows))
+}
+
+/// The table with another observation period.
+pub(crate) fn with_period(table: ActionTable, period_s: Option<f64>) -> ActionTable {
+    let Some(step_s) = period_s else { return table };
+    let mut space = Space::clone(table.space());
+    space.episode.step_s = step_s;
+    ActionTable::new(Arc::new(space))
+}
