@@ -5,6 +5,7 @@ use std::path::Path;
 
 use crate::check::explain::{PAGES, page};
 use crate::check::{Loaded, ReadError, load};
+use crate::model::policy::VARIABLES;
 use crate::syntax::{Style, render};
 
 /// Compiles an example as if it stood beside the shipped files.
@@ -34,6 +35,14 @@ fn declared() -> Vec<String> {
     let mut codes: Vec<String> = tables.into_iter().flat_map(quoted).collect();
     codes.sort_unstable();
     codes
+}
+
+#[test]
+fn the_page_about_variables_lists_them_all() {
+    let page = page("AV0705").unwrap().text;
+    let names = VARIABLES.iter().map(|variable| variable.name);
+    let missing: Vec<&str> = names.filter(|name| !page.contains(&format!("`{name}`"))).collect();
+    assert!(missing.is_empty(), "{missing:?}");
 }
 
 #[test]
