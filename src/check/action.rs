@@ -1,9 +1,10 @@
 //! Actions and groups: parameters with their values, effects with their words.
 
 use crate::check::checker::{Checker, docs, each, literal};
-use crate::check::declaration::{unknown_state, unknown_word};
+use crate::check::declaration::unknown_word;
 use crate::check::expression::{Place, is_number};
-use crate::check::names::{Names, unknown};
+use crate::check::names::unknown;
+use crate::check::report::{Report, field};
 use crate::model::expr::{Expr, ExprKind};
 use crate::model::vocabulary::{Body, Colour, LaneChoice, Side, Then, Verb, Word};
 use crate::model::{
@@ -25,30 +26,20 @@ const VALUES_MAX: i64 = 100_000;
 
 impl Checker {
     pub(super) fn declare_actions(&mut self, items: &[&ast::Item]) {
-        let actions: Vec<(&ast::Item, &ast::Action)> = each(items, |kind| match kind {
-            ItemKind::Action(action) => Some(action),
-            _ => None,
-        })
-        .collect();
+        let (names, actions) = self.declared("action", items, ItemKind::as_action);
+        self.action_names = names;
         for (item, declared) in actions {
-            if let Err(error) = self.action_names.declare("action", &declared.name, self.actions.len()) {
-                self.report(error);
-                continue;
-            }
             let action = self.action(item, declared);
             self.actions.push(action);
         }
     }
 
     fn action(&mut self, item: &ast::Item, declared: &ast::Action) -> Option<ActionDef> {
-        let mut names = Names::default();
         let mut locals: Vec<(String, Type)> = Vec::new();
         let mut parameters = Vec::new();
         let mut sound = true;
-        for (index, parameter) in declared.params.iter().enumerate() {
-            if let Err(error) = names.declare("parameter", &parameter.name, index) {
-                self.report(error);
-            }
+        self.once("parameter", declared.params.iter().map(|parameter| &parameter.name));
+        for parameter in &declared.params {
             let Some(ty) = self.plain_type(&parameter.ty) else {
                 // Keep its name, so that uses of it are not reported as unknown.
                 locals.push((parameter.name.text.clone(), Type::Bool));
@@ -110,8 +101,7 @@ impl Checker {
                     let message = format!("`{}` has no end of values", declared.name.text);
                     let error = Diagnostic::error(code::INFINITE, message)
                         .at(declared.ty.span, format!("any `{name}`"));
-                    self.report(error.help("say from where to where: `in low .. high`"));
-                    return None;
+                    return self.reject(error.help("say from where to where: `in low .. high`"));
                 }
             },
         };
@@ -124,8 +114,7 @@ impl Checker {
             let message = format!("`each` over `{}` has no end of rows", declared.name.text);
             let error = Diagnostic::error(code::INFINITE, message)
                 .at(declared.ty.span, format!("a range of `{name}`"));
-            self.report(error.help("list the values, `in [1 m, 2 m]`, or draw one with `any`"));
-            return None;
+            return self.reject(error.help("list the values, `in [1 m, 2 m]`, or draw one with `any`"));
         }
         let mut locals = before.to_vec();
         locals.push((declared.name.text.clone(), ty));
@@ -149,13 +138,10 @@ impl Checker {
         let drawn: Vec<Value> =
             values.iter().flat_map(|value| core::iter::repeat_n(*value, odds(value))).collect();
         if drawn.is_empty() && !values.is_empty() {
-            let error = Diagnostic::error(
-                code::EMPTY,
-                format!("nothing is left to draw for `{}`", declared.name.text),
-            );
-            let error = error.at(declared.span, "the odds of all its values are 0");
-            self.report(error.help("give at least one of them odds above 0"));
-            return None;
+            let message = format!("nothing is left to draw for `{}`", declared.name.text);
+            let error =
+                Diagnostic::error(code::EMPTY, message).at(declared.span, "the odds of all its values are 0");
+            return self.reject(error.help("give at least one of them odds above 0"));
         }
         Some(drawn)
     }
@@ -167,18 +153,16 @@ impl Checker {
                 if !is_number(ty) {
                     let name = self.type_name(ty);
                     let error = Diagnostic::error(code::TYPE_MISMATCH, format!("`{name}` has no ranges"));
-                    self.report(error.at(within.span, "a range of numbers"));
-                    return None;
+                    return self.reject(error.at(within.span, "a range of numbers"));
                 }
                 let (low, high) = (self.typed(low, &place, ty), self.typed(high, &place, ty));
                 let (low, high) = (low?, high?);
                 let (low, high) = (self.fold_number(&low), self.fold_number(&high));
                 let (low, high) = (low?, high?);
                 if low > high {
-                    let error = Diagnostic::error(code::EMPTY, "the range is empty");
-                    let error = error.at(within.span, "its low end lies above its high end");
-                    self.report(error.help("write the low end first"));
-                    return None;
+                    let error = Diagnostic::error(code::EMPTY, "the range is empty")
+                        .at(within.span, "its low end lies above its high end");
+                    return self.reject(error.help("write the low end first"));
                 }
                 if ty == Type::Int {
                     self.whole_values(low, high, within.span)
@@ -194,21 +178,18 @@ impl Checker {
                         literal(&self.fold(&item)?)
                     })
                     .collect();
-                let values: Option<Vec<Value>> = values.into_iter().collect();
-                let values = values?;
+                let values: Vec<Value> = values.into_iter().collect::<Option<_>>()?;
                 if values.is_empty() {
-                    self.report(
+                    return self.reject(
                         Diagnostic::error(code::EMPTY, "the list is empty")
                             .at(within.span, "no value is left"),
                     );
-                    return None;
                 }
                 Some(Domain::Values(values))
             }
             _ => {
                 let error = Diagnostic::error(code::TYPE_MISMATCH, "`in` needs a range or a list here");
-                self.report(error.at(within.span, "neither"));
-                None
+                self.reject(error.at(within.span, "neither"))
             }
         }
     }
@@ -219,12 +200,8 @@ impl Checker {
                 Some(Domain::Values((low..=high).map(|value| Value::Number(value as f64)).collect()))
             }
             _ => {
-                let error = Diagnostic::error(
-                    code::TOO_MANY_ROWS,
-                    format!("the range holds more than {VALUES_MAX} numbers"),
-                );
-                self.report(error.at(span, "too many"));
-                None
+                let message = format!("the range holds more than {VALUES_MAX} numbers");
+                self.reject(Diagnostic::error(code::TOO_MANY_ROWS, message).at(span, "too many"))
             }
         }
     }
@@ -232,20 +209,15 @@ impl Checker {
     fn effect(&mut self, effect: &ast::Effect, place: &Place<'_>) -> Option<EffectDef> {
         match &effect.kind {
             ast::EffectKind::Set { state, key, value } => {
-                let Some(index) = self.states.iter().position(|known| known.name == state.text) else {
-                    let error = unknown_state(self, state);
-                    self.report(error);
-                    return None;
-                };
+                let index = self.state_named(state)?;
                 let (key_of, ty) = (self.states[index].key, self.states[index].ty);
                 let key = match (key, key_of) {
                     (None, _) => None,
                     (Some(key), Some(of)) => Some(self.typed(key, place, Type::Enum(of))?),
                     (Some(key), None) => {
-                        let error =
-                            Diagnostic::error(code::TYPE_MISMATCH, format!("`{}` is not a map", state.text));
-                        self.report(error.at(key.span, "takes no key"));
-                        return None;
+                        let message = format!("`{}` is not a map", state.text);
+                        let error = Diagnostic::error(code::TYPE_MISMATCH, message);
+                        return self.reject(error.at(key.span, "takes no key"));
                     }
                 };
                 let value = self.typed(value, place, ty)?;
@@ -269,35 +241,28 @@ impl Checker {
         span: Span,
     ) -> Option<SpawnDef> {
         const FIELDS: [&str; 6] = ["does", "lane", "side", "then", "speed", "colour"];
-        let mut names = Names::default();
-        for (index, field) in fields.iter().enumerate() {
-            if let Err(error) = names.declare("field", &field.name, index) {
-                self.report(error);
-            }
-            if !FIELDS.contains(&field.name.text.as_str()) {
-                self.report(unknown("field", &field.name.text, field.name.span, FIELDS));
-            }
-        }
-        let find = |name: &str| fields.iter().find(|field| field.name.text == name).map(|field| &field.value);
+        self.fields_known(fields, &FIELDS);
+        let find = |name: &str| field(fields, name);
+        let lacks = |what: &str| format!("the spawn does not say {what}");
         let body_word = self.word::<Body>("body", body, place);
         let distance = self.typed(distance, place, Type::Quantity(Dimension::LENGTH));
         let verb = match find("does") {
             Some(value) => self.word::<Verb>("verb", value, place),
-            None => self.missing_field("does", "what it does", span),
+            None => self.missing_field("does", span, lacks("what it does")),
         };
         let verb_words: Vec<Verb> = verb.as_ref().map(possible).unwrap_or_default();
         let needs = |verbs: &[Verb]| verb_words.iter().any(|verb| verbs.contains(verb));
         let lane = match find("lane") {
             Some(value) => self.word::<LaneChoice>("lane", value, place),
             None if needs(&[Verb::DriveAhead, Verb::Overtake]) => {
-                self.missing_field("lane", "its lane", span)
+                self.missing_field("lane", span, lacks("its lane"))
             }
             None => Some(WordExpr::Fixed(LaneChoice::Current)),
         };
         let side = match find("side") {
             Some(value) => self.word::<Side>("side", value, place),
             None if needs(&[Verb::CrossRoad, Verb::Walk]) => {
-                self.missing_field("side", "where it comes from", span)
+                self.missing_field("side", span, lacks("where it comes from"))
             }
             None => Some(WordExpr::Fixed(Side::Right)),
         };
@@ -315,7 +280,7 @@ impl Checker {
             None if verb_words == [Verb::Stand] => {
                 Some(Expr { kind: ExprKind::Number(Rational::ZERO), ty: speed_type, span })
             }
-            None => self.missing_field("speed", "how fast it is", span),
+            None => self.missing_field("speed", span, lacks("how fast it is")),
         };
         let (body, verb) = (body_word?, verb?);
         self.check_verb(&body, &verb, behind, span);
@@ -359,29 +324,20 @@ impl Checker {
         }
     }
 
-    fn missing_field<T>(&mut self, field: &str, what: &str, span: Span) -> Option<T> {
-        let error = Diagnostic::error(code::MISSING_FIELD, format!("the spawn does not say {what}"));
-        self.report(error.at(span, format!("`{field}: …` is missing")));
-        None
-    }
-
     /// A word of the engine: its own spelling, or an expression whose enum is spelt like it.
     fn word<W: Word>(&mut self, kind: &str, expr: &ast::Expr, place: &Place<'_>) -> Option<WordExpr<W>> {
         if let ast::ExprKind::Name(name) = &expr.kind
             && self.is_bare_variant(expr, place)
         {
-            let word = W::from_name(name);
-            if word.is_none() {
+            return W::from_name(name).map(WordExpr::Fixed).or_else(|| {
                 let locals = place.locals.iter().map(|(local, _)| local.as_str());
-                let error = match nearest(name, locals) {
+                self.reject(match nearest(name, locals) {
                     Some(near) => Diagnostic::error(code::UNKNOWN, format!("unknown name `{name}`"))
                         .at(expr.span, "not declared")
                         .meant(expr.span, near),
                     None => unknown_word::<W>(kind, name, expr.span),
-                };
-                self.report(error);
-            }
-            return word.map(WordExpr::Fixed);
+                })
+            });
         }
         let expr = self.expr(expr, place, None)?;
         let words = self.words::<W>(kind, expr.ty, expr.span)?;
@@ -389,10 +345,7 @@ impl Checker {
     }
 
     pub(super) fn declare_groups(&mut self, items: &[&ast::Item]) {
-        for (item, declared) in each(items, |kind| match kind {
-            ItemKind::Group(declared) => Some(declared),
-            _ => None,
-        }) {
+        for (item, declared) in each(items, ItemKind::as_group) {
             let taken = self.groups.iter().any(|group| group.name == declared.name.text);
             if taken || self.action_names.get(&declared.name.text).is_some() {
                 let message = format!("the name `{}` is taken", declared.name.text);
@@ -400,10 +353,7 @@ impl Checker {
                 self.report(error.help("groups and actions share their names"));
                 continue;
             }
-            let mut actions = Vec::new();
-            for member in &declared.members {
-                actions.extend(self.targets(member));
-            }
+            let actions = declared.members.iter().flat_map(|member| self.targets(member)).collect();
             let name = declared.name.text.clone();
             self.groups.push(GroupDef { name, docs: docs(item), actions });
         }

@@ -5,10 +5,10 @@
 
 use std::path::PathBuf;
 
+use crate::check::names::{Names, unknown};
+use crate::check::report::Report;
 use crate::check::road::Maps;
 use crate::check::{style, unused};
-
-use crate::check::names::{Names, unknown};
 use crate::model::expr::{Expr, ExprKind};
 use crate::model::{ActionDef, EnumDef, EnumIndex, FnDef, GroupDef, Space, StateDef, Type, Value, code};
 use crate::prove;
@@ -64,15 +64,10 @@ pub(super) fn space(
 ) -> (Option<Space>, Vec<Diagnostic>) {
     let mut checker = Checker::default();
     checker.declare_enums(items);
-    let function = |item: &&ast::Item| matches!(item.kind, ItemKind::Fn(_));
-    let functions = items.iter().copied().filter(function).filter_map(|item| item.kind.name());
-    checker.functions_to_come = functions.map(|name| name.text.clone()).collect();
-    checker.road_names = each(items, |kind| match kind {
-        ItemKind::Road(block) => Some(block),
-        _ => None,
-    })
-    .map(|(_, block)| block.name.text.clone())
-    .collect();
+    let functions = each(items, ItemKind::as_fn);
+    checker.functions_to_come = functions.map(|(_, function)| function.name.text.clone()).collect();
+    let roads = each(items, ItemKind::as_road);
+    checker.road_names = roads.map(|(_, road)| road.name.text.clone()).collect();
     checker.declare_constants(items);
     checker.declare_odds(items);
     checker.declare_functions(items);
@@ -106,12 +101,11 @@ pub(super) fn space(
         episode,
         reward,
         verdicts,
-        expects: Vec::new(),
         roads,
         rows: Vec::new(),
     };
     space.rows = prove::rows(&space);
-    space.expects = checker.expects(&own, &space);
+    checker.expects(&own, &space);
     checker.diagnostics.extend(unused::report(&own, items));
     checker.diagnostics.extend(style::report(&own));
     checker.diagnostics.extend(prove::report(&space));
@@ -119,11 +113,13 @@ pub(super) fn space(
     (sound.then_some(space), checker.finish())
 }
 
-impl Checker {
-    pub(super) fn report(&mut self, diagnostic: Diagnostic) {
+impl Report for Checker {
+    fn report(&mut self, diagnostic: Diagnostic) {
         self.diagnostics.push(diagnostic);
     }
+}
 
+impl Checker {
     pub(super) fn has_errors(&self) -> bool {
         self.diagnostics.iter().any(Diagnostic::is_error)
     }
@@ -140,6 +136,24 @@ impl Checker {
         kept
     }
 
+    /// The declarations of one kind, by name. Reports a second declaration of a name and leaves it out.
+    pub(super) fn declared<'a, T>(
+        &mut self,
+        kind: &str,
+        items: &'a [&'a ast::Item],
+        pick: impl Fn(&'a ItemKind) -> Option<&'a T> + 'a,
+    ) -> (Names, Vec<(&'a ast::Item, &'a T)>) {
+        let mut names = Names::default();
+        let mut first = Vec::new();
+        for (item, declared) in each(items, pick) {
+            let name = item.kind.name().expect("only declarations with a name are asked for");
+            if self.take(names.declare(kind, name, first.len())).is_some() {
+                first.push((item, declared));
+            }
+        }
+        (names, first)
+    }
+
     /// The type of that name.
     pub(super) fn named_type(&mut self, name: &ast::Name) -> Option<Type> {
         let builtin = match name.text.as_str() {
@@ -148,13 +162,11 @@ impl Checker {
             other => crate::units::Dimension::from_name(other).map(Type::Quantity),
         };
         let found = builtin.or(self.enum_names.get(&name.text).map(|index| Type::Enum(EnumIndex(index))));
-        if found.is_none() {
+        found.or_else(|| {
             let builtin = ["Bool", "Int", "Length", "Duration", "Speed", "Accel", "Angle", "Ratio"];
-            let error =
-                unknown("type", &name.text, name.span, builtin.into_iter().chain(self.enum_names.all()));
-            self.report(error);
-        }
-        found
+            let candidates = builtin.into_iter().chain(self.enum_names.all());
+            self.reject(unknown("type", &name.text, name.span, candidates))
+        })
     }
 
     pub(super) fn plain_type(&mut self, ty: &ast::Type) -> Option<Type> {
@@ -162,8 +174,7 @@ impl Checker {
             ast::TypeKind::Named(name) => self.named_type(name),
             ast::TypeKind::Map { .. } => {
                 let error = Diagnostic::error(code::TYPE_MISMATCH, "only a state can be a map");
-                self.report(error.at(ty.span, "a map"));
-                None
+                self.reject(error.at(ty.span, "a map"))
             }
         }
     }
@@ -187,11 +198,10 @@ impl Checker {
             Values::Truth { may_hold, may_fail } if may_hold != may_fail => Some(ExprKind::Bool(may_hold)),
             Values::Truth { .. } => None,
         };
-        if folded.is_none() {
+        folded.or_else(|| {
             let error = Diagnostic::error(code::NUMBER, "the value cannot be computed exactly");
-            self.report(error.at(expr.span, "too large, or a division by 0"));
-        }
-        folded
+            self.reject(error.at(expr.span, "too large, or a division by 0"))
+        })
     }
 
     /// The same for a number.

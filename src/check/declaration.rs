@@ -1,8 +1,9 @@
 //! Enums, constants, functions and states.
 
-use crate::check::checker::{Checker, docs, each};
+use crate::check::checker::{Checker, Signature, docs};
 use crate::check::expression::Place;
-use crate::check::names::{Names, unknown};
+use crate::check::names::unknown;
+use crate::check::report::Report;
 use crate::check::rule::names_in;
 use crate::model::expr::{Expr, ExprKind};
 use crate::model::vocabulary::{Level, Phenomenon, TimeOfDay, Word};
@@ -31,20 +32,10 @@ const ODDS_MAX: u32 = 100;
 
 impl Checker {
     pub(super) fn declare_enums(&mut self, items: &[&ast::Item]) {
-        for (item, declared) in each(items, |kind| match kind {
-            ItemKind::Enum(declared) => Some(declared),
-            _ => None,
-        }) {
-            if let Err(error) = self.enum_names.declare("enum", &declared.name, self.enums.len()) {
-                self.report(error);
-                continue;
-            }
-            let mut variants = Names::default();
-            for (index, variant) in declared.variants.iter().enumerate() {
-                if let Err(error) = variants.declare("variant", variant, index) {
-                    self.report(error);
-                }
-            }
+        let (names, enums) = self.declared("enum", items, ItemKind::as_enum);
+        self.enum_names = names;
+        for (item, declared) in enums {
+            self.once("variant", &declared.variants);
             if declared.variants.len() > VARIANTS_MAX {
                 let message = format!("`{}` has {} variants", declared.name.text, declared.variants.len());
                 let error = Diagnostic::error(code::TOO_MANY_VARIANTS, message);
@@ -64,15 +55,7 @@ impl Checker {
 
     /// How often variants are drawn: whole numbers, folded like constants.
     pub(super) fn declare_odds(&mut self, items: &[&ast::Item]) {
-        let mut names = Names::default();
-        for (_, declared) in each(items, |kind| match kind {
-            ItemKind::Odds(declared) => Some(declared),
-            _ => None,
-        }) {
-            if let Err(error) = names.declare("odds of", &declared.name, 0) {
-                self.report(error);
-                continue;
-            }
+        for (_, declared) in self.declared("odds of", items, ItemKind::as_odds).1 {
             let Some(of) = self.enum_names.get(&declared.name.text) else {
                 let error = unknown("enum", &declared.name.text, declared.name.span, self.enum_names.all());
                 self.report(error);
@@ -119,30 +102,18 @@ impl Checker {
             }
             _ => None,
         };
-        let odds = found.filter(|odds| *odds <= ODDS_MAX);
-        if odds.is_none() {
-            let error = Diagnostic::error(code::SETTING, "odds are whole numbers");
-            let error = error.at(value.span, format!("wanted a whole number from 0 to {ODDS_MAX}"));
-            self.report(error.help("`BoxTruck => 2` makes trucks twice as likely as what has 1"));
-        }
-        odds
+        found.filter(|odds| *odds <= ODDS_MAX).or_else(|| {
+            let error = Diagnostic::error(code::SETTING, "odds are whole numbers")
+                .at(value.span, format!("wanted a whole number from 0 to {ODDS_MAX}"));
+            self.reject(error.help("`BoxTruck => 2` makes trucks twice as likely as what has 1"))
+        })
     }
 
     pub(super) fn declare_constants(&mut self, items: &[&ast::Item]) {
-        let mut names = Names::default();
-        let mut open: Vec<&ast::Let> = Vec::new();
-        for (_, declared) in each(items, |kind| match kind {
-            ItemKind::Let(declared) => Some(declared),
-            _ => None,
-        }) {
-            match names.declare("constant", &declared.name, open.len()) {
-                Ok(()) => open.push(declared),
-                Err(error) => self.report(error),
-            }
-        }
+        let (names, open) = self.declared("constant", items, ItemKind::as_let);
         // The order of declarations means nothing: a constant waits for those that it names. Where
         // they wait in a circle, the first is taken, and its names are unknown.
-        let named: Vec<Vec<ast::Name>> = open.iter().map(|declared| names_in(&declared.value)).collect();
+        let named: Vec<Vec<ast::Name>> = open.iter().map(|(_, declared)| names_in(&declared.value)).collect();
         let mut waiting: Vec<usize> = (0..open.len()).collect();
         while !waiting.is_empty() {
             let waits = |at: usize| {
@@ -151,7 +122,7 @@ impl Checker {
                 })
             };
             let next = waiting.iter().position(|at| !waits(*at)).unwrap_or(0);
-            let declared = open[waiting.remove(next)];
+            let (_, declared) = open[waiting.remove(next)];
             let value = self.expr(&declared.value, &Place::default(), None);
             let value = value.and_then(|value| Some(Expr { kind: self.fold(&value)?, ..value }));
             self.constants.push((declared.name.text.clone(), value));
@@ -159,21 +130,10 @@ impl Checker {
     }
 
     pub(super) fn declare_functions(&mut self, items: &[&ast::Item]) {
-        let mut declared = Vec::new();
-        for (_, function) in each(items, |kind| match kind {
-            ItemKind::Fn(function) => Some(function),
-            _ => None,
-        }) {
-            match self.function_names.declare("function", &function.name, declared.len()) {
-                Ok(()) => declared.push(function),
-                Err(error) => self.report(error),
-            }
-        }
-        for function in &declared {
-            let signature = self.signature(function);
-            self.signatures.push(signature);
-        }
-        for (index, function) in declared.iter().enumerate() {
+        let (names, declared) = self.declared("function", items, ItemKind::as_fn);
+        self.function_names = names;
+        self.signatures = declared.iter().map(|(_, function)| self.signature(function)).collect();
+        for (index, (_, function)) in declared.iter().enumerate() {
             let Some((parameters, result, span)) = self.signatures[index].clone() else { continue };
             let place = Place { locals: &parameters, ..Place::default() };
             let Some(body) = self.typed(&function.body, &place, result) else { continue };
@@ -188,20 +148,13 @@ impl Checker {
         }
     }
 
-    fn signature(&mut self, function: &ast::Fn) -> Option<crate::check::checker::Signature> {
-        let mut names = Names::default();
-        let mut parameters = Some(Vec::new());
-        for (index, parameter) in function.params.iter().enumerate() {
-            if let Err(error) = names.declare("parameter", &parameter.name, index) {
-                self.report(error);
-            }
-            let ty = self.plain_type(&parameter.ty);
-            parameters = parameters.zip(ty).map(|(mut all, ty)| {
-                all.push((parameter.name.text.clone(), ty));
-                all
-            });
-        }
+    fn signature(&mut self, function: &ast::Fn) -> Option<Signature> {
+        self.once("parameter", function.params.iter().map(|parameter| &parameter.name));
+        // All types are looked at before one that is broken ends it.
+        let types: Vec<Option<Type>> = function.params.iter().map(|p| self.plain_type(&p.ty)).collect();
         let result = self.plain_type(&function.result);
+        let parameters = function.params.iter().zip(types);
+        let parameters: Option<_> = parameters.map(|(p, ty)| Some((p.name.text.clone(), ty?))).collect();
         Some((parameters?, result?, function.name.span))
     }
 
@@ -228,11 +181,10 @@ impl Checker {
             if costs[start].flatten().is_some_and(too_large) {
                 let function = &self.functions[start];
                 let message = format!("`{}` calls too much", function.name);
-                let error =
-                    Diagnostic::error(code::TOO_LARGE, message).at(function.span, "with all that it calls");
-                let error = error.note(format!(
-                    "at most {OPERATIONS_MAX} operations and {CALLS_MAX} calls within calls are possible"
-                ));
+                let limits = format!("{OPERATIONS_MAX} operations and {CALLS_MAX} calls within calls");
+                let error = Diagnostic::error(code::TOO_LARGE, message)
+                    .at(function.span, "with all that it calls")
+                    .note(format!("at most {limits} are possible"));
                 self.report(error.help("compute what is needed twice once, and pass it on as a parameter"));
                 self.functions.clear();
                 return;
@@ -278,16 +230,8 @@ impl Checker {
     }
 
     pub(super) fn declare_states(&mut self, items: &[&ast::Item]) {
-        let mut names = Names::default();
         let mut cells_so_far = 0;
-        for (item, declared) in each(items, |kind| match kind {
-            ItemKind::State(declared) => Some(declared),
-            _ => None,
-        }) {
-            if let Err(error) = names.declare("state", &declared.name, self.states.len()) {
-                self.report(error);
-                continue;
-            }
+        for (item, declared) in self.declared("state", items, ItemKind::as_state).1 {
             let (key, value) = match &declared.ty.kind {
                 ast::TypeKind::Named(name) => (None, self.named_type(name)),
                 ast::TypeKind::Map { key, value } => {
@@ -320,6 +264,19 @@ impl Checker {
         }
     }
 
+    /// Position of the state of that name.
+    pub(super) fn state_named(&mut self, name: &ast::Name) -> Option<usize> {
+        let found = self.states.iter().position(|state| state.name == name.text);
+        found.or_else(|| {
+            let states = self.states.iter().map(|state| state.name.as_str());
+            let mut error = unknown("state", &name.text, name.span, states);
+            error.code = code::UNKNOWN_STATE;
+            let declare = || format!("declare it with `state {}: …`", name.text);
+            error.help = error.help.or_else(|| Some(declare()));
+            self.reject(error)
+        })
+    }
+
     fn initial(&mut self, declared: &ast::State, ty: Type) -> Option<Initial> {
         match &declared.initial {
             ast::Initial::Value(value) => {
@@ -328,12 +285,9 @@ impl Checker {
             }
             ast::Initial::Any if matches!(ty, Type::Bool | Type::Enum(_)) => Some(Initial::Any),
             ast::Initial::Any => {
-                let error = Diagnostic::error(
-                    code::INFINITE,
-                    format!("`{}` cannot begin as `any` number", declared.name.text),
-                );
-                self.report(error.at(declared.ty.span, "has no end of values").help("give it a value"));
-                None
+                let message = format!("`{}` cannot begin as `any` number", declared.name.text);
+                let error = Diagnostic::error(code::INFINITE, message);
+                self.reject(error.at(declared.ty.span, "has no end of values").help("give it a value"))
             }
         }
     }
@@ -351,12 +305,9 @@ impl Checker {
             }
             ("time" | "sky", _) => {
                 let shape = if name.text == "time" { "`time: Time`" } else { "`sky: Sky -> Level`" };
-                let error = Diagnostic::error(
-                    code::TYPE_MISMATCH,
-                    format!("`{}` is a state of the world", name.text),
-                );
-                self.report(error.at(name.span, format!("must be declared as {shape}")));
-                None
+                let message = format!("`{}` is a state of the world", name.text);
+                let error = Diagnostic::error(code::TYPE_MISMATCH, message);
+                self.reject(error.at(name.span, format!("must be declared as {shape}")))
             }
             _ => Some(StateMeaning::Private),
         }
@@ -366,30 +317,20 @@ impl Checker {
     pub(super) fn words<W: Word>(&mut self, kind: &str, ty: Type, span: Span) -> Option<Vec<W>> {
         let Type::Enum(of) = ty else {
             let name = self.type_name(ty);
-            let error = Diagnostic::error(
-                code::TYPE_MISMATCH,
-                format!("type mismatch: wanted a {kind}, found `{name}`"),
-            );
-            self.report(error.at(span, format!("this is a `{name}`")));
-            return None;
+            let message = format!("type mismatch: wanted a {kind}, found `{name}`");
+            let error = Diagnostic::error(code::TYPE_MISMATCH, message);
+            return self.reject(error.at(span, format!("this is a `{name}`")));
         };
         let declared = self.enums[of.0].clone();
-        let mut words = Some(Vec::new());
-        for variant in &declared.variants {
-            match W::from_name(variant) {
-                Some(word) => {
-                    if let Some(words) = &mut words {
-                        words.push(word);
-                    }
-                }
-                None => {
-                    words = None;
-                    let error = unknown_word::<W>(kind, variant, declared.span);
-                    self.report(error.beside(span, format!("`{}` is used as a {kind} here", declared.name)));
-                }
-            }
-        }
-        words
+        let word = |variant: &String| {
+            W::from_name(variant).or_else(|| {
+                let error = unknown_word::<W>(kind, variant, declared.span);
+                self.reject(error.beside(span, format!("`{}` is used as a {kind} here", declared.name)))
+            })
+        };
+        // Every unknown word is reported, not just the first.
+        let words: Vec<Option<W>> = declared.variants.iter().map(word).collect();
+        words.into_iter().collect()
     }
 }
 
@@ -401,22 +342,11 @@ fn variants_of(declared: &ast::Enum) -> Vec<String> {
 /// A spelling that means nothing to the engine.
 pub(super) fn unknown_word<W: Word>(kind: &str, word: &str, span: Span) -> Diagnostic {
     let words: Vec<&str> = W::ALL.iter().map(|word| word.name()).collect();
-    let error = Diagnostic::error(code::NOT_A_WORD, format!("the engine knows no {kind} `{word}`"));
-    let error = error.at(span, "");
+    let error =
+        Diagnostic::error(code::NOT_A_WORD, format!("the engine knows no {kind} `{word}`")).at(span, "");
     match nearest(word, words.iter().copied()) {
         Some(near) => error.help(format!("did you mean `{near}`?")),
         None => error.help(format!("it knows {}", listed(&words))),
-    }
-}
-
-/// A state or other thing that is not declared, among candidates.
-pub(super) fn unknown_state(checker: &Checker, name: &ast::Name) -> Diagnostic {
-    let states = checker.states.iter().map(|state| state.name.as_str());
-    let mut error = unknown("state", &name.text, name.span, states);
-    error.code = code::UNKNOWN_STATE;
-    match error.help {
-        Some(_) => error,
-        None => error.help(format!("declare it with `state {}: …`", name.text)),
     }
 }
 

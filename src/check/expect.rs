@@ -2,25 +2,23 @@
 
 use crate::check::checker::{Checker, each};
 use crate::check::names::unknown;
-use crate::model::{ExpectDef, Reach, Row, Space, code};
-use crate::syntax::ast::{BinaryOp, ItemKind, Span};
+use crate::check::report::Report;
+use crate::model::expr::Comparison;
+use crate::model::{Reach, Row, Space, code};
+use crate::syntax::ast::{ItemKind, Span};
 use crate::syntax::{Diagnostic, ast};
 
 impl Checker {
-    /// Judges every claim; gives those that hold.
-    pub(super) fn expects(&mut self, items: &[&ast::Item], space: &Space) -> Vec<ExpectDef> {
-        let mut held = Vec::new();
-        for (_, expect) in each(items, pick) {
-            if self.claim(&expect.claim, expect.span, space).is_some() {
-                held.push(ExpectDef { text: describe(&expect.claim), span: expect.span });
-            }
+    /// Judges every claim.
+    pub(super) fn expects(&mut self, items: &[&ast::Item], space: &Space) {
+        for (_, expect) in each(items, ItemKind::as_expect) {
+            self.claim(&expect.claim, expect.span, space);
         }
-        held
     }
 
     /// Without a sound space, claims of the wrong form are reported all the same.
     pub(super) fn look_at_expects(&mut self, items: &[&ast::Item]) {
-        for (_, expect) in each(items, pick) {
+        for (_, expect) in each(items, ItemKind::as_expect) {
             if !is_static(&expect.claim) {
                 self.report(not_static(expect.span));
             }
@@ -35,8 +33,7 @@ impl Checker {
                     |argument| matches!(&argument.value.kind, ast::ExprKind::Name(name) if name == "realisable"),
                 );
                 if call.args.len() != 2 || !realisable {
-                    self.report(not_static(call.span));
-                    return None;
+                    return self.reject(not_static(call.span));
                 }
                 let dead: Vec<&str> =
                     rows.iter().filter(|row| is_dead(row)).map(|row| row.label.as_str()).collect();
@@ -45,39 +42,23 @@ impl Checker {
                 }
                 let message = format!("{} of {} rows can never run", dead.len(), rows.len());
                 let error = Diagnostic::error(code::FALSE_CLAIM, message).at(span, "this is false");
-                self.report(
-                    dead.iter().take(5).fold(error, |error, row| error.note(format!("{row} cannot"))),
-                );
-                None
+                self.reject(dead.iter().take(5).fold(error, |error, row| error.note(format!("{row} cannot"))))
             }
             ast::ExprKind::Binary { op, left, right, .. } => {
                 let (left, right) = (self.count(left, space)?, self.count(right, space)?);
-                let holds = match op {
-                    BinaryOp::Equal => left == right,
-                    BinaryOp::NotEqual => left != right,
-                    BinaryOp::Less => left < right,
-                    BinaryOp::LessEqual => left <= right,
-                    BinaryOp::Greater => left > right,
-                    BinaryOp::GreaterEqual => left >= right,
-                    _ => {
-                        self.report(not_static(span));
-                        return None;
-                    }
+                let Some(comparison) = Comparison::from_operator(*op) else {
+                    return self.reject(not_static(span));
                 };
-                if holds {
+                if comparison.holds(left, right) {
                     return Some(());
                 }
                 let message = format!("{left} {} {right} does not hold", op.symbol());
                 let error = Diagnostic::error(code::FALSE_CLAIM, message).at(claim.span, "this is false");
-                self.report(
+                self.reject(
                     error.help("`avastra table FILE` lists the rows: correct the claim, or what makes them"),
-                );
-                None
+                )
             }
-            _ => {
-                self.report(not_static(span));
-                None
-            }
+            _ => self.reject(not_static(span)),
         }
     }
 
@@ -93,8 +74,7 @@ impl Checker {
             }
             _ => {
                 let error = Diagnostic::error(code::NOT_STATIC, "wanted a number of rows");
-                self.report(error.at(expr.span, "not one").help("write `count(actions)` or a whole number"));
-                None
+                self.reject(error.at(expr.span, "not one").help("write `count(actions)` or a whole number"))
             }
         }
     }
@@ -107,15 +87,11 @@ impl Checker {
         space: &'a Space,
     ) -> Option<Vec<&'a Row>> {
         let Some(ast::Arg { value, .. }) = argument else {
-            self.report(not_static(span));
-            return None;
+            return self.reject(not_static(span));
         };
         let ast::ExprKind::Name(name) = &value.kind else {
-            self.report(
-                Diagnostic::error(code::NOT_STATIC, "wanted an action or a group")
-                    .at(value.span, "not a name"),
-            );
-            return None;
+            let error = Diagnostic::error(code::NOT_STATIC, "wanted an action or a group");
+            return self.reject(error.at(value.span, "not a name"));
         };
         if name == "actions" {
             return Some(space.rows.iter().collect());
@@ -125,17 +101,10 @@ impl Checker {
         let Some(actions) = group.or(action) else {
             let groups = space.groups.iter().map(|group| group.name.as_str());
             let actions = space.actions.iter().map(|action| action.name.as_str());
-            self.report(unknown("action", name, value.span, groups.chain(actions).chain(["actions"])));
-            return None;
+            let candidates = groups.chain(actions).chain(["actions"]);
+            return self.reject(unknown("action", name, value.span, candidates));
         };
         Some(space.rows.iter().filter(|row| actions.contains(&row.action)).collect())
-    }
-}
-
-fn pick(kind: &ItemKind) -> Option<&ast::Expect> {
-    match kind {
-        ItemKind::Expect(expect) => Some(expect),
-        _ => None,
     }
 }
 
@@ -155,19 +124,4 @@ fn not_static(span: Span) -> Diagnostic {
 
 fn is_dead(row: &Row) -> bool {
     !row.roads.is_empty() && row.roads.iter().all(|reach| matches!(reach, Reach::Dead { .. }))
-}
-
-fn describe(claim: &ast::Expr) -> String {
-    match &claim.kind {
-        ast::ExprKind::Binary { op, left, right, .. } => {
-            format!("{} {} {}", describe(left), op.symbol(), describe(right))
-        }
-        ast::ExprKind::Call(call) => {
-            let arguments: Vec<String> = call.args.iter().map(|argument| describe(&argument.value)).collect();
-            format!("{}({})", call.name.text, arguments.join(", "))
-        }
-        ast::ExprKind::Name(name) => name.clone(),
-        ast::ExprKind::Number(number) => number.digits.clone(),
-        _ => String::new(),
-    }
 }

@@ -2,6 +2,7 @@
 
 use crate::check::checker::Checker;
 use crate::check::names::unknown;
+use crate::check::report::Report;
 use crate::model::expr::{Arithmetic, Comparison, Expr, ExprKind, Fact};
 use crate::model::vocabulary::LaneChoice;
 use crate::model::{EnumIndex, Type, code};

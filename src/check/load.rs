@@ -110,7 +110,7 @@ pub fn load_with(root: &Path, read: &ReadFile<'_>, cache: &mut MapCache) -> Resu
     diagnostics.extend(found);
     let space = space.filter(|_| !diagnostics.iter().any(Diagnostic::is_error));
     let mut scenario = None;
-    let has_scenario = files[0].tree.items.iter().any(|item| matches!(item.kind, ItemKind::Scenario(_)));
+    let has_scenario = files[0].tree.items.iter().any(|item| item.kind.as_scenario().is_some());
     if let (Some(space), true) = (&space, has_scenario) {
         match scenario::scenario(&files[0].tree, space) {
             Ok(found) => scenario = Some(found),
@@ -118,7 +118,7 @@ pub fn load_with(root: &Path, read: &ReadFile<'_>, cache: &mut MapCache) -> Resu
         }
     }
     let mut policy = None;
-    let has_policy = files[0].tree.items.iter().any(|item| matches!(item.kind, ItemKind::Policy(_)));
+    let has_policy = files[0].tree.items.iter().any(|item| item.kind.as_policy().is_some());
     if let (Some(space), true) = (&space, has_policy) {
         match policy::policy(sources.text(FileId(0)), &files[0].tree, space) {
             Ok(found) => policy = Some(found),
@@ -210,10 +210,7 @@ fn whole_digest(files: &[LoadedFile], root: &Path, maps: &mut MapReader<'_>) -> 
 }
 
 pub(super) fn uses(file: &LoadedFile) -> impl Iterator<Item = &ast::Use> {
-    file.tree.items.iter().filter_map(|item| match &item.kind {
-        ItemKind::Use(used) => Some(used),
-        _ => None,
-    })
+    file.tree.items.iter().filter_map(|item| item.kind.as_use())
 }
 
 /// The files that a file uses.
@@ -228,10 +225,7 @@ pub(super) fn used_path(file: &LoadedFile, used: &ast::Use) -> PathBuf {
 
 /// The maps that a file's roads name, as written.
 fn maps_named(file: &LoadedFile) -> impl Iterator<Item = &str> {
-    let roads = file.tree.items.iter().filter_map(|item| match item.kind.plain() {
-        ItemKind::Road(block) => Some(block),
-        _ => None,
-    });
+    let roads = file.tree.items.iter().filter_map(|item| item.kind.plain().as_road());
     let fields = roads.flat_map(|block| block.fields.iter().filter(|field| field.name.text == "map"));
     fields.filter_map(|field| match &field.value.kind {
         ast::ExprKind::Text(path) => Some(path.as_str()),

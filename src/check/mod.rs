@@ -17,6 +17,7 @@ mod load;
 mod names;
 mod overriding;
 pub mod policy;
+mod report;
 mod road;
 mod rule;
 mod scenario;

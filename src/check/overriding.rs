@@ -118,9 +118,8 @@ fn left_names(
             let mut known = false;
             for member in members().filter(is_next) {
                 known = true;
-                if let ItemKind::Group(group) = &member.item.kind {
-                    open.extend(group.members.iter().map(|member| member.text.clone()));
-                }
+                let group = member.item.kind.as_group();
+                open.extend(group.iter().flat_map(|group| &group.members).map(|member| member.text.clone()));
             }
             if known {
                 left.insert(next);
@@ -177,10 +176,7 @@ fn keeps_something(
 /// What rules without an action's name bind by: the states that some action sets, and the gaps if some
 /// action spawns.
 fn touched<'a>(items: impl Iterator<Item = &'a Item>) -> BTreeSet<String> {
-    let actions = items.filter_map(|item| match item.kind.plain() {
-        ItemKind::Action(action) => Some(action),
-        _ => None,
-    });
+    let actions = items.filter_map(|item| item.kind.plain().as_action());
     let effects = actions.flat_map(|action| &action.effects);
     effects
         .flat_map(|effect| match &effect.kind {

@@ -3,9 +3,10 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use crate::check::checker::{Checker, docs, each};
+use crate::check::checker::{Checker, docs};
 use crate::check::expression::Place;
-use crate::check::names::{Names, unknown};
+use crate::check::names::unknown;
+use crate::check::report::{Report, field};
 use crate::model::{Road, RoadFacts, SPAWN_SPEED_MPS, Type, code};
 use crate::road::{LanePlace, RoadMap, Route};
 use crate::syntax::ast::ItemKind;
@@ -26,17 +27,7 @@ impl Checker {
         chosen: Option<Vec<ast::Name>>,
         maps: &mut dyn Maps,
     ) -> Vec<Road> {
-        let mut names = Names::default();
-        let mut declared = Vec::new();
-        for (item, block) in each(items, |kind| match kind {
-            ItemKind::Road(block) => Some(block),
-            _ => None,
-        }) {
-            match names.declare("road", &block.name, declared.len()) {
-                Ok(()) => declared.push((item, block)),
-                Err(error) => self.report(error),
-            }
-        }
+        let (names, declared) = self.declared("road", items, ItemKind::as_road);
         let mut roads: Vec<Option<Road>> =
             declared.into_iter().map(|(item, block)| self.road(item, block, maps)).collect();
         let Some(chosen) = chosen else { return roads.into_iter().flatten().collect() };
@@ -52,53 +43,41 @@ impl Checker {
     }
 
     fn road(&mut self, item: &ast::Item, block: &ast::Block, maps: &mut dyn Maps) -> Option<Road> {
-        const NEEDED: [&str; 3] = ["map", "start", "goal"];
         const FIELDS: [&str; 4] = ["map", "start", "goal", "limit"];
-        let mut names = Names::default();
-        for (index, field) in block.fields.iter().enumerate() {
-            if let Err(error) = names.declare("field", &field.name, index) {
-                self.report(error);
-            }
-            if !FIELDS.contains(&field.name.text.as_str()) {
-                self.report(unknown("field", &field.name.text, field.name.span, FIELDS));
-            }
-        }
-        let find = |name: &str| block.fields.iter().find(|field| field.name.text == name);
-        for name in NEEDED.into_iter().filter(|name| find(name).is_none()) {
-            let error =
-                Diagnostic::error(code::MISSING_FIELD, format!("road `{}` has no `{name}`", block.name.text));
-            self.report(error.at(block.name.span, format!("`{name}: …` is missing")));
-        }
-        let (map, start, goal) = (find("map")?, find("start")?, find("goal")?);
-        let ast::ExprKind::Text(path) = &map.value.kind else {
-            self.report(
+        self.fields_known(&block.fields, &FIELDS);
+        let [map, start, goal] = ["map", "start", "goal"].map(|name| {
+            field(&block.fields, name).or_else(|| {
+                let message = format!("road `{}` has no `{name}`", block.name.text);
+                self.missing_field(name, block.name.span, message)
+            })
+        });
+        let (map, start, goal) = (map?, start?, goal?);
+        let ast::ExprKind::Text(path) = &map.kind else {
+            return self.reject(
                 Diagnostic::error(code::TYPE_MISMATCH, "`map` needs a path in quotes")
-                    .at(map.value.span, "not a text"),
+                    .at(map.span, "not a text"),
             );
-            return None;
         };
-        let (map_path, map) = match maps.map(&ast::Text::new(path.clone(), map.value.span)) {
+        let (map_path, map) = match maps.map(&ast::Text::new(path.clone(), map.span)) {
             Ok(found) => found,
             Err(reason) => {
                 let error = Diagnostic::error(code::UNREADABLE, format!("cannot use map `{path}`"));
-                self.report(error.at(map.value.span, reason));
-                return None;
+                return self.reject(error.at(map.span, reason));
             }
         };
-        let map = match find("limit").map(|limit| self.limit(&limit.value)) {
+        let map = match field(&block.fields, "limit").map(|limit| self.limit(limit)) {
             None => map,
             Some(limit_mps) => slowed(&map, limit_mps?),
         };
-        let start = self.lane_point(&start.value, &map);
-        let goal = self.lane_point(&goal.value, &map);
+        let start = self.lane_point(start, &map);
+        let goal = self.lane_point(goal, &map);
         let (start, goal) = (start?, goal?);
         let route = match Route::find(&map, start, goal) {
             Ok(route) => route,
             Err(error) => {
                 let message = format!("road `{}` has no route", block.name.text);
                 let error = Diagnostic::error(code::NO_ROUTE, message).at(block.name.span, error.to_string());
-                self.report(error.help("`avastra road MAP` tells which lane leads where"));
-                return None;
+                return self.reject(error.help("`avastra road MAP` tells which lane leads where"));
             }
         };
         let facts = facts(&block.name.text, &map, &route);
@@ -116,36 +95,32 @@ impl Checker {
         let error =
             Diagnostic::error(code::SETTING, format!("a limit of `{}` is not possible", print_expr(value)));
         let wanted = format!("must be more than 0 m/s and at most {} m/s", SPAWN_SPEED_MPS.end());
-        self.report(error.at(value.span, wanted).help("write for example `limit: 30 km/h`"));
-        None
+        self.reject(error.at(value.span, wanted).help("write for example `limit: 30 km/h`"))
     }
 
     fn lane_point(&mut self, value: &ast::Expr, map: &RoadMap) -> Option<LanePlace> {
         let ast::ExprKind::LanePoint { road, lane, station } = &value.kind else {
             let error = Diagnostic::error(code::TYPE_MISMATCH, "wanted a place on a lane");
-            self.report(
+            return self.reject(
                 error.at(value.span, "not a place").help("write `lane 1/-1 at 12 m`: road, lane and station"),
             );
-            return None;
         };
         let station_expr = self.number(station)?;
         let station = self.fit(station_expr, Type::Quantity(Dimension::LENGTH))?;
         let station_m = self.fold_number(&station)?.to_f64();
         let Ok(lane_id) = lane.text.parse::<i32>() else {
-            self.report(
+            return self.reject(
                 Diagnostic::error(code::NO_ROUTE, "the lane's number is too large").at(lane.span, ""),
             );
-            return None;
         };
         match map.place(&road.value, lane_id, station_m) {
             Ok(place) => Some(place),
             Err(error) => {
                 let message = format!("there is no such place on map `{}`", map.name);
                 let error = Diagnostic::error(code::NO_ROUTE, message).at(value.span, error.to_string());
-                self.report(
+                self.reject(
                     error.help("`avastra road MAP` tells which lanes there are, and how long they are"),
-                );
-                None
+                )
             }
         }
     }

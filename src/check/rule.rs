@@ -1,9 +1,9 @@
 //! Rules: which actions each binds, and its condition compiled for every one of them.
 
-use crate::check::checker::{Checker, docs, each};
-use crate::check::declaration::unknown_state;
+use crate::check::checker::{Checker, docs};
 use crate::check::expression::Place;
-use crate::check::names::{Names, unknown};
+use crate::check::names::unknown;
+use crate::check::report::Report;
 use crate::model::expr::{Expr, ExprKind};
 use crate::model::{ActionDef, EffectDef, RuleBinding, RuleBody, RuleDef, Type, code};
 use crate::syntax::ast::ItemKind;
@@ -11,16 +11,8 @@ use crate::syntax::{Diagnostic, ast, listed};
 
 impl Checker {
     pub(super) fn rules(&mut self, items: &[&ast::Item]) -> Vec<RuleDef> {
-        let mut names = Names::default();
         let mut rules = Vec::new();
-        for (item, declared) in each(items, |kind| match kind {
-            ItemKind::Rule(declared) => Some(declared),
-            _ => None,
-        }) {
-            if let Err(error) = names.declare("rule", &declared.name, rules.len()) {
-                self.report(error);
-                continue;
-            }
+        for (item, declared) in self.declared("rule", items, ItemKind::as_rule).1 {
             let body = match &declared.body {
                 ast::RuleBody::Holds { on, condition } => self.holds(declared, on, condition),
                 ast::RuleBody::Moves { state, moves } => self.moves(declared, state, moves),
@@ -95,8 +87,7 @@ impl Checker {
             let message = format!("`{}` names the parameter `{parameter}` but no action", rule.name.text);
             let error = Diagnostic::error(code::LACKING_PARAMETER, message)
                 .at(named_at, "a parameter of which action?");
-            self.report(error.help(format!("write `rule {} on {action}: …`", rule.name.text)));
-            return None;
+            return self.reject(error.help(format!("write `rule {} on {action}: …`", rule.name.text)));
         }
         let place = Place { locals: &[], states: true, road: true, spawn: true, ..Place::default() };
         let compiled = self.typed(condition, &place, Type::Bool)?;
@@ -158,19 +149,14 @@ impl Checker {
     }
 
     fn moves(&mut self, rule: &ast::Rule, state: &ast::Name, moves: &[ast::Move]) -> Option<RuleBody> {
-        let Some(index) = self.states.iter().position(|known| known.name == state.text) else {
-            let error = unknown_state(self, state);
-            self.report(error);
-            return None;
-        };
+        let index = self.state_named(state)?;
         let definition = self.states[index].clone();
         let (Type::Enum(of), None) = (definition.ty, definition.key) else {
-            let error = Diagnostic::error(
-                code::TYPE_MISMATCH,
-                format!("`{}` does not move from value to value", state.text),
+            let message = format!("`{}` does not move from value to value", state.text);
+            let error = Diagnostic::error(code::TYPE_MISMATCH, message);
+            return self.reject(
+                error.at(state.span, "must be a plain state of an enum").beside(definition.span, ""),
             );
-            self.report(error.at(state.span, "must be a plain state of an enum").beside(definition.span, ""));
-            return None;
         };
         let variants = self.enums[of.0].variants.clone();
         let mut allowed = vec![vec![false; variants.len()]; variants.len()];
@@ -205,12 +191,9 @@ impl Checker {
     }
 
     pub(super) fn variant(&mut self, name: &ast::Name, variants: &[String]) -> Option<usize> {
-        let found = variants.iter().position(|variant| *variant == name.text);
-        if found.is_none() {
-            let candidates = variants.iter().map(String::as_str);
-            self.report(unknown("variant", &name.text, name.span, candidates));
-        }
-        found
+        let names = || variants.iter().map(String::as_str);
+        let found = names().position(|variant| variant == name.text);
+        found.or_else(|| self.reject(unknown("variant", &name.text, name.span, names())))
     }
 
     /// Every value must lead somewhere, and something else must lead to it.
@@ -228,13 +211,10 @@ impl Checker {
         let unreachable = rows(&|to| (0..variants.len()).all(|from| from == to || !allowed[from][to]));
         if !unreachable.is_empty() && variants.len() > 1 {
             let message = format!("rule `{}` never leads to {}", rule.name.text, listed(&unreachable));
-            let warning = Diagnostic::warning(code::UNREACHABLE, message);
-            let warning = warning.at(rule.name.span, "only an episode that begins there ever sees it");
-            self.report(warning.help(format!(
-                "add a move to it, for example `{} -> {}`",
-                first_other(variants, unreachable[0]),
-                unreachable[0]
-            )));
+            let warning = Diagnostic::warning(code::UNREACHABLE, message)
+                .at(rule.name.span, "only an episode that begins there ever sees it");
+            let (from, to) = (first_other(variants, unreachable[0]), unreachable[0]);
+            self.report(warning.help(format!("add a move to it, for example `{from} -> {to}`")));
         }
     }
 }
@@ -259,42 +239,10 @@ fn reads_state(condition: &Expr, state: &crate::model::StateDef) -> bool {
 
 /// Every bare name in an expression, in order.
 pub(super) fn names_in(expr: &ast::Expr) -> Vec<ast::Name> {
-    let mut names = Vec::new();
-    collect_names(expr, &mut names);
-    names
-}
-
-fn collect_names(expr: &ast::Expr, into: &mut Vec<ast::Name>) {
     match &expr.kind {
-        ast::ExprKind::Name(name) => into.push(ast::Name::new(name.clone(), expr.span)),
-        ast::ExprKind::Unary { operand, .. } => collect_names(operand, into),
-        ast::ExprKind::Binary { left, right, .. } => {
-            collect_names(left, into);
-            collect_names(right, into);
-        }
-        ast::ExprKind::Range { low, high } => {
-            collect_names(low, into);
-            collect_names(high, into);
-        }
-        ast::ExprKind::Index { base, index } => {
-            collect_names(base, into);
-            collect_names(index, into);
-        }
-        ast::ExprKind::Call(call) => {
-            call.args.iter().for_each(|argument| collect_names(&argument.value, into))
-        }
-        ast::ExprKind::List(items) => items.iter().for_each(|item| collect_names(item, into)),
-        ast::ExprKind::Match { subject, arms } => {
-            collect_names(subject, into);
-            arms.iter().for_each(|arm| collect_names(&arm.value, into));
-        }
-        // The base of a field is `road`, no variable.
-        ast::ExprKind::Field { .. }
-        | ast::ExprKind::Number(_)
-        | ast::ExprKind::Text(_)
-        | ast::ExprKind::Bool(_)
-        | ast::ExprKind::Record(_)
-        | ast::ExprKind::LanePoint { .. }
-        | ast::ExprKind::Numbered { .. } => {}
+        ast::ExprKind::Name(name) => vec![ast::Name::new(name.clone(), expr.span)],
+        // The base of a field is the word `road`, not a variable.
+        ast::ExprKind::Field { .. } => Vec::new(),
+        _ => expr.parts().into_iter().flat_map(names_in).collect(),
     }
 }

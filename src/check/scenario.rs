@@ -2,7 +2,9 @@
 
 use std::sync::Arc;
 
-use crate::check::names::{Names, unknown};
+use crate::check::checker::docs;
+use crate::check::names::unknown;
+use crate::check::report::{Report, unknown_field};
 use crate::check::scenario_rules::{Moment, breaches};
 use crate::check::scenario_value::{figure, number, value};
 use crate::model::expr::{Comparison, Expr};
@@ -13,7 +15,7 @@ use crate::model::{
     AMBIENT_MAX, Bound, Domain, Facts, Initial, Memory, Parameter, Row, SIGNAL_PHASE_S, Space, Value, bounds,
     code, evaluate, locals,
 };
-use crate::syntax::ast::{BinaryOp, ClauseKind, FileId, ItemKind};
+use crate::syntax::ast::{BinaryOp, ClauseKind, FileId};
 use crate::syntax::{Diagnostic, LANGUAGE, ast, listed, parse};
 use crate::units::{Dimension, Rational};
 
@@ -25,14 +27,10 @@ const STEPS_MAX: u64 = 100_000;
 /// # Errors
 /// Everything that is wrong with it. A file without a scenario, or with two, is an error too.
 pub fn scenario(file: &ast::File, space: &Space) -> Result<Scenario, Vec<Diagnostic>> {
-    let mut found = file.items.iter().filter_map(|item| match &item.kind {
-        ItemKind::Scenario(scenario) => Some((item, scenario)),
-        _ => None,
-    });
+    let mut found = file.items.iter().filter_map(|item| Some((item, item.kind.as_scenario()?)));
     let Some((item, declared)) = found.next() else {
-        return Err(vec![
-            Diagnostic::error(code::ONE_SCENARIO, "the file holds no scenario").at(file.span, ""),
-        ]);
+        let error = Diagnostic::error(code::ONE_SCENARIO, "the file holds no scenario");
+        return Err(vec![error.at(file.span, "")]);
     };
     if let Some((second, _)) = found.next() {
         let error = Diagnostic::error(code::ONE_SCENARIO, "the file holds two scenarios");
@@ -44,7 +42,7 @@ pub fn scenario(file: &ast::File, space: &Space) -> Result<Scenario, Vec<Diagnos
     let start = reader.start(declared);
     let steps = reader.steps(&declared.steps, &start.memory, &origin, road);
     let claims = declared.expects.iter().filter_map(|expect| reader.claim(expect)).collect();
-    let docs = item.docs.iter().map(|doc| doc.text.clone()).collect();
+    let docs = docs(item);
     let name = declared.name.text.clone();
     match road {
         Some(road) if reader.diagnostics.is_empty() => {
@@ -68,25 +66,13 @@ struct Reader<'a> {
     diagnostics: Vec<Diagnostic>,
 }
 
-impl<'a> Reader<'a> {
+impl Report for Reader<'_> {
     fn report(&mut self, diagnostic: Diagnostic) {
         self.diagnostics.push(diagnostic);
     }
+}
 
-    /// The value, or `None` once the mistake is reported.
-    fn take<T>(&mut self, value: Result<T, Diagnostic>) -> Option<T> {
-        value.map_err(|error| self.report(error)).ok()
-    }
-
-    /// Reports every field that is given twice: the first would be lost.
-    fn once(&mut self, kind: &str, fields: &[ast::Field]) {
-        let mut names = Names::default();
-        for (index, field) in fields.iter().enumerate() {
-            let declared = names.declare(kind, &field.name, index);
-            self.take(declared);
-        }
-    }
-
+impl<'a> Reader<'a> {
     fn origin(&mut self, fields: &[ast::Field]) -> Origin {
         const FIELDS: [&str; 10] = [
             "seed",
@@ -101,7 +87,7 @@ impl<'a> Reader<'a> {
             "without",
         ];
         let mut origin = Origin::default();
-        self.once("field", fields);
+        self.fields_once("field", fields);
         for field in fields {
             match field.name.text.as_str() {
                 "seed" => origin.seed = self.whole(&field.value),
@@ -114,7 +100,7 @@ impl<'a> Reader<'a> {
                 "avoidability" => origin.avoidability = self.text(&field.value),
                 "with" => origin.with = self.rule_names(&field.value),
                 "without" => origin.without = self.rule_names(&field.value),
-                other => self.report(unknown("field", other, field.name.span, FIELDS)),
+                _ => self.report(unknown_field(field, &FIELDS)),
             }
         }
         origin
@@ -122,9 +108,8 @@ impl<'a> Reader<'a> {
 
     fn rule_names(&mut self, list: &ast::Expr) -> Vec<String> {
         let ast::ExprKind::List(items) = &list.kind else {
-            self.report(
-                Diagnostic::error(code::TYPE_MISMATCH, "wanted a list of rules").at(list.span, "not a list"),
-            );
+            let error = Diagnostic::error(code::TYPE_MISMATCH, "wanted a list of rules");
+            self.report(error.at(list.span, "not a list"));
             return Vec::new();
         };
         let mut names = Vec::new();
@@ -146,12 +131,9 @@ impl<'a> Reader<'a> {
     }
 
     fn road(&mut self, name: &ast::Name) -> Option<usize> {
-        let found = self.space.roads.iter().position(|road| road.name == name.text);
-        if found.is_none() {
-            let roads = self.space.roads.iter().map(|road| road.name.as_str());
-            self.report(unknown("road", &name.text, name.span, roads));
-        }
-        found
+        let roads = || self.space.roads.iter().map(|road| road.name.as_str());
+        let found = roads().position(|road| road == name.text);
+        found.or_else(|| self.reject(unknown("road", &name.text, name.span, roads())))
     }
 
     fn start(&mut self, declared: &ast::Scenario) -> ScenarioStart {
@@ -159,7 +141,7 @@ impl<'a> Reader<'a> {
         // The seed is arbitrary: what it draws is replaced below, or reported as missing.
         let mut memory = space.initial_memory(0);
         let mut start = (0.0, None, 0);
-        self.once("field", &declared.start);
+        self.fields_once("field", &declared.start);
         for field in &declared.start {
             match field.name.text.as_str() {
                 "signal_phase" => {
@@ -210,7 +192,7 @@ impl<'a> Reader<'a> {
         let space = self.space;
         if let (ast::ExprKind::Record(fields), Some(of)) = (&given.kind, state.key) {
             let keys = &space.enums[of.0].variants;
-            self.once("key", fields);
+            self.fields_once("key", fields);
             for field in fields {
                 match keys.iter().position(|key| *key == field.name.text) {
                     Some(key) => {
@@ -239,8 +221,7 @@ impl<'a> Reader<'a> {
         let mut steps: Vec<ScenarioStep> = Vec::new();
         let mut history = vec![(0, start.clone())];
         for step in declared {
-            let number = step.number.digits.parse::<u64>();
-            let Ok(number) = number else {
+            let Ok(number) = step.number.digits.parse::<u64>() else {
                 let error = Diagnostic::error(code::STEP_ORDER, "the number of the step is too large");
                 self.report(error.at(step.number.span, ""));
                 continue;
@@ -286,8 +267,7 @@ impl<'a> Reader<'a> {
         let space = self.space;
         let Some(action) = space.actions.iter().position(|action| action.name == call.name.text) else {
             let actions = space.actions.iter().map(|action| action.name.as_str());
-            self.report(unknown("action", &call.name.text, call.name.span, actions));
-            return None;
+            return self.reject(unknown("action", &call.name.text, call.name.span, actions));
         };
         let axes: Vec<&Parameter> = space.actions[action].parameters.iter().filter(|p| p.axis).collect();
         let mut values: Vec<Option<Value>> = vec![None; axes.len()];
@@ -299,14 +279,14 @@ impl<'a> Reader<'a> {
                 Some(name) => axes.iter().position(|axis| *axis.name == *name.text),
             };
             let Some(slot) = slot else {
-                let name = argument.name.as_ref().map_or("", |name| name.text.as_str());
-                let span = argument.name.as_ref().map_or(argument.value.span, |name| name.span);
-                let error = unknown("argument", name, span, axes.iter().map(|axis| &*axis.name));
-                self.report(if name.is_empty() {
-                    let message = format!("`{}` takes {} arguments", call.name.text, axes.len());
-                    Diagnostic::error(code::ARGUMENTS, message).at(span, "one too many")
-                } else {
-                    error
+                self.report(match &argument.name {
+                    Some(name) => {
+                        unknown("argument", &name.text, name.span, axes.iter().map(|axis| &*axis.name))
+                    }
+                    None => {
+                        let message = format!("`{}` takes {} arguments", call.name.text, axes.len());
+                        Diagnostic::error(code::ARGUMENTS, message).at(argument.value.span, "one too many")
+                    }
                 });
                 sound = false;
                 continue;
@@ -325,11 +305,9 @@ impl<'a> Reader<'a> {
         if let Some((axis, _)) = missing.next() {
             let message = format!("`{}` is missing", axis.name);
             let error = Diagnostic::error(code::ARGUMENTS, message).at(call.span, "which row is meant?");
-            self.report(error.beside(axis.span, "declared here"));
-            return None;
+            return self.reject(error.beside(axis.span, "declared here"));
         }
-        let values: Option<Vec<Value>> = values.into_iter().collect();
-        let values = values?;
+        let values: Vec<Value> = values.into_iter().collect::<Option<_>>()?;
         let same = |row: &&Row| {
             row.action == action && row.axes.iter().zip(&values).all(|((_, axis), value)| axis == value)
         };
@@ -353,7 +331,7 @@ impl<'a> Reader<'a> {
         let action = &self.space.actions[row.action];
         let drawn = || action.parameters.iter().filter(|parameter| !parameter.axis);
         let mut sound = true;
-        self.once("drawn value", &step.drawn);
+        self.fields_once("drawn value", &step.drawn);
         for field in &step.drawn {
             if !drawn().any(|parameter| *parameter.name == *field.name.text) {
                 let names = drawn().map(|parameter| &*parameter.name);
@@ -390,8 +368,7 @@ impl<'a> Reader<'a> {
         }
         if !missing.is_empty() {
             let error = self.missing(step, row, road, &missing, values);
-            self.report(error);
-            return None;
+            return self.reject(error);
         }
         sound.then_some(values)
     }
@@ -486,16 +463,14 @@ impl<'a> Reader<'a> {
             ast::ExprKind::Binary { op: BinaryOp::Equal, left, right, .. } => match (&left.kind, &right.kind)
             {
                 (ast::ExprKind::Name(name), ast::ExprKind::List(items)) if name == "proc" => {
-                    let values: Option<Vec<Figure>> =
-                        items.iter().map(|item| self.take(figure(item, Dimension::RATIO))).collect();
-                    values.map(Claim::Proc)
+                    let values = items.iter().map(|item| self.take(figure(item, Dimension::RATIO)));
+                    values.collect::<Option<_>>().map(Claim::Proc)
                 }
                 (ast::ExprKind::Name(name), ast::ExprKind::Text(text)) if name == "trace" => {
                     if !is_digest(text) {
                         let error = Diagnostic::error(code::UNKNOWN_CLAIM, "this is the digest of no trace");
                         let error = error.at(right.span, "not `sha256:` and 64 digits from 0 to f");
-                        self.report(error.help("`avastra replay FILE` says which digest was found"));
-                        return None;
+                        return self.reject(error.help("`avastra replay FILE` says which digest was found"));
                     }
                     Some(Claim::Trace(text.clone()))
                 }
@@ -509,20 +484,13 @@ impl<'a> Reader<'a> {
                         let message = format!("an episode does not end `{end}`");
                         let error = Diagnostic::error(code::UNKNOWN_CLAIM, message);
                         let error = error.at(right.span, "unknown end");
-                        self.report(error.help(format!("ends are {}", listed(&ENDS))));
-                        return None;
+                        return self.reject(error.help(format!("ends are {}", listed(&ENDS))));
                     }
                     Some(Claim::End(end.clone()))
                 }
-                _ => {
-                    self.report(unclear());
-                    None
-                }
+                _ => self.reject(unclear()),
             },
-            _ => {
-                self.report(unclear());
-                None
-            }
+            _ => self.reject(unclear()),
         }
     }
 
@@ -536,12 +504,10 @@ impl<'a> Reader<'a> {
         for item in items {
             let ast::ExprKind::Name(name) = &item.kind else {
                 let error = Diagnostic::error(code::TYPE_MISMATCH, "wanted a module of the driving system");
-                self.report(error.at(item.span, "not a name"));
-                return None;
+                return self.reject(error.at(item.span, "not a name"));
             };
             if !MODULES.contains(&name.as_str()) {
-                self.report(unknown("module", name, item.span, MODULES));
-                return None;
+                return self.reject(unknown("module", name, item.span, MODULES));
             }
             modules.push(name.clone());
         }
@@ -559,8 +525,7 @@ impl<'a> Reader<'a> {
         let drivers: Option<Vec<Vec<String>>> = drivers.collect();
         let Some(drivers) = drivers.filter(|lists| lists.len() <= 1) else {
             let error = Diagnostic::error(code::UNKNOWN_CLAIM, "wanted one list of reference drivers");
-            self.report(error.at(by[0].span, "not one").help("write `avoidable by [cc, fsm]`"));
-            return None;
+            return self.reject(error.at(by[0].span, "not one").help("write `avoidable by [cc, fsm]`"));
         };
         let others: Vec<ast::Clause> = others.into_iter().cloned().collect();
         let (obstacle, _) = self.clauses(&others, false)?;
@@ -582,21 +547,19 @@ impl<'a> Reader<'a> {
                     if time.value < 0.0 {
                         let error =
                             Diagnostic::error(code::UNKNOWN_CLAIM, "no time of an episode is negative");
-                        self.report(
+                        return self.reject(
                             error.at(clause.value.span, "before its beginning").help("count from 0 s"),
                         );
-                        return None;
                     }
                     time_s = Some(time);
                 }
                 _ => {
                     let error = Diagnostic::error(code::UNKNOWN_CLAIM, "unknown clause of this claim");
-                    self.report(
+                    return self.reject(
                         error
                             .at(clause.span, "")
                             .help("write `collision with npc#2 at 14.22 s`; obstacles are numbered from 1"),
                     );
-                    return None;
                 }
             }
         }
@@ -608,24 +571,19 @@ impl<'a> Reader<'a> {
             ast::ExprKind::Number(number) if number.unit.is_none() => number.digits.parse().ok(),
             _ => None,
         };
-        if found.is_none() {
-            self.report(
-                Diagnostic::error(code::TYPE_MISMATCH, "wanted a whole number").at(value.span, "not one"),
-            );
-        }
-        found
+        found.or_else(|| {
+            let error = Diagnostic::error(code::TYPE_MISMATCH, "wanted a whole number");
+            self.reject(error.at(value.span, "not one"))
+        })
     }
 
     fn text(&mut self, value: &ast::Expr) -> Option<String> {
         match &value.kind {
             ast::ExprKind::Text(text) => Some(text.clone()),
-            _ => {
-                self.report(
-                    Diagnostic::error(code::TYPE_MISMATCH, "wanted a text in quotes")
-                        .at(value.span, "not a text"),
-                );
-                None
-            }
+            _ => self.reject(
+                Diagnostic::error(code::TYPE_MISMATCH, "wanted a text in quotes")
+                    .at(value.span, "not a text"),
+            ),
         }
     }
 }
@@ -641,10 +599,7 @@ impl Space {
             "language {LANGUAGE}\nscenario given {{\nroad: any_road\nstart {{ {text} }}\nsteps {{ }}\n}}\n"
         );
         let (file, mistakes) = parse(FileId(0), &around);
-        let scenario = file.items.iter().find_map(|item| match &item.kind {
-            ItemKind::Scenario(scenario) => Some(scenario),
-            _ => None,
-        });
+        let scenario = file.items.iter().find_map(|item| item.kind.as_scenario());
         let Some(scenario) = scenario.filter(|_| mistakes.is_empty()) else {
             return Err(format!(
                 "cannot read `{text}` as states: write `time: Night, sky: {{ Rain: High }}`"
@@ -671,10 +626,7 @@ impl Space {
 
 /// The name of a reference driver.
 fn driver(expr: &ast::Expr) -> Option<String> {
-    match &expr.kind {
-        ast::ExprKind::Name(name) => Some(name.clone()),
-        _ => None,
-    }
+    if let ast::ExprKind::Name(name) = &expr.kind { Some(name.clone()) } else { None }
 }
 
 /// Whether a text has the form of a SHA-256 as avastra prints it.

@@ -2,7 +2,7 @@
 
 use crate::check::checker::{Checker, docs, each};
 use crate::check::expression::Place;
-use crate::check::names::{Names, unknown};
+use crate::check::report::Report;
 use crate::model::expr::{Expr, ExprKind, Fact};
 use crate::model::{COUNTED, EpisodeDef, RewardCase, TICK_MS, Type, VerdictDef, code};
 use crate::syntax::ast::{BinaryOp, ItemKind, Span};
@@ -19,39 +19,42 @@ const STEP_S_MAX: f64 = 600.0;
 const STEP_LIMIT: u32 = 20;
 
 impl Checker {
+    /// The first block of a kind that a space has once. Reports every further one.
+    fn only<'a, T>(
+        &mut self,
+        items: &'a [&'a ast::Item],
+        pick: impl Fn(&'a ItemKind) -> Option<&'a T> + 'a,
+    ) -> Option<(&'a ast::Item, &'a T)> {
+        let mut blocks = each(items, pick);
+        let first = blocks.next()?;
+        for (item, _) in blocks {
+            let message = format!("`{}` is declared twice", item.kind.keyword());
+            let error = Diagnostic::error(code::DUPLICATE, message)
+                .at(item.span, "again here")
+                .beside(first.0.span, "first here");
+            self.report(match first.0.span.file == item.span.file {
+                true => error.help("remove one of them"),
+                false => error.help("write `override` before the later one to replace the other"),
+            });
+        }
+        Some(first)
+    }
+
     /// The settings, and the names of the roads if the block gives them.
     pub(super) fn episode(&mut self, items: &[&ast::Item]) -> (EpisodeDef, Option<Vec<ast::Name>>) {
         const FIELDS: [&str; 4] = ["roads", "step", "stop", "limit"];
         let mut episode =
             EpisodeDef { step_s: STEP_S, stop_arrived: true, stalled_steps: None, step_limit: STEP_LIMIT };
         let mut roads = None;
-        let mut first: Option<Span> = None;
-        let blocks = each(items, |kind| match kind {
-            ItemKind::Episode(fields) => Some(fields),
-            _ => None,
-        });
-        for (item, fields) in blocks {
-            if let Some(first) = first.replace(item.span) {
-                let error = Diagnostic::error(code::DUPLICATE, "`episode` is declared twice");
-                let error = error.at(item.span, "again here").beside(first, "first here");
-                self.report(match first.file == item.span.file {
-                    true => error.help("remove one of them"),
-                    false => error.help("write `override` before the later one to replace the other"),
-                });
-                continue;
-            }
-            let mut names = Names::default();
-            for (index, field) in fields.iter().enumerate() {
-                if let Err(error) = names.declare("field", &field.name, index) {
-                    self.report(error);
-                }
-                match field.name.text.as_str() {
-                    "roads" => roads = self.road_list(&field.value),
-                    "step" => episode.step_s = self.step(&field.value).unwrap_or(STEP_S),
-                    "stop" => self.stop(&field.value, &mut episode),
-                    "limit" => episode.step_limit = self.count_of_steps(&field.value).unwrap_or(STEP_LIMIT),
-                    _ => self.report(unknown("field", &field.name.text, field.name.span, FIELDS)),
-                }
+        let fields = self.only(items, ItemKind::as_episode).map_or(&[][..], |(_, fields)| fields);
+        self.fields_known(fields, &FIELDS);
+        for field in fields {
+            match field.name.text.as_str() {
+                "roads" => roads = self.road_list(&field.value),
+                "step" => episode.step_s = self.step(&field.value).unwrap_or(STEP_S),
+                "stop" => self.stop(&field.value, &mut episode),
+                "limit" => episode.step_limit = self.count_of_steps(&field.value).unwrap_or(STEP_LIMIT),
+                _ => {}
             }
         }
         (episode, roads)
@@ -60,8 +63,7 @@ impl Checker {
     fn road_list(&mut self, value: &ast::Expr) -> Option<Vec<ast::Name>> {
         let ast::ExprKind::List(items) = &value.kind else {
             let error = Diagnostic::error(code::TYPE_MISMATCH, "`roads` needs a list of roads");
-            self.report(error.at(value.span, "not a list").help("write `roads: [name, name]`"));
-            return None;
+            return self.reject(error.at(value.span, "not a list").help("write `roads: [name, name]`"));
         };
         let mut roads = Vec::new();
         for item in items {
@@ -86,8 +88,7 @@ impl Checker {
         }
         let error = Diagnostic::error(code::SETTING, format!("a step of {seconds} s is not possible"));
         let wanted = format!("must be a multiple of {TICK_MS} ms, more than 0 s and at most {STEP_S_MAX} s");
-        self.report(error.at(value.span, wanted).help("time passes in ticks; write for example `6 s`"));
-        None
+        self.reject(error.at(value.span, wanted).help("time passes in ticks; write for example `6 s`"))
     }
 
     /// `20`, or `20 steps`.
@@ -100,11 +101,10 @@ impl Checker {
             }
             _ => None,
         };
-        if count.is_none() {
+        count.or_else(|| {
             let error = Diagnostic::error(code::SETTING, "wanted a number of steps");
-            self.report(error.at(value.span, "not a whole number from 1").help("write `20 steps`"));
-        }
-        count
+            self.reject(error.at(value.span, "not a whole number from 1").help("write `20 steps`"))
+        })
     }
 
     /// `arrived`, `stalled >= 4`, or both with `or` between them.
@@ -123,9 +123,9 @@ impl Checker {
                 }
                 _ => {
                     let error = Diagnostic::error(code::STOP, "an episode cannot be stopped by this");
-                    self.report(error.at(part.span, "unknown reason").help(
-                        "reasons are `arrived` and `stalled >= 4` (steps without progress), joined by `or`",
-                    ));
+                    let help =
+                        "reasons are `arrived` and `stalled >= 4` (steps without progress), joined by `or`";
+                    self.report(error.at(part.span, "unknown reason").help(help));
                 }
             }
         }
@@ -134,59 +134,41 @@ impl Checker {
     pub(super) fn reward(&mut self, items: &[&ast::Item]) -> Vec<RewardCase> {
         let place = Place { outcome: true, ..Place::default() };
         let mut cases = Vec::new();
-        let mut first: Option<Span> = None;
-        let blocks = each(items, |kind| match kind {
-            ItemKind::Reward(cases) => Some(cases),
-            _ => None,
-        });
-        for (item, declared) in blocks {
-            if let Some(first) = first.replace(item.span) {
-                let error = Diagnostic::error(code::DUPLICATE, "`reward` is declared twice");
-                let error = error.at(item.span, "again here").beside(first, "first here");
-                self.report(match first.file == item.span.file {
-                    true => error.help("remove one of them"),
-                    false => error.help("write `override` before the later one to replace the other"),
-                });
-                continue;
+        let Some((item, declared)) = self.only(items, ItemKind::as_reward) else { return cases };
+        let mut closed = false;
+        for case in declared {
+            if closed {
+                let error = Diagnostic::error(code::NEVER_REACHED, "this case is never reached");
+                let error = error.at(case.span, "`_` before it takes everything");
+                self.report(error.help("let `_` be the last line, or remove this one"));
             }
-            let mut closed = false;
-            for case in declared {
-                if closed {
-                    let error = Diagnostic::error(code::NEVER_REACHED, "this case is never reached");
-                    let error = error.at(case.span, "`_` before it takes everything");
-                    self.report(error.help("let `_` be the last line, or remove this one"));
-                }
-                let condition = case.condition.as_ref().map(|c| self.typed(c, &place, Type::Bool));
-                let value = self.typed(&case.value, &place, Type::Quantity(Dimension::RATIO));
-                closed |= condition.is_none();
-                if let (Some(value), false) = (value, matches!(condition, Some(None))) {
-                    cases.push(RewardCase { condition: condition.flatten(), value });
-                }
+            let condition = case.condition.as_ref().map(|c| self.typed(c, &place, Type::Bool));
+            let value = self.typed(&case.value, &place, Type::Quantity(Dimension::RATIO));
+            closed |= condition.is_none();
+            if let (Some(value), false) = (value, matches!(condition, Some(None))) {
+                cases.push(RewardCase { condition: condition.flatten(), value });
             }
-            if !closed {
-                let error = Diagnostic::error(code::NOT_EXHAUSTIVE, "`reward` does not cover every case");
-                self.report(error.at(item.span, "the rest is missing").help("end with `_ => 0`"));
-            }
+        }
+        if !closed {
+            let error = Diagnostic::error(code::NOT_EXHAUSTIVE, "`reward` does not cover every case");
+            self.report(error.at(item.span, "the rest is missing").help("end with `_ => 0`"));
         }
         cases
     }
 
     pub(super) fn verdicts(&mut self, items: &[&ast::Item]) -> Vec<VerdictDef> {
         let place = Place { outcome: true, judged: true, ..Place::default() };
-        let mut names = Names::default();
         let mut verdicts = Vec::new();
-        for (item, declared) in each(items, |kind| match kind {
-            ItemKind::Verdict(declared) => Some(declared),
-            _ => None,
-        }) {
-            if let Err(error) = names.declare("verdict", &declared.name, verdicts.len()) {
-                self.report(error);
-            }
+        let declared: Vec<_> = each(items, ItemKind::as_verdict).collect();
+        self.once("verdict", declared.iter().map(|(_, declared)| &declared.name));
+        let is_counted = |(_, declared): &(&ast::Item, &ast::Verdict)| declared.name.text == COUNTED;
+        let names_counted = declared.iter().any(is_counted);
+        for (item, declared) in declared {
             if let Some(condition) = self.typed(&declared.condition, &place, Type::Bool) {
                 verdicts.push(VerdictDef { name: declared.name.text.clone(), docs: docs(item), condition });
             }
         }
-        if names.get(COUNTED).is_none() {
+        if !names_counted {
             verdicts.push(counted());
         }
         verdicts

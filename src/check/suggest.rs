@@ -47,10 +47,7 @@ fn insertion(tree: &File) -> Span {
 
 fn declares(tree: &File, name: &str) -> bool {
     tree.items.iter().any(|item| {
-        let of_enum = match &item.kind {
-            ItemKind::Enum(declared) => declared.variants.iter().any(|variant| variant.text == name),
-            _ => false,
-        };
-        of_enum || item.kind.name().is_some_and(|declared| declared.text == name)
+        let variants = item.kind.as_enum().map_or(&[][..], |declared| &declared.variants);
+        item.kind.name().into_iter().chain(variants).any(|declared| declared.text == name)
     })
 }

@@ -163,40 +163,12 @@ fn names_of_fields<'a>(fields: &'a [ast::Field], used: &mut BTreeSet<&'a str>) {
 /// Every name in an expression, whatever it stands for.
 pub(crate) fn names_of_expr<'a>(expr: &'a ast::Expr, used: &mut BTreeSet<&'a str>) {
     match &expr.kind {
-        ast::ExprKind::Name(name) => {
-            used.insert(name);
+        ast::ExprKind::Name(name) => used.extend([name.as_str()]),
+        ast::ExprKind::Call(call) => used.extend([call.name.text.as_str()]),
+        ast::ExprKind::Match { arms, .. } => {
+            used.extend(arms.iter().flat_map(|arm| &arm.patterns).map(|pattern| pattern.text.as_str()));
         }
-        ast::ExprKind::Unary { operand, .. } => names_of_expr(operand, used),
-        ast::ExprKind::Binary { left, right, .. } => {
-            names_of_expr(left, used);
-            names_of_expr(right, used);
-        }
-        ast::ExprKind::Range { low, high } => {
-            names_of_expr(low, used);
-            names_of_expr(high, used);
-        }
-        ast::ExprKind::Field { base, .. } => names_of_expr(base, used),
-        ast::ExprKind::Index { base, index } => {
-            names_of_expr(base, used);
-            names_of_expr(index, used);
-        }
-        ast::ExprKind::Call(call) => {
-            used.insert(&call.name.text);
-            call.args.iter().for_each(|argument| names_of_expr(&argument.value, used));
-        }
-        ast::ExprKind::List(items) => items.iter().for_each(|item| names_of_expr(item, used)),
-        ast::ExprKind::Record(fields) => names_of_fields(fields, used),
-        ast::ExprKind::Match { subject, arms } => {
-            names_of_expr(subject, used);
-            for arm in arms {
-                used.extend(arm.patterns.iter().map(|pattern| pattern.text.as_str()));
-                names_of_expr(&arm.value, used);
-            }
-        }
-        ast::ExprKind::Number(_)
-        | ast::ExprKind::Text(_)
-        | ast::ExprKind::Bool(_)
-        | ast::ExprKind::LanePoint { .. }
-        | ast::ExprKind::Numbered { .. } => {}
+        _ => {}
     }
+    expr.parts().into_iter().for_each(|part| names_of_expr(part, used));
 }

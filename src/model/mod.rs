@@ -33,8 +33,8 @@ pub use scenario::{
     Avoidability, Claim, ENDS, Figure, MODULES, Origin, Scenario, ScenarioStart, ScenarioStep,
 };
 pub use space::{
-    ActionDef, COUNTED, Domain, EffectDef, EnumDef, EpisodeDef, ExpectDef, FnDef, GroupDef, Initial,
-    Parameter, RewardCase, Road, RoadFacts, RuleBinding, RuleBody, RuleDef, SetDef, Space, SpawnDef,
-    StateDef, StateMeaning, VerdictDef, WordExpr,
+    ActionDef, COUNTED, Domain, EffectDef, EnumDef, EpisodeDef, FnDef, GroupDef, Initial, Parameter,
+    RewardCase, Road, RoadFacts, RuleBinding, RuleBody, RuleDef, SetDef, Space, SpawnDef, StateDef,
+    StateMeaning, VerdictDef, WordExpr,
 };
 pub use value::{EnumIndex, Memory, Type, Value};

@@ -37,7 +37,6 @@ pub struct Space {
     pub reward: Vec<RewardCase>,
     /// As declared; one of them is [`COUNTED`].
     pub verdicts: Vec<VerdictDef>,
-    pub expects: Vec<ExpectDef>,
     /// The roads of `episode.roads`, in that order; every declared road if there is no `episode`.
     pub roads: Vec<Road>,
     /// The action table: actions as declared, axes left to right, the last varying fastest.
@@ -253,13 +252,6 @@ pub struct VerdictDef {
     pub name: String,
     pub docs: Vec<String>,
     pub condition: Expr,
-}
-
-/// A static claim that held when the space was checked, as written.
-#[derive(Debug, Clone, PartialEq)]
-pub struct ExpectDef {
-    pub text: String,
-    pub span: Span,
 }
 
 /// A road with its map and the ego vehicle's way through it.

@@ -190,6 +190,25 @@ impl ItemKind {
     }
 }
 
+/// For each kind a method that gives its declaration, or `None` for a declaration of another kind.
+macro_rules! accessors {
+    ($($name:ident: $kind:ident($declared:ty)),* $(,)?) => {
+        impl ItemKind {
+            $(pub fn $name(&self) -> Option<&$declared> {
+                if let ItemKind::$kind(declared) = self { Some(declared) } else { None }
+            })*
+        }
+    };
+}
+
+accessors! {
+    as_language: Language(Number), as_use: Use(Use), as_enum: Enum(Enum), as_odds: Odds(Odds),
+    as_state: State(State), as_let: Let(Let), as_fn: Fn(Fn), as_action: Action(Action),
+    as_group: Group(Group), as_rule: Rule(Rule), as_road: Road(Block), as_episode: Episode(Vec<Field>),
+    as_reward: Reward(Vec<Case>), as_verdict: Verdict(Verdict), as_expect: Expect(Expect),
+    as_scenario: Scenario(Scenario), as_policy: Policy(Policy),
+}
+
 /// `use "roads.ava" digest "sha256:…"`.
 ///
 /// The digest covers the used file with everything that it uses itself, and the maps of all roads
@@ -494,6 +513,29 @@ impl Expr {
     /// An expression that was built instead of read.
     pub fn built(kind: ExprKind) -> Self {
         Expr { kind, span: Span::NONE }
+    }
+
+    /// The expressions directly inside this one, in the order of the text.
+    pub fn parts(&self) -> Vec<&Expr> {
+        match &self.kind {
+            ExprKind::Unary { operand, .. } => vec![operand],
+            ExprKind::Binary { left, right, .. } => vec![left, right],
+            ExprKind::Range { low, high } => vec![low, high],
+            ExprKind::Index { base, index } => vec![base, index],
+            ExprKind::Field { base, .. } => vec![base],
+            ExprKind::Call(call) => call.args.iter().map(|argument| &argument.value).collect(),
+            ExprKind::List(items) => items.iter().collect(),
+            ExprKind::Record(fields) => fields.iter().map(|field| &field.value).collect(),
+            ExprKind::Match { subject, arms } => {
+                core::iter::once(&**subject).chain(arms.iter().map(|arm| &arm.value)).collect()
+            }
+            ExprKind::Number(_)
+            | ExprKind::Text(_)
+            | ExprKind::Bool(_)
+            | ExprKind::Name(_)
+            | ExprKind::LanePoint { .. }
+            | ExprKind::Numbered { .. } => Vec::new(),
+        }
     }
 }
 

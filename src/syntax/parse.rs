@@ -8,7 +8,7 @@ use pest::Parser;
 use pest::error::{ErrorVariant, InputLocation};
 use pest::iterators::Pair;
 
-use crate::syntax::ast::{Doc, File, FileId, Item, ItemKind, Span};
+use crate::syntax::ast::{Doc, File, FileId, Item, Span};
 use crate::syntax::build::{Builder, end_of};
 use crate::syntax::diagnostic::enumerated;
 use crate::syntax::grammar::{AvaParser, Rule, continues_expression, words};
@@ -274,10 +274,7 @@ impl Reader<'_> {
     /// `language` must come first, once, and be known. `sound` says that nothing else is wrong:
     /// only then is it certain that the line is missing and not merely unreadable.
     fn check_version(&self, tree: &File, sound: bool) -> Vec<Diagnostic> {
-        let mut declared = tree.items.iter().filter_map(|item| match &item.kind {
-            ItemKind::Language(number) => Some((item.span, number)),
-            _ => None,
-        });
+        let mut declared = tree.items.iter().filter_map(|item| Some((item.span, item.kind.as_language()?)));
         let Some((span, number)) = declared.next() else {
             if !sound {
                 return Vec::new();

@@ -6,22 +6,19 @@ mod region;
 use serde::de::DeserializeOwned;
 use serde_json::Value;
 
-use crate::model::{Space, code};
-use crate::syntax::ast::{Field, FileId, ItemKind, Span};
-use crate::syntax::{Diagnostic, LANGUAGE, ast, parse};
-
+use crate::check::checker::docs;
 use crate::check::policy::lines::{rules, value_of};
 use crate::model::policy::{Net, Policy, PolicyClaims, PolicyOrigin, record, seal, weights_from_lines};
+use crate::model::{Space, code};
+use crate::syntax::ast::{Field, FileId, Span};
+use crate::syntax::{Diagnostic, LANGUAGE, ast, parse};
 
 /// The policy of a file, checked against the space that it uses. `text` is what the tree was read from.
 ///
 /// # Errors
 /// What is wrong with it, the seal first: of a damaged file nothing else is worth saying.
 pub fn policy(text: &str, file: &ast::File, space: &Space) -> Result<Policy, Vec<Diagnostic>> {
-    let mut found = file.items.iter().filter_map(|item| match &item.kind {
-        ItemKind::Policy(policy) => Some((item, policy)),
-        _ => None,
-    });
+    let mut found = file.items.iter().filter_map(|item| Some((item, item.kind.as_policy()?)));
     let (item, declared) = found.next().expect("it is asked only where there is one");
     if let Some((second, _)) = found.next() {
         let error = Diagnostic::error(code::ONE_POLICY, "the file holds two policies");
@@ -50,7 +47,7 @@ pub fn policy(text: &str, file: &ast::File, space: &Space) -> Result<Policy, Vec
     }
     Ok(Policy {
         name: declared.name.text.clone(),
-        docs: item.docs.iter().map(|doc| doc.text.clone()).collect(),
+        docs: docs(item),
         origin,
         layers: net.layers,
         dueling: net.dueling,
@@ -127,10 +124,7 @@ fn field_span(fields: &[Field], name: &str, otherwise: Span) -> Span {
 pub fn values_from(text: &str) -> Result<Vec<(usize, f32)>, String> {
     let around = format!("language {LANGUAGE}\npolicy given {{ origin {{ {text} }} }}\n");
     let (file, mistakes) = parse(FileId(0), &around);
-    let fields = file.items.iter().find_map(|item| match &item.kind {
-        ItemKind::Policy(policy) => Some(&policy.origin),
-        _ => None,
-    });
+    let fields = file.items.iter().find_map(|item| Some(&item.kind.as_policy()?.origin));
     let Some(fields) = fields.filter(|_| mistakes.is_empty()) else {
         return Err(format!("cannot read `{text}` as a state: write `ego_speed: 12 m/s, time: Night`"));
     };

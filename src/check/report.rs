@@ -1,0 +1,59 @@
+//! What every check shares: reporting a mistake and going on, and reading the fields of a block.
+
+use crate::check::names::{Names, unknown};
+use crate::model::code;
+use crate::syntax::ast::{Field, Name, Span};
+use crate::syntax::{Diagnostic, ast};
+
+/// A check that collects mistakes and goes on after each.
+pub(super) trait Report {
+    fn report(&mut self, diagnostic: Diagnostic);
+
+    /// Reports why there is no value.
+    fn reject<T>(&mut self, diagnostic: Diagnostic) -> Option<T> {
+        self.report(diagnostic);
+        None
+    }
+
+    /// The value, or `None` once its mistake is reported.
+    fn take<T>(&mut self, value: Result<T, Diagnostic>) -> Option<T> {
+        value.map_err(|error| self.report(error)).ok()
+    }
+
+    /// Reports every name that stands twice.
+    fn once<'a>(&mut self, kind: &str, names: impl IntoIterator<Item = &'a Name>) {
+        let mut known = Names::default();
+        for (index, name) in names.into_iter().enumerate() {
+            self.take(known.declare(kind, name, index));
+        }
+    }
+
+    /// Reports every field that stands twice.
+    fn fields_once(&mut self, kind: &str, fields: &[Field]) {
+        self.once(kind, fields.iter().map(|field| &field.name));
+    }
+
+    /// Reports every field that stands twice or that the block does not have.
+    fn fields_known(&mut self, fields: &[Field], known: &[&str]) {
+        self.fields_once("field", fields);
+        for field in fields.iter().filter(|field| !known.contains(&field.name.text.as_str())) {
+            self.report(unknown_field(field, known));
+        }
+    }
+
+    /// Reports that a block lacks a field which it needs.
+    fn missing_field<T>(&mut self, name: &str, span: Span, message: String) -> Option<T> {
+        let error = Diagnostic::error(code::MISSING_FIELD, message);
+        self.reject(error.at(span, format!("`{name}: …` is missing")))
+    }
+}
+
+/// A field that the block does not have.
+pub(super) fn unknown_field(field: &Field, known: &[&str]) -> Diagnostic {
+    unknown("field", &field.name.text, field.name.span, known.iter().copied())
+}
+
+/// The value of the first field of that name.
+pub(super) fn field<'a>(fields: &'a [Field], name: &str) -> Option<&'a ast::Expr> {
+    fields.iter().find(|field| field.name.text == name).map(|field| &field.value)
+}
