@@ -59,9 +59,8 @@ impl Case<'_> {
         scenario: &'a Scenario,
         profile: Option<&ModularConfig>,
     ) -> Result<Case<'a>, Failure> {
-        let usage = |error: &dyn std::error::Error| Failure::usage(error.to_string());
-        let (ads, _) = driver(None, profile, scenario).map_err(|error| usage(&error))?;
-        let stage = Stage::new(table, scenario).map_err(|error| usage(&error))?;
+        let (ads, _) = driver(None, profile, scenario)?;
+        let stage = Stage::new(table, scenario)?;
         let log = stage.play(&ads, &mut |_, _, _| {});
         let judgements = stage.judge(&ads, &log);
         let Some(&index) = oracle::counted(table.space(), &log, &judgements).first() else {
@@ -110,8 +109,7 @@ fn explain(
     let (table, scenario) = load::scenario(output, file)?;
     let Case { stage, ads, log, index } = Case::of(&table, &scenario, profile)?;
     let setup = stage.setup(&ads);
-    let diagnosis = oracle::diagnose(&setup, &log, index, baseline);
-    let diagnosis = diagnosis.map_err(|error| Failure::usage(error.to_string()))?;
+    let diagnosis = oracle::diagnose(&setup, &log, index, baseline).map_err(Failure::usage)?;
     let likelihood = arguments.likelihood.map(|count| oracle::likelihood(&setup, &log, index, count));
     let collision = log.collisions[index];
     Ok(Explained { scenario: scenario.name.clone(), ads: ads.name(), collision, diagnosis, likelihood })
@@ -154,8 +152,7 @@ fn mechanisms(
     let found = each_file(&arguments.files, arguments.jobs, |file| {
         let (table, scenario) = load::scenario(output, file)?;
         let Case { stage, ads, log, index } = Case::of(&table, &scenario, profile)?;
-        let found = oracle::mechanisms(&stage.setup(&ads), &log, index);
-        found.map_err(|error| Failure::usage(error.to_string()))
+        oracle::mechanisms(&stage.setup(&ads), &log, index).map_err(Failure::usage)
     });
     let mut crashes: Vec<Vec<WithoutMechanism>> = Vec::new();
     let mut results = Vec::new();

@@ -3,12 +3,11 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use crate::action::ActionTable;
 use crate::agent::{Face, QPolicy};
 use crate::emit;
 use crate::model::Policy;
 use crate::model::policy::RulesClaims;
-use crate::run;
+use crate::run::Arena;
 use crate::train;
 
 use super::arguments::DistillArguments;
@@ -41,7 +40,8 @@ pub fn distill(output: &Output, arguments: &DistillArguments) -> Result<(), Fail
         let message = "the policy was trained with `rules_leaves: 0`: say how many with `--leaves N`";
         return Err(Failure::usage(message));
     }
-    let policy = with_rules(&table, &acting, policy)?;
+    let arena = train::training_arena(&table, &policy, &acting, &policy.origin.roads)?;
+    let policy = with_rules(&arena, &acting, policy);
     let path = arguments.output.clone().unwrap_or_else(|| {
         let stem = arguments.file.file_stem().unwrap_or_default().to_string_lossy();
         arguments.file.with_file_name(format!("{stem}.distilled.ava"))
@@ -62,29 +62,22 @@ pub fn distill(output: &Output, arguments: &DistillArguments) -> Result<(), Fail
     Ok(())
 }
 
-/// The policy with rules distilled as its settings want them, and with the claims about them.
-pub fn with_rules(table: &ActionTable, acting: &QPolicy, policy: Policy) -> Result<Policy, Failure> {
-    let settings = acting.settings();
+/// The policy with rules distilled as its settings want them, and with the claims about them. `arena` is where it
+/// was trained.
+pub fn with_rules(arena: &Arena, acting: &QPolicy, policy: Policy) -> Policy {
     let mut policy = Policy { rules: Vec::new(), ..policy };
-    let Some(mut claims) = policy.claims.take() else { return Ok(policy) };
+    let Some(claims) = &mut policy.claims else { return policy };
     claims.rules = None;
-    if settings.rules_leaves == 0 {
-        return Ok(Policy { claims: Some(claims), ..policy });
+    if acting.settings().rules_leaves == 0 {
+        return policy;
     }
-    let origin = &policy.origin;
-    let rules = (origin.with.as_slice(), origin.without.as_slice());
-    let roads = &origin.roads;
-    let failed = |error: run::RunError| Failure::usage(error.to_string());
-    let ads = &run::trained_against(&policy).map_err(failed)?;
-    let found = train::distill(table, acting, roads, ads, rules, origin.seed).map_err(failed)?;
-    if found.is_empty() {
-        return Ok(Policy { claims: Some(claims), ..policy });
+    let rules = Arc::new(train::distill(arena, acting, policy.origin.seed));
+    if !rules.is_empty() {
+        let test = (claims.episodes, claims.seed);
+        claims.rules = Some(train::judge_rules(arena, acting, &rules, test));
+        policy.rules = rules.to_vec();
     }
-    let found = Arc::new(found);
-    let test = (claims.episodes, claims.seed);
-    let judged = train::judge_rules(table, acting, &found, roads, ads, rules, test).map_err(failed)?;
-    claims.rules = Some(judged);
-    Ok(Policy { claims: Some(claims), rules: found.to_vec(), ..policy })
+    policy
 }
 
 /// What the rules are worth, beside the network's return.

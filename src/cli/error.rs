@@ -2,6 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::run::RunError;
+
 /// Every way in which a command can end but well.
 #[derive(Debug, thiserror::Error)]
 pub enum Failure {
@@ -26,8 +28,8 @@ pub enum Failure {
 }
 
 impl Failure {
-    pub fn usage(message: impl Into<String>) -> Failure {
-        Failure::Usage { message: message.into() }
+    pub fn usage(message: impl ToString) -> Failure {
+        Failure::Usage { message: message.to_string() }
     }
 
     pub fn file(doing: &'static str, path: &Path, reason: impl ToString) -> Failure {
@@ -44,5 +46,11 @@ impl Failure {
             // What a shell reports for a process that SIGINT ended.
             Failure::Interrupted { .. } => 130,
         }
+    }
+}
+
+impl From<RunError> for Failure {
+    fn from(error: RunError) -> Failure {
+        Failure::usage(error)
     }
 }

@@ -2,8 +2,7 @@
 
 use crate::agent::Face;
 use crate::check::policy::values_from;
-use crate::run::trained_against;
-use crate::train::{Insight, insight};
+use crate::train::{Insight, insight, training_arena};
 
 use super::arguments::ExplainPolicyArguments;
 use super::error::Failure;
@@ -20,13 +19,10 @@ pub fn explain_policy(output: &Output, arguments: &ExplainPolicyArguments) -> Re
     let (table, policy) = load::policy(output, &arguments.file)?;
     let acting = acting(&table, &policy, Face::Network)?;
     let given = arguments.state.as_deref().map_or(Ok(Vec::new()), values_from).map_err(Failure::usage)?;
-    let origin = &policy.origin;
-    let roads = if arguments.road.is_empty() { &origin.roads } else { &arguments.road };
-    let rules = (origin.with.as_slice(), origin.without.as_slice());
+    let roads = if arguments.road.is_empty() { &policy.origin.roads } else { &arguments.road };
     let test = (u64::from(arguments.episodes), arguments.seed, u64::from(arguments.repeats));
-    let ads = trained_against(&policy).map_err(|error| Failure::usage(error.to_string()))?;
-    let found = insight(&table, &acting, &given, roads, &ads, rules, test)
-        .map_err(|error| Failure::usage(error.to_string()))?;
+    let arena = training_arena(&table, &policy, &acting, roads)?;
+    let found = insight(&arena, &acting, &given, test);
     output.say(&format!(
         "{} on {}: {} of {}, {:.3} of Q-value at stake in each",
         policy.name,

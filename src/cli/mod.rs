@@ -14,6 +14,7 @@ mod explain;
 mod explain_policy;
 mod export_weights;
 mod fmt;
+mod interrupt;
 mod load;
 pub mod lsp;
 mod new;
@@ -41,6 +42,9 @@ use clap::Parser;
 use arguments::{Arguments, Command};
 use error::Failure;
 use output::Output;
+
+/// Version of avastra, as settings record it.
+const VERSION: &str = env!("CARGO_PKG_VERSION");
 
 /// Runs the command that the process was started with.
 pub fn main() -> ExitCode {

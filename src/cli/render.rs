@@ -30,8 +30,7 @@ pub fn render(output: &Output, arguments: &RenderArguments) -> Result<(), Failur
     let scenario = &scenario;
     let times_s = times(arguments, scenario, table.space().episode.step_s)?;
     let profile = arguments.ads_config.as_deref().map(load::profile).transpose()?;
-    let (ads, _) = driver(arguments.ads.as_deref(), profile.as_ref(), scenario)
-        .map_err(|error| Failure::usage(error.to_string()))?;
+    let (ads, _) = driver(arguments.ads.as_deref(), profile.as_ref(), scenario)?;
     let moments = moments(&table, scenario, &ads, &times_s)?;
     // A strip ends where its scenario does.
     if moments.is_empty() || (!arguments.strip && moments.len() < times_s.len()) {
@@ -100,7 +99,7 @@ fn moments(
 ) -> Result<Vec<Snapshot>, Failure> {
     let mut moments: Vec<Snapshot> = Vec::new();
     let mut last_contact: Option<(f64, Vec2)> = None;
-    let stage = Stage::new(table, scenario).map_err(|error| Failure::usage(error.to_string()))?;
+    let stage = Stage::new(table, scenario)?;
     stage.play(ads, &mut |world, ads, contacts| {
         if let Some(contact) = contacts.last() {
             last_contact = Some((contact.time_s, contact.point));

@@ -85,9 +85,8 @@ fn play(
     path: &Path,
 ) -> Result<Played, Failure> {
     let (table, scenario) = load::scenario(output, path)?;
-    let (ads, is_recorded) = driver(arguments.ads.as_deref(), profile, &scenario)
-        .map_err(|error| Failure::usage(error.to_string()))?;
-    let stage = Stage::new(&table, &scenario).map_err(|error| Failure::usage(error.to_string()))?;
+    let (ads, is_recorded) = driver(arguments.ads.as_deref(), profile, &scenario)?;
+    let stage = Stage::new(&table, &scenario)?;
     let mut measures = Gauges::default();
     let log = stage.play(&ads, &mut |world, _, contacts| measures.note(world, contacts));
     let (criticality, pet_s) = measures.of_steps(&log);

@@ -85,8 +85,7 @@ fn read(output: &Output, arguments: &RoadArguments) -> Result<(Arc<RoadMap>, Opt
         (Arc::new(map.map_err(|error| Failure::file("read", path, error))?), None)
     };
     let (Some(from), Some(to)) = (&arguments.from, &arguments.to) else { return Ok((map, route)) };
-    let route = Route::find(&map, place(&map, from)?, place(&map, to)?);
-    let route = route.map_err(|error| Failure::usage(error.to_string()))?;
+    let route = Route::find(&map, place(&map, from)?, place(&map, to)?).map_err(Failure::usage)?;
     Ok((map, Some(route)))
 }
 
@@ -99,7 +98,7 @@ fn place(map: &RoadMap, text: &str) -> Result<LanePlace, Failure> {
     let (road, lane, s_m) = parts.ok_or_else(|| {
         Failure::usage(format!("`{text}` is no place; write ROAD/LANE@S, for example `1/-1@12.5`"))
     })?;
-    map.place(road, lane, s_m).map_err(|error| Failure::usage(error.to_string()))
+    map.place(road, lane, s_m).map_err(Failure::usage)
 }
 
 fn words(map: &RoadMap, route: Option<&Route>) -> String {

@@ -1,8 +1,7 @@
 //! `avastra run`: episodes in, crashes out.
 
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::Ordering;
 use std::time::Instant;
 
 use crate::action::ActionTable;
@@ -19,14 +18,13 @@ use crate::sim::ENGINE;
 
 use super::arguments::{FaceArgument, RunArguments};
 use super::error::Failure;
-use super::output::{Output, remark};
+use super::interrupt::stop_on_interrupt;
+use super::output::Output;
 use super::parallel::jobs;
 use super::progress::{Progress, plural};
 use super::run_directory::{Begun, RunDirectory, write};
 use super::verify::acting;
-use super::{compile, load, run_directory};
-
-pub const VERSION: &str = env!("CARGO_PKG_VERSION");
+use super::{VERSION, compile, load, run_directory};
 
 /// How many critical scenarios, and how many reasons of refusals, the summary names.
 const NAMED_MAX: usize = 10;
@@ -51,7 +49,7 @@ pub fn run(output: &Output, arguments: &RunArguments) -> Result<(), Failure> {
     play(&run, &todo, jobs(arguments.jobs), &stop, &mut |summary, log| {
         keep(&run, &mut directory, &space_path, &summary, &log)?;
         progress.episode(summary.counted());
-        Ok(())
+        Ok::<_, Failure>(())
     })?;
     drop(progress);
 
@@ -168,7 +166,7 @@ fn ready(
     face: Face,
 ) -> Result<Run, Failure> {
     let Some((own, policy)) = policy else {
-        return Run::new(table, settings).map_err(|error| Failure::usage(error.to_string()));
+        return Ok(Run::new(table, settings)?);
     };
     let labels =
         |table: &ActionTable| -> Vec<String> { table.rows().iter().map(|row| row.label.clone()).collect() };
@@ -186,7 +184,7 @@ fn ready(
             policy.name
         )));
     }
-    Run::with_policy(table, settings, acting).map_err(|error| Failure::usage(error.to_string()))
+    Ok(Run::with_policy(table, settings, acting)?)
 }
 
 /// Writes what an episode found. The scenario comes first: an episode that is in the database has
@@ -221,20 +219,6 @@ fn keep(
 /// The space as a file in `critical/` must name it.
 fn space_path(run: &Run, directory: &RunDirectory) -> Result<String, Failure> {
     load::relative(&directory.path.join("critical"), &run.space().path)
-}
-
-/// A flag that the first Ctrl-C sets; the second ends the process at once.
-pub fn stop_on_interrupt() -> Result<Arc<AtomicBool>, Failure> {
-    let stop = Arc::new(AtomicBool::new(false));
-    let flag = stop.clone();
-    ctrlc::set_handler(move || {
-        if flag.swap(true, Ordering::Relaxed) {
-            std::process::exit(130);
-        }
-        remark("finishing the episodes under way; press again to leave them");
-    })
-    .map_err(|error| Failure::usage(format!("cannot listen for Ctrl-C: {error}")))?;
-    Ok(stop)
 }
 
 fn heading(run: &Run, directory: &Path) -> String {

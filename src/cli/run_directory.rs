@@ -8,9 +8,8 @@ use crate::run::Database;
 use crate::sim::ENGINE;
 
 use super::error::Failure;
-use super::load;
 use super::output::Output;
-use super::run::VERSION;
+use super::{VERSION, load};
 
 /// A run directory on disk.
 pub struct RunDirectory {

@@ -21,7 +21,7 @@ pub fn log(records: &[DiagnosticRecord]) -> Value {
         "runs": [{
             "tool": { "driver": {
                 "name": "avastra",
-                "semanticVersion": env!("CARGO_PKG_VERSION"),
+                "semanticVersion": super::VERSION,
                 "rules": rules,
             } },
             "columnKind": "unicodeCodePoints",

@@ -110,10 +110,9 @@ impl Small {
 
 /// Shrinks the scenario of a file into another.
 fn smaller(output: &Output, file: &Path, path: &Path) -> Result<Small, Failure> {
-    let usage = |error: run::RunError| Failure::usage(error.to_string());
     let (table, scenario) = load::scenario(output, file)?;
-    let ads = run::recorded(&scenario).map_err(usage)?;
-    let stage = Stage::new(&table, &scenario).map_err(usage)?;
+    let ads = run::recorded(&scenario)?;
+    let stage = Stage::new(&table, &scenario)?;
     let log = stage.play(&ads, &mut |_, _, _| {});
     let judgements = stage.judge(&ads, &log);
     let Some(&index) = oracle::counted(table.space(), &log, &judgements).first() else {
@@ -143,7 +142,7 @@ fn smaller(output: &Output, file: &Path, path: &Path) -> Result<Small, Failure> 
     summary.avoidability = stage.avoidability().clone();
     summary.collisions[shrunk.index].minimal = spare.is_empty();
     if scenario.claims.iter().any(|claim| matches!(claim, Claim::Cause { .. })) {
-        summary.find_causes(&setup, &shrunk.log).map_err(|error| Failure::usage(error.to_string()))?;
+        summary.find_causes(&setup, &shrunk.log).map_err(Failure::usage)?;
     }
     write(path, &crate::syntax::print(&emit::scenario(&table, &shrunk.log, &summary, &source)))?;
     let actions = shrunk.log.steps.iter().filter_map(|step| match &step.outcome {
@@ -188,10 +187,9 @@ fn refutation(refuted: usize) -> Result<(), Failure> {
 
 /// Number of claims of a written file that do not hold.
 fn refuted(output: &Output, path: &Path) -> Result<usize, Failure> {
-    let usage = |error: run::RunError| Failure::usage(error.to_string());
     let (table, scenario) = load::scenario(output, path)?;
-    let ads = run::recorded(&scenario).map_err(usage)?;
-    let stage = Stage::new(&table, &scenario).map_err(usage)?;
+    let ads = run::recorded(&scenario)?;
+    let stage = Stage::new(&table, &scenario)?;
     let log = stage.play(&ads, &mut |_, _, _| {});
     let claims = stage.verify(&ads, &log);
     Ok(claims.iter().filter(|claim| !claim.confirmed).count())

@@ -13,12 +13,12 @@ use crate::study::{
 
 use super::arguments::StudyArguments;
 use super::error::Failure;
+use super::interrupt::stop_on_interrupt;
 use super::output::Output;
 use super::parallel::jobs;
 use super::progress::{Progress, plural};
-use super::run::{VERSION, stop_on_interrupt};
 use super::run_directory::{Begun, write};
-use super::{load, run_directory};
+use super::{VERSION, load, run_directory};
 
 /// Plays what a study still lacks and prints its result.
 pub fn study(output: &Output, arguments: &StudyArguments) -> Result<(), Failure> {
@@ -92,7 +92,7 @@ fn resumed(output: &Output, path: &Path) -> Result<Study, Failure> {
     let begun =
         Begun { avastra: &settings.avastra, engine: &settings.engine, space_digest: &settings.space_digest };
     let table = begun.table(output, "study", &path.join(&settings.space))?;
-    Study::new(table, settings).map_err(|error| Failure::usage(error.to_string()))
+    Study::new(table, settings).map_err(Failure::usage)
 }
 
 fn heading(study: &Study, directory: &Path) -> String {

@@ -33,7 +33,7 @@ struct Case {
 pub fn test(output: &Output, arguments: &TestArguments) -> Result<(), Failure> {
     let profile = arguments.ads_config.as_deref().map(load::profile).transpose()?;
     if let Some(name) = &arguments.ads {
-        run::driving_system(name).map_err(|error| Failure::usage(error.to_string()))?;
+        run::driving_system(name)?;
     }
     let mut cases = Vec::new();
     for file in scenario_files(&arguments.directory)? {

@@ -11,16 +11,16 @@ use crate::model::{Policy, Space, digest_text};
 use crate::run::Profile;
 use crate::sim::ENGINE;
 use crate::syntax::listed;
-use crate::train::{Evaluation, TrainSettings, TrainedEpisode, Training, evaluate_agent, rounded};
+use crate::train::{Evaluation, TrainSettings, TrainedEpisode, Training, evaluate, rounded};
 
 use super::arguments::TrainArguments;
 use super::distill::rules_text;
 use super::error::Failure;
+use super::interrupt::stop_on_interrupt;
 use super::output::Output;
 use super::progress::{TrainingProgress, plural};
-use super::run::{VERSION, stop_on_interrupt};
 use super::run_directory::{Begun, RunDirectory, write};
-use super::{distill, load, run_directory};
+use super::{VERSION, distill, load, run_directory};
 
 /// Episodes between two checkpoints: what a kill may cost to play again.
 const CHECKPOINT_EPISODES: usize = 25;
@@ -78,7 +78,7 @@ fn begun(output: &Output, arguments: &TrainArguments) -> Result<(Training, RunDi
         with: arguments.rules.with.clone(),
         hyperparameters,
     };
-    let training = Training::new(table, settings).map_err(|error| Failure::usage(error.to_string()))?;
+    let training = Training::new(table, settings)?;
     let path = run_directory::create(arguments.out.as_deref())?;
     let space = load::relative(&path, &training.table().space().path)?;
     run_directory::write_settings(&path, &TrainSettings { space, ..training.settings().clone() })?;
@@ -113,10 +113,10 @@ fn resumed(output: &Output, path: &Path) -> Result<(Training, RunDirectory), Fai
     let checkpoint =
         directory.database.return_to_checkpoint().map_err(|error| Failure::file("resume", path, error))?;
     let training = match checkpoint {
-        None => Training::new(table, settings),
-        Some(checkpoint) => Training::resumed(table, settings, checkpoint.episodes, &checkpoint.learner),
+        None => Training::new(table, settings)?,
+        Some(checkpoint) => Training::resumed(table, settings, checkpoint.episodes, &checkpoint.learner)?,
     };
-    Ok((training.map_err(|error| Failure::usage(error.to_string()))?, directory))
+    Ok((training, directory))
 }
 
 /// Commits an episode; with it a checkpoint every so often, at the end, and where the user stops.
@@ -167,15 +167,12 @@ fn write_critical(
 /// Judges the policy, writes it, and says what came of the training.
 fn finish(output: &Output, training: &Training, directory: &RunDirectory) -> Result<(), Failure> {
     let settings = training.settings();
-    let table = training.table().clone();
-    let rules = (settings.with.as_slice(), settings.without.as_slice());
     let roads = &settings.roads;
-    let (ads, test) = (training.arena().ads(), (EVALUATION_EPISODES, settings.seed));
-    let evaluation = evaluate_agent(table, &|| training.actor(), roads, ads, rules, test);
-    let evaluation = evaluation.map_err(|error| Failure::usage(error.to_string()))?;
+    let test = (EVALUATION_EPISODES, settings.seed);
+    let evaluation = evaluate(training.arena(), &|| training.actor(), test);
     let kept = training.policy().map(|acting| {
         output.tell("distilling rules from the network");
-        let policy = policy(training, acting, &evaluation)?;
+        let policy = policy(training, acting, &evaluation);
         let path = write_policy(&policy, training.table().space(), &directory.path)?;
         Ok::<_, Failure>((path, policy))
     });
@@ -225,7 +222,7 @@ fn finish(output: &Output, training: &Training, directory: &RunDirectory) -> Res
 }
 
 /// The policy as it is to be kept, with the rules distilled from it and the claims of both.
-fn policy(training: &Training, acting: &QPolicy, evaluation: &Evaluation) -> Result<Policy, Failure> {
+fn policy(training: &Training, acting: &QPolicy, evaluation: &Evaluation) -> Policy {
     let settings = training.settings();
     let name = match settings.roads.as_slice() {
         [road] => format!("{road}_{}_{}", settings.agent, settings.seed),
@@ -269,7 +266,7 @@ fn policy(training: &Training, acting: &QPolicy, evaluation: &Evaluation) -> Res
         rules: Vec::new(),
         digest: String::new(),
     };
-    distill::with_rules(training.table(), acting, policy)
+    distill::with_rules(training.arena(), acting, policy)
 }
 
 /// Writes `policy/NAME.ava`.

@@ -6,7 +6,7 @@ use crate::action::ActionTable;
 use crate::emit;
 use crate::emit::Provenance;
 use crate::report;
-use crate::run::Arena;
+use crate::run::{Arena, driving_system};
 use crate::syntax;
 use crate::trial::{Cell, TrialSettings, Trials};
 
@@ -23,8 +23,7 @@ pub fn trials(output: &Output, arguments: &TableArguments, table: ActionTable) -
         None => table.space().roads.iter().map(|road| road.name.clone()).collect(),
     };
     let wanted = &arguments.trials;
-    let arena = Arena::new(table, &roads, &wanted.ads, (&[], &[]))
-        .map_err(|error| Failure::usage(error.to_string()))?;
+    let arena = Arena::new(table, &roads, driving_system(&wanted.ads)?, &[], &[])?;
     let settings = TrialSettings { drives: wanted.drives, tries: wanted.tries, seed: wanted.seed };
     let trials = Trials::new(&arena, settings);
     let roads: Vec<Vec<Cell>> = std::thread::scope(|scope| {

@@ -7,9 +7,8 @@ use crate::action::ActionTable;
 use crate::agent::{Face, QPolicy};
 use crate::model::policy::RulesClaims;
 use crate::model::{Policy, digest_text};
-use crate::run;
 use crate::sim::ENGINE;
-use crate::train::{evaluate, judge_rules, rounded};
+use crate::train::{evaluate, judge_rules, rounded, training_arena};
 
 use super::arguments::{ReplayArguments, VerifyArguments};
 use super::error::Failure;
@@ -63,14 +62,11 @@ pub fn verify(output: &Output, arguments: &VerifyArguments) -> Result<(), Failur
 /// The claims that do not hold, each with what was found.
 fn judge(table: &ActionTable, policy: &Policy) -> Result<Vec<String>, Failure> {
     same_world(policy)?;
-    let origin = &policy.origin;
     let acting = acting(table, policy, Face::Network)?;
     let Some(claims) = &policy.claims else { return Ok(Vec::new()) };
-    let rules = (origin.with.as_slice(), origin.without.as_slice());
+    let arena = training_arena(table, policy, &acting, &policy.origin.roads)?;
     let test = (claims.episodes, claims.seed);
-    let ads = run::trained_against(policy).map_err(|error| Failure::usage(error.to_string()))?;
-    let found = evaluate(table.clone(), &acting, &origin.roads, &ads, rules, test)
-        .map_err(|error| Failure::usage(error.to_string()))?;
+    let found = evaluate(&arena, &|| Box::new(acting.clone()), test);
     let trace = digest_text(&found.trace);
     let pairs = [
         ("collisions", claims.collisions.to_string(), found.collisions.to_string()),
@@ -82,8 +78,7 @@ fn judge(table: &ActionTable, policy: &Policy) -> Result<Vec<String>, Failure> {
     let mut pairs = Vec::from(pairs.map(|(name, claimed, found)| (name.to_owned(), claimed, found)));
     if let Some(claims) = &claims.rules {
         let lines = Arc::new(policy.rules.clone());
-        let found = judge_rules(table, &acting, &lines, &origin.roads, &ads, rules, test)
-            .map_err(|error| Failure::usage(error.to_string()))?;
+        let found = judge_rules(&arena, &acting, &lines, test);
         pairs.extend(
             figures(claims)
                 .into_iter()

@@ -32,8 +32,8 @@ pub fn why(output: &Output, arguments: &WhyArguments) -> Result<(), Failure> {
         None => 0,
     };
     let road = &space.roads[road];
-    let rules = ActiveRules::new(space, &arguments.rules.with, &arguments.rules.without)
-        .map_err(|error| Failure::usage(error.to_string()))?;
+    let rules =
+        ActiveRules::new(space, &arguments.rules.with, &arguments.rules.without).map_err(Failure::usage)?;
     let memory = match &arguments.state {
         None => space.initial_memory(SEED),
         Some(text) => space.memory_from(text, SEED).map_err(Failure::usage)?,

@@ -6,7 +6,6 @@ use std::sync::Arc;
 use ndarray::Array1;
 
 use crate::action::{ActionTable, ActiveRules, Offer, Situation};
-use crate::ads;
 use crate::ads::Selected;
 use crate::agent::{Agent, Branch, Trial};
 use crate::episode;
@@ -20,7 +19,6 @@ use crate::sim::Scene;
 use crate::syntax::listed;
 
 use crate::run::play::RunError;
-use crate::run::profile::Profile;
 use crate::run::summary::EpisodeSummary;
 
 /// Everything that the episodes of a run or a training share.
@@ -33,15 +31,16 @@ pub struct Arena {
 }
 
 impl Arena {
-    /// Looks the names up. `rules` are those switched on and those switched off.
+    /// Looks the names up: of roads, and of the rules that are switched on (`with`) and off (`without`).
     ///
     /// # Errors
-    /// If a road, a driving system or a rule does not exist, or is named twice.
+    /// If a road or a rule does not exist, or is named twice.
     pub fn new(
         table: ActionTable,
         roads: &[String],
-        ads: &str,
-        (with, without): (&[String], &[String]),
+        ads: Selected,
+        with: &[String],
+        without: &[String],
     ) -> Result<Arena, RunError> {
         if let Some(name) = twice(roads).or_else(|| twice(with.iter().chain(without))) {
             return Err(RunError::Twice { name });
@@ -56,36 +55,12 @@ impl Arena {
             Ok((index, Arc::new(episode::scene(&space.roads[index]))))
         });
         let roads = roads.collect::<Result<_, RunError>>()?;
-        let ads = driving_system(ads)?;
         let rules = ActiveRules::new(space, with, without)?;
         Ok(Arena { table, rules, ads, roads })
     }
 
     pub fn table(&self) -> &ActionTable {
         &self.table
-    }
-
-    /// From now on with these settings of the driving system.
-    ///
-    /// # Errors
-    /// If it has none, or they mean something else in this version.
-    pub(crate) fn set_profile(&mut self, profile: &Profile) -> Result<(), RunError> {
-        if profile.settings.digest() != profile.digest {
-            let ads = self.ads.name().to_owned();
-            return Err(RunError::ProfileDigest { what: "the run".to_owned(), ads });
-        }
-        self.ads = self.ads.clone().with_profile(profile.settings)?;
-        Ok(())
-    }
-
-    /// The driving system.
-    pub fn ads(&self) -> &Selected {
-        &self.ads
-    }
-
-    /// From now on against this driving system.
-    pub(crate) fn set_ads(&mut self, ads: Selected) {
-        self.ads = ads;
     }
 
     /// Whether the driving system is made of modules that could be at fault.
@@ -186,20 +161,6 @@ impl Branch for Lookahead<'_> {
             simulated_s: log.duration_s - log.steps[step].time_s,
         }
     }
-}
-
-/// Who drives where nobody is named.
-pub const DEFAULT_ADS: &str = "modular";
-
-/// The driving system of that name, as it comes.
-///
-/// # Errors
-/// If there is none.
-pub fn driving_system(name: &str) -> Result<Selected, RunError> {
-    ads::by_name(name).map(Selected::new).ok_or_else(|| {
-        let known = listed(&ads::REGISTRY.iter().map(|entry| entry.name).collect::<Vec<_>>());
-        RunError::Ads { name: name.to_owned(), known }
-    })
 }
 
 /// The first name that comes a second time.

@@ -13,7 +13,7 @@ mod shape;
 mod summary;
 mod gauges;
 
-pub use arena::{Arena, DEFAULT_ADS, driving_system};
+pub use arena::Arena;
 pub(crate) use arena::{carry_out, choose, legal, offers};
 pub(crate) use database::add_all;
 pub use database::{Database, DatabaseError, RefusalCount, Totals};
@@ -22,6 +22,7 @@ pub use groups::Group;
 pub(crate) use groups::kind;
 pub(crate) use play::check_episodes;
 pub use play::{EPISODES_MAX, PolicyReference, Run, RunError, RunSettings, Stage, play};
-pub use profile::{Profile, recorded, trained_against};
+pub(crate) use profile::under_test;
+pub use profile::{DEFAULT_ADS, Profile, driving_system, recorded, trained_against};
 pub use shape::Shape;
 pub use summary::{EpisodeSummary, Finding};

@@ -24,7 +24,7 @@ use crate::syntax::listed;
 
 use crate::run::arena::{Arena, choose};
 use crate::run::gauges::Gauges;
-use crate::run::profile::Profile;
+use crate::run::profile::{Profile, under_test};
 use crate::run::summary::EpisodeSummary;
 
 /// Everything that is needed to repeat a run; written to `run.yaml`.
@@ -165,11 +165,8 @@ impl Run {
     fn with_agent(table: ActionTable, settings: RunSettings, agent: Box<MakeAgent>) -> Result<Run, RunError> {
         check_episodes(settings.episodes)?;
         settings.avoidability.check()?;
-        let rules = (settings.with.as_slice(), settings.without.as_slice());
-        let mut arena = Arena::new(table, &settings.roads, &settings.ads, rules)?;
-        if let Some(profile) = &settings.profile {
-            arena.set_profile(profile)?;
-        }
+        let ads = under_test(&settings.ads, settings.profile.as_ref())?;
+        let arena = Arena::new(table, &settings.roads, ads, &settings.with, &settings.without)?;
         if settings.causes && !arena.has_modules() {
             return Err(RunError::NoModules(oracle::NoModules { ads: settings.ads }));
         }

@@ -1,10 +1,25 @@
-//! Profiles of driving systems as runs and scenarios record them.
+//! Driving systems by name, with the profiles that runs, scenarios and policies record.
 
+use crate::ads;
 use crate::ads::{ModularConfig, Selected};
 use crate::model::{Policy, Scenario};
+use crate::syntax::listed;
 
-use crate::run::arena::{DEFAULT_ADS, driving_system};
 use crate::run::play::RunError;
+
+/// The driving system under test where none is named.
+pub const DEFAULT_ADS: &str = "modular";
+
+/// The driving system of that name, with its default settings.
+///
+/// # Errors
+/// If there is none.
+pub fn driving_system(name: &str) -> Result<Selected, RunError> {
+    ads::by_name(name).map(Selected::new).ok_or_else(|| {
+        let known = listed(&ads::REGISTRY.iter().map(|entry| entry.name).collect::<Vec<_>>());
+        RunError::Ads { name: name.to_owned(), known }
+    })
+}
 
 /// Settings of a driving system, and a digest that tells whether they still mean the same.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -17,6 +32,21 @@ pub struct Profile {
 impl Profile {
     pub fn new(settings: &ModularConfig) -> Profile {
         Profile { digest: settings.digest(), settings: *settings }
+    }
+}
+
+/// The driving system that the settings of a run or a training name, with their profile if they have one.
+///
+/// # Errors
+/// If there is none of that name, it has no settings, or they mean something else in this version.
+pub(crate) fn under_test(ads: &str, profile: Option<&Profile>) -> Result<Selected, RunError> {
+    let selected = driving_system(ads)?;
+    match profile {
+        None => Ok(selected),
+        Some(profile) if profile.settings.digest() != profile.digest => {
+            Err(RunError::ProfileDigest { what: "the run".to_owned(), ads: ads.to_owned() })
+        }
+        Some(profile) => Ok(selected.with_profile(profile.settings)?),
     }
 }
 

@@ -1,17 +1,13 @@
-//! What a policy achieves without learning any more, in figures that anybody can check.
+//! What an agent achieves when it does not learn, in figures that can be checked by playing again.
 
 use sha2::{Digest, Sha256};
 
-use crate::action::ActionTable;
-use crate::ads::Selected;
-use crate::agent::{Agent, QPolicy};
+use crate::agent::Agent;
 use crate::episode;
 use crate::oracle::AvoidabilitySettings;
 use crate::rng;
 use crate::rng::Stream;
-use crate::run::{Arena, EpisodeSummary, RunError, choose};
-
-use crate::train::training::with_period;
+use crate::run::{Arena, EpisodeSummary, choose};
 
 /// The outcome of a number of episodes.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
@@ -32,36 +28,12 @@ pub struct Evaluation {
     pub simulated_s: f64,
 }
 
-/// Plays so many episodes on each road with a policy. `rules` are those switched on and off.
-///
-/// # Errors
-/// If a road or a rule does not exist.
+/// Plays so many episodes on each road; `make` gives a fresh agent for each.
 pub fn evaluate(
-    table: ActionTable,
-    policy: &QPolicy,
-    roads: &[String],
-    ads: &Selected,
-    rules: (&[String], &[String]),
-    (episodes, seed): (u64, u64),
-) -> Result<Evaluation, RunError> {
-    let table = with_period(table, policy.settings().observation_period_s);
-    evaluate_agent(table, &|| Box::new(policy.clone()), roads, ads, rules, (episodes, seed))
-}
-
-/// The same with any agent: `make` gives a fresh one for each episode.
-///
-/// # Errors
-/// As [`evaluate`].
-pub fn evaluate_agent(
-    table: ActionTable,
+    arena: &Arena,
     make: &dyn Fn() -> Box<dyn Agent>,
-    roads: &[String],
-    ads: &Selected,
-    rules: (&[String], &[String]),
     (episodes, seed): (u64, u64),
-) -> Result<Evaluation, RunError> {
-    let mut arena = Arena::new(table, roads, ads.name(), rules)?;
-    arena.set_ads(ads.clone());
+) -> Evaluation {
     let mut traces = Sha256::new();
     let mut found = Evaluation {
         episodes,
@@ -91,5 +63,5 @@ pub fn evaluate_agent(
         traces.update(log.trace());
     }
     let return_mean = sum / (episodes * arena.roads() as u64).max(1) as f64;
-    Ok(Evaluation { return_mean, trace: traces.finalize().into(), ..found })
+    Evaluation { return_mean, trace: traces.finalize().into(), ..found }
 }

@@ -2,15 +2,14 @@
 //! state, and which variables matter to it.
 
 use crate::action::ActionTable;
-use crate::ads::Selected;
 use crate::agent::{QPolicy, Visit};
 use crate::mdp::Observation;
 use crate::model::policy::{VARIABLES, VariableKind, variable_index};
 use crate::rng::Stream;
-use crate::run::RunError;
+use crate::run::Arena;
 
 use crate::train::importance::{Importance, importance, set};
-use crate::train::visits::{arena, visits};
+use crate::train::visits::visits;
 
 /// What was found.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
@@ -60,35 +59,27 @@ const TELLING: usize = 3;
 const TELLING_DEVIATIONS: f64 = 0.25;
 
 /// Looks at a policy over so many episodes on each road. `given` are values in place of the mean state's.
-/// `rules` are those of the space that are switched on and off.
-///
-/// # Errors
-/// If a road or a rule does not exist.
 pub fn insight(
-    table: &ActionTable,
+    arena: &Arena,
     policy: &QPolicy,
     given: &[(usize, f32)],
-    roads: &[String],
-    ads: &Selected,
-    rules: (&[String], &[String]),
     (episodes, seed, repeats): (u64, u64, u64),
-) -> Result<Insight, RunError> {
-    let arena = arena(table, policy, roads, ads, rules)?;
-    let visits = visits(&arena, policy, episodes, (seed, Stream::Evaluation, 0));
+) -> Insight {
+    let visits = visits(arena, policy, episodes, (seed, Stream::Evaluation, 0));
     let all: Vec<&Visit> = visits.iter().collect();
     let mut observation = mean(&all);
     for &(variable, value) in given {
         set(&mut observation, variable, value);
     }
     pack_weather(&mut observation);
-    Ok(Insight {
+    Insight {
         states: visits.len(),
         stake: visits.iter().map(Visit::stake).sum::<f64>() / visits.len().max(1) as f64,
-        rows: rows(table, policy, &visits),
-        state: state(table, policy, &observation),
+        rows: rows(arena.table(), policy, &visits),
+        state: state(arena.table(), policy, &observation),
         importance: importance(policy, &visits, repeats, seed),
         repeats,
-    })
+    }
 }
 
 fn rows(table: &ActionTable, policy: &QPolicy, visits: &[Visit]) -> Vec<RowUse> {

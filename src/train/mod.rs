@@ -12,9 +12,10 @@ mod training;
 mod visits;
 
 pub use distill::{distill, judge_rules, rounded};
-pub use evaluation::{Evaluation, evaluate, evaluate_agent};
+pub use evaluation::{Evaluation, evaluate};
 pub use importance::Importance;
 pub use insight::{Insight, RowUse, State, insight};
 pub use record::Checkpoint;
 pub(crate) use training::with_period;
 pub use training::{TrainSettings, TrainedEpisode, Training};
+pub use visits::training_arena;

@@ -22,7 +22,7 @@ use crate::oracle::AvoidabilitySettings;
 use crate::rng;
 use crate::rng::Stream;
 use crate::run::{
-    Arena, EpisodeSummary, Finding, Profile, RunError, carry_out, check_episodes, legal, offers,
+    Arena, EpisodeSummary, Finding, Profile, RunError, carry_out, check_episodes, legal, offers, under_test,
 };
 use crate::sim::{Contact, World};
 use crate::syntax::listed;
@@ -317,12 +317,8 @@ fn prepared(table: ActionTable, settings: &TrainSettings) -> Result<(Arena, Arc<
     }
     let table = with_period(table, settings.hyperparameters.observation_period_s());
     let rows = Arc::new(Rows::new(&table, settings.hyperparameters.actions())?);
-    let rules = (settings.with.as_slice(), settings.without.as_slice());
-    let mut arena = Arena::new(table, &settings.roads, &settings.ads, rules)?;
-    if let Some(profile) = &settings.profile {
-        arena.set_profile(profile)?;
-    }
-    Ok((arena, rows))
+    let ads = under_test(&settings.ads, settings.profile.as_ref())?;
+    Ok((Arena::new(table, &settings.roads, ads, &settings.with, &settings.without)?, rows))
 }
 
 /// The table with another observation period.

@@ -5,15 +5,16 @@ use std::sync::{Arc, Mutex, PoisonError};
 use ndarray::ArrayView1;
 
 use crate::action::ActionTable;
-use crate::ads::Selected;
 use crate::agent::{Agent, QPolicy, Visit};
 use crate::episode;
 use crate::episode::Moment;
 use crate::mdp::Observation;
+use crate::model::Policy;
 use crate::rng;
 use crate::rng::{Rng, Stream};
-use crate::run::{Arena, RunError, choose};
-use crate::train::with_period;
+use crate::run::{Arena, RunError, choose, trained_against};
+
+use crate::train::training::with_period;
 
 /// A policy that acts as it would, and notes every state that it chooses in with its legal rows, also
 /// where its settings would not ask what is legal. States in which no row is open are left out.
@@ -53,21 +54,20 @@ impl Agent for Recorder {
     }
 }
 
-/// Where a policy is looked at: the table at its own pace, and the driving system.
+/// The conditions that a policy was trained in, on these roads: its observation period, the driving system and
+/// the rules. `acting` is the policy, ready to act.
 ///
 /// # Errors
-/// If a road or a rule does not exist.
-pub(super) fn arena(
+/// If a road, a rule, the driving system or its settings do not exist (any more).
+pub fn training_arena(
     table: &ActionTable,
-    policy: &QPolicy,
+    policy: &Policy,
+    acting: &QPolicy,
     roads: &[String],
-    ads: &Selected,
-    rules: (&[String], &[String]),
 ) -> Result<Arena, RunError> {
-    let table = with_period(table.clone(), policy.settings().observation_period_s);
-    let mut arena = Arena::new(table, roads, ads.name(), rules)?;
-    arena.set_ads(ads.clone());
-    Ok(arena)
+    let table = with_period(table.clone(), acting.settings().observation_period_s);
+    let origin = &policy.origin;
+    Arena::new(table, roads, trained_against(policy)?, &origin.with, &origin.without)
 }
 
 /// The states of so many episodes on each road; seeds come from a stream, numbered from `first`.

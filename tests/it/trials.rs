@@ -2,7 +2,7 @@
 
 use avastra::action::ActionTable;
 use avastra::report;
-use avastra::run::Arena;
+use avastra::run::{Arena, driving_system};
 use avastra::trial::{Cell, Outcome, TrialSettings, Trials};
 
 use crate::cases::expect_snapshot;
@@ -12,7 +12,8 @@ use crate::world::space;
 fn cells(name: &str, settings: TrialSettings) -> Vec<Cell> {
     let table = ActionTable::new(space(name));
     let roads: Vec<String> = table.space().roads.iter().map(|road| road.name.clone()).collect();
-    let arena = Arena::new(table, &roads, "modular", (&[], &[])).expect("all of it is there");
+    let arena =
+        Arena::new(table, &roads, driving_system("modular").unwrap(), &[], &[]).expect("all of it is there");
     let trials = Trials::new(&arena, settings);
     let by_road: Vec<Vec<Cell>> = std::thread::scope(|scope| {
         let trials = &trials;
