@@ -246,11 +246,8 @@ impl Play {
     }
 
     fn collision(&self, contact: Contact) -> Collision {
-        let obstacles = self.world.obstacles();
-        let obstacle = obstacles
-            .iter()
-            .find(|obstacle| obstacle.id == contact.obstacle)
-            .expect("an obstacle stays for some time after it is hit");
+        let obstacle =
+            self.world.obstacle(contact.obstacle).expect("an obstacle stays for some time after it is hit");
         Collision {
             contact,
             step: self.steps.len(),

@@ -12,13 +12,13 @@ const CONTACT_M: f64 = 1e-6;
 
 /// The gap between two boxes.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Clearance {
+struct Clearance {
     /// 0 if they touch or overlap, m.
-    pub distance_m: f64,
+    distance_m: f64,
     /// Nearest point of the first box.
-    pub on_first: Vec2,
+    on_first: Vec2,
     /// Nearest point of the second box.
-    pub on_second: Vec2,
+    on_second: Vec2,
 }
 
 /// A box that moves on a straight line, turning evenly, from where it stands to `end`.
@@ -83,7 +83,7 @@ pub fn distance_m(a: &OrientedBox, b: &OrientedBox) -> f64 {
 /// Distance and nearest points of two boxes.
 ///
 /// Boxes that do not overlap are nearest at a corner of one of them, so eight corners are asked.
-pub fn clearance(a: &OrientedBox, b: &OrientedBox) -> Clearance {
+fn clearance(a: &OrientedBox, b: &OrientedBox) -> Clearance {
     let reach_m = a.radius_m() + b.radius_m();
     let near = (a.pose.position - b.pose.position).norm_squared() <= reach_m * reach_m;
     let (a, b) = (Frame::of(a), Frame::of(b));

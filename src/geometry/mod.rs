@@ -1,14 +1,14 @@
 //! Plane geometry: poses, oriented boxes, paths, distances and swept contact.
 //!
 //! SI units, `f64`, x east and y north, headings in rad counter-clockwise from +x. Trigonometry is
-//! `libm`'s, because the platform's differs in the last digit. `contact` alone names `parry2d`.
+//! `libm`'s, because the platform's differs in the last digit.
 
 mod contact;
 mod path;
 mod pose;
 mod smooth_step;
 
-pub use contact::{Clearance, FirstContact, Frame, Sweep, clearance, distance_m, first_contact, ray_hit_m};
-pub use path::{Path, PathPoint, Projection};
+pub use contact::{FirstContact, Frame, Sweep, distance_m, first_contact, ray_hit_m};
+pub use path::{Path, PathPoint, Projection, TangentProjection};
 pub use pose::{OrientedBox, Pose, Vec2, unit_vector, wrap_angle};
 pub use smooth_step::{SMOOTH_STEP_BEND_MAX, SMOOTH_STEP_SLOPE_MAX, SmoothStep, smooth_step};

@@ -2,7 +2,16 @@
 //!
 //! A path carries station, heading and curvature at each vertex. Between vertices the position is a
 //! chord with the heading interpolated; makers sample so densely that the chord is within a
-//! millimetre of the curve (see `road`), so nobody downstream needs the curve itself.
+//! millimetre of the curve (see `road`), so no user of a path needs the curve itself.
+//!
+//! Where a point lies beside a path can be asked in four ways:
+//!
+//! | function | answer | for |
+//! |---|---|---|
+//! | [`Path::project`] | the nearest point of all, exact | a point that may be anywhere |
+//! | [`Path::project_near`] | the nearest point of a stretch, exact | a vehicle that was seen there before |
+//! | [`Path::project_from`] | a point at a right angle near a guess, within 2 cm; none far aside | drivers, for every other road user |
+//! | `ads::guide` | the tangent of the nearest even sample | a driving system, for every predicted position |
 
 use super::pose::{Pose, Vec2, wrap_angle};
 
@@ -26,6 +35,17 @@ pub struct Projection {
     pub offset_m: f64,
     /// Distance to the nearest point of the path, m; larger than `|offset_m|` beyond the ends.
     pub distance_m: f64,
+}
+
+/// Where a point lies beside a path, with the direction of the path there: see [`Path::project_from`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TangentProjection {
+    /// m along the path; beyond the ends it goes on straight.
+    pub station_m: f64,
+    /// m to the left of the path.
+    pub offset_m: f64,
+    /// Unit vector along the path there.
+    pub forward: Vec2,
 }
 
 /// A directed curve: at least two vertices, stations strictly rising from 0.
@@ -153,6 +173,22 @@ impl Path {
         let first = self.segment(near_m - reach_m);
         let last = self.segment(near_m + reach_m) + 1;
         self.project_segments(point, first, last)
+    }
+
+    /// Where a point lies beside the path, by stepping along tangents from a guess that is at most a bend
+    /// away: much quicker than a search. `None` for points so far aside that the steps do not settle.
+    pub fn project_from(&self, point: Vec2, guess_m: f64) -> Option<TangentProjection> {
+        let mut station_m = guess_m;
+        for _ in 0..5 {
+            let pose = self.pose_at(station_m);
+            let (forward, away) = (pose.forward(), point - pose.position);
+            let ahead_m = forward.dot(&away);
+            if ahead_m.abs() < 0.02 {
+                return Some(TangentProjection { station_m, offset_m: forward.perp(&away), forward });
+            }
+            station_m += ahead_m;
+        }
+        None
     }
 
     /// The part between two stations, clamped to the path. `None` if it is shorter than 1 µm.

@@ -58,7 +58,7 @@ impl Criticality {
         }
         let speed_mps = world.ego().speed_mps;
         let mut is_unsafe = false;
-        for obstacle in world.obstacles().iter().filter(|obstacle| !is_hit(obstacle.id)) {
+        for obstacle in world.obstacles().filter(|obstacle| !is_hit(obstacle.id)) {
             let seen = Seen::of(world, obstacle);
             if let Some(ttc_s) = time_to_collision_s(world, obstacle) {
                 self.ttc_s = Some(self.ttc_s.map_or(ttc_s, |least| least.min(ttc_s)));

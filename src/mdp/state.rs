@@ -111,7 +111,7 @@ fn hour(time: TimeOfDay) -> f64 {
 
 /// Distance (m, between outlines) and speed (m/s) of the nearest obstacle.
 fn nearest_obstacle(world: &World) -> Option<(f64, f64)> {
-    let gaps = world.obstacles().iter().map(|obstacle| (obstacle.distance_m, obstacle.velocity_mps.norm()));
+    let gaps = world.obstacles().map(|obstacle| (obstacle.distance_m, obstacle.velocity_mps.norm()));
     gaps.min_by(|a, b| a.0.total_cmp(&b.0))
 }
 
@@ -173,12 +173,15 @@ pub fn perception_counts(world: &World, status: &Status) -> PerceptionCounts {
     counts(world.obstacles(), &status.perceived)
 }
 
-fn counts(real: &[Obstacle], perceived: &[PerceivedObject]) -> PerceptionCounts {
+fn counts<'a>(
+    real: impl Iterator<Item = &'a Obstacle> + Clone,
+    perceived: &[PerceivedObject],
+) -> PerceptionCounts {
     let known = |id: u32| perceived.iter().any(|object| object.id == Some(id));
     let missed =
-        real.iter().filter(|obstacle| obstacle.distance_m <= SENSOR_REACH_M && !known(obstacle.id)).count();
+        real.clone().filter(|obstacle| obstacle.distance_m <= SENSOR_REACH_M && !known(obstacle.id)).count();
     let ghosts =
-        perceived.iter().filter(|object| !real.iter().any(|truth| Some(truth.id) == object.id)).count();
+        perceived.iter().filter(|object| !real.clone().any(|truth| Some(truth.id) == object.id)).count();
     PerceptionCounts { missed: missed as u32, ghosts: ghosts as u32 }
 }
 
@@ -191,10 +194,13 @@ struct Differences {
     velocity_mps: f64,
 }
 
-fn perception_differences(real: &[Obstacle], perceived: &[PerceivedObject]) -> Differences {
+fn perception_differences<'a>(
+    real: impl Iterator<Item = &'a Obstacle> + Clone,
+    perceived: &[PerceivedObject],
+) -> Differences {
     let mut most = Differences::default();
     for object in perceived {
-        let Some(truth) = real.iter().find(|truth| Some(truth.id) == object.id) else { continue };
+        let Some(truth) = real.clone().find(|truth| Some(truth.id) == object.id) else { continue };
         let outline = &truth.outline;
         let turned_rad = wrap_angle(object.pose.heading_rad - outline.pose.heading_rad).abs();
         let size = nalgebra::Vector3::new(
@@ -248,15 +254,16 @@ mod tests {
             predicted: Vec::new(),
         };
         // The second is a ghost: far off, but no difference to anything that exists.
-        let found = perception_differences(&[truth], &[object(Some(1), 10.5, -3.1), object(None, 90.0, 0.0)]);
+        let found =
+            perception_differences([truth].iter(), &[object(Some(1), 10.5, -3.1), object(None, 90.0, 0.0)]);
         assert!((found.position_m - 0.5).abs() < 1e-12);
         assert!((found.direction_rad - (core::f64::consts::TAU - 6.2)).abs() < 1e-12);
         assert!((found.size_m - 0.4).abs() < 1e-12);
         assert!((found.velocity_mps - 3.0).abs() < 1e-12);
-        assert_eq!(perception_differences(&[truth], &[]), Differences::default());
+        assert_eq!(perception_differences([truth].iter(), &[]), Differences::default());
         let far = Obstacle { distance_m: 200.0, id: 2, ..truth };
         let seen = |objects: &[PerceivedObject]| {
-            let counts = counts(&[truth, far], objects);
+            let counts = counts([truth, far].iter(), objects);
             (counts.missed, counts.ghosts)
         };
         assert_eq!(seen(&[]), (1, 0));

@@ -32,7 +32,7 @@ pub fn onset(recording: &[World], obstacle: u32, met: OrientedBox) -> Option<usi
         if !left.is_multiple_of(FRAME_TICKS as usize) && began {
             continue;
         }
-        let Some(other) = world.obstacles().iter().find(|other| other.id == obstacle) else { break };
+        let Some(other) = world.obstacle(obstacle) else { break };
         let conflicts = (0..=left.div_ceil(STRIDE)).any(|step| {
             let mut then = other.outline;
             then.pose.position += other.velocity_mps * (step * STRIDE) as f64 * DT_S;

@@ -153,7 +153,7 @@ fn what_was_never_in_sight_has_no_onset() {
     vehicle(&mut hidden, 20.0, 0.5);
     let met = hidden.ego_outline();
     assert_eq!(onset(&[hidden.clone()], 1, met), None, "20 m away and no way leads there");
-    let there = hidden.obstacles()[0].outline;
+    let there = hidden.obstacle(1).expect("it was put there").outline;
     assert_eq!(onset(&[hidden.clone()], 1, there), Some(0));
     assert_eq!(onset(&[hidden], 2, there), None, "nobody of that number");
 }

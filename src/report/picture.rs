@@ -76,7 +76,7 @@ fn view_radius_m(moments: &[Snapshot]) -> f64 {
     };
     moments
         .iter()
-        .flat_map(|moment| moment.world.obstacles().iter().map(move |obstacle| away_m(moment, obstacle)))
+        .flat_map(|moment| moment.world.obstacles().map(move |obstacle| away_m(moment, obstacle)))
         .filter(|radius_m| *radius_m <= most_m)
         .fold(least_m, f64::max)
 }
@@ -165,9 +165,7 @@ impl Panel<'_> {
 
     /// The way that an obstacle came since the first panel.
     fn trail(&mut self, obstacle: &Obstacle, earlier: &[Snapshot]) {
-        let known = earlier
-            .iter()
-            .filter_map(|moment| moment.world.obstacles().iter().find(|other| other.id == obstacle.id));
+        let known = earlier.iter().filter_map(|moment| moment.world.obstacle(obstacle.id));
         let mut way: Vec<Vec2> = known.map(|other| other.outline.pose.position).collect();
         way.push(obstacle.outline.pose.position);
         self.canvas.polyline(&way, r##"stroke="#7a1fa0" stroke-width="1.4" stroke-dasharray="1 3""##);

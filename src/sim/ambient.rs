@@ -9,19 +9,18 @@
 //! neither towards the ten obstacles of the published package nor among `npc#1`, `npc#2`, …: their
 //! ids begin above [`COMMANDED_MAX`].
 
-use crate::geometry::{OrientedBox, distance_m};
+use crate::geometry::OrientedBox;
 use crate::model::AMBIENT_MAX;
 use crate::model::vocabulary::{Body, Colour, Verb, Word};
 use crate::rng;
 use crate::rng::{Rng, Stream};
 
+use super::around::Around;
 use super::body;
-use super::mover::{Around, Motion, Mover};
 use super::npc::{Cruise, Driver};
-use super::placement::Placed;
+use super::road_user::{Motion, Mover, Obstacle, RoadUser};
 use super::sense::RANGE_M;
 use super::way::Way;
-use super::world::Obstacle;
 
 /// Ids up to this are of obstacles that an action made appear.
 pub(super) const COMMANDED_MAX: u32 = 1_000_000;
@@ -65,7 +64,7 @@ impl Ambient {
     }
 
     /// One attempt at a newcomer; `begins` says that the ego vehicle has not seen anything yet.
-    pub fn attempt(&mut self, around: &Around, begins: bool) -> Option<Placed> {
+    pub fn attempt(&mut self, around: &Around, begins: bool) -> Option<RoadUser> {
         let mut rng = rng::stream(around.seed, Stream::Ambient, self.attempts);
         self.attempts += 1;
         let nearest_m = if begins { START_ROOM_M } else { RANGE_M };
@@ -90,7 +89,7 @@ pub(super) fn is_gone(obstacle: &Obstacle, ego: &OrientedBox) -> bool {
 }
 
 /// A vehicle somewhere on a street, if it may appear there.
-fn draw(around: &Around, nearest_m: f64, id: u32, rng: &mut Rng) -> Option<Placed> {
+fn draw(around: &Around, nearest_m: f64, id: u32, rng: &mut Rng) -> Option<RoadUser> {
     let (lane, station_m) = around.scene.street_at(rng::unit(rng))?;
     let bodies = Body::ALL.iter().filter(|body| body.is_vehicle()).count() as u32;
     let body = *Body::ALL.iter().filter(|body| body.is_vehicle()).nth(rng::below(rng, bodies) as usize)?;
@@ -107,22 +106,7 @@ fn draw(around: &Around, nearest_m: f64, id: u32, rng: &mut Rng) -> Option<Place
     let way = Way::along(around.scene, &[lane], rng)?;
     let driver = Driver::new(around.scene, way, station_m, cruise, Vec::new(), 1);
     let moved = driver.moved();
-    let outline = OrientedBox::new(moved.pose, size.length_m, size.width_m);
-    if around.others(id).any(|(other, _)| distance_m(&outline, other) < ROOM_M) {
-        return None;
-    }
-    let obstacle = Obstacle {
-        id,
-        body,
-        colour,
-        verb: Verb::DriveAhead,
-        outline,
-        height_m: size.height_m,
-        forward: moved.forward,
-        lane_heading_rad: moved.lane_heading_rad,
-        velocity_mps: moved.velocity_mps,
-        distance_m: distance_m(around.ego_outline, &outline),
-        spawned_tick: around.tick,
-    };
-    Some(Placed { obstacle, mover: Mover::new(size, Motion::Drive(driver)) })
+    let mover = Mover::new(size, Motion::Drive(driver));
+    let newcomer = RoadUser::new(around, id, body, colour, Verb::DriveAhead, mover, moved);
+    newcomer.has_room(around, ROOM_M).then_some(newcomer)
 }

@@ -2,12 +2,33 @@
 //!
 //! Outlines are swept from tick to tick, so nothing passes through anything. The impact is plastic
 //! and acts along the ego vehicle's heading alone: enough for what follows a first contact, and no
-//! claim about damage. Contacts among obstacles are `world`'s (`Incident`).
+//! claim about damage. Contacts among obstacles are in `incident`.
 
 use crate::geometry::{Sweep, Vec2, first_contact};
 
 use super::ego::VehicleParameters;
-use super::world::{Contact, DT_S};
+use super::world::DT_S;
+
+/// The ego vehicle touched an obstacle that it did not touch in the tick before.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Contact {
+    /// Since the episode began, s.
+    pub time_s: f64,
+    /// Id of the obstacle.
+    pub obstacle: u32,
+    /// Where they met, in the world, m.
+    pub point: Vec2,
+    /// The point in the frame of the ego outline's centre: x ahead, y left, m.
+    pub on_ego: Vec2,
+    /// Before the contact, m/s.
+    pub ego_speed_mps: f64,
+    /// Before the contact, in the world, m/s.
+    pub obstacle_velocity_mps: Vec2,
+    /// `obstacle_velocity_mps` in the frame of the ego outline: x ahead, y left, m/s.
+    pub obstacle_velocity_on_ego_mps: Vec2,
+    /// Speed at which the gap between the outlines closed where they met, m/s, not negative.
+    pub closing_speed_mps: f64,
+}
 
 /// One party of a possible contact during one tick.
 #[derive(Debug, Clone, Copy)]
@@ -20,7 +41,7 @@ pub(super) struct Party {
 pub(super) fn meet(ego: &Party, ego_speed_mps: f64, obstacle: &Party, id: u32, tick: u64) -> Option<Contact> {
     let first = first_contact(&ego.sweep, &obstacle.sweep)?;
     let ego_pose = ego.sweep.at(first.fraction).pose;
-    // Of the points that meet: a corner that swings out closes a gap, too.
+    // The velocities of the points that meet, not of the centres: a corner that swings out closes a gap, too.
     let rate_m = |party: &Party| party.sweep.rate_m(first.fraction, first.point);
     let closing_mps = (rate_m(ego) - rate_m(obstacle)).dot(&first.normal) / DT_S;
     Some(Contact {

@@ -5,7 +5,7 @@
 //! ours, from the published range of 0.1 to 0.3 s. No reverse gear, no load transfer, no tyre slip
 //! angles: what the tyres cannot give is cut off instead.
 
-use crate::geometry::{OrientedBox, Pose, unit_vector, wrap_angle};
+use crate::geometry::{Frame, OrientedBox, Pose, Vec2, unit_vector, wrap_angle};
 
 use super::environment::GRAVITY_MPS2;
 use super::sense::EgoMotion;
@@ -125,6 +125,9 @@ pub(super) struct Ego {
     /// What the pedals give after their lag, %.
     throttle_pct: f64,
     brake_pct: f64,
+    /// These two follow from the pose, and are kept because they are asked for so often.
+    pub outline: OrientedBox,
+    pub frame: Frame,
 }
 
 impl Ego {
@@ -132,13 +135,12 @@ impl Ego {
     pub fn new(rear_axle: Pose, speed_mps: f64) -> Ego {
         let motion =
             EgoMotion { rear_axle, speed_mps, acceleration_mps2: 0.0, yaw_rate_radps: 0.0, steer_rad: 0.0 };
-        Ego { motion, throttle_pct: 0.0, brake_pct: 0.0 }
+        let outline = outline_at(&rear_axle);
+        Ego { motion, throttle_pct: 0.0, brake_pct: 0.0, outline, frame: Frame::of(&outline) }
     }
 
-    pub fn outline(&self) -> OrientedBox {
-        let car = &VehicleParameters::MKZ;
-        let centre = self.motion.rear_axle.offset(car.rear_axle_to_centre_m(), 0.0);
-        OrientedBox::new(centre, car.length_m, car.width_m)
+    pub fn velocity_mps(&self) -> Vec2 {
+        self.frame.forward() * self.motion.speed_mps
     }
 
     /// One tick of `dt_s` under a command; commands out of range are cut off, NaN counts as 0.
@@ -182,6 +184,8 @@ impl Ego {
             yaw_rate_radps: turned_rad / dt_s,
             steer_rad,
         };
+        self.outline = outline_at(&self.motion.rear_axle);
+        self.frame = Frame::of(&self.outline);
     }
 
     /// Every bit that later ticks depend on.
@@ -201,6 +205,12 @@ impl Ego {
             sink(value.to_bits());
         }
     }
+}
+
+/// The outline of the ego vehicle whose rear axle is at a pose.
+fn outline_at(rear_axle: &Pose) -> OrientedBox {
+    let car = &VehicleParameters::MKZ;
+    OrientedBox::new(rear_axle.offset(car.rear_axle_to_centre_m(), 0.0), car.length_m, car.width_m)
 }
 
 /// Curvature of the rear axle's way under an angle of the road wheels, 1/m.

@@ -1,16 +1,36 @@
 //! The world: ego vehicle, other road users, weather, light, signals, contacts.
+//!
+//! [`World`] is the whole state of an episode; its `Clone` is a snapshot. [`Scene`] is what stays the
+//! same in all episodes of a road, and is shared. Time passes in ticks of [`DT_S`] (50 Hz). A tick does,
+//! in this order (`World::tick`):
+//!
+//! 1. The ego vehicle moves by its pedals and wheel (`ego`), and its place beside the route is found.
+//! 2. The other road users move one after another, each among the others as they stand at that moment
+//!    (`road_user`, `around`). A driver looks around every fifth tick and then follows, stops or changes
+//!    lanes (`npc`); a pedestrian walks or waits (`pedestrian`).
+//! 3. A road user that would move into another stops at it (`incident`); one that the ego vehicle touches
+//!    shares its momentum (`contact`). Both leave 2 s later.
+//! 4. Twice a second, ambient traffic leaves and appears (`ambient`).
+//! 5. Every fifth tick, water rises and drains (`environment`) and lines of sight are worked out (`sense`).
+//!
+//! Between ticks an action may change the sky or the time of day, or make a road user appear
+//! (`World::apply`). `placement` decides where it appears, along which `way`, or why it cannot;
+//! `safety` says how much room a careful driver would need. `junction` knows where lanes cross and which
+//! goes first, `signals` the colour of every light at every tick.
 
 mod ambient;
+mod around;
 mod body;
 mod contact;
 mod ego;
 mod environment;
 mod following;
+mod incident;
 mod junction;
-mod mover;
 mod npc;
 mod pedestrian;
 mod placement;
+mod road_user;
 mod safety;
 mod scene;
 mod sense;
@@ -23,8 +43,11 @@ mod way;
 mod world;
 
 pub use body::body_mass_t;
+pub use contact::Contact;
 pub use ego::{Control, VehicleParameters, pedal_acceleration_mps2, pedals_for};
 pub use following::Following;
+pub use incident::Incident;
+pub use road_user::Obstacle;
 pub use scene::Scene;
 pub use sense::{Conditions, EgoMotion, FRAME_TICKS, Sensed, SensedObject, SignalColour};
-pub use world::{Contact, DT_S, ENGINE, Incident, Obstacle, Start, World};
+pub use world::{DT_S, ENGINE, Start, World};

@@ -18,9 +18,10 @@ use crate::geometry::{OrientedBox, Pose, Vec2, distance_m};
 use crate::rng;
 use crate::rng::Rng;
 
-use super::mover::{Around, Moved};
+use super::around::Around;
+use super::road_user::{Moved, Obstacle};
 use super::sense::FRAME_TICKS;
-use super::world::{DT_S, Obstacle};
+use super::world::DT_S;
 
 /// At the kerb before setting out, s (published package).
 const WAIT_S: f64 = 1.0;
@@ -171,7 +172,7 @@ impl Walker {
             }
             return;
         }
-        self.wants_aside_m = if self.meets_somebody(this, around) { -ASIDE_M } else { 0.0 };
+        self.wants_aside_m = if self.meets_pedestrian(around) { -ASIDE_M } else { 0.0 };
         let startled = self.manner == Manner::Startled && self.startle_ticks > 0;
         if self.is_blocked(this, around) {
             self.pace_mps = 0.0;
@@ -188,7 +189,7 @@ impl Walker {
     /// Whether something stands or passes right before its feet.
     fn is_blocked(&self, this: &Obstacle, around: &Around) -> bool {
         let next = OrientedBox { pose: this.outline.pose.offset(STEP_M, 0.0), ..this.outline };
-        around.others(this.id).any(|(outline, _)| {
+        around.others().any(|(outline, _)| {
             let reach_m = outline.half_length_m + outline.half_width_m + 2.0;
             let away = outline.pose.position - next.pose.position;
             away.norm_squared() < reach_m * reach_m && distance_m(&next, outline) < ROOM_M
@@ -196,9 +197,8 @@ impl Walker {
     }
 
     /// Whether somebody else on foot is ahead on about the same line.
-    fn meets_somebody(&self, this: &Obstacle, around: &Around) -> bool {
-        let others = around.obstacles.iter().filter(|other| other.id != this.id && !other.body.is_vehicle());
-        others.into_iter().any(|other| {
+    fn meets_pedestrian(&self, around: &Around) -> bool {
+        around.obstacles().filter(|other| !other.body.is_vehicle()).any(|other| {
             let there = self.from.to_local(other.outline.pose.position);
             (-1.0..MEET_M).contains(&(there.x - self.walked_m)) && there.y.abs() < 2.0 * ASIDE_M
         })

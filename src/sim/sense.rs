@@ -7,7 +7,7 @@
 use crate::geometry::{Frame, OrientedBox, Pose, Vec2};
 use crate::model::vocabulary::Body;
 
-use super::world::Obstacle;
+use super::road_user::Obstacle;
 
 /// Objects farther away than this are not sensed at all, m: the clear-day range for cars of the
 /// LiDAR and the camera that driving systems are given.
@@ -89,7 +89,11 @@ pub enum SignalColour {
 /// Lines of sight run to points spread evenly over its width as seen from `eye`. One that meets a
 /// lower body still shows what rises above that, so a car does not hide a bus wholly. Buildings and
 /// the ego vehicle itself hide nothing.
-pub(super) fn visible_fraction(eye: Vec2, target: &Obstacle, obstacles: &[Obstacle]) -> f64 {
+pub(super) fn visible_fraction<'a>(
+    eye: Vec2,
+    target: &Obstacle,
+    obstacles: impl Iterator<Item = &'a Obstacle> + Clone,
+) -> f64 {
     let towards = target.outline.pose.position - eye;
     let distance_m = towards.norm();
     if distance_m < 1e-6 {
@@ -97,7 +101,7 @@ pub(super) fn visible_fraction(eye: Vec2, target: &Obstacle, obstacles: &[Obstac
     }
     // One bit for each obstacle that may stand in the way; most often there is none.
     let mut hiders = 0_u32;
-    for (index, other) in obstacles.iter().take(u32::BITS as usize).enumerate() {
+    for (index, other) in obstacles.clone().take(u32::BITS as usize).enumerate() {
         hiders |= u32::from(may_hide(eye, towards, distance_m, target, other)) << index;
     }
     if hiders == 0 {
@@ -110,7 +114,7 @@ pub(super) fn visible_fraction(eye: Vec2, target: &Obstacle, obstacles: &[Obstac
         ((point - eye) / reach_m.max(1e-6), reach_m)
     });
     let mut shown = [1.0_f64; RAYS];
-    for (_, other) in obstacles.iter().enumerate().filter(|(index, _)| hiders >> index & 1 == 1) {
+    for (_, other) in obstacles.enumerate().filter(|(index, _)| hiders >> index & 1 == 1) {
         let above = (1.0 - other.height_m / target.height_m).max(0.0);
         let other = Frame::along(&other.outline, other.forward);
         for ((direction, reach_m), shown) in rays.iter().zip(&mut shown) {
@@ -181,7 +185,7 @@ mod tests {
     fn a_bus_hides_and_a_sedan_does_so_in_part() {
         let eye = Vec2::zeros();
         let walker = obstacle(1, Body::Pedestrian, 30.0, 0.0);
-        let see = |others: &[Obstacle]| visible_fraction(eye, &walker, others);
+        let see = |others: &[Obstacle]| visible_fraction(eye, &walker, others.iter());
         assert_eq!(see(&[walker]), 1.0);
         assert_eq!(see(&[walker, obstacle(2, Body::SchoolBus, 15.0, 0.0)]), 0.0);
         assert_eq!(see(&[walker, obstacle(2, Body::SchoolBus, 45.0, 0.0)]), 1.0);
@@ -196,6 +200,6 @@ mod tests {
         let mut wall = obstacle(2, Body::BoxTruck, 20.0, 0.0);
         // Its left flank lies on the line of sight to the target's middle.
         wall.outline.pose.position.y = -wall.outline.half_width_m;
-        assert_eq!(visible_fraction(Vec2::zeros(), &target, &[target, wall]), 0.5);
+        assert_eq!(visible_fraction(Vec2::zeros(), &target, [target, wall].iter()), 0.5);
     }
 }

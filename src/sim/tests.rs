@@ -51,17 +51,13 @@ fn drive(world: &mut World, speed_mps: f64, time_s: f64) -> Vec<Contact> {
 fn spawn(world: &mut World, request: SpawnRequest) -> Obstacle {
     let facts = world.survey(&request).expect("there is room");
     let id = world.apply(&Effect::Spawn(request)).expect("there is room").expect("a newcomer has an id");
-    let newcomer = *find(world, id).expect("it just came");
+    let newcomer = *world.obstacle(id).expect("it just came");
     assert_eq!(facts.spawn_gap_m, distance_m(&world.ego_outline(), &newcomer.outline));
     newcomer
 }
 
-fn find(world: &World, id: u32) -> Option<&Obstacle> {
-    world.obstacles().iter().find(|obstacle| obstacle.id == id)
-}
-
 fn y_m(world: &World, id: u32) -> f64 {
-    find(world, id).expect("it is still there").outline.pose.position.y
+    world.obstacle(id).expect("it is still there").outline.pose.position.y
 }
 
 #[test]
@@ -79,12 +75,12 @@ fn ahead_and_then_into_the_lane_of_the_ego_vehicle() {
     for _ in 0..400 {
         let control = hold(&world, 8.0);
         world.tick(&control);
-        let now = find(&world, beside.id).expect("it drives on");
+        let now = world.obstacle(beside.id).expect("it drives on");
         sideways_mps = sideways_mps.max(now.velocity_mps.y);
     }
     assert!((y_m(&world, beside.id) + 1.75).abs() < 1e-6);
     assert!((1.7..1.8 + 1e-6).contains(&sideways_mps), "{sideways_mps}");
-    assert!(distance_m(&world.ego_outline(), &find(&world, beside.id).unwrap().outline) > 12.0);
+    assert!(distance_m(&world.ego_outline(), &world.obstacle(beside.id).unwrap().outline) > 12.0);
 }
 
 #[test]
@@ -137,7 +133,7 @@ fn overtakes_and_cuts_in() {
         let passing = spawn(&mut world, passing);
         assert!(passing.outline.pose.position.x < world.ego_outline().pose.position.x - 12.0);
         assert_eq!(drive(&mut world, 8.0, 15.0), []);
-        let now = find(&world, passing.id).expect("it drives on");
+        let now = world.obstacle(passing.id).expect("it drives on");
         assert!(now.outline.pose.position.x > world.ego_outline().pose.position.x + 10.0, "{lane:?}");
         assert!((now.outline.pose.position.y + 1.75).abs() < 1e-6, "{lane:?}");
     }
@@ -203,7 +199,7 @@ fn a_red_light_stops_and_refuses() {
     let mut world = World::new(testing::crossing(), &Start { signal_phase_s: 15.0, ..testing::start() });
     let ahead = spawn(&mut world, request(Verb::DriveAhead, 60.0, 12.0));
     drive(&mut world, 3.0, 15.0);
-    let stopped = find(&world, ahead.id).expect("it waits");
+    let stopped = world.obstacle(ahead.id).expect("it waits");
     assert!(stopped.velocity_mps.norm() < 0.2);
     let front_m = stopped.outline.pose.position.x + stopped.outline.half_length_m;
     assert!((281.0..285.0).contains(&front_m), "{front_m}");
@@ -221,7 +217,7 @@ fn a_pedestrian_run_over_is_one_contact() {
     assert_eq!(contact.obstacle, standing.id);
     assert!((contact.on_ego.x - 2.35).abs() < 0.01, "{contact:?}");
     assert!((contact.closing_speed_mps - before_mps).abs() < 0.5);
-    assert_eq!(find(&world, standing.id), None);
+    assert_eq!(world.obstacle(standing.id), None);
 }
 
 #[test]
@@ -233,7 +229,7 @@ fn a_pedestrian_crosses_from_the_left() {
     drive(&mut world, 0.0, 8.5);
     assert!((y_m(&world, walker.id) + 6.75).abs() < 1e-6);
     drive(&mut world, 0.0, 2.0);
-    assert_eq!(find(&world, walker.id), None);
+    assert_eq!(world.obstacle(walker.id), None);
 }
 
 #[test]
@@ -242,7 +238,7 @@ fn an_eleventh_removes_the_oldest() {
     for i in 0..11 {
         spawn(&mut world, request(Verb::Stand, 10.0 * f64::from(i + 1), 1.0));
     }
-    let ids: Vec<u32> = world.obstacles().iter().map(|obstacle| obstacle.id).collect();
+    let ids: Vec<u32> = world.obstacles().map(|obstacle| obstacle.id).collect();
     assert_eq!(ids, (2..=11).collect::<Vec<u32>>());
 }
 
@@ -292,10 +288,10 @@ proptest! {
         for _ in 0..1000 {
             let speed_mps = if world.time_s() < 10.0 { 10.0 } else { 0.0 };
             let control = hold(&world, speed_mps);
-            let before: Vec<Obstacle> = world.obstacles().to_vec();
+            let before: Vec<Obstacle> = world.obstacles().copied().collect();
             world.tick(&control);
             for was in before.iter().filter(|was| was.verb != Verb::Walk) {
-                let Some(now) = find(&world, was.id) else { continue };
+                let Some(now) = world.obstacle(was.id) else { continue };
                 if world.incidents().iter().any(|met| met.obstacle == was.id || met.other == was.id) {
                     continue; // It stands at once, after it has moved.
                 }
@@ -306,8 +302,8 @@ proptest! {
                 prop_assert!(turned.abs() < 0.06, "{was:?} {now:?}");
             }
             met.extend(world.incidents().iter().map(|incident| (incident.obstacle, incident.other)));
-            for (i, a) in world.obstacles().iter().enumerate() {
-                for b in &world.obstacles()[i + 1..] {
+            for (i, a) in world.obstacles().enumerate() {
+                for b in world.obstacles().skip(i + 1) {
                     let told = met.contains(&(a.id, b.id)) || met.contains(&(b.id, a.id));
                     prop_assert!(told || distance_m(&a.outline, &b.outline) > 0.0, "{a:?} {b:?}");
                 }
@@ -412,7 +408,7 @@ fn a_crosser_and_an_ego_vehicle_that_wait_for_each_other_part() {
         let control =
             if brakes { Control { brake_pct: 100.0, ..Control::default() } } else { hold(&world, 15.0) };
         world.tick(&control);
-        if find(&world, across.id).is_none() && gone_s.is_none() {
+        if world.obstacle(across.id).is_none() && gone_s.is_none() {
             gone_s = Some(world.time_s());
         }
     }
@@ -455,7 +451,7 @@ fn rain_makes_the_road_slippery_in_time() {
 fn ambient_traffic_is_there_and_comes_from_afar() {
     let mut world = World::new(testing::corner(), &Start { ambient: 6, ..testing::start() });
     assert!(world.obstacles().len() >= 4, "{}", world.obstacles().len());
-    let mut known: Vec<u32> = world.obstacles().iter().map(|obstacle| obstacle.id).collect();
+    let mut known: Vec<u32> = world.obstacles().map(|obstacle| obstacle.id).collect();
     let mut newcomers = 0;
     while !world.arrived() {
         let control = hold(&world, 7.0);
@@ -485,7 +481,7 @@ fn drivers_seldom_run_into_each_other() {
             for _ in 0..1500 {
                 let control = hold(&world, 8.0);
                 world.tick(&control);
-                let drives = |id| find(&world, id).is_some_and(|obstacle| obstacle.verb != Verb::Walk);
+                let drives = |id| world.obstacle(id).is_some_and(|obstacle| obstacle.verb != Verb::Walk);
                 let of_drivers = |incident: &&Incident| drives(incident.obstacle) && drives(incident.other);
                 met += world.incidents().iter().filter(of_drivers).count();
             }

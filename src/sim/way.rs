@@ -180,32 +180,10 @@ fn lane_bit(lane: LaneIndex) -> u64 {
     1 << (lane.0 % 64)
 }
 
-/// A point beside a path, from a guess that is at most a bend away.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Beside {
-    pub station_m: f64,
-    pub offset_m: f64,
-    /// Unit vector along the path there.
-    pub forward: Vec2,
-}
-
-/// Where a point lies beside a path, by stepping along its tangents: much quicker than a search,
-/// but `None` for points so far aside that the steps do not settle. Nobody there is in the way.
-pub(super) fn beside(path: &Path, point: Vec2, guess_m: f64) -> Option<Beside> {
-    let mut station_m = guess_m;
-    for _ in 0..5 {
-        let pose = path.pose_at(station_m);
-        let (forward, away) = (pose.forward(), point - pose.position);
-        let ahead_m = forward.dot(&away);
-        if ahead_m.abs() < 0.02 {
-            return Some(Beside { station_m, offset_m: forward.perp(&away), forward });
-        }
-        station_m += ahead_m;
-    }
-    None
-}
-
 /// The speed of the bend at each vertex, lowered so that braking for the next ones stays gentle.
+///
+/// `ads::guide` has a pass of its own over even samples of the route, with a driving system's limits.
+/// The two are not one function because their vertices lie elsewhere, so results would change.
 fn bend_speeds_mps(path: &Path) -> Vec<f64> {
     let points = path.points();
     let mut speeds: Vec<f64> =

@@ -1,19 +1,21 @@
-//! The world of one episode.
+//! The world of one episode, and what a tick does to it. `world/playback` moves it by a recording.
 
 mod playback;
 
 use std::sync::Arc;
 
 use crate::action::{Effect, SpawnFacts, SpawnRequest, Surroundings};
-use crate::geometry::{FirstContact, Frame, OrientedBox, Pose, Sweep, Vec2, first_contact, wrap_angle};
-use crate::model::vocabulary::{Body, Colour, Level, TimeOfDay, Verb};
+use crate::geometry::{Frame, OrientedBox, Sweep, Vec2};
+use crate::model::vocabulary::{Level, TimeOfDay};
 
-use super::ambient::{Ambient, COMMANDED_MAX, RENEWAL_TICKS, is_gone};
-use super::contact::{Party, common_speed_mps, meet};
+use super::ambient::{Ambient, RENEWAL_TICKS, is_gone};
+use super::around::Around;
+use super::contact::{Contact, Party, common_speed_mps, meet};
 use super::ego::{Control, Ego, VehicleParameters};
 use super::environment::Environment;
-use super::mover::{Around, Moved, Mover};
+use super::incident::{Bump, Incident, bump};
 use super::placement;
+use super::road_user::{Moved, Obstacle, RoadUser};
 use super::scene::Scene;
 use super::sense::{
     Conditions, EgoMotion, FRAME_TICKS, RANGE_M, Sensed, SensedObject, SignalColour, visible_fraction,
@@ -30,12 +32,8 @@ pub const DT_S: f64 = 0.02;
 /// Speed at which an episode begins, m/s.
 const START_MPS: f64 = 3.0;
 
-/// Obstacles at a time (published package): the next one removes the oldest.
+/// Commanded obstacles at a time (published package): the next one removes the oldest.
 const OBSTACLES_MAX: usize = 10;
-
-/// Obstacles whose gap after a tick is at least this are not looked at for contacts, m: far more than
-/// rounding.
-const CLOSE_M: f64 = 1e-3;
 
 /// How far along the route the ego vehicle is looked for from where it was, m. More than it drives
 /// in a tick, so that it is found again after a corner cut, and less than any loop of a route.
@@ -60,115 +58,47 @@ pub struct Start {
 #[derive(Debug, Clone)]
 pub struct World {
     scene: Arc<Scene>,
+    // The state: what later ticks depend on. `trace` covers all of it.
     ticks: u64,
     ego: Ego,
-    /// Outline of the ego vehicle, kept because everybody asks for it.
-    ego_outline: OrientedBox,
-    /// The same with its axes worked out.
-    ego_frame: Frame,
-    /// Rear axle beside the route.
+    /// Place of the ego vehicle's rear axle beside the route.
     ego_station_m: f64,
     ego_offset_m: f64,
     red_runs: u32,
     environment: Environment,
     conditions: Conditions,
     signals: SignalClock,
-    obstacles: Vec<Obstacle>,
-    /// What moves the obstacle of the same index.
-    movers: Vec<Mover>,
-    /// Those that began in the tick before.
-    contacts: Vec<Contact>,
-    incidents: Vec<Incident>,
+    /// In order of appearance.
+    users: Vec<RoadUser>,
     next_id: u32,
     ambient: Ambient,
-    /// Of the choices of other road users.
+    /// Seed of the choices of other road users.
     seed: u64,
-}
-
-/// A road user other than the ego vehicle, as others may see it.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Obstacle {
-    /// From 1, in order of appearance; ambient traffic has numbers of its own.
-    pub id: u32,
-    pub body: Body,
-    pub colour: Colour,
-    pub verb: Verb,
-    pub outline: OrientedBox,
-    /// Unit vector along the outline's heading, kept because everybody asks for it.
-    pub forward: Vec2,
-    pub height_m: f64,
-    /// Heading of the lane that it drives in; its own on foot.
-    pub lane_heading_rad: f64,
-    pub velocity_mps: Vec2,
-    /// Gap between its outline and the ego vehicle's, m; 0 if they touch.
-    pub distance_m: f64,
-    pub spawned_tick: u64,
-}
-
-impl Obstacle {
-    /// Whether it is ambient traffic, which no action made appear.
-    pub fn is_ambient(&self) -> bool {
-        self.id > COMMANDED_MAX
-    }
-}
-
-/// The ego vehicle touched an obstacle that it did not touch in the tick before.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Contact {
-    /// Since the episode began, s.
-    pub time_s: f64,
-    /// Id of the obstacle.
-    pub obstacle: u32,
-    /// Where they met, in the world, m.
-    pub point: Vec2,
-    /// The point in the frame of the ego outline's centre: x ahead, y left, m.
-    pub on_ego: Vec2,
-    /// Before the contact, m/s.
-    pub ego_speed_mps: f64,
-    /// Before the contact, in the world, m/s.
-    pub obstacle_velocity_mps: Vec2,
-    /// The same in the frame of the ego outline: x ahead, y left, m/s.
-    pub obstacle_velocity_on_ego_mps: Vec2,
-    /// Speed at which the gap between the outlines closed where they met, m/s, not negative.
-    pub closing_speed_mps: f64,
-}
-
-/// Two obstacles touched each other. Both stand where it happened, and leave 2 s later.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Incident {
-    /// Since the episode began, s.
-    pub time_s: f64,
-    /// Id of who moved into the other.
-    pub obstacle: u32,
-    pub other: u32,
-    /// Where they met, in the world, m.
-    pub point: Vec2,
+    // What the last tick has to tell. No later tick reads it.
+    contacts: Vec<Contact>,
+    incidents: Vec<Incident>,
 }
 
 impl World {
     /// The beginning of an episode: the ego vehicle rolls at 3 m/s with its rear axle on the start of
-    /// the route, and nobody else is there.
+    /// the route; beside ambient traffic, if asked for, nothing else is there.
     pub fn new(scene: Arc<Scene>, start: &Start) -> World {
-        let ego = Ego::new(scene.route.path.pose_at(0.0), START_MPS);
         let environment = Environment::new(start.time, [start.rain, start.fog, start.wetness]);
         let mut world = World {
             ticks: 0,
-            ego_outline: ego.outline(),
-            ego_frame: Frame::of(&ego.outline()),
-            ego,
+            ego: Ego::new(scene.route.path.pose_at(0.0), START_MPS),
             ego_station_m: 0.0,
             ego_offset_m: 0.0,
             red_runs: 0,
             conditions: environment.conditions(START_MPS),
             environment,
             signals: SignalClock::new(start.signal_phase_s),
-            obstacles: Vec::with_capacity(OBSTACLES_MAX),
-            movers: Vec::with_capacity(OBSTACLES_MAX),
-            contacts: Vec::new(),
-            incidents: Vec::new(),
+            users: Vec::with_capacity(OBSTACLES_MAX),
             next_id: 1,
             ambient: Ambient::new(start.ambient),
             seed: start.seed,
+            contacts: Vec::new(),
+            incidents: Vec::new(),
             scene,
         };
         for _ in 0..world.ambient.wanted() {
@@ -188,34 +118,28 @@ impl World {
     pub fn tick(&mut self, control: &Control) -> &[Contact] {
         self.contacts.clear();
         self.incidents.clear();
-        let outline = self.ego_outline;
+        let start = self.ego.outline;
         let friction = self.environment.grip().friction(self.ego.motion.speed_mps);
         self.ego.step(control, friction, DT_S);
-        self.ego_outline = self.ego.outline();
-        self.ego_frame = Frame::of(&self.ego_outline);
         self.follow_route();
         // Taken once: of two contacts in a tick, the second does not see what the first did to the ego.
         let ego = Party {
-            sweep: Sweep { start: outline, end: self.ego_outline.pose },
-            velocity_mps: self.ego_frame.forward() * self.ego.motion.speed_mps,
+            sweep: Sweep { start, end: self.ego.outline.pose },
+            velocity_mps: self.ego.velocity_mps(),
         };
         let ego_mps = self.ego.motion.speed_mps;
-        // Taken out for the tick, so that each can move while it looks at the world.
-        let mut movers = core::mem::take(&mut self.movers);
+        // Taken out for the tick, so that each can move while it looks at the others and at the world.
+        let mut users = core::mem::take(&mut self.users);
         let mut index = 0;
-        while index < movers.len() {
-            if self.tick_obstacle(index, &mut movers, &ego, ego_mps) {
+        while index < users.len() {
+            if self.tick_user(index, &mut users, &ego, ego_mps) {
                 index += 1;
             } else {
-                movers.remove(index);
-                self.obstacles.remove(index);
+                users.remove(index);
             }
         }
-        self.movers = movers;
-        for obstacle in &mut self.obstacles {
-            let outline = Frame::along(&obstacle.outline, obstacle.forward);
-            obstacle.distance_m = self.ego_frame.distance_m(&outline);
-        }
+        self.users = users;
+        self.measure();
         self.ticks += 1;
         if self.ambient.wanted() > 0 && self.ticks.is_multiple_of(RENEWAL_TICKS) {
             self.renew_ambient(false);
@@ -255,7 +179,7 @@ impl World {
     }
 
     pub fn ego_outline(&self) -> OrientedBox {
-        self.ego_outline
+        self.ego.outline
     }
 
     /// Station of the ego vehicle's rear axle on the route, m.
@@ -273,8 +197,14 @@ impl World {
         self.red_runs
     }
 
-    pub fn obstacles(&self) -> &[Obstacle] {
-        &self.obstacles
+    /// All road users but the ego vehicle, in order of appearance.
+    pub fn obstacles(&self) -> impl ExactSizeIterator<Item = &Obstacle> + Clone {
+        self.users.iter().map(|user| &user.obstacle)
+    }
+
+    /// The road user with an id, if it is there.
+    pub fn obstacle(&self, id: u32) -> Option<&Obstacle> {
+        self.obstacles().find(|obstacle| obstacle.id == id)
     }
 
     /// Contacts among obstacles that began in the tick before.
@@ -316,7 +246,7 @@ impl World {
 
     /// Fills `into` with what the sensors see now; its buffers are reused.
     ///
-    /// Everything is of this tick, except lines of sight, which are looked at ten times a second.
+    /// Everything is of this tick, except lines of sight, which are worked out ten times a second.
     pub fn sense(&self, into: &mut Sensed) {
         into.time_s = self.time_s();
         into.ego = self.ego.motion;
@@ -324,8 +254,8 @@ impl World {
         into.signals.clear();
         into.signals.extend((0..self.scene.map.signals.len()).map(|signal| self.signal(signal)));
         into.objects.clear();
-        for (obstacle, mover) in self.obstacles.iter().zip(&self.movers) {
-            let away = obstacle.outline.pose.position - self.ego_outline.pose.position;
+        for RoadUser { obstacle, mover } in &self.users {
+            let away = obstacle.outline.pose.position - self.ego.outline.pose.position;
             if away.norm_squared() > RANGE_M * RANGE_M {
                 continue;
             }
@@ -356,20 +286,8 @@ impl World {
         sink(u64::from(self.next_id));
         self.ambient.trace(sink);
         sink(self.seed);
-        for (obstacle, mover) in self.obstacles.iter().zip(&self.movers) {
-            sink(u64::from(obstacle.id));
-            sink(obstacle.spawned_tick);
-            for word in [obstacle.body as u64, obstacle.colour as u64, obstacle.verb as u64] {
-                sink(word);
-            }
-            let pose = &obstacle.outline.pose;
-            for value in [pose.position.x, pose.position.y, pose.heading_rad] {
-                sink(value.to_bits());
-            }
-            for value in obstacle.velocity_mps.iter() {
-                sink(value.to_bits());
-            }
-            mover.trace(sink);
+        for user in &self.users {
+            user.trace(sink);
         }
     }
 
@@ -383,16 +301,15 @@ impl World {
         VehicleParameters::MKZ.front_m(self.ego_station_m)
     }
 
-    fn around<'a>(&'a self, movers: [&'a [Mover]; 2]) -> Around<'a> {
+    fn around<'a>(&'a self, users: [&'a [RoadUser]; 2]) -> Around<'a> {
         Around {
             scene: &self.scene,
             ego: &self.ego.motion,
-            ego_outline: &self.ego_outline,
-            ego_forward: self.ego_frame.forward(),
-            ego_velocity_mps: self.ego_frame.forward() * self.ego.motion.speed_mps,
+            ego_outline: &self.ego.outline,
+            ego_forward: self.ego.frame.forward(),
+            ego_velocity_mps: self.ego.velocity_mps(),
             ego_station_m: self.ego_station_m,
-            obstacles: &self.obstacles,
-            movers,
+            users,
             signals: &self.signals,
             tick: self.ticks,
             friction: self.conditions.friction,
@@ -403,61 +320,49 @@ impl World {
     }
 
     fn spawn(&mut self, request: &SpawnRequest) -> Result<u32, String> {
-        let placed = placement::place(&self.around([&self.movers, &[]]), request, self.next_id)?;
-        let commanded = self.obstacles.iter().filter(|obstacle| !obstacle.is_ambient());
-        if commanded.count() == OBSTACLES_MAX {
-            let oldest = self.obstacles.iter().position(|obstacle| !obstacle.is_ambient());
-            self.remove(oldest.expect("there are ten of them"));
+        let newcomer = placement::place(&self.around([&self.users, &[]]), request, self.next_id)?;
+        let is_commanded = |user: &RoadUser| !user.obstacle.is_ambient();
+        if self.users.iter().filter(|user| is_commanded(user)).count() == OBSTACLES_MAX {
+            self.users.remove(self.users.iter().position(is_commanded).expect("there are ten of them"));
         }
-        let id = placed.obstacle.id;
-        self.obstacles.push(placed.obstacle);
-        self.movers.push(placed.mover);
+        self.users.push(newcomer);
+        let id = self.next_id;
         self.next_id += 1;
         self.look();
         Ok(id)
     }
 
-    fn remove(&mut self, index: usize) {
-        self.obstacles.remove(index);
-        self.movers.remove(index);
-    }
-
     /// Lets ambient traffic leave and appear; `begins` is before the first tick.
     fn renew_ambient(&mut self, begins: bool) {
-        let ego_outline = self.ego_outline;
-        let gone = |obstacle: &Obstacle| obstacle.is_ambient() && is_gone(obstacle, &ego_outline);
-        while let Some(index) = self.obstacles.iter().position(gone) {
-            self.remove(index);
-        }
-        let present = self.obstacles.iter().filter(|obstacle| obstacle.is_ambient()).count();
+        let ego_outline = self.ego.outline;
+        let is_gone = |user: &RoadUser| user.obstacle.is_ambient() && is_gone(&user.obstacle, &ego_outline);
+        self.users.retain(|user| !is_gone(user));
+        let present = self.obstacles().filter(|obstacle| obstacle.is_ambient()).count();
         if !self.ambient.lacks(present) {
             return;
         }
         // A copy, because the attempt looks at the world.
         let mut ambient = self.ambient.clone();
-        if let Some(placed) = ambient.attempt(&self.around([&self.movers, &[]]), begins) {
-            self.obstacles.push(placed.obstacle);
-            self.movers.push(placed.mover);
-        }
+        let newcomer = ambient.attempt(&self.around([&self.users, &[]]), begins);
+        self.users.extend(newcomer);
         self.ambient = ambient;
     }
 
-    /// Moves one obstacle and looks whether it touches anybody; `false` if it left.
+    /// Moves one road user and finds what it touches; `false` if it left.
     /// `ego_mps` is the ego vehicle's speed before any contact of this tick.
-    fn tick_obstacle(&mut self, index: usize, movers: &mut [Mover], ego: &Party, ego_mps: f64) -> bool {
-        let before = self.obstacles[index];
-        let (earlier, rest) = movers.split_at_mut(index);
-        let (mover, later) = rest.split_first_mut().expect("every obstacle has its mover");
-        let Some(mut moved) = mover.step(&before, &self.around([&*earlier, &*later])) else { return false };
-        if let Some((other, pose, incident)) = self.bump(index, &before, &moved.pose) {
+    fn tick_user(&mut self, index: usize, users: &mut [RoadUser], ego: &Party, ego_mps: f64) -> bool {
+        let (earlier, rest) = users.split_at_mut(index);
+        let (user, later) = rest.split_first_mut().expect("the index is that of a user");
+        let before = user.obstacle;
+        let Some(mut moved) = user.mover.step(&before, &self.around([earlier, later])) else { return false };
+        if let Some(Bump { other, pose, incident }) = bump(users, index, &moved.pose, self.ticks) {
             moved = Moved { pose, forward: pose.forward(), velocity_mps: Vec2::zeros(), ..moved };
-            mover.crash();
-            let hit = if other < index { &mut earlier[other] } else { &mut later[other - index - 1] };
-            hit.crash();
-            self.obstacles[other].velocity_mps = Vec2::zeros();
+            users[index].mover.crash();
+            users[other].mover.crash();
+            users[other].obstacle.velocity_mps = Vec2::zeros();
             self.incidents.push(incident);
         }
-        let obstacle = &mut self.obstacles[index];
+        let RoadUser { obstacle, mover } = &mut users[index];
         (obstacle.outline.pose, obstacle.velocity_mps) = (moved.pose, moved.velocity_mps);
         (obstacle.forward, obstacle.lane_heading_rad) = (moved.forward, moved.lane_heading_rad);
         if mover.touched {
@@ -468,68 +373,33 @@ impl World {
             velocity_mps: moved.velocity_mps,
         };
         if let Some(contact) = meet(ego, ego_mps, &other, before.id, self.ticks) {
-            let heading = self.ego_frame.forward();
+            let heading = self.ego.frame.forward();
             let along_mps = heading.dot(&moved.velocity_mps);
             // Impacts chain: the second acts on the speed that the first left.
             let common_mps = common_speed_mps(self.ego.motion.speed_mps, along_mps, mover.size.mass_t);
             self.ego.motion.speed_mps = common_mps;
-            // Who is pushed forward goes on at what the push gives; who is stopped stays.
+            // A vehicle that is pushed forward goes on at what the push gives; one that is stopped stays.
             mover.touch((moved.forward.dot(&heading) * common_mps).max(0.0));
             self.contacts.push(contact);
         }
         true
     }
 
-    /// The first other obstacle in the way of a motion: its index, where the motion ends, and what to
-    /// tell of it.
-    ///
-    /// Obstacles move one after another, each among the others as they stand at that moment. So no
-    /// two can come to overlap, whatever the size of a step.
-    fn bump(&self, index: usize, this: &Obstacle, end: &Pose) -> Option<(usize, Pose, Incident)> {
-        let outline = &this.outline;
-        let way = end.position - outline.pose.position;
-        if way == Vec2::zeros() && end.heading_rad == outline.pose.heading_rad {
-            return None;
+    /// Brings the gaps to the ego vehicle up to date.
+    fn measure(&mut self) {
+        for RoadUser { obstacle, .. } in &mut self.users {
+            let outline = Frame::along(&obstacle.outline, obstacle.forward);
+            obstacle.distance_m = self.ego.frame.distance_m(&outline);
         }
-        let sweep = Sweep { start: *outline, end: *end };
-        let own = Frame::along(outline, this.forward);
-        // No corner moves farther than this.
-        let radius_m = outline.half_length_m + outline.half_width_m;
-        let turn_rad = wrap_angle(end.heading_rad - outline.pose.heading_rad);
-        let most_m = way.norm() + turn_rad.abs() * radius_m;
-        let reach_m = radius_m + most_m;
-        let mut first: Option<(usize, FirstContact)> = None;
-        for (other, obstacle) in self.obstacles.iter().enumerate() {
-            let near_m = reach_m + obstacle.outline.half_length_m + obstacle.outline.half_width_m;
-            let away = obstacle.outline.pose.position - outline.pose.position;
-            if other == index || away.x.abs() > near_m || away.y.abs() > near_m {
-                continue;
-            }
-            if own.is_apart(&Frame::along(&obstacle.outline, obstacle.forward), most_m + CLOSE_M) {
-                continue;
-            }
-            let still = Sweep { start: obstacle.outline, end: obstacle.outline.pose };
-            if let Some(contact) = first_contact(&sweep, &still)
-                && first.is_none_or(|(_, found)| contact.fraction < found.fraction)
-            {
-                first = Some((other, contact));
-            }
-        }
-        let (other, contact) = first?;
-        let incident = Incident {
-            time_s: (self.ticks as f64 + contact.fraction) * DT_S,
-            obstacle: self.obstacles[index].id,
-            other: self.obstacles[other].id,
-            point: contact.point,
-        };
-        Some((other, sweep.at(contact.fraction).pose, incident))
     }
 
-    /// Looks along the lines of sight from the ego vehicle's roof.
+    /// Brings up to date what is seen along the lines of sight from the ego vehicle's roof.
     fn look(&mut self) {
-        let eye = self.ego_outline.pose.position;
-        for (obstacle, mover) in self.obstacles.iter().zip(&mut self.movers) {
-            mover.visible_fraction = visible_fraction(eye, obstacle, &self.obstacles);
+        let eye = self.ego.outline.pose.position;
+        for index in 0..self.users.len() {
+            let target = &self.users[index].obstacle;
+            let visible_fraction = visible_fraction(eye, target, self.obstacles());
+            self.users[index].mover.visible_fraction = visible_fraction;
         }
     }
 
@@ -552,16 +422,16 @@ impl World {
 
 impl Surroundings for World {
     fn survey(&self, request: &SpawnRequest) -> Result<SpawnFacts, String> {
-        let around = self.around([&self.movers, &[]]);
-        let placed = placement::place(&around, request, self.next_id)?;
-        Ok(placement::facts(&around, request, &placed))
+        let around = self.around([&self.users, &[]]);
+        let newcomer = placement::place(&around, request, self.next_id)?;
+        Ok(placement::facts(&around, request, &newcomer))
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::vocabulary::{LaneChoice, Side, Then};
+    use crate::model::vocabulary::{Body, Colour, LaneChoice, Side, Then, Verb};
     use crate::sim::testing;
 
     #[test]
@@ -582,8 +452,8 @@ mod tests {
             world.spawn(&request).expect("there is room");
         }
         // Side by side, where no request would put them.
-        let beside = world.obstacles[0].outline.pose.position + Vec2::new(0.0, 0.7);
-        world.obstacles[1].outline.pose.position = beside;
+        let beside = world.users[0].obstacle.outline.pose.position + Vec2::new(0.0, 0.7);
+        world.users[1].obstacle.outline.pose.position = beside;
         let contacts = loop {
             let contacts = world.tick(&Control::default()).to_vec();
             if !contacts.is_empty() {

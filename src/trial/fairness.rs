@@ -17,11 +17,9 @@ const SLACK_M: f64 = 0.1;
 
 /// What is unfair about the newcomer of an id, in words.
 pub(super) fn complaint(world: &World, request: &SpawnRequest, id: u32) -> Option<String> {
-    let newcomer = world.obstacles().iter().find(|obstacle| obstacle.id == id)?;
-    let overlaps = world
-        .obstacles()
-        .iter()
-        .any(|other| other.id != id && distance_m(&other.outline, &newcomer.outline) <= 0.0);
+    let newcomer = world.obstacle(id)?;
+    let overlaps =
+        world.obstacles().any(|other| other.id != id && distance_m(&other.outline, &newcomer.outline) <= 0.0);
     if overlaps || newcomer.distance_m <= 0.0 {
         return Some("it appears on somebody".to_owned());
     }

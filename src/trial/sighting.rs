@@ -92,7 +92,7 @@ pub(super) fn watch(
 }
 
 fn frame(scene: &Scene, world: &World, id: u32, begin_s: f64) -> Option<Frame> {
-    let obstacle = world.obstacles().iter().find(|obstacle| obstacle.id == id)?;
+    let obstacle = world.obstacle(id)?;
     let pose = obstacle.outline.pose;
     let beside = scene.route.path.project(pose.position);
     let lane = scene.map.nearest(pose.position, obstacle.lane_heading_rad, LANE_REACH_M).map(|place| {

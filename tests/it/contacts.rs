@@ -359,7 +359,7 @@ fn the_contacts_of_whole_episodes_are_the_twins() {
             if let Some((ego, obstacles)) = &before {
                 // Everybody, however far away: the brute force that the broad phase is held against.
                 for was in obstacles.iter().filter(|was| !touched.contains(&was.id)) {
-                    let Some(now) = world.obstacles().iter().find(|now| now.id == was.id) else { continue };
+                    let Some(now) = world.obstacle(was.id) else { continue };
                     let case = Case {
                         poses: [
                             vec![ego.pose, world.ego_outline().pose],
@@ -381,7 +381,7 @@ fn the_contacts_of_whole_episodes_are_the_twins() {
                 }
             }
             touched.extend(found.iter().map(|contact| contact.obstacle));
-            before = Some((world.ego_outline(), world.obstacles().to_vec()));
+            before = Some((world.ego_outline(), world.obstacles().copied().collect::<Vec<_>>()));
         };
         let again = run.play(number, &mut |moment| script.choose(run.table(), moment), &mut watch);
         assert_eq!(again.collisions, log.collisions);

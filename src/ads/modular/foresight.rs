@@ -24,7 +24,7 @@ struct Course {
 
 impl Foresight {
     /// Notes where everybody is; to be called after every tick, with its number.
-    pub fn record(&mut self, tick: u64, obstacles: &[Obstacle]) {
+    pub fn record<'a>(&mut self, tick: u64, obstacles: impl Iterator<Item = &'a Obstacle>) {
         if !tick.is_multiple_of(FRAME_TICKS) {
             return;
         }
@@ -89,7 +89,7 @@ mod tests {
             let x_m = (tick as f64 * crate::sim::DT_S) * (tick as f64 * crate::sim::DT_S);
             foresight.record(
                 tick,
-                &[Obstacle {
+                core::iter::once(&Obstacle {
                     id: 4,
                     body: Body::Sedan,
                     colour: Colour::Red,
@@ -101,7 +101,7 @@ mod tests {
                     velocity_mps: Vec2::zeros(),
                     distance_m: 5.0,
                     spawned_tick: 0,
-                }],
+                }),
             );
         }
         let mut positions = [Vec2::zeros(); 4];

@@ -10,12 +10,14 @@ use crate::model::vocabulary::Side;
 use crate::road;
 use crate::road::{LaneIndex, Neighbour};
 
+use crate::sim::around::Around;
 use crate::sim::body::BodyParameters;
-use crate::sim::mover::{Around, Moved};
-use crate::sim::way::{Way, beside};
-use crate::sim::world::{DT_S, Obstacle};
+use crate::sim::road_user::{Moved, Obstacle};
+use crate::sim::way::Way;
+use crate::sim::world::DT_S;
 
-use super::driver::{Driver, SIDE_ROOM_M, along, extent_m};
+use super::driver::{Driver, SIDE_ROOM_M, along};
+use super::leader::extent_m;
 
 /// Room in front of and behind them that they want before changing lanes, m.
 const MIRROR_ROOM_M: f64 = 2.0;
@@ -117,7 +119,7 @@ impl Driver {
         let room_m = map.change_room_m(here, on_road(side), here_m);
         if there.distance_m > CHANGE_M_MAX
             || room_m < change_length_m(self.speed_mps, there.distance_m)
-            || !self.is_free(centre, there.station_m, this, size, around)
+            || !self.is_free(centre, there.station_m, size, around)
         {
             return None;
         }
@@ -127,19 +129,14 @@ impl Driver {
     }
 
     /// Whether nobody is beside it in another lane, or so fast behind that a second would not do.
-    fn is_free(
-        &self,
-        path: &Path,
-        station_m: f64,
-        this: &Obstacle,
-        size: &BodyParameters,
-        around: &Around,
-    ) -> bool {
+    fn is_free(&self, path: &Path, station_m: f64, size: &BodyParameters, around: &Around) -> bool {
         let here = path.pose_at(station_m);
         let forward = here.forward();
-        around.others_along(this.id).all(|(outline, heading, velocity_mps)| {
+        around.others_along().all(|(outline, heading, velocity_mps)| {
             let ahead_m = forward.dot(&(outline.pose.position - here.position));
-            let Some(other) = beside(path, outline.pose.position, station_m + ahead_m) else { return true };
+            let Some(other) = path.project_from(outline.pose.position, station_m + ahead_m) else {
+                return true;
+            };
             let (half_length_m, half_width_m) = extent_m(outline, heading, other.forward);
             let aside_m = other.offset_m.abs() - half_width_m - size.width_m / 2.0;
             let apart_m = (other.station_m - station_m).abs() - half_length_m - size.length_m / 2.0;
@@ -157,7 +154,7 @@ impl Driver {
         };
         let guess_m = change.to_station_m + way_m;
         change.to_station_m =
-            beside(&change.to.path, from.position, guess_m).map_or(guess_m, |found| found.station_m);
+            change.to.path.project_from(from.position, guess_m).map_or(guess_m, |found| found.station_m);
         let to = change.to.path.pose_at(change.to_station_m);
         let progress_per_m = 1.0 / (self.speed_mps.max(CHANGE_FULL_MPS) * change.duration_s);
         change.progress += progress_per_m * way_m;

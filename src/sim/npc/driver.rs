@@ -1,59 +1,55 @@
 //! Other drivers: along their way by the Intelligent Driver Model.
 //!
 //! IDM after Treiber, Hennecke and Helbing (2000), with the brakes of the body on the grip of the
-//! road and a kinematic floor, because IDM alone assumes brakes without limit. They stop for red
-//! lights, slow down for bends, follow whoever is in front of them, let others go first at junctions
-//! (see `manners`) and look before they change lanes (see `change`); what they do to the ego vehicle otherwise is the
-//! scenario's business. Leaders and occasions are looked for ten times a second: reaction time.
+//! road and a kinematic floor, because IDM alone assumes brakes without limit. Ten times a second,
+//! which is their reaction time, drivers look for a leader (`leader`, `foresight`), for a reason to wait
+//! at a junction (`manners`) and for the occasion of their next lane change (`change`); in every tick
+//! they slow down for bends, stop at red lights (`red_light`) and follow. What else they do to the ego
+//! vehicle is the scenario's business.
 
 use std::sync::Arc;
 
-use crate::geometry::{OrientedBox, Path, Pose, Vec2};
+use crate::geometry::Pose;
 use crate::model::vocabulary::Side;
 use crate::rng;
 use crate::rng::{Rng, Stream};
 
+use crate::sim::around::Around;
 use crate::sim::body::BodyParameters;
-use crate::sim::following::Following;
-use crate::sim::mover::{Around, Moved};
+use crate::sim::road_user::{Moved, Obstacle};
 use crate::sim::scene::Scene;
-use crate::sim::sense::{FRAME_TICKS, SignalColour};
-use crate::sim::way::{Way, beside};
-use crate::sim::world::{DT_S, Obstacle};
+use crate::sim::sense::FRAME_TICKS;
+use crate::sim::way::Way;
+use crate::sim::world::DT_S;
 
 use super::change::{Change, Manoeuvre};
+use super::leader::Leader;
 use super::manners::{GIVE_UP_S, STANDS_MPS};
 
 /// IDM: comfortable deceleration, m/s².
 pub(super) const COMFORT_MPS2: f64 = 2.0;
 /// IDM: gap at standstill, m.
 pub(super) const GAP_M_MIN: f64 = 2.0;
-/// IDM: time gap, s.
-const TIME_GAP_S: f64 = 1.2;
-/// What they look ahead beyond the way on which they could stop gently, m.
+/// How far drivers look ahead beyond the way on which they could stop gently, m.
 pub(super) const LOOK_AHEAD_M: f64 = 25.0;
-/// Room beside the outline that they want to be free, m.
+/// Room that drivers want free beside the outline, m.
 pub(super) const SIDE_ROOM_M: f64 = 0.2;
-/// A yellow light that takes harder braking is passed, m/s².
-const YELLOW_BRAKING_MPS2: f64 = 3.0;
-/// Who is slower than this when a wait ends sets out anew, m/s.
+/// A driver slower than this when a wait ends sets out anew, m/s.
 const SETS_OUT_MPS: f64 = 1.0;
-/// Who stands at more than this angle to the way stands across it or against it (cosine of 45°).
-const CROSSWISE_COS_MAX: f64 = core::f64::consts::FRAC_1_SQRT_2;
 
-/// How fast somebody wants to drive, and who they are to the ego vehicle.
+/// How fast a driver wants to drive, and how it treats the ego vehicle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(in crate::sim) enum Cruise {
     /// At the speed that an action asked for, m/s, and without yielding to the ego vehicle at junctions.
     Commanded(f64),
-    /// At a part of each lane's limit, and with manners towards everybody: ambient traffic.
+    /// At a part of each lane's limit, yielding to all others: ambient traffic.
     Limit(f64),
 }
 
 #[derive(Debug, Clone)]
 pub(in crate::sim) struct Driver {
     pub(super) way: Arc<Way>,
-    /// Of the outline's centre.
+    /// Station of the outline's centre on the way.
     pub(super) station_m: f64,
     pub speed_mps: f64,
     pub(super) cruise_mps: f64,
@@ -63,26 +59,16 @@ pub(in crate::sim) struct Driver {
     pub(super) leader: Option<Leader>,
     /// Station at which it waits for others, or will.
     pub(super) hold_m: Option<f64>,
-    /// Up to this station it goes on after a wait, whoever comes.
+    /// After a wait it goes on up to this station, whatever comes.
     pub(super) insists_to_m: f64,
     /// Ticks at rest because of others.
     pub(super) waited_ticks: u32,
     pub(super) change: Option<Change>,
     pub(super) last_change: Option<Side>,
-    /// In reverse order: the next one is last.
+    /// In reverse order: the next manoeuvre is last.
     pub(super) plan: Vec<Manoeuvre>,
     /// How often it drew where to go, so that each draw has its own stream.
     draws: u32,
-}
-
-/// Whoever is in front.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Leader {
-    pub gap_m: f64,
-    /// Along the own way; negative if it comes nearer.
-    pub speed_mps: f64,
-    /// Whether it heads across the way or against it.
-    pub crosswise: bool,
 }
 
 impl Driver {
@@ -131,20 +117,7 @@ impl Driver {
         along(self.way.path.pose_at(self.station_m), self.speed_mps)
     }
 
-    /// Gap to another outline on its way, m, if that is ahead and in its corridor; and the other's
-    /// speed along the way.
-    pub fn gap_to(
-        &self,
-        size: &BodyParameters,
-        other: &OrientedBox,
-        velocity_mps: Vec2,
-    ) -> Option<(f64, f64)> {
-        let here = self.way.path.pose_at(self.station_m);
-        let other = (other, other.pose.forward(), velocity_mps);
-        in_corridor(&self.way.path, self.station_m, &here, size, other)
-            .map(|leader| (leader.gap_m, leader.speed_mps))
-    }
-
+    /// One tick; `None` if it leaves the world. One that has `touched` the ego vehicle only brakes.
     pub fn step(
         &mut self,
         this: &Obstacle,
@@ -175,40 +148,7 @@ impl Driver {
         Some(self.advance_change(way_m, this.outline.pose.position))
     }
 
-    /// Counts a tick at rest because of others; whether that was the last straw.
-    fn gives_up(&mut self) -> bool {
-        let blocked = self.leader.is_some_and(|leader| leader.crosswise && leader.gap_m < GAP_M_MIN + 3.0);
-        if self.speed_mps >= STANDS_MPS {
-            self.waited_ticks = 0;
-        } else if self.hold_m.is_some() || blocked {
-            self.waited_ticks += 1;
-        }
-        f64::from(self.waited_ticks) * DT_S >= GIVE_UP_S
-    }
-
-    /// Feeds every bit that later ticks depend on to `sink`; ways follow from the draws.
-    pub fn trace(&self, sink: &mut dyn FnMut(u64)) {
-        for value in [self.station_m, self.speed_mps, self.cruise_mps] {
-            sink(value.to_bits());
-        }
-        let leader = self.leader.unwrap_or(Leader { gap_m: -1.0, speed_mps: 0.0, crosswise: false });
-        sink(leader.gap_m.to_bits());
-        sink(leader.speed_mps.to_bits());
-        sink(u64::from(leader.crosswise));
-        sink(self.hold_m.unwrap_or(f64::INFINITY).to_bits());
-        sink(self.insists_to_m.to_bits());
-        sink(u64::from(self.waited_ticks));
-        if let Some(change) = &self.change {
-            for value in [change.to_station_m, change.progress, change.duration_s] {
-                sink(value.to_bits());
-            }
-        }
-        sink(self.last_change.map_or(0, |side| side as u64 + 1));
-        sink(self.plan.len() as u64);
-        sink(u64::from(self.draws));
-    }
-
-    /// Whom to follow, whether the occasion for the next lane change is there, where the way goes on.
+    /// Prolongs the way, begins a lane change that is due, and finds what to follow and what to wait for.
     fn look(&mut self, this: &Obstacle, size: &BodyParameters, around: &Around) {
         if self.way.ends_soon(self.station_m) {
             let mut rng = self.draw(this.id, around);
@@ -234,34 +174,7 @@ impl Driver {
         }
     }
 
-    fn find_leader(&self, this: &Obstacle, size: &BodyParameters, around: &Around) -> Option<Leader> {
-        let here = &this.outline.pose;
-        let forward = this.forward;
-        let reach_m = LOOK_AHEAD_M
-            + self.speed_mps * (TIME_GAP_S + self.speed_mps / (2.0 * COMFORT_MPS2))
-            + size.length_m / 2.0;
-        let mut nearest: Option<Leader> = None;
-        for other in around.others_along(this.id) {
-            let outline = other.0;
-            let delta = outline.pose.position - here.position;
-            let reach_m = reach_m + outline.half_length_m;
-            if delta.norm_squared() > reach_m * reach_m || forward.dot(&delta) < 0.0 {
-                continue;
-            }
-            let on_own_way = in_corridor(&self.way.path, self.station_m, here, size, other);
-            let on_next_way = self
-                .change
-                .as_ref()
-                .and_then(|change| in_corridor(&change.to.path, change.to_station_m, here, size, other));
-            for leader in on_own_way.into_iter().chain(on_next_way) {
-                if nearest.is_none_or(|found| leader.gap_m < found.gap_m) {
-                    nearest = Some(leader);
-                }
-            }
-        }
-        nearest
-    }
-
+    /// The lowest acceleration that the cruising speed, bends, the leader, a light or a wait demands.
     fn wanted_mps2(&self, size: &BodyParameters, around: &Around, braking_mps2: f64) -> f64 {
         let mut bend_mps = self.way.speed_mps_max(self.station_m);
         if let Some(change) = &self.change {
@@ -277,65 +190,56 @@ impl Driver {
             wanted_mps2 = wanted_mps2.min(self.follow_mps2(size, leader, free_mps2));
         }
         if let Some(gap_m) = self.stop_gap_m(size, around, braking_mps2) {
-            let line = Leader { gap_m, speed_mps: 0.0, crosswise: false };
-            wanted_mps2 = wanted_mps2.min(self.follow_mps2(size, &line, free_mps2));
+            wanted_mps2 = wanted_mps2.min(self.follow_mps2(size, &Leader::line(gap_m), free_mps2));
         }
         if let Some(hold_m) = self.hold_m {
             let gap_m = hold_m - self.station_m - size.length_m / 2.0;
-            let line = Leader { gap_m, speed_mps: 0.0, crosswise: false };
-            wanted_mps2 = wanted_mps2.min(self.follow_mps2(size, &line, free_mps2));
+            wanted_mps2 = wanted_mps2.min(self.follow_mps2(size, &Leader::line(gap_m), free_mps2));
         }
         wanted_mps2
     }
 
-    /// IDM's interaction, and at least the braking that still avoids the leader.
-    fn follow_mps2(&self, size: &BodyParameters, leader: &Leader, free_mps2: f64) -> f64 {
-        let closing_mps = self.speed_mps - leader.speed_mps;
-        let following = Following {
-            gap_m_min: GAP_M_MIN,
-            time_gap_s: TIME_GAP_S,
-            acceleration_mps2: size.acceleration_mps2_max,
-            comfortable_mps2: COMFORT_MPS2,
-        };
-        let crowding = following.wanted_gap_m(self.speed_mps, leader.speed_mps) / leader.gap_m.max(0.1);
-        let idm_mps2 = free_mps2 - size.acceleration_mps2_max * crowding * crowding;
-        if closing_mps <= 0.0 {
-            return idm_mps2;
+    /// Counts a tick at rest because of others; `true` if it has waited too long and leaves.
+    fn gives_up(&mut self) -> bool {
+        let blocked = self.leader.is_some_and(|leader| leader.crosswise && leader.gap_m < GAP_M_MIN + 3.0);
+        if self.speed_mps >= STANDS_MPS {
+            self.waited_ticks = 0;
+        } else if self.hold_m.is_some() || blocked {
+            self.waited_ticks += 1;
         }
-        let needed_mps2 = closing_mps * closing_mps / (2.0 * (leader.gap_m - GAP_M_MIN / 2.0).max(0.1));
-        if needed_mps2 > COMFORT_MPS2 { idm_mps2.min(-needed_mps2) } else { idm_mps2 }
+        f64::from(self.waited_ticks) * DT_S >= GIVE_UP_S
     }
 
-    /// Gap from the front to the stop line at which it has to stop now, m.
-    pub(super) fn stop_gap_m(
-        &self,
-        size: &BodyParameters,
-        around: &Around,
-        braking_mps2: f64,
-    ) -> Option<f64> {
-        let front_m = self.station_m + size.length_m / 2.0;
-        let line = self.way.stop_lines.iter().find(|line| line.station_m > front_m)?;
-        let gap_m = line.station_m - front_m;
-        let energy_m2ps2 = self.speed_mps * self.speed_mps / 2.0;
-        if gap_m > LOOK_AHEAD_M + energy_m2ps2 / COMFORT_MPS2 {
-            return None;
-        }
-        // Who cannot stop before the line any more does not stop behind it either.
-        let stops = match around.signals.colour(&around.scene.map, line.signal, around.tick) {
-            SignalColour::Green => false,
-            SignalColour::Yellow => gap_m * YELLOW_BRAKING_MPS2 > energy_m2ps2,
-            SignalColour::Red => gap_m * braking_mps2 > energy_m2ps2,
-        };
-        stops.then_some(gap_m)
-    }
-
+    /// The stream of its next draw of where to go.
     pub(super) fn draw(&mut self, id: u32, around: &Around) -> Rng {
         self.draws += 1;
         choices(around.seed, id, self.draws - 1)
     }
+
+    /// Feeds every bit that later ticks depend on to `sink`; ways follow from the draws.
+    pub fn trace(&self, sink: &mut dyn FnMut(u64)) {
+        for value in [self.station_m, self.speed_mps, self.cruise_mps] {
+            sink(value.to_bits());
+        }
+        let leader = self.leader.unwrap_or(Leader::line(-1.0));
+        sink(leader.gap_m.to_bits());
+        sink(leader.speed_mps.to_bits());
+        sink(u64::from(leader.crosswise));
+        sink(self.hold_m.unwrap_or(f64::INFINITY).to_bits());
+        sink(self.insists_to_m.to_bits());
+        sink(u64::from(self.waited_ticks));
+        if let Some(change) = &self.change {
+            for value in [change.to_station_m, change.progress, change.duration_s] {
+                sink(value.to_bits());
+            }
+        }
+        sink(self.last_change.map_or(0, |side| side as u64 + 1));
+        sink(self.plan.len() as u64);
+        sink(u64::from(self.draws));
+    }
 }
 
-/// At a pose of a lane, along it.
+/// At a pose of a lane, driving along it.
 pub(super) fn along(pose: Pose, speed_mps: f64) -> Moved {
     let forward = pose.forward();
     Moved { pose, forward, lane_heading_rad: pose.heading_rad, velocity_mps: forward * speed_mps }
@@ -344,36 +248,4 @@ pub(super) fn along(pose: Pose, speed_mps: f64) -> Moved {
 /// The stream of one choice of one road user.
 pub(in crate::sim) fn choices(seed: u64, id: u32, draw: u32) -> Rng {
     rng::stream(seed, Stream::Traffic, u64::from(id) << 32 | u64::from(draw))
-}
-
-/// An outline, with its heading as a unit vector and its velocity, as the leader of somebody at a
-/// station, if it is ahead and in the corridor.
-fn in_corridor(
-    path: &Path,
-    station_m: f64,
-    here: &Pose,
-    size: &BodyParameters,
-    (outline, heading, velocity_mps): (&OrientedBox, Vec2, Vec2),
-) -> Option<Leader> {
-    let straight_m = (outline.pose.position - here.position).norm();
-    let other = beside(path, outline.pose.position, station_m + straight_m)?;
-    let (half_length_m, half_width_m) = extent_m(outline, heading, other.forward);
-    let aside_m = other.offset_m.abs() - half_width_m - size.width_m / 2.0;
-    if other.station_m < station_m || aside_m > SIDE_ROOM_M {
-        return None;
-    }
-    Some(Leader {
-        gap_m: other.station_m - station_m - half_length_m - size.length_m / 2.0,
-        speed_mps: velocity_mps.dot(&other.forward),
-        crosswise: heading.dot(&other.forward) < CROSSWISE_COS_MAX,
-    })
-}
-
-/// Half extents of an outline that is turned to `heading` along and across another unit vector, m.
-pub(super) fn extent_m(outline: &OrientedBox, heading: Vec2, along: Vec2) -> (f64, f64) {
-    let (cosine, sine) = (along.dot(&heading).abs(), along.perp(&heading).abs());
-    (
-        outline.half_length_m * cosine + outline.half_width_m * sine,
-        outline.half_length_m * sine + outline.half_width_m * cosine,
-    )
 }

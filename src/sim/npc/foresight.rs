@@ -9,11 +9,12 @@
 use core::cell::LazyCell;
 
 use crate::geometry::{OrientedBox, Pose, distance_m};
+use crate::sim::around::Around;
 use crate::sim::body::BodyParameters;
-use crate::sim::mover::Around;
-use crate::sim::world::Obstacle;
+use crate::sim::road_user::Obstacle;
 
-use super::driver::{Driver, Leader};
+use super::driver::Driver;
+use super::leader::Leader;
 
 /// Moments that are looked at, s.
 const MOMENTS_S: [f64; 5] = [0.4, 0.8, 1.2, 1.6, 2.0];
@@ -53,7 +54,7 @@ impl Driver {
             };
             free_m = free_m.min(free_way_m(this, &own, speed_mps, around.ego_outline, ego));
         }
-        for (obstacle, _, driver) in around.drivers(this.id) {
+        for (obstacle, _, driver) in around.drivers() {
             if driver.change.is_some() || !matters(&obstacle.outline, driver.speed_mps) {
                 continue;
             }

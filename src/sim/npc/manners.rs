@@ -22,12 +22,13 @@
 use core::cell::LazyCell;
 
 use crate::road::LaneIndex;
+use crate::sim::around::Around;
 use crate::sim::body::BodyParameters;
 use crate::sim::ego::VehicleParameters;
 use crate::sim::junction::Area;
-use crate::sim::mover::Around;
+use crate::sim::road_user::Obstacle;
 use crate::sim::sense::SignalColour;
-use crate::sim::world::{DT_S, Obstacle};
+use crate::sim::world::DT_S;
 
 use super::driver::{COMFORT_MPS2, Driver, GAP_M_MIN, LOOK_AHEAD_M};
 
@@ -150,7 +151,7 @@ impl Driver {
         // Most areas are on nobody else's way, and then it is not needed.
         let own = LazyCell::new(|| self.passage(area.from_m, area.to_m, size, around));
         let impatient = f64::from(self.waited_ticks) * DT_S >= PATIENCE_S;
-        let mut others = around.drivers(this.id);
+        let mut others = around.drivers();
         let for_others = others.any(|(obstacle, body, driver)| {
             let reach_m = APPROACH_M + JUNCTION_M;
             let away = obstacle.outline.pose.position - this.outline.pose.position;

@@ -1,9 +1,19 @@
-//! Other drivers: how they follow, change lanes and let others go first.
+//! Other drivers: how they follow, stop at lights, change lanes and let others go first.
+//!
+//! | question | file |
+//! |---|---|
+//! | in what order a driver decides and moves | `driver` |
+//! | which vehicle it follows, and how close | `leader`; in tight turns `foresight` |
+//! | where it stops for a red or yellow light | `red_light` |
+//! | for whom it waits at a junction, and for how long | `manners` |
+//! | when and how it changes lanes | `change` |
 
 mod change;
 mod driver;
 mod foresight;
+mod leader;
 mod manners;
+mod red_light;
 
 pub(super) use change::{Manoeuvre, Towards, When, can_change, lane_beside};
 pub(super) use driver::{Cruise, Driver, choices};

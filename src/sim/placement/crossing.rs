@@ -5,9 +5,9 @@ use crate::action::SpawnRequest;
 use crate::model::vocabulary::{Side, Then};
 use crate::road::{Conflict, LaneIndex};
 
+use crate::sim::around::Around;
 use crate::sim::body::BodyParameters;
 use crate::sim::ego::VehicleParameters;
-use crate::sim::mover::Around;
 use crate::sim::npc::{Driver, Manoeuvre, Towards, When, can_change, choices, lane_beside};
 use crate::sim::sense::SignalColour;
 use crate::sim::way::Way;

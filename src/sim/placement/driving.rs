@@ -4,9 +4,9 @@ use crate::action::SpawnRequest;
 use crate::model::vocabulary::{LaneChoice, Side, Then};
 use crate::rng;
 
+use crate::sim::around::Around;
 use crate::sim::body::BodyParameters;
 use crate::sim::ego::VehicleParameters;
-use crate::sim::mover::Around;
 use crate::sim::npc::{Driver, Manoeuvre, Towards, When, can_change, choices, lane_beside};
 use crate::sim::way::Way;
 use crate::sim::world::DT_S;

@@ -3,7 +3,7 @@
 use crate::model::vocabulary::{LaneChoice, Side};
 use crate::road::{LaneIndex, RouteLane, Turn};
 
-use crate::sim::mover::Around;
+use crate::sim::around::Around;
 use crate::sim::npc::lane_beside;
 
 /// A median wider than this divides a road: nobody comes towards the ego vehicle across it, m.

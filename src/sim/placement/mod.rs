@@ -12,17 +12,17 @@ mod lanes;
 use std::sync::Arc;
 
 use crate::action::{SpawnFacts, SpawnRequest};
-use crate::geometry::{OrientedBox, Pose, Vec2, distance_m, wrap_angle};
+use crate::geometry::{Pose, Vec2, wrap_angle};
 use crate::model::vocabulary::{Side, Verb};
 
+use crate::sim::around::Around;
 use crate::sim::body::BodyParameters;
 use crate::sim::ego::VehicleParameters;
-use crate::sim::mover::{Around, Motion, Moved, Mover};
 use crate::sim::npc::{Cruise, Driver, Manoeuvre, choices};
 use crate::sim::pedestrian::Walker;
+use crate::sim::road_user::{Motion, Moved, Mover, RoadUser};
 use crate::sim::sense::{RANGE_M, visible_fraction};
 use crate::sim::way::Way;
-use crate::sim::world::Obstacle;
 use crate::sim::{body, safety};
 
 use crossing::cross_road;
@@ -37,17 +37,11 @@ const DISTANCE_M_MAX: f64 = 1000.0;
 /// Nobody appears nearer to anybody else, m.
 const ROOM_M: f64 = 0.5;
 
-/// A road user ready to appear.
-pub(super) struct Placed {
-    pub obstacle: Obstacle,
-    pub mover: Mover,
-}
-
 /// Where a request would put its road user, and what it would be, under a new id.
 ///
 /// # Errors
 /// Why it cannot, in words that complete "cannot spawn: …".
-pub(super) fn place(around: &Around, request: &SpawnRequest, id: u32) -> Result<Placed, String> {
+pub(super) fn place(around: &Around, request: &SpawnRequest, id: u32) -> Result<RoadUser, String> {
     check(request)?;
     let size = body::parameters(request.body);
     let driver = match request.verb {
@@ -90,27 +84,27 @@ fn check(request: &SpawnRequest) -> Result<(), String> {
 /// Nobody but those from behind appears in plain view nearer than the way that the ego vehicle drives
 /// while a careful driver perceives and reacts, even if they would be no danger: who is in sight, and
 /// not hidden by others, fog or distance, did not come from nowhere.
-pub(super) fn facts(around: &Around, request: &SpawnRequest, placed: &Placed) -> SpawnFacts {
-    let along_mps = around.ego_outline.pose.forward().dot(&placed.obstacle.velocity_mps);
+pub(super) fn facts(around: &Around, request: &SpawnRequest, newcomer: &RoadUser) -> SpawnFacts {
+    let along_mps = around.ego_outline.pose.forward().dot(&newcomer.obstacle.velocity_mps);
     let (ego_mps, friction) = (around.ego.speed_mps, around.friction);
     let braking_gap_m = match request.verb {
         Verb::DriveAhead => safety::behind_leader_m(ego_mps, along_mps, friction),
         Verb::Overtake => {
-            let braking_mps2 = around.braking_mps2(&placed.mover.size, along_mps.max(0.0));
+            let braking_mps2 = around.braking_mps2(&newcomer.mover.size, along_mps.max(0.0));
             safety::from_behind_m(along_mps, ego_mps, braking_mps2)
         }
-        Verb::DriveOpposite if meets_route(around, &placed.mover) => {
+        Verb::DriveOpposite if meets_route(around, &newcomer.mover) => {
             safety::oncoming_m(ego_mps, -along_mps, friction)
         }
         Verb::DriveOpposite => 0.0,
         Verb::CrossRoad | Verb::Walk | Verb::Stand => safety::behind_leader_m(ego_mps, 0.0, friction),
     };
-    let spawn_gap_m = placed.obstacle.distance_m;
+    let spawn_gap_m = newcomer.obstacle.distance_m;
     let is_behind = request.verb == Verb::Overtake;
     let sight_m = RANGE_M.min(around.visibility_m);
     let in_view = || {
         let eye = around.ego_outline.pose.position;
-        spawn_gap_m < sight_m && visible_fraction(eye, &placed.obstacle, around.obstacles) > 0.0
+        spawn_gap_m < sight_m && visible_fraction(eye, &newcomer.obstacle, around.obstacles()) > 0.0
     };
     let noticing_m = safety::noticing_m(ego_mps);
     let is_sudden = !is_behind && noticing_m > braking_gap_m && in_view();
@@ -144,32 +138,17 @@ fn finish(
     mover: Mover,
     id: u32,
     moved: Moved,
-) -> Result<Placed, String> {
-    let outline = OrientedBox::new(moved.pose, mover.size.length_m, mover.size.width_m);
-    if around.others(id).any(|(other, _)| distance_m(&outline, other) < ROOM_M) {
-        return Err("another road user is there".into());
-    }
-    let obstacle = Obstacle {
-        id,
-        body: request.body,
-        colour: request.colour,
-        verb: request.verb,
-        outline,
-        distance_m: distance_m(around.ego_outline, &outline),
-        height_m: mover.size.height_m,
-        forward: moved.forward,
-        lane_heading_rad: moved.lane_heading_rad,
-        velocity_mps: moved.velocity_mps,
-        spawned_tick: around.tick,
-    };
-    Ok(Placed { obstacle, mover })
+) -> Result<RoadUser, String> {
+    let SpawnRequest { body, colour, verb, .. } = *request;
+    let newcomer = RoadUser::new(around, id, body, colour, verb, mover, moved);
+    if newcomer.has_room(around, ROOM_M) { Ok(newcomer) } else { Err("another road user is there".into()) }
 }
 
 /// A newcomer must be able to brake for those before it. The ego vehicle is not among them: how near
 /// to it a newcomer may appear is for the rules of the space to say.
 fn check_way(around: &Around, driver: &Driver, size: &BodyParameters) -> Result<(), String> {
     let braking_mps2 = around.braking_mps2(size, driver.speed_mps);
-    let blocked = around.obstacles.iter().any(|other| {
+    let blocked = around.obstacles().any(|other| {
         driver.gap_to(size, &other.outline, other.velocity_mps).is_some_and(|(gap_m, speed_mps)| {
             let closing_mps = (driver.speed_mps - speed_mps).max(0.0);
             gap_m < 1.0 + closing_mps * closing_mps / (2.0 * braking_mps2) + 0.1 * closing_mps
@@ -188,7 +167,12 @@ fn ahead_m(around: &Around, request: &SpawnRequest, size: &BodyParameters) -> Re
     Ok(station_m)
 }
 
-fn on_foot(around: &Around, request: &SpawnRequest, size: BodyParameters, id: u32) -> Result<Placed, String> {
+fn on_foot(
+    around: &Around,
+    request: &SpawnRequest,
+    size: BodyParameters,
+    id: u32,
+) -> Result<RoadUser, String> {
     let station_m = ahead_m(around, request, &size)?;
     let lane = around.scene.route.path.pose_at(station_m);
     let (left_m, turn_rad) = match request.side {

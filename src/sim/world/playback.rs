@@ -1,50 +1,45 @@
-//! A world with another ego vehicle: everybody else moves as they did in a recording, tick by tick,
+//! A world with another ego vehicle: everything else moves as it did in a recording, tick by tick,
 //! whatever the ego vehicle does now.
 //!
-//! A recording is the worlds after each tick, in order. Impacts are left out: who plays a recording
-//! back asks whether there is a contact, not what comes of it.
+//! A recording is the worlds after each tick, in order. Impacts are left out: a playback tells whether
+//! there is a contact, not what comes of it.
 
-use crate::geometry::{Frame, OrientedBox, Sweep};
-use crate::sim::contact::{Party, meet};
+use crate::geometry::{OrientedBox, Sweep};
+use crate::sim::contact::{Contact, Party, meet};
 use crate::sim::ego::Control;
+use crate::sim::road_user::RoadUser;
 
-use super::{Contact, DT_S, FRAME_TICKS, World};
+use super::{DT_S, FRAME_TICKS, World};
 
 impl World {
-    /// Advances by [`DT_S`]: the ego vehicle by its command, everything else to where `recorded`, the
-    /// world one tick later, has it. Returns the contacts of this tick; one that lasts is returned
-    /// again in every tick.
+    /// Advances by [`DT_S`]: the ego vehicle by its command, everything else to where it is in
+    /// `recorded`, the recorded world one tick later. Returns the contacts of this tick; one that lasts
+    /// is returned again in every tick.
     pub fn tick_recorded(&mut self, control: &Control, recorded: &World) -> &[Contact] {
         let before: Vec<(u32, OrientedBox)> =
-            self.obstacles.iter().map(|obstacle| (obstacle.id, obstacle.outline)).collect();
-        let ego_before = self.ego_outline;
+            self.obstacles().map(|obstacle| (obstacle.id, obstacle.outline)).collect();
+        let ego_before = self.ego.outline;
         self.ego.step(control, self.conditions.friction, DT_S);
-        self.ego_outline = self.ego.outline();
-        self.ego_frame = Frame::of(&self.ego_outline);
         self.follow_route();
-        let own = self.clone();
         *self = World {
-            ego: own.ego,
-            ego_outline: own.ego_outline,
-            ego_frame: own.ego_frame,
-            ego_station_m: own.ego_station_m,
-            ego_offset_m: own.ego_offset_m,
-            red_runs: own.red_runs,
+            ego: self.ego.clone(),
+            ego_station_m: self.ego_station_m,
+            ego_offset_m: self.ego_offset_m,
+            red_runs: self.red_runs,
             contacts: Vec::new(),
             ..recorded.clone()
         };
+        self.measure();
         let ego_mps = self.ego.motion.speed_mps;
         let ego = Party {
-            sweep: Sweep { start: ego_before, end: self.ego_outline.pose },
-            velocity_mps: self.ego_frame.forward() * ego_mps,
+            sweep: Sweep { start: ego_before, end: self.ego.outline.pose },
+            velocity_mps: self.ego.velocity_mps(),
         };
-        for (obstacle, mover) in self.obstacles.iter_mut().zip(&self.movers) {
-            let outline = Frame::along(&obstacle.outline, obstacle.forward);
-            obstacle.distance_m = self.ego_frame.distance_m(&outline);
+        for RoadUser { obstacle, mover } in &self.users {
             if mover.touched {
                 continue;
             }
-            // Who was not there a tick ago has not come from anywhere.
+            // An obstacle that was not there a tick ago has not come from anywhere.
             let known = before.iter().find(|(id, _)| *id == obstacle.id);
             let start = known.map_or(obstacle.outline, |(_, outline)| *outline);
             let other = Party {
@@ -97,7 +92,8 @@ mod tests {
             assert_eq!(bits(&same), bits(&world));
         }
         assert_eq!(braked.ego().speed_mps, 0.0);
-        assert_eq!(braked.obstacles()[0].outline, world.obstacles()[0].outline);
-        assert!(braked.obstacles()[0].distance_m > world.obstacles()[0].distance_m + 20.0);
+        let first = |world: &World| *world.obstacles().next().expect("it drives on");
+        assert_eq!(first(&braked).outline, first(&world).outline);
+        assert!(first(&braked).distance_m > first(&world).distance_m + 20.0);
     }
 }

@@ -1,0 +1,204 @@
+//! A road user other than the ego vehicle: what others may see of it (`Obstacle`), and what moves it
+//! (`Mover`): a driver, two legs, or nothing.
+
+use crate::geometry::{OrientedBox, Pose, Vec2, distance_m};
+use crate::model::vocabulary::{Body, Colour, Verb};
+
+use super::ambient::COMMANDED_MAX;
+use super::around::Around;
+use super::body::BodyParameters;
+use super::npc::Driver;
+use super::pedestrian::Walker;
+use super::world::DT_S;
+
+/// How long a wreck stays where it came to rest, s.
+const WRECK_S: f64 = 2.0;
+
+/// A road user other than the ego vehicle, as others may see it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Obstacle {
+    /// From 1, in order of appearance; ambient traffic has numbers of its own.
+    pub id: u32,
+    pub body: Body,
+    pub colour: Colour,
+    pub verb: Verb,
+    pub outline: OrientedBox,
+    /// Unit vector along the outline's heading, kept because it is asked for so often.
+    pub forward: Vec2,
+    pub height_m: f64,
+    /// Heading of the lane that it drives in; a pedestrian's own heading.
+    pub lane_heading_rad: f64,
+    pub velocity_mps: Vec2,
+    /// Gap between its outline and the ego vehicle's, m; 0 if they touch.
+    pub distance_m: f64,
+    pub spawned_tick: u64,
+}
+
+impl Obstacle {
+    /// Whether it is ambient traffic, which no action made appear.
+    pub fn is_ambient(&self) -> bool {
+        self.id > COMMANDED_MAX
+    }
+}
+
+/// One road user of the world.
+#[derive(Debug, Clone)]
+pub(super) struct RoadUser {
+    pub obstacle: Obstacle,
+    pub mover: Mover,
+}
+
+/// The hidden side of a road user.
+#[derive(Debug, Clone)]
+pub(super) struct Mover {
+    pub size: BodyParameters,
+    pub motion: Motion,
+    /// Whether it and the ego vehicle have touched, whichever ran into the other.
+    pub touched: bool,
+    /// Whether it and another obstacle have touched. It stands where that happened.
+    crashed: bool,
+    /// Ticks that it has been a wreck at rest.
+    rest_ticks: u32,
+    /// Part of it that the ego vehicle's sensors saw when they last looked.
+    pub visible_fraction: f64,
+}
+
+#[derive(Debug, Clone)]
+pub(super) enum Motion {
+    Drive(Driver),
+    Walk(Walker),
+    Stand,
+}
+
+/// Where a road user is after a tick.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Moved {
+    /// Centre of the outline.
+    pub pose: Pose,
+    /// Unit vector along its heading.
+    pub forward: Vec2,
+    /// Heading of the lane that it drives in; a pedestrian's own heading.
+    pub lane_heading_rad: f64,
+    pub velocity_mps: Vec2,
+}
+
+impl RoadUser {
+    /// A newcomer where `moved` says.
+    pub fn new(
+        around: &Around,
+        id: u32,
+        body: Body,
+        colour: Colour,
+        verb: Verb,
+        mover: Mover,
+        moved: Moved,
+    ) -> RoadUser {
+        let outline = OrientedBox::new(moved.pose, mover.size.length_m, mover.size.width_m);
+        let obstacle = Obstacle {
+            id,
+            body,
+            colour,
+            verb,
+            outline,
+            forward: moved.forward,
+            height_m: mover.size.height_m,
+            lane_heading_rad: moved.lane_heading_rad,
+            velocity_mps: moved.velocity_mps,
+            distance_m: distance_m(around.ego_outline, &outline),
+            spawned_tick: around.tick,
+        };
+        RoadUser { obstacle, mover }
+    }
+
+    /// Whether every other road user, the ego vehicle included, is at least `room_m` away.
+    pub fn has_room(&self, around: &Around, room_m: f64) -> bool {
+        !around.others().any(|(other, _)| distance_m(&self.obstacle.outline, other) < room_m)
+    }
+
+    /// Every bit that later ticks depend on.
+    pub fn trace(&self, sink: &mut dyn FnMut(u64)) {
+        let Obstacle { id, body, colour, verb, outline, velocity_mps, spawned_tick, .. } = &self.obstacle;
+        sink(u64::from(*id));
+        sink(*spawned_tick);
+        for word in [*body as u64, *colour as u64, *verb as u64] {
+            sink(word);
+        }
+        let pose = &outline.pose;
+        for value in [pose.position.x, pose.position.y, pose.heading_rad] {
+            sink(value.to_bits());
+        }
+        for value in velocity_mps.iter() {
+            sink(value.to_bits());
+        }
+        self.mover.trace(sink);
+    }
+}
+
+impl Mover {
+    pub fn new(size: BodyParameters, motion: Motion) -> Mover {
+        Mover { size, motion, touched: false, crashed: false, rest_ticks: 0, visible_fraction: 1.0 }
+    }
+
+    /// Whether it does nothing any more but come to rest.
+    pub fn is_wreck(&self) -> bool {
+        self.touched || self.crashed
+    }
+
+    /// One tick of the obstacle `this`; `None` if it leaves the world.
+    pub fn step(&mut self, this: &Obstacle, around: &Around) -> Option<Moved> {
+        if self.is_wreck() && this.velocity_mps == Vec2::zeros() {
+            self.rest_ticks += 1;
+            if f64::from(self.rest_ticks) * DT_S >= WRECK_S {
+                return None;
+            }
+        }
+        let rest = Moved::at_rest(this);
+        match &mut self.motion {
+            _ if self.crashed => Some(rest),
+            Motion::Drive(driver) => driver.step(this, &self.size, self.touched, around),
+            Motion::Walk(_) if self.touched => Some(rest),
+            Motion::Walk(walker) => walker.step(this, around),
+            Motion::Stand => Some(rest),
+        }
+    }
+
+    /// It touched the ego vehicle: from now on it goes at most `speed_mps`, until its brakes stop it.
+    pub fn touch(&mut self, speed_mps: f64) {
+        self.touched = true;
+        if let Motion::Drive(driver) = &mut self.motion {
+            driver.speed_mps = speed_mps;
+        }
+    }
+
+    /// It and another obstacle touched: it stands from now on.
+    pub fn crash(&mut self) {
+        self.crashed = true;
+        if let Motion::Drive(driver) = &mut self.motion {
+            driver.speed_mps = 0.0;
+        }
+    }
+
+    fn trace(&self, sink: &mut dyn FnMut(u64)) {
+        sink(u64::from(self.touched));
+        sink(u64::from(self.crashed));
+        sink(u64::from(self.rest_ticks));
+        sink(self.visible_fraction.to_bits());
+        match &self.motion {
+            Motion::Drive(driver) => driver.trace(sink),
+            Motion::Walk(walker) => walker.trace(sink),
+            Motion::Stand => {}
+        }
+    }
+}
+
+impl Moved {
+    /// Standing where it was.
+    pub fn at_rest(this: &Obstacle) -> Moved {
+        Moved {
+            pose: this.outline.pose,
+            forward: this.forward,
+            lane_heading_rad: this.lane_heading_rad,
+            velocity_mps: Vec2::zeros(),
+        }
+    }
+}
