@@ -2,7 +2,14 @@
 //! and curves allow at each place.
 //!
 //! Even samples make look-ups and projections cheap enough to be done for every predicted position
-//! of every object. No signals and no obstacles here.
+//! of every object, which the exact projections of `geometry::Path` are not. A projection here is onto the
+//! tangent of a sample:
+//!
+//! - [`Guide::project`]: of the nearest sample between two stations;
+//! - [`Guide::locate`]: near where a vehicle lately was;
+//! - [`Guide::trace`]: for a moving point, position after position.
+//!
+//! There are no signals and no obstacles here.
 
 use crate::geometry::{Pose, Vec2, unit_vector, wrap_angle};
 use crate::sim::Scene;
@@ -16,7 +23,7 @@ const STRIDES: [usize; 3] = [16, 4, 1];
 /// within a tick, less than to another branch of the route.
 const NEAR_M: f64 = 5.0;
 
-/// Steps along tangents until a place has settled; in a bend each leaves a fraction of the error.
+/// Most steps along tangents until a place has settled; in a bend each step leaves a fraction of the error.
 const SLIDES_MAX: usize = 8;
 
 /// Step of the differences that give the slope of a guide beside the path, m.
@@ -25,14 +32,15 @@ const H_M: f64 = 0.25;
 /// What bounds the speed on a free road.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SpeedRules {
-    /// m/s.
+    /// Speed on a free road, m/s.
     pub cruise_mps: f64,
-    /// In curves, m/s².
+    /// Lateral acceleration in curves, m/s².
     pub lateral_acceleration_mps2_max: f64,
-    /// With which the vehicle slows down for a curve or a lower limit ahead, magnitude, m/s².
+    /// Deceleration for a curve or a lower limit ahead, magnitude, m/s².
     pub slowdown_mps2: f64,
 }
 
+/// The route, or a path beside it, in even samples.
 #[derive(Debug, Clone)]
 pub struct Guide {
     samples: Vec<Sample>,
@@ -47,7 +55,7 @@ struct Sample {
     speed_mps_max: f64,
 }
 
-/// Stations from the nearer to the farther end, m.
+/// A stretch of stations, m.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Span {
     pub from_m: f64,
@@ -60,7 +68,7 @@ impl Span {
     }
 }
 
-/// A place beside the route.
+/// A place beside the route, by the tangent of the sample that is nearest to it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Beside {
     pub station_m: f64,
@@ -119,7 +127,7 @@ impl Guide {
         })
     }
 
-    /// Beside the route's path, by a smooth function of its station, m to the left.
+    /// A guide `offset_m` beside the route's path: a smooth function of the station, m to the left.
     fn beside(scene: &Scene, rules: &SpeedRules, offset_m: impl Fn(f64) -> f64) -> Guide {
         let route = &scene.route;
         let count = (route.path.length_m() / SPACING_M).ceil() as usize + 1;
@@ -150,6 +158,7 @@ impl Guide {
                 }
             })
             .collect();
+        // `sim::way` has a pass like this over its own vertices; see there why they are two.
         for index in (0..count - 1).rev() {
             let next_mps = samples[index + 1].speed_mps_max;
             let reachable_mps = (next_mps * next_mps + 2.0 * rules.slowdown_mps2 * SPACING_M).sqrt();
@@ -183,7 +192,7 @@ impl Guide {
         a.speed_mps_max + (b.speed_mps_max - a.speed_mps_max) * fraction.clamp(0.0, 1.0)
     }
 
-    /// The place of the route beside a vehicle that was lately near a station; `None` looks everywhere.
+    /// The place of a vehicle that was lately at station `near_m`; with `None` the whole route is searched.
     pub fn locate(&self, point: Vec2, near_m: Option<f64>) -> Beside {
         let Some(near_m) = near_m else { return self.project(point, 0.0, f64::INFINITY) };
         let within = Stretch { first: self.index(near_m - NEAR_M), last: self.index(near_m + NEAR_M) };
@@ -197,9 +206,8 @@ impl Guide {
         self.beside_sample(point, self.nearest(point, within))
     }
 
-    /// The same for the places of somebody who moves, one after another; the first of them, and who
-    /// gives the others. Those farther than `reach_m` from the stretch are told as such, most often
-    /// without a search.
+    /// Projects a moving point: returns the first projection and a [`Tracer`] for the following ones, which
+    /// returns `None` beyond `reach_m`, most often without a search.
     pub fn trace(&self, point: Vec2, from_m: f64, to_m: f64, reach_m: f64) -> (Beside, Tracer<'_>) {
         let within = Stretch { first: self.index(from_m), last: self.index(to_m) };
         let index = self.nearest(point, within);
@@ -243,8 +251,8 @@ impl Guide {
         best.0
     }
 
-    /// The same by stepping along tangents from a sample nearby: much quicker, but `None` where the
-    /// steps do not settle.
+    /// The nearest sample, found by stepping along tangents from a sample nearby: much quicker than a
+    /// search, but `None` where the steps do not settle.
     fn slide(&self, point: Vec2, from: usize, within: Stretch) -> Option<usize> {
         let mut index = from;
         for _ in 0..SLIDES_MAX {
@@ -259,7 +267,8 @@ impl Guide {
         None
     }
 
-    /// From a sample on to the one whose neighbours are both farther from a point; of equals, the first.
+    /// Walks from a sample to one whose neighbours are both farther from a point; of several equally near,
+    /// to the first.
     fn descend(&self, point: Vec2, from: usize, within: Stretch) -> usize {
         let mut best = (from, self.squared_m2(point, from));
         while best.0 < within.last {
@@ -297,23 +306,23 @@ struct Stretch {
     last: usize,
 }
 
-/// Follows somebody who moves beside a stretch of a guide.
+/// Projects a moving point onto a stretch of a guide, position after position.
 #[derive(Debug)]
 pub struct Tracer<'a> {
     guide: &'a Guide,
     within: Stretch,
     reach_m: f64,
-    /// The last place that was looked at, its nearest sample, and how far that was, m.
+    /// The last position, its nearest sample, and the distance between the two, m.
     point: Vec2,
     index: usize,
     distance_m: f64,
 }
 
 impl Tracer<'_> {
-    /// The place of the route beside the next place; `None` if that is out of reach.
+    /// The projection of the next position; `None` if it is out of reach.
     pub fn next(&mut self, point: Vec2) -> Option<Beside> {
         let moved_m = (point - self.point).norm();
-        // Nobody is nearer than what is left of the last distance.
+        // The point cannot be nearer than the last distance less the way that it has moved.
         if self.distance_m - moved_m > self.reach_m {
             return None;
         }
@@ -323,7 +332,7 @@ impl Tracer<'_> {
             None
         };
         let near = |index: &usize| self.guide.squared_m2(point, *index) <= self.reach_m * self.reach_m;
-        // Out of reach where it was, it may be in reach of another bend.
+        // A point that is out of reach of the stretch near by may be in reach of another bend.
         self.index = slid.filter(near).unwrap_or_else(|| self.guide.nearest(point, self.within));
         self.point = point;
         self.distance_m = self.guide.squared_m2(point, self.index).sqrt();

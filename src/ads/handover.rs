@@ -1,18 +1,19 @@
 //! Two drivers of one drive: the second watches from the start and takes over at a moment.
 //!
-//! Whoever asks what another driver would have made of a hazard lets the first drive up to it, so
-//! that the hazard is the same to the bit, and the second from there on, with all that it has seen.
+//! This answers what another driver would have made of a hazard. The first drives up to it, so that the
+//! hazard is the same to the bit; the second drives from there on, with all that it has seen until then.
 
 use crate::sim::{Control, Sensed};
 
 use super::driver::Ads;
 use super::status::Status;
 
-/// The first driver until a moment, the second from then on. Both always drive; one is obeyed.
+/// The first driver until a moment, the second from then on. Until then the second drives, too, but its
+/// commands are not obeyed.
 pub struct Handover {
     first: Box<dyn Ads>,
     second: Box<dyn Ads>,
-    /// Since the start of the episode, s.
+    /// The moment, s since the start of the episode.
     at_s: f64,
     is_over: bool,
 }

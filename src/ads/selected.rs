@@ -15,7 +15,7 @@ pub struct Selected {
     entry: &'static Entry,
     profile: Option<ModularConfig>,
     foresight: Option<Arc<Foresight>>,
-    /// Who takes over, and when, s.
+    /// The driving system that takes over, and when, s.
     successor: Option<(Box<Selected>, f64)>,
 }
 
@@ -27,7 +27,7 @@ pub struct NoSettings {
 }
 
 impl Selected {
-    /// The driving system as it comes.
+    /// The driving system with its default settings.
     pub fn new(entry: &'static Entry) -> Selected {
         let profile = (entry.name == MODULAR).then(ModularConfig::default);
         Selected { entry, profile, foresight: None, successor: None }
@@ -49,7 +49,7 @@ impl Selected {
         Selected { foresight: Some(foresight), ..self }
     }
 
-    /// Up to a moment of the episode, s; from there on `successor` drives, who has watched until then.
+    /// Drives up to a moment of the episode, s; from there on `successor` drives, which has watched until then.
     pub fn until(self, at_s: f64, successor: Selected) -> Selected {
         Selected { successor: Some((Box::new(successor), at_s)), ..self }
     }

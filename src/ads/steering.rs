@@ -14,7 +14,7 @@ use crate::sim::{DT_S, EgoMotion, VehicleParameters};
 
 use super::guide::Guide;
 
-/// Speeds of the table: 1 to 30 m/s.
+/// Number of speeds in the table: 1 to 30 m/s.
 const SPEEDS: usize = 30;
 const ITERATIONS_MAX: usize = 600;
 const CONVERGED: f64 = 1e-4;
@@ -75,7 +75,7 @@ impl SteeringConfig {
 pub struct Aside {
     /// m to the left.
     pub offset_m: f64,
-    /// Change of that per metre of station.
+    /// Change of the offset per metre of station.
     pub slope: f64,
     /// Change of the slope per metre, 1/m.
     pub curvature_per_m: f64,
@@ -117,7 +117,7 @@ impl Steering {
         self.steer_aside_rad(guide, &|_| Aside::default(), rear_axle, station_m, motion)
     }
 
-    /// The same for a path that lies beside the guide.
+    /// As [`Steering::steer_rad`], for a path that lies beside the guide.
     pub fn steer_aside_rad(
         &self,
         guide: &Guide,

@@ -11,7 +11,7 @@ use super::driver::Ads;
 use super::registry::REGISTRY;
 use super::testing::{Rig, corner, object, straight};
 
-/// What a drive without obstacles came to.
+/// Result of a drive without obstacles.
 #[derive(Debug)]
 struct Drive {
     arrived: bool,

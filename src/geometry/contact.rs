@@ -1,13 +1,13 @@
 //! Distances between oriented boxes, rays, and the first contact of two moving boxes.
 //!
-//! All of it is asked for many times a tick and so is our own: distances and rays are closed forms, the
-//! first contact advances along the gap. `parry2d` is the oracle of the tests below and named nowhere
-//! else. That no contact is missed is shown by `tests/it/contacts.rs`.
+//! All of it runs many times a tick, so it is written here rather than taken from a library: distances
+//! and rays are closed forms, the first contact advances along the gap. The tests below compare it with
+//! `parry2d`, which only they use; `tests/it/contacts.rs` shows that no contact is missed.
 
 use super::pose::{OrientedBox, Pose, Vec2, wrap_angle};
 
-/// Boxes nearer than this touch, m. What it adds to the time of a contact is below a millisecond for
-/// gaps that close with at least a millimetre a second.
+/// Boxes nearer than this count as touching, m. A contact is told at most a millisecond early if the gap
+/// closes with at least a millimetre a second.
 const CONTACT_M: f64 = 1e-6;
 
 /// The gap between two boxes.
@@ -51,8 +51,8 @@ impl Sweep {
         OrientedBox { pose, ..self.start }
     }
 
-    /// Velocity, as the way it would make during the whole motion, of the point of the box that is at
-    /// `point` after a part of it, m.
+    /// Velocity of the point of the box that is at `point` when `fraction` of the motion is done, in m per
+    /// whole motion.
     pub fn rate_m(&self, fraction: f64, point: Vec2) -> Vec2 {
         let turn_rad = wrap_angle(self.end.heading_rad - self.start.pose.heading_rad);
         let arm = point - self.at(fraction).pose.position;
@@ -63,13 +63,13 @@ impl Sweep {
         self.end.position - self.start.pose.position
     }
 
-    /// No corner gets farther than this from where the centre was, but for the displacement, m.
+    /// Farthest that a corner gets from where the centre began, the displacement not counted, m.
     fn reach_m(&self) -> f64 {
         let turn_rad = wrap_angle(self.end.heading_rad - self.start.pose.heading_rad);
         (self.start.half_length_m + self.start.half_width_m) * (1.0 + turn_rad.abs())
     }
 
-    /// How far any corner travels by turning alone, m.
+    /// Farthest that a corner travels by turning alone, m.
     fn turning_m(&self) -> f64 {
         wrap_angle(self.end.heading_rad - self.start.pose.heading_rad).abs() * self.start.radius_m()
     }
@@ -82,7 +82,7 @@ pub fn distance_m(a: &OrientedBox, b: &OrientedBox) -> f64 {
 
 /// Distance and nearest points of two boxes.
 ///
-/// Boxes that do not overlap are nearest at a corner of one of them, so eight corners are asked.
+/// Boxes that do not overlap are nearest at a corner of one of them, so eight corners are tried.
 fn clearance(a: &OrientedBox, b: &OrientedBox) -> Clearance {
     let reach_m = a.radius_m() + b.radius_m();
     let near = (a.pose.position - b.pose.position).norm_squared() <= reach_m * reach_m;
@@ -111,20 +111,19 @@ fn clearance(a: &OrientedBox, b: &OrientedBox) -> Clearance {
 
 /// The first moment at which two moving boxes touch, if they do before the motion ends.
 ///
-/// Conservative advancement along the gap: boxes stay apart as long as a line stays between them, and
-/// the line across the middle of the gap is met no sooner than the displacement along the gap's
-/// direction plus the travel of the corners by turning have used the gap up. Stepping by that part of
-/// the motion never jumps over a contact, and of boxes that do not turn it lands on it.
+/// Conservative advancement along the gap: the gap cannot close before the displacement along its
+/// direction, plus the travel of the corners by turning, add up to its width. So a step of that part of
+/// the motion never jumps over a contact; for boxes that do not turn it lands on the contact.
 pub fn first_contact(a: &Sweep, b: &Sweep) -> Option<FirstContact> {
     let approach = a.displacement() - b.displacement();
     let between = b.start.pose.position - a.start.pose.position;
-    // Broad phase: circles around them, a little too large and got without a root, do not come together.
+    // Broad phase: circles around the boxes do not meet. They are a little too large, and need no root.
     let reach_m = a.reach_m() + b.reach_m() + approach.x.abs() + approach.y.abs() + CONTACT_M;
     if between.norm_squared() > reach_m * reach_m {
         return None;
     }
     let turning_m = a.turning_m() + b.turning_m();
-    // And of those that do, most have a gap that is wider than they can close.
+    // Most of the other pairs have a gap that is wider than the motion can close.
     let closing_m = approach.norm() + turning_m + 2.0 * CONTACT_M;
     let (first, second) = (Frame::of(&a.start), Frame::of(&b.start));
     if first.is_apart(&second, closing_m) || first.distance_m(&second) > closing_m {
@@ -134,7 +133,7 @@ pub fn first_contact(a: &Sweep, b: &Sweep) -> Option<FirstContact> {
     let mut normal = Vec2::zeros();
     loop {
         let gap = clearance(&a.at(fraction), &b.at(fraction));
-        // The gap's direction is sound as long as there is one; touching boxes keep the last.
+        // A gap of no width has no direction: touching boxes keep the last one.
         if gap.distance_m > CONTACT_M / 100.0 {
             normal = (gap.on_second - gap.on_first) / gap.distance_m;
         }
@@ -145,7 +144,7 @@ pub fn first_contact(a: &Sweep, b: &Sweep) -> Option<FirstContact> {
         if closing_m * (1.0 - fraction) < gap.distance_m - CONTACT_M {
             return None;
         }
-        // Half the tolerance beyond, so that the approach ends; the rest of the tolerance is for rounding.
+        // Half the tolerance beyond the gap, so that the approach ends; the other half is for rounding.
         fraction = (fraction + (gap.distance_m - CONTACT_M / 2.0) / closing_m).min(1.0);
     }
 }
@@ -156,7 +155,7 @@ pub fn ray_hit_m(origin: Vec2, direction: Vec2, reach_m: f64, target: &OrientedB
     Frame::of(target).ray_hit_m(origin, direction, reach_m)
 }
 
-/// A box with its axes worked out, for who asks it several distances.
+/// A box with its axes worked out once, for several questions about distances.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Frame {
     centre: Vec2,
@@ -170,7 +169,7 @@ impl Frame {
         Frame::along(shape, shape.pose.forward())
     }
 
-    /// Of a box whose unit vector ahead is at hand.
+    /// The frame of a box whose unit vector ahead is known already.
     pub fn along(shape: &OrientedBox, forward: Vec2) -> Frame {
         Frame {
             centre: shape.pose.position,
@@ -207,8 +206,8 @@ impl Frame {
         (enters_m <= leaves_m).then_some(enters_m)
     }
 
-    /// Whether they are farther apart than `gap_m` along an axis of this box, which is quick to tell; if
-    /// not, they may be so all the same.
+    /// Whether the boxes are farther apart than `gap_m` along an axis of this box. This is quick, and says
+    /// too little: boxes for which it is false may be farther apart, too.
     pub fn is_apart(&self, other: &Frame, gap_m: f64) -> bool {
         let between = other.centre - self.centre;
         let cosine = self.forward.dot(&other.forward).abs();
@@ -221,8 +220,8 @@ impl Frame {
 
     /// Distance to another box, m; 0 if they touch or overlap.
     ///
-    /// Boxes that do not overlap are nearest at a corner of one of them: each box asks the corners of
-    /// the other in its own frame, where its nearest point needs no search.
+    /// Boxes that do not overlap are nearest at a corner of one of them. Each box takes the corners of the
+    /// other in its own frame, where the nearest point needs no search.
     pub fn distance_m(&self, other: &Frame) -> f64 {
         let between = other.centre - self.centre;
         let (cosine, sine) = (self.forward.dot(&other.forward), self.forward.perp(&other.forward));
@@ -285,7 +284,7 @@ impl Frame {
         self.half_length_m * self.forward.dot(&axis).abs() + self.half_width_m * self.left().dot(&axis).abs()
     }
 
-    /// Whether no axis of either box separates them.
+    /// Whether the boxes overlap: no axis of either separates them.
     fn overlaps(&self, other: &Frame) -> bool {
         let between = other.centre - self.centre;
         let meets = |axis: Vec2| between.dot(&axis).abs() <= self.reach_m(axis) + other.reach_m(axis);
@@ -293,8 +292,8 @@ impl Frame {
     }
 }
 
-/// The larger of two numbers. `f64::max` takes four times as long to say what becomes of NaN, and this
-/// is done a thousand times a tick.
+/// The larger of two numbers. `f64::max` takes four times as long because it handles NaN, and this runs a
+/// thousand times a tick.
 fn larger(a: f64, b: f64) -> f64 {
     if a > b { a } else { b }
 }
@@ -316,7 +315,7 @@ fn overlap_point(a: &Frame, b: &Frame) -> Vec2 {
         shared = clipped(&shared, |point| half_m - (point - a.centre).dot(&outward));
     }
     if shared.is_empty() {
-        // They touch in a point, and rounding took it.
+        // The boxes touch in a point, which rounding has lost.
         return (a.nearest(b.centre) + b.nearest(a.centre)) / 2.0;
     }
     shared.iter().sum::<Vec2>() / shared.len() as f64
@@ -384,7 +383,7 @@ mod tests {
             match (ray_hit_m(origin, direction, reach_m, &target), parrys) {
                 (Some(ours_m), Some(parrys_m)) => prop_assert!((ours_m - parrys_m).abs() < 1e-6),
                 (None, None) => {}
-                // They may differ on a ray that grazes a corner or ends on a side, and nowhere else.
+                // The two may differ only on a ray that grazes a corner or ends on a side.
                 (ours, parrys) => {
                     let grown = |by_m: f64| {
                         let (length_m, width_m) = (2.0 * target.half_length_m, 2.0 * target.half_width_m);
@@ -403,7 +402,7 @@ mod tests {
             prop_assert!((found.distance_m - distance_m(&a, &b)).abs() < 1e-9, "{found:?}");
             let (first, second) = (Frame::of(&a), Frame::of(&b));
             prop_assert!(!first.is_apart(&second, found.distance_m + 1e-9), "{found:?}");
-            // Of boxes that overlap or face each other squarely, one of the two always tells.
+            // For a gap of 0, one of the two boxes always tells whether they are apart.
             let is_known = |gap_m: f64| first.is_apart(&second, gap_m) || second.is_apart(&first, gap_m);
             prop_assert_eq!(is_known(0.0), found.distance_m > 0.0);
             let (a, b) = (Frame::of(&a), Frame::of(&b));

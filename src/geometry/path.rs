@@ -52,18 +52,17 @@ pub struct TangentProjection {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Path {
     points: Vec<PathPoint>,
-    /// For places evenly spread from the beginning to the end, the segment that holds each: where to
-    /// begin to look for a station.
+    /// The segment that holds each of some evenly spread places: where the search for a station begins.
     cells: Vec<u32>,
     cells_per_m: f64,
-    /// What holds the segments from each multiple of [`BLOCK`] on.
+    /// The box around each run of [`BLOCK`] segments.
     blocks: Vec<Bounds>,
 }
 
-/// So many segments share their bounds: a projection looks only into blocks that can hold its answer.
+/// Number of segments that share a box: a projection looks only into boxes that can hold its answer.
 const BLOCK: usize = 16;
 
-/// An upright box.
+/// A box with its sides along the axes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Bounds {
     least: Vec2,
@@ -109,7 +108,7 @@ impl Path {
         if points.len() < 2 {
             return None;
         }
-        // As many as vertices: on average a cell is as long as a segment.
+        // As many cells as vertices, so that a cell is on average as long as a segment.
         let cells_per_m = points.len() as f64 / points[points.len() - 1].station_m;
         let mut segment = 0;
         let cells = (0..points.len()).map(|cell| {
@@ -162,7 +161,7 @@ impl Path {
         a.curvature_per_m + (b.curvature_per_m - a.curvature_per_m) * fraction
     }
 
-    /// The nearest point of the whole path. Of equals, the first.
+    /// The nearest point of the whole path; the first, if several are equally near.
     pub fn project(&self, point: Vec2) -> Projection {
         self.project_segments(point, 0, self.points.len() - 1)
     }
@@ -220,7 +219,7 @@ impl Path {
         let blocks = first / BLOCK..=(last - 1) / BLOCK;
         let within = |block: usize| (block * BLOCK).max(first)..((block + 1) * BLOCK).min(last);
         let bound = |block: usize| self.blocks[block].distance_m2_min(point);
-        // The least bound is a guess where the nearest point lies; its distance rules out most others.
+        // The nearest box is a guess: the distance to what is in it rules out most other boxes.
         let guess =
             blocks.clone().min_by(|a, b| bound(*a).total_cmp(&bound(*b))).expect("a path has segments");
         let reach_m2 = self.nearest(point, within(guess)).distance_m2;
@@ -242,7 +241,7 @@ impl Path {
         }
     }
 
-    /// The nearest point of some segments. Of equals, the first.
+    /// The nearest point of some segments; the first, if several are equally near.
     fn nearest(&self, point: Vec2, segments: core::ops::Range<usize>) -> Nearest {
         let mut best = Nearest { segment: segments.start, fraction: 0.0, distance_m2: f64::INFINITY };
         for segment in segments {
@@ -286,10 +285,10 @@ impl Path {
     }
 }
 
-/// A place on a path, and how far from it something is.
+/// The nearest point of a path, and its distance.
 struct Nearest {
     segment: usize,
-    /// Of the segment, in `[0, 1]`.
+    /// Part of the segment before the point, in `[0, 1]`.
     fraction: f64,
     distance_m2: f64,
 }

@@ -7,9 +7,9 @@ pub type Vec2 = nalgebra::Vector2<f64>;
 
 /// The unit vector that points along a heading (rad).
 ///
-/// Most of a tick's trigonometry is asked for here, of angles of a few turns at most. Sums of Taylor
-/// terms on an eighth of a turn to either side give it without `libm`'s care for huge angles, with the
-/// same bits on every machine, and within two units of the last digit.
+/// This is most of a tick's trigonometry, and its angles are a few turns at most. So it sums Taylor terms
+/// within an eighth of a turn of a multiple of a quarter turn, without `libm`'s care for huge angles. The
+/// bits are the same on every machine, and right within two units of the last digit.
 pub fn unit_vector(heading_rad: f64) -> Vec2 {
     if heading_rad.is_nan() || heading_rad.abs() > FEW_TURNS_RAD {
         let (sin, cos) = libm::sincos(heading_rad);
@@ -23,14 +23,14 @@ pub fn unit_vector(heading_rad: f64) -> Vec2 {
     if shifted.to_bits() & 2 == 0 { Vec2::new(x, y) } else { Vec2::new(-x, -y) }
 }
 
-/// Up to here the two parts of a quarter turn, times their number, lose nothing that matters.
+/// Up to this angle, subtracting whole quarter turns in two parts loses nothing that matters.
 const FEW_TURNS_RAD: f64 = 1000.0;
 
-/// 1.5 · 2⁵²: what is added to it is rounded to an integer, which then stands in its lowest bits.
+/// 1.5 · 2⁵²: a number that is added to it is rounded to an integer, which is then in the lowest bits.
 const TO_INTEGER: f64 = 6_755_399_441_055_744.0;
 
-/// π/2 to 26 bits, so that its products with small integers are exact; and the rest, with the 6.1e-17
-/// by which π/2 is more than its nearest `f64`.
+/// π/2 to 26 bits, so that its products with small integers are exact; and the rest of π/2, with the
+/// 6.1e-17 by which it exceeds the nearest `f64`.
 const QUARTER_HIGH_RAD: f64 = f64::from_bits(FRAC_PI_2.to_bits() & !0x7ff_ffff);
 const QUARTER_LOW_RAD: f64 = (FRAC_PI_2 - QUARTER_HIGH_RAD) + 6.123_233_995_736_766e-17;
 
@@ -65,7 +65,7 @@ fn short_cos(x: f64) -> f64 {
     1.0 - (square / 2.0 - square * square * TERMS.iter().fold(0.0, |sum, term| sum * square + term))
 }
 
-/// The same angle in `(-π, π]`.
+/// An angle, brought into `(-π, π]` by whole turns.
 pub fn wrap_angle(angle_rad: f64) -> f64 {
     if angle_rad > -PI && angle_rad <= PI {
         return angle_rad;

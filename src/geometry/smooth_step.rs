@@ -1,5 +1,5 @@
 //! The smooth step: from 0 to 1 with no slope and no bend at its ends, the quintic of least jerk. Lane
-//! changes, overtaken obstacles and merging lanes are shifted by it.
+//! changes, shifts past obstacles and merging lanes follow it.
 
 /// Largest slope, half way.
 pub const SMOOTH_STEP_SLOPE_MAX: f64 = 1.875;
@@ -7,7 +7,7 @@ pub const SMOOTH_STEP_SLOPE_MAX: f64 = 1.875;
 /// Largest second derivative, `10 / √3`.
 pub const SMOOTH_STEP_BEND_MAX: f64 = 5.773_502_691_896_258;
 
-/// A shift at a part of its length.
+/// How far a shift is, and how it bends, after a part of its length.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SmoothStep {
     /// Part of the shift that is done, in `[0, 1]`.
@@ -18,7 +18,7 @@ pub struct SmoothStep {
     pub bend: f64,
 }
 
-/// The smooth step at a part of its length; before 0 and beyond 1 it rests.
+/// The smooth step after a part of its length; before 0 and beyond 1 it is constant.
 pub fn smooth_step(part: f64) -> SmoothStep {
     let u = part.clamp(0.0, 1.0);
     let rest = u * (1.0 - u);

@@ -1,11 +1,11 @@
-//! Ambient traffic: vehicles that nobody commanded and that want nothing but to drive on.
+//! Ambient traffic: vehicles that no action commanded and that only drive on.
 //!
 //! An episode that asks for it keeps a number of them within [`AROUND_M`] of the ego vehicle. At the start
-//! they are there already; later ones appear on streets beyond what the ego vehicle's sensors reach,
-//! and leave once they are that far away and behind it, or far away. Where, what and how fast is drawn
-//! from a stream of their own, one index an attempt, so that commanded traffic draws what it would
-//! draw without them. They drive at 80 to 100 % of each lane's limit, keep their lane, turn as drawn,
-//! and keep the manners of `npc::manners` towards everybody, the ego vehicle included. They count
+//! they are there already. Later ones appear on streets beyond the range of the ego vehicle's sensors.
+//! They leave when they are well beyond that range behind it, or farther than [`AROUND_M`] away. Place,
+//! body, colour and speed are drawn from a stream of their own, with one index for each attempt, so that
+//! commanded traffic draws the same with and without them. They drive at 80 to 100 % of each lane's limit,
+//! keep their lane, turn as drawn, and yield (`npc::manners`) to the ego vehicle, too. They count
 //! neither towards the ten obstacles of the published package nor among `npc#1`, `npc#2`, …: their
 //! ids begin above [`COMMANDED_MAX`].
 
@@ -25,23 +25,23 @@ use super::way::Way;
 /// Ids up to this are of obstacles that an action made appear.
 pub(super) const COMMANDED_MAX: u32 = 1_000_000;
 
-/// Ticks between two looks whether somebody is missing: half a second.
+/// Ticks between two checks whether vehicles are missing: half a second.
 pub(super) const RENEWAL_TICKS: u64 = 25;
 
-/// They drive no farther from the ego vehicle than this, m.
+/// Ambient vehicles farther from the ego vehicle than this leave, m.
 const AROUND_M: f64 = 200.0;
-/// At the start of an episode nobody stands nearer to the ego vehicle, m: two seconds at 50 km/h and
-/// the way to brake.
+/// Least distance to the ego vehicle at the start of an episode, m: two seconds at 50 km/h and the way
+/// to brake.
 const START_ROOM_M: f64 = 45.0;
-/// Nobody appears nearer to another road user, m.
+/// Least gap between a newcomer and any other road user, m.
 const ROOM_M: f64 = 20.0;
-/// Nobody appears nearer to the end of a street, where a signal may be red, m: the way to brake from
-/// 50 km/h at 3 m/s², rounded down.
+/// Least distance of a newcomer to the end of a street, where a signal may be red, m: the way to brake
+/// from 50 km/h at 3 m/s², rounded down.
 const STREET_END_M: f64 = 30.0;
 /// Draws before an attempt is given up.
 const DRAWS_MAX: usize = 8;
 
-/// How many are wanted, and what has been drawn for them.
+/// How many vehicles are wanted, and how many attempts were made.
 #[derive(Debug, Clone)]
 pub(super) struct Ambient {
     wanted: u32,
@@ -63,7 +63,7 @@ impl Ambient {
         self.wanted
     }
 
-    /// One attempt at a newcomer; `begins` says that the ego vehicle has not seen anything yet.
+    /// One attempt at a newcomer. `begins`: before the first tick, when the ego vehicle has seen nothing.
     pub fn attempt(&mut self, around: &Around, begins: bool) -> Option<RoadUser> {
         let mut rng = rng::stream(around.seed, Stream::Ambient, self.attempts);
         self.attempts += 1;

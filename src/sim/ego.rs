@@ -30,9 +30,9 @@ pub struct VehicleParameters {
     pub wheelbase_m: f64,
     pub rear_axle_to_front_m: f64,
     pub rear_axle_to_back_m: f64,
-    /// Of the road wheels, rad.
+    /// Largest angle of the road wheels, rad.
     pub steer_rad_max: f64,
-    /// Of the road wheels, rad/s.
+    /// Fastest change of that angle, rad/s.
     pub steer_rate_radps_max: f64,
     pub acceleration_mps2_max: f64,
     /// Magnitude.
@@ -41,7 +41,7 @@ pub struct VehicleParameters {
     pub pedal_lag_s: f64,
     /// Time constant of the steering, s. Ours.
     pub steer_lag_s: f64,
-    /// Of four wheels at 530 kg each (Apollo `control_conf`), t.
+    /// Four wheels at 530 kg each (Apollo `control_conf`), t.
     pub mass_t: f64,
 }
 
@@ -88,15 +88,16 @@ const BRAKE: [(f64, f64); 6] =
 
 /// Acceleration (m/s², negative brakes) that pedals give on a dry road, by Apollo's calibration table.
 ///
-/// The published rows end at 10 m/s and hardly change with the speed, so their medians hold at any.
+/// The published rows end at 10 m/s and scarcely change with the speed, so their medians are used at every
+/// speed.
 pub fn pedal_acceleration_mps2(throttle_pct: f64, brake_pct: f64) -> f64 {
     read(&THROTTLE, throttle_pct) - read(&BRAKE, brake_pct)
 }
 
 /// The pedals `(throttle %, brake %)` that give an acceleration: the inverse of the table.
 ///
-/// As in Apollo, the pedal in use never rests inside its dead zone. Beyond the table's ends the
-/// pedal of its last row.
+/// As in Apollo, the pedal in use never rests inside its dead zone. Beyond the ends of the table it is
+/// the pedal of the last row.
 pub fn pedals_for(acceleration_mps2: f64) -> (f64, f64) {
     let invert = |table: &[(f64, f64)], wanted: f64| {
         let after = table.partition_point(|row| row.1 <= wanted).clamp(1, table.len() - 1);
@@ -131,7 +132,7 @@ pub(super) struct Ego {
 }
 
 impl Ego {
-    /// Rolling straight on at `speed_mps`, with the feet off the pedals.
+    /// Rolling straight on at `speed_mps`, with no pedal pressed.
     pub fn new(rear_axle: Pose, speed_mps: f64) -> Ego {
         let motion =
             EgoMotion { rear_axle, speed_mps, acceleration_mps2: 0.0, yaw_rate_radps: 0.0, steer_rad: 0.0 };

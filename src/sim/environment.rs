@@ -1,7 +1,7 @@
 //! Light, weather and grip: the **model card** of the physical world.
 //!
-//! Levels come from the language; the numbers behind them stand here, and here it says where those
-//! come from that stand elsewhere. "Ours" is said of what no source gives.
+//! Levels come from the language. The numbers behind them are in this file; for those that are in another
+//! file, the table names it. "Ours" marks what no source gives.
 //!
 //! | effect | model | source | where |
 //! |---|---|---|---|
@@ -10,7 +10,7 @@
 //! | wetness | 0.1, 0.5, 1.5 mm of water | ours, within the columns of the friction table | here |
 //! | water on the road | rain fills, drains with [`DRAIN_S`], dries with [`DRYING_MMPH`] | ours, from the rows of rain and wetness | here |
 //! | friction | new tyres at 50, 90, 130 km/h and 0, 0.2, 1, 2 mm | Bosch, Automotive Handbook; between its columns the mapping 0.1, 0.5, 1.5 mm to 0.70, 0.60, 0.52 is ours | here |
-//! | braking | min(brakes, μ·g), forces inside the friction circle | physics | `ego`, `mover` |
+//! | braking | min(brakes, μ·g), forces inside the friction circle | physics | `ego`, `around` |
 //! | light | 0.8, 1, 0.15 of a camera's light | ours: a low sun costs contrast, street lamps leave the range of low beams | here |
 //! | sight through fog and rain | R·e^(σR) = R₀, σ = 2.996 / MOR (Koschmieder) + 1.076·R^0.67 dB/km (Carbonneau) | as named | `ads::modular::perception` |
 //! | detection by class, position noise | ranges of LiDAR and camera for cars and pedestrians, noise per metre | `scenarios/ads/default.yaml` | `ads::modular::perception` |
@@ -19,8 +19,8 @@
 //! | line of sight | rays against outlines; low bodies hide the lower part | geometry | `sense` |
 //!
 //! The level that an action sets is where the water on the road begins; from then on it follows the rain.
-//! Left out: temperature, ice, wind, spray, drifting fog, glare, puddles that lie in places: the water
-//! is the same everywhere.
+//! Left out: temperature, ice, wind, spray, drifting fog, glare, and single puddles: the water is as deep
+//! everywhere.
 
 use crate::model::vocabulary::{Level, Phenomenon, TimeOfDay};
 
@@ -32,7 +32,7 @@ pub(super) const GRAVITY_MPS2: f64 = 9.80665;
 /// Light for Morning, Noon and Night, 1 at noon. Ours: a low sun costs a camera some contrast, and
 /// street lamps leave it the recognition range that low beams give (35 to 50 %) on few pixels.
 const LIGHT: [f64; 3] = [0.8, 1.0, 0.15];
-// The levels of the others are None, Light, Moderate, High.
+// The next three tables have an entry for each level: None, Light, Moderate, High.
 /// Rain, mm/h: bounds of light, moderate and violent rain (WMO).
 const RAIN_MMPH: [f64; 4] = [0.0, 2.5, 10.0, 50.0];
 /// Meteorological optical range, m: within the classes fog (< 1000), thick (< 200) and dense (< 50).
@@ -60,10 +60,11 @@ const FRICTION: [[f64; 7]; 3] = [
     [0.80, 0.70, 0.60, 0.4875, 0.30, 0.175, 0.05],
     [0.75, 0.65, 0.55, 0.41875, 0.20, 0.10, 0.0],
 ];
-/// Friction never falls below this: ice. A table that ends at 0 is of aquaplaning wheels, not of braking.
+/// Friction never falls below this, which is that of ice. The table's 0 is a wheel that floats on water,
+/// not a car that brakes.
 const FRICTION_MIN: f64 = 0.05;
 
-/// Time of day, the levels of the three phenomena, and the water that came of them.
+/// Time of day, the levels of the three phenomena, and the water on the road.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Environment {
     pub time: TimeOfDay,
@@ -71,20 +72,20 @@ pub(super) struct Environment {
     pub fog: Level,
     pub wetness: Level,
     water_mm: f64,
-    /// What that water leaves of the friction.
+    /// The friction on a road with that water.
     grip: Grip,
 }
 
 impl Environment {
-    /// A road as wet as the wetter of two levels makes it: an episode does not begin with the first
-    /// drop.
+    /// The road is as wet as the higher of the levels of rain and wetness: an episode does not begin with
+    /// the first drop.
     pub fn new(time: TimeOfDay, [rain, fog, wetness]: [Level; 3]) -> Environment {
         let water_mm = WATER_MM[wetness.max(rain) as usize];
         Environment { time, rain, fog, wetness, water_mm, grip: Grip::under(water_mm) }
     }
 
-    /// Makes it rain, foggy or wet from now on. Water comes at once, but no level takes it away: it drains
-    /// and dries (see [`Environment::pass`]).
+    /// Sets a level from now on. A level of wetness adds water at once, but none takes water away: it
+    /// drains and dries (see [`Environment::pass`]).
     pub fn set(&mut self, phenomenon: Phenomenon, level: Level) {
         match phenomenon {
             Phenomenon::Rain => self.rain = level,
@@ -129,7 +130,7 @@ impl Environment {
 }
 
 /// Friction of a tyre on a road with so much water: the table, linear between its entries and held
-/// beyond its ends. Everybody asks for it in every tick, at a speed of their own.
+/// beyond its ends. Every vehicle asks for it in every tick, at its own speed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Grip {
     /// At the speeds of the table's rows.

@@ -1,10 +1,10 @@
-//! The gap of the Intelligent Driver Model (Treiber, Hennecke and Helbing 2000), for all who follow.
+//! The gap of the Intelligent Driver Model (Treiber, Hennecke and Helbing 2000).
 //!
 //! Other drivers, the speed law of the modular driving system and the reference driver differ in their
 //! parameters and in what they do beyond comfort, each with its reason in its file; the wanted gap is
 //! the model's in all three.
 
-/// How somebody follows a leader.
+/// How a driver follows a leader.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Following {
     /// Gap at standstill, m.

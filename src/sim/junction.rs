@@ -3,8 +3,8 @@
 //!
 //! Made once for a map from its lanes alone. Where the way of another vehicle passes through the area,
 //! and when, is for the drivers to judge (see `manners`). Lanes that leave the same lane are no
-//! conflict: who is on them follows the one ahead. Stop and yield signs of a map are not obeyed, so nobody
-//! has a priority road; where signals differ, they decide before any of this.
+//! conflict: a vehicle on one of them follows the vehicle ahead. Stop and yield signs of a map are not
+//! obeyed, so no road has priority; where signals differ, they decide before any of this.
 
 use crate::geometry::{Path, PathPoint, Vec2, wrap_angle};
 use crate::road::{LaneIndex, RoadMap, Turn};
@@ -25,11 +25,11 @@ const ALONGSIDE_RAD_MAX: f64 = 30.0 * core::f64::consts::PI / 180.0;
 /// One lane's part of a conflict.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Area {
-    /// On the own lane, or on a way along it, m.
+    /// Its stretch of the own lane, or of a way along it, m.
     pub from_m: f64,
     pub to_m: f64,
     pub other: LaneIndex,
-    /// On the other lane, m.
+    /// Its stretch of the other lane, m.
     pub other_from_m: f64,
     pub other_to_m: f64,
     /// Whether traffic of the own lane goes before that of the other.
@@ -113,9 +113,9 @@ fn boxes_meet(a: &Path, b: &Path) -> bool {
 
 /// Whether `a` goes before `b`.
 ///
-/// Who turns left or round yields to who comes towards them; of others who comes from the right goes
-/// first (Vienna Convention, article 18; the same in Estonia and California). Where two come from the
-/// same side, who turns less goes first; of equals, the lane that the file names first.
+/// A vehicle that turns left or round yields to oncoming traffic; otherwise the vehicle from the right
+/// goes first (Vienna Convention, article 18; so in Estonia and California). Of two from the same side,
+/// the one that turns less goes first; if they turn alike, the lane that the file names first.
 fn goes_first(map: &RoadMap, a: LaneIndex, b: LaneIndex) -> bool {
     let approach_rad = |lane: LaneIndex| map.lane(lane).centre.points()[0].heading_rad;
     let angle_rad = wrap_angle(approach_rad(b) - approach_rad(a));

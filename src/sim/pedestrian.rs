@@ -1,18 +1,18 @@
 //! Pedestrians who cross the road: wait, walk straight over, stay a moment, leave.
 //!
-//! Waiting 1 s at the kerb and walking on whatever comes is the published package's pedestrian, and
-//! still the most frequent of four manners, drawn once from the pedestrian's own stream:
+//! The published package's pedestrian waits 1 s at the kerb and walks on, whatever comes. Here that is the
+//! most frequent of four manners, drawn once from the pedestrian's own stream:
 //!
 //! | share | manner | what it does |
 //! |---|---|---|
-//! | 55 % | steady | walks on at its pace, whoever comes |
+//! | 55 % | steady | walks on at its pace, whatever comes |
 //! | 15 % | hesitant | stays at the kerb while a vehicle would be there within 3 s, at most 3 s longer |
 //! | 15 % | startled | stops once, for 1 to 2 s, when a vehicle would reach it within 1.5 s |
-//! | 15 % | hurried | runs, at most 8 km/h (Euro NCAP's running adult), while one would within 3 s |
+//! | 15 % | hurried | runs, at most 8 km/h (Euro NCAP's running adult), while a vehicle would be there within 3 s |
 //!
-//! The shares and times are ours; no source counts them. All of them cross in the end, and nobody
-//! walks into the side of a vehicle: they wait before it, pass each other on the right, and leave after
-//! 10 s without a way on. One who is hit stops (see `mover`).
+//! The shares and times are ours; no source counts them. All pedestrians cross in the end, and none walks
+//! into the side of a vehicle: they wait before it, pass each other on the right, and leave after 10 s
+//! without a way on. A pedestrian who is hit stops (see `road_user`).
 
 use crate::geometry::{OrientedBox, Pose, Vec2, distance_m};
 use crate::rng;
@@ -29,23 +29,24 @@ const WAIT_S: f64 = 1.0;
 const STAY_S: f64 = 2.0;
 /// Running adult of Euro NCAP (8 km/h), m/s.
 const RUN_MPS_MAX: f64 = 8.0 / 3.6;
-/// Of the walking pace, when in a hurry. Ours.
+/// Factor of the walking pace in a hurry. Ours.
 const HURRY: f64 = 1.6;
-/// A vehicle that would be there sooner is close: for those at the kerb or in a hurry, s.
+/// A vehicle that would be there sooner is close, for pedestrians at the kerb or in a hurry, s.
 const CLOSE_S: f64 = 3.0;
-/// The same for those who are startled, s: perception and reaction of a driver take 1.15 s.
+/// A vehicle that would be there sooner startles, s: perception and reaction of a driver take 1.15 s.
 const STARTLE_S: f64 = 1.5;
-/// Beside its flank, a vehicle's way is so much wider for those who look at it, m.
+/// Width that pedestrians add to each side of a vehicle's way, m.
 const MARGIN_M: f64 = 1.0;
-/// How far before their feet they look for whoever stands there, m.
+/// How far before their feet pedestrians look for obstacles, m.
 const STEP_M: f64 = 0.6;
-/// Room that they leave to whatever that is, m.
+/// Room that they leave to such an obstacle, m.
 const ROOM_M: f64 = 0.25;
-/// From here on others on foot are passed, m, on the right and so far aside, m, at this speed, m/s.
+/// A pedestrian ahead within this distance is passed, m.
 const MEET_M: f64 = 3.0;
+/// How far to the right it is passed, m, and the speed of stepping aside, m/s.
 const ASIDE_M: f64 = 0.9;
 const ASIDE_MPS: f64 = 0.7;
-/// Who cannot go on for so long leaves, s.
+/// A pedestrian who cannot go on for so long leaves, s.
 const GIVE_UP_S: f64 = 10.0;
 
 /// What a pedestrian does when a vehicle comes near.
@@ -75,25 +76,25 @@ pub(super) struct Walker {
     way_m: f64,
     speed_mps: f64,
     manner: Manner,
-    /// How long a startled one stops, ticks; 0 once it has.
+    /// How long a startled pedestrian stops, ticks; 0 once it has stopped.
     startle_ticks: u32,
-    /// Done so far, m, and to the left of the straight line, m.
+    /// Way walked so far, m, and offset to the left of the straight line, m.
     walked_m: f64,
     aside_m: f64,
-    /// Pace and side that it wants, as of its last look.
+    /// Pace and offset that it wants since its last look.
     pace_mps: f64,
     wants_aside_m: f64,
-    /// Tick of the first step, moved on by whatever holds it back.
+    /// Tick of the first step; later while a vehicle holds it back.
     begins_tick: u64,
     /// Latest tick of the first step.
     begins_tick_max: u64,
-    /// Ticks without a way on, and at the other side.
+    /// Ticks without a way on, and ticks spent on the other side.
     stuck_ticks: u32,
     stayed_ticks: u32,
 }
 
 impl Walker {
-    /// Somebody who is to walk `way_m` ahead from a pose; the manner is drawn.
+    /// A pedestrian who is to walk `way_m` ahead from a pose; the manner is drawn.
     pub fn new(from: Pose, way_m: f64, speed_mps: f64, spawn_tick: u64, rng: &mut Rng) -> Walker {
         let begins_tick = spawn_tick + ticks(WAIT_S);
         let manner = Manner::draw(rng);
@@ -161,7 +162,7 @@ impl Walker {
         sink(self.manner as u64);
     }
 
-    /// Ten times a second: who comes, who is in the way, and what to do about it.
+    /// Looks, ten times a second, for vehicles that come and for what is in the way, and sets the pace.
     fn look(&mut self, this: &Obstacle, around: &Around) {
         let waits = around.tick < self.begins_tick && self.walked_m == 0.0;
         let soonest_s = soonest_s(&this.outline, around);
@@ -196,7 +197,7 @@ impl Walker {
         })
     }
 
-    /// Whether somebody else on foot is ahead on about the same line.
+    /// Whether another pedestrian is ahead on about the same line.
     fn meets_pedestrian(&self, around: &Around) -> bool {
         around.obstacles().filter(|other| !other.body.is_vehicle()).any(|other| {
             let there = self.from.to_local(other.outline.pose.position);
@@ -205,7 +206,7 @@ impl Walker {
     }
 }
 
-/// Time until the first vehicle would reach an outline if all go on as they do, s.
+/// Time until the first vehicle would reach an outline if all vehicles keep their velocity, s.
 fn soonest_s(outline: &OrientedBox, around: &Around) -> f64 {
     around.vehicles().fold(f64::INFINITY, |soonest_s, (vehicle, velocity_mps)| {
         soonest_s.min(arrival_s(outline, vehicle, velocity_mps))

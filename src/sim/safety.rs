@@ -16,10 +16,10 @@ const REACTION_S: f64 = 0.75;
 const BRAKING_MPS2: f64 = 0.774 * GRAVITY_MPS2;
 const JERK_MPS3: f64 = 12.65;
 
-/// Gap that closes until a careful driver has slowed down to whoever is ahead, m; 0 if it opens.
+/// Gap that closes until a careful driver is no faster than a road user ahead, m; 0 if the gap opens.
 ///
-/// `ahead_mps` is the speed of the one ahead along the heading of the driver; crossing and oncoming
-/// ones count as 0, which is to brake to rest.
+/// `ahead_mps` is the speed of the road user ahead along the heading of the driver. Crossing and oncoming
+/// road users count as 0: the driver brakes to rest.
 pub(super) fn behind_leader_m(own_mps: f64, ahead_mps: f64, friction: f64) -> f64 {
     let closing_mps = (own_mps - ahead_mps.max(0.0)).max(0.0);
     let braking_mps2 = BRAKING_MPS2.min(friction * GRAVITY_MPS2);
@@ -36,8 +36,8 @@ pub(super) fn behind_leader_m(own_mps: f64, ahead_mps: f64, friction: f64) -> f6
     reaction_m + build_up_m + left_mps * left_mps / (2.0 * braking_mps2)
 }
 
-/// Gap to somebody who comes towards a careful driver at `towards_mps`: until the driver is at rest,
-/// both come nearer, m.
+/// Gap that closes until a careful driver is at rest, while an oncoming vehicle keeps its speed
+/// `towards_mps`, m.
 pub(super) fn oncoming_m(own_mps: f64, towards_mps: f64, friction: f64) -> f64 {
     let braking_mps2 = BRAKING_MPS2.min(friction * GRAVITY_MPS2);
     let build_up_s = braking_mps2 / JERK_MPS3;
@@ -51,13 +51,13 @@ pub(super) fn oncoming_m(own_mps: f64, towards_mps: f64, friction: f64) -> f64 {
     behind_leader_m(own_mps, 0.0, friction) + towards_mps.max(0.0) * stopping_s
 }
 
-/// Way of a driver until they have perceived and reacted to what they see appear, m.
+/// Way that a driver goes while perceiving and reacting to what appears, m.
 pub(super) fn noticing_m(own_mps: f64) -> f64 {
     own_mps.max(0.0) * (PERCEPTION_S + REACTION_S)
 }
 
-/// Gap that somebody from behind needs to slow down to the ego vehicle, m; 0 if they are no faster.
-/// They chose to come near, so no time goes into perceiving it.
+/// Gap that a vehicle from behind needs to slow down to the ego vehicle, m; 0 if it is no faster. Its
+/// driver chose to come near, so no time goes into perceiving.
 pub(super) fn from_behind_m(behind_mps: f64, ego_mps: f64, braking_mps2: f64) -> f64 {
     let closing_mps = (behind_mps - ego_mps).max(0.0);
     closing_mps * REACTION_S + closing_mps * closing_mps / (2.0 * braking_mps2)

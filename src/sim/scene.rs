@@ -15,7 +15,7 @@ pub struct Scene {
     pub route: Route,
     areas: ConflictAreas,
     ways: Ways,
-    /// Lanes outside junctions, each with the length of all up to its end, m.
+    /// Lanes outside junctions, each with the sum of the lengths up to its end, m.
     streets: Vec<(LaneIndex, f64)>,
 }
 
@@ -30,7 +30,7 @@ impl Scene {
         Scene { areas: ConflictAreas::new(&map), ways: Ways::default(), streets, map, route }
     }
 
-    /// The place at a fraction of all streets laid end to end: every metre is as likely as any other.
+    /// The place at a fraction of all streets laid end to end, so that every metre is equally likely.
     pub(super) fn street_at(&self, fraction: f64) -> Option<(LaneIndex, f64)> {
         let at_m = fraction * self.streets.last()?.1;
         let index = self.streets.partition_point(|street| street.1 <= at_m).min(self.streets.len() - 1);

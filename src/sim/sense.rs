@@ -1,5 +1,5 @@
-//! What reaches the ego vehicle's sensors: the truth, cut down to what is in range. Of each object it
-//! is told how much is in sight; nothing is left out for being hidden.
+//! What reaches the ego vehicle's sensors: the truth, cut down to what is in range. Hidden objects are
+//! not left out: each object says how much of it is in sight.
 //!
 //! This is the physical side of sensing (line of sight, light, weather). What a driving system makes
 //! of it, with its errors and delays, is `ads`.
@@ -13,14 +13,14 @@ use super::road_user::Obstacle;
 /// LiDAR and the camera that driving systems are given.
 pub(super) const RANGE_M: f64 = 120.0;
 
-/// Ticks between two frames: lines of sight are looked at, driving systems perceive and other drivers
-/// react at 10 Hz.
+/// Ticks between two frames (10 Hz): once a frame, lines of sight are worked out, driving systems perceive
+/// and other drivers react.
 pub const FRAME_TICKS: u64 = 5;
 
 /// Points of an outline to which a line of sight is tried.
 const RAYS: usize = 8;
 
-/// One look around, made anew for every tick in which the driving system asks.
+/// What the sensors give in one tick.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sensed {
     /// Since the start of the episode, s.
@@ -47,7 +47,7 @@ pub struct EgoMotion {
 /// A road user within sensor range, as it truly is.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SensedObject {
-    /// The same for the whole life of the object, from 1.
+    /// From 1; it stays the same for the whole life of the object.
     pub id: u32,
     pub body: Body,
     /// Centre of the outline.
@@ -86,8 +86,8 @@ pub enum SignalColour {
 
 /// Part of an obstacle's outline that can be seen from a point, in `[0, 1]`.
 ///
-/// Lines of sight run to points spread evenly over its width as seen from `eye`. One that meets a
-/// lower body still shows what rises above that, so a car does not hide a bus wholly. Buildings and
+/// Lines of sight run to points spread evenly over its width as seen from `eye`. A line that meets a
+/// lower body still shows what rises above that body, so a car does not hide a bus wholly. Buildings and
 /// the ego vehicle itself hide nothing.
 pub(super) fn visible_fraction<'a>(
     eye: Vec2,

@@ -17,7 +17,7 @@ const GREEN_TICKS: u64 = (GREEN_S / DT_S + 0.5) as u64;
 const YELLOW_TICKS: u64 = (YELLOW_S / DT_S + 0.5) as u64;
 const SLOT_TICKS: u64 = GREEN_TICKS + YELLOW_TICKS + (ALL_RED_S / DT_S + 0.5) as u64;
 
-/// After so long every cycle of up to 16 groups begins anew, s: 720 720 is divisible by 1, 2, … 16.
+/// Time after which every cycle of up to 16 groups begins anew, s: 720 720 is divisible by 1, 2, … 16.
 const REPEAT_S: f64 = 720_720.0 * (GREEN_S + YELLOW_S + ALL_RED_S);
 
 /// Where in its cycle every signal stands at tick 0.
@@ -27,7 +27,7 @@ pub(super) struct SignalClock {
 }
 
 impl SignalClock {
-    /// A clock that is `phase_s` into the cycle; negative phases and such as are no number count as 0.
+    /// A clock that is `phase_s` into the cycle; a phase that is negative or not finite counts as 0.
     pub fn new(phase_s: f64) -> SignalClock {
         SignalClock { offset_ticks: (phase_s.max(0.0) % REPEAT_S / DT_S + 0.5) as u64 }
     }

@@ -15,20 +15,21 @@ use super::scene::Scene;
 /// Lateral acceleration that other drivers accept in a bend, m/s²: upper end of comfort.
 const LATERAL_MPS2: f64 = 3.0;
 
-/// Deceleration with which they slow down for it, m/s².
+/// Deceleration with which other drivers slow down for a bend, m/s².
 const BEND_BRAKING_MPS2: f64 = 2.0;
 
 /// A way reaches at least this far beyond the lanes it was asked for, if the road does, m.
 const REACH_M: f64 = 400.0;
 
-/// So many ways are kept for a map, of some 30 kB each.
+/// Number of ways that are kept for a map; each takes some 30 kB.
 const WAYS_MAX: usize = 256;
 
+/// A chain of lanes as a vehicle follows it.
 #[derive(Debug, Clone)]
 pub(super) struct Way {
     pub path: Path,
     lanes: Vec<WayLane>,
-    /// A bit for each lane's index modulo 64: most lanes are not on the way, and this says so at once.
+    /// One bit for each lane of the way, its index modulo 64: tells quickly of most lanes that they are not on the way.
     lane_bits: u64,
     /// By rising station.
     pub stop_lines: Vec<RouteStopLine>,
@@ -40,7 +41,7 @@ pub(super) struct Way {
     open: bool,
 }
 
-/// Lanes that begin farther ahead than this matter to nobody yet, m.
+/// Lanes that begin farther ahead than this do not matter yet, m.
 const AHEAD_M: f64 = 150.0;
 
 #[derive(Debug, Clone, Copy)]
@@ -121,7 +122,7 @@ impl Way {
         self.lanes.iter().find(|part| part.lane == lane).map(|part| part.from_m)
     }
 
-    /// Station at which a lane begins that is not left at `rear_m`, if the way still takes it.
+    /// Station at which a lane begins, if the way takes it and a rear at `rear_m` has not left it yet.
     pub fn lane_ahead_m(&self, lane: LaneIndex, rear_m: f64) -> Option<f64> {
         if self.lane_bits & lane_bit(lane) == 0 {
             return None;
@@ -146,7 +147,7 @@ impl Way {
         self.open && self.path.length_m() - station_m < REACH_M / 2.0
     }
 
-    /// The same way from the lane at `station_m` on, but longer; and that station on it.
+    /// A longer way that begins with the lane at `station_m`, and that station on the new way.
     pub fn prolonged(&self, scene: &Scene, station_m: f64, rng: &mut Rng) -> Option<(Arc<Way>, f64)> {
         let (here, lane_station_m) = self.lane_at(station_m);
         let first = self.lanes.iter().rposition(|part| part.lane == here && part.from_m <= station_m)?;
@@ -155,14 +156,14 @@ impl Way {
     }
 }
 
-/// The ways that somebody on a map has taken, by their lanes. Every row makes its ways anew at every step;
-/// few of them differ.
+/// The ways that were asked for on a map so far, by their lanes. Every row asks for its ways at every
+/// step, and few of them differ.
 #[derive(Debug, Default)]
 pub(super) struct Ways(Mutex<BTreeMap<Vec<LaneIndex>, Arc<Way>>>);
 
 impl Ways {
     fn through(&self, scene: &Scene, chain: Vec<LaneIndex>) -> Option<Arc<Way>> {
-        // A thread that panicked while it held the lock left whole ways behind.
+        // Even if a thread panicked while it held the lock, the ways in here are whole.
         let mut known = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(way) = known.get(&chain) {
             return Some(Arc::clone(way));

@@ -46,7 +46,7 @@ pub struct Start {
     pub rain: Level,
     pub fog: Level,
     pub wetness: Level,
-    /// Where in their cycle the signals begin, s.
+    /// Time in the signals' cycle at which the episode begins, s.
     pub signal_phase_s: f64,
     /// Seed of the choices of other road users.
     pub seed: u64,

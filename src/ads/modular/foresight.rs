@@ -1,8 +1,8 @@
 //! The recorded future of other road users, for a prediction without error.
 //!
-//! Whoever looks for causes replays an episode, records where everybody was, and replays it again with
-//! a driving system that knows. Others react to the ego vehicle, so what they do next to another drive
-//! may differ from the recording: it is right up to the first difference that matters.
+//! To find a cause, an episode is replayed, every obstacle's positions are recorded, and it is replayed
+//! again with a driving system that knows the recording. Obstacles react to the ego vehicle, so if it
+//! drives otherwise, they may leave the recorded way: it is right up to the first difference that matters.
 
 use crate::geometry::Vec2;
 use crate::sim::{FRAME_TICKS, Obstacle};
@@ -23,7 +23,7 @@ struct Course {
 }
 
 impl Foresight {
-    /// Notes where everybody is; to be called after every tick, with its number.
+    /// Notes where every obstacle is; to be called after every tick, with its number.
     pub fn record<'a>(&mut self, tick: u64, obstacles: impl Iterator<Item = &'a Obstacle>) {
         if !tick.is_multiple_of(FRAME_TICKS) {
             return;
@@ -33,7 +33,7 @@ impl Foresight {
         }
     }
 
-    /// Notes where one is in a frame; frames of one follow each other without a gap.
+    /// Notes where an obstacle is in a frame; its frames follow each other without a gap.
     pub(super) fn note(&mut self, id: u32, frame: u64, position: Vec2) {
         match self.courses.iter_mut().find(|course| course.id == id) {
             Some(course) => course.positions.push(position),
@@ -45,7 +45,7 @@ impl Foresight {
     }
 
     /// Writes the future of one obstacle, every `step_s` from `time_s`, as displacements from `position`.
-    /// `false` if nothing is recorded of that moment.
+    /// `false` if the recording does not hold that moment.
     pub fn positions(
         &self,
         id: u32,

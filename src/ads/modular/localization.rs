@@ -13,7 +13,7 @@ use crate::sim::{DT_S, Sensed};
 
 use super::config::LocalizationConfig;
 
-/// Rain at which the full factor holds, mm/h, and water on the road, mm.
+/// Rain, mm/h, or water on the road, mm, from which on the full factor holds.
 const RAIN_HIGH_MMPH: f64 = 50.0;
 const WATER_HIGH_MM: f64 = 1.5;
 
@@ -26,7 +26,7 @@ pub struct Localization {
     /// Part of an error that survives a tick, and the size of the draw that replaces the rest.
     keep: f64,
     renew: f64,
-    /// Factor of the position error that holds now; it comes to a new one no faster than the error itself.
+    /// Factor of the position error that holds now; it changes no faster than the error itself.
     spread: Option<f64>,
 }
 

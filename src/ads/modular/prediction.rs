@@ -57,7 +57,7 @@ pub struct Forecast {
     pub positions: [Vec2; STEPS + 1],
 }
 
-/// What is remembered of a vehicle from frame to frame.
+/// What prediction remembers of a vehicle from frame to frame.
 #[derive(Debug, Clone)]
 struct Memory {
     id: u32,
@@ -157,7 +157,7 @@ impl Memory {
             map.nearest(position, heading_rad, LANE_REACH_M)
                 .filter(|place| aligned(config, map, *place, heading_rad))
         });
-        // Offsets from two different lanes make no difference.
+        // Offsets from two different lanes cannot be subtracted.
         if let (Some(old), Some(new)) = (before, kept) {
             let measured_mps = (new.offset_m - old.offset_m) / FRAME_S;
             self.lateral_mps += LATERAL_GAIN * (measured_mps - self.lateral_mps);
@@ -190,7 +190,7 @@ fn aligned(config: &PredictionConfig, map: &RoadMap, place: LanePlace, heading_r
     wrap_angle(heading_rad - lane_rad).abs() <= config.off_lane_rad
 }
 
-/// The successor at whose end the heading has changed least. Of equals, the first.
+/// The successor at whose end the heading has changed least; of several that are equal, the first.
 fn straightest_successor(map: &RoadMap, lane: LaneIndex) -> Option<LaneIndex> {
     let end_rad = |lane: LaneIndex| {
         let points = map.lane(lane).centre.points();
@@ -306,7 +306,7 @@ mod tests {
     }
 
     #[test]
-    fn a_frozen_prediction_keeps_everybody_where_he_is() {
+    fn a_frozen_prediction_keeps_every_object_where_it_is() {
         let config = PredictionConfig { frozen: true, ..PredictionConfig::default() };
         let mut prediction = Prediction::new(&config, true, &winding(), None);
         let at = Pose::new(20.0, -1.75, 0.0);

@@ -44,7 +44,7 @@ impl Modular {
         Modular::with_foresight(scene, config, seed, None)
     }
 
-    /// The same, with a recording of the future for a perfect prediction.
+    /// As [`Modular::new`], with a recording of the future for a perfect prediction.
     pub fn with_foresight(
         scene: &Arc<Scene>,
         config: &ModularConfig,
@@ -116,7 +116,7 @@ impl Modular {
         self.status.planned.clear();
         self.status.planned.extend(self.planner.trajectory().points.iter().map(|point| {
             let (on_guide, aside) = (guide.pose_at(point.station_m), lateral.aside(point.station_m));
-            // Most plans are not beside the guide, and to be so takes trigonometry.
+            // Most plans lie on the guide, and a place beside it takes trigonometry.
             let pose = if aside.offset_m == 0.0 { on_guide } else { on_guide.offset(0.0, aside.offset_m) };
             PlannedPoint { pose, speed_mps: point.speed_mps }
         }));

@@ -75,7 +75,7 @@ fn it_gives_way_to_a_pedestrian_and_goes_on() {
     }
 }
 
-/// The default with one weakness, or none, of those that the closure switches.
+/// The default settings with the changes that the closure makes.
 fn config(change: impl Fn(&mut ModularConfig)) -> ModularConfig {
     let mut config = ModularConfig::default();
     change(&mut config);
@@ -276,7 +276,7 @@ fn it_changes_lanes_where_the_gap_is_safe() {
     let y_m = free.sensed.ego.rear_axle.position.y;
     assert!(changed && (y_m + 1.75).abs() < 0.3, "{y_m}");
 
-    // Somebody faster comes from behind: first he, then the change.
+    // A faster car comes from behind: first it passes, then the lane change begins.
     let mut passed = changing(300.0);
     passed.sensed.objects.push(object(1, Body::Sedan, Pose::new(-15.0, -1.75, 0.0), 13.0));
     passed.run(1.0);

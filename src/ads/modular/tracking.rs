@@ -12,11 +12,11 @@ use crate::model::vocabulary::Body;
 use super::config::TrackingConfig;
 use super::perception::{Detection, FRAME_S};
 
-/// Standard deviation of a velocity nobody has measured yet, m/s.
+/// Standard deviation of a velocity that is not measured yet, m/s.
 const UNKNOWN_VELOCITY_MPS: f64 = 10.0;
 /// Part of a new heading that the track takes over in a frame.
 const HEADING_GAIN: f64 = 0.4;
-/// So long a perfect tracker remembers what it saw, s.
+/// How long a perfect tracker remembers what it saw, s.
 const PERFECT_RESERVE_S: f64 = 5.0;
 
 #[derive(Debug, Clone)]
@@ -34,7 +34,7 @@ pub struct Tracking {
 pub struct Track {
     pub id: u32,
     pub body: Body,
-    /// Centre of the whole object; of a part that is taken for the whole, see [`Track::centre`].
+    /// Centre of the whole object. For the centre of a part that is taken for the whole, see [`Track::centre`].
     position: Vec2,
     pub velocity_mps: Vec2,
     pub heading_rad: f64,
@@ -49,7 +49,7 @@ pub struct Track {
     unseen_s: f64,
 }
 
-/// Of position and velocity, the same along both axes.
+/// Covariance of position and velocity, alike along both axes.
 #[derive(Debug, Clone, Copy)]
 struct Covariance {
     position: f64,
@@ -112,7 +112,7 @@ impl Tracking {
         self.published.push_back(newest);
     }
 
-    /// Tracks fit for use, by age: those of some frames ago.
+    /// The tracks that are used now: those of `latency_frames` ago.
     pub fn published(&self) -> &[Track] {
         match self.published.len() > self.latency_frames {
             true => &self.published[0],
@@ -120,7 +120,7 @@ impl Tracking {
         }
     }
 
-    /// How old they are, s.
+    /// Age of the tracks that are used now, s.
     pub fn age_s(&self) -> f64 {
         self.latency_frames as f64 * FRAME_S
     }

@@ -4,11 +4,11 @@
 //! lane by more than drivers wander (0.375 m) is evaluated for 0.4 s; 0.75 s later the foot is on the
 //! brake, which reaches 0.774 g within 0.6 s (jerk 12.65 m/s³); meanwhile the released accelerator
 //! gives 0.4 m/s². It is critical at a time to collision of at most 2 s, and a vehicle ahead that
-//! brakes hardly, or that a cut-out has uncovered, at a time headway below 2 s.
+//! brakes hard, or that a cut-out has uncovered, at a time headway below 2 s.
 //!
-//! Beyond the model, which knows vehicles of the ego vehicle's direction only: whoever will be on the
-//! way when the ego vehicle comes there is critical at the same 2 s, from wherever they come. Left
-//! out is the automatic emergency brake that one published implementation adds to the human.
+//! The model knows vehicles of the ego vehicle's direction only. Beyond it, a road user that will be on
+//! the way when the ego vehicle comes there is critical at 2 s, too, from whatever side it comes. Left out
+//! is the automatic emergency brake that one published implementation adds to the human.
 
 use super::encounter::Encounter;
 use super::model::Model;
@@ -23,7 +23,7 @@ const CRITICAL_S: f64 = 2.0;
 const LEADER_MPS2: f64 = 5.0;
 /// Deceleration of the hardest braking, m/s².
 const BRAKING_MPS2: f64 = 0.774 * GRAVITY_MPS2;
-/// Within this of its course somebody merely wanders, m.
+/// A vehicle within this distance of its course merely wanders, m.
 const WANDER_M: f64 = 0.375;
 
 /// The driver, by when a cut-in is noticed: implementations read the regulation in two ways.

@@ -5,8 +5,8 @@
 //! harder than is comfortable. Whatever is harder is the model's reaction to a risk.
 //!
 //! A reference driver is the judge's careful driver: what is in its line of sight, and near enough for
-//! the fog, it knows as it truly is. Darkness and rain do not blind it, nobody behind it concerns it,
-//! and it does not swerve: the published models brake.
+//! the fog, it knows as it truly is. Darkness and rain do not blind it, it ignores traffic behind it, and
+//! it does not swerve: the published models brake.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
@@ -24,15 +24,15 @@ use super::reflex::Reflex;
 /// Comfortable deceleration for other road users, m/s² (IDM's, and of the same size as what passengers
 /// call comfortable).
 const COMFORTABLE_MPS2: f64 = 3.0;
-/// Part of somebody's outline that must be in sight to be recognised. Ours.
+/// Part of an outline that must be in sight for the road user to be recognised. Ours.
 const SEEN_PART_MIN: f64 = 0.25;
 /// Slower than this towards the way is no movement towards it, m/s.
 const TOWARDS_MPS_MIN: f64 = 0.05;
 /// One look, s.
 const FRAME_S: f64 = FRAME_TICKS as f64 * DT_S;
 
-/// Whether careful eyes see somebody: enough of the outline is in the line of sight, and no farther
-/// away than the fog lets see.
+/// Whether a careful driver sees an object: enough of its outline is in the line of sight, and it is no
+/// farther away than one can see in the fog.
 pub fn in_sight(object: &SensedObject, conditions: &Conditions) -> bool {
     object.visible_fraction >= SEEN_PART_MIN && object.distance_m <= conditions.visibility_m
 }
@@ -43,7 +43,7 @@ pub struct Reference<M> {
     route: Idm,
     model: M,
     reflex: Reflex,
-    /// What the model demands since the last look, and because of whom.
+    /// What the model demands since the last look, m/s², and the id of the object that is the reason.
     demand: Option<(f64, u32)>,
     /// What was in sight at the last looks, the newest last.
     looks: VecDeque<Vec<SensedObject>>,
@@ -77,7 +77,7 @@ impl<M: Model> Reference<M> {
         }
     }
 
-    /// Looks at everybody in sight: what the model demands, and what the route's driver learns.
+    /// Looks at every object in sight: sets what the model demands and what the route's driver learns.
     fn look(&mut self, sensed: &Sensed, station_m: f64) {
         let mut seen = match self.looks.len() > self.delay_frames() {
             true => self.looks.pop_front().unwrap_or_default(),
@@ -103,7 +103,7 @@ impl<M: Model> Reference<M> {
         self.looks.push_back(seen);
     }
 
-    /// Looks between seeing something and doing something about it.
+    /// Number of looks between seeing an object and reacting to it.
     fn delay_frames(&self) -> usize {
         (self.model.braking().reaction_s / FRAME_S).ceil() as usize
     }
@@ -128,7 +128,7 @@ impl<M: Model> Reference<M> {
     }
 }
 
-/// Completes an encounter by what was seen of it before; what to remember of it now.
+/// Completes an encounter by what was seen of it before; returns what to remember of it now.
 fn remember(before: Option<&Watched>, encounter: &mut Encounter) -> Watched {
     if let Some(before) = before {
         encounter.other_mps2 = (encounter.other_mps - before.other_mps) / FRAME_S;

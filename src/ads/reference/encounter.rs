@@ -1,10 +1,10 @@
 //! An encounter: one road user as the published models of careful driving see it, in the frame of the
 //! ego vehicle's way.
 //!
-//! The models know a straight road with a gap along and a gap across it. This is what those become
-//! beside a route: the road user's outline is projected onto it, and its motion is taken to go on
-//! straight at constant speed. `meeting_s` is ours: it carries the models' time to collision over to
-//! road users that cross or come towards.
+//! The models know a straight road with a gap along and a gap across it. Here both are measured beside a
+//! route: the road user's outline is projected onto it, and its motion is taken to go on straight at
+//! constant speed. `meeting_s` is ours: it extends the models' time to collision to road users that cross
+//! or come towards the ego vehicle.
 
 use crate::ads::guide::Guide;
 use crate::geometry::{Vec2, unit_vector};
@@ -20,9 +20,9 @@ const CROSSING_PART: f64 = 0.5;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Encounter {
     pub id: u32,
-    /// From the ego vehicle's front to the near end of the other along the way, m; negative beside.
+    /// From the ego vehicle's front to the near end of the road user along the way, m; negative beside.
     pub gap_m: f64,
-    /// Between the flanks across the way, m; not positive where the outlines overlap.
+    /// Gap between the flanks across the way, m; 0 or negative where the outlines overlap.
     pub side_gap_m: f64,
     /// Speed at which the side gap closes, m/s; negative if it opens.
     pub towards_mps: f64,
@@ -45,7 +45,7 @@ pub struct Encounter {
 
 impl Encounter {
     /// How a road user seen now stands to an ego vehicle whose front is at `front_m` of the route.
-    /// `None` if the ego vehicle is past it. What takes memory (`other_mps2`, `aside_m`) is left at 0.
+    /// `None` if the ego vehicle is past it. What needs earlier looks (`other_mps2`, `aside_m`) is left at 0.
     pub(super) fn seen(
         guide: &Guide,
         object: &SensedObject,
@@ -109,7 +109,7 @@ impl Encounter {
         if self.own_mps > 0.0 { self.gap_m.max(0.0) / self.own_mps } else { f64::INFINITY }
     }
 
-    /// Whether the models' gap along the way says nothing: the other is beside or behind the front.
+    /// Whether the models' gap along the way says nothing, because the other is beside or behind the front.
     pub fn is_beside(&self) -> bool {
         self.gap_m + self.lengths_m / 2.0 < 0.0
     }

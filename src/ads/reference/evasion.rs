@@ -1,9 +1,9 @@
 //! Evasive manoeuvres: from the first moment one pedal and one place beside the route, whatever
 //! happens. The best of them bounds what any driver could have done.
 //!
-//! They are tried out against a recording, so they need no eyes. The wheel is in the hands of the
-//! common lateral controller, which is quick but not the quickest that tyres allow; a collision that
-//! none of them avoids could still be avoided by a stunt.
+//! They are tried out against a recording, so they perceive nothing. The common lateral controller steers,
+//! which is quick but not as quick as the tyres allow; a collision that none of them avoids could still be
+//! avoided by a stunt.
 
 use std::sync::Arc;
 

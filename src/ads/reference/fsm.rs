@@ -2,9 +2,9 @@
 //!
 //! Mattas and others 2020 (Accident Analysis & Prevention 148, 105794) and 2022: a proactive and a
 //! critical surrogate, PFS and CFS, each from 0 (safe) to 1 (unsafe), linear between two distances.
-//! Performance model 2 of UN R157's 01 series. The surrogates know leaders; one who crosses counts by
-//! its speed along the way, and one who comes towards as standing where both would meet after the time
-//! that stopping takes: those two are ours.
+//! Performance model 2 of UN R157's 01 series. The surrogates know leaders. Two extensions are ours: a
+//! crossing road user counts by its speed along the way, and an oncoming one as standing where both would
+//! meet after the time that stopping takes.
 
 use super::encounter::Encounter;
 use super::model::Model;
@@ -21,7 +21,7 @@ pub struct FuzzySafety {
     pub leader_mps2: f64,
     /// Distance at rest, m.
     pub margin_m: f64,
-    /// Added to the safe distance, m.
+    /// Margin that is added to the safe distance, m.
     pub safe_margin_m: f64,
 }
 
@@ -57,7 +57,7 @@ impl FuzzySafety {
         let closing_mps = rear_mps - leader_mps;
         let after_mps = closing_mps + rear_mps2 * self.reaction_s;
         if after_mps < 0.0 {
-            // Slower than the leader before the reaction is over, so it does brake.
+            // It is slower than the leader before the reaction is over, because it brakes already.
             let closed_m = closing_mps * closing_mps / (2.0 * rear_mps2.abs());
             return if gap_m < closed_m { 1.0 } else { 0.0 };
         }
@@ -109,7 +109,7 @@ impl Model for FuzzySafety {
     }
 }
 
-/// Whether somebody is on the way, or comes onto it before the ego vehicle has passed: the model's
+/// Whether a road user is on the way, or comes onto it before the ego vehicle has passed: the model's
 /// lateral gate, with its tolerance of 0.1 s.
 fn comes_in_time(encounter: &Encounter) -> bool {
     if encounter.side_gap_m <= 0.0 {

@@ -1,13 +1,13 @@
 //! The intelligent driver model (Treiber, Hennecke, Helbing 2000) on the route, with true knowledge.
 //!
 //! It sees everything within 120 m, hidden or not, looking around ten times a second. Around the
-//! model stand three rules of our own: it stops at red and yellow lights where it can, brakes for
-//! what is on its way, and lets pass whoever would cross its way at nearly the same time. Predictions
-//! are straight lines at constant speed.
+//! model stand three rules of our own: it stops at red and yellow lights where it can, brakes for what is
+//! on its way, and gives way to what would cross its way at nearly the same time. Predictions are straight
+//! lines at constant speed.
 //!
-//! Lane changes of the route it begins once nobody in the target lane would have to brake hard for it,
-//! nor it for them (the safety criterion of MOBIL: Kesting, Treiber, Helbing 2007); until then it stays
-//! in its lane and stops where a short change is just possible.
+//! It begins a lane change of the route once no vehicle in the target lane would have to brake hard for
+//! it, nor it for them (the safety criterion of MOBIL: Kesting, Treiber, Helbing 2007); until then it
+//! stays in its lane and stops where a short change is just possible.
 
 use std::sync::Arc;
 
@@ -40,16 +40,16 @@ const LOOK_AHEAD_S: f64 = 6.0;
 const LOOK_STEP_S: f64 = 0.25;
 /// Least difference of the times at which two road users pass one place, s.
 const CONFLICT_S: f64 = 1.0;
-/// Gap from the front bumper to a stop line, and to the way of somebody who crosses, m.
+/// Gap from the front bumper to a stop line, and to the way of a crossing road user, m.
 const LINE_GAP_M: f64 = 1.0;
 const CROSSING_GAP_M: f64 = 3.0;
-/// A guide is at most so much longer than the difference of its stations: outside a bend, and where it
-/// goes from lane to lane.
+/// Greatest ratio of a guide's length to the difference of its stations: it is longer outside a bend, and
+/// where it changes lanes.
 const GUIDE_STRETCH_MAX: f64 = 1.5;
 /// Acceleration that holds the vehicle at rest, m/s².
 const HOLD_MPS2: f64 = -3.0;
 
-/// Braking that a lane change may ask of anybody, magnitude, m/s².
+/// Braking that a lane change may ask of any vehicle, magnitude, m/s².
 const SAFE_MPS2: f64 = 2.0;
 
 #[derive(Debug, Clone)]
@@ -59,7 +59,7 @@ pub struct Idm {
     /// Where each lane change of the route begins, m; infinite while no gap was found.
     begins_m: Vec<f64>,
     steering: Arc<Steering>,
-    /// Where on the route, m; `None` before the first tick.
+    /// Station on the route, m; `None` before the first tick.
     station_m: Option<f64>,
     steer_rad: f64,
     /// What it keeps away from, looked for every fifth tick.
@@ -73,7 +73,7 @@ pub struct Idm {
 struct Ahead {
     /// Station of its near end when it was looked at, m.
     near_m: f64,
-    /// Since then, s.
+    /// Time since then, s.
     age_s: f64,
     speed_mps: f64,
     reason: Reason,
@@ -158,8 +158,8 @@ impl Idm {
         self.guide = Arc::new(Guide::with_changes(&self.scene, &RULES, &self.begins_m));
     }
 
-    /// Whether everybody in the lane `lateral_m` to the left, and the ego vehicle, could do with gentle
-    /// braking if it were there now.
+    /// Whether gentle braking would do for every vehicle in the lane `lateral_m` to the left, and for the
+    /// ego vehicle, if the ego vehicle were in that lane now.
     fn has_gap(&self, sensed: &Sensed, station_m: f64, lateral_m: f64) -> bool {
         let half_way_m = VehicleParameters::MKZ.width_m / 2.0 + SIDE_M;
         let front_m = VehicleParameters::MKZ.front_m(station_m);
@@ -214,7 +214,7 @@ impl Idm {
         })
     }
 
-    /// What a road user means for the ego vehicle: a leader, something in the way, one who crosses.
+    /// What a road user means for the ego vehicle: a leader, something in the way, or something that crosses it.
     fn ahead(&self, object: &SensedObject, speed_mps: f64, front_m: f64) -> Option<Ahead> {
         let half_way_m = VehicleParameters::MKZ.width_m / 2.0 + SIDE_M;
         let rear_m = front_m - VehicleParameters::MKZ.length_m;
@@ -224,7 +224,7 @@ impl Idm {
         let (beside, mut tracer) =
             self.guide.trace(object.pose.position, rear_m - 10.0, front_m + SIGHT_M, reach_m);
         if let Some(span) = taken(&beside) {
-            // On the way now: behind its middle the ego vehicle is past it.
+            // It is on the way now; once its middle is behind the front, the ego vehicle is past it.
             return (span.middle_m() > front_m - 1.0).then(|| Ahead {
                 near_m: span.from_m,
                 age_s: 0.0,
@@ -278,8 +278,7 @@ impl Idm {
         }));
     }
 
-    /// Drives the route like the model, but with the acceleration that `decide` makes of the model's,
-    /// given with its reason, m/s².
+    /// Drives the route, but with the acceleration (m/s²) and reason that `decide` makes of the model's.
     pub(super) fn drive_with(
         &mut self,
         sensed: &Sensed,
@@ -335,7 +334,7 @@ fn model_mps2(speed_mps: f64, allowed_mps: f64, ahead: Option<(f64, f64)>) -> f6
         let part = speed_mps / allowed_mps;
         MODEL.acceleration_mps2 * (1.0 - part * part * part * part)
     } else {
-        // The model brakes hardly for a falling limit; follow it as closely as it falls.
+        // The model scarcely brakes for a falling limit; this follows the limit as closely as it falls.
         (allowed_mps - speed_mps) / 0.6
     };
     let Some((gap_m, ahead_mps)) = ahead else { return free };

@@ -3,11 +3,11 @@
 use super::encounter::Encounter;
 use super::reflex::Braking;
 
-/// A model of how somebody careful brakes.
+/// A model of how a careful driver brakes.
 pub trait Model: Clone + Send + 'static {
     /// Times and slopes of its reaction.
     fn braking(&self) -> Braking;
 
-    /// The deceleration that it wants because of somebody, m/s²; 0 is no risk.
+    /// The deceleration that it wants because of a road user, m/s²; 0 is no risk.
     fn demand_mps2(&self, encounter: &Encounter) -> f64;
 }

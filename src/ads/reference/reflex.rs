@@ -1,10 +1,10 @@
 //! What lies between a perceived risk and the brake: evaluation, reaction, build-up, release.
 //!
 //! The times and slopes are those of the models; that a driver who has just braked stays alert and
-//! does not react anew is ours. The code that the models were published with lets nobody ever speed
-//! up again; here the brake is released when no risk is left.
+//! does not react anew is ours. In the code that the models were published with, a driver never speeds up
+//! again; here the brake is released when no risk is left.
 
-/// After a risk has ended, one that comes back within this time meets a foot that is ready, s.
+/// A driver stays ready to brake for this time after a risk has ended, s.
 const ALERT_S: f64 = 2.0;
 
 /// How a driver brakes.
@@ -12,13 +12,13 @@ const ALERT_S: f64 = 2.0;
 pub struct Braking {
     /// The risk must last this long before it is believed, s.
     pub evaluation_s: f64,
-    /// From there to the brake, s.
+    /// From believing the risk to the brake, s.
     pub reaction_s: f64,
-    /// Deceleration meanwhile, by the released accelerator, m/s².
+    /// Deceleration by the released accelerator during the reaction, m/s².
     pub release_mps2: f64,
-    /// Of the build-up, m/s³; infinite for a step.
+    /// Jerk of the build-up, m/s³; infinite for a step.
     pub jerk_mps3: f64,
-    /// Hardest, m/s².
+    /// Hardest braking, m/s².
     pub deceleration_mps2_max: f64,
 }
 
@@ -60,7 +60,7 @@ impl Reflex {
             },
             State::Calm => State::Risk { for_s: dt_s },
             State::Risk { for_s } => {
-                // Steps add up with rounding errors; a time that is over but for them is over.
+                // Steps add up with rounding errors, which must not delay the brake by a step.
                 if for_s + 1e-9 >= self.braking.evaluation_s + self.braking.reaction_s {
                     State::Ready { calm_s: 0.0 }
                 } else {
@@ -85,7 +85,7 @@ impl Reflex {
         self.deceleration_mps2
     }
 
-    /// The same a little later, if the demand stays, m/s².
+    /// The deceleration a little later, if the demand stays, m/s².
     pub fn after(&self, demand_mps2: f64, ahead_s: f64) -> f64 {
         let mut later = *self;
         later.step(demand_mps2, ahead_s)

@@ -2,8 +2,8 @@
 //!
 //! Shalev-Shwartz, Shammah, Shashua 2017 (arXiv 1708.06374), definitions 1, 2 and 6, with the
 //! parameters that the R157 studies of the JRC use. The driver keeps its lane, so its own part of the
-//! lateral distance is nil. Whoever crosses the way is somebody whose speed along it is small and
-//! whose lateral distance is unsafe: the published rule covers them as it stands.
+//! lateral distance is nil. A road user that crosses the way has a small speed along it and an unsafe
+//! lateral distance: the published rule covers it as it stands.
 
 use super::encounter::Encounter;
 use super::model::Model;
@@ -12,13 +12,13 @@ use super::reflex::Braking;
 /// Parameters of the safe distances.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Rss {
-    /// ρ, s.
+    /// Response time ρ, s.
     pub response_s: f64,
-    /// Acceleration during it, m/s².
+    /// Acceleration during the response, m/s².
     pub acceleration_mps2: f64,
-    /// Braking that the one behind may be trusted with, m/s².
+    /// Braking that the vehicle behind is sure to reach, m/s².
     pub braking_mps2_min: f64,
-    /// Braking that the one ahead may show, m/s².
+    /// Hardest braking of the vehicle ahead, m/s².
     pub braking_mps2_max: f64,
     /// Lateral acceleration and braking, m/s².
     pub lateral_mps2: f64,
@@ -40,19 +40,19 @@ impl Default for Rss {
 }
 
 impl Rss {
-    /// Safe gap behind somebody of the same direction, m.
+    /// Safe gap behind a vehicle of the same direction, m.
     pub fn longitudinal_m(&self, rear_mps: f64, front_mps: f64) -> f64 {
         (self.stopping_m(rear_mps, self.braking_mps2_min)
             - front_mps * front_mps / (2.0 * self.braking_mps2_max))
             .max(0.0)
     }
 
-    /// Safe gap to somebody who comes towards at `towards_mps`, m: both respond and brake.
+    /// Safe gap to a vehicle that comes towards at `towards_mps`, m: both respond and brake.
     pub fn oncoming_m(&self, own_mps: f64, towards_mps: f64) -> f64 {
         self.stopping_m(own_mps, self.braking_mps2_min) + self.stopping_m(towards_mps, self.braking_mps2_min)
     }
 
-    /// Safe gap to the side to somebody who comes nearer at `towards_mps`, m.
+    /// Safe gap to the side to a road user that comes nearer at `towards_mps`, m.
     pub fn lateral_m(&self, towards_mps: f64) -> f64 {
         let speed_mps = towards_mps.max(0.0);
         let after_mps = speed_mps + self.response_s * self.lateral_mps2;
@@ -61,7 +61,7 @@ impl Rss {
             + after_mps * after_mps / (2.0 * self.lateral_mps2)
     }
 
-    /// Way to rest of somebody who accelerates during the response, m.
+    /// Way to rest of a vehicle that accelerates during the response, m.
     fn stopping_m(&self, speed_mps: f64, braking_mps2: f64) -> f64 {
         let after_mps = speed_mps + self.response_s * self.acceleration_mps2;
         speed_mps * self.response_s

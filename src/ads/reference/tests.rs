@@ -24,8 +24,8 @@ struct CutIn {
 
 /// Whether a driver of the model touches the car that cuts in, on a straight road at 10 Hz.
 ///
-/// The published simulation moves with the speed at the end of a look, and everybody once before the
-/// first decision. The grid's borders lie so near to some of its cases that both show.
+/// The published simulation moves with the speed at the end of a look, and moves both cars once before
+/// the first decision. Some cases lie so near to the grid's borders that both matter.
 fn crashes(model: &impl Model, cut_in: CutIn) -> bool {
     let mut reflex = Reflex::new(model.braking());
     let (mut own_mps, mut own_mps2) = (cut_in.own_kmph / 3.6, 0.0);
@@ -61,7 +61,7 @@ fn crashes(model: &impl Model, cut_in: CutIn) -> bool {
     false
 }
 
-/// Who crashes: FSM, RSS, the regulation's minimum, the careful human.
+/// Which models crash: FSM, RSS, the regulation's minimum, the careful human.
 fn grid(cut_in: CutIn) -> [bool; 4] {
     [
         crashes(&FuzzySafety::default(), cut_in),

@@ -1,7 +1,7 @@
-//! Lane changes of other drivers: what they plan, when they dare, and how they move over.
+//! Lane changes of other drivers: what they plan, when they begin one, and how they move over.
 //!
-//! A change is a smooth step from the way in one lane to that in another; its length depends on the speed and
-//! the distance. Markings hold for everybody, and nobody changes lanes inside a junction.
+//! A change is a smooth step from the way in one lane to that in another; its length depends on the speed
+//! and the distance. All drivers obey markings, and none changes lanes inside a junction.
 
 use std::sync::Arc;
 
@@ -19,7 +19,7 @@ use crate::sim::world::DT_S;
 use super::driver::{Driver, SIDE_ROOM_M, along};
 use super::leader::extent_m;
 
-/// Room in front of and behind them that they want before changing lanes, m.
+/// Room in front and behind that drivers want before changing lanes, m.
 const MIRROR_ROOM_M: f64 = 2.0;
 /// Highest lateral speed of a lane change, m/s: bound of a cut-in in UN R157.
 const CHANGE_MPS_MAX: f64 = 1.8;
@@ -27,7 +27,7 @@ const CHANGE_MPS_MAX: f64 = 1.8;
 const CHANGE_S_MIN: f64 = 2.0;
 /// Below this speed a lane change slows down with the vehicle, which cannot slide sideways, m/s.
 const CHANGE_FULL_MPS: f64 = 5.0;
-/// Neighbouring lanes whose centres are farther apart have parted, m.
+/// Neighbouring lanes whose centres are farther apart than this have parted, m.
 const CHANGE_M_MAX: f64 = 8.0;
 
 /// A lane change that waits for its occasion.
@@ -50,7 +50,7 @@ pub(in crate::sim) enum Towards {
     To(Side),
     /// Left if that lane is there and free, else right.
     Either,
-    /// Against the change before.
+    /// Opposite to the change before.
     Back,
     Way(Arc<Way>),
 }
@@ -115,7 +115,7 @@ impl Driver {
         let target = lane_beside(around, here, side)?;
         let centre = &map.lane(target).centre;
         let there = centre.project(this.outline.pose.position);
-        // Markings hold for everybody, and nobody changes lanes in a junction, where they part.
+        // `change_room_m` ends at markings that forbid a change, and at junctions, where lanes part.
         let room_m = map.change_room_m(here, on_road(side), here_m);
         if there.distance_m > CHANGE_M_MAX
             || room_m < change_length_m(self.speed_mps, there.distance_m)
@@ -128,7 +128,7 @@ impl Driver {
         Some((way, there.station_m, Some(side)))
     }
 
-    /// Whether nobody is beside it in another lane, or so fast behind that a second would not do.
+    /// Whether no vehicle is beside it in another lane, or would be within a second.
     fn is_free(&self, path: &Path, station_m: f64, size: &BodyParameters, around: &Around) -> bool {
         let here = path.pose_at(station_m);
         let forward = here.forward();
@@ -146,7 +146,8 @@ impl Driver {
         })
     }
 
-    /// Moves the lane change on by a tick in which `way_m` were driven, from where it was `before`.
+    /// Where it is after a tick in which it drove `way_m`, with the lane change under way moved on. `before`
+    /// is where its centre was.
     pub(super) fn advance_change(&mut self, way_m: f64, before: Vec2) -> Moved {
         let from = self.way.path.pose_at(self.station_m);
         let Some(change) = &mut self.change else {
@@ -170,7 +171,7 @@ impl Driver {
             position: from.position + (to.position - from.position) * blend,
             heading_rad: wrap_angle(heading_rad + turned_rad),
         };
-        // Measured, because between two lanes in a bend it is neither lane's speed.
+        // The velocity is measured, because between two lanes in a bend it is neither lane's speed.
         let lane = if change.progress < 0.5 { from } else { to };
         let velocity_mps = (pose.position - before) / DT_S;
         Moved { pose, forward: pose.forward(), lane_heading_rad: lane.heading_rad, velocity_mps }
@@ -201,7 +202,7 @@ fn change_duration_s(aside_m: f64) -> f64 {
     (SMOOTH_STEP_SLOPE_MAX * aside_m / CHANGE_MPS_MAX).max(CHANGE_S_MIN)
 }
 
-/// Way on which a lane change of so much to the side is done at a speed, m.
+/// Way that a lane change of `aside_m` to the side takes at a speed, m.
 fn change_length_m(speed_mps: f64, aside_m: f64) -> f64 {
     speed_mps.max(CHANGE_FULL_MPS) * change_duration_s(aside_m)
 }

@@ -1,10 +1,10 @@
-//! Whose outline would meet whose in a tight turn.
+//! Outlines that would meet in a tight turn.
 //!
 //! Leaders are looked for in a corridor as wide as the vehicle, and conflict areas are between lanes;
 //! but a bus in a bend sweeps more than its lane. So inside junctions drivers look two seconds ahead:
 //! where both would be if they went on as they do, and stop before the outlines meet. They look at
-//! whose centre is ahead of their own, and at whoever is slower: a tail swings into those. Commanded
-//! vehicles do not look at the ego vehicle so.
+//! vehicles whose centre is ahead of their own, and at slower ones, into which their tail could swing.
+//! Commanded vehicles do not look at the ego vehicle in this way.
 
 use core::cell::LazyCell;
 
@@ -16,19 +16,19 @@ use crate::sim::road_user::Obstacle;
 use super::driver::Driver;
 use super::leader::Leader;
 
-/// Moments that are looked at, s.
+/// Moments ahead that are looked at, s.
 const MOMENTS_S: [f64; 5] = [0.4, 0.8, 1.2, 1.6, 2.0];
-/// A vehicle at rest wonders where it would be at this speed, m/s.
+/// Speed that a vehicle at rest assumes for itself, m/s.
 const CREEP_MPS: f64 = 1.0;
 /// Outlines are kept this far apart, m.
 const ROOM_M: f64 = 0.3;
-/// Others farther away are no matter, m: two school buses and a car's length.
+/// Vehicles farther away do not matter, m: two school buses and a car's length.
 const NEAR_M: f64 = 16.0;
 /// Room left before the place where they would meet, m.
 const STOP_M: f64 = 1.0;
 
 impl Driver {
-    /// Somebody beside the way whom the own outline would meet soon, as a leader that stands there.
+    /// A vehicle that the own outline would soon meet, as a leader that stands there.
     pub(super) fn foresee(&self, this: &Obstacle, size: &BodyParameters, around: &Around) -> Option<Leader> {
         let half_m = size.length_m / 2.0;
         let turns = |station_m: f64| around.scene.map.lane(self.way.lane_at(station_m).0).junction.is_some();
@@ -41,7 +41,7 @@ impl Driver {
             away.norm_squared() < NEAR_M * NEAR_M
                 && (this.forward.dot(&away) > 0.0 || speed_mps < self.speed_mps)
         };
-        // Where it would be at those moments itself, worked out once there is somebody to meet.
+        // The own poses at those moments, worked out only if there is a vehicle to meet.
         let speed_mps = self.speed_mps.max(CREEP_MPS);
         let own = LazyCell::new(|| {
             MOMENTS_S.map(|time_s| self.way.path.pose_at(self.station_m + speed_mps * time_s))
@@ -65,8 +65,8 @@ impl Driver {
     }
 }
 
-/// How far somebody gets at a speed, from moment to moment in the poses `own`, before their outline
-/// would meet another, m; infinite if it would not.
+/// How far `this` gets at a speed, through the poses `own`, before its outline would meet another, m;
+/// infinite if it would not.
 fn free_way_m(
     this: &Obstacle,
     own: &[Pose; MOMENTS_S.len()],

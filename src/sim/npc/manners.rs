@@ -1,23 +1,24 @@
-//! Who waits for whom at a junction.
+//! For which other vehicles a driver waits at a junction.
 //!
 //! Before a conflict area (see `junction`) a driver waits for
 //!
-//! - whoever is in it;
-//! - whoever cannot stop before it any more, or has begun to cross it after a wait;
-//! - whoever goes first by the lanes' own order, unless one of the two is through before the other comes;
-//! - room behind it, if the one ahead stands: nobody stops in an area.
+//! - a vehicle that is in it;
+//! - a vehicle that can no longer stop before it, or has begun to cross it after a wait;
+//! - a vehicle that goes first by the lanes' own order, unless one of the two is through before the other
+//!   comes;
+//! - room behind it, if the vehicle ahead stands: no vehicle stops in an area.
 //!
-//! Nobody waits for somebody who waits or stands at a red light. Who sets out after a wait crosses all
-//! areas of the junction and counts as if inside them, so that four who wait for each other do not all
-//! set out at once: they look one after another, and the first to look goes. Who has waited for
-//! [`PATIENCE_S`] goes before anybody who stands, whatever the order of the lanes; who has waited for
-//! [`GIVE_UP_S`] leaves the world, so that no standstill is forever.
+//! No driver waits for a vehicle that waits itself or stands at a red light. A driver that sets out after
+//! a wait crosses all areas of the junction and counts as if inside them, so that four that wait for each
+//! other do not all set out at once: they look one after another, and the first to look goes. After
+//! [`PATIENCE_S`] of waiting a driver goes before any vehicle that stands, whatever the order of the lanes;
+//! after [`GIVE_UP_S`] it leaves the world, so that no standstill is forever.
 //!
 //! **Commanded vehicles and the ego vehicle.** A vehicle that an action made appear keeps these manners
 //! towards all other vehicles, but never yields to the ego vehicle at a junction: to cross or to turn
 //! before it is what its verb means. It follows, brakes for and does not push an ego vehicle that is
-//! ahead of it. Ambient vehicles yield to the ego vehicle as to everybody else, and take it for
-//! somebody who will not stop whenever it moves and no red light holds it.
+//! ahead of it. Ambient vehicles yield to the ego vehicle as to all others, and expect that it will not
+//! stop whenever it moves and no red light holds it.
 
 use core::cell::LazyCell;
 
@@ -32,23 +33,23 @@ use crate::sim::world::DT_S;
 
 use super::driver::{COMFORT_MPS2, Driver, GAP_M_MIN, LOOK_AHEAD_M};
 
-/// After so long at rest nobody who stands is waited for any more, s. Ours.
+/// After so long at rest a driver no longer waits for vehicles that stand, s. Ours.
 const PATIENCE_S: f64 = 8.0;
 /// After so long at rest for others a driver leaves the world, s. Ours: less than the 24 s without
 /// progress that end an episode of the shipped space.
 pub(super) const GIVE_UP_S: f64 = 20.0;
-/// Between one vehicle in an area and the next, s: accepted gaps in towns are longer, but the one who
-/// accepts them does not yet move.
+/// Time between one vehicle in an area and the next, s: accepted gaps in towns are longer, but there the
+/// vehicle that accepts them does not move yet.
 const GAP_S: f64 = 1.5;
-/// Who would have to brake harder than this does not stop any more, m/s² (as at a yellow light).
+/// A vehicle that would have to brake harder than this does not stop any more, m/s² (as at a yellow light).
 const COMMITTED_MPS2: f64 = 3.0;
 /// Room between the front and the area that is waited for, m.
 const HOLD_ROOM_M: f64 = 0.5;
-/// Others so far from an area are no matter yet, m.
+/// Vehicles farther from an area than this do not matter yet, m.
 const APPROACH_M: f64 = 80.0;
 /// A junction is no longer than this, m.
 const JUNCTION_M: f64 = 45.0;
-/// Below this speed somebody stands, m/s.
+/// Below this speed a vehicle stands, m/s.
 pub(super) const STANDS_MPS: f64 = 0.1;
 /// An ego vehicle that moves faster than this is taken for one that will not stop, m/s.
 const EGO_MOVES_MPS: f64 = 1.0;
@@ -98,7 +99,7 @@ fn waits(own: &Passage, other: &Passage, goes_first: bool, impatient: bool) -> b
         return false;
     }
     if other.in_m <= 0.0 {
-        // Who is inside and moves may have left by then.
+        // A vehicle inside that moves may have left by then.
         return other.speed_mps < 1.0 || other.out_s() + GAP_S / 2.0 > own.in_s();
     }
     if other.holds && !other.committed {
@@ -116,7 +117,7 @@ fn waits(own: &Passage, other: &Passage, goes_first: bool, impatient: bool) -> b
 }
 
 impl Driver {
-    /// Station of the own way at which to wait now, m, if there is anybody to wait for.
+    /// Station of the own way at which to wait now, m, if there is something to wait for.
     pub(super) fn find_hold_m(&self, this: &Obstacle, size: &BodyParameters, around: &Around) -> Option<f64> {
         let front_m = self.station_m + size.length_m / 2.0;
         let reach_m = LOOK_AHEAD_M + self.speed_mps * self.speed_mps / (2.0 * COMFORT_MPS2);
@@ -127,7 +128,7 @@ impl Driver {
             .iter()
             .take_while(near)
             .position(|area| self.must_wait(area, this, size, around))?;
-        // Not in an area before it either, unless the front is in that already.
+        // It must not wait in an earlier area either, unless its front is in that already.
         let mut hold_m = areas[open + waited_for].from_m;
         for area in areas[open..open + waited_for].iter().rev() {
             if area.to_m > hold_m - HOLD_ROOM_M - GAP_M_MIN - size.length_m {
@@ -137,7 +138,7 @@ impl Driver {
         Some(hold_m - HOLD_ROOM_M)
     }
 
-    /// End of the last area that somebody at the junction ahead crosses, m.
+    /// End of the last area at the junction ahead, m.
     pub(super) fn junction_end_m(&self, size: &BodyParameters) -> f64 {
         let front_m = self.station_m + size.length_m / 2.0;
         let ahead = self.way.areas.iter().filter(|area| area.from_m < front_m + JUNCTION_M);
@@ -148,7 +149,7 @@ impl Driver {
         if self.would_stop_in(area, size) {
             return true;
         }
-        // Most areas are on nobody else's way, and then it is not needed.
+        // Worked out only if needed: most areas are on no other vehicle's way.
         let own = LazyCell::new(|| self.passage(area.from_m, area.to_m, size, around));
         let impatient = f64::from(self.waited_ticks) * DT_S >= PATIENCE_S;
         let mut others = around.drivers();
@@ -168,7 +169,7 @@ impl Driver {
         for_others || (self.yields_to_ego && for_ego())
     }
 
-    /// Whether the one ahead stands so near behind an area that there is no room for both.
+    /// Whether the vehicle ahead stands so near behind an area that this one would have to stop in it.
     fn would_stop_in(&self, area: &Area, size: &BodyParameters) -> bool {
         let front_m = self.station_m + size.length_m / 2.0;
         self.leader.as_ref().is_some_and(|leader| {
@@ -197,14 +198,14 @@ impl Driver {
         }
     }
 
-    /// This driver's passage through the other side of somebody's area, if the way leads there.
+    /// This driver's passage through the other lane of an area, if its way leads there.
     fn passage_through(&self, area: &Area, size: &BodyParameters, around: &Around) -> Option<Passage> {
         let begin_m = self.way.lane_ahead_m(area.other, self.station_m - size.length_m / 2.0)?;
         Some(self.passage(begin_m + area.other_from_m, begin_m + area.other_to_m, size, around))
     }
 }
 
-/// The ego vehicle's passage along its route, in the eyes of others.
+/// The ego vehicle's passage along its route, as ambient vehicles expect it.
 fn ego_passage(area: &Area, around: &Around) -> Option<Passage> {
     let begin_m = ego_lane_begin_m(area.other, around)?;
     let car = &VehicleParameters::MKZ;
@@ -224,7 +225,7 @@ fn ego_passage(area: &Area, around: &Around) -> Option<Passage> {
     })
 }
 
-/// Station of the route at which a lane begins that the ego vehicle has not left yet, m.
+/// Station of the route at which a lane begins, m, if the ego vehicle has not left that lane yet.
 fn ego_lane_begin_m(lane: LaneIndex, around: &Around) -> Option<f64> {
     let rear_m = VehicleParameters::MKZ.rear_m(around.ego_station_m);
     let part = around.scene.route.lanes.iter().find(|part| part.lane == lane && part.to_m > rear_m)?;

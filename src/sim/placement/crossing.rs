@@ -20,9 +20,9 @@ const CROSSING_M: f64 = 60.0;
 /// How the ego vehicle is expected to gain speed on its way to a rendezvous, m/s²: ours, the comfort of most
 /// planners.
 const EGO_GAINS_MPS2: f64 = 1.5;
-/// How it is expected to take bends, m/s²: ours, the same.
+/// Lateral acceleration with which it is expected to take bends, m/s²: ours, as above.
 const EGO_LATERAL_MPS2: f64 = 2.0;
-/// A stop line so far behind a vehicle that appears counts as passed at that moment, m.
+/// A stop line at most so far behind a newcomer counts as passed when it appears, m.
 const BEYOND_LINE_M: f64 = 30.0;
 /// Step in which a drive towards a rendezvous is timed, m.
 const TIMING_M: f64 = 1.0;
@@ -74,7 +74,7 @@ fn arrival_s(around: &Around, distance_m: f64) -> f64 {
     time_s
 }
 
-/// A driver who reaches a conflict when the ego vehicle does, if nothing is in its way.
+/// A driver that reaches a conflict when the ego vehicle does, if nothing is in its way.
 fn rendezvous(
     around: &Around,
     request: &SpawnRequest,
@@ -127,8 +127,8 @@ fn rendezvous(
     Ok(commanded(around, request, first, station_m, vec![change]))
 }
 
-/// Where the front is that reaches a meeting on a way in time: backwards from there at the speed that each
-/// bend allows, m.
+/// Station at which a front has to start to be at the meeting point after `arrival_s`, m. It is found by
+/// going back from there at the speed that each bend allows.
 ///
 /// # Errors
 /// If the way begins nearer, or a signal on it will not be green.
@@ -155,7 +155,7 @@ fn approach_m(
             return Err("the crossing road is too short".into());
         }
     }
-    // Nobody appears just beyond a line at which they would have had to stop.
+    // No vehicle appears just beyond a line at which it would have had to stop.
     let behind =
         way.stop_lines.iter().filter(|line| (front_m - BEYOND_LINE_M..front_m).contains(&line.station_m));
     passed_lines.extend(behind.map(|line| (line.signal, 0.0)));

@@ -1,4 +1,4 @@
-//! Drivers ahead, from behind and from the front.
+//! Drivers that appear ahead, from behind or as oncoming traffic.
 
 use crate::action::SpawnRequest;
 use crate::model::vocabulary::{LaneChoice, Side, Then};
@@ -14,7 +14,7 @@ use crate::sim::world::DT_S;
 use super::lanes::{chosen_lane, lane_along, lane_before, opposing_lane};
 use super::{ahead_m, commanded};
 
-/// Before somebody ahead changes lanes, s.
+/// Time after which a vehicle ahead changes lanes, s.
 const CHANGE_AFTER_S: f64 = 1.0;
 /// How far in front of the ego vehicle an overtaker cuts in, m.
 const CUT_IN_M: f64 = 5.0;

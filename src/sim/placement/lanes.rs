@@ -1,4 +1,4 @@
-//! Which lane a request means: the ego vehicle's, one beside it, the one that comes the other way.
+//! Which lane a request means: the ego vehicle's, one beside it, or an oncoming one.
 
 use crate::model::vocabulary::{LaneChoice, Side};
 use crate::road::{LaneIndex, RouteLane, Turn};
@@ -6,7 +6,7 @@ use crate::road::{LaneIndex, RouteLane, Turn};
 use crate::sim::around::Around;
 use crate::sim::npc::lane_beside;
 
-/// A median wider than this divides a road: nobody comes towards the ego vehicle across it, m.
+/// A median wider than this divides a road: lanes beyond it do not count as oncoming, m.
 const MEDIAN_M_MAX: f64 = 3.0;
 
 pub(super) fn chosen_lane(around: &Around, station_m: f64, choice: LaneChoice) -> Result<LaneIndex, String> {
@@ -20,8 +20,8 @@ pub(super) fn chosen_lane(around: &Around, station_m: f64, choice: LaneChoice) -
     }
 }
 
-/// The nearest lane that comes the other way beside a lane of the route, of its road or another, if no
-/// wide median lies between.
+/// The nearest oncoming lane beside a lane of the route, on its road or another, if no wide median lies
+/// between.
 pub(super) fn opposing_lane(around: &Around, lane: LaneIndex, station_m: f64) -> Result<LaneIndex, String> {
     let map = &around.scene.map;
     let here = around.scene.route.path.pose_at(station_m).position;
@@ -36,8 +36,8 @@ pub(super) fn opposing_lane(around: &Around, lane: LaneIndex, station_m: f64) ->
 
 /// The lane that `pick` finds for the lane of the route at a station.
 ///
-/// Inside junctions lanes have few neighbours. There it is the lane that joins what `pick` finds for
-/// the streets before and after, in the direction of the route or against it.
+/// Inside junctions lanes have few neighbours. There the result is the lane that joins what `pick` finds
+/// for the streets before and after, in the direction of the route (`forward`) or against it.
 pub(super) fn lane_along(
     around: &Around,
     station_m: f64,
@@ -66,8 +66,8 @@ pub(super) fn lane_along(
     through.iter().copied().find(|lane| map.lane(*lane).successors.contains(&to)).ok_or(refusal)
 }
 
-/// The lane from which one comes into a lane: that of the route, if it is one, else one straight behind,
-/// else the first.
+/// The predecessor of a lane: the one on the route if there is one, else one that leads straight on, else
+/// the first.
 pub(super) fn lane_before(around: &Around, lane: LaneIndex) -> Option<LaneIndex> {
     let (map, route) = (&around.scene.map, &around.scene.route.lanes);
     let before = &map.lane(lane).predecessors;

@@ -34,10 +34,10 @@ const KERB_M: f64 = 5.0;
 /// small enough for every sum that is made of them.
 const SPEED_MPS_MAX: f64 = 70.0;
 const DISTANCE_M_MAX: f64 = 1000.0;
-/// Nobody appears nearer to anybody else, m.
+/// Least gap between a newcomer and any other road user, m.
 const ROOM_M: f64 = 0.5;
 
-/// Where a request would put its road user, and what it would be, under a new id.
+/// The road user that a request would make appear, with a new id.
 ///
 /// # Errors
 /// Why it cannot, in words that complete "cannot spawn: …".
@@ -56,8 +56,8 @@ pub(super) fn place(around: &Around, request: &SpawnRequest, id: u32) -> Result<
     finish(around, request, Mover::new(size, Motion::Drive(driver)), id, moved)
 }
 
-/// Whether a request is one that anybody could carry out. Scripts come from outside, so nothing is
-/// taken for granted; NaN is in no range.
+/// Refuses what no road user could do. Requests of scripts come from outside, so nothing is taken for
+/// granted; NaN is in no range.
 fn check(request: &SpawnRequest) -> Result<(), String> {
     if !(0.0..=SPEED_MPS_MAX).contains(&request.speed_mps) {
         return Err(format!("the speed is not between 0 and {SPEED_MPS_MAX} m/s"));
@@ -76,14 +76,14 @@ fn check(request: &SpawnRequest) -> Result<(), String> {
 
 /// The distances that rules ask for.
 ///
-/// The gap at the spawn is between the outlines. The gap that a careful driver needs (see `safety`) is
-/// to slow down to one ahead, or to rest for one who crosses, walks or stands: their stopping zone.
-/// For one from behind it is what the newcomer needs to slow down to the ego vehicle. One that comes
-/// the other way stays in its own lanes and needs none, unless its way crosses the route at a junction.
+/// The gap at the spawn is between the outlines. The safety gap is what a careful driver needs (see
+/// `safety`): to slow down to a vehicle ahead, or to stop for a newcomer that crosses, walks or stands.
+/// For a newcomer from behind it is what the newcomer needs to slow down to the ego vehicle. An oncoming
+/// vehicle stays in its own lanes and needs none, unless its way crosses the route at a junction.
 ///
-/// Nobody but those from behind appears in plain view nearer than the way that the ego vehicle drives
-/// while a careful driver perceives and reacts, even if they would be no danger: who is in sight, and
-/// not hidden by others, fog or distance, did not come from nowhere.
+/// A newcomer in plain view (not from behind, and not hidden by others, fog or distance) needs at least
+/// the way that the ego vehicle drives while a careful driver perceives and reacts, even if it would be
+/// no danger: it must not seem to come from nowhere.
 pub(super) fn facts(around: &Around, request: &SpawnRequest, newcomer: &RoadUser) -> SpawnFacts {
     let along_mps = around.ego_outline.pose.forward().dot(&newcomer.obstacle.velocity_mps);
     let (ego_mps, friction) = (around.ego.speed_mps, around.friction);
@@ -112,7 +112,7 @@ pub(super) fn facts(around: &Around, request: &SpawnRequest, newcomer: &RoadUser
     SpawnFacts { spawn_gap_m, safety_gap_m }
 }
 
-/// Whether the way of a driver crosses or joins what the ego vehicle has before it.
+/// Whether the way of a driver crosses or joins the rest of the ego vehicle's route.
 fn meets_route(around: &Around, mover: &Mover) -> bool {
     let Motion::Drive(driver) = &mover.motion else { return false };
     let mut ahead =
@@ -128,10 +128,11 @@ fn commanded(
     station_m: f64,
     plan: Vec<Manoeuvre>,
 ) -> Driver {
-    // The way was the first of its choices.
+    // One draw went into it so far: that of its way.
     Driver::new(around.scene, way, station_m, Cruise::Commanded(request.speed_mps), plan, 1)
 }
 
+/// The newcomer, if there is room for it.
 fn finish(
     around: &Around,
     request: &SpawnRequest,
@@ -144,8 +145,8 @@ fn finish(
     if newcomer.has_room(around, ROOM_M) { Ok(newcomer) } else { Err("another road user is there".into()) }
 }
 
-/// A newcomer must be able to brake for those before it. The ego vehicle is not among them: how near
-/// to it a newcomer may appear is for the rules of the space to say.
+/// Refuses a newcomer that could not brake for a road user ahead of it. The ego vehicle does not count:
+/// the rules of the space say how near to it a newcomer may appear.
 fn check_way(around: &Around, driver: &Driver, size: &BodyParameters) -> Result<(), String> {
     let braking_mps2 = around.braking_mps2(size, driver.speed_mps);
     let blocked = around.obstacles().any(|other| {

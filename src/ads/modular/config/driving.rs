@@ -12,17 +12,17 @@ section! {
     pub struct PredictionConfig {
         /// Slower vehicles are taken to stand, m/s, in `[0, 5]`. Apollo `still_obstacle_speed_threshold`: 0.99.
         still_vehicle_mps: f64 = 0.99, 0.0..=5.0;
-        /// The same for pedestrians. Apollo: 0.2.
+        /// Slower pedestrians are taken to stand, m/s, in `[0, 5]`. Apollo: 0.2.
         still_pedestrian_mps: f64 = 0.2, 0.0..=5.0;
         /// Lateral speed that counts as leaving the lane, m/s, in `[0, 5]`. Ours.
         lateral_speed_mps: f64 = 0.4, 0.0..=5.0;
-        /// For how long it must last before it is believed under weakness (b), s, in `[0, 10]`. Apollo `max_tracking_time`: 0.5.
+        /// For how long that lateral speed must last before it is believed under weakness (b), s, in `[0, 10]`. Apollo `max_tracking_time`: 0.5.
         lateral_persistence_s: f64 = 0.5, 0.0..=10.0;
         /// A vehicle turned further from every lane is taken to go straight on, rad, in `[0, 3.2]`. Ours.
         off_lane_rad: f64 = 0.6, 0.0..=3.2;
         /// Farther objects are taken to keep their velocity, m, in `[0, 300]`. Apollo's scan box: 80.
         reach_m: f64 = 80.0, 0.0..=300.0;
-        /// Everybody is predicted to stay where he is. A fault to plant.
+        /// Every object is predicted to stay where it is. A fault to plant.
         frozen: bool = false;
         /// The future is known where a recording of it is at hand (`ads::Foresight`); without one this is no more than weakness (b) switched off. An idealisation, to find causes with.
         perfect: bool = false;
@@ -34,21 +34,21 @@ section! {
     pub struct PlanningConfig {
         /// Speed on a free road, m/s, in `[1, 40]`. Apollo's upstream `planning.conf`, `default_cruise_speed`: 11.18 (25 mph); the flag's own default is 5.0.
         cruise_mps: f64 = 11.18, 1.0..=40.0;
-        /// In curves, m/s², in `[0.5, 6]`. Apollo's DP `max_centric_acceleration_limit`: 2.0.
+        /// Lateral acceleration in curves, m/s², in `[0.5, 6]`. Apollo's DP `max_centric_acceleration_limit`: 2.0.
         lateral_acceleration_mps2_max: f64 = 2.0, 0.5..=6.0;
         /// Slowing down for curves and limits ahead, magnitude, m/s², in `[0.5, 6]`. Ours.
         slowdown_mps2: f64 = 1.5, 0.5..=6.0;
-        /// m/s², in `[0.5, 4]`. Apollo's DP `max_acceleration`: 2.0.
+        /// Hardest acceleration, m/s², in `[0.5, 4]`. Apollo's DP `max_acceleration`: 2.0.
         acceleration_mps2_max: f64 = 2.0, 0.5..=4.0;
-        /// Magnitude, m/s², in `[1, 8]`. Apollo's DP `max_deceleration`: 4.0.
+        /// Hardest braking of a plan, magnitude, m/s², in `[1, 8]`. Apollo's DP `max_deceleration`: 4.0.
         deceleration_mps2_max: f64 = 4.0, 1.0..=8.0;
-        /// When that does not suffice, magnitude, m/s², in `[1, 10]`. Apollo's vehicle limit: 6.0.
+        /// Hardest braking when that does not suffice, magnitude, m/s², in `[1, 10]`. Apollo's vehicle limit: 6.0.
         emergency_mps2: f64 = 6.0, 1.0..=10.0;
-        /// Of a planned stop, magnitude, m/s², in `[0.5, 4]`. Ours.
+        /// Braking for a planned stop, magnitude, m/s², in `[0.5, 4]`. Ours.
         comfortable_mps2: f64 = 2.0, 0.5..=4.0;
         /// Rate at which a plan may lower its acceleration under weakness (c), magnitude, m/s³, in `[0.5, 50]`. Apollo: 4.
         jerk_mps3_down: f64 = 4.0, 0.5..=50.0;
-        /// Rate at which it may raise it, m/s³, in `[0.5, 50]`. Apollo: 2.
+        /// Rate at which a plan may raise its acceleration, m/s³, in `[0.5, 50]`. Apollo: 2.
         jerk_mps3_up: f64 = 2.0, 0.5..=50.0;
         /// Room kept free on each side, m, in `[0, 2]`. Apollo `obstacle_lat_buffer`: 0.4.
         lateral_buffer_m: f64 = 0.4, 0.0..=2.0;
@@ -78,23 +78,23 @@ section! {
         crosswalk_mps2_max: f64 = 6.0, 1.0..=8.0;
         /// Pedestrians on a crosswalk nearer to the path than this are waited for, m, in `[0, 20]`. Apollo `stop_strict_l_distance`: 6.0.
         crosswalk_strict_m: f64 = 6.0, 0.0..=20.0;
-        /// The same of pedestrians who come nearer, m, in `[0, 20]`. Apollo `stop_loose_l_distance`: 8.0.
+        /// Pedestrians who come nearer are waited for up to this distance from the path, m, in `[0, 20]`. Apollo `stop_loose_l_distance`: 8.0.
         crosswalk_loose_m: f64 = 8.0, 0.0..=20.0;
         /// Slower objects are static, m/s, in `[0, 3]`. Apollo `static_obstacle_speed_threshold`: 0.5.
         static_mps: f64 = 0.5, 0.0..=3.0;
         /// A lane change needs at least this gap in front and behind in the target lane, m, in `[0, 50]`. Apollo's lane change decider: 10.
         change_gap_m: f64 = 10.0, 0.0..=50.0;
-        /// And this time at the difference of the speeds, s, in `[0, 20]`. The same: 3.
+        /// It also needs this time gap at the difference of the speeds, s, in `[0, 20]`. Apollo's lane change decider: 3.
         change_time_s: f64 = 3.0, 0.0..=20.0;
-        /// Gap to oncoming traffic in the target lane, m, in `[0, 200]`. The same: 50.
+        /// Gap to oncoming traffic in the target lane, m, in `[0, 200]`. Apollo's lane change decider: 50.
         change_oncoming_gap_m: f64 = 50.0, 0.0..=200.0;
-        /// And the time at the sum of the speeds, s, in `[0, 20]`. The same: 5.
+        /// Time gap to oncoming traffic at the sum of the speeds, s, in `[0, 20]`. Apollo's lane change decider: 5.
         change_oncoming_time_s: f64 = 5.0, 0.0..=20.0;
         /// Braking when there is no plan, and under weakness (i) when no plan keeps clear, magnitude, m/s², in `[1, 8]`. Apollo `slowdown_profile_deceleration`: 4.0.
         fallback_mps2: f64 = 4.0, 1.0..=8.0;
-        /// Farther beside the route there is no plan, m, in `[1, 20]`. Ours.
+        /// Farther than this beside the route there is no plan, m, in `[1, 20]`. Ours.
         lost_offset_m: f64 = 3.0, 1.0..=20.0;
-        /// Gives way to nobody who crosses or joins. A fault to plant.
+        /// Never gives way to what crosses or joins. A fault to plant.
         never_yields: bool = false;
     }
 }
@@ -131,7 +131,7 @@ section! {
         switch_mps: f64 = 2.0, 0.0..=20.0;
         /// Acceleration per speed error at low speed, 1/s, in `[0, 5]`. Apollo: 0.5.
         speed_kp_low: f64 = 0.5, 0.0..=5.0;
-        /// The same above. Apollo: 1.0.
+        /// Acceleration per speed error above `switch_mps`, 1/s, in `[0, 5]`. Apollo: 1.0.
         speed_kp_high: f64 = 1.0, 0.0..=5.0;
         /// Acceleration per speed error and second, 1/s², in `[0, 5]`. Apollo: 0.3.
         speed_ki: f64 = 0.3, 0.0..=5.0;
@@ -139,7 +139,7 @@ section! {
         integral_mps2_max: f64 = 0.3, 0.0..=5.0;
         /// The plan's acceleration is read this far ahead, s, in `[0, 1]`. Apollo: 20 cycles of 10 ms.
         preview_s: f64 = 0.2, 0.0..=1.0;
-        /// Held at rest, magnitude, m/s², in `[0, 6]`. Apollo `standstill_acceleration`: 3.0.
+        /// Braking held at rest, magnitude, m/s², in `[0, 6]`. Apollo `standstill_acceleration`: 3.0.
         standstill_mps2: f64 = 3.0, 0.0..=6.0;
         /// Planned speeds below this mean a full stop, m/s, in `[0, 2]`. Apollo `max_abs_speed_when_stopped`: 0.2.
         stopped_mps: f64 = 0.2, 0.0..=2.0;
@@ -151,7 +151,7 @@ section! {
     pub struct ActuatorsConfig {
         /// No harder braking is commanded, magnitude, m/s², in `[0.5, 10]`. Apollo's calibration table ends at 8.5. Less is a fault to plant.
         brake_mps2_max: f64 = 8.5, 0.5..=10.0;
-        /// No more throttle is commanded than gives this, m/s², in `[0, 10]`. The same table: 4.95.
+        /// No more throttle is commanded than gives this, m/s², in `[0, 10]`. Apollo's calibration table: 4.95.
         throttle_mps2_max: f64 = 4.95, 0.0..=10.0;
         /// First-order lag of the commanded steering angle beside the actuator's own, s, in `[0, 5]`. A fault to plant: none by default.
         steer_lag_s: f64 = 0.0, 0.0..=5.0;

@@ -20,7 +20,7 @@ pub enum Module {
 }
 
 impl Module {
-    /// In the order of the data's way.
+    /// In the order in which data passes through them.
     pub const ALL: [Module; 7] = [
         Module::Localization,
         Module::Perception,
@@ -46,7 +46,7 @@ impl Module {
 }
 
 impl ModularConfig {
-    /// The same system with one module without error: no noise, no planted fault, no weakness of its
+    /// This system with one module without error: no noise, no planted fault, no weakness of its
     /// own. Weakness (a) belongs to perception (range, occlusion, flicker) and to tracking
     /// (publication): each of the two loses its share by its `perfect` switch.
     ///
@@ -93,10 +93,8 @@ impl ModularConfig {
         }
         config
     }
-}
 
-impl ModularConfig {
-    /// The same system with one module as another profile has it. Weakness (a) goes with perception.
+    /// This system with one module as another profile has it. Weakness (a) goes with perception.
     pub fn with_module_of(&self, module: Module, other: &ModularConfig) -> ModularConfig {
         let mut config = *self;
         match module {

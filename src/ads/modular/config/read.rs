@@ -12,7 +12,7 @@ use super::ModularConfig;
 use super::driving::{ActuatorsConfig, PedalsConfig, PlanningConfig, PredictionConfig};
 use super::sensing::{LocalizationConfig, PerceptionConfig, TrackingConfig};
 
-/// Why a profile cannot be used. Whoever shows it says before it which file is meant.
+/// Why a profile cannot be used. The message does not name the file: the caller puts the name before it.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum ConfigError {
     #[error("no YAML: {reason}")]
@@ -57,7 +57,7 @@ impl ModularConfig {
             .map_err(|error| ConfigError::Yaml { reason: error.to_string().trim().to_owned() })?;
         let mut whole =
             serde_json::to_value(ModularConfig::default()).expect("a configuration is plain data");
-        // More likely a slip, or a file that was cut off, than a wish for the default.
+        // An empty file is more likely a slip, or was cut off, than a wish for the default.
         if file.is_null() {
             return Err(ConfigError::Empty);
         }
@@ -73,7 +73,7 @@ impl ModularConfig {
         difference(&own, &usual).unwrap_or_default()
     }
 
-    /// Digest of all settings, `sha256:` and 64 digits: two profiles that mean the same have the same.
+    /// Digest of all settings, `sha256:` and 64 digits. Profiles with equal settings have equal digests.
     pub fn digest(&self) -> String {
         let text = serde_json::to_string(self).expect("a configuration is plain data");
         let mut digest = "sha256:".to_owned();
@@ -84,7 +84,7 @@ impl ModularConfig {
     }
 }
 
-/// Puts the values of a file over those of the default, `path` deep.
+/// Puts the values of a file, or of its section at `path`, over those of the default.
 fn overlay(text: &str, path: &str, file: &Value, whole: &mut Value) -> Result<(), ConfigError> {
     let mistake = |wanted| ConfigError::Type {
         line: line_of(text, path),
@@ -117,7 +117,7 @@ fn overlay(text: &str, path: &str, file: &Value, whole: &mut Value) -> Result<()
             let (line, key) = (line_of(text, path), path.to_owned());
             return Err(ConfigError::Range { line, key, value, low, high });
         }
-        // `8` and `8.0` are one setting, and shall have one digest.
+        // `8` and `8.0` are one setting and must have one digest.
         if whole.is_f64() {
             *whole = Value::from(value);
             return Ok(());
@@ -160,8 +160,8 @@ fn kind(value: &Value) -> String {
     }
 }
 
-/// The line (from 1) on which the last key of a path stands: each key is looked for below the one
-/// before.
+/// The line (from 1) of the last key of a path. Each key is searched for from the line of the key before
+/// it.
 fn line_of(text: &str, path: &str) -> Option<usize> {
     let lines: Vec<&str> = text.lines().collect();
     let mut line = 0;
@@ -178,7 +178,7 @@ fn line_of(text: &str, path: &str) -> Option<usize> {
     (!path.is_empty()).then_some(line + 1)
 }
 
-/// The part of `own` that is not as in `usual`, as flow YAML.
+/// The part of `own` that differs from `usual`, as flow YAML.
 fn difference(own: &Value, usual: &Value) -> Option<String> {
     let (Value::Object(own), Value::Object(usual)) = (own, usual) else {
         return (own != usual).then(|| own.to_string());

@@ -7,11 +7,11 @@ section! {
     pub struct LocalizationConfig {
         /// Standard deviation of the slowly moving position error per axis under open sky, m, in `[0, 5]`. RTK fixed: 0.02 to 0.05; RTK float: 0.2 to 0.5.
         position_sigma_m: f64 = 0.04, 0.0..=5.0;
-        /// Factor of it in streets, where houses and trees hide part of the sky: outside junctions, in `[1, 50]`. Apollo's MSF: 0.05 to 0.10 m RMS over both axes; urban canyon: 0.5 to 2.5 m.
+        /// Factor of that deviation in streets, where houses and trees hide part of the sky: outside junctions, in `[1, 50]`. Apollo's MSF: 0.05 to 0.10 m RMS over both axes; urban canyon: 0.5 to 2.5 m.
         street_factor: f64 = 1.5, 1.0..=50.0;
         /// Standard deviation of the heading error, rad, in `[0, 0.1]`. Published: 0.2° to 0.5°.
         heading_sigma_rad: f64 = 0.0035, 0.0..=0.1;
-        /// Correlation time of both, s, in `[0.1, 100]`. Multipath and map matching: about 5.
+        /// Correlation time of the errors of position and heading, s, in `[0.1, 100]`. Multipath and map matching: about 5.
         correlation_s: f64 = 5.0, 0.1..=100.0;
         /// Age of a pose when it is used, s, in `[0, 0.1]`. LGSVL with Apollo: 0.01 to 0.02.
         latency_s: f64 = 0.015, 0.0..=0.1;
@@ -29,19 +29,19 @@ section! {
     pub struct PerceptionConfig {
         /// Reach of the LiDAR in clear air, m, in `[0, 300]`: vehicles. Sensor data sheets, 10 % reflectance: 120. Weakness (a) ends it at `grid_m`.
         lidar_vehicle_m: f64 = 120.0, 0.0..=300.0;
-        /// The same for pedestrians: 60. Weakness (a) ends it at `small_m`.
+        /// Reach of the LiDAR in clear air, m, in `[0, 300]`: pedestrians. 60. Weakness (a) ends it at `small_m`.
         lidar_pedestrian_m: f64 = 60.0, 0.0..=300.0;
         /// Where the detector's grid ends, m, in `[0, 300]`. Apollo's PointPillars: 74.88.
         grid_m: f64 = 74.88, 0.0..=300.0;
-        /// Where it still finds pedestrians, m, in `[0, 300]`. nuScenes scores them to 40.
+        /// How far the detector finds pedestrians, m, in `[0, 300]`. nuScenes scores them to 40.
         small_m: f64 = 40.0, 0.0..=300.0;
         /// Range of the cameras by day in clear air, m, in `[0, 300]`: vehicles. Sensor defaults of the literature: 120.
         camera_vehicle_m: f64 = 120.0, 0.0..=300.0;
-        /// The same for pedestrians: 60.
+        /// Range of the cameras by day in clear air, m, in `[0, 300]`: pedestrians. 60.
         camera_pedestrian_m: f64 = 60.0, 0.0..=300.0;
         /// Factor of the camera's range in full darkness, in `[0, 1]`: vehicles, which carry lamps. Night tests: 0.7.
         night_vehicle_factor: f64 = 0.7, 0.0..=1.0;
-        /// The same for pedestrians. Low beam, dark clothing: 25 to 40 m of 80.
+        /// Factor of the camera's range in full darkness, in `[0, 1]`: pedestrians. Low beam, dark clothing: 25 to 40 m of 80.
         night_pedestrian_factor: f64 = 0.4, 0.0..=1.0;
         /// Part of the camera in the fused range, in `[0, 1]`; the LiDAR has the rest. nuScenes, BEVFusion: losing the camera costs about a fifth of what losing the LiDAR costs.
         camera_weight: f64 = 0.2, 0.0..=1.0;
@@ -59,15 +59,15 @@ section! {
         visible_fraction_min: f64 = 0.2, 0.0..=1.0;
         /// Ghosts that begin in a second in clear air, 1/s, in `[0, 10]`. Sensor defaults of the literature: 0.002.
         ghosts_per_s: f64 = 0.002, 0.0..=10.0;
-        /// Factor of that rate in a downpour (50 mm/h), in `[1, 1000]`. The same: 20.
+        /// Factor of that rate in a downpour (50 mm/h), in `[1, 1000]`. Sensor defaults of the literature: 20.
         ghosts_rain_factor: f64 = 20.0, 1.0..=1000.0;
         /// Mean life of a ghost, s, in `[0.1, 10]`. As a run of missed frames; the figure is ours.
         ghost_s: f64 = 0.4, 0.1..=10.0;
         /// Frames of 0.1 s between the look and its use, in `[0, 20]`. Published latency 60 to 120 ms: 1.
         latency_frames: u32 = 1, 0.0..=20.0;
-        /// Position noise at no distance, m, in `[0, 5]`. nuScenes, LiDAR detectors.
+        /// Position noise at distance 0, m, in `[0, 5]`. nuScenes, LiDAR detectors.
         position_sigma_m: f64 = 0.10, 0.0..=5.0;
-        /// Position noise per metre of distance, in `[0, 0.1]`. The same.
+        /// Position noise per metre of distance, in `[0, 0.1]`. nuScenes, LiDAR detectors.
         position_sigma_per_m: f64 = 0.002, 0.0..=0.1;
         /// Heading noise of a frame, rad, in `[0, 1]`. LiDAR: 3°.
         heading_sigma_rad: f64 = 0.052, 0.0..=1.0;
@@ -99,7 +99,7 @@ section! {
         reserve_s: f64 = 0.3, 0.0..=5.0;
         /// Acceleration that the tracker expects of vehicles, standard deviation, m/s², in `[0.1, 20]`. Ours.
         vehicle_acceleration_sigma_mps2: f64 = 3.0, 0.1..=20.0;
-        /// The same for pedestrians.
+        /// Acceleration that the tracker expects of pedestrians, standard deviation, m/s², in `[0.1, 20]`. Ours.
         pedestrian_acceleration_sigma_mps2: f64 = 2.0, 0.1..=20.0;
         /// Factor of the velocity that is reported, in `[0, 2]`. A fault to plant: 1 by default.
         velocity_factor: f64 = 1.0, 0.0..=2.0;

@@ -12,15 +12,15 @@ pub struct Weaknesses {
     pub b_lane_bound_prediction: bool,
     /// (c) The braking of a plan builds up at a bounded rate, in an emergency too. Apollo `longitudinal_jerk_lower_bound` -4. Off: at once.
     pub c_bounded_jerk: bool,
-    /// (d) Whoever crosses on wheels and overlaps the way but briefly is not given way to. Apollo issue 14870. Off: everybody is.
+    /// (d) A vehicle that crosses and is on the way only briefly is not given way to. Apollo issue 14870. Off: it is.
     pub d_brief_yielding: bool,
-    /// (e) Of all that stands only what is closest is kept clear of, even while it is being passed. Apollo's `STBoundsDecider`: one static obstacle. Off: all of it.
+    /// (e) Only the closest of all standing objects is kept clear of, even while it is being passed. Apollo's `STBoundsDecider`: one static obstacle. Off: all of them are.
     pub e_closest_static_only: bool,
-    /// (f) A pedestrian who has stood for some time is ignored until he moves again. Apollo's crosswalk `stop_timeout`; issue 11926: creeps into a pedestrian. Off: he is not.
+    /// (f) A pedestrian who has stood for some time is ignored until he moves again. Apollo's crosswalk `stop_timeout`; issue 11926: creeps into a pedestrian. Off: every pedestrian counts.
     pub f_standing_pedestrian_ignored: bool,
     /// (g) A red light that would need hard braking is passed. Apollo `max_stop_deceleration`. Off: it is braked for, however late.
     pub g_late_red_passed: bool,
-    /// (h) Traffic beside and behind is not reacted to. Apollo issue 14633, `BACKSIDE_VEHICLE` off. Off: whoever moves over from beside is let in.
+    /// (h) Traffic beside and behind is not reacted to. Apollo issue 14633, `BACKSIDE_VEHICLE` off. Off: a vehicle that moves over from beside is let in.
     pub h_blind_to_side_and_rear: bool,
     /// (i) When no plan keeps clear, the fallback brakes at 4 m/s² and no harder. Apollo `slowdown_profile_deceleration`. Off: as hard as the vehicle can.
     pub i_gentle_fallback: bool,
@@ -63,7 +63,7 @@ impl Weaknesses {
         found
     }
 
-    /// Not one of them.
+    /// Every weakness switched off.
     pub const NONE: Weaknesses = Weaknesses {
         a_late_unstable_tracks: false,
         b_lane_bound_prediction: false,

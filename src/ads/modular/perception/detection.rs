@@ -10,14 +10,14 @@ pub struct Detection {
     pub body: Body,
     /// Pose as measured: centre of the whole object, see `shift_m`.
     pub pose: Pose,
-    /// From there to the centre of the part that was seen, along the heading, m.
+    /// From the centre of `pose` to the centre of the part that was seen, along the heading, m.
     pub shift_m: f64,
     pub length_m: f64,
     pub width_m: f64,
     pub height_m: f64,
     /// Standard deviation of the position, m.
     pub sigma_m: f64,
-    /// What no sensor measures at once, and only an idealised tracker is given: the true motion.
+    /// The true motion, which no sensor measures at once; only an idealised tracker uses it.
     pub true_velocity_mps: Vec2,
     pub true_heading_rad: f64,
 }

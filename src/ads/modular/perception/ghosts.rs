@@ -18,7 +18,7 @@ use super::ranges::RAIN_HIGH_MMPH;
 /// Ghosts begin so far ahead of the rear axle, m, and so far to each side.
 const AHEAD_M: (f64, f64) = (8.0, 50.0);
 const ASIDE_M: f64 = 5.0;
-/// Edge of the cube that one is taken for, m.
+/// Edge of the cube that a ghost looks like, m.
 const EDGE_M: f64 = 1.5;
 
 #[derive(Debug, Clone)]
@@ -37,11 +37,11 @@ struct Ghost {
 
 impl Ghosts {
     pub fn new(seed: u64) -> Ghosts {
-        // Index 0 is no object's, so nobody else draws from this stream.
+        // No object has the id 0, so nothing else draws from this stream.
         Ghosts { rng: rng::stream(seed, Stream::Perception, 0), begun: 0, alive: Vec::new() }
     }
 
-    /// One frame later; adds a detection of each to `detections`.
+    /// Moves on by a frame; adds a detection of each ghost to `detections`.
     pub fn haunt(
         &mut self,
         config: &PerceptionConfig,

@@ -2,8 +2,8 @@
 //!
 //! LiDAR and camera detect an object together with a chance that falls with distance and with what
 //! hides it; far away by day the camera alone does. Misses come in runs, not one by one: a chain of
-//! two states whose share of misses is the chance's. Each object has a random stream of its own, so
-//! that a change of one leaves the luck of the others alone.
+//! two states in which the share of misses is one minus that chance. Each object has a random stream of
+//! its own, so that a change of one object does not change the luck of the others.
 //! Left out: confusion of identities and of classes beside the flicker of large vehicles, headings
 //! turned round, and a latency that grows with the number of objects.
 
@@ -28,14 +28,14 @@ pub struct Perception {
     limited: bool,
     seed: u64,
     frame: u64,
-    /// Ranges of the conditions that last were; weather changes seldom.
+    /// Ranges in the last conditions, kept because weather changes seldom.
     ranges: Option<(Conditions, Ranges)>,
     watched: Vec<Watched>,
     ghosts: Ghosts,
     detections: Vec<Detection>,
 }
 
-/// An object within reach of the sensors: its luck.
+/// An object within reach of the sensors, with its luck so far.
 #[derive(Debug, Clone)]
 struct Watched {
     id: u32,

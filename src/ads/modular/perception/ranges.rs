@@ -8,7 +8,7 @@ use crate::sim::{Conditions, SensedObject};
 
 use super::super::config::PerceptionConfig;
 
-/// Rain at which "a downpour" in the settings' words is reached, mm/h.
+/// Rain that the settings call a downpour, mm/h.
 pub const RAIN_HIGH_MMPH: f64 = 50.0;
 
 /// Extinction at which 5 % of a contrast is left, times the distance (Koschmieder).
@@ -72,7 +72,7 @@ pub fn sight_m(conditions: &Conditions) -> f64 {
     OPTICAL_DEPTH / extinction_per_m(conditions)
 }
 
-/// Of light, 1/m.
+/// Extinction of light, 1/m.
 fn extinction_per_m(conditions: &Conditions) -> f64 {
     let fog_per_m = OPTICAL_DEPTH / conditions.visibility_m.max(1.0);
     // Carbonneau gives dB/km; 4.343 dB are one factor of e.

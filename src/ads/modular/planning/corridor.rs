@@ -10,10 +10,10 @@ use super::super::prediction::{Forecast, STEP_S, STEPS};
 use super::nudge::LateralPlan;
 use super::speed::Trajectory;
 
-/// Farther behind the rear axle nothing matters, m.
+/// Road users farther behind the rear axle do not matter, m.
 const BEHIND_M: f64 = 10.0;
 
-/// What a road user will take of the way.
+/// The part of the way that a road user will take, over time.
 #[derive(Debug, Clone)]
 pub struct Claim {
     pub id: u32,
@@ -115,7 +115,7 @@ impl Claim {
         if self.last == STEPS { f64::INFINITY } else { (self.last + 1) as f64 * STEP_S }
     }
 
-    /// Station of its near end, m; before its entry, as if it had come along the way.
+    /// Station of its near end at a time from now, m; before its entry, as if it came along the way.
     pub fn near_end_m(&self, time_s: f64) -> f64 {
         let place = (time_s / STEP_S).max(0.0);
         if place < self.first as f64 {

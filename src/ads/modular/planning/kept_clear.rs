@@ -13,10 +13,12 @@ use super::planner::HORIZON_M;
 use super::speed::{Constraint, Point};
 use super::standing::Standing;
 
-/// A pedestrian this little beside a crosswalk is on it, m. Apollo expands it by 2.
+/// A pedestrian so near to a crosswalk is on it, m. Apollo expands it by 2.
 const CROSSWALK_MARGIN_M: f64 = 2.0;
 /// Slower than this across the way, a pedestrian neither comes nor goes, m/s.
 const ACROSS_MPS: f64 = 0.2;
+/// Apollo's `stop_timeout`, s: it belongs to this rule and holds whether weakness (f) is on or not.
+const CROSSWALK_PATIENCE_S: f64 = 4.0;
 
 /// A stop before each crosswalk ahead that a pedestrian is on, or comes onto.
 pub fn crosswalks(
@@ -44,7 +46,7 @@ pub fn crosswalks(
             let velocity_mps = walker.velocity_mps;
             let left_mps = beside.forward.x * velocity_mps.y - beside.forward.y * velocity_mps.x;
             let away_mps = left_mps * beside.offset_m.signum();
-            // Apollo's `stop_timeout`: whoever does not go lets the vehicle go first.
+            // Apollo's `stop_timeout`: a pedestrian who does not go lets the vehicle go first.
             if standing.time_s(walker.id) > CROSSWALK_PATIENCE_S {
                 return false;
             }
@@ -59,10 +61,7 @@ pub fn crosswalks(
     }
 }
 
-/// Apollo's `stop_timeout`, s: it is the rule's own and holds whether weakness (f) is on or not.
-const CROSSWALK_PATIENCE_S: f64 = 4.0;
-
-/// A stop before a junction behind which something stands so near that the vehicle would have to stop
+/// A stop before a junction if something stands so near behind it that the vehicle would have to stop
 /// inside.
 pub fn keep_clear(
     config: &PlanningConfig,
@@ -115,7 +114,7 @@ mod tests {
         prediction.forecasts()[0].clone()
     }
 
-    /// Whether somebody at an offset from the path (m), walking to the left, stops the vehicle before a
+    /// Whether a pedestrian at an offset from the path (m), walking to the left, stops the vehicle before a
     /// crosswalk.
     fn stops_for(offset_m: f64, left_mps: f64, stood_s: f64) -> bool {
         let mut route = straight().route.clone();

@@ -28,7 +28,7 @@ pub struct LaneChanges {
     scene: Arc<Scene>,
     /// Where each change of the route begins, m; infinite while it has not.
     begins_m: Vec<f64>,
-    /// For how long the lane of the next one has been clear, s.
+    /// For how long the target lane of the next change has been clear, s.
     clear_s: f64,
 }
 
@@ -38,7 +38,7 @@ impl LaneChanges {
         LaneChanges { scene: Arc::clone(scene), begins_m, clear_s: 0.0 }
     }
 
-    /// The guide of the lanes as they are to be driven now.
+    /// The guide along the lanes that are to be driven now.
     pub fn guide(&self, config: &PlanningConfig) -> Guide {
         if self.begins_m.is_empty() {
             return Guide::new(&self.scene, &config.speed_rules());
@@ -59,7 +59,7 @@ impl LaneChanges {
         (station_m >= change.begin_m && !self.under_way(station_m)).then_some(change)
     }
 
-    /// Begins the next change if it is due and its lane is clear; `true` if the guide is another now.
+    /// Begins the next change if it is due and its lane is clear; `true` if that changes the guide.
     pub fn seek(
         &mut self,
         config: &PlanningConfig,

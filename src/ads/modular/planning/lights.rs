@@ -17,7 +17,7 @@ use super::speed::Constraint;
 
 /// A bumper this far over the line while the light let it go has passed it, m. Ours.
 const PASSED_M: f64 = 0.5;
-/// A bumper this far over the line is in the junction, and whoever is there clears it, m. Apollo's
+/// A bumper this far over the line is in the junction, which the vehicle must then clear, m. Apollo's
 /// traffic-light rule, `min_pass_s_distance`: 4.0.
 const INSIDE_M: f64 = 4.0;
 

@@ -1,4 +1,4 @@
-//! Planning: a path and a speed along the route that obey limits, lights and everybody on the way.
+//! Planning: a path and a speed along the route that obey limits and lights and keep clear of road users.
 //!
 //! Path: the lane, a shift within it past what stands at its edge, the route's lane changes once their
 //! gap is safe. Speed: stop fences, following, giving way. Left out, of Apollo's tasks: lane borrowing
@@ -6,11 +6,11 @@
 //! (maps have none here), pull-over and parking.
 
 mod corridor;
+mod kept_clear;
 mod lane_change;
 mod lights;
 mod nudge;
 mod planner;
-mod kept_clear;
 mod speed;
 mod standing;
 

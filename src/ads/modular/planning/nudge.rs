@@ -2,7 +2,7 @@
 //!
 //! Apollo's path bounds keep 0.3 m from static obstacles, 3 m before and 2 m behind them; its
 //! piecewise-jerk optimiser is replaced by a quintic shift of bounded lateral acceleration. Pedestrians
-//! and whatever moves are not nudged round.
+//! and moving road users are not passed in this way.
 
 use crate::ads::guide::{Guide, Span};
 use crate::ads::steering::Aside;
@@ -16,7 +16,7 @@ use super::planner::HORIZON_M;
 /// Apollo's `obstacle_lon_start_buffer` and `obstacle_lon_end_buffer`, m.
 const BEFORE_M: f64 = 3.0;
 const BEHIND_M: f64 = 2.0;
-/// The shift may go on until the bumper is so near, m, where there is no more room.
+/// Where there is no room for that, the shift may go on until the bumper is so near, m.
 const BEFORE_M_MIN: f64 = 0.5;
 /// Lateral acceleration of the shift, m/s², and its least length, m. Ours.
 const LATERAL_MPS2: f64 = 1.5;
@@ -42,7 +42,7 @@ struct Bump {
     down_m: (f64, f64),
 }
 
-/// What stands in the way, and how far it reaches across.
+/// A standing object, and how far it reaches across the way.
 struct Edge {
     id: u32,
     span: Span,
@@ -71,7 +71,7 @@ impl LateralPlan {
         }
     }
 
-    /// How far from the guide it lies at most, m.
+    /// Greatest distance of the path from the guide, m.
     pub fn offset_m_max(&self) -> f64 {
         self.bump.map_or(0.0, |bump| bump.offset_m.abs())
     }
@@ -81,7 +81,7 @@ impl LateralPlan {
         self.bump.map(|bump| (bump.id, bump.span))
     }
 
-    /// One cycle later: ends a shift that is over, begins one that is needed and possible.
+    /// Once a cycle: ends a shift that is over, begins one that is needed and possible.
     pub fn update(
         &mut self,
         config: &PlanningConfig,

@@ -81,7 +81,7 @@ impl Planner {
         }
     }
 
-    /// The lanes as they are driven now: another after a lane change has begun.
+    /// The guide along the lanes that are driven now; replaced when a lane change begins.
     pub fn guide(&self) -> &Arc<Guide> {
         &self.guide
     }
@@ -123,7 +123,7 @@ impl Planner {
             self.roll(start);
         }
         if !self.trajectory.keeps_clear(&self.constraints, &self.claims) {
-            // Weakness (i); without it, this is as hard as before.
+            // Weakness (i); without it, this braking is as hard as that of the plan before.
             let emergency_mps2 = self.config.fallback_mps2.min(self.config.emergency_mps2);
             let config = PlanningConfig { emergency_mps2, ..self.config };
             let trajectory = &mut self.trajectory;
@@ -151,8 +151,8 @@ impl Planner {
         };
     }
 
-    /// Rules, and whoever is on the way already: that decides when crossings ahead are reached, so it
-    /// comes before them.
+    /// Collects the constraints of rules and of road users on the way already. They decide when crossings
+    /// ahead are reached, so they come before the constraints of crossing road users.
     fn collect(&mut self, outlook: &Outlook, start: &Point) {
         let &Outlook { station_m, speed_mps, forecasts, .. } = outlook;
         let constraints = &mut self.constraints;
@@ -164,7 +164,7 @@ impl Planner {
         self.claims.clear();
         let passed = self.lateral.passing().map(|(id, _)| id);
         for forecast in forecasts {
-            // Weakness (f): whoever has stood for so long does not count.
+            // Weakness (f): a pedestrian who has stood for so long does not count.
             let ignored = self.standing.time_s(forecast.id) > config.standing_pedestrian_s;
             // The path leads past what is being passed.
             if ignored || (passed == Some(forecast.id) && !forecast.moving) {
@@ -183,8 +183,8 @@ impl Planner {
         }
     }
 
-    /// Weakness (e): of all that stands, drops what is not the closest, which may be something that is
-    /// just being passed.
+    /// Weakness (e): keeps only the closest of all standing objects, which may be the one that is just
+    /// being passed.
     fn keep_closest_static(&mut self, station_m: f64) {
         let rear_m = VehicleParameters::MKZ.rear_m(station_m);
         let stands = |claim: &Claim| !claim.moving && claim.spans[0].to_m > rear_m;
@@ -222,8 +222,8 @@ impl Planner {
         (claim.cosine > ALONG_COSINE).then(|| Constraint::follow(claim.id, index))
     }
 
-    /// Whether somebody beside the vehicle, who has come or will come onto its way, is let in. Under
-    /// weakness (h) nobody is (Apollo issue 14633).
+    /// Whether a road user beside the vehicle that has come or will come onto its way is let in. Under
+    /// weakness (h) none is (Apollo issue 14633).
     fn lets_in(&self, claim: &Claim, span: &Span, point: &Point) -> bool {
         !self.weaknesses.h_blind_to_side_and_rear
             && claim.moving
@@ -235,10 +235,10 @@ impl Planner {
     /// FOLLOW or YIELD or, as `None`, OVERTAKE: for road users that move onto or across the way.
     ///
     /// There is a conflict if both would be at one place less than `conflict_buffer_s` apart. Under
-    /// weakness (d), one who crosses on wheels and will be off the way again within `brief_overlap_s` of
-    /// coming onto it is no reason to wait: the decision flips from YIELD to OVERTAKE (Apollo issue
-    /// 14870). The ego vehicle goes first only if it would be past by that buffer, or can no longer stop
-    /// and would still be past.
+    /// weakness (d), a crossing vehicle that will be off the way again within `brief_overlap_s` of coming
+    /// onto it is no reason to wait: the decision flips from YIELD to OVERTAKE (Apollo issue 14870). The
+    /// ego vehicle goes first only if it would be past by that buffer, or if it can no longer stop and
+    /// would still be past.
     fn in_conflict(&self, claim: &Claim, index: usize, start: &Point) -> Option<Constraint> {
         let (config, trajectory) = (&self.config, &self.trajectory);
         let along = claim.cosine > ALONG_COSINE;
@@ -263,7 +263,7 @@ impl Planner {
         if past(claim.entry_s() - config.conflict_buffer_s) || (too_late && past(claim.entry_s())) {
             return None;
         }
-        // One who crosses behind the front bumper: the best is to be gone.
+        // It crosses behind the front bumper: the best is to drive on.
         if claim.cosine > -ALONG_COSINE && room_m < 0.0 {
             return None;
         }
@@ -272,7 +272,7 @@ impl Planner {
     }
 }
 
-/// The settings with what belongs to an absent weakness out of force.
+/// The settings without what belongs to weaknesses that are switched off.
 fn without_absent(config: &PlanningConfig, weaknesses: &Weaknesses) -> PlanningConfig {
     let mut config = *config;
     if !weaknesses.c_bounded_jerk {
@@ -293,5 +293,5 @@ fn without_absent(config: &PlanningConfig, weaknesses: &Weaknesses) -> PlanningC
     config
 }
 
-/// From any braking to any other between two points of a plan, m/s³.
+/// Jerk that allows any change of acceleration between two points of a plan, m/s³.
 const JERK_MPS3_UNBOUNDED: f64 = 1e4;

@@ -13,7 +13,7 @@ use super::corridor::Claim;
 
 /// Time between points of a trajectory, s.
 pub const POINT_S: f64 = 0.1;
-/// 8 s.
+/// Points of a trajectory: 8 s.
 const POINTS: usize = 81;
 /// Every so many points a plan is checked for contact.
 const CHECK_POINTS: usize = 4;
@@ -68,7 +68,7 @@ impl Trajectory {
         }
     }
 
-    /// Whether the plan stops short of everything that it is to stop for and closes up to nobody.
+    /// Whether the plan stops short of everything that it is to stop for, and touches no leader.
     pub fn keeps_clear(&self, constraints: &[Constraint], claims: &[Claim]) -> bool {
         constraints.iter().all(|constraint| {
             let room_m = |index: usize| {
@@ -84,13 +84,13 @@ impl Trajectory {
                     }
                 }
             };
-            // What is touched already, or beside, no plan can keep clear of.
+            // No plan can keep clear of what is touched already, or beside.
             let is_open = room_m(0).is_none_or(|room_m| room_m > 0.0);
             !is_open || (0..POINTS).step_by(CHECK_POINTS).all(|index| room_m(index).is_none_or(|m| m > 0.0))
         })
     }
 
-    /// Constant braking to rest: the plan when there is none.
+    /// Constant braking to rest, for a vehicle that has lost the route.
     pub fn braking(station_m: f64, speed_mps: f64, decel_mps2: f64) -> Trajectory {
         let mut trajectory = Trajectory { reason: Reason::Fallback, ..Trajectory::default() };
         let mut point = Point { station_m, speed_mps, acceleration_mps2: -decel_mps2 };

@@ -1,13 +1,13 @@
-//! How long pedestrians have stood: weakness (f) ignores those who have done so for some time.
+//! How long pedestrians have stood: weakness (f) ignores those who have stood for some time.
 //!
-//! Tracked speeds are too noisy to tell that somebody stands; that he stays where he is does.
+//! Tracked speeds are too noisy to tell that a pedestrian stands; staying in one place tells it.
 
 use crate::geometry::Vec2;
 
 use super::super::perception::FRAME_S;
 use super::super::prediction::Forecast;
 
-/// Whoever stays this near to a place stands there, m. Ours.
+/// A pedestrian who stays this near to a place stands there, m. Ours.
 const PLACE_M: f64 = 0.5;
 
 #[derive(Debug, Clone, Default)]
@@ -24,7 +24,7 @@ struct Stood {
 }
 
 impl Standing {
-    /// One cycle later.
+    /// Once a cycle: counts on for pedestrians who have stayed, and forgets those who are gone.
     pub fn update(&mut self, forecasts: &[Forecast]) {
         self.known.iter_mut().for_each(|stood| stood.seen = false);
         for walker in forecasts.iter().filter(|forecast| !forecast.body.is_vehicle()) {
