@@ -94,7 +94,7 @@ pub struct Steering {
 }
 
 impl Steering {
-    /// A controller with these settings. The usual ones are solved once and shared: a solution
+    /// A controller with these settings. That of the default settings is solved once and shared: a solution
     /// takes as long as a few hundred ticks of driving.
     pub fn shared(config: &SteeringConfig) -> Arc<Steering> {
         static USUAL: LazyLock<Arc<Steering>> =

@@ -6,7 +6,7 @@
 
 use crate::ads::Rss;
 use crate::geometry::{OrientedBox, Pose, Sweep, Vec2, distance_m, first_contact, wrap_angle};
-use crate::sim::{DT_S, FRAME_TICKS, Obstacle, World};
+use crate::sim::{FRAME_S, FRAME_TICKS, Obstacle, World};
 
 /// Contacts later than this are not looked for, s.
 const HORIZON_S: f64 = 8.0;
@@ -77,7 +77,7 @@ impl Criticality {
             is_unsafe |= seen.is_unsafe(speed_mps, &Rss::default());
         }
         if is_unsafe {
-            self.rss_unsafe_s += FRAME_TICKS as f64 * DT_S;
+            self.rss_unsafe_s += FRAME_S;
         }
     }
 }
@@ -199,8 +199,7 @@ impl Encroachment {
     /// The least post-encroachment time with anybody, s; `None` above 5 s. Those of whom `is_hit` says
     /// that the ego vehicle has hit them are left out: they and it were at one place at one time.
     pub fn least_s(&self, is_hit: &dyn Fn(u32) -> bool) -> Option<f64> {
-        let frame_s = FRAME_TICKS as f64 * DT_S;
-        let most = (PET_S_MAX / frame_s) as usize;
+        let most = (PET_S_MAX / FRAME_S) as usize;
         let mut least = most + 1;
         for trail in self.others.iter().filter(|trail| !is_hit(trail.id)) {
             for (index, other) in trail.outlines.iter().enumerate() {
@@ -214,7 +213,7 @@ impl Encroachment {
                 }
             }
         }
-        (least <= most).then_some(least as f64 * frame_s)
+        (least <= most).then_some(least as f64 * FRAME_S)
     }
 }
 

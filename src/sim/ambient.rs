@@ -81,7 +81,7 @@ impl Ambient {
     }
 }
 
-/// Whether an ambient vehicle has got so far away that it leaves, unseen.
+/// Whether an ambient vehicle is so far away that it can leave unseen.
 pub(super) fn is_gone(obstacle: &Obstacle, ego: &OrientedBox) -> bool {
     let there = ego.pose.to_local(obstacle.outline.pose.position);
     let away_m2 = there.norm_squared();

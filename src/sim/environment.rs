@@ -129,7 +129,7 @@ impl Environment {
     }
 }
 
-/// Friction of a tyre on a road with so much water: the table, linear between its entries and held
+/// Friction of a tyre on a road with some depth of water: the table, linear between its entries and held
 /// beyond its ends. Every vehicle asks for it in every tick, at its own speed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Grip {

@@ -49,5 +49,5 @@ pub use following::Following;
 pub use incident::Incident;
 pub use road_user::Obstacle;
 pub use scene::Scene;
-pub use sense::{Conditions, EgoMotion, FRAME_TICKS, Sensed, SensedObject, SignalColour};
+pub use sense::{Conditions, EgoMotion, FRAME_S, FRAME_TICKS, Sensed, SensedObject, SignalColour};
 pub use world::{DT_S, ENGINE, Start, World};

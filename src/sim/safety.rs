@@ -1,4 +1,4 @@
-//! How much room a newcomer leaves to a driver who is careful and competent.
+//! How much room a newcomer leaves to a careful and competent driver.
 //!
 //! The driver of UN R157 (Annex 4, Appendix 3) perceives the risk for 0.4 s, reacts after 0.75 s
 //! more, and brakes with a jerk of 12.65 m/s³ up to 0.774 g, or what the road gives. With Δv the

@@ -8,6 +8,7 @@ use crate::geometry::{Frame, OrientedBox, Pose, Vec2};
 use crate::model::vocabulary::Body;
 
 use super::road_user::Obstacle;
+use super::world::DT_S;
 
 /// Objects farther away than this are not sensed at all, m: the clear-day range for cars of the
 /// LiDAR and the camera that driving systems are given.
@@ -16,6 +17,9 @@ pub(super) const RANGE_M: f64 = 120.0;
 /// Ticks between two frames (10 Hz): once a frame, lines of sight are worked out, driving systems perceive
 /// and other drivers react.
 pub const FRAME_TICKS: u64 = 5;
+
+/// Time between two frames, s.
+pub const FRAME_S: f64 = FRAME_TICKS as f64 * DT_S;
 
 /// Points of an outline to which a line of sight is tried.
 const RAYS: usize = 8;

@@ -166,7 +166,7 @@ fn comes_towards_in_the_inner_opposing_lane() {
 
 #[test]
 fn crosses_when_the_ego_vehicle_is_there() {
-    // Who is to change lanes first needs a longer way before the junction.
+    // A vehicle that changes lanes first needs a longer way before the junction.
     for (then, begin_m) in [(Then::Keep, 150.0), (Then::Change, 110.0)] {
         let start = Start { signal_phase_s: 10.0, ..testing::start() };
         let mut world = World::new(testing::crossing(), &start);
@@ -295,7 +295,7 @@ proptest! {
                 if world.incidents().iter().any(|met| met.obstacle == was.id || met.other == was.id) {
                     continue; // It stands at once, after it has moved.
                 }
-                // Nobody jumps, neither between lanes nor between their halves.
+                // No vehicle jumps, neither between lanes nor half-way through a lane change.
                 let moved = now.outline.pose.position - was.outline.pose.position;
                 prop_assert!((moved - now.velocity_mps * DT_S).norm() < 0.02, "{was:?} {now:?}");
                 let turned = wrap_angle(now.outline.pose.heading_rad - was.outline.pose.heading_rad);
@@ -315,7 +315,7 @@ proptest! {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 24, ..ProptestConfig::default() })]
 
-    /// With everybody under way, in a changing sky: a clone of any moment drives on as its original.
+    /// With all road users under way, in a changing sky: a clone of any moment drives on as its original.
     #[test]
     fn a_branch_of_any_moment_goes_on_alike(seed in 0_u64..1000, road in 0..3, moment in 1_u32..900, turn in 0..4) {
         let scene = [testing::straight(), testing::crossing(), testing::corner()][road as usize].clone();
@@ -387,7 +387,7 @@ fn nobody_changes_lanes_across_a_median() {
         let refusal = world.survey(&wish).expect_err("there is no way over");
         assert!(refusal.starts_with("no lane ") || refusal.starts_with("no room "), "{refusal}");
     }
-    // Nor does anybody come who would have to pass.
+    // Nor does a vehicle come that would have to pass.
     world.survey(&request(Verb::Overtake, 15.0, 12.0)).expect_err("there is no way past");
 }
 
@@ -423,7 +423,7 @@ fn who_appears_in_plain_view_leaves_time_to_notice() {
     let wish = request(Verb::DriveAhead, 10.0, 20.0);
     let facts = world.survey(&wish).expect("there is room");
     assert!((facts.safety_gap_m - 1.15 * world.ego().speed_mps).abs() < 1e-9, "{facts:?}");
-    // Behind a bus that is there already nobody sees it come.
+    // Behind a bus that is there already it is not seen to come.
     let bus = SpawnRequest { body: Body::SchoolBus, ..request(Verb::DriveAhead, 4.0, 20.0) };
     spawn(&mut world, bus);
     let hidden = SpawnRequest { body: Body::Hatchback, ..request(Verb::DriveAhead, 40.0, 20.0) };

@@ -18,7 +18,8 @@ use super::placement;
 use super::road_user::{Moved, Obstacle, RoadUser};
 use super::scene::Scene;
 use super::sense::{
-    Conditions, EgoMotion, FRAME_TICKS, RANGE_M, Sensed, SensedObject, SignalColour, visible_fraction,
+    Conditions, EgoMotion, FRAME_S, FRAME_TICKS, RANGE_M, Sensed, SensedObject, SignalColour,
+    visible_fraction,
 };
 use super::signals::SignalClock;
 
@@ -145,7 +146,7 @@ impl World {
             self.renew_ambient(false);
         }
         if self.ticks.is_multiple_of(FRAME_TICKS) {
-            self.environment.pass(FRAME_TICKS as f64 * DT_S);
+            self.environment.pass(FRAME_S);
             self.conditions = self.environment.conditions(self.ego.motion.speed_mps);
             self.look();
         }

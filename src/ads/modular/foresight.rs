@@ -5,9 +5,7 @@
 //! drives otherwise, they may leave the recorded way: it is right up to the first difference that matters.
 
 use crate::geometry::Vec2;
-use crate::sim::{FRAME_TICKS, Obstacle};
-
-use super::perception::FRAME_S;
+use crate::sim::{FRAME_S, FRAME_TICKS, Obstacle};
 
 /// Where every obstacle of an episode was, every 0.1 s.
 #[derive(Debug, Clone, PartialEq, Default)]

@@ -12,11 +12,10 @@ use std::sync::Arc;
 use crate::geometry::{Vec2, unit_vector, wrap_angle};
 use crate::model::vocabulary::Body;
 use crate::road::{LaneIndex, LanePlace, RoadMap};
-use crate::sim::Scene;
+use crate::sim::{FRAME_S, Scene};
 
 use super::config::PredictionConfig;
 use super::foresight::Foresight;
-use super::perception::FRAME_S;
 use super::tracking::Track;
 
 /// Predicted positions after the present one.

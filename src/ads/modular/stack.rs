@@ -8,14 +8,14 @@ use std::sync::Arc;
 use crate::ads::driver::Ads;
 use crate::ads::status::{GHOST_ID_MIN, PerceivedObject, PlannedPoint, Status};
 use crate::geometry::Pose;
-use crate::sim::{Control, DT_S, FRAME_TICKS, Scene, Sensed};
+use crate::sim::{Control, DT_S, FRAME_S, FRAME_TICKS, Scene, Sensed};
 
 use super::config::ModularConfig;
 use super::control::Controller;
 use super::foresight::Foresight;
 use super::junctions::Junctions;
 use super::localization::Localization;
-use super::perception::{FRAME_S, LightReader, Perception};
+use super::perception::{LightReader, Perception};
 use super::planning::{Outlook, Planner};
 use super::prediction::Prediction;
 use super::tracking::Tracking;

@@ -115,8 +115,8 @@ fn weakness_d_does_not_give_way_to_a_brief_overlap() {
     }
 }
 
-/// A car stands suddenly so far ahead of the bumper of a vehicle at cruising speed: the gap that is
-/// left, and the speed at contact (m/s) if none is.
+/// A car suddenly stands `ahead_m` before the bumper of a vehicle at cruising speed. Returns the gap that is
+/// left, m, and the speed at contact if there is one, m/s.
 fn sudden_wall(config: &ModularConfig, ahead_m: f64) -> (f64, f64) {
     let scene = straight();
     let mut rig = rig_of(&scene, config, 1);

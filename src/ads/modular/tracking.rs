@@ -8,9 +8,10 @@ use std::collections::VecDeque;
 
 use crate::geometry::{Pose, Vec2, unit_vector, wrap_angle};
 use crate::model::vocabulary::Body;
+use crate::sim::FRAME_S;
 
 use super::config::TrackingConfig;
-use super::perception::{Detection, FRAME_S};
+use super::perception::Detection;
 
 /// Standard deviation of a velocity that is not measured yet, m/s.
 const UNKNOWN_VELOCITY_MPS: f64 = 10.0;

@@ -14,7 +14,9 @@ use std::sync::Arc;
 use crate::ads::driver::Ads;
 use crate::ads::guide::Guide;
 use crate::ads::status::{Reason, Status};
-use crate::sim::{Conditions, Control, DT_S, FRAME_TICKS, Scene, Sensed, SensedObject, VehicleParameters};
+use crate::sim::{
+    Conditions, Control, DT_S, FRAME_S, FRAME_TICKS, Scene, Sensed, SensedObject, VehicleParameters,
+};
 
 use super::encounter::Encounter;
 use super::idm::Idm;
@@ -28,8 +30,6 @@ const COMFORTABLE_MPS2: f64 = 3.0;
 const SEEN_PART_MIN: f64 = 0.25;
 /// Slower than this towards the way is no movement towards it, m/s.
 const TOWARDS_MPS_MIN: f64 = 0.05;
-/// One look, s.
-const FRAME_S: f64 = FRAME_TICKS as f64 * DT_S;
 
 /// Whether a careful driver sees an object: enough of its outline is in the line of sight, and it is no
 /// farther away than one can see in the fog.

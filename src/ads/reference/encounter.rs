@@ -19,7 +19,6 @@ const CROSSING_PART: f64 = 0.5;
 /// One road user ahead or beside, and the ego vehicle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Encounter {
-    pub id: u32,
     /// From the ego vehicle's front to the near end of the road user along the way, m; negative beside.
     pub gap_m: f64,
     /// Gap between the flanks across the way, m; 0 or negative where the outlines overlap.
@@ -79,7 +78,6 @@ impl Encounter {
             })
         };
         Some(Encounter {
-            id: object.id,
             gap_m: beside.station_m - along_m / 2.0 - front_m,
             side_gap_m: beside.offset_m.abs() - (across_m + car.width_m) / 2.0,
             towards_mps: if beside.offset_m >= 0.0 { -left_mps } else { left_mps },

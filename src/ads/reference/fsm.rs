@@ -40,7 +40,7 @@ impl Default for FuzzySafety {
 
 impl FuzzySafety {
     /// Proactive fuzzy surrogate in `[0, 1]`: what if the leader brakes hard?
-    pub fn proactive(&self, gap_m: f64, rear_mps: f64, leader_mps: f64) -> f64 {
+    fn proactive(&self, gap_m: f64, rear_mps: f64, leader_mps: f64) -> f64 {
         let common_m = rear_mps * self.reaction_s - leader_mps * leader_mps / (2.0 * self.leader_mps2);
         let braked_m = |braking_mps2: f64| rear_mps * rear_mps / (2.0 * braking_mps2);
         let safe_m = common_m + braked_m(self.braking_mps2_min) + self.safe_margin_m;
@@ -49,7 +49,7 @@ impl FuzzySafety {
     }
 
     /// Critical fuzzy surrogate in `[0, 1]`: what if nothing changes?
-    pub fn critical(&self, gap_m: f64, rear_mps: f64, rear_mps2: f64, leader_mps: f64) -> f64 {
+    fn critical(&self, gap_m: f64, rear_mps: f64, rear_mps2: f64, leader_mps: f64) -> f64 {
         if rear_mps <= leader_mps {
             return 0.0;
         }

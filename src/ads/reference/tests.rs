@@ -35,7 +35,6 @@ fn crashes(model: &impl Model, cut_in: CutIn) -> bool {
     let over_m = SIDE_GAP_M - 3.5;
     for _ in 0..200 {
         let encounter = Encounter {
-            id: 1,
             gap_m,
             side_gap_m,
             towards_mps: if side_gap_m > over_m { cut_in.lateral_mps } else { 0.0 },

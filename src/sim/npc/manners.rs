@@ -33,9 +33,9 @@ use crate::sim::world::DT_S;
 
 use super::driver::{COMFORT_MPS2, Driver, GAP_M_MIN, LOOK_AHEAD_M};
 
-/// After so long at rest a driver no longer waits for vehicles that stand, s. Ours.
+/// Time at rest after which a driver no longer waits for vehicles that stand, s. Ours.
 const PATIENCE_S: f64 = 8.0;
-/// After so long at rest for others a driver leaves the world, s. Ours: less than the 24 s without
+/// Time at rest for others after which a driver leaves the world, s. Ours: less than the 24 s without
 /// progress that end an episode of the shipped space.
 pub(super) const GIVE_UP_S: f64 = 20.0;
 /// Time between one vehicle in an area and the next, s: accepted gaps in towns are longer, but there the

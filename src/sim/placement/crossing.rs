@@ -22,7 +22,7 @@ const CROSSING_M: f64 = 60.0;
 const EGO_GAINS_MPS2: f64 = 1.5;
 /// Lateral acceleration with which it is expected to take bends, m/s²: ours, as above.
 const EGO_LATERAL_MPS2: f64 = 2.0;
-/// A stop line at most so far behind a newcomer counts as passed when it appears, m.
+/// A stop line within this distance behind a newcomer counts as passed when it appears, m.
 const BEYOND_LINE_M: f64 = 30.0;
 /// Step in which a drive towards a rendezvous is timed, m.
 const TIMING_M: f64 = 1.0;

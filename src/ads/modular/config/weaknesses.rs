@@ -16,7 +16,7 @@ pub struct Weaknesses {
     pub d_brief_yielding: bool,
     /// (e) Only the closest of all standing objects is kept clear of, even while it is being passed. Apollo's `STBoundsDecider`: one static obstacle. Off: all of them are.
     pub e_closest_static_only: bool,
-    /// (f) A pedestrian who has stood for some time is ignored until he moves again. Apollo's crosswalk `stop_timeout`; issue 11926: creeps into a pedestrian. Off: every pedestrian counts.
+    /// (f) A pedestrian who has stood for some time is ignored until moving again. Apollo's crosswalk `stop_timeout`; issue 11926: creeps into a pedestrian. Off: every pedestrian counts.
     pub f_standing_pedestrian_ignored: bool,
     /// (g) A red light that would need hard braking is passed. Apollo `max_stop_deceleration`. Off: it is braked for, however late.
     pub g_late_red_passed: bool,

@@ -8,14 +8,13 @@ use crate::geometry::{Pose, Vec2};
 use crate::model::vocabulary::Body;
 use crate::rng;
 use crate::rng::{Rng, Stream};
-use crate::sim::Conditions;
+use crate::sim::{Conditions, FRAME_S};
 
 use super::super::config::PerceptionConfig;
 use super::detection::Detection;
-use super::look::FRAME_S;
 use super::ranges::RAIN_HIGH_MMPH;
 
-/// Ghosts begin so far ahead of the rear axle, m, and so far to each side.
+/// Where ghosts begin: least and greatest distance ahead of the rear axle, and greatest to each side, m.
 const AHEAD_M: (f64, f64) = (8.0, 50.0);
 const ASIDE_M: f64 = 5.0;
 /// Edge of the cube that a ghost looks like, m.

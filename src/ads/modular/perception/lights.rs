@@ -9,10 +9,9 @@
 use std::sync::Arc;
 
 use crate::geometry::{OrientedBox, Vec2, ray_hit_m};
-use crate::sim::{Scene, Sensed, SensedObject, SignalColour, VehicleParameters};
+use crate::sim::{FRAME_S, Scene, Sensed, SensedObject, SignalColour, VehicleParameters};
 
 use super::super::config::PerceptionConfig;
-use super::look::FRAME_S;
 use super::ranges::sight_m;
 
 /// Height of the camera and of the lamps, m. Ours: roof of the vehicle, arm over the lane.

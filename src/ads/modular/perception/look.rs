@@ -11,15 +11,12 @@ use crate::geometry::{Pose, Vec2, unit_vector, wrap_angle};
 use crate::model::vocabulary::Body;
 use crate::rng;
 use crate::rng::{Rng, Stream};
-use crate::sim::{Conditions, DT_S, FRAME_TICKS, Sensed, SensedObject};
+use crate::sim::{Conditions, FRAME_S, Sensed, SensedObject};
 
 use super::super::config::PerceptionConfig;
 use super::detection::Detection;
 use super::ghosts::Ghosts;
 use super::ranges::Ranges;
-
-/// Time between frames, s.
-pub const FRAME_S: f64 = FRAME_TICKS as f64 * DT_S;
 
 #[derive(Debug, Clone)]
 pub struct Perception {

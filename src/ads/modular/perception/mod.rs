@@ -8,4 +8,4 @@ mod ranges;
 
 pub use detection::Detection;
 pub use lights::LightReader;
-pub use look::{FRAME_S, Perception};
+pub use look::Perception;

@@ -9,17 +9,16 @@ use std::sync::Arc;
 use crate::ads::guide::{Beside, Guide};
 use crate::ads::status::Reason;
 use crate::road::RouteLaneChange;
-use crate::sim::{Scene, VehicleParameters};
+use crate::sim::{FRAME_S, Scene, VehicleParameters};
 
 use super::super::config::PlanningConfig;
-use super::super::perception::FRAME_S;
 use super::super::prediction::Forecast;
 use super::speed::Constraint;
 
 /// Vehicles farther away along the road do not matter, m: the greatest gap that is asked for in a town.
 const LOOK_M: f64 = 200.0;
 
-/// For so long a lane must have been clear, s: a new track takes almost half of it to be published.
+/// Time for which a lane must have been clear, s: a new track takes almost half of it to be published.
 /// Apollo waits as long after a failed attempt.
 const CLEAR_S: f64 = 1.0;
 

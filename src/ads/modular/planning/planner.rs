@@ -23,7 +23,8 @@ use super::{kept_clear, speed};
 
 /// Claims and lights that begin farther ahead do not matter yet, m. Apollo's ST graph ends at 100.
 pub(super) const HORIZON_M: f64 = 100.0;
-/// Faster than this along the route, a road user is a leader rather than one who crosses: cosine of 60°.
+/// A road user that moves along the route with more than this part of its speed is a leader; otherwise it
+/// crosses. Cosine of 60°.
 const ALONG_COSINE: f64 = 0.5;
 /// Traffic beside that is slower by more than this falls back by itself, m/s.
 const FALLS_BACK_MPS: f64 = 2.0;

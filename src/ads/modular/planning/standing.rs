@@ -3,8 +3,8 @@
 //! Tracked speeds are too noisy to tell that a pedestrian stands; staying in one place tells it.
 
 use crate::geometry::Vec2;
+use crate::sim::FRAME_S;
 
-use super::super::perception::FRAME_S;
 use super::super::prediction::Forecast;
 
 /// A pedestrian who stays this near to a place stands there, m. Ours.
