@@ -11,7 +11,7 @@ use rand::SeedableRng;
 /// The one generator of avastra.
 pub type Rng = rand_chacha::ChaCha8Rng;
 
-/// Who draws. The discriminant is part of every replay: never renumber, only add.
+/// What a stream is for. The discriminant is part of every replay: never renumber, only add.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u64)]
 pub enum Stream {
@@ -29,13 +29,13 @@ pub enum Stream {
     Perception = 6,
     /// Choices of other road users, for example which way to turn.
     Traffic = 7,
-    /// Ambient traffic: where somebody appears and what they are; one index an attempt.
+    /// Ambient traffic: where a vehicle appears and of what kind; one index for each attempt.
     Ambient = 8,
     /// Small changes of a scenario, to see whether it still crashes.
     Variation = 9,
     /// First weights of a network.
     Initialization = 21,
-    /// Which transitions a learner looks at again.
+    /// Which transitions a learner draws for an update.
     Replay = 22,
     /// Seeds of the episodes that a trained policy is judged by.
     Evaluation = 23,
@@ -49,11 +49,11 @@ pub enum Stream {
     Bootstrap = 33,
     /// Seeds of the episodes in which rules learn from a network.
     Distillation = 41,
-    /// The order into which the values of a variable are shuffled; one index a variable and repeat.
+    /// The order into which the values of a variable are shuffled; one index for each variable and repeat.
     Permutation = 42,
 }
 
-/// The stream of one consumer; `index` tells apart its uses, for example the step number.
+/// The stream of one consumer; `index` tells its uses apart, and may be the number of a step.
 pub fn stream(seed: u64, stream: Stream, index: u64) -> Rng {
     let mut key = [0_u8; 32];
     key[0..8].copy_from_slice(&seed.to_le_bytes());

@@ -1,6 +1,6 @@
-//! Trying rows out before one is chosen: the handle that an agent gets for a moment of an episode.
+//! Trying rows out before choosing one: what an agent may do at a moment of an episode.
 //!
-//! What drives and judges the branches stands right of here; an agent sees what came of them.
+//! `run` drives and judges the branches; an agent sees only their outcomes.
 
 /// The moment at which an agent is to choose, to be tried out in copies of the world.
 pub trait Branch {
@@ -8,14 +8,14 @@ pub trait Branch {
     fn try_row(&self, row: usize) -> Trial;
 }
 
-/// What came of a row in a branch.
+/// The outcome of a row in a branch.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Trial {
     /// Largest collision probability of the observation period, in `[0, 1]`.
     pub proc: f64,
-    /// A contact began.
+    /// Whether a contact began.
     pub collided: bool,
-    /// A contact began that the verdict counts.
+    /// Whether a contact began that the verdict counts.
     pub counted: bool,
     /// Time driven, s.
     pub simulated_s: f64,

@@ -5,12 +5,12 @@
 use std::sync::Arc;
 
 use super::hyperparameters::Hyperparameters;
-use super::learner::{Learner, priorities};
+use super::learner::Learner;
 use super::network::Adam;
 use super::q_policy::Rows;
 use super::replay::{Replay, Transition};
 
-/// Begins every checkpoint; raised when the layout changes.
+/// The first bytes of every checkpoint; the number rises when the layout changes.
 const MAGIC: &[u8; 8] = b"avackpt1";
 
 impl Learner {
@@ -19,7 +19,7 @@ impl Learner {
         let mut bytes = Writer(MAGIC.to_vec());
         bytes.u64(self.steps);
         bytes.u64(self.updates);
-        bytes.f64s(&self.random_weights);
+        bytes.f64s(&self.policy.quirks.random_weights);
         bytes.f32s(self.policy.network.parameters());
         bytes.f32s(self.target.parameters());
         bytes.f32s(&self.adam.mean);
@@ -48,7 +48,7 @@ impl Learner {
         let mut bytes = Reader(bytes.strip_prefix(MAGIC)?);
         learner.steps = bytes.u64()?;
         learner.updates = bytes.u64()?;
-        learner.random_weights = bytes.f64s(rows.allowed.len())?;
+        learner.policy.quirks.random_weights = bytes.f64s(rows.allowed.len())?;
         learner.policy.network.parameters_mut().copy_from_slice(&bytes.f32s(parameters)?);
         learner.target.parameters_mut().copy_from_slice(&bytes.f32s(parameters)?);
         let (mean, square) = (bytes.f32s(parameters)?, bytes.f32s(parameters)?);
@@ -70,13 +70,16 @@ impl Learner {
         }
         let capacity = settings.replay_capacity;
         let fits = bytes.0.is_empty() && items.len() <= capacity && next < capacity as u64;
-        learner.replay = fits
-            .then(|| Replay::restored(capacity, priorities(&settings), items, next as usize, priority_max))?;
+        if !fits {
+            return None;
+        }
+        learner.replay =
+            Replay::restored(capacity, settings.priorities(), items, next as usize, priority_max);
         Some(learner)
     }
 }
 
-/// Little-endian; every list is as long as its reader expects.
+/// Writes little-endian numbers. Lists come without their length, which the reader knows.
 struct Writer(Vec<u8>);
 
 impl Writer {
@@ -97,7 +100,7 @@ impl Writer {
     }
 }
 
-/// Gives `None` where the bytes come to an end too soon.
+/// Reads what [`Writer`] wrote; `None` if too few bytes are left.
 struct Reader<'a>(&'a [u8]);
 
 impl Reader<'_> {

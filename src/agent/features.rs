@@ -1,7 +1,7 @@
 //! From an observation to the numbers that go into a network.
 //!
-//! Scales are fixed, so that a policy means the same on every road and there is no running mean to be
-//! frozen. They bring the usual range of a variable to about one; rare values may exceed it.
+//! Scales are fixed numbers, not running means, so that a policy means the same on every road. They bring
+//! the usual range of a variable to about one; rare values may exceed it.
 
 use crate::mdp::{Observation, STATE_LEN, STATE_NAMES, variable};
 
@@ -26,7 +26,7 @@ const DEEP_COLLISION: [&str; 12] = [
     "speed",
 ];
 
-/// What the extended set has beside the paper's 19.
+/// Variables that the extended set adds to the paper's 19.
 const EXTENSION: [&str; 8] = [
     "nearestAhead",
     "nearestLeft",
@@ -42,7 +42,7 @@ const EXTENSION: [&str; 8] = [
 enum Scale {
     /// Divided by this.
     By(f32),
-    /// One number for each of these values, 1 where the variable has it.
+    /// One input for each of these values: 1 for the value that the variable has, 0 for the others.
     OneHot(&'static [f32]),
     /// The three phenomena that the paper packs into one number.
     Weather,
@@ -76,10 +76,6 @@ impl Features {
     /// Number of network inputs.
     pub fn len(&self) -> usize {
         self.len
-    }
-
-    pub fn is_empty(&self) -> bool {
-        self.len == 0
     }
 
     /// The variables that go in, by index.

@@ -10,12 +10,13 @@ use crate::mdp::Observation;
 use crate::rng::Rng;
 
 use super::branch::{Branch, Trial};
-use super::q_policy::any;
+use super::random::any;
 use super::registry::Agent;
 
-/// One step of lookahead; what it drives in branches is added up.
+/// One step of lookahead.
 #[derive(Debug, Clone, Default)]
 pub struct Greedy {
+    /// Time driven in branches in this episode, s.
     branched_s: f64,
 }
 
@@ -24,9 +25,9 @@ impl Agent for Greedy {
         self.branched_s = 0.0;
     }
 
-    /// Blind, every row is as good as any other.
+    /// Without a branch to look into, every row is as good as any other.
     fn choose(&mut self, _: &Observation, legal: ArrayView1<bool>, rng: &mut Rng) -> Option<usize> {
-        any(legal.to_vec().as_slice(), rng)
+        any(legal, rng)
     }
 
     fn choose_ahead(
@@ -56,7 +57,7 @@ impl Agent for Greedy {
     }
 }
 
-/// What rows are ranked by.
+/// How dangerous an outcome is: a collision that counts most of all, one that does not count not at all.
 fn danger(trial: &Trial) -> f64 {
     match trial {
         Trial { counted: true, .. } => 2.0,
@@ -71,7 +72,7 @@ mod tests {
     use crate::rng::{Stream, stream};
     use ndarray::Array1;
 
-    /// What each row would come to.
+    /// A branch in which the outcome of each row is known.
     struct Known(Vec<Trial>);
 
     impl Branch for Known {

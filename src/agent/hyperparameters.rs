@@ -1,7 +1,10 @@
-//! Every setting of a learning agent, its presets, and how a file changes them.
+//! Every setting of a learning agent, and how a file changes them.
 //!
 //! Sources: the paper, its published package (iSE-UET-VNU/AVASTRA), DeepCollision's paper and code.
 //! "Ours" marks what they leave open. A policy file records the whole of it.
+
+use core::fmt::Display;
+use core::ops::RangeInclusive;
 
 use serde_json::Value;
 
@@ -10,6 +13,7 @@ use crate::syntax::{listed, nearest};
 
 use super::network::Initialization;
 use super::presets;
+use super::replay::Priorities;
 
 /// Settings of a learning agent. Presets give the values; there is no other default.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -19,58 +23,60 @@ pub struct Hyperparameters {
     pub preset: String,
 
     // What the agent sees and may do.
-    /// Which variables it sees (RQ2).
+    /// State variables that the agent sees (RQ2).
     pub state: StateSet,
-    /// How they go into the network.
+    /// How these variables go into the network.
     pub encoding: Encoding,
-    /// Names of the actions and groups that it may choose from (RQ2); empty: all.
+    /// Names of the actions and groups that the agent may choose from (RQ2); empty: all.
     pub actions: Vec<String>,
-    /// Whether rows that the rules forbid are left out when it chooses. Where not, a forbidden choice
-    /// is a step lost.
+    /// Whether the agent chooses only among rows that the rules allow. If not, a forbidden choice loses
+    /// the step.
     pub masks_choice: bool,
-    /// Whether they are left out of the learning target too.
+    /// Whether the learning target considers only rows that the rules allow.
     pub masks_target: bool,
-    /// Steps that must pass between two changes of weather or time; 0: none. Published package: 5.
+    /// Steps that must pass between two changes of weather or time; 0: no gate. Published package: 5. A
+    /// quirk (see `quirks`).
     pub environment_gate_steps: u32,
 
     // The step and its reward.
-    /// Observation period (OTP), s, in place of the space's own (RQ3).
+    /// Observation period (OTP), s, which replaces the space's own (RQ3).
     pub observation_period_s: Option<f64>,
-    /// How collision probabilities are reckoned.
+    /// Formula of the collision probability.
     pub proc: ProcKind,
     /// Where rewards come from.
     pub reward: RewardSource,
-    /// R_col (RQ3).
+    /// Reward of a step with a collision, R_col (RQ3).
     pub collision_reward: f64,
-    /// For a collision that the space's verdict does not count.
+    /// Reward of a step whose collision the space's verdict does not count.
     pub uncounted_reward: f64,
-    /// A collision probability up to this is safe, in `[0, 1]`.
+    /// A step is safe if its collision probability is below this, in `[0, 1]`.
     pub safe_proc_max: f64,
-    /// Whether that bound itself is safe.
+    /// Whether a probability equal to `safe_proc_max` is safe too.
     pub bound_is_safe: bool,
-    /// For a safe step.
+    /// Reward of a safe step.
     pub safe_reward: f64,
-    /// Whether the step at which an obstacle appeared gets the collision reward that comes of it, and
-    /// the step of the collision a third. Published package: yes.
+    /// Whether a collision pays at the step that made its obstacle appear, and a third at its own step.
+    /// Published package: yes. A quirk (see `quirks`).
     pub delayed_credit: bool,
 
     // The network.
     /// Widths of the hidden layers, each 1 to 4096; one to four of them.
     pub hidden_units: Vec<usize>,
+    /// Whether the network has a dueling head (Wang et al., 2016).
     pub dueling: bool,
     pub initialization: Initialization,
 
     // Its training.
-    /// Of Adam, above 0.
+    /// Learning rate of Adam, above 0.
     pub learning_rate: f64,
     pub loss: Loss,
-    /// The gradient is shortened to this length.
+    /// A longer gradient is scaled down to this length, above 0.
     pub gradient_norm_max: Option<f64>,
-    /// Transitions of one update.
+    /// Transitions in one update.
     pub batch_len: usize,
-    /// Transitions that must be there before the first update.
+    /// Transitions that the replay must hold before the first update.
     pub learning_starts: usize,
-    /// Updates for each step of an episode; made when it ends.
+    /// Updates for each step of an episode; they are made when the episode ends.
     pub updates_per_step: u32,
     /// Updates between two copies of the online network to the target network.
     pub target_period_updates: u64,
@@ -80,54 +86,57 @@ pub struct Hyperparameters {
     pub double: bool,
     /// γ, in `[0, 1]`.
     pub discount: f64,
-    /// Rewards before the bootstrapped value (n-step), at least 1.
+    /// Rewards that are summed before the bootstrapped value: the n of n-step returns, at least 1.
     pub n_step: usize,
-    /// Whether arrival ends the sum of rewards. The published packages bootstrap through it. A truncated
-    /// episode (stalled, step limit) is bootstrapped in any case.
+    /// Whether no value is expected after arrival. The published packages bootstrap there too. An episode
+    /// that was cut off (stalled, step limit) is bootstrapped in any case.
     pub arrival_is_terminal: bool,
 
     // Replay.
-    /// Transitions that are kept.
+    /// Transitions that the replay keeps.
     pub replay_capacity: usize,
-    /// α of prioritised replay; 0: none.
+    /// α of prioritised replay, in `[0, 1]`; 0 draws uniformly.
     pub priority_exponent: f64,
-    /// Added to the TD error, above 0.
+    /// Added to the size of each TD error, so that no priority is 0; above 0.
     pub priority_floor: f64,
-    /// Of the first transition.
+    /// Priority of the first transition, above 0.
     pub priority_first: f64,
     /// β at the first update, in `[0, 1]`.
     pub importance_begin: f64,
     /// β after `importance_updates` updates and from then on.
     pub importance_end: f64,
+    /// Updates over which β goes from `importance_begin` to `importance_end`.
     pub importance_updates: u64,
 
     // Exploration.
     /// How ε falls with the steps.
     pub exploration: Exploration,
+    /// ε at the first step.
     pub exploration_begin: f64,
     /// The floor of ε (RQ3).
     pub exploration_end: f64,
-    /// How many steps that takes; the time constant of an exponential.
+    /// Steps until ε is at its floor; for an exponential, its time constant.
     pub exploration_steps: u64,
-    /// Steps at the beginning that are all random.
+    /// Number of first steps in which ε is 1.
     pub random_steps: u64,
-    /// Whether ε is the share of greedy choices, as in DeepCollision's published code.
+    /// Whether ε is the share of greedy choices, as in DeepCollision's published code. A quirk (see
+    /// `quirks`).
     pub exploration_inverted: bool,
-    /// By how much the weight of a row falls each time that it is chosen at random, as a share; the
-    /// others rise. Published package: 0.05.
+    /// Share of its weight that a row loses to the others each time that it is chosen at random; 0: random
+    /// choices are uniform. Published package: 0.05. A quirk (see `quirks`).
     pub random_decay: f64,
     /// ε of the trained policy.
     pub evaluation_epsilon: f64,
 
     // The readable rules that are distilled from the network at the end (VIPER, Bastani et al., 2018). The
     // numbers are ours.
-    /// Leaves of the decision tree, at most, which is lines of rules; 0: none are distilled.
+    /// Most leaves of the decision tree, and so lines of rules; 0: no rules are distilled.
     pub rules_leaves: usize,
-    /// Its depth, at most.
+    /// Largest depth of the tree, and so tests in a line.
     pub rules_depth: usize,
-    /// Rounds of DAgger: in the first the network drives, then the rules of the round before.
+    /// Rounds of DAgger: the network drives in the first, the rules of the round before in each later one.
     pub rules_rounds: u32,
-    /// Episodes of a round, on each road.
+    /// Episodes in a round, on each road.
     pub rules_episodes: u32,
 }
 
@@ -151,9 +160,9 @@ pub enum StateSet {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Encoding {
-    /// As it is, like all published code.
+    /// The variable as it is, as in all published code.
     Raw,
-    /// By a fixed scale, categories one-hot.
+    /// Divided by a fixed scale; categories one-hot.
     Scaled,
 }
 
@@ -180,11 +189,11 @@ pub enum Exploration {
     Linear,
     /// End + (begin - end) · exp(-steps / time constant).
     Exponential,
-    /// The same up to the time constant, and the end from then on: the published package.
+    /// `Exponential` up to the time constant, then the end: the published package.
     ExponentialThenEnd,
 }
 
-/// Why settings cannot be taken.
+/// Why settings are refused.
 #[derive(Debug, thiserror::Error)]
 pub enum SettingsError {
     #[error("{0}")]
@@ -202,8 +211,8 @@ fn hint(suggestion: &Option<String>) -> String {
 }
 
 impl Hyperparameters {
-    /// A preset of an agent with what a YAML text changes. The text's own `preset` comes before
-    /// `preset`; the first of `presets` is the default.
+    /// A preset with the changes of a YAML text. A line `preset` in the text takes precedence over the
+    /// argument; without both, the first of `presets` is taken.
     ///
     /// # Errors
     /// Text that is no map, an unknown preset or setting, a value of the wrong kind or out of range.
@@ -258,6 +267,37 @@ impl Hyperparameters {
         }
     }
 
+    /// ε of training after so many steps.
+    pub(super) fn exploration_epsilon(&self, steps: u64) -> f64 {
+        if steps < self.random_steps {
+            return 1.0;
+        }
+        let (begin, end) = (self.exploration_begin, self.exploration_end);
+        let share = steps as f64 / self.exploration_steps as f64;
+        match self.exploration {
+            Exploration::Linear => begin + (end - begin) * share.min(1.0),
+            Exploration::ExponentialThenEnd if share > 1.0 => end,
+            Exploration::Exponential | Exploration::ExponentialThenEnd => {
+                end + (begin - end) * libm::exp(-share)
+            }
+        }
+    }
+
+    /// β of prioritised replay after so many updates.
+    pub(super) fn importance_exponent(&self, updates: u64) -> f64 {
+        let share = (updates as f64 / self.importance_updates as f64).min(1.0);
+        self.importance_begin + (self.importance_end - self.importance_begin) * share
+    }
+
+    /// How TD errors become priorities.
+    pub(super) fn priorities(&self) -> Priorities {
+        Priorities {
+            exponent: self.priority_exponent,
+            floor: self.priority_floor,
+            first: self.priority_first,
+        }
+    }
+
     fn changed(&self, changes: serde_json::Map<String, Value>) -> Result<Hyperparameters, SettingsError> {
         let mut record = self.record();
         for (name, value) in changes {
@@ -265,7 +305,7 @@ impl Hyperparameters {
                 let suggestion = nearest(&name, record.keys().map(String::as_str)).map(str::to_owned);
                 return Err(SettingsError::Unknown { name, suggestion });
             }
-            // A mistake is put at its own setting's door: all others are good already.
+            // Each change is tried alone, so that an error names the setting that is wrong.
             let mut alone = self.record();
             alone.insert(name.clone(), value.clone());
             serde_json::from_value::<Hyperparameters>(Value::Object(alone))
@@ -279,77 +319,95 @@ impl Hyperparameters {
     }
 
     fn check(&self) -> Result<(), SettingsError> {
-        let mut wrong = None;
-        let mut require = |name, is_right: bool, value: String, wanted| {
-            if !is_right && wrong.is_none() {
-                wrong = Some(SettingsError::Range { name, value, wanted });
-            }
+        let unit = |name, value: f64| within(name, value, 0.0..=1.0, "from 0 to 1");
+        let positive = |name, value: f64| Requirement {
+            is_met: value > 0.0 && value <= 1e6,
+            ..within(name, value, 0.0..=1e6, "above 0, and at most 1e6")
         };
-        let unit = 0.0..=1.0;
-        for (name, value) in [
-            ("safe_proc_max", self.safe_proc_max),
-            ("discount", self.discount),
-            ("priority_exponent", self.priority_exponent),
-            ("importance_begin", self.importance_begin),
-            ("importance_end", self.importance_end),
-            ("exploration_begin", self.exploration_begin),
-            ("exploration_end", self.exploration_end),
-            ("random_decay", self.random_decay),
-            ("evaluation_epsilon", self.evaluation_epsilon),
-        ] {
-            require(name, unit.contains(&value), value.to_string(), "from 0 to 1");
-        }
-        for (name, value) in [
-            ("learning_rate", self.learning_rate),
-            ("priority_floor", self.priority_floor),
-            ("priority_first", self.priority_first),
-            ("gradient_norm_max", self.gradient_norm_max.unwrap_or(1.0)),
-        ] {
-            require(name, value > 0.0 && value <= 1e6, value.to_string(), "above 0, and at most 1e6");
-        }
-        for (name, value) in [
-            ("collision_reward", self.collision_reward),
-            ("uncounted_reward", self.uncounted_reward),
-            ("safe_reward", self.safe_reward),
-        ] {
-            require(name, value.abs() <= 1e6, value.to_string(), "from -1e6 to 1e6");
-        }
-        for (name, value, most) in [
-            ("batch_len", self.batch_len, 4096),
-            ("n_step", self.n_step, 100),
-            ("replay_capacity", self.replay_capacity, 1_000_000),
-            ("target_period_updates", self.target_period_updates as usize, 1_000_000_000),
-            ("importance_updates", self.importance_updates as usize, 1_000_000_000),
-            ("exploration_steps", self.exploration_steps as usize, 1_000_000_000),
-        ] {
-            let is_right = (1..=most).contains(&value);
-            require(name, is_right, value.to_string(), "a whole number from 1, and not enormous");
-        }
-        let begins = (1..=self.replay_capacity).contains(&self.learning_starts);
-        require("learning_starts", begins, self.learning_starts.to_string(), "from 1 to `replay_capacity`");
-        require("rules_leaves", self.rules_leaves <= 256, self.rules_leaves.to_string(), "up to 256");
-        let is_right = (1..=32).contains(&self.rules_depth);
-        require("rules_depth", is_right, self.rules_depth.to_string(), "from 1 to 32");
-        for (name, value) in [("rules_rounds", self.rules_rounds), ("rules_episodes", self.rules_episodes)] {
-            require(name, (1..=1000).contains(&value), value.to_string(), "from 1 to 1000");
-        }
-        require(
-            "updates_per_step",
-            self.updates_per_step <= 64,
-            self.updates_per_step.to_string(),
-            "up to 64",
-        );
-        let period_s = self.observation_period_s.unwrap_or(6.0);
-        let is_right = (0.5..=60.0).contains(&period_s);
-        require("observation_period_s", is_right, period_s.to_string(), "from 0.5 to 60");
+        let reward = |name, value: f64| within(name, value, -1e6..=1e6, "from -1e6 to 1e6");
+        let count = |name, value: u64, most: u64| {
+            within(name, value, 1..=most, "a whole number from 1, and not enormous")
+        };
         let widths = &self.hidden_units;
-        let fits = (1..=4).contains(&widths.len()) && widths.iter().all(|width| (1..=4096).contains(width));
-        require("hidden_units", fits, format!("{widths:?}"), "one to four widths from 1 to 4096");
-        if let Initialization::Normal(deviation) = self.initialization {
-            let fits = (0.0..=10.0).contains(&deviation);
-            require("initialization", fits, deviation.to_string(), "`he`, or normal from 0 to 10");
-        }
-        wrong.map_or(Ok(()), Err)
+        let deviation = match self.initialization {
+            Initialization::Normal(deviation) => deviation,
+            Initialization::He => 0.0,
+        };
+        require([
+            unit("safe_proc_max", self.safe_proc_max),
+            unit("discount", self.discount),
+            unit("priority_exponent", self.priority_exponent),
+            unit("importance_begin", self.importance_begin),
+            unit("importance_end", self.importance_end),
+            unit("exploration_begin", self.exploration_begin),
+            unit("exploration_end", self.exploration_end),
+            unit("random_decay", self.random_decay),
+            unit("evaluation_epsilon", self.evaluation_epsilon),
+            positive("learning_rate", self.learning_rate),
+            positive("priority_floor", self.priority_floor),
+            positive("priority_first", self.priority_first),
+            positive("gradient_norm_max", self.gradient_norm_max.unwrap_or(1.0)),
+            reward("collision_reward", self.collision_reward),
+            reward("uncounted_reward", self.uncounted_reward),
+            reward("safe_reward", self.safe_reward),
+            count("batch_len", self.batch_len as u64, 4096),
+            count("n_step", self.n_step as u64, 100),
+            count("replay_capacity", self.replay_capacity as u64, 1_000_000),
+            count("target_period_updates", self.target_period_updates, 1_000_000_000),
+            count("importance_updates", self.importance_updates, 1_000_000_000),
+            count("exploration_steps", self.exploration_steps, 1_000_000_000),
+            within(
+                "learning_starts",
+                self.learning_starts,
+                1..=self.replay_capacity,
+                "from 1 to `replay_capacity`",
+            ),
+            within("rules_leaves", self.rules_leaves, 0..=256, "up to 256"),
+            within("rules_depth", self.rules_depth, 1..=32, "from 1 to 32"),
+            within("rules_rounds", self.rules_rounds, 1..=1000, "from 1 to 1000"),
+            within("rules_episodes", self.rules_episodes, 1..=1000, "from 1 to 1000"),
+            within("updates_per_step", self.updates_per_step, 0..=64, "up to 64"),
+            within(
+                "observation_period_s",
+                self.observation_period_s.unwrap_or(6.0),
+                0.5..=60.0,
+                "from 0.5 to 60",
+            ),
+            Requirement {
+                name: "hidden_units",
+                is_met: (1..=4).contains(&widths.len())
+                    && widths.iter().all(|width| (1..=4096).contains(width)),
+                value: format!("{widths:?}"),
+                wanted: "one to four widths from 1 to 4096",
+            },
+            within("initialization", deviation, 0.0..=10.0, "`he`, or normal from 0 to 10"),
+        ])
+    }
+}
+
+/// What a setting must be, and whether it is.
+pub(super) struct Requirement {
+    pub name: &'static str,
+    pub is_met: bool,
+    pub value: String,
+    pub wanted: &'static str,
+}
+
+/// The requirement that a value lies in a range; `wanted` is the range in words.
+pub(super) fn within<T: PartialOrd + Display>(
+    name: &'static str,
+    value: T,
+    range: RangeInclusive<T>,
+    wanted: &'static str,
+) -> Requirement {
+    Requirement { name, is_met: range.contains(&value), value: value.to_string(), wanted }
+}
+
+/// Refuses settings by the first requirement that is not met.
+pub(super) fn require(requirements: impl IntoIterator<Item = Requirement>) -> Result<(), SettingsError> {
+    match requirements.into_iter().find(|requirement| !requirement.is_met) {
+        Some(Requirement { name, value, wanted, .. }) => Err(SettingsError::Range { name, value, wanted }),
+        None => Ok(()),
     }
 }
 
@@ -381,6 +439,28 @@ mod tests {
         assert_eq!(settings, expected);
         assert_eq!(Hyperparameters::from_yaml(DDQN, None, "").unwrap(), presets::avastra());
         assert_eq!(Hyperparameters::from_yaml(DDQN, Some("released"), "").unwrap(), presets::released());
+    }
+
+    #[test]
+    fn exploration_falls_as_the_settings_say() {
+        let at = |exploration, steps| {
+            let settings = Hyperparameters {
+                exploration,
+                exploration_begin: 1.0,
+                exploration_end: 0.1,
+                exploration_steps: 100,
+                random_steps: 10,
+                ..presets::avastra()
+            };
+            settings.exploration_epsilon(steps)
+        };
+        let near = |found: f64, expected: f64| assert!((found - expected).abs() < 1e-9, "{found} {expected}");
+        near(at(Exploration::Linear, 9), 1.0);
+        near(at(Exploration::Linear, 50), 0.55);
+        near(at(Exploration::Linear, 500), 0.1);
+        near(at(Exploration::Exponential, 100), 0.1 + 0.9 * 0.367_879_441_171);
+        near(at(Exploration::ExponentialThenEnd, 100), 0.1 + 0.9 * 0.367_879_441_171);
+        near(at(Exploration::ExponentialThenEnd, 101), 0.1);
     }
 
     #[test]

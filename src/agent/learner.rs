@@ -1,19 +1,23 @@
-//! Deep Q-learning: DQN (Mnih et al., 2015), Double DQN (van Hasselt et al., 2016), prioritised replay
-//! and n-step returns, as the settings say.
+//! Deep Q-learning: DQN (Mnih et al., 2015, Algorithm 1), Double DQN (van Hasselt, Guez and Silver, 2016)
+//! and prioritised replay (Schaul et al., 2016, Algorithm 1), as the settings say.
+//!
+//! [`improve`] is one update: targets, TD errors, loss, gradient, step. `n_step` makes the transitions,
+//! `replay` keeps and draws them, and `quirks` holds what only the published packages do.
 
 use std::sync::Arc;
 
-use ndarray::{Array2, ArrayView1};
+use ndarray::{Array2, ArrayView1, ArrayView2};
 
 use crate::mdp::Observation;
 use crate::rng;
 use crate::rng::{Rng, Stream};
 
-use super::hyperparameters::{Exploration, Hyperparameters, Loss};
+use super::hyperparameters::{Hyperparameters, Loss};
+use super::n_step::transitions;
 use super::network::{Adam, Network};
-use super::q_policy::{QPolicy, Rows, any, best};
+use super::q_policy::{QPolicy, Rows, best};
 use super::registry::Agent;
-use super::replay::{Priorities, Replay, Transition};
+use super::replay::{Replay, Transition};
 use super::trainable::Trainable;
 use super::trajectory::{Lesson, Trajectory};
 
@@ -28,8 +32,6 @@ pub struct Learner {
     pub(super) steps: u64,
     /// Updates made.
     pub(super) updates: u64,
-    /// How likely each row is when a row is chosen at random, shape `(rows,)`.
-    pub(super) random_weights: Vec<f64>,
 }
 
 impl Learner {
@@ -41,61 +43,22 @@ impl Learner {
         Learner {
             target: network.clone(),
             adam: Adam::new(network.parameters().len()),
-            replay: Replay::new(settings.replay_capacity, priorities(&settings)),
+            replay: Replay::new(settings.replay_capacity, settings.priorities()),
             steps: 0,
             updates: 0,
-            random_weights: vec![1.0; rows.allowed.len()],
             policy: QPolicy::new(settings, rows, network),
         }
     }
 
-    /// One transition for each step, with the rewards of up to `n_step` steps.
-    fn transitions(&self, episode: &Trajectory) -> Vec<Transition> {
-        let settings = self.policy.settings();
-        let features = &self.policy.features;
-        let inputs: Vec<Vec<f32>> =
-            episode.steps.iter().map(|step| features.encode(&step.observation)).collect();
-        let rewards = if settings.delayed_credit {
-            credited(episode, settings.collision_reward)
-        } else {
-            episode.steps.iter().map(|step| step.reward).collect()
-        };
-        let count = episode.steps.len();
-        let transition = |at: usize| {
-            let end = (at + settings.n_step).min(count);
-            let (mut reward, mut discount) = (0.0, 1.0);
-            for &next in &rewards[at..end] {
-                reward += discount * next;
-                discount *= settings.discount;
-            }
-            if end == count && episode.terminal && settings.arrival_is_terminal {
-                discount = 0.0;
-            }
-            let (next_inputs, legal) = match episode.steps.get(end) {
-                Some(step) => (inputs[end].clone(), &step.legal),
-                None => (features.encode(&episode.last), &episode.last_legal),
-            };
-            let allowed = self.policy.rows.allowed.iter().zip(legal);
-            Transition {
-                inputs: inputs[at].clone(),
-                row: episode.steps[at].row as u32,
-                reward: reward as f32,
-                discount: discount as f32,
-                next_inputs,
-                next_legal: allowed.map(|(&row, &legal)| row && (legal || !settings.masks_target)).collect(),
-            }
-        };
-        (0..count).map(transition).collect()
-    }
-
-    /// One step of Adam on a batch; its loss.
+    /// Draws a batch, improves the online network by it and renews its priorities; its loss.
     fn update(&mut self, rng: &mut Rng) -> f64 {
         let settings = self.policy.settings.clone();
-        let samples = self.replay.sample(settings.batch_len, importance(&settings, self.updates), rng);
+        let importance_exponent = settings.importance_exponent(self.updates);
+        let samples = self.replay.sample(settings.batch_len, importance_exponent, rng);
         let batch: Vec<&Transition> = samples.iter().map(|sample| self.replay.get(sample.index)).collect();
         let weights: Vec<f32> = samples.iter().map(|sample| sample.weight).collect();
-        let (loss, td_errors) =
-            improve(&mut self.policy.network, &self.target, &mut self.adam, &settings, &batch, &weights);
+        let online = &mut self.policy.network;
+        let (loss, td_errors) = improve(online, &self.target, &mut self.adam, &settings, &batch, &weights);
         for (sample, td_error) in samples.iter().zip(td_errors) {
             self.replay.update(sample.index, f64::from(td_error));
         }
@@ -105,30 +68,6 @@ impl Learner {
         }
         loss
     }
-
-    /// A random row among those that are open, by the weights that fall with use.
-    fn explore(&mut self, open: &[bool], rng: &mut Rng) -> Option<usize> {
-        let decay = self.policy.settings.random_decay;
-        if decay == 0.0 {
-            return any(open, rng);
-        }
-        let weight = |row: usize| if open[row] { self.random_weights[row] } else { 0.0 };
-        let total: f64 = (0..open.len()).map(weight).sum();
-        let mut mass = rng::unit(rng) * total;
-        let mut row = open.iter().rposition(|&is_open| is_open)?;
-        for candidate in 0..row {
-            if mass < weight(candidate) {
-                row = candidate;
-                break;
-            }
-            mass -= weight(candidate);
-        }
-        let lost = self.random_weights[row] * decay;
-        let others = self.random_weights.len().max(2) - 1;
-        self.random_weights.iter_mut().for_each(|weight| *weight += lost / others as f64);
-        self.random_weights[row] -= lost + lost / others as f64;
-        Some(row)
-    }
 }
 
 impl Agent for Learner {
@@ -136,12 +75,16 @@ impl Agent for Learner {
         self.policy.begin();
     }
 
+    /// ε-greedy over the open rows.
     fn choose(&mut self, observation: &Observation, legal: ArrayView1<bool>, rng: &mut Rng) -> Option<usize> {
         let open = self.policy.open(legal);
-        let is_drawn = rng::unit(rng) < self.exploration_epsilon();
-        let explores = is_drawn != self.policy.settings.exploration_inverted;
+        let explores = rng::unit(rng) < self.exploration_epsilon();
         self.steps += 1;
-        let row = if explores { self.explore(&open, rng) } else { self.policy.greedy(observation, &open) }?;
+        let row = if self.policy.quirks.explores(explores) {
+            self.policy.quirks.random_row(&open, rng)
+        } else {
+            self.policy.greedy(observation, &open)
+        }?;
         self.policy.chosen(row);
         Some(row)
     }
@@ -150,10 +93,11 @@ impl Agent for Learner {
 impl Trainable for Learner {
     /// Keeps what the episode showed, and makes the updates that its steps are worth.
     fn learn(&mut self, episode: &Trajectory, rng: &mut Rng) -> Lesson {
-        for transition in self.transitions(episode) {
+        let rewards = self.policy.quirks.rewards(episode);
+        for transition in transitions(episode, &rewards, &self.policy) {
             self.replay.push(transition);
         }
-        let settings = self.policy.settings.clone();
+        let settings = self.policy.settings();
         if self.replay.len() < settings.learning_starts {
             return Lesson::default();
         }
@@ -167,8 +111,7 @@ impl Trainable for Learner {
     }
 
     fn exploration_epsilon(&self) -> f64 {
-        let settings = self.policy.settings();
-        if self.steps < settings.random_steps { 1.0 } else { epsilon(settings, self.steps) }
+        self.policy.settings().exploration_epsilon(self.steps)
     }
 
     fn actor(&self) -> Box<dyn Agent> {
@@ -184,9 +127,9 @@ impl Trainable for Learner {
     }
 }
 
-/// One update of the online network on a batch: the loss, and the TD error of each transition.
+/// One update of the online network on a batch: its loss, and the TD errors, shape `(batch,)`.
 ///
-/// `weights` are the importance weights, as many as transitions.
+/// `weights` are the importance weights, shape `(batch,)`.
 pub fn improve(
     online: &mut Network,
     target: &Network,
@@ -195,34 +138,20 @@ pub fn improve(
     batch: &[&Transition],
     weights: &[f32],
 ) -> (f64, Vec<f32>) {
-    let stacked = |inputs: fn(&Transition) -> &Vec<f32>| {
-        let columns = inputs(batch[0]).len();
-        let values = batch.iter().flat_map(|transition| inputs(transition)).copied().collect();
-        Array2::from_shape_vec((batch.len(), columns), values).expect("all states have the same features")
+    let states = stacked(batch, |transition| &transition.inputs);
+    let next_states = stacked(batch, |transition| &transition.next_inputs);
+
+    let next_values = target.q_values(next_states.view());
+    // The only difference between the two algorithms is the network that chooses the next row.
+    let targets = if settings.double {
+        targets(batch, online.q_values(next_states.view()).view(), next_values.view())
+    } else {
+        targets(batch, next_values.view(), next_values.view())
     };
-    let inputs = stacked(|transition| &transition.inputs);
-    let next_inputs = stacked(|transition| &transition.next_inputs);
-    let values = target.q_values(next_inputs.view());
-    let choices = if settings.double { Some(online.q_values(next_inputs.view())) } else { None };
-    let goals: Vec<f32> = (0..batch.len())
-        .map(|at| {
-            let choosing = choices.as_ref().unwrap_or(&values);
-            td_target(batch[at], choosing.row(at), values.row(at))
-        })
-        .collect();
-    let (mut loss, mut td_errors) = (0.0, Vec::with_capacity(batch.len()));
-    let mut gradient = online.gradient(inputs.view(), |q_values| {
-        let mut slopes = Array2::zeros(q_values.dim());
-        for (at, transition) in batch.iter().enumerate() {
-            let row = transition.row as usize;
-            let td_error = q_values[[at, row]] - goals[at];
-            let (cost, slope) = cost(settings.loss, td_error);
-            loss += f64::from(weights[at] * cost) / batch.len() as f64;
-            slopes[[at, row]] = weights[at] * slope / batch.len() as f32;
-            td_errors.push(td_error);
-        }
-        slopes
-    });
+    let pass = online.forward(states.view());
+    let td_errors = td_errors(batch, pass.q_values.view(), &targets);
+    let (loss, slopes) = loss(settings.loss, &td_errors, weights);
+    let mut gradient = online.gradient(&pass, placed(batch, &slopes, pass.q_values.dim()));
     if let Some(norm_max) = settings.gradient_norm_max {
         shorten(&mut gradient, norm_max);
     }
@@ -230,24 +159,66 @@ pub fn improve(
     (loss, td_errors)
 }
 
-/// The value that a transition's Q-value should have: the rewards, and what the next state is worth by
-/// the target network in the row that `choosing` likes best of those that are legal there.
-///
-/// With `choosing` of the online network this is Double DQN, with that of the target network DQN.
-fn td_target(transition: &Transition, choosing: ArrayView1<f32>, values: ArrayView1<f32>) -> f32 {
-    match best(choosing, &transition.next_legal) {
-        Some(row) if transition.discount > 0.0 => transition.reward + transition.discount * values[row],
-        _ => transition.reward,
-    }
+/// States of a batch, one a row: shape `(batch, inputs)`.
+fn stacked(batch: &[&Transition], inputs: fn(&Transition) -> &Vec<f32>) -> Array2<f32> {
+    let shape = (batch.len(), inputs(batch[0]).len());
+    let values = batch.iter().flat_map(|transition| inputs(transition)).copied().collect();
+    Array2::from_shape_vec(shape, values).expect("all states have the same features")
 }
 
-/// What a TD error costs, and the derivative.
-fn cost(loss: Loss, td_error: f32) -> (f32, f32) {
-    match loss {
-        Loss::Squared => (td_error * td_error, 2.0 * td_error),
-        Loss::Huber if td_error.abs() < 1.0 => (td_error * td_error / 2.0, td_error),
-        Loss::Huber => (td_error.abs() - 0.5, td_error.signum()),
+/// What the Q-values should have been, shape `(batch,)`: the reward, and the discounted value of the next
+/// state by the target network, in the legal row that `choosing` likes best there.
+///
+/// Both arrays are Q-values of the next states, shape `(batch, rows)`: `values` by the target network, and
+/// `choosing` by the online network (Double DQN, Eq. 4) or by the target network too (DQN).
+fn targets(batch: &[&Transition], choosing: ArrayView2<f32>, values: ArrayView2<f32>) -> Vec<f32> {
+    debug_assert_eq!(choosing.dim(), values.dim());
+    debug_assert_eq!(values.nrows(), batch.len());
+    let target = |(at, transition): (usize, &&Transition)| {
+        debug_assert_eq!(transition.next_legal.len(), values.ncols());
+        match best(choosing.row(at), &transition.next_legal) {
+            Some(row) if transition.discount > 0.0 => {
+                transition.reward + transition.discount * values[[at, row]]
+            }
+            _ => transition.reward,
+        }
+    };
+    batch.iter().enumerate().map(target).collect()
+}
+
+/// The Q-value of the row that was chosen, less its target: shape `(batch,)`, from Q-values of shape
+/// `(batch, rows)`.
+fn td_errors(batch: &[&Transition], q_values: ArrayView2<f32>, targets: &[f32]) -> Vec<f32> {
+    debug_assert_eq!((q_values.nrows(), targets.len()), (batch.len(), batch.len()));
+    let chosen = batch.iter().enumerate().map(|(at, transition)| q_values[[at, transition.row as usize]]);
+    chosen.zip(targets).map(|(q_value, target)| q_value - target).collect()
+}
+
+/// The weighted mean loss of a batch, and its derivative by each TD error, shape `(batch,)`.
+fn loss(kind: Loss, td_errors: &[f32], weights: &[f32]) -> (f64, Vec<f32>) {
+    debug_assert_eq!(td_errors.len(), weights.len());
+    let count = td_errors.len();
+    let (mut mean, mut slopes) = (0.0, Vec::with_capacity(count));
+    for (&td_error, &weight) in td_errors.iter().zip(weights) {
+        let (cost, slope) = match kind {
+            Loss::Squared => (td_error * td_error, 2.0 * td_error),
+            Loss::Huber if td_error.abs() < 1.0 => (td_error * td_error / 2.0, td_error),
+            Loss::Huber => (td_error.abs() - 0.5, td_error.signum()),
+        };
+        mean += f64::from(weight * cost) / count as f64;
+        slopes.push(weight * slope / count as f32);
     }
+    (mean, slopes)
+}
+
+/// The derivative by every Q-value, of the given shape `(batch, rows)`: 0 but for the rows that were chosen.
+fn placed(batch: &[&Transition], slopes: &[f32], shape: (usize, usize)) -> Array2<f32> {
+    debug_assert_eq!((slopes.len(), shape.0), (batch.len(), batch.len()));
+    let mut placed = Array2::zeros(shape);
+    for (at, transition) in batch.iter().enumerate() {
+        placed[[at, transition.row as usize]] = slopes[at];
+    }
+    placed
 }
 
 /// Scales a gradient down to a length.
@@ -259,43 +230,5 @@ fn shorten(gradient: &mut [f32], norm_max: f64) {
     }
 }
 
-/// Rewards in which a collision is paid for where its obstacle appeared: in full there, and a third
-/// where it came to pass (published package).
-fn credited(episode: &Trajectory, collision_reward: f64) -> Vec<f64> {
-    let mut rewards: Vec<f64> = episode.steps.iter().map(|step| step.reward).collect();
-    for (at, step) in episode.steps.iter().enumerate() {
-        for &origin in step.hits.iter().filter(|&&origin| origin < at) {
-            rewards[origin] = collision_reward;
-            rewards[at] = collision_reward / 3.0;
-        }
-    }
-    rewards
-}
-
-/// ε after so many steps.
-fn epsilon(settings: &Hyperparameters, steps: u64) -> f64 {
-    let (begin, end) = (settings.exploration_begin, settings.exploration_end);
-    let share = steps as f64 / settings.exploration_steps as f64;
-    match settings.exploration {
-        Exploration::Linear => begin + (end - begin) * share.min(1.0),
-        Exploration::ExponentialThenEnd if share > 1.0 => end,
-        Exploration::Exponential | Exploration::ExponentialThenEnd => end + (begin - end) * libm::exp(-share),
-    }
-}
-
-/// β after so many updates.
-fn importance(settings: &Hyperparameters, updates: u64) -> f64 {
-    let share = (updates as f64 / settings.importance_updates as f64).min(1.0);
-    settings.importance_begin + (settings.importance_end - settings.importance_begin) * share
-}
-
-pub(super) fn priorities(settings: &Hyperparameters) -> Priorities {
-    Priorities {
-        exponent: settings.priority_exponent,
-        floor: settings.priority_floor,
-        first: settings.priority_first,
-    }
-}
-
 #[cfg(test)]
-mod tests;
+pub(super) mod tests;

@@ -1,21 +1,35 @@
-//! Agents: who decides, step by step, what happens around the car.
+//! Agents: what decides, step by step, what happens around the ego vehicle.
 //!
-//! An agent sees an observation and which rows are legal; never the world. A learning agent is told
-//! afterwards what its choices were worth.
+//! An [`Agent`] is asked at each step of an episode for a row of the action table. It sees an
+//! [`Observation`](crate::mdp::Observation) and the mask of rows that the rules allow, never the world.
+//! [`REGISTRY`] has every agent by name.
+//!
+//! - `random` and `greedy` need no training.
+//! - [`Trainable`] agents take in a [`Trajectory`] when an episode has ended and has been judged.
+//! - The [`Learner`] is deep Q-learning; [`improve`] is one update. `n_step` makes transitions of an
+//!   episode, `replay` keeps them, `network` computes Q-values and gradients, `checkpoint` saves it all.
+//!   `quirks` holds what only the published packages do.
+//! - A [`QPolicy`] acts by a trained network, or by the rules that `decision` distils from it; `features`
+//!   says what a network sees.
+//! - `search` has the searches: AV-Fuzzer and Go-Explore.
+//! - [`Hyperparameters`] are the settings of a learner and `presets` their values, by source;
+//!   [`Settings`] are those of any trainable agent.
 
 mod branch;
 mod checkpoint;
+mod decision;
 mod features;
 mod greedy;
 mod hyperparameters;
 mod learner;
+mod n_step;
 mod network;
 mod presets;
 mod q_policy;
+mod quirks;
 mod random;
 mod registry;
 mod replay;
-mod decision;
 mod search;
 mod settings;
 mod trainable;
@@ -23,17 +37,12 @@ mod trajectory;
 
 pub use branch::{Branch, Trial};
 pub use decision::{Visit, chosen_by, distilled};
-pub use features::Features;
-pub use hyperparameters::{
-    Encoding, Exploration, Hyperparameters, Loss, RewardSource, SettingsError, StateSet,
-};
+pub use hyperparameters::{Hyperparameters, Loss, SettingsError};
 pub use learner::{Learner, improve};
-pub use network::{Adam, Initialization, Network, Shape};
-pub use presets::Preset;
+pub use network::{Adam, Network, Shape};
 pub use q_policy::{Face, QPolicy, Rows};
 pub use registry::{Agent, Entry, Kind, REGISTRY, by_name};
-pub use replay::{Priorities, Replay, Sample, Transition};
-pub use search::{AvFuzzerSettings, GoExploreSettings};
+pub use replay::Transition;
 pub use settings::Settings;
 pub use trainable::{Beginning, Trainable};
 pub use trajectory::{Experience, Lesson, Trajectory};

@@ -39,7 +39,7 @@ pub(super) fn paper() -> Hyperparameters {
         proc: ProcKind::Paper,
         reward: RewardSource::Equation,
         collision_reward: 7.5,
-        // The reward knows of no verdict.
+        // The paper's reward does not depend on the verdict.
         uncounted_reward: 7.5,
         safe_proc_max: 0.2,
         bound_is_safe: true,
@@ -83,8 +83,8 @@ pub(super) fn paper() -> Hyperparameters {
 }
 
 /// The published package with its faults: it bootstraps through arrival, knows no rule but a gate for
-/// weather and time, and pays for a collision at the step that made the obstacle. Its second table of
-/// weights for the traffic rows alone is one with the first here.
+/// weather and time, and pays for a collision at the step that made the obstacle appear. The package has a
+/// second table of weights for the traffic rows; here there is one table for all rows.
 pub(super) fn released() -> Hyperparameters {
     Hyperparameters {
         preset: "released".to_owned(),
@@ -105,7 +105,7 @@ pub(super) fn released() -> Hyperparameters {
 }
 
 /// Ours: scaled variables, learning from the first few hundred transitions, several updates a step,
-/// three-step returns, a dueling head, and R_col for collisions that count alone.
+/// three-step returns, a dueling head, and R_col only for collisions that count.
 pub(super) fn avastra() -> Hyperparameters {
     Hyperparameters {
         preset: "avastra".to_owned(),
@@ -140,7 +140,7 @@ pub(super) fn avastra() -> Hyperparameters {
 fn deep_collision() -> Hyperparameters {
     Hyperparameters {
         preset: "paper".to_owned(),
-        // Its lateral safety distance has the margin that the later paper left out, and ours has.
+        // Its lateral safety distance has a margin, as ours has; the later paper left it out.
         proc: ProcKind::Avastra,
         state: StateSet::DeepCollision,
         collision_reward: 1.0,

@@ -16,19 +16,21 @@ use super::decision::chosen_by;
 use super::features::Features;
 use super::hyperparameters::{Hyperparameters, SettingsError};
 use super::network::{Network, Shape};
+use super::quirks::Quirks;
+use super::random::any;
 use super::registry::Agent;
 
-/// What is known of the rows before any episode.
+/// What an agent knows about the rows before any episode.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Rows {
-    /// Whether the agent may choose it at all, shape `(rows,)`.
+    /// Whether the agent may choose the row at all, shape `(rows,)`.
     pub allowed: Vec<bool>,
-    /// Whether it changes the weather or the time and makes nobody appear, shape `(rows,)`.
+    /// Whether the row changes weather or time alone, and makes no road user appear, shape `(rows,)`.
     pub environment: Vec<bool>,
 }
 
 impl Rows {
-    /// The rows of a table; `actions` names the actions and groups that are allowed, none: all.
+    /// The rows of a table; `actions` names the actions and groups that are allowed, empty: all.
     ///
     /// # Errors
     /// If the space has no action or group of such a name.
@@ -61,7 +63,7 @@ impl Rows {
     }
 }
 
-/// Which of the two faces of a policy acts.
+/// Which of the two faces of a policy chooses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Face {
@@ -79,10 +81,9 @@ pub struct QPolicy {
     pub(super) features: Features,
     pub(super) rows: Arc<Rows>,
     pub(super) network: Network,
-    /// What acts in the network's place.
+    /// Rules that choose in place of the network.
     rules: Option<Arc<Vec<PolicyRule>>>,
-    /// The last row that changed weather or time in this episode, and the steps since then.
-    last_environment: Option<(usize, u32)>,
+    pub(super) quirks: Quirks,
 }
 
 impl QPolicy {
@@ -98,7 +99,8 @@ impl QPolicy {
     pub fn new(settings: Arc<Hyperparameters>, rows: Arc<Rows>, network: Network) -> QPolicy {
         assert_eq!(*network.shape(), QPolicy::shape(&settings, rows.allowed.len()), "the network fits");
         let features = Features::new(settings.state, settings.encoding);
-        QPolicy { settings, features, rows, network, rules: None, last_environment: None }
+        let quirks = Quirks::new(&settings, rows.allowed.len());
+        QPolicy { settings, features, rows, network, rules: None, quirks }
     }
 
     /// The policy that a file describes, for the table that it is to choose from.
@@ -113,12 +115,12 @@ impl QPolicy {
             let message = "the network is not the one that its settings describe";
             return Err(SettingsError::Text(message.to_owned()));
         }
+        // The checker has counted the weights.
         let network = Network::from_parameters(shape, file.parameters.clone());
-        let network = network.expect("the checker has counted the weights");
         Ok(QPolicy::new(Arc::new(settings), Arc::new(rows), network))
     }
 
-    /// The same policy, but that rules choose where the network did. Exploration, gate and masks stay.
+    /// This policy with rules in place of the network; exploration, gate and masks stay.
     pub fn with_rules(&self, rules: Arc<Vec<PolicyRule>>) -> QPolicy {
         QPolicy { rules: Some(rules), ..self.clone() }
     }
@@ -156,28 +158,16 @@ impl QPolicy {
 
     fn allowed_now(&self, candidates: impl Iterator<Item = bool>) -> Vec<bool> {
         let rows = self.rows.allowed.iter().zip(candidates).enumerate();
-        rows.map(|(row, (&allowed, candidate))| allowed && candidate && self.gate_is_open(row)).collect()
+        let passes = |row: usize| self.quirks.lets_pass(row, self.rows.environment[row]);
+        rows.map(|(row, (&allowed, candidate))| allowed && candidate && passes(row)).collect()
     }
 
-    /// The published package's gate: weather and time change seldom, and never to what they are.
-    fn gate_is_open(&self, row: usize) -> bool {
-        let period = self.settings.environment_gate_steps;
-        match self.last_environment {
-            Some((last, since)) if period > 0 && self.rows.environment[row] => since >= period && row != last,
-            _ => true,
-        }
-    }
-
-    /// Keeps the gate's time.
+    /// Takes note of the row that was chosen.
     pub(super) fn chosen(&mut self, row: usize) {
-        if self.rows.environment[row] {
-            self.last_environment = Some((row, 1));
-        } else if let Some((_, since)) = &mut self.last_environment {
-            *since += 1;
-        }
+        self.quirks.chosen(row, self.rows.environment[row]);
     }
 
-    /// The row that it takes when it does not explore.
+    /// The row that the policy takes when it does not explore.
     fn decide(&self, observation: &Observation, open: &[bool]) -> Option<usize> {
         match &self.rules {
             Some(rules) => chosen_by(rules, observation, open),
@@ -194,7 +184,7 @@ impl QPolicy {
 /// The trained policy.
 impl Agent for QPolicy {
     fn begin(&mut self) {
-        self.last_environment = None;
+        self.quirks.begin();
     }
 
     fn choose(&mut self, observation: &Observation, legal: ArrayView1<bool>, rng: &mut Rng) -> Option<usize> {
@@ -206,7 +196,7 @@ impl Agent for QPolicy {
     }
 }
 
-/// The first of the largest values among the rows that are open.
+/// The open row of the largest value, the first of equals.
 pub(super) fn best(values: ArrayView1<f32>, open: &[bool]) -> Option<usize> {
     let rows = values.iter().zip(open).enumerate().filter(|(_, (_, is_open))| **is_open);
     let better = |best: Option<(usize, f32)>, (row, value): (usize, f32)| match best {
@@ -214,10 +204,4 @@ pub(super) fn best(values: ArrayView1<f32>, open: &[bool]) -> Option<usize> {
         _ => Some((row, value)),
     };
     rows.map(|(row, (&value, _))| (row, value)).fold(None, better).map(|(row, _)| row)
-}
-
-/// Any of the rows that are open, each as likely.
-pub(super) fn any(open: &[bool], rng: &mut Rng) -> Option<usize> {
-    let rows: Vec<usize> = (0..open.len()).filter(|&row| open[row]).collect();
-    (!rows.is_empty()).then(|| rows[rng::below(rng, rows.len() as u32) as usize])
 }

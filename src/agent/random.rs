@@ -13,10 +13,7 @@ pub struct MaskedRandom;
 
 impl Agent for MaskedRandom {
     fn choose(&mut self, _: &Observation, legal: ArrayView1<bool>, rng: &mut Rng) -> Option<usize> {
-        let choices = legal.iter().filter(|&&is_legal| is_legal).count();
-        let nth = rng::below(rng, choices as u32) as usize;
-        let mut rows = legal.iter().enumerate().filter(|&(_, &is_legal)| is_legal).map(|(row, _)| row);
-        rows.nth(nth)
+        any(legal, rng)
     }
 }
 
@@ -26,5 +23,30 @@ pub struct RawRandom;
 impl Agent for RawRandom {
     fn choose(&mut self, _: &Observation, legal: ArrayView1<bool>, rng: &mut Rng) -> Option<usize> {
         Some(rng::below(rng, legal.len() as u32) as usize)
+    }
+}
+
+/// Any of the open rows, each as likely; none if no row is open.
+pub(super) fn any<'a>(open: impl IntoIterator<Item = &'a bool>, rng: &mut Rng) -> Option<usize> {
+    let rows = open.into_iter().enumerate().filter(|&(_, &is_open)| is_open);
+    let rows: Vec<usize> = rows.map(|(row, _)| row).collect();
+    (!rows.is_empty()).then(|| rows[rng::below(rng, rows.len() as u32) as usize])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::rng::{Stream, stream};
+
+    #[test]
+    fn any_open_row_is_as_likely_as_another() {
+        let mut rng = stream(3, Stream::Exploration, 0);
+        let mut seen = [0_u32; 5];
+        for _ in 0..3000 {
+            seen[any(&[false, true, false, true, true], &mut rng).unwrap()] += 1;
+        }
+        assert_eq!((seen[0], seen[2]), (0, 0));
+        assert!([1, 3, 4].iter().all(|&row: &usize| (900..1100).contains(&seen[row])), "{seen:?}");
+        assert_eq!(any(&[false; 5], &mut rng), None);
     }
 }

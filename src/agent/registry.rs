@@ -1,5 +1,5 @@
-//! What an agent is, and every agent by name. A new one is a file and one line here; the conformance
-//! tests run through them all.
+//! What an agent is, and every agent by name. A new agent is a file and one entry here; the conformance
+//! tests run through all of them.
 
 use ndarray::ArrayView1;
 
@@ -20,7 +20,7 @@ pub trait Agent: Send {
     /// The row to carry out next, or none. `legal` has shape `(rows,)`; at least one is true.
     fn choose(&mut self, observation: &Observation, legal: ArrayView1<bool>, rng: &mut Rng) -> Option<usize>;
 
-    /// The same for an agent that tries rows out before it chooses.
+    /// As [`Agent::choose`], for an agent that tries rows out before it chooses.
     fn choose_ahead(
         &mut self,
         observation: &Observation,
@@ -32,7 +32,7 @@ pub trait Agent: Send {
         self.choose(observation, legal, rng)
     }
 
-    /// A step begins: the seed of its draws, if they are not to come from the episode's own.
+    /// A step begins: the seed for its draws, or `None` if they come from the episode's own.
     fn draw_seed(&mut self, step: usize) -> Option<u64> {
         let _ = step;
         None
@@ -51,13 +51,13 @@ pub struct Entry {
     pub kind: Kind,
 }
 
-/// How one comes by an agent.
+/// How an agent is made.
 pub enum Kind {
     /// It can act at once: a fresh one for each episode.
     Ready(fn() -> Box<dyn Agent>),
-    /// It has to be trained: its presets, the default first. See [`super::Learner`].
+    /// It must be trained: its presets, the default first. See [`super::Learner`].
     Learning(&'static [Preset]),
-    /// It searches over many episodes and leaves something behind to act by: its default settings. See
+    /// It searches over many episodes, and what it found can act: its default settings. See
     /// [`super::Trainable`].
     Searching(fn() -> Settings),
 }
@@ -214,7 +214,14 @@ mod tests {
     fn every_trained_agent_goes_on_after_a_kill_as_if_there_had_been_none() {
         let rows = || Arc::new(Rows { allowed: vec![true; ROWS], environment: vec![false; ROWS] });
         for entry in REGISTRY {
-            let Some(settings) = Settings::from_yaml(entry, None, "") else { continue };
+            let text = match entry.kind {
+                // So small that everything which a checkpoint holds is in use.
+                Kind::Learning(_) => {
+                    "learning_starts: 32\nreplay_capacity: 60\nrandom_decay: 0.05\nhidden_units: [16]"
+                }
+                Kind::Ready(_) | Kind::Searching(_) => "",
+            };
+            let Some(settings) = Settings::from_yaml(entry, None, text) else { continue };
             let settings = settings.unwrap();
             let play = |agent: &mut Box<dyn Trainable>, number: u64| {
                 let beginning =
@@ -245,20 +252,9 @@ mod tests {
                 play(&mut restored, number);
             }
             assert_eq!(whole.save(), restored.save(), "{}", entry.name);
-            assert!(settings.restore(rows(), &bytes[1..]).is_none(), "{}", entry.name);
+            for damaged in [&bytes[1..], &bytes[..bytes.len() - 1]] {
+                assert!(settings.restore(rows(), damaged).is_none(), "{}", entry.name);
+            }
         }
-    }
-
-    #[test]
-    fn masked_random_obeys_the_mask_evenly() {
-        let legal = Array1::from_vec(vec![false, true, false, true, true]);
-        let mut agent = random::MaskedRandom;
-        let mut rng = stream(3, Stream::Exploration, 0);
-        let mut seen = [0_u32; 5];
-        for _ in 0..3000 {
-            seen[agent.choose(&Observation::zeros(), legal.view(), &mut rng).unwrap()] += 1;
-        }
-        assert_eq!((seen[0], seen[2]), (0, 0));
-        assert!([1, 3, 4].iter().all(|&row: &usize| (900..1100).contains(&seen[row])), "{seen:?}");
     }
 }

@@ -1,4 +1,4 @@
-//! Settings of any agent that is trained, and how to come by the agent from them.
+//! Settings of any trainable agent, and the agents that are built from them.
 
 use std::sync::Arc;
 
@@ -13,7 +13,7 @@ use super::registry::{Entry, Kind};
 use super::search::{AvFuzzer, AvFuzzerSettings, GoExplore, GoExploreSettings};
 use super::trainable::Trainable;
 
-/// All settings of one agent; which agent is told by their names.
+/// All settings of one agent. In a file, the names of the settings tell which kind of agent it is.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(untagged)]
 pub enum Settings {
@@ -49,7 +49,7 @@ impl Settings {
         })
     }
 
-    /// The same search with what a text changes.
+    /// The settings of a search with the changes of a YAML text.
     fn changed(self, text: &str) -> Result<Settings, SettingsError> {
         fn read<T: DeserializeOwned + Default>(text: &str) -> Result<T, SettingsError> {
             let read: Option<T> =
@@ -93,7 +93,7 @@ impl Settings {
         })
     }
 
-    /// Settings of a learner, if it is one.
+    /// The settings, if they are those of a learner.
     pub fn hyperparameters(&self) -> Option<&Hyperparameters> {
         match self {
             Settings::Learning(settings) => Some(settings.as_ref()),
@@ -101,12 +101,12 @@ impl Settings {
         }
     }
 
-    /// What the settings began as.
+    /// The preset that the settings began as; `search` for a search, which has none.
     pub fn preset(&self) -> &str {
         self.hyperparameters().map_or("search", |settings| &settings.preset)
     }
 
-    /// Names of the actions and groups that it may choose from; empty: all.
+    /// Names of the actions and groups that the agent may choose from; empty: all.
     pub fn actions(&self) -> &[String] {
         self.hyperparameters().map_or(&[], |settings| &settings.actions)
     }
@@ -116,12 +116,13 @@ impl Settings {
         self.hyperparameters().and_then(|settings| settings.observation_period_s)
     }
 
-    /// How collision probabilities are reckoned.
+    /// Formula of the collision probability.
     pub fn proc(&self) -> ProcKind {
         self.hyperparameters().map_or(ProcKind::Avastra, |settings| settings.proc)
     }
 
-    /// Constants of the reward; `None`: the space's own. Searches are not paid by it, but show it.
+    /// Constants of the reward; `None`: the space's own reward. A search reports the reward, but does not
+    /// use it.
     pub fn reward(&self) -> Option<RewardSettings> {
         match self.hyperparameters() {
             Some(settings) if settings.reward == RewardSource::Equation => Some(settings.reward_settings()),

@@ -1,7 +1,7 @@
 //! What a learning agent is told of an episode when it has ended.
 //!
-//! Learning waits for the end because only then it is known which collisions count. It costs nothing
-//! but a lag of one episode, and makes the end of an episode the place where everything is at rest.
+//! Learning waits for the end, because only then it is known which collisions count. It costs a lag of one
+//! episode, and between two episodes nothing is under way, so that a checkpoint is complete.
 
 use ndarray::Array1;
 
@@ -17,7 +17,7 @@ pub struct Trajectory {
     pub last_legal: Array1<bool>,
     /// Whether the episode came to an end of its own (arrival), as opposed to being cut off.
     pub terminal: bool,
-    /// How close somebody came; measured for searches alone.
+    /// How close other road users came; measured for searches only.
     pub closeness: Closeness,
 }
 
@@ -29,20 +29,20 @@ pub struct Experience {
     pub legal: Array1<bool>,
     pub row: usize,
     pub reward: f64,
-    /// For each contact of this step: the index, here, of the choice that made the obstacle appear.
+    /// For each contact of this step: the index in `steps` of the choice that made the obstacle appear.
     pub hits: Vec<usize>,
-    /// Whether the ego vehicle touched anybody in this step.
+    /// Whether the ego vehicle touched any road user in this step.
     pub collided: bool,
-    /// For each collision of this step that counts: the index, here, of the choice that made the
-    /// obstacle appear, if one of these did.
+    /// For each collision of this step that counts: the index in `steps` of the choice that made the
+    /// obstacle appear; `None` if no choice did.
     pub crashes: Vec<Option<usize>>,
 }
 
-/// What learning from an episode did.
+/// What an agent did to learn from an episode.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Lesson {
     pub updates: u64,
-    /// Mean loss of these updates; none if there was none.
+    /// Mean loss of these updates; `None` if there was no update.
     pub loss: Option<f64>,
 }
 

@@ -1,14 +1,14 @@
 //! Could a careful driver have avoided this collision?
 //!
-//! The world is taken back to the onset of the hazard (see `hazard`), but no further than 8 s. Everybody
-//! else then moves as recorded until the recorded contact, and after it as they themselves decide.
-//! The ego vehicle, the same car on the same road, is driven by each reference driver in turn, who have
-//! watched for some time before they take over, and, if none of the careful ones avoids the collision,
-//! by evasive manoeuvres that begin at the onset without any delay.
+//! The world is taken back to the onset of the hazard (see `hazard`), but no further than 8 s. All other
+//! road users then move as recorded until the recorded contact, and after it as they themselves decide.
+//! The ego vehicle, the same car on the same road, is driven by each reference driver in turn; a driver
+//! watches for some time before it takes over. If none of the careful drivers avoids the collision,
+//! evasive manoeuvres that begin at the onset without any delay are tried.
 //!
-//! A driver avoids the collision if it does not touch the obstacle at all, and nobody else by its own
-//! fault, until 4 s after the recorded contact. That recorded road users do not give way to a car that
-//! now is elsewhere is why contacts with others who run into it are not held against it.
+//! A driver avoids the collision if until 4 s after the recorded contact it does not touch the obstacle,
+//! and does not run into any other road user. A contact in which another road user runs into the ego
+//! vehicle does not count, because recorded road users do not give way to a car that is now elsewhere.
 
 use std::collections::VecDeque;
 
@@ -23,14 +23,14 @@ use crate::syntax::listed;
 use super::facts::struck;
 use super::hazard::onset;
 
-/// What the verdict depends on. Recorded with every run.
+/// Settings of the verdict. Every run records them.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct AvoidabilitySettings {
     /// The careful drivers: a collision that one of them avoids is avoidable. UN R157's two
     /// performance models.
     pub careful: Vec<String>,
-    /// Drivers that are tried and reported beside them.
+    /// Other drivers that are tried and reported.
     pub reported: Vec<String>,
     /// No onset is earlier than this before the contact, s. Ours: from 20 m/s a careful driver is at
     /// rest within 5 s.
@@ -69,10 +69,10 @@ impl AvoidabilitySettings {
         serde_json::to_string(self).expect("settings are plain data")
     }
 
-    /// Settings from a line of YAML; what it leaves out is as usual.
+    /// Settings from a line of YAML; what it leaves out has its default.
     ///
     /// # Errors
-    /// If it is none, or names a driver that does not exist.
+    /// If the line cannot be read, or names a driver that does not exist.
     pub fn from_line(line: &str) -> Result<AvoidabilitySettings, AvoidabilityError> {
         let settings: AvoidabilitySettings = serde_yaml::from_str(line)
             .map_err(|error| AvoidabilityError::Yaml { reason: error.to_string().trim().to_owned() })?;
@@ -140,7 +140,7 @@ pub fn judge_one(
     settings: &AvoidabilitySettings,
 ) -> Judgement {
     let last = recording.len() - 1;
-    // Nobody can react to what was never in sight: the last moment is then the first.
+    // No driver can react to what was never in sight: the takeover is then at the last moment.
     let from = onset(recording, contact.obstacle, met).unwrap_or(last);
     let from = from.max((last + 1).saturating_sub(ticks(settings.rewind_s)));
     let case = Case { recording, from, obstacle: contact.obstacle, settings };
@@ -172,7 +172,7 @@ struct Case<'a> {
 }
 
 impl Case<'_> {
-    /// Whether a driver who watches first avoids the collision.
+    /// Whether a driver that watches first avoids the collision.
     fn avoids(&self, driver: &mut dyn Ads) -> bool {
         let watched = self.from - self.from.min(ticks(self.settings.watch_s));
         let mut sensed = self.recording[watched].sensed();
@@ -227,7 +227,7 @@ impl Case<'_> {
     }
 }
 
-/// Whether the ego vehicle stands on driving lanes with all its corners, of whatever direction.
+/// Whether all corners of the ego vehicle are on driving lanes, of either direction.
 fn is_on_road(world: &World) -> bool {
     let outline = world.ego_outline();
     let map = &world.scene().map;

@@ -1,21 +1,23 @@
-//! Which module of a driving system a collision is the fault of.
+//! Which module of a driving system is at fault for a collision.
 //!
 //! The ego vehicle drives as it did until the obstacle appears. From then on the same system drives with
 //! one module without its errors (`ads::Module`), which has watched from the start, so that the hazard
-//! is the same to the bit; everybody else decides for themselves. Modules without which the collision
-//! vanishes *suffice* to avoid it. If none does alone, pairs are tried.
+//! is the same to the bit; other road users decide for themselves. A module *suffices* if the collision
+//! vanishes without its errors. If no module suffices alone, pairs are tried.
 //!
-//! Several modules may suffice: good brakes make up for bad eyes, and nobody can tell from one crash
-//! which of the two is to blame without knowing how good eyes and brakes should be. A *baseline* says
-//! so: if modules differ from it, and the collision vanishes with one of them as the baseline has it,
-//! only such modules come into question. Then the cause is, in this order, one whose errors alone lead to
-//! the collision, all other modules being as in the baseline, or without any (which says something only
-//! where nothing happens with all of them so); the one that prevents most of the collisions under small
-//! variations; one that has a documented weakness without which alone the collision vanishes; and the
-//! first on the data's way. Where no variation leads to the collision, it hung by a hair, and no module
-//! is named.
+//! Several modules may suffice: good brakes make up for bad eyes, and one crash does not tell which of the
+//! two is at fault. A *baseline* says how good eyes and brakes should be: if the collision vanishes with a
+//! module as the baseline has it, only such modules are candidates. Where several are left, these criteria
+//! decide, in this order:
 //!
-//! Left out: what an error before the obstacle appeared has to do with it.
+//! 1. the errors of the module alone lead to the collision, all other modules being as in the baseline, or
+//!    without errors (asked only if the collision vanishes with all modules so);
+//! 2. the module prevents most of the collisions under small variations; if no variation leads to the
+//!    collision, it was chance, and no module is named;
+//! 3. the module has a documented weakness, and the collision vanishes without that weakness alone;
+//! 4. the module comes first on the data's way.
+//!
+//! Left out: errors from before the obstacle appeared.
 
 use std::sync::Arc;
 
@@ -25,36 +27,35 @@ use crate::episode::{EpisodeLog, Setup};
 use super::crash::{Crash, Fate, play};
 use super::variation::Variation;
 
-/// Variations by which modules that suffice alike are told apart.
+/// Number of variations that are played where several modules suffice.
 pub const VARIATIONS: u32 = 8;
 
-/// Ambient traffic may have been around for long: no takeover is earlier than this before the
-/// collision, s. Longer than any reaction or braking.
+/// The takeover is at most this long before the collision, s: longer than any reaction or braking, because
+/// ambient traffic may have appeared long before.
 const LOOK_BACK_S: f64 = 15.0;
 
-/// Why there is no cause to be found.
+/// Why no cause can be found.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("`{ads}` is not made of modules that could be at fault: only `modular` is")]
 pub struct NoModules {
     pub ads: String,
 }
 
-/// What a collision is owed to.
+/// The cause of a collision, and what it was found by.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Diagnosis {
     /// The module at fault; two if only both together suffice; none if no two do.
     pub cause: Vec<Module>,
     pub modules: Vec<ModuleFinding>,
-    /// With no module's errors.
+    /// The collision if no module has errors.
     pub ideal: Fate,
-    /// Each documented weakness that is switched on.
+    /// The collision without each documented weakness that is switched on.
     pub weaknesses: Vec<WeaknessFinding>,
-    /// Small variations that led to the collision, of [`VARIATIONS`]. Looked at only to tell modules
-    /// apart.
+    /// How many of [`VARIATIONS`] small variations led to the collision. Played only to tell modules apart.
     pub varied_crashes: Option<u32>,
     /// Pairs that suffice, looked for if no module does alone.
     pub pairs: Vec<[Module; 2]>,
-    /// Takeover of the driving systems compared, s.
+    /// When the other driving systems took over, s.
     pub from_s: f64,
 }
 
@@ -62,15 +63,15 @@ pub struct Diagnosis {
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct ModuleFinding {
     pub module: Module,
-    /// With this module as the baseline has it; `None` if it is so already.
+    /// The collision with this module as the baseline has it; `None` if it is so already.
     pub restored: Option<Fate>,
-    /// With this module alone without its errors.
+    /// The collision with only this module without errors.
     pub idealised: Fate,
-    /// With the errors of this module alone: all others are as in the baseline, if this one differs from
-    /// it, or else without any.
+    /// The collision with the errors of this module alone: all others are as in the baseline, if this one
+    /// differs from it, or else without errors.
     pub alone: Fate,
     /// Of the collisions under small variations, the share that vanishes with it restored, if that
-    /// suffices, or else idealised. Looked at only to tell modules apart.
+    /// suffices, or else idealised. Played only to tell modules apart.
     pub prevented: Option<f64>,
 }
 
@@ -81,7 +82,7 @@ pub struct WeaknessFinding {
     pub without: Fate,
 }
 
-/// What another profile of the same driving system makes of the hazard of the nth collision of a log.
+/// What becomes of the nth collision of a log if another profile of the driving system takes over.
 ///
 /// # Errors
 /// If the driving system has no modules.
@@ -129,7 +130,7 @@ pub fn diagnose(
             WeaknessFinding { weakness, without }
         })
         .collect();
-    // Places of the modules that may be the cause: fewer from criterion to criterion.
+    // Indices of the modules that may be the cause; each criterion leaves fewer.
     let mut best: Vec<usize> = (0..modules.len()).collect();
     best.retain(|&index| modules[index].suffices());
     prefer(&mut best, |index| modules[index].restored == Some(Fate::Vanished));
@@ -179,14 +180,14 @@ impl ModuleFinding {
     }
 }
 
-/// Keeps those that meet a criterion, if any do.
+/// Keeps the modules that meet a criterion, if any do.
 fn prefer(best: &mut Vec<usize>, criterion: impl Fn(usize) -> bool) {
     if best.iter().any(|&index| criterion(index)) {
         best.retain(|&index| criterion(index));
     }
 }
 
-/// Whether a documented weakness is one of a module, by what `ModularConfig::idealised` switches off.
+/// Whether a documented weakness belongs to a module: `ModularConfig::idealised` switches it off with it.
 fn owns(module: Module, weakness: &str) -> bool {
     match weakness {
         "a_late_unstable_tracks" => matches!(module, Module::Perception | Module::Tracking),
@@ -223,7 +224,7 @@ impl<'a> Inquiry<'a> {
         self.crash.fate(&self.crash.play(&ads))
     }
 
-    /// Pairs that suffice.
+    /// Pairs of modules that suffice together.
     fn pairs(&self) -> Vec<[Module; 2]> {
         let mut found = Vec::new();
         for (index, first) in Module::ALL.into_iter().enumerate() {

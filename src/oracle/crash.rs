@@ -19,9 +19,9 @@ use super::facts::struck;
 pub enum Fate {
     /// The ego vehicle touches the same obstacle.
     Crash,
-    /// It touches somebody else, by its own fault.
+    /// It runs into another road user.
     Other,
-    /// It touches nobody, or somebody else only because that one ran into it.
+    /// It touches no road user, or only others that ran into it.
     Vanished,
     /// The obstacle never appeared: the play says nothing.
     Absent,
@@ -39,14 +39,14 @@ impl Fate {
     }
 }
 
-/// What another driving system makes of a scenario that was found with a collision.
+/// What became of a scenario that was found with a collision, played by another driving system.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Regression {
     /// It runs into the same obstacle.
     StillFails { time_s: f64 },
-    /// It touches nobody, or somebody else only because that one ran into it.
+    /// It touches no road user, or only others that ran into it.
     Fixed,
-    /// It runs into somebody else.
+    /// It runs into another road user.
     OtherCrash,
     /// The same obstacle runs into it.
     Struck,
@@ -55,7 +55,7 @@ pub enum Regression {
 }
 
 impl Regression {
-    /// Whether the driving system runs into somebody.
+    /// Whether the driving system runs into a road user.
     pub fn is_failure(self) -> bool {
         matches!(self, Regression::StillFails { .. } | Regression::OtherCrash)
     }
@@ -79,7 +79,8 @@ pub fn regression(setup: &Setup, log: &EpisodeLog, index: usize, ads: &Selected)
 pub(super) struct Crash<'a> {
     pub setup: &'a Setup<'a>,
     pub script: Script,
-    /// Step and place among its newcomers; `None` is ambient traffic.
+    /// The step at which the obstacle appeared, and its place among those that appeared then; `None` is
+    /// ambient traffic.
     appeared: Option<(usize, usize)>,
     pub collision: Collision,
 }
@@ -138,7 +139,7 @@ impl<'a> Crash<'a> {
     }
 }
 
-/// Plays an episode and records where everybody was.
+/// Plays an episode and records where all other road users were.
 pub(super) fn play(setup: &Setup, mut choose: impl FnMut(&Moment) -> Choice) -> (EpisodeLog, Arc<Foresight>) {
     let mut foresight = Foresight::default();
     let log = episode::run(setup, &mut choose, &mut |world, _, _| {

@@ -2,10 +2,10 @@
 //!
 //! The rule that combines these facts into "counted" is the space's own `verdict`. Sudden appearance
 //! is judged as in the published package; side and rear hits, which its authors sorted out by hand,
-//! are decided here by contact point and motion. Its "overlapping" cannot occur, because nobody
-//! appears within another's outline, and its "repeated" does not, because an obstacle that was
-//! touched once touches nobody again; the word stays for worlds in which one can. Not taken over:
-//! that a second pedestrian of an episode never counts.
+//! are decided here by contact point and motion. Its "overlapping" cannot occur, because no obstacle
+//! appears within another's outline. Its "repeated" does not occur either, because an obstacle that was
+//! touched once touches nothing again; the word stays for worlds in which it can. Not taken over: that a
+//! second pedestrian of an episode never counts.
 
 use crate::episode::EpisodeLog;
 use crate::geometry::Vec2;
@@ -14,16 +14,16 @@ use crate::sim::{Contact, VehicleParameters};
 
 use super::avoidable::Judgement;
 
-/// A collision so soon after the obstacle appeared is its appearance's fault, s (published package).
+/// A collision this soon after the obstacle appeared is sudden, s (published package).
 const SUDDEN_S: f64 = 0.75;
-/// An ego vehicle this slow stands: whoever touches it drove or walked into it, m/s. The published
-/// package has the figure for pedestrians; that it holds for everybody is ours.
+/// An ego vehicle slower than this stands: any contact is an obstacle that ran into it, m/s. The published
+/// package has the figure for pedestrians; ours is to use it for all obstacles.
 const STANDING_MPS: f64 = 1.0;
-/// The ego vehicle's own speed sideways is nil; an obstacle that moves towards its flank faster than
-/// this came from the side by itself, m/s.
+/// An obstacle that moves towards the ego vehicle's side faster than this ran into it, m/s: the ego vehicle
+/// itself does not move sideways.
 const SIDEWAYS_MPS: f64 = 0.1;
 
-/// The facts about one collision of a log, of which `judgement` is the verdict.
+/// The facts about one collision of a log; `judgement` is the verdict on it.
 pub fn facts(log: &EpisodeLog, index: usize, judgement: &Judgement) -> OutcomeFacts {
     let collision = &log.collisions[index];
     let earlier = &log.collisions[..index];
@@ -44,14 +44,14 @@ pub fn counted(space: &Space, log: &EpisodeLog, judgements: &[Judgement]) -> Vec
     (0..log.collisions.len()).filter(counts).collect()
 }
 
-/// A contact this near to two faces is one of the corner between them, m. Far more than a first contact
-/// leaves open.
+/// A contact this near to two faces is at the corner between them, m. A first contact is known far more
+/// exactly.
 const CORNER_M: f64 = 1e-3;
 
 /// Whether the obstacle ran into the ego vehicle rather than the other way round.
 ///
 /// True if the ego vehicle stood; if it was hit at the rear; if it was hit at the side behind its
-/// front axle, or before it by somebody moving towards that side; and at a front corner if the
+/// front axle, or before it by an obstacle moving towards that side; and at a front corner if the
 /// obstacle moved sideways onto it faster than the ego vehicle drove.
 pub(super) fn struck(contact: &Contact, ego: &VehicleParameters) -> bool {
     if contact.ego_speed_mps < STANDING_MPS {

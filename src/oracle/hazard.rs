@@ -1,11 +1,11 @@
-//! When a collision began to be one: the onset of its hazard.
+//! The onset of a hazard: when a collision began to take shape.
 //!
 //! The onset is the first moment of the last uninterrupted time before the contact in which the
 //! obstacle was on the ego vehicle's way or heading for it, and in which it could be seen. The way is
 //! the one that the ego vehicle took, as wide as the vehicle and the 0.375 m by which careful drivers
 //! wander (UN R157, Annex 4, Appendix 3); heading is to go on at constant velocity until the time of
-//! the contact. Both are told by places alone, not by times: a driver may see that ways cross before
-//! it is plain who will be there first.
+//! the contact. Both compare places alone, not times: a driver may see that two ways cross before it is
+//! clear which vehicle will be there first.
 
 use crate::ads::in_sight;
 use crate::geometry::{OrientedBox, distance_m};
@@ -21,7 +21,7 @@ const STRIDE: usize = 2 * FRAME_TICKS as usize;
 pub fn onset(recording: &[World], obstacle: u32, met: OrientedBox) -> Option<usize> {
     let mut way: Vec<OrientedBox> = vec![met];
     let mut sensed = recording.last()?.sensed();
-    // Backwards in time: whether the hazard has begun to be one, and the earliest sight of it.
+    // Backwards in time: whether a moment of the hazard was found, and the earliest at which it was seen.
     let mut began = false;
     let mut first = None;
     for (index, world) in recording.iter().enumerate().rev() {

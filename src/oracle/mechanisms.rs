@@ -1,16 +1,16 @@
-//! The share of crashes that each documented weakness makes: how many vanish when it alone is off.
+//! The share of crashes that each documented weakness causes: how many vanish when it alone is off.
 //!
 //! Each crash is played again in two ways: the mended system takes over when the obstacle appears, as for
-//! a cause (see `cause`), so that it meets the hazard that was met; and it drives from the start, where
-//! it may well be elsewhere by then. A play that ends in another crash, or in which the obstacle never
-//! appears, is none in which the crash vanishes.
+//! a cause (see `cause`), so that it meets the same hazard; and it drives from the start, and then may be
+//! elsewhere by that time. If the play ends in another crash, or the obstacle never appears, the crash does
+//! not count as vanished.
 
 use crate::ads::{ModularConfig, Weaknesses};
 use crate::episode::{EpisodeLog, Setup};
 
 use super::cause::{Inquiry, NoModules};
 use super::crash::{Crash, Fate};
-use super::variation::wilson;
+use super::variation::proportion;
 
 /// A crash with one documented weakness switched off.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
@@ -40,7 +40,7 @@ pub fn mechanisms(setup: &Setup, log: &EpisodeLog, index: usize) -> Result<Vec<W
     Ok(found.collect())
 }
 
-/// What one weakness has to do with many crashes.
+/// How many of many crashes vanish without one weakness.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct MechanismShare {
     pub mechanism: &'static str,
@@ -54,11 +54,11 @@ pub struct MechanismShare {
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct Share {
     pub vanished: u32,
-    /// Plays that crash into somebody else instead.
+    /// Plays that crash into another road user instead.
     pub other: u32,
     /// Plays in which the obstacle never appears.
     pub absent: u32,
-    /// `vanished` of all crashes; 0 of none.
+    /// Share of the crashes that vanish; 0 if there are none.
     pub share: f64,
     /// 95 % interval of the share, after Wilson.
     pub low: f64,
@@ -83,14 +83,14 @@ pub fn mechanism_shares(crashes: &[Vec<WithoutMechanism>]) -> Vec<MechanismShare
 fn share(fates: impl Iterator<Item = Fate> + Clone) -> Share {
     let count = |wanted: Fate| fates.clone().filter(|fate| *fate == wanted).count() as u32;
     let (crashes, vanished) = (fates.clone().count() as u32, count(Fate::Vanished));
-    let (low, high) = wilson(vanished, crashes);
-    let share = if crashes == 0 { 0.0 } else { f64::from(vanished) / f64::from(crashes) };
+    let (share, [low, high]) = proportion(vanished, crashes);
     Share { vanished, other: count(Fate::Other), absent: count(Fate::Absent), share, low, high }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::oracle::wilson;
 
     #[test]
     fn a_share_counts_what_vanishes_among_all_crashes_of_a_system_that_has_the_weakness() {

@@ -1,7 +1,7 @@
 //! How hard a collision was.
 //!
 //! Delta-v is the change of velocity of a perfectly inelastic impact of two bodies:
-//! `m2 / (m1 + m2) · |v2 - v1|`. Injury models are left out: their curves are of whole populations.
+//! `m2 / (m1 + m2) · |v2 - v1|`. Injury models are left out: their curves describe whole populations.
 
 use crate::episode::Collision;
 use crate::geometry::Vec2;
@@ -9,7 +9,7 @@ use crate::sim::{VehicleParameters, body_mass_t};
 
 use super::facts::side;
 
-/// What an impact amounts to.
+/// How hard an impact was.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct Severity {
     /// Speed at which the gap closed where the outlines met, m/s.
@@ -49,7 +49,7 @@ pub fn severity(collision: &Collision) -> Severity {
     }
 }
 
-/// How somebody moves, by a velocity in the ego vehicle's frame: x ahead, y left.
+/// How the obstacle moves, by its velocity in the ego vehicle's frame: x ahead, y left.
 fn approach(velocity_mps: Vec2) -> &'static str {
     match velocity_mps {
         v if v.norm() < STANDING_MPS => "standing",

@@ -1,12 +1,11 @@
 //! The smallest scenario that still makes the same crash.
 //!
 //! Fewest actions first (ddmin, Zeller and Hildebrandt 2002), then fewest steps, ambient vehicles and
-//! effects, then the plainest start (noon under a clear sky) and values; over again until nothing changes.
-//! Every candidate is played, and every action in it must be legal by the rules of the space. The crash is
-//! the same if the ego vehicle
-//! hits an obstacle of the same body that does the same, the class of the verdict is the same, and the
-//! space's verdict still counts it, or still does not. The result is 1-minimal: with any one step
-//! left out, whether it leaves its time behind or not, the crash is gone or another one.
+//! effects, then the plainest start (noon under a clear sky) and values; all passes repeat until nothing
+//! changes. Every candidate is played, and every action in it must be legal by the rules of the space. The
+//! crash is the same if the ego vehicle hits an obstacle with the same body and verb, the class of the
+//! verdict is the same, and the space's verdict still counts it, or still does not. The result is
+//! 1-minimal: if any one step is removed, or replaced by waiting, the crash is gone or is another one.
 
 use std::sync::Arc;
 
@@ -20,7 +19,7 @@ use crate::sim::Start;
 use super::avoidable::{AvoidabilitySettings, Judgement, judge};
 use super::facts::facts;
 
-/// Rounds of all passes, at most: each makes something smaller or plainer, and most need two.
+/// Most rounds of all passes. Each round makes something smaller or plainer; most crashes need two.
 const ROUNDS_MAX: usize = 8;
 
 /// A smaller scenario with the same crash.
@@ -73,8 +72,8 @@ pub fn shrink(
     }
 }
 
-/// Steps that could be left out of what led to the nth collision of a log, each by itself, with the same
-/// crash: none, if the scenario is 1-minimal.
+/// Steps that could each be removed, or replaced by waiting, with the nth collision of a log staying the same:
+/// none if the scenario is 1-minimal.
 pub fn spare_steps(
     setup: &Setup,
     log: &EpisodeLog,
@@ -121,7 +120,7 @@ struct Kept {
     index: usize,
 }
 
-/// The crash that is to stay, and the number of plays so far.
+/// The crash that must stay, and the number of plays so far.
 struct Search<'a> {
     setup: &'a Setup<'a>,
     settings: &'a AvoidabilitySettings,
@@ -132,7 +131,7 @@ struct Search<'a> {
     plays: u32,
 }
 
-/// An action whose values are wishes: rules set what follows from them.
+/// A step, and an action to try there: its values are wishes, which the rules may change.
 type Wish<'w> = Option<(usize, &'w ScriptedAction)>;
 
 impl<'a> Search<'a> {
@@ -330,7 +329,7 @@ impl<'a> Search<'a> {
                 let number = value.number();
                 let reached = ends.map(|end| self.reached(best, step, &with(Value::Number(end)), index));
                 if reached.contains(&Some(number)) {
-                    // A bound of a rule is plain, but for what is rounder.
+                    // A bound of a rule is plain; only rounder numbers are plainer.
                     round(number).into_iter().take(2).map(Value::Number).collect()
                 } else {
                     let bounds = reached.into_iter().flatten();
@@ -341,7 +340,7 @@ impl<'a> Search<'a> {
         for wanted in candidates {
             let wish = with(wanted);
             let Some((_, script)) = self.keeps(best, Some((step, &wish))) else { continue };
-            // What the rules made of the wish is no plainer than what was there.
+            // A value that the rules have changed is no plainer than the old one.
             let got = script.steps.get(step).and_then(Option::as_ref);
             if got.is_some_and(|got| got.values[index].1 == wanted) {
                 best.script = script;
@@ -378,8 +377,8 @@ fn effects(table: &ActionTable, row: usize) -> usize {
     table.space().actions[table.rows()[row].action].effects.len()
 }
 
-/// Rounder numbers near one, the roundest first: multiples of 10, 5, 1 and a half. None for what is as
-/// round already.
+/// Rounder numbers near a number, the roundest first: multiples of 10, 5, 1 and a half. Empty if the number
+/// is as round already.
 fn round(number: f64) -> Vec<f64> {
     let mut found = Vec::new();
     for unit in [10.0, 5.0, 1.0, 0.5] {

@@ -1,11 +1,11 @@
 //! Small changes of a scenario, and how often it crashes under them.
 //!
-//! Nothing of a scenario is known to the last digit on a street. A variation changes, each by its own
+//! On a street, no value of a scenario repeats to the last digit. A variation changes, each by its own
 //! draw: when an action happens (normal, 0.1 s, cut at 0.3 s; the first stays at the start), every
 //! speed that an action draws (normal, 2 %, cut at 6 %), the phase of the signals (normal, 0.1 s, cut
 //! at 0.3 s), and all errors of the driving system's sensors, which are drawn anew. What the rules set
-//! follows from the changed values, and values stay within the rules. The widths are ours: what a
-//! tester's repetition of one manoeuvre on a proving ground may well differ by.
+//! follows from the changed values, and values stay within the rules. The widths are ours: how much
+//! repetitions of one manoeuvre may differ on a proving ground.
 
 use std::sync::Arc;
 
@@ -23,9 +23,9 @@ use super::crash::{Crash, play};
 const TIME_S: f64 = 0.1;
 /// Standard deviation of speeds, as a part of them.
 const SPEED: f64 = 0.02;
-/// Draws are cut at so many standard deviations.
+/// Draws are cut at this many standard deviations.
 const CUT: f64 = 3.0;
-/// Draws of one variation before a step that they make illegal is carried out as it was.
+/// Draws that are tried for a step; if all are illegal, the step is carried out as it was.
 const DRAWS_MAX: u32 = 8;
 
 /// How often a collision happens under variations.
@@ -33,8 +33,8 @@ const DRAWS_MAX: u32 = 8;
 pub struct Likelihood {
     pub variations: u32,
     pub crashes: u32,
-    /// Variations in which the obstacle never appeared, or appeared to an ego vehicle that had no way
-    /// to it: they count as no crash.
+    /// Share of the variations that crash. One in which the obstacle never appeared, or the ego vehicle had
+    /// no way to it, counts as no crash.
     pub share: f64,
     /// 95 % interval of the share, after Wilson.
     pub low: f64,
@@ -48,12 +48,17 @@ pub fn likelihood(setup: &Setup, log: &EpisodeLog, index: usize, variations: u32
     let crashes =
         (1..=variations).filter(|&number| crash.again(&Variation::of(&crash, number).log).is_some());
     let crashes = crashes.count() as u32;
-    let (low, high) = wilson(crashes, variations);
-    let share = if variations == 0 { 0.0 } else { f64::from(crashes) / f64::from(variations) };
+    let (share, [low, high]) = proportion(crashes, variations);
     Likelihood { variations, crashes, share, low, high }
 }
 
-/// 95 % interval of a share by its count, after Wilson 1927; everything is possible of no trials.
+/// A share by its count, 0 without trials, and its 95 % interval.
+pub(super) fn proportion(count: u32, trials: u32) -> (f64, [f64; 2]) {
+    let share = if trials == 0 { 0.0 } else { f64::from(count) / f64::from(trials) };
+    (share, wilson(count, trials).into())
+}
+
+/// 95 % interval of a share by its count, after Wilson 1927; from 0 to 1 without trials.
 pub fn wilson(count: u32, trials: u32) -> (f64, f64) {
     if trials == 0 {
         return (0.0, 1.0);
@@ -79,7 +84,7 @@ pub(super) struct Variation<'a> {
 }
 
 impl<'a> Variation<'a> {
-    /// The variation of a number, always the same.
+    /// The variation with a number; the same number gives the same variation.
     pub fn of(crash: &Crash<'a>, number: u32) -> Variation<'a> {
         let seed = rng::child_seed(crash.setup.seed, Stream::Variation, u64::from(number));
         let mut rng = rng::stream(seed, Stream::Variation, 0);
@@ -103,8 +108,8 @@ impl<'a> Variation<'a> {
     }
 }
 
-/// The action of a step with other speeds. Where none of several draws is legal, the action as it was
-/// written stays as it is if it can.
+/// The action of a step with other speeds. Where none of several draws is legal, the action is tried as it
+/// was written.
 fn choose(crash: &Crash, seed: u64, moment: &Moment) -> Choice {
     let table = crash.setup.table;
     let Some(Some(action)) = crash.script.steps.get(moment.step) else {

@@ -8,7 +8,7 @@ use super::avoidable::Judgement;
 use super::cause::NoModules;
 use super::facts;
 
-/// One claim, and what came of it.
+/// One claim, and what the replay says of it.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct ClaimResult {
     /// The claim in words.
@@ -18,7 +18,7 @@ pub struct ClaimResult {
     pub found: String,
 }
 
-/// What a claim may ask for that takes many replays, each of the nth collision of the log.
+/// Findings that take many replays, each about the nth collision of the log; asked for only by some claims.
 pub struct Replays<'a> {
     /// The modules at fault.
     pub cause: &'a dyn Fn(usize) -> Result<Vec<Module>, NoModules>,
@@ -130,7 +130,7 @@ fn check(
     }
 }
 
-/// The first collision with an obstacle, or with anybody.
+/// The first collision with an obstacle, or with any obstacle.
 fn collision(log: &EpisodeLog, obstacle: Option<u32>) -> Result<usize, String> {
     let meant = |collision: &Collision| obstacle.is_none_or(|id| collision.contact.obstacle == id);
     log.collisions.iter().position(meant).ok_or_else(|| "no such collision".to_owned())

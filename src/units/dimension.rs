@@ -37,7 +37,7 @@ impl Dimension {
         Dimension::NAMED.iter().find(|(_, word, _)| *word == name).map(|(dimension, _, _)| *dimension)
     }
 
-    /// Of a product; `None` beyond exponents of ±127.
+    /// The dimension of a product; `None` beyond exponents of ±127.
     pub fn times(self, other: Dimension) -> Option<Dimension> {
         Some(Dimension {
             metres: self.metres.checked_add(other.metres)?,
@@ -46,7 +46,7 @@ impl Dimension {
         })
     }
 
-    /// Of a quotient; `None` beyond exponents of ±127.
+    /// The dimension of a quotient; `None` beyond exponents of ±127.
     pub fn per(self, other: Dimension) -> Option<Dimension> {
         Some(Dimension {
             metres: self.metres.checked_sub(other.metres)?,

@@ -1,7 +1,7 @@
 //! Exact fractions of 128-bit integers.
 //!
 //! Every operation that can leave the range gives `None` instead: the numbers of a scenario are a
-//! few digits long, so who sees `None` has an absurd file and says so.
+//! few digits long, so `None` means an absurd file, and the caller says so.
 
 use core::cmp::Ordering;
 use core::fmt;
@@ -46,7 +46,7 @@ impl Rational {
             return None;
         }
         let (mut numerator, mut denominator) = (0_i128, 1_i128);
-        // Zeros at the end of a fraction say nothing, yet would cost range.
+        // Zeros at the end of a fraction change nothing, but would use up range.
         for (digit, fractional) in
             whole.chars().map(|c| (c, false)).chain(fraction.trim_end_matches('0').chars().map(|c| (c, true)))
         {

@@ -1,6 +1,6 @@
 //! The unit words of the language and their exact factors to SI.
 //!
-//! No units of the author's own: a closed list is what makes a misspelt unit an error.
+//! Authors cannot add units: with a closed list, a misspelt unit is an error.
 
 use super::dimension::Dimension;
 use super::rational::Rational;
@@ -15,7 +15,7 @@ pub struct Unit {
 }
 
 impl Unit {
-    /// How many SI units one of these is.
+    /// The unit in SI units: 5/18 for `km/h`.
     pub fn factor(&self) -> Rational {
         Rational::new(i128::from(self.numerator), i128::from(self.denominator))
             .expect("the table below has no zero denominators")

@@ -1,39 +1,40 @@
-//! A tree as a first-match list, and a list that acts.
+//! A decision tree becomes a list of rules, of which the first that applies acts.
 //!
-//! Of a split the smaller side comes first, with the test; the other side needs none any more. Of a
-//! leaf the row comes first that most of the stake wants; where that one is not open, the row that most of
-//! the rest wants, and so on. Which rows are legal at a moment the variables do not tell.
+//! A split becomes two lines: the smaller branch with its test, then the other without one. A leaf becomes
+//! a list of rows, because the variables do not tell which rows are legal: first the row that most of the
+//! stake wants, then the row that most of the stake wants where the first is not open, and so on.
 
 use crate::mdp::Observation;
 use crate::model::expr::Comparison;
 use crate::model::policy::{Condition, PolicyRule, variable_index};
 
-use crate::agent::decision::tree::{Bounds, Tree, Visit, grow, holds};
+use super::tree::{Bounds, Tree, Visit, grow, holds};
 
-/// Rows of a line, at most, besides the one that is always open. Ours.
+/// Most rows of a line, besides one that is always open. Ours.
 const ALTERNATIVES_MAX: usize = 4;
 /// A leaf holds at least this share of the visits. Ours: less is noise.
 const LEAF_SHARE_MIN: f64 = 0.005;
 
-/// The row of the first line that applies, if one of its rows is open.
+/// The first open row of the first line whose conditions hold; `None` if that line has no open row.
 pub fn chosen_by(rules: &[PolicyRule], observation: &Observation, open: &[bool]) -> Option<usize> {
     let applies = |rule: &&PolicyRule| rule.conditions.iter().all(|condition| holds(condition, observation));
     let rule = rules.iter().find(applies)?;
     rule.rows.iter().copied().find(|&row| open[row])
 }
 
-/// Rules that imitate the visits, of so many lines and tests in a line at most. There must be a visit.
+/// Rules that imitate the visits, with at most `leaves` lines and `depth` tests in a line. There must be a
+/// visit.
 pub fn distilled(visits: &[Visit], variables: &[usize], leaves: usize, depth: usize) -> Vec<PolicyRule> {
     let fewest = (visits.len() as f64 * LEAF_SHARE_MIN).ceil() as usize;
     let tree = grow(visits, &readable(variables), Bounds { leaves, depth, visits: fewest.max(2) });
     let rows = visits[0].open.len();
     let always: Vec<bool> = (0..rows).map(|row| visits.iter().all(|visit| visit.open[row])).collect();
-    let mut rules = lines(&merged(ranked(&tree, visits, &always)));
+    let mut rules = lines(&ranked(tree, visits, &always));
     rules.iter_mut().for_each(|rule| simplify(&mut rule.conditions));
     rules
 }
 
-/// The variables that a reader understands: the sky's three in place of the packed number.
+/// The variables that a reader understands: `weather` packs three phenomena, which take its place.
 fn readable(variables: &[usize]) -> Vec<usize> {
     let index = |name| variable_index(name).expect("it is a variable");
     let (packed, sky) = (index("weather"), ["rain", "fog", "wetness"].map(index));
@@ -41,39 +42,37 @@ fn readable(variables: &[usize]) -> Vec<usize> {
     variables.iter().flat_map(parts).collect()
 }
 
-/// A tree with the rows of its leaves, the one that most of the stake wants first.
-enum Ranked {
-    Leaf(Vec<usize>),
-    Split(Condition, Box<Ranked>, Box<Ranked>),
-}
-
-fn ranked(tree: &Tree, visits: &[Visit], always: &[bool]) -> Ranked {
+/// The tree with rows in place of the visits of each leaf; a split of two leaves with the same rows becomes one
+/// leaf.
+fn ranked(tree: Tree, visits: &[Visit], always: &[bool]) -> Tree {
     match tree {
         Tree::Leaf(own) => {
             let own: Vec<&Visit> = own.iter().map(|&visit| &visits[visit]).collect();
-            Ranked::Leaf(alternatives(&own, always))
+            Tree::Leaf(alternatives(&own, always))
         }
-        Tree::Split(condition, inside, outside) => Ranked::Split(
-            *condition,
-            Box::new(ranked(inside, visits, always)),
-            Box::new(ranked(outside, visits, always)),
-        ),
+        Tree::Split(condition, inside, outside) => {
+            match (ranked(*inside, visits, always), ranked(*outside, visits, always)) {
+                (Tree::Leaf(rows), Tree::Leaf(others)) if rows == others => Tree::Leaf(rows),
+                (inside, outside) => Tree::Split(condition, Box::new(inside), Box::new(outside)),
+            }
+        }
     }
 }
 
+/// The rows of a leaf, the one that most of the stake wants first.
 fn alternatives(visits: &[&Visit], always: &[bool]) -> Vec<usize> {
     let mut rest = visits.to_vec();
     let mut rows = Vec::new();
     while !rest.is_empty() && rows.len() < ALTERNATIVES_MAX {
         let mut wanted = vec![0.0; always.len()];
-        // A visit without any stake counts a little, or it would have no say anywhere.
+        // A visit without stake counts a little: a leaf may hold no other visits.
         rest.iter().for_each(|visit| wanted[visit.best] += visit.stake() + 1e-9);
         let row = first_largest(&wanted);
         rows.push(row);
         rest.retain(|visit| !visit.open[row]);
     }
     if !rows.iter().any(|&row| always[row]) {
-        // Something is to happen where all of these are closed: what costs least of what never is.
+        // Where all of these rows are closed, the row acts that costs least of those that are always open.
         let cost = |row: usize| -> f64 { visits.iter().map(|visit| visit.loss(Some(row))).sum() };
         let costs: Vec<f64> =
             (0..always.len()).map(|row| if always[row] { -cost(row) } else { f64::NEG_INFINITY }).collect();
@@ -88,28 +87,17 @@ fn first_largest(values: &[f64]) -> usize {
     (0..values.len()).fold(0, |best, at| if values[at] > values[best] { at } else { best })
 }
 
-/// Two leaves that say the same become one.
-fn merged(tree: Ranked) -> Ranked {
+fn leaves(tree: &Tree) -> usize {
     match tree {
-        Ranked::Leaf(rows) => Ranked::Leaf(rows),
-        Ranked::Split(condition, inside, outside) => match (merged(*inside), merged(*outside)) {
-            (Ranked::Leaf(rows), Ranked::Leaf(others)) if rows == others => Ranked::Leaf(rows),
-            (inside, outside) => Ranked::Split(condition, Box::new(inside), Box::new(outside)),
-        },
+        Tree::Leaf(_) => 1,
+        Tree::Split(_, inside, outside) => leaves(inside) + leaves(outside),
     }
 }
 
-fn leaves(tree: &Ranked) -> usize {
+fn lines(tree: &Tree) -> Vec<PolicyRule> {
     match tree {
-        Ranked::Leaf(_) => 1,
-        Ranked::Split(_, inside, outside) => leaves(inside) + leaves(outside),
-    }
-}
-
-fn lines(tree: &Ranked) -> Vec<PolicyRule> {
-    match tree {
-        Ranked::Leaf(rows) => vec![PolicyRule { conditions: Vec::new(), rows: rows.clone() }],
-        Ranked::Split(condition, inside, outside) => {
+        Tree::Leaf(rows) => vec![PolicyRule { conditions: Vec::new(), rows: rows.clone() }],
+        Tree::Split(condition, inside, outside) => {
             let (condition, first, second) = match leaves(inside) <= leaves(outside) {
                 true => (*condition, inside, outside),
                 false => (opposite(condition), outside, inside),
@@ -134,7 +122,7 @@ fn opposite(condition: &Condition) -> Condition {
     Condition { comparison, ..*condition }
 }
 
-/// Of two tests of one variable in one direction the later is the narrower, and implies the other.
+/// Leaves out what another test implies: of two tests of a variable in one direction, the later is narrower.
 fn simplify(conditions: &mut Vec<Condition>) {
     let is_implied = |at: usize, all: &[Condition]| {
         let this = all[at];

@@ -7,7 +7,7 @@ use crate::mdp::Observation;
 use crate::model::expr::Comparison;
 use crate::model::policy::{Condition, VARIABLES, VariableKind};
 
-/// One state, and what the network thinks of it.
+/// A state that was visited, and the network's view of it.
 #[derive(Debug, Clone)]
 pub struct Visit {
     pub observation: Observation,
@@ -26,7 +26,7 @@ impl Visit {
         f64::from(self.q_values[self.best]) - lowest
     }
 
-    /// What is lost by a row, or by none: the whole stake where it is not open.
+    /// What is lost by choosing a row: the whole stake if it is not open, or if no row is chosen.
     pub fn loss(&self, row: Option<usize>) -> f64 {
         match row.filter(|&row| self.open[row]) {
             Some(row) => f64::from(self.q_values[self.best] - self.q_values[row]),
@@ -40,34 +40,34 @@ impl Visit {
     }
 }
 
-/// A tree whose leaves hold the visits that come to them.
+/// A tree whose leaves hold indices: of the visits that come to them, or of the rows that act there.
 pub(super) enum Tree {
     Leaf(Vec<usize>),
-    /// Where the condition holds, and where it does not.
+    /// A condition, the branch where it holds, and the branch where it does not.
     Split(Condition, Box<Tree>, Box<Tree>),
 }
 
-/// What bounds a tree.
+/// Limits on the size of a tree.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Bounds {
     pub leaves: usize,
     pub depth: usize,
-    /// Visits in a leaf, at least.
+    /// Fewest visits in a leaf.
     pub visits: usize,
 }
 
-/// A split that could be made.
+/// The best split of a leaf.
 struct Split {
     gain: f64,
     condition: Condition,
 }
 
-/// A leaf on its way.
+/// A node of the tree while it grows.
 struct Bud {
     visits: Vec<usize>,
     depth: usize,
     split: Option<Split>,
-    /// Buds that came of it.
+    /// The split that was made, and the indices of the two buds: condition holds, does not hold.
     children: Option<(Condition, usize, usize)>,
 }
 
@@ -110,7 +110,7 @@ pub(super) fn holds(condition: &Condition, observation: &Observation) -> bool {
 
 struct Grower<'a> {
     visits: &'a [Visit],
-    /// Of each visit.
+    /// Stake of each visit.
     stakes: Vec<f64>,
     variables: &'a [usize],
     bounds: Bounds,
@@ -162,7 +162,7 @@ impl Grower<'_> {
         best
     }
 
-    /// What it gains to part some of the visits from the others; nothing if too few are on a side.
+    /// The gain of separating a range of the visits from the others; `None` if a side has too few visits.
     fn gain_of(&self, sorted: &[(f32, usize)], inside: core::ops::Range<usize>) -> Option<f64> {
         let count = inside.len();
         if count < self.bounds.visits || sorted.len() - count < self.bounds.visits {
@@ -178,7 +178,7 @@ impl Grower<'_> {
         Some(whole.impurity() - within.impurity() - without.impurity())
     }
 
-    /// Every place between two different values, with what it gains to part the visits there.
+    /// Calls `found` for every pair of neighbouring values, with the gain of splitting between them.
     fn thresholds(&self, sorted: &[(f32, usize)], mut found: impl FnMut(f32, f32, f64)) {
         let (mut below, mut above) = (Weights::default(), Weights::default());
         sorted.iter().for_each(|(_, visit)| above.add(self.visits[*visit].best, self.stakes[*visit]));

@@ -55,40 +55,62 @@ fn experience(state: usize, row: usize, reward: f64, rows: usize) -> Experience 
     }
 }
 
+/// An episode with a step for each reward; its rows and states count up from 0.
+pub fn episode(rewards: &[f64]) -> Trajectory {
+    let rows = 4;
+    ended(rewards.iter().enumerate().map(|(at, &reward)| experience(at, at, reward, rows)).collect(), 9, rows)
+}
+
+/// An episode that ended of its own in a state.
+fn ended(steps: Vec<Experience>, last: usize, rows: usize) -> Trajectory {
+    Trajectory {
+        steps,
+        last: sight(last),
+        last_legal: all(rows),
+        terminal: true,
+        closeness: Closeness::default(),
+    }
+}
+
 #[test]
 fn targets_follow_the_worked_example() {
-    let transition = |discount, next_legal| Transition {
+    let transition = |discount, next_legal: [bool; 3]| Transition {
         inputs: vec![],
         row: 0,
         reward: 1.0,
         discount,
         next_inputs: vec![],
-        next_legal,
+        next_legal: next_legal.to_vec(),
     };
-    let (online, target) = (array![0.5, 2.0, 3.0], array![10.0, 20.0, 5.0]);
-    let all = transition(0.9, vec![true; 3]);
+    let (online, target) = (array![[0.5, 2.0, 3.0]], array![[10.0, 20.0, 5.0]]);
+    let all = transition(0.9, [true; 3]);
+    let target_of =
+        |one: &Transition, choosing: &Array2<f32>| targets(&[one], choosing.view(), target.view());
     // The online network likes row 2, which the target network values at 5.
-    assert_eq!(td_target(&all, online.view(), target.view()), 1.0 + 0.9 * 5.0);
+    assert_eq!(target_of(&all, &online), [1.0 + 0.9 * 5.0]);
     // DQN takes the target network's own best.
-    assert_eq!(td_target(&all, target.view(), target.view()), 1.0 + 0.9 * 20.0);
+    assert_eq!(target_of(&all, &target), [1.0 + 0.9 * 20.0]);
     // Where row 2 is not legal, the online network likes row 1.
-    let masked = transition(0.9, vec![true, true, false]);
-    assert_eq!(td_target(&masked, online.view(), target.view()), 1.0 + 0.9 * 20.0);
-    assert_eq!(td_target(&transition(0.0, vec![true; 3]), online.view(), target.view()), 1.0);
-    assert_eq!(td_target(&transition(0.9, vec![false; 3]), online.view(), target.view()), 1.0);
+    assert_eq!(target_of(&transition(0.9, [true, true, false]), &online), [1.0 + 0.9 * 20.0]);
+    assert_eq!(target_of(&transition(0.0, [true; 3]), &online), [1.0]);
+    assert_eq!(target_of(&transition(0.9, [false; 3]), &online), [1.0]);
+}
+
+#[test]
+fn the_loss_is_the_weighted_mean_and_its_slope_is_its_derivative() {
+    let (td_errors, weights) = ([0.5, -3.0], [1.0, 0.5]);
+    assert_eq!(loss(Loss::Squared, &td_errors, &weights), ((0.25 + 0.5 * 9.0) / 2.0, vec![0.5, -1.5]));
+    assert_eq!(loss(Loss::Huber, &td_errors, &weights), ((0.125 + 0.5 * 2.5) / 2.0, vec![0.25, -0.25]));
 }
 
 #[test]
 fn returns_take_n_steps_and_know_the_end() {
     let settings = Hyperparameters { n_step: 2, discount: 0.5, ..small() };
-    let episode = |terminal| Trajectory {
-        steps: (0..3).map(|at| experience(at, at, (at + 1) as f64, 4)).collect(),
-        last: sight(9),
-        last_legal: array![true, false, false, false],
-        terminal,
-        closeness: Closeness::default(),
+    let of = |settings: Hyperparameters, terminal| {
+        let last_legal = array![true, false, false, false];
+        let episode = Trajectory { terminal, last_legal, ..episode(&[1.0, 2.0, 3.0]) };
+        transitions(&episode, &[1.0, 2.0, 3.0], &learner(settings, 4, 0).policy)
     };
-    let of = |settings: Hyperparameters, terminal| learner(settings, 4, 0).transitions(&episode(terminal));
     let found = of(settings.clone(), true);
     let figures: Vec<_> = found.iter().map(|one| (one.reward, one.discount)).collect();
     // 1 + 0.5 · 2, then 2 + 0.5 · 3, then 3.
@@ -103,55 +125,12 @@ fn returns_take_n_steps_and_know_the_end() {
 }
 
 #[test]
-fn credit_goes_back_to_where_the_obstacle_appeared() {
-    let mut episode = Trajectory {
-        steps: (0..3).map(|at| experience(at, 0, -1.0, 2)).collect(),
-        last: sight(9),
-        last_legal: all(2),
-        terminal: true,
-        closeness: Closeness::default(),
-    };
-    episode.steps[2].hits = vec![0];
-    episode.steps[1].hits = vec![1];
-    assert_eq!(credited(&episode, 7.5), [7.5, -1.0, 2.5]);
-}
-
-#[test]
-fn exploration_falls_as_the_settings_say() {
-    let at = |exploration, steps| {
-        let settings =
-            Hyperparameters { exploration, exploration_end: 0.1, exploration_steps: 100, ..small() };
-        epsilon(&settings, steps)
-    };
-    let near = |found: f64, expected: f64| assert!((found - expected).abs() < 1e-9, "{found} {expected}");
-    near(at(Exploration::Linear, 50), 0.55);
-    near(at(Exploration::Linear, 500), 0.1);
-    near(at(Exploration::Exponential, 100), 0.1 + 0.9 * 0.367_879_441_171);
-    near(at(Exploration::ExponentialThenEnd, 100), 0.1 + 0.9 * 0.367_879_441_171);
-    near(at(Exploration::ExponentialThenEnd, 101), 0.1);
-}
-
-#[test]
 fn inverted_exploration_begins_greedy() {
     let settings = Hyperparameters { exploration_inverted: true, ..small() };
     let mut learner = learner(settings, 8, 3);
     let mut rng = stream(1, Stream::Exploration, 0);
     let chosen: Vec<_> = (0..20).map(|_| learner.choose(&sight(0), all(8).view(), &mut rng)).collect();
     assert!(chosen.iter().all(|row| *row == chosen[0]), "{chosen:?}");
-}
-
-#[test]
-fn the_gate_keeps_weather_from_changing_at_every_step() {
-    let settings = Hyperparameters { environment_gate_steps: 3, ..small() };
-    let rows = Rows { allowed: vec![true; 3], environment: vec![true, true, false] };
-    let mut learner = Learner::new(Arc::new(settings), Arc::new(rows), 0);
-    let mut open = |row: usize| {
-        learner.policy.chosen(row);
-        learner.policy.open(all(3).view())
-    };
-    assert_eq!(open(0), [false, false, true]);
-    assert_eq!(open(2), [false, false, true]);
-    assert_eq!(open(2), [false, true, true]);
 }
 
 /// A corridor of five states: row 1 goes right, row 0 left; the right end is worth 1, the left end,
@@ -181,13 +160,7 @@ fn every_kind_of_the_algorithm_solves_a_known_problem() {
                 terminal = next.is_none();
                 state = next.unwrap_or(state);
             }
-            let trajectory = Trajectory {
-                steps,
-                last: sight(state),
-                last_legal: all(2),
-                terminal,
-                closeness: Closeness::default(),
-            };
+            let trajectory = Trajectory { terminal, ..ended(steps, state, 2) };
             learner.learn(&trajectory, &mut stream(episode, Stream::Replay, 0));
         }
         // 0.6⁴ < 0.2 < 0.6³: by the discounted sum, only the leftmost state had better go left.
@@ -227,14 +200,7 @@ fn mean_estimate(double: bool, seed: u64) -> f64 {
         let rows: Vec<usize> = (0..2).map(|_| rng::below(&mut rng, ROWS as u32) as usize).collect();
         let noise = rng::normal(&mut rng);
         let steps = vec![experience(0, rows[0], 0.0, ROWS), experience(1, rows[1], noise, ROWS)];
-        let trajectory = Trajectory {
-            steps,
-            last: sight(2),
-            last_legal: all(ROWS),
-            terminal: true,
-            closeness: Closeness::default(),
-        };
-        learner.learn(&trajectory, &mut stream(seed, Stream::Replay, episode));
+        learner.learn(&ended(steps, 2, ROWS), &mut stream(seed, Stream::Replay, episode));
         if episode >= 200 {
             sum += f64::from(learner.policy.q_values(&sight(0)).mean().expect("there are rows"));
             count += 1.0;
@@ -249,40 +215,4 @@ fn double_q_learning_overestimates_less() {
     let (plain, double) = (mean(false), mean(true));
     assert!(plain > 0.2, "DQN should overestimate a value of 0: {plain}");
     assert!(double < 0.7 * plain, "DDQN {double}, DQN {plain}");
-}
-
-#[test]
-fn a_restored_learner_goes_on_alike() {
-    let settings = Hyperparameters { random_decay: 0.05, replay_capacity: 60, ..small() };
-    let rows = Arc::new(Rows { allowed: vec![true; 2], environment: vec![false; 2] });
-    let episode = |learner: &mut Learner, number| {
-        let mut rng = stream(number, Stream::Exploration, 0);
-        let steps = (0..12).map(|at| {
-            let row = learner.choose(&sight(at % 5), all(2).view(), &mut rng).expect("rows are open");
-            experience(at % 5, row, at as f64 * 0.1, 2)
-        });
-        let steps = steps.collect();
-        let trajectory = Trajectory {
-            steps,
-            last: sight(0),
-            last_legal: all(2),
-            terminal: number % 2 == 0,
-            closeness: Closeness::default(),
-        };
-        learner.learn(&trajectory, &mut stream(number, Stream::Replay, 0))
-    };
-    let settings = Arc::new(settings);
-    let mut whole = Learner::new(settings.clone(), rows.clone(), 5);
-    for number in 0..8 {
-        episode(&mut whole, number);
-    }
-    let bytes = whole.save();
-    let mut restored = Learner::restore(settings.clone(), rows.clone(), &bytes).expect("it was saved");
-    assert_eq!(restored.save(), bytes);
-    for number in 8..14 {
-        assert_eq!(episode(&mut whole, number), episode(&mut restored, number));
-    }
-    assert_eq!(whole.save(), restored.save());
-    assert!(Learner::restore(settings.clone(), rows.clone(), &bytes[..bytes.len() - 1]).is_none());
-    assert!(Learner::restore(settings, rows, b"avackpt0").is_none());
 }

@@ -1,17 +1,17 @@
 //! Adam (Kingma and Ba, 2015, Algorithm 1), with the operations in PyTorch's order.
 
-/// The optimiser and its running moments, one of each for each parameter.
+/// The optimiser and its running moments, a mean and a square for each parameter.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Adam {
     pub(in crate::agent) mean: Vec<f32>,
     pub(in crate::agent) square: Vec<f32>,
-    /// The decay rates to the power of the steps done, in `f64` lest they drift.
+    /// Each decay rate to the power of the number of steps, in `f64` so that it does not drift.
     pub(in crate::agent) mean_power: f64,
     pub(in crate::agent) square_power: f64,
 }
 
-/// Decay rates of the moments, and what keeps the quotient finite: the algorithm's own defaults, which
-/// every source of ours uses.
+/// Decay rates of the two moments, and the term that keeps the quotient finite: the algorithm's defaults,
+/// which all our sources use.
 const MEAN_DECAY: f64 = 0.9;
 const SQUARE_DECAY: f64 = 0.999;
 const FLOOR: f32 = 1e-8;

@@ -13,7 +13,7 @@ use crate::rng::Rng;
 
 use super::product::product;
 
-/// What a network is but its numbers.
+/// A network without its parameters.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Shape {
     /// Widths: inputs, hidden layers, actions.
@@ -36,7 +36,7 @@ impl Shape {
     }
 }
 
-/// How weights begin.
+/// How the first weights are drawn.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Initialization {
@@ -54,6 +54,16 @@ pub struct Network {
     parameters: Vec<f32>,
 }
 
+/// One pass of a batch through a network, with what the way back needs.
+pub struct Pass<'a> {
+    /// Shape `(batch, inputs)`.
+    inputs: ArrayView2<'a, f32>,
+    /// Outputs of each hidden layer, each of shape `(batch, width)`.
+    hidden: Vec<Array2<f32>>,
+    /// Shape `(batch, actions)`.
+    pub q_values: Array2<f32>,
+}
+
 impl Network {
     /// A network that knows nothing yet.
     pub fn new(shape: Shape, initialization: Initialization, rng: &mut Rng) -> Network {
@@ -69,10 +79,10 @@ impl Network {
         Network { shape, parameters }
     }
 
-    /// A network of given parameters; `None` if they are not as many as the shape has.
-    pub fn from_parameters(shape: Shape, parameters: Vec<f32>) -> Option<Network> {
-        let fits = shape.layers.len() >= 2 && shape.parameters() == parameters.len();
-        fits.then_some(Network { shape, parameters })
+    /// A network of given parameters, as many as the shape has.
+    pub fn from_parameters(shape: Shape, parameters: Vec<f32>) -> Network {
+        assert_eq!(shape.parameters(), parameters.len(), "the parameters are those of the shape");
+        Network { shape, parameters }
     }
 
     pub fn shape(&self) -> &Shape {
@@ -96,8 +106,14 @@ impl Network {
 
     /// Q-values, shape `(batch, actions)`, of inputs `(batch, inputs)`.
     pub fn q_values(&self, inputs: ArrayView2<f32>) -> Array2<f32> {
-        let mut outputs = self.outputs(inputs);
-        self.joined(outputs.pop().expect("a network has a layer"))
+        self.forward(inputs).q_values
+    }
+
+    /// Passes inputs `(batch, inputs)` through the network.
+    pub fn forward<'a>(&self, inputs: ArrayView2<'a, f32>) -> Pass<'a> {
+        let mut hidden = self.outputs(inputs);
+        let q_values = self.joined(hidden.pop().expect("a network has a layer"));
+        Pass { inputs, hidden, q_values }
     }
 
     /// Outputs of each layer, hidden ones after ReLU, the last as it is.
@@ -135,19 +151,11 @@ impl Network {
         q_values
     }
 
-    /// Q-values of a batch, and the gradient that `slopes` makes of them.
-    ///
-    /// `slopes` gives the derivative of the loss by each Q-value, shape `(batch, actions)`; the
-    /// gradient has one number for each parameter.
-    pub fn gradient(
-        &self,
-        inputs: ArrayView2<f32>,
-        slopes: impl FnOnce(&Array2<f32>) -> Array2<f32>,
-    ) -> Vec<f32> {
-        let outputs = self.outputs(inputs);
-        let last = outputs.last().expect("a network has a layer");
-        let mut slope = self.parted(slopes(&self.joined(last.clone())));
-        debug_assert_eq!(slope.dim(), last.dim());
+    /// The gradient of a loss, one number for each parameter, from a pass through this network and the
+    /// derivative of the loss by each of its Q-values, shape `(batch, actions)`.
+    pub fn gradient(&self, pass: &Pass, slopes: Array2<f32>) -> Vec<f32> {
+        debug_assert_eq!(slopes.dim(), pass.q_values.dim());
+        let mut slope = self.parted(slopes);
         let mut gradient = vec![0.0; self.parameters.len()];
         let mut end = gradient.len();
         for (at, (weights, _)) in self.layers().iter().enumerate().rev() {
@@ -155,7 +163,7 @@ impl Network {
             let begin = end - (rows + 1) * columns;
             let (by_weights, by_biases) = gradient[begin..end].split_at_mut(rows * columns);
             end = begin;
-            let from = if at == 0 { inputs } else { outputs[at - 1].view() };
+            let from = if at == 0 { pass.inputs } else { pass.hidden[at - 1].view() };
             let by_weights = ndarray::ArrayViewMut2::from_shape((rows, columns), by_weights);
             product(from.t(), slope.view(), by_weights.expect("the slice has the layer's length"));
             for row in slope.rows() {
@@ -164,8 +172,8 @@ impl Network {
             if at > 0 {
                 let mut before = Array2::zeros((slope.nrows(), rows));
                 product(slope.view(), weights.t(), before.view_mut());
-                // ReLU lets through what it let through before.
-                let passed = before.iter_mut().zip(&outputs[at - 1]);
+                // The derivative of ReLU is 1 where its output was positive, and 0 elsewhere.
+                let passed = before.iter_mut().zip(&pass.hidden[at - 1]);
                 passed.for_each(|(slope, &output)| *slope = if output <= 0.0 { 0.0 } else { *slope });
                 slope = before;
             }
@@ -230,10 +238,10 @@ mod tests {
                 let squares = network.q_values(inputs.view()).into_iter().enumerate();
                 squares.map(|(at, q)| f64::from(q - place(at)) * f64::from(q - place(at)) / 2.0).sum()
             };
-            let gradient = network.gradient(inputs.view(), |q| {
-                let mut at = 0..;
-                q.mapv(|q| q - place(at.next().expect("it never ends")))
-            });
+            let pass = network.forward(inputs.view());
+            let mut slopes = pass.q_values.clone();
+            slopes.iter_mut().enumerate().for_each(|(at, q)| *q -= place(at));
+            let gradient = network.gradient(&pass, slopes);
             let mut kinks = 0;
             for (at, &slope) in gradient.iter().enumerate() {
                 let here = network.parameters[at];

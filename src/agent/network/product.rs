@@ -25,7 +25,7 @@ pub fn product(left: ArrayView2<f32>, right: ArrayView2<f32>, out: ArrayViewMut2
     by_tiles(left, right, out);
 }
 
-/// For a row or a few, as an agent that acts needs them: nothing is worth packing.
+/// For fewer rows than a tile has, as when an agent acts: packing would not pay.
 fn by_rows(left: ArrayView2<f32>, right: ArrayView2<f32>, mut out: ArrayViewMut2<f32>) {
     for (factors, mut sums) in left.rows().into_iter().zip(out.rows_mut()) {
         sums.fill(0.0);
@@ -43,7 +43,7 @@ fn by_tiles_avx2(left: ArrayView2<f32>, right: ArrayView2<f32>, out: ArrayViewMu
     by_tiles(left, right, out);
 }
 
-/// Inlined into each of its callers, so that each compiles it for its own instructions.
+/// Inlined into each caller, so that the compiler uses the instructions which that caller may use.
 #[inline(always)]
 fn by_tiles(left: ArrayView2<f32>, right: ArrayView2<f32>, mut out: ArrayViewMut2<f32>) {
     let (rows, inner, columns) = (left.nrows(), left.ncols(), right.ncols());

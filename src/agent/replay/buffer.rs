@@ -91,10 +91,6 @@ impl Replay {
         self.transitions.len()
     }
 
-    pub fn is_empty(&self) -> bool {
-        self.transitions.is_empty()
-    }
-
     pub fn get(&self, index: usize) -> &Transition {
         &self.transitions[index]
     }

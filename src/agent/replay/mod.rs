@@ -3,4 +3,4 @@
 mod buffer;
 mod sum_tree;
 
-pub use buffer::{Priorities, Replay, Sample, Transition};
+pub use buffer::{Priorities, Replay, Transition};

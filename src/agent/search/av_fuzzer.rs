@@ -5,12 +5,13 @@
 //! slices, on one start. Here it is a script: a row with its draws for each step. The part of one
 //! vehicle, which crossover swaps whole, is one step, because everything that a vehicle does lies in the
 //! row that makes it appear; a new speed is a new draw. A row that is not legal when its turn comes is
-//! replaced for good by any that is. Each restart takes a new start as well: the published search knows
-//! one start, and would say nothing about others.
+//! replaced for good by a random legal one. Each restart of the search also takes a new start: the
+//! published search knows one start, and would say nothing about others.
 
 use ndarray::ArrayView1;
 
-use crate::agent::hyperparameters::SettingsError;
+use crate::agent::hyperparameters::{SettingsError, require, within};
+use crate::agent::random::any;
 use crate::agent::registry::Agent;
 use crate::agent::trainable::{Beginning, Trainable};
 use crate::agent::trajectory::{Lesson, Trajectory};
@@ -18,7 +19,7 @@ use crate::mdp::Observation;
 use crate::rng;
 use crate::rng::{Rng, Stream};
 
-use super::played::{Gene, any_legal, seed, start_of};
+use super::played::{Gene, seed, start_of};
 use super::population::{Individual, Population};
 use super::scripts::{Found, Scripts, keep};
 
@@ -32,7 +33,8 @@ pub struct AvFuzzerSettings {
     pub crossover_probability: f64,
     /// Probability that an individual is changed in a generation, in `[0, 1]`.
     pub mutation_probability: f64,
-    /// Generations over whose best the search must have got better, or it restarts; at least 1.
+    /// The search restarts if a generation's best is not above the mean best of this many generations; at
+    /// least 1.
     pub restart_generations: usize,
     /// Random scripts from which a restart takes those that are least like all before; from `population`
     /// to 100000.
@@ -41,7 +43,7 @@ pub struct AvFuzzerSettings {
     pub local_after_generations: usize,
     /// Generations of the local search around the best individual; 0: none.
     pub local_generations: usize,
-    /// How many times as likely a change is there, from 0 to 100.
+    /// How many times as likely a change is in the local search, from 0 to 100.
     pub local_mutation_factor: f64,
     /// Steps of a script, from 1 to 1000; it begins anew after its end. Ours: the space's limit.
     pub script_steps: usize,
@@ -70,49 +72,22 @@ impl AvFuzzerSettings {
     /// # Errors
     /// If a value is out of range.
     pub fn check(&self) -> Result<(), SettingsError> {
-        let unit = 0.0..=1.0;
-        let within = |value: usize, least: usize, most: usize| (least..=most).contains(&value);
-        let rules = [
-            ("population", within(self.population, 2, 1000), self.population as f64, "from 2 to 1000"),
-            (
-                "crossover_probability",
-                unit.contains(&self.crossover_probability),
-                self.crossover_probability,
-                "from 0 to 1",
-            ),
-            (
-                "mutation_probability",
-                unit.contains(&self.mutation_probability),
-                self.mutation_probability,
-                "from 0 to 1",
-            ),
-            (
-                "local_mutation_factor",
-                (0.0..=100.0).contains(&self.local_mutation_factor),
-                self.local_mutation_factor,
-                "from 0 to 100",
-            ),
-            (
-                "restart_generations",
-                within(self.restart_generations, 1, 100_000),
-                self.restart_generations as f64,
-                "from 1 to 100000",
-            ),
-            (
+        let unit = |name, value: f64| within(name, value, 0.0..=1.0, "from 0 to 1");
+        require([
+            within("population", self.population, 2..=1000, "from 2 to 1000"),
+            unit("crossover_probability", self.crossover_probability),
+            unit("mutation_probability", self.mutation_probability),
+            within("local_mutation_factor", self.local_mutation_factor, 0.0..=100.0, "from 0 to 100"),
+            within("restart_generations", self.restart_generations, 1..=100_000, "from 1 to 100000"),
+            within(
                 "restart_candidates",
-                within(self.restart_candidates, self.population, 100_000),
-                self.restart_candidates as f64,
+                self.restart_candidates,
+                self.population..=100_000,
                 "from `population` to 100000",
             ),
-            ("script_steps", within(self.script_steps, 1, 1000), self.script_steps as f64, "from 1 to 1000"),
-            ("kept_scripts", within(self.kept_scripts, 1, 1000), self.kept_scripts as f64, "from 1 to 1000"),
-        ];
-        match rules.into_iter().find(|(_, is_right, _, _)| !is_right) {
-            Some((name, _, value, wanted)) => {
-                Err(SettingsError::Range { name, value: value.to_string(), wanted })
-            }
-            None => Ok(()),
-        }
+            within("script_steps", self.script_steps, 1..=1000, "from 1 to 1000"),
+            within("kept_scripts", self.kept_scripts, 1..=1000, "from 1 to 1000"),
+        ])
     }
 }
 
@@ -121,13 +96,13 @@ pub struct AvFuzzer {
     settings: AvFuzzerSettings,
     rows: usize,
     memory: Memory,
-    /// Of the episode under way.
+    // The episode under way.
     road: usize,
     step: usize,
     started_at: Option<[f32; 2]>,
 }
 
-/// What outlasts an episode.
+/// What the search keeps from episode to episode.
 #[derive(Debug, Clone, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 struct Memory {
     steps: u64,
@@ -171,12 +146,12 @@ impl Hunt {
     }
 
     fn played(&mut self) -> &mut Individual {
-        let index = *self.queue.last().expect("there is always somebody to play");
+        let index = *self.queue.last().expect("there is always an individual to play");
         let population = self.local.as_mut().map_or(&mut self.population, |(population, _)| population);
         &mut population.individuals[index]
     }
 
-    /// Goes on to the next generation in which somebody is to be played.
+    /// Goes on to the next generation that has an individual to play.
     fn advance(&mut self, settings: &AvFuzzerSettings, rows: usize, rng: &mut Rng) {
         while self.queue.is_empty() {
             self.queue = match self.local.take() {
@@ -188,7 +163,7 @@ impl Hunt {
         }
     }
 
-    /// A generation of the search proper has been played.
+    /// A generation of the main search has been played: what is to be played next.
     fn generation(&mut self, settings: &AvFuzzerSettings, rows: usize, rng: &mut Rng) -> Vec<usize> {
         let best = self.population.best().clone();
         self.former.extend(self.population.individuals.iter().map(Individual::rows));
@@ -220,7 +195,7 @@ impl Hunt {
         touched.into_iter().collect()
     }
 
-    /// A generation of the local search has been played.
+    /// A generation of the local search has been played: what is to be played next.
     fn search_around(
         &mut self,
         mut population: Population,
@@ -245,7 +220,7 @@ impl Hunt {
         touched.into_iter().collect()
     }
 
-    /// Begins anew with what is least like everything before.
+    /// Begins anew with the random scripts that are least like all former ones.
     fn restart(&mut self, settings: &AvFuzzerSettings, rows: usize, rng: &mut Rng) -> Vec<usize> {
         let candidates = Population::random(settings.restart_candidates, settings.script_steps, rows, rng);
         self.population = candidates.least_like(&self.former, settings.population);
@@ -308,10 +283,10 @@ impl Agent for AvFuzzer {
         self.memory.steps += 1;
         self.started_at.get_or_insert(start_of(observation));
         let step = self.step as u64;
-        let Some(gene) = self.gene() else { return any_legal(legal, rng) };
+        let Some(gene) = self.gene() else { return any(legal, rng) };
         if !legal[gene.row as usize] {
             let mut rng = rng::stream(gene.draw_seed, Stream::Search, step);
-            gene.row = any_legal(legal, &mut rng)? as u32;
+            gene.row = any(legal, &mut rng)? as u32;
         }
         Some(gene.row as usize)
     }

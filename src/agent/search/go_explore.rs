@@ -11,7 +11,8 @@ use std::collections::BTreeSet;
 
 use ndarray::ArrayView1;
 
-use crate::agent::hyperparameters::SettingsError;
+use crate::agent::hyperparameters::{Requirement, SettingsError, require, within};
+use crate::agent::random::any;
 use crate::agent::registry::Agent;
 use crate::agent::trainable::{Beginning, Trainable};
 use crate::agent::trajectory::{Lesson, Trajectory};
@@ -19,7 +20,7 @@ use crate::mdp::Observation;
 use crate::rng;
 use crate::rng::{Rng, Stream};
 
-use super::played::{Gene, Genes, any_legal, note};
+use super::played::{Gene, Genes};
 use super::situation::{cell, situation};
 use super::worth::{Doubt, Worth, worths};
 
@@ -41,7 +42,7 @@ pub struct GoExploreSettings {
     pub prior_choices: f64,
     /// Cells that are kept for each road, at most 100000.
     pub cells_max: usize,
-    /// Random choices of what acts in the end, in `[0, 1]`.
+    /// Share of random choices when the record acts in the end, in `[0, 1]`.
     pub evaluation_epsilon: f64,
 }
 
@@ -63,31 +64,19 @@ impl GoExploreSettings {
     /// # Errors
     /// If a value is out of range.
     pub fn check(&self) -> Result<(), SettingsError> {
-        let unit = 0.0..=1.0;
-        let shares = [
-            ("fresh_share", self.fresh_share),
-            ("record_share", self.record_share),
-            ("credit_discount", self.credit_discount),
-            ("evaluation_epsilon", self.evaluation_epsilon),
-        ];
-        let share =
-            shares.into_iter().map(|(name, value)| (name, unit.contains(&value), value, "from 0 to 1"));
-        let others = [
-            ("doubt", (0.0..=100.0).contains(&self.doubt), self.doubt, "from 0 to 100"),
-            (
-                "prior_choices",
-                self.prior_choices > 0.0 && self.prior_choices <= 1e6,
-                self.prior_choices,
-                "above 0, and at most 1e6",
-            ),
-            ("cells_max", self.cells_max <= 100_000, self.cells_max as f64, "up to 100000"),
-        ];
-        match share.chain(others).find(|(_, is_right, _, _)| !is_right) {
-            Some((name, _, value, wanted)) => {
-                Err(SettingsError::Range { name, value: value.to_string(), wanted })
-            }
-            None => Ok(()),
-        }
+        let unit = |name, value: f64| within(name, value, 0.0..=1.0, "from 0 to 1");
+        require([
+            unit("fresh_share", self.fresh_share),
+            unit("record_share", self.record_share),
+            unit("credit_discount", self.credit_discount),
+            unit("evaluation_epsilon", self.evaluation_epsilon),
+            within("doubt", self.doubt, 0.0..=100.0, "from 0 to 100"),
+            Requirement {
+                is_met: self.prior_choices > 0.0 && self.prior_choices <= 1e6,
+                ..within("prior_choices", self.prior_choices, 0.0..=1e6, "above 0, and at most 1e6")
+            },
+            within("cells_max", self.cells_max, 0..=100_000, "up to 100000"),
+        ])
     }
 }
 
@@ -95,12 +84,12 @@ impl GoExploreSettings {
 pub struct GoExplore {
     settings: GoExploreSettings,
     memory: Memory,
-    // Of the episode under way.
+    // The episode under way.
     road: usize,
     /// A seed that no episode had before.
     fresh: u64,
     beginning: Beginning,
-    /// Choices from the start of the episode on, those that are made again included.
+    /// Choices since the start of the episode, including those that are repeated.
     genes: Genes,
     step: usize,
     /// The new choices.
@@ -108,7 +97,7 @@ pub struct GoExplore {
     keepsakes: Vec<(usize, usize)>,
 }
 
-/// A new choice: its step, where it was made, and what.
+/// A new choice: its step, the kinds of moment it was made in, and the row.
 struct Made {
     step: usize,
     cell: u32,
@@ -116,7 +105,7 @@ struct Made {
     row: u32,
 }
 
-/// What outlasts an episode.
+/// What the search keeps from episode to episode.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 struct Memory {
     steps: u64,
@@ -170,12 +159,12 @@ impl GoExplore {
         fits.then(|| GoExplore { memory, ..GoExplore::new(settings, rows) })
     }
 
-    /// The step up to which choices are made again.
+    /// The number of first steps whose choices are repeated.
     fn depth(&self) -> usize {
         self.beginning.from.map_or(0, |(_, step)| step)
     }
 
-    /// A cell of the road, by its promise.
+    /// A random cell of the road, drawn in proportion to its promise.
     fn promising(&self, rng: &mut Rng) -> Option<usize> {
         let here = || self.memory.cells.iter().enumerate().filter(|(_, cell)| cell.road == self.road);
         let total: f64 = here().map(|(_, cell)| cell.promise()).sum();
@@ -189,8 +178,8 @@ impl GoExplore {
         here().next_back().map(|(index, _)| index)
     }
 
-    /// Keeps the moments of the episode that are of a new kind. After a collision there is none: who
-    /// returned there would count it again.
+    /// Keeps the moments of the episode that are of a new kind, up to the first collision: an episode that
+    /// went on from a later moment would count that collision again.
     fn remember(&mut self, episode: &Trajectory) {
         let here = self.memory.cells.iter().filter(|cell| cell.road == self.road);
         let mut known: BTreeSet<u32> = here.map(|cell| cell.cell).collect();
@@ -230,7 +219,7 @@ impl Agent for GoExplore {
         if self.step < self.depth() {
             return self.genes[self.step].map(|gene| gene.row as usize);
         }
-        // Of its own, so that it makes no difference whether the steps before were played again.
+        // Each step has its own stream, so that it does not matter whether earlier steps were played again.
         let mut rng = rng::stream(self.fresh, Stream::Search, 1 + self.step as u64);
         let here = situation(observation);
         let by_record = rng::unit(&mut rng) < self.settings.record_share;
@@ -243,10 +232,13 @@ impl Agent for GoExplore {
                 &mut rng,
             )
         } else {
-            any_legal(legal, &mut rng)
+            any(legal, &mut rng)
         }?;
         self.memory.steps += 1;
-        note(&mut self.genes, self.step, Gene { row: row as u32, draw_seed: self.fresh });
+        if self.genes.len() <= self.step {
+            self.genes.resize(self.step + 1, None);
+        }
+        self.genes[self.step] = Some(Gene { row: row as u32, draw_seed: self.fresh });
         self.made.push(Made { step: self.step, cell: cell(observation), situation: here, row: row as u32 });
         Some(row)
     }
@@ -316,7 +308,7 @@ struct Recorded {
 impl Agent for Recorded {
     fn choose(&mut self, observation: &Observation, legal: ArrayView1<bool>, rng: &mut Rng) -> Option<usize> {
         if rng::unit(rng) < self.settings.evaluation_epsilon {
-            return any_legal(legal, rng);
+            return any(legal, rng);
         }
         let GoExploreSettings { prior_choices, doubt, .. } = self.settings;
         self.worth.best(situation(observation), legal, prior_choices, Doubt::Avoid(doubt), rng)

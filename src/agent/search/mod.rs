@@ -1,7 +1,7 @@
 //! Searches: agents that look for crashes in the deterministic world instead of learning values.
 //!
-//! They see what every agent sees. What they have over a learner is that they may ask for a start that
-//! they know, draw as they drew before, and so come back to where they have been.
+//! They see what every agent sees. Unlike a learner, they ask for a start that they know and repeat their
+//! draws, and so come back to a moment where they have been.
 
 mod av_fuzzer;
 mod go_explore;

@@ -1,8 +1,5 @@
 //! What a search did in an episode, so that it can be done again.
 
-use ndarray::ArrayView1;
-
-use crate::agent::q_policy::any;
 use crate::mdp::{Observation, variable};
 use crate::rng;
 use crate::rng::Rng;
@@ -31,20 +28,7 @@ pub fn seed(rng: &mut Rng) -> u64 {
 /// The choices of an episode by step; `None` where nothing could be chosen, or has not been yet.
 pub type Genes = Vec<Option<Gene>>;
 
-/// Notes a choice.
-pub fn note(genes: &mut Genes, step: usize, gene: Gene) {
-    if genes.len() <= step {
-        genes.resize(step + 1, None);
-    }
-    genes[step] = Some(gene);
-}
-
-/// Where an episode began, m: enough to tell roads apart.
+/// Position of the ego vehicle at the start of an episode, m: enough to tell roads apart.
 pub fn start_of(observation: &Observation) -> [f32; 2] {
     ["egoX", "egoY"].map(|name| observation.get(variable(name).expect("it is a variable")))
-}
-
-/// Any of the legal rows, each as likely.
-pub fn any_legal(legal: ArrayView1<bool>, rng: &mut Rng) -> Option<usize> {
-    any(&legal.to_vec(), rng)
 }

@@ -1,4 +1,4 @@
-//! Scripts that are bred: AV-Fuzzer's operators.
+//! Populations of scripts, and AV-Fuzzer's operators on them.
 
 use std::collections::BTreeSet;
 
@@ -54,7 +54,7 @@ impl Population {
         Population { individuals: (0..size).map(|_| copy()).collect() }
     }
 
-    /// The indices of all.
+    /// The indices of all individuals, the last first.
     pub fn all(&self) -> Vec<usize> {
         (0..self.individuals.len()).rev().collect()
     }
@@ -77,7 +77,7 @@ impl Population {
 
     /// Roulette: as many as there are, each drawn with a probability in proportion to its fitness.
     pub fn select(&mut self, rng: &mut Rng) {
-        // Published code: nobody is without any chance.
+        // Published code: every individual has some chance.
         let weights: Vec<f64> = self.individuals.iter().map(|one| one.fitness.max(0.001)).collect();
         let total: f64 = weights.iter().sum();
         let mut draw = || {
@@ -93,8 +93,8 @@ impl Population {
         self.individuals = (0..weights.len()).map(|_| draw()).collect();
     }
 
-    /// Tries half as often as there are individuals to swap what two of them do at a step; the indices
-    /// of those that are changed.
+    /// Crossover: in half as many tries as there are individuals, with a probability, swaps the gene of one
+    /// step between two of them. Gives the indices of the changed ones.
     pub fn cross(&mut self, probability: f64, rng: &mut Rng) -> BTreeSet<usize> {
         let mut touched = BTreeSet::new();
         let size = self.individuals.len() as u32;
@@ -114,8 +114,8 @@ impl Population {
         touched
     }
 
-    /// Changes individuals with a probability, of which a third comes to nothing (published code); the
-    /// indices of those that are changed.
+    /// Mutation: changes each individual with two thirds of a probability (published code). Gives the indices
+    /// of the changed ones.
     pub fn mutate(&mut self, probability: f64, rows: usize, rng: &mut Rng) -> BTreeSet<usize> {
         let mut touched = BTreeSet::new();
         for (index, individual) in self.individuals.iter_mut().enumerate() {
@@ -127,7 +127,7 @@ impl Population {
         touched
     }
 
-    /// Those whose rows differ most, on average, from former scripts.
+    /// The individuals whose rows differ most from former scripts, on average.
     pub fn least_like(self, former: &[Vec<u32>], size: usize) -> Population {
         let alike = |individual: &Individual| -> usize {
             let same = |rows: &Vec<u32>| {
@@ -142,7 +142,7 @@ impl Population {
         Population { individuals: ranked.into_iter().map(|(_, individual)| individual).collect() }
     }
 
-    /// Whether it is one of so many scripts of such a length over so many rows.
+    /// Whether it has `size` scripts of `steps` steps, with rows below `rows`.
     pub fn is_sound(&self, size: usize, steps: usize, rows: usize) -> bool {
         let fits = |one: &Individual| {
             one.genes.len() == steps && one.genes.iter().all(|gene| (gene.row as usize) < rows)

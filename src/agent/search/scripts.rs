@@ -1,15 +1,16 @@
 //! Acting by scripts that a search has found: the same rows in the same steps, on any start.
 //!
-//! Values are drawn anew: old draws were good for the moment in which they were made.
+//! Values are drawn anew: the old draws fitted only the moment in which they were made.
 
 use ndarray::ArrayView1;
 
+use crate::agent::random::any;
 use crate::agent::registry::Agent;
 use crate::mdp::Observation;
 use crate::rng;
 use crate::rng::Rng;
 
-use super::played::{any_legal, start_of};
+use super::played::start_of;
 
 /// A script and what came of it when it was played.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -38,8 +39,8 @@ pub fn keep(best: &mut Vec<Found>, found: Found, most: usize) {
     });
 }
 
-/// Plays one of the scripts, chosen at random among those that begin nearest; any legal row where the
-/// script's is not.
+/// Plays one of the scripts, chosen at random among those that begin nearest; where the script's row is not
+/// legal, a random legal one.
 #[derive(Debug, Clone)]
 pub struct Scripts {
     scripts: Vec<Found>,
@@ -79,7 +80,7 @@ impl Agent for Scripts {
         self.chosen = self.chosen.or_else(|| self.choose_script(observation, rng));
         let script = self.chosen.map(|chosen| &self.scripts[chosen].rows);
         let row = script.map(|rows| rows[self.step % rows.len()] as usize);
-        row.filter(|&row| legal[row]).or_else(|| any_legal(legal, rng))
+        row.filter(|&row| legal[row]).or_else(|| any(legal, rng))
     }
 }
 

@@ -1,9 +1,9 @@
-//! Coarse views of a moment: what a search takes to be alike. All bounds are ours.
+//! Coarse views of a moment: to a search, moments with the same number are alike. All bounds are ours.
 
 use crate::mdp::{Observation, variable};
 
-/// A kind of moment, to tell those worth returning to apart: where on the route, how fast, who is near,
-/// what weather.
+/// A kind of moment, to decide which moments are worth keeping: where on the route, how fast, how many
+/// obstacles, where the nearest is, what weather.
 pub fn cell(observation: &Observation) -> u32 {
     let value = |name| value(observation, name);
     let place = (value("routeLeft") / 20.0).clamp(0.0, 99.0) as u32;
@@ -12,8 +12,8 @@ pub fn cell(observation: &Observation) -> u32 {
     (((place * 10 + speed) * 5 + others) * 4 + nearest(observation)) * 3 + weather(observation)
 }
 
-/// A kind of situation, to tell what was done in it: how fast, how far from a junction, who is near,
-/// what weather.
+/// A kind of situation, to record what its choices led to: how fast, how far from a junction, where the
+/// nearest obstacle is, what weather.
 pub fn situation(observation: &Observation) -> u32 {
     let value = |name| value(observation, name);
     let speed = below(value("speed"), &[1.0, 5.0, 9.0]);
@@ -21,7 +21,7 @@ pub fn situation(observation: &Observation) -> u32 {
     ((speed * 3 + junction) * 4 + nearest(observation)) * 3 + weather(observation)
 }
 
-/// Kinds of [`situation`].
+/// Number of kinds of [`situation`].
 pub const SITUATIONS: usize = 4 * 3 * 4 * 3;
 
 /// The number of bounds that a value is not below.
@@ -29,7 +29,7 @@ fn below(value: f64, bounds: &[f64]) -> u32 {
     bounds.iter().filter(|&&bound| value >= bound).count() as u32
 }
 
-/// Nobody near, somebody in front, beside, or behind.
+/// Where the nearest obstacle is: 0 beyond 30 m, 1 in front, 2 beside, 3 behind.
 fn nearest(observation: &Observation) -> u32 {
     let value = |name| value(observation, name);
     let (ahead_m, left_m) = (value("nearestAhead"), value("nearestLeft"));
@@ -44,7 +44,7 @@ fn nearest(observation: &Observation) -> u32 {
     }
 }
 
-/// Dry, wet, fog.
+/// 0 dry, 1 wet, 2 fog.
 fn weather(observation: &Observation) -> u32 {
     let is_some = |name| value(observation, name) as f32 > 0.3;
     if is_some("fog") { 2 } else { u32::from(is_some("wetness") || is_some("rain")) }

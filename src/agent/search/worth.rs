@@ -30,13 +30,13 @@ impl Tally {
     }
 }
 
-/// How a row is treated whose record is short. The number is the standard deviation that the worth of one
-/// choice is taken to have.
+/// How to treat a row whose record is short. The number is the assumed standard deviation of the worth of
+/// one choice.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Doubt {
-    /// It is worth trying: its mean is taken with noise.
+    /// The row is worth trying: noise is added to its mean.
     Try(f64),
-    /// It may have been luck: its mean is taken for less. Otherwise the best of many rows is a lucky one.
+    /// The record may be luck: its mean is lowered. Otherwise the best of many rows is a lucky one.
     Avoid(f64),
 }
 
@@ -57,7 +57,7 @@ impl Worth {
         Worth { rows, all: none, of_row: vec![none; rows], own: vec![none; rows * SITUATIONS] }
     }
 
-    /// Whether it is a record of so many rows.
+    /// Whether it is a record of this many rows.
     pub fn is_of(&self, rows: usize) -> bool {
         self.rows == rows && self.of_row.len() == rows && self.own.len() == rows * SITUATIONS
     }
