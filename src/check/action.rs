@@ -1,4 +1,4 @@
-//! Actions and groups: parameters with their values, effects with their words.
+//! Actions and groups: parameters with their domains, effects with the engine's words.
 
 use crate::check::checker::{Checker, docs, each, literal};
 use crate::check::declaration::unknown_word;
@@ -15,13 +15,14 @@ use crate::syntax::ast::{ItemKind, ParamMode, Span};
 use crate::syntax::{Diagnostic, ast, listed, nearest};
 use crate::units::{Dimension, Rational};
 
-/// A table may have so many rows.
+/// Largest number of rows in a table.
 pub(crate) const ROWS_MAX: u64 = 100_000;
 
-/// Rows times the rules that bind them times roads: what takes a moment to prove.
+/// Limit on the number of proofs, which is rows times the rules that bind them times roads. More would take
+/// long.
 const PROOFS_MAX: u64 = 500_000;
 
-/// An `Int` range may be spelt out into so many values.
+/// Largest number of values in an `Int` range.
 const VALUES_MAX: i64 = 100_000;
 
 impl Checker {
@@ -41,12 +42,12 @@ impl Checker {
         self.once("parameter", declared.params.iter().map(|parameter| &parameter.name));
         for parameter in &declared.params {
             let Some(ty) = self.plain_type(&parameter.ty) else {
-                // Keep its name, so that uses of it are not reported as unknown.
+                // Its name is kept, so that uses of it are not reported as unknown.
                 locals.push((parameter.name.text.clone(), Type::Bool));
                 sound = false;
                 continue;
             };
-            // What is wrong with its values is reported; its type is enough for looking further.
+            // A mistake in its values is reported already; the type is enough to check the rest of the action.
             parameters.push(self.parameter(parameter, ty, &locals).unwrap_or_else(|| Parameter {
                 name: parameter.name.text.as_str().into(),
                 ty,
@@ -69,7 +70,7 @@ impl Checker {
         let effects: Vec<Option<EffectDef>> =
             declared.effects.iter().map(|effect| self.effect(effect, &place)).collect();
         if effects.iter().any(Option::is_none) {
-            // What is sound of it is kept, so that rules on it are looked at all the same.
+            // The sound effects are kept, so that rules on this action are checked too.
             self.half_broken.push(self.actions.len());
         }
         Some(ActionDef {
@@ -129,7 +130,7 @@ impl Checker {
         Some(Parameter { name, ty, axis, domain, condition, span: declared.span })
     }
 
-    /// The values that are drawn, each as often as its odds say.
+    /// The values to draw from, each repeated as often as its odds say.
     fn by_odds(&mut self, values: Vec<Value>, declared: &ast::ActionParam) -> Option<Vec<Value>> {
         let odds = |value: &Value| match value {
             Value::Variant(of, variant) => self.enums[of.0].odds[*variant] as usize,
@@ -298,7 +299,8 @@ impl Checker {
         })
     }
 
-    /// Vehicles do not walk, and only who overtakes comes from behind.
+    /// Reports a vehicle that walks, a pedestrian that drives, and a wrong `ahead` or `behind`: only a vehicle that
+    /// overtakes spawns behind the ego vehicle.
     fn check_verb(&mut self, body: &WordExpr<Body>, verb: &WordExpr<Verb>, behind: bool, span: Span) {
         let on_foot = |verb: &Verb| matches!(verb, Verb::Walk | Verb::Stand);
         let verbs = possible(verb);
@@ -324,7 +326,7 @@ impl Checker {
         }
     }
 
-    /// A word of the engine: its own spelling, or an expression whose enum is spelt like it.
+    /// A word of the engine: either the word itself, or an expression of an enum whose variants are such words.
     fn word<W: Word>(&mut self, kind: &str, expr: &ast::Expr, place: &Place<'_>) -> Option<WordExpr<W>> {
         if let ast::ExprKind::Name(name) = &expr.kind
             && self.is_bare_variant(expr, place)
@@ -359,7 +361,7 @@ impl Checker {
         }
     }
 
-    /// The actions of a name: an action or a group.
+    /// The indices of the actions that a name means: one action, or the members of a group.
     pub(super) fn targets(&mut self, name: &ast::Name) -> Vec<usize> {
         if let Some(action) = self.action_names.get(&name.text) {
             return vec![action];
@@ -373,11 +375,11 @@ impl Checker {
         Vec::new()
     }
 
-    /// Counts the rows of every action and refuses a table that is too long, before it is made.
+    /// Counts the rows of every action. Reports a table that would be too long, before it is made.
     pub(super) fn count_rows(&mut self, rules: &[RuleDef], roads: usize) {
         let mut total = 0_u64;
         for action in self.actions.clone() {
-            // No row at all: an axis is broken, and that is reported where it stands.
+            // A count of 0 means that an axis is broken, which is reported where it is declared.
             let count = action.as_ref().map(product_size).filter(|count| *count > 0);
             if let (Some(count), Some(action)) = (count, &action) {
                 total = total.saturating_add(count);
@@ -399,7 +401,7 @@ impl Checker {
             self.report(error.help(format!("at most {ROWS_MAX} are possible")));
             return;
         }
-        // Every row is proved on every road under every rule that binds it.
+        // Each row is proved on each road under each rule that binds it.
         let bound = |action: usize| rules.iter().filter(|rule| rule.body.binds(action)).count() as u64;
         let counts = self.row_counts.iter().enumerate();
         let work: u64 = counts
@@ -415,7 +417,7 @@ impl Checker {
     }
 }
 
-/// Every word that the expression may come to.
+/// Every word that the expression can have as its value.
 fn possible<W: Copy>(word: &WordExpr<W>) -> Vec<W> {
     match word {
         WordExpr::Fixed(word) => vec![*word],

@@ -1,7 +1,7 @@
 //! The checker: declarations in, a sound [`Space`] or diagnostics out.
 //!
-//! It goes on after a mistake, so that one run shows them all: what is broken becomes `None`, and
-//! whatever depends on it stays silent.
+//! It goes on after a mistake, so that one run shows all mistakes: a broken declaration becomes `None`, and
+//! no diagnostic is reported for what depends on it.
 
 use std::path::PathBuf;
 
@@ -17,46 +17,46 @@ use crate::syntax::ast::{FileId, ItemKind, Span};
 use crate::syntax::{Diagnostic, ast};
 use crate::units::Rational;
 
-/// Where the parameters, the result and the header of a function are.
+/// A function's parameters, its result type, and the span of its header.
 pub(super) type Signature = (Vec<(String, Type)>, Type, Span);
 
-/// What is known so far.
+/// The declarations that are checked so far, and their diagnostics.
 #[derive(Default)]
 pub(super) struct Checker {
     pub(super) diagnostics: Vec<Diagnostic>,
     pub(super) enum_names: Names,
     pub(super) enums: Vec<EnumDef>,
     pub(super) states: Vec<StateDef>,
-    /// Constants are folded: each is a literal. `None` is one that is broken.
+    /// Each constant is folded to a literal; `None` stands for a broken one.
     pub(super) constants: Vec<(String, Option<Expr>)>,
     pub(super) function_names: Names,
     /// Every declared road, driven or not.
     pub(super) road_names: Vec<String>,
-    /// What the functions will be called, while the constants are looked at.
+    /// Names of all functions. Constants are checked before them and cannot call them.
     pub(super) functions_to_come: Vec<String>,
-    /// `None` is a function with a broken header.
+    /// `None` stands for a function with a broken header.
     pub(super) signatures: Vec<Option<Signature>>,
     pub(super) functions: Vec<FnDef>,
     pub(super) action_names: Names,
     pub(super) actions: Vec<Option<ActionDef>>,
-    /// Actions with an effect that is broken: nothing is to be said of what they lack.
+    /// Indices of actions with a broken effect: no rule reports that such an action lacks an effect.
     pub(super) half_broken: Vec<usize>,
     pub(super) groups: Vec<GroupDef>,
-    /// Number of rows of each action, where its axes are sound.
+    /// Number of rows of each action; `None` if an axis is broken.
     pub(super) row_counts: Vec<Option<u64>>,
 }
 
 /// What the reader of files knows about the root of a space.
 pub(super) struct Root {
-    /// Claims are judged, and unused declarations looked for, in this file alone: those of a used
-    /// file are about that file as it is by itself.
+    /// Claims and unused declarations are looked for in this file alone. A used file is checked for them
+    /// when it is the root itself.
     pub file: FileId,
     pub path: PathBuf,
     pub digest: String,
     pub docs: Vec<String>,
 }
 
-/// Checks the declarations of a space: those of all its files, imports first.
+/// Checks the declarations of all files of a space, imports first.
 pub(super) fn space(
     root: Root,
     items: &[&ast::Item],
@@ -83,7 +83,7 @@ pub(super) fn space(
 
     let own: Vec<&ast::Item> = items.iter().copied().filter(|item| item.span.file == root.file).collect();
 
-    // What was broken is missing, and indices would be off: without errors nothing is missing.
+    // A broken declaration is missing from its list, so the indices of the others would be wrong.
     if checker.has_errors() {
         checker.look_at_expects(&own);
         return (None, checker.finish());
@@ -124,7 +124,8 @@ impl Checker {
         self.diagnostics.iter().any(Diagnostic::is_error)
     }
 
-    /// The diagnostics in reading order; a rule over several actions says the same thing once.
+    /// The diagnostics in the order of the text. A rule is checked for each of its actions, so equal diagnostics
+    /// are kept once.
     fn finish(self) -> Vec<Diagnostic> {
         let mut kept: Vec<Diagnostic> = Vec::new();
         for diagnostic in self.diagnostics {
@@ -154,7 +155,7 @@ impl Checker {
         (names, first)
     }
 
-    /// The type of that name.
+    /// The type with this name.
     pub(super) fn named_type(&mut self, name: &ast::Name) -> Option<Type> {
         let builtin = match name.text.as_str() {
             "Bool" => Some(Type::Bool),
@@ -179,11 +180,11 @@ impl Checker {
         }
     }
 
-    /// The value of an expression that names nothing but constants, functions and literals.
+    /// The value of an expression that consists of constants, functions and literals.
     pub(super) fn fold(&mut self, expr: &Expr) -> Option<ExprKind> {
         let calls = expr.any(|kind| matches!(kind, ExprKind::Call(..)));
         if calls && self.functions.len() != self.signatures.len() {
-            // A broken function was reported where it stands.
+            // The broken function was reported where it is declared.
             return None;
         }
         let known = Known { functions: &self.functions, locals: &[], cells: &[], road: None };
@@ -204,7 +205,7 @@ impl Checker {
         })
     }
 
-    /// The same for a number.
+    /// The value of such an expression, if it is a number.
     pub(super) fn fold_number(&mut self, expr: &Expr) -> Option<Rational> {
         match self.fold(expr)? {
             ExprKind::Number(value) => Some(value),
@@ -213,7 +214,7 @@ impl Checker {
     }
 }
 
-/// The literal as a value at run time.
+/// The value at run time of a literal.
 pub(super) fn literal(kind: &ExprKind) -> Option<Value> {
     match kind {
         ExprKind::Bool(truth) => Some(Value::Bool(*truth)),

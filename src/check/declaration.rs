@@ -12,22 +12,21 @@ use crate::prove::VARIANTS_MAX;
 use crate::syntax::ast::{ItemKind, Span};
 use crate::syntax::{Diagnostic, ast, listed, nearest};
 
-/// A function may come to so many operations, those of the functions it calls included: each call
-/// stands for a copy, and copies of copies grow fast.
+/// Limit on a function's operations with every call inlined; nested calls multiply.
 const OPERATIONS_MAX: u64 = 10_000;
 
-/// Calls within calls, at most.
+/// Limit on the depth of nested calls.
 const CALLS_MAX: u32 = 64;
 
-/// What a function comes to, all that it calls included.
+/// Size of a function with every call inlined.
 #[derive(Debug, Clone, Copy)]
 struct Cost {
     operations: u64,
-    /// Calls within calls.
+    /// Depth of nested calls.
     depth: u32,
 }
 
-/// A variant may be drawn so many times as often as another.
+/// Largest value that `odds` may give to a variant.
 const ODDS_MAX: u32 = 100;
 
 impl Checker {
@@ -53,7 +52,7 @@ impl Checker {
         }
     }
 
-    /// How often variants are drawn: whole numbers, folded like constants.
+    /// The odds of variants: whole numbers, folded like constants.
     pub(super) fn declare_odds(&mut self, items: &[&ast::Item]) {
         for (_, declared) in self.declared("odds of", items, ItemKind::as_odds).1 {
             let Some(of) = self.enum_names.get(&declared.name.text) else {
@@ -71,7 +70,7 @@ impl Checker {
                     true => (0..variants.len()).filter(|variant| odds[*variant].is_none()).collect(),
                     false => named.into_iter().flatten().collect(),
                 };
-                // An unknown variant was reported.
+                // If no variant of the arm is known, that was reported.
                 let sound = arm.patterns.is_empty() || !taken.is_empty();
                 if sound && !taken.iter().any(|variant| odds[*variant].is_none()) {
                     let error = Diagnostic::error(code::NEVER_REACHED, "these odds never count");
@@ -81,7 +80,7 @@ impl Checker {
                     odds[variant] = odds[variant].or(Some(value));
                 }
             }
-            // Whoever is not named is as likely as before.
+            // A variant that is not named has the odds 1.
             let odds: Vec<u32> = odds.into_iter().map(|odds| odds.unwrap_or(1)).collect();
             if odds.iter().all(|odds| *odds == 0) {
                 let message = format!("no `{}` is ever drawn", declared.name.text);
@@ -111,8 +110,8 @@ impl Checker {
 
     pub(super) fn declare_constants(&mut self, items: &[&ast::Item]) {
         let (names, open) = self.declared("constant", items, ItemKind::as_let);
-        // The order of declarations means nothing: a constant waits for those that it names. Where
-        // they wait in a circle, the first is taken, and its names are unknown.
+        // Constants may be declared in any order, so each waits for the constants that it names. If all that
+        // are left wait for one another, the first is checked, and it reports an unknown name.
         let named: Vec<Vec<ast::Name>> = open.iter().map(|(_, declared)| names_in(&declared.value)).collect();
         let mut waiting: Vec<usize> = (0..open.len()).collect();
         while !waiting.is_empty() {
@@ -140,7 +139,7 @@ impl Checker {
             let name = function.name.text.clone();
             self.functions.push(FnDef { name, parameters, result, body, span });
         }
-        // With a body missing, indices would be off; the mistake is reported already.
+        // A function without a body is missing, so indices would be wrong; its mistake is already reported.
         if self.functions.len() == declared.len() {
             self.reject_recursion();
         } else {
@@ -158,10 +157,10 @@ impl Checker {
         Some((parameters?, result?, function.name.span))
     }
 
-    /// Functions may not call themselves, nor grow without measure by calling others.
+    /// Reports functions that call themselves, and functions that are too large with their calls inlined.
     fn reject_recursion(&mut self) {
         let calls: Vec<Vec<usize>> = self.functions.iter().map(|function| calls_of(&function.body)).collect();
-        // `None` while a function is being measured: meeting it again is recursion.
+        // `Some(None)` while a function is measured: to meet it again is recursion.
         let mut costs: Vec<Option<Option<Cost>>> = vec![None; calls.len()];
         for start in 0..calls.len() {
             let mut path = Vec::new();
@@ -192,10 +191,10 @@ impl Checker {
         }
     }
 
-    /// Operations of a function and all it calls.
+    /// The size of a function with every call inlined.
     ///
     /// # Errors
-    /// The functions of a circle.
+    /// The functions that call each other in a circle.
     fn cost(
         &self,
         function: usize,
@@ -209,7 +208,7 @@ impl Checker {
                 let begin = path.iter().position(|step| *step == function).unwrap_or(0);
                 return Err(path[begin..].to_vec());
             }
-            // Far enough to know that it is too far.
+            // The limit on the depth is passed already, and the exact depth does not matter.
             None if path.len() > CALLS_MAX as usize => {
                 return Ok(Cost { operations: 0, depth: CALLS_MAX + 1 });
             }
@@ -246,7 +245,7 @@ impl Checker {
             };
             let Some(ty) = value else { continue };
             let Some(initial) = self.initial(declared, ty) else { continue };
-            // A state with a broken meaning is a state all the same to whatever names it.
+            // A state with a broken meaning stays declared, so that its uses are not reported as unknown.
             let meaning = self.meaning(&declared.name, key, ty).unwrap_or(StateMeaning::Private);
             let cells = key.map_or(1, |of| self.enums[of.0].variants.len());
             self.states.push(StateDef {
@@ -292,7 +291,7 @@ impl Checker {
         }
     }
 
-    /// `time` and `sky` are the world's own; any other state is the author's bookkeeping.
+    /// `time` and `sky` set the time of day and the weather; any other state is only the author's record.
     fn meaning(&mut self, name: &ast::Name, key: Option<EnumIndex>, ty: Type) -> Option<StateMeaning> {
         match (name.text.as_str(), key) {
             ("time", None) => {
@@ -313,7 +312,7 @@ impl Checker {
         }
     }
 
-    /// The engine's word for each variant of an enum whose values reach the world.
+    /// The engine's word for each variant of an enum, for values that reach the world.
     pub(super) fn words<W: Word>(&mut self, kind: &str, ty: Type, span: Span) -> Option<Vec<W>> {
         let Type::Enum(of) = ty else {
             let name = self.type_name(ty);
@@ -334,12 +333,12 @@ impl Checker {
     }
 }
 
-/// The variants as far as they can be held.
+/// The names of the variants, at most [`VARIANTS_MAX`].
 fn variants_of(declared: &ast::Enum) -> Vec<String> {
     declared.variants.iter().take(VARIANTS_MAX).map(|variant| variant.text.clone()).collect()
 }
 
-/// A spelling that means nothing to the engine.
+/// A word that the engine does not know.
 pub(super) fn unknown_word<W: Word>(kind: &str, word: &str, span: Span) -> Diagnostic {
     let words: Vec<&str> = W::ALL.iter().map(|word| word.name()).collect();
     let error =

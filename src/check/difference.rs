@@ -1,7 +1,7 @@
-//! What one space says that another does not: rows, ranges, rules and declarations by meaning.
+//! What differs between two spaces: rows, ranges, rules and declarations, compared by their meaning.
 //!
-//! Rows are compared by their labels, rules by what they leave of each range that both spaces know.
-//! Where ranges do not tell, a rule whose text differs is called changed.
+//! Rows are matched by their labels. Rules are compared by what they leave of each range that both spaces have;
+//! if the ranges show no difference, a rule with another text is called changed.
 
 use core::fmt;
 use std::collections::BTreeMap;
@@ -12,13 +12,13 @@ use crate::prove::{Prover, Values};
 use crate::syntax::ast::ItemKind;
 use crate::syntax::print_item;
 
-/// One difference, as a sentence in parts.
+/// One difference; its parts together make a sentence.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Difference {
     pub change: Change,
     /// ``rule `npc_speed` ``, ``row `rain(how: High)` ``.
     pub subject: String,
-    /// Figures; may be empty.
+    /// What has changed in figures; may be empty.
     pub detail: String,
 }
 
@@ -27,11 +27,11 @@ pub struct Difference {
 pub enum Change {
     Added,
     Removed,
-    /// Another row number.
+    /// It has another row number.
     Moved,
-    /// Forbids more.
+    /// It forbids more.
     Tightened,
-    /// Forbids less.
+    /// It forbids less.
     Loosened,
     Changed,
 }
@@ -63,7 +63,7 @@ fn difference(change: Change, subject: String, detail: impl Into<String>) -> Dif
     Difference { change, subject, detail: detail.into() }
 }
 
-/// Every declaration by keyword and name, with its text in the one style.
+/// The formatted text of every declaration, by keyword and name.
 fn texts(loaded: &Loaded) -> BTreeMap<(String, String), String> {
     let items = standing_items(loaded);
     let named = items.iter().filter(|item| {
@@ -84,7 +84,7 @@ fn texts(loaded: &Loaded) -> BTreeMap<(String, String), String> {
         .collect()
 }
 
-/// Declarations other than rules and actions, whose meaning is compared below.
+/// Differences between declarations other than rules and actions, which are compared by their meaning.
 fn declarations(old: &Loaded, new: &Loaded) -> Vec<Difference> {
     let (old, new) = (texts(old), texts(new));
     let mut found = Vec::new();
@@ -218,7 +218,7 @@ fn compared(old: (&Space, usize), new: (&Space, usize)) -> Option<(Change, Strin
     }
 }
 
-/// What a rule alone leaves of each range of a row; `None` if nothing.
+/// What one rule alone leaves of each range of a row; `None` if it leaves nothing.
 fn left((space, rule): (&Space, usize), row: &Row, road: &Road) -> Option<Vec<(String, Interval)>> {
     let values = locals(&space.actions[row.action], row, &[]);
     let bounds = bounds(space, row.action);
@@ -289,7 +289,7 @@ fn rows(old: &Space, new: &Space) -> Vec<Difference> {
     found
 }
 
-/// What all rules together leave, where it differs.
+/// Differences in what all rules together leave of the ranges.
 fn reaches(old: &Space, new: &Space) -> Vec<Difference> {
     let mut found: Vec<Difference> = Vec::new();
     for row in &old.rows {

@@ -16,7 +16,7 @@ impl Checker {
         }
     }
 
-    /// Without a sound space, claims of the wrong form are reported all the same.
+    /// Reports claims of the wrong form. Used when the space is not sound and no claim can be judged.
     pub(super) fn look_at_expects(&mut self, items: &[&ast::Item]) {
         for (_, expect) in each(items, ItemKind::as_expect) {
             if !is_static(&expect.claim) {
@@ -79,7 +79,7 @@ impl Checker {
         }
     }
 
-    /// Rows of an action, a group, or of all `actions`.
+    /// The rows of an action, of a group, or of all `actions`.
     fn rows_of<'a>(
         &mut self,
         argument: Option<&ast::Arg>,

@@ -1,6 +1,6 @@
-//! From a root file to everything it says: imports, digests, maps, and the checks.
+//! Loads a root file: reads its imports and maps, compares digests, and runs the checks.
 //!
-//! Files are read through a function that `cli` hands in; nothing here touches a disk.
+//! Files are read through a function that `cli` gives; nothing here reads the disk itself.
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -40,7 +40,7 @@ pub struct Loaded {
     /// The texts that the diagnostics point into.
     pub sources: Sources,
     pub diagnostics: Vec<Diagnostic>,
-    /// What is worth knowing of a sound space and asks for no change: `check` prints it.
+    /// Facts about a sound space that ask for no change; only `avastra check` prints them.
     pub remarks: Vec<Diagnostic>,
     /// In order of reading, the root first, so never empty; a file's [`FileId`] is its position.
     pub files: Vec<LoadedFile>,
@@ -50,17 +50,17 @@ pub struct Loaded {
     pub scenario: Option<Scenario>,
     /// The policy of the root, if it has one and it is sound.
     pub policy: Option<Policy>,
-    /// Files by index, imports before those that use them.
+    /// Indices of files, imports before the files that use them.
     order: Vec<usize>,
 }
 
-/// The declarations that hold, overridden ones replaced, in the order of the files' reading.
+/// The declarations that stand, overridden ones replaced; imports come before the files that use them.
 pub(super) fn standing_items(loaded: &Loaded) -> Vec<Cow<'_, ast::Item>> {
     overriding::resolve(&loaded.files, &loaded.order).0
 }
 
-/// Maps that were understood before, by name and content: who loads again and again, as an editor's
-/// server does, reads each but once.
+/// Maps that were read before, by name and content. A caller that loads often, such as the editor's server,
+/// then reads each map once.
 #[derive(Debug, Clone, Default)]
 pub struct MapCache {
     known: BTreeMap<(String, String), Result<Arc<RoadMap>, String>>,
@@ -69,12 +69,12 @@ pub struct MapCache {
 /// Reads a root file, all it uses, and checks the whole.
 ///
 /// # Errors
-/// If the root itself cannot be read. Whatever else is wrong is among the diagnostics.
+/// If the root itself cannot be read. All other mistakes are in the diagnostics.
 pub fn load(root: &Path, read: &ReadFile<'_>) -> Result<Loaded, ReadError> {
     load_with(root, read, &mut MapCache::default())
 }
 
-/// The same, with the maps of earlier loads.
+/// Does the same as [`load`], and takes maps from earlier loads.
 ///
 /// # Errors
 /// As [`load`].
@@ -88,7 +88,7 @@ pub fn load_with(root: &Path, read: &ReadFile<'_>, cache: &mut MapCache) -> Resu
     };
     loader.read_file(&normal(root), &mut Vec::new())?;
     let Loader { sources, files, order, mut diagnostics, .. } = loader;
-    // A file that does not parse lacks declarations, and everything else would look unknown.
+    // A file that does not parse lacks declarations, and their uses would be reported as unknown.
     if diagnostics.iter().any(Diagnostic::is_error) {
         return Ok(Loaded {
             sources,
@@ -125,7 +125,8 @@ pub fn load_with(root: &Path, read: &ReadFile<'_>, cache: &mut MapCache) -> Resu
             Err(found) => diagnostics.extend(found),
         }
     }
-    // Remarks are about spaces; who reads a scenario or a policy knows its space.
+    // Remarks are about the space. They are shown when the space itself is checked, not for each of its
+    // scenarios and policies.
     if has_scenario || has_policy || diagnostics.iter().any(Diagnostic::is_error) {
         remarks.clear();
     }
@@ -141,19 +142,19 @@ fn check_space(
         file.tree.items.iter().any(|item| {
             match &item.kind {
                 ItemKind::Language(_) | ItemKind::Scenario(_) | ItemKind::Policy(_) => false,
-                // What leaves something out makes another space.
+                // A `use` that leaves something out makes a space of its own.
                 ItemKind::Use(used) => !used.without.is_empty(),
                 _ => true,
             }
         })
     };
-    // A scenario is no space itself: its space is what it uses first.
+    // A scenario file declares no space: its space is the first file that declares something.
     let index = files.iter().position(declares).unwrap_or(0);
     let root = &files[index];
     let root = Root {
         file: FileId(u32::try_from(index).expect("a file's id is its position")),
         path: root.path.clone(),
-        // Where a map cannot be read there is no space either.
+        // Without a digest a map could not be read; then there is no space either.
         digest: whole_digest(files, &root.path, maps).unwrap_or_default(),
         docs: root.tree.docs.iter().map(|doc| doc.text.clone()).collect(),
     };
@@ -213,12 +214,12 @@ pub(super) fn uses(file: &LoadedFile) -> impl Iterator<Item = &ast::Use> {
     file.tree.items.iter().filter_map(|item| item.kind.as_use())
 }
 
-/// The files that a file uses.
+/// The paths of the files that a file uses.
 pub(super) fn used_paths(file: &LoadedFile) -> impl Iterator<Item = PathBuf> {
     uses(file).map(|used| used_path(file, used))
 }
 
-/// The file that a `use` means.
+/// The path of the file that a `use` names.
 pub(super) fn used_path(file: &LoadedFile, used: &ast::Use) -> PathBuf {
     normal(&folder(&file.path).join(&used.path.value))
 }
@@ -233,7 +234,7 @@ fn maps_named(file: &LoadedFile) -> impl Iterator<Item = &str> {
     })
 }
 
-/// A path with `/` between its parts, whatever the system.
+/// A path with `/` between its parts, on every system.
 fn spelt(path: &Path) -> String {
     let parts: Vec<_> = path.components().map(|part| part.as_os_str().to_string_lossy()).collect();
     parts.join("/")
@@ -243,13 +244,13 @@ struct Loader<'a> {
     read: &'a ReadFile<'a>,
     sources: Sources,
     files: Vec<LoadedFile>,
-    /// Files by index, imports before those that use them.
+    /// Indices of files, imports before the files that use them.
     order: Vec<usize>,
     diagnostics: Vec<Diagnostic>,
 }
 
 impl Loader<'_> {
-    /// Reads a file and what it uses. `path` is the way from the root to here.
+    /// Reads a file and the files that it uses. `way` holds the files from the root to this one.
     fn read_file(&mut self, path: &Path, way: &mut Vec<PathBuf>) -> Result<(), ReadError> {
         if self.files.iter().any(|file| file.path == path) {
             return Ok(());
@@ -331,7 +332,7 @@ fn folder(path: &Path) -> PathBuf {
     path.parent().map(Path::to_owned).unwrap_or_default()
 }
 
-/// The path without `.` and, where it can be seen, without `..`: two spellings of a file are one.
+/// The path without `.` and, where possible, without `..`, so that a file has one path.
 fn normal(path: &Path) -> PathBuf {
     let mut parts: Vec<Component<'_>> = Vec::new();
     for part in path.components() {

@@ -24,6 +24,7 @@ mod scenario;
 mod scenario_rules;
 mod scenario_value;
 mod settings;
+pub mod state_argument;
 mod style;
 mod suggest;
 mod unused;

@@ -1,4 +1,4 @@
-//! Names: where each is declared, and what an author may have meant by one that is not.
+//! Declared names, and suggestions for names that are not declared.
 
 use std::collections::BTreeMap;
 
@@ -6,15 +6,15 @@ use crate::model::code;
 use crate::syntax::ast::{Name, Span};
 use crate::syntax::{Diagnostic, listed, nearest};
 
-/// The declarations of one kind, by name.
+/// The names of one kind of declaration.
 #[derive(Debug, Default)]
 pub(super) struct Names {
-    /// Index among the declarations of the kind, and where it was declared.
+    /// For each name its index among the declarations of the kind, and the span of the name.
     found: BTreeMap<String, (usize, Span)>,
 }
 
 impl Names {
-    /// Notes a declaration.
+    /// Records a declaration.
     ///
     /// # Errors
     /// If the name is taken.
@@ -45,7 +45,7 @@ impl Names {
     }
 }
 
-/// A name that is declared nowhere.
+/// The diagnostic for a name that is not declared, with the most similar candidate or a short list of them.
 pub(crate) fn unknown<'a>(
     kind: &str,
     name: &str,

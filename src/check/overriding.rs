@@ -1,8 +1,8 @@
-//! What of the used files holds: `override` puts a declaration in place of the one of that kind and
-//! name, `use … without` leaves actions, groups and rules out.
+//! Which declarations of the used files stand: `override` replaces the declaration of the same kind and name,
+//! `use … without` leaves actions, groups and rules out.
 //!
-//! The new declaration stands where the old one stood, so that the rows of a table keep their
-//! numbers. What used the old one uses the new one, in the used file too: it is checked anew.
+//! The new declaration takes the place of the old one, so that the rows of a table keep their numbers.
+//! Everything that used the old declaration uses the new one, in the used file too, and is checked with it.
 
 use std::borrow::Cow;
 use std::collections::BTreeSet;
@@ -15,16 +15,16 @@ use crate::model::code;
 use crate::syntax::ast::{EffectKind, Item, ItemKind, Name, RuleBody, Use};
 use crate::syntax::{Diagnostic, nearest};
 
-/// What a rule may ask about a spawn.
+/// The facts about a spawn that a rule may use.
 const GAPS: [&str; 2] = ["spawn_gap", "safety_gap"];
 
-/// A declaration that holds, and the file that it is from.
+/// A declaration that stands, and the index of its file.
 struct Standing<'a> {
     file: usize,
     item: Cow<'a, Item>,
 }
 
-/// Every declaration of the files in that order (imports first), overridden ones replaced.
+/// Every declaration that stands, in the given order of files (imports first); overridden ones are replaced.
 pub(super) fn resolve<'a>(files: &'a [LoadedFile], order: &[usize]) -> (Vec<Cow<'a, Item>>, Vec<Diagnostic>) {
     let mut standing: Vec<Standing<'a>> = Vec::new();
     let mut diagnostics = Vec::new();
@@ -48,8 +48,9 @@ pub(super) fn resolve<'a>(files: &'a [LoadedFile], order: &[usize]) -> (Vec<Cow<
     (standing.into_iter().map(|standing| standing.item).collect(), diagnostics)
 }
 
-/// Takes away what a `use` is without, and what means nothing any more: names in groups and after `on`,
-/// groups and rules without a name left, rules on a state or a gap that no action touches any more.
+/// Removes the names that a `use` leaves out, also from groups and after `on`. Then removes what has lost its
+/// meaning: groups and rules without any name left, and rules about a state or a gap that no action touches any
+/// more.
 fn leave_out(
     files: &[LoadedFile],
     standing: &mut Vec<Standing<'_>>,
@@ -58,11 +59,11 @@ fn leave_out(
     diagnostics: &mut Vec<Diagnostic>,
 ) {
     let path = used_path(&files[file], used);
-    // A file that cannot be read was reported.
+    // A file that cannot be read was reported already.
     let Some(target) = files.iter().position(|other| other.path == path) else { return };
     let offered: Vec<bool> = (0..files.len()).map(|other| uses(files, target, other)).collect();
     let mut left = left_names(standing, &offered, used, diagnostics);
-    // What other files declare can give a rule something to bind again.
+    // Actions of other files may still touch what a rule is about.
     let others = files.iter().zip(&offered).filter(|(_, is_offered)| !**is_offered);
     let others = touched(others.flat_map(|(file, _)| &file.tree.items));
     let touched_now = |standing: &[Standing<'_>]| {
@@ -91,13 +92,13 @@ fn leave_out(
     }
 }
 
-/// Whether a `use` can leave it out.
+/// Whether a `use` can leave this declaration out.
 fn is_offered(standing: &Standing<'_>, offered: &[bool]) -> bool {
     offered[standing.file]
         && matches!(standing.item.kind, ItemKind::Action(_) | ItemKind::Group(_) | ItemKind::Rule(_))
 }
 
-/// The names that a `use` is without, a group's members with it.
+/// The names that a `use` leaves out; for a group also its members.
 fn left_names(
     standing: &[Standing<'_>],
     offered: &[bool],
@@ -109,7 +110,7 @@ fn left_names(
     for name in &used.without {
         let mut open = vec![name.text.clone()];
         while let Some(next) = open.pop() {
-            // A broken text may put a group into itself.
+            // In a broken text a group may contain itself.
             if left.contains(&next) {
                 continue;
             }
@@ -133,8 +134,8 @@ fn left_names(
     left
 }
 
-/// Takes names that are gone out of a group or a rule; whether anything is left of it. A group of which
-/// nothing is left is gone, too.
+/// Removes the names in `left` from a group or a rule, and gives whether the declaration still has a meaning.
+/// A group without members is added to `left`.
 fn keeps_something(
     item: &mut Cow<'_, Item>,
     left: &mut BTreeSet<String>,
@@ -173,8 +174,8 @@ fn keeps_something(
     }
 }
 
-/// What rules without an action's name bind by: the states that some action sets, and the gaps if some
-/// action spawns.
+/// What decides which actions a rule without `on` binds: the states that the actions set, and the gaps if one
+/// of them spawns.
 fn touched<'a>(items: impl Iterator<Item = &'a Item>) -> BTreeSet<String> {
     let actions = items.filter_map(|item| item.kind.plain().as_action());
     let effects = actions.flat_map(|action| &action.effects);
@@ -186,7 +187,7 @@ fn touched<'a>(items: impl Iterator<Item = &'a Item>) -> BTreeSet<String> {
         .collect()
 }
 
-/// Where the declaration stands that is to be replaced.
+/// The index of the declaration that an `override` replaces.
 fn find(
     files: &[LoadedFile],
     standing: &[Standing<'_>],
@@ -243,7 +244,7 @@ fn find(
     Ok(place)
 }
 
-/// Whether a file uses the other, by whatever way.
+/// Whether a file uses the other, directly or through other files.
 fn uses(files: &[LoadedFile], from: usize, to: usize) -> bool {
     let mut seen: BTreeSet<PathBuf> = BTreeSet::new();
     let mut open = vec![files[from].path.clone()];

@@ -1,4 +1,4 @@
-//! Roads: a map, two places on it, the way between them, and what rules may ask about it.
+//! Roads: each has a map, a start and a goal on it, the route between them, and the facts that rules may use.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -13,9 +13,9 @@ use crate::syntax::ast::ItemKind;
 use crate::syntax::{Diagnostic, ast, print_expr};
 use crate::units::{Dimension, Rational};
 
-/// Where maps come from: the reader of files knows the folder of the file that names one.
+/// Loads maps. Its implementation knows the folder of the file that names a map.
 pub(crate) trait Maps {
-    /// The map's path and the map, or what is wrong with it.
+    /// The map and its path, or in words why it cannot be used.
     fn map(&mut self, name: &ast::Text) -> Result<(PathBuf, Arc<RoadMap>), String>;
 }
 
@@ -35,7 +35,7 @@ impl Checker {
         for name in &chosen {
             match names.get(&name.text) {
                 None => self.report(unknown("road", &name.text, name.span, names.all())),
-                // Naming a road twice would only repeat it.
+                // A road that is named twice is taken once.
                 Some(index) => picked.extend(roads[index].take()),
             }
         }
@@ -126,8 +126,8 @@ impl Checker {
     }
 }
 
-/// The map under a lower limit: where the signs allow less, they still count. Driving systems read the
-/// limit off the lanes, so it stands there.
+/// A copy of the map in which no lane allows more than the limit; lower limits of the map stay. The limit is
+/// stored in the lanes because driving systems read it there.
 fn slowed(map: &RoadMap, limit_mps: f64) -> Arc<RoadMap> {
     let mut map = map.clone();
     for lane in &mut map.lanes {
@@ -136,7 +136,7 @@ fn slowed(map: &RoadMap, limit_mps: f64) -> Arc<RoadMap> {
     Arc::new(map)
 }
 
-/// Reads the facts of a route off its map.
+/// The facts about a route that rules may use.
 fn facts(name: &str, map: &RoadMap, route: &Route) -> RoadFacts {
     let lanes = || route.lanes.iter().map(|part| map.lane(part.lane));
     let limit_mps = lanes().map(|lane| lane.speed_limit_mps).fold(f64::INFINITY, f64::min);
@@ -151,7 +151,7 @@ fn facts(name: &str, map: &RoadMap, route: &Route) -> RoadFacts {
     RoadFacts { name, limit, limit_mps: limit.to_f64(), lanes: [beside(true), true, beside(false)] }
 }
 
-/// A limit as the road sign has it: whole km/h or mph where the map's f64 is next to one.
+/// The exact limit: a whole number of km/h or mph if the map's `f64` is close to one, as on road signs.
 fn exact_limit(limit_mps: f64) -> Rational {
     for unit in ["km/h", "mph"] {
         let Some(unit) = crate::units::unit(unit) else { continue };
@@ -163,6 +163,6 @@ fn exact_limit(limit_mps: f64) -> Rational {
             }
         }
     }
-    // No limit at all is read as a limit that nothing reaches.
+    // A road without a limit gets 1000 m/s, which nothing reaches.
     Rational::from_f64(limit_mps).unwrap_or(Rational::integer(1000))
 }

@@ -1,4 +1,4 @@
-//! Rules: which actions each binds, and its condition compiled for every one of them.
+//! Rules: the actions that each rule binds, and its condition compiled for each of these actions.
 
 use crate::check::checker::{Checker, docs};
 use crate::check::expression::Place;
@@ -42,7 +42,7 @@ impl Checker {
         let lacking = self.lacking_parameters(&rule.name, &targets, condition);
         let mut bindings = Vec::new();
         for action in targets {
-            // A broken action was reported where it stands.
+            // A broken action was reported where it is declared.
             let Some(definition) = self.actions[action].clone() else { continue };
             if lacking.contains(&action) {
                 continue;
@@ -73,8 +73,9 @@ impl Checker {
         Some(RuleBody::Holds(bindings))
     }
 
-    /// Without `on`, a rule binds the actions that could break it: those that spawn, if it asks about
-    /// spawns; those that set a state which it reads; else all.
+    /// The actions that a rule without `on` binds. These are the actions that could break it: those that spawn,
+    /// if the rule asks about spawns, and those that set a state which it reads. A rule that does neither binds
+    /// all actions.
     fn targets_of_global(&mut self, rule: &ast::Rule, condition: &ast::Expr) -> Option<Vec<usize>> {
         let named = names_in(condition);
         let parameter = self.actions.iter().flatten().find_map(|action| {
@@ -108,7 +109,8 @@ impl Checker {
         )
     }
 
-    /// Reports names that are parameters of some bound action but not of others; gives the others.
+    /// Reports a name that is a parameter of some actions but not of every bound action. Gives the bound actions
+    /// that lack it.
     fn lacking_parameters(
         &mut self,
         rule: &ast::Name,
@@ -196,7 +198,7 @@ impl Checker {
         found.or_else(|| self.reject(unknown("variant", &name.text, name.span, names())))
     }
 
-    /// Every value must lead somewhere, and something else must lead to it.
+    /// Reports a value from which no move is allowed, and a value to which no other value may move.
     fn check_graph(&mut self, rule: &ast::Rule, variants: &[String], allowed: &[Vec<bool>]) {
         let rows = |test: &dyn Fn(usize) -> bool| -> Vec<&str> {
             (0..variants.len()).filter(|v| test(*v)).map(|v| variants[v].as_str()).collect()
@@ -219,12 +221,12 @@ impl Checker {
     }
 }
 
-/// A value other than this one.
+/// Another variant than `value`, if there is one.
 fn first_other<'a>(variants: &'a [String], value: &'a str) -> &'a str {
     variants.iter().map(String::as_str).find(|other| *other != value).unwrap_or(value)
 }
 
-/// The parameters of an action as locals of an expression.
+/// The parameters of an action, as an expression sees them.
 pub(super) fn locals(action: &ActionDef) -> Vec<(String, Type)> {
     action.parameters.iter().map(|parameter| (parameter.name.to_string(), parameter.ty)).collect()
 }

@@ -1,4 +1,4 @@
-//! Scenarios: one timeline over a space, with every value in its place and every claim understood.
+//! Scenarios: checks a timeline against its space, with the start, every step and every claim.
 
 use std::sync::Arc;
 
@@ -12,20 +12,20 @@ use crate::model::scenario::{
     Avoidability, Claim, ENDS, Figure, MODULES, Origin, Scenario, ScenarioStart, ScenarioStep,
 };
 use crate::model::{
-    AMBIENT_MAX, Bound, Domain, Facts, Initial, Memory, Parameter, Row, SIGNAL_PHASE_S, Space, Value, bounds,
-    code, evaluate, locals,
+    AMBIENT_MAX, Bound, Domain, Facts, Initial, Memory, Parameter, Row, SIGNAL_PHASE_S, Space, StateDef,
+    Value, bounds, code, evaluate, locals,
 };
-use crate::syntax::ast::{BinaryOp, ClauseKind, FileId};
-use crate::syntax::{Diagnostic, LANGUAGE, ast, listed, parse};
+use crate::syntax::ast::{BinaryOp, ClauseKind};
+use crate::syntax::{Diagnostic, ast, listed};
 use crate::units::{Dimension, Rational};
 
-/// Numbers of steps stay below this.
+/// Step numbers must be below this.
 const STEPS_MAX: u64 = 100_000;
 
 /// The scenario of a file, checked against the space that it uses.
 ///
 /// # Errors
-/// Everything that is wrong with it. A file without a scenario, or with two, is an error too.
+/// All mistakes in the scenario. A file without a scenario, or with two, is an error too.
 pub fn scenario(file: &ast::File, space: &Space) -> Result<Scenario, Vec<Diagnostic>> {
     let mut found = file.items.iter().filter_map(|item| Some((item, item.kind.as_scenario()?)));
     let Some((item, declared)) = found.next() else {
@@ -52,18 +52,19 @@ pub fn scenario(file: &ast::File, space: &Space) -> Result<Scenario, Vec<Diagnos
     }
 }
 
-/// The row that a call names: by name, or in the order of the axes.
+/// The row that a call means. It names the values of the axes, or gives them in their order.
 ///
 /// # Errors
-/// If there is none.
+/// If there is no such row.
 pub(crate) fn row<'a>(space: &'a Space, call: &ast::Call) -> Result<&'a Row, Vec<Diagnostic>> {
     let mut reader = Reader { space, diagnostics: Vec::new() };
     reader.row(call).ok_or(reader.diagnostics)
 }
 
-struct Reader<'a> {
-    space: &'a Space,
-    diagnostics: Vec<Diagnostic>,
+/// Reads parts of a scenario and collects what is wrong with them.
+pub(super) struct Reader<'a> {
+    pub space: &'a Space,
+    pub diagnostics: Vec<Diagnostic>,
 }
 
 impl Report for Reader<'_> {
@@ -138,7 +139,7 @@ impl<'a> Reader<'a> {
 
     fn start(&mut self, declared: &ast::Scenario) -> ScenarioStart {
         let space = self.space;
-        // The seed is arbitrary: what it draws is replaced below, or reported as missing.
+        // Any seed will do: every state that it draws is replaced below or reported as missing.
         let mut memory = space.initial_memory(0);
         let mut start = (0.0, None, 0);
         self.fields_once("field", &declared.start);
@@ -188,7 +189,7 @@ impl<'a> Reader<'a> {
     }
 
     /// `time: Noon`, `sky: None` for all keys, `sky: { Rain: High }` for some.
-    fn start_state(&mut self, state: &crate::model::StateDef, given: &ast::Expr, memory: &mut Memory) {
+    pub(super) fn start_state(&mut self, state: &StateDef, given: &ast::Expr, memory: &mut Memory) {
         let space = self.space;
         if let (ast::ExprKind::Record(fields), Some(of)) = (&given.kind, state.key) {
             let keys = &space.enums[of.0].variants;
@@ -262,7 +263,7 @@ impl<'a> Reader<'a> {
             && !self.space.actions.iter().any(|action| action.name == "wait")
     }
 
-    /// The row that a call names: by name, or in the order of the axes.
+    /// The row that a call means. It names the values of the axes, or gives them in their order.
     fn row(&mut self, call: &ast::Call) -> Option<&'a Row> {
         let space = self.space;
         let Some(action) = space.actions.iter().position(|action| action.name == call.name.text) else {
@@ -373,8 +374,8 @@ impl<'a> Reader<'a> {
         sound.then_some(values)
     }
 
-    /// Drawn values that a step lacks, with an example of each: the first of a list, what a rule sets,
-    /// else the low end of the range.
+    /// The error for drawn values that a step lacks, with an example of each: the value that a rule sets, else
+    /// the first value of the list or the low end of the range.
     fn missing(
         &self,
         step: &ast::Step,
@@ -514,7 +515,7 @@ impl<'a> Reader<'a> {
         Some(modules)
     }
 
-    /// `avoidable by [cc, fsm] with npc#2`; the drivers' names are the oracle's business.
+    /// `avoidable by [cc, fsm] with npc#2`. The oracle judges whether the drivers' names are known.
     fn avoidability(&mut self, class: Avoidability, expect: &ast::Expect) -> Option<Claim> {
         let (by, others): (Vec<&ast::Clause>, Vec<&ast::Clause>) =
             expect.clauses.iter().partition(|clause| clause.kind == ClauseKind::By);
@@ -588,48 +589,12 @@ impl<'a> Reader<'a> {
     }
 }
 
-impl Space {
-    /// The memory that a text describes as the `start` of a scenario does, for example
-    /// `time: Night, sky: { Rain: High }`; what it leaves out is as [`Space::initial_memory`] says.
-    ///
-    /// # Errors
-    /// The first mistake, in words.
-    pub fn memory_from(&self, text: &str, seed: u64) -> Result<Memory, String> {
-        let around = format!(
-            "language {LANGUAGE}\nscenario given {{\nroad: any_road\nstart {{ {text} }}\nsteps {{ }}\n}}\n"
-        );
-        let (file, mistakes) = parse(FileId(0), &around);
-        let scenario = file.items.iter().find_map(|item| item.kind.as_scenario());
-        let Some(scenario) = scenario.filter(|_| mistakes.is_empty()) else {
-            return Err(format!(
-                "cannot read `{text}` as states: write `time: Night, sky: {{ Rain: High }}`"
-            ));
-        };
-        let mut reader = Reader { space: self, diagnostics: Vec::new() };
-        let mut memory = self.initial_memory(seed);
-        for field in &scenario.start {
-            match self.state(&field.name.text) {
-                Some(state) => reader.start_state(state, &field.value, &mut memory),
-                None => {
-                    let states = self.states.iter().map(|state| state.name.as_str());
-                    reader.report(unknown("state", &field.name.text, field.name.span, states));
-                }
-            }
-        }
-        match reader.diagnostics.into_iter().next() {
-            None => Ok(memory),
-            Some(Diagnostic { message, help: Some(help), .. }) => Err(format!("{message}; {help}")),
-            Some(Diagnostic { message, .. }) => Err(message),
-        }
-    }
-}
-
 /// The name of a reference driver.
 fn driver(expr: &ast::Expr) -> Option<String> {
     if let ast::ExprKind::Name(name) = &expr.kind { Some(name.clone()) } else { None }
 }
 
-/// Whether a text has the form of a SHA-256 as avastra prints it.
+/// Whether a text has the form in which avastra prints a SHA-256 digest.
 fn is_digest(text: &str) -> bool {
     let digits = text.strip_prefix("sha256:").unwrap_or("");
     digits.len() == 64 && digits.bytes().all(|byte| matches!(byte, b'0'..=b'9' | b'a'..=b'f'))

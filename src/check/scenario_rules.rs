@@ -1,7 +1,7 @@
-//! Which rules a scenario's steps break: the same conditions that are enforced when actions are
-//! drawn, said earlier, with the way to it and the way out.
+//! Which rules a scenario's steps break. The conditions are those that are enforced when actions are drawn; here
+//! a mistake is reported before the scenario is replayed, with its cause and a legal alternative.
 //!
-//! A rule that asks the world about a gap is left to the replay.
+//! Rules about a gap in the world can be judged only by the replay.
 
 use crate::model::expr::{Comparison, Expr, ExprKind};
 use crate::model::scenario::Origin;
@@ -10,10 +10,10 @@ use crate::model::{Facts, Memory, Row, RuleBody, RuleDef, Space, Value, bounds, 
 use crate::prove::{next_rows, shortest_way};
 use crate::syntax::{Diagnostic, ast, listed};
 
-/// Legal rows listed for one step, at most.
+/// Largest number of legal rows that are listed for one step.
 const ROWS_SHOWN: usize = 6;
 
-/// One step, and how it came to it.
+/// One step, and the states before it.
 pub(super) struct Moment<'a> {
     pub step: &'a ast::Step,
     pub row: &'a Row,
@@ -56,7 +56,7 @@ pub(super) fn breaches(space: &Space, moment: &Moment<'_>, origin: &Origin) -> V
     diagnostics
 }
 
-/// The timeline of the state up to the step, and the shortest legal way to where the step wants it.
+/// Adds the history of the state up to the step, and the shortest legal way to the value that the step sets.
 fn forbidden_move(
     space: &Space,
     rule: &RuleDef,
@@ -100,7 +100,7 @@ fn forbidden_move(
     })
 }
 
-/// The figures of a condition that fails, and the nearest value that would be legal.
+/// Adds the values with which the condition fails, and the nearest legal value.
 fn broken_condition(
     space: &Space,
     rule: usize,
@@ -108,7 +108,7 @@ fn broken_condition(
     moment: &Moment<'_>,
     error: Diagnostic,
 ) -> Option<Diagnostic> {
-    // What a road has is not known where the road is not.
+    // Without a known road its facts are not known either.
     let road = &space.roads[moment.road?];
     let facts = Facts { road: Some(&road.facts), ..Facts::new(moment.locals, moment.after) };
     if condition.needs_survey() || evaluate(condition, &space.functions, &facts).truth() {

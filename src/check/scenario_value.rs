@@ -1,4 +1,4 @@
-//! Values in scenarios: literals only, read back to the very f64 that was written.
+//! Values in scenarios. They are literals, and each is read back to exactly the `f64` that was written.
 
 use crate::check::expression::{exact_digits, unknown_unit};
 use crate::check::names::unknown;
@@ -9,10 +9,10 @@ use crate::syntax::{Diagnostic, ast};
 use crate::units;
 use crate::units::{Dimension, Rational};
 
-/// The literal as a value of that type.
+/// The value of a literal, which must be of the given type.
 ///
 /// # Errors
-/// If it is no literal, or not of that type.
+/// If it is not a literal, or is of another type.
 pub(super) fn value(space: &Space, expr: &ast::Expr, ty: Type) -> Result<Value, Diagnostic> {
     match (ty, &expr.kind) {
         (Type::Enum(of), ast::ExprKind::Name(name)) => {
@@ -44,7 +44,7 @@ pub(super) fn value(space: &Space, expr: &ast::Expr, ty: Type) -> Result<Value, 
 /// A number in SI units.
 ///
 /// # Errors
-/// If it is no number, its unit is unknown or of another dimension.
+/// If it is not a number, or its unit is unknown or of another dimension.
 pub(super) fn number(expr: &ast::Expr, dimension: Dimension) -> Result<f64, Diagnostic> {
     match &expr.kind {
         ast::ExprKind::Unary { op: UnaryOp::Negate, operand } => {
@@ -55,7 +55,7 @@ pub(super) fn number(expr: &ast::Expr, dimension: Dimension) -> Result<f64, Diag
     }
 }
 
-/// A number in SI units with the precision to which it was written.
+/// A number in SI units, with the number of decimals that were written.
 ///
 /// # Errors
 /// As [`number`].
@@ -68,7 +68,7 @@ pub(super) fn figure(expr: &ast::Expr, dimension: Dimension) -> Result<Figure, D
     Ok(Figure { value, decimals })
 }
 
-/// Places after the point of a literal in its SI unit; all that f64 has for any other.
+/// Decimals of a literal without a unit or in seconds; for any other literal, all that an `f64` has.
 fn decimals(expr: &ast::Expr) -> usize {
     const ALL: usize = 17;
     match &expr.kind {
@@ -98,7 +98,7 @@ fn read(literal: &ast::Number, dimension: Dimension) -> Result<f64, Diagnostic> 
     }
     let too_large = || Diagnostic::error(code::NUMBER, "the number is too large").at(literal.span, "");
     if factor == Rational::ONE {
-        // As text gives f64: what was written to the last bit is read to the last bit.
+        // The text is parsed as `f64` directly, so that the value is the same to the last bit.
         return literal.digits.parse::<f64>().ok().filter(|value| value.is_finite()).ok_or_else(too_large);
     }
     exact_digits(&literal.digits)

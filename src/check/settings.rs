@@ -12,7 +12,7 @@ use crate::units::{Dimension, Rational};
 /// The paper's observation period, s.
 const STEP_S: f64 = 6.0;
 
-/// An observation period may last so long, s.
+/// Longest observation period, s.
 const STEP_S_MAX: f64 = 600.0;
 
 /// Steps of an episode, if the space does not say.
@@ -40,7 +40,7 @@ impl Checker {
         Some(first)
     }
 
-    /// The settings, and the names of the roads if the block gives them.
+    /// The settings of the episode, and its list of roads if the block has one.
     pub(super) fn episode(&mut self, items: &[&ast::Item]) -> (EpisodeDef, Option<Vec<ast::Name>>) {
         const FIELDS: [&str; 4] = ["roads", "step", "stop", "limit"];
         let mut episode =
@@ -175,7 +175,7 @@ impl Checker {
     }
 }
 
-/// The verdict of a space that declares none of that name, as the paper counts:
+/// The verdict [`COUNTED`] for a space that does not declare it. It counts as the paper does:
 /// `collision and not repeated and not sudden`.
 fn counted() -> VerdictDef {
     let expr = |kind| Expr { kind, ty: Type::Bool, span: Span::NONE };

@@ -1,4 +1,4 @@
-//! A missing `use`: names that are declared nowhere in what was read, but in a file nearby.
+//! Suggests a missing `use`: an unknown name may be declared in a file of the same folder.
 
 use std::path::Path;
 
@@ -7,9 +7,9 @@ use crate::model::code;
 use crate::syntax::ast::{File, FileId, ItemKind, Span};
 use crate::syntax::{Diagnostic, parse};
 
-/// Says of every unknown name which of the files nearby declares it, and offers to use that file.
+/// Adds to the diagnostic of an unknown name which nearby file declares it, and a fix that uses that file.
 ///
-/// The files are given with their paths as the root would name them, and their texts.
+/// `nearby` holds each file's path, as the root would write it, and its text.
 pub fn suggest_uses(loaded: &mut Loaded, nearby: &[(String, String)]) {
     let trees: Vec<(&str, File)> =
         nearby.iter().map(|(path, text)| (path.as_str(), parse(FileId::default(), text).0)).collect();
@@ -31,14 +31,14 @@ pub fn suggest_uses(loaded: &mut Loaded, nearby: &[(String, String)]) {
 
 fn suggest(diagnostic: &mut Diagnostic, name: &str, path: &str, place: Span) {
     let title = format!("add `use \"{path}\"`");
-    // What is spelt exactly so is likelier than what is spelt alike.
+    // A declaration with exactly this name is likelier to be meant than a similar name.
     diagnostic.help = Some(format!("`{name}` is declared in `{path}`: {title}"));
     diagnostic.fixes.clear();
     let with_fix = diagnostic.clone().fix(title, place, format!("\nuse \"{path}\""));
     *diagnostic = with_fix;
 }
 
-/// Behind the last `use`, or behind `language`.
+/// The place after the last `use`, or after `language`.
 fn insertion(tree: &File) -> Span {
     let head = tree.items.iter().filter(|item| matches!(item.kind, ItemKind::Language(_) | ItemKind::Use(_)));
     let end = head.map(|item| item.span.end).max().unwrap_or(0);

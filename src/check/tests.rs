@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use crate::check::state_argument::memory_from;
 use crate::check::{Loaded, ReadError, load};
 use crate::model::{Avoidability, Claim};
 use crate::syntax::{Style, render};
@@ -243,15 +244,15 @@ fn mistakes_in_scenarios_have_their_codes() {
 fn states_can_be_given_as_text() {
     let loaded = load_files(&[("a.ava", BASE)]);
     let space = loaded.space.unwrap();
-    let memory = space.memory_from("time: Night, sky: { Rain: High }", 0).unwrap();
+    let memory = memory_from(&space, "time: Night, sky: { Rain: High }", 0).unwrap();
     let (time, sky) = space.weather(&memory);
     assert_eq!(format!("{time:?} {sky:?}"), "Night [High, None, None]");
     let plain =
         space.plain_weather().into_iter().fold(memory, |memory, (cell, value)| memory.with(cell, value));
     assert_eq!(format!("{:?}", space.weather(&plain)), "(Noon, [None, None, None])");
-    let error = space.memory_from("tim: Night", 0).unwrap_err();
+    let error = memory_from(&space, "tim: Night", 0).unwrap_err();
     assert_eq!(error, "unknown state `tim`; did you mean `time`?");
-    assert!(space.memory_from("}", 0).is_err());
+    assert!(memory_from(&space, "}", 0).is_err());
 }
 
 #[test]

@@ -1,7 +1,7 @@
-//! Declarations that nothing names.
+//! Warnings about declarations that nothing names.
 //!
-//! Only those of the space's own file are looked at: a used file offers more than each user takes.
-//! Names are compared, not scopes: what shares its name with something used is let pass. A name that
+//! Only the space's own file is examined: a used file offers more than each of its users needs. Names are
+//! compared without scopes, so a declaration counts as used if anything of that name is used. A name that
 //! begins with `_` is unused on purpose.
 
 use std::collections::BTreeSet;
@@ -12,7 +12,7 @@ use crate::syntax::{Diagnostic, ast};
 
 /// One warning for each declaration of `own` that no declaration of `all` names.
 pub(super) fn report(own: &[&ast::Item], all: &[&ast::Item]) -> Vec<Diagnostic> {
-    // A file without actions is there to be used by others.
+    // A file without actions is meant to be used by other files.
     if !all.iter().any(|item| matches!(item.kind, ItemKind::Action(_))) {
         return Vec::new();
     }
@@ -66,7 +66,7 @@ pub(super) fn report(own: &[&ast::Item], all: &[&ast::Item]) -> Vec<Diagnostic> 
     diagnostics
 }
 
-/// What a declaration names, its own names left out.
+/// Collects the names that a declaration uses; not the names that it declares.
 fn names_of_item<'a>(kind: &'a ItemKind, used: &mut BTreeSet<&'a str>) {
     match kind {
         ItemKind::State(declared) => {
@@ -85,7 +85,7 @@ fn names_of_item<'a>(kind: &'a ItemKind, used: &mut BTreeSet<&'a str>) {
             for param in &declared.params {
                 names_of_type(&param.ty, used);
                 param.within.iter().for_each(|within| names_of_expr(within, used));
-                // A parameter whose own `where` alone names it is used for nothing.
+                // A parameter that only its own `where` names is unused.
                 if let Some(condition) = &param.condition {
                     let mut inside = BTreeSet::new();
                     names_of_expr(condition, &mut inside);
@@ -160,7 +160,7 @@ fn names_of_fields<'a>(fields: &'a [ast::Field], used: &mut BTreeSet<&'a str>) {
     fields.iter().for_each(|field| names_of_expr(&field.value, used));
 }
 
-/// Every name in an expression, whatever it stands for.
+/// Collects every name in an expression.
 pub(crate) fn names_of_expr<'a>(expr: &'a ast::Expr, used: &mut BTreeSet<&'a str>) {
     match &expr.kind {
         ast::ExprKind::Name(name) => used.extend([name.as_str()]),

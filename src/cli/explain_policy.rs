@@ -1,7 +1,7 @@
 //! `avastra explain-policy`: what a policy favours, expects and looks at.
 
 use crate::agent::Face;
-use crate::check::policy::values_from;
+use crate::check::state_argument::values_from;
 use crate::train::{Insight, insight, training_arena};
 
 use super::arguments::ExplainPolicyArguments;

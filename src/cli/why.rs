@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use crate::action::{ActiveRules, Offer, Situation};
+use crate::check::state_argument::memory_from;
 use crate::emit;
 use crate::episode;
 use crate::sim::World;
@@ -36,7 +37,7 @@ pub fn why(output: &Output, arguments: &WhyArguments) -> Result<(), Failure> {
         ActiveRules::new(space, &arguments.rules.with, &arguments.rules.without).map_err(Failure::usage)?;
     let memory = match &arguments.state {
         None => space.initial_memory(SEED),
-        Some(text) => space.memory_from(text, SEED).map_err(Failure::usage)?,
+        Some(text) => memory_from(space, text, SEED).map_err(Failure::usage)?,
     };
     let start = episode::start(space, &memory, SEED);
     let world = World::new(Arc::new(episode::scene(road)), &start);

@@ -110,7 +110,8 @@ pub fn continues_expression(rule: Rule) -> bool {
 pub fn is_plain_terminal(rule: Rule) -> bool {
     matches!(
         rule,
-        Rule::colon
+        Rule::EOI
+            | Rule::colon
             | Rule::comma
             | Rule::equals
             | Rule::arrow

@@ -8,7 +8,7 @@ use pest::Parser;
 use pest::error::{ErrorVariant, InputLocation};
 use pest::iterators::Pair;
 
-use crate::syntax::ast::{Doc, File, FileId, Item, Span};
+use crate::syntax::ast::{Doc, Field, File, FileId, Item, Span};
 use crate::syntax::build::{Builder, end_of};
 use crate::syntax::diagnostic::enumerated;
 use crate::syntax::grammar::{AvaParser, Rule, continues_expression, words};
@@ -53,6 +53,17 @@ pub fn parse(file: FileId, text: &str) -> (File, Vec<Diagnostic>) {
     }
     let found = scanned.problems.into_iter().chain(mistakes).chain(version).collect();
     (tree, sorted(found))
+}
+
+/// Reads fields that stand in no file, as a command's argument gives them: `time: Night, sky: { Rain: High }`.
+/// `None` if the text has another form.
+pub fn parse_fields(text: &str) -> Option<Vec<Field>> {
+    let file = FileId::default();
+    if !scan(file, text).problems.is_empty() {
+        return None;
+    }
+    let fields = AvaParser::parse(Rule::lone_fields, text).ok()?.next()?;
+    Builder::new(file).fields(fields).ok()
 }
 
 /// In the order of the text, without more of them than anybody reads.

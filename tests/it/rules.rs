@@ -14,6 +14,7 @@ use avastra::action::{
     Surroundings, audit,
 };
 use avastra::check::load;
+use avastra::check::state_argument::memory_from;
 use avastra::episode::{Choice, Moment};
 use avastra::model::vocabulary::{Body, TimeOfDay, Verb};
 use avastra::model::{Type, Value};
@@ -251,7 +252,7 @@ impl Breach {
             (Arc::from(*name), value)
         };
         let values: Vec<(Arc<str>, Value)> = self.values.iter().map(value).collect();
-        let memory = space.memory_from(self.states, 1).expect("the states exist");
+        let memory = memory_from(space, self.states, 1).expect("the states exist");
         let surroundings = Wide { safety_gap_m: self.safety_gap_m };
         let situation =
             Situation { memory: &memory, road, rules: &rules, surroundings: &surroundings, seed: 1, step: 0 };

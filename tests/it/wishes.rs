@@ -3,6 +3,7 @@
 use avastra::action::{
     ActionTable, ActiveRules, Draw, Offer, Situation, SpawnFacts, SpawnRequest, Surroundings,
 };
+use avastra::check::state_argument::memory_from;
 use avastra::model::vocabulary::{Level, TimeOfDay};
 use avastra::model::{End, Memory, OutcomeFacts, Reach, Value};
 use avastra::syntax::ast::FileId;
@@ -175,7 +176,7 @@ fn everybody_is_slower_in_the_rain() {
     let table = wish("slower_in_rain");
     let row = row(&table, "cross_road(side: Left, mode: Far, then: Keep)");
     let fastest_mps = |rain: &str| {
-        let memory = table.space().memory_from(&format!("time: Noon, sky: {{ Rain: {rain} }}"), 1);
+        let memory = memory_from(table.space(), &format!("time: Noon, sky: {{ Rain: {rain} }}"), 1);
         let all = draws(&table, row, 3, &memory.expect("the states are there"), 100);
         assert_eq!(all.len(), 100);
         all.iter().map(|draw| number(draw, "speed")).fold(0.0, f64::max)

@@ -1,7 +1,6 @@
 //! What each code means, for `avastra explain`: one page of prose, a wrong example and a right one.
 //!
-//! The pages are files beside this one. Their examples stand as if in `scenarios/`, under the name
-//! `example.ava`, and are compiled by the tests.
+//! The pages are files in `pages/`. The tests compile their examples as `scenarios/example.ava`.
 
 #[cfg(test)]
 mod tests;
@@ -33,7 +32,7 @@ pub const PAGES: &[Page] = pages![
     "AV0704", "AV0705", "AV0706", "AV0707", "AV0708", "AV0801", "AV0802", "AV0901", "AV0902",
 ];
 
-/// The page of a code, however its letters are written.
+/// The page of a code, in capital or small letters.
 pub fn page(code: &str) -> Option<&'static Page> {
     PAGES.iter().find(|page| page.code.eq_ignore_ascii_case(code))
 }

@@ -1,5 +1,5 @@
-//! Every code has a page, and every page is true: its wrong example is wrong in that way, its right
-//! one is sound.
+//! Every code has a page, and its examples are true: the wrong example gives that code, the right one is
+//! sound.
 
 use std::path::Path;
 
@@ -8,7 +8,7 @@ use crate::check::{Loaded, ReadError, load};
 use crate::model::policy::VARIABLES;
 use crate::syntax::{Style, render};
 
-/// Compiles an example as if it stood beside the shipped files.
+/// Compiles an example as if it were in the folder of the shipped files.
 fn compiled(text: &str) -> Loaded {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios");
     load(Path::new("example.ava"), &|path| match path.to_str() {
@@ -27,7 +27,7 @@ fn shown(loaded: &Loaded) -> String {
     all.map(|found| render(found, &loaded.sources, Style::Plain)).collect::<Vec<_>>().join("\n")
 }
 
-/// The codes as the two tables declare them.
+/// The codes that the two tables declare.
 fn declared() -> Vec<String> {
     let tables = [include_str!("../../model/code.rs"), include_str!("../../syntax/code.rs")];
     let quoted =

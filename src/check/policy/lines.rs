@@ -1,5 +1,5 @@
-//! The checks of a policy's readable lines. They are proofs over boxes: what they say of a line is true of
-//! every state.
+//! Checks the rules of a policy, line by line. The checks are proofs over boxes of states: what they report
+//! about a line is true for every state.
 
 use crate::check::expression::{exact_digits, unknown_unit};
 use crate::check::names::unknown;
@@ -16,10 +16,10 @@ use crate::units::{Dimension, Rational};
 use crate::check::policy::region::Region;
 use crate::model::policy::{PolicyOrigin, VARIABLES, Variable, VariableKind, variable_index};
 
-/// The lines of a policy, checked.
+/// The checked lines of a policy.
 ///
 /// # Errors
-/// Everything that is wrong with them.
+/// All mistakes in them.
 pub(super) fn rules(
     lines: &[ast::PolicyLine],
     space: &Space,
@@ -41,7 +41,7 @@ pub(super) fn rules(
                     let calls = rule.rows.iter().zip(&line.actions);
                     diagnostics
                         .extend(calls.filter_map(|(&row, call)| illegal(space, origin, row, &region, call)));
-                    // Of a larger box than the line's own, "covered" would be no proof.
+                    // The box of an inexact line is too large, so it cannot prove that later lines are covered.
                     if rule.conditions.iter().all(Region::is_exact) {
                         above.push((region, line.span));
                     }
@@ -83,7 +83,7 @@ fn rule(line: &ast::PolicyLine, space: &Space) -> Result<PolicyRule, Vec<Diagnos
     if errors.is_empty() { Ok(PolicyRule { conditions, rows }) } else { Err(errors) }
 }
 
-/// The comparisons that `and` joins.
+/// The comparisons that are joined by `and`.
 fn parts(condition: &Expr) -> Vec<&Expr> {
     match &condition.kind {
         ExprKind::Binary { op: BinaryOp::And, left, right, .. } => {
@@ -133,8 +133,9 @@ fn variable(name: &str, span: Span) -> Result<usize, Diagnostic> {
     })
 }
 
-/// A variable and what an observation would hold; a number may do without its unit.
-pub(super) fn value_of(name: &ast::Name, given: &Expr) -> Result<(usize, f32), Diagnostic> {
+/// The index of a variable, and the value that an observation holds for it. A number may stand without its
+/// unit.
+pub(in crate::check) fn value_of(name: &ast::Name, given: &Expr) -> Result<(usize, f32), Diagnostic> {
     let index = variable(&name.text, name.span)?;
     let value = match (VARIABLES[index].kind, bare(given)) {
         (VariableKind::Words { words, .. }, _) => word(&VARIABLES[index], words, given)?,
@@ -165,7 +166,7 @@ fn word(variable: &Variable, words: &[(&str, f32)], given: &Expr) -> Result<f64,
     found.map(|(_, value)| f64::from(*value)).ok_or_else(|| unknown("word", name, given.span, names()))
 }
 
-/// A number in the variable's own unit, exactly as written where that is the unit it is written in.
+/// A number in the variable's own unit; exact if it is written in that unit.
 fn number(variable: &Variable, given: &Expr) -> Result<f64, Diagnostic> {
     if let ExprKind::Unary { op: UnaryOp::Negate, operand } = &given.kind {
         return number(variable, operand).map(|value| -value);
@@ -197,7 +198,7 @@ fn number(variable: &Variable, given: &Expr) -> Result<f64, Diagnostic> {
         .ok_or_else(too_large)
 }
 
-/// A line whose conditions nothing can fulfil.
+/// Reports a line whose conditions no state fulfils.
 fn nowhere(rule: &PolicyRule, place: Span) -> Diagnostic {
     let alone = |condition: &&Condition| Region::all().and(condition).is_empty();
     let label = match rule.conditions.iter().find(alone) {
@@ -208,14 +209,14 @@ fn nowhere(rule: &PolicyRule, place: Span) -> Diagnostic {
     error.at(place, label).help("remove the line, or widen its conditions")
 }
 
-/// A line whose every state an earlier line takes.
+/// Reports a line that never acts because the lines above it apply to all of its states.
 fn shadowed(region: &Region, above: &[(Region, Span)], line: Span) -> Option<Diagnostic> {
     let regions: Vec<Region> = above.iter().map(|(region, _)| region.clone()).collect();
     if !region.is_covered(&regions) {
         return None;
     }
     let error = Diagnostic::error(code::POLICY_SHADOWED, "the line never gets its turn").at(line, "shadowed");
-    // One line that does it alone says more than all of them.
+    // If one line above covers it alone, only that line is named.
     let alone = above.iter().find(|(other, _)| region.is_covered(std::slice::from_ref(other)));
     let error = match alone {
         Some((_, span)) => error.beside(*span, "applies wherever it would"),
@@ -224,7 +225,7 @@ fn shadowed(region: &Region, above: &[(Region, Span)], line: Span) -> Option<Dia
     Some(error.help("remove the line, or move it up"))
 }
 
-/// A row that is legal nowhere in a line's box, on none of the policy's roads.
+/// Reports a row that is legal for no state of the line, on every road of the policy.
 fn illegal(
     space: &Space,
     origin: &PolicyOrigin,
@@ -260,7 +261,7 @@ fn illegal(
     Some(error.help("remove the row from the line, or narrow the line by `time`"))
 }
 
-/// Why a row is dead on every road of the policy, under the rules that it was trained with.
+/// The reason why a row can run on no road of the policy, under the rules that the policy was trained with.
 fn dead(space: &Space, origin: &PolicyOrigin, row: &Row) -> Option<String> {
     let roads = space.roads.iter().zip(&row.roads).filter(|(road, _)| origin.roads.contains(&road.name));
     let mut reasons = roads.map(|(road, reach)| match reach {

@@ -1,22 +1,25 @@
-//! The checks of a policy: its seal, its form, and that its network fits the table.
+//! Checks a policy: its digest, its form, and whether its network fits the action table.
 
 mod lines;
 mod region;
+
+pub(super) use lines::value_of;
 
 use serde::de::DeserializeOwned;
 use serde_json::Value;
 
 use crate::check::checker::docs;
-use crate::check::policy::lines::{rules, value_of};
+use crate::check::policy::lines::rules;
 use crate::model::policy::{Net, Policy, PolicyClaims, PolicyOrigin, record, seal, weights_from_lines};
 use crate::model::{Space, code};
-use crate::syntax::ast::{Field, FileId, Span};
-use crate::syntax::{Diagnostic, LANGUAGE, ast, parse};
+use crate::syntax::ast::{Field, Span};
+use crate::syntax::{Diagnostic, ast};
 
 /// The policy of a file, checked against the space that it uses. `text` is what the tree was read from.
 ///
 /// # Errors
-/// What is wrong with it, the seal first: of a damaged file nothing else is worth saying.
+/// All mistakes in the policy. If the digest is wrong, only that: the other mistakes of a damaged file do not
+/// help.
 pub fn policy(text: &str, file: &ast::File, space: &Space) -> Result<Policy, Vec<Diagnostic>> {
     let mut found = file.items.iter().filter_map(|item| Some((item, item.kind.as_policy()?)));
     let (item, declared) = found.next().expect("it is asked only where there is one");
@@ -59,7 +62,7 @@ pub fn policy(text: &str, file: &ast::File, space: &Space) -> Result<Policy, Vec
     })
 }
 
-/// A block of fields as the struct that it describes.
+/// Reads a block of fields into a struct.
 fn block<T: DeserializeOwned>(fields: &[Field], name: &str, whole: Span) -> Result<T, Vec<Diagnostic>> {
     let error = |span, label: String| {
         let message = format!("cannot read `{name}` of the policy");
@@ -70,7 +73,7 @@ fn block<T: DeserializeOwned>(fields: &[Field], name: &str, whole: Span) -> Resu
     serde_json::from_value(Value::Object(record)).map_err(|reason| error(span, reason.to_string()))
 }
 
-/// The network's numbers, as many as its shape wants for the table of the space.
+/// The weights of the network. Their number must fit its layers, and the last layer the table of the space.
 fn parameters(
     net: &Net,
     declared: &ast::Policy,
@@ -101,7 +104,7 @@ fn parameters(
     Ok(found)
 }
 
-/// Number of weights and biases; `None` if it is beyond counting.
+/// Number of weights and biases; `None` if it exceeds `usize`.
 fn wanted(layers: &[usize], dueling: bool) -> Option<usize> {
     let mut sum = 0_usize;
     for (at, pair) in layers.windows(2).enumerate() {
@@ -114,25 +117,4 @@ fn wanted(layers: &[usize], dueling: bool) -> Option<usize> {
 
 fn field_span(fields: &[Field], name: &str, otherwise: Span) -> Span {
     fields.iter().find(|field| field.name.text == name).map_or(otherwise, |field| field.value.span)
-}
-
-/// Values of variables as somebody gives them, `ego_speed: 12 m/s, time: Night`: the index of each, and
-/// what an observation would hold. A number may do without its unit.
-///
-/// # Errors
-/// What is wrong, in words.
-pub fn values_from(text: &str) -> Result<Vec<(usize, f32)>, String> {
-    let around = format!("language {LANGUAGE}\npolicy given {{ origin {{ {text} }} }}\n");
-    let (file, mistakes) = parse(FileId(0), &around);
-    let fields = file.items.iter().find_map(|item| Some(&item.kind.as_policy()?.origin));
-    let Some(fields) = fields.filter(|_| mistakes.is_empty()) else {
-        return Err(format!("cannot read `{text}` as a state: write `ego_speed: 12 m/s, time: Night`"));
-    };
-    let value = |field: &Field| {
-        value_of(&field.name, &field.value).map_err(|error| match error.help {
-            Some(help) => format!("{}; {help}", error.message),
-            None => error.message,
-        })
-    };
-    fields.iter().map(value).collect()
 }

@@ -1,6 +1,7 @@
-//! Where a line of rules applies: a box over the variables, in exact numbers.
+//! The region of states in which a line of a policy applies: a box over the variables, in exact numbers.
 //!
-//! "Empty" and "covered" are proofs. Of whole numbers (`obstacles`) it knows no more than of others.
+//! "Empty" and "covered" are proofs. Variables with whole numbers (`obstacles`) are treated like all other
+//! numbers.
 
 use crate::model::{End, Interval};
 use crate::units::Rational;
@@ -8,23 +9,23 @@ use crate::units::Rational;
 use crate::model::expr::Comparison;
 use crate::model::policy::{Condition, VARIABLES, VariableKind};
 
-/// A box: what is left of each variable, in the order of [`VARIABLES`].
+/// A box: the values that are left of each variable, in the order of [`VARIABLES`].
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Region(Vec<Side>);
 
-/// What is left of one variable.
+/// The values that are left of one variable.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Side {
     Numbers(Interval),
-    /// Bits of the words.
+    /// A bit for each word that is left.
     Words(u32),
 }
 
-/// Pieces of a box beyond which it is not asked whether it is covered.
+/// A box that falls into more pieces than this is not proved to be covered.
 const PIECES_MAX: usize = 4096;
 
 impl Region {
-    /// Everything that the variables can be.
+    /// The box of all states.
     pub fn all() -> Region {
         let end = |end: Option<f64>| {
             end.and_then(Rational::from_f64).map_or(End::Unbounded, |value| End::At(value, true))
@@ -38,7 +39,7 @@ impl Region {
         Region(VARIABLES.iter().map(|variable| side(&variable.kind)).collect())
     }
 
-    /// What a condition leaves of it.
+    /// The part of the box in which a condition holds.
     pub fn and(&self, condition: &Condition) -> Region {
         let mut region = self.clone();
         let side = &mut region.0[condition.variable];
@@ -46,8 +47,8 @@ impl Region {
         region
     }
 
-    /// Whether [`Region::and`] leaves exactly what fulfils the condition. A threshold that is too small or
-    /// too large for an exact number leaves everything.
+    /// Whether [`Region::and`] gives exactly the states that fulfil the condition. If the threshold is too small
+    /// or too large for an exact number, it gives the whole box.
     pub fn is_exact(condition: &Condition) -> bool {
         Rational::from_f64(condition.value).is_some()
     }
@@ -56,7 +57,7 @@ impl Region {
         self.0.iter().any(Side::is_empty)
     }
 
-    /// What is left of a variable with words, as bits.
+    /// The words that are left of a variable, one bit each.
     pub fn words(&self, variable: usize) -> u32 {
         match self.0[variable] {
             Side::Words(words) => words,
@@ -64,7 +65,7 @@ impl Region {
         }
     }
 
-    /// Whether other boxes together hold all of it; no, where that takes too long to tell.
+    /// Whether other boxes together cover this one; `false` if the answer would take too long.
     pub fn is_covered(&self, others: &[Region]) -> bool {
         let mut rest = if self.is_empty() { Vec::new() } else { vec![self.clone()] };
         for other in others {
@@ -76,7 +77,7 @@ impl Region {
         rest.is_empty()
     }
 
-    /// What is left without another box, as boxes that do not overlap.
+    /// The part of the box outside another box, as boxes that do not overlap.
     fn without(&self, other: &Region) -> Vec<Region> {
         let mut pieces = Vec::new();
         let mut inner = self.clone();
@@ -120,7 +121,7 @@ impl Side {
                     Comparison::Greater => above(false),
                     Comparison::GreaterEqual => above(true),
                     Comparison::Equal => Interval::point(value),
-                    // Only words are told apart by `!=`.
+                    // The checker of lines allows `!=` only for words.
                     Comparison::NotEqual => Interval::ALL,
                 };
                 Side::Numbers(interval.intersect(&wanted))
@@ -129,7 +130,7 @@ impl Side {
         }
     }
 
-    /// What lies in another, and what lies outside it.
+    /// The part that lies inside another side, and the parts that lie outside it.
     fn split(&self, other: &Side) -> (Side, [Side; 2]) {
         match (self, other) {
             (Side::Numbers(own), Side::Numbers(other)) => {
@@ -157,7 +158,7 @@ impl Side {
     }
 }
 
-/// No number at all.
+/// The empty interval.
 const NOTHING: Interval = Interval { low: End::At(Rational::ONE, true), high: End::At(Rational::ZERO, true) };
 
 #[cfg(test)]
@@ -195,7 +196,7 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(300))]
 
-        /// A point is left exactly if it lies in the box and in none of the others.
+        /// A box is covered exactly if no point of it lies outside the other boxes.
         #[test]
         fn covered_boxes_have_no_point_outside(
             bounds in proptest::collection::vec((0..6_u8, 0..6_u8, 0..6_u8, 0..6_u8), 1..5),

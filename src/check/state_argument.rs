@@ -1,0 +1,52 @@
+//! The parser of `--state`: the states of a space for `avastra why`, the variables of a policy for
+//! `avastra explain-policy`. Mistakes come back as one sentence, because a command line has no place to point at.
+
+use crate::check::names::unknown;
+use crate::check::policy::value_of;
+use crate::check::report::Report;
+use crate::check::scenario::Reader;
+use crate::model::{Memory, Space};
+use crate::syntax::{Diagnostic, parse_fields};
+
+/// The memory that a text describes as the `start` of a scenario does, for example
+/// `time: Night, sky: { Rain: High }`. A state that the text leaves out has its initial value; the seed draws
+/// the states that begin as `any`.
+///
+/// # Errors
+/// The first mistake, in words.
+pub fn memory_from(space: &Space, text: &str, seed: u64) -> Result<Memory, String> {
+    let fields = parse_fields(text).ok_or_else(|| {
+        format!("cannot read `{text}` as states: write `time: Night, sky: {{ Rain: High }}`")
+    })?;
+    let mut reader = Reader { space, diagnostics: Vec::new() };
+    let mut memory = space.initial_memory(seed);
+    for field in &fields {
+        match space.state(&field.name.text) {
+            Some(state) => reader.start_state(state, &field.value, &mut memory),
+            None => {
+                let states = space.states.iter().map(|state| state.name.as_str());
+                reader.report(unknown("state", &field.name.text, field.name.span, states));
+            }
+        }
+    }
+    reader.diagnostics.into_iter().next().map_or(Ok(memory), |mistake| Err(in_words(mistake)))
+}
+
+/// The index of each variable that a text names, and the value that an observation holds for it, for example
+/// `ego_speed: 12 m/s, time: Night`. A number may stand without its unit.
+///
+/// # Errors
+/// The first mistake, in words.
+pub fn values_from(text: &str) -> Result<Vec<(usize, f32)>, String> {
+    let fields = parse_fields(text)
+        .ok_or_else(|| format!("cannot read `{text}` as a state: write `ego_speed: 12 m/s, time: Night`"))?;
+    fields.iter().map(|field| value_of(&field.name, &field.value).map_err(in_words)).collect()
+}
+
+/// The message of a mistake, and what to do about it.
+fn in_words(mistake: Diagnostic) -> String {
+    match mistake.help {
+        Some(help) => format!("{}; {help}", mistake.message),
+        None => mistake.message,
+    }
+}
