@@ -1,7 +1,7 @@
 //! Marks of learning: updates a second on one core, one line `mark NAME VALUE UNIT` each.
 //!
-//! An update is what the learner does: draw a batch of 64 by priority, Double DQN's three passes and the
-//! way back, Adam, and the new priorities. 19 inputs and 45 rows, as in the paper.
+//! An update draws a batch of 64 by priority, makes Double DQN's three forward passes and the backward pass,
+//! takes a step of Adam, and sets the new priorities. There are 19 inputs and 45 rows, as in the paper.
 
 use std::hint::black_box;
 use std::sync::Arc;
@@ -14,9 +14,9 @@ use avastra::{agent, rng};
 use ndarray::Array1;
 
 const ROWS: usize = 45;
-/// Of each, the median counts.
+/// Repeats of each mark; the median counts.
 const REPEATS: usize = 7;
-/// Steps of an episode, and so updates that are measured at once.
+/// Steps of an episode, which is the number of updates measured at once.
 const STEPS: usize = 100;
 
 fn main() {
@@ -39,7 +39,7 @@ fn measured(text: &str) -> (f64, f64) {
     let rows = Rows { allowed: vec![true; ROWS], environment: vec![false; ROWS] };
     let mut learner = Learner::new(Arc::new(settings), Arc::new(rows), 1);
     let mut rng = rng::stream(1, Stream::Traffic, 0);
-    // Fills the memory, and warms everything up.
+    // Fills the replay memory and warms up the caches.
     (0..20).for_each(|_| {
         black_box(learner.learn(&episode(&mut rng, 100), &mut rng.clone()).loss);
     });

@@ -1,12 +1,13 @@
 //! Marks: how fast avastra is on this machine, one line `mark NAME VALUE UNIT` each.
 //!
-//! A mark is the median of several repeats, per CPU second of this process where there is such a clock,
-//! so that a busy machine changes little; only what two cores make of episodes goes by the wall clock.
-//! `cargo bench --bench marks -- WORD` measures only those whose name holds the word. Build time and memory of a whole process are not measured here.
+//! A mark is the median of several repeats, per CPU second of this process where there is such a clock, so that
+//! a busy machine changes little; only the mark of two cores uses the wall clock. `cargo bench --bench marks --
+//! WORD` measures only the marks whose name contains the word. Build time and memory of a whole process are not
+//! measured here.
 //!
 //! For comparison, on one core of the same kind of machine (Zen 3, 2.4 GHz nominal), per CPU second.
-//! What a tick includes differs; ours is sensing, the driving system, ten obstacles with their
-//! behaviour, swept contacts and the collision probability, at 50 Hz:
+//! What a tick includes differs between simulators. Ours includes sensing, the driving system, ten obstacles
+//! with their behaviour, swept contacts and the collision probability, at 50 Hz:
 //!
 //! | simulator | a tick or step | per s | source |
 //! |---|---|---|---|
@@ -72,7 +73,7 @@ fn main() {
     let run = run(space);
     mark("episodes_per_s", "episodes/s", || median(|| episodes_per_s(&run)));
     mark("episodes_two_cores_over_one", "x", || {
-        // In turn, so that a machine that changes its speed changes both.
+        // The two are measured in turn, so that a machine that changes its speed changes both.
         median(|| two_cores_over_one(&run))
     });
     mark("episodes_real_time_factor", "x", || real_time_factor(&run));
@@ -122,7 +123,7 @@ fn crowded(scene: &Arc<Scene>) -> World {
                     speed_mps: if verb == Verb::Walk { 1.2 } else { 9.0 },
                     distance_m,
                 };
-                // A place that is taken is no failure here: there are more places than needed.
+                // A place that is taken does not matter: there are more places than needed.
                 let _ = world.apply(&Effect::Spawn(request));
             }
         }
@@ -130,7 +131,7 @@ fn crowded(scene: &Arc<Scene>) -> World {
     world
 }
 
-/// Somebody edits the 45-action space, whose four maps are known to the server.
+/// Edits of the 45-action space, whose four maps the server has read already.
 struct Editing {
     server: Server,
     uri: String,
@@ -152,8 +153,8 @@ impl Editing {
         editing
     }
 
-    /// Another digit in the range of a parameter, from the message to the message back. Never inlined,
-    /// so that a profiler can be told to count this and nothing else.
+    /// Changes a digit in the range of a parameter, from the message to the answer. Never inlined, so that a
+    /// profiler can be told to count this and nothing else.
     #[inline(never)]
     fn keystroke(&mut self) {
         self.keystrokes += 1;
@@ -166,7 +167,7 @@ impl Editing {
     }
 }
 
-/// Somebody drives in a world of their own.
+/// A driving system in a world of its own.
 struct Drive {
     world: World,
     driver: Box<dyn ads::Ads>,
@@ -289,7 +290,7 @@ fn real_time_factor(run: &Run) -> f64 {
     simulated_s / f64::from(EPISODES) * median(|| episodes_per_s(run))
 }
 
-/// Seconds that one call takes, over so many calls.
+/// Seconds for one call, as the mean of so many calls.
 fn seconds(calls: u64, mut call: impl FnMut()) -> f64 {
     let started_s = cpu_s();
     for _ in 0..calls {
@@ -308,7 +309,7 @@ fn cpu_s() -> f64 {
     time.tv_sec as f64 + time.tv_nsec as f64 * 1e-9
 }
 
-/// The wall clock, for want of a better one, s.
+/// The wall clock, where there is no clock of CPU time, s.
 #[cfg(not(unix))]
 fn cpu_s() -> f64 {
     #[allow(clippy::disallowed_methods, reason = "a benchmark is about the clock")]

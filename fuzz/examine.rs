@@ -1,8 +1,8 @@
-//! What must hold of every text, however hostile: it is read to its end, every diagnostic can be
-//! shown, and what has no mistake in its syntax survives the printer and the formatter.
+//! The laws that hold for every text, however hostile: it is read to its end, every diagnostic can be shown,
+//! and a text without syntax errors survives the printer and the formatter.
 //!
-//! Shared by the fuzz target, which makes the texts up, and by `tests/it/hostile.rs`, which runs the
-//! ones that were kept. No file is read: a text may use those that stand here.
+//! Shared by the fuzz target, which makes up texts, and by `tests/it/hostile.rs`, which runs the texts that
+//! were kept. No file is read: a text may use only the files that stand here.
 
 use std::path::Path;
 
@@ -39,10 +39,10 @@ const STRAIGHT: &str = r#"<OpenDRIVE><header name="straight"/><road id="1" lengt
 </right>
 </laneSection></lanes></road></OpenDRIVE>"#;
 
-/// The text's own name.
+/// The file name of the text.
 const OWN: &str = "text.ava";
 
-/// Panics if one of the laws is broken.
+/// Panics if a text breaks one of the laws.
 pub fn examine(text: &str) {
     examine_syntax(text);
     examine_meaning(text);

@@ -14,17 +14,17 @@ use super::map::{LaneIndex, RoadMap, Side};
 /// Lanes are parallel if their headings, or one and the reverse of the other, are this near, rad.
 const PARALLEL_RAD: f64 = 0.35;
 
-/// Of a parallel lane the nearest point is abreast; one that ends before is this much ahead or behind, m.
+/// A parallel lane counts as abreast only if its nearest point is within this distance along the road, m.
 const ABREAST_M: f64 = 1.0;
 
-/// No median is wider, m: beyond it another street begins.
+/// The widest median, m: an opposing lane farther away belongs to another street.
 const MEDIAN_M_MAX: f64 = 40.0;
 
 /// A lane beside a place on another.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Abreast {
     pub lane: LaneIndex,
-    /// On this lane, m.
+    /// Station on this lane, m.
     pub station_m: f64,
     /// From the centre of the lane asked about to the centre of this one, m, positive to the left.
     pub lateral_m: f64,
@@ -36,22 +36,24 @@ pub struct Abreast {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Opposing {
     pub lane: LaneIndex,
-    /// On the opposing lane, which counts the other way, m.
+    /// Station on the opposing lane, in that lane's own driving direction, m.
     pub station_m: f64,
     /// From centre to centre, m, positive to the left.
     pub lateral_m: f64,
-    /// Width of what lies between it and the nearest lane that leads our way, m; 0 if they share a line.
+    /// Width of the median between the opposing lane and the nearest lane in our direction, m; 0 if they share
+    /// a line.
     pub median_m: f64,
 }
 
 impl RoadMap {
-    /// All lanes parallel to a lane at a station of it, with edges within `reach_m` of its centre, from
-    /// left to right; without itself. Of lanes outside junctions only those outside junctions.
+    /// All lanes parallel to a lane at one of its stations, with an edge within `reach_m` of its centre, from
+    /// left to right. The lane itself is left out. For a lane outside junctions, so are the lanes inside
+    /// junctions.
     pub fn abreast(&self, lane: LaneIndex, station_m: f64, reach_m: f64) -> Vec<Abreast> {
         let own = self.lane(lane);
         let pose = own.centre.pose_at(station_m);
         let mut found: Vec<Abreast> = Vec::new();
-        // The edge of a lane is at most half the widest lane from its centre.
+        // The edge of a lane is at most half the width of the widest lane away from the lane's centre.
         let centre_m = reach_m + self.grid.half_width_m();
         for (index, projection) in self.grid.beside(&self.lanes, &pose, ABREAST_M, centre_m) {
             let other = self.lane(index);
@@ -71,7 +73,7 @@ impl RoadMap {
             }
             let (station_m, lateral_m) = (projection.station_m, offset.y);
             let abreast = Abreast { lane: index, station_m, lateral_m, width_m, same_direction };
-            // Where a lane of one section follows that of another, both are abreast: one is enough.
+            // Where two lane sections meet, a lane and its successor are both abreast: one of them is enough.
             let follows = |known: &Abreast| {
                 (known.lateral_m - lateral_m).abs() < 0.1 && known.same_direction == same_direction
             };
@@ -83,13 +85,13 @@ impl RoadMap {
         found
     }
 
-    /// The nearest lane of the opposite direction beside a lane at a station of it, on the side where
-    /// opposing traffic is (left, unless traffic keeps left), across a median of at most 40 m; of this
-    /// road or another.
+    /// The nearest lane of the opposite direction beside a lane at one of its stations: on the side of opposing
+    /// traffic (left, unless traffic keeps left), across a median of at most 40 m, on the same road or on
+    /// another.
     pub fn opposing(&self, lane: LaneIndex, station_m: f64) -> Option<Opposing> {
         let own = self.lane(lane);
         let side = if own.keeps_left { -1.0 } else { 1.0 };
-        // Lanes of our own direction may lie between, hence twice.
+        // Twice the width of a median, because lanes of our own direction may lie between.
         let abreast = self.abreast(lane, station_m, 2.0 * MEDIAN_M_MAX);
         let aside_m = |beside: &Abreast| side * beside.lateral_m;
         let nearest = abreast
@@ -104,13 +106,13 @@ impl RoadMap {
             .fold(own.width_at(station_m) / 2.0, f64::max);
         let gap_m = aside_m(nearest) - nearest.width_m / 2.0 - edge_m;
         let (lane, station_m, lateral_m) = (nearest.lane, nearest.station_m, nearest.lateral_m);
-        // Rounding leaves hairs between lanes that share a line.
+        // Rounding leaves tiny gaps between lanes that share a line.
         let median_m = if gap_m > 1e-3 { gap_m } else { 0.0 };
         (median_m <= MEDIAN_M_MAX).then_some(Opposing { lane, station_m, lateral_m, median_m })
     }
 
-    /// The lane to which one may change from a lane at a station of it: same road, same direction, no
-    /// median between, permitted by markings and wide enough.
+    /// The neighbouring lane into which a vehicle may change at a station: same road, same direction, no median
+    /// between, permitted by the markings, and wide enough.
     pub fn changeable(&self, lane: LaneIndex, side: Side, station_m: f64) -> Option<LaneIndex> {
         let lane = self.lane(lane);
         let mut permitted = lane.changes_m(side).iter();
@@ -118,14 +120,14 @@ impl RoadMap {
         lane.neighbour(side).map(|neighbour| neighbour.lane)
     }
 
-    /// Where on a lane, from a station on, one may begin to change to a side, and how far one may go on
-    /// doing so, into the lanes ahead: stations and lengths, m.
+    /// Where a change from a lane to a side is permitted, from a station on: for each stretch its first station
+    /// and its length, lanes ahead included, m.
     pub fn changes_from_m(&self, lane: LaneIndex, side: Side, station_m: f64) -> Vec<(f64, f64)> {
         let stretches = Stretch::from(self, lane, side, station_m);
         stretches.iter().map(|stretch| (stretch.pairs[0].from_m, stretch.length_m())).collect()
     }
 
-    /// How far a lane change that begins at a station may go on, into the lanes ahead, m; 0 where none may
+    /// How far a lane change that begins at a station may last, lanes ahead included, m; 0 where none may
     /// begin.
     pub fn change_room_m(&self, lane: LaneIndex, side: Side, station_m: f64) -> f64 {
         Stretch::room_m(self, lane, side, station_m)
@@ -158,7 +160,7 @@ impl RoadMap {
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Connection {
     pub from: LaneIndex,
-    /// Inside the junction: one lane, or several where connecting roads have several lane sections.
+    /// The lanes inside the junction: one, or several where a connecting road has several lane sections.
     pub lanes: Vec<LaneIndex>,
     pub to: LaneIndex,
 }

@@ -4,28 +4,28 @@ use crate::geometry::{Path, Vec2, wrap_angle};
 
 use super::opendrive::{RoadElement, SectionElement};
 
-/// Chords stay this near to the curve, m; half of what the rest may rely on.
+/// Largest distance of a chord from the curve, m; other modules rely on twice as much.
 const CHORD_ERROR_M: f64 = 5e-4;
 
-/// Between two vertices the heading and the road's station are read off a straight line; so far they may
-/// be off, rad and m. Matters where a lane runs near the centre of a tight bend.
+/// Between two vertices the heading and the road's station are interpolated linearly: largest error, rad and m.
+/// It matters where a lane runs near the centre of a tight bend.
 const HEADING_ERROR_RAD: f64 = 5e-4;
 const STATION_ERROR_M: f64 = 2e-3;
 
 /// Longest chord where anything bends or widens, m.
 const CHORD_M_MAX: f64 = 1.0;
 
-/// Before a jump in curvature the last vertex stands so far ahead of it, m: linear interpolation of
-/// curvature between two vertices would otherwise smear the jump over the whole straight.
+/// Distance of the last vertex before a jump in curvature from that jump, m. Without this vertex, linear
+/// interpolation would spread the jump over the whole straight.
 const JUMP_M: f64 = 0.05;
 
-/// No lane of a real road needs as many vertices.
+/// Limit on the vertices of a lane; no lane of a real road needs as many.
 const SAMPLES_MAX: usize = 500_000;
 
-/// Longer than any lane, m: roads are at most a tenth of this.
+/// Limit on the length of a lane, m; a road is at most a tenth as long.
 const LANE_M_MAX: f64 = 1e6;
 
-/// Farther from the origin than any map in metres (UTM northings reach 1e7).
+/// Limit on the distance from the origin, m; no map in metres reaches it (UTM northings reach 1e7).
 const COORDINATE_M_MAX: f64 = 1e8;
 
 /// A lane of one section, sampled in driving direction.
@@ -49,15 +49,15 @@ struct Sample {
     folded: bool,
 }
 
-/// Cubics that end at zero undershoot a little; narrower than this is a mistake, m.
+/// Widths below this are a mistake, m; a cubic that ends at zero undershoots a little.
 const WIDTH_M_MIN: f64 = -0.1;
 
 /// Why a lane has no centre line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum NoCentreLine {
-    /// The section is too short to hold one.
+    /// The section is too short for a centre line.
     Short,
-    /// Its polynomials or curves leave what a road can be.
+    /// Its polynomials or curves have values that no road has.
     Wild,
     /// Its width falls below zero: its edges would cross, and its centre lie in another lane.
     Inverted,
@@ -66,7 +66,7 @@ pub enum NoCentreLine {
 /// Samples the centre of a lane of a section.
 ///
 /// # Errors
-/// If there is nothing to sample, or no end of it.
+/// If the lane is too short, too large, or narrower than zero.
 pub fn centre_line(
     road: &RoadElement,
     section: &SectionElement,
@@ -86,7 +86,7 @@ pub fn centre_line(
     let mut samples: Vec<Sample> = Vec::new();
     for (i, piece) in breaks_m.windows(2).enumerate() {
         let (begin_m, limit_m) = (piece[0], piece[1]);
-        // A hair before its end a piece still follows its own polynomials.
+        // At its end the polynomials of the next piece hold; just before it still those of this piece.
         let mut end_m = limit_m - 1e-7;
         if i + 2 < breaks_m.len() {
             let jump = curve.at(limit_m).curvature_per_m - curve.at(end_m).curvature_per_m;
@@ -107,7 +107,7 @@ pub fn centre_line(
     if samples.iter().any(|sample| sample.width_m < WIDTH_M_MIN) {
         return Err(NoCentreLine::Inverted);
     }
-    // Path drops points that coincide; widths and stations must stay in step with it.
+    // `Path` drops points that coincide; the lists of widths and stations must drop the same ones.
     samples.dedup_by(|b, a| (b.position - a.position).norm() < 1e-5);
     if !road.runs_along(lane) {
         samples.reverse();
@@ -163,7 +163,7 @@ impl Curve<'_> {
         }
     }
 
-    /// Appends both ends and whatever is needed in between.
+    /// Appends both ends and the vertices needed between them.
     fn sample(&self, begin: Sample, end: Sample, samples: &mut Vec<Sample>) {
         samples.push(begin);
         let steps = if self.is_straight(begin, end) {
@@ -181,13 +181,14 @@ impl Curve<'_> {
         }
     }
 
-    /// The point half-way by station.
+    /// The point at the middle station.
     fn between(&self, begin: Sample, end: Sample) -> Sample {
         self.at((begin.s_m + end.s_m) / 2.0)
     }
 
-    /// Appends points strictly between two until the chords are near enough; `middle` is the point
-    /// half-way. A point takes long to compute: what one level has looked at the next takes over.
+    /// Appends points strictly between two until the chords are near enough; `middle` is the point at the
+    /// middle station. A point takes long to compute, so each level hands the points that it has computed to
+    /// the next.
     fn refine(&self, begin: Sample, middle: Sample, end: Sample, depth: u32, samples: &mut Vec<Sample>) {
         if depth == 0 || samples.len() > SAMPLES_MAX {
             return;
@@ -213,7 +214,7 @@ impl Curve<'_> {
     }
 }
 
-/// Whether the middle of the chord has nearly the station and the heading of the curve there.
+/// Whether linear interpolation gives nearly the curve's station and heading at the middle of the chord.
 fn interpolates(begin: Sample, middle: Sample, end: Sample) -> bool {
     let chord = end.position - begin.position;
     let length_m = chord.norm().max(1e-9);
@@ -224,7 +225,7 @@ fn interpolates(begin: Sample, middle: Sample, end: Sample) -> bool {
     middle.folded || aside_rad < HEADING_ERROR_RAD && (ahead_m - length_m / 2.0).abs() < STATION_ERROR_M
 }
 
-/// How far the curve leaves the chord, or the width its linear interpolation, m.
+/// Largest distance of the curve from its chord, or of the width from its linear interpolation, m.
 fn deviation_m(begin: Sample, quarters: [Sample; 3], end: Sample) -> f64 {
     let chord = end.position - begin.position;
     let length_m = chord.norm().max(1e-9);

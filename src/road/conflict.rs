@@ -45,13 +45,13 @@ pub fn conflicts(map: &RoadMap, lanes: &[RouteLane], path: &Path) -> Vec<Conflic
     all
 }
 
-/// Whether two lanes leave the same lane: whoever is on the other comes from behind the ego vehicle,
-/// or drives ahead of it, and follows its own way.
+/// Whether two lanes begin at the end of the same lane. A vehicle on the other one then comes from behind the
+/// ego vehicle or drives ahead of it, and is no crossing traffic.
 fn diverges(map: &RoadMap, here: LaneIndex, other: LaneIndex) -> bool {
     map.lane(other).predecessors.iter().any(|from| map.lane(here).predecessors.contains(from))
 }
 
-/// First point of a lane from which on it is within [`MERGE_M`] of the route: (route, lane), m.
+/// Where a lane comes within [`MERGE_M`] of the route and stays there: (station on the route, on the lane), m.
 fn merge(route: &Path, lane: &Path) -> Option<(f64, f64)> {
     let near = |point: &PathPoint| (route.project(point.position), point.station_m);
     let mut first = None;
@@ -64,7 +64,7 @@ fn merge(route: &Path, lane: &Path) -> Option<(f64, f64)> {
     first
 }
 
-/// The vertices of a path, with more where they are more than half a metre apart.
+/// The vertices of a path, with further points where they are more than half a metre apart.
 fn dense(path: &Path) -> Vec<PathPoint> {
     let mut points = Vec::new();
     for pair in path.points().windows(2) {
@@ -87,7 +87,7 @@ fn crossings(a: &Path, b: &Path) -> Vec<(f64, f64)> {
     let mut found: Vec<(f64, f64)> = Vec::new();
     let (low, high) = extent(b);
     for p in a.points().windows(2) {
-        // Most of a route is nowhere near the other lane.
+        // Most segments of a route are far from the other lane: their boxes tell so quickly.
         let (from, to) = (p[0].position, p[1].position);
         let apart =
             |axis: usize| from[axis].max(to[axis]) < low[axis] || from[axis].min(to[axis]) > high[axis];
@@ -109,7 +109,7 @@ fn crossings(a: &Path, b: &Path) -> Vec<(f64, f64)> {
     found
 }
 
-/// The corners of a box around a path, with a hair's room for rounding.
+/// Least and greatest corner of a box around a path, a little larger because of rounding.
 fn extent(path: &Path) -> (Vec2, Vec2) {
     const ROOM_M: f64 = 1e-3;
     let (mut low, mut high) = (Vec2::repeat(f64::INFINITY), Vec2::repeat(f64::NEG_INFINITY));
@@ -120,7 +120,7 @@ fn extent(path: &Path) -> (Vec2, Vec2) {
     (low - Vec2::repeat(ROOM_M), high + Vec2::repeat(ROOM_M))
 }
 
-/// Fractions along two segments at which they cross; `None` also if they are parallel.
+/// The fractions along two segments at which they cross; `None` if they do not cross or are parallel.
 fn segment_crossing(a: Vec2, b: Vec2, c: Vec2, d: Vec2) -> Option<(f64, f64)> {
     let (p, q, delta) = (b - a, d - c, c - a);
     let cross = p.x * q.y - p.y * q.x;

@@ -11,7 +11,7 @@ use super::map::{Junction, Lane, LaneIndex, LaneKey, Neighbour, RoadError, RoadM
 use super::opendrive::{Contact, Document, RoadElement, RoadLink, SectionElement};
 use super::signals::{add_crosswalks, add_signals};
 
-/// Where a file states no limit: 50 km/h, the usual one in towns.
+/// The limit of a road whose file states none: 50 km/h, usual in towns.
 const LIMIT_MPS_DEFAULT: f64 = 50.0 / 3.6;
 
 /// Below this change of heading a connection is straight (survey conventions).
@@ -46,7 +46,7 @@ pub fn build(document: &Document) -> Result<RoadMap, RoadError> {
     Ok(map)
 }
 
-/// A map in the making.
+/// A map while it is being built.
 pub struct Builder<'a> {
     pub document: &'a Document,
     pub map: RoadMap,
@@ -54,7 +54,7 @@ pub struct Builder<'a> {
     pub roads: BTreeMap<&'a str, usize>,
     /// Index in `map.junctions` and in `document.junctions`.
     pub junctions: BTreeMap<&'a str, usize>,
-    /// By road index, section and lane id.
+    /// Lanes by road index, section and lane id.
     lanes: BTreeMap<(usize, usize, i32), LaneIndex>,
 }
 
@@ -234,7 +234,7 @@ impl<'a> Builder<'a> {
         Ok(())
     }
 
-    /// The end of a road that touches a junction; if both do, the one nearer to the connecting road.
+    /// The end of a road that touches a junction; if both ends do, the one nearer to the connecting road.
     fn contact_at(&self, incoming: usize, junction: &str, connecting: usize, contact: Contact) -> Contact {
         let road = &self.document.roads[incoming];
         let touches =
@@ -257,7 +257,7 @@ impl<'a> Builder<'a> {
         End { road, section: end_section(&self.document.roads[road], contact), lane, contact }
     }
 
-    /// Joins two lane ends that meet. The direction of traffic says which of them leads into the other.
+    /// Joins two lane ends that meet. The direction of traffic decides which lane leads into the other.
     fn link(&mut self, a: End, b: End, line: u32) {
         let roads = &self.document.roads;
         for end in [a, b] {
@@ -273,7 +273,7 @@ impl<'a> Builder<'a> {
         }
         let lane = |end: End| self.lane_index(end.road, end.section, end.lane);
         let (Some(index_a), Some(index_b)) = (lane(a), lane(b)) else {
-            // One of them is no driving lane: a parking or a turning bay begins or ends here.
+            // One of the two is not a driving lane: a parking or a turning bay begins or ends here.
             return;
         };
         let leaves = |end: End| roads[end.road].runs_along(end.lane) == (end.contact == Contact::End);
@@ -357,10 +357,10 @@ struct End {
     contact: Contact,
 }
 
-/// Ends of linked lanes farther apart than this do not meet, m: a car would have to jump.
+/// Ends of linked lanes that are farther apart than this do not meet, m: a car would have to jump.
 const LOOSE_M: f64 = 0.5;
 
-/// A warning if lanes are linked whose ends do not meet.
+/// Warns of linked lanes whose ends do not meet.
 fn loose_links(map: &RoadMap) -> Option<String> {
     let links =
         map.lanes.iter().flat_map(|lane| lane.successors.iter().map(move |next| (lane, map.lane(*next))));
@@ -424,7 +424,7 @@ fn turn(path: &Path) -> Turn {
     }
 }
 
-/// The lowest limit that holds anywhere on a lane of a section; its own before the road's.
+/// The lowest speed limit on a lane of a section; a limit of the lane itself goes before the road's.
 fn speed_limit_mps(road: &RoadElement, section: &SectionElement, lane: i32) -> Option<f64> {
     let own = &section.lane(lane)?.speeds;
     lowest_limit(own, 0.0, section.end_m - section.begin_m)
@@ -439,13 +439,13 @@ fn lowest_limit(records: &[(f64, Option<f64>)], from_m: f64, to_m: f64) -> Optio
     holds.filter_map(|(_, (_, limit))| *limit).min_by(f64::total_cmp)
 }
 
-/// Width of what lies between two lanes in the middle of a section, m.
+/// Width of the gap between two lanes, measured in the middle of a section, m.
 fn gap_m(road: &RoadElement, section: &SectionElement, left: i32, right: i32) -> f64 {
     let middle_m = (section.begin_m + section.end_m) / 2.0;
     let (left_centre, left_width) = road.lane_at(section, left, middle_m);
     let (right_centre, right_width) = road.lane_at(section, right, middle_m);
     let pitch_m = left_centre.value - right_centre.value;
     let gap_m = pitch_m - (left_width.value + right_width.value) / 2.0;
-    // Rounding leaves hairs between lanes that share a line.
+    // Rounding leaves tiny gaps between lanes that share a line.
     if gap_m > 1e-6 { gap_m } else { 0.0 }
 }

@@ -9,14 +9,14 @@ use super::map::{Lane, LaneIndex};
 /// Side of a cell, m.
 const CELL_M: f64 = 8.0;
 
-/// Lanes are entered by stretches of this length, m.
+/// A lane is entered into the grid by stretches of this length, m.
 const STRETCH_M: f64 = 4.0;
 
-/// For rounding, m.
+/// Added to distances because of rounding, m.
 const SLACK_M: f64 = 1e-3;
 
-/// Where more cells would have to be looked into, whole lanes are projected on: far out, nearly all of
-/// them are in reach anyway, and each in many cells.
+/// Above this number of cells, every lane is tried instead: with a reach that wide nearly all lanes are in it,
+/// and each stands in many cells.
 const CELLS_MAX: i64 = 36;
 
 /// Which stretches of which lanes touch which cell.
@@ -67,7 +67,7 @@ impl LaneGrid {
 
     fn insert(&mut self, path: &Path, stretch: Stretch) {
         let (a, b) = (path.pose_at(stretch.from_m).position, path.pose_at(stretch.to_m).position);
-        // A curve of this length bulges by less than half of it.
+        // A curve lies less than half its length away from its chord.
         let margin = Vec2::new(STRETCH_M, STRETCH_M) / 2.0;
         let (low, high) = (cell(a.inf(&b) - margin), cell(a.sup(&b) + margin));
         for x in low.0..=high.0 {
@@ -83,8 +83,8 @@ impl LaneGrid {
         }
     }
 
-    /// The nearest point of each lane that may have one within `ahead_m` before or behind a pose and
-    /// `reach_m` beside it, by rising index; others may be among them.
+    /// The nearest point of each lane that may have a point within `ahead_m` before or behind a pose and
+    /// `reach_m` beside it, by rising index. A few lanes farther away may be among them.
     pub fn beside(
         &self,
         lanes: &[Lane],

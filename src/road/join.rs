@@ -1,4 +1,4 @@
-//! From the moves of a way to one path, with the place of each lane and each lane change on it.
+//! Joins the moves of a way into one path, and notes where each lane and each lane change lies on it.
 
 use crate::geometry::{Path, Vec2};
 
@@ -7,19 +7,19 @@ use super::map::{LanePlace, RoadMap};
 use super::route::{RouteLane, RouteLaneChange};
 use super::search::{Change, Move};
 
-/// Lanes are joined over this length, m: a millimetre between the end of one and the beginning of the
-/// next would otherwise become a segment across the road.
+/// Two lanes are joined over this length, m. Otherwise a millimetre between the end of one and the beginning of
+/// the next would become a segment across the road.
 const JOINT_M: f64 = 0.1;
 
 /// Distance between the vertices of a lane change, m.
 const CHANGE_STEP_M: f64 = 0.5;
 
-/// A path in the making.
+/// A path while it is being built.
 pub struct Joined<'a> {
     map: &'a RoadMap,
     points: Vec<(Vec2, f64, f64)>,
     length_m: f64,
-    /// Station of the last lane up to which the path has come, m.
+    /// The path has come to this station of the last lane, m.
     lane_station_m: f64,
     pub lanes: Vec<RouteLane>,
     pub changes: Vec<RouteLaneChange>,
@@ -44,7 +44,7 @@ impl<'a> Joined<'a> {
             Move::Follow(next) => {
                 self.end_lane();
                 let length_m = self.map.lane(*next).centre.length_m();
-                // Without points the start was the very end of the lane before.
+                // If there are no points yet, the route began at the very end of the lane before.
                 self.lane_station_m = if self.points.is_empty() { 0.0 } else { JOINT_M.min(length_m / 2.0) };
                 let here_m = self.length_m;
                 self.lanes.push(RouteLane { lane: *next, from_m: here_m, enter_m: here_m, to_m: here_m });
@@ -69,7 +69,7 @@ impl<'a> Joined<'a> {
         self.lanes.last_mut().expect("there is a lane from the beginning")
     }
 
-    /// Goes along the last lane up to a station of it.
+    /// Extends the path along the last lane up to a station.
     fn advance(&mut self, lane_station_m: f64) {
         let centre = &self.map.lane(self.last().lane).centre;
         let part = centre.part(self.lane_station_m, lane_station_m);
@@ -110,8 +110,8 @@ impl<'a> Joined<'a> {
         self.changes.push(RouteLaneChange { begin_m, end_m, latest_m, lateral_m, shifts_m });
     }
 
-    /// Notes the lanes that the path has come into: up to the middle of a change it is in the source
-    /// lanes, from there in the target lanes.
+    /// Notes the lanes of a change: the path is in the source lanes up to the middle of the change, then in the
+    /// target lanes.
     fn pass(&mut self, stretch: &Stretch, before: Place, place: Place, fraction: f64) {
         let pair = &stretch.pairs[place.pair];
         let lane = if fraction < 0.5 { pair.source } else { pair.target };
@@ -127,14 +127,14 @@ impl<'a> Joined<'a> {
         let last = *self.last();
         self.last().to_m = left_m;
         if ahead && last.lane == stretch.pairs[before.pair].target {
-            // Its end says best where a lane begins that was entered midway.
+            // For a lane entered midway, its begin is computed from its end, which is the more exact figure.
             self.last().from_m = left_m - self.map.lane(last.lane).centre.length_m();
         }
         self.lanes.push(RouteLane { lane, from_m, enter_m: left_m, to_m: left_m });
     }
 }
 
-/// Appends the shifts behind the end of a change, as far as its stretch goes; the station of its end.
+/// Appends the shifts behind the end of a change up to the end of its stretch, and returns the station there.
 fn shifts_beyond(
     map: &RoadMap,
     stretch: &Stretch,

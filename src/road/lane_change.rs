@@ -1,7 +1,7 @@
 //! Lane changes: where markings and widths permit them, and how a path goes from lane to lane.
 //!
-//! The lateral motion is a smooth step in the station: no lateral speed, acceleration or jump of curvature
-//! at its ends (as in Apollo's and most planners' lane changes). Traffic is nobody's business here.
+//! The lateral motion is a smooth step over the station: no lateral speed, acceleration or jump of curvature at
+//! its ends (as in Apollo's and most planners' lane changes). Traffic plays no part here.
 
 use crate::geometry::{Pose, SMOOTH_STEP_BEND_MAX, Vec2, smooth_step, wrap_angle};
 
@@ -11,26 +11,25 @@ use super::opendrive::{MarkRule, RoadElement, SectionElement};
 /// A lane narrower than this cannot be driven in yet, m: bays open from nothing.
 const WIDTH_M_MIN: f64 = 2.0;
 
-/// A strip wider than this between two lanes is no line but a median, which nobody crosses to change
-/// lanes, m.
+/// A strip between two lanes that is wider than this is a median, m. No lane change crosses a median.
 pub const STRIP_M_MAX: f64 = 0.5;
 
-/// Widths are looked at this often, m.
+/// Distance between the stations at which widths are checked, m.
 const STEP_M: f64 = 1.0;
 
-/// Largest lateral acceleration of a lane change driven at the limit, m/s²: comfortable, and at 50 km/h
-/// it gives a length of 50 m for a lane of 3.3 m.
+/// Largest lateral acceleration of a lane change at the speed limit, m/s². It is comfortable: at 50 km/h a
+/// change by 3.3 m takes 50 m.
 const LATERAL_MPS2: f64 = 1.5;
 
-/// No lane change is shorter, m: at walking pace a car needs it to shift by a lane.
+/// Least length of a lane change, m: what a car needs at walking pace to shift by a lane.
 pub const LENGTH_M_MIN: f64 = 15.0;
 
 /// Parallel lanes are not followed farther than this, m.
 const STRETCH_M_MAX: f64 = 2000.0;
 
-/// Ends of lanes and of permitted parts are taken for one within this, m.
+/// The end of a lane and the end of a permitted part count as equal within this, m.
 const TOUCH_M: f64 = 0.01;
-/// A lane change that is allowed from here on may begin at once, m.
+/// A stretch that begins at most this far ahead counts as begun, m.
 const AT_ONCE_M: f64 = 0.1;
 
 /// Length of a comfortable lane change at a speed over a width, m.
@@ -41,16 +40,16 @@ pub fn comfortable_length_m(speed_mps: f64, width_m: f64) -> f64 {
     (speed_mps * (SMOOTH_STEP_BEND_MAX * width_m / LATERAL_MPS2).sqrt()).max(LENGTH_M_MIN)
 }
 
-/// Stations of the reference line between which one may change from the left of two lanes of a section
-/// to the right one, and back, m: not over a median, not over markings that forbid it, and only where
-/// both lanes are wide enough.
+/// For two neighbouring lanes of a section: the stations of the reference line between which a vehicle may
+/// change from the left lane to the right one, and those for the way back, m. No change crosses a median or a
+/// marking that forbids it, and both lanes must be wide enough.
 pub fn permitted(
     road: &RoadElement,
     section: &SectionElement,
     left: i32,
     right: i32,
 ) -> [Vec<(f64, f64)>; 2] {
-    // The line between two lanes belongs to the one nearer to the reference line.
+    // The line between two lanes belongs to the lane that is nearer to the reference line.
     let inner = if left.abs() < right.abs() { left } else { right };
     let marks = section.lane(inner).map_or(&[][..], |lane| &lane.marks);
     let steps = ((section.end_m - section.begin_m) / STEP_M).ceil().clamp(1.0, 1e6) as usize;
@@ -68,7 +67,7 @@ pub fn permitted(
         }
         let middle_m = (from_m + to_m) / 2.0 - section.begin_m;
         let rule = marks.iter().rfind(|mark| mark.begin_m <= middle_m).map_or(MarkRule::Both, |m| m.rule);
-        // Ids fall from left to right.
+        // Lane ids fall from left to right.
         let allowed = [
             matches!(rule, MarkRule::Both | MarkRule::Decrease),
             matches!(rule, MarkRule::Both | MarkRule::Increase),
@@ -81,7 +80,7 @@ pub fn permitted(
 }
 
 fn wide(road: &RoadElement, section: &SectionElement, left: i32, right: i32, s_m: f64) -> bool {
-    // A hair before its end a section still follows its own polynomials.
+    // At its end the polynomials of the next section hold; just before it still those of this one.
     let s_m = s_m.min(section.end_m - 1e-7);
     let (left_centre, left_width) = road.lane_at(section, left, s_m);
     let (right_centre, right_width) = road.lane_at(section, right, s_m);
@@ -96,15 +95,15 @@ fn append(parts: &mut Vec<(f64, f64)>, from_m: f64, to_m: f64) {
     }
 }
 
-/// Two chains of lanes side by side, between which one may change all along.
+/// Two chains of lanes side by side; a vehicle may change from one to the other everywhere.
 #[derive(Debug, Clone)]
 pub struct Stretch {
     pub side: Side,
-    /// In driving direction.
+    /// The pairs in driving direction.
     pub pairs: Vec<Pair>,
 }
 
-/// A lane, its neighbour, and the stations of the first between which one may change.
+/// A lane, its neighbour, and the stations of the lane between which a vehicle may change.
 #[derive(Debug, Clone, Copy)]
 pub struct Pair {
     pub source: LaneIndex,
@@ -114,7 +113,7 @@ pub struct Pair {
 }
 
 impl Pair {
-    /// The pair of lanes ahead that goes on side by side without a break, if there is one.
+    /// The next pair of lanes, if both lanes go on side by side without a break.
     fn next(&self, map: &RoadMap, side: Side) -> Option<Pair> {
         let (source, target) = (map.lane(self.source), map.lane(self.target));
         if self.to_m < source.centre.length_m() - TOUCH_M {
@@ -149,9 +148,9 @@ impl Stretch {
         begun.collect()
     }
 
-    /// How far a lane change that begins at a station may go on, m; 0 where none may begin. The length of the
-    /// stretch from there, without making it: drivers ask ten times a second. A loop that leaves out the first
-    /// lane is followed up to [`STRETCH_M_MAX`].
+    /// How far a lane change that begins at a station may last, m; 0 where none may begin. It is the length of
+    /// the stretch from there, computed without building the stretch, because drivers ask ten times a second. A
+    /// loop that does not come back to the first lane is followed up to [`STRETCH_M_MAX`].
     pub fn room_m(map: &RoadMap, source: LaneIndex, side: Side, station_m: f64) -> f64 {
         let lane = map.lane(source);
         let Some(target) = lane.neighbour(side).map(|neighbour| neighbour.lane) else { return 0.0 };
@@ -171,7 +170,7 @@ impl Stretch {
         room_m
     }
 
-    /// Goes on into the lanes ahead as long as they stay side by side.
+    /// Appends the lanes ahead as long as they stay side by side.
     fn extended(mut self, map: &RoadMap) -> Stretch {
         while self.length_m() < STRETCH_M_MAX {
             match self.pairs[self.pairs.len() - 1].next(map, self.side) {

@@ -47,10 +47,10 @@ pub struct Lane {
     /// Next driving lane to the left, in the same or the opposite direction, however wide the gap.
     pub left: Option<Neighbour>,
     pub right: Option<Neighbour>,
-    /// Between which stations one may change to the left, by rising station, m: outside junctions, into a
-    /// neighbour of the same direction, where markings and widths permit it.
+    /// The stretches on which a vehicle may change to the left (from and to, m), by rising station: outside
+    /// junctions, into a neighbour of the same direction, where markings and widths permit it.
     pub changes_left_m: Vec<(f64, f64)>,
-    /// The same to the right.
+    /// The stretches on which a vehicle may change to the right.
     pub changes_right_m: Vec<(f64, f64)>,
     /// Index in [`RoadMap::junctions`], if the lane runs inside one.
     pub junction: Option<usize>,
@@ -112,7 +112,7 @@ pub struct Sign {
     pub id: String,
     pub kind: SignKind,
     pub position: Vec2,
-    /// Where it holds, with the station of the lane, m.
+    /// The lanes that it holds for, each with the station of the sign on it, m.
     pub lanes: Vec<(LaneIndex, f64)>,
 }
 
@@ -148,7 +148,7 @@ pub struct RoadMap {
     pub signs: Vec<Sign>,
     pub junctions: Vec<Junction>,
     pub crosswalks: Vec<Crosswalk>,
-    /// What was read but not understood, in words; each is worth a look.
+    /// Messages about parts of the file that were read but not understood.
     pub warnings: Vec<String>,
     pub(super) grid: LaneGrid,
 }
@@ -194,7 +194,7 @@ impl RoadMap {
                 listed(lanes)
             )));
         }
-        // Where two sections meet, the one that begins there.
+        // Where two sections meet, the place is in the section that begins there.
         let held = in_lane().rfind(|(_, candidate)| {
             let (from_m, to_m) = candidate.road_range_m();
             (from_m - 1e-3..=to_m + 1e-3).contains(&s_m)
@@ -215,9 +215,9 @@ impl RoadMap {
     /// The nearest lane within `reach_m`, its own width included; among equals the one whose heading
     /// fits `heading_rad` best.
     ///
-    /// All lanes whose surface holds the point are equals. There a metre off the centre weighs as much
-    /// as a tenth of a radian: inside a junction lanes lie over each other, and of two that lead the
-    /// same way the one nearer to its centre is meant.
+    /// All lanes whose surface holds the point are equally near. Between them the heading decides, and a metre
+    /// off the centre weighs as much as a tenth of a radian: lanes of a junction lie over each other, and of
+    /// two with the same heading the one with the nearer centre is meant.
     pub fn nearest(&self, point: Vec2, heading_rad: f64, reach_m: f64) -> Option<LanePlace> {
         let mut best: Option<(f64, f64, LanePlace)> = None;
         for (index, projection) in self.grid.near(&self.lanes, point, reach_m) {
@@ -244,7 +244,7 @@ impl RoadMap {
 const MISFIT_RAD_PER_M: f64 = 0.1;
 
 impl Lane {
-    /// The next driving lane to a side, in whichever direction.
+    /// The next driving lane to a side, of either direction.
     pub fn neighbour(&self, side: Side) -> Option<Neighbour> {
         match side {
             Side::Left => self.left,
@@ -252,7 +252,7 @@ impl Lane {
         }
     }
 
-    /// Between which stations one may change to a side, m.
+    /// The stretches on which a vehicle may change to a side: from and to, m.
     pub fn changes_m(&self, side: Side) -> &[(f64, f64)] {
         match side {
             Side::Left => &self.changes_left_m,
@@ -291,7 +291,7 @@ impl Lane {
         from_m + (to_m - from_m) * fraction
     }
 
-    /// Between which stations of the road's reference line the lane lies, m.
+    /// The first and the last station of the road's reference line beside the lane, m.
     fn road_range_m(&self) -> (f64, f64) {
         let (first_m, last_m) =
             (self.road_stations_m[0], self.road_stations_m[self.road_stations_m.len() - 1]);

@@ -36,7 +36,7 @@ pub struct RouteLane {
     /// Station of the route at which the lane begins, m. Before `enter_m` if the route begins in the
     /// lane, or comes into it by a lane change.
     pub from_m: f64,
-    /// Station from which on the route is in the lane, m. That of a lane change is its middle.
+    /// Station at which the route comes into the lane, m; with a lane change, the middle of the change.
     pub enter_m: f64,
     /// Station at which the route leaves it, m.
     pub to_m: f64,
@@ -49,13 +49,13 @@ pub struct RouteLaneChange {
     pub begin_m: f64,
     /// Here it is on the centre of the target lane, m.
     pub end_m: f64,
-    /// By this station the change must be over, m: there the road leaves no more room for it, or the
-    /// next change or the goal needs it done.
+    /// The change must be over by this station, m: there its stretch ends, the next change must begin, or the
+    /// goal lies.
     pub latest_m: f64,
     /// Distance between the two centres at the end, m, positive to the left.
     pub lateral_m: f64,
-    /// Distance between the centres (m, positive to the left) over the station, from `begin_m` to the end
-    /// of the stretch on which one may change.
+    /// Station and distance between the two centres there (m, positive to the left), from `begin_m` to the end
+    /// of the stretch on which the change is permitted.
     pub(super) shifts_m: Vec<(f64, f64)>,
 }
 
@@ -68,21 +68,21 @@ pub struct RouteStopLine {
 /// A crossing of the route with another lane inside a junction.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Conflict {
-    /// On the route, m.
+    /// Station on the route, m.
     pub station_m: f64,
     /// The other lane, inside the junction.
     pub lane: LaneIndex,
-    /// On the other lane, m.
+    /// Station on the other lane, m.
     pub lane_station_m: f64,
     /// Heading of the other lane there minus that of the route, in `(-π, π]`: positive comes from
     /// the right.
     pub angle_rad: f64,
 }
 
-/// So far the path goes on past the goal, m.
+/// Length of the path beyond the goal, if the lanes go on, m.
 const PAST_GOAL_M: f64 = 60.0;
 
-/// A stop line this little before or behind the part of a lane that is on the route is on it, too, m.
+/// A stop line counts as on the route up to this distance outside the part of its lane that the route uses, m.
 const PART_M: f64 = 0.2;
 
 impl Route {
@@ -126,7 +126,7 @@ impl Route {
             let of_lane = map.lane(lane.lane).stop_lines.iter();
             let on_route = of_lane
                 .map(|line| RouteStopLine { station_m: lane.from_m + line.station_m, signal: line.signal });
-            // Of a lane that is left or entered midway, only a part is on the route.
+            // The route uses only a part of a lane that it enters or leaves midway.
             on_route.filter(|line| (lane.enter_m - PART_M..=lane.to_m + PART_M).contains(&line.station_m))
         });
         let mut crosswalks_m: Vec<_> =
@@ -151,27 +151,27 @@ impl Route {
 }
 
 impl RouteLaneChange {
-    /// Where the centre of the source lane lies beside the path (within 5 cm), m, positive to the left:
-    /// 0 up to the beginning. Behind the stretch on which one may change the last value holds.
+    /// Offset of the source lane's centre from the path (within 5 cm), m, positive to the left. It is 0 up to
+    /// the begin of the change; behind the stretch on which the change is permitted, the last value holds.
     pub fn source_offset_m(&self, station_m: f64) -> f64 {
         let part = smooth_step((station_m - self.begin_m) / (self.end_m - self.begin_m)).value;
         -self.shift_m(station_m) * part
     }
 
-    /// Length of the change if it begins at another station, m: that of the path, or as much as is left
-    /// before `latest_m`, but at least [`RouteLaneChange::LENGTH_M_MIN`].
+    /// Length of the change if it begins at another station, m: the planned length or, if less is left, the
+    /// distance to `latest_m`, but at least [`RouteLaneChange::LENGTH_M_MIN`].
     pub fn length_from_m(&self, begin_m: f64) -> f64 {
         (self.end_m - self.begin_m).min(self.latest_m - begin_m).max(RouteLaneChange::LENGTH_M_MIN)
     }
 
-    /// Where a vehicle drives beside the path that begins the change at another station, m, positive to
-    /// the left; in the source lane if that is infinite.
+    /// Offset from the path of a vehicle that begins the change at another station, m, positive to the left.
+    /// With an infinite station the vehicle stays in the source lane.
     pub fn postponed_offset_m(&self, station_m: f64, begin_m: f64) -> f64 {
         let part = smooth_step((station_m - begin_m) / self.length_from_m(begin_m)).value;
         self.source_offset_m(station_m) + self.shift_m(station_m) * part
     }
 
-    /// No lane change is shorter, m.
+    /// Least length of a lane change, m.
     pub const LENGTH_M_MIN: f64 = LENGTH_M_MIN;
 
     /// Distance between the two centres at a station, m, positive to the left.
@@ -183,7 +183,7 @@ impl RouteLaneChange {
     }
 }
 
-/// Why there is no way, and whether a lane change would make one.
+/// The error for a goal that cannot be reached. It says whether there would be a way with a lane change.
 fn no_way(map: &RoadMap, start: LanePlace, goal: LanePlace) -> RoadError {
     let mut reached = BTreeSet::from([start.lane]);
     let mut open = vec![start.lane];

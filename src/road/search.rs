@@ -9,17 +9,17 @@ use std::collections::{BTreeMap, BinaryHeap};
 use super::lane_change::{LENGTH_M_MIN, Stretch, comfortable_length_m};
 use super::map::{LaneIndex, LanePlace, RoadMap, Side};
 
-/// What a lane change costs beside its length, m of detour. Ours: drivers take a block's detour rather
-/// than cut through traffic, but no more.
+/// Cost of a lane change in addition to its length, m of detour. The figure is ours: a driver rather makes a
+/// detour of one block than cut through traffic, but no longer one.
 const CHANGE_M: f64 = 100.0;
 
-/// What a change costs that has but half of its comfortable length, m of detour.
+/// Extra cost of a lane change that has only half of its comfortable length, m of detour.
 const HURRIED_M: f64 = 200.0;
 
-/// How a way goes on.
+/// The next move of a way.
 #[derive(Debug, Clone)]
 pub enum Move {
-    /// Into the lane that follows.
+    /// Drive on into a successor of the lane.
     Follow(LaneIndex),
     Change(Change),
 }
@@ -27,7 +27,7 @@ pub enum Move {
 /// A lane change on a way.
 #[derive(Debug, Clone)]
 pub struct Change {
-    /// Where it may be made; the change begins with it.
+    /// The stretch on which it is permitted; the change begins at its begin.
     pub stretch: Stretch,
     pub length_m: f64,
 }
@@ -35,7 +35,7 @@ pub struct Change {
 /// A place from which the search goes on.
 struct Label {
     lane: LaneIndex,
-    /// Station from which on a vehicle can be in the lane, m.
+    /// First station at which a vehicle can be in the lane, m.
     station_m: f64,
     /// Cost up to the beginning of the lane, mm: whole numbers, because a heap needs a total order.
     cost_mm: i64,
@@ -49,7 +49,7 @@ pub fn cheapest_way(map: &RoadMap, start: LanePlace, goal: LanePlace) -> Option<
     search.push(start.lane, start.station_m, -millimetres(start.station_m), None);
     while let Some(Reverse((_, _, index))) = search.open.pop() {
         let (lane, station_m) = (search.labels[index].lane, search.labels[index].station_m);
-        // A dearer way into a lane is of use only if it is in it sooner.
+        // A more expensive way into a lane is useful only if it comes into the lane at an earlier station.
         if search.settled.get(&lane).is_some_and(|soonest_m| *soonest_m <= station_m) {
             continue;
         }
@@ -68,7 +68,7 @@ pub fn cheapest_way(map: &RoadMap, start: LanePlace, goal: LanePlace) -> Option<
 struct Search<'a> {
     map: &'a RoadMap,
     labels: Vec<Label>,
-    /// By cost, station (mm) and index.
+    /// The labels to go on from, ordered by cost, station (mm) and index.
     open: BinaryHeap<Reverse<(i64, i64, usize)>>,
     settled: BTreeMap<LaneIndex, f64>,
 }
@@ -88,7 +88,7 @@ impl Search<'_> {
         }
     }
 
-    /// Changes begin as early as they may. A hurried one makes room for another, or for a goal.
+    /// A change begins as early as permitted. A shortened one leaves room for the next change or for the goal.
     fn change(&mut self, index: usize, side: Side) {
         let map = self.map;
         let (lane, station_m) = (self.labels[index].lane, self.labels[index].station_m);

@@ -8,7 +8,7 @@ use super::graph::{Builder, wrong};
 use super::map::{Crosswalk, LaneIndex, RoadError, Sign, SignKind, Signal, StopLine};
 use super::opendrive::{Meaning, Orientation, Outline, RoadElement, RoadLink, SignalElement};
 
-/// Heads of one group nearer than this share a stop line, m.
+/// Signal heads of one group that are nearer to each other than this share a stop line, m.
 const SHARED_LINE_M: f64 = 1.0;
 
 /// Adds all lights and signs: lights with a stop line on each lane they hold for.
@@ -74,17 +74,17 @@ pub fn add_signals(builder: &mut Builder) -> Result<(), RoadError> {
     Ok(())
 }
 
-/// What a signal became: an index in the map's signals or signs.
+/// What a signal of the file became: an index in the map's signals or in its signs.
 enum Found {
     Light(usize),
     Sign(usize),
 }
 
-/// Groups for lights that no controller of a junction switches: one for each arm, so that never two
-/// streets that cross are green together.
+/// Groups for lights that no controller of a junction switches: one group for each arm, so that two crossing
+/// streets are never green together.
 #[derive(Default)]
 struct Arms {
-    /// By junction, road and whether the light holds along the reference line.
+    /// Groups by junction, road, and whether the light holds for traffic along the reference line.
     groups: BTreeMap<(usize, usize, bool), usize>,
     lights: usize,
     lone: usize,
@@ -102,7 +102,7 @@ impl Arms {
         let along = match signal.orientation {
             Orientation::Along => true,
             Orientation::Against => false,
-            // The nearer end is meant.
+            // The light belongs to the nearer end of the road.
             Orientation::Both => signal.s_m > road.length_m / 2.0,
         };
         let ahead = if along { &road.successor } else { &road.predecessor };

@@ -110,7 +110,7 @@ fn a_branch_shows_what_then_comes_to_pass() {
                 Offer::Refused(_) => None,
             });
             let Some(draw) = draws.nth(moment.step % 3) else { return Choice::Pass };
-            // Others are tried as well, and leave nothing behind.
+            // Other rows are tried in a branch as well; they leave no trace in the episode.
             draws.take(2).for_each(|other| drop(moment.look_ahead(other)));
             ahead.push(moment.look_ahead(draw.clone()));
             Choice::Act(draw)

@@ -1,4 +1,4 @@
-//! Cases: every file of a directory, rendered and compared with its snapshot.
+//! Cases: each file of a directory is rendered, and the result is compared with its snapshot.
 
 use std::path::{Path, PathBuf};
 

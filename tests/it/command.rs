@@ -1,4 +1,4 @@
-//! The command as its users meet it: good days and bad ones.
+//! The command line: what it prints and writes, and how it fails.
 
 use std::path::Path;
 
@@ -142,7 +142,7 @@ fn compile_and_run_write_the_same_files_twice() {
     let svg = std::fs::read_to_string(scratch.path().join("strip.svg")).expect("it was drawn");
     roxmltree::Document::parse(&svg).expect("a picture is well-formed XML");
 
-    // A false claim is refuted, whatever it is about.
+    // A false claim of any kind is refuted.
     let lies = [
         ("expect proc == [", "expect proc == [0.999, ", "collision probability"),
         ("expect avoidable by [", "expect avoidable by [idm, ", "found   avoidable by ["),
@@ -188,7 +188,7 @@ fn an_interrupted_run_goes_on_where_it_was() {
     };
     assert_eq!(run("whole").0, 0);
     assert_eq!(run("cut").0, 0);
-    // As if it had been killed half-way.
+    // The directory is left as by a run that was killed half-way.
     let database = rusqlite::Connection::open(scratch.path().join("cut/run.db")).expect("it is a database");
     let cut = "DELETE FROM step WHERE episode >= 5; DELETE FROM collision WHERE episode >= 5;
                DELETE FROM episode WHERE episode >= 5;";

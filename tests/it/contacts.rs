@@ -1,5 +1,5 @@
-//! No contact is missed and none invented: first contacts against a twin that only ever looks at one
-//! moment at a time, every hundredth of a millisecond, and then halves the last step.
+//! No contact is missed and none invented: first contacts are compared with those of a twin, which looks at
+//! single moments, every hundredth of a millisecond, and then bisects the last step.
 //!
 //! The twin shares nothing with the code under test but the definition of the motion: between two
 //! ticks boxes move straight and turn evenly. It has no broad phase, and it tells overlap from gap by
@@ -20,16 +20,16 @@ const TICKS: usize = 10;
 /// Steps of the twin, s, and how many make a tick.
 const FINE_S: f64 = 1e-5;
 const FINE_PER_TICK: usize = 2000;
-/// Who dives no deeper than this only grazes, m: found or not, both are right.
+/// Boxes that never overlap by more than this only graze each other, m: such a contact may be found or not.
 const GRAZE_M: f64 = 1e-3;
-/// A first contact may be early by a gap of this size, m.
+/// Largest gap between the boxes at a first contact, m.
 const GAP_M: f64 = 1.1e-6;
-/// And late or early by this, s.
+/// Largest error of the time of a first contact, s.
 const TIME_S: f64 = 1e-3;
-/// Gaps that close more slowly are judged by the gap at the contact alone, m/s.
+/// Where the gap closes more slowly than this, m/s, the gap at the contact is compared and the time is not.
 const CREEP_MPS: f64 = 0.005;
 
-/// Two boxes and where they are at each tick.
+/// Two boxes and their poses at each tick.
 struct Case {
     boxes: [OrientedBox; 2],
     poses: [Vec<Pose>; 2],
@@ -38,7 +38,7 @@ struct Case {
 /// What the twin finds.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Touch {
-    /// Of the first overlap, s.
+    /// Time of the first overlap, s.
     time_s: f64,
     /// Whether they overlap by more than a graze later on.
     deep: bool,
@@ -87,7 +87,8 @@ impl Case {
         separation_m(&self.at(0, time_s), &self.at(1, time_s))
     }
 
-    /// From the corners of each to the other: boxes apart are nearest at a corner, m.
+    /// Distance between two boxes, m, from the corners of each to the other: boxes that are apart are nearest
+    /// at a corner.
     fn distance_m(&self, time_s: f64) -> f64 {
         let [a, b] = [0, 1].map(|which| self.at(which, time_s));
         let from_corners = |of: &OrientedBox, to: &OrientedBox| {
@@ -96,8 +97,8 @@ impl Case {
         from_corners(&a, &b).min(from_corners(&b, &a))
     }
 
-    /// Looks at every fine step, or, if it may skip, at those only in which a gap could be closed that
-    /// was there in the step before.
+    /// Looks at every fine step. If it may skip, it leaves out the steps in which the gap of the step before
+    /// cannot have closed.
     fn twin(&self, skips: bool) -> Option<Touch> {
         let fastest_mps = (0..self.ticks())
             .map(|tick| (0..2).map(|which| self.corner_way_m(which, tick)).sum::<f64>() / DT_S)
@@ -119,13 +120,13 @@ impl Case {
         first.map(|time_s| Touch { time_s, deep: step <= self.ticks() * FINE_PER_TICK })
     }
 
-    /// The most that a corner moves in a tick, m.
+    /// The largest distance that a corner moves in a tick, m.
     fn corner_way_m(&self, which: usize, tick: usize) -> f64 {
         let (from, to) = (&self.poses[which][tick], &self.poses[which][tick + 1]);
         (to.position - from.position).norm() + turn_rad(from, to).abs() * self.boxes[which].radius_m()
     }
 
-    /// When the overlap that is there at a fine step began.
+    /// The begin of the overlap that exists at a fine step, s.
     fn halved(&self, step: usize) -> f64 {
         let (mut apart_s, mut touching_s) = ((step as f64 - 1.0) * FINE_S, step as f64 * FINE_S);
         if apart_s < 0.0 {
@@ -199,8 +200,8 @@ const KINDS: [Kind; 8] = [
     Kind::Sliding,
 ];
 
-/// A case of a kind: two boxes that are at or near contact at some moment, and move to and from there
-/// with constant accelerations and yaw rates.
+/// A case of a kind: two boxes touch, or nearly touch, at some moment; before and after it they move with
+/// constant accelerations and yaw rates.
 fn case(kind: Kind, rng: &mut Rng) -> Case {
     let mut between = |low: f64, high: f64| rng::between(rng, low, high);
     let half_turn = core::f64::consts::PI;
@@ -218,7 +219,7 @@ fn case(kind: Kind, rng: &mut Rng) -> Case {
         widths_m[1],
     );
     let moment_s = if kind == Kind::FromContact { 0.0 } else { between(0.0, TICKS as f64 * DT_S) };
-    // Where the second lies from the first, and how far apart they are then.
+    // Direction from the first box to the second at that moment, and the gap between them.
     let towards = match kind {
         Kind::Sliding => place.left(),
         _ => avastra::geometry::unit_vector(between(-half_turn, half_turn)),
@@ -260,7 +261,7 @@ fn case(kind: Kind, rng: &mut Rng) -> Case {
         Kind::Sliding | Kind::Grazing | Kind::TouchAndLeave => [0.0, 0.0],
         _ => [between(-1.0, 1.0), between(-1.0, 1.0)],
     };
-    // Both move; the rest of the relative motion is the second's.
+    // Both boxes move; what is left of the relative motion belongs to the second.
     let common = Vec2::new(between(-35.0, 35.0), between(-35.0, 35.0));
     let poses = |shape: &OrientedBox, velocity: Vec2, acceleration: Vec2, yaw_radps: f64| -> Vec<Pose> {
         let pose_at = |tick: usize| {
@@ -298,7 +299,7 @@ fn ten_thousand_first_contacts_are_the_twins() {
             continue;
         };
         let [a, b] = [0, 1].map(|which| case.at(which, found.time_s));
-        // Two boxes that share a point touch; where is theirs is also where it is reported.
+        // The reported place of the contact lies on both boxes.
         for shape in [&a, &b] {
             assert!(from_box_m(shape, found.point) <= GAP_M, "{name}: {} touches neither", found.point);
         }
@@ -307,7 +308,7 @@ fn ten_thousand_first_contacts_are_the_twins() {
             touching += 1;
             continue;
         }
-        // The side: a line across the normal still lies between them.
+        // The reported side is right if a line across its normal still separates the boxes.
         assert!((found.normal.norm() - 1.0).abs() < 1e-9, "{name}: {}", found.normal);
         assert!(between_m(&a, &b, found.normal) >= -GAP_M, "{name}: {} separates nothing", found.normal);
         let closing_mps = closing_mps(&case, &found);
@@ -322,7 +323,7 @@ fn ten_thousand_first_contacts_are_the_twins() {
         }
     }
     println!("{touching} contacts, {grazing} grazes, {missing} misses; worst error {worst_s:e} s");
-    // The kinds are what they are called: most touch, and some do not.
+    // The kinds hold what their names say: most cases touch, and some do not.
     assert!(touching > CASES / 2 && grazing > 0 && missing > CASES / 20, "{touching} {grazing} {missing}");
 }
 
@@ -333,10 +334,10 @@ fn closing_mps(case: &Case, found: &Found) -> f64 {
     (gap_m(found.time_s - BEFORE_S) - gap_m(found.time_s)) / BEFORE_S
 }
 
-/// Whoever was there after a tick, and what the ego vehicle looked like.
+/// The obstacles and the ego vehicle after a tick.
 type Before = (OrientedBox, Vec<Obstacle>);
 
-/// A run against a driving system that sees next to nothing, so that there is something to find.
+/// A run against a driving system that sees almost nothing, so that there are contacts to find.
 fn blind() -> Run {
     let usual = run(15, 5, &[]);
     let mut config = ModularConfig::default();
@@ -357,7 +358,7 @@ fn the_contacts_of_whole_episodes_are_the_twins() {
         let mut touched: Vec<u32> = Vec::new();
         let mut watch = |world: &World, _: &dyn Ads, found: &[Contact]| {
             if let Some((ego, obstacles)) = &before {
-                // Everybody, however far away: the brute force that the broad phase is held against.
+                // Every obstacle, near or far: brute force, with which the broad phase is compared.
                 for was in obstacles.iter().filter(|was| !touched.contains(&was.id)) {
                     let Some(now) = world.obstacle(was.id) else { continue };
                     let case = Case {
@@ -399,8 +400,8 @@ fn same(case: &Case, touch: &Touch, contact: &Contact, tick: u64) {
         assert!(from_box_m(shape, contact.point) <= GAP_M, "{contact:?}");
     }
     assert!((ego.pose.to_world(contact.on_ego) - contact.point).norm() < 1e-9, "{contact:?}");
-    // By differences of the distance just before. A line held fast would not do: where the face that is
-    // met turns, the corner of it that sticks out farthest is not what is met.
+    // Measured by differences of the distance just before. A fixed line would be wrong: where the face that is
+    // met turns, its corner that sticks out farthest is not the one that is met.
     let step_s = (within_s / 4.0).min(1e-5);
     if step_s > 0.0 {
         let gap_m = |steps: f64| case.distance_m(within_s - steps * step_s);

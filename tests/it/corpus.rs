@@ -1,5 +1,5 @@
-//! The corpus of broken files: every code in it twice, every offered change a cure, and the forms in
-//! which diagnostics leave the house.
+//! The corpus of broken files: every code occurs in two of them, every offered change removes its mistake, and
+//! every output format of diagnostics is sound.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -12,7 +12,7 @@ use avastra::syntax::{Diagnostic, Severity, apply_fixes};
 use crate::cases::{cases, each_case, root};
 use crate::command::{avastra, outcome};
 
-/// Reads a case; its own text may be another than the file's.
+/// Loads a case, with `text` in place of the file's own text if there is one.
 fn loaded(path: &Path, text: Option<&str>) -> Loaded {
     let read = |file: &Path| match text {
         Some(text) if file == path => Ok(text.to_owned()),
@@ -54,7 +54,7 @@ fn every_code_is_provoked_and_every_error_twice() {
     assert!(missing.is_empty(), "{}", missing.join("\n"));
 }
 
-/// A name that a file nearby declares: which `use` is missing.
+/// A name that a file nearby declares: the diagnostic says which `use` is missing.
 #[test]
 fn a_missing_use_is_named() {
     each_case("missing_use", |path| {
@@ -63,7 +63,7 @@ fn a_missing_use_is_named() {
     });
 }
 
-/// What a diagnostic offers takes it away: made alone, the same mistake is no longer at that place.
+/// Each change that a diagnostic offers, made alone, removes the diagnostic.
 #[test]
 fn every_offered_change_is_a_cure() {
     let mut tried = 0;

@@ -1,4 +1,4 @@
-//! A healthy driving system with nothing in its way: whatever the weather, it arrives.
+//! A healthy driving system with nothing in its way arrives in every weather.
 
 use std::sync::Arc;
 
@@ -8,7 +8,7 @@ use avastra::{ads, episode};
 
 use crate::world::space;
 
-/// How far from the route the rear axle may come, m, in however wide a lane.
+/// Largest distance of the rear axle from the route, m, however wide the lane is.
 const OFFSET_M_MAX: f64 = 0.7;
 
 /// The number of drives of `modular` on each road, and of every other driver over all roads.
@@ -61,15 +61,15 @@ fn a_healthy_driving_system_mostly_survives_ambient_traffic() {
             }
         }
     }
-    // The weaknesses of `modular`, above all the crossing vehicle it does not brake for, show in ordinary
-    // traffic too; reference drivers do not look to the side, where the tail of a bus swings.
+    // The weaknesses of `modular` show in ordinary traffic too, above all that it does not brake for some
+    // crossing vehicles; reference drivers do not look to the side, where the tail of a bus swings.
     let of = |name: &str| failed.iter().filter(|who| who.starts_with(name)).count();
     assert_eq!(of("idm "), 0, "{failed:#?}");
     assert!(of("modular ") <= 2, "{failed:#?}");
     assert!(failed.len() * 20 <= drives, "{} of {drives}: {failed:#?}", failed.len());
 }
 
-/// Every level of every phenomenon comes up at every time of day; signals begin anywhere.
+/// Every level of every phenomenon occurs at every time of day; signals begin at any phase.
 fn start(seed: u64) -> Start {
     let pick = |n: u64| Level::ALL[(seed / n % 4) as usize];
     let time = TimeOfDay::ALL[(seed % 3) as usize];
@@ -90,7 +90,7 @@ fn drive(scene: &Arc<Scene>, entry: &ads::Entry, seed: u64, limit_mps: f64) {
         assert!(contacts.is_empty(), "{who}: {contacts:?}");
         assert!(world.ego().speed_mps <= 1.05 * limit_mps, "{who}: {} m/s", world.ego().speed_mps);
         let (offset_m, station_m) = (world.ego_offset_m(), world.ego_station_m());
-        // Who waits for a gap keeps to the lane that the route has left already.
+        // A vehicle that waits for a gap keeps to the lane that the route has left already.
         if scene.route.changes.iter().any(|change| (change.begin_m..change.latest_m).contains(&station_m)) {
             continue;
         }
@@ -103,7 +103,7 @@ fn drive(scene: &Arc<Scene>, entry: &ads::Entry, seed: u64, limit_mps: f64) {
 /// Half the width of a lane marking, m: a wheel on the line has not left the lane.
 const ON_THE_LINE_M: f64 = 0.06;
 
-/// How far from the middle of its lane the ego vehicle may be without leaving it, m.
+/// Largest distance of the ego vehicle from the middle of its lane without leaving the lane, m.
 fn room_m(scene: &Scene, world: &World) -> f64 {
     let here = scene.route.lane_at(world.ego_station_m());
     let width_m = scene.map.lane(here.lane).width_at(world.ego_station_m() - here.from_m);

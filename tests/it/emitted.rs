@@ -1,5 +1,4 @@
-//! What a run emits: replays to the bit, reads back to the same value, depends on nothing but the
-//! seed.
+//! What a run emits replays to the bit, reads back to the same value, and depends on nothing but the seed.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -42,7 +41,7 @@ fn half_an_action_is_none() {
     for number in 0..run.episodes() {
         let log = run.episode(number);
         assert!(log.steps.iter().all(|step| matches!(step.outcome, Outcome::Refused { .. })));
-        // Neither the first of the two nor the night is left behind.
+        // Neither the first of the two spawns nor the night remains.
         assert!(log.steps.iter().all(|step| step.state[1] == 14.0 && step.state[3] == 0.0));
         assert_replays(&run, number, &log);
     }
@@ -69,7 +68,7 @@ fn emitted_scenarios_keep_every_claim() {
         if emitted <= 2 {
             expect_snapshot("emitted", &format!("scenario_{emitted}"), &text);
         }
-        // As if the file stood in `scenarios/`: that is where its `use` looks.
+        // The file is read as if it stood in `scenarios/`, because its `use` is relative to that folder.
         let path = root().join("scenarios/emitted.ava");
         let with_it = |path: &Path| -> Result<String, _> {
             if path.ends_with("emitted.ava") { Ok(text.clone()) } else { read(path) }

@@ -1,4 +1,4 @@
-//! Causes: faults planted in the driving system are found again by the crashes that they make.
+//! Causes: `diagnose` names each fault that is planted in the driving system, from the crashes that it makes.
 
 use std::sync::Arc;
 
@@ -14,20 +14,20 @@ use crate::world::{read, run_of};
 
 /// Episodes on each road.
 const EPISODES: u32 = 50;
-/// Where one of a fault's crashes is found.
+/// A fault, and where one of its crashes is found.
 struct Planted {
     /// Shipped as `scenarios/ads/faults/NAME.yaml`; it begins with the module at fault.
     name: &'static str,
     space: &'static str,
-    /// An episode at or after which there is a crash of it.
+    /// The search for a crash begins at this episode.
     begin: usize,
 }
 
-/// Random search finds nine of them everywhere; the others show where a road is narrow, a leader has to
-/// brake and people step out, which is what the spaces of `tests/cases/faults` are made of. Of the shipped
-/// faults three are missing: noise of the localization crashes here and there, but not again when the
-/// noise is drawn anew; late steering costs a lane's width only in bends; and a vehicle that leaves its lane
-/// is on the way so soon after it could have been predicted that lane-bound prediction decides no crash.
+/// Random search finds nine of them in the shipped space. The others need a narrow road, a leader that brakes,
+/// or pedestrians that step out: the spaces of `tests/cases/faults` have these. Three shipped faults are
+/// missing. Noise of the localization makes crashes, but not again when the noise is drawn anew. Late steering
+/// costs a lane's width only in bends. Lane-bound prediction decides no crash, because a vehicle that leaves
+/// its lane is in the way very soon after the moment at which a better prediction would know.
 const PLANTED: [Planted; 12] = [
     planted("control_weak_brakes", SHIPPED, 150),
     planted("latency_half_second", "tests/cases/faults/step_out.ava", 0),
@@ -48,10 +48,10 @@ const fn planted(name: &'static str, space: &'static str, begin: usize) -> Plant
     Planted { name, space, begin }
 }
 
-/// Small variations of a crash, half of which at least must crash, too: a fault's crash is no accident.
+/// Number of small variations of a crash. At least half of them must crash too: a fault's crash is no accident.
 const VARIATIONS: u32 = 6;
 
-/// Every module a little other than it comes, so that a cause is not told by what differs alone.
+/// Small changes in every module, so that the cause is not simply the one module that differs from the default.
 const DECOYS: &str = "
 localization: { position_sigma_m: 0.06 }
 perception: { range_factor: 0.95, latency_frames: 2 }
@@ -85,15 +85,15 @@ fn the_module_at_fault_is_named() {
     assert!(wrong.is_empty(), "{wrong:#?}");
 }
 
-/// A space in which nobody need be able to avoid what appears: the notes about that are no mistakes here.
+/// A space in which obstacles may be unavoidable; the notes about that are no mistakes here.
 fn made(name: &str) -> Arc<Space> {
     let loaded = avastra::check::load(&root().join(name), &read).expect("it is there");
     assert!(!loaded.diagnostics.iter().any(|found| found.is_error()), "{name}: {:?}", loaded.diagnostics);
     loaded.space.expect("a space without mistakes is a space")
 }
 
-/// The counted collision of an episode, if the fault makes it: it is no accident, and with the faulty
-/// module as it comes there is none.
+/// The counted collision of an episode, if the fault makes it: with the default settings of the faulty module
+/// it vanishes, and small variations do not remove it.
 fn crash(run: &Run, number: usize, module: Module) -> Option<(usize, EpisodeLog, usize)> {
     let (summary, log) = run.judged(number);
     let index = summary.collisions.iter().find(|finding| finding.counted)?.number;

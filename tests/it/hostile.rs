@@ -1,5 +1,5 @@
-//! Texts that nobody writes in good faith: those that the fuzz target kept, and those that were made
-//! to be slow or large. `fuzz/` makes up more of them.
+//! Hostile texts: those that the fuzz target kept, and some made to be slow or large. `fuzz/` makes up more of
+//! them.
 
 #[path = "../../fuzz/examine.rs"]
 mod examine;
@@ -8,8 +8,9 @@ use std::process::Command;
 
 use crate::cases::{cases, root};
 
-/// What a text of 64 KB may cost, processor time in s and memory in MB. The mark is 1 s, and `fuzz/run.sh` holds an
-/// optimised build to it; this bound is for what grows without bound, on any build and a busy machine.
+/// Limits on processor time (s) and memory (MB) for a text of 64 KB. The aim is 1 s, which `fuzz/run.sh` checks
+/// with an optimised build. The limit here only catches what grows without bound, on any build and a busy
+/// machine.
 const CPU_S_MAX: f64 = 10.0;
 const PEAK_MB_MAX: f64 = 256.0;
 
@@ -43,7 +44,7 @@ fn every_prefix_of_a_space_is_examined() {
     }
 }
 
-/// 64 KB each, made to reach whatever grows faster than the text.
+/// Texts of 64 KB, each made to find something whose cost grows faster than the text.
 #[test]
 fn texts_made_to_be_slow_are_not() {
     let full = |head: &str, line: &dyn Fn(usize) -> String| {

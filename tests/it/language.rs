@@ -18,7 +18,7 @@ fn page() -> String {
     std::fs::read_to_string(root().join("LANGUAGE.md")).expect("the page is there")
 }
 
-/// What stands between the fences of ```` ```ava ````, with what follows `ava` and the line.
+/// The texts between the fences of ```` ```ava ````, each with the words after `ava` and its line.
 fn examples(page: &str) -> Vec<(String, String, usize)> {
     let mut found = Vec::new();
     let mut lines = page.lines().enumerate();
@@ -91,7 +91,7 @@ fn words_of_the_checker() -> Vec<String> {
 fn every_word_of_the_language_is_on_the_page() {
     let page = page();
     let mut on_page: BTreeSet<&str> = page.split(|c: char| !(c.is_alphanumeric() || c == '_')).collect();
-    // Units and the like are no words of letters.
+    // Units and the like do not consist of letters alone.
     on_page.extend(page.split([' ', '`', ',', '|', '\n', ')', '(', '}']));
     let names = |all: &[&'static str]| all.iter().map(|word| (*word).to_owned()).collect::<Vec<_>>();
     fn spelt<W: Word>() -> Vec<String> {

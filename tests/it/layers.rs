@@ -23,7 +23,7 @@ fn modules_use_only_what_stands_to_their_left() {
                 match ORDER.iter().position(|name| *name == module) {
                     Some(other) if other > rank => wrong.push(line),
                     Some(_) => {}
-                    // `crate::{…}` hides what it uses from this test.
+                    // With `crate::{…}` this test would not see the modules that are used.
                     None => wrong.push(line),
                 }
             }

@@ -20,6 +20,7 @@ mod references;
 mod road;
 mod rules;
 mod studies;
+mod surveys;
 mod tables;
 mod traces;
 mod torch;

@@ -1,5 +1,5 @@
-//! Policies as files: both faces are played and verified, a flipped byte is noticed wherever it is, and
-//! what is emitted is read back to the same value.
+//! Policies as files: both the network and the rules are played and verified, a flipped byte is noticed
+//! wherever it is, and an emitted policy reads back to the same value.
 
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
@@ -15,10 +15,7 @@ use safetensors::SafeTensors;
 
 use crate::cases::root;
 use crate::command::{avastra, outcome};
-use crate::world::read;
-
-const SMALL: &str = "learning_starts: 30\nupdates_per_step: 1\nhidden_units: [8]\nbatch_len: 8\n\
-                     rules_leaves: 6\nrules_rounds: 2\nrules_episodes: 3\n";
+use crate::world::{SMALL, read};
 
 /// A policy of a few episodes with a network of a few neurons, trained once for all tests.
 fn trained() -> &'static Path {
@@ -41,7 +38,7 @@ fn trained_text() -> String {
     std::fs::read_to_string(trained()).expect("a policy is written at the end")
 }
 
-/// A file of the tests' own beside the trained policy, so that its `use` still holds.
+/// Writes a file beside the trained policy, so that its `use` still finds the space.
 fn beside(name: &str, bytes: &[u8]) -> String {
     let path = trained().with_file_name(name);
     std::fs::write(&path, bytes).expect("it is writable");
@@ -65,14 +62,14 @@ fn space() -> &'static Arc<Space> {
     })
 }
 
-/// A policy whose `use` is as if it stood beside the shipped space.
+/// A policy with the `use` of a file that stands beside the shipped space.
 fn moved(text: &str) -> String {
     let begin = text.find("use \"").expect("it uses a space") + 5;
     let end = begin + text[begin..].find('"').expect("the path ends");
     format!("{}avastra45.ava{}", &text[..begin], &text[end..])
 }
 
-/// A changed text with the seal that it ought to have.
+/// A changed text with a seal that fits it.
 fn sealed(text: &str) -> String {
     let (tree, _) = avastra::syntax::parse(FileId(0), text);
     let begin = text.find("digest: \"sha256:").expect("it is sealed") + 9;
@@ -126,7 +123,7 @@ fn rules_are_distilled_anew_and_hold() {
     assert_eq!(first.parameters, second.parameters, "the network stays as it is");
 }
 
-/// Every bit of every byte, but of the digest itself in another case of its letters there is none.
+/// Every bit of every byte is flipped, except the bit that changes the case of a letter in the digest.
 #[test]
 fn a_flipped_bit_anywhere_in_a_small_policy_is_noticed() {
     let path = root().join("tests/cases/diagnostics/policy_line_shadowed.ava");
@@ -220,7 +217,7 @@ fn a_policy_is_explained() {
     }
 }
 
-/// A state within what the variables can be, from numbers in `[0, 1)`.
+/// A state within the ranges of the variables, from numbers in `[0, 1)`.
 fn observation(numbers: &[f64]) -> Observation {
     let mut observation = Observation::zeros();
     for (variable, (described, share)) in VARIABLES.iter().zip(numbers).enumerate() {
@@ -245,7 +242,7 @@ fn visit() -> impl Strategy<Value = Visit> {
     let numbers = proptest::collection::vec(0.0..1.0_f64, VARIABLES.len());
     let rows = proptest::collection::vec((any::<bool>(), -2.0..9.0_f32), 45);
     (numbers, rows, 0..6_usize).prop_map(|(numbers, mut rows, favourite)| {
-        // Few rows are best, as in a network that has learned; the last is never closed.
+        // Only a few rows are ever the best, as in a network that has learned; the last row is never closed.
         rows[favourite] = (true, 10.0);
         rows[44].0 = true;
         let (open, q_values): (Vec<bool>, Vec<f32>) = rows.into_iter().unzip();
@@ -256,7 +253,7 @@ fn visit() -> impl Strategy<Value = Visit> {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 24, failure_persistence: None, ..ProptestConfig::default() })]
 
-    /// Whatever is distilled is sound, always has a row to offer, and is read back to the same value.
+    /// Distilled rules are sound, always have a row to offer, and read back to the same value.
     #[test]
     fn emitted_rules_are_sound_and_read_back(
         visits in proptest::collection::vec(visit(), 12..60),
@@ -288,7 +285,7 @@ proptest! {
         prop_assert_eq!(policy_text(&policy, space(), "avastra45.ava"), text);
     }
 
-    /// A bit anywhere in a policy as it is written.
+    /// A bit is flipped anywhere in the text of a policy.
     #[test]
     fn a_flipped_bit_in_a_trained_policy_is_noticed(place in 0.0..1.0_f64, bit in 0..7_u8) {
         let mut bytes = moved(&trained_text()).into_bytes();

@@ -1,4 +1,5 @@
-//! Profiles of the driving system: from file to run, from run to scenario, from scenario to replay.
+//! Profiles of the driving system go from their file into a run, from there into a scenario, and into its
+//! replay.
 
 use std::path::Path;
 
@@ -7,6 +8,7 @@ use avastra::run::RunSettings;
 
 use crate::cases::root;
 use crate::command::{avastra, outcome};
+use crate::world::SMALL;
 
 const FAULT: &str = "scenarios/ads/faults/planning_never_yields.yaml";
 
@@ -60,10 +62,10 @@ fn a_scenario_keeps_the_profile_that_it_was_found_with() {
     let path = file.display().to_string();
     let (status, stdout, stderr) = outcome(&mut avastra(&["replay", &path]));
     assert_eq!(status, 0, "{stdout}{stderr}");
-    // The same profile from its file is the recorded one: claims are checked.
+    // The file holds the recorded profile, so claims are checked.
     let (status, stdout, _) = outcome(&mut avastra(&["replay", &path, "--ads-config", FAULT]));
     assert!(status == 0 && !stdout.contains("against"), "{stdout}");
-    // Another one is not: what happens is told.
+    // Another profile is not the recorded one, so the replay only tells what happens.
     let cautious = "scenarios/ads/cautious.yaml";
     let (status, stdout, _) = outcome(&mut avastra(&["replay", &path, "--ads-config", cautious]));
     assert!(status == 0 && stdout.contains("against modular with scenarios/ads/cautious.yaml"), "{stdout}");
@@ -73,7 +75,7 @@ fn a_scenario_keeps_the_profile_that_it_was_found_with() {
     let (status, _, stderr) = outcome(&mut avastra(&drawn));
     assert!(status == 0 && Path::new(&svg).is_file(), "{stderr}");
 
-    // Verdicts are told as the scenario says, by drivers that exist.
+    // The scenario names the reference drivers that judge it; they must exist.
     let other = file.with_file_name("other.ava");
     let engine = text.lines().find(|line| line.contains("engine: ")).expect("it names its world");
     let told_by = |driver: &str| {
@@ -83,11 +85,11 @@ fn a_scenario_keeps_the_profile_that_it_was_found_with() {
     };
     let (status, _, stderr) = told_by("cd");
     assert!(status == 1 && stderr.contains("no reference driver `cd`"), "{stderr}");
-    // Of the two careful drivers only one is asked now, so the other is missed.
+    // Now only one of the two careful drivers is asked, so the claim about the other fails.
     let (status, stdout, stderr) = told_by("fsm");
     assert!(status == 3 && stdout.contains("claimed avoidable by [cc"), "{stdout}{stderr}");
 
-    // A digest that the settings do not have: refused, with what to do.
+    // A digest that does not fit the settings is refused, with a remedy.
     let digest = profile(FAULT).digest();
     assert!(text.contains(&digest));
     std::fs::write(&other, text.replace(&digest, &ModularConfig::default().digest()))
@@ -131,8 +133,7 @@ fn a_profile_with_a_mistake_is_refused_by_name_line_and_remedy() {
 fn a_policy_is_verified_against_the_profile_that_it_was_trained_against() {
     let scratch = tempfile::tempdir().expect("a scratch directory");
     let config = scratch.path().join("small.yaml");
-    let small = "learning_starts: 30\nupdates_per_step: 1\nhidden_units: [8]\nbatch_len: 8\n";
-    std::fs::write(&config, small).expect("it is writable");
+    std::fs::write(&config, SMALL).expect("it is writable");
     let (config, out) = (config.display().to_string(), scratch.path().join("run").display().to_string());
     let place = ["train", "scenarios/avastra45.ava", "--road", "corner", "--episodes", "12", "--seed", "5"];
     let how = ["--config", &config, "--out", &out, "--ads-config", FAULT];

@@ -1,5 +1,5 @@
-//! Reference drivers where somebody tries to make them crash: with their perfect eyes they are the
-//! careful drivers that the verdicts take them for.
+//! Reference drivers in episodes of random search: with perfect perception they are as careful as the verdicts
+//! assume.
 
 use std::sync::atomic::AtomicBool;
 
@@ -11,8 +11,8 @@ use crate::world::{run_against, space};
 /// Episodes on each road.
 const EPISODES: u32 = 12;
 
-/// Whom one of them does run into, no other careful driver would have avoided; and that happens in one
-/// episode of thirty at most: somebody crosses so late that only swerving at once would help, and the
+/// No other careful driver would have avoided the obstacles that one of them does hit, and that happens in at
+/// most one episode of thirty: an obstacle crosses so late that only swerving at once would help, and the
 /// models brake.
 #[test]
 fn careful_drivers_run_into_nobody_whom_another_avoids() {

@@ -1,18 +1,14 @@
 //! `avastra road`: maps in words, as JSON and as pictures.
 
-use assert_cmd::Command;
 use serde_json::Value;
 
-use crate::cases::root;
+use crate::command::{avastra, outcome};
 
 const CORNER: &str = "scenarios/roads/corner.xodr";
 
 /// Exit status, stdout and stderr of `avastra road`, in the repository.
 fn road(arguments: &[&str]) -> (i32, String, String) {
-    let mut command = Command::cargo_bin("avastra").expect("the binary is built with the tests");
-    let output = command.current_dir(root()).arg("road").args(arguments).output().expect("it starts");
-    let text = |bytes: Vec<u8>| String::from_utf8(bytes).expect("it prints UTF-8");
-    (output.status.code().expect("no signal ends it"), text(output.stdout), text(output.stderr))
+    outcome(&mut avastra(&[&["road"], arguments].concat()))
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! Studies at their edges: what they find, that nothing but their file decides it, and what is refused.
+//! Studies: their results, that nothing but their file decides the results, and the files that are refused.
 
 use std::path::Path;
 use std::process::Stdio;
@@ -21,7 +21,7 @@ fn results(directory: &Path) -> Value {
     serde_json::from_str(&text).expect("it is JSON")
 }
 
-/// What is printed above the machine's own figures.
+/// The printed tables, without the figures about the machine.
 fn tables(stdout: &str) -> String {
     let (_, rest) = stdout.split_once('\n').expect("a line of settings with the directory comes first");
     rest.split("\nall figures: ").next().expect("split has a first part").to_owned()
@@ -40,7 +40,7 @@ fn a_study_depends_on_its_file_alone() {
         (&1.into(), &12.into(), &12.into())
     );
 
-    // Interrupted, gone on with by more workers, killed, and gone on with again.
+    // The study is interrupted, resumed with more workers, killed, and resumed again.
     let broken = scratch.path().join("broken");
     if interrupted(&broken, &whole) {
         let mut child = background(&["--jobs", "2", "--resume"], &broken);
@@ -55,7 +55,7 @@ fn a_study_depends_on_its_file_alone() {
     cells_are_runs(&whole);
 }
 
-/// A study under way; the last argument is its directory.
+/// Starts a study in the background; the last argument is its directory.
 fn background(arguments: &[&str], directory: &Path) -> std::process::Child {
     std::process::Command::new(avastra(&[]).get_program())
         .current_dir(root())
@@ -68,10 +68,10 @@ fn background(arguments: &[&str], directory: &Path) -> std::process::Child {
         .expect("it starts")
 }
 
-/// Ctrl-C ends a study in good order. Whether there was time for it: on a fast machine it was over before.
+/// Ctrl-C ends a study in good order. Returns false if the study was over before, as on a fast machine.
 fn interrupted(directory: &Path, whole: &Value) -> bool {
     let child = background(&["scenarios/studies/smoke.yaml", "--jobs", "1", "--out"], directory);
-    // Once there is a database it listens.
+    // The study handles Ctrl-C as soon as there is a database.
     for _ in 0..1200 {
         if directory.join("study.db").is_file() {
             break;
@@ -169,7 +169,7 @@ fn what_no_study_can_be_is_said_so() {
         assert!(status == 1 && stderr.contains(reason), "{text}: {stderr}");
         assert!(!out.exists(), "{text}: nothing is left behind");
     }
-    // Mistakes of form are said with their place.
+    // A mistake of form is reported with its line.
     std::fs::write(&file, format!("space: {space}\nagents:\n  - {{ name: random, repats: 3 }}\n"))
         .expect("writable");
     let (_, _, stderr) = outcome(&mut avastra(&["study", &file.display().to_string()]));

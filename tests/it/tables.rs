@@ -1,4 +1,4 @@
-//! The tables of the shipped spaces, and where their rows come from.
+//! The tables of the shipped spaces, compared with the published rows.
 
 use std::sync::Arc;
 

@@ -1,4 +1,5 @@
-//! Updates of the learner on made-up transitions, written for PyTorch to do again: `tests/interop/torch.sh`.
+//! Writes updates of the learner on made-up transitions, which PyTorch computes again:
+//! `tests/interop/torch.sh`.
 
 use avastra::agent::{Adam, Hyperparameters, Kind, Network, Shape, Transition};
 use avastra::rng::Stream;
@@ -42,7 +43,7 @@ fn case(preset: &str, text: &str) -> serde_json::Value {
     let transitions: Vec<Transition> = (0..TRANSITIONS).map(|_| transition(&mut rng)).collect();
     let mut losses = Vec::new();
     for update in 0..UPDATES {
-        // Both sides know which transitions and weights an update takes.
+        // Both programs use the same transitions and weights for an update.
         let chosen = (0..settings.batch_len).map(|at| (update * 37 + at * 11) % TRANSITIONS);
         let batch: Vec<&Transition> = chosen.map(|index| &transitions[index]).collect();
         let weights: Vec<f32> = (0..settings.batch_len).map(|at| 1.0 / (1.0 + (at % 4) as f32)).collect();

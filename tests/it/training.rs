@@ -1,26 +1,18 @@
-//! Training at its edges: it resumes to the same bytes, and what it writes holds or is refused.
+//! Training: a killed one resumes to the same bytes, its policies keep their claims, and damaged policies are
+//! refused.
 
 use std::path::Path;
 use std::process::Stdio;
 use std::time::Duration;
 
-use assert_cmd::Command;
 use avastra::model::policy::{Policy, seal};
 use avastra::rng::{Stream, below, stream};
 use avastra::run::Database;
 use avastra::syntax::ast::FileId;
 
 use crate::cases::root;
-use crate::world::read;
-
-const SMALL: &str = "learning_starts: 30\nupdates_per_step: 1\nhidden_units: [8]\nbatch_len: 8\n\
-                     rules_leaves: 6\nrules_rounds: 2\nrules_episodes: 3\n";
-
-fn avastra(arguments: &[&str]) -> Command {
-    let mut command = Command::cargo_bin("avastra").expect("the binary is built with the tests");
-    command.current_dir(root()).args(arguments);
-    command
-}
+use crate::command::avastra;
+use crate::world::{SMALL, read};
 
 /// A training of a few episodes with a network of a few neurons, into a directory.
 fn training(out: &Path) -> Vec<String> {
@@ -68,7 +60,7 @@ fn killed(arguments: &[String], out: &Path, waits_ms: impl IntoIterator<Item = u
     for wait_ms in waits_ms {
         let begins = !out.join("run.yaml").is_file();
         if begins {
-            // Killed before it had written its settings, it is as if it had never been.
+            // A training that is killed before it writes its settings leaves nothing to resume.
             let _ = std::fs::remove_dir_all(out);
         }
         let mut child = std::process::Command::new(&binary)
@@ -123,7 +115,7 @@ fn twenty_kills_change_nothing() {
     }
 }
 
-/// What a training leaves: its policy, or the search itself, and every scenario.
+/// The files that a training leaves: its policy or its search, and every scenario.
 fn kept(out: &Path) -> Vec<(String, Vec<u8>)> {
     let mut files = Vec::new();
     for folder in ["policy", "critical"] {
@@ -166,7 +158,7 @@ fn a_policy_is_verified_played_and_refused_when_damaged() {
     let weights = avastra::model::policy::weights_to_lines(&policy.parameters);
     assert!(weights.iter().all(|line| moved.contains(line)), "the weights come back bit by bit");
 
-    // Every so many bytes one is flipped, and lower bits and higher ones in turn.
+    // One byte in so many is flipped, at a lower and a higher bit in turn.
     for (turn, at) in (0..moved.len()).step_by(151).enumerate() {
         let mut bytes = moved.clone().into_bytes();
         bytes[at] ^= 1 << (turn % 7);
@@ -179,7 +171,7 @@ fn a_policy_is_verified_played_and_refused_when_damaged() {
 fn a_policy_that_does_not_fit_is_refused() {
     let scratch = tempfile::tempdir().expect("a scratch directory");
     let moved = beside_the_space(&trained(&scratch.path().join("run")));
-    // Changed and sealed again, so that the seal is not what is found wrong.
+    // The text is changed and sealed again, so that the seal is right and the change must be found.
     let sealed = |text: &str| {
         let (tree, _) = avastra::syntax::parse(FileId(0), text);
         let begin = text.find("    digest: \"").expect("it is sealed") + 13;

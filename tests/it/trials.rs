@@ -1,4 +1,4 @@
-//! Every row on every road: it does what it says, or why not.
+//! Every row on every road does what it says, or the result says why not.
 
 use avastra::action::ActionTable;
 use avastra::report;
@@ -24,9 +24,9 @@ fn cells(name: &str, settings: TrialSettings) -> Vec<Cell> {
     (0..rows).flat_map(|row| by_road.iter().map(move |cells| cells[row].clone())).collect()
 }
 
-/// Part of the tries of a verb, over all rows and roads, that did what they said before the ego vehicle
-/// arrived, at least. Overtakers may not drive faster than the limit, at which the ego vehicle drives as well;
-/// so most of them have not passed when the time is over.
+/// Least share of the trials of a verb, over all rows and roads, that do what they say before the ego vehicle
+/// arrives. Overtakers may not drive faster than the limit, at which the ego vehicle drives as well, so most of
+/// them have not passed when the time is over.
 const REALISED_PART_MIN: [(&str, f64); 5] = [
     ("pedestrian", 0.9),
     ("drive_ahead", 0.9),
@@ -46,7 +46,7 @@ fn every_row_does_what_it_says_or_it_is_said_why_not() {
         assert_eq!(cell.legal + refused, cell.moments, "{who}");
         assert_eq!(cell.outcome == Outcome::Masked, cell.legal == 0, "{who}");
         assert!(cell.unfair.is_empty(), "{who}: {:?}", cell.unfair);
-        // What a vehicle must never do, however the scene ends.
+        // A vehicle must never do this, however the scene ends.
         let wild = |why: &str| why.starts_with("it drives") || why.starts_with("it does not appear");
         assert!(!cell.failures.iter().any(|failure| wild(&failure.reason)), "{who}: {:?}", cell.failures);
     }

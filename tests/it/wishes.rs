@@ -1,8 +1,6 @@
-//! Ten files as a newcomer writes them, each with a wish; here it is seen that the wish came true.
+//! Ten files as a newcomer writes them, each with a wish. A test for each shows that the wish came true.
 
-use avastra::action::{
-    ActionTable, ActiveRules, Draw, Offer, Situation, SpawnFacts, SpawnRequest, Surroundings,
-};
+use avastra::action::{ActionTable, ActiveRules, Draw, Offer, Situation};
 use avastra::check::state_argument::memory_from;
 use avastra::model::vocabulary::{Level, TimeOfDay};
 use avastra::model::{End, Memory, OutcomeFacts, Reach, Value};
@@ -11,16 +9,7 @@ use avastra::syntax::{Diagnostic, format};
 
 use crate::cases::{cases, root};
 use crate::command::{avastra, outcome};
-use crate::world::{read, space_at};
-
-/// A world with room for everybody.
-struct Room;
-
-impl Surroundings for Room {
-    fn survey(&self, request: &SpawnRequest) -> Result<SpawnFacts, String> {
-        Ok(SpawnFacts { spawn_gap_m: request.distance_m, safety_gap_m: 0.0 })
-    }
-}
+use crate::world::{Wide, read, space_at};
 
 fn wish(name: &str) -> ActionTable {
     ActionTable::new(space_at(&format!("tests/cases/wishes/{name}.ava")))
@@ -31,12 +20,19 @@ fn row(table: &ActionTable, label: &str) -> usize {
     rows.position(|row| row.label == label).unwrap_or_else(|| panic!("no row `{label}`"))
 }
 
-/// What a row draws on a road under so many seeds, where it is legal.
+/// The legal draws of a row on a road, over so many seeds.
 fn draws(table: &ActionTable, row: usize, road: usize, memory: &Memory, seeds: u64) -> Vec<Draw> {
     let rules = ActiveRules::new(table.space(), &[], &[]).expect("no rule is named");
     let road = &table.space().roads[road];
     let offer = |seed| {
-        let situation = Situation { memory, road, rules: &rules, surroundings: &Room, seed, step: 0 };
+        let situation = Situation {
+            memory,
+            road,
+            rules: &rules,
+            surroundings: &Wide { safety_gap_m: 0.0 },
+            seed,
+            step: 0,
+        };
         match table.offer(&situation, row) {
             Offer::Legal(draw) => Some(draw),
             Offer::Refused(_) => None,
@@ -54,7 +50,7 @@ fn drawn(draw: &Draw, name: &str) -> Value {
     found.unwrap_or_else(|| panic!("no value `{name}`")).1
 }
 
-/// The ends of what is left of a row's range on a road.
+/// The least and the greatest value that a row still draws on a road.
 fn left(table: &ActionTable, row: usize, road: usize, name: &str) -> (f64, f64) {
     let Reach::Open(ranges) = &table.rows()[row].roads[road] else { panic!("row {row} is masked") };
     let (_, range) = ranges.iter().find(|(known, _)| &**known == name).expect("it is a drawn number");
@@ -116,7 +112,7 @@ fn trucks_are_twice_as_likely() {
         let is_truck = |draw: &&Draw| drawn(draw, "vehicle").variant() == 4;
         (all.len(), all.iter().filter(is_truck).count())
     };
-    // Two of seven instead of one of six; four standard deviations are 68 and 56.
+    // Two bodies of seven are trucks instead of one of six; four standard deviations are 68 and 56.
     let (all, trucks) = count(&wish("more_trucks"));
     assert!(all == 1400 && trucks.abs_diff(400) < 68, "{trucks} of {all}");
     let (all, trucks) = count(&ActionTable::new(space_at("scenarios/avastra45.ava")));
@@ -151,7 +147,7 @@ fn there_is_a_third_distance() {
     let table = wish("third_distance");
     let row = row(&table, "drive_ahead(lane: Current, mode: Middle, then: Keep)");
     let (low, high) = left(&table, row, 0, "distance");
-    // 30 m and half a second's way, 3 m more for large vehicles.
+    // 30 m and the way driven in half a second; 3 m more for large vehicles.
     assert!(low >= 30.0 + 0.5 * 10.0 && high <= 33.0 + 0.5 * 20.0, "{low} .. {high}");
 }
 

@@ -1,15 +1,30 @@
-//! The shipped space, ready to play.
+//! What the tests share: the shipped space ready to play, a world with room, a small learner.
 
 use std::path::Path;
 use std::sync::Arc;
 
-use avastra::action::ActionTable;
+use avastra::action::{ActionTable, SpawnFacts, SpawnRequest, Surroundings};
 use avastra::check::ReadError;
 use avastra::episode::{EpisodeLog, Script};
 use avastra::model::Space;
 use avastra::run::{Run, RunSettings};
 
 use crate::cases::root;
+
+/// Settings of a learner with a few neurons, whose rules are distilled from a few episodes.
+pub const SMALL: &str = "learning_starts: 30\nupdates_per_step: 1\nhidden_units: [8]\nbatch_len: 8\n\
+                         rules_leaves: 6\nrules_rounds: 2\nrules_episodes: 3\n";
+
+/// A world in which every spawn has room, and its gap is the distance asked for.
+pub struct Wide {
+    pub safety_gap_m: f64,
+}
+
+impl Surroundings for Wide {
+    fn survey(&self, request: &SpawnRequest) -> Result<SpawnFacts, String> {
+        Ok(SpawnFacts { spawn_gap_m: request.distance_m, safety_gap_m: self.safety_gap_m })
+    }
+}
 
 /// Reads a file as the command line does.
 pub fn read(path: &Path) -> Result<String, ReadError> {
@@ -28,7 +43,7 @@ pub fn space_at(name: &str) -> Arc<Space> {
     loaded.space.expect("a space without mistakes is a space")
 }
 
-/// An episode again from its own log: the same, bit for bit.
+/// Asserts that an episode, played again from its own log, is the same bit for bit.
 pub fn assert_replays(run: &Run, number: usize, log: &EpisodeLog) {
     let script = Script::of_log(log);
     let mut again = run.play(number, &mut |moment| script.choose(run.table(), moment), &mut |_, _, _| {});
@@ -44,12 +59,12 @@ pub fn run(episodes: u32, seed: u64, without: &[&str]) -> Run {
     run_of(space("avastra45.ava"), episodes, seed, without)
 }
 
-/// The same over any space.
+/// A run of masked random search in any space, against the modular driving system.
 pub fn run_of(space: Arc<Space>, episodes: u32, seed: u64, without: &[&str]) -> Run {
     run_against("modular", space, episodes, seed, without)
 }
 
-/// The same against any driving system.
+/// A run of masked random search in any space, against any driving system.
 pub fn run_against(ads: &str, space: Arc<Space>, episodes: u32, seed: u64, without: &[&str]) -> Run {
     let settings = RunSettings {
         avastra: "test".to_owned(),

@@ -34,7 +34,7 @@ impl Surroundings for Plain {
     }
 }
 
-/// A world without room for anybody.
+/// A world without room for any spawn.
 struct Full;
 
 impl Surroundings for Full {

@@ -82,25 +82,6 @@ proptest! {
 }
 
 #[test]
-fn each_ablation_changes_its_own_thing_and_only_that() {
-    let table = table("scenarios/avastra45.ava");
-    let surroundings = Plain { safety_gap_m: SAFETY_GAP_M };
-    for rule in ["chronology", "npc_gap", "npc_speed", "walking_pace", "no_teleport"] {
-        let mut seen = false;
-        for seed in 0..12 {
-            let memory = table.space().initial_memory(seed);
-            for offer in offers(&table, &memory, &[rule], &surroundings, seed, 0) {
-                let Offer::Legal(draw) = offer else { continue };
-                let broken = broken(&table, &memory, &draw);
-                assert!(broken.iter().all(|name| *name == rule), "without {rule}: {broken:?} {draw:?}");
-                seen |= !broken.is_empty();
-            }
-        }
-        assert!(seen, "without {rule} nothing changed");
-    }
-}
-
-#[test]
 fn optional_rules_wait_to_be_asked() {
     let table = table("scenarios/avastra45.ava");
     let memory = table.space().initial_memory(1);
@@ -176,11 +157,4 @@ fn given_values_are_judged_by_the_same_rules() {
     draw.values.pop();
     let refusals = table.check(&situation, row, &draw.values).unwrap_err();
     assert_eq!(refusals[0].reason, "`distance` is missing");
-}
-
-#[test]
-fn unknown_rules_are_named() {
-    let table = table("scenarios/avastra45.ava");
-    let error = ActiveRules::new(table.space(), &[], &named(&["chronolgy"])).unwrap_err();
-    assert_eq!(error.to_string(), "unknown rule `chronolgy`; did you mean `chronology`?");
 }

@@ -80,7 +80,7 @@ fn space() -> impl Strategy<Value = String> {
     })
 }
 
-/// The same space with its dead rows' error taken away: optional rules make no row dead.
+/// The space with all rules optional, so that dead rows are no error: an optional rule makes no row dead.
 fn with_optional_rules(text: &str) -> String {
     text.replace("\nrule ", "\noptional rule ")
 }
@@ -101,7 +101,7 @@ proptest! {
         let rules = ActiveRules::new(&loose, &names, &[]).unwrap();
         let road = &loose.roads[0];
         let world = Plain { safety_gap_m: 0.0 };
-        // Where rows are dead the strict space is refused; its error names them by number.
+        // A space with dead rows is refused; its error names the rows by number.
         let named_dead = |row: usize| verdicts.diagnostics.iter().any(|found| {
             found.code == crate::model::code::DEAD
                 && found.labels.iter().any(|label| names_row(&label.text, row))
@@ -118,7 +118,7 @@ proptest! {
                     Situation { memory: &memory, road, rules: &rules, surroundings: &world, seed: seed + draw, step: 0 };
                 let offer = table.offer(&situation, row.index);
                 prop_assert!(!(is_dead && matches!(offer, Offer::Legal(_))), "dead row drawn\n{}", text);
-                // Not only what drawing finds: a grid over the declared ranges.
+                // Draws alone would not find every value, so a grid over the declared ranges is tried too.
                 let share = |part: u64| part as f64 / 7.0;
                 let values: Vec<(Arc<str>, Value)> = loose.actions[row.action]
                     .parameters
@@ -143,7 +143,7 @@ proptest! {
                     prop_assert!(!blamed, "{}\n{}", idle.message, text);
                 }
             }
-            // What follows from others refuses nothing that they let pass.
+            // A rule that follows from others refuses nothing that the others let pass.
             for draw in 0..64 {
                 let memory = loose.initial_memory(seed + draw);
                 let situation =

@@ -48,13 +48,13 @@ pub struct Cubic {
     pub d: f64,
 }
 
-/// Cubics by rising beginning; each holds until the next begins, the first also before itself.
+/// Cubics by rising begin. Each holds until the next begins; the first one also holds before its begin.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Cubics(Vec<Cubic>);
 
 impl Cubics {
     pub fn new(mut pieces: Vec<Cubic>) -> Cubics {
-        // A stable sort: of two that begin at one place the later in the file wins.
+        // The sort is stable: of two pieces that begin at one station, the later one in the file holds.
         pieces.sort_by(|x, y| x.begin_m.total_cmp(&y.begin_m));
         Cubics(pieces)
     }

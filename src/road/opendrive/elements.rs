@@ -1,4 +1,4 @@
-//! What is read of an OpenDRIVE file, still in its own terms.
+//! The elements of an OpenDRIVE file that are read, in OpenDRIVE's own terms.
 
 use super::cubic::{Cubics, Jet};
 use super::geometry::ReferenceLine;
@@ -61,7 +61,7 @@ pub struct LaneElement {
     pub line: u32,
     /// Whether cars may drive on it, in one direction.
     pub driving: bool,
-    /// Over the distance from the section's beginning.
+    /// Width over the distance from the section's begin.
     pub widths: Cubics,
     pub borders: Cubics,
     pub predecessors: Vec<i32>,
@@ -80,7 +80,7 @@ pub struct MarkElement {
     pub rule: MarkRule,
 }
 
-/// Into which lane one may change over a marking, by the order of their ids.
+/// The direction in which a vehicle may cross a marking, by the order of the lane ids.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum MarkRule {
     Both,
@@ -104,10 +104,10 @@ pub struct SignalElement {
     pub validity: Vec<(i32, i32)>,
 }
 
-/// What a signal tells whom.
+/// The kind of a signal, and the traffic that it is for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Meaning {
-    /// A light for vehicles. A reference is taken for one, too, until its light or sign is found.
+    /// A light for vehicles. A reference counts as one until its light or sign is found.
     Light,
     /// A light for pedestrians, cyclists or trams.
     OtherLight,
@@ -115,7 +115,7 @@ pub enum Meaning {
     Yield,
 }
 
-/// For traffic in which direction of the reference line a signal holds.
+/// The traffic that a signal holds for, by its direction along the reference line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Orientation {
     Along,
@@ -173,7 +173,7 @@ impl RoadElement {
         self.sections.partition_point(|section| section.begin_m <= s_m).max(1) - 1
     }
 
-    /// Whether the traffic of a lane runs along the reference line.
+    /// Whether traffic on a lane runs in the direction of the reference line.
     pub fn runs_along(&self, lane: i32) -> bool {
         (lane < 0) != self.left_hand
     }

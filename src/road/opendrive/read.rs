@@ -1,4 +1,4 @@
-//! From XML to elements. Each function reads one kind of element and says what it lacks.
+//! Reads XML into elements. Each function reads one kind of element and reports what the element lacks.
 
 use std::collections::BTreeMap;
 
@@ -14,20 +14,20 @@ use super::elements::{
 use super::geometry::{Piece, ReferenceLine, Shape};
 use super::xml::{Element, Lines, wrong};
 
-/// Longer than any road; keeps the sampling of lanes within bounds.
+/// Limit on the length of a road, m; it bounds the work of sampling lanes.
 const ROAD_M_MAX: f64 = 100_000.0;
 
-/// More lanes than any road has to one side.
+/// Limit on the lanes of one side of a road.
 const LANES_MAX: i32 = 100;
 
-/// More copies than any road has of one crosswalk.
+/// Limit on the copies of one crosswalk.
 const REPEATS_MAX: f64 = 1000.0;
 
-/// One curve may turn so far, rad; a real one turns by a few.
+/// Limit on the turn of one curve, rad; a real curve turns by a few.
 const TURN_RAD_MAX: f64 = 200.0;
 
-/// What is wrong with a text that is no XML. A text that ends too early is told by its last line:
-/// the reader of XML points at its beginning.
+/// The error for a text that is not XML. If the text ends too early, the error names its last line, because the
+/// XML reader would name the first.
 fn not_xml(text: &str, error: &roxmltree::Error) -> RoadError {
     let message = error.to_string();
     if matches!(error, roxmltree::Error::UnexpectedEndOfStream | roxmltree::Error::UnclosedRootNode) {
@@ -71,10 +71,10 @@ pub fn read(name: &str, text: &str) -> Result<Document, RoadError> {
     })
 }
 
-/// Collects what is not understood on the way.
+/// Reads elements and collects what it does not understand.
 struct Reader {
     warnings: Vec<String>,
-    /// What was left out, and how often.
+    /// Each kind of thing that was left out, with its number.
     ignored: BTreeMap<String, usize>,
 }
 
@@ -129,7 +129,7 @@ impl Reader {
         })
     }
 
-    /// Roads are read as flat; says so where they are not.
+    /// Roads are read as flat; a road that is not flat gives a warning.
     fn ignore_heights(&mut self, road: Element) -> Result<(), RoadError> {
         let profiles = [
             ("elevationProfile", "elevation", "slopes: roads are taken as flat"),
@@ -391,7 +391,7 @@ fn is_driving(kind: &str) -> bool {
     )
 }
 
-/// Types of lanes that no car drives on: nothing is lost without them.
+/// Types of lanes that no car drives on; they are left out without a warning.
 const BESIDE_THE_ROAD: [&str; 14] = [
     "none",
     "shoulder",
@@ -409,11 +409,10 @@ const BESIDE_THE_ROAD: [&str; 14] = [
     "roadMarks",
 ];
 
-/// A marking at the outer line of a lane. What `laneChange` says holds; without it, what drivers read
-/// from the paint: solid lines and anything raised forbid, a broken line beside a solid one permits a
-/// change from its own side.
+/// A marking at the outer line of a lane. `laneChange` decides; without it, the paint does: a solid line and
+/// anything raised forbid a change, and a broken line beside a solid one permits a change from the broken side.
 fn road_mark(mark: Element, lane: i32) -> Result<MarkElement, RoadError> {
-    // Of double lines the inner one, nearer to the reference line, is named first.
+    // A double line names the inner line first, the one nearer to the reference line.
     let (outwards, inwards) = match lane < 0 {
         true => (MarkRule::Decrease, MarkRule::Increase),
         false => (MarkRule::Increase, MarkRule::Decrease),
@@ -489,7 +488,8 @@ fn cubic_shape(
     Ok(cubic)
 }
 
-/// `v(u)`, where `u` runs until the curve has its length: found by bisection, as `u` is not given.
+/// A curve `v(u)`. The file does not state the last `u`; bisection finds the one at which the curve has its
+/// length.
 fn poly3(shape: Element, v: [f64; 4], length_m: f64) -> Result<Shape, RoadError> {
     let (mut low, mut high) = (0.0, length_m);
     for _ in 0..60 {
@@ -519,14 +519,15 @@ fn cubics<'a, 'input: 'a>(
     pieces.collect::<Result<_, _>>().map(Cubics::new)
 }
 
-/// Where an object stands: how far ahead of its own station, and how far left of the reference line, m.
+/// Offsets of an object, m: ahead of its own station, and to the left of the reference line.
 fn repeats(object: Element, s_m: f64, t_m: f64) -> Result<Vec<(f64, f64)>, RoadError> {
     let mut places = Vec::new();
     for repeat in object.children("repeat") {
         let (begin_m, length_m) = (repeat.number("s")?, repeat.number_or("length", 0.0)?);
         let distance_m = repeat.number_or("distance", 0.0)?;
         let (from_m, to_m) = (repeat.number_or("tStart", t_m)?, repeat.number_or("tEnd", t_m)?);
-        // Without a distance one body is drawn out over the length, which a crosswalk is not.
+        // Without a distance, `repeat` means one body stretched over the length; a crosswalk is not such a
+        // body.
         let times = if distance_m > 1e-3 {
             (length_m / distance_m + 1e-9).floor().clamp(0.0, REPEATS_MAX)
         } else {
@@ -594,7 +595,7 @@ fn junction(junction: Element) -> Result<JunctionElement, RoadError> {
             incoming_road: connection.text("incomingRoad")?.to_owned(),
             connecting_road: match connection.attribute("connectingRoad") {
                 Some(road) => road.to_owned(),
-                // Direct junctions (1.7) link roads without one in between.
+                // A direct junction (1.7) links two roads without a connecting road.
                 None => connection.text("linkedRoad")?.to_owned(),
             },
             contact: contact(connection)?,

@@ -9,7 +9,7 @@ pub fn wrong(line: u32, message: impl Into<String>) -> RoadError {
     RoadError::Map { line, message: message.into() }
 }
 
-/// Where each line of a text begins, so that lines are found without counting anew.
+/// Where each line of a text begins, so that a line number needs no new count.
 pub struct Lines(Vec<usize>);
 
 impl Lines {
@@ -105,5 +105,6 @@ impl<'a, 'input> Element<'a, 'input> {
     }
 }
 
-/// Larger than any coordinate, station or coefficient of a real map; keeps all arithmetic finite.
+/// Limit on numbers: larger than any coordinate, station or coefficient of a real map. It keeps all arithmetic
+/// finite.
 const NUMBER_MAX: f64 = 1e9;

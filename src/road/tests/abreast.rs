@@ -2,7 +2,7 @@
 
 use crate::road::{LaneIndex, RoadMap, Route, Side};
 
-use super::corner;
+use super::places::corner;
 
 /// A boulevard like Road 4's: two roads of two lanes each, one way each, bending to the left, with 20 m
 /// of median that no road describes. Traffic keeps to `rule`'s side.
@@ -50,7 +50,7 @@ fn the_opposing_lane_is_found_across_a_median() {
             assert_eq!((key.road.as_str(), key.lane), ("2", inner), "{rule}");
             assert!((opposing.median_m - 20.0).abs() < 0.01, "{opposing:?}");
             assert!((opposing.lateral_m - side * lateral_m).abs() < 0.01, "{opposing:?}");
-            // Both stand at half of the same angle about the same centre.
+            // Both places lie at half of the same angle about the same centre.
             let half_m = map.lane(opposing.lane).centre.length_m() / 2.0;
             assert!((opposing.station_m - half_m).abs() < 0.1, "{opposing:?}");
         }
@@ -78,7 +78,7 @@ fn a_lane_change_never_crosses_a_median() {
     assert_eq!(map.changeable(outer.lane, Side::Left, 10.0), Some(inner.lane));
     assert!(Route::find(&map, inner, place("2", -1, 80.0)).is_err());
     assert!(Route::find(&map, inner, place("1", -2, 80.0)).is_ok());
-    // Nor one between lanes of a road: here with a strip of grass of 2 m.
+    // A median between two lanes of one road is not crossed either: here a strip of grass of 2 m.
     let text = r#"<OpenDRIVE><header name="strip"/><road id="1" length="100" junction="-1"><planView>
         <geometry s="0" x="0" y="0" hdg="0" length="100"><line/></geometry></planView><lanes><laneSection s="0"><right>
         <lane id="-1" type="driving"><width a="3"/></lane><lane id="-2" type="median"><width a="2"/></lane>
@@ -91,18 +91,18 @@ fn a_lane_change_never_crosses_a_median() {
 
 #[test]
 fn without_a_median_the_neighbour_is_the_opposing_lane() {
-    let map = corner::corner();
+    let map = corner();
     let place = map.place("1", -2, 80.0).unwrap();
     let opposing = map.opposing(place.lane, place.station_m).unwrap();
     assert_eq!((map.lane(opposing.lane).key.lane, opposing.median_m), (1, 0.0));
-    // Inside a one-way street there is none.
+    // A one-way street has no opposing lane.
     let one_way = map.place("5", -3, 60.0).unwrap();
     assert_eq!(map.opposing(one_way.lane, one_way.station_m), None);
 }
 
 #[test]
 fn the_ways_through_a_junction_are_its_connections() {
-    let map = corner::corner();
+    let map = corner();
     for (index, junction) in map.junctions.iter().enumerate() {
         let ways = map.connections(index);
         assert_eq!(ways.len(), junction.lanes.len(), "each lane of this map connects one pair");

@@ -1,8 +1,7 @@
 //! Routes with lane changes: where they may be, what their path is like, what they leave untouched.
 
 use crate::geometry::{Path, wrap_angle};
-
-use crate::road::{RoadError, RoadMap, Route};
+use crate::road::{LaneIndex, RoadError, RoadMap, Route, Side};
 
 /// A one-way road of three lanes, 300 m long: 150 m straight, a bend to the left of 100 m radius, two lane
 /// sections, a stop line at the end. `mark` is the marking between lanes -1 and -2, `bay` the widths of
@@ -36,8 +35,8 @@ fn route(map: &RoadMap, from: (i32, f64), to: (i32, f64)) -> Result<Route, RoadE
     Route::find(map, map.place("1", from.0, from.1).unwrap(), map.place("1", to.0, to.1).unwrap())
 }
 
-/// Headings are those of the path, curvatures those of the headings, and neither jumps (but where the
-/// road's own curvature does).
+/// Asserts that the headings fit the path and the curvatures fit the headings, and that neither jumps, except
+/// where the road's own curvature jumps.
 fn assert_smooth(path: &Path, jumps_m: &[f64]) {
     for triple in path.points().windows(3) {
         let [a, b, c] = triple else { unreachable!() };
@@ -75,7 +74,7 @@ fn two_changes_lead_across_an_avenue() {
     }
     assert_eq!(route.changes[0].begin_m, 0.0);
     assert!((route.changes[1].begin_m - route.changes[0].end_m).abs() < 1e-6);
-    // The second must be done at the goal, the first so early that the second has its room.
+    // The second change must be over at the goal, the first so early that the second has its room.
     assert_eq!(route.changes[1].latest_m, route.goal_m);
     assert!(
         (route.changes[0].latest_m - (route.goal_m - 51.2)).abs() < 1.0,
@@ -88,7 +87,7 @@ fn two_changes_lead_across_an_avenue() {
     assert!((route.path.pose_at(route.goal_m).position - expected).norm() < 1e-3);
     assert_eq!(route.stop_lines.len(), 1);
     assert!((route.stop_lines[0].station_m - route.goal_m - 10.0 * (1.0 + 0.0175)).abs() < 0.01);
-    // Each station of the route is beside the station of the lane that the list tells.
+    // The list of lanes gives the station of the lane beside each station of the route.
     for i in 0..280 {
         let station_m = f64::from(i);
         let part = route.lane_at(station_m);
@@ -114,7 +113,7 @@ fn the_source_lane_can_be_kept_until_the_latest_station() {
     for i in 0..270 {
         assert!(source(f64::from(i)) < 0.05, "{} m at {i}", source(f64::from(i)));
     }
-    // A change that begins later ends on the path, and the one that begins as planned is the path.
+    // A change that begins later ends on the path, and a change that begins as planned follows the path.
     for i in 0..270 {
         let station_m = f64::from(i);
         assert!(change.postponed_offset_m(station_m, change.begin_m).abs() < 1e-9);
@@ -131,7 +130,8 @@ fn markings_decide() {
     let refused = route(&avenue(solid, FULL), (-2, 10.0), (-1, 280.0));
     let Err(RoadError::Route { message }) = refused else { panic!() };
     assert!(message.contains("no room"), "{message}");
-    // Back to the right the solid line forbids it as well, further right nothing does.
+    // The solid line forbids the change back to the right too; between lanes -2 and -3 nothing forbids a
+    // change.
     assert!(route(&avenue(solid, FULL), (-1, 10.0), (-2, 280.0)).is_err());
     assert!(route(&avenue(solid, FULL), (-2, 10.0), (-3, 280.0)).is_ok());
     for (mark, inwards, outwards) in [
@@ -151,7 +151,7 @@ fn markings_decide() {
     let map = avenue(changing, FULL);
     let found = route(&map, (-2, 10.0), (-1, 280.0)).unwrap();
     let change = &found.changes[0];
-    // From 40 m on, and hurried: 30 m are less than the comfortable 51 m.
+    // The change begins at 40 m and is shortened: 30 m are less than the comfortable 51 m.
     assert!((change.begin_m - 30.0).abs() < 0.2 && (change.end_m - 55.6).abs() < 0.5, "{change:?}");
     assert!((change.latest_m - 60.0).abs() < 0.5, "{change:?}");
     assert!(route(&map, (-2, 50.0), (-1, 280.0)).is_err(), "20 m are too few");
@@ -159,7 +159,7 @@ fn markings_decide() {
 
 #[test]
 fn a_bay_is_entered_where_it_is_wide_enough() {
-    // Opens from nothing to 3.5 m over the 40 m of the first section: 2 m wide after 22 m.
+    // The bay opens from nothing to 3.5 m over the 40 m of the first section; it is 2 m wide after 22 m.
     let bay = r#"<width sOffset="0" a="0" b="0.0875" c="0" d="0"/>"#;
     let map = avenue(BROKEN, bay);
     let found = route(&map, (-2, 5.0), (-1, 280.0)).unwrap();
@@ -170,8 +170,27 @@ fn a_bay_is_entered_where_it_is_wide_enough() {
 fn a_goal_just_ahead_in_the_next_lane_is_out_of_reach() {
     let map = avenue(BROKEN, FULL);
     assert!(route(&map, (-2, 100.0), (-1, 120.0)).is_err());
-    // Hurried, but there.
+    // 10 m more are enough for a shortened change.
     let near = route(&map, (-2, 100.0), (-1, 130.0)).unwrap();
     assert!(near.changes[0].end_m <= near.goal_m && near.changes[0].latest_m == near.goal_m);
     assert_smooth(&near.path, &[49.9]);
+}
+
+#[test]
+fn the_room_for_a_lane_change_is_the_length_of_its_stretch() {
+    let text = include_str!("../../../scenarios/roads/crossroad.xodr");
+    let map = RoadMap::from_opendrive("crossroad", text).unwrap();
+    let mut with_room = 0;
+    for lane in (0..map.lanes.len()).map(LaneIndex) {
+        for side in [Side::Left, Side::Right] {
+            for station_m in (0..map.lane(lane).centre.length_m() as u32).step_by(3).map(f64::from) {
+                let stretches = map.changes_from_m(lane, side, station_m);
+                let here = stretches.into_iter().find(|(from_m, _)| from_m - station_m < 0.1);
+                let room_m = map.change_room_m(lane, side, station_m);
+                assert_eq!(room_m, here.map_or(0.0, |(_, length_m)| length_m), "{lane:?} {station_m}");
+                with_room += usize::from(room_m > 0.0);
+            }
+        }
+    }
+    assert!(with_room > 500, "{with_room}");
 }

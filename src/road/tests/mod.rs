@@ -1,10 +1,7 @@
-//! Tests of the whole module: the authored map against its survey, and reading made-up files.
+//! Tests of the whole module on made-up maps and on shipped ones. What was surveyed of the shipped maps is
+//! tested by `tests/it/surveys.rs`.
 
 mod abreast;
-mod boulevard;
 mod changes;
-mod corner;
-mod crossroad;
+mod places;
 mod reading;
-mod residential;
-mod survey;

@@ -1,4 +1,4 @@
-//! Made-up OpenDRIVE files: each feature once, and what is wrong with broken ones.
+//! Made-up OpenDRIVE files: each feature once, and the message for each kind of broken file.
 
 use proptest::prelude::*;
 
@@ -116,7 +116,7 @@ fn lights_stop_the_lanes_they_are_meant_for() {
     assert!((lane(&map, 0, 1).stop_lines[0].station_m - 90.0).abs() < 1e-6, "counted in driving direction");
     assert!(map.warnings.iter().any(|warning| warning.contains("type `274`")), "{:?}", map.warnings);
     assert!(map.warnings.iter().any(|warning| warning.contains("2 signals belong to no junction")));
-    // The sign comes with the lane it holds for, counted in driving direction, too.
+    // The sign has the lane that it holds for, with the station in driving direction.
     assert_eq!((map.signs.len(), map.signs[0].kind), (1, SignKind::Stop));
     assert_eq!(map.lane(map.signs[0].lanes[0].0).key.lane, 1);
     assert!((map.signs[0].lanes[0].1 - 90.0).abs() < 1e-6);
@@ -142,7 +142,7 @@ fn crosswalks_have_corners_in_either_frame() {
     assert_eq!(route.crosswalks_m.len(), 3);
 }
 
-/// SUMO's maps have controllers that no junction names, and arrow lights.
+/// In SUMO's maps no junction names the controllers, and there are arrow lights.
 #[test]
 fn lights_without_a_junctions_controller_are_grouped_by_their_arms() {
     let road = |id: u32, x: f64, y: f64, hdg: f64, link: &str, signals: &str| {
@@ -166,7 +166,7 @@ fn lights_without_a_junctions_controller_are_grouped_by_their_arms() {
     let groups: Vec<_> = map.signals.iter().map(|signal| (signal.junction, signal.group)).collect();
     assert_eq!(groups, [(Some(0), 0), (Some(0), 0), (Some(0), 1), (None, 0)]);
     assert_eq!(map.junctions[0].groups, 2);
-    // Two heads of one arm are one stop line.
+    // Two signal heads of one arm share one stop line.
     assert!(map.lanes.iter().all(|lane| lane.stop_lines.len() <= 1));
     assert!(map.warnings.iter().any(|warning| warning.contains("3 signals")), "{:?}", map.warnings);
 }
@@ -235,8 +235,8 @@ fn curves_end_where_they_should() {
     assert!(map.lanes.iter().all(|lane| lane.centre.length_m() > 99.0), "{:?}", map.warnings);
 }
 
-/// Half way between two vertices the exact curve is within a millimetre, and headings and curvatures
-/// are those of the path itself: an S of spirals, with a lane that widens.
+/// On an S of spirals with a lane that widens: half-way between two vertices the exact curve is within a
+/// millimetre, and headings and curvatures fit the path.
 #[test]
 fn sampled_centres_are_the_curves() {
     let geometry = r#"<geometry s="0" x="0" y="0" hdg="0" length="40"><spiral curvStart="0" curvEnd="0.1"/></geometry>
@@ -260,7 +260,7 @@ fn sampled_centres_are_the_curves() {
             assert!((chord - unit_vector(mean(b, c))).norm() < 2e-3, "{b:?} {c:?}");
             let turned = wrap_angle(mean(b, c) - mean(a, b)) / ((before_m + after_m) / 2.0);
             assert!((turned - b.curvature_per_m).abs() < 5e-3, "{turned} against {b:?}");
-            // Height of the arc over the chord.
+            // The height of the arc over the chord is less than a millimetre.
             assert!(b.curvature_per_m.abs() * after_m * after_m / 8.0 < 1e-3, "{b:?}");
         }
     }
@@ -336,7 +336,7 @@ fn all_finite(map: &RoadMap) -> bool {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(48))]
 
-    /// Whatever is changed in a file, reading it ends with a map of finite numbers or an error.
+    /// Reading a file with changed values gives a map of finite numbers or an error.
     #[test]
     fn a_damaged_file_does_no_harm(
         damages in prop::collection::vec((0.0..1.0_f64, 0_usize..9), 1..4),
@@ -359,7 +359,7 @@ proptest! {
         }
     }
 
-    /// Nor does a missing element, or one that stands twice.
+    /// Reading a file with a missing or a repeated line does no harm either.
     #[test]
     fn lost_and_doubled_elements_do_no_harm(place in 0.0..1.0_f64, doubled in any::<bool>()) {
         let begins: Vec<_> = CORNER.match_indices("\n").map(|(at, _)| at + 1).collect();
