@@ -1,4 +1,4 @@
-//! `avastra run`: episodes in, crashes out.
+//! `avastra run`: plays episodes and writes their crashes as scenarios.
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
@@ -26,7 +26,7 @@ use super::run_directory::{Begun, RunDirectory, write};
 use super::verify::acting;
 use super::{VERSION, compile, load, run_directory};
 
-/// How many critical scenarios, and how many reasons of refusals, the summary names.
+/// Largest number of critical scenarios, groups and refusal reasons that the summary lists.
 const NAMED_MAX: usize = 10;
 
 /// Plays the episodes of a new run, or those that an interrupted one still lacks.
@@ -158,7 +158,7 @@ fn resumed(output: &Output, path: &Path) -> Result<(Run, RunDirectory), Failure>
     Ok((ready(table, settings, policy.as_ref(), face)?, RunDirectory::open(path.to_owned())?))
 }
 
-/// A run of the agent that the settings name, or of a policy, which comes with its own table.
+/// A run of the agent that the settings name, or of the given policy, whose table must have the same rows.
 fn ready(
     table: ActionTable,
     settings: RunSettings,
@@ -187,8 +187,7 @@ fn ready(
     Ok(Run::with_policy(table, settings, acting)?)
 }
 
-/// Writes what an episode found. The scenario comes first: an episode that is in the database has
-/// its file.
+/// Writes what an episode found. The scenario comes first, so every episode in the database has its file.
 fn keep(
     run: &Run,
     directory: &mut RunDirectory,
@@ -216,7 +215,7 @@ fn keep(
         .map_err(|error| Failure::file("write", &directory.path.join("run.db"), error))
 }
 
-/// The space as a file in `critical/` must name it.
+/// Path of the space, from a file in `critical/`.
 fn space_path(run: &Run, directory: &RunDirectory) -> Result<String, Failure> {
     load::relative(&directory.path.join("critical"), &run.space().path)
 }
@@ -275,7 +274,7 @@ fn totals_text(totals: &Totals, elapsed_s: f64, played: usize) -> String {
     text
 }
 
-/// Steps in which nothing was done of what was asked for, by reason.
+/// Refused actions, by reason.
 fn refusals_text(refusals: &[RefusalCount]) -> String {
     let all: i64 = refusals.iter().map(|refusal| refusal.times).sum();
     let mut text = format!("refused: {}", plural(all as usize, "action"));
@@ -333,7 +332,7 @@ fn critical_text(directory: &Path, files: &[PathBuf]) -> String {
     if files.len() > NAMED_MAX {
         text.push_str(&format!("\n  and {} more", files.len() - NAMED_MAX));
     }
-    // A shell splits a path at its blanks, and must still see the star.
+    // A shell splits a path at its spaces, and must still expand the star.
     let directory = directory.display().to_string();
     let directory = if directory.contains(' ') { format!("'{directory}'") } else { directory };
     text.push_str(&format!("\nreplay them with: avastra replay {directory}/critical/*.ava"));

@@ -111,14 +111,14 @@ fn heading(study: &Study, directory: &Path) -> String {
     )
 }
 
-/// What the thread that asks has spent so far.
+/// Time that the calling thread has spent so far.
 fn spent() -> Spent {
     #[allow(
         clippy::disallowed_methods,
         reason = "this is cli, and the time goes nowhere but beside the result"
     )]
     let now = Instant::now();
-    // Linux keeps the nanoseconds that a thread was on a processor in the first word of this file.
+    // On Linux, the first word of this file is the thread's time on a processor, ns.
     let schedule = std::fs::read_to_string("/proc/thread-self/schedstat").ok();
     let on_cpu_ns = schedule.and_then(|text| text.split(' ').next()?.parse::<f64>().ok());
     Spent { wall_s: now.duration_since(*BEGAN).as_secs_f64(), cpu_s: on_cpu_ns.map(|ns| ns / 1e9) }
@@ -127,7 +127,7 @@ fn spent() -> Spent {
 #[allow(clippy::disallowed_methods, reason = "as above")]
 static BEGAN: std::sync::LazyLock<Instant> = std::sync::LazyLock::new(Instant::now);
 
-/// What an agent's cells took on average.
+/// Mean times of an agent's cells.
 #[derive(serde::Serialize)]
 struct Timing {
     agent: String,

@@ -1,4 +1,4 @@
-//! `avastra train`: an agent learns where the crashes are, and is kept as a policy.
+//! `avastra train`: trains an agent to find crashes, and writes it as a policy.
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -22,7 +22,7 @@ use super::progress::{TrainingProgress, plural};
 use super::run_directory::{Begun, RunDirectory, write};
 use super::{VERSION, distill, load, run_directory};
 
-/// Episodes between two checkpoints: what a kill may cost to play again.
+/// Episodes between two checkpoints: at most so many are played again after a kill.
 const CHECKPOINT_EPISODES: usize = 25;
 /// Episodes on each road that the finished policy is judged by: the paper's number.
 const EVALUATION_EPISODES: u64 = 15;
@@ -119,7 +119,7 @@ fn resumed(output: &Output, path: &Path) -> Result<(Training, RunDirectory), Fai
     Ok((training, directory))
 }
 
-/// Commits an episode; with it a checkpoint every so often, at the end, and where the user stops.
+/// Commits an episode, with a checkpoint every so often, at the end, and when the user stops.
 fn keep(
     training: &Training,
     directory: &mut RunDirectory,
@@ -137,8 +137,8 @@ fn keep(
         .map_err(|error| Failure::file("write", &directory.path.join("run.db"), error))
 }
 
-/// Writes the counted collisions of an episode as a scenario. A training with an observation period of
-/// its own writes none: the space would replay them at its own pace.
+/// Writes the counted collisions of an episode as a scenario. A training with an observation period of its own
+/// writes none, because a replay would use the period of the space.
 fn write_critical(
     training: &Training,
     directory: &RunDirectory,
@@ -164,7 +164,7 @@ fn write_critical(
     write(&directory.critical(&name), &crate::syntax::print(&file))
 }
 
-/// Judges the policy, writes it, and says what came of the training.
+/// Evaluates the policy, writes it, and prints the result of the training.
 fn finish(output: &Output, training: &Training, directory: &RunDirectory) -> Result<(), Failure> {
     let settings = training.settings();
     let roads = &settings.roads;
@@ -221,7 +221,7 @@ fn finish(output: &Output, training: &Training, directory: &RunDirectory) -> Res
     Ok(())
 }
 
-/// The policy as it is to be kept, with the rules distilled from it and the claims of both.
+/// The policy to be written, with the rules distilled from it and the claims of both.
 fn policy(training: &Training, acting: &QPolicy, evaluation: &Evaluation) -> Policy {
     let settings = training.settings();
     let name = match settings.roads.as_slice() {
@@ -279,7 +279,7 @@ fn write_policy(policy: &Policy, space: &Space, directory: &Path) -> Result<Path
     Ok(path)
 }
 
-/// What it is, in a sentence for the reader.
+/// The policy's headline: what it is, in a sentence.
 fn headline(settings: &TrainSettings, evaluation: &Evaluation) -> String {
     format!(
         "{} ({}) after {} episodes on {}: {} counted collisions in {} episodes of its own.",

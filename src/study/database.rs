@@ -11,8 +11,8 @@ use crate::study::job::Job;
 use crate::study::record::{CellRecord, CollisionRecord, EpisodeRecord, Failure, Spent, TrainedRecord};
 use crate::study::study::Study;
 
-/// Layout of the tables; raised whenever a column changes. Begins at 1001, so that it is
-/// never taken for that of `run.db`.
+/// Layout of the tables; raised whenever a column changes. Begins at 1001, so that a `run.db` is never taken for a
+/// `study.db`.
 const SCHEMA_VERSION: i64 = 1001;
 
 /// Seeds are text: SQLite's integers have a sign.
@@ -173,7 +173,7 @@ impl StudyDatabase {
         Ok(cells.into_values().collect())
     }
 
-    /// The rows of a query, each with the cell that its first column names.
+    /// The rows of a query, each with the cell in its first column.
     fn by_cell<T>(
         &self,
         query: &str,
@@ -242,7 +242,7 @@ fn trained_episode(row: &Row) -> Result<TrainedRecord, rusqlite::Error> {
     })
 }
 
-/// An episode without its collisions, which are rows of their own.
+/// An episode without its collisions: they are in a table of their own.
 fn evaluated_episode(row: &Row) -> Result<EpisodeRecord, rusqlite::Error> {
     Ok(EpisodeRecord {
         seed: seed_of(&row.get::<_, String>(1)?)?,
