@@ -8,13 +8,11 @@ use crate::action::ActionTable;
 use crate::agent::Face;
 use crate::emit;
 use crate::episode::EpisodeLog;
-use crate::model::Policy;
-use crate::oracle::AvoidabilitySettings;
+use crate::model::{Policy, Space};
 use crate::run;
 use crate::run::{
     EpisodeSummary, Group, PolicyReference, Profile, RefusalCount, Run, RunSettings, Totals, play,
 };
-use crate::sim::ENGINE;
 
 use super::arguments::{FaceArgument, RunArguments};
 use super::error::Failure;
@@ -24,7 +22,7 @@ use super::parallel::jobs;
 use super::progress::{Progress, plural};
 use super::run_directory::{Begun, RunDirectory, write};
 use super::verify::acting;
-use super::{VERSION, compile, load, run_directory};
+use super::{compile, load, run_directory};
 
 /// Largest number of critical scenarios, groups and refusal reasons that the summary lists.
 const NAMED_MAX: usize = 10;
@@ -90,32 +88,21 @@ fn begun(output: &Output, arguments: &RunArguments) -> Result<(Run, RunDirectory
         (None, None) => compile::last(output)?,
     };
     let space = table.space();
-    let roads = if arguments.road.is_empty() {
-        space.roads.iter().map(|road| road.name.clone()).collect()
-    } else {
-        arguments.road.clone()
-    };
     let profile = match &arguments.ads_config {
         Some(path) => Some(load::profile(path)?),
         None => run::driving_system(&arguments.ads).ok().and_then(|ads| ads.profile().copied()),
     };
+    let agent = policy.as_ref().map_or(&arguments.agent, |(_, policy)| &policy.name);
+    let settings = RunSettings::new(space, agent, arguments.episodes, arguments.seed);
     let settings = RunSettings {
-        avastra: VERSION.to_owned(),
-        engine: ENGINE.to_owned(),
-        space: space.path.display().to_string(),
-        space_digest: space.digest.clone(),
-        roads,
+        roads: roads_or_all(&arguments.road, space),
         ads: arguments.ads.clone(),
         profile: profile.as_ref().map(Profile::new),
-        agent: policy.as_ref().map_or(&arguments.agent, |(_, policy)| &policy.name).clone(),
-        policy: None,
-        episodes: arguments.episodes,
-        seed: arguments.seed,
         ambient: arguments.ambient,
         causes: arguments.causes,
         without: arguments.rules.without.clone(),
         with: arguments.rules.with.clone(),
-        avoidability: AvoidabilitySettings::default(),
+        ..settings
     };
     let face = match arguments.face {
         FaceArgument::Network => Face::Network,
@@ -133,6 +120,11 @@ fn begun(output: &Output, arguments: &RunArguments) -> Result<(Run, RunDirectory
     let settings = RunSettings { space, policy: reference, ..run.settings().clone() };
     run_directory::write_settings(&path, &settings)?;
     Ok((run, RunDirectory::open(path)?))
+}
+
+/// The roads that a command line names, or all of the space.
+pub fn roads_or_all(named: &[String], space: &Space) -> Vec<String> {
+    if named.is_empty() { space.roads.iter().map(|road| road.name.clone()).collect() } else { named.to_vec() }
 }
 
 /// The rest of an interrupted run.

@@ -4,12 +4,12 @@ use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 use crate::action::ActionTable;
-use crate::run::Database;
+use crate::run::{Database, VERSION};
 use crate::sim::ENGINE;
 
 use super::error::Failure;
+use super::load;
 use super::output::Output;
-use super::{VERSION, load};
 
 /// A run directory on disk.
 pub struct RunDirectory {

@@ -21,7 +21,7 @@ pub fn log(records: &[DiagnosticRecord]) -> Value {
         "runs": [{
             "tool": { "driver": {
                 "name": "avastra",
-                "semanticVersion": super::VERSION,
+                "semanticVersion": crate::run::VERSION,
                 "rules": rules,
             } },
             "columnKind": "unicodeCodePoints",

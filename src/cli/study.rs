@@ -6,7 +6,6 @@ use std::time::Instant;
 
 use crate::report;
 use crate::run::{Profile, driving_system};
-use crate::sim::ENGINE;
 use crate::study::{
     CellRecord, Event, Spent, Study, StudyDatabase, StudyFile, StudyResults, StudySettings, play_jobs,
 };
@@ -18,7 +17,7 @@ use super::output::Output;
 use super::parallel::jobs;
 use super::progress::{Progress, plural};
 use super::run_directory::{Begun, write};
-use super::{VERSION, load, run_directory};
+use super::{load, run_directory};
 
 /// Plays what a study still lacks and prints its result.
 pub fn study(output: &Output, arguments: &StudyArguments) -> Result<(), Failure> {
@@ -80,7 +79,7 @@ fn begun(output: &Output, path: &Path, quick: bool) -> Result<Study, Failure> {
     };
     let profile = profile.as_ref().map(Profile::new);
     let read = |name: &str| load::read(&beside(name)).map_err(|error| error.to_string());
-    let settings = StudySettings::new(file, &table, profile, (VERSION, ENGINE), &read);
+    let settings = StudySettings::new(file, &table, profile, &read);
     let settings = settings.map_err(|error| refuse(error.to_string()))?;
     let settings = if quick { settings.quick() } else { settings };
     Study::new(table, settings).map_err(|error| refuse(error.to_string()))

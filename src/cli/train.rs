@@ -8,8 +8,7 @@ use crate::agent::{Kind, QPolicy, Settings};
 use crate::emit;
 use crate::model::policy::{PolicyClaims, PolicyOrigin};
 use crate::model::{Policy, Space, digest_text};
-use crate::run::Profile;
-use crate::sim::ENGINE;
+use crate::run::{Profile, RunSettings};
 use crate::syntax::listed;
 use crate::train::{Evaluation, TrainSettings, TrainedEpisode, Training, evaluate, rounded};
 
@@ -19,8 +18,9 @@ use super::error::Failure;
 use super::interrupt::stop_on_interrupt;
 use super::output::Output;
 use super::progress::{TrainingProgress, plural};
+use super::run::roads_or_all;
 use super::run_directory::{Begun, RunDirectory, write};
-use super::{VERSION, distill, load, run_directory};
+use super::{distill, load, run_directory};
 
 /// Episodes between two checkpoints: at most so many are played again after a kill.
 const CHECKPOINT_EPISODES: usize = 25;
@@ -56,28 +56,16 @@ fn begun(output: &Output, arguments: &TrainArguments) -> Result<(Training, RunDi
     let table = load::table(output, file)?;
     let hyperparameters = settings(arguments)?;
     let space = table.space();
-    let roads = if arguments.road.is_empty() {
-        space.roads.iter().map(|road| road.name.clone()).collect()
-    } else {
-        arguments.road.clone()
-    };
     let profile = arguments.ads_config.as_deref().map(load::profile).transpose()?;
-    let settings = TrainSettings {
-        avastra: VERSION.to_owned(),
-        engine: ENGINE.to_owned(),
-        space: space.path.display().to_string(),
-        space_digest: space.digest.clone(),
-        roads,
+    let conditions = RunSettings {
+        roads: roads_or_all(&arguments.road, space),
         ads: arguments.ads.clone(),
         profile: profile.as_ref().map(Profile::new),
-        agent: arguments.agent.clone(),
-        episodes: arguments.episodes,
-        seed: arguments.seed,
-        ambient: 0,
         without: arguments.rules.without.clone(),
         with: arguments.rules.with.clone(),
-        hyperparameters,
+        ..RunSettings::new(space, &arguments.agent, arguments.episodes, arguments.seed)
     };
+    let settings = TrainSettings::new(conditions, hyperparameters);
     let training = Training::new(table, settings)?;
     let path = run_directory::create(arguments.out.as_deref())?;
     let space = load::relative(&path, &training.table().space().path)?;

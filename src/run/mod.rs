@@ -28,7 +28,7 @@ pub use play::{Run, play};
 pub(crate) use profile::under_test;
 pub use profile::{DEFAULT_ADS, Profile, driving_system, recorded, trained_against};
 pub(crate) use settings::check_episodes;
-pub use settings::{EPISODES_MAX, PolicyReference, RunError, RunSettings};
+pub use settings::{EPISODES_MAX, PolicyReference, RunError, RunSettings, VERSION};
 pub use shape::Shape;
 pub use stage::Stage;
 pub use summary::{EpisodeSummary, Finding};

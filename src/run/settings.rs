@@ -2,11 +2,15 @@
 
 use crate::ads;
 use crate::agent;
+use crate::model::Space;
 use crate::oracle;
 use crate::oracle::AvoidabilitySettings;
 use crate::sim::ENGINE;
 
-use crate::run::profile::Profile;
+use crate::run::profile::{DEFAULT_ADS, Profile};
+
+/// Version of avastra, as settings record it.
+pub const VERSION: &str = env!("CARGO_PKG_VERSION");
 
 /// Everything that is needed to repeat a run; written to `run.yaml`.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -45,6 +49,31 @@ pub struct RunSettings {
     /// How the avoidability of collisions is judged.
     #[serde(default)]
     pub avoidability: AvoidabilitySettings,
+}
+
+impl RunSettings {
+    /// A run on all roads of a space against the default driving system, with every option off. The caller
+    /// changes what it wants otherwise.
+    pub fn new(space: &Space, agent: &str, episodes: u32, seed: u64) -> RunSettings {
+        RunSettings {
+            avastra: VERSION.to_owned(),
+            engine: ENGINE.to_owned(),
+            space: space.path.display().to_string(),
+            space_digest: space.digest.clone(),
+            roads: space.roads.iter().map(|road| road.name.clone()).collect(),
+            ads: DEFAULT_ADS.to_owned(),
+            profile: None,
+            agent: agent.to_owned(),
+            policy: None,
+            episodes,
+            seed,
+            ambient: 0,
+            causes: false,
+            without: Vec::new(),
+            with: Vec::new(),
+            avoidability: AvoidabilitySettings::default(),
+        }
+    }
 }
 
 /// The policy file that a run plays.

@@ -7,7 +7,8 @@ use crate::ads::ModularConfig;
 use crate::agent;
 use crate::agent::{Kind, Settings};
 use crate::oracle::AvoidabilitySettings;
-use crate::run::{EPISODES_MAX, Profile, RunError};
+use crate::run::{EPISODES_MAX, Profile, RunError, VERSION};
+use crate::sim::ENGINE;
 use crate::syntax::listed;
 
 use crate::study::file::{AgentFile, EvaluationPlan, StudyFile};
@@ -110,7 +111,6 @@ impl StudySettings {
         file: StudyFile,
         table: &ActionTable,
         profile: Option<Profile>,
-        (avastra, engine): (&str, &str),
         read: &dyn Fn(&str) -> Result<String, String>,
     ) -> Result<StudySettings, StudyError> {
         let space = table.space();
@@ -120,8 +120,8 @@ impl StudySettings {
         };
         let agents = file.agents.into_iter().map(|agent| agent_settings(agent, read));
         Ok(StudySettings {
-            avastra: avastra.to_owned(),
-            engine: engine.to_owned(),
+            avastra: VERSION.to_owned(),
+            engine: ENGINE.to_owned(),
             question: file.question,
             space: space.path.display().to_string(),
             space_digest: space.digest.clone(),

@@ -96,53 +96,41 @@ impl Study {
             [] => job.roads.iter().map(|&road| self.settings.roads[road].clone()).collect(),
             named => named.to_vec(),
         };
-        let settings = TrainSettings {
-            avastra: self.settings.avastra.clone(),
-            engine: self.settings.engine.clone(),
-            space: self.settings.space.clone(),
-            space_digest: self.settings.space_digest.clone(),
-            roads,
-            ads: self.settings.ads.clone(),
-            profile: agent.profile.as_ref().or(self.settings.profile.as_ref()).cloned(),
-            agent: agent.name.clone(),
-            episodes: plan.episodes,
-            seed: self.training_seed(job.number),
-            ambient: self.settings.ambient,
-            without: agent.without.clone(),
-            with: agent.with.clone(),
-            hyperparameters: plan.hyperparameters.clone(),
-        };
+        let episodes = (plan.episodes, self.training_seed(job.number));
+        let settings =
+            TrainSettings::new(self.conditions(agent, roads, episodes), plan.hyperparameters.clone());
         Training::new(self.table.clone(), settings)
     }
 
     /// The evaluation under one seed on one road. For a trained agent it is a run of `none`, with which the caller
     /// plays the trained agent (see [`Run::judged_by`]).
     pub(super) fn evaluation(&self, job: &Job, seed: u32, road: &str) -> Result<Run, RunError> {
-        let settings = self.run_settings(job, seed, road);
-        let Some(plan) = &self.agent(job).training else { return Run::new(self.table.clone(), settings) };
+        let agent = self.agent(job);
+        let episodes = (self.settings.evaluation.episodes, self.evaluation_seed(job.number, seed));
+        let settings = self.conditions(agent, vec![road.to_owned()], episodes);
+        let Some(plan) = &agent.training else { return Run::new(self.table.clone(), settings) };
         let table = with_period(self.table.clone(), plan.hyperparameters.observation_period_s());
         Run::new(table, RunSettings { agent: "none".to_owned(), ..settings })
     }
 
-    fn run_settings(&self, job: &Job, seed: u32, road: &str) -> RunSettings {
-        let agent = self.agent(job);
+    /// What an agent's trainings and evaluations have in common.
+    fn conditions(
+        &self,
+        agent: &AgentSettings,
+        roads: Vec<String>,
+        (episodes, seed): (u32, u64),
+    ) -> RunSettings {
+        let study = &self.settings;
         RunSettings {
-            avastra: self.settings.avastra.clone(),
-            engine: self.settings.engine.clone(),
-            space: self.settings.space.clone(),
-            space_digest: self.settings.space_digest.clone(),
-            roads: vec![road.to_owned()],
-            ads: self.settings.ads.clone(),
-            profile: agent.profile.as_ref().or(self.settings.profile.as_ref()).cloned(),
-            agent: agent.name.clone(),
-            policy: None,
-            episodes: self.settings.evaluation.episodes,
-            seed: self.evaluation_seed(job.number, seed),
-            ambient: self.settings.ambient,
-            causes: self.settings.causes,
+            roads,
+            ads: study.ads.clone(),
+            profile: agent.profile.as_ref().or(study.profile.as_ref()).cloned(),
+            ambient: study.ambient,
+            causes: study.causes,
             without: agent.without.clone(),
             with: agent.with.clone(),
-            avoidability: self.settings.avoidability.clone(),
+            avoidability: study.avoidability.clone(),
+            ..RunSettings::new(self.table.space(), &agent.name, episodes, seed)
         }
     }
 }

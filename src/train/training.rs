@@ -22,7 +22,8 @@ use crate::oracle::AvoidabilitySettings;
 use crate::rng;
 use crate::rng::Stream;
 use crate::run::{
-    Arena, EpisodeSummary, Finding, Profile, RunError, carry_out, check_episodes, legal, offers, under_test,
+    Arena, EpisodeSummary, Finding, Profile, RunError, RunSettings, carry_out, check_episodes, legal, offers,
+    under_test,
 };
 use crate::sim::{Contact, World};
 use crate::syntax::listed;
@@ -58,6 +59,28 @@ pub struct TrainSettings {
     pub with: Vec<String>,
     /// The agent's hyperparameters.
     pub hyperparameters: Settings,
+}
+
+impl TrainSettings {
+    /// A training with the agent, the episodes and the conditions of a run.
+    pub fn new(run: RunSettings, hyperparameters: Settings) -> TrainSettings {
+        TrainSettings {
+            avastra: run.avastra,
+            engine: run.engine,
+            space: run.space,
+            space_digest: run.space_digest,
+            roads: run.roads,
+            ads: run.ads,
+            profile: run.profile,
+            agent: run.agent,
+            episodes: run.episodes,
+            seed: run.seed,
+            ambient: run.ambient,
+            without: run.without,
+            with: run.with,
+            hyperparameters,
+        }
+    }
 }
 
 /// A training that is ready to go on.
