@@ -3,8 +3,9 @@
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc;
 
-/// Does `work` for each item on so many threads, and hands what it tells to `on` on this one, in the order in
-/// which it is told. Stops early, between items, when `stop` is set or `on` fails; `tell` returns false then.
+/// Runs `work` for each item, on at most so many threads. What `work` reports by `tell` is handed to `on` on the
+/// calling thread, in the order of arrival. Stops early, between items, when `stop` is set or `on` fails; `tell`
+/// returns false then.
 ///
 /// # Errors
 /// The first error of `on`.

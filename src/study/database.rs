@@ -8,7 +8,7 @@ use rusqlite::{Connection, Row, params};
 use crate::run::DatabaseError;
 
 use crate::study::job::Job;
-use crate::study::record::{CellRecord, CollisionRecord, EpisodeRecord, Failure, Spent, TrainedRecord};
+use crate::study::record::{CellRecord, CollisionRecord, EpisodeRecord, FailureClass, Spent, TrainedRecord};
 use crate::study::study::Study;
 
 /// Layout of the tables; raised whenever a column changes. Begins at 1001, so that a `run.db` is never taken for a
@@ -210,7 +210,7 @@ fn add_episode(
     let mut insert = connection
         .prepare_cached("INSERT INTO collision VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)")?;
     for (number, found) in episode.collisions.iter().enumerate() {
-        let Failure { kind, manoeuvre, approach, side, cause } = &found.failure;
+        let FailureClass { kind, manoeuvre, approach, side, cause } = &found.failure;
         insert.execute(params![
             cell,
             index,
@@ -267,7 +267,7 @@ fn collision(row: &Row) -> Result<CollisionRecord, rusqlite::Error> {
         sudden: row.get(5)?,
         struck: row.get(6)?,
         avoidability: row.get(7)?,
-        failure: Failure {
+        failure: FailureClass {
             kind: row.get(8)?,
             manoeuvre: row.get(9)?,
             approach: row.get(10)?,

@@ -6,7 +6,7 @@ use std::collections::BTreeSet;
 use crate::study::statistics::{Lifetime, restricted_mean};
 
 use crate::study::file::EvaluationPlan;
-use crate::study::record::{CellRecord, CollisionRecord, EpisodeRecord, Failure};
+use crate::study::record::{CellRecord, CollisionRecord, EpisodeRecord, FailureClass};
 
 /// A number that is computed for each cell.
 pub struct Measure {
@@ -131,7 +131,9 @@ pub const MEASURES: &[Measure] = &[
 ];
 
 /// The distinct failures among the counted collisions of episodes.
-pub(super) fn failures<'a>(episodes: impl IntoIterator<Item = &'a EpisodeRecord>) -> BTreeSet<&'a Failure> {
+pub(super) fn failures<'a>(
+    episodes: impl IntoIterator<Item = &'a EpisodeRecord>,
+) -> BTreeSet<&'a FailureClass> {
     let collisions = episodes.into_iter().flat_map(|episode| &episode.collisions);
     collisions.filter(|found| found.counted).map(|found| &found.failure).collect()
 }

@@ -77,13 +77,13 @@ pub struct CollisionRecord {
     pub sudden: bool,
     pub struck: bool,
     pub avoidability: String,
-    pub failure: Failure,
+    pub failure: FailureClass,
 }
 
 /// What two collisions must have in common to be alike: as in the groups of a run (see `run::groups`), but without
 /// the shape of the ego vehicle's way.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, serde::Serialize)]
-pub struct Failure {
+pub struct FailureClass {
     /// `pedestrian`, `car` or `large vehicle`.
     pub kind: String,
     /// The obstacle's verb.
@@ -149,7 +149,7 @@ impl CollisionRecord {
             sudden: finding.facts.sudden,
             struck: finding.facts.struck,
             avoidability: finding.judgement.class.name().to_owned(),
-            failure: Failure {
+            failure: FailureClass {
                 kind: kind(finding.collision.body.name()).to_owned(),
                 manoeuvre: finding.collision.verb.name().to_owned(),
                 approach: severity.approach.to_owned(),

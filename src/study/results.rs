@@ -13,7 +13,7 @@ use crate::study::statistics::{
 
 use crate::study::file::EvaluationPlan;
 use crate::study::measures::{MEASURES, Measure, failures};
-use crate::study::record::{CellRecord, EpisodeRecord, Failure};
+use crate::study::record::{CellRecord, EpisodeRecord, FailureClass};
 use crate::study::settings::StudySettings;
 
 /// Points of a learning curve. Ours: few enough to read.
@@ -102,7 +102,7 @@ pub struct Rate {
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct FoundFailure {
     #[serde(flatten)]
-    pub failure: Failure,
+    pub failure: FailureClass,
     pub count: usize,
 }
 
