@@ -113,7 +113,7 @@ pub struct CheckArguments {
     pub strict: bool,
     /// Print a stage of the pipeline as JSON.
     #[arg(long, value_enum)]
-    pub dump: Option<Stage>,
+    pub dump: Option<Dump>,
     /// Make the changes that the diagnostics offer, in the files named here.
     #[arg(long)]
     pub fix: bool,
@@ -158,7 +158,7 @@ pub struct CompletionsArguments {
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum Stage {
+pub enum Dump {
     Ast,
     Actions,
 }

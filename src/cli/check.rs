@@ -7,7 +7,7 @@ use crate::check::Loaded;
 use crate::syntax::apply_fixes;
 use crate::syntax::ast::FileId;
 
-use super::arguments::{CheckArguments, Stage};
+use super::arguments::{CheckArguments, Dump};
 use super::error::Failure;
 use super::load;
 use super::output::Output;
@@ -32,8 +32,8 @@ pub fn check(output: &Output, arguments: &CheckArguments) -> Result<(), Failure>
         warnings += loaded.diagnostics.len() - wrong;
         let table = loaded.space.clone().map(ActionTable::new);
         let dump = match arguments.dump {
-            Some(Stage::Ast) => Some(json(&loaded.files[0].tree)),
-            Some(Stage::Actions) => table.as_ref().map(|table| json(&table.file())),
+            Some(Dump::Ast) => Some(json(&loaded.files[0].tree)),
+            Some(Dump::Actions) => table.as_ref().map(|table| json(&table.file())),
             None => None,
         };
         if let Some(dump) = &dump {

@@ -12,7 +12,7 @@ use super::progress::plural;
 use super::run_directory::write;
 use super::{load, trials};
 
-/// Names the table that `avastra run` takes when it is given none.
+/// The file that names the table for `avastra run` without a space.
 const LAST: &str = "build/last";
 
 /// Writes the table and remembers it as the last.

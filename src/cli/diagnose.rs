@@ -1,4 +1,4 @@
-//! `avastra diagnose`: which module of the driving system a scenario's collision is the fault of.
+//! `avastra diagnose`: which module of the driving system is at fault for a scenario's collision.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -20,8 +20,8 @@ use super::parallel::each_file;
 use super::progress::plural;
 use super::replay::driver;
 
-/// Says of every file's first counted collision which module is at fault, or, with `--mechanisms`, what
-/// each documented weakness has to do with all of them.
+/// Says which module is at fault for every file's first counted collision or, with `--mechanisms`, which share of
+/// all collisions each documented weakness causes.
 pub fn diagnose(output: &Output, arguments: &DiagnoseArguments) -> Result<(), Failure> {
     let profile = arguments.ads_config.as_deref().map(load::profile).transpose()?;
     if arguments.mechanisms {
@@ -45,7 +45,7 @@ pub fn diagnose(output: &Output, arguments: &DiagnoseArguments) -> Result<(), Fa
     Ok(())
 }
 
-/// A scenario ready to be asked about: its first counted collision.
+/// A scenario that was played, with its first counted collision.
 struct Case<'a> {
     stage: Stage<'a>,
     ads: Selected,
@@ -143,7 +143,7 @@ fn many(output: &Output, files: &[PathBuf], found: Vec<Result<Explained, Failure
     none_left_out(errors)
 }
 
-/// The share of the crashes of all files that each documented weakness makes.
+/// The share of all files' crashes that vanish without each documented weakness.
 fn mechanisms(
     output: &Output,
     arguments: &DiagnoseArguments,

@@ -62,8 +62,8 @@ pub fn distill(output: &Output, arguments: &DistillArguments) -> Result<(), Fail
     Ok(())
 }
 
-/// The policy with rules distilled as its settings want them, and with the claims about them. `arena` is where it
-/// was trained.
+/// The policy with rules distilled by its settings, and with the claims about them. `arena` is where it was
+/// trained.
 pub fn with_rules(arena: &Arena, acting: &QPolicy, policy: Policy) -> Policy {
     let mut policy = Policy { rules: Vec::new(), ..policy };
     let Some(claims) = &mut policy.claims else { return policy };
@@ -80,7 +80,7 @@ pub fn with_rules(arena: &Arena, acting: &QPolicy, policy: Policy) -> Policy {
     policy
 }
 
-/// What the rules are worth, beside the network's return.
+/// What the rules achieve, compared with the network.
 pub fn rules_text(lines: usize, network_return: f64, rules: &RulesClaims) -> String {
     format!(
         "its {lines} rules choose as the network in {:.1} % of {} states and lose {:.3} of Q-value in each; \

@@ -1,4 +1,4 @@
-//! `avastra doc`: a space as Markdown, from its documentation comments and what was proved of it.
+//! `avastra doc`: a space as Markdown, from its documentation comments and from what was proved about it.
 
 use core::fmt::Write;
 
@@ -122,7 +122,7 @@ fn rule_section(text: &mut String, space: &Space, index: usize, rule: &RuleDef) 
     }
 }
 
-/// What the rules leave of a range, for each road where it differs from what is declared.
+/// What the rules leave of a parameter's range, for each road on which they narrow it.
 fn ranges(space: &Space, action: usize, parameter: &Parameter) -> String {
     let Domain::Range(low, high) = &parameter.domain else { return String::new() };
     let declared = Interval::closed(*low, *high);

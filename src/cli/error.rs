@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use crate::run::RunError;
 
-/// Every way in which a command can end but well.
+/// Every way in which a command can fail.
 #[derive(Debug, thiserror::Error)]
 pub enum Failure {
     #[error("{message}")]

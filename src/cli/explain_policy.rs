@@ -14,7 +14,7 @@ use super::verify::acting;
 /// Rows and variables that are listed; JSON has them all.
 const LISTED_MAX: usize = 12;
 
-/// Lets the policy drive, and says what it did and why.
+/// Lets the policy drive, and prints which rows it chose and why.
 pub fn explain_policy(output: &Output, arguments: &ExplainPolicyArguments) -> Result<(), Failure> {
     let (table, policy) = load::policy(output, &arguments.file)?;
     let acting = acting(&table, &policy, Face::Network)?;

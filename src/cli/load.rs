@@ -12,10 +12,10 @@ use crate::model::{Policy, Scenario, Space};
 use super::error::Failure;
 use super::output::Output;
 
-/// Where a directory holds more files, one that declares a name is no guess at what was meant.
+/// In a directory with more files than this, a file that declares a missing name is too weak a hint.
 const NEARBY_MAX: usize = 32;
 
-/// Larger files are refused: no hand and no command of ours writes them.
+/// Larger files are refused: neither people nor our commands write them.
 const FILE_BYTES_MAX: u64 = 64 << 20;
 
 /// Reads and checks a file with everything that it uses. Diagnostics are printed.
@@ -23,7 +23,7 @@ const FILE_BYTES_MAX: u64 = 64 << 20;
 /// # Errors
 /// If the file cannot be read, or the source has mistakes.
 pub fn load(output: &Output, path: &Path) -> Result<Loaded, Failure> {
-    // The root file's absence is a failure of the command, not of the source.
+    // If the root file is missing, the command fails; that is no mistake in a source.
     let loaded = read_and_check(path)?;
     output.diagnostics(&loaded.sources, &loaded.diagnostics);
     match loaded.diagnostics.iter().filter(|diagnostic| diagnostic.is_error()).count() {
@@ -32,7 +32,7 @@ pub fn load(output: &Output, path: &Path) -> Result<Loaded, Failure> {
     }
 }
 
-/// Reads and checks a file; names that a file nearby declares are said to be there.
+/// Reads and checks a file. For a missing name, the diagnostic names a nearby file that declares it.
 ///
 /// # Errors
 /// If the file cannot be read.
@@ -44,7 +44,7 @@ pub fn read_and_check(path: &Path) -> Result<Loaded, Failure> {
     Ok(loaded)
 }
 
-/// Other source files in the directory of a file and in the one above, as it would name them.
+/// Other source files in the directory of a file and in the one above, with their paths from the file.
 pub fn nearby(path: &Path) -> Vec<(String, String)> {
     let folder = path.parent().unwrap_or(Path::new(""));
     let mut found = Vec::new();
@@ -140,7 +140,7 @@ fn space(loaded: Loaded, path: &Path) -> Result<Arc<Space>, Failure> {
     space.ok_or_else(|| Failure::usage(format!("`{}` declares no action", path.display())))
 }
 
-/// The one way in which text comes into avastra.
+/// Reads a text file; everything that avastra reads comes this way.
 pub fn read(path: &Path) -> Result<String, ReadError> {
     let length = std::fs::metadata(path).map_err(|error| ReadError(reason(&error)))?.len();
     if length > FILE_BYTES_MAX {

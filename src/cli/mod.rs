@@ -43,9 +43,6 @@ use arguments::{Arguments, Command};
 use error::Failure;
 use output::Output;
 
-/// Version of avastra, as settings record it.
-const VERSION: &str = env!("CARGO_PKG_VERSION");
-
 /// Runs the command that the process was started with.
 pub fn main() -> ExitCode {
     let arguments = match Arguments::try_parse() {

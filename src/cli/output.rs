@@ -14,7 +14,7 @@ pub struct Output {
     format: Format,
     colour: bool,
     pub quiet: bool,
-    /// What SARIF wants in one piece at the end.
+    /// Diagnostics for SARIF, which prints them in one piece at the end.
     collected: Mutex<Vec<DiagnosticRecord>>,
 }
 
@@ -116,7 +116,7 @@ impl Output {
     }
 }
 
-/// The result object of a command line that could not be read, if it asks for JSON.
+/// Prints the result object of a command line that could not be parsed, if it asks for JSON.
 pub fn usage_in_json(failure: &Failure) {
     let arguments: Vec<String> = std::env::args().collect();
     let asks = |pair: &[String]| pair[0] == "--format" && pair[1] == "json";

@@ -1,8 +1,10 @@
-//! The same work for many files, on threads: results come in the order of the files.
+//! Work on many files at once; results come in the order of the files.
 
+use std::convert::Infallible;
 use std::path::PathBuf;
-use std::sync::Mutex;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::atomic::AtomicBool;
+
+use crate::run::on_threads;
 
 /// Worker threads: as many as asked for, or one for each core.
 pub fn jobs(asked: Option<u32>) -> usize {
@@ -16,21 +18,15 @@ pub fn each_file<T: Send>(
     asked: Option<u32>,
     work: impl Fn(&PathBuf) -> T + Sync,
 ) -> Vec<T> {
-    let next = AtomicUsize::new(0);
-    let done: Mutex<Vec<(usize, T)>> = Mutex::new(Vec::with_capacity(files.len()));
-    std::thread::scope(|scope| {
-        for _ in 0..jobs(asked).min(files.len()) {
-            scope.spawn(|| {
-                loop {
-                    let number = next.fetch_add(1, Ordering::Relaxed);
-                    let Some(file) = files.get(number) else { break };
-                    let result = work(file);
-                    done.lock().expect("no worker panics while it holds the lock").push((number, result));
-                }
-            });
-        }
+    let numbered: Vec<(usize, &PathBuf)> = files.iter().enumerate().collect();
+    let work = |&(number, file): &(usize, &PathBuf), tell: &mut dyn FnMut(_) -> bool| {
+        tell((number, work(file)));
+    };
+    let mut done = Vec::new();
+    let Ok(()) = on_threads(&numbered, jobs(asked), &AtomicBool::new(false), work, &mut |result| {
+        done.push(result);
+        Ok::<_, Infallible>(())
     });
-    let mut done = done.into_inner().expect("no worker panics while it holds the lock");
     done.sort_by_key(|(number, _)| *number);
     done.into_iter().map(|(_, result)| result).collect()
 }

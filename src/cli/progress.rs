@@ -9,48 +9,24 @@ use crate::train::TrainedEpisode;
 
 use super::output::remark;
 
-/// How far a run is. Dropping it clears the bar.
+/// How far a run or a study is. Dropping it clears the bar.
 pub struct Progress {
-    bar: Option<ProgressBar>,
-    lines: bool,
-    total: u64,
-    done: u64,
+    count: Count,
     found: usize,
 }
 
 impl Progress {
     /// `quiet` shows nothing at all; `resumed` episodes count as done already.
     pub fn new(total: u64, resumed: u64, quiet: bool) -> Progress {
-        let terminal = std::io::stderr().is_terminal();
-        let bar = (!quiet && terminal).then(|| {
-            let bar = ProgressBar::new(total).with_position(resumed);
-            let template = "{bar:30} {pos}/{len} episodes, {msg}, {per_sec}, {eta} left";
-            bar.set_style(ProgressStyle::with_template(template).expect("a fixed template"));
-            bar.set_message("no counted collision");
-            bar
-        });
-        Progress { bar, lines: !quiet && !terminal, total, done: resumed, found: 0 }
+        let template = "{bar:30} {pos}/{len} episodes, {msg}, {per_sec}, {eta} left";
+        let count = Count::new(total, resumed, quiet, template, "no counted collision");
+        Progress { count, found: 0 }
     }
 
     /// One more episode is done, with so many counted collisions.
     pub fn episode(&mut self, counted: usize) {
-        self.done += 1;
         self.found += counted;
-        let message = format!("{} counted", plural(self.found, "collision"));
-        if let Some(bar) = &self.bar {
-            bar.set_message(message);
-            bar.inc(1);
-        } else if self.lines && (self.done * 10 / self.total > (self.done - 1) * 10 / self.total) {
-            remark(&format!("{}/{} episodes, {message}", self.done, self.total));
-        }
-    }
-}
-
-impl Drop for Progress {
-    fn drop(&mut self) {
-        if let Some(bar) = &self.bar {
-            bar.finish_and_clear();
-        }
+        self.count.up(format!("{} counted", plural(self.found, "collision")));
     }
 }
 
@@ -59,10 +35,7 @@ const RECENT: usize = 25;
 
 /// How far a training is. Dropping it clears the bar.
 pub struct TrainingProgress {
-    bar: Option<ProgressBar>,
-    lines: bool,
-    total: u64,
-    done: u64,
+    count: Count,
     found: usize,
     /// Sums of rewards of the last episodes.
     recent: VecDeque<f64>,
@@ -71,20 +44,13 @@ pub struct TrainingProgress {
 impl TrainingProgress {
     /// `quiet` shows nothing at all; `resumed` episodes count as done already.
     pub fn new(total: u64, resumed: u64, quiet: bool) -> TrainingProgress {
-        let terminal = std::io::stderr().is_terminal();
-        let bar = (!quiet && terminal).then(|| {
-            let bar = ProgressBar::new(total).with_position(resumed);
-            let template = "{bar:20} {pos}/{len} episodes, {msg}, {eta} left";
-            bar.set_style(ProgressStyle::with_template(template).expect("a fixed template"));
-            bar
-        });
-        let lines = !quiet && !terminal;
-        TrainingProgress { bar, lines, total, done: resumed, found: 0, recent: VecDeque::new() }
+        let template = "{bar:20} {pos}/{len} episodes, {msg}, {eta} left";
+        let count = Count::new(total, resumed, quiet, template, "");
+        TrainingProgress { count, found: 0, recent: VecDeque::new() }
     }
 
     /// One more episode has been learned from.
     pub fn episode(&mut self, trained: &TrainedEpisode) {
-        self.done += 1;
         self.found += trained.summary.counted();
         self.recent.push_back(trained.sum);
         if self.recent.len() > RECENT {
@@ -92,11 +58,36 @@ impl TrainingProgress {
         }
         let mean = self.recent.iter().sum::<f64>() / self.recent.len() as f64;
         let loss = trained.lesson.loss.map_or("no loss yet".to_owned(), |loss| format!("loss {loss:.3}"));
-        let message = format!(
+        self.count.up(format!(
             "return {mean:.1}, {} counted, ε {:.2}, {loss}",
             plural(self.found, "collision"),
             trained.exploration_epsilon
-        );
+        ));
+    }
+}
+
+/// Episodes done of all: a bar on a terminal; elsewhere a line for each tenth of them.
+struct Count {
+    bar: Option<ProgressBar>,
+    lines: bool,
+    total: u64,
+    done: u64,
+}
+
+impl Count {
+    fn new(total: u64, done: u64, quiet: bool, template: &str, message: &'static str) -> Count {
+        let terminal = std::io::stderr().is_terminal();
+        let bar = (!quiet && terminal).then(|| {
+            let bar = ProgressBar::new(total).with_position(done);
+            bar.set_style(ProgressStyle::with_template(template).expect("a fixed template"));
+            bar.set_message(message);
+            bar
+        });
+        Count { bar, lines: !quiet && !terminal, total, done }
+    }
+
+    fn up(&mut self, message: String) {
+        self.done += 1;
         if let Some(bar) = &self.bar {
             bar.set_message(message);
             bar.inc(1);
@@ -106,7 +97,7 @@ impl TrainingProgress {
     }
 }
 
-impl Drop for TrainingProgress {
+impl Drop for Count {
     fn drop(&mut self) {
         if let Some(bar) = &self.bar {
             bar.finish_and_clear();

@@ -32,7 +32,7 @@ pub fn render(output: &Output, arguments: &RenderArguments) -> Result<(), Failur
     let profile = arguments.ads_config.as_deref().map(load::profile).transpose()?;
     let (ads, _) = driver(arguments.ads.as_deref(), profile.as_ref(), scenario)?;
     let moments = moments(&table, scenario, &ads, &times_s)?;
-    // A strip ends where its scenario does.
+    // A strip ends with its scenario.
     if moments.is_empty() || (!arguments.strip && moments.len() < times_s.len()) {
         return Err(Failure::usage(format!(
             "`{}` is over before {} s",
@@ -82,7 +82,7 @@ fn times(arguments: &RenderArguments, scenario: &Scenario, step_s: f64) -> Resul
         let acted = acted.ok_or_else(|| {
             Failure::usage("`--strip` needs a scenario with an action or a collision: use `--at`")
         })?;
-        // The action is carried out between two ticks: one later it shows.
+        // The action is carried out between two ticks and is seen one tick later.
         let begin_s = acted.number as f64 * step_s + DT_S;
         return Ok((0..STRIP_LEN).map(|n| begin_s + ACTION_STRIDE_S * f64::from(n)).collect());
     };

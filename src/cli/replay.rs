@@ -1,4 +1,4 @@
-//! `avastra replay`: emitted scenarios again, every claim checked.
+//! `avastra replay`: plays emitted scenarios again and checks every claim.
 
 use std::path::Path;
 
@@ -27,7 +27,7 @@ pub fn replay(output: &Output, arguments: &ReplayArguments) -> Result<(), Failur
     for (path, played) in arguments.files.iter().zip(played) {
         let played = match played {
             Ok(played) => played,
-            // One broken file of many hides nothing of the others.
+            // A broken file does not hide the results of the others.
             Err(failure) => {
                 if arguments.files.len() > 1 {
                     output.tell(&format!("{}: {failure}", path.display()));
@@ -87,9 +87,9 @@ fn play(
     let (table, scenario) = load::scenario(output, path)?;
     let (ads, is_recorded) = driver(arguments.ads.as_deref(), profile, &scenario)?;
     let stage = Stage::new(&table, &scenario)?;
-    let mut measures = Gauges::default();
-    let log = stage.play(&ads, &mut |world, _, contacts| measures.note(world, contacts));
-    let (criticality, pet_s) = measures.of_steps(&log);
+    let mut gauges = Gauges::default();
+    let log = stage.play(&ads, &mut |world, _, contacts| gauges.note(world, contacts));
+    let (criticality, pet_s) = gauges.of_steps(&log);
     let severities: Vec<oracle::Severity> = log.collisions.iter().map(oracle::severity).collect();
     if is_recorded {
         let claims = stage.verify(&ads, &log);
@@ -117,7 +117,7 @@ fn play(
     Ok(Played { claims: None, told, result, scenario })
 }
 
-/// Who drives, and whether that is who the scenario was made with.
+/// The driving system to play with, and whether it is the one that the scenario records.
 pub fn driver(
     ads: Option<&str>,
     profile: Option<&ModularConfig>,

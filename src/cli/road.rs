@@ -1,7 +1,7 @@
 //! `avastra road`: a map in words, as JSON or as a picture, and a route through it.
 //!
-//! Of OpenDRIVE files and of the roads that a space declares. JSON is for comparing maps with other
-//! readers: it holds every lane with its links and its centre at every metre.
+//! Reads OpenDRIVE files and the roads that a space declares. JSON is for comparing maps with other readers: it
+//! holds every lane with its links and its centre at every metre.
 
 use std::path::Path;
 use std::sync::Arc;

@@ -1,4 +1,4 @@
-//! `avastra run`: episodes in, crashes out.
+//! `avastra run`: plays episodes and writes their crashes as scenarios.
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
@@ -8,13 +8,11 @@ use crate::action::ActionTable;
 use crate::agent::Face;
 use crate::emit;
 use crate::episode::EpisodeLog;
-use crate::model::Policy;
-use crate::oracle::AvoidabilitySettings;
+use crate::model::{Policy, Space};
 use crate::run;
 use crate::run::{
     EpisodeSummary, Group, PolicyReference, Profile, RefusalCount, Run, RunSettings, Totals, play,
 };
-use crate::sim::ENGINE;
 
 use super::arguments::{FaceArgument, RunArguments};
 use super::error::Failure;
@@ -24,9 +22,9 @@ use super::parallel::jobs;
 use super::progress::{Progress, plural};
 use super::run_directory::{Begun, RunDirectory, write};
 use super::verify::acting;
-use super::{VERSION, compile, load, run_directory};
+use super::{compile, load, run_directory};
 
-/// How many critical scenarios, and how many reasons of refusals, the summary names.
+/// Largest number of critical scenarios, groups and refusal reasons that the summary lists.
 const NAMED_MAX: usize = 10;
 
 /// Plays the episodes of a new run, or those that an interrupted one still lacks.
@@ -90,32 +88,21 @@ fn begun(output: &Output, arguments: &RunArguments) -> Result<(Run, RunDirectory
         (None, None) => compile::last(output)?,
     };
     let space = table.space();
-    let roads = if arguments.road.is_empty() {
-        space.roads.iter().map(|road| road.name.clone()).collect()
-    } else {
-        arguments.road.clone()
-    };
     let profile = match &arguments.ads_config {
         Some(path) => Some(load::profile(path)?),
         None => run::driving_system(&arguments.ads).ok().and_then(|ads| ads.profile().copied()),
     };
+    let agent = policy.as_ref().map_or(&arguments.agent, |(_, policy)| &policy.name);
+    let settings = RunSettings::new(space, agent, arguments.episodes, arguments.seed);
     let settings = RunSettings {
-        avastra: VERSION.to_owned(),
-        engine: ENGINE.to_owned(),
-        space: space.path.display().to_string(),
-        space_digest: space.digest.clone(),
-        roads,
+        roads: roads_or_all(&arguments.road, space),
         ads: arguments.ads.clone(),
         profile: profile.as_ref().map(Profile::new),
-        agent: policy.as_ref().map_or(&arguments.agent, |(_, policy)| &policy.name).clone(),
-        policy: None,
-        episodes: arguments.episodes,
-        seed: arguments.seed,
         ambient: arguments.ambient,
         causes: arguments.causes,
         without: arguments.rules.without.clone(),
         with: arguments.rules.with.clone(),
-        avoidability: AvoidabilitySettings::default(),
+        ..settings
     };
     let face = match arguments.face {
         FaceArgument::Network => Face::Network,
@@ -133,6 +120,11 @@ fn begun(output: &Output, arguments: &RunArguments) -> Result<(Run, RunDirectory
     let settings = RunSettings { space, policy: reference, ..run.settings().clone() };
     run_directory::write_settings(&path, &settings)?;
     Ok((run, RunDirectory::open(path)?))
+}
+
+/// The roads that a command line names, or all of the space.
+pub fn roads_or_all(named: &[String], space: &Space) -> Vec<String> {
+    if named.is_empty() { space.roads.iter().map(|road| road.name.clone()).collect() } else { named.to_vec() }
 }
 
 /// The rest of an interrupted run.
@@ -158,7 +150,7 @@ fn resumed(output: &Output, path: &Path) -> Result<(Run, RunDirectory), Failure>
     Ok((ready(table, settings, policy.as_ref(), face)?, RunDirectory::open(path.to_owned())?))
 }
 
-/// A run of the agent that the settings name, or of a policy, which comes with its own table.
+/// A run of the agent that the settings name, or of the given policy, whose table must have the same rows.
 fn ready(
     table: ActionTable,
     settings: RunSettings,
@@ -187,8 +179,7 @@ fn ready(
     Ok(Run::with_policy(table, settings, acting)?)
 }
 
-/// Writes what an episode found. The scenario comes first: an episode that is in the database has
-/// its file.
+/// Writes what an episode found. The scenario comes first, so every episode in the database has its file.
 fn keep(
     run: &Run,
     directory: &mut RunDirectory,
@@ -216,7 +207,7 @@ fn keep(
         .map_err(|error| Failure::file("write", &directory.path.join("run.db"), error))
 }
 
-/// The space as a file in `critical/` must name it.
+/// Path of the space, from a file in `critical/`.
 fn space_path(run: &Run, directory: &RunDirectory) -> Result<String, Failure> {
     load::relative(&directory.path.join("critical"), &run.space().path)
 }
@@ -275,7 +266,7 @@ fn totals_text(totals: &Totals, elapsed_s: f64, played: usize) -> String {
     text
 }
 
-/// Steps in which nothing was done of what was asked for, by reason.
+/// Refused actions, by reason.
 fn refusals_text(refusals: &[RefusalCount]) -> String {
     let all: i64 = refusals.iter().map(|refusal| refusal.times).sum();
     let mut text = format!("refused: {}", plural(all as usize, "action"));
@@ -333,7 +324,7 @@ fn critical_text(directory: &Path, files: &[PathBuf]) -> String {
     if files.len() > NAMED_MAX {
         text.push_str(&format!("\n  and {} more", files.len() - NAMED_MAX));
     }
-    // A shell splits a path at its blanks, and must still see the star.
+    // A shell splits a path at its spaces, and must still expand the star.
     let directory = directory.display().to_string();
     let directory = if directory.contains(' ') { format!("'{directory}'") } else { directory };
     text.push_str(&format!("\nreplay them with: avastra replay {directory}/critical/*.ava"));

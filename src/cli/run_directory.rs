@@ -4,12 +4,12 @@ use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 use crate::action::ActionTable;
-use crate::run::Database;
+use crate::run::{Database, VERSION};
 use crate::sim::ENGINE;
 
 use super::error::Failure;
+use super::load;
 use super::output::Output;
-use super::{VERSION, load};
 
 /// A run directory on disk.
 pub struct RunDirectory {
@@ -28,7 +28,7 @@ pub fn create_empty(out: Option<&Path>) -> Result<PathBuf, Failure> {
     }
 }
 
-/// The same for a run, with a place for its scenarios.
+/// Makes a run directory, with `critical/` for its scenarios.
 pub fn create(out: Option<&Path>) -> Result<PathBuf, Failure> {
     let path = create_empty(out)?;
     let critical = path.join("critical");
@@ -42,12 +42,12 @@ pub fn write_settings(directory: &Path, settings: &impl serde::Serialize) -> Res
     write(&directory.join("run.yaml"), &text)
 }
 
-/// The settings that a directory was made with.
+/// The settings in a run directory's `run.yaml`.
 pub fn settings<S: serde::de::DeserializeOwned>(directory: &Path) -> Result<S, Failure> {
     settings_in(directory, "run.yaml", "run")
 }
 
-/// The same of any kind of directory: the file's name, and a word for what it is of.
+/// The settings of any kind of directory: `name` is their file, `what` the kind in a word.
 pub fn settings_in<S: serde::de::DeserializeOwned>(
     directory: &Path,
     name: &str,
@@ -76,7 +76,7 @@ impl RunDirectory {
     }
 }
 
-/// What an interrupted run or training was begun with, as its settings tell.
+/// What an interrupted run, training or study was begun with.
 pub struct Begun<'a> {
     pub avastra: &'a str,
     pub engine: &'a str,
@@ -84,7 +84,8 @@ pub struct Begun<'a> {
 }
 
 impl Begun<'_> {
-    /// The table of the space, if neither it nor avastra has changed since. `what` was begun: a word.
+    /// The table of the space, if neither the space nor avastra has changed since. `what` is what was begun, in a
+    /// word.
     pub fn table(&self, output: &Output, what: &str, space: &Path) -> Result<ActionTable, Failure> {
         if (self.engine, self.avastra) != (ENGINE, VERSION) {
             return Err(Failure::usage(format!(
@@ -103,9 +104,8 @@ impl Begun<'_> {
     }
 }
 
-/// Writes a file whole or not at all: a kill leaves the old one.
-/// A link is followed, and what is no regular file (a pipe, a terminal, the null device) is
-/// written to rather than replaced.
+/// Writes a file completely or not at all: after a kill the old one is still there. A symbolic link is followed;
+/// what is no regular file (a pipe, a terminal, the null device) is written to and not replaced.
 pub fn write(path: &Path, text: &(impl AsRef<[u8]> + ?Sized)) -> Result<(), Failure> {
     let followed = std::fs::canonicalize(path);
     let path = followed.as_deref().unwrap_or(path);

@@ -1,7 +1,7 @@
 //! Diagnostics in SARIF 2.1.0 (OASIS, 2020), the form that code hosts and editors read.
 //!
-//! One run of one tool; every diagnostic is a result, every code that occurs a rule. Columns count
-//! characters, as SARIF's `unicodeCodePoints` says.
+//! One run of one tool; every diagnostic is a result, every code that occurs is a rule. Columns count characters,
+//! as SARIF's `unicodeCodePoints` says.
 
 use serde_json::{Value, json};
 
@@ -21,7 +21,7 @@ pub fn log(records: &[DiagnosticRecord]) -> Value {
         "runs": [{
             "tool": { "driver": {
                 "name": "avastra",
-                "semanticVersion": super::VERSION,
+                "semanticVersion": crate::run::VERSION,
                 "rules": rules,
             } },
             "columnKind": "unicodeCodePoints",

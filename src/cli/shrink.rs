@@ -17,7 +17,7 @@ use super::parallel::each_file;
 use super::progress::plural;
 use super::run_directory::write;
 
-/// Writes each file's scenario as small as it gets, and checks every claim of what it wrote.
+/// Writes each file's scenario as small as possible, and checks every claim of what it wrote.
 pub fn shrink(output: &Output, arguments: &ShrinkArguments) -> Result<(), Failure> {
     if let [file] = arguments.files.as_slice() {
         let path = arguments.output.clone().unwrap_or_else(|| beside(file));
@@ -71,7 +71,7 @@ pub fn shrink(output: &Output, arguments: &ShrinkArguments) -> Result<(), Failur
     refutation(done.iter().map(|small| small.refuted).sum())
 }
 
-/// What became of one file. Sizes are steps, and how many of them do something.
+/// The result for one file. Sizes are numbers of steps, and of steps with an action.
 struct Small {
     file: PathBuf,
     path: PathBuf,

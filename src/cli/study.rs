@@ -6,7 +6,6 @@ use std::time::Instant;
 
 use crate::report;
 use crate::run::{Profile, driving_system};
-use crate::sim::ENGINE;
 use crate::study::{
     CellRecord, Event, Spent, Study, StudyDatabase, StudyFile, StudyResults, StudySettings, play_jobs,
 };
@@ -18,7 +17,7 @@ use super::output::Output;
 use super::parallel::jobs;
 use super::progress::{Progress, plural};
 use super::run_directory::{Begun, write};
-use super::{VERSION, load, run_directory};
+use super::{load, run_directory};
 
 /// Plays what a study still lacks and prints its result.
 pub fn study(output: &Output, arguments: &StudyArguments) -> Result<(), Failure> {
@@ -80,7 +79,7 @@ fn begun(output: &Output, path: &Path, quick: bool) -> Result<Study, Failure> {
     };
     let profile = profile.as_ref().map(Profile::new);
     let read = |name: &str| load::read(&beside(name)).map_err(|error| error.to_string());
-    let settings = StudySettings::new(file, &table, profile, (VERSION, ENGINE), &read);
+    let settings = StudySettings::new(file, &table, profile, &read);
     let settings = settings.map_err(|error| refuse(error.to_string()))?;
     let settings = if quick { settings.quick() } else { settings };
     Study::new(table, settings).map_err(|error| refuse(error.to_string()))
@@ -111,14 +110,14 @@ fn heading(study: &Study, directory: &Path) -> String {
     )
 }
 
-/// What the thread that asks has spent so far.
+/// Time that the calling thread has spent so far.
 fn spent() -> Spent {
     #[allow(
         clippy::disallowed_methods,
         reason = "this is cli, and the time goes nowhere but beside the result"
     )]
     let now = Instant::now();
-    // Linux keeps the nanoseconds that a thread was on a processor in the first word of this file.
+    // On Linux, the first word of this file is the thread's time on a processor, ns.
     let schedule = std::fs::read_to_string("/proc/thread-self/schedstat").ok();
     let on_cpu_ns = schedule.and_then(|text| text.split(' ').next()?.parse::<f64>().ok());
     Spent { wall_s: now.duration_since(*BEGAN).as_secs_f64(), cpu_s: on_cpu_ns.map(|ns| ns / 1e9) }
@@ -127,7 +126,7 @@ fn spent() -> Spent {
 #[allow(clippy::disallowed_methods, reason = "as above")]
 static BEGAN: std::sync::LazyLock<Instant> = std::sync::LazyLock::new(Instant::now);
 
-/// What an agent's cells took on average.
+/// Mean times of an agent's cells.
 #[derive(serde::Serialize)]
 struct Timing {
     agent: String,

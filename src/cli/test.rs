@@ -19,12 +19,12 @@ use super::progress::plural;
 use super::replay::driver;
 use super::run_directory::write;
 
-/// What became of one scenario.
+/// The result for one scenario.
 struct Case {
     file: PathBuf,
     scenario: String,
     road: String,
-    /// Or why nothing can be said.
+    /// The outcome, or why the scenario could not be played.
     outcome: Result<Regression, String>,
     elapsed_s: f64,
 }

@@ -1,4 +1,4 @@
-//! `avastra train`: an agent learns where the crashes are, and is kept as a policy.
+//! `avastra train`: trains an agent to find crashes, and writes it as a policy.
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -8,8 +8,7 @@ use crate::agent::{Kind, QPolicy, Settings};
 use crate::emit;
 use crate::model::policy::{PolicyClaims, PolicyOrigin};
 use crate::model::{Policy, Space, digest_text};
-use crate::run::Profile;
-use crate::sim::ENGINE;
+use crate::run::{Profile, RunSettings};
 use crate::syntax::listed;
 use crate::train::{Evaluation, TrainSettings, TrainedEpisode, Training, evaluate, rounded};
 
@@ -19,10 +18,11 @@ use super::error::Failure;
 use super::interrupt::stop_on_interrupt;
 use super::output::Output;
 use super::progress::{TrainingProgress, plural};
+use super::run::roads_or_all;
 use super::run_directory::{Begun, RunDirectory, write};
-use super::{VERSION, distill, load, run_directory};
+use super::{distill, load, run_directory};
 
-/// Episodes between two checkpoints: what a kill may cost to play again.
+/// Episodes between two checkpoints: at most so many are played again after a kill.
 const CHECKPOINT_EPISODES: usize = 25;
 /// Episodes on each road that the finished policy is judged by: the paper's number.
 const EVALUATION_EPISODES: u64 = 15;
@@ -56,28 +56,16 @@ fn begun(output: &Output, arguments: &TrainArguments) -> Result<(Training, RunDi
     let table = load::table(output, file)?;
     let hyperparameters = settings(arguments)?;
     let space = table.space();
-    let roads = if arguments.road.is_empty() {
-        space.roads.iter().map(|road| road.name.clone()).collect()
-    } else {
-        arguments.road.clone()
-    };
     let profile = arguments.ads_config.as_deref().map(load::profile).transpose()?;
-    let settings = TrainSettings {
-        avastra: VERSION.to_owned(),
-        engine: ENGINE.to_owned(),
-        space: space.path.display().to_string(),
-        space_digest: space.digest.clone(),
-        roads,
+    let conditions = RunSettings {
+        roads: roads_or_all(&arguments.road, space),
         ads: arguments.ads.clone(),
         profile: profile.as_ref().map(Profile::new),
-        agent: arguments.agent.clone(),
-        episodes: arguments.episodes,
-        seed: arguments.seed,
-        ambient: 0,
         without: arguments.rules.without.clone(),
         with: arguments.rules.with.clone(),
-        hyperparameters,
+        ..RunSettings::new(space, &arguments.agent, arguments.episodes, arguments.seed)
     };
+    let settings = TrainSettings::new(conditions, hyperparameters);
     let training = Training::new(table, settings)?;
     let path = run_directory::create(arguments.out.as_deref())?;
     let space = load::relative(&path, &training.table().space().path)?;
@@ -119,7 +107,7 @@ fn resumed(output: &Output, path: &Path) -> Result<(Training, RunDirectory), Fai
     Ok((training, directory))
 }
 
-/// Commits an episode; with it a checkpoint every so often, at the end, and where the user stops.
+/// Commits an episode, with a checkpoint every so often, at the end, and when the user stops.
 fn keep(
     training: &Training,
     directory: &mut RunDirectory,
@@ -137,8 +125,8 @@ fn keep(
         .map_err(|error| Failure::file("write", &directory.path.join("run.db"), error))
 }
 
-/// Writes the counted collisions of an episode as a scenario. A training with an observation period of
-/// its own writes none: the space would replay them at its own pace.
+/// Writes the counted collisions of an episode as a scenario. A training with an observation period of its own
+/// writes none, because a replay would use the period of the space.
 fn write_critical(
     training: &Training,
     directory: &RunDirectory,
@@ -164,7 +152,7 @@ fn write_critical(
     write(&directory.critical(&name), &crate::syntax::print(&file))
 }
 
-/// Judges the policy, writes it, and says what came of the training.
+/// Evaluates the policy, writes it, and prints the result of the training.
 fn finish(output: &Output, training: &Training, directory: &RunDirectory) -> Result<(), Failure> {
     let settings = training.settings();
     let roads = &settings.roads;
@@ -221,7 +209,7 @@ fn finish(output: &Output, training: &Training, directory: &RunDirectory) -> Res
     Ok(())
 }
 
-/// The policy as it is to be kept, with the rules distilled from it and the claims of both.
+/// The policy to be written, with the rules distilled from it and the claims of both.
 fn policy(training: &Training, acting: &QPolicy, evaluation: &Evaluation) -> Policy {
     let settings = training.settings();
     let name = match settings.roads.as_slice() {
@@ -279,7 +267,7 @@ fn write_policy(policy: &Policy, space: &Space, directory: &Path) -> Result<Path
     Ok(path)
 }
 
-/// What it is, in a sentence for the reader.
+/// The policy's headline: what it is, in a sentence.
 fn headline(settings: &TrainSettings, evaluation: &Evaluation) -> String {
     format!(
         "{} ({}) after {} episodes on {}: {} counted collisions in {} episodes of its own.",

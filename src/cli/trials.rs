@@ -1,4 +1,4 @@
-//! `avastra table --try`: every row on every road, carried out and judged.
+//! `avastra table --try`: carries out every row on every road, and judges it.
 
 use std::path::Path;
 
@@ -16,7 +16,7 @@ use super::load;
 use super::output::Output;
 use super::run_directory::write;
 
-/// Tries the rows of a table and prints what became of each.
+/// Tries the rows of a table and prints the results.
 pub fn trials(output: &Output, arguments: &TableArguments, table: ActionTable) -> Result<(), Failure> {
     let roads: Vec<String> = match &arguments.road {
         Some(road) => vec![road.clone()],
@@ -26,26 +26,18 @@ pub fn trials(output: &Output, arguments: &TableArguments, table: ActionTable) -
     let arena = Arena::new(table, &roads, driving_system(&wanted.ads)?, &[], &[])?;
     let settings = TrialSettings { drives: wanted.drives, tries: wanted.tries, seed: wanted.seed };
     let trials = Trials::new(&arena, settings);
-    let roads: Vec<Vec<Cell>> = std::thread::scope(|scope| {
-        let trials = &trials;
-        let workers: Vec<_> = (0..arena.roads()).map(|road| scope.spawn(move || trials.road(road))).collect();
-        workers.into_iter().map(|worker| worker.join().expect("a worker's panic is ours")).collect()
-    });
+    let cells = trials.cells();
     if let Some(directory) = &wanted.out {
-        for (road, cells) in roads.iter().enumerate() {
-            for cell in cells {
-                emit_sample(&trials, &arena, road, cell, arguments, directory)?;
-            }
+        for (index, cell) in cells.iter().enumerate() {
+            emit_sample(&trials, &arena, index % arena.roads(), cell, arguments, directory)?;
         }
     }
-    let cells: Vec<&Cell> =
-        (0..arena.table().rows().len()).flat_map(|row| roads.iter().map(move |cells| &cells[row])).collect();
     output.say(report::trials(&cells).trim_end());
     output.result("table", serde_json::json!({ "trials": settings, "cells": cells }));
     Ok(())
 }
 
-/// Writes the first try that failed, or the first.
+/// Writes a try as a scenario: the first one that failed, or the first.
 fn emit_sample(
     trials: &Trials,
     arena: &Arena,

@@ -1,4 +1,4 @@
-//! `avastra verify`: emitted files, scenarios and policies alike, every claim checked.
+//! `avastra verify`: checks every claim of emitted scenarios and policies.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -17,14 +17,14 @@ use super::output::Output;
 use super::progress::plural;
 use super::{load, replay};
 
-/// Replays scenarios, and lets policies show again what they claim.
+/// Replays scenarios, and plays the evaluations of policies again.
 pub fn verify(output: &Output, arguments: &VerifyArguments) -> Result<(), Failure> {
     let (mut scenarios, mut policies, mut failed) = (Vec::new(), Vec::new(), None);
     for path in &arguments.files {
         match load::emitted(output, path) {
             Ok(Emitted::Scenario) => scenarios.push(path.clone()),
             Ok(Emitted::Policy(table, policy)) => policies.push((path, table, *policy)),
-            // One broken file of many hides nothing of the others.
+            // A broken file does not hide the results of the others.
             Err(failure) => {
                 if arguments.files.len() > 1 {
                     output.tell(&format!("{}: {failure}", path.display()));
@@ -116,11 +116,10 @@ pub fn same_world(policy: &Policy) -> Result<(), Failure> {
     )))
 }
 
-/// A policy that can act on a table, by one of its faces.
+/// The policy ready to act on a table, by its network or by its rules.
 ///
 /// # Errors
-/// If its settings cannot be read, its network is not what they describe, or it has no rules where
-/// those are to act.
+/// If its settings cannot be read, its network does not fit them, or its rules are to act and it has none.
 pub fn acting(table: &ActionTable, policy: &Policy, face: Face) -> Result<QPolicy, Failure> {
     let acting = QPolicy::read(policy, table)
         .map_err(|error| Failure::usage(format!("`{}`: {error}", policy.name)))?;

@@ -1,4 +1,4 @@
-//! `avastra why`: is a row legal here, and which rule says no.
+//! `avastra why`: whether a row is legal here, and which rule refuses it.
 
 use std::sync::Arc;
 
@@ -14,7 +14,7 @@ use super::error::Failure;
 use super::load;
 use super::output::Output;
 
-/// Seed of the question: what is asked is the rule, not the draw.
+/// Fixed seed: the question is about the rules, not about drawn values.
 const SEED: u64 = 0;
 
 /// Judges a row at the start of a road, with the states as given.

@@ -1,7 +1,6 @@
-//! Results as source: an episode log becomes a scenario in the language it came from, and what an agent
-//! learned a policy.
+//! Results as source files: an episode log becomes a scenario of its space, and a trained agent becomes a policy.
 //!
-//! Builds syntax trees and leaves the spelling to `syntax::format`; prints no concrete syntax itself.
+//! Builds syntax trees; `syntax` prints them.
 
 mod policy;
 mod safetensors;

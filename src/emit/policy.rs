@@ -1,5 +1,4 @@
-//! A policy as a file: the network bit by bit, every setting, where it comes from, what it claims, and
-//! its rules.
+//! A policy as a file: the network bit by bit, every setting, its origin, its claims and its rules.
 
 use serde_json::Value;
 
@@ -15,10 +14,10 @@ use crate::units::decimal;
 
 use super::tree;
 
-/// The text of a policy file, sealed; the policy's own digest is not looked at. `space_path` is the way
-/// from the file to its space.
+/// The text of a policy file, sealed with a new digest; the policy's own digest is ignored. `space_path` is the
+/// path from the file to its space.
 pub fn policy_text(policy: &Policy, space: &Space, space_path: &str) -> String {
-    // The seal is over the text, so the text comes first.
+    // The seal covers the text, so the text is printed first without it.
     let open = print(&file(policy, space, space_path, String::new()));
     let (tree, mistakes) = parse(FileId(0), &open);
     debug_assert!(mistakes.is_empty(), "what is printed can be read");
@@ -56,10 +55,7 @@ fn file(policy: &Policy, space: &Space, space_path: &str, digest: String) -> Fil
 
 /// `when ego_speed > 8.25 m/s and time == Night => pedestrian(from: Left)`.
 fn line(space: &Space, rule: &PolicyRule) -> PolicyLine {
-    let and = |left: Expr, right: Expr| {
-        let (left, right) = (Box::new(left), Box::new(right));
-        Expr::built(ExprKind::Binary { op: BinaryOp::And, op_span: Span::NONE, left, right })
-    };
+    let and = |left, right| tree::binary(BinaryOp::And, left, right);
     PolicyLine {
         condition: rule.conditions.iter().map(condition).reduce(and),
         actions: rule.rows.iter().map(|&row| call(space, row)).collect(),
@@ -79,9 +75,7 @@ fn condition(condition: &Condition) -> Expr {
             tree::signed(decimal(condition.value.abs(), false), condition.value < 0.0, unit)
         }
     };
-    let (left, right) = (Box::new(tree::name(variable.name)), Box::new(value));
-    let op = condition.comparison.operator();
-    Expr::built(ExprKind::Binary { op, op_span: Span::NONE, left, right })
+    tree::binary(condition.comparison.operator(), tree::name(variable.name), value)
 }
 
 /// The call that names a row, its values in the order of the axes.
@@ -93,7 +87,7 @@ fn call(space: &Space, row: usize) -> Call {
     Call { name: Name::built(&action.name), args: args.collect(), span: Span::NONE }
 }
 
-/// A struct as fields, in its own order.
+/// The fields of a struct, in its own order.
 fn fields(value: &impl serde::Serialize) -> Vec<Field> {
     let value: Value = serde_json::to_value(value).expect("policies are plain data");
     match expression(&value).kind {

@@ -1,4 +1,4 @@
-//! A policy's weights in the safetensors format, for tools that are not ours.
+//! A policy's weights in the safetensors format, for other tools.
 //!
 //! Named and laid out as PyTorch's `Sequential(Linear, ReLU, Linear, …)` has them: `0.weight` of shape
 //! (outputs, inputs), `0.bias`, then `2.weight`, and so on. The value of a dueling head is the last

@@ -18,14 +18,14 @@ use crate::units::Dimension;
 
 use super::tree;
 
-/// What an emitted file says about where it comes from.
+/// What an emitted file says about its origin.
 #[derive(Debug, Clone, Copy)]
 pub struct Provenance<'a> {
     /// The command that writes it, for example `run`.
     pub command: &'a str,
     /// Name of the scenario.
     pub name: &'a str,
-    /// Path of the space's file, as the emitted file is to name it.
+    /// Path of the space's file, from the emitted file.
     pub space_path: &'a str,
     /// Number of the episode in its run.
     pub episode: usize,
@@ -51,7 +51,7 @@ pub fn scenario(
     file(table, log, source, origin, [&emitted, &headline], steps, expects(log, summary, steps))
 }
 
-/// All steps of an episode, with a headline, as a scenario that claims nothing: to look at.
+/// All steps of an episode as a scenario without claims, to look at.
 pub fn unclaimed(table: &ActionTable, log: &EpisodeLog, headline: &str, source: &Provenance) -> File {
     let emitted =
         format!("Emitted by `avastra {}`; look at it with `avastra render FILE --strip`.", source.command);
@@ -143,7 +143,7 @@ fn start(space: &Space, log: &EpisodeLog) -> Vec<Field> {
         .collect()
 }
 
-/// A plain state's value, or a record of a map's cells; cells that are all alike are one value.
+/// A plain state's value, or a map's cells as a record; if all cells are equal, one value.
 fn state_value(space: &Space, log: &EpisodeLog, state: &StateDef) -> Expr {
     let cells = &log.memory.cells()[state.first_cell..state.first_cell + state.cells];
     let literal = |value: &Value| tree::value(space, *value, state.ty);

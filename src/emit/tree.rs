@@ -1,4 +1,4 @@
-//! Small constructors for syntax trees that were never text.
+//! Small constructors for syntax trees that do not come from text.
 
 use crate::model::{Space, Type, Value};
 use crate::syntax::ast::{
@@ -32,7 +32,7 @@ pub fn whole(value: u64) -> Expr {
     Expr::built(ExprKind::Number(digits(value.to_string())))
 }
 
-/// A quantity in its SI unit, shortest decimal that reads back to the same f64.
+/// A quantity in its SI unit, as the shortest decimal that reads back to the same `f64`.
 pub fn quantity(value: f64, dimension: Dimension) -> Expr {
     written(decimal(value.abs(), false), value < 0.0, dimension)
 }
@@ -46,7 +46,7 @@ fn written(digits: String, negative: bool, dimension: Dimension) -> Expr {
     signed(digits, negative, &dimension.si_unit())
 }
 
-/// A number of digits with its sign and its unit word, empty for none.
+/// A number with its sign and its unit; the unit may be empty.
 pub fn signed(digits: String, negative: bool, unit: &str) -> Expr {
     let unit = (!unit.is_empty()).then(|| Name::built(unit));
     let number = Expr::built(ExprKind::Number(Number { digits, unit, span: Span::NONE }));
@@ -85,8 +85,12 @@ pub fn call(function: &str, args: Vec<(String, Expr)>) -> Call {
 }
 
 pub fn equal(left: Expr, right: Expr) -> Expr {
+    binary(BinaryOp::Equal, left, right)
+}
+
+pub fn binary(op: BinaryOp, left: Expr, right: Expr) -> Expr {
     let (left, right) = (Box::new(left), Box::new(right));
-    Expr::built(ExprKind::Binary { op: BinaryOp::Equal, op_span: Span::NONE, left, right })
+    Expr::built(ExprKind::Binary { op, op_span: Span::NONE, left, right })
 }
 
 /// `npc#2`.

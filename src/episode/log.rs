@@ -1,4 +1,4 @@
-//! What an episode leaves behind: enough to judge it, to count it and to replay it.
+//! The record of an episode: enough to judge it, to count it and to replay it.
 
 use crate::action::Draw;
 use crate::ads::ModularConfig;
@@ -24,7 +24,7 @@ pub struct EpisodeLog {
     pub incidents: Vec<Incident>,
     pub end: End,
     pub duration_s: f64,
-    /// Driven by the ego vehicle, m.
+    /// Distance driven by the ego vehicle, m.
     pub distance_m: f64,
     /// Red lights passed by the ego vehicle.
     pub red_runs: u32,
@@ -37,7 +37,7 @@ pub struct EpisodeLog {
 pub struct StepLog {
     /// When the action was carried out, s.
     pub time_s: f64,
-    /// What the agent saw before it acted, shape `(STATE_LEN,)`.
+    /// The state vector before the action, shape `(STATE_LEN,)`.
     pub state: StateVector,
     pub outcome: Outcome,
     /// Largest collision probability of the observation period, in `[0, 1]`.
@@ -54,13 +54,13 @@ pub struct StepLog {
 pub enum Outcome {
     /// Carried out as drawn; the ids of the road users it made appear.
     Done { draw: Draw, spawned: Vec<u32> },
-    /// Nobody chose anything: no row was legal, or the script says so.
+    /// No action was chosen: no row was legal, or the script has none here.
     Passed,
-    /// Impossible: nothing changed, and the step passed without an action.
+    /// The chosen row could not be carried out: nothing changed, and the step passed without an action.
     Refused { row: usize, rule: Option<String>, reason: String },
 }
 
-/// The ego vehicle touched somebody.
+/// A contact of the ego vehicle with an obstacle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Collision {
     pub contact: Contact,
@@ -86,7 +86,7 @@ pub enum End {
     Arrived,
     /// No progress for several steps: truncated.
     Stalled,
-    /// As many steps as the space allows: truncated.
+    /// The space's limit of steps was reached: truncated.
     StepLimit,
     /// The script of a replay has no more steps.
     Script,

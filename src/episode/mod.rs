@@ -1,4 +1,6 @@
-//! Episodes: the loop in which somebody acts, the world moves, and a log is kept.
+//! Episodes: the loop of choosing an action, driving for one observation period and writing the log.
+//!
+//! [`run`] plays an episode from a [`Setup`] with any choices: of an agent, or of a [`Script`].
 //!
 //! Does not know which agent or which driving system it runs.
 

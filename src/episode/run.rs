@@ -1,4 +1,4 @@
-//! The loop: act, drive for one observation period, look what happened.
+//! The loop: act, drive for one observation period, record what happened.
 
 use sha2::{Digest, Sha256};
 
@@ -12,13 +12,13 @@ use crate::sim::{Contact, DT_S, Incident, Sensed, World};
 use super::log::{Collision, End, EpisodeLog, Outcome, StepLog};
 use super::setup::Setup;
 
-/// Less progress than this in a step is none, m. The published package: 3 m in five steps.
+/// A step with less progress than this counts as stalled, m. The published package: 3 m in five steps.
 const PROGRESS_M_MIN: f64 = 1.0;
 
-/// Sees the world, the driving system and the contacts that began, after every tick.
+/// Called after every tick with the world, the driving system and the contacts that began.
 pub type Watch<'a> = dyn FnMut(&World, &dyn Ads, &[Contact]) + 'a;
 
-/// What whoever acts may look at.
+/// What is known when an action is chosen.
 pub struct Moment<'a> {
     pub step: usize,
     pub observation: &'a Observation,
@@ -33,7 +33,8 @@ impl<'a> Moment<'a> {
         self.setup
     }
 
-    /// The episode as it would be one observation period after an action; the world stays as it is.
+    /// The log of the episode as it would be one observation period after an action. The episode itself does not
+    /// change.
     pub fn look_ahead(&self, draw: Draw) -> EpisodeLog {
         let mut copy = self.play.clone();
         let outcome = copy.carry_out(draw);
@@ -41,13 +42,13 @@ impl<'a> Moment<'a> {
         copy.into_log(self.setup, End::Script)
     }
 
-    /// This moment, to go on from as often as wanted.
+    /// A snapshot of this moment, for [`go_on`].
     pub fn snapshot(&self) -> Snapshot {
         Snapshot(self.play.clone())
     }
 }
 
-/// A moment of an episode, kept; see [`go_on`].
+/// A kept moment of an episode, from which [`go_on`] can play as often as wanted.
 #[derive(Clone)]
 pub struct Snapshot(Play);
 
@@ -66,13 +67,12 @@ pub enum Choice {
     Stop,
 }
 
-/// Plays one episode. `choose` acts once a step; `watch` sees the world after every tick, and once
-/// before the first.
+/// Plays one episode. `choose` is called once a step, `watch` after every tick and once before the first.
 pub fn run(setup: &Setup, choose: &mut dyn FnMut(&Moment) -> Choice, watch: &mut Watch) -> EpisodeLog {
     run_to_last(setup, choose, watch, &mut |_| {})
 }
 
-/// The same; `last` looks at the moment at which the next choice would have been due.
+/// As [`run`]; `last` gets the moment at which the next choice would have been due.
 pub fn run_to_last(
     setup: &Setup,
     choose: &mut dyn FnMut(&Moment) -> Choice,
@@ -82,7 +82,7 @@ pub fn run_to_last(
     to_the_end(setup, Play::new(setup), choose, watch, last)
 }
 
-/// The same from a moment of an episode of the same setup. The log is that of the whole episode.
+/// As [`run_to_last`], from a kept moment of an episode with this setup. The log covers the whole episode.
 pub fn go_on(
     setup: &Setup,
     from: Snapshot,
@@ -141,7 +141,7 @@ impl Play {
         let world = World::new(setup.scene.clone(), &setup.start);
         let mut ads = setup.ads.build(&setup.scene, setup.seed);
         let mut sensed = world.sensed();
-        // One look before the first step, so that its state has an inside.
+        // The driving system looks once before the first step, so that the first observation can show its state.
         ads.drive(&sensed);
         world.sense(&mut sensed);
         Play {
@@ -178,7 +178,7 @@ impl Play {
         Moment { step: self.steps.len(), observation, situation, play: self, setup }
     }
 
-    /// All of an action or nothing of it: its second spawn may find its first in the way.
+    /// Carries out a whole action or nothing of it: its second spawn may find its first in the way.
     fn carry_out(&mut self, draw: Draw) -> Outcome {
         let before = self.world.clone();
         let mut spawned = Vec::new();
@@ -224,8 +224,8 @@ impl Play {
         self.steps.push(StepLog { time_s, state, outcome, proc, reward, perception, trace });
     }
 
-    /// One physics step; the collision probability after it. Contact is certainty, once: who has been
-    /// hit stands against the ego vehicle for a while, and is no danger any more.
+    /// One physics step; returns the collision probability after it. It is 1 at the tick of a contact. After that
+    /// the obstacle is ignored: it stands against the ego vehicle for a while and is no danger any more.
     fn tick(&mut self, setup: &Setup, watch: &mut Watch, collided: &mut bool) -> f64 {
         self.world.sense(&mut self.sensed);
         let control = self.ads.drive(&self.sensed);

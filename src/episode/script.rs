@@ -1,4 +1,4 @@
-//! Scripts: the choices of an episode that has been, to be made again.
+//! Scripts: the choices of a recorded episode, to be made again.
 
 use std::sync::Arc;
 
@@ -42,7 +42,7 @@ impl Script {
         Script { steps }
     }
 
-    /// The choice of one moment: legal under the same rules that a run draws by, or refused.
+    /// The choice at a moment: the recorded action under the rules of the run, or its refusal.
     pub fn choose(&self, table: &ActionTable, moment: &Moment) -> Choice {
         match self.steps.get(moment.step) {
             None => Choice::Stop,

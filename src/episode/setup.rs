@@ -1,4 +1,4 @@
-//! What an episode is made of before anybody has chosen anything.
+//! The setup of an episode: everything but the choices.
 
 use std::sync::Arc;
 
@@ -13,7 +13,7 @@ use crate::sim::{Scene, Start};
 /// Signals begin anywhere in this span, s: a whole number of cycles of two, three and four groups.
 const SIGNAL_PHASE_S: f64 = 204.0;
 
-/// Everything that an episode is made of but the choices.
+/// Everything that determines an episode, except the choices.
 #[derive(Clone)]
 pub struct Setup<'a> {
     pub table: &'a ActionTable,
@@ -23,24 +23,24 @@ pub struct Setup<'a> {
     pub ads: Selected,
     pub seed: u64,
     pub start: Start,
-    /// States of the space at the start; those that mean weather agree with `start`.
+    /// States of the space at the start; those that stand for weather agree with `start`.
     pub memory: Memory,
-    /// Ticks by which each observation period is longer than the space says, or shorter; none beyond its
-    /// end. Only whoever asks what a little more or less time would have changed has any.
+    /// Ticks by which each observation period is longer than the space says (negative: shorter); steps beyond the
+    /// list's end are not shifted. Used to ask what a little more or less time would have changed; otherwise empty.
     pub period_shifts: Vec<i32>,
-    /// How collision probabilities are reckoned.
+    /// How collision probabilities are computed.
     pub proc: ProcKind,
 }
 
-/// The world that a road's episodes share.
+/// The part of the world that all episodes on a road share.
 pub fn scene(road: &Road) -> Scene {
     Scene::new(road.map.clone(), road.route.clone())
 }
 
-/// How an episode of a seed begins that starts with this memory, without ambient traffic.
+/// The start of an episode with this seed and memory, without ambient traffic.
 pub fn start(space: &Space, memory: &Memory, seed: u64) -> Start {
     let mut rng = rng::stream(seed, Stream::Reset, 1);
-    // A multiple of 1/64 s is short in a file.
+    // A multiple of 1/64 s is a short decimal in a file.
     let signal_phase_s = (rng::between(&mut rng, 0.0, SIGNAL_PHASE_S) * 64.0).floor() / 64.0;
     let (time, [rain, fog, wetness]) = space.weather(memory);
     Start { time, rain, fog, wetness, signal_phase_s, seed, ambient: 0 }

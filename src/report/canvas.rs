@@ -1,7 +1,6 @@
 //! A drawing surface in world coordinates, north up, that writes SVG.
 //!
-//! What all top views share: the projection, lines, areas and words, and the shape of a lane. What is drawn, and
-//! in which colours, is decided by its users.
+//! Projection, lines, areas, words and the shape of a lane. Its users decide what is drawn, and in which colours.
 
 use std::fmt::Write;
 
@@ -36,7 +35,7 @@ impl Canvas<'_> {
         let _ = writeln!(self.svg, r##"<polyline points="{points}" fill="none" {style}/>"##);
     }
 
-    /// Words that begin at a point, or where `style` says with `text-anchor`.
+    /// Text that begins at a point, or is anchored as `style` says with `text-anchor`.
     pub fn text(&mut self, point: Vec2, text: &str, style: &str) {
         let (x, y) = self.at(point);
         let _ = writeln!(self.svg, r##"<text x="{x:.1}" y="{y:.1}" {style}>{}</text>"##, escape(text));

@@ -1,9 +1,9 @@
 //! Top views as SVG: road, signals, ego vehicle, obstacles, what is perceived and what is planned.
 //!
-//! One panel is one moment, north up, centred on the ego vehicle; all panels of a picture have one scale,
-//! chosen so that the obstacles show. True obstacles are filled, with the way that they came since the first
-//! panel; what the driving system believes is dashed, so that a missed or misplaced object shows at a
-//! glance. Chevrons tell the direction of a lane, a yellow line parts traffic that comes from traffic that goes.
+//! One panel is one moment, north up, centred on the ego vehicle; all panels of a picture have one scale, chosen so
+//! that the obstacles are visible. True obstacles are filled, with their way since the first panel; what the
+//! driving system believes is dashed, so that a missed or misplaced object is seen at a glance. Chevrons show the
+//! direction of a lane; a yellow line separates opposing traffic.
 
 use std::fmt::Write;
 
@@ -21,21 +21,21 @@ const PANEL_PX: f64 = 480.0;
 const COLUMNS: usize = 4;
 /// How far a panel reaches from the ego vehicle in each direction, m: at least and at most.
 const VIEW_RADIUS_M: (f64, f64) = (35.0, 110.0);
-/// What it shows beyond the farthest obstacle that is within reach, m.
+/// Room that a panel shows beyond the farthest obstacle within reach, m.
 const VIEW_MARGIN_M: f64 = 8.0;
-/// Between two chevrons of a lane, and their size, m.
+/// Distance between two chevrons of a lane, and their size, m.
 const CHEVRON_EVERY_M: f64 = 15.0;
 const CHEVRON_M: f64 = 0.7;
 /// Height of the caption under a panel, px.
 const CAPTION_PX: f64 = 56.0;
-/// Length of a drawn velocity: this many seconds of it.
+/// An arrow for a velocity is as long as the way driven in this time, s.
 const VELOCITY_S: f64 = 1.0;
 
 /// What one panel shows.
 pub struct Snapshot {
     pub world: World,
     pub status: Status,
-    /// Where the ego vehicle touched somebody within the last moments.
+    /// Points at which the ego vehicle touched an obstacle within the last moments.
     pub contact: Option<Vec2>,
 }
 
@@ -67,7 +67,7 @@ pub fn picture(moments: &[Snapshot]) -> String {
     svg
 }
 
-/// As far as the farthest obstacle of any moment, of those that a panel can reach.
+/// The reach of every panel: up to the farthest obstacle of any moment, within the bounds of a panel.
 fn view_radius_m(moments: &[Snapshot]) -> f64 {
     let (least_m, most_m) = VIEW_RADIUS_M;
     let away_m = |moment: &Snapshot, obstacle: &Obstacle| {
@@ -144,7 +144,7 @@ impl Panel<'_> {
         self.canvas.polygon(&lane_outline(lane), &style);
     }
 
-    /// Which way traffic goes, outside junctions, where lanes lie over each other.
+    /// Chevrons in the driving direction; not inside junctions, where lanes overlap.
     fn direction(&mut self, lane: &Lane) {
         if lane.junction.is_some() || !self.shows(lane) {
             return;
@@ -163,7 +163,7 @@ impl Panel<'_> {
         }
     }
 
-    /// The way that an obstacle came since the first panel.
+    /// The way of an obstacle since the first panel.
     fn trail(&mut self, obstacle: &Obstacle, earlier: &[Snapshot]) {
         let known = earlier.iter().filter_map(|moment| moment.world.obstacle(obstacle.id));
         let mut way: Vec<Vec2> = known.map(|other| other.outline.pose.position).collect();
@@ -204,7 +204,7 @@ impl Panel<'_> {
         self.canvas.polyline(&way, r##"stroke="#e06a00" stroke-width="1" stroke-dasharray="2 3""##);
     }
 
-    /// An outline with a line across its front, so that the heading shows.
+    /// An outline with a line across its front, which shows the heading.
     fn body(&mut self, outline: &OrientedBox, style: &str) {
         self.canvas.polygon(&outline.corners(), style);
         let nose = Pose::offset(&outline.pose, outline.half_length_m * 0.6, 0.0);

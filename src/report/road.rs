@@ -1,8 +1,8 @@
 //! A whole map as SVG: lanes with their driving directions, junctions, signals, crosswalks, and a route through it.
 //!
-//! Everything comes from the lane graph, so the picture shows how the map was understood: an edge is dashed where
-//! the next lane runs the same way, yellow where it comes towards, dark where there is none. Road markings, and
-//! whatever else the file holds, are left out.
+//! Everything comes from the lane graph, so the picture shows how the map was understood: an edge is dashed if the
+//! lane beside it runs the same way, yellow if it runs the other way, dark if there is none. Road markings, and
+//! everything else that the file holds, are left out.
 
 use std::fmt::Write;
 
@@ -13,7 +13,7 @@ use super::canvas::{Canvas, across, escape, lane_edge, lane_outline};
 
 /// The longer edge of the picture, px.
 const LONGER_PX: f64 = 1600.0;
-/// Paper around the map, px.
+/// Margin around the map, px.
 const MARGIN_PX: f64 = 50.0;
 /// A gap between opposing lanes is drawn as a median from this width on, m.
 const MEDIAN_M_MIN: f64 = 0.3;
@@ -73,7 +73,7 @@ impl Drawing<'_> {
     fn medians(&mut self) {
         for (index, lane) in self.map.lanes.iter().enumerate() {
             let Some(beside) = lane.left.filter(|beside| !beside.same_direction) else { continue };
-            // Both lanes know of each other; one of them draws.
+            // Both lanes name each other; one of them draws.
             let other = self.map.lane(beside.lane);
             let mutual = other.left.is_some_and(|back| back.lane == LaneIndex(index));
             if beside.gap_m < MEDIAN_M_MIN || lane.junction.is_some() || (mutual && beside.lane.0 < index) {
@@ -85,7 +85,7 @@ impl Drawing<'_> {
     }
 
     fn surfaces(&mut self) {
-        // Streets over the ways through junctions.
+        // Streets are drawn over the lanes of junctions.
         for inside in [true, false] {
             for lane in self.map.lanes.iter().filter(|lane| lane.junction.is_some() == inside) {
                 let fill = if inside { "#d4d7da" } else { "#c2c6ca" };
@@ -126,7 +126,7 @@ impl Drawing<'_> {
             let outline = hull(junction_points(self.map, junction));
             let style = r##"fill="none" stroke="#35629c" stroke-width="1" stroke-dasharray="7 4""##;
             self.canvas.polygon(&outline, style);
-            // The name stands at the hull's northernmost corner, off the ways.
+            // The name goes to the hull's northernmost corner, off the lanes.
             if let Some(corner) = outline.iter().copied().max_by(|a, b| a.y.total_cmp(&b.y)) {
                 let name = if junction.name.is_empty() { &junction.id } else { &junction.name };
                 let style = r##"font-size="15" font-weight="bold" fill="#35629c" text-anchor="middle""##;

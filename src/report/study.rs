@@ -1,7 +1,7 @@
 //! The result of a study as tables for people. Everything else that it holds is in `results.json`.
 
 use crate::study::statistics::{Estimate, Interval};
-use crate::study::{AgentResults, Comparison, Rate, RoadResults, StudyResults};
+use crate::study::{AgentResults, BaselineComparison, Rate, RoadResults, StudyResults};
 
 /// Measures by which comparisons are printed.
 const PRINTED_COMPARISONS: [&str; 2] = ["counted", "distinct"];
@@ -76,7 +76,7 @@ fn verdict_table(road: &RoadResults) -> String {
 
 fn comparison_table(road: &RoadResults) -> String {
     let printed = road.comparisons.iter().filter(|one| PRINTED_COMPARISONS.contains(&one.measure));
-    let row = |one: &Comparison| {
+    let row = |one: &BaselineComparison| {
         let ratio = one.ratio.map_or("-".to_owned(), |ratio| with_interval(ratio, one.ratio_interval));
         vec![
             format!("{} / {}", one.agent, one.baseline),
@@ -150,7 +150,7 @@ fn with_interval(value: f64, interval: Option<Interval>) -> String {
     }
 }
 
-/// Columns side by side, all but the first flush right.
+/// Columns side by side; all but the first are aligned right.
 fn table<'a>(head: impl IntoIterator<Item = &'a str>, rows: impl IntoIterator<Item = Vec<String>>) -> String {
     let mut lines = vec![head.into_iter().map(str::to_owned).collect::<Vec<_>>()];
     lines.extend(rows);

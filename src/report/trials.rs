@@ -3,7 +3,7 @@
 use crate::trial::{Cell, Count, Outcome};
 
 /// One line a row, and under it one for each road. `cells` are by row, then by road.
-pub fn trials(cells: &[&Cell]) -> String {
+pub fn trials(cells: &[Cell]) -> String {
     let width = cells.iter().map(|cell| cell.road.chars().count()).max().unwrap_or(0);
     let mut text = String::new();
     let mut last = None;

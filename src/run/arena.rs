@@ -18,7 +18,7 @@ use crate::rng::Stream;
 use crate::sim::Scene;
 use crate::syntax::listed;
 
-use crate::run::play::RunError;
+use crate::run::settings::RunError;
 use crate::run::summary::EpisodeSummary;
 
 /// Everything that the episodes of a run or a training share.
@@ -105,7 +105,7 @@ pub(crate) fn choose(agent: &mut dyn Agent, moment: &Moment) -> Choice {
     carry_out(offers, legal.view(), agent, moment)
 }
 
-/// What each row would do now, drawn as the agent wants it.
+/// What each row would do now, with values drawn from the agent's seed if it gives one.
 pub(crate) fn offers(agent: &mut dyn Agent, moment: &Moment) -> Vec<Offer> {
     let seed = agent.draw_seed(moment.step).unwrap_or(moment.situation.seed);
     moment.setup().table.offers(&Situation { seed, ..*moment.situation })
@@ -116,7 +116,7 @@ pub(crate) fn legal(offers: &[Offer]) -> Array1<bool> {
     offers.iter().map(|offer| matches!(offer, Offer::Legal(_))).collect()
 }
 
-/// What the agent makes of the offers.
+/// The agent's choice among the offers.
 pub(crate) fn carry_out(
     mut offers: Vec<Offer>,
     legal: ndarray::ArrayView1<bool>,
@@ -137,7 +137,7 @@ pub(crate) fn carry_out(
     }
 }
 
-/// The offers of a moment, carried out in copies of its world and judged like everything else.
+/// Carries offers out in copies of the moment's world, and judges the collisions as in an episode.
 struct Lookahead<'a> {
     offers: &'a [Offer],
     moment: &'a Moment<'a>,

@@ -97,7 +97,7 @@ impl Database {
     /// The numbers of all episodes so far.
     ///
     /// # Errors
-    /// If the file cannot be read, or holds a number that is none of an episode.
+    /// If the file cannot be read, or holds an episode number below 0.
     pub fn episodes(&self) -> Result<BTreeSet<usize>, DatabaseError> {
         let mut statement = self.connection.prepare("SELECT episode FROM episode")?;
         let numbers = statement.query_map([], |row| row.get::<_, i64>(0))?;
@@ -105,8 +105,8 @@ impl Database {
         numbers.map(|found| number(found?)).collect()
     }
 
-    /// Why steps passed although something was asked for, and how often; the most frequent first.
-    /// Figures in a reason are left out, so that reasons can be told apart.
+    /// Why chosen actions were refused, and how often; the most frequent reason first. Figures in a reason are
+    /// replaced by `…`, so that reasons that differ only in figures count as one.
     ///
     /// # Errors
     /// If the file cannot be read.
@@ -208,11 +208,11 @@ pub struct Totals {
     pub sudden: i64,
     pub struck: i64,
     pub repeated: i64,
-    /// Collisions by what careful drivers make of them: their sum is `collisions`.
+    /// Collisions by their avoidability. The three numbers sum to `collisions`.
     pub avoidable: i64,
     pub beyond_reference: i64,
     pub unavoidable: i64,
-    /// Driven in branches, beside the episodes, by agents that look ahead, s.
+    /// Time that agents with lookahead simulated in branches, outside the episodes, s.
     pub branched_s: f64,
 }
 
@@ -256,7 +256,7 @@ pub(crate) fn add_all(
             step.proc.into(),
             step.reward.into(),
         ];
-        // Only runs measure; trainings do not.
+        // A run measures this, a training does not.
         let measured = summary.criticality.get(index);
         values.extend([
             measured.and_then(|step| step.ttc_s).into(),

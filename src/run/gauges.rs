@@ -1,5 +1,5 @@
-//! Gauges of danger and of manners, and the shapes of the ways to collisions, taken while an episode is
-//! played.
+//! What is measured tick by tick while an episode is played: danger (criticality, post-encroachment time), how the
+//! ego vehicle kept to limit and lane, and the shape of its way to each collision.
 
 use crate::episode::EpisodeLog;
 use crate::mdp::{Criticality, Encroachment};
@@ -9,28 +9,28 @@ use crate::run::shape::{Shape, Trail};
 
 /// Half the width of a lane marking of 12 cm, m: a wheel on the line has not left the lane. Ours.
 const ON_THE_LINE_M: f64 = 0.06;
-/// A speed this far above the limit is above it: less is the controller's overshoot. Ours.
+/// Only a speed above the limit times this counts as speeding: less is the controller's overshoot. Ours.
 const SPEEDING_FACTOR: f64 = 1.05;
 
-/// How the ego vehicle kept to what every vehicle has to keep to.
+/// How the ego vehicle kept to the speed limit and to its lane.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Manners {
     /// Time more than 5 % above the speed limit of its lane, s.
     pub speeding_s: f64,
-    /// Time with a side beyond the edge of its lane, s. Where the route may change lanes, nothing counts.
+    /// Time with a side beyond the edge of its lane, s. Stretches of the route with a lane change do not count.
     pub astray_s: f64,
 }
 
-/// A watch that takes them.
+/// All measurements of one episode; call [`Gauges::note`] after every tick.
 #[derive(Debug, Clone, Default)]
 pub struct Gauges {
-    /// By tick of ten in a second, with its time, s.
+    /// Time (s) and values of every tick at which there is any danger.
     moments: Vec<(f64, Criticality)>,
     encroachment: Encroachment,
     hit: Vec<u32>,
     trail: Trail,
     shapes: Vec<Option<Shape>>,
-    /// Ticks of the same two times.
+    /// Ticks that count as [`Manners::speeding_s`] and [`Manners::astray_s`].
     speeding: u64,
     astray: u64,
 }
@@ -68,12 +68,13 @@ impl Gauges {
         Manners { speeding_s: self.speeding as f64 * DT_S, astray_s: self.astray as f64 * DT_S }
     }
 
-    /// The most critical values of each step of the log that was watched, and the least
-    /// post-encroachment time, s.
+    /// The most critical values of each step of the measured episode's log, and the least post-encroachment time,
+    /// s.
     pub fn of_steps(&self, log: &EpisodeLog) -> (Vec<Criticality>, Option<f64>) {
         let mut steps = vec![Criticality::default(); log.steps.len()];
         for (time_s, moment) in &self.moments {
-            // The last moment of a period belongs to its own step, whatever its last bit says.
+            // The last tick of a period belongs to its own step, even if rounding puts it just after the next step
+            // began.
             let after = log.steps.partition_point(|step| step.time_s + 1e-6 < *time_s);
             if let Some(step) = after.checked_sub(1) {
                 steps[step] = steps[step].and(moment);

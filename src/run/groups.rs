@@ -1,8 +1,8 @@
-//! Failures that are alike: what a run found, told apart by what happened instead of how often.
+//! Groups of like failures: what a run found, by what happened and not by how often.
 //!
-//! Two counted collisions are alike if the kind of obstacle, what it was told to do, how it came, where
-//! the ego vehicle was hit, the shape of its way there (see `shape`) and the modules at fault are the
-//! same, the last two only where they were looked for.
+//! Two counted collisions are alike if these are equal: kind of obstacle, its verb, how it moved, where the ego
+//! vehicle was hit, the shape of the ego vehicle's way (see `shape`) and the modules at fault. The last two are
+//! compared only if they were recorded.
 
 use std::collections::BTreeMap;
 
@@ -15,24 +15,24 @@ use crate::run::database::{Database, DatabaseError};
 pub struct Group {
     /// `pedestrian`, `car` or `large vehicle`.
     pub kind: String,
-    /// What it was told to do, for example `CrossRoad`.
+    /// The obstacle's verb, for example `CrossRoad`.
     pub manoeuvre: String,
-    /// How it moved, as `oracle::Severity` has it.
+    /// How the obstacle moved, in the words of `oracle::Severity`.
     pub approach: String,
     /// Where the ego vehicle was hit.
     pub side: String,
-    /// The shape of the ego vehicle's way there, if it was watched: `straight`, `left turn` and so on.
+    /// The shape of the ego vehicle's way to the collision, if it was recorded: `straight`, `left turn` and so on.
     pub shape: Option<String>,
     /// Modules at fault, if they were looked for; empty if none was found.
     pub cause: Option<String>,
     pub count: usize,
-    /// The episode that stands for all: the one whose scenario is shortest, the first among equals.
+    /// The group's example: the episode with the shortest scenario, the first among equals.
     pub episode: i64,
     pub road: String,
 }
 
 impl Database {
-    /// The counted collisions so far by what happened, the most frequent first.
+    /// The groups of counted collisions so far, the largest first.
     ///
     /// # Errors
     /// If the file cannot be read.

@@ -1,17 +1,21 @@
 //! A run: many episodes of one space over seeds and roads, judged, counted and kept.
 //!
-//! [`Run`] and [`play`] are the loop over episodes, on any number of threads. [`Arena`] is what its episodes
-//! share: space, roads, driving system, rules in force. [`Database`] keeps them in `run.db`, and
-//! [`EpisodeSummary`] says what one of them amounts to.
+//! [`Run`] is made from [`RunSettings`] and knows how to set up, play and judge its nth episode; [`play`] does so
+//! for many, on threads. Its episodes share an [`Arena`]: space, roads, driving system, rules in force. Each comes to
+//! an [`EpisodeSummary`] (its collisions with their verdicts), which [`Database`] keeps in `run.db` and reads back
+//! as totals and as groups of like failures. [`Stage`] plays one emitted scenario again.
 
 mod arena;
 mod database;
+mod gauges;
 mod groups;
 mod play;
 mod profile;
+mod settings;
 mod shape;
+mod stage;
 mod summary;
-mod gauges;
+mod threads;
 
 pub use arena::Arena;
 pub(crate) use arena::{carry_out, choose, legal, offers};
@@ -20,9 +24,12 @@ pub use database::{Database, DatabaseError, RefusalCount, Totals};
 pub use gauges::Gauges;
 pub use groups::Group;
 pub(crate) use groups::kind;
-pub(crate) use play::check_episodes;
-pub use play::{EPISODES_MAX, PolicyReference, Run, RunError, RunSettings, Stage, play};
+pub use play::{Run, play};
 pub(crate) use profile::under_test;
 pub use profile::{DEFAULT_ADS, Profile, driving_system, recorded, trained_against};
+pub(crate) use settings::check_episodes;
+pub use settings::{EPISODES_MAX, PolicyReference, RunError, RunSettings, VERSION};
 pub use shape::Shape;
+pub use stage::Stage;
 pub use summary::{EpisodeSummary, Finding};
+pub use threads::on_threads;

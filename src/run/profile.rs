@@ -5,7 +5,7 @@ use crate::ads::{ModularConfig, Selected};
 use crate::model::{Policy, Scenario};
 use crate::syntax::listed;
 
-use crate::run::play::RunError;
+use crate::run::settings::RunError;
 
 /// The driving system under test where none is named.
 pub const DEFAULT_ADS: &str = "modular";
@@ -21,7 +21,7 @@ pub fn driving_system(name: &str) -> Result<Selected, RunError> {
     })
 }
 
-/// Settings of a driving system, and a digest that tells whether they still mean the same.
+/// Settings of a driving system, with a digest: a later version of avastra sees whether they still mean the same.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Profile {

@@ -1,25 +1,25 @@
 //! The shape of the ego vehicle's way up to a collision, in one word.
 //!
-//! Coarse on purpose: it tells failures apart, it does not describe them. What counts is the last 5 s,
-//! or less where the episode is younger: how far the vehicle has turned, how far it has come aside, what is
-//! left of its speed. A bend of the road is a turn like one at a junction. The bounds are ours.
+//! Coarse on purpose: it separates failures and does not describe them. It looks at the last 5 s, or less in a
+//! younger episode: how far the vehicle has turned, how far it has moved aside, how much of its speed is left. A
+//! bend of the road is a turn like one at a junction. The bounds are ours.
 
 use std::collections::VecDeque;
 
 use crate::geometry::{Pose, Vec2, unit_vector, wrap_angle};
 use crate::sim::{DT_S, World};
 
-/// How far back the way is looked at, s.
+/// Length of the way that is looked at, s.
 const PAST_S: f64 = 5.0;
-/// Who has turned by more than this makes a turn, rad (20°).
+/// A vehicle that has turned by more than this makes a turn, rad (20°).
 const TURN_RAD: f64 = core::f64::consts::PI / 9.0;
-/// Who has come aside by more than this, seen along the heading before and after, has changed lanes or
-/// was about to, m: a little more than half of a lane.
+/// A vehicle that has moved aside by more than this, seen along its heading before and after, changes lanes, m: a
+/// little more than half of a lane.
 const ASIDE_M: f64 = 2.0;
-/// Who has kept less than this part of its speed was about to stop.
+/// A vehicle that has kept less than this part of its speed is stopping.
 const KEPT_PART: f64 = 0.5;
 
-/// A class of ways. The first that holds is meant.
+/// A class of ways. The first one whose condition holds applies.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Shape {
     LeftTurn,
@@ -30,7 +30,7 @@ pub enum Shape {
 }
 
 impl Shape {
-    /// The word for it in tables.
+    /// Its name in tables.
     pub fn name(self) -> &'static str {
         match self {
             Shape::LeftTurn => "left turn",
@@ -48,7 +48,8 @@ impl Shape {
             let forward = unit_vector(heading_rad);
             Vec2::new(-forward.y, forward.x).dot(&(to.position - from.position))
         };
-        // The end of an arc lies on one side of where it began, and its beginning on the same side of its end.
+        // An arc ends on one side of its first heading and begins on that same side of its last; a lane change has
+        // opposite sides.
         let (before_m, after_m) = (left_m(from.heading_rad), left_m(to.heading_rad));
         let aside_m = if before_m * after_m > 0.0 { before_m.abs().min(after_m.abs()) } else { 0.0 };
         if turned_rad > TURN_RAD {

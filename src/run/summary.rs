@@ -1,4 +1,4 @@
-//! What an episode amounts to: its collisions, each with the facts of its verdict.
+//! An episode's result: its collisions, each with its verdict and the facts behind it.
 
 use crate::ads::{ModularConfig, Module};
 use crate::episode;
@@ -17,15 +17,15 @@ pub struct EpisodeSummary {
     /// Number of the episode in its run, from 0.
     pub episode: usize,
     pub collisions: Vec<Finding>,
-    /// By what it was told whether they were avoidable.
+    /// The settings by which their avoidability was judged.
     pub avoidability: AvoidabilitySettings,
-    /// Measures of danger in each step, where they were taken.
+    /// Measures of danger for each step; empty if the episode was not measured.
     pub criticality: Vec<Criticality>,
-    /// Least post-encroachment time with anybody who was not hit, s; `None` above 5 s.
+    /// Least post-encroachment time over the obstacles that were not hit, s; `None` above 5 s.
     pub pet_s: Option<f64>,
-    /// How the ego vehicle drove, where it was watched.
+    /// How the ego vehicle kept to limit and lane; zeros if the episode was not measured.
     pub manners: Manners,
-    /// Driven in branches, beside the episode, by an agent that tries rows out before it chooses, s.
+    /// Time that an agent with lookahead simulated in branches, outside the episode, s.
     pub branched_s: f64,
 }
 
@@ -40,15 +40,14 @@ pub struct Finding {
     /// Modules at fault, if they were looked for.
     pub cause: Option<Vec<Module>>,
     pub counted: bool,
-    /// Whether every step before it is known to be needed for it.
+    /// Whether it is proved that no step before it can be left out.
     pub minimal: bool,
-    /// The shape of the ego vehicle's way to it, where it was watched.
+    /// The shape of the ego vehicle's way to it, if the episode was measured.
     pub shape: Option<Shape>,
 }
 
 impl EpisodeSummary {
-    /// Judges every collision of a log, by playing it again from its setup, and applies the space's
-    /// verdict.
+    /// Judges every collision of a log by playing it again from its setup, and applies the space's verdict.
     pub fn judged(
         setup: &Setup,
         number: usize,
@@ -63,8 +62,8 @@ impl EpisodeSummary {
         EpisodeSummary { avoidability: settings.clone(), ..summary }
     }
 
-    /// Applies the space's verdict to every collision of a log; `judgements` has one for each, told in the
-    /// usual way.
+    /// Applies the space's verdict to every collision of a log. `judgements` has one for each, by the default
+    /// settings of avoidability.
     pub fn new(space: &Space, number: usize, log: &EpisodeLog, judgements: Vec<Judgement>) -> EpisodeSummary {
         let find = |(index, judgement)| {
             let facts = oracle::facts(log, index, &judgement);

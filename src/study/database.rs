@@ -8,11 +8,11 @@ use rusqlite::{Connection, Row, params};
 use crate::run::DatabaseError;
 
 use crate::study::job::Job;
-use crate::study::record::{CellRecord, CollisionRecord, EpisodeRecord, Failure, Spent, TrainedRecord};
+use crate::study::record::{CellRecord, CollisionRecord, EpisodeRecord, FailureClass, Spent, TrainedRecord};
 use crate::study::study::Study;
 
-/// Layout of the tables; raised whenever a column changes. Begins at 1001, so that it is
-/// never taken for that of `run.db`.
+/// Layout of the tables; raised whenever a column changes. Begins at 1001, so that a `run.db` is never taken for a
+/// `study.db`.
 const SCHEMA_VERSION: i64 = 1001;
 
 /// Seeds are text: SQLite's integers have a sign.
@@ -173,7 +173,7 @@ impl StudyDatabase {
         Ok(cells.into_values().collect())
     }
 
-    /// The rows of a query, each with the cell that its first column names.
+    /// The rows of a query, each with the cell in its first column.
     fn by_cell<T>(
         &self,
         query: &str,
@@ -210,7 +210,7 @@ fn add_episode(
     let mut insert = connection
         .prepare_cached("INSERT INTO collision VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)")?;
     for (number, found) in episode.collisions.iter().enumerate() {
-        let Failure { kind, manoeuvre, approach, side, cause } = &found.failure;
+        let FailureClass { kind, manoeuvre, approach, side, cause } = &found.failure;
         insert.execute(params![
             cell,
             index,
@@ -242,7 +242,7 @@ fn trained_episode(row: &Row) -> Result<TrainedRecord, rusqlite::Error> {
     })
 }
 
-/// An episode without its collisions, which are rows of their own.
+/// An episode without its collisions: they are in a table of their own.
 fn evaluated_episode(row: &Row) -> Result<EpisodeRecord, rusqlite::Error> {
     Ok(EpisodeRecord {
         seed: seed_of(&row.get::<_, String>(1)?)?,
@@ -267,7 +267,7 @@ fn collision(row: &Row) -> Result<CollisionRecord, rusqlite::Error> {
         sudden: row.get(5)?,
         struck: row.get(6)?,
         avoidability: row.get(7)?,
-        failure: Failure {
+        failure: FailureClass {
             kind: row.get(8)?,
             manoeuvre: row.get(9)?,
             approach: row.get(10)?,

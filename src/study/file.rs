@@ -8,7 +8,7 @@ use crate::run::DEFAULT_ADS;
 #[derive(Debug, Clone, PartialEq, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct StudyFile {
-    /// What it is to answer, in a sentence; printed above the result.
+    /// The question that it answers, in a sentence; printed above the result.
     #[serde(default)]
     pub question: Option<String>,
     /// The space (`.ava`).
@@ -19,13 +19,13 @@ pub struct StudyFile {
     /// Driving system under test.
     #[serde(default = "default_ads")]
     pub ads: String,
-    /// Profile of the `modular` driving system; without one it is as it comes.
+    /// Profile of the `modular` driving system; without one it has its default settings.
     #[serde(default)]
     pub ads_config: Option<String>,
     /// Vehicles of ambient traffic around the ego vehicle.
     #[serde(default)]
     pub ambient: u32,
-    /// All seeds of trainings and evaluations come of it, each kind by a stream of its own.
+    /// All seeds of trainings and evaluations are derived from this one, each kind by a stream of its own.
     #[serde(default = "default_seed")]
     pub first_seed: u64,
     #[serde(default)]
@@ -33,7 +33,7 @@ pub struct StudyFile {
     /// Whether the cause of each counted collision is looked for; takes some twenty replays for each.
     #[serde(default)]
     pub causes: bool,
-    /// Who is compared. The labels must differ.
+    /// The agents to compare. Their labels must differ.
     pub agents: Vec<AgentFile>,
     /// Labels of the agents that each other agent is compared with.
     #[serde(default)]
@@ -48,8 +48,8 @@ pub struct EvaluationPlan {
     pub episodes: u32,
     /// Seeds over which a number is averaged, for each training or repetition. Paper: 5.
     pub seeds: u32,
-    /// The time to the first counted collision is looked at up to here, s (restricted mean). Ours: most
-    /// episodes have ended by then.
+    /// The restricted mean of the time to the first counted collision is taken up to here, s. Ours: most episodes
+    /// have ended by then.
     pub horizon_s: f64,
 }
 
@@ -63,15 +63,15 @@ impl Default for EvaluationPlan {
 #[derive(Debug, Clone, PartialEq, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct AgentFile {
-    /// As in `avastra run --agent` and `avastra train --agent`.
+    /// The agent, as in `avastra run --agent` and `avastra train --agent`.
     pub name: String,
-    /// What the result calls it; without one its name.
+    /// Its name in the result; by default `name`.
     #[serde(default)]
     pub label: Option<String>,
-    /// Settings that a learning agent begins with; without one its own.
+    /// The preset of a learning agent; by default its own.
     #[serde(default)]
     pub preset: Option<String>,
-    /// What differs from them: a file, or the settings themselves.
+    /// Settings that differ from the preset: the name of a file, or the settings themselves.
     #[serde(default)]
     pub config: Option<Value>,
     /// Independent trainings of a learning agent; without a number 10.
@@ -87,8 +87,8 @@ pub struct AgentFile {
     /// Independent repetitions of the evaluation, of an agent that has nothing to learn; without a number 10.
     #[serde(default)]
     pub repeats: Option<u32>,
-    /// Profile of the driving system that this agent meets, in place of the study's: a file, or what differs
-    /// from the default.
+    /// Profile of the driving system for this agent, in place of the study's: the name of a file, or the settings
+    /// that differ from the default.
     #[serde(default)]
     pub ads_config: Option<Value>,
     /// Rules switched off for this agent.
@@ -109,7 +109,7 @@ fn default_seed() -> u64 {
 
 impl StudyFile {
     /// # Errors
-    /// Text that is no such map: the reason, with its place.
+    /// If the text has another form: the reason, with its place.
     pub fn from_yaml(text: &str) -> Result<StudyFile, String> {
         serde_yaml::from_str(text).map_err(|error| error.to_string())
     }

@@ -1,7 +1,8 @@
 //! Jobs: what a study consists of, played on any number of threads.
 
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-use std::sync::mpsc;
+use std::sync::atomic::AtomicBool;
+
+use crate::run::on_threads;
 
 use crate::study::record::{CellRecord, EpisodeRecord, Spent, TrainedRecord};
 use crate::study::study::Study;
@@ -26,7 +27,7 @@ pub enum Event {
 }
 
 /// Plays jobs on so many threads and hands what happens to `on`, on this one. Stops early when `stop` is set or
-/// `on` fails; what was under way is lost then. `clock` says what the thread that asks has spent so far.
+/// `on` fails; a job that is not finished then is lost. `clock` says what the calling thread has spent so far.
 ///
 /// # Errors
 /// The first error of `on`.
@@ -38,38 +39,16 @@ pub fn play_jobs<E>(
     clock: &(dyn Fn() -> Spent + Sync),
     on: &mut dyn FnMut(Event) -> Result<(), E>,
 ) -> Result<(), E> {
-    let next = AtomicUsize::new(0);
-    let abandoned = AtomicBool::new(false);
-    std::thread::scope(|scope| {
-        let (sender, receiver) = mpsc::channel();
-        for _ in 0..threads.min(jobs.len()) {
-            let sender = sender.clone();
-            scope.spawn(|| {
-                // Moved in, so that the channel closes when the last worker is done.
-                let sender = sender;
-                let is_over = || stop.load(Ordering::Relaxed) || abandoned.load(Ordering::Relaxed);
-                // A receiver that is gone has abandoned the study.
-                let mut tell = |counted| !is_over() && sender.send(Event::Episode { counted }).is_ok();
-                while let Some(job) = jobs.get(next.fetch_add(1, Ordering::Relaxed)) {
-                    let Some(cells) = play(study, job, clock, &mut tell) else { break };
-                    if sender.send(Event::Done(cells)).is_err() {
-                        break;
-                    }
-                }
-            });
+    let work = |job: &Job, tell: &mut dyn FnMut(Event) -> bool| {
+        if let Some(cells) = play(study, job, clock, &mut |counted| tell(Event::Episode { counted })) {
+            tell(Event::Done(cells));
         }
-        drop(sender);
-        for event in receiver {
-            if let Err(error) = on(event) {
-                abandoned.store(true, Ordering::Relaxed);
-                return Err(error);
-            }
-        }
-        Ok(())
-    })
+    };
+    on_threads(jobs, threads, stop, work, on)
 }
 
-/// Plays one job; `tell` hears of every episode and says whether to go on. None if it says no.
+/// Plays one job. `tell` gets the counted collisions of every episode and says whether to go on; if not, the
+/// result is `None`.
 fn play(
     study: &Study,
     job: &Job,

@@ -1,125 +1,107 @@
-//! What is measured of a cell: one number each, over whose trainings or repetitions the statistics go.
+//! Measures: what is computed for each cell. The statistics run over the cells, that is over trainings or
+//! repetitions.
 
 use std::collections::BTreeSet;
 
 use crate::study::statistics::{Lifetime, restricted_mean};
 
 use crate::study::file::EvaluationPlan;
-use crate::study::record::{CellRecord, CollisionRecord, EpisodeRecord, Failure};
+use crate::study::record::{CellRecord, CollisionRecord, EpisodeRecord, FailureClass};
 
-/// Something that is measured of a cell.
+/// A number that is computed for each cell.
 pub struct Measure {
     pub name: &'static str,
-    /// For people, with its unit.
-    pub title: &'static str,
     /// Whether agents are compared by it.
     pub is_compared: bool,
-    /// None where there is none: a training of an agent that learns nothing, a time of no collision.
+    /// Computes it; `None` if the cell has no such number, for example the time to a collision without any
+    /// collision.
     pub of: fn(&CellRecord, &EvaluationPlan) -> Option<f64>,
 }
 
-/// Every measure. Where not said otherwise, a number is of the episodes of one seed, averaged over the seeds.
+/// Every measure. If not said otherwise, a number is a total over the episodes of one seed, averaged over the
+/// seeds.
 pub const MEASURES: &[Measure] = &[
     Measure {
         name: "counted",
-        title: "counted collisions",
         is_compared: true,
         of: |cell, plan| number(cell, plan, |found| found.counted),
     },
-    Measure {
-        name: "collisions",
-        title: "all collisions",
-        is_compared: true,
-        of: |cell, plan| number(cell, plan, |_| true),
-    },
+    Measure { name: "collisions", is_compared: true, of: |cell, plan| number(cell, plan, |_| true) },
+    // Avoidable by a careful driver.
     Measure {
         name: "avoidable",
-        title: "avoidable by a careful driver",
         is_compared: false,
         of: |cell, plan| number(cell, plan, |found| found.avoidability == "avoidable"),
     },
+    // Avoidable without any delay only.
     Measure {
         name: "beyond_reference",
-        title: "avoidable without any delay only",
         is_compared: false,
         of: |cell, plan| number(cell, plan, |found| found.avoidability == "beyond_reference"),
     },
     Measure {
         name: "unavoidable",
-        title: "unavoidable",
         is_compared: false,
         of: |cell, plan| number(cell, plan, |found| found.avoidability == "unavoidable"),
     },
+    // With an obstacle hit before.
     Measure {
         name: "repeated",
-        title: "with an obstacle hit before",
         is_compared: false,
         of: |cell, plan| number(cell, plan, |found| found.repeated),
     },
-    Measure {
-        name: "sudden",
-        title: "just after it appeared",
-        is_compared: false,
-        of: |cell, plan| number(cell, plan, |found| found.sudden),
-    },
-    Measure {
-        name: "struck",
-        title: "the other ran into the ego vehicle",
-        is_compared: false,
-        of: |cell, plan| number(cell, plan, |found| found.struck),
-    },
+    // Just after it appeared.
+    Measure { name: "sudden", is_compared: false, of: |cell, plan| number(cell, plan, |found| found.sudden) },
+    // The other ran into the ego vehicle.
+    Measure { name: "struck", is_compared: false, of: |cell, plan| number(cell, plan, |found| found.struck) },
+    // Episodes with a counted collision.
     Measure {
         name: "colliding",
-        title: "episodes with a counted collision",
         is_compared: true,
         of: |cell, plan| per_seed(cell, plan, |episode| f64::from(episode.counted() > 0)),
     },
-    Measure { name: "distinct", title: "distinct failures", is_compared: true, of: distinct },
+    Measure { name: "distinct", is_compared: true, of: distinct },
+    // Distinct failures under all seeds together.
     Measure {
         name: "distinct_all",
-        title: "distinct failures under all seeds together",
         is_compared: false,
         of: |cell, _| Some(failures(&cell.episodes).len() as f64),
     },
-    Measure {
-        name: "ttfc_s",
-        title: "time to the first counted collision, where there is one, s",
-        is_compared: false,
-        of: |cell, _| ttfc_s(cell),
-    },
+    // Time to the first counted collision, where there is one, s.
+    Measure { name: "ttfc_s", is_compared: false, of: |cell, _| ttfc_s(cell) },
+    // Time to the first counted collision, restricted mean, s.
     Measure {
         name: "ttfc_restricted_s",
-        title: "time to the first counted collision, restricted mean, s",
         is_compared: true,
         of: |cell, plan| restricted_mean(&lifetimes(&cell.episodes), plan.horizon_s),
     },
+    // Red lights run.
     Measure {
         name: "red_runs",
-        title: "red lights run",
         is_compared: false,
         of: |cell, plan| per_seed(cell, plan, |episode| f64::from(episode.red_runs)),
     },
+    // Share of time above the speed limit.
     Measure {
         name: "speeding_share",
-        title: "share of time above the speed limit",
         is_compared: false,
         of: |cell, _| time_share(cell, |episode| episode.speeding_s),
     },
+    // Share of time beside the lane.
     Measure {
         name: "astray_share",
-        title: "share of time beside the lane",
         is_compared: false,
         of: |cell, _| time_share(cell, |episode| episode.astray_s),
     },
+    // Share of episodes that end at the goal.
     Measure {
         name: "arrived_share",
-        title: "share of episodes that end at the goal",
         is_compared: false,
         of: |cell, _| Some(mean(cell.episodes.iter().map(|episode| f64::from(episode.ended == "arrived")))),
     },
+    // Simulated time of the evaluation, h.
     Measure {
         name: "evaluation_h",
-        title: "simulated time of the evaluation, h",
         is_compared: false,
         of: |cell, _| {
             Some(
@@ -128,9 +110,9 @@ pub const MEASURES: &[Measure] = &[
             )
         },
     },
+    // Simulated time of the training, h.
     Measure {
         name: "training_h",
-        title: "simulated time of the training, h",
         is_compared: false,
         of: |cell, _| {
             of_training(cell, |cell| {
@@ -138,9 +120,9 @@ pub const MEASURES: &[Measure] = &[
             })
         },
     },
+    // Counted collisions of the training.
     Measure {
         name: "training_counted",
-        title: "counted collisions of the training",
         is_compared: false,
         of: |cell, _| {
             of_training(cell, |cell| cell.trained.iter().map(|episode| f64::from(episode.counted)).sum())
@@ -148,8 +130,10 @@ pub const MEASURES: &[Measure] = &[
     },
 ];
 
-/// Failures that differ among the counted collisions of episodes.
-pub(super) fn failures<'a>(episodes: impl IntoIterator<Item = &'a EpisodeRecord>) -> BTreeSet<&'a Failure> {
+/// The distinct failures among the counted collisions of episodes.
+pub(super) fn failures<'a>(
+    episodes: impl IntoIterator<Item = &'a EpisodeRecord>,
+) -> BTreeSet<&'a FailureClass> {
     let collisions = episodes.into_iter().flat_map(|episode| &episode.collisions);
     collisions.filter(|found| found.counted).map(|found| &found.failure).collect()
 }
@@ -172,7 +156,7 @@ fn per_seed(cell: &CellRecord, plan: &EvaluationPlan, of: impl Fn(&EpisodeRecord
     Some(cell.episodes.iter().map(of).sum::<f64>() / f64::from(plan.seeds))
 }
 
-/// Collisions of a kind.
+/// The number of collisions for which `is_meant` holds.
 fn number(
     cell: &CellRecord,
     plan: &EvaluationPlan,
@@ -186,7 +170,7 @@ fn distinct(cell: &CellRecord, plan: &EvaluationPlan) -> Option<f64> {
     Some(of_seeds.map(|episodes| failures(episodes).len() as f64).sum::<f64>() / f64::from(plan.seeds))
 }
 
-/// The paper's mean: over the episodes that collide.
+/// Mean time to the first counted collision over the episodes that have one, as in the paper.
 fn ttfc_s(cell: &CellRecord) -> Option<f64> {
     let times: Vec<f64> = cell.episodes.iter().filter_map(EpisodeRecord::first_counted_s).collect();
     (!times.is_empty()).then(|| mean(times.iter().copied()))

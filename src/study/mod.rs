@@ -1,8 +1,10 @@
 //! Studies: agents compared over roads and independent repetitions, with statistics.
 //!
-//! A study is cut into jobs (one training and its evaluation, or one repetition of an agent that has nothing
-//! to learn). Jobs know nothing of each other, so the result depends neither on how many are under way at a
-//! time nor on how often the study was interrupted.
+//! A [`StudyFile`] says in short what to compare; [`StudySettings`] are the same in full, and [`Study`] cuts them into
+//! jobs: one training and its evaluation, or one repetition of an agent that has nothing to learn. Jobs know nothing
+//! of each other, so the result depends neither on how many run at a time nor on interruptions. [`play_jobs`] plays
+//! them on threads, each road of a job becomes a [`CellRecord`] in [`StudyDatabase`], and [`StudyResults`] are
+//! computed from the cells alone: a number for each cell and measure (`measures`), then `statistics` over them.
 
 mod database;
 mod file;
@@ -10,13 +12,14 @@ mod job;
 mod measures;
 mod record;
 mod results;
+mod settings;
 pub mod statistics;
 mod study;
 
 pub use database::StudyDatabase;
-pub use file::{AgentFile, EvaluationPlan, StudyFile};
-pub use job::{Event, Job, play_jobs};
-pub use measures::MEASURES;
+pub use file::StudyFile;
+pub use job::{Event, play_jobs};
 pub use record::{CellRecord, Spent};
-pub use results::{AgentResults, Comparison, Pooled, Rate, RoadResults, StudyResults};
-pub use study::{AgentSettings, Study, StudyError, StudySettings, TrainingPlan};
+pub use results::{AgentResults, BaselineComparison, Rate, RoadResults, StudyResults};
+pub use settings::StudySettings;
+pub use study::Study;

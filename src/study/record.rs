@@ -7,7 +7,7 @@ use crate::oracle;
 use crate::run::{EpisodeSummary, Finding, kind};
 use crate::train::TrainedEpisode;
 
-/// One agent on one road, once trained or once repeated.
+/// The result of one training or one repetition of an agent, on one road.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CellRecord {
     /// Label of the agent.
@@ -15,7 +15,7 @@ pub struct CellRecord {
     pub road: String,
     /// Number of the training or repetition, from 0.
     pub number: u32,
-    /// For `avastra train --seed`, if it was trained.
+    /// The seed for `avastra train --seed`, if it was trained.
     pub training_seed: Option<u64>,
     /// The training, episode by episode.
     pub trained: Vec<TrainedRecord>,
@@ -24,7 +24,7 @@ pub struct CellRecord {
     pub spent: Spent,
 }
 
-/// What a cell took on this machine. No part of the result.
+/// Time that a cell took on this machine; no part of the result.
 #[derive(Debug, Clone, Copy, Default, PartialEq, serde::Serialize)]
 pub struct Spent {
     pub wall_s: f64,
@@ -38,24 +38,24 @@ pub struct TrainedRecord {
     /// Sum of its rewards, not discounted.
     pub sum: f64,
     pub collisions: u32,
-    /// Those of them that the verdict counts.
+    /// Collisions that the verdict counts.
     pub counted: u32,
     pub exploration_epsilon: f64,
     pub loss: Option<f64>,
-    /// Time driven for it, s: branches count, what a snapshot saved does not.
+    /// Time simulated for it, s: branches included, the part that a snapshot saved left out.
     pub simulated_s: f64,
 }
 
 /// An evaluated episode.
 #[derive(Debug, Clone, PartialEq)]
 pub struct EpisodeRecord {
-    /// For `avastra run --seed`: that of the evaluation, not of the episode.
+    /// The seed for `avastra run --seed`: that of the evaluation, not of the episode.
     pub seed: u64,
     /// Number of the episode under that seed.
     pub number: u32,
     pub ended: String,
     pub duration_s: f64,
-    /// Driven beside it, by an agent that tries rows out before it chooses, s.
+    /// Time that an agent with lookahead simulated in branches, outside the episode, s.
     pub branched_s: f64,
     pub distance_m: f64,
     pub red_runs: u32,
@@ -77,18 +77,18 @@ pub struct CollisionRecord {
     pub sudden: bool,
     pub struck: bool,
     pub avoidability: String,
-    pub failure: Failure,
+    pub failure: FailureClass,
 }
 
-/// What makes two collisions alike: as in the groups of a run (see `study::groups`), but for the shape of the
-/// ego vehicle's way, which is not asked about here.
+/// What two collisions must have in common to be alike: as in the groups of a run (see `run::groups`), but without
+/// the shape of the ego vehicle's way.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, serde::Serialize)]
-pub struct Failure {
+pub struct FailureClass {
     /// `pedestrian`, `car` or `large vehicle`.
     pub kind: String,
-    /// What it was told to do.
+    /// The obstacle's verb.
     pub manoeuvre: String,
-    /// How it moved.
+    /// How the obstacle moved.
     pub approach: String,
     /// Where the ego vehicle was hit.
     pub side: String,
@@ -149,7 +149,7 @@ impl CollisionRecord {
             sudden: finding.facts.sudden,
             struck: finding.facts.struck,
             avoidability: finding.judgement.class.name().to_owned(),
-            failure: Failure {
+            failure: FailureClass {
                 kind: kind(finding.collision.body.name()).to_owned(),
                 manoeuvre: finding.collision.verb.name().to_owned(),
                 approach: severity.approach.to_owned(),

@@ -1,6 +1,6 @@
 //! What a study found: measures with intervals, comparisons with tests.
 //!
-//! Depends on the cells alone. While cells are missing it is of those that are there, and says so.
+//! Computed from the cells alone. While some are missing, the result covers those that are there, and says so.
 
 use std::collections::BTreeMap;
 
@@ -13,8 +13,8 @@ use crate::study::statistics::{
 
 use crate::study::file::EvaluationPlan;
 use crate::study::measures::{MEASURES, Measure, failures};
-use crate::study::record::{CellRecord, EpisodeRecord, Failure};
-use crate::study::study::StudySettings;
+use crate::study::record::{CellRecord, EpisodeRecord, FailureClass};
+use crate::study::settings::StudySettings;
 
 /// Points of a learning curve. Ours: few enough to read.
 const CURVE_POINTS: usize = 15;
@@ -25,11 +25,11 @@ pub struct StudyResults {
     /// Raised whenever a field changes its meaning or goes away.
     pub schema: u32,
     pub question: Option<String>,
-    /// Whether it was cut down: no result then, but a sign that it works.
+    /// Whether it was cut down: then it shows that the study works, and nothing more.
     pub quick: bool,
-    /// What a number of collisions refers to.
+    /// The evaluation plan, to which every number of collisions refers.
     pub evaluation: EvaluationPlan,
-    /// Cells that are there, and how many there will be.
+    /// Number of cells that are there, and of all cells.
     pub cells: usize,
     pub cells_wanted: usize,
     pub roads: Vec<RoadResults>,
@@ -42,7 +42,7 @@ pub struct StudyResults {
 pub struct RoadResults {
     pub road: String,
     pub agents: Vec<AgentResults>,
-    pub comparisons: Vec<Comparison>,
+    pub comparisons: Vec<BaselineComparison>,
 }
 
 /// One agent on one road.
@@ -51,12 +51,12 @@ pub struct AgentResults {
     pub agent: String,
     /// Trainings or repetitions.
     pub cells: usize,
-    /// Of each training or repetition, by the names of [`MEASURES`].
+    /// Mean over trainings or repetitions of each measure, by the names of [`MEASURES`].
     pub measures: BTreeMap<&'static str, Estimate>,
     /// Over all episodes together.
     pub episodes: Pooled,
-    /// Counted collisions by cause, if causes were looked for; modules that only together are at fault
-    /// stand side by side.
+    /// Counted collisions by cause, if causes were looked for; the names of modules that are only together at fault
+    /// are joined by a space.
     pub causes: BTreeMap<String, usize>,
     /// Distinct failures of all cells together, with how often each was found.
     pub failures: Vec<FoundFailure>,
@@ -72,9 +72,9 @@ pub struct Together {
     pub episodes: Pooled,
 }
 
-/// Rates over episodes taken together. Their intervals take events to be independent. Collisions of one
-/// episode, or of one trained policy, are not quite, so these intervals are rather too short; those of
-/// [`AgentResults::measures`], of which each value is of a training of its own, are not.
+/// Rates over all episodes together. Their intervals assume independent events. Collisions of one episode or of one
+/// trained policy are not quite independent, so these intervals are somewhat too short. The intervals of
+/// [`AgentResults::measures`] are sound: there each value comes from a training of its own.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Pooled {
     pub episodes: usize,
@@ -92,7 +92,7 @@ pub struct Pooled {
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Rate {
     pub events: u64,
-    /// None of nothing.
+    /// `None` if nothing was driven.
     pub rate: Option<f64>,
     #[serde(flatten)]
     pub interval: Option<Interval>,
@@ -102,45 +102,45 @@ pub struct Rate {
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct FoundFailure {
     #[serde(flatten)]
-    pub failure: Failure,
+    pub failure: FailureClass,
     pub count: usize,
 }
 
-/// Some episodes of all trainings.
+/// A point of the learning curve: a span of episodes, averaged over all trainings.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct CurvePoint {
-    /// The last of them, from 1.
+    /// Number of the span's last episode, from 1.
     pub episode: usize,
-    /// Means of an episode.
+    /// Means over the episodes of the span.
     pub reward: f64,
     pub counted: f64,
     pub exploration_epsilon: f64,
 }
 
-/// By which seeds a cell can be repeated.
+/// The seeds by which a cell can be repeated.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct CellSeeds {
     pub number: u32,
-    /// For `avastra train --seed`. As text: JSON's numbers are too short.
+    /// The seed for `avastra train --seed`; text, because numbers in JSON cannot hold 64 bits.
     pub training: Option<String>,
-    /// For `avastra run --seed`.
+    /// The seeds for `avastra run --seed`.
     pub evaluation: Vec<String>,
 }
 
-/// An agent against a baseline by one measure.
+/// An agent compared with a baseline by one measure.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
-pub struct Comparison {
+pub struct BaselineComparison {
     pub agent: String,
     pub baseline: String,
     pub measure: &'static str,
-    /// Mean of the agent over mean of the baseline, with a percentile bootstrap interval; none where the
-    /// baseline's is 0.
+    /// Mean of the agent divided by the mean of the baseline, with a percentile bootstrap interval; `None` if the
+    /// baseline's mean is 0.
     pub ratio: Option<f64>,
     pub ratio_interval: Option<Interval>,
     /// Mann–Whitney.
     #[serde(flatten)]
     pub test: RankTest,
-    /// `p` after Holm's correction; its family are all comparisons of the study by the same measure.
+    /// `p` after Holm's correction over all comparisons of the study by the same measure.
     pub p_holm: f64,
     /// Â12: how probable it is that a value of the agent is larger than one of the baseline.
     pub superiority: f64,
@@ -148,7 +148,7 @@ pub struct Comparison {
 }
 
 impl StudyResults {
-    /// The result over cells, which may stand in any order.
+    /// The result over cells in any order.
     pub fn new(settings: &StudySettings, cells: &[CellRecord]) -> StudyResults {
         let of = |agent: &str, road: &str| -> Vec<&CellRecord> {
             let mut own: Vec<_> =
@@ -223,7 +223,7 @@ fn agent_results(settings: &StudySettings, label: &str, cells: &[&CellRecord]) -
     }
 }
 
-/// No measure is below 0, so neither is its mean.
+/// No measure is below 0, so its interval is cut off there.
 fn not_negative(estimate: Estimate) -> Estimate {
     let interval = estimate.interval.map(|interval| Interval { low: interval.low.max(0.0), ..interval });
     Estimate { interval, ..estimate }
@@ -295,8 +295,8 @@ fn curve(cells: &[&CellRecord]) -> Vec<CurvePoint> {
     (0..points).map(point).collect()
 }
 
-/// Every agent against every baseline but itself, not yet corrected.
-fn comparisons(settings: &StudySettings, groups: &[(&str, Vec<&CellRecord>)]) -> Vec<Comparison> {
+/// Every agent compared with every baseline but itself, not yet corrected.
+fn comparisons(settings: &StudySettings, groups: &[(&str, Vec<&CellRecord>)]) -> Vec<BaselineComparison> {
     let mut found = Vec::new();
     for baseline in &settings.baselines {
         let Some((_, theirs)) = groups.iter().find(|(label, _)| label == baseline) else { continue };
@@ -310,18 +310,18 @@ fn comparisons(settings: &StudySettings, groups: &[(&str, Vec<&CellRecord>)]) ->
     found
 }
 
-/// None if there is nothing to compare yet.
+/// `None` if one of the samples is still empty.
 fn comparison(
     settings: &StudySettings,
     (agent, baseline): (&str, &str),
     measure: &'static str,
     (own, theirs): (Vec<f64>, Vec<f64>),
-) -> Option<Comparison> {
+) -> Option<BaselineComparison> {
     let test = mann_whitney(&own, &theirs)?;
     let (superiority, superiority_interval) = superiority(&own, &theirs)?;
     let mut rng = rng::stream(settings.first_seed, Stream::Bootstrap, 0);
     let ratio = ratio_of_means(&own, &theirs, &mut rng);
-    Some(Comparison {
+    Some(BaselineComparison {
         agent: agent.to_owned(),
         baseline: baseline.to_owned(),
         measure,
@@ -337,7 +337,7 @@ fn comparison(
 /// Holm's correction over all roads, agents and baselines, for each measure by itself.
 fn correct(roads: &mut [RoadResults]) {
     for measure in MEASURES {
-        let mut family: Vec<&mut Comparison> = roads
+        let mut family: Vec<&mut BaselineComparison> = roads
             .iter_mut()
             .flat_map(|road| &mut road.comparisons)
             .filter(|comparison| comparison.measure == measure.name)

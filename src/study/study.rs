@@ -1,109 +1,14 @@
-//! A study that is ready to play: its settings in full, everything looked up that they name.
-
-use std::collections::BTreeSet;
+//! A study that is ready to play: its jobs, their seeds, and the training and evaluations of each.
 
 use crate::action::ActionTable;
-use crate::ads::ModularConfig;
-use crate::agent;
-use crate::agent::{Kind, Settings};
-use crate::oracle::AvoidabilitySettings;
 use crate::rng;
 use crate::rng::Stream;
-use crate::run::{EPISODES_MAX, Profile, Run, RunError, RunSettings};
-use crate::syntax::listed;
+use crate::run::{Run, RunError, RunSettings};
 use crate::train::{TrainSettings, Training, with_period};
 
-use crate::study::file::{AgentFile, EvaluationPlan, StudyFile};
+use crate::study::file::EvaluationPlan;
 use crate::study::job::Job;
-
-/// Everything that is needed to repeat a study; written to `study.yaml`.
-#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct StudySettings {
-    /// Version of avastra that wrote it.
-    pub avastra: String,
-    /// Version of the simulated world.
-    pub engine: String,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub question: Option<String>,
-    /// Path of the space, from the study's directory.
-    pub space: String,
-    /// Digest of the space with all that it uses.
-    pub space_digest: String,
-    pub roads: Vec<String>,
-    pub ads: String,
-    /// Settings of the driving system, if it has any.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub profile: Option<Profile>,
-    pub ambient: u32,
-    pub first_seed: u64,
-    pub evaluation: EvaluationPlan,
-    pub causes: bool,
-    /// Whether it was cut down to see if it works.
-    pub quick: bool,
-    pub agents: Vec<AgentSettings>,
-    pub baselines: Vec<String>,
-    pub avoidability: AvoidabilitySettings,
-}
-
-/// One agent of a study.
-#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct AgentSettings {
-    pub label: String,
-    pub name: String,
-    /// Independent trainings, or repetitions where nothing is learned.
-    pub repeats: u32,
-    /// How it learns, if it does.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub training: Option<TrainingPlan>,
-    /// The profile of the driving system that this agent meets, in place of the study's.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub profile: Option<Profile>,
-    pub without: Vec<String>,
-    pub with: Vec<String>,
-}
-
-/// How an agent of a study is trained.
-#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct TrainingPlan {
-    /// Episodes on all roads together.
-    pub episodes: u32,
-    /// Roads that a training goes round; none: the one on which it is evaluated.
-    pub roads: Vec<String>,
-    pub hyperparameters: Settings,
-}
-
-/// Why there cannot be such a study.
-#[derive(Debug, thiserror::Error)]
-pub enum StudyError {
-    #[error("{0}")]
-    File(String),
-    #[error("no agent is named: list at least one under `agents`")]
-    NoAgent,
-    #[error("two agents are called `{label}`: give one of them another `label`")]
-    LabelTwice { label: String },
-    #[error("no agent is called `{label}`, which `baselines` names: there are {known}")]
-    Baseline { label: String, known: String },
-    #[error("agent `{label}`: `{field}` is for agents that learn, `{name}` does not")]
-    NotLearning { label: String, name: String, field: &'static str },
-    #[error("agent `{label}`: `repeats` is for agents that do not learn, `{name}` does; say `trainings`")]
-    Learning { label: String, name: String },
-    #[error("agent `{label}`: {error}")]
-    Agent { label: String, error: RunError },
-    #[error("agent `{label}`: {reason}")]
-    Settings { label: String, reason: String },
-    #[error("`{field}` is {found}: {wanted} is possible")]
-    Range { field: &'static str, found: String, wanted: &'static str },
-}
-
-/// Trainings or repetitions of one agent, at most. Ours.
-const REPEATS_MAX: u32 = 10_000;
-/// The same where the file gives no number. Ours.
-const REPEATS: u32 = 10;
-/// Episodes of a training where the file gives no number: the default of `avastra train`.
-const TRAINING_EPISODES: u32 = 750;
+use crate::study::settings::{AgentSettings, StudyError, StudySettings, check};
 
 /// A study that is ready to play.
 pub struct Study {
@@ -111,136 +16,8 @@ pub struct Study {
     settings: StudySettings,
 }
 
-impl StudySettings {
-    /// What a file asks for, in full. `read` gives the text of a file that it names.
-    ///
-    /// # Errors
-    /// If the file asks for something that does not exist or cannot be.
-    pub fn new(
-        file: StudyFile,
-        table: &ActionTable,
-        profile: Option<Profile>,
-        (avastra, engine): (&str, &str),
-        read: &dyn Fn(&str) -> Result<String, String>,
-    ) -> Result<StudySettings, StudyError> {
-        let space = table.space();
-        let roads = match file.roads.as_slice() {
-            [] => space.roads.iter().map(|road| road.name.clone()).collect(),
-            _ => file.roads,
-        };
-        let agents = file.agents.into_iter().map(|agent| agent_settings(agent, read));
-        Ok(StudySettings {
-            avastra: avastra.to_owned(),
-            engine: engine.to_owned(),
-            question: file.question,
-            space: space.path.display().to_string(),
-            space_digest: space.digest.clone(),
-            roads,
-            ads: file.ads,
-            profile,
-            ambient: file.ambient,
-            first_seed: file.first_seed,
-            evaluation: file.evaluation,
-            causes: file.causes,
-            quick: false,
-            agents: agents.collect::<Result<_, _>>()?,
-            baselines: file.baselines,
-            avoidability: AvoidabilitySettings::default(),
-        })
-    }
-
-    /// The same cut down to what takes a minute or two: enough to see that it works, not enough to learn
-    /// anything from.
-    pub fn quick(mut self) -> StudySettings {
-        self.quick = true;
-        self.evaluation.episodes = self.evaluation.episodes.min(3);
-        self.evaluation.seeds = self.evaluation.seeds.min(1);
-        for agent in &mut self.agents {
-            agent.repeats = agent.repeats.min(2);
-            if let Some(training) = &mut agent.training {
-                training.episodes = training.episodes.min(12);
-            }
-        }
-        self
-    }
-}
-
-/// What the file asks for, in full.
-fn agent_settings(
-    file: AgentFile,
-    read: &dyn Fn(&str) -> Result<String, String>,
-) -> Result<AgentSettings, StudyError> {
-    let label = file.label.unwrap_or_else(|| file.name.clone());
-    let entry = agent::by_name(&file.name).ok_or_else(|| {
-        let known = listed(&agent::REGISTRY.iter().map(|entry| entry.name).collect::<Vec<_>>());
-        let error = RunError::Agent { name: file.name.clone(), known };
-        StudyError::Agent { label: label.clone(), error }
-    })?;
-    let (repeats, training) = match entry.kind {
-        Kind::Ready(_) => {
-            let learning = [
-                ("trainings", file.trainings.is_some()),
-                ("episodes", file.episodes.is_some()),
-                ("preset", file.preset.is_some()),
-                ("config", file.config.is_some()),
-                ("train_roads", !file.train_roads.is_empty()),
-            ];
-            if let Some((field, _)) = learning.into_iter().find(|(_, is_there)| *is_there) {
-                return Err(StudyError::NotLearning { label, name: file.name, field });
-            }
-            (file.repeats, None)
-        }
-        Kind::Learning(_) | Kind::Searching(_) => {
-            if file.repeats.is_some() {
-                return Err(StudyError::Learning { label, name: file.name });
-            }
-            let refuse = |reason: String| StudyError::Settings { label: label.clone(), reason };
-            let text = settings_text(file.config.as_ref(), read).map_err(refuse)?;
-            let hyperparameters = Settings::from_yaml(entry, file.preset.as_deref(), &text)
-                .expect("an agent that is trained has settings")
-                .map_err(|error| refuse(error.to_string()))?;
-            let episodes = file.episodes.unwrap_or(TRAINING_EPISODES);
-            (file.trainings, Some(TrainingPlan { episodes, roads: file.train_roads, hyperparameters }))
-        }
-    };
-    let refuse = |reason| StudyError::Settings { label: label.clone(), reason };
-    let profile = match &file.ads_config {
-        None => None,
-        given => {
-            let text = settings_text(given.as_ref(), read).map_err(refuse)?;
-            let settings = ModularConfig::from_yaml(&text).map_err(|error| refuse(error.to_string()))?;
-            Some(Profile::new(&settings))
-        }
-    };
-    Ok(AgentSettings {
-        label,
-        name: file.name,
-        repeats: repeats.unwrap_or(REPEATS),
-        training,
-        profile,
-        without: file.without,
-        with: file.with,
-    })
-}
-
-/// Settings as text: those of a file that is named, or those that stand there.
-fn settings_text(
-    given: Option<&serde_json::Value>,
-    read: &dyn Fn(&str) -> Result<String, String>,
-) -> Result<String, String> {
-    match given {
-        None => Ok(String::new()),
-        Some(serde_json::Value::String(path)) => {
-            read(path).map_err(|reason| format!("cannot read `{path}`: {reason}"))
-        }
-        // JSON is YAML.
-        Some(settings @ serde_json::Value::Object(_)) => Ok(settings.to_string()),
-        Some(_) => Err("settings are the name of a file, or `{ name: value, … }`".to_owned()),
-    }
-}
-
 impl Study {
-    /// Looks everything up that the settings name, so that nothing is found missing after hours.
+    /// Looks up everything that the settings name, so that nothing turns out to be missing hours later.
     ///
     /// # Errors
     /// If something does not exist, is named twice, or is out of range.
@@ -268,8 +45,8 @@ impl Study {
         &self.settings
     }
 
-    /// All jobs. The first training or repetition of everybody comes before the second of anybody, so that an
-    /// unfinished study says something of all.
+    /// All jobs. The first training or repetition of every agent comes before the second of any, so that an
+    /// unfinished study says something about all of them.
     pub fn jobs(&self) -> Vec<Job> {
         let StudySettings { agents, roads, .. } = &self.settings;
         let most = agents.iter().map(|agent| agent.repeats).max().unwrap_or(0);
@@ -299,13 +76,13 @@ impl Study {
         &self.settings.agents[job.agent]
     }
 
-    /// Seed of the nth training: the same for every agent and road, so that they meet the same episodes.
+    /// Seed of the nth training. It depends neither on agent nor on road, so all agents meet identical episodes.
     pub fn training_seed(&self, number: u32) -> u64 {
         rng::child_seed(self.settings.first_seed, Stream::StudyTraining, u64::from(number))
     }
 
-    /// Seed of an evaluation after the nth training: of the same for every agent and road, and of others
-    /// for every training, because trainings judged by the same episodes would not be independent.
+    /// Seed of an evaluation after the nth training. It depends on the training's number, not on agent or road:
+    /// agents meet identical episodes, and trainings stay independent.
     pub fn evaluation_seed(&self, number: u32, seed: u32) -> u64 {
         let index = u64::from(number) * u64::from(self.settings.evaluation.seeds) + u64::from(seed);
         rng::child_seed(self.settings.first_seed, Stream::StudyEvaluation, index)
@@ -319,91 +96,41 @@ impl Study {
             [] => job.roads.iter().map(|&road| self.settings.roads[road].clone()).collect(),
             named => named.to_vec(),
         };
-        let settings = TrainSettings {
-            avastra: self.settings.avastra.clone(),
-            engine: self.settings.engine.clone(),
-            space: self.settings.space.clone(),
-            space_digest: self.settings.space_digest.clone(),
-            roads,
-            ads: self.settings.ads.clone(),
-            profile: agent.profile.as_ref().or(self.settings.profile.as_ref()).cloned(),
-            agent: agent.name.clone(),
-            episodes: plan.episodes,
-            seed: self.training_seed(job.number),
-            ambient: self.settings.ambient,
-            without: agent.without.clone(),
-            with: agent.with.clone(),
-            hyperparameters: plan.hyperparameters.clone(),
-        };
+        let episodes = (plan.episodes, self.training_seed(job.number));
+        let settings =
+            TrainSettings::new(self.conditions(agent, roads, episodes), plan.hyperparameters.clone());
         Training::new(self.table.clone(), settings)
     }
 
-    /// The evaluation under one seed and on one road: by itself, or by who was trained.
+    /// The evaluation under one seed on one road. For a trained agent it is a run of `none`, with which the caller
+    /// plays the trained agent (see [`Run::judged_by`]).
     pub(super) fn evaluation(&self, job: &Job, seed: u32, road: &str) -> Result<Run, RunError> {
-        let settings = self.run_settings(job, seed, road);
-        let Some(plan) = &self.agent(job).training else { return Run::new(self.table.clone(), settings) };
+        let agent = self.agent(job);
+        let episodes = (self.settings.evaluation.episodes, self.evaluation_seed(job.number, seed));
+        let settings = self.conditions(agent, vec![road.to_owned()], episodes);
+        let Some(plan) = &agent.training else { return Run::new(self.table.clone(), settings) };
         let table = with_period(self.table.clone(), plan.hyperparameters.observation_period_s());
         Run::new(table, RunSettings { agent: "none".to_owned(), ..settings })
     }
 
-    fn run_settings(&self, job: &Job, seed: u32, road: &str) -> RunSettings {
-        let agent = self.agent(job);
+    /// What an agent's trainings and evaluations have in common.
+    fn conditions(
+        &self,
+        agent: &AgentSettings,
+        roads: Vec<String>,
+        (episodes, seed): (u32, u64),
+    ) -> RunSettings {
+        let study = &self.settings;
         RunSettings {
-            avastra: self.settings.avastra.clone(),
-            engine: self.settings.engine.clone(),
-            space: self.settings.space.clone(),
-            space_digest: self.settings.space_digest.clone(),
-            roads: vec![road.to_owned()],
-            ads: self.settings.ads.clone(),
-            profile: agent.profile.as_ref().or(self.settings.profile.as_ref()).cloned(),
-            agent: agent.name.clone(),
-            policy: None,
-            episodes: self.settings.evaluation.episodes,
-            seed: self.evaluation_seed(job.number, seed),
-            ambient: self.settings.ambient,
-            causes: self.settings.causes,
+            roads,
+            ads: study.ads.clone(),
+            profile: agent.profile.as_ref().or(study.profile.as_ref()).cloned(),
+            ambient: study.ambient,
+            causes: study.causes,
             without: agent.without.clone(),
             with: agent.with.clone(),
-            avoidability: self.settings.avoidability.clone(),
+            avoidability: study.avoidability.clone(),
+            ..RunSettings::new(self.table.space(), &agent.name, episodes, seed)
         }
     }
-}
-
-/// # Errors
-/// What is wrong with the settings in themselves.
-fn check(settings: &StudySettings) -> Result<(), StudyError> {
-    let range = |field, found: String, wanted| Err(StudyError::Range { field, found, wanted });
-    let EvaluationPlan { episodes, seeds, horizon_s } = settings.evaluation;
-    if !(1..=EPISODES_MAX).contains(&episodes) {
-        return range("evaluation.episodes", episodes.to_string(), "from 1 to 1000000");
-    }
-    if !(1..=1000).contains(&seeds) {
-        return range("evaluation.seeds", seeds.to_string(), "from 1 to 1000");
-    }
-    if !(1.0..=1e6).contains(&horizon_s) {
-        return range("evaluation.horizon_s", horizon_s.to_string(), "from 1 to 1e6");
-    }
-    if settings.ambient > crate::model::AMBIENT_MAX {
-        return range("ambient", settings.ambient.to_string(), "what `avastra run --ambient` takes");
-    }
-    if settings.agents.is_empty() {
-        return Err(StudyError::NoAgent);
-    }
-    let mut labels = BTreeSet::new();
-    for agent in &settings.agents {
-        if !labels.insert(agent.label.as_str()) {
-            return Err(StudyError::LabelTwice { label: agent.label.clone() });
-        }
-        if !(1..=REPEATS_MAX).contains(&agent.repeats) {
-            let field = if agent.training.is_some() { "trainings" } else { "repeats" };
-            return range(field, agent.repeats.to_string(), "from 1 to 10000");
-        }
-    }
-    for baseline in &settings.baselines {
-        if !labels.contains(baseline.as_str()) {
-            let known = listed(&settings.agents.iter().map(|agent| agent.label.as_str()).collect::<Vec<_>>());
-            return Err(StudyError::Baseline { label: baseline.clone(), known });
-        }
-    }
-    Ok(())
 }

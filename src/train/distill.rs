@@ -1,8 +1,8 @@
 //! Rules from a network: rounds of DAgger (Ross et al., 2011) as VIPER uses them.
 //!
-//! In the first round the network drives, then the rules of the round before: so the states are those
-//! that the rules come to, and in all of them the network says what it would have done. VIPER keeps the
-//! best of its rounds; here the last is kept, which has learned from all states.
+//! In the first round the network drives, in each further round the rules of the round before. So the states are
+//! those that the rules reach, and for all of them the network says what it would have chosen. VIPER keeps the best
+//! of its rounds; here the last is kept, which has learned from all states.
 
 use std::sync::Arc;
 
@@ -15,7 +15,7 @@ use crate::run::Arena;
 use crate::train::evaluation::evaluate;
 use crate::train::visits::{Record, visits};
 
-/// Rules that imitate a policy, as its settings want them; none if it never came to a choice.
+/// Rules that imitate a policy, with the limits that its settings give; empty if the policy never made a choice.
 pub fn distill(arena: &Arena, policy: &QPolicy, seed: u64) -> Vec<PolicyRule> {
     let settings = policy.settings();
     let episodes = u64::from(settings.rules_episodes);
@@ -34,8 +34,8 @@ pub fn distill(arena: &Arena, policy: &QPolicy, seed: u64) -> Vec<PolicyRule> {
     found
 }
 
-/// What rules achieve, and how near they come to their network there. `test` is the number of episodes on
-/// each road and their seed.
+/// What rules achieve when they drive, and how often they choose as the network. `test` is the number of episodes
+/// on each road, and their seed.
 pub fn judge_rules(
     arena: &Arena,
     policy: &QPolicy,
@@ -65,7 +65,7 @@ pub fn judge_rules(
     }
 }
 
-/// A figure as a claim states it: to four decimals.
+/// A figure rounded to the four decimals of a claim.
 pub fn rounded(value: f64) -> f64 {
     (value * 1e4).round() / 1e4
 }

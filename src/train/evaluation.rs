@@ -24,7 +24,7 @@ pub struct Evaluation {
     pub return_mean: f64,
     /// SHA-256 over the traces of all episodes, in order.
     pub trace: [u8; 32],
-    /// Time driven, branches included, s.
+    /// Time simulated, branches included, s.
     pub simulated_s: f64,
 }
 

@@ -1,8 +1,9 @@
-//! Permutation importance (Breiman, 2001; Fisher et al., 2019): what a policy's choices lose when the
-//! values of one variable are shuffled over the states that it came to.
+//! Permutation importance (Breiman, 2001; Fisher et al., 2019): how much worse a policy chooses when the values of
+//! one variable are shuffled among the states that it visited.
 //!
-//! States are weighted by what is at stake there, so a choice that makes no difference counts for
-//! nothing. Variables are shuffled one at a time, so of two that say the same neither seems important.
+//! A state weighs as much as its stake (see `Visit::stake`), so a choice that makes no difference counts for
+//! nothing. Variables are shuffled one at a time, so two variables that carry the same information both seem
+//! unimportant.
 
 use crate::agent::{QPolicy, Visit};
 use crate::mdp::{Observation, STATE_LEN};
@@ -13,19 +14,19 @@ use crate::rng::Stream;
 /// How much a policy's choices depend on a variable.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Importance {
-    /// As the rules of a policy call it.
+    /// Its name in the rules of a policy.
     pub variable: &'static str,
-    /// As the paper calls it, or an observation what is beyond the paper.
+    /// Its name in the paper, or in the observation if the paper does not have it.
     pub observed_as: &'static str,
     /// Whether it is one of the paper's 19.
     pub of_paper: bool,
     /// Whether the network sees it at all.
     pub seen: bool,
-    /// Share of the stake on which the shuffled choice is another, mean over the repeats, in `[0, 1]`.
+    /// Share of the stake in states where shuffling changes the choice; mean over the repeats, in `[0, 1]`.
     pub change: f64,
     /// Its standard deviation over the repeats.
     pub change_deviation: f64,
-    /// Mean Q-value that the shuffled choice loses in a state.
+    /// Mean Q-value that a choice loses by shuffling.
     pub loss: f64,
     /// Its standard deviation over the repeats.
     pub loss_deviation: f64,
@@ -62,7 +63,7 @@ pub(super) fn importance(policy: &QPolicy, visits: &[Visit], repeats: u64, seed:
     all
 }
 
-/// Share of the stake on which the choice changes, and mean Q-value lost.
+/// One shuffle: share of the stake in states where the choice changes, and mean Q-value lost.
 fn shuffled(policy: &QPolicy, visits: &[Visit], variable: usize, mut rng: rng::Rng) -> (f64, f64) {
     let mut order: Vec<usize> = (0..visits.len()).collect();
     for at in (1..order.len()).rev() {
@@ -85,8 +86,8 @@ fn shuffled(policy: &QPolicy, visits: &[Visit], variable: usize, mut rng: rng::R
     (if stakes > 0.0 { changed / stakes } else { 0.0 }, lost / visits.len().max(1) as f64)
 }
 
-/// What must move with a variable because it is the same thing: the paper's one number for the weather
-/// and its three parts, which go into a network in its place.
+/// The variables that are shuffled together with this one because they carry the same information: the paper's one
+/// number for the weather, and its three parts, which a network sees in its place.
 fn together(variable: usize) -> Vec<usize> {
     let index = |name| variable_index(name).expect("it is a variable");
     let mut all = vec![variable];
@@ -96,7 +97,7 @@ fn together(variable: usize) -> Vec<usize> {
     all
 }
 
-/// Puts a value in the place of a variable.
+/// Sets a variable of an observation.
 pub(super) fn set(observation: &mut Observation, variable: usize, value: f32) {
     if variable < STATE_LEN {
         observation.state[variable] = value;

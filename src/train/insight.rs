@@ -1,5 +1,5 @@
-//! How a policy comes to its choices: which rows it favours and when, what it expects of each row in a
-//! state, and which variables matter to it.
+//! Why a policy chooses as it does: which rows it prefers and when, which Q-values it expects in a state, and which
+//! variables matter.
 
 use crate::action::ActionTable;
 use crate::agent::{QPolicy, Visit};
@@ -11,20 +11,20 @@ use crate::run::Arena;
 use crate::train::importance::{Importance, importance, set};
 use crate::train::visits::visits;
 
-/// What was found.
+/// The result of [`insight`].
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Insight {
-    /// States that the policy came to.
+    /// Number of visited states.
     pub states: usize,
-    /// Mean of what is at stake in them: highest less lowest Q-value of the open rows.
+    /// Mean stake of the visited states: highest minus lowest Q-value of the open rows.
     pub stake: f64,
-    /// The rows that it chose, the most frequent first.
+    /// The chosen rows, the most frequent first.
     pub rows: Vec<RowUse>,
-    /// The state that was asked for, over the mean of those visited.
+    /// The state asked for; variables that were not given have their mean over the visited states.
     pub state: State,
-    /// The most important first.
+    /// The variables, the most important first.
     pub importance: Vec<Importance>,
-    /// Shuffles of each variable.
+    /// Number of shuffles of each variable.
     pub repeats: u64,
 }
 
@@ -38,8 +38,8 @@ pub struct RowUse {
     pub open: f64,
     /// Mean Q-value where it is chosen.
     pub q_value: f64,
-    /// The variables in which the states of its choice differ most from all states: name, mean there and
-    /// mean of all, as text in the variable's unit.
+    /// The variables that differ most between the states of this choice and all states: name, mean here, mean of
+    /// all; means are text in the variable's unit.
     pub when: Vec<(&'static str, String, String)>,
 }
 
@@ -48,17 +48,18 @@ pub struct RowUse {
 pub struct State {
     /// Every variable that the network sees, with its value as text.
     pub variables: Vec<(&'static str, String)>,
-    /// Row, its name and Q-value, the highest first. No rule is asked: which rows are legal a state does
-    /// not tell.
+    /// Index, name and Q-value of every row, the highest first. A state alone does not tell which rows are legal,
+    /// so all are listed.
     pub q_values: Vec<(usize, String, f32)>,
 }
 
-/// Variables that tell when a row is chosen, for each row. Ours.
+/// Number of variables listed in [`RowUse::when`]. Ours.
 const TELLING: usize = 3;
-/// A mean that is off by fewer standard deviations tells nothing. Ours.
+/// A variable whose mean differs by fewer standard deviations than this is not listed. Ours.
 const TELLING_DEVIATIONS: f64 = 0.25;
 
-/// Looks at a policy over so many episodes on each road. `given` are values in place of the mean state's.
+/// Lets a policy drive so many episodes on each road, and says why it chooses as it does. `given` are values that
+/// replace those of the mean state.
 pub fn insight(
     arena: &Arena,
     policy: &QPolicy,
@@ -128,7 +129,7 @@ impl Spread {
         Spread { variables, mean: mean(visits), deviations }
     }
 
-    /// The variables whose mean over some visits is off by most standard deviations.
+    /// The variables whose mean over these visits differs from the mean over all by the most standard deviations.
     fn telling(&self, own: &[&Visit]) -> Vec<(&'static str, String, String)> {
         let here = mean(own);
         let mut telling: Vec<(f64, usize)> = self
@@ -154,7 +155,7 @@ fn average(visits: &[&Visit], variable: usize) -> f64 {
     sum / visits.len().max(1) as f64
 }
 
-/// The mean of states: of quantities the mean, of words the most frequent.
+/// The mean state: the mean of each quantity, the most frequent word of each variable with words.
 fn mean(visits: &[&Visit]) -> Observation {
     let mut observation = Observation::zeros();
     for (variable, described) in VARIABLES.iter().enumerate() {
@@ -173,7 +174,7 @@ fn mean(visits: &[&Visit]) -> Observation {
     observation
 }
 
-/// The paper's one number for the weather follows from its parts.
+/// Computes the paper's one number for the weather from its three parts.
 fn pack_weather(observation: &mut Observation) {
     let index = |name| variable_index(name).expect("it is a variable");
     let [rain, fog, wetness] = ["rain", "fog", "wetness"].map(|name| observation.get(index(name)));
@@ -201,7 +202,7 @@ fn show(observation: &Observation, variable: usize) -> String {
             None => format!("{value:.2}"),
         },
         VariableKind::Quantity { unit, .. } => {
-            // Minus zero is no value that anybody means.
+            // Avoids `-0.00`.
             let value = (f64::from(value) * 100.0).round() / 100.0 + 0.0;
             format!("{value:.2} {unit}").trim_end().to_owned()
         }

@@ -1,7 +1,8 @@
 //! Training, and what was learned: episodes one after another, from each of which the agent learns.
 //!
-//! [`Training`] is the loop, [`Checkpoint`] what is kept of it, [`evaluate`] the figures of a finished policy.
-//! [`distill`] turns a network into readable lines; [`insight`] tells why a policy chooses as it does.
+//! [`Training`] is the loop, made from [`TrainSettings`]; `record` keeps its episodes and checkpoints in `run.db`.
+//! What follows looks at a finished policy, in the [`training_arena`] where it was trained: [`evaluate`] gives its
+//! figures, [`distill`] turns its network into readable rules, and [`insight`] says why it chooses as it does.
 
 mod distill;
 mod evaluation;
@@ -13,9 +14,7 @@ mod visits;
 
 pub use distill::{distill, judge_rules, rounded};
 pub use evaluation::{Evaluation, evaluate};
-pub use importance::Importance;
-pub use insight::{Insight, RowUse, State, insight};
-pub use record::Checkpoint;
+pub use insight::{Insight, insight};
 pub(crate) use training::with_period;
 pub use training::{TrainSettings, TrainedEpisode, Training};
 pub use visits::training_arena;

@@ -1,7 +1,7 @@
 //! A training in the run database: learning curves, and checkpoints to go on from.
 //!
-//! A checkpoint and the episodes up to it are committed together. What was kept after the last one is
-//! forgotten when a training is resumed: it is played again, to the same bytes.
+//! A checkpoint and the episodes up to it are committed together. Episodes after the last checkpoint are deleted
+//! when a training is resumed, and played again to the same bytes.
 
 use rusqlite::{OptionalExtension, params};
 
@@ -66,7 +66,7 @@ impl Database {
         Ok(())
     }
 
-    /// Time driven for the episodes of a training so far, s.
+    /// Time simulated for the episodes of a training so far, s.
     ///
     /// # Errors
     /// If the file cannot be read.
@@ -75,8 +75,8 @@ impl Database {
         Ok(self.connection.query_row(sum, [], |row| row.get(0))?)
     }
 
-    /// The last checkpoint, with everything after it forgotten; none if there has been none, and then
-    /// no episode is left.
+    /// Returns the last checkpoint and deletes all episodes after it. Without a checkpoint, all episodes are
+    /// deleted.
     ///
     /// # Errors
     /// If the file cannot be read or written, or the checkpoint is damaged.

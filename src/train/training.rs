@@ -1,6 +1,6 @@
 //! The training loop, one episode at a time, and what an episode teaches.
 //!
-//! Single-threaded: every episode depends on all before it. Whoever calls it keeps the records.
+//! Single-threaded: every episode depends on all before it. The caller keeps the records.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -22,7 +22,8 @@ use crate::oracle::AvoidabilitySettings;
 use crate::rng;
 use crate::rng::Stream;
 use crate::run::{
-    Arena, EpisodeSummary, Finding, Profile, RunError, carry_out, check_episodes, legal, offers, under_test,
+    Arena, EpisodeSummary, Finding, Profile, RunError, RunSettings, carry_out, check_episodes, legal, offers,
+    under_test,
 };
 use crate::sim::{Contact, World};
 use crate::syntax::listed;
@@ -42,7 +43,7 @@ pub struct TrainSettings {
     /// Episodes go round them, one each.
     pub roads: Vec<String>,
     pub ads: String,
-    /// Settings of the driving system, if it was given any; without them it is as it comes.
+    /// Settings of the driving system; without them it has its defaults.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub profile: Option<Profile>,
     pub agent: String,
@@ -56,8 +57,30 @@ pub struct TrainSettings {
     pub without: Vec<String>,
     /// Optional rules switched on.
     pub with: Vec<String>,
-    /// Of the agent.
+    /// The agent's hyperparameters.
     pub hyperparameters: Settings,
+}
+
+impl TrainSettings {
+    /// A training with the agent, the episodes and the conditions of a run.
+    pub fn new(run: RunSettings, hyperparameters: Settings) -> TrainSettings {
+        TrainSettings {
+            avastra: run.avastra,
+            engine: run.engine,
+            space: run.space,
+            space_digest: run.space_digest,
+            roads: run.roads,
+            ads: run.ads,
+            profile: run.profile,
+            agent: run.agent,
+            episodes: run.episodes,
+            seed: run.seed,
+            ambient: run.ambient,
+            without: run.without,
+            with: run.with,
+            hyperparameters,
+        }
+    }
 }
 
 /// A training that is ready to go on.
@@ -65,8 +88,8 @@ pub struct Training {
     arena: Arena,
     settings: TrainSettings,
     agent: Box<dyn Trainable>,
-    /// Moments that the agent may want to return to, by the numbers that it gave them. What is missing
-    /// after a kill is played again.
+    /// Moments that a search may return to, by the numbers that it gave them. A moment that is missing after a kill
+    /// is played again.
     moments: BTreeMap<usize, Snapshot>,
     /// Number of the next episode.
     next: usize,
@@ -76,14 +99,14 @@ pub struct Training {
 pub struct TrainedEpisode {
     pub log: EpisodeLog,
     pub summary: EpisodeSummary,
-    /// Sum of its rewards.
+    /// Sum of its rewards, not discounted.
     pub sum: f64,
     /// The exploration rate at its beginning.
     pub exploration_epsilon: f64,
     pub lesson: Lesson,
     /// Choices made in the training up to its end.
     pub steps: u64,
-    /// Time driven for it, s: what was driven in branches counts, what a snapshot saved does not.
+    /// Time simulated for it, s: branches included, the part that a snapshot saved left out.
     pub simulated_s: f64,
 }
 
@@ -126,7 +149,7 @@ impl Training {
         self.arena.table()
     }
 
-    /// The network as learned so far, if the agent has one.
+    /// The network as trained so far, if the agent has one.
     pub fn policy(&self) -> Option<&QPolicy> {
         self.agent.policy()
     }
@@ -194,7 +217,8 @@ impl Training {
         }
     }
 
-    /// The log of an episode as the space itself would have it: with its own collision probabilities.
+    /// The log of an episode with the collision probabilities that the space defines, where the agent learns with
+    /// others.
     pub fn log_of_space(&self, log: &EpisodeLog) -> EpisodeLog {
         if self.settings.hyperparameters.proc() == ProcKind::default() {
             return log.clone();
@@ -213,9 +237,9 @@ struct Played {
     log: EpisodeLog,
     /// The choices that were made anew.
     choices: Vec<Chosen>,
-    /// What would have been seen next, and what would have been legal.
+    /// The observation after the last step, and the rows that were legal then, shape `(rows,)`.
     last: Option<(Observation, Array1<bool>)>,
-    /// By step, for an agent that returns.
+    /// Snapshots by step, for an agent that returns to moments.
     snapshots: BTreeMap<usize, Snapshot>,
     closeness: Closeness,
 }
@@ -267,7 +291,7 @@ fn play(
     Played { log, choices, last, snapshots, closeness }
 }
 
-/// A choice of the agent and what it was made on.
+/// A choice of the agent, with the observation and the legal rows that it was made on.
 struct Chosen {
     step: usize,
     observation: Observation,
@@ -275,7 +299,7 @@ struct Chosen {
     row: usize,
 }
 
-/// What each choice was worth. Steps in which nothing could be chosen teach nothing.
+/// The reward and the consequences of each choice. A step in which nothing could be chosen teaches nothing.
 fn experiences(
     settings: &Settings,
     choices: Vec<Chosen>,

@@ -1,4 +1,4 @@
-//! The states that a policy comes to, and what its network thinks of each.
+//! The states that a policy visits, with the Q-values of its network in each.
 
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -16,14 +16,14 @@ use crate::run::{Arena, RunError, choose, trained_against};
 
 use crate::train::training::with_period;
 
-/// A policy that acts as it would, and notes every state that it chooses in with its legal rows, also
-/// where its settings would not ask what is legal. States in which no row is open are left out.
+/// A policy that acts as usual and records every state in which it chooses, with the legal rows, even if its
+/// settings ignore what is legal. States without an open row are left out.
 pub(super) struct Recorder {
     policy: QPolicy,
     visits: Arc<Mutex<Vec<Visit>>>,
 }
 
-/// Where recorders note what they see: one after another, each for an episode.
+/// The visits that recorders have in common; each recorder serves one episode, one after another.
 #[derive(Default)]
 pub(super) struct Record(Arc<Mutex<Vec<Visit>>>);
 
@@ -32,7 +32,7 @@ impl Record {
         Recorder { policy: policy.clone(), visits: self.0.clone() }
     }
 
-    /// All that was seen.
+    /// All recorded visits.
     pub fn visits(self) -> Vec<Visit> {
         std::mem::take(&mut *self.0.lock().unwrap_or_else(PoisonError::into_inner))
     }
@@ -70,7 +70,7 @@ pub fn training_arena(
     Arena::new(table, roads, trained_against(policy)?, &origin.with, &origin.without)
 }
 
-/// The states of so many episodes on each road; seeds come from a stream, numbered from `first`.
+/// The visits of so many episodes on each road; their seeds come from a stream, numbered from `first`.
 pub(super) fn visits(
     arena: &Arena,
     policy: &QPolicy,

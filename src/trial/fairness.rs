@@ -1,7 +1,7 @@
 //! Whether a road user appeared fairly, judged from the outside.
 //!
-//! Written apart from the rule `no_teleport` and from `sim::placement`, which it is to catch: plain
-//! formulas that leave out the time in which a brake builds up, and so ask for a little less.
+//! Written apart from the rule `no_teleport` and from `sim::placement`, which it tests: plain formulas that ignore
+//! the time in which a brake builds up, and so ask for a little less.
 
 use crate::action::SpawnRequest;
 use crate::geometry::distance_m;
@@ -15,7 +15,7 @@ const BRAKING_MPS2: f64 = 0.774 * 9.80665;
 /// Rounding of figures, m.
 const SLACK_M: f64 = 0.1;
 
-/// What is unfair about the newcomer of an id, in words.
+/// What is unfair about the road user with this id, in words.
 pub(super) fn complaint(world: &World, request: &SpawnRequest, id: u32) -> Option<String> {
     let newcomer = world.obstacle(id)?;
     let overlaps =
@@ -29,7 +29,7 @@ pub(super) fn complaint(world: &World, request: &SpawnRequest, id: u32) -> Optio
         let closing_mps = closing_mps.max(0.0);
         closing_mps * REACTION_S + closing_mps * closing_mps / (2.0 * BRAKING_MPS2)
     };
-    // Who comes the other way passes in a lane of its own.
+    // An oncoming vehicle passes in a lane of its own, so it needs no stopping zone.
     let zone_m = match request.verb {
         Verb::DriveAhead => stopping_m(ego_mps - along_mps.max(0.0)),
         Verb::CrossRoad | Verb::Walk | Verb::Stand => stopping_m(ego_mps),

@@ -28,18 +28,18 @@ use crate::trial::sighting::{Ending, Frame, Sighting};
 
 /// A vehicle has this long to do what its verb says: four observation periods, s.
 pub(super) const HORIZON_S: f64 = 24.0;
-/// Whose centre is farther beyond the edge of its lane drives beside the road, m: half of what a bus
-/// needs in a tight turn.
+/// A vehicle whose centre is farther than this outside its lane has left the road, m: half of what a bus needs in a
+/// tight turn.
 const BESIDE_ROAD_M: f64 = 0.5;
-/// Who has gone this far moves with the traffic, m.
+/// A vehicle that has driven this far counts as moving, m.
 const MOVES_M: f64 = 5.0;
-/// The gap at which somebody appears may differ from the asked one by this, m, and by this part of it:
-/// stations on parallel lanes of a bend differ.
+/// The gap at which a road user appears may differ from the asked one by this, m, plus this part of it: stations on
+/// parallel lanes of a bend differ.
 const GAP_M: f64 = 1.0;
 const GAP_PART: f64 = 0.1;
 /// Lanes beside the route have their centre at least this far from its path, m.
 const BESIDE_M: f64 = 1.5;
-/// Who comes towards the route at more than this angle comes the other way, rad.
+/// A vehicle at more than this angle to the route comes the other way, rad.
 const OPPOSES_RAD: f64 = 3.0 * core::f64::consts::FRAC_PI_4;
 /// An oncoming vehicle that passes farther aside than this does not meet the ego vehicle, m.
 const MEETS_M: f64 = 12.0;
@@ -169,7 +169,8 @@ fn crosses(seen: &Sighting) -> Result<usize, String> {
         frame.route_offset_m.abs() <= reach_m + frame.ego.half_width_m
     };
     let Some(index) = seen.frames.iter().position(on_path) else {
-        // An ego vehicle in a turn may be beside the path itself: a meeting all the same.
+        // An ego vehicle in a turn may be beside the path itself; a contact with it counts as a meeting all the
+        // same.
         if seen.ending == Ending::TouchedEgo {
             return Ok(seen.frames.len() - 1);
         }
@@ -224,7 +225,7 @@ fn changes(
     }
 }
 
-/// Frames in which it is in another lane of the same street than in the frame before.
+/// Indices of the frames in which it is in another lane of the street than one frame before.
 fn lane_changes(map: &RoadMap, frames: &[Frame]) -> Vec<usize> {
     let lane = |index: usize| frames[index].lane.map(|(lane, _)| lane);
     let beside = |a: LaneIndex, b: LaneIndex| {
@@ -244,7 +245,7 @@ fn lane_changes(map: &RoadMap, frames: &[Frame]) -> Vec<usize> {
         .collect()
 }
 
-/// `what` did not come to pass, because what was to be seen was over.
+/// The complaint that `what` had not happened when the sighting ended.
 fn ended(seen: &Sighting, what: &str) -> String {
     match seen.ending {
         Ending::TimeOver => format!("{HORIZON_S:.0} s were over before {what}"),

@@ -1,4 +1,8 @@
 //! Trials: does a road user do what its verb says, on every road where its row is legal?
+//!
+//! [`Trials`] offers every row at moments of undisturbed drives (`survey`), watches the road users that it makes
+//! appear (`sighting`) and judges what they do (`judge`) and whether they appeared fairly (`fairness`). The
+//! criteria are written apart from the drivers and rules that they test.
 
 mod fairness;
 mod judge;

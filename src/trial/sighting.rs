@@ -14,13 +14,13 @@ pub(super) struct Frame {
     /// Since the road user appeared, s.
     pub after_s: f64,
     pub ego: OrientedBox,
-    /// Of the ego vehicle's rear axle, m.
+    /// Station of the ego vehicle's rear axle on the route, m.
     pub ego_station_m: f64,
     pub outline: OrientedBox,
     pub velocity_mps: Vec2,
     /// Gap between the two outlines, m.
     pub gap_m: f64,
-    /// Of its centre on the route, m, and how far to the left of it.
+    /// Station of the road user's centre on the route, m, and how far left of the route it is, m.
     pub route_station_m: f64,
     pub route_offset_m: f64,
     /// Heading of the route beside it, rad.
@@ -29,7 +29,7 @@ pub(super) struct Frame {
     pub lane: Option<(LaneIndex, f64)>,
 }
 
-/// Why nothing more was seen.
+/// Why a sighting ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Ending {
     /// The time that a verb has was over.
@@ -40,7 +40,7 @@ pub(super) enum Ending {
     TouchedEgo,
     /// The road user touched another one.
     TouchedOther,
-    /// It left.
+    /// The road user left the world.
     Left,
 }
 

@@ -29,17 +29,11 @@ pub struct TrialSettings {
     pub seed: u64,
 }
 
-impl Default for TrialSettings {
-    fn default() -> TrialSettings {
-        TrialSettings { drives: 8, tries: 6, seed: 1 }
-    }
-}
-
 /// Something that happened several times, for one reason.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
 pub struct Count {
     pub count: usize,
-    /// With the figures of the first time.
+    /// The reason, with the figures of its first occurrence.
     pub reason: String,
 }
 
@@ -49,9 +43,9 @@ pub struct Count {
 pub enum Outcome {
     /// Every try did what the row says.
     Realised,
-    /// Some did.
+    /// Some tries did what the row says.
     Partly,
-    /// None did, though the row was legal.
+    /// No try did what the row says, though the row was legal.
     NotRealised,
     /// It was legal at no moment.
     Masked,
@@ -64,7 +58,7 @@ pub struct Cell {
     pub label: String,
     pub road: String,
     pub outcome: Outcome,
-    /// Moments at which it was offered, and at which it was legal.
+    /// Moments at which it was offered, and those of them at which it was legal.
     pub moments: usize,
     pub legal: usize,
     pub tried: usize,
@@ -118,8 +112,19 @@ impl<'a> Trials<'a> {
         Trials { arena, settings }
     }
 
+    /// All cells, by row and then by road; each road is tried on a thread of its own.
+    pub fn cells(&self) -> Vec<Cell> {
+        let by_road: Vec<Vec<Cell>> = std::thread::scope(|scope| {
+            let roads = 0..self.arena.roads();
+            let workers: Vec<_> = roads.map(|road| scope.spawn(move || self.road(road))).collect();
+            workers.into_iter().map(|worker| worker.join().expect("no trial panics")).collect()
+        });
+        let rows = 0..self.arena.table().rows().len();
+        rows.flat_map(|row| by_road.iter().map(move |cells| cells[row].clone())).collect()
+    }
+
     /// The cells of the nth road of the arena, by row.
-    pub fn road(&self, road: usize) -> Vec<Cell> {
+    fn road(&self, road: usize) -> Vec<Cell> {
         let moments = self.moments(road);
         let rows = self.arena.table().rows();
         rows.iter().map(|row| self.cell(road, row.index, &moments)).collect()
@@ -267,7 +272,7 @@ fn attempt(moment: &Moment, draw: &Draw) -> Try {
     found
 }
 
-/// What of the last effects on weather and time is not so now.
+/// The first effect on weather or time that the world does not show.
 fn unmet(world: &World, effects: &[Effect]) -> Option<String> {
     let last = |wanted: Phenomenon| {
         effects.iter().rev().find_map(|effect| match effect {
@@ -296,7 +301,7 @@ fn refused(refusal: &Refusal) -> String {
     }
 }
 
-/// Counts reasons that differ in nothing but their figures as one.
+/// Counts a reason; reasons that differ only in their figures count as one.
 fn count(counts: &mut Vec<Count>, reason: &str) {
     let words = |text: &str| text.replace(|c: char| c.is_ascii_digit() || "-.".contains(c), "");
     match counts.iter_mut().find(|known| words(&known.reason) == words(reason)) {

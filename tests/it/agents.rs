@@ -28,23 +28,12 @@ fn training(entry: &Entry, checkpoint: Option<(usize, &[u8])>) -> Option<Trainin
         Kind::Searching(_) => "",
     };
     let usual = run(1, 1, &[]);
-    let settings = usual.settings().clone();
-    let settings = TrainSettings {
-        avastra: settings.avastra,
-        engine: settings.engine,
-        space: settings.space,
-        space_digest: settings.space_digest,
+    let hyperparameters = Settings::from_yaml(entry, None, text)?.expect("the settings are sound");
+    let conditions = RunSettings {
         roads: vec!["corner".to_owned(), "residential".to_owned()],
-        ads: settings.ads,
-        profile: settings.profile,
-        agent: entry.name.to_owned(),
-        episodes: 24,
-        seed: 3,
-        ambient: 0,
-        without: Vec::new(),
-        with: Vec::new(),
-        hyperparameters: Settings::from_yaml(entry, None, text)?.expect("the settings are sound"),
+        ..RunSettings::new(usual.space(), entry.name, 24, 3)
     };
+    let settings = TrainSettings::new(conditions, hyperparameters);
     let table = usual.table().clone();
     let training = match checkpoint {
         None => Training::new(table, settings),

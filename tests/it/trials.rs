@@ -14,14 +14,7 @@ fn cells(name: &str, settings: TrialSettings) -> Vec<Cell> {
     let roads: Vec<String> = table.space().roads.iter().map(|road| road.name.clone()).collect();
     let arena =
         Arena::new(table, &roads, driving_system("modular").unwrap(), &[], &[]).expect("all of it is there");
-    let trials = Trials::new(&arena, settings);
-    let by_road: Vec<Vec<Cell>> = std::thread::scope(|scope| {
-        let trials = &trials;
-        let workers: Vec<_> = (0..arena.roads()).map(|road| scope.spawn(move || trials.road(road))).collect();
-        workers.into_iter().map(|worker| worker.join().expect("no trial panics")).collect()
-    });
-    let rows = arena.table().rows().len();
-    (0..rows).flat_map(|row| by_road.iter().map(move |cells| cells[row].clone())).collect()
+    Trials::new(&arena, settings).cells()
 }
 
 /// Least share of the trials of a verb, over all rows and roads, that do what they say before the ego vehicle
@@ -59,7 +52,7 @@ fn every_row_does_what_it_says_or_it_is_said_why_not() {
         let realised: usize = of_verb().map(|cell| cell.realised).sum();
         assert!(realised as f64 >= part_min * tried as f64, "{verb}: {realised} of {tried}");
     }
-    expect_snapshot("tables", "avastra45_trials", &report::trials(&cells.iter().collect::<Vec<_>>()));
+    expect_snapshot("tables", "avastra45_trials", &report::trials(&cells));
 }
 
 #[test]

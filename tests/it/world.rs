@@ -67,22 +67,9 @@ pub fn run_of(space: Arc<Space>, episodes: u32, seed: u64, without: &[&str]) -> 
 /// A run of masked random search in any space, against any driving system.
 pub fn run_against(ads: &str, space: Arc<Space>, episodes: u32, seed: u64, without: &[&str]) -> Run {
     let settings = RunSettings {
-        avastra: "test".to_owned(),
-        engine: avastra::sim::ENGINE.to_owned(),
-        space: "scenarios/avastra45.ava".to_owned(),
-        space_digest: space.digest.clone(),
-        roads: space.roads.iter().map(|road| road.name.clone()).collect(),
         ads: ads.to_owned(),
-        profile: None,
-        agent: "random".to_owned(),
-        policy: None,
-        episodes,
-        seed,
-        ambient: 0,
-        causes: false,
         without: without.iter().map(|rule| (*rule).to_owned()).collect(),
-        with: Vec::new(),
-        avoidability: Default::default(),
+        ..RunSettings::new(&space, "random", episodes, seed)
     };
     Run::new(ActionTable::new(space), settings).expect("the settings name what exists")
 }

@@ -9,25 +9,24 @@ use crate::study::statistics::bisect;
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct Interval {
     pub low: f64,
-    /// None: no bound.
+    /// `None` if it has no upper bound.
     pub high: Option<f64>,
 }
 
-/// A mean with what is known of its precision.
+/// A mean with its precision.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Estimate {
     pub mean: f64,
-    /// None of fewer than two values, and of values that are all alike: they say nothing of how far others
-    /// would lie apart.
+    /// `None` for fewer than two values, and for values that are all equal: they say nothing about the spread.
     #[serde(flatten)]
     pub interval: Option<Interval>,
     /// The sample.
     pub values: Vec<f64>,
 }
 
-/// Mean and Student's interval of a sample; none of an empty one.
+/// Mean of a sample with Student's interval; `None` if the sample is empty.
 ///
-/// Student's and not the bootstrap's, whose intervals are too short where there are only ten values.
+/// Student's interval and not the bootstrap's, which is too short with only ten values.
 pub fn mean(values: &[f64]) -> Option<Estimate> {
     if values.is_empty() {
         return None;
@@ -43,7 +42,7 @@ pub fn mean(values: &[f64]) -> Option<Estimate> {
     Some(Estimate { mean, interval, values: values.to_vec() })
 }
 
-/// The number that a Student variable's magnitude stays below with probability 0.95.
+/// The bound below which the magnitude of a Student variable stays with probability 0.95.
 fn student_quantile(degrees: usize) -> f64 {
     bisect(0.0, 1000.0, |quantile| student_within(quantile, degrees) >= 0.95)
 }
@@ -64,9 +63,9 @@ fn student_within(bound: f64, degrees: usize) -> f64 {
     if is_odd { core::f64::consts::FRAC_2_PI * (angle_rad + sine * sum) } else { sine * sum }
 }
 
-/// The exact interval of the mean of a Poisson variable that was seen to be `count` (Garwood 1936).
+/// The exact interval of the mean of a Poisson variable, of which `count` was observed (Garwood 1936).
 pub fn poisson(count: u64) -> Interval {
-    // Far enough on both sides: ten standard deviations and some more.
+    // Ten standard deviations and some more: far enough on both sides.
     let far = count as f64 + 10.0 * (count as f64).sqrt() + 20.0;
     let at_most = |events: u64, mean: f64| poisson_at_most(events, mean);
     let low = match count.checked_sub(1) {
@@ -92,11 +91,11 @@ fn poisson_at_most(count: u64, mean: f64) -> f64 {
 /// Resamples of a bootstrap. Ours.
 const RESAMPLES: usize = 10_000;
 
-/// Ratio of two samples' means with its percentile bootstrap interval; none if one is empty or the second's
-/// mean is 0. Resamples whose denominator is 0 count as beyond every bound.
+/// Ratio of two samples' means with its percentile bootstrap interval; `None` if one is empty or the second's mean
+/// is 0. Resamples whose denominator is 0 count as larger than every bound.
 ///
-/// Of ten values such an interval is too short, as is said at [`mean`]: it shows how large a difference is, and
-/// whether there is one is for the rank test to say.
+/// With about ten values the bootstrap interval is too narrow (see [`mean`]): read it as effect size, and use the
+/// rank test for significance.
 pub fn ratio_of_means(numerator: &[f64], denominator: &[f64], rng: &mut Rng) -> Option<(f64, Interval)> {
     let ratio = |above: f64, below: f64| if below == 0.0 { f64::INFINITY } else { above / below };
     let (above, below) = (mean(numerator)?.mean, mean(denominator)?.mean);
@@ -109,7 +108,7 @@ pub fn ratio_of_means(numerator: &[f64], denominator: &[f64], rng: &mut Rng) -> 
     ratios.sort_by(f64::total_cmp);
     let tail = RESAMPLES / 40;
     let (low, high) = (ratios[tail], ratios[RESAMPLES - 1 - tail]);
-    // Where even the lower bound is infinite, nothing at all is known.
+    // If even the lower bound is infinite, nothing at all is known.
     let low = if low.is_finite() { low } else { 0.0 };
     Some((above / below, Interval { low, high: high.is_finite().then_some(high) }))
 }

@@ -1,9 +1,9 @@
-//! Two samples compared by ranks alone, so that no shape of distribution is assumed.
+//! Two samples compared by ranks alone, without any assumption about their distributions.
 
 use crate::study::statistics::{Interval, bisect};
 
-/// Samples up to this size are compared exactly, if no value comes twice. Ours: beyond it the normal
-/// distribution is as good.
+/// Samples up to this size are compared exactly, if no value occurs twice. Ours: for larger ones the normal
+/// approximation is as good.
 const EXACT_MAX: usize = 50;
 /// Normal quantile of a two-sided 95 %.
 const Z: f64 = 1.959963984540054;
@@ -11,16 +11,16 @@ const Z: f64 = 1.959963984540054;
 /// Outcome of a two-sided Mann–Whitney U test (1947).
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct RankTest {
-    /// Pairs in which the first sample's value is the larger; a tie is half a pair.
+    /// Number of pairs in which the first sample's value is the larger; a tie counts as half a pair.
     pub u: f64,
-    /// In `[0, 1]`.
+    /// The p-value, in `[0, 1]`.
     pub p: f64,
-    /// Whether `p` is from the exact distribution; else from the normal one, with the variance corrected
-    /// for ties and a continuity correction of one half.
+    /// Whether `p` comes from the exact distribution; otherwise it comes from the normal one, with the variance
+    /// corrected for ties and a continuity correction of one half.
     pub exact: bool,
 }
 
-/// Tests whether values of one sample tend to be larger than those of another; none if one is empty.
+/// Tests whether values of one sample tend to be larger than those of another; `None` if one is empty.
 pub fn mann_whitney(first: &[f64], second: &[f64]) -> Option<RankTest> {
     if first.is_empty() || second.is_empty() {
         return None;
@@ -46,14 +46,14 @@ fn pairs_won(first: &[f64], second: &[f64]) -> f64 {
     first.iter().map(|one| second.iter().map(|other| won(one, other)).sum::<f64>()).sum()
 }
 
-/// How many values are alike, for each value that comes more than once.
+/// Sizes of the groups of equal values, for each value that occurs more than once.
 fn tie_sizes(first: &[f64], second: &[f64]) -> Vec<usize> {
     let mut all: Vec<f64> = first.iter().chain(second).copied().collect();
     all.sort_by(f64::total_cmp);
     all.chunk_by(|one, other| one == other).map(<[f64]>::len).filter(|&size| size > 1).collect()
 }
 
-/// Probability that U is at least `u` if both samples are of one distribution, without ties.
+/// Probability that U is at least `u` if both samples come from one distribution, without ties.
 fn exact_tail(first: usize, second: usize, u: usize) -> f64 {
     // orders[m][v]: in how many orders of m values of the first sample and the values of the second so far
     // U is v. The largest value is either of the first sample, and beats all of the second, or of the second.
@@ -74,7 +74,7 @@ fn exact_tail(first: usize, second: usize, u: usize) -> f64 {
     orders[first][u..].iter().sum::<f64>() / all
 }
 
-/// The same from the normal distribution; `ties` are the sizes of the groups of equal values.
+/// The p-value from the normal distribution; `ties` are the sizes of the groups of equal values.
 fn normal_tail(first: usize, second: usize, u: f64, ties: &[usize]) -> f64 {
     let pairs = (first * second) as f64;
     let all = (first + second) as f64;
@@ -101,13 +101,13 @@ pub fn superiority(first: &[f64], second: &[f64]) -> Option<(f64, Interval)> {
         let spread = 1.0 + typical * (1.0 - truth) / (2.0 - truth) + typical * truth / (1.0 + truth);
         (truth * (1.0 - truth) * spread / pairs).sqrt()
     };
-    // The truths that lie no further from what was found than chance would explain.
+    // The true values from which the observed one lies no farther than chance explains.
     let low = bisect(0.0, found, |truth| found - truth <= Z * deviation(truth));
     let high = bisect(found, 1.0, |truth| truth - found > Z * deviation(truth));
     Some((found, Interval { low, high: Some(high) }))
 }
 
-/// Holm's correction (1979): each p-value of a family, corrected for the number of its members.
+/// Holm's correction (1979): the p-values of a family, each corrected for the family's size.
 pub fn holm(p: &[f64]) -> Vec<f64> {
     let mut order: Vec<usize> = (0..p.len()).collect();
     order.sort_by(|&one, &other| p[one].total_cmp(&p[other]));

@@ -1,23 +1,23 @@
-//! Time to the first failure where some never fail (Kaplan and Meier 1958).
+//! Time to the first failure if some never fail (Kaplan and Meier 1958).
 
-/// How long something was watched, and whether it failed at the end of that.
+/// How long something was watched, and whether it failed at the end of that time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Lifetime {
     pub time_s: f64,
     pub failed: bool,
 }
 
-/// Restricted mean time to failure: the area below the Kaplan–Meier curve up to `horizon_s`; none of no
+/// Restricted mean time to failure: the area below the Kaplan–Meier curve up to `horizon_s`; `None` without
 /// lifetimes.
 ///
-/// Whoever was watched to the end without a failure is censored then, as if the end had nothing to do with
-/// failing. Where the last of all is censored before the horizon, the curve goes on level (Gill 1980).
+/// A lifetime without a failure is censored at its end, on the assumption that its end has nothing to do with
+/// failing. If the longest lifetime is censored before the horizon, the curve goes on level (Gill 1980).
 pub fn restricted_mean(lifetimes: &[Lifetime], horizon_s: f64) -> Option<f64> {
     if lifetimes.is_empty() {
         return None;
     }
     let mut lifetimes = lifetimes.to_vec();
-    // Who fails at the moment at which another is censored failed before.
+    // Of a failure and a censoring at the same moment, the failure comes first.
     lifetimes.sort_by(|one, other| one.time_s.total_cmp(&other.time_s).then(other.failed.cmp(&one.failed)));
     let (mut area, mut surviving, mut since_s) = (0.0, 1.0, 0.0);
     for (index, lifetime) in lifetimes.iter().enumerate() {

@@ -1,0 +1,138 @@
+//! What a run is asked to do, as `run.yaml` keeps it, and why it cannot begin.
+
+use crate::ads;
+use crate::agent;
+use crate::model::Space;
+use crate::oracle;
+use crate::oracle::AvoidabilitySettings;
+use crate::sim::ENGINE;
+
+use crate::run::profile::{DEFAULT_ADS, Profile};
+
+/// Version of avastra, as settings record it.
+pub const VERSION: &str = env!("CARGO_PKG_VERSION");
+
+/// Everything that is needed to repeat a run; written to `run.yaml`.
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RunSettings {
+    /// Version of avastra that wrote it.
+    pub avastra: String,
+    /// Version of the simulated world.
+    pub engine: String,
+    /// Path of the space, from the run directory.
+    pub space: String,
+    /// Digest of the space with all that it uses.
+    pub space_digest: String,
+    pub roads: Vec<String>,
+    pub ads: String,
+    /// Settings of the driving system; without them it has its defaults.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub profile: Option<Profile>,
+    pub agent: String,
+    /// The policy that the agent follows, from the run directory, and its digest.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub policy: Option<PolicyReference>,
+    /// Episodes on each road.
+    pub episodes: u32,
+    pub seed: u64,
+    /// Vehicles of ambient traffic.
+    #[serde(default)]
+    pub ambient: u32,
+    /// Whether each counted collision is diagnosed.
+    #[serde(default)]
+    pub causes: bool,
+    /// Rules switched off.
+    pub without: Vec<String>,
+    /// Optional rules switched on.
+    pub with: Vec<String>,
+    /// How the avoidability of collisions is judged.
+    #[serde(default)]
+    pub avoidability: AvoidabilitySettings,
+}
+
+impl RunSettings {
+    /// A run on all roads of a space against the default driving system, with every option off. The caller
+    /// changes what it wants otherwise.
+    pub fn new(space: &Space, agent: &str, episodes: u32, seed: u64) -> RunSettings {
+        RunSettings {
+            avastra: VERSION.to_owned(),
+            engine: ENGINE.to_owned(),
+            space: space.path.display().to_string(),
+            space_digest: space.digest.clone(),
+            roads: space.roads.iter().map(|road| road.name.clone()).collect(),
+            ads: DEFAULT_ADS.to_owned(),
+            profile: None,
+            agent: agent.to_owned(),
+            policy: None,
+            episodes,
+            seed,
+            ambient: 0,
+            causes: false,
+            without: Vec::new(),
+            with: Vec::new(),
+            avoidability: AvoidabilitySettings::default(),
+        }
+    }
+}
+
+/// The policy file that a run plays.
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PolicyReference {
+    pub file: String,
+    pub digest: String,
+    /// Which of its faces acts.
+    #[serde(default)]
+    pub face: agent::Face,
+}
+
+/// Why a run or a replay cannot begin.
+#[derive(Debug, thiserror::Error)]
+pub enum RunError {
+    #[error("no road `{name}` in this space: it has {known}")]
+    Road { name: String, known: String },
+    #[error("no driving system `{name}`: there are {known}")]
+    Ads { name: String, known: String },
+    #[error("no agent `{name}`: there are {known}")]
+    Agent { name: String, known: String },
+    #[error("`{name}` has to be trained first: `avastra train`, then `avastra run --policy FILE`")]
+    Untrained { name: String },
+    #[error("`{name}` has nothing to learn: `avastra run --agent {name}` plays it")]
+    Unteachable { name: String },
+    #[error("the checkpoint is not of a training with such settings: begin a new one")]
+    Checkpoint,
+    #[error(transparent)]
+    Settings(#[from] agent::SettingsError),
+    #[error(transparent)]
+    Rule(#[from] crate::action::UnknownRule),
+    #[error("`{name}` is asked for twice, or both on and off")]
+    Twice { name: String },
+    #[error("{found} episodes a road: from 1 to {EPISODES_MAX} are possible")]
+    Episodes { found: u32 },
+    #[error(transparent)]
+    Avoidability(#[from] oracle::AvoidabilityError),
+    #[error(transparent)]
+    NoModules(#[from] oracle::NoModules),
+    #[error(transparent)]
+    NoSettings(#[from] ads::NoSettings),
+    #[error("the profile of `{name}`: {error}")]
+    Profile { name: String, error: ads::ConfigError },
+    #[error(
+        "{what} was made with settings of `{ads}` that mean something else in this version: nothing need \
+         happen alike; name a profile with `--ads-config FILE` to see what happens with that"
+    )]
+    ProfileDigest { what: String, ads: String },
+    #[error("`{scenario}` was made in world `{engine}`; this is `{ENGINE}`, where nothing need happen alike")]
+    Engine { scenario: String, engine: String },
+}
+
+/// Most episodes that a run may have on each road.
+pub const EPISODES_MAX: u32 = 1_000_000;
+
+/// # Errors
+/// If this many episodes on a road are not possible.
+pub(crate) fn check_episodes(episodes: u32) -> Result<(), RunError> {
+    let fits = (1..=EPISODES_MAX).contains(&episodes);
+    if fits { Ok(()) } else { Err(RunError::Episodes { found: episodes }) }
+}

@@ -1,0 +1,95 @@
+//! An emitted scenario played again, and its claims checked.
+
+use std::sync::Arc;
+
+use crate::action::{ActionTable, ActiveRules};
+use crate::ads::{ModularConfig, Selected};
+use crate::episode;
+use crate::episode::{EpisodeLog, Script, Watch};
+use crate::mdp::ProcKind;
+use crate::model::Scenario;
+use crate::oracle;
+use crate::oracle::{AvoidabilitySettings, ClaimResult, Judgement, Replays};
+use crate::sim::{ENGINE, Scene, Start};
+
+use crate::run::settings::RunError;
+
+/// A scenario that is ready to play: its road and the rules that it was made with.
+pub struct Stage<'a> {
+    table: &'a ActionTable,
+    scenario: &'a Scenario,
+    rules: ActiveRules,
+    scene: Arc<Scene>,
+    avoidability: AvoidabilitySettings,
+}
+
+impl<'a> Stage<'a> {
+    /// # Errors
+    /// If the scenario was made in another world or with rules that do not exist, or names reference drivers that
+    /// do not exist.
+    pub fn new(table: &'a ActionTable, scenario: &'a Scenario) -> Result<Stage<'a>, RunError> {
+        let origin = &scenario.origin;
+        if let Some(engine) = origin.engine.as_ref().filter(|engine| engine.as_str() != ENGINE) {
+            return Err(RunError::Engine { scenario: scenario.name.clone(), engine: engine.clone() });
+        }
+        let rules = ActiveRules::new(table.space(), &origin.with, &origin.without)?;
+        let scene = Arc::new(episode::scene(&table.space().roads[scenario.road]));
+        let line = origin.avoidability.as_deref();
+        let avoidability = line.map(AvoidabilitySettings::from_line).transpose()?.unwrap_or_default();
+        Ok(Stage { table, scenario, rules, scene, avoidability })
+    }
+
+    /// How the avoidability of its collisions is judged: as the file records it.
+    pub fn avoidability(&self) -> &AvoidabilitySettings {
+        &self.avoidability
+    }
+
+    /// The beginning of its episode, with any driving system.
+    pub fn setup(&self, ads: &Selected) -> episode::Setup<'_> {
+        let space = self.table.space();
+        let start = &self.scenario.start;
+        let seed = self.scenario.origin.seed.unwrap_or(0);
+        let memory = start.memory.clone();
+        episode::Setup {
+            table: self.table,
+            road: &space.roads[self.scenario.road],
+            scene: self.scene.clone(),
+            rules: &self.rules,
+            ads: ads.clone(),
+            seed,
+            start: Start {
+                signal_phase_s: start.signal_phase_s,
+                seed: start.traffic_seed.unwrap_or(seed),
+                ambient: start.ambient,
+                ..episode::start(space, &memory, seed)
+            },
+            memory,
+            period_shifts: Vec::new(),
+            proc: ProcKind::default(),
+        }
+    }
+
+    /// Plays it as it is written down.
+    pub fn play(&self, ads: &Selected, watch: &mut Watch) -> EpisodeLog {
+        let script = Script::of_scenario(self.scenario);
+        episode::run(&self.setup(ads), &mut |moment| script.choose(self.table, moment), watch)
+    }
+
+    /// Checks its claims against a log of it.
+    pub fn verify(&self, ads: &Selected, log: &EpisodeLog) -> Vec<ClaimResult> {
+        let setup = self.setup(ads);
+        let judgements = self.judge(ads, log);
+        let replays = Replays {
+            cause: &|index| Ok(oracle::diagnose(&setup, log, index, &ModularConfig::default())?.cause),
+            spare_steps: &|index| oracle::spare_steps(&setup, log, index, &judgements, &self.avoidability),
+        };
+        oracle::verify(self.table.space(), self.scenario, log, &judgements, &replays)
+    }
+
+    /// Judges the collisions of its log, by playing it again.
+    pub fn judge(&self, ads: &Selected, log: &EpisodeLog) -> Vec<Judgement> {
+        oracle::judge(log, &self.avoidability, &mut |watch| {
+            self.play(ads, watch);
+        })
+    }
+}
