@@ -54,8 +54,8 @@ pub fn audit(table: &ActionTable) -> Audit {
             RuleBody::Holds(_) => Enforcement::Draw,
         };
         let mut cuts: Vec<String> = Vec::new();
-        for (action, bounds) in table.bounds.iter().enumerate() {
-            for bound in bounds.iter().filter(|bound| bound.rule == Some(index) && bound.is_known_early()) {
+        for (action, bounds) in space.bounds.iter().enumerate() {
+            for bound in bounds.iter().filter(|bound| bound.rule == Some(index) && bound.is_known_early) {
                 let parameter = &space.actions[action].parameters[bound.local];
                 if !parameter.axis && !cuts.contains(&parameter.name.to_string()) {
                     cuts.push(parameter.name.to_string());

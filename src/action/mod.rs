@@ -7,13 +7,11 @@ mod audit;
 mod draw;
 mod effect;
 mod file;
-mod rules;
 mod table;
 
 pub use audit::{Audit, Enforcement, RuleAudit, audit};
 pub use effect::{Effect, SpawnFacts, SpawnRequest, Surroundings};
 pub use file::{AxisRecord, DrawRecord, RoadRecord, RowRecord, RuleRecord, TableFile};
-pub use rules::{ActiveRules, UnknownRule};
 pub use table::{ActionTable, Draw, Offer, Refusal, Situation};
 
 #[cfg(test)]

@@ -3,16 +3,13 @@
 use std::sync::Arc;
 
 use crate::action::draw::Judge;
-use crate::action::rules::ActiveRules;
 use crate::action::{Effect, Surroundings};
-use crate::model::{Bound, Memory, Road, Row, Space, Value, bounds};
+use crate::model::{Memory, Road, Row, RulesInForce, Space, Value};
 
 /// The rows that an agent chooses from.
 #[derive(Debug, Clone)]
 pub struct ActionTable {
     space: Arc<Space>,
-    /// By action: what its rules say about single numbers.
-    pub(super) bounds: Vec<Vec<Bound>>,
 }
 
 /// What a row is judged in.
@@ -20,7 +17,7 @@ pub struct ActionTable {
 pub struct Situation<'a> {
     pub memory: &'a Memory,
     pub road: &'a Road,
-    pub rules: &'a ActiveRules,
+    pub rules: &'a RulesInForce,
     pub surroundings: &'a dyn Surroundings,
     /// Seed of the episode.
     pub seed: u64,
@@ -57,8 +54,7 @@ pub struct Refusal {
 
 impl ActionTable {
     pub fn new(space: Arc<Space>) -> ActionTable {
-        let bounds = (0..space.actions.len()).map(|action| bounds(&space, action)).collect();
-        ActionTable { space, bounds }
+        ActionTable { space }
     }
 
     pub fn space(&self) -> &Arc<Space> {
@@ -77,7 +73,7 @@ impl ActionTable {
 
     /// The offer of one row: the same as in [`ActionTable::offers`].
     pub fn offer(&self, situation: &Situation<'_>, row: usize) -> Offer {
-        match Judge::new(self, situation, row).draw() {
+        match Judge::new(&self.space, situation, row).draw() {
             Ok(draw) => Offer::Legal(draw),
             Err(refusal) => Offer::Refused(refusal),
         }
@@ -94,7 +90,7 @@ impl ActionTable {
         row: usize,
         values: &[(Arc<str>, Value)],
     ) -> Result<Draw, Vec<Refusal>> {
-        Judge::new(self, situation, row).nearest(values)
+        Judge::new(&self.space, situation, row).nearest(values)
     }
 
     /// Judges given values by the rules that drawing obeys: for replays and for `why`.
@@ -107,6 +103,6 @@ impl ActionTable {
         row: usize,
         values: &[(Arc<str>, Value)],
     ) -> Result<Draw, Vec<Refusal>> {
-        Judge::new(self, situation, row).check(values)
+        Judge::new(&self.space, situation, row).check(values)
     }
 }

@@ -2,9 +2,10 @@
 
 use std::sync::Arc;
 
-use crate::action::{ActiveRules, Offer, Situation};
+use crate::action::{Offer, Situation};
 use crate::emit;
 use crate::episode;
+use crate::model::RulesInForce;
 use crate::sim::World;
 
 use super::arguments::WhyArguments;
@@ -33,7 +34,7 @@ pub fn why(output: &Output, arguments: &WhyArguments) -> Result<(), Failure> {
     };
     let road = &space.roads[road];
     let rules =
-        ActiveRules::new(space, &arguments.rules.with, &arguments.rules.without).map_err(Failure::usage)?;
+        RulesInForce::new(space, &arguments.rules.with, &arguments.rules.without).map_err(Failure::usage)?;
     let memory = match &arguments.state {
         None => space.initial_memory(SEED),
         Some(text) => space.memory_from(text, SEED).map_err(Failure::usage)?,
@@ -46,7 +47,7 @@ pub fn why(output: &Output, arguments: &WhyArguments) -> Result<(), Failure> {
 
     output.say(&format!("row {}: {} on {}", row.index, row.label, road.name));
     for &rule in row.rules.iter() {
-        let state = if rules.is_active(rule) { "" } else { " (off)" };
+        let state = if rules.contains(rule) { "" } else { " (off)" };
         output.say(&format!("  bound by {}{state}", space.rules[rule].name));
     }
     let verdict = match &offer {

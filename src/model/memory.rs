@@ -1,7 +1,7 @@
 //! How the memory begins and how actions change it.
 
 use crate::model::eval::{Facts, evaluate};
-use crate::model::space::{EffectDef, Initial, RuleBody, RuleDef, SetDef, Space, StateDef, StateMeaning};
+use crate::model::space::{EffectDef, Initial, SetDef, Space, StateDef, StateMeaning};
 use crate::model::value::{Memory, Type, Value};
 use crate::model::vocabulary::{Level, TimeOfDay};
 use crate::rng;
@@ -84,19 +84,6 @@ impl Space {
             }
         }
         after
-    }
-
-    /// Why a transition rule does not allow the step from one memory to the next; `None` if it does,
-    /// or is no transition rule.
-    pub(crate) fn forbidden_move(&self, rule: &RuleDef, before: &Memory, after: &Memory) -> Option<String> {
-        let RuleBody::Moves { state, allowed, .. } = &rule.body else { return None };
-        let state = &self.states[*state];
-        let (from, to) = (before.cells[state.first_cell], after.cells[state.first_cell]);
-        if allowed[from.variant()][to.variant()] {
-            return None;
-        }
-        let (from, to) = (self.show(from, state.ty), self.show(to, state.ty));
-        Some(format!("`{}` may not move from {from} to {to}", state.name))
     }
 
     /// The checker allows `any` states only for finite types.

@@ -6,6 +6,7 @@ use std::sync::Arc;
 
 use crate::model::expr::Expr;
 use crate::model::row::Row;
+use crate::model::rules::Bound;
 use crate::model::value::{EnumIndex, Type, Value};
 use crate::model::vocabulary::{Body, Colour, LaneChoice, Level, Phenomenon, Side, Then, TimeOfDay, Verb};
 use crate::road::{LanePlace, RoadMap, Route};
@@ -41,6 +42,8 @@ pub struct Space {
     pub roads: Vec<Road>,
     /// The action table: actions as declared, axes left to right, the last varying fastest.
     pub rows: Vec<Row>,
+    /// By action: what `where`s and rules say about its single numbers.
+    pub(crate) bounds: Vec<Vec<Bound>>,
 }
 
 #[derive(Debug, Clone, PartialEq)]
@@ -123,6 +126,16 @@ pub struct Parameter {
     /// `where`: may name the parameters before it.
     pub condition: Option<Expr>,
     pub span: Span,
+}
+
+impl ActionDef {
+    /// The drawn parameters with a range, by index; the others have a list of values.
+    pub(crate) fn drawn_numbers(&self) -> impl Iterator<Item = usize> {
+        let is_open = |(_, parameter): &(usize, &Parameter)| {
+            !parameter.axis && matches!(parameter.domain, Domain::Range(..))
+        };
+        self.parameters.iter().enumerate().filter(is_open).map(|(index, _)| index)
+    }
 }
 
 /// The values that a parameter may have.
@@ -286,16 +299,6 @@ pub struct RoadFacts {
 impl RoadFacts {
     pub fn has_lane(&self, lane: LaneChoice) -> bool {
         self.lanes[lane as usize]
-    }
-}
-
-impl RuleBody {
-    /// Whether the rule binds the action.
-    pub fn binds(&self, action: usize) -> bool {
-        match self {
-            RuleBody::Holds(bindings) => bindings.iter().any(|binding| binding.action == action),
-            RuleBody::Moves { actions, .. } => actions.contains(&action),
-        }
     }
 }
 

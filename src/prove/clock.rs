@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 
 use crate::model::{Initial, Reach, Row, RuleBody, RuleDef, Space, Type, Value, code};
 use crate::prove::enclose::Values;
-use crate::prove::reach::{Prover, numbers};
+use crate::prove::reach::{declared, numbers};
 use crate::syntax::{Diagnostic, listed};
 
 /// The graph of one rule.
@@ -102,9 +102,7 @@ fn graph<'a>(space: &'a Space, rule: &'a RuleDef) -> Option<Graph<'a>> {
         },
     };
     let rows = space.rows.iter().filter(|row| actions.contains(&row.action)).map(|row| {
-        let values = crate::model::locals(&space.actions[row.action], row, &[]);
-        let prover = Prover { space, row, values: &values, bounds: &[], road: None };
-        let after = space.cells_after(row.action, &prover.declared(), &space.cells_unknown());
+        let after = space.cells_after(row.action, &declared(space, row), &space.cells_unknown());
         match after[definition.first_cell] {
             Values::Variants(set) => (row, set),
             Values::Truth { .. } | Values::Number(_) => (row, 0),

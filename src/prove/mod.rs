@@ -19,7 +19,7 @@ mod witness;
 pub(crate) use clock::{forbids, next_rows, shortest_way};
 pub use cut::{Removal, removals};
 pub(crate) use enclose::{Known, VARIANTS_MAX, Values, enclose};
-pub(crate) use reach::{Prover, product_size, rows};
+pub(crate) use reach::{product_size, rows};
 pub use witness::{Witness, witness};
 
 use crate::model::Space;

@@ -2,7 +2,7 @@
 
 use std::cell::Cell;
 
-use crate::model::{Reach, Row, Space, bounds, code};
+use crate::model::{Reach, Row, Space, code};
 use crate::prove::reach::numbers;
 use crate::prove::witness::witness_within;
 use crate::syntax::{Diagnostic, listed};
@@ -15,7 +15,6 @@ pub(super) fn report(space: &Space) -> Vec<Diagnostic> {
     let mut diagnostics = Vec::new();
     let boxes_left = Cell::new(BOXES_MAX);
     for (action, definition) in space.actions.iter().enumerate() {
-        let bounds = bounds(space, action);
         for (index, road) in space.roads.iter().enumerate() {
             let mut unknown: Vec<&Row> = Vec::new();
             for row in space.rows.iter().filter(|row| row.action == action) {
@@ -23,7 +22,7 @@ pub(super) fn report(space: &Space) -> Vec<Diagnostic> {
                     continue;
                 }
                 // A search that was cut short says nothing.
-                if witness_within(space, row, road, &bounds, &boxes_left).is_none() && boxes_left.get() > 0 {
+                if witness_within(space, row, road, &boxes_left).is_none() && boxes_left.get() > 0 {
                     unknown.push(row);
                 }
             }

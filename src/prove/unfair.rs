@@ -7,9 +7,10 @@
 
 use std::cell::Cell;
 
+use crate::model::rules::{Demand, RowRules};
 use crate::model::vocabulary::{Verb, Word};
 use crate::model::{
-    EffectDef, Facts, Memory, Reach, Road, Row, RuleBody, Space, SpawnDef, Value, bounds, code, evaluate,
+    EffectDef, Facts, Memory, Reach, Road, Row, RulesInForce, Space, SpawnDef, Value, code, evaluate, locals,
 };
 use crate::prove::witness::{Search, Witness};
 use crate::syntax::Diagnostic;
@@ -55,19 +56,13 @@ pub(super) fn unfair(
     spawn: &SpawnDef,
     boxes_left: &Cell<usize>,
 ) -> Option<Witness> {
-    let rules: Vec<usize> = row.rules.iter().copied().filter(|rule| !space.rules[*rule].optional).collect();
-    let asks = |rule: &usize| match &space.rules[*rule].body {
-        RuleBody::Holds(bindings) => {
-            bindings.iter().any(|binding| binding.action == row.action && binding.condition.needs_survey())
-        }
-        RuleBody::Moves { .. } => false,
-    };
-    if rules.iter().any(asks) {
+    let in_force = RulesInForce::by_default(space);
+    let rules = RowRules { space, row, road: Some(&road.facts), in_force: &in_force };
+    let asks = |demand| matches!(demand, Demand::Holds(condition) if condition.needs_survey());
+    if rules.demands().any(|(_, demand)| asks(demand)) {
         return None;
     }
-    let bounds = bounds(space, row.action);
-    let search = Search { space, row, road, rules, bounds: &bounds, boxes_left };
-    search.find(&|values, memory| {
+    Search { rules, boxes_left }.find(&|values, memory| {
         let figures = figures(space, road, spawn, values, memory);
         figures.needed_m > figures.distance_m + MARGIN_M
     })
@@ -99,7 +94,7 @@ fn figures(space: &Space, road: &Road, spawn: &SpawnDef, values: &[Value], memor
 
 fn remark(space: &Space, row: &Row, road: &Road, spawn: &SpawnDef, found: &Witness) -> Diagnostic {
     let action = &space.actions[row.action];
-    let values = crate::model::locals(action, row, &found.values);
+    let values = locals(action, row, &found.values);
     let after = space.memory_after(row.action, &values, &found.memory);
     let figures = figures(space, road, spawn, &values, &after);
     let facts = Facts { road: Some(&road.facts), ..Facts::new(&values, &after) };

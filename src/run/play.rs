@@ -6,7 +6,7 @@
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, mpsc};
 
-use crate::action::{ActionTable, ActiveRules};
+use crate::action::ActionTable;
 use crate::ads;
 use crate::ads::{ModularConfig, Selected};
 use crate::agent;
@@ -14,7 +14,7 @@ use crate::agent::{Agent, Kind, QPolicy};
 use crate::episode;
 use crate::episode::{Choice, EpisodeLog, Moment, Script, Watch};
 use crate::mdp::ProcKind;
-use crate::model::{Scenario, Space};
+use crate::model::{RulesInForce, Scenario, Space};
 use crate::oracle;
 use crate::oracle::{AvoidabilitySettings, ClaimResult, Judgement, Replays};
 use crate::rng;
@@ -95,7 +95,7 @@ pub enum RunError {
     #[error(transparent)]
     Settings(#[from] agent::SettingsError),
     #[error(transparent)]
-    Rule(#[from] crate::action::UnknownRule),
+    Rule(#[from] crate::model::UnknownRule),
     #[error("`{name}` is asked for twice, or both on and off")]
     Twice { name: String },
     #[error("{found} episodes a road: from 1 to {EPISODES_MAX} are possible")]
@@ -286,7 +286,7 @@ pub fn play<E>(
 pub struct Stage<'a> {
     table: &'a ActionTable,
     scenario: &'a Scenario,
-    rules: ActiveRules,
+    rules: RulesInForce,
     scene: Arc<Scene>,
     avoidability: AvoidabilitySettings,
 }
@@ -299,7 +299,7 @@ impl<'a> Stage<'a> {
         if let Some(engine) = origin.engine.as_ref().filter(|engine| engine.as_str() != ENGINE) {
             return Err(RunError::Engine { scenario: scenario.name.clone(), engine: engine.clone() });
         }
-        let rules = ActiveRules::new(table.space(), &origin.with, &origin.without)?;
+        let rules = RulesInForce::new(table.space(), &origin.with, &origin.without)?;
         let scene = Arc::new(episode::scene(&table.space().roads[scenario.road]));
         let line = origin.avoidability.as_deref();
         let avoidability = line.map(AvoidabilitySettings::from_line).transpose()?.unwrap_or_default();

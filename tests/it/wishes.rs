@@ -1,10 +1,8 @@
 //! Ten files as a newcomer writes them, each with a wish; here it is seen that the wish came true.
 
-use avastra::action::{
-    ActionTable, ActiveRules, Draw, Offer, Situation, SpawnFacts, SpawnRequest, Surroundings,
-};
+use avastra::action::{ActionTable, Draw, Offer, Situation, SpawnFacts, SpawnRequest, Surroundings};
 use avastra::model::vocabulary::{Level, TimeOfDay};
-use avastra::model::{End, Memory, OutcomeFacts, Reach, Value};
+use avastra::model::{End, Memory, OutcomeFacts, Reach, RulesInForce, Value};
 use avastra::syntax::ast::FileId;
 use avastra::syntax::{Diagnostic, format};
 
@@ -32,7 +30,7 @@ fn row(table: &ActionTable, label: &str) -> usize {
 
 /// What a row draws on a road under so many seeds, where it is legal.
 fn draws(table: &ActionTable, row: usize, road: usize, memory: &Memory, seeds: u64) -> Vec<Draw> {
-    let rules = ActiveRules::new(table.space(), &[], &[]).expect("no rule is named");
+    let rules = RulesInForce::new(table.space(), &[], &[]).expect("no rule is named");
     let road = &table.space().roads[road];
     let offer = |seed| {
         let situation = Situation { memory, road, rules: &rules, surroundings: &Room, seed, step: 0 };

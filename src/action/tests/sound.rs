@@ -7,9 +7,9 @@ use std::sync::Arc;
 use proptest::prelude::*;
 
 use crate::action::tests::Plain;
-use crate::action::{ActionTable, ActiveRules, Offer, Situation};
+use crate::action::{ActionTable, Offer, Situation};
 use crate::check::{Loaded, ReadError, load};
-use crate::model::{Reach, Value};
+use crate::model::{Reach, RulesInForce, Value};
 use crate::prove::witness;
 
 const HEAD: &str = "language 1
@@ -98,7 +98,7 @@ proptest! {
         let verdicts = compiled(&text);
         let table = ActionTable::new(loose.clone());
         let names: Vec<String> = loose.rules.iter().map(|rule| rule.name.clone()).collect();
-        let rules = ActiveRules::new(&loose, &names, &[]).unwrap();
+        let rules = RulesInForce::new(&loose, &names, &[]).unwrap();
         let road = &loose.roads[0];
         let world = Plain { safety_gap_m: 0.0 };
         // Where rows are dead the strict space is refused; its error names them by number.
@@ -170,7 +170,7 @@ proptest! {
                 && let Some(found) = witness(space, &space.rows[row.index], &space.roads[0])
             {
                 let strict = ActionTable::new(space.clone());
-                let in_force = ActiveRules::new(space, &[], &[]).unwrap();
+                let in_force = RulesInForce::new(space, &[], &[]).unwrap();
                 let situation = Situation {
                     memory: &found.memory, road: &space.roads[0], rules: &in_force, surroundings: &world, seed, step: 0,
                 };
@@ -200,7 +200,7 @@ fn shipped_rows_have_witnesses_that_run() {
     for path in ["scenarios/avastra45.ava", "scenarios/deepcollision52.ava"] {
         let table = crate::action::tests::table(path);
         let space = table.space();
-        let rules = ActiveRules::new(space, &[], &[]).unwrap();
+        let rules = RulesInForce::new(space, &[], &[]).unwrap();
         for row in table.rows() {
             for (road, reach) in space.roads.iter().zip(&row.roads) {
                 if matches!(reach, Reach::Dead { .. }) {
