@@ -1,4 +1,4 @@
-//! Drawing the values of a row, and judging values: one set of rules for both.
+//! Drawing the values of a row, and judging given values. Both end in `Judge::judge`.
 
 use std::sync::Arc;
 
@@ -12,10 +12,10 @@ use crate::model::{
 use crate::rng;
 use crate::rng::{Rng, Stream};
 
-/// Draws before a row is refused.
+/// Draws of one row in a step before the row is refused.
 const DRAWS_MAX: usize = 16;
 
-/// Drawn numbers are multiples of this, so that they are short in text and exact in binary, SI.
+/// Drawn numbers are multiples of this where the rules allow it, SI: short in text and exact in binary.
 const GRID: f64 = 1.0 / 64.0;
 
 /// One row in one situation.
@@ -37,19 +37,19 @@ impl<'a> Judge<'a> {
     /// Draws until all rules hold.
     ///
     /// # Errors
-    /// The most frequent refusal, by rule or by the world's reason, the first among equals.
+    /// The most frequent refusal; the earliest, if several are equally frequent.
     pub fn draw(&self) -> Result<Draw, Refusal> {
         let seed = rng::child_seed(self.situation.seed, Stream::Draw, self.situation.step);
         let mut rng = rng::stream(seed, Stream::Draw, self.row.row.index as u64);
         let mut failures: Vec<(usize, Refusal)> = Vec::new();
-        // What a rule says differs in its figures from draw to draw; what the world says differs in
-        // its reason.
+        // Refusals by the same rule count as one, because only their figures differ from draw to draw.
+        // Refusals by the world are told apart by their reasons.
         let same = |a: &Refusal, b: &Refusal| a.rule == b.rule && (a.rule.is_some() || a.reason == b.reason);
         let mut note = |refusal: Refusal| match failures.iter_mut().find(|(_, known)| same(known, &refusal)) {
             Some((count, _)) => *count += 1,
             None => failures.push((1, refusal)),
         };
-        // Without anything to draw, one look is as good as many.
+        // With nothing to draw, every try gives the same result.
         let fixed = self.action.parameters.iter().all(|parameter| parameter.axis);
         for _ in 0..if fixed { 1 } else { DRAWS_MAX } {
             match self.draw_values(&mut rng).and_then(|values| self.judge(&values).map_err(first)) {
@@ -62,6 +62,8 @@ impl<'a> Judge<'a> {
         Err(worst.map(|(_, refusal)| refusal).expect("every draw that failed left its reason"))
     }
 
+    /// The draw with these values.
+    ///
     /// # Errors
     /// Everything that is wrong with the values.
     pub fn check(&self, values: &[(Arc<str>, Value)]) -> Result<Draw, Vec<Refusal>> {
@@ -85,8 +87,10 @@ impl<'a> Judge<'a> {
         self.judge(&locals(self.action, self.row.row, values))
     }
 
+    /// The draw with the legal values nearest to these.
+    ///
     /// # Errors
-    /// Everything that is wrong with the nearest values, or with those that are no numbers.
+    /// Everything that is wrong with the nearest values, or with the values that are not numbers.
     pub fn nearest(&self, wanted: &[(Arc<str>, Value)]) -> Result<Draw, Vec<Refusal>> {
         let values = self.values(wanted, |wanted, room| nearest(room, wanted.number()));
         let values = values.map_err(|refusal| vec![refusal])?;
@@ -131,7 +135,8 @@ impl<'a> Judge<'a> {
         Facts { road: self.row.road, ..Facts::new(values, memory) }
     }
 
-    /// What the world is told. States are told as they end up, so that world and memory agree.
+    /// The changes of the world. They carry the values of the memory after the action, so that world and
+    /// memory agree.
     fn effects(&self, locals: &[Value], after: &Memory) -> Vec<Effect> {
         let mut effects = Vec::new();
         for effect in &self.action.effects {
@@ -190,8 +195,8 @@ impl<'a> Judge<'a> {
         self.values(&chosen, |_, room| on_grid(room, rng::between(rng, room.low, room.high)))
     }
 
-    /// Values for all parameters: first what was `given` of what is chosen from lists, then the numbers.
-    /// `number` takes a number from its room, given what was given for it.
+    /// Values of all parameters: those of lists as `given`, numbers as `number` chooses them. `number` gets
+    /// the given value of the parameter, if it has one, and the parameter's room.
     fn values(
         &self,
         given: &[(Arc<str>, Value)],
@@ -199,7 +204,8 @@ impl<'a> Judge<'a> {
     ) -> Result<Vec<Value>, Refusal> {
         let mut values = locals(self.action, self.row.row, given);
         self.row.solve(&mut values, self.action.drawn_numbers().collect(), |local, given, room| {
-            // The draw is made in any case: a rule that sets a value must not shift later draws.
+            // A number is drawn even where an equality sets the value: switching a rule off must not
+            // shift later draws.
             let number = number(given, room);
             room.settle(number).ok_or_else(|| self.no_room(local, room))
         })?;
@@ -224,7 +230,7 @@ impl<'a> Judge<'a> {
         let shown = |value: Value| self.row.space.show(value, parameter.ty);
         let range = match &parameter.domain {
             Domain::Values(values) => {
-                // What is likelier stands there more than once.
+                // A value that is likelier stands in the list more than once.
                 let mut words: Vec<String> = Vec::new();
                 for word in values.iter().map(|value| shown(*value)) {
                     if !words.contains(&word) {

@@ -1,4 +1,4 @@
-//! The action table of a space: what each row would do now, or which rule says no.
+//! The action table of a space: what each row would do now, or which rule refuses it.
 
 use std::sync::Arc;
 
@@ -12,7 +12,7 @@ pub struct ActionTable {
     space: Arc<Space>,
 }
 
-/// What a row is judged in.
+/// The moment in which a row is offered or judged.
 #[derive(Clone, Copy)]
 pub struct Situation<'a> {
     pub memory: &'a Memory,
@@ -46,9 +46,10 @@ pub struct Draw {
 /// Why a row cannot be chosen.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Refusal {
-    /// The rule that says no; `None` if the world has no place for it or a value is out of range.
+    /// The rule that refuses; `None` if the world has no place for a spawn, or a value is out of range or
+    /// breaks a `where`.
     pub rule: Option<String>,
-    /// With figures, in words.
+    /// In words, with figures.
     pub reason: String,
 }
 
@@ -65,8 +66,8 @@ impl ActionTable {
         &self.space.rows
     }
 
-    /// One offer for each row. Every row draws from a stream of its own, so that what one row draws
-    /// says nothing about another.
+    /// One offer for each row. Every row draws from a stream of its own, so that one row's draws do not
+    /// change another's.
     pub fn offers(&self, situation: &Situation<'_>) -> Vec<Offer> {
         (0..self.rows().len()).map(|row| self.offer(situation, row)).collect()
     }
@@ -79,8 +80,8 @@ impl ActionTable {
         }
     }
 
-    /// The legal values nearest to given ones: numbers that rules set follow from the others, and
-    /// numbers out of bounds move to the bound.
+    /// The draw with the legal values nearest to given ones. A number that a rule sets is computed from the
+    /// others; a number out of bounds moves to the bound.
     ///
     /// # Errors
     /// As [`ActionTable::check`].
@@ -93,10 +94,10 @@ impl ActionTable {
         Judge::new(&self.space, situation, row).nearest(values)
     }
 
-    /// Judges given values by the rules that drawing obeys: for replays and for `why`.
+    /// Judges given values by the same rules as drawing. Replays use it.
     ///
     /// # Errors
-    /// Every rule that says no, and every value that is missing, unknown or out of range.
+    /// Every rule that refuses, and every value that is missing, unknown or out of range.
     pub fn check(
         &self,
         situation: &Situation<'_>,

@@ -31,8 +31,8 @@ impl Space {
         self.states.iter().find(|state| state.name == name)
     }
 
-    /// What the memory says of the world: time of day, and levels of rain, fog and wetness. Noon and
-    /// a clear sky where the space has no such state.
+    /// What the memory says about the world: time of day, and levels of rain, fog and wetness. Without such
+    /// a state it is noon with a clear sky.
     pub fn weather(&self, memory: &Memory) -> (TimeOfDay, [Level; 3]) {
         let (mut time, mut sky) = (TimeOfDay::Noon, [Level::None; 3]);
         for state in &self.states {
@@ -50,8 +50,8 @@ impl Space {
         (time, sky)
     }
 
-    /// The cells that mean weather or time of day, with what is plainest in them: noon, and nothing of any
-    /// phenomenon. Cells whose enum has no such word are left out.
+    /// The cells for weather and time of day with their plainest values: noon, and the level `None`. Cells
+    /// whose enum has no such word are left out.
     pub fn plain_weather(&self) -> Vec<(usize, Value)> {
         let mut plain = Vec::new();
         for state in &self.states {

@@ -7,7 +7,7 @@ use crate::model::expr::{Arithmetic, Comparison, Expr, ExprKind, Fact};
 use crate::model::{FnDef, Interval, RoadFacts, Value};
 use crate::units::Rational;
 
-/// Enums have at most so many variants, so that a set of them is one integer.
+/// The most variants of an enum: a set of them fits one integer.
 pub(crate) const VARIANTS_MAX: usize = 128;
 
 /// A set of values of one type.

@@ -1,15 +1,15 @@
-//! Rules that change nothing: they hold by themselves, or follow from others.
+//! Rules that change nothing: they always hold, or they follow from other rules.
 
 use crate::model::rules::{Demand, RowRules};
 use crate::model::{Row, RuleBody, RulesInForce, Space, code};
 use crate::prove::enclose::enclose;
 use crate::syntax::{Diagnostic, listed};
 
-/// Rows times rules looked at for all rules together, at most: what is left then is not judged.
+/// Limit on rows times rules for the whole report; rules beyond it are not looked at.
 const WORK_MAX: usize = 1_000_000;
 
-/// One warning for each rule that could never refuse anything, whatever the road and the memory. Of
-/// two that follow from each other the later one is named.
+/// One warning for each rule that can never refuse anything, on any road and with any memory. If two rules
+/// follow from each other, the later one is named.
 pub(super) fn report(space: &Space) -> Vec<Diagnostic> {
     let mut diagnostics = Vec::new();
     let mut work = WORK_MAX;
@@ -49,8 +49,8 @@ fn warning(space: &Space, rule: usize, reasons: &[usize]) -> Diagnostic {
     warning.help("remove it, or make it the stricter one")
 }
 
-/// Whether the rule holds for every row that it binds and every value that `others` leave; false also
-/// where that would be too much work.
+/// Whether the rule holds for every row that it binds and every value that `others` leave; also `false` if
+/// the work left does not suffice.
 fn follows(space: &Space, rule: usize, others: &RulesInForce, work: &mut usize) -> bool {
     let bound = || space.rows.iter().filter(|row| row.rules.contains(&rule));
     let count = bound().count();
@@ -77,7 +77,7 @@ fn follows(space: &Space, rule: usize, others: &RulesInForce, work: &mut usize) 
 fn holds(space: &Space, row: &Row, rule: usize, others: &RulesInForce) -> bool {
     let Some(Demand::Holds(condition)) = space.rules[rule].body.demand(row.action) else { return false };
     let rules = RowRules { space, row, road: None, in_force: others };
-    // A row that the others leave dead would make everything true of it.
+    // If the other rules leave the row no value, the row says nothing about this rule.
     let Some(locals) = rules.settle() else { return false };
     let after = space.cells_after(row.action, &locals, &space.cells_unknown());
     !enclose(condition, &rules.known(&locals, &after)).may_fail()

@@ -1,7 +1,7 @@
 //! The rows of the action table, and what can be proved of each on each road.
 //!
-//! A row is dead on a road if no draw can satisfy the rules there: a proof by intervals. A row that
-//! is not proved dead is open, which promises nothing: what lies around the car is not known here.
+//! A row is dead on a road if intervals prove that no draw satisfies the rules there. Every other row is
+//! open. An open row may still fail: what lies around the car is not known here.
 
 use std::sync::Arc;
 
@@ -14,10 +14,10 @@ use crate::model::{
 use crate::prove::enclose::{Known, Values, enclose};
 use crate::syntax::{Diagnostic, listed};
 
-/// Rounds of narrowing: a bound may wait for another one, rarely for two.
+/// Rounds of narrowing: a bound may depend on another one, rarely on two.
 const ROUNDS: usize = 3;
 
-/// The rows that an action multiplies to, its conditions left aside.
+/// The number of rows of an action before its `where`s remove any.
 pub(crate) fn product_size(action: &ActionDef) -> u64 {
     let sizes = action.parameters.iter().filter(|parameter| parameter.axis).map(|axis| match &axis.domain {
         Domain::Values(values) => values.len() as u64,
@@ -106,7 +106,7 @@ impl RowRules<'_> {
             });
             return Reach::Open(ranges.collect());
         }
-        // A minimal conflict: drop every rule without which the row is dead all the same.
+        // A minimal conflict: drop every rule without which the row is still dead.
         let mut conflict = self.in_force.clone();
         for rule in self.in_force.on_row(self.row) {
             let fewer = conflict.except(rule);
@@ -140,7 +140,7 @@ impl RowRules<'_> {
                 }
                 locals[bound.local] = Values::Number(narrowed);
             }
-            // What changed nothing will change nothing again.
+            // A round that changes nothing is the last.
             if locals == was {
                 break;
             }
@@ -162,7 +162,7 @@ impl RowRules<'_> {
         Known { functions: &self.space.functions, locals, cells, road: self.road }
     }
 
-    /// What each rule of a conflict leaves, in words.
+    /// What each rule of a conflict wants, in words.
     fn reason(self, rules: &[usize]) -> String {
         let parameters = &self.space.actions[self.row.action].parameters;
         let locals = declared(self.space, self.row);
@@ -200,11 +200,11 @@ impl RowRules<'_> {
         }
     }
 
-    /// What a rule that bounds no number says of the row.
+    /// The words for a rule that bounds no number.
     fn without_figures(self, name: &str) -> String {
         match self.row.axes.is_empty() {
             true => format!("rule `{name}` never holds"),
-            // Other rows of the action may well obey it.
+            // Other rows of the action may obey the rule.
             false => format!("rule `{name}` cannot hold in `{}`", self.row.label),
         }
     }
@@ -224,7 +224,7 @@ pub(crate) fn declared(space: &Space, row: &Row) -> Vec<Values> {
     action.parameters.iter().zip(locals(action, row, &[])).map(all).collect()
 }
 
-/// What is to be said about rows: actions without any, dead rows, masked rows.
+/// Diagnostics about rows: actions that have none, dead rows, masked rows.
 pub(crate) fn report(space: &Space) -> Vec<Diagnostic> {
     let mut diagnostics = Vec::new();
     for (index, action) in space.actions.iter().enumerate() {

@@ -8,8 +8,8 @@ use crate::prove::reach::spawn_figures;
 use crate::syntax::Diagnostic;
 use crate::units::Rational;
 
-/// Every spawn whose speed or distance may leave its bounds, once, with the first row that shows it.
-/// Rules do not count: `--without` can switch them off.
+/// One error for each speed or distance of a spawn that may leave its bounds, with the first row that shows
+/// it. Rules are ignored, because `--without` can switch them off.
 pub(crate) fn report(space: &Space) -> Vec<Diagnostic> {
     let mut diagnostics = Vec::new();
     for (index, action) in space.actions.iter().enumerate() {

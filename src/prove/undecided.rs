@@ -1,4 +1,4 @@
-//! Rows of which nothing is known: neither proved dead nor seen to run.
+//! Rows that are neither proved dead nor found to run.
 
 use std::cell::Cell;
 
@@ -7,7 +7,7 @@ use crate::prove::reach::numbers;
 use crate::prove::witness::witness_within;
 use crate::syntax::{Diagnostic, listed};
 
-/// Boxes of ranges looked at in the search for witnesses, at most; most rows need one for each road.
+/// The most boxes of ranges that the search for witnesses looks at; most rows need one for each road.
 const BOXES_MAX: usize = 20_000;
 
 /// One warning for each action and road with such rows.
@@ -21,7 +21,7 @@ pub(super) fn report(space: &Space) -> Vec<Diagnostic> {
                 if matches!(row.roads[index], Reach::Dead { .. }) || boxes_left.get() == 0 {
                     continue;
                 }
-                // A search that was cut short says nothing.
+                // A search that ran out of boxes shows nothing.
                 if witness_within(space, row, road, &boxes_left).is_none() && boxes_left.get() > 0 {
                     unknown.push(row);
                 }

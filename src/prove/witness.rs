@@ -1,9 +1,9 @@
 //! Witnesses: values with which a row runs on a road, found by search.
 //!
-//! The search narrows the ranges by exact intervals, tries the middle and the ends of what is left,
-//! and halves it where nothing fits. What it finds is judged in f64 by the evaluator that drawing
-//! uses. The world around is taken to be empty: a spawn lands where it was asked to, and nobody needs
-//! room. What it does not find may exist all the same.
+//! The search narrows the ranges by exact intervals, tries the ends and the middle of what is left, and
+//! halves the box where nothing fits. Each try is solved and judged as a draw is, in f64. The world around is
+//! taken to be empty: a spawn lands where it was asked to, and no gap is too small. Values that the search
+//! does not find may still exist.
 
 use std::cell::Cell;
 use std::collections::VecDeque;
@@ -18,17 +18,17 @@ use crate::model::{
 use crate::prove::enclose::Values;
 use crate::units::Rational;
 
-/// Boxes of ranges looked at for one choice of the listed values and one memory.
+/// The most boxes of ranges looked at for one choice of the listed values and one memory.
 const BOXES_MAX: usize = 24;
-/// Boxes looked at in one search for a single witness.
+/// The most boxes looked at in one search for a single witness.
 const BOXES_IN_ALL_MAX: usize = 20_000;
-/// Choices of listed values, and memories, at most.
+/// The most choices of listed values, and the most memories, that are tried.
 const CHOICES_MAX: usize = 256;
 const MEMORIES_MAX: usize = 64;
 /// Ranges whose ends are tried in every combination; the ranges beyond share the choice of the last.
 const CORNER_BITS: usize = 3;
 
-/// Values with which a row runs, and what is remembered before.
+/// Values with which a row runs, and the memory before it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Witness {
     /// The drawn parameters, as declared.
@@ -69,7 +69,7 @@ enum Place {
     Middle,
 }
 
-/// What is asked of a witness beyond the rules: of all parameters, and the memory after.
+/// What is asked of a witness beyond the rules, given all parameters and the memory after.
 pub(super) type Wish<'a> = dyn Fn(&[Value], &Memory) -> bool + 'a;
 
 impl Search<'_> {
@@ -176,8 +176,8 @@ impl Search<'_> {
         self.rules.breaches(candidate).next().is_none() && wish(values, after)
     }
 
-    /// What may be remembered: the initial memory first, then every value of the cells that the rules
-    /// or effects of the row read.
+    /// Memories to try: the initial one first, then every value of the cells that the rules or effects of the
+    /// row read.
     fn memories(&self) -> Vec<Memory> {
         let space = self.rules.space;
         let mut memories = vec![Memory::default()];
@@ -231,7 +231,7 @@ fn choices(action: &ActionDef, values: &[Value]) -> Vec<Vec<Value>> {
     for (local, parameter) in action.parameters.iter().enumerate().filter(|(_, p)| !p.axis) {
         let Domain::Values(values) = &parameter.domain else { continue };
         let room = (CHOICES_MAX / chosen.len()).max(1);
-        // What is likelier stands there more than once, and would use up the room.
+        // A value that is likelier stands in the list more than once; one time is enough here.
         let mut different: Vec<Value> = Vec::new();
         for value in values {
             if different.len() < room && !different.contains(value) {
@@ -274,7 +274,7 @@ fn halves(narrowed: &[Values], open: &[usize]) -> Vec<Vec<Values>> {
     ]
 }
 
-/// What the cells of a state begin as; of what is drawn, the first value.
+/// The value that the cells of a state begin with; the first of its type if it is drawn.
 fn initial(space: &Space, state: &StateDef) -> Value {
     match &state.initial {
         Initial::Value(expr) => evaluate(expr, &space.functions, &Facts::new(&[], &Memory::default())),

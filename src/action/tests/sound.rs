@@ -194,6 +194,34 @@ fn names_row(text: &str, row: usize) -> bool {
     }
 }
 
+/// Equalities that depend on each other are solved in the order of their dependence, whatever the order of
+/// declaration: by drawing, and by the search for witnesses.
+#[test]
+fn a_chain_of_equalities_is_solved_from_its_end() {
+    let speeds =
+        ["first", "second", "third", "fourth"].map(|name| format!("any {name}: Speed in 1 m/s .. 20 m/s"));
+    let text = format!(
+        "{HEAD}action ahead({}) {{ spawn Sedan ahead 50 m {{ lane: Current, speed: first, does: DriveAhead }} }}\n\
+         rule r0 on ahead: first == second * 0.5 + 4 m/s\n\
+         rule r1 on ahead: second == third * 0.5 + 4 m/s\n\
+         rule r2 on ahead: third == fourth * 0.5 + 4 m/s\n",
+        speeds.join(", ")
+    );
+    let space = compiled(&text).space.unwrap();
+    let row = space.rows.iter().find(|row| row.label == "ahead()").unwrap();
+    let road = &space.roads[0];
+    assert!(witness(&space, row, road).is_some());
+    let rules = RulesInForce::by_default(&space);
+    let world = Plain { safety_gap_m: 0.0 };
+    let memory = space.initial_memory(0);
+    for step in 0..8 {
+        let situation =
+            Situation { memory: &memory, road, rules: &rules, surroundings: &world, seed: 0, step };
+        let offer = ActionTable::new(space.clone()).offer(&situation, row.index);
+        assert!(matches!(offer, Offer::Legal(_)), "{offer:?}");
+    }
+}
+
 /// Every row of the shipped spaces has a witness on every road, and every witness runs.
 #[test]
 fn shipped_rows_have_witnesses_that_run() {
