@@ -6,7 +6,7 @@ use crate::action::table::ActionTable;
 use crate::model::{Reach, RuleBody};
 use crate::prove::{Removal, removals};
 
-/// Every rule of a space.
+/// The audit of every rule of a space.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Audit {
     pub rules: Vec<RuleAudit>,
@@ -18,7 +18,7 @@ pub struct RuleAudit {
     pub optional: bool,
     /// Rows that it binds.
     pub rows: Vec<usize>,
-    /// Rows that it helps to mask, on any road.
+    /// Rows that are masked on some road and have this rule in their conflict.
     pub masks: Vec<usize>,
     /// Numeric parameters whose range it cuts before they are drawn.
     pub cuts: Vec<String>,
@@ -27,19 +27,19 @@ pub struct RuleAudit {
     pub enforced: Enforcement,
 }
 
-/// Where a rule has its last word. Masks and cuts only spare vain draws.
+/// When a rule is judged. Masks and cuts come earlier, but only to avoid draws that the rule would refuse.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Enforcement {
     /// On every complete draw.
     Draw,
-    /// On every draw, once the world has been asked where the spawn would be.
+    /// On every draw, after the world has answered where the spawn would be.
     Survey,
     /// On the step from one state to the next.
     Transition,
 }
 
-/// Looks every rule up.
+/// Audits every rule of the table's space.
 pub fn audit(table: &ActionTable) -> Audit {
     let space = table.space();
     let rules = space.rules.iter().enumerate().map(|(index, rule)| {
@@ -54,8 +54,8 @@ pub fn audit(table: &ActionTable) -> Audit {
             RuleBody::Holds(_) => Enforcement::Draw,
         };
         let mut cuts: Vec<String> = Vec::new();
-        for (action, bounds) in table.bounds.iter().enumerate() {
-            for bound in bounds.iter().filter(|bound| bound.rule == Some(index) && bound.is_known_early()) {
+        for (action, bounds) in space.bounds.iter().enumerate() {
+            for bound in bounds.iter().filter(|bound| bound.rule == Some(index) && bound.is_known_early) {
                 let parameter = &space.actions[action].parameters[bound.local];
                 if !parameter.axis && !cuts.contains(&parameter.name.to_string()) {
                     cuts.push(parameter.name.to_string());

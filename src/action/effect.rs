@@ -24,8 +24,8 @@ pub struct SpawnRequest {
     pub then: Then,
     /// Cruising speed, m/s.
     pub speed_mps: f64,
-    /// Gap to the ego vehicle along its route, m; behind it for `Overtake`. What exactly lies at
-    /// that distance is the verb's business: see `sim::placement`.
+    /// Gap to the ego vehicle along its route, m; behind the ego vehicle for `Overtake`. `sim::placement`
+    /// says for each verb what exactly lies at that distance.
     pub distance_m: f64,
 }
 
@@ -34,11 +34,11 @@ pub struct SpawnRequest {
 pub struct SpawnFacts {
     /// Distance between the outlines of the ego vehicle and the newcomer, m.
     pub spawn_gap_m: f64,
-    /// Gap that a careful and competent driver would need there, m; 0 if they do not approach.
+    /// Gap that a careful and competent driver would need there, m; 0 if the two do not approach.
     pub safety_gap_m: f64,
 }
 
-/// The side of the world that the action table may see.
+/// What the action table may ask the world.
 pub trait Surroundings {
     /// Where a spawn would put its road user, in numbers; or why it cannot, in words.
     ///

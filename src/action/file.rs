@@ -55,13 +55,13 @@ pub struct AxisRecord {
 #[serde(deny_unknown_fields)]
 pub struct RoadRecord {
     pub road: String,
-    /// Why the row is masked; none if it is open.
+    /// Why the row is masked; `None` if it is open.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub masked: Option<String>,
     pub draws: Vec<DrawRecord>,
 }
 
-/// What a drawn parameter may be, the default rules applied.
+/// The values that the default rules leave to a drawn parameter.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct DrawRecord {
@@ -98,7 +98,7 @@ impl ActionTable {
         }
     }
 
-    /// The table as text, one line a row; with a road, its ranges and masks there too.
+    /// The table as text, one line for each row; with a road, also the row's ranges or its mask there.
     pub fn text(&self, road: Option<&str>) -> String {
         let space = self.space();
         let road = road.and_then(|name| space.roads.iter().position(|road| road.name == name));

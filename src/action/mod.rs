@@ -1,19 +1,17 @@
 //! The action table: what an agent may choose, what its choice would do now, and which rule forbids it.
 //!
-//! Rules are enforced here and nowhere else: drawing (`offers`) and judging given values (`check`)
-//! evaluate the same compiled rules. Which rows are dead on which road was found by `model`.
+//! An action reaches the world only through this table. Drawing (`offers`) and judging given values
+//! (`check`) call the same judgement, `model::rules`. Which rows are dead on which road was found by `prove`.
 
 mod audit;
 mod draw;
 mod effect;
 mod file;
-mod rules;
 mod table;
 
 pub use audit::{Audit, Enforcement, RuleAudit, audit};
 pub use effect::{Effect, SpawnFacts, SpawnRequest, Surroundings};
 pub use file::{AxisRecord, DrawRecord, RoadRecord, RowRecord, RuleRecord, TableFile};
-pub use rules::{ActiveRules, UnknownRule};
 pub use table::{ActionTable, Draw, Offer, Refusal, Situation};
 
 #[cfg(test)]

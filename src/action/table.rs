@@ -1,26 +1,23 @@
-//! The action table of a space: what each row would do now, or which rule says no.
+//! The action table of a space: what each row would do now, or which rule refuses it.
 
 use std::sync::Arc;
 
 use crate::action::draw::Judge;
-use crate::action::rules::ActiveRules;
 use crate::action::{Effect, Surroundings};
-use crate::model::{Bound, Memory, Road, Row, Space, Value, bounds};
+use crate::model::{Memory, Road, Row, RulesInForce, Space, Value};
 
 /// The rows that an agent chooses from.
 #[derive(Debug, Clone)]
 pub struct ActionTable {
     space: Arc<Space>,
-    /// By action: what its rules say about single numbers.
-    pub(super) bounds: Vec<Vec<Bound>>,
 }
 
-/// What a row is judged in.
+/// The moment in which a row is offered or judged.
 #[derive(Clone, Copy)]
 pub struct Situation<'a> {
     pub memory: &'a Memory,
     pub road: &'a Road,
-    pub rules: &'a ActiveRules,
+    pub rules: &'a RulesInForce,
     pub surroundings: &'a dyn Surroundings,
     /// Seed of the episode.
     pub seed: u64,
@@ -49,16 +46,16 @@ pub struct Draw {
 /// Why a row cannot be chosen.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Refusal {
-    /// The rule that says no; `None` if the world has no place for it or a value is out of range.
+    /// The rule that refuses; `None` if the world has no place for a spawn, or a value is out of range or
+    /// breaks a `where`.
     pub rule: Option<String>,
-    /// With figures, in words.
+    /// In words, with figures.
     pub reason: String,
 }
 
 impl ActionTable {
     pub fn new(space: Arc<Space>) -> ActionTable {
-        let bounds = (0..space.actions.len()).map(|action| bounds(&space, action)).collect();
-        ActionTable { space, bounds }
+        ActionTable { space }
     }
 
     pub fn space(&self) -> &Arc<Space> {
@@ -69,22 +66,22 @@ impl ActionTable {
         &self.space.rows
     }
 
-    /// One offer for each row. Every row draws from a stream of its own, so that what one row draws
-    /// says nothing about another.
+    /// One offer for each row. Every row draws from a stream of its own, so that one row's draws do not
+    /// change another's.
     pub fn offers(&self, situation: &Situation<'_>) -> Vec<Offer> {
         (0..self.rows().len()).map(|row| self.offer(situation, row)).collect()
     }
 
     /// The offer of one row: the same as in [`ActionTable::offers`].
     pub fn offer(&self, situation: &Situation<'_>, row: usize) -> Offer {
-        match Judge::new(self, situation, row).draw() {
+        match Judge::new(&self.space, situation, row).draw() {
             Ok(draw) => Offer::Legal(draw),
             Err(refusal) => Offer::Refused(refusal),
         }
     }
 
-    /// The legal values nearest to given ones: numbers that rules set follow from the others, and
-    /// numbers out of bounds move to the bound.
+    /// The draw with the legal values nearest to given ones. A number that a rule sets is computed from the
+    /// others; a number out of bounds moves to the bound.
     ///
     /// # Errors
     /// As [`ActionTable::check`].
@@ -94,19 +91,19 @@ impl ActionTable {
         row: usize,
         values: &[(Arc<str>, Value)],
     ) -> Result<Draw, Vec<Refusal>> {
-        Judge::new(self, situation, row).nearest(values)
+        Judge::new(&self.space, situation, row).nearest(values)
     }
 
-    /// Judges given values by the rules that drawing obeys: for replays and for `why`.
+    /// Judges given values by the same rules as drawing. Replays use it.
     ///
     /// # Errors
-    /// Every rule that says no, and every value that is missing, unknown or out of range.
+    /// Every rule that refuses, and every value that is missing, unknown or out of range.
     pub fn check(
         &self,
         situation: &Situation<'_>,
         row: usize,
         values: &[(Arc<str>, Value)],
     ) -> Result<Draw, Vec<Refusal>> {
-        Judge::new(self, situation, row).check(values)
+        Judge::new(&self.space, situation, row).check(values)
     }
 }

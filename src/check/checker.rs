@@ -10,6 +10,7 @@ use crate::check::report::Report;
 use crate::check::road::Maps;
 use crate::check::{style, unused};
 use crate::model::expr::{Expr, ExprKind};
+use crate::model::rules::bounds;
 use crate::model::{ActionDef, EnumDef, EnumIndex, FnDef, GroupDef, Space, StateDef, Type, Value, code};
 use crate::prove;
 use crate::prove::{Known, Values, enclose};
@@ -88,6 +89,8 @@ pub(super) fn space(
         checker.look_at_expects(&own);
         return (None, checker.finish());
     }
+    let actions: Vec<ActionDef> = core::mem::take(&mut checker.actions).into_iter().flatten().collect();
+    let bounds = bounds(&actions, &rules);
     let mut space = Space {
         path: root.path,
         digest: root.digest,
@@ -95,7 +98,7 @@ pub(super) fn space(
         enums: core::mem::take(&mut checker.enums),
         states: core::mem::take(&mut checker.states),
         functions: core::mem::take(&mut checker.functions),
-        actions: core::mem::take(&mut checker.actions).into_iter().flatten().collect(),
+        actions,
         groups: core::mem::take(&mut checker.groups),
         rules,
         episode,
@@ -103,6 +106,7 @@ pub(super) fn space(
         verdicts,
         roads,
         rows: Vec::new(),
+        bounds,
     };
     space.rows = prove::rows(&space);
     checker.expects(&own, &space);

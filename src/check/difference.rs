@@ -7,8 +7,9 @@ use core::fmt;
 use std::collections::BTreeMap;
 
 use crate::check::load::{Loaded, standing_items};
-use crate::model::{Interval, Reach, Road, Row, RuleBody, Space, Type, bounds, locals};
-use crate::prove::{Prover, Values};
+use crate::model::rules::RowRules;
+use crate::model::{Interval, Reach, Road, Row, RuleBody, RulesInForce, Space, Type};
+use crate::prove::Values;
 use crate::syntax::ast::ItemKind;
 use crate::syntax::print_item;
 
@@ -220,10 +221,8 @@ fn compared(old: (&Space, usize), new: (&Space, usize)) -> Option<(Change, Strin
 
 /// What one rule alone leaves of each range of a row; `None` if it leaves nothing.
 fn left((space, rule): (&Space, usize), row: &Row, road: &Road) -> Option<Vec<(String, Interval)>> {
-    let values = locals(&space.actions[row.action], row, &[]);
-    let bounds = bounds(space, row.action);
-    let prover = Prover { space, row, values: &values, bounds: &bounds, road: Some(road) };
-    let settled = prover.settle(&[rule])?;
+    let alone = RulesInForce::only(space, rule);
+    let settled = RowRules { space, row, road: Some(&road.facts), in_force: &alone }.settle()?;
     let drawn = space.actions[row.action].parameters.iter().zip(settled).filter(|(p, _)| !p.axis);
     let ranges = drawn.filter_map(|(parameter, values)| match values {
         Values::Number(interval) => Some((parameter.name.to_string(), interval)),

@@ -1,5 +1,6 @@
 //! Scenarios: checks a timeline against its space, with the start, every step and every claim.
 
+use std::convert::Infallible;
 use std::sync::Arc;
 
 use crate::check::checker::docs;
@@ -7,13 +8,13 @@ use crate::check::names::unknown;
 use crate::check::report::{Report, unknown_field};
 use crate::check::scenario_rules::{Moment, breaches};
 use crate::check::scenario_value::{figure, number, value};
-use crate::model::expr::{Comparison, Expr};
+use crate::model::rules::RowRules;
 use crate::model::scenario::{
     Avoidability, Claim, ENDS, Figure, MODULES, Origin, Scenario, ScenarioStart, ScenarioStep,
 };
 use crate::model::{
-    AMBIENT_MAX, Bound, Domain, Facts, Initial, Memory, Parameter, Row, SIGNAL_PHASE_S, Space, StateDef,
-    Value, bounds, code, evaluate, locals,
+    AMBIENT_MAX, Domain, Initial, Memory, Parameter, Row, RulesInForce, SIGNAL_PHASE_S, Space, StateDef,
+    Value, code, locals,
 };
 use crate::syntax::ast::{BinaryOp, ClauseKind};
 use crate::syntax::{Diagnostic, ast, listed};
@@ -219,6 +220,8 @@ impl<'a> Reader<'a> {
         origin: &Origin,
         road: Option<usize>,
     ) -> Vec<ScenarioStep> {
+        let in_force = RulesInForce::new(self.space, &origin.with, &origin.without);
+        let in_force = in_force.expect("the origin was read without the names that are no rules");
         let mut steps: Vec<ScenarioStep> = Vec::new();
         let mut history = vec![(0, start.clone())];
         for step in declared {
@@ -243,12 +246,12 @@ impl<'a> Reader<'a> {
             }
             let Some(row) = self.row(&step.action) else { continue };
             let action = &self.space.actions[row.action];
-            let Some(drawn) = self.drawn(step, row, road) else { continue };
+            let Some(drawn) = self.drawn(step, row, road, &in_force) else { continue };
             let locals = locals(action, row, &drawn);
             let memory = &history[history.len() - 1].1;
             let after = self.space.memory_after(row.action, &locals, memory);
             let moment = Moment { step, row, locals: &locals, after: &after, history: &history, road };
-            self.diagnostics.extend(breaches(self.space, &moment, origin));
+            self.diagnostics.extend(breaches(self.space, &moment, &in_force));
             history.push((number, after));
             steps.push(ScenarioStep { number, row: Some(row.index), drawn });
         }
@@ -328,7 +331,13 @@ impl<'a> Reader<'a> {
         row
     }
 
-    fn drawn(&mut self, step: &ast::Step, row: &Row, road: Option<usize>) -> Option<Vec<(Arc<str>, Value)>> {
+    fn drawn(
+        &mut self,
+        step: &ast::Step,
+        row: &Row,
+        road: Option<usize>,
+        in_force: &RulesInForce,
+    ) -> Option<Vec<(Arc<str>, Value)>> {
         let action = &self.space.actions[row.action];
         let drawn = || action.parameters.iter().filter(|parameter| !parameter.axis);
         let mut sound = true;
@@ -368,7 +377,7 @@ impl<'a> Reader<'a> {
             values.push((parameter.name.clone(), value));
         }
         if !missing.is_empty() {
-            let error = self.missing(step, row, road, &missing, values);
+            let error = self.missing(step, row, road, in_force, &missing, values);
             return self.reject(error);
         }
         sound.then_some(values)
@@ -381,6 +390,7 @@ impl<'a> Reader<'a> {
         step: &ast::Step,
         row: &Row,
         road: Option<usize>,
+        in_force: &RulesInForce,
         missing: &[&Parameter],
         mut values: Vec<(Arc<str>, Value)>,
     ) -> Diagnostic {
@@ -400,31 +410,24 @@ impl<'a> Reader<'a> {
             };
             values.push((parameter.name.clone(), value));
         }
+        let mut known = locals(action, row, &values);
+        let indices = || (0..known.len()).filter(|local| names.contains(&&*action.parameters[*local].name));
+        let missing: Vec<usize> = indices().collect();
         if let Some(road) = road {
-            let memory = Memory::default();
-            let known = locals(action, row, &values);
-            let facts = Facts { road: Some(&space.roads[road].facts), ..Facts::new(&known, &memory) };
-            let bounds = bounds(space, row.action);
-            let sets = |bound: &&Bound| bound.op == Comparison::Equal && bound.is_known_early();
-            for bound in bounds.iter().filter(sets) {
-                let holds = |guard: &Expr| evaluate(guard, &space.functions, &facts).truth();
-                let parameter = &action.parameters[bound.local];
-                let limit = evaluate(&bound.limit, &space.functions, &facts);
-                if bound.guards.iter().all(holds) && parameter.domain.holds(limit) {
-                    let missing = missing.iter().any(|missing| missing.name == parameter.name);
-                    let slot = values.iter_mut().find(|(name, _)| missing && *name == parameter.name);
-                    slot.into_iter().for_each(|(_, value)| *value = limit);
-                }
-            }
+            let rules = RowRules { space, row, road: Some(&space.roads[road].facts), in_force };
+            let is_number = |local: &usize| matches!(known[*local], Value::Number(_));
+            let open = missing.iter().copied().filter(is_number).collect();
+            let Ok(()) = rules.solve(&mut known, open, |local, example, room| {
+                let example = example.number();
+                let holds = |set: &f64| action.parameters[local].domain.holds(Value::Number(*set));
+                Ok::<f64, Infallible>(room.settle(example).filter(holds).unwrap_or(example))
+            });
         }
-        let shown: Vec<String> = missing
-            .iter()
-            .filter_map(|parameter| {
-                let (_, value) = values.iter().find(|(name, _)| *name == parameter.name)?;
-                Some(format!("{}: {}", parameter.name, space.show(*value, parameter.ty)))
-            })
-            .collect();
-        let shown = shown.join(", ");
+        let shown = missing.iter().map(|local| {
+            let parameter = &action.parameters[*local];
+            format!("{}: {}", parameter.name, space.show(known[*local], parameter.ty))
+        });
+        let shown = shown.collect::<Vec<_>>().join(", ");
         let error = error.help(format!("for example `{shown}`"));
         let end = |span: ast::Span| ast::Span::new(span.file, span.end, span.end);
         match step.drawn.last() {

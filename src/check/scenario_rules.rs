@@ -4,9 +4,9 @@
 //! Rules about a gap in the world can be judged only by the replay.
 
 use crate::model::expr::{Comparison, Expr, ExprKind};
-use crate::model::scenario::Origin;
+use crate::model::rules::{Breach, Candidate, RowRules};
 use crate::model::vocabulary::{LaneChoice, Word};
-use crate::model::{Facts, Memory, Row, RuleBody, RuleDef, Space, Value, bounds, code, compare, evaluate};
+use crate::model::{Facts, Memory, Row, RuleDef, RulesInForce, Space, Value, code, compare, evaluate};
 use crate::prove::{next_rows, shortest_way};
 use crate::syntax::{Diagnostic, ast, listed};
 
@@ -32,39 +32,37 @@ impl Moment<'_> {
     }
 }
 
-/// One error for each rule in force that the step breaks.
-pub(super) fn breaches(space: &Space, moment: &Moment<'_>, origin: &Origin) -> Vec<Diagnostic> {
-    let mut diagnostics = Vec::new();
-    for rule in moment.row.rules.iter() {
-        let definition = &space.rules[*rule];
-        let asked = !definition.optional || origin.with.contains(&definition.name);
-        if !asked || origin.without.contains(&definition.name) {
-            continue;
-        }
-        let message = format!("step {} breaks rule `{}`", moment.step.number.digits, definition.name);
+/// One error for each rule in force that the step breaks. What the world would answer is not known here,
+/// so that a rule that asks it holds.
+pub(super) fn breaches(space: &Space, moment: &Moment<'_>, in_force: &RulesInForce) -> Vec<Diagnostic> {
+    let road = moment.road.map(|road| &space.roads[road].facts);
+    let rules = RowRules { space, row: moment.row, road, in_force };
+    let candidate =
+        Candidate { values: moment.locals, before: moment.before(), after: moment.after, gaps_m: &[] };
+    let error = |breach: Breach<'_>| {
+        let rule = &space.rules[breach.rule()?];
+        let message = format!("step {} breaks rule `{}`", moment.step.number.digits, rule.name);
         let error = Diagnostic::error(code::BROKEN_RULE, message);
-        diagnostics.extend(match &definition.body {
-            RuleBody::Moves { state, .. } => forbidden_move(space, definition, *state, moment, error),
-            RuleBody::Holds(bindings) => {
-                let mut bindings = bindings.iter().filter(|binding| binding.action == moment.row.action);
-                bindings.find_map(|binding| {
-                    broken_condition(space, *rule, &binding.condition, moment, error.clone())
-                })
+        match breach {
+            Breach::Condition { rule, condition } => broken_condition(space, rule, condition, moment, error),
+            Breach::Move { state, from, to, .. } => {
+                let error = error.at(moment.step.span, rules.words(breach, candidate));
+                Some(forbidden_move(space, rule, (state, from, to), moment, error))
             }
-        });
-    }
-    diagnostics
+            Breach::Where(_) | Breach::Gap { .. } => None,
+        }
+    };
+    rules.breaches(candidate).filter_map(error).collect()
 }
 
 /// Adds the history of the state up to the step, and the shortest legal way to the value that the step sets.
 fn forbidden_move(
     space: &Space,
     rule: &RuleDef,
-    state: usize,
+    (state, from, to): (usize, Value, Value),
     moment: &Moment<'_>,
     error: Diagnostic,
-) -> Option<Diagnostic> {
-    let reason = space.forbidden_move(rule, moment.before(), moment.after)?;
+) -> Diagnostic {
     let state = &space.states[state];
     let shown = |memory: &Memory| space.show(memory.cells()[state.first_cell], state.ty);
     let mut timeline = vec![format!("{} at the start", shown(&moment.history[0].1))];
@@ -74,12 +72,11 @@ fn forbidden_move(
             timeline.push(format!("{} from step {number}", shown(after)));
         }
     }
-    let error = error.at(moment.step.span, reason).beside(rule.span, "does not allow it").note(format!(
+    let error = error.beside(rule.span, "does not allow it").note(format!(
         "`{}` is {}",
         state.name,
         timeline.join(", ")
     ));
-    let (from, to) = (moment.before().cells()[state.first_cell], moment.after.cells()[state.first_cell]);
     let legal = next_rows(space, rule, from);
     let labels: Vec<&str> = legal.iter().take(ROWS_SHOWN).map(|row| row.label.as_str()).collect();
     let error = match labels.as_slice() {
@@ -87,7 +84,7 @@ fn forbidden_move(
         labels => error.note(format!("the rule allows {} here", listed(labels))),
     };
     let way = shortest_way(space, rule, from, to);
-    Some(match way.as_slice() {
+    match way.as_slice() {
         [] => error.help(format!(
             "no steps lead from {} to {}",
             space.show(from, state.ty),
@@ -97,7 +94,7 @@ fn forbidden_move(
             let steps: Vec<String> = way.iter().map(|row| format!("`{}`", row.label)).collect();
             error.help(format!("the shortest legal way there is {}", steps.join(", then ")))
         }
-    })
+    }
 }
 
 /// Adds the values with which the condition fails, and the nearest legal value.
@@ -111,13 +108,10 @@ fn broken_condition(
     // Without a known road its facts are not known either.
     let road = &space.roads[moment.road?];
     let facts = Facts { road: Some(&road.facts), ..Facts::new(moment.locals, moment.after) };
-    if condition.needs_survey() || evaluate(condition, &space.functions, &facts).truth() {
-        return None;
-    }
     let action = &space.actions[moment.row.action];
     let mut error = error.beside(space.rules[rule].span, "does not allow it");
     let mut nearest = None;
-    for bound in bounds(space, moment.row.action).iter().filter(|bound| bound.rule == Some(rule)) {
+    for bound in space.bounds[moment.row.action].iter().filter(|bound| bound.rule == Some(rule)) {
         let holds = |guard: &Expr| evaluate(guard, &space.functions, &facts).truth();
         if !bound.guards.iter().all(holds) {
             continue;

@@ -2,10 +2,11 @@
 
 use std::sync::Arc;
 
-use crate::action::{ActiveRules, Offer, Situation};
+use crate::action::{Offer, Situation};
 use crate::check::state_argument::memory_from;
 use crate::emit;
 use crate::episode;
+use crate::model::RulesInForce;
 use crate::sim::World;
 
 use super::arguments::WhyArguments;
@@ -34,7 +35,7 @@ pub fn why(output: &Output, arguments: &WhyArguments) -> Result<(), Failure> {
     };
     let road = &space.roads[road];
     let rules =
-        ActiveRules::new(space, &arguments.rules.with, &arguments.rules.without).map_err(Failure::usage)?;
+        RulesInForce::new(space, &arguments.rules.with, &arguments.rules.without).map_err(Failure::usage)?;
     let memory = match &arguments.state {
         None => space.initial_memory(SEED),
         Some(text) => memory_from(space, text, SEED).map_err(Failure::usage)?,
@@ -47,7 +48,7 @@ pub fn why(output: &Output, arguments: &WhyArguments) -> Result<(), Failure> {
 
     output.say(&format!("row {}: {} on {}", row.index, row.label, road.name));
     for &rule in row.rules.iter() {
-        let state = if rules.is_active(rule) { "" } else { " (off)" };
+        let state = if rules.contains(rule) { "" } else { " (off)" };
         output.say(&format!("  bound by {}{state}", space.rules[rule].name));
     }
     let verdict = match &offer {

@@ -2,10 +2,10 @@
 
 use std::sync::Arc;
 
-use crate::action::{ActionTable, ActiveRules};
+use crate::action::ActionTable;
 use crate::ads::Selected;
 use crate::mdp::ProcKind;
-use crate::model::{Memory, Road, Space};
+use crate::model::{Memory, Road, RulesInForce, Space};
 use crate::rng;
 use crate::rng::Stream;
 use crate::sim::{Scene, Start};
@@ -19,7 +19,7 @@ pub struct Setup<'a> {
     pub table: &'a ActionTable,
     pub road: &'a Road,
     pub scene: Arc<Scene>,
-    pub rules: &'a ActiveRules,
+    pub rules: &'a RulesInForce,
     pub ads: Selected,
     pub seed: u64,
     pub start: Start,

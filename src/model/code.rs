@@ -6,7 +6,7 @@
 pub const UNKNOWN: &str = "AV0101";
 /// Declared twice.
 pub const DUPLICATE: &str = "AV0102";
-/// A variant of several enums, and nothing tells which.
+/// A variant of several enums, where nothing says which enum is meant.
 pub const AMBIGUOUS: &str = "AV0103";
 /// Exists, but cannot be used in this place.
 pub const NOT_HERE: &str = "AV0104";
@@ -14,13 +14,13 @@ pub const NOT_HERE: &str = "AV0104";
 pub const RECURSION: &str = "AV0105";
 /// A file that cannot be read, or a map that cannot be understood.
 pub const UNREADABLE: &str = "AV0106";
-/// A function that comes to too many operations.
+/// A function that needs too many operations.
 pub const TOO_LARGE: &str = "AV0107";
-/// A place that a map does not have, or no way between two.
+/// A place that a map does not have, or two places with no way between them.
 pub const NO_ROUTE: &str = "AV0108";
 /// Files that use each other in a circle.
 pub const IMPORT_CYCLE: &str = "AV0109";
-/// An imported file that is not the one that was meant.
+/// An imported file whose digest is not the one written in `use`.
 pub const DIGEST: &str = "AV0110";
 /// A declaration that nothing names.
 pub const UNUSED: &str = "AV0111";
@@ -33,7 +33,7 @@ pub const OVERRIDE: &str = "AV0112";
 pub const UNIT_MISMATCH: &str = "AV0201";
 /// Two types where one is needed.
 pub const TYPE_MISMATCH: &str = "AV0202";
-/// No unit of that spelling.
+/// An unknown unit.
 pub const UNKNOWN_UNIT: &str = "AV0203";
 /// `<` between things that have no order.
 pub const UNORDERED: &str = "AV0204";
@@ -41,7 +41,7 @@ pub const UNORDERED: &str = "AV0204";
 pub const NOT_EXHAUSTIVE: &str = "AV0205";
 /// A case that never gets its turn.
 pub const NEVER_REACHED: &str = "AV0206";
-/// A number that cannot be held exactly.
+/// A number that cannot be computed exactly.
 pub const NUMBER: &str = "AV0207";
 /// An enum with too many variants.
 pub const TOO_MANY_VARIANTS: &str = "AV0208";
@@ -54,9 +54,9 @@ pub const ARGUMENTS: &str = "AV0211";
 
 // Actions.
 
-/// A parameter without an end of values.
+/// A parameter with infinitely many values where a list is needed.
 pub const INFINITE: &str = "AV0301";
-/// A table that is too long to be made.
+/// A table with too many rows.
 pub const TOO_MANY_ROWS: &str = "AV0302";
 /// Two rows that are one action.
 pub const TWINS: &str = "AV0303";
@@ -70,7 +70,7 @@ pub const MISSING_FIELD: &str = "AV0306";
 pub const UNKNOWN_STATE: &str = "AV0307";
 /// A word that the engine does not know.
 pub const NOT_A_WORD: &str = "AV0308";
-/// A road user that cannot do what it is told.
+/// A road user whose body cannot do what the verb says.
 pub const IMPOSSIBLE_SPAWN: &str = "AV0309";
 /// A spawn whose speed or distance may lie out of bounds.
 pub const OUT_OF_BOUNDS: &str = "AV0310";
@@ -81,7 +81,7 @@ pub const OUT_OF_BOUNDS: &str = "AV0310";
 pub const DEAD: &str = "AV0401";
 /// Rows that cannot run on some road.
 pub const MASKED: &str = "AV0402";
-/// Rows of which neither is known.
+/// Rows that are neither proved dead nor found to run.
 pub const UNDECIDED: &str = "AV0403";
 /// A range of which rules leave less than half.
 pub const CUT: &str = "AV0404";
@@ -93,7 +93,7 @@ pub const NO_SPAWN: &str = "AV0406";
 pub const BINDS_NOTHING: &str = "AV0407";
 /// A rule that can refuse nothing.
 pub const NEVER_ACTS: &str = "AV0408";
-/// A spawn that nobody could avoid.
+/// A spawn that no careful driver could avoid.
 pub const UNFAIR: &str = "AV0409";
 /// A rule that follows from others.
 pub const IMPLIED: &str = "AV0410";
@@ -101,14 +101,14 @@ pub const IMPLIED: &str = "AV0410";
 pub const DEADLOCK: &str = "AV0501";
 /// A value that a transition rule does not lead to.
 pub const UNREACHABLE: &str = "AV0502";
-/// A value that leads to itself alone.
+/// A value from which no move leads to another value.
 pub const STUCK: &str = "AV0503";
 /// A row that a transition rule never allows.
 pub const NEVER_ENABLED: &str = "AV0504";
 
 // Scenarios.
 
-/// A call that no row of the table answers to.
+/// A call that names no row of the table.
 pub const NO_SUCH_ROW: &str = "AV0601";
 /// Steps that are out of order.
 pub const STEP_ORDER: &str = "AV0602";
@@ -120,7 +120,7 @@ pub const OUT_OF_RANGE: &str = "AV0604";
 pub const BROKEN_RULE: &str = "AV0605";
 /// A start that leaves a state open.
 pub const OPEN_START: &str = "AV0606";
-/// A claim that nobody can check.
+/// A claim of an unknown form.
 pub const UNKNOWN_CLAIM: &str = "AV0607";
 /// A file with no scenario, or with two.
 pub const ONE_SCENARIO: &str = "AV0608";
@@ -129,7 +129,7 @@ pub const ONE_SCENARIO: &str = "AV0608";
 
 /// A network that fits neither its table nor its own layers.
 pub const POLICY_SHAPE: &str = "AV0701";
-/// A policy file that is not what was written.
+/// A policy file that was changed after it was written.
 pub const POLICY_DIGEST: &str = "AV0702";
 /// A policy that cannot be read.
 pub const POLICY_FORM: &str = "AV0703";

@@ -1,18 +1,19 @@
 //! The one evaluator of expressions: what a rule, a function or a verdict is worth in f64.
 //!
-//! Total: the checker has seen to names and types, functions cannot recurse, and a division by 0
-//! gives infinity or NaN, which satisfies no comparison but `!=`.
+//! Evaluation cannot fail: the checker has resolved names and types, functions cannot recurse, and a
+//! division by 0 gives infinity or NaN. NaN satisfies no comparison but `!=`.
 
 use crate::model::expr::{Arithmetic, Comparison, Expr, ExprKind, Fact};
 use crate::model::space::{COUNTED, FnDef, RoadFacts, Space, WordExpr};
 use crate::model::value::{Memory, Value};
 use crate::model::vocabulary::LaneChoice;
 
-/// Numbers that differ by less than this part of the larger one are `==`: it forgives the digits
-/// that a person rounds away, not a distance that anybody could measure.
+/// Numbers that differ by at most this part of the larger one are `==`: it forgives the digits that an
+/// author rounds away, but no measurable distance.
 const EQUAL_PART: f64 = 1e-9;
 
-/// What an expression may look at. What its place in the file does not offer stays at the default.
+/// The facts that an expression may read. Facts that its place in the file does not offer keep their
+/// defaults.
 #[derive(Debug, Clone, Copy)]
 pub struct Facts<'a> {
     /// The parameters of the action or function around it.

@@ -38,7 +38,7 @@ pub enum ExprKind {
     /// Both ends included.
     InRange(Box<Expr>, Box<Expr>, Box<Expr>),
     InList(Box<Expr>, Vec<Expr>),
-    /// Membership in `road.lanes`; the table turns variants of the expression's enum into lanes.
+    /// Membership in `road.lanes`; the list gives the lane for each variant of the expression's enum.
     InLanes(Box<Expr>, Vec<LaneChoice>),
     /// `road == corner`, `road in [corner, boulevard]`: whether the road is one of these.
     OnRoad(Vec<String>),

@@ -108,7 +108,7 @@ impl Interval {
         if *self == zero || *other == zero {
             return zero;
         }
-        // A half line times a positive point stays exact; everything else with an open side is all.
+        // A half line times a point stays exact; any other product with an unbounded side is `ALL`.
         let (Some(left), Some(right)) = (ends(self), ends(other)) else {
             return match (self.single(), other.single()) {
                 (_, Some(factor)) => self.scale(factor),
@@ -120,7 +120,7 @@ impl Interval {
         for (x, x_in) in left {
             for (y, y_in) in right {
                 let Some(value) = x.checked_mul(y) else { return Interval::ALL };
-                // An end at 0 that belongs to its interval makes the product 0 whatever the other is.
+                // If 0 belongs to one interval, the product 0 is reached, whatever the other end is.
                 let zero_of = |end_in: bool, end: Rational| end_in && end == Rational::ZERO;
                 let closed = (x_in && y_in) || zero_of(x_in, x) || zero_of(y_in, y);
                 let corner = Interval { low: End::At(value, closed), high: End::At(value, closed) };

@@ -1,6 +1,6 @@
 //! Bounds on the numbers that reach the world, whichever file they come from: a space, a scenario, a draw.
 //!
-//! `prove::spawn_bounds` proves them for every row; the action table holds every draw to them again.
+//! `prove::spawn_bounds` proves them for every row, and `action` checks every draw again.
 
 use core::ops::RangeInclusive;
 
@@ -13,8 +13,40 @@ pub const SPAWN_SPEED_MPS: RangeInclusive<f64> = 0.0..=70.0;
 /// Distances from the ego vehicle at which anything may be spawned, m.
 pub const SPAWN_DISTANCE_M: RangeInclusive<f64> = 0.0..=1000.0;
 
-/// Where the cycle of the signals may begin, s.
+/// Offsets at which the cycle of the signals may begin, s.
 pub const SIGNAL_PHASE_S: RangeInclusive<f64> = 0.0..=3600.0;
 
 /// Most ambient vehicles around the ego vehicle.
 pub const AMBIENT_MAX: u32 = 20;
+
+/// Why the world must not be asked for a spawn with these figures, whatever the rules say; `None` if it
+/// may. NaN is out of bounds, too.
+pub(crate) fn spawn_out_of_bounds(speed_mps: f64, distance_m: f64) -> Option<String> {
+    if !SPAWN_SPEED_MPS.contains(&speed_mps) {
+        let (low, high) = (SPAWN_SPEED_MPS.start(), SPAWN_SPEED_MPS.end());
+        return Some(format!("the spawn's speed is {speed_mps} m/s, possible is {low} .. {high} m/s"));
+    }
+    if !SPAWN_DISTANCE_M.contains(&distance_m) {
+        let (low, high) = (SPAWN_DISTANCE_M.start(), SPAWN_DISTANCE_M.end());
+        return Some(format!("the spawn's distance is {distance_m} m, possible is {low} .. {high} m"));
+    }
+    None
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_spawn_lies_out_of_bounds() {
+        for (speed_mps, distance_m) in [(0.0, 0.0), (70.0, 1000.0)] {
+            assert_eq!(spawn_out_of_bounds(speed_mps, distance_m), None);
+        }
+        for speed_mps in [-0.1, 70.1, f64::NAN] {
+            assert!(spawn_out_of_bounds(speed_mps, 10.0).is_some_and(|reason| reason.contains("speed")));
+        }
+        for distance_m in [-0.1, 1000.1, f64::NAN] {
+            assert!(spawn_out_of_bounds(5.0, distance_m).is_some_and(|reason| reason.contains("distance")));
+        }
+    }
+}

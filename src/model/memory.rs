@@ -1,7 +1,7 @@
 //! How the memory begins and how actions change it.
 
 use crate::model::eval::{Facts, evaluate};
-use crate::model::space::{EffectDef, Initial, RuleBody, RuleDef, SetDef, Space, StateDef, StateMeaning};
+use crate::model::space::{EffectDef, Initial, SetDef, Space, StateDef, StateMeaning};
 use crate::model::value::{Memory, Type, Value};
 use crate::model::vocabulary::{Level, TimeOfDay};
 use crate::rng;
@@ -31,8 +31,8 @@ impl Space {
         self.states.iter().find(|state| state.name == name)
     }
 
-    /// What the memory says of the world: time of day, and levels of rain, fog and wetness. Noon and
-    /// a clear sky where the space has no such state.
+    /// What the memory says about the world: time of day, and levels of rain, fog and wetness. Without such
+    /// a state it is noon with a clear sky.
     pub fn weather(&self, memory: &Memory) -> (TimeOfDay, [Level; 3]) {
         let (mut time, mut sky) = (TimeOfDay::Noon, [Level::None; 3]);
         for state in &self.states {
@@ -50,8 +50,8 @@ impl Space {
         (time, sky)
     }
 
-    /// The cells that mean weather or time of day, with what is plainest in them: noon, and nothing of any
-    /// phenomenon. Cells whose enum has no such word are left out.
+    /// The cells for weather and time of day with their plainest values: noon, and the level `None`. Cells
+    /// whose enum has no such word are left out.
     pub fn plain_weather(&self) -> Vec<(usize, Value)> {
         let mut plain = Vec::new();
         for state in &self.states {
@@ -84,19 +84,6 @@ impl Space {
             }
         }
         after
-    }
-
-    /// Why a transition rule does not allow the step from one memory to the next; `None` if it does,
-    /// or is no transition rule.
-    pub(crate) fn forbidden_move(&self, rule: &RuleDef, before: &Memory, after: &Memory) -> Option<String> {
-        let RuleBody::Moves { state, allowed, .. } = &rule.body else { return None };
-        let state = &self.states[*state];
-        let (from, to) = (before.cells[state.first_cell], after.cells[state.first_cell]);
-        if allowed[from.variant()][to.variant()] {
-            return None;
-        }
-        let (from, to) = (self.show(from, state.ty), self.show(to, state.ty));
-        Some(format!("`{}` may not move from {from} to {to}", state.name))
     }
 
     /// The checker allows `any` states only for finite types.

@@ -5,7 +5,6 @@
 //! Its expressions are [`expr::Expr`], and [`evaluate`] is their one evaluator. A [`Row`] is one entry of the
 //! action table; [`Memory`] holds the values of the states during an episode.
 
-mod bound;
 pub mod code;
 mod digest;
 mod eval;
@@ -15,20 +14,22 @@ mod limits;
 mod memory;
 pub mod policy;
 mod row;
+pub(crate) mod rules;
 pub mod scenario;
 mod space;
 mod value;
 pub mod vocabulary;
 
-pub(crate) use bound::{Bound, allowed, bounds};
 pub use digest::{digest, digest_text};
 pub(crate) use eval::compare;
 pub use eval::{Facts, OutcomeFacts, evaluate};
 pub use interval::{End, Interval};
+pub(crate) use limits::spawn_out_of_bounds;
 pub use limits::{AMBIENT_MAX, SIGNAL_PHASE_S, SPAWN_DISTANCE_M, SPAWN_SPEED_MPS, TICK_MS};
 pub use policy::Policy;
 pub(crate) use row::locals;
 pub use row::{Reach, Row};
+pub use rules::{RulesInForce, UnknownRule};
 pub use scenario::{
     Avoidability, Claim, ENDS, Figure, MODULES, Origin, Scenario, ScenarioStart, ScenarioStep,
 };

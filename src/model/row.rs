@@ -18,21 +18,21 @@ pub struct Row {
     pub label: String,
     /// Indices in `Space::rules` of the rules that bind it, optional ones included.
     pub rules: Arc<[usize]>,
-    /// What can be said of it beforehand on each road of `Space::roads`, with the default rules.
+    /// What is proved of the row on each road of `Space::roads` under the default rules.
     pub roads: Vec<Reach>,
 }
 
 /// Whether a row can run on a road.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Reach {
-    /// Nothing forbids it beforehand. The ranges that the rules leave to its drawn numbers, SI.
+    /// The row is not proved dead. Holds the ranges that the rules leave to its drawn numbers, SI.
     Open(Vec<(Arc<str>, Interval)>),
     /// The rules forbid every draw.
     Dead { rules: Vec<usize>, reason: String },
 }
 
-/// Values of all parameters of an action: its row's axes and what was drawn. What is not drawn yet
-/// holds a placeholder.
+/// Values of all parameters of an action: the axes of the row, and the drawn values. A parameter that is
+/// not drawn yet holds a placeholder.
 pub(crate) fn locals(action: &ActionDef, row: &Row, drawn: &[(Arc<str>, Value)]) -> Vec<Value> {
     let find = |parameter: &Parameter| {
         let mut all = row.axes.iter().chain(drawn);

@@ -30,7 +30,8 @@ pub struct Origin {
     /// Digest of all its settings.
     pub profile_digest: Option<String>,
     pub engine: Option<String>,
-    /// By what it was told whether collisions were avoidable, as one line of YAML; the usual way if not given.
+    /// Settings of the verdict whether collisions were avoidable, as one line of YAML; the defaults if not
+    /// given.
     pub avoidability: Option<String>,
     /// Rules that were asked for (`--with`) and switched off (`--without`).
     pub with: Vec<String>,
@@ -77,22 +78,22 @@ pub enum Claim {
     /// `expect cause == perception with npc#2`, `expect cause == [tracking, planning]`: the module at
     /// fault, or the two that are at fault together; in words of [`MODULES`].
     Cause { modules: Vec<String>, obstacle: Option<u32> },
-    /// `expect minimal with npc#2`: without any one of the steps, its time left behind or not, there is no
-    /// such collision.
+    /// `expect minimal with npc#2`: if any one step is left out, with its time or without, there is no such
+    /// collision.
     Minimal { obstacle: Option<u32> },
     /// `expect end == arrived`: one of [`ENDS`].
     End(String),
 }
 
-/// What careful drivers make of a collision.
+/// Whether careful drivers avoid a collision.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Avoidability {
     /// A careful reference driver avoids it.
     Avoidable,
-    /// None does, but an evasive manoeuvre without any delay.
+    /// No careful driver avoids it, but an evasive manoeuvre without any delay does.
     BeyondReference,
-    /// Nothing that was tried.
+    /// Nothing that was tried avoids it.
     Unavoidable,
 }
 

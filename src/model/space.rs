@@ -6,6 +6,7 @@ use std::sync::Arc;
 
 use crate::model::expr::Expr;
 use crate::model::row::Row;
+use crate::model::rules::Bound;
 use crate::model::value::{EnumIndex, Type, Value};
 use crate::model::vocabulary::{Body, Colour, LaneChoice, Level, Phenomenon, Side, Then, TimeOfDay, Verb};
 use crate::road::{LanePlace, RoadMap, Route};
@@ -33,7 +34,7 @@ pub struct Space {
     pub groups: Vec<GroupDef>,
     pub rules: Vec<RuleDef>,
     pub episode: EpisodeDef,
-    /// First match counts.
+    /// The first case that applies gives the reward.
     pub reward: Vec<RewardCase>,
     /// As declared; one of them is [`COUNTED`].
     pub verdicts: Vec<VerdictDef>,
@@ -41,6 +42,8 @@ pub struct Space {
     pub roads: Vec<Road>,
     /// The action table: actions as declared, axes left to right, the last varying fastest.
     pub rows: Vec<Row>,
+    /// By action: what `where`s and rules say about its single numbers.
+    pub(crate) bounds: Vec<Vec<Bound>>,
 }
 
 #[derive(Debug, Clone, PartialEq)]
@@ -69,7 +72,7 @@ pub struct StateDef {
     /// 1, or the number of keys.
     pub cells: usize,
     pub initial: Initial,
-    /// What it is in the world, if anything.
+    /// What the state stands for in the world.
     pub meaning: StateMeaning,
     pub span: Span,
 }
@@ -78,14 +81,14 @@ pub struct StateDef {
 pub enum Initial {
     /// Drawn at reset, each cell by itself.
     Any,
-    /// The same for every cell.
+    /// The same value for every cell.
     Value(Expr),
 }
 
-/// What a state variable means to the world. The tables turn variants into words of the engine.
+/// What a state variable stands for in the world. The lists give the engine's word for each variant.
 #[derive(Debug, Clone, PartialEq)]
 pub enum StateMeaning {
-    /// The space's own bookkeeping.
+    /// Nothing: only the space's rules and effects use it.
     Private,
     /// `time`.
     Time(Vec<TimeOfDay>),
@@ -125,10 +128,20 @@ pub struct Parameter {
     pub span: Span,
 }
 
+impl ActionDef {
+    /// The drawn parameters with a range, by index; the others have a list of values.
+    pub(crate) fn drawn_numbers(&self) -> impl Iterator<Item = usize> {
+        let is_open = |(_, parameter): &(usize, &Parameter)| {
+            !parameter.axis && matches!(parameter.domain, Domain::Range(..))
+        };
+        self.parameters.iter().enumerate().filter(is_open).map(|(index, _)| index)
+    }
+}
+
 /// The values that a parameter may have.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Domain {
-    /// In this order. One of the list is drawn: what stands there twice is twice as likely.
+    /// One of the list is drawn; a value that stands there twice is twice as likely.
     Values(Vec<Value>),
     /// Both ends included, SI.
     Range(Rational, Rational),
@@ -158,7 +171,7 @@ pub enum EffectDef {
     Spawn(Box<SpawnDef>),
 }
 
-/// How a state changes: all its cells, or the one of a key.
+/// How a state changes: all its cells, or only the cell of a key.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SetDef {
     /// Index in `Space::states`.
@@ -206,7 +219,7 @@ pub struct GroupDef {
 pub struct RuleDef {
     pub name: String,
     pub docs: Vec<String>,
-    /// Off unless asked for.
+    /// Off unless `--with` names it.
     pub optional: bool,
     pub body: RuleBody,
     pub span: Span,
@@ -276,7 +289,7 @@ pub struct RoadFacts {
     pub name: String,
     /// The lowest limit of the route's lanes: a drawn speed must be legal on the whole of it, SI.
     pub limit: Rational,
-    /// The same, m/s.
+    /// `limit` as a float, m/s.
     pub limit_mps: f64,
     /// Which lanes in the ego vehicle's direction exist somewhere along the route, by
     /// [`LaneChoice`] in its order: left, current, right.
@@ -286,16 +299,6 @@ pub struct RoadFacts {
 impl RoadFacts {
     pub fn has_lane(&self, lane: LaneChoice) -> bool {
         self.lanes[lane as usize]
-    }
-}
-
-impl RuleBody {
-    /// Whether the rule binds the action.
-    pub fn binds(&self, action: usize) -> bool {
-        match self {
-            RuleBody::Holds(bindings) => bindings.iter().any(|binding| binding.action == action),
-            RuleBody::Moves { actions, .. } => actions.contains(&action),
-        }
     }
 }
 

@@ -27,12 +27,12 @@ pub enum Value {
 }
 
 impl Value {
-    /// The truth value; `false` for what is none. The checker lets no other type get here.
+    /// The truth value; `false` for any other type, which the checker rules out.
     pub fn truth(self) -> bool {
         self == Value::Bool(true)
     }
 
-    /// The number in SI units; NaN for what is none. The checker lets no other type get here.
+    /// The number in SI units; NaN for any other type, which the checker rules out.
     pub fn number(self) -> f64 {
         match self {
             Value::Number(number) => number,
@@ -63,7 +63,7 @@ impl Memory {
         &self.cells
     }
 
-    /// The same with another value in one cell.
+    /// A copy with another value in one cell.
     pub fn with(&self, cell: usize, value: Value) -> Memory {
         let mut changed = self.clone();
         changed.cells[cell] = value;

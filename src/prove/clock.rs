@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 
 use crate::model::{Initial, Reach, Row, RuleBody, RuleDef, Space, Type, Value, code};
 use crate::prove::enclose::Values;
-use crate::prove::reach::{Prover, numbers};
+use crate::prove::reach::{declared, numbers};
 use crate::syntax::{Diagnostic, listed};
 
 /// The graph of one rule.
@@ -16,7 +16,8 @@ struct Graph<'a> {
     begin: u128,
 }
 
-/// Values that cannot be left, or not be reached from where episodes begin; rows never enabled.
+/// One warning each for values that no move leaves, values that no episode reaches, and rows that no move
+/// enables.
 pub(crate) fn report(space: &Space) -> Vec<Diagnostic> {
     let mut diagnostics = Vec::new();
     for rule in &space.rules {
@@ -37,7 +38,7 @@ pub(crate) fn report(space: &Space) -> Vec<Diagnostic> {
                 .help(format!("add `{} -> …` with another value, if an episode should go on", names[0]));
             diagnostics.push(warning);
         }
-        // Values that nothing leads to were named with the rule itself.
+        // A value that no move leads to was reported with the rule itself.
         let led_to =
             |value: &usize| (0..variants.len()).any(|from| from != *value && graph.allowed[from][*value]);
         let unreached: u128 = bits(all & !reached).filter(led_to).map(|value| 1 << value).sum();
@@ -68,15 +69,14 @@ pub(crate) fn report(space: &Space) -> Vec<Diagnostic> {
     diagnostics
 }
 
-/// The shortest way of one row after another by which a state may come from one value to another
-/// under a transition rule; empty if there is none, or it is there already.
+/// The shortest sequence of rows that brings a state from one value to another under a transition rule;
+/// empty if there is none, or if both values are the same.
 pub(crate) fn shortest_way<'a>(space: &'a Space, rule: &'a RuleDef, from: Value, to: Value) -> Vec<&'a Row> {
     let Some(graph) = graph(space, rule) else { return Vec::new() };
     graph.way(from.variant(), to.variant()).into_iter().map(|index| graph.rows[index].0).collect()
 }
 
-/// The rows that a transition rule allows where the state has that value, and whose own value is
-/// certain.
+/// The rows that a transition rule allows from that value. Only rows that always set the same value count.
 pub(crate) fn next_rows<'a>(space: &'a Space, rule: &'a RuleDef, from: Value) -> Vec<&'a Row> {
     let Some(graph) = graph(space, rule) else { return Vec::new() };
     let allowed =
@@ -102,9 +102,7 @@ fn graph<'a>(space: &'a Space, rule: &'a RuleDef) -> Option<Graph<'a>> {
         },
     };
     let rows = space.rows.iter().filter(|row| actions.contains(&row.action)).map(|row| {
-        let values = crate::model::locals(&space.actions[row.action], row, &[]);
-        let prover = Prover { space, row, values: &values, bounds: &[], road: None };
-        let after = space.cells_after(row.action, &prover.declared(), &space.cells_unknown());
+        let after = space.cells_after(row.action, &declared(space, row), &space.cells_unknown());
         match after[definition.first_cell] {
             Values::Variants(set) => (row, set),
             Values::Truth { .. } | Values::Number(_) => (row, 0),
@@ -114,7 +112,7 @@ fn graph<'a>(space: &'a Space, rule: &'a RuleDef) -> Option<Graph<'a>> {
 }
 
 impl Graph<'_> {
-    /// Every value to which moves and rows together lead.
+    /// Every value that an episode can reach.
     fn reached(&self) -> u128 {
         let mut reached = self.begin;
         loop {
@@ -129,12 +127,12 @@ impl Graph<'_> {
         }
     }
 
-    /// Whether a value leads to itself alone, though to itself it does.
+    /// Whether the only move allowed from this value is back to itself.
     fn is_stuck(&self, from: usize) -> bool {
         self.allowed[from].iter().enumerate().all(|(to, allowed)| *allowed == (to == from))
     }
 
-    /// Breadth first, over rows whose value is certain.
+    /// The shortest way, found breadth first, over rows that always set the same value.
     fn way(&self, from: usize, to: usize) -> Vec<usize> {
         let mut came_by: Vec<Option<(usize, usize)>> = vec![None; self.allowed.len()];
         let mut open = VecDeque::from([from]);

@@ -1,13 +1,15 @@
-//! Ranges of which the rules leave less than half: usually meant, sometimes a slip of the pen.
+//! Ranges of which the rules leave less than half. Most are meant; some are a mistake in the rule.
 
 use crate::model::expr::Comparison;
-use crate::model::{Domain, End, Interval, Parameter, Reach, Space, Type, bounds, code, locals};
-use crate::prove::reach::Prover;
+use crate::model::rules::RowRules;
+use crate::model::{Domain, End, Interval, Parameter, Reach, RulesInForce, Space, Type, code};
 use crate::syntax::{Diagnostic, listed};
 use crate::units::Rational;
 
-/// One remark for each rule and range that is cut alike, naming the actions and roads.
+/// One remark for each range on each road that rules cut below half. Cuts with the same parameter, rules
+/// and remaining range are reported once.
 pub(super) fn report(space: &Space) -> Vec<Diagnostic> {
+    let in_force = RulesInForce::by_default(space);
     let mut found: Vec<Cut<'_>> = Vec::new();
     for row in &space.rows {
         for (road, reach) in space.roads.iter().zip(&row.roads) {
@@ -17,7 +19,7 @@ pub(super) fn report(space: &Space) -> Vec<Diagnostic> {
                 let parameter = action.parameters.iter().find(|parameter| parameter.name == *name);
                 let Some(parameter) = parameter else { continue };
                 let Some(percent) = kept_percent(&parameter.domain, kept) else { continue };
-                let rules = cutting_rules(space, row.action, parameter);
+                let rules = cutting_rules(space, &in_force, row.action, parameter);
                 if rules.is_empty() {
                     continue;
                 }
@@ -39,7 +41,7 @@ pub(super) fn report(space: &Space) -> Vec<Diagnostic> {
 struct Cut<'a> {
     parameter: &'a Parameter,
     kept: Interval,
-    /// Of the declared range.
+    /// Share of the declared range that is left.
     percent: f64,
     rules: Vec<usize>,
     road: &'a str,
@@ -68,7 +70,7 @@ impl Cut<'_> {
     }
 }
 
-/// How much of a range is left, if less than half, and more than nothing.
+/// How much of a range is left, in percent; `None` if it is half or more, or a single value.
 fn kept_percent(domain: &Domain, kept: &Interval) -> Option<f64> {
     let (Domain::Range(low, high), End::At(from, _), End::At(to, _)) = (domain, kept.low, kept.high) else {
         return None;
@@ -76,20 +78,19 @@ fn kept_percent(domain: &Domain, kept: &Interval) -> Option<f64> {
     let (whole, left) = (high.checked_sub(*low)?, to.checked_sub(from)?);
     let share = left.checked_div(whole)?;
     let half = Rational::new(1, 2).expect("2 is not 0");
-    // A single value is what an equality asks for, and no accident.
+    // A single value comes from an equality, so it is meant.
     (share > Rational::ZERO && share < half).then(|| share.to_f64() * 100.0)
 }
 
-/// Rules in force that bound the parameter, none of them by an equality.
-fn cutting_rules(space: &Space, action: usize, parameter: &Parameter) -> Vec<usize> {
+/// The rules in force that bound the parameter; none if any rule sets it by an equality.
+fn cutting_rules(space: &Space, in_force: &RulesInForce, action: usize, parameter: &Parameter) -> Vec<usize> {
     let local = space.actions[action].parameters.iter().position(|known| known.name == parameter.name);
-    let bounds = bounds(space, action);
-    let on_it = || bounds.iter().filter(|bound| Some(bound.local) == local);
+    let on_it = || space.bounds[action].iter().filter(|bound| Some(bound.local) == local);
     if on_it().any(|bound| bound.op == Comparison::Equal) {
         return Vec::new();
     }
     let mut rules: Vec<usize> =
-        on_it().filter_map(|bound| bound.rule).filter(|rule| !space.rules[*rule].optional).collect();
+        on_it().filter_map(|bound| bound.rule).filter(|rule| in_force.contains(*rule)).collect();
     rules.sort_unstable();
     rules.dedup();
     rules
@@ -105,18 +106,17 @@ pub struct Removal {
     pub percent_max: f64,
 }
 
-/// What a rule by itself removes from the ranges of the rows that it binds; nothing for a rule that
-/// bounds no range.
+/// What a rule by itself removes from the ranges of the rows that it binds; empty if the rule bounds no
+/// range.
 pub fn removals(space: &Space, rule: usize) -> Vec<Removal> {
+    let alone = RulesInForce::only(space, rule);
     let mut found: Vec<Removal> = Vec::new();
     for row in space.rows.iter().filter(|row| row.rules.contains(&rule)) {
         let action = &space.actions[row.action];
-        let bounds = bounds(space, row.action);
-        let values = locals(action, row, &[]);
         for road in &space.roads {
-            let prover = Prover { space, row, values: &values, bounds: &bounds, road: Some(road) };
-            let settled = prover.settle(&[rule]);
-            for bound in bounds.iter().filter(|bound| bound.rule == Some(rule)) {
+            let rules = RowRules { space, row, road: Some(&road.facts), in_force: &alone };
+            let settled = rules.settle();
+            for bound in rules.bounds().filter(|bound| bound.rule.is_some()) {
                 let parameter = &action.parameters[bound.local];
                 let kept = settled.as_ref().map(|settled| settled[bound.local].interval());
                 let Some(percent) = removed_percent(&parameter.domain, kept) else { continue };
@@ -140,7 +140,8 @@ pub fn removals(space: &Space, rule: usize) -> Vec<Removal> {
     found
 }
 
-/// `None` for what is no range, or a range of one number; all of it if nothing is kept.
+/// How much of a range is removed, in percent; `None` if the domain is a list or a single number. `kept` is
+/// `None` if nothing is left.
 fn removed_percent(domain: &Domain, kept: Option<Interval>) -> Option<f64> {
     let Domain::Range(low, high) = domain else { return None };
     let whole = high.checked_sub(*low).filter(|whole| *whole > Rational::ZERO)?;

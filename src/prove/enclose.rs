@@ -4,10 +4,10 @@
 //! proof and "may be true" is not.
 
 use crate::model::expr::{Arithmetic, Comparison, Expr, ExprKind, Fact};
-use crate::model::{FnDef, Interval, RoadFacts};
+use crate::model::{FnDef, Interval, RoadFacts, Value};
 use crate::units::Rational;
 
-/// Enums have at most so many variants, so that a set of them is one integer.
+/// The most variants of an enum: a set of them fits one integer.
 pub(crate) const VARIANTS_MAX: usize = 128;
 
 /// A set of values of one type.
@@ -37,6 +37,17 @@ impl Values {
 
     pub fn truth(value: bool) -> Values {
         Values::Truth { may_hold: value, may_fail: !value }
+    }
+
+    /// One value alone.
+    pub fn point(value: Value) -> Values {
+        match value {
+            Value::Bool(truth) => Values::truth(truth),
+            Value::Variant(_, variant) => Values::Variants(1 << variant),
+            Value::Number(number) => {
+                Values::Number(Rational::from_f64(number).map_or(Interval::ALL, Interval::point))
+            }
+        }
     }
 
     pub fn may_hold(self) -> bool {

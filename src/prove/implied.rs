@@ -1,34 +1,33 @@
-//! Rules that change nothing: they hold by themselves, or follow from others.
+//! Rules that change nothing: they always hold, or they follow from other rules.
 
-use crate::model::{Bound, Row, RuleBody, Space, bounds, code};
+use crate::model::rules::{Demand, RowRules};
+use crate::model::{Row, RuleBody, RulesInForce, Space, code};
 use crate::prove::enclose::enclose;
-use crate::prove::reach::Prover;
 use crate::syntax::{Diagnostic, listed};
 
-/// Rows times rules looked at for all rules together, at most: what is left then is not judged.
+/// Limit on rows times rules for the whole report; rules beyond it are not looked at.
 const WORK_MAX: usize = 1_000_000;
 
-/// One warning for each rule that could never refuse anything, whatever the road and the memory. Of
-/// two that follow from each other the later one is named.
+/// One warning for each rule that can never refuse anything, on any road and with any memory. If two rules
+/// follow from each other, the later one is named.
 pub(super) fn report(space: &Space) -> Vec<Diagnostic> {
     let mut diagnostics = Vec::new();
     let mut work = WORK_MAX;
-    let bounds: Vec<Vec<Bound>> = (0..space.actions.len()).map(|action| bounds(space, action)).collect();
-    let mut kept: Vec<usize> = (0..space.rules.len()).filter(|rule| !space.rules[*rule].optional).collect();
+    let mut kept = RulesInForce::by_default(space);
     for rule in (0..space.rules.len()).rev() {
-        let others: Vec<usize> = kept.iter().copied().filter(|other| *other != rule).collect();
-        if !follows(space, rule, &others, &bounds, &mut work) {
+        let others = kept.except(rule);
+        if !follows(space, rule, &others, &mut work) {
             continue;
         }
-        kept = others.clone();
-        let mut reasons = others;
-        for other in reasons.clone() {
-            let fewer: Vec<usize> = reasons.iter().copied().filter(|known| *known != other).collect();
-            if follows(space, rule, &fewer, &bounds, &mut work) {
+        let mut reasons = others.clone();
+        for other in others.all() {
+            let fewer = reasons.except(other);
+            if follows(space, rule, &fewer, &mut work) {
                 reasons = fewer;
             }
         }
-        diagnostics.push(warning(space, rule, &reasons));
+        kept = others;
+        diagnostics.push(warning(space, rule, &reasons.all().collect::<Vec<_>>()));
     }
     diagnostics
 }
@@ -50,12 +49,12 @@ fn warning(space: &Space, rule: usize, reasons: &[usize]) -> Diagnostic {
     warning.help("remove it, or make it the stricter one")
 }
 
-/// Whether the rule holds for every row that it binds and every value that `others` leave; false also
-/// where that would be too much work.
-fn follows(space: &Space, rule: usize, others: &[usize], bounds: &[Vec<Bound>], work: &mut usize) -> bool {
+/// Whether the rule holds for every row that it binds and every value that `others` leave; also `false` if
+/// the work left does not suffice.
+fn follows(space: &Space, rule: usize, others: &RulesInForce, work: &mut usize) -> bool {
     let bound = || space.rows.iter().filter(|row| row.rules.contains(&rule));
     let count = bound().count();
-    let Some(left) = work.checked_sub(count * (1 + others.len())) else { return false };
+    let Some(left) = work.checked_sub(count * (1 + others.all().count())) else { return false };
     *work = left;
     if count == 0 {
         return false;
@@ -63,7 +62,7 @@ fn follows(space: &Space, rule: usize, others: &[usize], bounds: &[Vec<Bound>], 
     match &space.rules[rule].body {
         RuleBody::Moves { state, allowed, .. } => {
             let all = allowed.iter().flatten().all(|allowed| *allowed);
-            all || others.iter().any(|other| match &space.rules[*other].body {
+            all || others.all().any(|other| match &space.rules[other].body {
                 RuleBody::Moves { state: same, allowed: stricter, .. } => {
                     let pairs = stricter.iter().flatten().zip(allowed.iter().flatten());
                     same == state && pairs.into_iter().all(|(stricter, allowed)| *allowed || !*stricter)
@@ -71,19 +70,15 @@ fn follows(space: &Space, rule: usize, others: &[usize], bounds: &[Vec<Bound>], 
                 RuleBody::Holds(_) => false,
             })
         }
-        RuleBody::Holds(_) => bound().all(|row| holds(space, row, rule, others, &bounds[row.action])),
+        RuleBody::Holds(_) => bound().all(|row| holds(space, row, rule, others)),
     }
 }
 
-fn holds(space: &Space, row: &Row, rule: usize, others: &[usize], bounds: &[Bound]) -> bool {
-    let RuleBody::Holds(bindings) = &space.rules[rule].body else { return false };
-    let values = crate::model::locals(&space.actions[row.action], row, &[]);
-    let prover = Prover { space, row, values: &values, bounds, road: None };
-    let in_force: Vec<usize> = others.iter().copied().filter(|other| row.rules.contains(other)).collect();
-    // A row that the others leave dead would make everything true of it.
-    let Some(locals) = prover.settle(&in_force) else { return false };
+fn holds(space: &Space, row: &Row, rule: usize, others: &RulesInForce) -> bool {
+    let Some(Demand::Holds(condition)) = space.rules[rule].body.demand(row.action) else { return false };
+    let rules = RowRules { space, row, road: None, in_force: others };
+    // If the other rules leave the row no value, the row says nothing about this rule.
+    let Some(locals) = rules.settle() else { return false };
     let after = space.cells_after(row.action, &locals, &space.cells_unknown());
-    let known = prover.known(&locals, &after);
-    let mut conditions = bindings.iter().filter(|binding| binding.action == row.action);
-    conditions.all(|binding| !enclose(&binding.condition, &known).may_fail())
+    !enclose(condition, &rules.known(&locals, &after)).may_fail()
 }

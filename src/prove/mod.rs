@@ -1,7 +1,8 @@
-//! What can be proved of a sound space beyond which rows are dead, and what only a search can show.
+//! What holds of a space whatever is drawn: which rows are dead, which rules are idle, which spawns are
+//! unfair.
 //!
-//! A proof goes over exact intervals (`reach`, `enclose`), so it may say too little, never too much.
-//! A witness is found by search and judged by the evaluator that drawing uses.
+//! A proof works on exact intervals (`enclose`, `reach`), so it may say too little, never too much. It goes
+//! over the demands and bounds of `model::rules`. A witness is found by search and judged as drawing judges.
 
 mod cells;
 mod clock;
@@ -19,7 +20,7 @@ mod witness;
 pub(crate) use clock::{forbids, next_rows, shortest_way};
 pub use cut::{Removal, removals};
 pub(crate) use enclose::{Known, VARIANTS_MAX, Values, enclose};
-pub(crate) use reach::{Prover, product_size, rows};
+pub(crate) use reach::{product_size, rows};
 pub use witness::{Witness, witness};
 
 use crate::model::Space;

@@ -1,23 +1,23 @@
 //! The rows of the action table, and what can be proved of each on each road.
 //!
-//! A row is dead on a road if no draw can satisfy the rules there: a proof by intervals. A row that
-//! is not proved dead is open, which promises nothing: what lies around the car is not known here.
+//! A row is dead on a road if intervals prove that no draw satisfies the rules there. Every other row is
+//! open. An open row may still fail: what lies around the car is not known here.
 
 use std::sync::Arc;
 
 use crate::model::expr::Expr;
+use crate::model::rules::{Bound, Demand, RowRules, allowed};
 use crate::model::{
-    ActionDef, Bound, Domain, Facts, Interval, Memory, Reach, Road, Row, RuleBody, Space, Type, Value,
-    allowed, bounds, code, evaluate,
+    ActionDef, Domain, Facts, Interval, Memory, Parameter, Reach, Road, Row, RulesInForce, Space, Type,
+    Value, code, evaluate, locals,
 };
 use crate::prove::enclose::{Known, Values, enclose};
 use crate::syntax::{Diagnostic, listed};
-use crate::units::Rational;
 
-/// Rounds of narrowing: a bound may wait for another one, rarely for two.
+/// Rounds of narrowing: a bound may depend on another one, rarely on two.
 const ROUNDS: usize = 3;
 
-/// The rows that an action multiplies to, its conditions left aside.
+/// The number of rows of an action before its `where`s remove any.
 pub(crate) fn product_size(action: &ActionDef) -> u64 {
     let sizes = action.parameters.iter().filter(|parameter| parameter.axis).map(|axis| match &axis.domain {
         Domain::Values(values) => values.len() as u64,
@@ -28,9 +28,9 @@ pub(crate) fn product_size(action: &ActionDef) -> u64 {
 
 /// All rows, in order.
 pub(crate) fn rows(space: &Space) -> Vec<Row> {
+    let in_force = RulesInForce::by_default(space);
     let mut rows = Vec::new();
     for (index, action) in space.actions.iter().enumerate() {
-        let bounds = bounds(space, index);
         let rules: Arc<[usize]> =
             (0..space.rules.len()).filter(|rule| space.rules[*rule].body.binds(index)).collect();
         for values in products(space, action) {
@@ -47,9 +47,8 @@ pub(crate) fn rows(space: &Space) -> Vec<Row> {
             let label = format!("{}({})", action.name, shown.join(", "));
             let rules = rules.clone();
             let row = Row { index: rows.len(), action: index, axes, label, rules, roads: Vec::new() };
-            let reach = |road: &Road| {
-                Prover { space, row: &row, values: &values, bounds: &bounds, road: Some(road) }.reach()
-            };
+            let rules = RowRules { space, row: &row, road: None, in_force: &in_force };
+            let reach = |road: &Road| RowRules { road: Some(&road.facts), ..rules }.reach();
             let roads = space.roads.iter().map(reach).collect();
             rows.push(Row { roads, ..row });
         }
@@ -58,13 +57,12 @@ pub(crate) fn rows(space: &Space) -> Vec<Row> {
 }
 
 /// All values that an expression of the row's action may have by the parameters' own ranges and
-/// conditions, whatever the road and the memory; `None` if they leave no value.
-pub(crate) fn spawn_figures(space: &Space, row: &Row, bounds: &[Bound], expr: &Expr) -> Option<Interval> {
-    let values = crate::model::locals(&space.actions[row.action], row, &[]);
-    let prover = Prover { space, row, values: &values, bounds, road: None };
-    let locals = prover.settle(&[])?;
+/// conditions, whatever the road, the rules and the memory; `None` if they leave no value.
+pub(crate) fn spawn_figures(space: &Space, row: &Row, expr: &Expr) -> Option<Interval> {
+    let rules = RowRules { space, row, road: None, in_force: &RulesInForce::none(space) };
+    let locals = rules.settle()?;
     let after = space.cells_after(row.action, &locals, &space.cells_unknown());
-    Some(enclose(expr, &prover.known(&locals, &after)).interval())
+    Some(enclose(expr, &rules.known(&locals, &after)).interval())
 }
 
 /// The values of all parameters for each row of an action; those that are drawn hold a placeholder.
@@ -97,23 +95,10 @@ fn products(space: &Space, action: &ActionDef) -> Vec<Vec<Value>> {
     rows
 }
 
-/// One row on one road.
-pub(crate) struct Prover<'a> {
-    pub space: &'a Space,
-    pub row: &'a Row,
-    /// Values of all parameters; only those of axes mean something.
-    pub values: &'a [Value],
-    pub bounds: &'a [Bound],
-    /// `None`: any road.
-    pub road: Option<&'a Road>,
-}
-
-impl Prover<'_> {
-    fn reach(&self) -> Reach {
+impl RowRules<'_> {
+    fn reach(self) -> Reach {
         let parameters = &self.space.actions[self.row.action].parameters;
-        let in_force: Vec<usize> =
-            self.row.rules.iter().copied().filter(|rule| !self.space.rules[*rule].optional).collect();
-        if let Some(locals) = self.settle(&in_force) {
+        if let Some(locals) = self.settle() {
             let drawn = parameters.iter().zip(locals).filter(|(parameter, _)| !parameter.axis);
             let ranges = drawn.filter_map(|(parameter, values)| match values {
                 Values::Number(interval) => Some((parameter.name.clone(), interval)),
@@ -121,31 +106,29 @@ impl Prover<'_> {
             });
             return Reach::Open(ranges.collect());
         }
-        // A minimal conflict: drop every rule without which the row is dead all the same.
-        let mut rules = in_force;
-        for rule in rules.clone() {
-            let without: Vec<usize> = rules.iter().copied().filter(|kept| *kept != rule).collect();
-            if self.settle(&without).is_none() {
-                rules = without;
+        // A minimal conflict: drop every rule without which the row is still dead.
+        let mut conflict = self.in_force.clone();
+        for rule in self.in_force.on_row(self.row) {
+            let fewer = conflict.except(rule);
+            if (RowRules { in_force: &fewer, ..self }).settle().is_none() {
+                conflict = fewer;
             }
         }
+        let rules: Vec<usize> = conflict.on_row(self.row).collect();
         Reach::Dead { reason: self.reason(&rules), rules }
     }
 
-    /// All values that the drawn parameters may have under these rules; `None` if there are none.
-    pub fn settle(&self, rules: &[usize]) -> Option<Vec<Values>> {
-        self.narrow(self.declared(), &self.space.cells_unknown(), rules)
+    /// All values that the parameters may have under the rules in force; `None` if the rules leave none.
+    pub fn settle(self) -> Option<Vec<Values>> {
+        self.narrow(declared(self.space, self.row), &self.space.cells_unknown())
     }
 
-    /// The same, begun with these values of the parameters and cells.
-    pub fn narrow(&self, mut locals: Vec<Values>, before: &[Values], rules: &[usize]) -> Option<Vec<Values>> {
+    /// As [`RowRules::settle`], begun with these values of the parameters and cells.
+    pub fn narrow(self, mut locals: Vec<Values>, before: &[Values]) -> Option<Vec<Values>> {
         for _ in 0..ROUNDS {
             let was = locals.clone();
             let after = self.space.cells_after(self.row.action, &locals, before);
-            for bound in self.bounds {
-                if bound.rule.is_some_and(|rule| !rules.contains(&rule)) {
-                    continue;
-                }
+            for bound in self.bounds() {
                 let known = self.known(&locals, &after);
                 if bound.guards.iter().any(|guard| enclose(guard, &known).may_fail()) {
                     continue;
@@ -157,18 +140,15 @@ impl Prover<'_> {
                 }
                 locals[bound.local] = Values::Number(narrowed);
             }
-            // What changed nothing will change nothing again.
+            // A round that changes nothing is the last.
             if locals == was {
                 break;
             }
         }
         let after = self.space.cells_after(self.row.action, &locals, before);
-        let possible = rules.iter().all(|rule| match &self.space.rules[*rule].body {
-            RuleBody::Holds(bindings) => bindings
-                .iter()
-                .filter(|binding| binding.action == self.row.action)
-                .all(|binding| enclose(&binding.condition, &self.known(&locals, &after)).may_hold()),
-            RuleBody::Moves { state, allowed, .. } => match after[self.space.states[*state].first_cell] {
+        let possible = self.demands().all(|(_, demand)| match demand {
+            Demand::Holds(condition) => enclose(condition, &self.known(&locals, &after)).may_hold(),
+            Demand::Moves { state, allowed } => match after[self.space.states[state].first_cell] {
                 Values::Variants(set) => {
                     (0..allowed.len()).any(|to| set >> to & 1 == 1 && allowed.iter().any(|from| from[to]))
                 }
@@ -178,34 +158,14 @@ impl Prover<'_> {
         possible.then_some(locals)
     }
 
-    pub fn known<'a>(&'a self, locals: &'a [Values], cells: &'a [Values]) -> Known<'a> {
-        Known { functions: &self.space.functions, locals, cells, road: self.road.map(|road| &road.facts) }
+    pub fn known<'k>(&'k self, locals: &'k [Values], cells: &'k [Values]) -> Known<'k> {
+        Known { functions: &self.space.functions, locals, cells, road: self.road }
     }
 
-    /// What the parameters may be before any rule.
-    pub fn declared(&self) -> Vec<Values> {
+    /// What each rule of a conflict wants, in words.
+    fn reason(self, rules: &[usize]) -> String {
         let parameters = &self.space.actions[self.row.action].parameters;
-        let point = |value: &Value| match value {
-            Value::Bool(truth) => Values::truth(*truth),
-            Value::Variant(_, variant) => Values::Variants(1 << variant),
-            Value::Number(number) => {
-                Values::Number(Rational::from_f64(*number).map_or(Interval::ALL, Interval::point))
-            }
-        };
-        let all = |(parameter, value): (&crate::model::Parameter, &Value)| match &parameter.domain {
-            _ if parameter.axis => point(value),
-            Domain::Range(low, high) => Values::Number(Interval::closed(*low, *high)),
-            Domain::Values(values) => {
-                values.iter().map(point).reduce(Values::union).unwrap_or(Values::UNKNOWN_TRUTH)
-            }
-        };
-        parameters.iter().zip(self.values).map(all).collect()
-    }
-
-    /// What each rule of a conflict leaves, in words.
-    fn reason(&self, rules: &[usize]) -> String {
-        let parameters = &self.space.actions[self.row.action].parameters;
-        let locals = self.declared();
+        let locals = declared(self.space, self.row);
         let before = self.space.cells_unknown();
         let after = self.space.cells_after(self.row.action, &locals, &before);
         let known = self.known(&locals, &after);
@@ -213,7 +173,7 @@ impl Prover<'_> {
         for rule in rules {
             let name = &self.space.rules[*rule].name;
             let mut figures = Vec::new();
-            for bound in self.bounds.iter().filter(|bound| bound.rule == Some(*rule)) {
+            for bound in self.bounds().filter(|bound| bound.rule == Some(*rule)) {
                 let parameter = &parameters[bound.local];
                 let limit = allowed(bound.op, &enclose(&bound.limit, &known).interval());
                 let unit = match parameter.ty {
@@ -239,20 +199,32 @@ impl Prover<'_> {
             },
         }
     }
-}
 
-impl Prover<'_> {
-    /// What a rule that bounds no number says of the row.
-    fn without_figures(&self, name: &str) -> String {
+    /// The words for a rule that bounds no number.
+    fn without_figures(self, name: &str) -> String {
         match self.row.axes.is_empty() {
             true => format!("rule `{name}` never holds"),
-            // Other rows of the action may well obey it.
+            // Other rows of the action may obey the rule.
             false => format!("rule `{name}` cannot hold in `{}`", self.row.label),
         }
     }
 }
 
-/// What is to be said about rows: actions without any, dead rows, masked rows.
+/// What the parameters of a row may be before any rule.
+pub(crate) fn declared(space: &Space, row: &Row) -> Vec<Values> {
+    let action = &space.actions[row.action];
+    let all = |(parameter, value): (&Parameter, Value)| match &parameter.domain {
+        _ if parameter.axis => Values::point(value),
+        Domain::Range(low, high) => Values::Number(Interval::closed(*low, *high)),
+        Domain::Values(values) => {
+            let points = values.iter().map(|value| Values::point(*value));
+            points.reduce(Values::union).unwrap_or(Values::UNKNOWN_TRUTH)
+        }
+    };
+    action.parameters.iter().zip(locals(action, row, &[])).map(all).collect()
+}
+
+/// Diagnostics about rows: actions that have none, dead rows, masked rows.
 pub(crate) fn report(space: &Space) -> Vec<Diagnostic> {
     let mut diagnostics = Vec::new();
     for (index, action) in space.actions.iter().enumerate() {
@@ -289,7 +261,7 @@ fn report_dead(space: &Space, action: &ActionDef, rows: &[&Row]) -> Vec<Diagnost
         let error = error.help("widen a range, change a rule, or remove the rows with `where`");
         let error =
             rules.iter().fold(error, |error, rule| error.beside(space.rules[*rule].span, "by this rule"));
-        let bounded = bounds(space, gone[0].action);
+        let bounded = &space.bounds[gone[0].action];
         let is_bounded = |local: usize| {
             let of_conflict = |bound: &Bound| bound.rule.is_some_and(|rule| rules.contains(&rule));
             bounded.iter().any(|bound| bound.local == local && of_conflict(bound))

@@ -1,11 +1,11 @@
-//! Expressions as far as they can be computed beforehand: calls opened, constants folded.
+//! Expressions computed as far as possible beforehand: calls are replaced by bodies, constants are folded.
 
 use crate::model::expr::{Expr, ExprKind};
 use crate::model::{FnDef, Type};
 use crate::prove::enclose::{Known, Values, enclose};
 use crate::syntax::ast::Span;
 
-/// The expression with its locals replaced, without calls and without places in a text, so that two
+/// The expression with its locals replaced, its calls opened and its spans removed, so that two expressions
 /// of the same form are equal.
 pub(super) fn reduce(expr: &Expr, functions: &[FnDef], locals: &[Expr]) -> Expr {
     let inner = |expr: &Expr| Box::new(reduce(expr, functions, locals));
@@ -54,7 +54,7 @@ pub(super) fn reduce(expr: &Expr, functions: &[FnDef], locals: &[Expr]) -> Expr 
     fold(Expr { kind, ty: expr.ty, span: Span::NONE })
 }
 
-/// A literal, where the value is certain without knowing anything.
+/// A literal, if the expression depends on nothing that is open.
 fn fold(expr: Expr) -> Expr {
     let open = |kind: &ExprKind| {
         matches!(

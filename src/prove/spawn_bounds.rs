@@ -3,17 +3,16 @@
 use core::ops::RangeInclusive;
 
 use crate::model::expr::Expr;
-use crate::model::{EffectDef, Interval, SPAWN_DISTANCE_M, SPAWN_SPEED_MPS, Space, bounds, code};
+use crate::model::{EffectDef, Interval, SPAWN_DISTANCE_M, SPAWN_SPEED_MPS, Space, code};
 use crate::prove::reach::spawn_figures;
 use crate::syntax::Diagnostic;
 use crate::units::Rational;
 
-/// Every spawn whose speed or distance may leave its bounds, once, with the first row that shows it.
-/// Rules do not count: `--without` can switch them off.
+/// One error for each speed or distance of a spawn that may leave its bounds, with the first row that shows
+/// it. Rules are ignored, because `--without` can switch them off.
 pub(crate) fn report(space: &Space) -> Vec<Diagnostic> {
     let mut diagnostics = Vec::new();
     for (index, action) in space.actions.iter().enumerate() {
-        let bounds = bounds(space, index);
         for effect in &action.effects {
             let EffectDef::Spawn(spawn) = effect else { continue };
             let figures: [(&str, &str, &Expr, &RangeInclusive<f64>); 2] = [
@@ -23,7 +22,7 @@ pub(crate) fn report(space: &Space) -> Vec<Diagnostic> {
             for (what, unit, expr, range) in figures {
                 let mut rows = space.rows.iter().filter(|row| row.action == index);
                 let found = rows.find_map(|row| {
-                    let found = spawn_figures(space, row, &bounds, expr)?;
+                    let found = spawn_figures(space, row, expr)?;
                     (!lies_in(&found, range)).then_some((row, found))
                 });
                 let Some((row, found)) = found else { continue };

@@ -1,7 +1,8 @@
 //! Rows that are the same action under two names.
 //!
-//! Two rows are the same if, with their axes put in, they draw the same, do the same and are bound
-//! by the same conditions. Compared is the form, so equal rows in different words may be missed.
+//! Two rows are the same if, with the values of their axes put in, they draw the same parameters, have the
+//! same effects and are bound by the same conditions. Forms are compared, not meanings, so equal rows that
+//! are written differently may be missed.
 
 use std::collections::BTreeMap;
 
@@ -12,7 +13,7 @@ use crate::syntax::Diagnostic;
 use crate::syntax::ast::Span;
 use crate::units::Rational;
 
-/// Longer tables are not searched for equal rows.
+/// Tables with more rows than this are not searched for equal rows.
 const ROWS_MAX: usize = 10_000;
 
 /// Pairs listed for two actions, at most.
@@ -67,7 +68,7 @@ pub(super) fn report(space: &Space) -> Vec<Diagnostic> {
     pairs.into_iter().map(warning).collect()
 }
 
-/// Everything that a row is, as text: equal for equal rows.
+/// The row as text; equal rows have equal texts.
 fn form(space: &Space, row: &Row) -> String {
     let action = &space.actions[row.action];
     let functions = &space.functions;

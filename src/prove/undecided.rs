@@ -1,13 +1,13 @@
-//! Rows of which nothing is known: neither proved dead nor seen to run.
+//! Rows that are neither proved dead nor found to run.
 
 use std::cell::Cell;
 
-use crate::model::{Reach, Row, Space, bounds, code};
+use crate::model::{Reach, Row, Space, code};
 use crate::prove::reach::numbers;
 use crate::prove::witness::witness_within;
 use crate::syntax::{Diagnostic, listed};
 
-/// Boxes of ranges looked at in the search for witnesses, at most; most rows need one for each road.
+/// The most boxes of ranges that the search for witnesses looks at; most rows need one for each road.
 const BOXES_MAX: usize = 20_000;
 
 /// One warning for each action and road with such rows.
@@ -15,15 +15,14 @@ pub(super) fn report(space: &Space) -> Vec<Diagnostic> {
     let mut diagnostics = Vec::new();
     let boxes_left = Cell::new(BOXES_MAX);
     for (action, definition) in space.actions.iter().enumerate() {
-        let bounds = bounds(space, action);
         for (index, road) in space.roads.iter().enumerate() {
             let mut unknown: Vec<&Row> = Vec::new();
             for row in space.rows.iter().filter(|row| row.action == action) {
                 if matches!(row.roads[index], Reach::Dead { .. }) || boxes_left.get() == 0 {
                     continue;
                 }
-                // A search that was cut short says nothing.
-                if witness_within(space, row, road, &bounds, &boxes_left).is_none() && boxes_left.get() > 0 {
+                // A search that ran out of boxes shows nothing.
+                if witness_within(space, row, road, &boxes_left).is_none() && boxes_left.get() > 0 {
                     unknown.push(row);
                 }
             }

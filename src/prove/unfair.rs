@@ -1,28 +1,28 @@
-//! Spawns that nobody could avoid: at some legal speed they lie within the stopping distance of a
-//! careful driver.
+//! Unfair spawns: at some legal speed they lie within the stopping distance of a careful driver.
 //!
 //! The driver is that of UN R157 (Annex 4, Appendix 3): 0.4 s of perception, 0.75 s of reaction, then
-//! 0.774 g. What the brake takes to build up is left out here: it only adds to the distance, and a
-//! lower bound is what a proof needs. The world has the whole of it (`spawn_gap >= safety_gap`).
+//! 0.774 g. The time in which the brake builds up is left out: it only adds to the distance, and this proof
+//! needs a lower bound. The world computes the whole distance (`spawn_gap >= safety_gap`).
 
 use std::cell::Cell;
 
+use crate::model::rules::{Demand, RowRules};
 use crate::model::vocabulary::{Verb, Word};
 use crate::model::{
-    EffectDef, Facts, Memory, Reach, Road, Row, RuleBody, Space, SpawnDef, Value, bounds, code, evaluate,
+    EffectDef, Facts, Memory, Reach, Road, Row, RulesInForce, Space, SpawnDef, Value, code, evaluate, locals,
 };
 use crate::prove::witness::{Search, Witness};
 use crate::syntax::Diagnostic;
 use crate::units::decimal;
 
-/// Boxes of ranges looked at for all actions together, at most, each having its share.
+/// The most boxes of ranges looked at for all actions together; each action has an equal share.
 const BOXES_MAX: usize = 50_000;
 
 /// Perception and reaction, s.
 const REACTION_S: f64 = 0.4 + 0.75;
 /// 0.774 g, m/s².
 const BRAKING_MPS2: f64 = 0.774 * 9.80665;
-/// What is nearer than that by less is a matter of rounding, m.
+/// A smaller difference between the distances is taken for rounding, m.
 const MARGIN_M: f64 = 0.01;
 
 /// One remark for each action that can spawn unfairly on some road, with the speeds that show it.
@@ -46,8 +46,8 @@ pub(super) fn report(space: &Space) -> Vec<Diagnostic> {
     diagnostics
 }
 
-/// Values with which a row spawns within the stopping distance on a road; `None` if a rule asks the
-/// world about the gap, which then decides, or if none are found.
+/// Values with which a row spawns within the stopping distance on a road; `None` if none are found, or if a
+/// rule asks the world about the gap and so decides by itself.
 pub(super) fn unfair(
     space: &Space,
     row: &Row,
@@ -55,29 +55,23 @@ pub(super) fn unfair(
     spawn: &SpawnDef,
     boxes_left: &Cell<usize>,
 ) -> Option<Witness> {
-    let rules: Vec<usize> = row.rules.iter().copied().filter(|rule| !space.rules[*rule].optional).collect();
-    let asks = |rule: &usize| match &space.rules[*rule].body {
-        RuleBody::Holds(bindings) => {
-            bindings.iter().any(|binding| binding.action == row.action && binding.condition.needs_survey())
-        }
-        RuleBody::Moves { .. } => false,
-    };
-    if rules.iter().any(asks) {
+    let in_force = RulesInForce::by_default(space);
+    let rules = RowRules { space, row, road: Some(&road.facts), in_force: &in_force };
+    let asks = |demand| matches!(demand, Demand::Holds(condition) if condition.needs_survey());
+    if rules.demands().any(|(_, demand)| asks(demand)) {
         return None;
     }
-    let bounds = bounds(space, row.action);
-    let search = Search { space, row, road, rules, bounds: &bounds, boxes_left };
-    search.find(&|values, memory| {
+    Search { rules, boxes_left }.find(&|values, memory| {
         let figures = figures(space, road, spawn, values, memory);
         figures.needed_m > figures.distance_m + MARGIN_M
     })
 }
 
-/// What a driver at the road's limit meets.
+/// The spawn, and the gap that a driver at the road's limit needs.
 struct Figures {
     speed_mps: f64,
     distance_m: f64,
-    /// At least.
+    /// The gap that the driver needs at least.
     needed_m: f64,
 }
 
@@ -91,7 +85,7 @@ fn figures(space: &Space, road: &Road, spawn: &SpawnDef, values: &[Value], memor
         Verb::DriveAhead => braked_m((ego_mps - speed_mps).max(0.0)),
         Verb::DriveOpposite => braked_m(ego_mps) + speed_mps * (REACTION_S + ego_mps / BRAKING_MPS2),
         Verb::CrossRoad | Verb::Walk | Verb::Stand => braked_m(ego_mps),
-        // Who comes from behind sees the ego vehicle, which need do nothing.
+        // A vehicle from behind sees the ego vehicle, which need do nothing.
         Verb::Overtake => 0.0,
     };
     Figures { speed_mps, distance_m, needed_m }
@@ -99,7 +93,7 @@ fn figures(space: &Space, road: &Road, spawn: &SpawnDef, values: &[Value], memor
 
 fn remark(space: &Space, row: &Row, road: &Road, spawn: &SpawnDef, found: &Witness) -> Diagnostic {
     let action = &space.actions[row.action];
-    let values = crate::model::locals(action, row, &found.values);
+    let values = locals(action, row, &found.values);
     let after = space.memory_after(row.action, &values, &found.memory);
     let figures = figures(space, road, spawn, &values, &after);
     let facts = Facts { road: Some(&road.facts), ..Facts::new(&values, &after) };

@@ -1,32 +1,34 @@
 //! Witnesses: values with which a row runs on a road, found by search.
 //!
-//! The search narrows the ranges by exact intervals, tries the middle and the ends of what is left,
-//! and halves it where nothing fits. What it finds is judged in f64 by the evaluator that drawing
-//! uses. The world around is taken to be empty: a spawn lands where it was asked to, and nobody needs
-//! room. What it does not find may exist all the same.
+//! The search narrows the ranges by exact intervals, tries the ends and the middle of what is left, and
+//! halves the box where nothing fits. Each try is solved and judged as a draw is, in f64. The world around is
+//! taken to be empty: a spawn lands where it was asked to, and no gap is too small. Values that the search
+//! does not find may still exist.
 
 use std::cell::Cell;
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-use crate::model::expr::{Comparison, Expr, ExprKind};
+use crate::model::expr::{Expr, ExprKind};
+use crate::model::rules::{Candidate, Demand, Room, RowRules};
 use crate::model::{
-    ActionDef, Bound, Domain, EffectDef, End, Facts, Initial, Interval, Memory, Road, Row, RuleBody,
-    SPAWN_DISTANCE_M, SPAWN_SPEED_MPS, Space, StateDef, Type, Value, bounds, evaluate, locals,
+    ActionDef, Domain, EffectDef, End, Facts, Initial, Interval, Memory, Parameter, Road, Row, RulesInForce,
+    Space, StateDef, Type, Value, evaluate, locals, spawn_out_of_bounds,
 };
 use crate::prove::enclose::Values;
-use crate::prove::reach::Prover;
 use crate::units::Rational;
 
-/// Boxes of ranges looked at for one choice of the listed values and one memory.
+/// The most boxes of ranges looked at for one choice of the listed values and one memory.
 const BOXES_MAX: usize = 24;
-/// Boxes looked at in one search for a single witness.
+/// The most boxes looked at in one search for a single witness.
 const BOXES_IN_ALL_MAX: usize = 20_000;
-/// Choices of listed values, and memories, at most.
+/// The most choices of listed values, and the most memories, that are tried.
 const CHOICES_MAX: usize = 256;
 const MEMORIES_MAX: usize = 64;
+/// Ranges whose ends are tried in every combination; the ranges beyond share the choice of the last.
+const CORNER_BITS: usize = 3;
 
-/// Values with which a row runs, and what is remembered before.
+/// Values with which a row runs, and the memory before it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Witness {
     /// The drawn parameters, as declared.
@@ -36,46 +38,51 @@ pub struct Witness {
 
 /// A witness for a row on a road with the default rules; `None` if the search finds none.
 pub fn witness(space: &Space, row: &Row, road: &Road) -> Option<Witness> {
-    witness_within(space, row, road, &bounds(space, row.action), &Cell::new(BOXES_IN_ALL_MAX))
+    witness_within(space, row, road, &Cell::new(BOXES_IN_ALL_MAX))
 }
 
-/// The same, given the bounds of the row's action, with so many boxes left to look at.
+/// As [`witness`], with so many boxes left to look at.
 pub(super) fn witness_within(
     space: &Space,
     row: &Row,
     road: &Road,
-    bounds: &[Bound],
     boxes_left: &Cell<usize>,
 ) -> Option<Witness> {
-    let rules: Vec<usize> = row.rules.iter().copied().filter(|rule| !space.rules[*rule].optional).collect();
-    Search { space, row, road, rules, bounds, boxes_left }.find(&|_, _| true)
+    let in_force = RulesInForce::by_default(space);
+    let rules = RowRules { space, row, road: Some(&road.facts), in_force: &in_force };
+    Search { rules, boxes_left }.find(&|_, _| true)
 }
 
-/// A search under given rules.
+/// A search for values of a row on a road under the rules in force.
 pub(super) struct Search<'a> {
-    pub space: &'a Space,
-    pub row: &'a Row,
-    pub road: &'a Road,
-    pub rules: Vec<usize>,
-    pub bounds: &'a [Bound],
+    pub rules: RowRules<'a>,
     /// Boxes that may still be looked at; at 0 a search finds nothing more.
     pub boxes_left: &'a Cell<usize>,
 }
 
-/// What is asked of a witness beyond the rules: of all parameters, and the memory after.
+/// Where in a box a candidate is taken from.
+#[derive(Clone, Copy)]
+enum Place {
+    /// Bit `i` says whether the high end of the ith range is taken, or the low end. An end that does not
+    /// belong to its range gives way to the middle.
+    Corner(usize),
+    Middle,
+}
+
+/// What is asked of a witness beyond the rules, given all parameters and the memory after.
 pub(super) type Wish<'a> = dyn Fn(&[Value], &Memory) -> bool + 'a;
 
 impl Search<'_> {
     /// The first values that run and fulfil the wish.
     pub fn find(&self, wish: &Wish<'_>) -> Option<Witness> {
-        let action = &self.space.actions[self.row.action];
-        let choices = choices(action, &locals(action, self.row, &[]));
+        let action = self.action();
+        let choices = choices(action, &locals(action, self.rules.row, &[]));
         for memory in self.memories() {
             for chosen in &choices {
                 if self.boxes_left.get() == 0 {
                     return None;
                 }
-                if let Some(values) = self.numbers(action, chosen, &memory, wish) {
+                if let Some(values) = self.numbers(chosen, &memory, wish) {
                     let drawn = action.parameters.iter().zip(values).filter(|(parameter, _)| !parameter.axis);
                     let values = drawn.map(|(parameter, value)| (parameter.name.clone(), value)).collect();
                     return Some(Witness { values, memory });
@@ -85,65 +92,44 @@ impl Search<'_> {
         None
     }
 
+    fn action(&self) -> &ActionDef {
+        &self.rules.space.actions[self.rules.row.action]
+    }
+
     /// Looks for numbers, given everything that is chosen from lists.
-    fn numbers(
-        &self,
-        action: &ActionDef,
-        chosen: &[Value],
-        memory: &Memory,
-        wish: &Wish<'_>,
-    ) -> Option<Vec<Value>> {
-        let open: Vec<usize> = ranges(action).collect();
-        let values = |value: &Value| match value {
-            Value::Bool(truth) => Values::truth(*truth),
-            Value::Variant(_, variant) => Values::Variants(1 << variant),
-            Value::Number(number) => {
-                Values::Number(Rational::from_f64(*number).map_or(Interval::ALL, Interval::point))
-            }
-        };
-        let before: Vec<Values> = memory.cells().iter().map(values).collect();
-        let mut declared: Vec<Values> = chosen.iter().map(values).collect();
+    fn numbers(&self, chosen: &[Value], memory: &Memory, wish: &Wish<'_>) -> Option<Vec<Value>> {
+        let action = self.action();
+        let open: Vec<usize> = action.drawn_numbers().collect();
+        let before: Vec<Values> = memory.cells().iter().map(|value| Values::point(*value)).collect();
+        let mut declared: Vec<Values> = chosen.iter().map(|value| Values::point(*value)).collect();
         for local in &open {
             if let Domain::Range(low, high) = &action.parameters[*local].domain {
                 declared[*local] = Values::Number(Interval::closed(*low, *high));
             }
         }
-        let prover = Prover {
-            space: self.space,
-            row: self.row,
-            values: chosen,
-            bounds: self.bounds,
-            road: Some(self.road),
-        };
+        let corners = 0..1_usize << open.len().min(CORNER_BITS);
         let mut boxes = VecDeque::from([declared]);
         for _ in 0..BOXES_MAX.min(self.boxes_left.get()) {
             self.boxes_left.set(self.boxes_left.get() - 1);
-            let Some(narrowed) = prover.narrow(boxes.pop_front()?, &before, &self.rules) else { continue };
-            for pick in 0..1_usize << open.len().min(3) {
-                if let Some(found) = self.candidate(action, chosen, &open, &narrowed, pick, memory, wish) {
+            let Some(narrowed) = self.rules.narrow(boxes.pop_front()?, &before) else { continue };
+            for place in corners.clone().map(Place::Corner).chain([Place::Middle]) {
+                let values = self.candidate(chosen, &open, &narrowed, place);
+                if let Some(found) = values.filter(|values| self.runs(values, memory, wish)) {
                     return Some(found);
                 }
-            }
-            if let Some(found) = self.candidate(action, chosen, &open, &narrowed, usize::MAX, memory, wish) {
-                return Some(found);
             }
             boxes.extend(halves(&narrowed, &open));
         }
         None
     }
 
-    /// One point of a box: `pick` says for each range whether its low or its high end is taken, or
-    /// [`usize::MAX`] the middle of all.
-    #[expect(clippy::too_many_arguments, reason = "it is the inside of two loops of `numbers`")]
+    /// One point of a box, its equalities solved as drawing solves them.
     fn candidate(
         &self,
-        action: &ActionDef,
         chosen: &[Value],
         open: &[usize],
         narrowed: &[Values],
-        pick: usize,
-        memory: &Memory,
-        wish: &Wish<'_>,
+        place: Place,
     ) -> Option<Vec<Value>> {
         let mut values = chosen.to_vec();
         for (index, local) in open.iter().enumerate() {
@@ -152,78 +138,48 @@ impl Search<'_> {
                 return None;
             };
             let middle = low.checked_add(high)?.checked_div(Rational::integer(2))?;
-            let end = match pick {
-                usize::MAX => middle,
-                pick if pick >> index.min(2) & 1 == 0 && low_in => low,
-                pick if pick >> index.min(2) & 1 == 1 && high_in => high,
-                _ => middle,
+            let is_high = |corner: usize| corner >> index.min(CORNER_BITS - 1) & 1 == 1;
+            let number = match place {
+                Place::Corner(corner) if is_high(corner) && high_in => high,
+                Place::Corner(corner) if !is_high(corner) && low_in => low,
+                Place::Corner(_) | Place::Middle => middle,
             };
-            values[*local] = Value::Number(end.to_f64());
+            values[*local] = Value::Number(number.to_f64());
         }
-        // Equalities are solved as drawing solves them: once for what waits for nothing, once more for
-        // what waited.
-        for _ in 0..2 {
-            for local in open {
-                for bound in self.bounds.iter().filter(|bound| bound.local == *local) {
-                    let in_force = bound.rule.is_none_or(|rule| self.rules.contains(&rule));
-                    if bound.op != Comparison::Equal || !in_force || !bound.is_known_early() {
-                        continue;
-                    }
-                    let facts = Facts { road: Some(&self.road.facts), ..Facts::new(&values, memory) };
-                    let holds = |guard: &Expr| evaluate(guard, &self.space.functions, &facts).truth();
-                    if bound.guards.iter().all(holds) {
-                        values[*local] =
-                            Value::Number(evaluate(&bound.limit, &self.space.functions, &facts).number());
-                    }
-                }
-            }
-        }
-        self.runs(action, &values, memory, wish).then_some(values)
+        let settle = |_, value: Value, room: &Room| room.settle(value.number()).ok_or(());
+        self.rules.solve(&mut values, open.to_vec(), settle).ok()?;
+        Some(values)
     }
 
     /// Whether these values run in an empty world, and fulfil the wish.
-    fn runs(&self, action: &ActionDef, values: &[Value], memory: &Memory, wish: &Wish<'_>) -> bool {
-        let space = self.space;
-        let in_domain = |(parameter, value): (&crate::model::Parameter, &Value)| {
-            parameter.axis || parameter.domain.holds(*value)
-        };
+    fn runs(&self, values: &[Value], before: &Memory, wish: &Wish<'_>) -> bool {
+        let (space, action) = (self.rules.space, self.action());
+        let in_domain =
+            |(parameter, value): (&Parameter, &Value)| parameter.axis || parameter.domain.holds(*value);
         if !action.parameters.iter().zip(values).all(in_domain) {
             return false;
         }
-        let after = space.memory_after(self.row.action, values, memory);
-        let base = Facts { road: Some(&self.road.facts), ..Facts::new(values, &after) };
-        let number = |expr: &Expr| evaluate(expr, &space.functions, &base).number();
+        let after = &space.memory_after(self.rules.row.action, values, before);
+        let facts = Facts { road: self.rules.road, ..Facts::new(values, after) };
+        let number = |expr: &Expr| evaluate(expr, &space.functions, &facts).number();
         let mut gaps_m = Vec::new();
         for effect in &action.effects {
             let EffectDef::Spawn(spawn) = effect else { continue };
             let (speed_mps, distance_m) = (number(&spawn.speed), number(&spawn.distance));
-            if !SPAWN_SPEED_MPS.contains(&speed_mps) || !SPAWN_DISTANCE_M.contains(&distance_m) {
+            if spawn_out_of_bounds(speed_mps, distance_m).is_some() {
                 return false;
             }
+            // The spawn lands where it was asked to, and no gap is unfair.
             gaps_m.push((distance_m, 0.0));
         }
-        let holds = |condition: &Expr| match condition.needs_survey() {
-            true => gaps_m.iter().all(|gaps_m| {
-                evaluate(condition, &space.functions, &Facts { gaps_m: *gaps_m, ..base }).truth()
-            }),
-            false => evaluate(condition, &space.functions, &base).truth(),
-        };
-        let by_rule = |rule: &usize| match &space.rules[*rule].body {
-            RuleBody::Holds(bindings) => {
-                let mut bindings = bindings.iter().filter(|binding| binding.action == self.row.action);
-                bindings.all(|binding| holds(&binding.condition))
-            }
-            RuleBody::Moves { .. } => space.forbidden_move(&space.rules[*rule], memory, &after).is_none(),
-        };
-        action.parameters.iter().filter_map(|parameter| parameter.condition.as_ref()).all(holds)
-            && self.rules.iter().all(by_rule)
-            && wish(values, &after)
+        let candidate = Candidate { values, before, after, gaps_m: &gaps_m };
+        self.rules.breaches(candidate).next().is_none() && wish(values, after)
     }
 
-    /// What may be remembered: the initial memory first, then every value of the cells that the rules
-    /// or effects of the row read.
+    /// Memories to try: the initial one first, then every value of the cells that the rules or effects of the
+    /// row read.
     fn memories(&self) -> Vec<Memory> {
-        let space = self.space;
+        let space = self.rules.space;
         let mut memories = vec![Memory::default()];
         for state in &space.states {
             let initial = initial(space, state);
@@ -255,18 +211,17 @@ impl Search<'_> {
                 _ => false,
             })
         };
-        let by_rule = |rule: &usize| match &self.space.rules[*rule].body {
-            RuleBody::Holds(bindings) => bindings
-                .iter()
-                .filter(|binding| binding.action == self.row.action)
-                .any(|binding| named(&binding.condition)),
-            RuleBody::Moves { state: moved, .. } => self.space.states[*moved].first_cell == state.first_cell,
+        let by_rule = |demand| match demand {
+            Demand::Holds(condition) => named(condition),
+            Demand::Moves { state: moved, .. } => {
+                self.rules.space.states[moved].first_cell == state.first_cell
+            }
         };
         let by_effect = |effect: &EffectDef| match effect {
             EffectDef::Set(set) => named(&set.value) || set.key.as_ref().is_some_and(named),
             EffectDef::Spawn(spawn) => named(&spawn.speed) || named(&spawn.distance),
         };
-        self.rules.iter().any(by_rule) || self.space.actions[self.row.action].effects.iter().any(by_effect)
+        self.rules.demands().any(|(_, demand)| by_rule(demand)) || self.action().effects.iter().any(by_effect)
     }
 }
 
@@ -276,7 +231,7 @@ fn choices(action: &ActionDef, values: &[Value]) -> Vec<Vec<Value>> {
     for (local, parameter) in action.parameters.iter().enumerate().filter(|(_, p)| !p.axis) {
         let Domain::Values(values) = &parameter.domain else { continue };
         let room = (CHOICES_MAX / chosen.len()).max(1);
-        // What is likelier stands there more than once, and would use up the room.
+        // A value that is likelier stands in the list more than once; one time is enough here.
         let mut different: Vec<Value> = Vec::new();
         for value in values {
             if different.len() < room && !different.contains(value) {
@@ -293,12 +248,6 @@ fn choices(action: &ActionDef, values: &[Value]) -> Vec<Vec<Value>> {
         chosen = longer.collect();
     }
     chosen
-}
-
-/// The drawn parameters with a range.
-fn ranges(action: &ActionDef) -> impl Iterator<Item = usize> {
-    let all = action.parameters.iter().enumerate();
-    all.filter(|(_, p)| !p.axis && matches!(p.domain, Domain::Range(..))).map(|(local, _)| local)
 }
 
 /// The box cut in two across its widest range; nothing if every range is a point.
@@ -325,7 +274,7 @@ fn halves(narrowed: &[Values], open: &[usize]) -> Vec<Vec<Values>> {
     ]
 }
 
-/// What the cells of a state begin as; of what is drawn, the first value.
+/// The value that the cells of a state begin with; the first of its type if it is drawn.
 fn initial(space: &Space, state: &StateDef) -> Value {
     match &state.initial {
         Initial::Value(expr) => evaluate(expr, &space.functions, &Facts::new(&[], &Memory::default())),

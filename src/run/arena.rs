@@ -5,13 +5,13 @@ use std::sync::Arc;
 
 use ndarray::Array1;
 
-use crate::action::{ActionTable, ActiveRules, Offer, Situation};
+use crate::action::{ActionTable, Offer, Situation};
 use crate::ads::Selected;
 use crate::agent::{Agent, Branch, Trial};
 use crate::episode;
 use crate::episode::{Choice, Moment};
 use crate::mdp::ProcKind;
-use crate::model::Road;
+use crate::model::{Road, RulesInForce};
 use crate::oracle::AvoidabilitySettings;
 use crate::rng;
 use crate::rng::Stream;
@@ -24,7 +24,7 @@ use crate::run::summary::EpisodeSummary;
 /// Everything that the episodes of a run or a training share.
 pub struct Arena {
     table: ActionTable,
-    rules: ActiveRules,
+    rules: RulesInForce,
     ads: Selected,
     /// Index of each road in the space, with its scene.
     roads: Vec<(usize, Arc<Scene>)>,
@@ -55,7 +55,7 @@ impl Arena {
             Ok((index, Arc::new(episode::scene(&space.roads[index]))))
         });
         let roads = roads.collect::<Result<_, RunError>>()?;
-        let rules = ActiveRules::new(space, with, without)?;
+        let rules = RulesInForce::new(space, with, without)?;
         Ok(Arena { table, rules, ads, roads })
     }
 

@@ -105,7 +105,7 @@ pub enum RunError {
     #[error(transparent)]
     Settings(#[from] agent::SettingsError),
     #[error(transparent)]
-    Rule(#[from] crate::action::UnknownRule),
+    Rule(#[from] crate::model::UnknownRule),
     #[error("`{name}` is asked for twice, or both on and off")]
     Twice { name: String },
     #[error("{found} episodes a road: from 1 to {EPISODES_MAX} are possible")]

@@ -2,12 +2,12 @@
 
 use std::sync::Arc;
 
-use crate::action::{ActionTable, ActiveRules};
+use crate::action::ActionTable;
 use crate::ads::{ModularConfig, Selected};
 use crate::episode;
 use crate::episode::{EpisodeLog, Script, Watch};
 use crate::mdp::ProcKind;
-use crate::model::Scenario;
+use crate::model::{RulesInForce, Scenario};
 use crate::oracle;
 use crate::oracle::{AvoidabilitySettings, ClaimResult, Judgement, Replays};
 use crate::sim::{ENGINE, Scene, Start};
@@ -18,7 +18,7 @@ use crate::run::settings::RunError;
 pub struct Stage<'a> {
     table: &'a ActionTable,
     scenario: &'a Scenario,
-    rules: ActiveRules,
+    rules: RulesInForce,
     scene: Arc<Scene>,
     avoidability: AvoidabilitySettings,
 }
@@ -32,7 +32,7 @@ impl<'a> Stage<'a> {
         if let Some(engine) = origin.engine.as_ref().filter(|engine| engine.as_str() != ENGINE) {
             return Err(RunError::Engine { scenario: scenario.name.clone(), engine: engine.clone() });
         }
-        let rules = ActiveRules::new(table.space(), &origin.with, &origin.without)?;
+        let rules = RulesInForce::new(table.space(), &origin.with, &origin.without)?;
         let scene = Arc::new(episode::scene(&table.space().roads[scenario.road]));
         let line = origin.avoidability.as_deref();
         let avoidability = line.map(AvoidabilitySettings::from_line).transpose()?.unwrap_or_default();

@@ -10,14 +10,14 @@ use std::path::Path;
 use std::sync::Arc;
 
 use avastra::action::{
-    ActionTable, ActiveRules, Draw, Effect, Enforcement, Offer, Refusal, Situation, SpawnFacts, SpawnRequest,
+    ActionTable, Draw, Effect, Enforcement, Offer, Refusal, Situation, SpawnFacts, SpawnRequest,
     Surroundings, audit,
 };
 use avastra::check::load;
 use avastra::check::state_argument::memory_from;
 use avastra::episode::{Choice, Moment};
 use avastra::model::vocabulary::{Body, TimeOfDay, Verb};
-use avastra::model::{Type, Value};
+use avastra::model::{RulesInForce, Type, Value};
 use avastra::rng;
 use avastra::rng::Stream;
 
@@ -224,7 +224,7 @@ impl Breach {
     fn judged(&self, table: &ActionTable, with: &[&str], without: &[&str]) -> Result<Draw, Vec<Refusal>> {
         let space = table.space();
         let owned = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect::<Vec<_>>();
-        let rules = ActiveRules::new(space, &owned(with), &owned(without)).expect("the rules exist");
+        let rules = RulesInForce::new(space, &owned(with), &owned(without)).expect("the rules exist");
         let road = space.roads.iter().find(|road| road.name == self.road).expect("the road exists");
         let row = table.rows().iter().find(|row| row.label == self.row).expect("the row exists");
         let parameters = &space.actions[row.action].parameters;
@@ -329,7 +329,7 @@ action a(any d: Length in 1 m .. 9 m where d < 5 m, any body: Body in [Jeep, SUV
     });
     let table = ActionTable::new(loaded.expect("its text is known").space.expect("it is sound"));
     let space = table.space();
-    let rules = ActiveRules::new(space, &[], &[]).expect("no rule is named");
+    let rules = RulesInForce::new(space, &[], &[]).expect("no rule is named");
     let memory = space.initial_memory(1);
     let (roomy, full) = (Wide { safety_gap_m: 0.0 }, Full);
     let judged = |values: &[(&str, Value)], surroundings: &dyn Surroundings| {

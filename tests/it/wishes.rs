@@ -1,9 +1,9 @@
 //! Ten files as a newcomer writes them, each with a wish. A test for each shows that the wish came true.
 
-use avastra::action::{ActionTable, ActiveRules, Draw, Offer, Situation};
+use avastra::action::{ActionTable, Draw, Offer, Situation};
 use avastra::check::state_argument::memory_from;
 use avastra::model::vocabulary::{Level, TimeOfDay};
-use avastra::model::{End, Memory, OutcomeFacts, Reach, Value};
+use avastra::model::{End, Memory, OutcomeFacts, Reach, RulesInForce, Value};
 use avastra::syntax::ast::FileId;
 use avastra::syntax::{Diagnostic, format};
 
@@ -22,7 +22,7 @@ fn row(table: &ActionTable, label: &str) -> usize {
 
 /// The legal draws of a row on a road, over so many seeds.
 fn draws(table: &ActionTable, row: usize, road: usize, memory: &Memory, seeds: u64) -> Vec<Draw> {
-    let rules = ActiveRules::new(table.space(), &[], &[]).expect("no rule is named");
+    let rules = RulesInForce::new(table.space(), &[], &[]).expect("no rule is named");
     let road = &table.space().roads[road];
     let offer = |seed| {
         let situation = Situation {

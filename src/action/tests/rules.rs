@@ -1,9 +1,9 @@
 use proptest::prelude::*;
 
 use super::{Full, Plain, named, table, value_of};
-use crate::action::{ActionTable, ActiveRules, Draw, Effect, Offer, Situation, Surroundings};
-use crate::model::Memory;
+use crate::action::{ActionTable, Draw, Effect, Offer, Situation, Surroundings};
 use crate::model::vocabulary::{Body, TimeOfDay, Verb};
+use crate::model::{Memory, RulesInForce};
 
 const SAFETY_GAP_M: f64 = 19.0;
 
@@ -51,7 +51,7 @@ fn offers(
     seed: u64,
     step: u64,
 ) -> Vec<Offer> {
-    let rules = ActiveRules::new(table.space(), &[], &named(without)).unwrap();
+    let rules = RulesInForce::new(table.space(), &[], &named(without)).unwrap();
     let road = &table.space().roads[0];
     table.offers(&Situation { memory, road, rules: &rules, surroundings, seed, step })
 }
@@ -69,7 +69,7 @@ proptest! {
                 Offer::Legal(draw) => {
                     prop_assert_eq!(broken(&table, &memory, &draw), Vec::<&str>::new());
                     // The judge of replays agrees with the drawer, on the same values.
-                    let rules = ActiveRules::new(table.space(), &[], &[]).unwrap();
+                    let rules = RulesInForce::new(table.space(), &[], &[]).unwrap();
                     let road = &table.space().roads[0];
                     let situation =
                         Situation { memory: &memory, road, rules: &rules, surroundings: &surroundings, seed, step };
@@ -89,7 +89,7 @@ fn optional_rules_wait_to_be_asked() {
     let road = &table.space().roads[0];
     let row = table.rows().iter().position(|row| row.label == "wet(how: High)").unwrap();
     let judge = |with: &[&str]| {
-        let rules = ActiveRules::new(table.space(), &named(with), &[]).unwrap();
+        let rules = RulesInForce::new(table.space(), &named(with), &[]).unwrap();
         let situation =
             Situation { memory: &memory, road, rules: &rules, surroundings: &surroundings, seed: 1, step: 0 };
         table.offer(&situation, row)
@@ -120,7 +120,7 @@ fn draws_are_short_and_independent_of_each_other() {
     let memory = table.space().initial_memory(3);
     let surroundings = Plain { safety_gap_m: 0.0 };
     let all = offers(&table, &memory, &[], &surroundings, 3, 4);
-    let rules = ActiveRules::new(table.space(), &[], &[]).unwrap();
+    let rules = RulesInForce::new(table.space(), &[], &[]).unwrap();
     let road = &table.space().roads[0];
     let situation =
         Situation { memory: &memory, road, rules: &rules, surroundings: &surroundings, seed: 3, step: 4 };
@@ -139,7 +139,7 @@ fn given_values_are_judged_by_the_same_rules() {
     let table = table("scenarios/avastra45.ava");
     let memory = table.space().initial_memory(3);
     let surroundings = Plain { safety_gap_m: 0.0 };
-    let rules = ActiveRules::new(table.space(), &[], &[]).unwrap();
+    let rules = RulesInForce::new(table.space(), &[], &[]).unwrap();
     let road = &table.space().roads[0];
     let situation =
         Situation { memory: &memory, road, rules: &rules, surroundings: &surroundings, seed: 3, step: 4 };

@@ -7,9 +7,9 @@ use std::sync::Arc;
 use proptest::prelude::*;
 
 use crate::action::tests::Plain;
-use crate::action::{ActionTable, ActiveRules, Offer, Situation};
+use crate::action::{ActionTable, Offer, Situation};
 use crate::check::{Loaded, ReadError, load};
-use crate::model::{Reach, Value};
+use crate::model::{Reach, RulesInForce, Value};
 use crate::prove::witness;
 
 const HEAD: &str = "language 1
@@ -98,7 +98,7 @@ proptest! {
         let verdicts = compiled(&text);
         let table = ActionTable::new(loose.clone());
         let names: Vec<String> = loose.rules.iter().map(|rule| rule.name.clone()).collect();
-        let rules = ActiveRules::new(&loose, &names, &[]).unwrap();
+        let rules = RulesInForce::new(&loose, &names, &[]).unwrap();
         let road = &loose.roads[0];
         let world = Plain { safety_gap_m: 0.0 };
         // A space with dead rows is refused; its error names the rows by number.
@@ -170,7 +170,7 @@ proptest! {
                 && let Some(found) = witness(space, &space.rows[row.index], &space.roads[0])
             {
                 let strict = ActionTable::new(space.clone());
-                let in_force = ActiveRules::new(space, &[], &[]).unwrap();
+                let in_force = RulesInForce::new(space, &[], &[]).unwrap();
                 let situation = Situation {
                     memory: &found.memory, road: &space.roads[0], rules: &in_force, surroundings: &world, seed, step: 0,
                 };
@@ -194,13 +194,41 @@ fn names_row(text: &str, row: usize) -> bool {
     }
 }
 
+/// Equalities that depend on each other are solved in the order of their dependence, whatever the order of
+/// declaration: by drawing, and by the search for witnesses.
+#[test]
+fn a_chain_of_equalities_is_solved_from_its_end() {
+    let speeds =
+        ["first", "second", "third", "fourth"].map(|name| format!("any {name}: Speed in 1 m/s .. 20 m/s"));
+    let text = format!(
+        "{HEAD}action ahead({}) {{ spawn Sedan ahead 50 m {{ lane: Current, speed: first, does: DriveAhead }} }}\n\
+         rule r0 on ahead: first == second * 0.5 + 4 m/s\n\
+         rule r1 on ahead: second == third * 0.5 + 4 m/s\n\
+         rule r2 on ahead: third == fourth * 0.5 + 4 m/s\n",
+        speeds.join(", ")
+    );
+    let space = compiled(&text).space.unwrap();
+    let row = space.rows.iter().find(|row| row.label == "ahead()").unwrap();
+    let road = &space.roads[0];
+    assert!(witness(&space, row, road).is_some());
+    let rules = RulesInForce::by_default(&space);
+    let world = Plain { safety_gap_m: 0.0 };
+    let memory = space.initial_memory(0);
+    for step in 0..8 {
+        let situation =
+            Situation { memory: &memory, road, rules: &rules, surroundings: &world, seed: 0, step };
+        let offer = ActionTable::new(space.clone()).offer(&situation, row.index);
+        assert!(matches!(offer, Offer::Legal(_)), "{offer:?}");
+    }
+}
+
 /// Every row of the shipped spaces has a witness on every road, and every witness runs.
 #[test]
 fn shipped_rows_have_witnesses_that_run() {
     for path in ["scenarios/avastra45.ava", "scenarios/deepcollision52.ava"] {
         let table = crate::action::tests::table(path);
         let space = table.space();
-        let rules = ActiveRules::new(space, &[], &[]).unwrap();
+        let rules = RulesInForce::new(space, &[], &[]).unwrap();
         for row in table.rows() {
             for (road, reach) in space.roads.iter().zip(&row.roads) {
                 if matches!(reach, Reach::Dead { .. }) {

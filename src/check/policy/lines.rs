@@ -6,7 +6,7 @@ use crate::check::names::unknown;
 use crate::check::scenario::row;
 use crate::model::expr::Comparison;
 use crate::model::policy::{Condition, PolicyRule};
-use crate::model::{Reach, Row, Space, StateMeaning, code};
+use crate::model::{Reach, Row, RulesInForce, Space, StateMeaning, code};
 use crate::prove::forbids;
 use crate::syntax::ast::{BinaryOp, Expr, ExprKind, Span, UnaryOp};
 use crate::syntax::{Diagnostic, ast, listed, nearest};
@@ -236,14 +236,12 @@ fn illegal(
     let row = &space.rows[row];
     let message = format!("`{}` can never act here", row.label);
     let error = Diagnostic::error(code::POLICY_ROW, message);
-    if let Some(reason) = dead(space, origin, row) {
+    // Nothing is known of rules that the space does not have.
+    let in_force = RulesInForce::new(space, &origin.with, &origin.without).ok()?;
+    if let Some(reason) = dead(space, origin, &in_force, row) {
         let error = error.at(call.span, "no road of the policy allows it").note(reason);
         return Some(error.help("remove the row from the line"));
     }
-    let is_active = |rule: &&crate::model::RuleDef| {
-        let named = |names: &[String]| names.contains(&rule.name);
-        if rule.optional { named(&origin.with) } else { !named(&origin.without) }
-    };
     let time = variable_index("time").expect("it is a variable");
     let (clock, meant) = space.states.iter().enumerate().find_map(|(at, state)| match &state.meaning {
         StateMeaning::Time(words) => Some((at, words)),
@@ -251,7 +249,7 @@ fn illegal(
     })?;
     let from = (0..meant.len()).filter(|&variant| region.words(time) >> (meant[variant] as u32) & 1 == 1);
     let from: u128 = from.map(|variant| 1 << variant).sum();
-    let forbidding = space.rules.iter().filter(is_active).find(|rule| match &rule.body {
+    let forbidding = in_force.all().map(|rule| &space.rules[rule]).find(|rule| match &rule.body {
         crate::model::RuleBody::Moves { state, .. } => *state == clock && forbids(space, rule, row, from),
         crate::model::RuleBody::Holds(_) => false,
     })?;
@@ -262,12 +260,10 @@ fn illegal(
 }
 
 /// The reason why a row can run on no road of the policy, under the rules that the policy was trained with.
-fn dead(space: &Space, origin: &PolicyOrigin, row: &Row) -> Option<String> {
+fn dead(space: &Space, origin: &PolicyOrigin, in_force: &RulesInForce, row: &Row) -> Option<String> {
     let roads = space.roads.iter().zip(&row.roads).filter(|(road, _)| origin.roads.contains(&road.name));
     let mut reasons = roads.map(|(road, reach)| match reach {
-        Reach::Dead { rules, reason }
-            if !rules.iter().any(|&rule| origin.without.contains(&space.rules[rule].name)) =>
-        {
+        Reach::Dead { rules, reason } if rules.iter().all(|&rule| in_force.contains(rule)) => {
             Some(format!("on `{}`: {reason}", road.name))
         }
         Reach::Dead { .. } | Reach::Open(_) => None,

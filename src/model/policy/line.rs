@@ -1,7 +1,7 @@
 //! The readable face of a policy: lines of which the first that applies acts.
 //!
-//! A condition is a comparison of one variable with one value; a line wants all of its conditions. Of
-//! the rows of a line the first that is legal at the moment acts; if none is, the step passes.
+//! A condition compares one variable with one value; a line applies if all of its conditions hold. The first
+//! row of the line that is legal at the moment acts; if none is legal, the step passes without an action.
 
 use crate::model::expr::Comparison;
 
@@ -20,6 +20,6 @@ pub struct Condition {
     /// Index in [`VARIABLES`].
     pub variable: usize,
     pub comparison: Comparison,
-    /// In the variable's own unit; of a word the number that stands for it.
+    /// In the variable's own unit; for a word, the number that stands for it.
     pub value: f64,
 }

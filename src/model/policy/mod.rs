@@ -1,8 +1,7 @@
 //! Policies: what an agent has learned, as a file says it.
 //!
-//! The network's numbers are opaque here: that they are as many as the shape wants, and that the file
-//! is as it was written, is checked; what they mean is `agent`'s business. The readable face (`line`)
-//! is understood whole.
+//! The network's numbers mean nothing here: only their count and the file's digest are checked, and `agent`
+//! gives them meaning. The readable face (`line`) is checked completely.
 
 mod line;
 mod plain;
@@ -36,7 +35,7 @@ pub struct Policy {
     pub claims: Option<PolicyClaims>,
     /// The readable face, the first line first; empty if there is none.
     pub rules: Vec<PolicyRule>,
-    /// Digest of the whole file but the paths in it.
+    /// Digest of the whole file except the paths in it.
     pub digest: String,
 }
 
@@ -63,7 +62,7 @@ pub struct PolicyOrigin {
     pub without: Vec<String>,
 }
 
-/// What a policy says that it achieves, on episodes that anybody can play again.
+/// What a policy claims to achieve, on episodes that can be played again.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PolicyClaims {
@@ -88,7 +87,7 @@ pub struct PolicyClaims {
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RulesClaims {
-    /// States in which it was compared with the network: all that it came to.
+    /// Number of states in which it was compared with the network: all that its episodes reached.
     pub states: u64,
     /// Share of the states in which both choose the same row.
     pub fidelity: f64,

@@ -4,7 +4,7 @@ use serde_json::{Map, Value};
 
 use crate::syntax::ast::{Expr, ExprKind, Field, Name, Number, Span, UnaryOp};
 
-/// What stands for "not given".
+/// The word for "not given".
 const NONE: &str = "none";
 
 /// Data as an expression that was never text.
@@ -57,7 +57,7 @@ fn data(expr: &Expr) -> Result<Value, (Span, &'static str)> {
         ExprKind::List(items) => Ok(Value::Array(items.iter().map(data).collect::<Result<_, _>>()?)),
         ExprKind::Record(fields) => Ok(Value::Object(record(fields)?)),
         ExprKind::Number(number) if number.unit.is_none() => {
-            // The same reading as that of the writer, so that numbers come back exactly.
+            // Read by the library that wrote it, so that numbers come back exactly.
             serde_json::from_str(&number.digits).map_err(|_| (expr.span, "no number"))
         }
         ExprKind::Unary { op: UnaryOp::Negate, operand } => match &operand.kind {

@@ -1,7 +1,7 @@
 //! The seal of a policy file: a digest over every byte of it, so that a flipped one anywhere is noticed.
 //!
-//! Left out are the digest itself and the paths of the files that it uses, so that a policy can move to
-//! another directory. What stands at the end of a path has its own digest.
+//! The digest itself and the paths of the files that it uses are left out, so that a policy can move to
+//! another directory. A file at the end of a path has its own digest.
 
 use sha2::{Digest, Sha256};
 
@@ -27,7 +27,7 @@ pub fn seal(text: &str, tree: &ast::File) -> String {
     let (mut hash, mut from) = (Sha256::new(), 0);
     for span in open {
         hash.update(&text.as_bytes()[from..span.start]);
-        // A mark, so that what is left out cannot change its place.
+        // A mark in place of the part that is left out, so that the part cannot move unnoticed.
         hash.update([0]);
         from = span.end;
     }

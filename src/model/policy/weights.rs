@@ -11,7 +11,8 @@ pub fn weights_to_lines(weights: &[f32]) -> Vec<String> {
     bytes.chunks(LINE_BYTES).map(encode).collect()
 }
 
-/// The numbers that lines of text stand for; `None` if they are none.
+/// The numbers that lines of text stand for; `None` if the text is not Base64, or
+/// its bytes are not whole numbers.
 pub fn weights_from_lines(lines: &[String]) -> Option<Vec<f32>> {
     let mut bytes = Vec::new();
     for line in lines {
@@ -52,7 +53,7 @@ fn decode(text: &str, bytes: &mut Vec<u8>) -> Option<()> {
         bits <<= 6 * padding;
         let [_, decoded @ ..] = bits.to_be_bytes();
         let (kept, cut) = decoded.split_at(3 - padding);
-        // Bits that no byte holds must be 0, or two texts would mean the same.
+        // Left-over bits must be 0; otherwise two texts would mean the same numbers.
         if cut.iter().any(|&byte| byte != 0) {
             return None;
         }

@@ -1,8 +1,9 @@
-//! What a condition says about one number: the bounds from which drawing and proving both start.
+//! What the conditions of rules and `where`s say about single numbers: `speed <= road.limit`.
 
 use crate::model::expr::{Comparison, Expr, ExprKind};
 use crate::model::interval::{End, Interval};
-use crate::model::space::{RuleBody, Space};
+use crate::model::rules::Demand;
+use crate::model::space::{ActionDef, RuleDef};
 use crate::model::value::Type;
 
 /// `local op limit`, wherever all guards hold.
@@ -14,36 +15,35 @@ pub(crate) struct Bound {
     pub op: Comparison,
     pub limit: Expr,
     pub guards: Vec<Expr>,
-}
-
-/// Every bound on a numeric parameter of the action, by all its rules and conditions.
-pub(crate) fn bounds(space: &Space, action: usize) -> Vec<Bound> {
-    let mut found = Vec::new();
-    for parameter in &space.actions[action].parameters {
-        if let Some(condition) = &parameter.condition {
-            collect(condition, None, &mut Vec::new(), &mut found);
-        }
-    }
-    for (rule, definition) in space.rules.iter().enumerate() {
-        let RuleBody::Holds(bindings) = &definition.body else { continue };
-        for binding in bindings.iter().filter(|binding| binding.action == action) {
-            collect(&binding.condition, Some(rule), &mut Vec::new(), &mut found);
-        }
-    }
-    found
+    /// Whether it can be computed before the world is asked and before the memory changes.
+    pub is_known_early: bool,
+    /// The parameters that the limit and the guards name.
+    needs: Vec<usize>,
 }
 
 impl Bound {
     /// Whether the limit or a guard names the parameter.
     pub fn needs(&self, local: usize) -> bool {
-        names(&self.limit, local) || self.guards.iter().any(|guard| names(guard, local))
+        self.needs.contains(&local)
     }
+}
 
-    /// Whether it can be computed before the world is asked and before the memory changes.
-    pub fn is_known_early(&self) -> bool {
-        let late = |expr: &Expr| expr.needs_survey() || expr.reads_memory();
-        !late(&self.limit) && !self.guards.iter().any(late)
-    }
+/// By action: every bound on its numeric parameters, first by their `where`s, then by the rules in the
+/// order of their declarations.
+pub(crate) fn bounds(actions: &[ActionDef], rules: &[RuleDef]) -> Vec<Vec<Bound>> {
+    let of_action = |(index, action): (usize, &ActionDef)| {
+        let mut found = Vec::new();
+        for condition in action.parameters.iter().filter_map(|parameter| parameter.condition.as_ref()) {
+            collect(condition, None, &mut Vec::new(), &mut found);
+        }
+        for (rule, definition) in rules.iter().enumerate() {
+            if let Some(Demand::Holds(condition)) = definition.body.demand(index) {
+                collect(condition, Some(rule), &mut Vec::new(), &mut found);
+            }
+        }
+        found
+    };
+    actions.iter().enumerate().map(of_action).collect()
 }
 
 /// The numbers that the comparison allows, given those of the limit.
@@ -62,12 +62,18 @@ pub(crate) fn allowed(op: Comparison, limit: &Interval) -> Interval {
     }
 }
 
+/// Adds the bounds of a condition: of a comparison, of both sides of `and`, and of what a guard implies.
+/// A condition of any other form bounds nothing; it is still judged.
 fn collect(condition: &Expr, rule: Option<usize>, guards: &mut Vec<Expr>, into: &mut Vec<Bound>) {
     let mut note = |side: &Expr, op: Comparison, limit: &Expr| {
         if let (ExprKind::Local(local), Type::Quantity(_) | Type::Int) = (&side.kind, side.ty)
-            && !names(limit, *local)
+            && !locals(limit).contains(local)
         {
-            into.push(Bound { rule, local: *local, op, limit: limit.clone(), guards: guards.clone() });
+            let mut parts = guards.iter().chain([limit]);
+            let needs = parts.clone().flat_map(locals).collect();
+            let is_known_early = !parts.any(|expr| expr.needs_survey() || expr.reads_memory());
+            let (limit, guards) = (limit.clone(), guards.clone());
+            into.push(Bound { rule, local: *local, op, limit, guards, is_known_early, needs });
         }
     };
     match &condition.kind {
@@ -92,6 +98,13 @@ fn collect(condition: &Expr, rule: Option<usize>, guards: &mut Vec<Expr>, into: 
     }
 }
 
-fn names(expr: &Expr, local: usize) -> bool {
-    expr.any(|kind| matches!(kind, ExprKind::Local(named) if *named == local))
+/// The parameters that an expression names.
+fn locals(expr: &Expr) -> Vec<usize> {
+    let mut found = Vec::new();
+    expr.walk(&mut |part| {
+        if let ExprKind::Local(local) = part.kind {
+            found.push(local);
+        }
+    });
+    found
 }

@@ -1,0 +1,134 @@
+//! The judgement: which rules a complete choice of values breaks.
+
+use crate::model::eval::{Facts, evaluate};
+use crate::model::expr::{Expr, ExprKind};
+use crate::model::rules::{Demand, RowRules};
+use crate::model::space::Parameter;
+use crate::model::value::{Memory, Value};
+
+/// A complete choice for a row, and what it would do.
+#[derive(Clone, Copy)]
+pub(crate) struct Candidate<'a> {
+    /// Values of all parameters of the row's action.
+    pub values: &'a [Value],
+    pub before: &'a Memory,
+    /// The memory after the action.
+    pub after: &'a Memory,
+    /// `(spawn_gap, safety_gap)` of each spawn, m. A rule that asks about a gap holds where there is none.
+    pub gaps_m: &'a [(f64, f64)],
+}
+
+/// One rule, or one `where`, that a candidate breaks.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Breach<'a> {
+    /// The parameter's `where` does not hold.
+    Where(&'a Parameter),
+    Condition {
+        rule: usize,
+        condition: &'a Expr,
+    },
+    /// A rule that asks about the gap of a spawn; m.
+    Gap {
+        rule: usize,
+        spawn_gap_m: f64,
+        safety_gap_m: f64,
+    },
+    /// A state makes a move that the rule does not allow.
+    Move {
+        rule: usize,
+        state: usize,
+        from: Value,
+        to: Value,
+    },
+}
+
+impl<'a> RowRules<'a> {
+    /// Everything that the candidate breaks: `where`s first, then the rules in force that bind the row.
+    pub fn breaches(self, candidate: Candidate<'a>) -> impl Iterator<Item = Breach<'a>> {
+        let facts = self.facts(candidate);
+        let parameters = self.space.actions[self.row.action].parameters.iter();
+        let wheres = parameters.filter_map(move |parameter| {
+            let condition = parameter.condition.as_ref()?;
+            (!self.holds(condition, facts)).then_some(Breach::Where(parameter))
+        });
+        let rules = self.demands().filter_map(move |(rule, demand)| self.breach(rule, demand, candidate));
+        wheres.chain(rules)
+    }
+
+    /// Why the rule forbids the candidate; `None` if it does not.
+    fn breach(self, rule: usize, demand: Demand<'a>, candidate: Candidate<'a>) -> Option<Breach<'a>> {
+        let facts = self.facts(candidate);
+        match demand {
+            Demand::Holds(condition) if condition.needs_survey() => {
+                let is_broken =
+                    |gaps_m: &&(f64, f64)| !self.holds(condition, Facts { gaps_m: **gaps_m, ..facts });
+                let (spawn_gap_m, safety_gap_m) = *candidate.gaps_m.iter().find(is_broken)?;
+                Some(Breach::Gap { rule, spawn_gap_m, safety_gap_m })
+            }
+            Demand::Holds(condition) => {
+                (!self.holds(condition, facts)).then_some(Breach::Condition { rule, condition })
+            }
+            Demand::Moves { state, allowed } => {
+                let cell = self.space.states[state].first_cell;
+                let (from, to) = (candidate.before.cells[cell], candidate.after.cells[cell]);
+                (!allowed[from.variant()][to.variant()]).then_some(Breach::Move { rule, state, from, to })
+            }
+        }
+    }
+
+    fn facts(self, candidate: Candidate<'a>) -> Facts<'a> {
+        Facts { road: self.road, ..Facts::new(candidate.values, candidate.after) }
+    }
+
+    fn holds(self, condition: &Expr, facts: Facts<'_>) -> bool {
+        evaluate(condition, &self.space.functions, &facts).truth()
+    }
+
+    /// A breach in words, with its figures.
+    pub fn words(self, breach: Breach<'_>, candidate: Candidate<'a>) -> String {
+        match breach {
+            Breach::Where(parameter) => format!("the `where` of `{}` does not hold", parameter.name),
+            Breach::Condition { condition, .. } => self.figures(condition, candidate),
+            Breach::Gap { spawn_gap_m, safety_gap_m, .. } => {
+                format!("the gap would be {spawn_gap_m:.1} m, a fair one is {safety_gap_m:.1} m")
+            }
+            Breach::Move { state, from, to, .. } => {
+                let state = &self.space.states[state];
+                let (from, to) = (self.space.show(from, state.ty), self.space.show(to, state.ty));
+                format!("`{}` may not move from {from} to {to}", state.name)
+            }
+        }
+    }
+
+    /// The parameters that a broken condition names, with their values, and the other side of a
+    /// comparison.
+    fn figures(self, condition: &Expr, candidate: Candidate<'a>) -> String {
+        let mut shown = Vec::new();
+        for (index, parameter) in self.space.actions[self.row.action].parameters.iter().enumerate() {
+            if condition.any(|kind| matches!(kind, ExprKind::Local(local) if *local == index)) {
+                let value = self.space.show(candidate.values[index], parameter.ty);
+                shown.push(format!("{} = {value}", parameter.name));
+            }
+        }
+        if let ExprKind::Compare(op, _, right) = &condition.kind {
+            let wanted = evaluate(right, &self.space.functions, &self.facts(candidate));
+            shown.push(format!("wanted {} {}", op.symbol(), self.space.show(wanted, right.ty)));
+        }
+        match shown.is_empty() {
+            true => "its condition does not hold".to_owned(),
+            false => shown.join(", "),
+        }
+    }
+}
+
+impl Breach<'_> {
+    /// The rule that is broken; `None` for a `where`.
+    pub fn rule(&self) -> Option<usize> {
+        match self {
+            Breach::Where(_) => None,
+            Breach::Condition { rule, .. } | Breach::Gap { rule, .. } | Breach::Move { rule, .. } => {
+                Some(*rule)
+            }
+        }
+    }
+}

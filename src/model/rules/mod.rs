@@ -1,0 +1,85 @@
+//! How a rule is enforced. Everything that draws, replays, searches or checks asks this module.
+//!
+//! The checker compiles a rule once for every action that it binds, and a row of the action table knows
+//! the rules that bind it ([`Row::rules`]). From there on:
+//!
+//! 1. [`RulesInForce`] says which rules apply: those that are not optional, changed by `--with` and
+//!    `--without`.
+//! 2. [`RowRules`] is one row on one road under the rules in force. Each of its rules makes a [`Demand`]
+//!    on the row's action: a condition that must hold, or the moves that a state may make.
+//! 3. `bound` takes from the conditions what they say about single numbers, for example
+//!    `speed <= road.limit`. [`RowRules::solve`] chooses numbers within these bounds, so that few choices
+//!    are in vain. It need not find every bound, because it does not have the last word.
+//! 4. [`RowRules::breaches`] has the last word. It takes a complete [`Candidate`] (values, the memory before
+//!    and after, the gaps of its spawns) and returns every rule in force that the candidate breaks.
+//!
+//! Drawing and replaying (`action`), the search for witnesses (`prove::witness`) and the checker of scenarios
+//! judge by `breaches`; they differ only in where the gaps of a spawn come from. Proofs (`prove::reach`)
+//! work on sets of values and cannot call it, but they go over the same demands and bounds.
+
+mod bound;
+mod in_force;
+mod judge;
+mod solve;
+
+pub(crate) use bound::{Bound, allowed, bounds};
+pub use in_force::{RulesInForce, UnknownRule};
+pub(crate) use judge::{Breach, Candidate};
+pub(crate) use solve::Room;
+
+use crate::model::expr::Expr;
+use crate::model::row::Row;
+use crate::model::space::{RoadFacts, RuleBody, Space};
+
+/// One row on one road, under the rules in force.
+#[derive(Clone, Copy)]
+pub(crate) struct RowRules<'a> {
+    pub space: &'a Space,
+    pub row: &'a Row,
+    /// `None`: the road is not known.
+    pub road: Option<&'a RoadFacts>,
+    pub in_force: &'a RulesInForce,
+}
+
+/// What a rule demands of an action.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Demand<'a> {
+    /// The condition holds. State in it is the state after the action.
+    Holds(&'a Expr),
+    /// The state of that index moves only as `allowed[from][to]` says.
+    Moves { state: usize, allowed: &'a [Vec<bool>] },
+}
+
+impl RuleBody {
+    /// Whether the rule binds the action.
+    pub fn binds(&self, action: usize) -> bool {
+        self.demand(action).is_some()
+    }
+
+    /// What the rule demands of an action; `None` if it does not bind the action.
+    pub(crate) fn demand(&self, action: usize) -> Option<Demand<'_>> {
+        match self {
+            RuleBody::Holds(bindings) => {
+                let binding = bindings.iter().find(|binding| binding.action == action)?;
+                Some(Demand::Holds(&binding.condition))
+            }
+            RuleBody::Moves { state, allowed, actions } => {
+                actions.contains(&action).then_some(Demand::Moves { state: *state, allowed })
+            }
+        }
+    }
+}
+
+impl<'a> RowRules<'a> {
+    /// The rules in force that bind the row, by index, and what each demands.
+    pub fn demands(self) -> impl Iterator<Item = (usize, Demand<'a>)> {
+        let rules = self.in_force.on_row(self.row);
+        rules.filter_map(move |rule| Some((rule, self.space.rules[rule].body.demand(self.row.action)?)))
+    }
+
+    /// The bounds on the numbers of the row: those of `where`s, and those of rules in force.
+    pub fn bounds(self) -> impl Iterator<Item = &'a Bound> {
+        let is_in_force = move |bound: &&Bound| bound.rule.is_none_or(|rule| self.in_force.contains(rule));
+        self.space.bounds[self.row.action].iter().filter(is_in_force)
+    }
+}
