@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use crate::geometry::{OrientedBox, Pose, Vec2, distance_m, unit_vector, wrap_angle};
+use crate::geometry::{OrientedBox, Pose, distance_m, unit_vector, wrap_angle};
 use crate::model::vocabulary::Body;
 use crate::road::{RoadMap, Route, RouteStopLine, Signal};
 use crate::sim::{
@@ -11,6 +11,8 @@ use crate::sim::{
 };
 
 use super::driver::Ads;
+
+pub use crate::sim::testing::corner;
 
 pub const CLEAR_DAY: Conditions =
     Conditions { light: 1.0, rain_mmph: 0.0, visibility_m: 10_000.0, water_mm: 0.0, friction: 0.85 };
@@ -145,16 +147,9 @@ pub struct Rig {
 
 impl Rig {
     pub fn new(scene: &Arc<Scene>, ads: Box<dyn Ads>, speed_mps: f64) -> Rig {
-        let ego = EgoMotion {
-            rear_axle: scene.route.path.pose_at(0.0),
-            speed_mps,
-            acceleration_mps2: 0.0,
-            yaw_rate_radps: 0.0,
-            steer_rad: 0.0,
-        };
         let sensed = Sensed {
             time_s: 0.0,
-            ego,
+            ego: EgoMotion::straight(scene.route.path.pose_at(0.0), speed_mps),
             objects: vec![],
             signals: vec![SignalColour::Green],
             conditions: CLEAR_DAY,
@@ -214,14 +209,4 @@ impl Rig {
         self.sensed.time_s += DT_S;
         control
     }
-}
-
-/// Road 2 of the paper with the surveyed route.
-pub fn corner() -> Arc<Scene> {
-    let text = include_str!("../../scenarios/roads/corner.xodr");
-    let map = RoadMap::from_opendrive("corner", text).expect("the map is sound");
-    let start = map.nearest(Vec2::new(0.0, 0.0), 2.377, 1.0).expect("a lane at the start");
-    let goal = map.nearest(Vec2::new(-71.4, 145.5), -2.983, 1.0).expect("a lane at the goal");
-    let route = Route::find(&map, start, goal).expect("the goal can be reached");
-    Arc::new(Scene::new(map.into(), route))
 }

@@ -132,8 +132,7 @@ pub(super) struct Ego {
 impl Ego {
     /// Rolling straight on at `speed_mps`, with no pedal pressed.
     pub fn new(rear_axle: Pose, speed_mps: f64) -> Ego {
-        let motion =
-            EgoMotion { rear_axle, speed_mps, acceleration_mps2: 0.0, yaw_rate_radps: 0.0, steer_rad: 0.0 };
+        let motion = EgoMotion::straight(rear_axle, speed_mps);
         let outline = outline_at(&rear_axle);
         Ego { motion, throttle_pct: 0.0, brake_pct: 0.0, outline, frame: Frame::of(&outline) }
     }

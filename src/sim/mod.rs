@@ -36,7 +36,7 @@ mod scene;
 mod sense;
 mod signals;
 #[cfg(test)]
-mod testing;
+pub(crate) mod testing;
 #[cfg(test)]
 mod tests;
 mod way;

@@ -48,6 +48,13 @@ pub struct EgoMotion {
     pub steer_rad: f64,
 }
 
+impl EgoMotion {
+    /// Rolling straight on at a constant speed.
+    pub fn straight(rear_axle: Pose, speed_mps: f64) -> EgoMotion {
+        EgoMotion { rear_axle, speed_mps, acceleration_mps2: 0.0, yaw_rate_radps: 0.0, steer_rad: 0.0 }
+    }
+}
+
 /// A road user within sensor range, as it truly is.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SensedObject {

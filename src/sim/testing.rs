@@ -1,4 +1,4 @@
-//! Roads made by hand for the tests of this module.
+//! Roads for the tests of this module and of `ads`, most of them made by hand.
 
 use std::sync::Arc;
 

@@ -78,13 +78,8 @@ mod tests {
     use crate::sim::{Conditions, EgoMotion};
 
     fn sensed(speed_mps: f64, conditions: Conditions) -> Sensed {
-        let ego = EgoMotion {
-            rear_axle: Pose::new(3.0, 4.0, 0.0),
-            speed_mps,
-            acceleration_mps2: 0.0,
-            yaw_rate_radps: 0.1,
-            steer_rad: 0.0,
-        };
+        let ego =
+            EgoMotion { yaw_rate_radps: 0.1, ..EgoMotion::straight(Pose::new(3.0, 4.0, 0.0), speed_mps) };
         Sensed { time_s: 0.0, ego, objects: vec![], signals: vec![], conditions }
     }
 

@@ -93,13 +93,7 @@ mod tests {
         let line = scene.route.stop_lines[0];
         let station_m = line.station_m - before_m;
         let rear_axle = scene.route.path.pose_at(station_m);
-        let ego = EgoMotion {
-            rear_axle,
-            speed_mps: 0.0,
-            acceleration_mps2: 0.0,
-            yaw_rate_radps: 0.0,
-            steer_rad: 0.0,
-        };
+        let ego = EgoMotion::straight(rear_axle, 0.0);
         let lamp = scene.map.signals[line.signal].position;
         let objects = truck_m.map(|away_m| {
             let mut pose = rear_axle;

@@ -216,13 +216,7 @@ mod tests {
     use crate::sim::EgoMotion;
 
     fn sensed(objects: Vec<SensedObject>) -> Sensed {
-        let ego = EgoMotion {
-            rear_axle: Pose::new(0.0, 0.0, 0.0),
-            speed_mps: 0.0,
-            acceleration_mps2: 0.0,
-            yaw_rate_radps: 0.0,
-            steer_rad: 0.0,
-        };
+        let ego = EgoMotion::straight(Pose::new(0.0, 0.0, 0.0), 0.0);
         Sensed { time_s: 0.0, ego, objects, signals: vec![], conditions: CLEAR_DAY }
     }
 
