@@ -6,7 +6,7 @@ use crate::check::expression::{Place, is_number};
 use crate::check::names::unknown;
 use crate::check::report::{Report, field};
 use crate::model::expr::{Expr, ExprKind};
-use crate::model::vocabulary::{Body, Colour, LaneChoice, Side, Then, Verb, Word};
+use crate::model::vocabulary::{Body, Colour, LaneChoice, Side, SpawnField, Then, Verb, Word};
 use crate::model::{
     ActionDef, Domain, EffectDef, GroupDef, Parameter, RuleDef, SetDef, SpawnDef, Type, Value, WordExpr, code,
 };
@@ -241,47 +241,46 @@ impl Checker {
         place: &Place<'_>,
         span: Span,
     ) -> Option<SpawnDef> {
-        const FIELDS: [&str; 6] = ["does", "lane", "side", "then", "speed", "colour"];
-        self.fields_known(fields, &FIELDS);
-        let find = |name: &str| field(fields, name);
+        let fields = self.fields_known(fields);
+        let find = |wanted: SpawnField| field(&fields, wanted);
         let lacks = |what: &str| format!("the spawn does not say {what}");
         let body_word = self.word::<Body>("body", body, place);
         let distance = self.typed(distance, place, Type::Quantity(Dimension::LENGTH));
-        let verb = match find("does") {
+        let verb = match find(SpawnField::Does) {
             Some(value) => self.word::<Verb>("verb", value, place),
-            None => self.missing_field("does", span, lacks("what it does")),
+            None => self.missing_field(SpawnField::Does, span, lacks("what it does")),
         };
         let verb_words: Vec<Verb> = verb.as_ref().map(possible).unwrap_or_default();
         let needs = |verbs: &[Verb]| verb_words.iter().any(|verb| verbs.contains(verb));
-        let lane = match find("lane") {
+        let lane = match find(SpawnField::Lane) {
             Some(value) => self.word::<LaneChoice>("lane", value, place),
             None if needs(&[Verb::DriveAhead, Verb::Overtake]) => {
-                self.missing_field("lane", span, lacks("its lane"))
+                self.missing_field(SpawnField::Lane, span, lacks("its lane"))
             }
             None => Some(WordExpr::Fixed(LaneChoice::Current)),
         };
-        let side = match find("side") {
+        let side = match find(SpawnField::Side) {
             Some(value) => self.word::<Side>("side", value, place),
             None if needs(&[Verb::CrossRoad, Verb::Walk]) => {
-                self.missing_field("side", span, lacks("where it comes from"))
+                self.missing_field(SpawnField::Side, span, lacks("where it comes from"))
             }
             None => Some(WordExpr::Fixed(Side::Right)),
         };
-        let then = match find("then") {
+        let then = match find(SpawnField::Then) {
             Some(value) => self.word::<Then>("word for `then`", value, place),
             None => Some(WordExpr::Fixed(Then::Keep)),
         };
-        let colour = match find("colour") {
+        let colour = match find(SpawnField::Colour) {
             Some(value) => self.word::<Colour>("colour", value, place),
             None => Some(WordExpr::Fixed(Colour::Black)),
         };
         let speed_type = Type::Quantity(Dimension::SPEED);
-        let speed = match find("speed") {
+        let speed = match find(SpawnField::Speed) {
             Some(value) => self.typed(value, place, speed_type),
             None if verb_words == [Verb::Stand] => {
                 Some(Expr { kind: ExprKind::Number(Rational::ZERO), ty: speed_type, span })
             }
-            None => self.missing_field("speed", span, lacks("how fast it is")),
+            None => self.missing_field(SpawnField::Speed, span, lacks("how fast it is")),
         };
         let (body, verb) = (body_word?, verb?);
         self.check_verb(&body, &verb, behind, span);

@@ -11,6 +11,7 @@ use crate::check::road::Maps;
 use crate::check::{style, unused};
 use crate::model::expr::{Expr, ExprKind};
 use crate::model::rules::bounds;
+use crate::model::vocabulary::TYPES;
 use crate::model::{ActionDef, EnumDef, EnumIndex, FnDef, GroupDef, Space, StateDef, Type, Value, code};
 use crate::prove;
 use crate::prove::{Known, Values, enclose};
@@ -161,15 +162,10 @@ impl Checker {
 
     /// The type with this name.
     pub(super) fn named_type(&mut self, name: &ast::Name) -> Option<Type> {
-        let builtin = match name.text.as_str() {
-            "Bool" => Some(Type::Bool),
-            "Int" => Some(Type::Int),
-            other => crate::units::Dimension::from_name(other).map(Type::Quantity),
-        };
-        let found = builtin.or(self.enum_names.get(&name.text).map(|index| Type::Enum(EnumIndex(index))));
+        let built_in = TYPES.iter().find(|(word, ..)| *word == name.text).map(|(_, ty, _)| *ty);
+        let found = built_in.or(self.enum_names.get(&name.text).map(|index| Type::Enum(EnumIndex(index))));
         found.or_else(|| {
-            let builtin = ["Bool", "Int", "Length", "Duration", "Speed", "Accel", "Angle", "Ratio"];
-            let candidates = builtin.into_iter().chain(self.enum_names.all());
+            let candidates = TYPES.iter().map(|(word, ..)| *word).chain(self.enum_names.all());
             self.reject(unknown("type", &name.text, name.span, candidates))
         })
     }

@@ -4,6 +4,7 @@ use crate::check::checker::{Checker, each};
 use crate::check::names::unknown;
 use crate::check::report::Report;
 use crate::model::expr::Comparison;
+use crate::model::vocabulary::{SpaceClaim, Word};
 use crate::model::{Reach, Row, Space, code};
 use crate::syntax::ast::{ItemKind, Span};
 use crate::syntax::{Diagnostic, ast};
@@ -27,11 +28,10 @@ impl Checker {
 
     fn claim(&mut self, claim: &ast::Expr, span: Span, space: &Space) -> Option<()> {
         match &claim.kind {
-            ast::ExprKind::Call(call) if call.name.text == "every" => {
+            ast::ExprKind::Call(call) if call.name.text == SpaceClaim::Every.name() => {
                 let rows = self.rows_of(call.args.first(), call.span, space)?;
-                let realisable = call.args.get(1).is_some_and(
-                    |argument| matches!(&argument.value.kind, ast::ExprKind::Name(name) if name == "realisable"),
-                );
+                let is_known = |kind: &ast::ExprKind| matches!(kind, ast::ExprKind::Name(name) if name == SpaceClaim::Realisable.name());
+                let realisable = call.args.get(1).is_some_and(|argument| is_known(&argument.value.kind));
                 if call.args.len() != 2 || !realisable {
                     return self.reject(not_static(call.span));
                 }
@@ -64,7 +64,9 @@ impl Checker {
 
     fn count(&mut self, expr: &ast::Expr, space: &Space) -> Option<u64> {
         match &expr.kind {
-            ast::ExprKind::Call(call) if call.name.text == "count" && call.args.len() == 1 => {
+            ast::ExprKind::Call(call)
+                if call.name.text == SpaceClaim::Count.name() && call.args.len() == 1 =>
+            {
                 self.rows_of(call.args.first(), call.span, space).map(|rows| rows.len() as u64)
             }
             ast::ExprKind::Number(number)
@@ -93,7 +95,7 @@ impl Checker {
             let error = Diagnostic::error(code::NOT_STATIC, "wanted an action or a group");
             return self.reject(error.at(value.span, "not a name"));
         };
-        if name == "actions" {
+        if name == SpaceClaim::Actions.name() {
             return Some(space.rows.iter().collect());
         }
         let group = space.groups.iter().find(|group| group.name == *name).map(|group| group.actions.clone());
@@ -101,7 +103,7 @@ impl Checker {
         let Some(actions) = group.or(action) else {
             let groups = space.groups.iter().map(|group| group.name.as_str());
             let actions = space.actions.iter().map(|action| action.name.as_str());
-            let candidates = groups.chain(actions).chain(["actions"]);
+            let candidates = groups.chain(actions).chain([SpaceClaim::Actions.name()]);
             return self.reject(unknown("action", name, value.span, candidates));
         };
         Some(space.rows.iter().filter(|row| actions.contains(&row.action)).collect())
@@ -110,7 +112,7 @@ impl Checker {
 
 fn is_static(claim: &ast::Expr) -> bool {
     match &claim.kind {
-        ast::ExprKind::Call(call) => call.name.text == "every",
+        ast::ExprKind::Call(call) => call.name.text == SpaceClaim::Every.name(),
         ast::ExprKind::Binary { .. } => true,
         _ => false,
     }

@@ -3,8 +3,8 @@
 use crate::check::checker::Checker;
 use crate::check::names::unknown;
 use crate::check::report::Report;
-use crate::model::expr::{Arithmetic, Comparison, Expr, ExprKind, Fact};
-use crate::model::vocabulary::LaneChoice;
+use crate::model::expr::{Arithmetic, Comparison, Expr, ExprKind};
+use crate::model::vocabulary::{Fact, LaneChoice, ROAD_LANES, Site, Word, parts_of, things};
 use crate::model::{EnumIndex, Type, code};
 use crate::syntax::ast::{BinaryOp, Span, UnaryOp};
 use crate::syntax::{Diagnostic, ast, listed, nearest};
@@ -16,35 +16,18 @@ use crate::units::{Dimension, Rational};
 pub(super) struct Place<'a> {
     pub locals: &'a [(String, Type)],
     pub states: bool,
-    pub road: bool,
-    pub spawn: bool,
-    pub outcome: bool,
-    /// Whether the collision has been judged: true of verdicts, not of rewards.
-    pub judged: bool,
+    pub site: Site,
 }
 
-/// The facts of the world by their spelling; which are on offer is the place's business.
-const FACTS: &[(&str, Fact, Type)] = &[
-    ("spawn_gap", Fact::SpawnGap, Type::Quantity(Dimension::LENGTH)),
-    ("safety_gap", Fact::SafetyGap, Type::Quantity(Dimension::LENGTH)),
-    ("proc", Fact::Proc, Type::Quantity(Dimension::RATIO)),
-    ("collision", Fact::Collision, Type::Bool),
-    ("repeated", Fact::Repeated, Type::Bool),
-    ("sudden", Fact::Sudden, Type::Bool),
-    ("struck", Fact::Struck, Type::Bool),
-    ("avoidable", Fact::Avoidable, Type::Bool),
-];
-
 impl Place<'_> {
-    fn fact(&self, name: &str) -> Option<(Fact, Type)> {
-        let (_, fact, ty) = FACTS.iter().find(|(spelling, _, _)| *spelling == name)?;
-        let offered = match fact {
-            Fact::RoadLimit => self.road,
-            Fact::SpawnGap | Fact::SafetyGap => self.spawn,
-            Fact::Proc | Fact::Collision | Fact::Repeated | Fact::Sudden | Fact::Struck => self.outcome,
-            Fact::Avoidable => self.judged,
-        };
-        offered.then_some((*fact, *ty))
+    /// The fact of that name, if it is known here.
+    fn fact(&self, name: &str) -> Option<Fact> {
+        Fact::from_name(name).filter(|fact| self.site.knows(*fact))
+    }
+
+    /// Whether something can be asked of a thing (`road`) here.
+    fn knows(&self, thing: &str) -> bool {
+        self.site.facts().any(|fact| fact.thing() == Some(thing))
     }
 }
 
@@ -102,16 +85,7 @@ impl Checker {
             ast::ExprKind::Binary { op, op_span, left, right } => {
                 self.binary(*op, *op_span, left, right, place, span)
             }
-            ast::ExprKind::Field { base, field } => {
-                if !matches!(&base.kind, ast::ExprKind::Name(name) if name == "road") {
-                    self.report(
-                        Diagnostic::error(code::UNKNOWN, "only `road` has fields")
-                            .at(base.span, "not `road`"),
-                    );
-                    return None;
-                }
-                self.road_field(field, place, span)
-            }
+            ast::ExprKind::Field { base, field } => self.part(base, field, place, span),
             ast::ExprKind::Index { base, index } => self.index(base, index, place, span),
             ast::ExprKind::Call(call) => self.call(call, place),
             ast::ExprKind::Match { subject, arms } => self.matching(subject, arms, place, hint, span),
@@ -187,8 +161,8 @@ impl Checker {
                 if place.states {
                     candidates.extend(self.states.iter().map(|state| state.name.as_str()));
                 }
-                candidates
-                    .extend(FACTS.iter().filter(|fact| place.fact(fact.0).is_some()).map(|fact| fact.0));
+                let facts = place.site.facts().filter(|fact| fact.thing().is_none());
+                candidates.extend(facts.map(|fact| fact.name()));
                 let error = unknown("name", name, span, candidates);
                 let error = match self.lacking(name, place) {
                     Some(note) => error.note(note),
@@ -214,11 +188,15 @@ impl Checker {
 
     /// A name that exists, but not here.
     fn lacking(&self, name: &str, place: &Place<'_>) -> Option<String> {
-        if name == "road" && place.road {
-            let asked = "`road.limit`, `road.lanes`, `road == corner` or `road in [corner, boulevard]`";
-            return Some(format!("`road` is no value: ask for {asked}"));
+        if place.knows(name) {
+            let mut asked: Vec<String> =
+                parts_of(name).iter().map(|(part, _)| format!("{name}.{part}")).collect();
+            if name == "road" {
+                asked.extend(["road == corner", "road in [corner, boulevard]"].map(str::to_owned));
+            }
+            return Some(format!("`{name}` is no value: ask for {}", one_of(&asked)));
         }
-        if FACTS.iter().any(|fact| fact.0 == name) && place.fact(name).is_none() {
+        if Fact::from_name(name).is_some() && place.fact(name).is_none() {
             return Some(format!("`{name}` is known to the engine, but not in this place"));
         }
         if !place.states && self.states.iter().any(|state| state.name == name) {
@@ -245,8 +223,8 @@ impl Checker {
             }
             return Some(Some(Expr { kind: ExprKind::Cell(state.first_cell), ty: state.ty, span }));
         }
-        let (fact, ty) = place.fact(name)?;
-        Some(Some(Expr { kind: ExprKind::Fact(fact), ty, span }))
+        let fact = place.fact(name)?;
+        Some(Some(Expr { kind: ExprKind::Fact(fact), ty: fact.ty(), span }))
     }
 
     /// Whether a name can only be a variant here, so that its type must come from elsewhere.
@@ -259,27 +237,31 @@ impl Checker {
         !is_variable
     }
 
-    fn road_field(&mut self, field: &ast::Name, place: &Place<'_>, span: Span) -> Option<Expr> {
-        if !place.road {
-            self.report(road_unknown(span));
-            return None;
-        }
-        match field.text.as_str() {
-            "limit" => Some(Expr {
-                kind: ExprKind::Fact(Fact::RoadLimit),
-                ty: Type::Quantity(Dimension::SPEED),
-                span,
-            }),
-            "lanes" => {
-                let error = Diagnostic::error(code::TYPE_MISMATCH, "`road.lanes` is a set of lanes");
-                self.report(error.at(span, "not a value").help("write `lane in road.lanes`"));
-                None
+    /// `road.limit`: a fact about a thing.
+    fn part(&mut self, base: &ast::Expr, part: &ast::Name, place: &Place<'_>, span: Span) -> Option<Expr> {
+        let things = things();
+        let thing = match &base.kind {
+            ast::ExprKind::Name(name) if things.contains(&name.as_str()) => name,
+            _ => {
+                let things = one_of(&things);
+                let error = Diagnostic::error(code::UNKNOWN, format!("only {things} has fields"));
+                self.report(error.at(base.span, format!("not {things}")));
+                return None;
             }
-            other => {
-                self.report(unknown("road fact", other, field.span, ["limit", "lanes"]));
-                None
-            }
+        };
+        let name = format!("{thing}.{}", part.text);
+        if !place.knows(thing) {
+            self.report(unknown_here(thing, span));
+        } else if let Some(fact) = place.fact(&name) {
+            return Some(Expr { kind: ExprKind::Fact(fact), ty: fact.ty(), span });
+        } else if name == ROAD_LANES.0 {
+            let error = Diagnostic::error(code::TYPE_MISMATCH, "`road.lanes` is a set of lanes");
+            self.report(error.at(span, "not a value").help("write `lane in road.lanes`"));
+        } else {
+            let parts = parts_of(thing).into_iter().map(|(part, _)| part);
+            self.report(unknown(&format!("{thing} fact"), &part.text, part.span, parts));
         }
+        None
     }
 
     fn index(&mut self, base: &ast::Expr, index: &ast::Expr, place: &Place<'_>, span: Span) -> Option<Expr> {
@@ -633,8 +615,9 @@ impl Checker {
                 if field.text == "lanes"
                     && matches!(&base.kind, ast::ExprKind::Name(name) if name == "road") =>
             {
-                if !place.road {
-                    return self.road_field(field, place, right.span);
+                if !place.knows("road") {
+                    self.report(unknown_here("road", right.span));
+                    return None;
                 }
                 let lanes = self.words::<LaneChoice>("lane", ty, value.span)?;
                 ExprKind::InLanes(value, lanes)
@@ -651,8 +634,8 @@ impl Checker {
 
     /// `road == corner`: whether the road is one of these.
     fn on_road(&mut self, names: &[ast::Expr], place: &Place<'_>, span: Span) -> Option<Expr> {
-        if !place.road {
-            self.report(road_unknown(span));
+        if !place.knows("road") {
+            self.report(unknown_here("road", span));
             return None;
         }
         let mut roads = Some(Vec::new());
@@ -697,10 +680,12 @@ impl Checker {
     }
 }
 
-fn road_unknown(span: Span) -> Diagnostic {
-    Diagnostic::error(code::NOT_HERE, "`road` is not known here")
-        .at(span, "only rules see the road")
-        .help("write a rule, or pass a function what it needs: `f(road.limit)`")
+/// A thing that is asked where no fact about it is known.
+fn unknown_here(thing: &str, span: Span) -> Diagnostic {
+    let asked = parts_of(thing).first().map_or("", |(part, _)| part);
+    Diagnostic::error(code::NOT_HERE, format!("`{thing}` is not known here"))
+        .at(span, format!("only rules see the {thing}"))
+        .help(format!("write a rule, or pass a function what it needs: `f({thing}.{asked})`"))
 }
 
 /// A word that is no unit.
@@ -747,8 +732,8 @@ pub(super) fn fits(found: Type, wanted: Type) -> bool {
 }
 
 /// `a`, `b` or `c`.
-fn one_of(words: &[&str]) -> String {
-    let quoted: Vec<String> = words.iter().map(|word| format!("`{word}`")).collect();
+fn one_of<S: AsRef<str>>(words: &[S]) -> String {
+    let quoted: Vec<String> = words.iter().map(|word| format!("`{}`", word.as_ref())).collect();
     match quoted.split_last() {
         Some((last, rest)) if !rest.is_empty() => format!("{} or {last}", rest.join(", ")),
         _ => quoted.concat(),

@@ -2,6 +2,7 @@
 
 use crate::check::names::{Names, unknown};
 use crate::model::code;
+use crate::model::vocabulary::Word;
 use crate::syntax::ast::{Field, Name, Span};
 use crate::syntax::{Diagnostic, ast};
 
@@ -33,27 +34,28 @@ pub(super) trait Report {
         self.once(kind, fields.iter().map(|field| &field.name));
     }
 
-    /// Reports every field that stands twice or that the block does not have.
-    fn fields_known(&mut self, fields: &[Field], known: &[&str]) {
+    /// The fields of a block with their values. Reports every field that stands twice or that the block
+    /// does not have.
+    fn fields_known<'a, W: Word>(&mut self, fields: &'a [Field]) -> Vec<(W, &'a ast::Expr)> {
         self.fields_once("field", fields);
-        for field in fields.iter().filter(|field| !known.contains(&field.name.text.as_str())) {
-            self.report(unknown_field(field, known));
+        let mut known = Vec::new();
+        for Field { name, value, .. } in fields {
+            match W::from_name(&name.text) {
+                Some(word) => known.push((word, value)),
+                None => self.report(unknown("field", &name.text, name.span, W::names())),
+            }
         }
+        known
     }
 
     /// Reports that a block lacks a field which it needs.
-    fn missing_field<T>(&mut self, name: &str, span: Span, message: String) -> Option<T> {
+    fn missing_field<T>(&mut self, field: impl Word, span: Span, message: String) -> Option<T> {
         let error = Diagnostic::error(code::MISSING_FIELD, message);
-        self.reject(error.at(span, format!("`{name}: …` is missing")))
+        self.reject(error.at(span, format!("`{}: …` is missing", field.name())))
     }
 }
 
-/// A field that the block does not have.
-pub(super) fn unknown_field(field: &Field, known: &[&str]) -> Diagnostic {
-    unknown("field", &field.name.text, field.name.span, known.iter().copied())
-}
-
 /// The value of the first field of that name.
-pub(super) fn field<'a>(fields: &'a [Field], name: &str) -> Option<&'a ast::Expr> {
-    fields.iter().find(|field| field.name.text == name).map(|field| &field.value)
+pub(super) fn field<'a, W: Word>(fields: &[(W, &'a ast::Expr)], wanted: W) -> Option<&'a ast::Expr> {
+    fields.iter().find(|(field, _)| *field == wanted).map(|(_, value)| *value)
 }

@@ -7,6 +7,7 @@ use crate::check::checker::{Checker, docs};
 use crate::check::expression::Place;
 use crate::check::names::unknown;
 use crate::check::report::{Report, field};
+use crate::model::vocabulary::{RoadField, Word};
 use crate::model::{Road, RoadFacts, SPAWN_SPEED_MPS, Type, code};
 use crate::road::{LanePlace, RoadMap, Route};
 use crate::syntax::ast::ItemKind;
@@ -43,12 +44,11 @@ impl Checker {
     }
 
     fn road(&mut self, item: &ast::Item, block: &ast::Block, maps: &mut dyn Maps) -> Option<Road> {
-        const FIELDS: [&str; 4] = ["map", "start", "goal", "limit"];
-        self.fields_known(&block.fields, &FIELDS);
-        let [map, start, goal] = ["map", "start", "goal"].map(|name| {
-            field(&block.fields, name).or_else(|| {
-                let message = format!("road `{}` has no `{name}`", block.name.text);
-                self.missing_field(name, block.name.span, message)
+        let fields = self.fields_known(&block.fields);
+        let [map, start, goal] = [RoadField::Map, RoadField::Start, RoadField::Goal].map(|needed| {
+            field(&fields, needed).or_else(|| {
+                let message = format!("road `{}` has no `{}`", block.name.text, needed.name());
+                self.missing_field(needed, block.name.span, message)
             })
         });
         let (map, start, goal) = (map?, start?, goal?);
@@ -65,7 +65,7 @@ impl Checker {
                 return self.reject(error.at(map.span, reason));
             }
         };
-        let map = match field(&block.fields, "limit").map(|limit| self.limit(limit)) {
+        let map = match field(&fields, RoadField::Limit).map(|limit| self.limit(limit)) {
             None => map,
             Some(limit_mps) => slowed(&map, limit_mps?),
         };

@@ -5,6 +5,7 @@ use crate::check::expression::Place;
 use crate::check::names::unknown;
 use crate::check::report::Report;
 use crate::model::expr::{Expr, ExprKind};
+use crate::model::vocabulary::Site;
 use crate::model::{ActionDef, EffectDef, RuleBinding, RuleBody, RuleDef, Type, code};
 use crate::syntax::ast::ItemKind;
 use crate::syntax::{Diagnostic, ast, listed};
@@ -49,7 +50,7 @@ impl Checker {
             }
             let locals = locals(&definition);
             let spawns = definition.effects.iter().any(|effect| matches!(effect, EffectDef::Spawn(_)));
-            let place = Place { locals: &locals, states: true, road: true, spawn: true, ..Place::default() };
+            let place = Place { locals: &locals, states: true, site: Site::Rule };
             let Some(condition) = self.typed(condition, &place, Type::Bool) else { continue };
             if condition.needs_survey() && !spawns && !self.half_broken.contains(&action) {
                 let message =
@@ -90,7 +91,7 @@ impl Checker {
                 .at(named_at, "a parameter of which action?");
             return self.reject(error.help(format!("write `rule {} on {action}: …`", rule.name.text)));
         }
-        let place = Place { locals: &[], states: true, road: true, spawn: true, ..Place::default() };
+        let place = Place { locals: &[], states: true, site: Site::Rule };
         let compiled = self.typed(condition, &place, Type::Bool)?;
         let binds = |action: &ActionDef| {
             action.effects.iter().any(|effect| match effect {

@@ -5,13 +5,14 @@ use std::sync::Arc;
 
 use crate::check::checker::docs;
 use crate::check::names::unknown;
-use crate::check::report::{Report, unknown_field};
+use crate::check::report::Report;
 use crate::check::scenario_rules::{Moment, breaches};
 use crate::check::scenario_value::{figure, number, value};
 use crate::model::rules::RowRules;
 use crate::model::scenario::{
     Avoidability, Claim, ENDS, Figure, MODULES, Origin, Scenario, ScenarioStart, ScenarioStep,
 };
+use crate::model::vocabulary::{Fact, OriginField, ScenarioClaim, StartField, WAIT, Word};
 use crate::model::{
     AMBIENT_MAX, Domain, Initial, Memory, Parameter, Row, RulesInForce, SIGNAL_PHASE_S, Space, StateDef,
     Value, code, locals,
@@ -76,33 +77,19 @@ impl Report for Reader<'_> {
 
 impl<'a> Reader<'a> {
     fn origin(&mut self, fields: &[ast::Field]) -> Origin {
-        const FIELDS: [&str; 10] = [
-            "seed",
-            "episode",
-            "policy",
-            "ads",
-            "profile",
-            "profile_digest",
-            "engine",
-            "avoidability",
-            "with",
-            "without",
-        ];
         let mut origin = Origin::default();
-        self.fields_once("field", fields);
-        for field in fields {
-            match field.name.text.as_str() {
-                "seed" => origin.seed = self.whole(&field.value),
-                "episode" => origin.episode = self.whole(&field.value),
-                "policy" => origin.policy = self.text(&field.value),
-                "ads" => origin.ads = self.text(&field.value),
-                "profile" => origin.profile = self.text(&field.value),
-                "profile_digest" => origin.profile_digest = self.text(&field.value),
-                "engine" => origin.engine = self.text(&field.value),
-                "avoidability" => origin.avoidability = self.text(&field.value),
-                "with" => origin.with = self.rule_names(&field.value),
-                "without" => origin.without = self.rule_names(&field.value),
-                _ => self.report(unknown_field(field, &FIELDS)),
+        for (field, value) in self.fields_known(fields) {
+            match field {
+                OriginField::Seed => origin.seed = self.whole(value),
+                OriginField::Episode => origin.episode = self.whole(value),
+                OriginField::Policy => origin.policy = self.text(value),
+                OriginField::Ads => origin.ads = self.text(value),
+                OriginField::Profile => origin.profile = self.text(value),
+                OriginField::ProfileDigest => origin.profile_digest = self.text(value),
+                OriginField::Engine => origin.engine = self.text(value),
+                OriginField::Avoidability => origin.avoidability = self.text(value),
+                OriginField::With => origin.with = self.rule_names(value),
+                OriginField::Without => origin.without = self.rule_names(value),
             }
         }
         origin
@@ -145,8 +132,8 @@ impl<'a> Reader<'a> {
         let mut start = (0.0, None, 0);
         self.fields_once("field", &declared.start);
         for field in &declared.start {
-            match field.name.text.as_str() {
-                "signal_phase" => {
+            match StartField::from_name(&field.name.text) {
+                Some(StartField::SignalPhase) => {
                     let seconds = number(&field.value, Dimension::DURATION);
                     start.0 = self.take(seconds).unwrap_or(0.0);
                     if !SIGNAL_PHASE_S.contains(&start.0) {
@@ -156,8 +143,8 @@ impl<'a> Reader<'a> {
                         self.report(error.at(field.value.span, format!("must lie within {range}")));
                     }
                 }
-                "traffic_seed" => start.1 = self.whole(&field.value),
-                "ambient" => {
+                Some(StartField::TrafficSeed) => start.1 = self.whole(&field.value),
+                Some(StartField::Ambient) => {
                     let wanted = self.whole(&field.value).unwrap_or(0);
                     if wanted > u64::from(AMBIENT_MAX) {
                         let message = format!("{wanted} ambient vehicles are not possible");
@@ -168,12 +155,12 @@ impl<'a> Reader<'a> {
                     }
                     start.2 = wanted.min(u64::from(AMBIENT_MAX)) as u32;
                 }
-                name => match space.state(name) {
+                None => match space.state(&field.name.text) {
                     Some(state) => self.start_state(state, &field.value, &mut memory),
                     None => {
                         let states = space.states.iter().map(|state| state.name.as_str());
-                        let names = states.chain(["signal_phase", "traffic_seed", "ambient"]);
-                        self.report(unknown("field", name, field.name.span, names));
+                        let names = states.chain(StartField::names());
+                        self.report(unknown("field", &field.name.text, field.name.span, names));
                     }
                 },
             }
@@ -260,10 +247,10 @@ impl<'a> Reader<'a> {
 
     /// `wait()` is a step without an action, unless the space has an action of that name.
     fn is_wait(&self, step: &ast::Step) -> bool {
-        step.action.name.text == "wait"
+        step.action.name.text == WAIT.0
             && step.action.args.is_empty()
             && step.drawn.is_empty()
-            && !self.space.actions.iter().any(|action| action.name == "wait")
+            && !self.space.actions.iter().any(|action| action.name == WAIT.0)
     }
 
     /// The row that a call means. It names the values of the axes, or gives them in their order.
@@ -448,7 +435,7 @@ impl<'a> Reader<'a> {
             )
         };
         match &expect.claim.kind {
-            ast::ExprKind::Name(name) if name == "collision" => {
+            ast::ExprKind::Name(name) if name == Fact::Collision.name() => {
                 let (obstacle, time_s) = self.clauses(&expect.clauses, true)?;
                 Some(Claim::Collision { obstacle, time_s })
             }
@@ -456,7 +443,7 @@ impl<'a> Reader<'a> {
                 let (obstacle, _) = self.clauses(&expect.clauses, false)?;
                 Some(Claim::Verdict { name: name.clone(), obstacle })
             }
-            ast::ExprKind::Name(name) if name == "minimal" => {
+            ast::ExprKind::Name(name) if name == ScenarioClaim::Minimal.name() => {
                 let (obstacle, _) = self.clauses(&expect.clauses, false)?;
                 Some(Claim::Minimal { obstacle })
             }
@@ -470,7 +457,9 @@ impl<'a> Reader<'a> {
                     let values = items.iter().map(|item| self.take(figure(item, Dimension::RATIO)));
                     values.collect::<Option<_>>().map(Claim::Proc)
                 }
-                (ast::ExprKind::Name(name), ast::ExprKind::Text(text)) if name == "trace" => {
+                (ast::ExprKind::Name(name), ast::ExprKind::Text(text))
+                    if name == ScenarioClaim::Trace.name() =>
+                {
                     if !is_digest(text) {
                         let error = Diagnostic::error(code::UNKNOWN_CLAIM, "this is the digest of no trace");
                         let error = error.at(right.span, "not `sha256:` and 64 digits from 0 to f");
@@ -478,12 +467,14 @@ impl<'a> Reader<'a> {
                     }
                     Some(Claim::Trace(text.clone()))
                 }
-                (ast::ExprKind::Name(name), _) if name == "cause" => {
+                (ast::ExprKind::Name(name), _) if name == ScenarioClaim::Cause.name() => {
                     let modules = self.modules(right)?;
                     let (obstacle, _) = self.clauses(&expect.clauses, false)?;
                     Some(Claim::Cause { modules, obstacle })
                 }
-                (ast::ExprKind::Name(name), ast::ExprKind::Name(end)) if name == "end" => {
+                (ast::ExprKind::Name(name), ast::ExprKind::Name(end))
+                    if name == ScenarioClaim::End.name() =>
+                {
                     if !ENDS.contains(&end.as_str()) {
                         let message = format!("an episode does not end `{end}`");
                         let error = Diagnostic::error(code::UNKNOWN_CLAIM, message);

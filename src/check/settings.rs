@@ -3,7 +3,8 @@
 use crate::check::checker::{Checker, docs, each};
 use crate::check::expression::Place;
 use crate::check::report::Report;
-use crate::model::expr::{Expr, ExprKind, Fact};
+use crate::model::expr::{Expr, ExprKind};
+use crate::model::vocabulary::{EpisodeField, Fact, Site, StopReason, Word};
 use crate::model::{COUNTED, EpisodeDef, RewardCase, TICK_MS, Type, VerdictDef, code};
 use crate::syntax::ast::{BinaryOp, ItemKind, Span};
 use crate::syntax::{Diagnostic, ast};
@@ -42,19 +43,16 @@ impl Checker {
 
     /// The settings of the episode, and its list of roads if the block has one.
     pub(super) fn episode(&mut self, items: &[&ast::Item]) -> (EpisodeDef, Option<Vec<ast::Name>>) {
-        const FIELDS: [&str; 4] = ["roads", "step", "stop", "limit"];
         let mut episode =
             EpisodeDef { step_s: STEP_S, stop_arrived: true, stalled_steps: None, step_limit: STEP_LIMIT };
         let mut roads = None;
         let fields = self.only(items, ItemKind::as_episode).map_or(&[][..], |(_, fields)| fields);
-        self.fields_known(fields, &FIELDS);
-        for field in fields {
-            match field.name.text.as_str() {
-                "roads" => roads = self.road_list(&field.value),
-                "step" => episode.step_s = self.step(&field.value).unwrap_or(STEP_S),
-                "stop" => self.stop(&field.value, &mut episode),
-                "limit" => episode.step_limit = self.count_of_steps(&field.value).unwrap_or(STEP_LIMIT),
-                _ => {}
+        for (field, value) in self.fields_known(fields) {
+            match field {
+                EpisodeField::Roads => roads = self.road_list(value),
+                EpisodeField::Step => episode.step_s = self.step(value).unwrap_or(STEP_S),
+                EpisodeField::Stop => self.stop(value, &mut episode),
+                EpisodeField::Limit => episode.step_limit = self.count_of_steps(value).unwrap_or(STEP_LIMIT),
             }
         }
         (episode, roads)
@@ -111,17 +109,27 @@ impl Checker {
     fn stop(&mut self, value: &ast::Expr, episode: &mut EpisodeDef) {
         episode.stop_arrived = false;
         let mut parts = vec![value];
+        let reason = |expr: &ast::Expr| match &expr.kind {
+            ast::ExprKind::Name(name) => StopReason::from_name(name),
+            _ => None,
+        };
         while let Some(part) = parts.pop() {
-            match &part.kind {
+            let (reason, count) = match &part.kind {
                 ast::ExprKind::Binary { op: BinaryOp::Or, left, right, .. } => {
-                    parts.extend([&**left, &**right])
+                    parts.extend([&**left, &**right]);
+                    continue;
                 }
-                ast::ExprKind::Name(name) if name == "arrived" => episode.stop_arrived = true,
-                ast::ExprKind::Binary { op: BinaryOp::GreaterEqual, left, right, .. } if matches!(&left.kind, ast::ExprKind::Name(name) if name == "stalled") =>
-                {
-                    episode.stalled_steps = self.count_of_steps(right);
+                ast::ExprKind::Binary { op: BinaryOp::GreaterEqual, left, right, .. } => {
+                    (reason(left), Some(right))
                 }
-                _ => {
+                _ => (reason(part), None),
+            };
+            match (reason, count) {
+                (Some(StopReason::Arrived), None) => episode.stop_arrived = true,
+                (Some(StopReason::Stalled), Some(count)) => {
+                    episode.stalled_steps = self.count_of_steps(count);
+                }
+                (Some(StopReason::Arrived), Some(_)) | (Some(StopReason::Stalled), None) | (None, _) => {
                     let error = Diagnostic::error(code::STOP, "an episode cannot be stopped by this");
                     let help =
                         "reasons are `arrived` and `stalled >= 4` (steps without progress), joined by `or`";
@@ -132,7 +140,7 @@ impl Checker {
     }
 
     pub(super) fn reward(&mut self, items: &[&ast::Item]) -> Vec<RewardCase> {
-        let place = Place { outcome: true, ..Place::default() };
+        let place = Place { site: Site::Reward, ..Place::default() };
         let mut cases = Vec::new();
         let Some((item, declared)) = self.only(items, ItemKind::as_reward) else { return cases };
         let mut closed = false;
@@ -157,7 +165,7 @@ impl Checker {
     }
 
     pub(super) fn verdicts(&mut self, items: &[&ast::Item]) -> Vec<VerdictDef> {
-        let place = Place { outcome: true, judged: true, ..Place::default() };
+        let place = Place { site: Site::Verdict, ..Place::default() };
         let mut verdicts = Vec::new();
         let declared: Vec<_> = each(items, ItemKind::as_verdict).collect();
         self.once("verdict", declared.iter().map(|(_, declared)| &declared.name));

@@ -3,10 +3,10 @@
 //! Evaluation cannot fail: the checker has resolved names and types, functions cannot recurse, and a
 //! division by 0 gives infinity or NaN. NaN satisfies no comparison but `!=`.
 
-use crate::model::expr::{Arithmetic, Comparison, Expr, ExprKind, Fact};
+use crate::model::expr::{Arithmetic, Comparison, Expr, ExprKind};
 use crate::model::space::{COUNTED, FnDef, RoadFacts, Space, WordExpr};
 use crate::model::value::{Memory, Value};
-use crate::model::vocabulary::LaneChoice;
+use crate::model::vocabulary::{Fact, LaneChoice};
 
 /// Numbers that differ by at most this part of the larger one are `==`: it forgives the digits that an
 /// author rounds away, but no measurable distance.

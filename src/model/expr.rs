@@ -1,7 +1,7 @@
 //! Typed expressions: names are resolved, units are gone (all numbers are SI), every type fits.
 
 use crate::model::value::{EnumIndex, Type};
-use crate::model::vocabulary::LaneChoice;
+use crate::model::vocabulary::{Fact, LaneChoice};
 use crate::syntax::ast::{BinaryOp, Span};
 use crate::units::Rational;
 
@@ -48,29 +48,6 @@ pub enum ExprKind {
         arm_of: Vec<usize>,
         arms: Vec<Expr>,
     },
-}
-
-/// What an expression may ask about the world.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Fact {
-    /// `road.limit`: the lowest speed limit along the route, m/s.
-    RoadLimit,
-    /// `spawn_gap`: distance between the ego vehicle and the newcomer, m.
-    SpawnGap,
-    /// `safety_gap`: gap that a careful driver would need there, m.
-    SafetyGap,
-    /// `proc`: collision probability of the step, in `[0, 1]`.
-    Proc,
-    /// `collision`: the ego vehicle touched something.
-    Collision,
-    /// `repeated`: it had touched the same thing before.
-    Repeated,
-    /// `sudden`: the thing appeared too late for anybody.
-    Sudden,
-    /// `struck`: the thing ran into the ego vehicle's side or rear.
-    Struck,
-    /// `avoidable`: a careful reference driver would not have touched it.
-    Avoidable,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

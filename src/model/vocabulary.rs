@@ -1,7 +1,15 @@
-//! The engine's own words: what a `spawn`, a `set time` or a `set sky` in a space may mean.
+//! The table of the engine's words: facts, fields, claims, and what a `spawn`, a `set time` or a `set sky`
+//! may mean.
+//!
+//! A row holds the spelling of a word and one sentence for people; a fact also has its type and the site
+//! where it is known. The checker, the editor's server, the highlighter and the test of LANGUAGE.md read
+//! the rows. Keywords stand in `syntax::keyword`, because the grammar knows them.
 //!
 //! Enums are the author's; the names of their variants must be found here wherever a value reaches
-//! the world. The tables are the one place that ties a spelling to a meaning.
+//! the world.
+
+use crate::model::value::Type;
+use crate::units::Dimension;
 
 /// A word of the engine: it has a spelling, and the spelling finds it again.
 pub trait Word: Copy + PartialEq + 'static {
@@ -10,83 +18,257 @@ pub trait Word: Copy + PartialEq + 'static {
 
     fn name(self) -> &'static str;
 
+    /// One sentence for people.
+    fn meaning(self) -> &'static str;
+
     fn from_name(name: &str) -> Option<Self> {
         Self::ALL.iter().copied().find(|word| word.name() == name)
     }
+
+    /// The spellings, in the order of [`Word::ALL`].
+    fn names<'a>() -> impl Iterator<Item = &'a str> {
+        Self::ALL.iter().map(|word| -> &'a str { word.name() })
+    }
 }
 
-/// Declares an enum whose variants are spelt as they are named.
+/// Declares an enum of words. A row is the variant, its spelling if that differs, and its sentence if the
+/// sentence of the kind is not enough.
 macro_rules! words {
-    ($(#[$doc:meta])* $kind:ident: $($(#[$variant_doc:meta])* $word:ident),+ $(,)?) => {
+    ($(#[$doc:meta])* $kind:ident $each:literal: $($word:ident $($spelling:literal)? $(= $own:literal)?),+ $(,)?) => {
+        #[doc = $each]
         $(#[$doc])*
         #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
-        pub enum $kind { $($(#[$variant_doc])* $word),+ }
+        pub enum $kind { $($(#[doc = $own])? $word),+ }
 
         impl Word for $kind {
             const ALL: &'static [$kind] = &[$($kind::$word),+];
 
             fn name(self) -> &'static str {
-                match self { $($kind::$word => stringify!($word)),+ }
+                match self { $($kind::$word => words!(@last stringify!($word) $(, $spelling)?)),+ }
+            }
+
+            fn meaning(self) -> &'static str {
+                match self { $($kind::$word => words!(@last $each $(, $own)?)),+ }
+            }
+        }
+    };
+    (@last $only:expr) => { $only };
+    (@last $first:expr, $second:expr) => { $second };
+}
+
+/// Declares the facts: words with a type and the site where they are known.
+macro_rules! facts {
+    ($($fact:ident $spelling:literal $ty:expr, $site:ident = $meaning:literal;)+) => {
+        words! { Fact "What an expression may ask about the world.": $($fact $spelling = $meaning),+ }
+
+        impl Fact {
+            pub fn ty(self) -> Type {
+                match self { $(Fact::$fact => $ty),+ }
+            }
+
+            /// Where it is known first; see [`Site::knows`].
+            fn site(self) -> Site {
+                match self { $(Fact::$fact => Site::$site),+ }
             }
         }
     };
 }
 
-words! {
-    /// Period of the day: 10:00, 14:00 and 20:00 in the published package.
-    TimeOfDay: Morning, Noon, Night
+/// Where an expression stands, as far as it decides which facts are known there.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Site {
+    /// In functions, constants, parameters and effects, which see no facts.
+    #[default]
+    Elsewhere,
+    Rule,
+    Reward,
+    Verdict,
+}
+
+impl Site {
+    /// Whether the fact is known here. A verdict knows what a reward knows, and how the collision was judged.
+    pub fn knows(self, fact: Fact) -> bool {
+        fact.site() == self || fact.site() == Site::Reward && self == Site::Verdict
+    }
+
+    /// The facts that are known here.
+    pub fn facts(self) -> impl Iterator<Item = Fact> {
+        Fact::ALL.iter().copied().filter(move |fact| self.knows(*fact))
+    }
+}
+
+/// The types that nobody declares, with their spelling and a sentence.
+pub const TYPES: &[(&str, Type, &str)] = &[
+    ("Bool", Type::Bool, "`true` or `false`."),
+    ("Int", Type::Int, "A whole number; may stand wherever a ratio may."),
+    ("Length", LENGTH, "In `m` or `km`."),
+    ("Duration", Type::Quantity(Dimension::DURATION), "In `s`, `ms` or `min`."),
+    ("Speed", SPEED, "In `m/s`, `km/h` or `mph`."),
+    ("Accel", Type::Quantity(Dimension::ACCEL), "In `m/s^2`."),
+    ("Angle", Type::Quantity(Dimension::ANGLE), "In `deg` or `rad`."),
+    ("Ratio", RATIO, "A number without a unit, or with `%`."),
+];
+
+const LENGTH: Type = Type::Quantity(Dimension::LENGTH);
+const RATIO: Type = Type::Quantity(Dimension::RATIO);
+const SPEED: Type = Type::Quantity(Dimension::SPEED);
+
+facts! {
+    RoadLimit "road.limit" SPEED, Rule = "A `Speed`: the lowest limit along the route.";
+    SpawnGap "spawn_gap" LENGTH, Rule = "A `Length`: the gap between the ego vehicle and who appears.";
+    SafetyGap "safety_gap" LENGTH, Rule = "A `Length`: the gap that a careful driver needs.";
+    Proc "proc" RATIO, Reward = "A `Ratio`: the collision probability of the step.";
+    Collision "collision" Type::Bool, Reward = "A `Bool`: the ego vehicle collided.";
+    Repeated "repeated" Type::Bool, Reward = "A `Bool`: with an obstacle that it has hit before.";
+    Sudden "sudden" Type::Bool, Reward = "A `Bool`: with an obstacle that appeared a moment ago.";
+    Struck "struck" Type::Bool, Reward = "A `Bool`: the obstacle ran into the side or the rear of the ego vehicle.";
+    Avoidable "avoidable" Type::Bool, Verdict = "A `Bool`: a careful reference driver avoids it. Verdicts only.";
+}
+
+/// `lane in road.lanes`: spelt like a fact, but a set that nothing else can be done with.
+pub const ROAD_LANES: (&str, &str) =
+    ("road.lanes", "The lanes in the ego vehicle's direction: `lane in road.lanes`.");
+
+impl Fact {
+    /// The thing that it is asked of: `road` for `road.limit`.
+    pub fn thing(self) -> Option<&'static str> {
+        self.name().split_once('.').map(|(thing, _)| thing)
+    }
+}
+
+/// The things of which something may be asked.
+pub fn things() -> Vec<&'static str> {
+    let mut things: Vec<&str> = Fact::ALL.iter().filter_map(|fact| fact.thing()).collect();
+    things.dedup();
+    things
+}
+
+/// What may be asked of a thing (`road`): the words behind its `.`, each with its sentence.
+pub fn parts_of(thing: &str) -> Vec<(&'static str, &'static str)> {
+    let facts = Fact::ALL.iter().map(|fact| (fact.name(), fact.meaning()));
+    let dotted =
+        facts.chain([ROAD_LANES]).filter_map(|(name, meaning)| Some((name.split_once('.')?, meaning)));
+    dotted.filter(|((of, _), _)| *of == thing).map(|((_, part), meaning)| (part, meaning)).collect()
 }
 
 words! {
-    /// What the sky does to the road.
-    Phenomenon: Rain, Fog, Wetness
+    EpisodeField "A setting of `episode`.":
+    Roads "roads" = "The roads on which episodes are driven, in this order: `roads: [corner, boulevard]`.",
+    Step "step" = "The observation period after each action: `step: 6 s`.",
+    Stop "stop" = "What ends an episode: `arrived`, `stalled >= 4`, or both with `or`.",
+    Limit "limit" = "The steps after which an episode is cut off: `limit: 20 steps`.",
 }
 
 words! {
-    /// How strongly: 0, 0.2, 0.5 and 1 on LGSVL's scale.
-    Level: None, Light, Moderate, High
+    StopReason "What an episode may stop for.":
+    Arrived "arrived" = "The ego vehicle is at the goal.",
+    Stalled "stalled" = "Steps without progress: `stalled >= 4`.",
 }
 
 words! {
-    /// Body of a road user.
-    Body: Jeep, Sedan, SUV, Hatchback, BoxTruck, SchoolBus, Pedestrian
+    RoadField "A field of `road`.":
+    Map "map" = "The OpenDRIVE file, relative to this file: `map: \"roads/corner.xodr\"`.",
+    Start "start" = "Where the ego vehicle starts: `start: lane 1/-1 at 12 m`.",
+    Goal "goal" = "Where it is to arrive: `goal: lane 7/-1 at 80 m`.",
+    Limit "limit" = "A lower limit for the whole road: `limit: 30 km/h`.",
 }
 
 words! {
-    /// Paint. It matters to nothing but the picture, yet belongs to the scenario.
-    Colour: Pink, Red, Yellow, Black, White, Skyblue
+    SpawnField "A field of `spawn`.":
+    Does "does" = "What the road user does: a verb of the engine.",
+    Lane "lane" = "Its lane, seen from the ego vehicle: `Left`, `Current` or `Right`.",
+    Side "side" = "The side that it comes from: `Left` or `Right`.",
+    Then "then" = "Whether it keeps its lane or changes it: `Keep` or `Change`.",
+    Speed "speed" = "How fast it is.",
+    Colour "colour" = "Its paint.",
 }
 
 words! {
-    /// What a spawned road user does.
-    Verb:
-    /// Drives ahead of the ego vehicle in the same direction.
-    DriveAhead,
-    /// Comes from behind, faster, and passes.
-    Overtake,
-    /// Comes towards the ego vehicle in an opposing lane.
-    DriveOpposite,
-    /// Crosses the ego vehicle's way at a junction.
-    CrossRoad,
-    /// A pedestrian who crosses the road on foot.
-    Walk,
-    /// A pedestrian who stands in the lane.
-    Stand,
+    /// A scenario's `start` also has a field for each state.
+    StartField "A field of `start` in a scenario.":
+    SignalPhase "signal_phase" = "Where the cycle of the signals begins, in seconds.",
+    TrafficSeed "traffic_seed" = "The seed of the choices of other road users.",
+    Ambient "ambient" = "The number of vehicles of ambient traffic.",
 }
 
 words! {
-    /// Lane of a spawn, seen from the ego vehicle's lane.
-    LaneChoice: Left, Current, Right
+    OriginField "A field of `origin` in a scenario: where it came from.":
+    Seed "seed" = "The seed of the run.",
+    Episode "episode" = "The number of the episode in the run.",
+    Policy "policy" = "The agent that chose the actions.",
+    Ads "ads" = "The driving system.",
+    Profile "profile" = "The settings of the driving system that differ from the default.",
+    ProfileDigest "profile_digest" = "The digest of all settings of the driving system.",
+    Engine "engine" = "The version of the world's physics.",
+    Avoidability "avoidability" = "The reference drivers, if they are not the usual ones.",
+    With "with" = "The optional rules that were on.",
+    Without "without" = "The rules that were off.",
 }
 
 words! {
-    /// Side from which a crossing road user comes, seen from the ego vehicle.
-    Side: Left, Right
+    SpaceClaim "What a space may claim of itself.":
+    Count "count" = "The number of rows of an action, a group, or all `actions`: `count(actions)`.",
+    Every "every" = "`every(actions, realisable)`: each row can run on some road.",
+    Actions "actions" = "All actions.",
+    Realisable "realisable" = "Not proved dead on every road.",
 }
 
 words! {
-    /// Whether a vehicle keeps its lane or changes it: the paper's "lane-change" group.
-    Then: Keep, Change
+    ScenarioClaim "What a scenario may claim beside facts and verdicts.":
+    Cause "cause" = "The module at fault: `expect cause == perception`.",
+    End "end" = "How the episode ends: `expect end == arrived`.",
+    Minimal "minimal" = "Without any one of its steps the scenario loses its crash.",
+    Trace "trace" = "The digest of the whole state stream: `expect trace == \"sha256:…\"`.",
+}
+
+/// In place of an action in a scenario.
+pub const WAIT: (&str, &str) = ("wait", "A step without an action: `3: wait()`.");
+
+words! {
+    /// 10:00, 14:00 and 20:00 in the published package.
+    TimeOfDay "A period of the day.": Morning, Noon, Night
+}
+
+words! {
+    Phenomenon "What the sky does to the road.": Rain, Fog, Wetness
+}
+
+words! {
+    /// 0, 0.2, 0.5 and 1 on LGSVL's scale.
+    Level "How strong a phenomenon is.": None, Light, Moderate, High
+}
+
+words! {
+    Body "The body of a road user.": Jeep, Sedan, SUV, Hatchback, BoxTruck, SchoolBus, Pedestrian
+}
+
+words! {
+    /// It matters to nothing but the picture, yet it belongs to the scenario.
+    Colour "A paint.": Pink, Red, Yellow, Black, White, Skyblue
+}
+
+words! {
+    Verb "What a spawned road user does.":
+    DriveAhead = "Drives ahead of the ego vehicle in the same direction.",
+    Overtake = "Comes from behind, faster, and passes.",
+    DriveOpposite = "Comes towards the ego vehicle in an opposing lane.",
+    CrossRoad = "Crosses the ego vehicle's way at a junction.",
+    Walk = "A pedestrian who crosses the road on foot.",
+    Stand = "A pedestrian who stands in the lane.",
+}
+
+words! {
+    LaneChoice "A lane, seen from the ego vehicle's lane.": Left, Current, Right
+}
+
+words! {
+    /// A crossing road user comes from there.
+    Side "A side, seen from the ego vehicle's lane.": Left, Right
+}
+
+words! {
+    /// The paper's "lane-change" group.
+    Then "Whether a vehicle keeps its lane or changes it.": Keep, Change
 }
 
 impl Level {
@@ -105,5 +287,30 @@ impl Body {
     /// Everything on wheels.
     pub fn is_vehicle(self) -> bool {
         self != Body::Pedestrian
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn types_are_spelt_as_they_are_shown() {
+        let quantities = TYPES.iter().filter_map(|(word, ty, _)| match ty {
+            Type::Quantity(dimension) => Some((*word, dimension.to_string())),
+            Type::Bool | Type::Int | Type::Enum(_) => None,
+        });
+        let quantities: Vec<(&str, String)> = quantities.collect();
+        assert!(quantities.iter().all(|(word, shown)| word == shown), "{quantities:?}");
+        assert_eq!(quantities.len(), Dimension::NAMED.len());
+    }
+
+    #[test]
+    fn the_sentence_of_a_fact_begins_with_its_type() {
+        for fact in Fact::ALL {
+            let ty = TYPES.iter().find(|(_, ty, _)| *ty == fact.ty()).map(|(word, ..)| *word);
+            let begins = format!("A `{}`: ", ty.expect("it has a name"));
+            assert!(fact.meaning().starts_with(&begins), "{fact:?}");
+        }
     }
 }

@@ -3,7 +3,8 @@
 //! The static counterpart of `eval`, over exact numbers. It over-approximates, so "never true" is a
 //! proof and "may be true" is not.
 
-use crate::model::expr::{Arithmetic, Comparison, Expr, ExprKind, Fact};
+use crate::model::expr::{Arithmetic, Comparison, Expr, ExprKind};
+use crate::model::vocabulary::Fact;
 use crate::model::{FnDef, Interval, RoadFacts, Value};
 use crate::units::Rational;
 

@@ -9,6 +9,7 @@ mod diagnostic;
 mod expression;
 mod format;
 mod grammar;
+pub mod keyword;
 mod layout;
 mod parse;
 mod print;

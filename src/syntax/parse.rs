@@ -12,6 +12,7 @@ use crate::syntax::ast::{Doc, Field, File, FileId, Item, Span};
 use crate::syntax::build::{Builder, end_of};
 use crate::syntax::diagnostic::enumerated;
 use crate::syntax::grammar::{AvaParser, Rule, continues_expression, words};
+use crate::syntax::keyword::{CLAUSES, DECLARATIONS, OPERATORS};
 use crate::syntax::scan::{Comment, Scan, scan};
 use crate::syntax::{Diagnostic, code, nearest};
 
@@ -24,17 +25,16 @@ pub const LANGUAGE: u64 = 1;
 /// Mistakes reported for one file, at most: more help nobody.
 const DIAGNOSTICS_MAX: usize = 100;
 
-/// Every word that begins a declaration.
-const DECLARATIONS: [&str; 19] = [
-    "language", "use", "enum", "odds", "state", "let", "fn", "action", "group", "optional", "rule", "road",
-    "episode", "reward", "verdict", "expect", "scenario", "policy", "override",
-];
+/// The words that begin a declaration.
+fn declarations() -> impl Iterator<Item = &'static str> {
+    DECLARATIONS.iter().map(|(word, _)| *word)
+}
 
-/// Words that begin something inside a declaration.
-const CLAUSES: [&str; 23] = [
-    "each", "any", "where", "set", "spawn", "ahead", "behind", "digest", "without", "origin", "start",
-    "steps", "expect", "with", "claims", "net", "rules", "when", "match", "implies", "and", "not", "rule",
-];
+/// The words that stand inside a declaration, without those of two letters: they are near to too many others.
+fn words_inside() -> impl Iterator<Item = &'static str> {
+    let words = CLAUSES.iter().chain(OPERATORS).map(|(word, _)| *word);
+    words.filter(|word| word.len() > 2).chain(["rule", "expect"])
+}
 
 /// Reads a text. The tree holds what could be read; it is whole if no diagnostic is an error.
 ///
@@ -144,7 +144,7 @@ impl Reader<'_> {
         if start >= end {
             return None;
         }
-        if DECLARATIONS.contains(&found) {
+        if declarations().any(|word| word == found) {
             let (at, expected) = self.failure(start, end);
             return Some(self.expected(at, expected, (start, end)));
         }
@@ -194,11 +194,11 @@ impl Reader<'_> {
             };
         }
         let unknown = Diagnostic::error(code::DECLARATION, format!("no declaration begins with `{found}`"));
-        match nearest(found, DECLARATIONS) {
+        match nearest(found, declarations()) {
             Some(meant) => unknown.at(span, "unknown declaration").meant(span, meant),
             None => unknown.at(span, "unknown declaration").note(format!(
                 "declarations begin with {}",
-                enumerated(&DECLARATIONS.map(|word| format!("`{word}`")), "or")
+                enumerated(&declarations().map(|word| format!("`{word}`")).collect::<Vec<_>>(), "or")
             )),
         }
     }
@@ -228,8 +228,8 @@ impl Reader<'_> {
         if wants_name && found.starts_with(|first: char| first.is_ascii_alphabetic()) {
             return mistake.help(format!("`{found}` is a word of the language; choose another name"));
         }
-        // Short words are near to too many others.
-        match nearest(found, CLAUSES).filter(|_| found.len() > 2 && !CLAUSES.contains(&found)) {
+        let is_word = words_inside().any(|word| word == found);
+        match nearest(found, words_inside()).filter(|_| found.len() > 2 && !is_word) {
             Some(meant) => mistake.meant(Span::new(self.file, token_start, token_start + found.len()), meant),
             None => mistake,
         }

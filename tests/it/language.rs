@@ -5,10 +5,13 @@ use std::path::Path;
 
 use avastra::check::{Loaded, load};
 use avastra::model::vocabulary::{
-    Body, Colour, LaneChoice, Level, Phenomenon, Side, Then, TimeOfDay, Verb, Word,
+    Body, Colour, EpisodeField, Fact, LaneChoice, Level, OriginField, Phenomenon, ROAD_LANES, RoadField,
+    ScenarioClaim, Side, SpaceClaim, SpawnField, StartField, StopReason, TYPES, Then, TimeOfDay, Verb, WAIT,
+    Word,
 };
-use avastra::model::{ENDS, MODULES};
+use avastra::model::{Avoidability, COUNTED, ENDS, MODULES};
 use avastra::syntax::Diagnostic;
+use avastra::syntax::keyword::keywords;
 use avastra::units::UNITS;
 
 use crate::cases::root;
@@ -62,29 +65,23 @@ fn every_example_says_what_the_page_says_of_it() {
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
-/// The words between the quotes of a source text.
-fn quoted(text: &str) -> impl Iterator<Item = &str> {
-    text.split('"').skip(1).step_by(2)
+/// The words in the first column of the table with that heading.
+fn first_column<'a>(page: &'a str, heading: &str) -> BTreeSet<&'a str> {
+    let from = page.find(&format!("\n| {heading} |")).expect("the table is there") + 1;
+    let rows = page[from..].lines().skip(2).take_while(|line| line.starts_with('|'));
+    rows.filter_map(|row| row.strip_prefix("| `")?.split('`').next()).collect()
 }
 
-/// The words of the lists that the checker declares as constants: fields, settings, facts.
-fn words_of_the_checker() -> Vec<String> {
-    let folder = root().join("src/check");
-    let mut words = Vec::new();
-    for entry in std::fs::read_dir(folder).expect("the checker is there").flatten() {
-        if entry.path().is_dir() {
-            continue;
-        }
-        let text = std::fs::read_to_string(entry.path()).expect("a source file is readable");
-        for list in ["const FIELDS", "const FACTS"] {
-            for (at, _) in text.match_indices(list) {
-                let end = text[at..].find("];").expect("a list ends");
-                words.extend(quoted(&text[at..at + end]).map(str::to_owned));
-            }
-        }
-    }
-    assert!(words.len() > 25, "{words:?}");
-    words
+#[test]
+fn the_tables_of_the_page_list_the_words_of_the_engine() {
+    let page = page();
+    let check = |heading: &str, words: Vec<&str>| {
+        assert_eq!(first_column(&page, heading), BTreeSet::from_iter(words), "the table `{heading}`");
+    };
+    check("type", TYPES.iter().map(|(word, ..)| *word).collect());
+    check("field", SpawnField::names().collect());
+    check("verb", Verb::names().collect());
+    check("setting", EpisodeField::names().collect());
 }
 
 #[test]
@@ -93,37 +90,29 @@ fn every_word_of_the_language_is_on_the_page() {
     let mut on_page: BTreeSet<&str> = page.split(|c: char| !(c.is_alphanumeric() || c == '_')).collect();
     // Units and the like do not consist of letters alone.
     on_page.extend(page.split([' ', '`', ',', '|', '\n', ')', '(', '}']));
-    let names = |all: &[&'static str]| all.iter().map(|word| (*word).to_owned()).collect::<Vec<_>>();
-    fn spelt<W: Word>() -> Vec<String> {
-        W::ALL.iter().map(|word| word.name().to_owned()).collect()
-    }
-    let grammar = std::fs::read_to_string(root().join("grammar/ava.pest")).expect("it is there");
-    let terminals = grammar.lines().filter(|line| line.starts_with("kw_") || line.starts_with("op_"));
-    let keywords: Vec<String> = terminals.filter_map(|line| quoted(line).next()).map(str::to_owned).collect();
-    assert!(keywords.len() > 55, "{keywords:?}");
-    let types = ["Bool", "Int", "Length", "Duration", "Speed", "Accel", "Angle", "Ratio"];
-    let claims =
-        ["count", "every", "actions", "realisable", "counted", "beyond_reference", "unavoidable", "wait"];
-    let all = [
-        keywords,
-        words_of_the_checker(),
-        names(&types),
-        names(&claims),
-        names(&ENDS),
-        names(&MODULES),
-        UNITS.iter().map(|unit| unit.word.to_owned()).collect(),
-        spelt::<Body>(),
-        spelt::<Colour>(),
-        spelt::<LaneChoice>(),
-        spelt::<Level>(),
-        spelt::<Phenomenon>(),
-        spelt::<Side>(),
-        spelt::<Then>(),
-        spelt::<TimeOfDay>(),
-        spelt::<Verb>(),
-        names(&["limit", "lanes", "arrived", "stalled", "signal_phase", "traffic_seed", "ambient"]),
+    let all: [Vec<&str>; 21] = [
+        keywords().map(|(word, _)| *word).collect(),
+        UNITS.iter().map(|unit| unit.word).collect(),
+        ENDS.to_vec(),
+        MODULES.to_vec(),
+        Avoidability::ALL.map(Avoidability::name).to_vec(),
+        vec![COUNTED, ROAD_LANES.0, WAIT.0],
+        Fact::names().collect(),
+        RoadField::names().collect(),
+        StartField::names().collect(),
+        OriginField::names().collect(),
+        StopReason::names().collect(),
+        SpaceClaim::names().collect(),
+        ScenarioClaim::names().collect(),
+        Body::names().collect(),
+        Colour::names().collect(),
+        LaneChoice::names().collect(),
+        Level::names().collect(),
+        Phenomenon::names().collect(),
+        Side::names().collect(),
+        Then::names().collect(),
+        TimeOfDay::names().collect(),
     ];
-    let missing: Vec<String> =
-        all.into_iter().flatten().filter(|word| !on_page.contains(word.as_str())).collect();
+    let missing: Vec<&str> = all.into_iter().flatten().filter(|word| !on_page.contains(word)).collect();
     assert!(missing.is_empty(), "LANGUAGE.md does not mention {missing:?}");
 }

@@ -5,6 +5,7 @@ use std::path::Path;
 
 use serde_json::{Value, json};
 
+use crate::syntax::keyword;
 use crate::units;
 
 use super::context::Kind;
@@ -55,15 +56,16 @@ impl List<'_> {
     fn kind(&mut self, kind: &Kind) {
         let declared = &self.analysis.names.declared;
         match kind {
-            Kind::Declarations => self.words(words::DECLARATIONS, KEYWORD, LIKELY),
+            Kind::Declarations => self.words(keyword::DECLARATIONS, KEYWORD, LIKELY),
             Kind::Words(entries) => self.words(entries, FIELD, WANTED),
             Kind::Keyword(word) => {
-                let meaning = words::keywords().find(|(known, _)| known == word).map(|(_, meaning)| *meaning);
+                let meaning =
+                    keyword::keywords().find(|(known, _)| known == word).map(|(_, meaning)| *meaning);
                 self.add(word, KEYWORD, LIKELY, "", meaning.map(str::to_owned));
             }
             Kind::Types => {
                 self.kind(&Kind::Enums);
-                self.words(words::TYPES, CLASS, LIKELY);
+                self.words(&words::types(), CLASS, LIKELY);
             }
             Kind::Enums => {
                 for name in declared.enums.keys() {
@@ -106,7 +108,7 @@ impl List<'_> {
                 }
             }
             Kind::Value(ty) => self.value(ty.as_ref()),
-            Kind::Operators => self.words(words::OPERATORS, OPERATOR, POSSIBLE),
+            Kind::Operators => self.words(keyword::OPERATORS, OPERATOR, POSSIBLE),
             Kind::Variants(of) => self.variants(of, WANTED),
             Kind::Local(name, ty, fits) => {
                 let ty = ty.as_ref().map(Ty::name).unwrap_or_default();
@@ -135,7 +137,7 @@ impl List<'_> {
             }
         }
         if ty.is_none_or(|ty| *ty == Ty::Bool) {
-            self.words(words::LITERALS, KEYWORD, POSSIBLE);
+            self.words(keyword::LITERALS, KEYWORD, POSSIBLE);
         }
         for (name, of) in &declared.constants {
             let rank = if of.of.is_some() && of.of.as_ref() == ty { WANTED } else { LIKELY };

@@ -1,7 +1,12 @@
 //! What could be written at a place, from the words before it: the text there is unfinished, and no
 //! tree can be trusted.
 
+use crate::model::vocabulary::{
+    EpisodeField, RoadField, ScenarioClaim, Site, SpaceClaim, SpawnField, StartField, StopReason, WAIT,
+    parts_of, things,
+};
 use crate::syntax::ast::ParamMode;
+use crate::syntax::keyword;
 
 use super::names::{Names, Ty};
 use super::tokens::{Ending, Token, tokens};
@@ -65,7 +70,7 @@ fn item_start(text: &str, byte: usize) -> usize {
     loop {
         let start = text[..at].rfind('\n').map_or(0, |newline| newline + 1);
         let word: &str = text[start..].split(|c: char| !c.is_ascii_alphabetic()).next().unwrap_or_default();
-        let is_keyword = words::meaning(words::DECLARATIONS, word).is_some();
+        let is_keyword = words::meaning(keyword::DECLARATIONS, word).is_some();
         if start == 0 || is_keyword && start + word.len() <= byte {
             return start;
         }
@@ -160,12 +165,12 @@ impl<'a> Place<'a> {
             ("", _) => return vec![Kind::Declarations],
             ("override", _) => {
                 let fixed = ["language", "use", "expect", "scenario", "policy", "override"];
-                let declarations = words::DECLARATIONS.iter().copied();
+                let declarations = keyword::DECLARATIONS.iter().copied();
                 let open = declarations.filter(|(word, _)| !fixed.contains(word));
                 return vec![Kind::Words(open.collect())];
             }
             ("optional", _) => return vec![Kind::Keyword("rule")],
-            (".", "road") => return vec![Kind::Words(words::ROAD_FACTS.to_vec())],
+            (".", thing) if things().contains(&thing) => return vec![Kind::Words(parts_of(thing))],
             _ => {}
         }
         if self.tokens.last().is_some_and(Token::is_number)
@@ -270,7 +275,7 @@ impl<'a> Place<'a> {
                 kinds
             }
             (2, _) if self.begins_entry() && self.inside().1 == "{" => {
-                vec![Kind::Words(self.unused(words::SPAWN_FIELDS))]
+                vec![Kind::Words(self.unused(&words::of::<SpawnField>()))]
             }
             _ => self.value(None),
         }
@@ -292,8 +297,8 @@ impl<'a> Place<'a> {
             (_, Some(_), _) => {
                 let mut kinds = self.value(Some(Ty::Bool));
                 if self.wants_operand() {
-                    kinds.push(Kind::Words(words::SPAWN_FACTS.to_vec()));
-                    kinds.push(Kind::Keyword("road"));
+                    kinds.push(Kind::Words(words::facts(Site::Rule)));
+                    kinds.extend(things().into_iter().map(Kind::Keyword));
                 }
                 kinds
             }
@@ -314,7 +319,7 @@ impl<'a> Place<'a> {
         match self.last(0) {
             ":" if matches!(self.last(1), "start" | "goal") => vec![Kind::Keyword("lane")],
             _ if self.open.len() == 1 && self.begins_entry() => {
-                vec![Kind::Words(self.unused(words::ROAD_FIELDS))]
+                vec![Kind::Words(self.unused(&words::of::<RoadField>()))]
             }
             _ => Vec::new(),
         }
@@ -325,11 +330,11 @@ impl<'a> Place<'a> {
             return vec![Kind::Roads];
         }
         if self.begins_entry() {
-            return vec![Kind::Words(self.unused(words::EPISODE_FIELDS))];
+            return vec![Kind::Words(self.unused(&words::of::<EpisodeField>()))];
         }
         let field = self.tokens.iter().rposition(|token| token.text == ":").map_or(0, |colon| colon - 1);
         match (self.text(field), self.wants_operand()) {
-            ("stop", true) => vec![Kind::Words(words::STOPS.to_vec())],
+            ("stop", true) => vec![Kind::Words(words::of::<StopReason>())],
             ("stop", false) => vec![Kind::Keyword("or")],
             _ => Vec::new(),
         }
@@ -339,15 +344,15 @@ impl<'a> Place<'a> {
         if !self.wants_operand() && !self.begins_entry() {
             return self.after_value();
         }
-        let mut kinds = vec![Kind::Words(words::OUTCOME_FACTS.to_vec())];
+        let mut kinds = vec![Kind::Words(words::facts(Site::Verdict))];
         kinds.extend(self.value(None));
         kinds
     }
 
     fn in_expect(&self) -> Vec<Kind> {
         match self.inside().1 {
-            "(" => vec![Kind::Words(words::CLAIMS.to_vec()), Kind::Actions, Kind::Groups],
-            _ => vec![Kind::Words(words::CLAIMS.to_vec())],
+            "(" => vec![Kind::Words(words::of::<SpaceClaim>()), Kind::Actions, Kind::Groups],
+            _ => vec![Kind::Words(words::of::<SpaceClaim>())],
         }
     }
 
@@ -372,7 +377,7 @@ impl<'a> Place<'a> {
             self.tokens.iter().rposition(|token| token.text == "expect").map_or(0, |expect| expect + 1);
         match (self.last(0), self.text(from)) {
             ("expect", _) => {
-                let facts = [words::OUTCOME_FACTS, words::SCENARIO_CLAIMS].concat();
+                let facts = [words::facts(Site::Verdict), words::of::<ScenarioClaim>()].concat();
                 vec![Kind::Words(facts), Kind::Verdicts]
             }
             ("==" | "[" | ",", claim) => {
@@ -391,7 +396,7 @@ impl<'a> Place<'a> {
             (_, 3, Some(Ty::Map(key, _))) => vec![Kind::Variants(key)],
             (":", _, Some(Ty::Map(_, value))) => self.value(Some(*value)),
             (":", _, ty) => self.value(ty),
-            _ => vec![Kind::States, Kind::Words(words::START_FIELDS.to_vec())],
+            _ => vec![Kind::States, Kind::Words(words::of::<StartField>())],
         }
     }
 
@@ -399,7 +404,7 @@ impl<'a> Place<'a> {
     fn in_steps(&self) -> Vec<Kind> {
         let (before, bracket) = self.inside();
         match (self.last(0), bracket) {
-            (":", "{") if before == "steps" => vec![Kind::Actions, Kind::Words(vec![words::WAIT])],
+            (":", "{") if before == "steps" => vec![Kind::Actions, Kind::Words(vec![WAIT])],
             (":", "(") => self.value(self.parameter_type(before)),
             (":", "{") if before == "with" => self.value(self.parameter_type(&self.called())),
             ("(" | ",", "(") => vec![Kind::Parameters(before.to_owned(), ParamMode::Each)],

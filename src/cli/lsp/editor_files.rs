@@ -5,6 +5,8 @@
 
 use serde_json::{Value, json};
 
+use crate::model::vocabulary::{Site, StopReason};
+use crate::syntax::keyword;
 use crate::units;
 
 use super::words;
@@ -28,11 +30,10 @@ fn grammar() -> Value {
     let mut engine: Vec<&str> = engine.iter().flatten().map(|(word, _)| *word).collect();
     engine.sort_unstable();
     engine.dedup();
-    let facts = [words::SPAWN_FACTS, words::OUTCOME_FACTS, words::STOPS];
-    let facts: Vec<Entry> = facts.into_iter().flatten().copied().collect();
+    let facts = [words::facts(Site::Rule), words::facts(Site::Verdict), words::of::<StopReason>()].concat();
     // These have no name behind them.
     let nameless = ["language", "use", "optional", "episode", "reward", "expect", "override"];
-    let mut naming = names(words::DECLARATIONS);
+    let mut naming = names(keyword::DECLARATIONS);
     naming.retain(|word| !nameless.contains(word));
     let rule = |name: &str, pattern: String| json!({ "name": format!("{name}.avastra"), "match": pattern });
     json!({
@@ -58,11 +59,11 @@ fn grammar() -> Value {
             },
             // A field may have the name of a keyword.
             rule("variable.other.member", r"\b[A-Za-z_][A-Za-z0-9_]*(?=\s*:)".to_owned()),
-            rule("keyword.declaration", one_of(names(words::DECLARATIONS))),
-            rule("keyword.operator.word", one_of(names(words::OPERATORS))),
-            rule("constant.language", one_of(names(words::LITERALS))),
-            rule("keyword.control", one_of(names(words::CLAUSES))),
-            rule("support.type", one_of(names(words::TYPES))),
+            rule("keyword.declaration", one_of(names(keyword::DECLARATIONS))),
+            rule("keyword.operator.word", one_of(names(keyword::OPERATORS))),
+            rule("constant.language", one_of(names(keyword::LITERALS))),
+            rule("keyword.control", one_of(names(keyword::CLAUSES))),
+            rule("support.type", one_of(names(&words::types()))),
             rule("support.constant", one_of(engine)),
             rule("support.variable", one_of(names(&facts))),
             {
@@ -79,7 +80,7 @@ fn grammar() -> Value {
     })
 }
 
-fn names(entries: &[Entry]) -> Vec<&str> {
+fn names(entries: &[Entry]) -> Vec<&'static str> {
     entries.iter().map(|(word, _)| *word).collect()
 }
 

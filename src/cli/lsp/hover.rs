@@ -7,7 +7,7 @@ use crate::cli::doc::{range_on, unit};
 use crate::cli::progress::plural;
 use crate::model::{ActionDef, Reach, RuleBody, Space};
 use crate::syntax::ast::Span;
-use crate::syntax::listed;
+use crate::syntax::{keyword, listed};
 use crate::units;
 use crate::units::Rational;
 
@@ -38,7 +38,7 @@ pub fn hover(analysis: &Analysis, byte: usize) -> Option<(Span, String)> {
     }
     let text = analysis.text(Analysis::ROOT);
     let (start, word) = tokens::word_at(text, byte)?;
-    let meaning = words::keywords().find(|(known, _)| *known == word).map(|(_, meaning)| *meaning)?;
+    let meaning = keyword::keywords().find(|(known, _)| *known == word).map(|(_, meaning)| *meaning)?;
     let span = Span::new(Analysis::ROOT, start, start + word.len());
     Some((span, format!("**{word}**\n\n{meaning}")))
 }
@@ -129,7 +129,7 @@ pub fn describe(analysis: &Analysis, symbol: &Symbol) -> Option<String> {
         }
         Symbol::Engine(word, meaning) => Some(format!("**{word}**\n\n{meaning}")),
         Symbol::Type(name) => {
-            words::meaning(words::TYPES, name).map(|meaning| format!("**{name}**\n\n{meaning}"))
+            words::meaning(&words::types(), name).map(|meaning| format!("**{name}**\n\n{meaning}"))
         }
         Symbol::Number(digits, unit) => number(digits, unit.as_deref()?),
     }

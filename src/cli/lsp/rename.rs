@@ -9,12 +9,12 @@ use std::path::{Path, PathBuf};
 use serde_json::Value;
 
 use crate::model::COUNTED;
-use crate::syntax::Diagnostic;
 use crate::syntax::ast::Span;
+use crate::syntax::{Diagnostic, keyword};
 
 use super::names::Symbol;
 use super::workspace::{Analysis, Workspace};
-use super::{diagnostics, tokens, words};
+use super::{diagnostics, tokens};
 
 /// Where the name stands that would be renamed.
 ///
@@ -24,7 +24,7 @@ pub fn prepare(analysis: &Analysis, byte: usize) -> Result<Span, String> {
     let Some(occurrence) = analysis.names.at(Analysis::ROOT, byte) else {
         let word = tokens::word_at(analysis.text(Analysis::ROOT), byte).map(|(_, word)| word);
         return Err(match word {
-            Some(word) if words::keywords().any(|(known, _)| *known == word) => {
+            Some(word) if keyword::keywords().any(|(known, _)| *known == word) => {
                 format!("`{word}` is a word of the language")
             }
             Some(word) => format!("`{word}` is declared nowhere"),

@@ -3,6 +3,11 @@
 use std::path::{Path, PathBuf};
 
 use crate::check::LoadedFile;
+use crate::model::Type;
+use crate::model::vocabulary::{
+    EpisodeField, Fact, RoadField, ScenarioClaim, SpaceClaim, SpawnField, StartField, StopReason, WAIT, Word,
+    parts_of,
+};
 use crate::syntax::ast::{BinaryOp, Expr, ExprKind, FileId, ItemKind, Name, Span};
 use crate::syntax::{Sources, ast};
 use crate::units;
@@ -157,7 +162,7 @@ impl Walker<'_> {
     fn type_name(&mut self, name: &Name) {
         if self.declared.enums.contains_key(&name.text) {
             self.uses(name.span, Symbol::Enum(name.text.clone()));
-        } else if words::meaning(words::TYPES, &name.text).is_some() {
+        } else if words::meaning(&words::types(), &name.text).is_some() {
             self.uses(name.span, Symbol::Type(name.text.clone()));
         }
     }
@@ -213,7 +218,7 @@ impl Walker<'_> {
                 self.word("body", body, locals);
                 self.expr(distance, locals, Some(Ty::Quantity(Dimension::LENGTH)));
                 for field in fields {
-                    self.engine(&field.name.text, field.name.span, words::SPAWN_FIELDS);
+                    self.engine(&field.name.text, field.name.span, &words::of::<SpawnField>());
                     self.word(&field.name.text, &field.value, locals);
                 }
             }
@@ -304,7 +309,7 @@ impl Walker<'_> {
     fn road(&mut self, block: &ast::Block) {
         self.declares(&block.name, Symbol::Road);
         for field in &block.fields {
-            self.engine(&field.name.text, field.name.span, words::ROAD_FIELDS);
+            self.engine(&field.name.text, field.name.span, &words::of::<RoadField>());
             match &field.value.kind {
                 ExprKind::Text(path) if field.name.text == "map" => {
                     let path = self.path(path);
@@ -319,7 +324,7 @@ impl Walker<'_> {
 
     fn episode(&mut self, fields: &[ast::Field]) {
         for field in fields {
-            self.engine(&field.name.text, field.name.span, words::EPISODE_FIELDS);
+            self.engine(&field.name.text, field.name.span, &words::of::<EpisodeField>());
             match (&field.value.kind, field.name.text.as_str()) {
                 (ExprKind::List(roads), "roads") => self.listed(roads, Symbol::Road),
                 (_, "stop") => self.stop(&field.value),
@@ -332,7 +337,9 @@ impl Walker<'_> {
 
     fn stop(&mut self, expr: &Expr) {
         match &expr.kind {
-            ExprKind::Name(name) => self.engine(name, self.name_span(name, expr.span), words::STOPS),
+            ExprKind::Name(name) => {
+                self.engine(name, self.name_span(name, expr.span), &words::of::<StopReason>())
+            }
             ExprKind::Binary { left, right, .. } => {
                 self.stop(left);
                 self.stop(right);
@@ -364,11 +371,11 @@ impl Walker<'_> {
                 self.claim(right);
             }
             ExprKind::Call(call) => {
-                self.engine(&call.name.text, call.name.span, words::CLAIMS);
+                self.engine(&call.name.text, call.name.span, &words::of::<SpaceClaim>());
                 for argument in &call.args {
                     if let ExprKind::Name(name) = &argument.value.kind {
                         let span = self.name_span(name, argument.value.span);
-                        self.engine(name, span, words::CLAIMS);
+                        self.engine(name, span, &words::of::<SpaceClaim>());
                         self.target(&Name::new(name.clone(), span));
                     }
                 }
@@ -376,8 +383,8 @@ impl Walker<'_> {
             ExprKind::Name(name) if self.declared.verdicts.contains_key(name) => {
                 self.uses(self.name_span(name, claim.span), Symbol::Verdict(name.clone()));
             }
-            ExprKind::Name(name) if words::meaning(words::SCENARIO_CLAIMS, name).is_some() => {
-                self.engine(name, self.name_span(name, claim.span), words::SCENARIO_CLAIMS);
+            ExprKind::Name(name) if ScenarioClaim::from_name(name).is_some() => {
+                self.engine(name, self.name_span(name, claim.span), &words::of::<ScenarioClaim>());
             }
             _ => {
                 self.expr(claim, &Locals::default(), None);
@@ -390,7 +397,7 @@ impl Walker<'_> {
         self.origin(&declared.origin);
         self.uses(declared.road.span, Symbol::Road(declared.road.text.clone()));
         for field in &declared.start {
-            self.engine(&field.name.text, field.name.span, words::START_FIELDS);
+            self.engine(&field.name.text, field.name.span, &words::of::<StartField>());
             let ty = self.state(&field.name);
             match (&field.value.kind, ty) {
                 (ExprKind::Record(cells), Some(Ty::Map(key, value))) => {
@@ -429,8 +436,8 @@ impl Walker<'_> {
     /// An action with values of its `each` parameters.
     fn step(&mut self, call: &ast::Call) {
         let action = &call.name.text;
-        if action == words::WAIT.0 {
-            self.engine(action, call.name.span, &[words::WAIT]);
+        if action == WAIT.0 {
+            self.engine(action, call.name.span, &[WAIT]);
         }
         self.target(&call.name);
         for (index, argument) in call.args.iter().enumerate() {
@@ -475,10 +482,9 @@ impl Walker<'_> {
             ExprKind::Unary { operand, .. } => self.expr(operand, locals, None),
             ExprKind::Binary { op, left, right, .. } => self.binary(*op, left, right, locals),
             ExprKind::Field { base, field } => {
-                if matches!(&base.kind, ExprKind::Name(name) if name == "road") {
-                    self.engine(&field.text, field.span, words::ROAD_FACTS);
-                }
-                (field.text == "limit").then_some(Ty::Quantity(Dimension::SPEED))
+                let ExprKind::Name(thing) = &base.kind else { return None };
+                self.engine(&field.text, field.span, &parts_of(thing));
+                Fact::from_name(&format!("{thing}.{}", field.text)).and_then(type_of_fact)
             }
             ExprKind::Index { base, index } => {
                 let ExprKind::Name(name) = &base.kind else { return None };
@@ -546,15 +552,9 @@ impl Walker<'_> {
         if self.declared.states.contains_key(name) {
             return self.state(&Name::new(name, span));
         }
-        for facts in [words::SPAWN_FACTS, words::OUTCOME_FACTS] {
-            if words::meaning(facts, name).is_some() {
-                self.engine(name, span, facts);
-                return Some(match name {
-                    "spawn_gap" | "safety_gap" => Ty::Quantity(Dimension::LENGTH),
-                    "proc" => Ty::Quantity(Dimension::RATIO),
-                    _ => Ty::Bool,
-                });
-            }
+        if let Some(fact) = Fact::from_name(name) {
+            self.engine(name, span, &[(fact.name(), fact.meaning())]);
+            return type_of_fact(fact);
         }
         let of = self.variant_of(name, hint.as_ref())?;
         self.uses(span, Symbol::Variant(of.clone(), name.to_owned()));
@@ -615,6 +615,15 @@ impl Walker<'_> {
             self.expr(&argument.value, locals, parameter.and_then(|(_, ty)| ty.clone()));
         }
         function.and_then(|function| function.of.result.clone())
+    }
+}
+
+fn type_of_fact(fact: Fact) -> Option<Ty> {
+    match fact.ty() {
+        Type::Bool => Some(Ty::Bool),
+        Type::Int => Some(Ty::Int),
+        Type::Quantity(dimension) => Some(Ty::Quantity(dimension)),
+        Type::Enum(_) => None,
     }
 }
 
