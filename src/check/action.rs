@@ -4,6 +4,7 @@ use crate::check::checker::{Checker, docs, each, literal};
 use crate::check::declaration::unknown_word;
 use crate::check::expression::{Place, is_number};
 use crate::check::names::unknown;
+use crate::check::references::Symbol;
 use crate::check::report::{Report, field};
 use crate::model::expr::{Expr, ExprKind};
 use crate::model::vocabulary::{Body, Colour, LaneChoice, Side, SpawnField, Then, Verb, Word};
@@ -35,7 +36,8 @@ impl Checker {
         }
     }
 
-    fn action(&mut self, item: &ast::Item, declared: &ast::Action) -> Option<ActionDef> {
+    pub(super) fn action(&mut self, item: &ast::Item, declared: &ast::Action) -> Option<ActionDef> {
+        let owner = Symbol::Action(declared.name.text.clone());
         let mut locals: Vec<(String, Type)> = Vec::new();
         let mut parameters = Vec::new();
         let mut sound = true;
@@ -45,10 +47,16 @@ impl Checker {
                 // Its name is kept, so that uses of it are not reported as unknown.
                 locals.push((parameter.name.text.clone(), Type::Bool));
                 sound = false;
+                let place = Place { locals: &locals, owner: Some(&owner), ..Place::default() };
+                let values = parameter.within.iter().chain(&parameter.condition);
+                values.for_each(|expr| self.look_at(expr, &place, None));
                 continue;
             };
+            if let Some(symbol) = owner.parameter(&parameter.name.text) {
+                self.references.typed(&symbol, ty, None);
+            }
             // A mistake in its values is reported already; the type is enough to check the rest of the action.
-            parameters.push(self.parameter(parameter, ty, &locals).unwrap_or_else(|| Parameter {
+            parameters.push(self.parameter(parameter, ty, &locals, &owner).unwrap_or_else(|| Parameter {
                 name: parameter.name.text.as_str().into(),
                 ty,
                 axis: parameter.mode == ParamMode::Each,
@@ -58,7 +66,12 @@ impl Checker {
             }));
             locals.push((parameter.name.text.clone(), ty));
         }
+        let place = Place { locals: &locals, owner: Some(&owner), states: true, ..Place::default() };
         if !sound {
+            let look = |checker: &mut Checker| {
+                declared.effects.iter().for_each(|effect| drop(checker.effect(effect, &place)));
+            };
+            self.quietly(look);
             return None;
         }
         if declared.effects.is_empty() {
@@ -66,7 +79,6 @@ impl Checker {
             let error = Diagnostic::error(code::NO_EFFECT, message).at(declared.name.span, "does nothing");
             self.report(error.help("give it a `set` or a `spawn`, or remove it"));
         }
-        let place = Place { locals: &locals, states: true, ..Place::default() };
         let effects: Vec<Option<EffectDef>> =
             declared.effects.iter().map(|effect| self.effect(effect, &place)).collect();
         if effects.iter().any(Option::is_none) {
@@ -87,7 +99,26 @@ impl Checker {
         declared: &ast::ActionParam,
         ty: Type,
         before: &[(String, Type)],
+        owner: &Symbol,
     ) -> Option<Parameter> {
+        let mut locals = before.to_vec();
+        locals.push((declared.name.text.clone(), ty));
+        let place = Place { locals: &locals, owner: Some(owner), ..Place::default() };
+        let Some(domain) = self.values(declared, ty) else {
+            declared.condition.iter().for_each(|condition| self.look_at(condition, &place, Some(Type::Bool)));
+            return None;
+        };
+        let condition = match &declared.condition {
+            None => None,
+            Some(condition) => Some(self.typed(condition, &place, Type::Bool)?),
+        };
+        let name = declared.name.text.as_str().into();
+        let axis = declared.mode == ParamMode::Each;
+        Some(Parameter { name, ty, axis, domain, condition, span: declared.span })
+    }
+
+    /// The values of a parameter before its `where`.
+    fn values(&mut self, declared: &ast::ActionParam, ty: Type) -> Option<Domain> {
         let axis = declared.mode == ParamMode::Each;
         let domain = match &declared.within {
             Some(within) => self.domain(within, ty)?,
@@ -117,17 +148,7 @@ impl Checker {
                 .at(declared.ty.span, format!("a range of `{name}`"));
             return self.reject(error.help("list the values, `in [1 m, 2 m]`, or draw one with `any`"));
         }
-        let mut locals = before.to_vec();
-        locals.push((declared.name.text.clone(), ty));
-        let condition = match &declared.condition {
-            None => None,
-            Some(condition) => {
-                let place = Place { locals: &locals, ..Place::default() };
-                Some(self.typed(condition, &place, Type::Bool)?)
-            }
-        };
-        let name = declared.name.text.as_str().into();
-        Some(Parameter { name, ty, axis, domain, condition, span: declared.span })
+        Some(domain)
     }
 
     /// The values to draw from, each repeated as often as its odds say.
@@ -152,6 +173,7 @@ impl Checker {
         match &within.kind {
             ast::ExprKind::Range { low, high } => {
                 if !is_number(ty) {
+                    self.look_at(within, &place, Some(ty));
                     let name = self.type_name(ty);
                     let error = Diagnostic::error(code::TYPE_MISMATCH, format!("`{name}` has no ranges"));
                     return self.reject(error.at(within.span, "a range of numbers"));
@@ -189,6 +211,7 @@ impl Checker {
                 Some(Domain::Values(values))
             }
             _ => {
+                self.look_at(within, &place, Some(ty));
                 let error = Diagnostic::error(code::TYPE_MISMATCH, "`in` needs a range or a list here");
                 self.reject(error.at(within.span, "neither"))
             }
@@ -210,16 +233,24 @@ impl Checker {
     fn effect(&mut self, effect: &ast::Effect, place: &Place<'_>) -> Option<EffectDef> {
         match &effect.kind {
             ast::EffectKind::Set { state, key, value } => {
-                let index = self.state_named(state)?;
+                let Some(index) = self.state_named(state) else {
+                    key.iter().chain([value]).for_each(|expr| self.look_at(expr, place, None));
+                    return None;
+                };
                 let (key_of, ty) = (self.states[index].key, self.states[index].ty);
                 let key = match (key, key_of) {
-                    (None, _) => None,
-                    (Some(key), Some(of)) => Some(self.typed(key, place, Type::Enum(of))?),
+                    (None, _) => Some(None),
+                    (Some(key), Some(of)) => self.typed(key, place, Type::Enum(of)).map(Some),
                     (Some(key), None) => {
+                        self.look_at(key, place, None);
                         let message = format!("`{}` is not a map", state.text);
                         let error = Diagnostic::error(code::TYPE_MISMATCH, message);
-                        return self.reject(error.at(key.span, "takes no key"));
+                        self.reject(error.at(key.span, "takes no key"))
                     }
+                };
+                let Some(key) = key else {
+                    self.look_at(value, place, Some(ty));
+                    return None;
                 };
                 let value = self.typed(value, place, ty)?;
                 Some(EffectDef::Set(Box::new(SetDef { state: index, key, value, span: effect.span })))
@@ -241,6 +272,7 @@ impl Checker {
         place: &Place<'_>,
         span: Span,
     ) -> Option<SpawnDef> {
+        self.note_fields::<SpawnField>(fields, place);
         let fields = self.fields_known(fields);
         let find = |wanted: SpawnField| field(&fields, wanted);
         let lacks = |what: &str| format!("the spawn does not say {what}");
@@ -330,7 +362,9 @@ impl Checker {
         if let ast::ExprKind::Name(name) = &expr.kind
             && self.is_bare_variant(expr, place)
         {
-            return W::from_name(name).map(WordExpr::Fixed).or_else(|| {
+            let word = W::from_name(name);
+            word.into_iter().for_each(|word| self.references.word(expr.span, word));
+            return word.map(WordExpr::Fixed).or_else(|| {
                 let locals = place.locals.iter().map(|(local, _)| local.as_str());
                 self.reject(match nearest(name, locals) {
                     Some(near) => Diagnostic::error(code::UNKNOWN, format!("unknown name `{name}`"))
@@ -352,6 +386,7 @@ impl Checker {
                 let message = format!("the name `{}` is taken", declared.name.text);
                 let error = Diagnostic::error(code::DUPLICATE, message).at(declared.name.span, "again here");
                 self.report(error.help("groups and actions share their names"));
+                self.doubles.insert(item.span);
                 continue;
             }
             let actions = declared.members.iter().flat_map(|member| self.targets(member)).collect();
@@ -362,6 +397,7 @@ impl Checker {
 
     /// The indices of the actions that a name means: one action, or the members of a group.
     pub(super) fn targets(&mut self, name: &ast::Name) -> Vec<usize> {
+        self.references.uses_target(name.span, &name.text);
         if let Some(action) = self.action_names.get(&name.text) {
             return vec![action];
         }

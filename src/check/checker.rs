@@ -3,9 +3,11 @@
 //! It goes on after a mistake, so that one run shows all mistakes: a broken declaration becomes `None`, and
 //! no diagnostic is reported for what depends on it.
 
+use std::collections::BTreeSet;
 use std::path::PathBuf;
 
 use crate::check::names::{Names, unknown};
+use crate::check::references::{References, Symbol};
 use crate::check::report::Report;
 use crate::check::road::Maps;
 use crate::check::{style, unused};
@@ -46,6 +48,18 @@ pub(super) struct Checker {
     pub(super) groups: Vec<GroupDef>,
     /// Number of rows of each action; `None` if an axis is broken.
     pub(super) row_counts: Vec<Option<u64>>,
+    /// What each name stands for.
+    pub(super) references: References,
+    /// Declarations that are not checked, because another has their name.
+    pub(super) doubles: BTreeSet<Span>,
+}
+
+/// What the declarations of a space come to.
+pub(super) struct Checked {
+    /// `None` if it is not sound.
+    pub space: Option<Space>,
+    pub diagnostics: Vec<Diagnostic>,
+    pub references: References,
 }
 
 /// What the reader of files knows about the root of a space.
@@ -58,14 +72,18 @@ pub(super) struct Root {
     pub docs: Vec<String>,
 }
 
-/// Checks the declarations of all files of a space, imports first.
+/// Checks the declarations of all files of a space, imports first. Of the declarations `aside` it notes the
+/// names alone. Without maps there is no space.
 pub(super) fn space(
     root: Root,
     items: &[&ast::Item],
-    maps: &mut dyn Maps,
-) -> (Option<Space>, Vec<Diagnostic>) {
-    let mut checker = Checker::default();
+    aside: &[&ast::Item],
+    references: References,
+    maps: Option<&mut dyn Maps>,
+) -> Checked {
+    let mut checker = Checker { references, ..Checker::default() };
     checker.declare_enums(items);
+    checker.references.enums = checker.enums.clone();
     let functions = each(items, ItemKind::as_fn);
     checker.functions_to_come = functions.map(|(_, function)| function.name.text.clone()).collect();
     let roads = each(items, ItemKind::as_road);
@@ -80,15 +98,17 @@ pub(super) fn space(
     let reward = checker.reward(items);
     let verdicts = checker.verdicts(items);
     let (episode, road_names) = checker.episode(items);
-    let roads = checker.roads(items, road_names, maps);
+    let has_maps = maps.is_some();
+    let roads = maps.map_or_else(Vec::new, |maps| checker.roads(items, road_names, maps));
     checker.count_rows(&rules, roads.len());
+    checker.note_the_rest(items, aside);
 
     let own: Vec<&ast::Item> = items.iter().copied().filter(|item| item.span.file == root.file).collect();
 
     // A broken declaration is missing from its list, so the indices of the others would be wrong.
-    if checker.has_errors() {
+    if checker.has_errors() || !has_maps {
         checker.look_at_expects(&own);
-        return (None, checker.finish());
+        return checker.finish(None);
     }
     let actions: Vec<ActionDef> = core::mem::take(&mut checker.actions).into_iter().flatten().collect();
     let bounds = bounds(&actions, &rules);
@@ -114,8 +134,8 @@ pub(super) fn space(
     checker.diagnostics.extend(unused::report(&own, items));
     checker.diagnostics.extend(style::report(&own));
     checker.diagnostics.extend(prove::report(&space));
-    let sound = !checker.has_errors();
-    (sound.then_some(space), checker.finish())
+    let is_sound = !checker.has_errors();
+    checker.finish(is_sound.then_some(space))
 }
 
 impl Report for Checker {
@@ -131,7 +151,7 @@ impl Checker {
 
     /// The diagnostics in the order of the text. A rule is checked for each of its actions, so equal diagnostics
     /// are kept once.
-    fn finish(self) -> Vec<Diagnostic> {
+    fn finish(self, space: Option<Space>) -> Checked {
         let mut kept: Vec<Diagnostic> = Vec::new();
         for diagnostic in self.diagnostics {
             if !kept.contains(&diagnostic) {
@@ -139,7 +159,58 @@ impl Checker {
             }
         }
         kept.sort_by_key(Diagnostic::place);
-        kept
+        Checked { space, diagnostics: kept, references: self.references }
+    }
+
+    /// Looks at what is broken already, for its names alone: no mistake is reported.
+    pub(super) fn quietly<T>(&mut self, look: impl FnOnce(&mut Self) -> T) -> T {
+        let reported = self.diagnostics.len();
+        let found = look(self);
+        self.diagnostics.truncate(reported);
+        found
+    }
+
+    /// Notes the names of all that the checks before did not see.
+    fn note_the_rest(&mut self, items: &[&ast::Item], aside: &[&ast::Item]) {
+        let is_double = |item: &&&ast::Item| self.doubles.contains(&item.span);
+        let doubles: Vec<&ast::Item> = items.iter().filter(is_double).copied().collect();
+        for item in doubles.iter().chain(aside) {
+            self.quietly(|checker| checker.look_at_item(item));
+        }
+        for item in items.iter().chain(aside) {
+            match item.kind.plain() {
+                ItemKind::Road(block) => self.note_road(block),
+                ItemKind::Expect(expect) => self.note_claim(&expect.claim),
+                _ => {}
+            }
+        }
+    }
+
+    /// Looks at a declaration that does not stand: it is overridden, left out, or the second of its name.
+    fn look_at_item(&mut self, item: &ast::Item) {
+        match item.kind.plain() {
+            ItemKind::Odds(declared) => drop(self.odds(declared)),
+            ItemKind::State(declared) => drop(self.state(item, declared)),
+            ItemKind::Let(declared) => drop(self.constant(declared)),
+            ItemKind::Fn(declared) => {
+                let signature = self.signature(declared);
+                self.function(declared, signature);
+            }
+            ItemKind::Action(declared) => drop(self.action(item, declared)),
+            ItemKind::Group(declared) => declared.members.iter().for_each(|name| drop(self.targets(name))),
+            ItemKind::Rule(declared) => drop(self.rule(declared)),
+            ItemKind::Episode(fields) => drop(self.settings(fields)),
+            ItemKind::Reward(cases) => drop(self.cases(item, cases)),
+            ItemKind::Verdict(declared) => drop(self.verdict(declared)),
+            ItemKind::Language(_)
+            | ItemKind::Use(_)
+            | ItemKind::Enum(_)
+            | ItemKind::Road(_)
+            | ItemKind::Expect(_)
+            | ItemKind::Scenario(_)
+            | ItemKind::Policy(_)
+            | ItemKind::Override(_) => {}
+        }
     }
 
     /// The declarations of one kind, by name. Reports a second declaration of a name and leaves it out.
@@ -153,8 +224,9 @@ impl Checker {
         let mut first = Vec::new();
         for (item, declared) in each(items, pick) {
             let name = item.kind.name().expect("only declarations with a name are asked for");
-            if self.take(names.declare(kind, name, first.len())).is_some() {
-                first.push((item, declared));
+            match self.take(names.declare(kind, name, first.len())) {
+                Some(()) => first.push((item, declared)),
+                None => drop(self.doubles.insert(item.span)),
             }
         }
         (names, first)
@@ -163,6 +235,10 @@ impl Checker {
     /// The type with this name.
     pub(super) fn named_type(&mut self, name: &ast::Name) -> Option<Type> {
         let built_in = TYPES.iter().find(|(word, ..)| *word == name.text).map(|(_, ty, _)| *ty);
+        match built_in {
+            Some(_) => self.references.note(name.span, Symbol::Type(name.text.clone()), false),
+            None => self.references.uses(name.span, Symbol::Enum(name.text.clone())),
+        }
         let found = built_in.or(self.enum_names.get(&name.text).map(|index| Type::Enum(EnumIndex(index))));
         found.or_else(|| {
             let candidates = TYPES.iter().map(|(word, ..)| *word).chain(self.enum_names.all());

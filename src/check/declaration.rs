@@ -3,6 +3,7 @@
 use crate::check::checker::{Checker, Signature, docs};
 use crate::check::expression::Place;
 use crate::check::names::unknown;
+use crate::check::references::Symbol;
 use crate::check::report::Report;
 use crate::check::rule::names_in;
 use crate::model::expr::{Expr, ExprKind};
@@ -55,42 +56,50 @@ impl Checker {
     /// The odds of variants: whole numbers, folded like constants.
     pub(super) fn declare_odds(&mut self, items: &[&ast::Item]) {
         for (_, declared) in self.declared("odds of", items, ItemKind::as_odds).1 {
-            let Some(of) = self.enum_names.get(&declared.name.text) else {
-                let error = unknown("enum", &declared.name.text, declared.name.span, self.enum_names.all());
-                self.report(error);
-                continue;
-            };
-            let variants = self.enums[of].variants.clone();
-            let mut odds: Vec<Option<u32>> = vec![None; variants.len()];
-            for arm in &declared.arms {
-                let value = self.odds_of(&arm.value).unwrap_or(1);
-                let named: Vec<Option<usize>> =
-                    arm.patterns.iter().map(|pattern| self.variant(pattern, &variants)).collect();
-                let taken: Vec<usize> = match arm.patterns.is_empty() {
-                    true => (0..variants.len()).filter(|variant| odds[*variant].is_none()).collect(),
-                    false => named.into_iter().flatten().collect(),
-                };
-                // If no variant of the arm is known, that was reported.
-                let sound = arm.patterns.is_empty() || !taken.is_empty();
-                if sound && !taken.iter().any(|variant| odds[*variant].is_none()) {
-                    let error = Diagnostic::error(code::NEVER_REACHED, "these odds never count");
-                    self.report(error.at(arm.span, "the lines before it say it all").help("remove the line"));
-                }
-                for variant in taken {
-                    odds[variant] = odds[variant].or(Some(value));
-                }
+            if let Some((of, odds)) = self.odds(declared) {
+                self.enums[of].odds = odds;
             }
-            // A variant that is not named has the odds 1.
-            let odds: Vec<u32> = odds.into_iter().map(|odds| odds.unwrap_or(1)).collect();
-            if odds.iter().all(|odds| *odds == 0) {
-                let message = format!("no `{}` is ever drawn", declared.name.text);
-                let error =
-                    Diagnostic::error(code::EMPTY, message).at(declared.name.span, "all its odds are 0");
-                self.report(error.help("give at least one variant odds above 0"));
-                continue;
-            }
-            self.enums[of].odds = odds;
         }
+    }
+
+    /// The enum, and the odds of each of its variants.
+    pub(super) fn odds(&mut self, declared: &ast::Odds) -> Option<(usize, Vec<u32>)> {
+        self.references.uses(declared.name.span, Symbol::Enum(declared.name.text.clone()));
+        let Some(of) = self.enum_names.get(&declared.name.text) else {
+            for arm in &declared.arms {
+                arm.patterns.iter().for_each(|pattern| self.references.variant(pattern, None));
+                self.look_at(&arm.value, &Place::default(), None);
+            }
+            let error = unknown("enum", &declared.name.text, declared.name.span, self.enum_names.all());
+            return self.reject(error);
+        };
+        let mut odds: Vec<Option<u32>> = vec![None; self.enums[of].variants.len()];
+        for arm in &declared.arms {
+            let value = self.odds_of(&arm.value).unwrap_or(1);
+            let named: Vec<Option<usize>> =
+                arm.patterns.iter().map(|pattern| self.variant(pattern, of)).collect();
+            let taken: Vec<usize> = match arm.patterns.is_empty() {
+                true => (0..odds.len()).filter(|variant| odds[*variant].is_none()).collect(),
+                false => named.into_iter().flatten().collect(),
+            };
+            // An unknown variant was reported.
+            let sound = arm.patterns.is_empty() || !taken.is_empty();
+            if sound && !taken.iter().any(|variant| odds[*variant].is_none()) {
+                let error = Diagnostic::error(code::NEVER_REACHED, "these odds never count");
+                self.report(error.at(arm.span, "the lines before it say it all").help("remove the line"));
+            }
+            for variant in taken {
+                odds[variant] = odds[variant].or(Some(value));
+            }
+        }
+        // Variants that are not named are as likely as before.
+        let odds: Vec<u32> = odds.into_iter().map(|odds| odds.unwrap_or(1)).collect();
+        if odds.iter().all(|odds| *odds == 0) {
+            let message = format!("no `{}` is ever drawn", declared.name.text);
+            let error = Diagnostic::error(code::EMPTY, message).at(declared.name.span, "all its odds are 0");
+            return self.reject(error.help("give at least one variant odds above 0"));
+        }
+        Some((of, odds))
     }
 
     fn odds_of(&mut self, value: &ast::Expr) -> Option<u32> {
@@ -122,10 +131,15 @@ impl Checker {
             };
             let next = waiting.iter().position(|at| !waits(*at)).unwrap_or(0);
             let (_, declared) = open[waiting.remove(next)];
-            let value = self.expr(&declared.value, &Place::default(), None);
-            let value = value.and_then(|value| Some(Expr { kind: self.fold(&value)?, ..value }));
+            let value = self.constant(declared);
             self.constants.push((declared.name.text.clone(), value));
         }
+    }
+
+    pub(super) fn constant(&mut self, declared: &ast::Let) -> Option<Expr> {
+        let value = self.expr(&declared.value, &Place::default(), None)?;
+        self.references.typed(&Symbol::Constant(declared.name.text.clone()), value.ty, None);
+        Some(Expr { kind: self.fold(&value)?, ..value })
     }
 
     pub(super) fn declare_functions(&mut self, items: &[&ast::Item]) {
@@ -133,11 +147,9 @@ impl Checker {
         self.function_names = names;
         self.signatures = declared.iter().map(|(_, function)| self.signature(function)).collect();
         for (index, (_, function)) in declared.iter().enumerate() {
-            let Some((parameters, result, span)) = self.signatures[index].clone() else { continue };
-            let place = Place { locals: &parameters, ..Place::default() };
-            let Some(body) = self.typed(&function.body, &place, result) else { continue };
-            let name = function.name.text.clone();
-            self.functions.push(FnDef { name, parameters, result, body, span });
+            let signature = self.signatures[index].clone();
+            let found = self.function(function, signature);
+            self.functions.extend(found);
         }
         // A function without a body is missing, so indices would be wrong; its mistake is already reported.
         if self.functions.len() == declared.len() {
@@ -147,11 +159,32 @@ impl Checker {
         }
     }
 
-    fn signature(&mut self, function: &ast::Fn) -> Option<Signature> {
+    pub(super) fn function(&mut self, function: &ast::Fn, signature: Option<Signature>) -> Option<FnDef> {
+        let owner = Symbol::Function(function.name.text.clone());
+        let Some((parameters, result, span)) = signature else {
+            let locals = self.references.locals(&owner);
+            let place = Place { locals: &locals, owner: Some(&owner), ..Place::default() };
+            self.look_at(&function.body, &place, None);
+            return None;
+        };
+        let place = Place { locals: &parameters, owner: Some(&owner), ..Place::default() };
+        let body = self.typed(&function.body, &place, result)?;
+        Some(FnDef { name: function.name.text.clone(), parameters, result, body, span })
+    }
+
+    pub(super) fn signature(&mut self, function: &ast::Fn) -> Option<Signature> {
+        let symbol = Symbol::Function(function.name.text.clone());
         self.once("parameter", function.params.iter().map(|parameter| &parameter.name));
         // All types are looked at before one that is broken ends it.
         let types: Vec<Option<Type>> = function.params.iter().map(|p| self.plain_type(&p.ty)).collect();
         let result = self.plain_type(&function.result);
+        let known = function.params.iter().zip(&types);
+        let known = known.map(|(p, ty)| (symbol.parameter(&p.name.text), *ty));
+        for (symbol, ty) in known.chain([(Some(symbol.clone()), result)]) {
+            if let (Some(symbol), Some(ty)) = (symbol, ty) {
+                self.references.typed(&symbol, ty, None);
+            }
+        }
         let parameters = function.params.iter().zip(types);
         let parameters: Option<_> = parameters.map(|(p, ty)| Some((p.name.text.clone(), ty?))).collect();
         Some((parameters?, result?, function.name.span))
@@ -231,40 +264,54 @@ impl Checker {
     pub(super) fn declare_states(&mut self, items: &[&ast::Item]) {
         let mut cells_so_far = 0;
         for (item, declared) in self.declared("state", items, ItemKind::as_state).1 {
-            let (key, value) = match &declared.ty.kind {
-                ast::TypeKind::Named(name) => (None, self.named_type(name)),
-                ast::TypeKind::Map { key, value } => {
-                    let Some(Type::Enum(of)) = self.named_type(key) else {
-                        let error =
-                            Diagnostic::error(code::TYPE_MISMATCH, "the keys of a map must be an enum");
-                        self.report(error.at(key.span, "not an enum"));
-                        continue;
-                    };
-                    (Some(of), self.named_type(value))
-                }
-            };
-            let Some(ty) = value else { continue };
-            let Some(initial) = self.initial(declared, ty) else { continue };
-            // A state with a broken meaning stays declared, so that its uses are not reported as unknown.
-            let meaning = self.meaning(&declared.name, key, ty).unwrap_or(StateMeaning::Private);
-            let cells = key.map_or(1, |of| self.enums[of.0].variants.len());
-            self.states.push(StateDef {
-                name: declared.name.text.clone(),
-                docs: docs(item),
-                key,
-                ty,
-                first_cell: cells_so_far,
-                cells,
-                initial,
-                meaning,
-                span: declared.name.span,
-            });
-            cells_so_far += cells;
+            let Some(state) = self.state(item, declared) else { continue };
+            let first_cell = cells_so_far;
+            cells_so_far += state.cells;
+            self.states.push(StateDef { first_cell, ..state });
         }
+    }
+
+    /// A state, with its first cell still to be set.
+    pub(super) fn state(&mut self, item: &ast::Item, declared: &ast::State) -> Option<StateDef> {
+        let (key, value) = match &declared.ty.kind {
+            ast::TypeKind::Named(name) => (None, self.named_type(name)),
+            ast::TypeKind::Map { key, value } => match self.named_type(key) {
+                Some(Type::Enum(of)) => (Some(of), self.named_type(value)),
+                _ => {
+                    self.quietly(|checker| checker.named_type(value));
+                    let error = Diagnostic::error(code::TYPE_MISMATCH, "the keys of a map must be an enum");
+                    self.report(error.at(key.span, "not an enum"));
+                    (None, None)
+                }
+            },
+        };
+        let Some(ty) = value else {
+            if let ast::Initial::Value(initial) = &declared.initial {
+                self.look_at(initial, &Place::default(), None);
+            }
+            return None;
+        };
+        let symbol = Symbol::State(declared.name.text.clone());
+        self.references.typed(&symbol, ty, key);
+        let initial = self.initial(declared, ty)?;
+        // A state with a broken meaning stays declared, so that its uses are not reported as unknown.
+        let meaning = self.meaning(&declared.name, key, ty).unwrap_or(StateMeaning::Private);
+        Some(StateDef {
+            name: declared.name.text.clone(),
+            docs: docs(item),
+            key,
+            ty,
+            first_cell: 0,
+            cells: key.map_or(1, |of| self.enums[of.0].variants.len()),
+            initial,
+            meaning,
+            span: declared.name.span,
+        })
     }
 
     /// Position of the state of that name.
     pub(super) fn state_named(&mut self, name: &ast::Name) -> Option<usize> {
+        self.references.uses(name.span, Symbol::State(name.text.clone()));
         let found = self.states.iter().position(|state| state.name == name.text);
         found.or_else(|| {
             let states = self.states.iter().map(|state| state.name.as_str());

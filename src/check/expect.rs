@@ -26,6 +26,26 @@ impl Checker {
         }
     }
 
+    /// Notes the names of a claim, judged or not.
+    pub(super) fn note_claim(&mut self, claim: &ast::Expr) {
+        match &claim.kind {
+            ast::ExprKind::Binary { left, right, .. } => {
+                self.note_claim(left);
+                self.note_claim(right);
+            }
+            ast::ExprKind::Call(call) => {
+                self.references.word_named::<SpaceClaim>(call.name.span, &call.name.text);
+                call.args.iter().for_each(|argument| self.note_claim(&argument.value));
+            }
+            ast::ExprKind::Name(name) => {
+                self.references.word_named::<SpaceClaim>(claim.span, name);
+                self.references.uses_target(claim.span, name);
+            }
+            ast::ExprKind::Number(number) => self.references.number(number),
+            _ => {}
+        }
+    }
+
     fn claim(&mut self, claim: &ast::Expr, span: Span, space: &Space) -> Option<()> {
         match &claim.kind {
             ast::ExprKind::Call(call) if call.name.text == SpaceClaim::Every.name() => {

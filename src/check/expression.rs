@@ -2,6 +2,7 @@
 
 use crate::check::checker::Checker;
 use crate::check::names::unknown;
+use crate::check::references::Symbol;
 use crate::check::report::Report;
 use crate::model::expr::{Arithmetic, Comparison, Expr, ExprKind};
 use crate::model::vocabulary::{Fact, LaneChoice, ROAD_LANES, Site, Word, parts_of, things};
@@ -15,11 +16,16 @@ use crate::units::{Dimension, Rational};
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Place<'a> {
     pub locals: &'a [(String, Type)],
+    /// The function or the action whose parameters the locals are.
+    pub owner: Option<&'a Symbol>,
     pub states: bool,
     pub site: Site,
 }
 
 impl Place<'_> {
+    /// The condition of a rule.
+    pub const RULE: Place<'static> = Place { locals: &[], owner: None, states: true, site: Site::Rule };
+
     /// The fact of that name, if it is known here.
     fn fact(&self, name: &str) -> Option<Fact> {
         Fact::from_name(name).filter(|fact| self.site.knows(*fact))
@@ -90,11 +96,35 @@ impl Checker {
             ast::ExprKind::Call(call) => self.call(call, place),
             ast::ExprKind::Match { subject, arms } => self.matching(subject, arms, place, hint, span),
             ast::ExprKind::Text(_) => self.misplaced("a text", span),
-            ast::ExprKind::List(_) => self.misplaced("a list", span),
-            ast::ExprKind::Record(_) => self.misplaced("a record", span),
-            ast::ExprKind::Range { .. } => self.misplaced("a range", span),
+            ast::ExprKind::List(items) => {
+                items.iter().for_each(|item| self.look_at(item, place, hint));
+                self.misplaced("a list", span)
+            }
+            ast::ExprKind::Record(fields) => {
+                fields.iter().for_each(|field| self.look_at(&field.value, place, hint));
+                self.misplaced("a record", span)
+            }
+            ast::ExprKind::Range { low, high } => {
+                [low, high].into_iter().for_each(|end| self.look_at(end, place, hint));
+                self.misplaced("a range", span)
+            }
             ast::ExprKind::LanePoint { .. } => self.misplaced("a lane point", span),
             ast::ExprKind::Numbered { .. } => self.misplaced("a numbered road user", span),
+        }
+    }
+
+    /// Notes the names of an expression in a place that is broken already: no mistake is reported.
+    pub(super) fn look_at(&mut self, expr: &ast::Expr, place: &Place<'_>, hint: Option<Type>) {
+        self.quietly(|checker| checker.expr(expr, place, hint));
+    }
+
+    /// Notes the names of fields, and looks at the values of fields that do not exist.
+    pub(super) fn note_fields<W: Word>(&mut self, fields: &[ast::Field], place: &Place<'_>) {
+        for field in fields {
+            match W::from_name(&field.name.text) {
+                Some(word) => self.references.word(field.name.span, word),
+                None => self.look_at(&field.value, place, None),
+            }
         }
     }
 
@@ -106,6 +136,7 @@ impl Checker {
 
     /// A number literal in SI units.
     pub(super) fn number(&mut self, number: &ast::Number) -> Option<Expr> {
+        self.references.number(number);
         let value = self.exact(exact_digits(&number.digits), number.span)?;
         let (value, ty) = match &number.unit {
             None if value.is_integer() && !number.digits.contains(['.', 'e', 'E']) => {
@@ -151,6 +182,7 @@ impl Checker {
             (Some(of), owners) if owners.contains(&of) => of,
             (_, [of]) => *of,
             (_, []) => {
+                self.note_broken(name, span, place);
                 let mut candidates: Vec<&str> = place.locals.iter().map(|(name, _)| name.as_str()).collect();
                 match wanted {
                     Some(of) => candidates.extend(self.enums[of].variants.iter().map(String::as_str)),
@@ -183,7 +215,16 @@ impl Checker {
             }
         };
         let index = self.enums[of].variants.iter().position(|variant| variant == name)?;
+        self.references.variant(&ast::Name::new(name, span), Some(of));
         Some(Expr { kind: ExprKind::Variant(EnumIndex(of), index), ty: Type::Enum(EnumIndex(of)), span })
+    }
+
+    /// Notes the name of a declaration that is itself broken, or that is not known in this place.
+    fn note_broken(&mut self, name: &str, span: Span, place: &Place<'_>) {
+        let parameter = place.owner.and_then(|owner| owner.parameter(name));
+        let others = [Symbol::Constant, Symbol::State].map(|symbol| symbol(name.to_owned()));
+        parameter.into_iter().chain(others).for_each(|symbol| self.references.uses(span, symbol));
+        self.references.word_named::<Fact>(span, name);
     }
 
     /// A name that exists, but not here.
@@ -210,12 +251,17 @@ impl Checker {
     /// A parameter, constant, plain state or fact; `Some(None)` once a mistake is reported.
     fn variable(&mut self, name: &str, span: Span, place: &Place<'_>) -> Option<Option<Expr>> {
         if let Some(index) = place.locals.iter().position(|(local, _)| local == name) {
+            if let Some(owner) = place.owner {
+                self.references.uses_parameter(&ast::Name::new(name, span), owner);
+            }
             return Some(Some(Expr { kind: ExprKind::Local(index), ty: place.locals[index].1, span }));
         }
         if let Some((_, value)) = self.constants.iter().find(|(constant, _)| constant == name) {
+            self.references.uses(span, Symbol::Constant(name.to_owned()));
             return Some(value.clone().map(|value| Expr { span, ..value }));
         }
         if let Some(state) = self.states.iter().find(|state| state.name == name && place.states) {
+            self.references.uses(span, Symbol::State(name.to_owned()));
             if state.key.is_some() {
                 let error = Diagnostic::error(code::TYPE_MISMATCH, format!("`{name}` is a map"));
                 self.report(error.at(span, "a key is missing").help(format!("write `{name}[key]`")));
@@ -224,6 +270,7 @@ impl Checker {
             return Some(Some(Expr { kind: ExprKind::Cell(state.first_cell), ty: state.ty, span }));
         }
         let fact = place.fact(name)?;
+        self.references.word(span, fact);
         Some(Some(Expr { kind: ExprKind::Fact(fact), ty: fact.ty(), span }))
     }
 
@@ -239,10 +286,12 @@ impl Checker {
 
     /// `road.limit`: a fact about a thing.
     fn part(&mut self, base: &ast::Expr, part: &ast::Name, place: &Place<'_>, span: Span) -> Option<Expr> {
+        self.note_part(base, part);
         let things = things();
         let thing = match &base.kind {
             ast::ExprKind::Name(name) if things.contains(&name.as_str()) => name,
             _ => {
+                self.look_at(base, place, None);
                 let things = one_of(&things);
                 let error = Diagnostic::error(code::UNKNOWN, format!("only {things} has fields"));
                 self.report(error.at(base.span, format!("not {things}")));
@@ -264,7 +313,19 @@ impl Checker {
         None
     }
 
+    /// Notes the `limit` of `road.limit`.
+    fn note_part(&mut self, base: &ast::Expr, part: &ast::Name) {
+        let ast::ExprKind::Name(thing) = &base.kind else { return };
+        if let Some((word, meaning)) = parts_of(thing).into_iter().find(|(word, _)| *word == part.text) {
+            self.references.note(part.span, Symbol::Engine(word, meaning), false);
+        }
+    }
+
     fn index(&mut self, base: &ast::Expr, index: &ast::Expr, place: &Place<'_>, span: Span) -> Option<Expr> {
+        match &base.kind {
+            ast::ExprKind::Name(name) => self.references.uses(base.span, Symbol::State(name.clone())),
+            _ => self.look_at(base, place, None),
+        }
         let state = match &base.kind {
             ast::ExprKind::Name(name) if place.states => {
                 self.states.iter().find(|state| state.name == *name).cloned()
@@ -279,10 +340,12 @@ impl Checker {
                 _ => Diagnostic::error(code::TYPE_MISMATCH, "only a state can have a key")
                     .at(base.span, "not a state"),
             };
+            self.look_at(index, place, None);
             self.report(error);
             return None;
         };
         let Some(key_of) = state.key else {
+            self.look_at(index, place, None);
             let error = Diagnostic::error(code::TYPE_MISMATCH, format!("`{}` is not a map", state.name));
             self.report(error.at(span, "takes no key").beside(state.span, "declared here"));
             return None;
@@ -296,7 +359,14 @@ impl Checker {
     }
 
     fn call(&mut self, call: &ast::Call, place: &Place<'_>) -> Option<Expr> {
+        let symbol = Symbol::Function(call.name.text.clone());
+        let named = call.args.iter().filter_map(|argument| argument.name.as_ref());
+        for name in named {
+            self.references.uses_parameter(name, &symbol);
+        }
+        self.references.uses(call.name.span, symbol);
         let Some(index) = self.function_names.get(&call.name.text) else {
+            self.look_at_arguments(&call.args, place);
             if self.functions_to_come.contains(&call.name.text) {
                 let error = Diagnostic::error(code::NOT_HERE, "a constant cannot call functions");
                 self.report(error.at(call.span, "called here").help("make it a `fn` without parameters"));
@@ -307,8 +377,12 @@ impl Checker {
             return None;
         };
         // A function whose own header is broken was reported there.
-        let (parameters, result, header) = self.signatures.get(index).cloned().flatten()?;
+        let Some((parameters, result, header)) = self.signatures.get(index).cloned().flatten() else {
+            self.look_at_arguments(&call.args, place);
+            return None;
+        };
         if call.args.len() != parameters.len() {
+            self.look_at_arguments(&call.args, place);
             let message = format!(
                 "`{}` takes {} argument{}, not {}",
                 call.name.text,
@@ -328,6 +402,7 @@ impl Checker {
                 Some(name) => match parameters.iter().position(|(parameter, _)| *parameter == name.text) {
                     Some(slot) => slot,
                     None => {
+                        self.look_at_arguments(&call.args[position..], place);
                         let names = parameters.iter().map(|(parameter, _)| parameter.as_str());
                         let error = unknown("argument", &name.text, name.span, names);
                         self.report(error);
@@ -341,6 +416,10 @@ impl Checker {
         Some(Expr { kind: ExprKind::Call(index, arguments?), ty: result, span: call.span })
     }
 
+    fn look_at_arguments(&mut self, arguments: &[ast::Arg], place: &Place<'_>) {
+        arguments.iter().for_each(|argument| self.look_at(&argument.value, place, None));
+    }
+
     fn matching(
         &mut self,
         subject: &ast::Expr,
@@ -349,7 +428,17 @@ impl Checker {
         hint: Option<Type>,
         span: Span,
     ) -> Option<Expr> {
-        let subject = self.expr(subject, place, None)?;
+        let subject = self.expr(subject, place, None);
+        let of = match subject.as_ref().map(|subject| subject.ty) {
+            Some(Type::Enum(of)) => Some(of.0),
+            _ => None,
+        };
+        arms.iter().flat_map(|arm| &arm.patterns).for_each(|pattern| self.references.variant(pattern, of));
+        let is_number = subject.as_ref().is_none_or(|subject| is_number(subject.ty));
+        if is_number {
+            arms.iter().for_each(|arm| self.look_at(&arm.value, place, hint));
+        }
+        let subject = subject?;
         let variants: Vec<String> = match subject.ty {
             Type::Enum(of) => self.enums[of.0].variants.clone(),
             Type::Bool => vec!["false".to_owned(), "true".to_owned()],
@@ -526,6 +615,7 @@ impl Checker {
         };
         if let Some(road) = road {
             if !matches!(op, Comparison::Equal | Comparison::NotEqual) {
+                self.note_roads(core::slice::from_ref(road));
                 let error = Diagnostic::error(code::UNORDERED, "roads have no order");
                 let error = error.at(span, format!("`{}` needs one", op.symbol()));
                 self.report(error.help("write `road == corner`, or `road in [corner, boulevard]`"));
@@ -571,9 +661,11 @@ impl Checker {
     /// Checks first the side that tells the type of the other.
     fn both_sides(&mut self, left: &ast::Expr, right: &ast::Expr, place: &Place<'_>) -> Option<(Expr, Expr)> {
         if self.is_bare_variant(left, place) {
-            let right = self.expr(right, place, None)?;
-            let left = self.expr(left, place, Some(right.ty))?;
-            return Some((left, right));
+            let Some(right) = self.expr(right, place, None) else {
+                self.look_at(left, place, None);
+                return None;
+            };
+            return Some((self.expr(left, place, Some(right.ty))?, right));
         }
         let left = self.expr(left, place, None);
         let right = self.expr(right, place, left.as_ref().map(|left| left.ty));
@@ -590,7 +682,10 @@ impl Checker {
         if let (true, ast::ExprKind::List(roads)) = (self.names_road(left, place), &right.kind) {
             return self.on_road(roads, place, span);
         }
-        let value = self.expr(left, place, None)?;
+        let Some(value) = self.expr(left, place, None) else {
+            self.look_at(right, place, None);
+            return None;
+        };
         let ty = value.ty;
         let value = Box::new(value);
         let kind = match &right.kind {
@@ -615,6 +710,7 @@ impl Checker {
                 if field.text == "lanes"
                     && matches!(&base.kind, ast::ExprKind::Name(name) if name == "road") =>
             {
+                self.note_part(base, field);
                 if !place.knows("road") {
                     self.report(unknown_here("road", right.span));
                     return None;
@@ -623,6 +719,7 @@ impl Checker {
                 ExprKind::InLanes(value, lanes)
             }
             _ => {
+                self.look_at(right, place, Some(ty));
                 let error =
                     Diagnostic::error(code::TYPE_MISMATCH, "`in` needs a list, a range or `road.lanes`");
                 self.report(error.at(right.span, "none of them"));
@@ -634,6 +731,7 @@ impl Checker {
 
     /// `road == corner`: whether the road is one of these.
     fn on_road(&mut self, names: &[ast::Expr], place: &Place<'_>, span: Span) -> Option<Expr> {
+        self.note_roads(names);
         if !place.knows("road") {
             self.report(unknown_here("road", span));
             return None;
@@ -660,6 +758,15 @@ impl Checker {
             });
         }
         Some(Expr { kind: ExprKind::OnRoad(roads?), ty: Type::Bool, span })
+    }
+
+    /// Notes the names among the expressions as roads.
+    pub(super) fn note_roads(&mut self, names: &[ast::Expr]) {
+        for expr in names {
+            if let ast::ExprKind::Name(name) = &expr.kind {
+                self.references.uses(expr.span, Symbol::Road(name.clone()));
+            }
+        }
     }
 
     /// Whether the expression is the word `road`, and no parameter, constant or state of that name hides it.

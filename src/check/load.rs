@@ -7,9 +7,10 @@ use std::collections::BTreeMap;
 use std::path::{Component, Path, PathBuf};
 use std::sync::Arc;
 
-use crate::check::checker::Root;
+use crate::check::checker::{Checked, Root};
+use crate::check::references::References;
 use crate::check::road::Maps;
-use crate::check::{checker, overriding, policy, scenario};
+use crate::check::{checker, overriding, policy, scenario, scenario_names};
 use crate::model::policy::Policy;
 use crate::model::scenario::Scenario;
 use crate::model::{Space, code, digest};
@@ -44,6 +45,8 @@ pub struct Loaded {
     pub remarks: Vec<Diagnostic>,
     /// In order of reading, the root first, so never empty; a file's [`FileId`] is its position.
     pub files: Vec<LoadedFile>,
+    /// What each name of the files stands for, as far as it can be told of files with mistakes.
+    pub references: References,
     /// The space that the root is or uses, if it is sound.
     pub space: Option<Arc<Space>>,
     /// The scenario of the root, if it has one and it is sound.
@@ -79,35 +82,22 @@ pub fn load(root: &Path, read: &ReadFile<'_>) -> Result<Loaded, ReadError> {
 /// # Errors
 /// As [`load`].
 pub fn load_with(root: &Path, read: &ReadFile<'_>, cache: &mut MapCache) -> Result<Loaded, ReadError> {
-    let mut loader = Loader {
-        read,
-        sources: Sources::new(),
-        files: Vec::new(),
-        order: Vec::new(),
-        diagnostics: Vec::new(),
-    };
-    loader.read_file(&normal(root), &mut Vec::new())?;
-    let Loader { sources, files, order, mut diagnostics, .. } = loader;
-    // A file that does not parse lacks declarations, and their uses would be reported as unknown.
-    if diagnostics.iter().any(Diagnostic::is_error) {
-        return Ok(Loaded {
-            sources,
-            diagnostics,
-            remarks: Vec::new(),
-            files,
-            space: None,
-            scenario: None,
-            policy: None,
-            order,
-        });
-    }
+    let Loader { sources, files, order, mut diagnostics, .. } = Loader::read(root, read)?;
+    // A file that does not parse lacks declarations, and their uses would be reported as unknown. So it is
+    // checked for the names alone, and the checker's diagnostics are dropped.
+    let is_whole = !diagnostics.iter().any(Diagnostic::is_error);
     let folders = files.iter().map(|file| folder(&file.path)).collect();
     let mut maps = MapReader { read, folders, texts: BTreeMap::new(), known: BTreeMap::new(), cache };
-    diagnostics.extend(check_digests(&files, &mut maps));
-    let (space, found) = check_space(&files, &order, &mut maps);
+    if is_whole {
+        diagnostics.extend(check_digests(&files, &mut maps));
+    }
+    let checked = check_space(&files, &order, &mut maps, is_whole);
+    let Checked { space, diagnostics: found, mut references } = checked;
+    files.iter().for_each(|file| scenario_names::note(&file.tree, &mut references));
+    references.settle(&sources);
     let (mut remarks, found): (Vec<_>, Vec<_>) =
         found.into_iter().partition(|found| found.severity == Severity::Note);
-    diagnostics.extend(found);
+    diagnostics.extend(found.into_iter().filter(|_| is_whole));
     let space = space.filter(|_| !diagnostics.iter().any(Diagnostic::is_error));
     let mut scenario = None;
     let has_scenario = files[0].tree.items.iter().any(|item| item.kind.as_scenario().is_some());
@@ -130,14 +120,17 @@ pub fn load_with(root: &Path, read: &ReadFile<'_>, cache: &mut MapCache) -> Resu
     if has_scenario || has_policy || diagnostics.iter().any(Diagnostic::is_error) {
         remarks.clear();
     }
-    Ok(Loaded { sources, diagnostics, remarks, files, space: space.map(Arc::new), scenario, policy, order })
+    let space = space.map(Arc::new);
+    Ok(Loaded { sources, diagnostics, remarks, files, references, space, scenario, policy, order })
 }
 
-fn check_space(
-    files: &[LoadedFile],
-    order: &[usize],
-    maps: &mut MapReader<'_>,
-) -> (Option<Space>, Vec<Diagnostic>) {
+/// The files that a file uses, itself included, however far away. Nothing is checked.
+pub fn files_used(root: &Path, read: &ReadFile<'_>) -> Vec<PathBuf> {
+    let files = Loader::read(root, read).map(|loader| loader.files).unwrap_or_default();
+    files.into_iter().map(|file| file.path).collect()
+}
+
+fn check_space(files: &[LoadedFile], order: &[usize], maps: &mut MapReader<'_>, is_whole: bool) -> Checked {
     let declares = |file: &LoadedFile| {
         file.tree.items.iter().any(|item| {
             match &item.kind {
@@ -155,14 +148,16 @@ fn check_space(
         file: FileId(u32::try_from(index).expect("a file's id is its position")),
         path: root.path.clone(),
         // Without a digest a map could not be read; then there is no space either.
-        digest: whole_digest(files, &root.path, maps).unwrap_or_default(),
+        digest: is_whole.then(|| whole_digest(files, &root.path, maps)).flatten().unwrap_or_default(),
         docs: root.tree.docs.iter().map(|doc| doc.text.clone()).collect(),
     };
-    let (items, mut diagnostics) = overriding::resolve(files, order);
-    let items: Vec<&ast::Item> = items.iter().map(core::convert::AsRef::as_ref).collect();
-    let (space, found) = checker::space(root, &items, maps);
-    diagnostics.extend(found);
-    (space, diagnostics)
+    let (standing, mut diagnostics) = overriding::resolve(files, order);
+    let aside = overriding::set_aside(files, &standing);
+    let items: Vec<&ast::Item> = standing.iter().map(AsRef::as_ref).collect();
+    let maps = is_whole.then_some(maps as &mut dyn Maps);
+    let mut checked = checker::space(root, &items, &aside, References::declared(files), maps);
+    diagnostics.append(&mut checked.diagnostics);
+    Checked { diagnostics, ..checked }
 }
 
 /// Compares every `use … digest` with what was read.
@@ -171,7 +166,7 @@ fn check_digests(files: &[LoadedFile], maps: &mut MapReader<'_>) -> Vec<Diagnost
     for file in files {
         for used in uses(file) {
             let Some(wanted) = &used.digest else { continue };
-            let target = normal(&folder(&file.path).join(&used.path.value));
+            let target = used_path(file, used);
             // A map that cannot be read is reported where it is named.
             let Some(found) = whole_digest(files, &target, maps) else { continue };
             if wanted.value != found {
@@ -221,7 +216,12 @@ pub(super) fn used_paths(file: &LoadedFile) -> impl Iterator<Item = PathBuf> {
 
 /// The path of the file that a `use` names.
 pub(super) fn used_path(file: &LoadedFile, used: &ast::Use) -> PathBuf {
-    normal(&folder(&file.path).join(&used.path.value))
+    path_from(file, &used.path.value)
+}
+
+/// The path that a file means by a text.
+pub(super) fn path_from(file: &LoadedFile, written: &str) -> PathBuf {
+    normal(&folder(&file.path).join(written))
 }
 
 /// The maps that a file's roads name, as written.
@@ -249,7 +249,15 @@ struct Loader<'a> {
     diagnostics: Vec<Diagnostic>,
 }
 
-impl Loader<'_> {
+impl<'a> Loader<'a> {
+    fn read(root: &Path, read: &'a ReadFile<'a>) -> Result<Loader<'a>, ReadError> {
+        let sources = Sources::new();
+        let (files, order, diagnostics) = (Vec::new(), Vec::new(), Vec::new());
+        let mut loader = Loader { read, sources, files, order, diagnostics };
+        loader.read_file(&normal(root), &mut Vec::new())?;
+        Ok(loader)
+    }
+
     /// Reads a file and the files that it uses. `way` holds the files from the root to this one.
     fn read_file(&mut self, path: &Path, way: &mut Vec<PathBuf>) -> Result<(), ReadError> {
         if self.files.iter().any(|file| file.path == path) {

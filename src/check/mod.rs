@@ -18,9 +18,11 @@ mod names;
 mod overriding;
 pub mod policy;
 mod report;
+mod references;
 mod road;
 mod rule;
 mod scenario;
+mod scenario_names;
 mod scenario_rules;
 mod scenario_value;
 mod settings;
@@ -30,7 +32,8 @@ mod suggest;
 mod unused;
 
 pub use difference::{Change, Difference, differences};
-pub use load::{Loaded, LoadedFile, MapCache, ReadError, ReadFile, load, load_with};
+pub use load::{Loaded, LoadedFile, MapCache, ReadError, ReadFile, files_used, load, load_with};
+pub use references::{Declaration, Occurrence, References, Symbol};
 pub use scenario::scenario;
 pub use suggest::suggest_uses;
 

@@ -40,6 +40,11 @@ impl Names {
         self.found.get(name).map(|(index, _)| *index)
     }
 
+    /// The name with that index.
+    pub fn name(&self, index: usize) -> Option<&str> {
+        self.found.iter().find(|(_, (at, _))| *at == index).map(|(name, _)| name.as_str())
+    }
+
     pub fn all(&self) -> impl Iterator<Item = &str> {
         self.found.keys().map(String::as_str)
     }

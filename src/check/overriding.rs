@@ -12,7 +12,7 @@ use crate::check::load::{LoadedFile, used_path, used_paths, uses as uses_of};
 use crate::check::names::unknown;
 use crate::check::unused::names_of_expr;
 use crate::model::code;
-use crate::syntax::ast::{EffectKind, Item, ItemKind, Name, RuleBody, Use};
+use crate::syntax::ast::{EffectKind, Item, ItemKind, Name, RuleBody, Span, Use};
 use crate::syntax::{Diagnostic, nearest};
 
 /// The facts about a spawn that a rule may use.
@@ -46,6 +46,19 @@ pub(super) fn resolve<'a>(files: &'a [LoadedFile], order: &[usize]) -> (Vec<Cow<
         }
     }
     (standing.into_iter().map(|standing| standing.item).collect(), diagnostics)
+}
+
+/// The declarations that do not stand as they are written: overridden ones, ones that a `use` leaves out,
+/// and groups and rules that lost a name. The checker looks at them for their names alone.
+pub(super) fn set_aside<'a>(files: &'a [LoadedFile], standing: &[Cow<'_, Item>]) -> Vec<&'a Item> {
+    let whole = standing.iter().filter(|item| matches!(item, Cow::Borrowed(_)));
+    let whole: BTreeSet<Span> = whole.map(|item| item.span).collect();
+    let all: BTreeSet<Span> = standing.iter().map(|item| item.span).collect();
+    let stands = |item: &&Item| match item.kind {
+        ItemKind::Override(_) => all.contains(&item.span),
+        _ => whole.contains(&item.span),
+    };
+    files.iter().flat_map(|file| &file.tree.items).filter(|item| !stands(item)).collect()
 }
 
 /// Removes the names that a `use` leaves out, also from groups and after `on`. Then removes what has lost its

@@ -85,6 +85,17 @@ impl Checker {
         Some(Road { name, docs: docs(item), map_path, map, start, goal, route, facts, span })
     }
 
+    /// Notes the names and numbers of a road, whether its map can be read or not.
+    pub(super) fn note_road(&mut self, block: &ast::Block) {
+        for field in &block.fields {
+            self.references.word_named::<RoadField>(field.name.span, &field.name.text);
+            match &field.value.kind {
+                ast::ExprKind::LanePoint { station, .. } => self.references.number(station),
+                _ => self.look_at(&field.value, &Place::default(), None),
+            }
+        }
+    }
+
     /// A limit for the whole road, m/s.
     fn limit(&mut self, value: &ast::Expr) -> Option<f64> {
         let limit = self.typed(value, &Place::default(), Type::Quantity(Dimension::SPEED))?;

@@ -3,9 +3,9 @@
 use crate::check::checker::{Checker, docs};
 use crate::check::expression::Place;
 use crate::check::names::unknown;
+use crate::check::references::Symbol;
 use crate::check::report::Report;
 use crate::model::expr::{Expr, ExprKind};
-use crate::model::vocabulary::Site;
 use crate::model::{ActionDef, EffectDef, RuleBinding, RuleBody, RuleDef, Type, code};
 use crate::syntax::ast::ItemKind;
 use crate::syntax::{Diagnostic, ast, listed};
@@ -14,11 +14,7 @@ impl Checker {
     pub(super) fn rules(&mut self, items: &[&ast::Item]) -> Vec<RuleDef> {
         let mut rules = Vec::new();
         for (item, declared) in self.declared("rule", items, ItemKind::as_rule).1 {
-            let body = match &declared.body {
-                ast::RuleBody::Holds { on, condition } => self.holds(declared, on, condition),
-                ast::RuleBody::Moves { state, moves } => self.moves(declared, state, moves),
-            };
-            if let Some(body) = body {
+            if let Some(body) = self.rule(declared) {
                 let name = declared.name.text.clone();
                 let span = declared.name.span;
                 rules.push(RuleDef { name, docs: docs(item), optional: declared.optional, body, span });
@@ -27,10 +23,21 @@ impl Checker {
         rules
     }
 
+    pub(super) fn rule(&mut self, declared: &ast::Rule) -> Option<RuleBody> {
+        match &declared.body {
+            ast::RuleBody::Holds { on, condition } => self.holds(declared, on, condition),
+            ast::RuleBody::Moves { state, moves } => self.moves(declared, state, moves),
+        }
+    }
+
     fn holds(&mut self, rule: &ast::Rule, on: &[ast::Name], condition: &ast::Expr) -> Option<RuleBody> {
         let mut targets: Vec<usize> = Vec::new();
         for name in on {
-            for action in self.targets(name) {
+            let found = self.targets(name);
+            if found.is_empty() {
+                self.look_at_condition(condition, &name.text);
+            }
+            for action in found {
                 if !targets.contains(&action) {
                     targets.push(action);
                 }
@@ -44,13 +51,16 @@ impl Checker {
         let mut bindings = Vec::new();
         for action in targets {
             // A broken action was reported where it is declared.
-            let Some(definition) = self.actions[action].clone() else { continue };
-            if lacking.contains(&action) {
+            let definition = self.actions[action].clone().filter(|_| !lacking.contains(&action));
+            let Some(definition) = definition else {
+                let name = self.action_names.name(action).unwrap_or_default().to_owned();
+                self.look_at_condition(condition, &name);
                 continue;
-            }
+            };
             let locals = locals(&definition);
+            let owner = Symbol::Action(definition.name.clone());
             let spawns = definition.effects.iter().any(|effect| matches!(effect, EffectDef::Spawn(_)));
-            let place = Place { locals: &locals, states: true, site: Site::Rule };
+            let place = Place { locals: &locals, owner: Some(&owner), ..Place::RULE };
             let Some(condition) = self.typed(condition, &place, Type::Bool) else { continue };
             if condition.needs_survey() && !spawns && !self.half_broken.contains(&action) {
                 let message =
@@ -74,6 +84,14 @@ impl Checker {
         Some(RuleBody::Holds(bindings))
     }
 
+    /// Looks at a rule's condition for an action that it cannot bind.
+    fn look_at_condition(&mut self, condition: &ast::Expr, action: &str) {
+        let owner = Symbol::Action(action.to_owned());
+        let locals = self.references.locals(&owner);
+        let place = Place { locals: &locals, owner: Some(&owner), ..Place::RULE };
+        self.look_at(condition, &place, Some(Type::Bool));
+    }
+
     /// The actions that a rule without `on` binds. These are the actions that could break it: those that spawn,
     /// if the rule asks about spawns, and those that set a state which it reads. A rule that does neither binds
     /// all actions.
@@ -85,14 +103,14 @@ impl Checker {
         });
         let is_state = |name: &str| self.states.iter().any(|state| state.name == name);
         if let Some((parameter, action)) = parameter.filter(|(name, _)| !is_state(name)) {
+            self.look_at(condition, &Place::RULE, Some(Type::Bool));
             let named_at = named.iter().find(|name| name.text == *parameter).map(|name| name.span)?;
             let message = format!("`{}` names the parameter `{parameter}` but no action", rule.name.text);
             let error = Diagnostic::error(code::LACKING_PARAMETER, message)
                 .at(named_at, "a parameter of which action?");
             return self.reject(error.help(format!("write `rule {} on {action}: …`", rule.name.text)));
         }
-        let place = Place { locals: &[], states: true, site: Site::Rule };
-        let compiled = self.typed(condition, &place, Type::Bool)?;
+        let compiled = self.typed(condition, &Place::RULE, Type::Bool)?;
         let binds = |action: &ActionDef| {
             action.effects.iter().any(|effect| match effect {
                 EffectDef::Spawn(_) => compiled.needs_survey(),
@@ -152,21 +170,30 @@ impl Checker {
     }
 
     fn moves(&mut self, rule: &ast::Rule, state: &ast::Name, moves: &[ast::Move]) -> Option<RuleBody> {
-        let index = self.state_named(state)?;
-        let definition = self.states[index].clone();
-        let (Type::Enum(of), None) = (definition.ty, definition.key) else {
+        let index = self.state_named(state);
+        let definition = index.map(|index| self.states[index].clone());
+        let of = match definition.as_ref().map(|state| (state.ty, state.key)) {
+            Some((Type::Enum(of), None)) => Some(of.0),
+            _ => None,
+        };
+        if of.is_none() {
+            let named = moves.iter().flat_map(|line| line.to.iter().chain([&line.from]));
+            named.for_each(|name| self.references.variant(name, None));
+        }
+        let (index, definition) = (index?, definition?);
+        let Some(of) = of else {
             let message = format!("`{}` does not move from value to value", state.text);
             let error = Diagnostic::error(code::TYPE_MISMATCH, message);
             return self.reject(
                 error.at(state.span, "must be a plain state of an enum").beside(definition.span, ""),
             );
         };
-        let variants = self.enums[of.0].variants.clone();
+        let variants = self.enums[of].variants.clone();
         let mut allowed = vec![vec![false; variants.len()]; variants.len()];
         let mut sound = true;
         for line in moves {
-            let from = self.variant(&line.from, &variants);
-            let to: Vec<Option<usize>> = line.to.iter().map(|to| self.variant(to, &variants)).collect();
+            let from = self.variant(&line.from, of);
+            let to: Vec<Option<usize>> = line.to.iter().map(|to| self.variant(to, of)).collect();
             for to in to {
                 match (from, to) {
                     (Some(from), Some(to)) => allowed[from][to] = true,
@@ -193,10 +220,14 @@ impl Checker {
         Some(RuleBody::Moves { state: index, allowed, actions })
     }
 
-    pub(super) fn variant(&mut self, name: &ast::Name, variants: &[String]) -> Option<usize> {
-        let names = || variants.iter().map(String::as_str);
+    /// Position of a variant of an enum.
+    pub(super) fn variant(&mut self, name: &ast::Name, of: usize) -> Option<usize> {
+        self.references.variant(name, Some(of));
+        let names = || self.enums[of].variants.iter().map(String::as_str);
         let found = names().position(|variant| variant == name.text);
-        found.or_else(|| self.reject(unknown("variant", &name.text, name.span, names())))
+        let error = found.is_none().then(|| unknown("variant", &name.text, name.span, names()));
+        error.into_iter().for_each(|error| self.report(error));
+        found
     }
 
     /// Reports a value from which no move is allowed, and a value to which no other value may move.

@@ -37,16 +37,22 @@ impl Checker {
                 true => error.help("remove one of them"),
                 false => error.help("write `override` before the later one to replace the other"),
             });
+            self.doubles.insert(item.span);
         }
         Some(first)
     }
 
     /// The settings of the episode, and its list of roads if the block has one.
     pub(super) fn episode(&mut self, items: &[&ast::Item]) -> (EpisodeDef, Option<Vec<ast::Name>>) {
+        let fields = self.only(items, ItemKind::as_episode).map_or(&[][..], |(_, fields)| fields);
+        self.settings(fields)
+    }
+
+    pub(super) fn settings(&mut self, fields: &[ast::Field]) -> (EpisodeDef, Option<Vec<ast::Name>>) {
         let mut episode =
             EpisodeDef { step_s: STEP_S, stop_arrived: true, stalled_steps: None, step_limit: STEP_LIMIT };
         let mut roads = None;
-        let fields = self.only(items, ItemKind::as_episode).map_or(&[][..], |(_, fields)| fields);
+        self.note_fields::<EpisodeField>(fields, &Place::default());
         for (field, value) in self.fields_known(fields) {
             match field {
                 EpisodeField::Roads => roads = self.road_list(value),
@@ -60,9 +66,11 @@ impl Checker {
 
     fn road_list(&mut self, value: &ast::Expr) -> Option<Vec<ast::Name>> {
         let ast::ExprKind::List(items) = &value.kind else {
+            self.note_roads(core::slice::from_ref(value));
             let error = Diagnostic::error(code::TYPE_MISMATCH, "`roads` needs a list of roads");
             return self.reject(error.at(value.span, "not a list").help("write `roads: [name, name]`"));
         };
+        self.note_roads(items);
         let mut roads = Vec::new();
         for item in items {
             match &item.kind {
@@ -91,6 +99,9 @@ impl Checker {
 
     /// `20`, or `20 steps`.
     fn count_of_steps(&mut self, value: &ast::Expr) -> Option<u32> {
+        if let ast::ExprKind::Number(number) = &value.kind {
+            self.references.number(number);
+        }
         let count = match &value.kind {
             ast::ExprKind::Number(number)
                 if number.unit.as_ref().is_none_or(|unit| matches!(unit.text.as_str(), "steps" | "step")) =>
@@ -108,6 +119,7 @@ impl Checker {
     /// `arrived`, `stalled >= 4`, or both with `or` between them.
     fn stop(&mut self, value: &ast::Expr, episode: &mut EpisodeDef) {
         episode.stop_arrived = false;
+        self.note_reasons(value);
         let mut parts = vec![value];
         let reason = |expr: &ast::Expr| match &expr.kind {
             ast::ExprKind::Name(name) => StopReason::from_name(name),
@@ -139,10 +151,26 @@ impl Checker {
         }
     }
 
+    /// Notes the names of reasons to stop.
+    fn note_reasons(&mut self, reason: &ast::Expr) {
+        match &reason.kind {
+            ast::ExprKind::Name(name) => self.references.word_named::<StopReason>(reason.span, name),
+            ast::ExprKind::Binary { left, right, .. } => {
+                self.note_reasons(left);
+                self.note_reasons(right);
+            }
+            _ => {}
+        }
+    }
+
     pub(super) fn reward(&mut self, items: &[&ast::Item]) -> Vec<RewardCase> {
+        let Some((item, declared)) = self.only(items, ItemKind::as_reward) else { return Vec::new() };
+        self.cases(item, declared)
+    }
+
+    pub(super) fn cases(&mut self, item: &ast::Item, declared: &[ast::Case]) -> Vec<RewardCase> {
         let place = Place { site: Site::Reward, ..Place::default() };
         let mut cases = Vec::new();
-        let Some((item, declared)) = self.only(items, ItemKind::as_reward) else { return cases };
         let mut closed = false;
         for case in declared {
             if closed {
@@ -165,14 +193,13 @@ impl Checker {
     }
 
     pub(super) fn verdicts(&mut self, items: &[&ast::Item]) -> Vec<VerdictDef> {
-        let place = Place { site: Site::Verdict, ..Place::default() };
         let mut verdicts = Vec::new();
         let declared: Vec<_> = each(items, ItemKind::as_verdict).collect();
         self.once("verdict", declared.iter().map(|(_, declared)| &declared.name));
         let is_counted = |(_, declared): &(&ast::Item, &ast::Verdict)| declared.name.text == COUNTED;
         let names_counted = declared.iter().any(is_counted);
         for (item, declared) in declared {
-            if let Some(condition) = self.typed(&declared.condition, &place, Type::Bool) {
+            if let Some(condition) = self.verdict(declared) {
                 verdicts.push(VerdictDef { name: declared.name.text.clone(), docs: docs(item), condition });
             }
         }
@@ -180,6 +207,11 @@ impl Checker {
             verdicts.push(counted());
         }
         verdicts
+    }
+
+    pub(super) fn verdict(&mut self, declared: &ast::Verdict) -> Option<Expr> {
+        let place = Place { site: Site::Verdict, ..Place::default() };
+        self.typed(&declared.condition, &place, Type::Bool)
     }
 }
 

@@ -15,6 +15,12 @@ use super::output::Output;
 /// In a directory with more files than this, a file that declares a missing name is too weak a hint.
 const NEARBY_MAX: usize = 32;
 
+/// Files and folders that are looked at in search of source files.
+const ENTRIES_MAX: usize = 20_000;
+
+/// Folders of build outputs.
+const PASSED_OVER: [&str; 2] = ["target", "node_modules"];
+
 /// Larger files are refused: neither people nor our commands write them.
 const FILE_BYTES_MAX: u64 = 64 << 20;
 
@@ -62,6 +68,35 @@ pub fn nearby(path: &Path) -> Vec<(String, String)> {
             found.extend(read(&file).ok().map(|text| (format!("{prefix}{name}"), text)));
         }
     }
+    found
+}
+
+/// Source files below a folder, sorted. Hidden folders and folders of build outputs are passed over, and so
+/// is what comes after many entries: a folder so large is no workspace.
+pub fn below(folder: &Path) -> Vec<PathBuf> {
+    let mut found = Vec::new();
+    let mut open = vec![folder.to_owned()];
+    let mut entries_left = ENTRIES_MAX;
+    while let Some(folder) = open.pop() {
+        let Ok(entries) = std::fs::read_dir(folder) else { continue };
+        for entry in entries.flatten() {
+            entries_left -= 1;
+            if entries_left == 0 {
+                return found;
+            }
+            let name = entry.file_name().to_string_lossy().into_owned();
+            let is_source = entry.path().extension().is_some_and(|extension| extension == "ava");
+            // The type of a link is not followed: links may go in a circle.
+            match entry.file_type() {
+                Ok(kind) if kind.is_dir() && !name.starts_with('.') && !PASSED_OVER.contains(&&*name) => {
+                    open.push(entry.path());
+                }
+                Ok(kind) if kind.is_file() && is_source => found.push(entry.path()),
+                _ => {}
+            }
+        }
+    }
+    found.sort();
     found
 }
 

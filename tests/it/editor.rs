@@ -504,6 +504,107 @@ fn renames_are_tried_first() {
     assert_eq!(range.expect("it can be renamed")["end"]["character"], 7);
 }
 
+/// A file that overrides a declaration of another.
+const OVERRIDING: (&str, &str) = (
+    "language 1\nlet far = 50 m\nfn twice(d: Length) -> Length = d * 2\nfn reach(pace: Speed) -> Length = pace * 3 s + twice(d: far)\n",
+    "language 1\nuse \"base.ava\"\noverride fn reach(pace: Speed) -> Length = pace * 2 s\n",
+);
+
+#[test]
+fn an_overridden_declaration_is_known_too() {
+    let scratch = tempfile::tempdir().expect("a scratch directory");
+    std::fs::write(scratch.path().join("base.ava"), OVERRIDING.0).expect("it is writable");
+    let base = uri(&scratch.path().join("base.ava"));
+    let own = uri(&scratch.path().join("own.ava"));
+    let mut editor = Editor::ready();
+    // From the override to what it replaces, and the body of that is known: `far` and `twice` are used there.
+    let marked = OVERRIDING.1.replace("fn rea", "fn rea|");
+    let found = editor.ask_at("textDocument/definition", &own, &marked, json!({})).expect("it can be asked");
+    assert_eq!(found.as_array().map(Vec::len), Some(1));
+    assert_eq!((&found[0]["uri"], &found[0]["range"]["start"]["line"]), (&json!(base), &json!(3)));
+    let said = editor.ask_at("textDocument/hover", &own, &marked, json!({})).expect("it can be asked");
+    assert!(text(&said["contents"]["value"]).contains("pace * 2 s"), "{said}");
+    let found = editor.ask_at("textDocument/rename", &own, &marked, json!({ "newName": "range" }));
+    let found = found.expect("both are renamed");
+    let changes = [&found["changes"][&base], &found["changes"][&own]];
+    assert_eq!(changes.map(|edits| edits.as_array().map(Vec::len)), [Some(1), Some(1)], "{found}");
+    let more = OVERRIDING.1.to_owned() + "fn more() -> Length = fa|r\n";
+    let found = editor.ask_at("textDocument/references", &own, &more, json!({})).expect("it can be asked");
+    assert_eq!(found.as_array().map(Vec::len), Some(3), "{found}");
+    let more = OVERRIDING.1.to_owned() + "fn more() -> Length = twice(d|: 5 m)\n";
+    let found = editor.ask_at("textDocument/rename", &own, &more, json!({ "newName": "length" }));
+    let found = found.expect("the overridden use is renamed");
+    assert_eq!(found["changes"][&base].as_array().map(Vec::len), Some(3), "{found}");
+}
+
+#[test]
+fn a_half_written_declaration_keeps_its_names() {
+    let mut editor = Editor::ready();
+    let uri = space_uri();
+    let head = "language 1\nenum Side = Left || Right\nlet far = 50 m\nfn near(s: Side) -> Length = far\nstate seen: Side = any\n";
+    // In each text something before the name is unknown, lacking or of a wrong type.
+    let places = [
+        ("fn f(s: Nothing) -> Length = near(Left) + fa|r\n", 2, "Type: `Length`"),
+        ("fn f(s: Side) -> Length = unknown(fa|r)\n", 2, "Type: `Length`"),
+        ("fn f(s: Side) -> Length = match nothing { Left => fa|r }\n", 2, "Type: `Length`"),
+        ("fn f(s: Side) -> Length = near(Left, Right, fa|r)\n", 2, "Type: `Length`"),
+        ("action a(each x: Nothing) {\n  set nothing = fa|r\n}\n", 2, "Type: `Length`"),
+        (
+            "action a(each x: Side where x == nothing, any y: Nothing in 1 m .. fa|r) {\n}\n",
+            2,
+            "Type: `Length`",
+        ),
+        ("action a(any y: Length where y > fa|r) {\n  set seen = Left\n}\n", 2, "Type: `Length`"),
+        ("action a(any y: Length in 1 m .. far) {\n  set seen[nothing] = Ri|ght\n}\n", 1, "variant 2 of 2"),
+        ("rule r on nothing: se|en == Left\n", 4, "Type: `Side`"),
+        ("rule r on nothing {\n  Left -> Ri|ght\n}\n", 1, "variant 2 of 2"),
+        ("odds Nothing {\n  Ri|ght => 2\n}\n", 1, "variant 2 of 2"),
+        ("state other: Nothing = Ri|ght\n", 1, "variant 2 of 2"),
+        ("scenario s { road: nothing start { seen: Ri|ght } steps { } }\n", 1, "variant 2 of 2"),
+    ];
+    for (place, line, wanted) in places {
+        // A line that does not parse, elsewhere: the rest of the file is known all the same.
+        for broken in ["", "group g = = =\n"] {
+            let marked = format!("{head}{broken}{place}");
+            let found = editor.ask_at("textDocument/definition", &uri, &marked, json!({}));
+            let found = found.expect("it can be asked");
+            assert_eq!(found[0]["range"]["start"]["line"], line, "{broken}{place}: {found}");
+            let said = editor.hover(&marked);
+            assert!(said.contains(wanted), "{broken}{place}: {said}");
+        }
+    }
+    let marked = format!("{head}fn f(s: Nothing) -> Length = near(Left) + fa|r\n");
+    let found = editor.ask_at("textDocument/rename", &uri, &marked, json!({ "newName": "away" }));
+    let found = found.expect("a mistake beside it is no reason not to");
+    assert_eq!(found["changes"][&uri].as_array().map(Vec::len), Some(3), "{found}");
+}
+
+#[test]
+fn a_rename_reaches_files_that_are_not_open() {
+    let scratch = tempfile::tempdir().expect("a scratch directory");
+    let write = |name: &str, text: &str| {
+        std::fs::create_dir_all(scratch.path().join("deep")).expect("it is writable");
+        std::fs::write(scratch.path().join(name), text).expect("it is writable");
+    };
+    write("deep/user.ava", "language 1\nuse \"../base.ava\"\nfn twice() -> Length = far * 2\n");
+    write("stranger.ava", "language 1\nlet far = 2 s\n");
+    let mut editor = Editor::start();
+    let folder = json!([{ "uri": uri(scratch.path()), "name": "all" }]);
+    editor.ask("initialize", json!({ "workspaceFolders": folder })).expect("it can be initialized");
+    let base = uri(&scratch.path().join("base.ava"));
+    let marked = "language 1\nlet fa|r = 50 m\n";
+    let found = editor.ask_at("textDocument/rename", &base, marked, json!({ "newName": "away" }));
+    let found = found.expect("it can be renamed");
+    let user = uri(&scratch.path().join("deep/user.ava"));
+    assert_eq!(found["changes"].as_object().map(serde_json::Map::len), Some(2), "{found}");
+    assert_eq!(found["changes"][&user][0]["range"]["start"], json!({ "line": 2, "character": 23 }));
+    // A clash in a file that is not open is a reason to refuse.
+    write("deep/user.ava", "language 1\nuse \"../base.ava\"\nlet away = far * 2\n");
+    let found = editor.ask_at("textDocument/rename", &base, marked, json!({ "newName": "away" }));
+    let error = found.expect_err("the name is taken there");
+    assert!(text(&error["message"]).contains("`far` cannot be called `away`"), "{error}");
+}
+
 #[test]
 fn formatting_is_that_of_fmt() {
     let mut editor = Editor::ready();

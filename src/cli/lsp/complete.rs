@@ -1,15 +1,16 @@
-//! What may be written next, as an editor lists it.
+//! Completion: what may be written next, as an editor lists it.
 
 use std::collections::BTreeSet;
 use std::path::Path;
 
 use serde_json::{Value, json};
 
+use crate::check::Symbol;
+use crate::model::Type;
 use crate::syntax::keyword;
 use crate::units;
 
 use super::context::Kind;
-use super::names::{Symbol, Ty};
 use super::words::Entry;
 use super::workspace::Analysis;
 use super::{context, hover, uri, words};
@@ -29,7 +30,7 @@ const CONSTANT: u32 = 21;
 const EVENT: u32 = 23;
 const OPERATOR: u32 = 24;
 
-/// How near a proposal is to what is wanted: editors sort by it.
+// How well a proposal fits. Editors sort by this number.
 const WANTED: u32 = 0;
 const LIKELY: u32 = 1;
 const POSSIBLE: u32 = 2;
@@ -37,7 +38,7 @@ const POSSIBLE: u32 = 2;
 /// The proposals at a byte of the document.
 pub fn complete(analysis: &Analysis, byte: usize) -> Value {
     let text = analysis.text(Analysis::ROOT);
-    let (kinds, start) = context::wanted(&analysis.names, text, byte);
+    let (kinds, start) = context::wanted(analysis.references(), text, byte);
     let range = crate::syntax::ast::Span::new(Analysis::ROOT, start, byte.max(start));
     let mut list = List { analysis, range: analysis.range(range), seen: BTreeSet::new(), items: Vec::new() };
     kinds.iter().for_each(|kind| list.kind(kind));
@@ -46,7 +47,7 @@ pub fn complete(analysis: &Analysis, byte: usize) -> Value {
 
 struct List<'a> {
     analysis: &'a Analysis,
-    /// What is replaced.
+    /// The range of the text that a proposal replaces.
     range: Value,
     seen: BTreeSet<String>,
     items: Vec<Value>,
@@ -54,7 +55,6 @@ struct List<'a> {
 
 impl List<'_> {
     fn kind(&mut self, kind: &Kind) {
-        let declared = &self.analysis.names.declared;
         match kind {
             Kind::Declarations => self.words(keyword::DECLARATIONS, KEYWORD, LIKELY),
             Kind::Words(entries) => self.words(entries, FIELD, WANTED),
@@ -67,58 +67,31 @@ impl List<'_> {
                 self.kind(&Kind::Enums);
                 self.words(&words::types(), CLASS, LIKELY);
             }
-            Kind::Enums => {
-                for name in declared.enums.keys() {
-                    self.symbol(name, ENUM, WANTED, Symbol::Enum(name.clone()));
-                }
-            }
+            Kind::Enums => self.symbols(ENUM, |symbol| matches!(symbol, Symbol::Enum(_))),
             Kind::Units => {
                 for unit in units::UNITS {
                     self.add(unit.word, UNIT, WANTED, &unit.dimension.to_string(), None);
                 }
             }
-            Kind::Actions => {
-                for name in declared.actions.keys() {
-                    self.symbol(name, EVENT, WANTED, Symbol::Action(name.clone()));
-                }
-            }
-            Kind::Groups => {
-                for name in declared.groups.keys() {
-                    self.symbol(name, MODULE, WANTED, Symbol::Group(name.clone()));
-                }
-            }
-            Kind::States => {
-                for name in declared.states.keys() {
-                    self.symbol(name, VARIABLE, WANTED, Symbol::State(name.clone()));
-                }
-            }
-            Kind::Roads => {
-                for name in declared.roads.keys() {
-                    self.symbol(name, MODULE, WANTED, Symbol::Road(name.clone()));
-                }
-            }
-            Kind::Rules => {
-                for name in declared.rules.keys() {
-                    self.symbol(name, OPERATOR, WANTED, Symbol::Rule(name.clone()));
-                }
-            }
-            Kind::Verdicts => {
-                for name in declared.verdicts.keys() {
-                    self.symbol(name, OPERATOR, WANTED, Symbol::Verdict(name.clone()));
-                }
-            }
-            Kind::Value(ty) => self.value(ty.as_ref()),
+            Kind::Actions => self.symbols(EVENT, |symbol| matches!(symbol, Symbol::Action(_))),
+            Kind::Groups => self.symbols(MODULE, |symbol| matches!(symbol, Symbol::Group(_))),
+            Kind::States => self.symbols(VARIABLE, |symbol| matches!(symbol, Symbol::State(_))),
+            Kind::Roads => self.symbols(MODULE, |symbol| matches!(symbol, Symbol::Road(_))),
+            Kind::Rules => self.symbols(OPERATOR, |symbol| matches!(symbol, Symbol::Rule(_))),
+            Kind::Verdicts => self.symbols(OPERATOR, |symbol| matches!(symbol, Symbol::Verdict(_))),
+            Kind::Value(ty) => self.value(*ty),
             Kind::Operators => self.words(keyword::OPERATORS, OPERATOR, POSSIBLE),
             Kind::Variants(of) => self.variants(of, WANTED),
             Kind::Local(name, ty, fits) => {
-                let ty = ty.as_ref().map(Ty::name).unwrap_or_default();
+                let ty = ty.map(|ty| self.analysis.references().type_name(ty)).unwrap_or_default();
                 self.add(name, VARIABLE, if *fits { WANTED } else { LIKELY }, &ty, None);
             }
-            Kind::Parameters(action, mode) => {
-                for parameter in declared.actions.get(action).iter().flat_map(|of| &of.of) {
-                    if parameter.mode == *mode {
-                        let symbol = Symbol::Parameter(action.clone(), parameter.name.clone());
-                        self.symbol(&parameter.name, FIELD, WANTED, symbol);
+            Kind::Parameters(action, axis) => {
+                let references = self.analysis.references();
+                let action = references.declaration(&Symbol::Action(action.clone()));
+                for parameter in action.iter().flat_map(|action| &action.parts) {
+                    if references.declaration(parameter).is_some_and(|known| known.axis == *axis) {
+                        self.symbol(parameter, FIELD, WANTED);
                     }
                 }
             }
@@ -126,37 +99,38 @@ impl List<'_> {
         }
     }
 
-    fn value(&mut self, ty: Option<&Ty>) {
-        let declared = &self.analysis.names.declared;
-        match ty.and_then(Ty::variants_of) {
-            Some(of) => self.variants(of, WANTED),
+    fn value(&mut self, ty: Option<Type>) {
+        let references = self.analysis.references();
+        match ty.and_then(|ty| references.enum_of(ty)) {
+            Some(of) => self.variants(&of.name, WANTED),
             None => {
-                for of in declared.enums.keys() {
-                    self.variants(of, POSSIBLE);
+                for symbol in references.symbols() {
+                    if let Symbol::Enum(of) = symbol {
+                        self.variants(of, POSSIBLE);
+                    }
                 }
             }
         }
-        if ty.is_none_or(|ty| *ty == Ty::Bool) {
+        if ty.is_none_or(|ty| ty == Type::Bool) {
             self.words(keyword::LITERALS, KEYWORD, POSSIBLE);
         }
-        for (name, of) in &declared.constants {
-            let rank = if of.of.is_some() && of.of.as_ref() == ty { WANTED } else { LIKELY };
-            self.symbol(name, CONSTANT, rank, Symbol::Constant(name.clone()));
-        }
-        for (name, of) in &declared.functions {
-            let fits = of.of.result.is_some() && of.of.result.as_ref() == ty;
-            self.symbol(name, FUNCTION, if fits { WANTED } else { LIKELY }, Symbol::Function(name.clone()));
-        }
-        for name in declared.states.keys() {
-            self.symbol(name, VARIABLE, LIKELY, Symbol::State(name.clone()));
+        for symbol in references.symbols() {
+            let found = references.declaration(symbol).and_then(|known| known.ty);
+            let rank = if found.is_some() && found == ty { WANTED } else { LIKELY };
+            match symbol {
+                Symbol::Constant(_) => self.symbol(symbol, CONSTANT, rank),
+                Symbol::Function(_) => self.symbol(symbol, FUNCTION, rank),
+                Symbol::State(_) => self.symbol(symbol, VARIABLE, LIKELY),
+                _ => {}
+            }
         }
         self.kind(&Kind::Keyword("match"));
         self.kind(&Kind::Keyword("not"));
     }
 
     fn variants(&mut self, of: &str, rank: u32) {
-        let declared = &self.analysis.names.declared;
-        for variant in declared.enums.get(of).iter().flat_map(|of| &of.of.variants) {
+        let variants = self.analysis.references().enum_named(of).map(|of| of.variants.as_slice());
+        for variant in variants.unwrap_or_default() {
             self.add(variant, ENUM_MEMBER, rank, of, None);
         }
     }
@@ -167,9 +141,16 @@ impl List<'_> {
         }
     }
 
-    fn symbol(&mut self, name: &str, kind: u32, rank: u32, symbol: Symbol) {
-        let text = hover::describe(self.analysis, &symbol);
-        self.add(name, kind, rank, "", text);
+    /// Every declared symbol of a kind.
+    fn symbols(&mut self, kind: u32, is_wanted: impl Fn(&Symbol) -> bool) {
+        for symbol in self.analysis.references().symbols().filter(|symbol| is_wanted(symbol)) {
+            self.symbol(symbol, kind, WANTED);
+        }
+    }
+
+    fn symbol(&mut self, symbol: &Symbol, kind: u32, rank: u32) {
+        let text = hover::describe(self.analysis, symbol);
+        self.add(symbol.word().unwrap_or_default(), kind, rank, "", text);
     }
 
     fn add(&mut self, label: &str, kind: u32, rank: u32, detail: &str, documentation: Option<String>) {
@@ -191,13 +172,13 @@ impl List<'_> {
         self.items.push(item);
     }
 
-    /// Files and folders that go on from a path.
+    /// Files and folders that continue a path.
     fn files(&mut self, extension: &str, written: &str) {
         let root = &self.analysis.loaded.files[0].path;
         let folder = root.parent().unwrap_or(Path::new(""));
         let beginning = written.rfind('/').map_or("", |slash| &written[..=slash]);
         let directory = uri::normal(&folder.join(beginning));
-        // A directory that cannot be read has nothing to propose.
+        // A directory that cannot be read gives no proposals.
         let Ok(entries) = std::fs::read_dir(directory) else { return };
         let mut names: Vec<String> = entries
             .flatten()

@@ -1,19 +1,19 @@
-//! What could be written at a place, from the words before it: the text there is unfinished, and no
-//! tree can be trusted.
+//! What could be written at a place, told from the words before it: the declaration there is unfinished and
+//! has no tree. Why the grammar is not asked instead is said in ARCHITECTURE.md, decision 34.
 
+use crate::check::{Declaration, References, Symbol};
+use crate::model::Type;
 use crate::model::vocabulary::{
     EpisodeField, RoadField, ScenarioClaim, Site, SpaceClaim, SpawnField, StartField, StopReason, WAIT,
     parts_of, things,
 };
-use crate::syntax::ast::ParamMode;
 use crate::syntax::keyword;
 
-use super::names::{Names, Ty};
 use super::tokens::{Ending, Token, tokens};
 use super::words;
 use super::words::Entry;
 
-/// One kind of thing that fits.
+/// A kind of thing that can be written at a place.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Kind {
     Declarations,
@@ -29,21 +29,21 @@ pub enum Kind {
     Roads,
     Rules,
     Verdicts,
-    /// What a value can be made of, the variants of this type first.
-    Value(Option<Ty>),
+    /// The parts of an expression; the variants of this type come first.
+    Value(Option<Type>),
     Operators,
     /// Variants of an enum.
     Variants(String),
-    /// A parameter; whether its type is the wanted one.
-    Local(String, Option<Ty>, bool),
-    /// Parameters of an action, and how they get their values.
-    Parameters(String, ParamMode),
-    /// Files with this extension, beside the document; the path so far.
+    /// A parameter, its type, and whether this is the wanted type.
+    Local(String, Option<Type>, bool),
+    /// Parameters of an action: the axes if `true`, else the drawn ones.
+    Parameters(String, bool),
+    /// Files with this extension, and the path that is written so far.
     Files(&'static str, String),
 }
 
-/// What fits at a byte, and where the word begins that it would replace.
-pub fn wanted(names: &Names, text: &str, byte: usize) -> (Vec<Kind>, usize) {
+/// The kinds that fit at a byte, and the start of the word that a proposal would replace.
+pub fn wanted(references: &References, text: &str, byte: usize) -> (Vec<Kind>, usize) {
     let byte = text.floor_char_boundary(byte.min(text.len()));
     let is_word = |c: char| c.is_ascii_alphanumeric() || c == '_';
     let start = text[..byte].trim_end_matches(is_word).len();
@@ -56,7 +56,7 @@ pub fn wanted(names: &Names, text: &str, byte: usize) -> (Vec<Kind>, usize) {
     let (tokens, _) = tokens(&text[item..start]);
     let line_start = text[..start].rfind('\n').map_or(0, |newline| newline + 1);
     let fresh_line = text[line_start..start].trim().is_empty();
-    let place = Place::new(names, tokens, fresh_line);
+    let place = Place::new(references, tokens, fresh_line);
     let mut found = place.kinds();
     if start == line_start || (place.open.is_empty() && fresh_line && !place.wants_operand()) {
         found.insert(0, Kind::Declarations);
@@ -78,7 +78,7 @@ fn item_start(text: &str, byte: usize) -> usize {
     }
 }
 
-/// Within a text literal: a path, where the language has paths.
+/// The kinds that fit within a text literal: files, if the text is a path.
 fn path(text: &str, from: usize, item: usize) -> (Vec<Kind>, usize) {
     let written = text[from..].to_owned();
     let before = tokens(&text[..from - 1]).0;
@@ -91,19 +91,19 @@ fn path(text: &str, from: usize, item: usize) -> (Vec<Kind>, usize) {
     (kinds, item + from)
 }
 
-/// The words of a declaration up to the place.
+/// The tokens of a declaration up to the place.
 struct Place<'a> {
-    names: &'a Names,
+    references: &'a References,
     tokens: Vec<Token<'a>>,
-    /// Open brackets, by position among the tokens.
+    /// Positions of the open brackets among the tokens.
     open: Vec<usize>,
-    /// Whether nothing stands before the place on its line.
+    /// Whether the place is the first on its line.
     fresh_line: bool,
-    locals: Vec<(String, Option<Ty>)>,
+    locals: Vec<(String, Option<Type>)>,
 }
 
 impl<'a> Place<'a> {
-    fn new(names: &'a Names, mut tokens: Vec<Token<'a>>, fresh_line: bool) -> Place<'a> {
+    fn new(references: &'a References, mut tokens: Vec<Token<'a>>, fresh_line: bool) -> Place<'a> {
         if tokens.len() > 1 && tokens[0].text == "override" {
             tokens.remove(0);
         }
@@ -117,7 +117,7 @@ impl<'a> Place<'a> {
                 _ => {}
             }
         }
-        let mut place = Place { names, tokens, open, fresh_line, locals: Vec::new() };
+        let mut place = Place { references, tokens, open, fresh_line, locals: Vec::new() };
         place.locals = place.find_locals();
         place
     }
@@ -143,7 +143,7 @@ impl<'a> Place<'a> {
         }
     }
 
-    /// Whether a value is missing, as opposed to an operator or the next entry.
+    /// Whether a value must come next, and not an operator or the next entry.
     fn wants_operand(&self) -> bool {
         let last = self.last(0);
         let words =
@@ -214,7 +214,7 @@ impl<'a> Place<'a> {
             ("->", _) => vec![Kind::Enums],
             ("=", Some(equals)) => {
                 let mut kinds = vec![Kind::Keyword("any")];
-                kinds.extend(self.value(self.names.declared.named(self.text(equals - 1))));
+                kinds.extend(self.value(self.references.type_named(self.text(equals - 1))));
                 kinds
             }
             (_, Some(_)) => self.value(None),
@@ -227,7 +227,7 @@ impl<'a> Place<'a> {
         match (self.last(0), equals) {
             (":", None) => vec![Kind::Types],
             ("->", None) => vec![Kind::Types],
-            (_, Some(equals)) => self.value(self.names.declared.named(self.text(equals - 1))),
+            (_, Some(equals)) => self.value(self.references.type_named(self.text(equals - 1))),
             _ => Vec::new(),
         }
     }
@@ -288,14 +288,11 @@ impl<'a> Place<'a> {
         match (self.last(0), colon, on) {
             _ if moves => {
                 let state = self.open[0].checked_sub(1).map_or("", |before| self.text(before));
-                match self.state(state).as_ref().and_then(Ty::variants_of) {
-                    Some(of) => vec![Kind::Variants(of.to_owned())],
-                    None => Vec::new(),
-                }
+                self.plain_state(state).and_then(|ty| self.variants(ty)).into_iter().collect()
             }
             (_, Some(_), _) if self.asks_for_road() => vec![Kind::Roads],
             (_, Some(_), _) => {
-                let mut kinds = self.value(Some(Ty::Bool));
+                let mut kinds = self.value(Some(Type::Bool));
                 if self.wants_operand() {
                     kinds.push(Kind::Words(words::facts(Site::Rule)));
                     kinds.extend(things().into_iter().map(Kind::Keyword));
@@ -391,11 +388,10 @@ impl<'a> Place<'a> {
     fn in_start(&self) -> Vec<Kind> {
         let field = self.open.get(2).map_or_else(|| self.last(1), |open| self.text(open.saturating_sub(2)));
         let state = self.state(field);
-        match (self.last(0), self.open.len(), state) {
-            (":", 3, Some(Ty::Map(_, value))) => self.value(Some(*value)),
-            (_, 3, Some(Ty::Map(key, _))) => vec![Kind::Variants(key)],
-            (":", _, Some(Ty::Map(_, value))) => self.value(Some(*value)),
-            (":", _, ty) => self.value(ty),
+        let key = state.and_then(|state| state.key);
+        match (self.last(0), self.open.len(), key) {
+            (":", _, _) => self.value(state.and_then(|state| state.ty)),
+            (_, 3, Some(key)) => self.variants(Type::Enum(key)).into_iter().collect(),
             _ => vec![Kind::States, Kind::Words(words::of::<StartField>())],
         }
     }
@@ -407,8 +403,8 @@ impl<'a> Place<'a> {
             (":", "{") if before == "steps" => vec![Kind::Actions, Kind::Words(vec![WAIT])],
             (":", "(") => self.value(self.parameter_type(before)),
             (":", "{") if before == "with" => self.value(self.parameter_type(&self.called())),
-            ("(" | ",", "(") => vec![Kind::Parameters(before.to_owned(), ParamMode::Each)],
-            (_, "{") if before == "with" => vec![Kind::Parameters(self.called(), ParamMode::Any)],
+            ("(" | ",", "(") => vec![Kind::Parameters(before.to_owned(), true)],
+            (_, "{") if before == "with" => vec![Kind::Parameters(self.called(), false)],
             (")", _) => vec![Kind::Keyword("with")],
             _ => Vec::new(),
         }
@@ -419,18 +415,18 @@ impl<'a> Place<'a> {
         match (self.open.len(), self.last(0), bracket) {
             (1, _, _) => ["origin", "net", "claims", "rules"].map(Kind::Keyword).to_vec(),
             (_, "=>", _) => vec![Kind::Actions],
-            (_, "(" | ",", "(") => match self.names.declared.actions.contains_key(before) {
-                true => vec![Kind::Parameters(before.to_owned(), ParamMode::Each)],
-                false => self.value(None),
+            (_, "(" | ",", "(") => match self.declared(Symbol::Action, before) {
+                Some(_) => vec![Kind::Parameters(before.to_owned(), true)],
+                None => self.value(None),
             },
             (_, ":", "(") => self.value(self.parameter_type(before)),
             (2, _, _) if before == "rules" && self.begins_entry() => vec![Kind::Keyword("when")],
-            (2, _, _) if before == "rules" => self.value(Some(Ty::Bool)),
+            (2, _, _) if before == "rules" => self.value(Some(Type::Bool)),
             _ => Vec::new(),
         }
     }
 
-    /// The action of the step under way.
+    /// The action that the unfinished step calls.
     fn called(&self) -> String {
         let with = self.tokens.iter().rposition(|token| token.text == "with").unwrap_or(0);
         let open = self.tokens[..with].iter().rposition(|token| token.text == "(").unwrap_or(0);
@@ -438,8 +434,9 @@ impl<'a> Place<'a> {
     }
 
     /// Type of the parameter whose name stands before the colon.
-    fn parameter_type(&self, action: &str) -> Option<Ty> {
-        self.names.declared.parameter(action, self.last(1))?.ty.clone()
+    fn parameter_type(&self, action: &str) -> Option<Type> {
+        let symbol = Symbol::Parameter(action.to_owned(), self.last(1).to_owned());
+        self.references.declaration(&symbol)?.ty
     }
 
     fn has(&self, word: &str) -> bool {
@@ -456,8 +453,8 @@ impl<'a> Place<'a> {
         fields.iter().copied().filter(|(field, _)| !has(field)).collect()
     }
 
-    /// Where a value may stand: what it can be made of; behind one, what can follow.
-    fn value(&self, ty: Option<Ty>) -> Vec<Kind> {
+    /// The kinds that fit in an expression: the parts of a value, or what can follow one.
+    fn value(&self, ty: Option<Type>) -> Vec<Kind> {
         if let Some(kinds) = self.arm() {
             return kinds;
         }
@@ -465,11 +462,10 @@ impl<'a> Place<'a> {
             return self.after_value();
         }
         let wanted = self.hint().or(ty);
-        // A condition begins with a value of any type.
-        let is_open = wanted.as_ref().is_none_or(|wanted| *wanted == Ty::Bool);
-        let local = |(name, ty): &(String, Option<Ty>)| {
-            Kind::Local(name.clone(), ty.clone(), is_open || *ty == wanted)
-        };
+        // A condition may begin with a value of any type.
+        let is_open = wanted.is_none_or(|wanted| wanted == Type::Bool);
+        let local =
+            |(name, ty): &(String, Option<Type>)| Kind::Local(name.clone(), *ty, is_open || *ty == wanted);
         let mut kinds: Vec<Kind> = self.locals.iter().map(local).collect();
         kinds.push(Kind::Value(wanted));
         kinds
@@ -479,19 +475,19 @@ impl<'a> Place<'a> {
         vec![Kind::Operators]
     }
 
-    /// At the beginning of an arm of `match`.
+    /// The variants for the start of an arm of `match`; `None` elsewhere.
     fn arm(&self) -> Option<Vec<Kind>> {
         let open = *self.open.last()?;
         let from = self.tokens[..open].iter().rposition(|token| token.text == "match")?;
         if self.text(open) != "{" || from + 2 != open || !(self.begins_entry() || self.last(0) == "|") {
             return None;
         }
-        let ty = self.type_of(self.text(from + 1))?;
-        Some(vec![Kind::Variants(ty.variants_of()?.to_owned()), Kind::Keyword("_")])
+        let variants = self.variants(self.type_of(self.text(from + 1))?)?;
+        Some(vec![variants, Kind::Keyword("_")])
     }
 
-    /// The type that the words before the place ask for.
-    fn hint(&self) -> Option<Ty> {
+    /// The type that the tokens before the place ask for.
+    fn hint(&self) -> Option<Type> {
         let end = self.tokens.len();
         match self.last(0) {
             "==" | "!=" | "<" | "<=" | ">" | ">=" => self.type_before(end - 1),
@@ -499,78 +495,77 @@ impl<'a> Place<'a> {
                 let open = *self.open.last()?;
                 match self.text(open.checked_sub(1)?) {
                     "in" => self.type_before(open - 1),
-                    state => match self.state(state)? {
-                        Ty::Map(key, _) => Some(Ty::Enum(key)),
-                        Ty::Bool | Ty::Int | Ty::Quantity(_) | Ty::Enum(_) => None,
-                    },
+                    state => self.state(state)?.key.map(Type::Enum),
                 }
             }
             "(" | "," if self.inside().1 == "(" => {
                 let open = *self.open.last()?;
-                let function = self.names.declared.functions.get(self.text(open.checked_sub(1)?))?;
+                let function = self.declared(Symbol::Function, self.text(open.checked_sub(1)?))?;
                 let commas = self.tokens[open..].iter().filter(|token| token.text == ",").count();
-                function.of.parameters.get(commas)?.1.clone()
+                self.references.declaration(function.parts.get(commas)?)?.ty
             }
             _ => None,
         }
     }
 
     /// Type of the value that ends before a token: a name, `state[key]` or `function(…)`.
-    fn type_before(&self, end: usize) -> Option<Ty> {
+    fn type_before(&self, end: usize) -> Option<Type> {
         let last = end.checked_sub(1)?;
         let back_to = |bracket: &str| self.tokens[..last].iter().rposition(|token| token.text == bracket);
         match self.text(last) {
-            "]" => match self.state(self.text(back_to("[")?.checked_sub(1)?))? {
-                Ty::Map(_, value) => Some(*value),
-                Ty::Bool | Ty::Int | Ty::Quantity(_) | Ty::Enum(_) => None,
-            },
-            ")" => {
-                let function = self.text(back_to("(")?.checked_sub(1)?);
-                self.names.declared.functions.get(function)?.of.result.clone()
-            }
+            "]" => self.state(self.text(back_to("[")?.checked_sub(1)?))?.ty,
+            ")" => self.declared(Symbol::Function, self.text(back_to("(")?.checked_sub(1)?))?.ty,
             name => self.type_of(name),
         }
     }
 
-    fn type_of(&self, name: &str) -> Option<Ty> {
+    fn type_of(&self, name: &str) -> Option<Type> {
         let local = self.locals.iter().find(|(local, _)| local == name);
-        let constant = || self.names.declared.constants.get(name).and_then(|of| of.of.clone());
-        local.and_then(|(_, ty)| ty.clone()).or_else(constant).or_else(|| self.state(name))
+        let constant = || self.declared(Symbol::Constant, name).and_then(|constant| constant.ty);
+        local.and_then(|(_, ty)| *ty).or_else(constant).or_else(|| self.plain_state(name))
     }
 
-    fn state(&self, name: &str) -> Option<Ty> {
-        self.names.declared.states.get(name)?.of.clone()
+    /// Type of a state that is no map.
+    fn plain_state(&self, name: &str) -> Option<Type> {
+        self.state(name).filter(|state| state.key.is_none())?.ty
+    }
+
+    fn state(&self, name: &str) -> Option<&'a Declaration> {
+        self.declared(Symbol::State, name)
+    }
+
+    fn declared(&self, symbol: fn(String) -> Symbol, name: &str) -> Option<&'a Declaration> {
+        self.references.declaration(&symbol(name.to_owned()))
+    }
+
+    /// The variants of an enum.
+    fn variants(&self, ty: Type) -> Option<Kind> {
+        self.references.enum_of(ty).map(|of| Kind::Variants(of.name.clone()))
     }
 
     /// Type of the parameter of an action that is being declared.
-    fn declared_type(&self) -> Option<Ty> {
+    fn declared_type(&self) -> Option<Type> {
         let colon = self.tokens.iter().rposition(|token| token.text == ":")?;
-        self.names.declared.named(self.text(colon + 1))
+        self.references.type_named(self.text(colon + 1))
     }
 
     /// Type of what `set` sets.
-    fn set_type(&self) -> Option<Ty> {
+    fn set_type(&self) -> Option<Type> {
         let set = self.tokens.iter().rposition(|token| token.text == "set")?;
-        match self.state(self.text(set + 1))? {
-            Ty::Map(_, value) => Some(*value),
-            ty => Some(ty),
-        }
+        self.state(self.text(set + 1))?.ty
     }
 
-    /// The parameters that can be named.
-    fn find_locals(&self) -> Vec<(String, Option<Ty>)> {
-        let declared = &self.names.declared;
-        let mut found: Vec<(String, Option<Ty>)> = Vec::new();
+    /// The parameters that an expression at the place can name.
+    fn find_locals(&self) -> Vec<(String, Option<Type>)> {
+        let mut found: Vec<(String, Option<Type>)> = Vec::new();
         match self.keyword() {
             "rule" => {
                 let from = self.tokens.iter().position(|token| token.text == "on");
                 let names = self.tokens.iter().skip(from.map_or(usize::MAX, |on| on + 1));
                 let names = names.take_while(|token| token.text != ":").filter(|token| token.is_word());
-                for action in names.flat_map(|name| declared.targets(name.text)) {
-                    for parameter in declared.actions.get(&action).iter().flat_map(|action| &action.of) {
-                        if !found.iter().any(|(name, _)| *name == parameter.name) {
-                            found.push((parameter.name.clone(), parameter.ty.clone()));
-                        }
+                for (name, ty) in names.flat_map(|name| self.parameters_of(name.text)) {
+                    if !found.iter().any(|(known, _)| *known == name) {
+                        found.push((name, ty));
                     }
                 }
             }
@@ -582,12 +577,23 @@ impl<'a> Place<'a> {
                             _ => matches!(self.text(at - 1), "each" | "any"),
                         };
                     if is_parameter && self.tokens[at].is_word() {
-                        found.push((self.text(at).to_owned(), declared.named(self.text(at + 2))));
+                        found.push((self.text(at).to_owned(), self.references.type_named(self.text(at + 2))));
                     }
                 }
             }
             _ => {}
         }
         found
+    }
+
+    /// Parameters of an action, or of the actions of a group.
+    fn parameters_of(&self, target: &str) -> Vec<(String, Option<Type>)> {
+        let actions = self.references.actions(target);
+        let actions = actions.iter().filter_map(|action| self.references.declaration(action));
+        let parameter = |symbol: &Symbol| match symbol {
+            Symbol::Parameter(_, name) => Some((name.clone(), self.references.declaration(symbol)?.ty)),
+            _ => None,
+        };
+        actions.flat_map(|action| &action.parts).filter_map(parameter).collect()
     }
 }

@@ -40,7 +40,7 @@ fn to_json(diagnostic: &Diagnostic, analysis: &Analysis, workspace: &Workspace) 
     let severity = match diagnostic.severity {
         Severity::Error => 1,
         Severity::Warning => 2,
-        // A hint: what asks for no change should not look like a mistake.
+        // 4 is a hint: a note asks for no change and should not look like a mistake.
         Severity::Note => 4,
     };
     let place = diagnostic.place().unwrap_or(Span::NONE);
@@ -75,19 +75,19 @@ fn to_json(diagnostic: &Diagnostic, analysis: &Analysis, workspace: &Workspace) 
         "relatedInformation": related,
     });
     if diagnostic.code == model::code::UNUSED {
-        // 1: unnecessary. Editors fade it.
+        // 1 means unnecessary: editors show the text faded.
         shown["tags"] = json!([1]);
     }
     shown
 }
 
-/// Where a span is, for the editor; `None` if it lies nowhere.
+/// The location of a span, for the editor; `None` if the span is in no file.
 pub fn location(span: Span, analysis: &Analysis, workspace: &Workspace) -> Option<Value> {
     let path = analysis.path(span.file)?;
     Some(json!({ "uri": workspace.uri(path), "range": analysis.range(span) }))
 }
 
-/// The changes that mistakes between two bytes of the document offer.
+/// The quick fixes of the mistakes between two bytes of the document.
 pub fn fixes(analysis: &Analysis, workspace: &Workspace, from: usize, to: usize) -> Vec<Value> {
     let touches = |diagnostic: &&Diagnostic| {
         let of_root = diagnostic.labels.iter().filter(|label| label.span.file == Analysis::ROOT);
@@ -111,7 +111,7 @@ pub fn fixes(analysis: &Analysis, workspace: &Workspace, from: usize, to: usize)
     actions
 }
 
-/// Changes of several files, as an editor takes them; `None` if one of them lies nowhere.
+/// Edits of several files as an editor takes them; `None` if the span of an edit is in no file.
 pub fn edit<'a>(
     edits: impl Iterator<Item = (Span, &'a str)>,
     analysis: &Analysis,

@@ -1,5 +1,5 @@
-//! The files of `editors/vscode` that follow from the language: its words as a TextMate grammar, and
-//! how its brackets and comments behave.
+//! The files of `editors/vscode` that follow from the language: a TextMate grammar with its words, and the
+//! rules for its brackets and comments.
 //!
 //! `avastra editor-files DIR` writes them; a test compares what is shipped with what would be written.
 
@@ -31,7 +31,7 @@ fn grammar() -> Value {
     engine.sort_unstable();
     engine.dedup();
     let facts = [words::facts(Site::Rule), words::facts(Site::Verdict), words::of::<StopReason>()].concat();
-    // These have no name behind them.
+    // No name follows these keywords.
     let nameless = ["language", "use", "optional", "episode", "reward", "expect", "override"];
     let mut naming = names(keyword::DECLARATIONS);
     naming.retain(|word| !nameless.contains(word));
@@ -89,7 +89,7 @@ fn one_of(mut words: Vec<&str>) -> String {
     format!(r"\b({})\b", words.join("|"))
 }
 
-/// Longer units first: `m/s^2` is no `m`.
+/// The units, longer ones first: `m/s^2` must not match as `m`.
 fn units_pattern() -> String {
     let mut words: Vec<&str> = units::UNITS.iter().map(|unit| unit.word).collect();
     words.sort_by_key(|word| (std::cmp::Reverse(word.len()), *word));

@@ -2,28 +2,29 @@
 //!
 //! Keywords, numbers and comments are coloured by the TextMate grammar.
 
-use super::names::Symbol;
+use crate::check::Symbol;
+
 use super::workspace::Analysis;
 
-/// Kinds of names, by their numbers.
+/// The kinds of names. A token holds the position of its kind in this list.
 pub const TYPES: [&str; 9] =
     ["enum", "enumMember", "variable", "function", "parameter", "event", "namespace", "type", "property"];
 
-/// By bit.
+/// The modifiers of a token, one bit each.
 pub const MODIFIERS: [&str; 3] = ["declaration", "readonly", "defaultLibrary"];
 
 const DECLARATION: u32 = 1;
 const READONLY: u32 = 2;
 const DEFAULT_LIBRARY: u32 = 4;
 
-/// Five numbers for each name, as the protocol has it: lines and UTF-16 units since the last one, length,
-/// kind and modifiers.
+/// Five numbers for each name, as the protocol wants them: lines since the last name, UTF-16 units since the
+/// last name or the start of the line, length, kind and modifiers.
 pub fn tokens(analysis: &Analysis) -> Vec<usize> {
     let text = analysis.text(Analysis::ROOT);
     let Some(lines) = analysis.lines(Analysis::ROOT) else { return Vec::new() };
     let mut data = Vec::new();
     let mut last = (0, 0);
-    for occurrence in analysis.names.in_file(Analysis::ROOT) {
+    for occurrence in analysis.references().in_file(Analysis::ROOT) {
         let Some((kind, modifiers)) = occurrence.symbols.first().and_then(kind) else { continue };
         let (line, column) = lines.position(text, occurrence.span.start);
         let length: usize = analysis.slice(occurrence.span).chars().map(char::len_utf16).sum();

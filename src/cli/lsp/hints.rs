@@ -1,7 +1,7 @@
-//! What the compiler knows and the text does not say: the rows of an action behind its name, and what
-//! the rules leave of a drawn range behind it.
+//! What the compiler knows and the text does not say: behind the name of an action its rows, and behind a
+//! drawn range the part that the rules leave.
 //!
-//! Only while the space is sound: numbers of rows that have moved would mislead.
+//! Hints are shown only while the space is sound: row numbers from an earlier state could be wrong.
 
 use serde_json::{Value, json};
 
@@ -34,8 +34,8 @@ pub fn hints(analysis: &Analysis, from: usize, to: usize) -> Vec<Value> {
     found
 }
 
-/// What all roads together leave of a range, if it is less than what is written; road by road in the
-/// tooltip.
+/// The range that the rules leave on any road, if it is smaller than the written one. The tooltip lists it
+/// road by road.
 fn range(analysis: &Analysis, space: &Space, action: &Action, param: &ActionParam) -> Option<Value> {
     let (index, of) = find_action(space, &action.name.text)?;
     let of = of.parameters.iter().find(|parameter| *parameter.name == *param.name.text)?;

@@ -1,8 +1,9 @@
-//! What is said of a name under the pointer: its declaration, its type, what the rules leave of it,
-//! and its documentation.
+//! The text for a name under the pointer: its declaration, its type, the values that the rules leave, and its
+//! documentation.
 
 use core::fmt::Write;
 
+use crate::check::{Declaration, Symbol};
 use crate::cli::doc::{range_on, unit};
 use crate::cli::progress::plural;
 use crate::model::{ActionDef, Reach, RuleBody, Space};
@@ -11,19 +12,18 @@ use crate::syntax::{keyword, listed};
 use crate::units;
 use crate::units::Rational;
 
-use super::names::Symbol;
 use super::workspace::Analysis;
 use super::{tokens, words};
 
-/// Longer declarations are cut.
+/// Lines of a declaration that are shown, at most.
 const LINES_MAX: usize = 12;
 
-/// The place that is meant by a byte of the document, and Markdown about it.
+/// The span of the name or keyword at a byte of the document, and Markdown about it.
 pub fn hover(analysis: &Analysis, byte: usize) -> Option<(Span, String)> {
-    if let Some(occurrence) = analysis.names.at(Analysis::ROOT, byte) {
+    if let Some(occurrence) = analysis.references().at(Analysis::ROOT, byte) {
         let mut texts: Vec<String> = Vec::new();
         for symbol in &occurrence.symbols {
-            // A rule names the same parameter of several actions: what is alike is said once.
+            // A rule over several actions names a parameter of each. Equal texts are shown once.
             let text = describe(analysis, symbol)?;
             if !texts.contains(&text) {
                 texts.push(text);
@@ -43,7 +43,7 @@ pub fn hover(analysis: &Analysis, byte: usize) -> Option<(Span, String)> {
     Some((span, format!("**{word}**\n\n{meaning}")))
 }
 
-/// The action or function that a parameter is of.
+/// The action or function that has the parameter.
 fn owner(symbol: &Symbol) -> Option<&str> {
     match symbol {
         Symbol::Argument(of, _) | Symbol::Parameter(of, _) => Some(of),
@@ -51,97 +51,81 @@ fn owner(symbol: &Symbol) -> Option<&str> {
     }
 }
 
-/// Markdown about a symbol; `None` where there is nothing to say.
+/// Markdown about a symbol; `None` if nothing is known of it.
 pub fn describe(analysis: &Analysis, symbol: &Symbol) -> Option<String> {
-    let declared = &analysis.names.declared;
-    let space = analysis.space();
+    let references = analysis.references();
     match symbol {
-        Symbol::File(path) => Some(format!("`{}`", path.display())),
-        Symbol::Enum(name) => {
-            let of = declared.enums.get(name)?;
-            let order = if of.of.ordered { "\n\nOrdered: `<` compares its variants." } else { "" };
-            Some(block(analysis, of.span, &of.docs) + order)
+        Symbol::File(path) => return Some(format!("`{}`", path.display())),
+        Symbol::Engine(word, meaning) => return Some(format!("**{word}**\n\n{meaning}")),
+        Symbol::Type(name) => {
+            let meaning = words::meaning(&words::types(), name)?;
+            return Some(format!("**{name}**\n\n{meaning}"));
         }
+        Symbol::Number(digits, unit) => return number(digits, unit.as_deref()?),
+        _ => {}
+    }
+    let declared = references.declaration(symbol)?;
+    let text = block(analysis, declared);
+    let ty = declared.type_name(references);
+    let typed = ty.as_ref().map(|ty| format!("\n\nType: `{ty}`")).unwrap_or_default();
+    let space = analysis.space();
+    Some(match symbol {
+        Symbol::Enum(name) => match references.enum_named(name).is_some_and(|of| of.ordered) {
+            true => format!("{text}\n\nOrdered: `<` compares its variants."),
+            false => text,
+        },
         Symbol::Variant(of, name) => {
-            let of_enum = declared.enums.get(of)?;
-            let place = of_enum.of.variants.iter().position(|variant| variant == name)?;
-            let count = of_enum.of.variants.len();
-            let text = block(analysis, of_enum.span, &of_enum.docs);
-            Some(format!("{text}\n\n`{name}`: variant {} of {count} of `{of}`", place + 1))
+            let variants = &references.enum_named(of)?.variants;
+            let place = variants.iter().position(|variant| variant == name)?;
+            format!("{text}\n\n`{name}`: variant {} of {} of `{of}`", place + 1, variants.len())
         }
         Symbol::State(name) => {
-            let of = declared.states.get(name)?;
-            let text = block(analysis, of.span, &of.docs);
             let world = match name.as_str() {
                 "time" | "sky" => "\n\nThe world reads it.",
                 _ => "",
             };
-            Some(format!("{text}\n\nType: `{}`{world}", of.of.as_ref()?.name()))
+            format!("{text}{typed}{world}")
         }
-        Symbol::Constant(name) => {
-            let of = declared.constants.get(name)?;
-            let ty = of.of.as_ref().map(|ty| format!("\n\nType: `{}`", ty.name())).unwrap_or_default();
-            Some(block(analysis, of.span, &of.docs) + &ty)
-        }
-        Symbol::Function(name) => declared.functions.get(name).map(|of| block(analysis, of.span, &of.docs)),
-        Symbol::Argument(of, name) => {
-            let function = declared.functions.get(of)?;
-            let (_, ty) = function.of.parameters.iter().find(|(known, _)| known == name)?;
-            let ty = ty.as_ref().map_or_else(|| "unknown".to_owned(), super::names::Ty::name);
-            Some(format!("```avastra\n{name}: {ty}\n```"))
+        Symbol::Constant(_) => format!("{text}{typed}"),
+        Symbol::Argument(_, name) => {
+            format!("```avastra\n{name}: {}\n```", ty.as_deref().unwrap_or("unknown"))
         }
         Symbol::Action(name) => {
-            let of = declared.actions.get(name)?;
-            let header = match of.of.last() {
-                Some(last) => format!("{})", analysis.slice(Span { end: last.span.end, ..of.span })),
+            let last = declared.parts.last().and_then(|last| references.declaration(last));
+            let header = match last {
+                Some(last) => format!("{})", analysis.slice(declared.span.to(last.span))),
                 None => format!("action {name}()"),
             };
             let rows = space.and_then(|space| rows_of(space, name, when(analysis))).unwrap_or_default();
-            Some(with_docs(&header, &of.docs) + &rows)
+            with_docs(&header, &declared.docs) + &rows
         }
-        Symbol::Parameter(action, name) => parameter(analysis, action, name),
+        Symbol::Parameter(action, name) => format!("{text}{typed}{}", ranges(analysis, action, name)),
         Symbol::Group(name) => {
-            let of = declared.groups.get(name)?;
-            let text = block(analysis, of.span, &of.docs);
-            let members = declared.targets(name);
+            let members = references.actions(name);
             let rows = space.map(|space| {
-                let is_member =
-                    |action: usize| members.iter().any(|name| *name == space.actions[action].name);
-                let count = space.rows.iter().filter(|row| is_member(row.action)).count();
+                let names = members.iter().filter_map(Symbol::word);
+                let actions: Vec<usize> =
+                    names.filter_map(|name| Some(find_action(space, name)?.0)).collect();
+                let count = space.rows.iter().filter(|row| actions.contains(&row.action)).count();
                 format!("\n\n{}", plural(count, "row"))
             });
-            Some(text + &rows.unwrap_or_default())
+            text + &rows.unwrap_or_default()
         }
-        Symbol::Rule(name) => {
-            let of = declared.rules.get(name)?;
-            let text = block(analysis, of.span, &of.docs);
-            Some(text + &space.and_then(|space| bound_by(space, name)).unwrap_or_default())
-        }
-        Symbol::Road(name) => {
-            let of = declared.roads.get(name)?;
-            let text = block(analysis, of.span, &of.docs);
-            Some(text + &space.and_then(|space| facts_of(space, name)).unwrap_or_default())
-        }
-        Symbol::Verdict(name) => declared.verdicts.get(name).map(|of| block(analysis, of.span, &of.docs)),
-        Symbol::Scenario(name) | Symbol::Policy(name) => {
-            let of = declared.others.get(name)?;
-            (!of.docs.is_empty()).then(|| of.docs.join("\n"))
-        }
-        Symbol::Engine(word, meaning) => Some(format!("**{word}**\n\n{meaning}")),
-        Symbol::Type(name) => {
-            words::meaning(&words::types(), name).map(|meaning| format!("**{name}**\n\n{meaning}"))
-        }
-        Symbol::Number(digits, unit) => number(digits, unit.as_deref()?),
-    }
+        Symbol::Rule(name) => text + &space.and_then(|space| bound_by(space, name)).unwrap_or_default(),
+        Symbol::Road(name) => text + &space.and_then(|space| facts_of(space, name)).unwrap_or_default(),
+        Symbol::Scenario(_) | Symbol::Policy(_) if declared.docs.is_empty() => return None,
+        Symbol::Scenario(_) | Symbol::Policy(_) => declared.docs.join("\n"),
+        _ => text,
+    })
 }
 
-fn block(analysis: &Analysis, span: Span, docs: &[String]) -> String {
-    let text = analysis.slice(span);
+fn block(analysis: &Analysis, declared: &Declaration) -> String {
+    let text = analysis.slice(declared.span);
     let mut lines: Vec<&str> = text.lines().take(LINES_MAX).collect();
     if text.lines().count() > LINES_MAX {
         lines.push("…");
     }
-    with_docs(&lines.join("\n"), docs)
+    with_docs(&lines.join("\n"), &declared.docs)
 }
 
 fn with_docs(code: &str, docs: &[String]) -> String {
@@ -149,20 +133,17 @@ fn with_docs(code: &str, docs: &[String]) -> String {
     format!("```avastra\n{code}\n```{docs}")
 }
 
-/// What was proved holds for the last sound state of the files, and should say so.
+/// A remark that a proof is about an earlier state of the files; empty while the space is sound.
 fn when(analysis: &Analysis) -> &'static str {
     if analysis.is_sound() { "" } else { " (when the file was last sound)" }
 }
 
-fn parameter(analysis: &Analysis, action: &str, name: &str) -> Option<String> {
-    let declared = analysis.names.declared.parameter(action, name)?;
-    let ty = declared.ty.as_ref().map(|ty| format!("\n\nType: `{}`", ty.name())).unwrap_or_default();
-    let code = analysis.slice(declared.span);
-    let mut text = format!("```avastra\n{code}\n```{ty}");
-    let Some(space) = analysis.space() else { return Some(text) };
-    let Some((index, of)) = find_action(space, action) else { return Some(text) };
+/// The values of a drawn parameter that the rules leave, road by road.
+fn ranges(analysis: &Analysis, action: &str, name: &str) -> String {
+    let Some(space) = analysis.space() else { return String::new() };
+    let Some((index, of)) = find_action(space, action) else { return String::new() };
     let Some(of) = of.parameters.iter().find(|parameter| *parameter.name == *name) else {
-        return Some(text);
+        return String::new();
     };
     let unit = unit(of.ty);
     let mut lines = String::new();
@@ -171,10 +152,10 @@ fn parameter(analysis: &Analysis, action: &str, name: &str) -> Option<String> {
             let _ = write!(lines, "\n- `{}`: {left} {unit}", known.name);
         }
     }
-    if !lines.is_empty() {
-        let _ = write!(text, "\n\nAfter the rules{}:\n{lines}", when(analysis));
+    match lines.is_empty() {
+        true => lines,
+        false => format!("\n\nAfter the rules{}:\n{lines}", when(analysis)),
     }
-    Some(text)
 }
 
 pub fn find_action<'a>(space: &'a Space, name: &str) -> Option<(usize, &'a ActionDef)> {
@@ -241,7 +222,7 @@ fn facts_of(space: &Space, name: &str) -> Option<String> {
     ))
 }
 
-/// A number with a unit in SI, exactly.
+/// A number with its unit, and its exact value in SI.
 fn number(digits: &str, word: &str) -> Option<String> {
     let unit = units::unit(word)?;
     let exact = Rational::from_decimal(digits)?.checked_mul(unit.factor())?;

@@ -19,7 +19,7 @@ const ENUM_MEMBER: u32 = 22;
 const EVENT: u32 = 24;
 const OPERATOR: u32 = 25;
 
-/// One symbol for each declaration that is more than a `language` or a `use`.
+/// One symbol for each declaration except `language`, `use` and `expect`.
 pub fn symbols(analysis: &Analysis) -> Vec<Value> {
     analysis.loaded.files[0].tree.items.iter().filter_map(|item| symbol(item, analysis)).collect()
 }

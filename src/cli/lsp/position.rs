@@ -31,8 +31,8 @@ impl Lines {
         (line, column)
     }
 
-    /// The byte at a line and UTF-16 column. What lies beyond the end of a line or of the text is
-    /// taken for that end; the second half of a character for the first.
+    /// The byte at a line and UTF-16 column. A column beyond the end of its line means that end, a line beyond
+    /// the text means the end of the text, and the second half of a character means its first.
     pub fn byte(&self, text: &str, line: usize, column: usize) -> usize {
         let Some(&start) = self.starts.get(line) else { return text.len() };
         let end = self.starts.get(line + 1).copied().unwrap_or(text.len());
@@ -68,7 +68,7 @@ mod tests {
     fn columns_count_utf16_units() {
         let text = "a\u{e4}\u{1f697}b\r\nc\rd";
         let lines = Lines::new(text);
-        // `ä` has two bytes and one unit, the car four bytes and two units.
+        // `ä` takes two bytes and one unit, the car takes four bytes and two units.
         assert_eq!(lines.position(text, 3), (0, 2));
         assert_eq!(lines.position(text, 7), (0, 4));
         assert_eq!(lines.byte(text, 0, 4), 7);
@@ -87,7 +87,7 @@ mod tests {
             let byte = text.floor_char_boundary(at.min(text.len()));
             let (line, column) = lines.position(&text, byte);
             let back = lines.byte(&text, line, column);
-            // Only within a line's end the two may differ.
+            // The two may differ only within the `\r\n` that ends a line.
             prop_assert!(back == byte || text[back..byte].chars().all(|c| c == '\r' || c == '\n'));
         }
     }

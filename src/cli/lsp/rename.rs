@@ -1,27 +1,27 @@
-//! Another name for what the author declared, wherever it stands.
+//! Rename: another name for something that the author declared, wherever the name stands.
 //!
-//! A rename is tried before it is offered: the files with the new name are checked. What would bring a
-//! mistake is refused with the compiler's own words, and so is what would give a name another meaning.
+//! A rename is tried first: the files are checked with the new name. It is refused if that brings a new
+//! mistake, with the compiler's message, or if a name would stand for something else.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-use serde_json::Value;
+use serde_json::{Value, json};
 
+use crate::check::Symbol;
 use crate::model::COUNTED;
 use crate::syntax::ast::Span;
 use crate::syntax::{Diagnostic, keyword};
 
-use super::names::Symbol;
 use super::workspace::{Analysis, Workspace};
 use super::{diagnostics, tokens};
 
-/// Where the name stands that would be renamed.
+/// The span of the name that a rename at this byte would change.
 ///
 /// # Errors
-/// If it is not the author's to rename, in a sentence for the author.
+/// Why the author cannot rename it, as a sentence for the author.
 pub fn prepare(analysis: &Analysis, byte: usize) -> Result<Span, String> {
-    let Some(occurrence) = analysis.names.at(Analysis::ROOT, byte) else {
+    let Some(occurrence) = analysis.references().at(Analysis::ROOT, byte) else {
         let word = tokens::word_at(analysis.text(Analysis::ROOT), byte).map(|(_, word)| word);
         return Err(match word {
             Some(word) if keyword::keywords().any(|(known, _)| *known == word) => {
@@ -54,10 +54,11 @@ fn fixed(symbol: &Symbol) -> Option<String> {
     }
 }
 
-/// The changes that give the name at a byte of a document another spelling.
+/// The edits that rename the name at a byte of a document, in open documents and in the other files of the
+/// editor's folders.
 ///
 /// # Errors
-/// If that cannot be, in a sentence for the author.
+/// Why the rename is not possible, as a sentence for the author.
 pub fn rename(workspace: &mut Workspace, path: &Path, byte: usize, name: &str) -> Result<Value, String> {
     let paths = workspace.paths();
     for path in &paths {
@@ -67,42 +68,23 @@ pub fn rename(workspace: &mut Workspace, path: &Path, byte: usize, name: &str) -
     let span = prepare(analysis, byte)?;
     let old = analysis.slice(span).to_owned();
     check_name(name)?;
-    let symbols = &analysis.names.at(Analysis::ROOT, byte).ok_or("there is no name here")?.symbols;
-    let symbols = analysis.names.tied(symbols);
+    let occurrence = analysis.references().at(Analysis::ROOT, byte).ok_or("there is no name here")?;
+    let mut symbols = analysis.references().tied(&occurrence.symbols.iter().cloned().collect());
     let home = home(analysis, &symbols);
-    let mut places: BTreeMap<PathBuf, BTreeSet<Span>> = BTreeMap::new();
-    let mut touched = Vec::new();
-    for path in &paths {
-        let Some(analysis) = workspace.known(path) else { continue };
-        // Another document may declare something else by that name.
-        let is_same = self::home(analysis, &symbols).iter().any(|file| home.contains(file));
-        if !is_same {
-            continue;
-        }
-        if let Some(broken) = analysis.loaded.diagnostics.iter().find(|found| is_syntax(found)) {
-            let file = broken.place().and_then(|place| analysis.path(place.file)).unwrap_or(path);
-            return Err(format!("repair the syntax of `{}` first: {}", file.display(), broken.message));
-        }
-        for occurrence in analysis.names.of(&symbols) {
-            let Some(file) = analysis.path(occurrence.span.file) else { continue };
-            places
-                .entry(file.to_owned())
-                .or_default()
-                .insert(Span { file: Analysis::ROOT, ..occurrence.span });
-        }
-        touched.push(path.clone());
+    let closed = workspace.closed_users(&home);
+    // Another document may declare a different thing by the same name.
+    let is_same = |known: &&Analysis| self::home(known, &symbols).iter().any(|file| home.contains(file));
+    let open = paths.iter().filter_map(|path| workspace.known(path));
+    let touched: Vec<&Analysis> = open.chain(&closed).filter(is_same).collect();
+    if let Some(reason) = touched.iter().find_map(|known| broken(known)) {
+        return Err(reason);
     }
-    let mut texts = BTreeMap::new();
-    for (file, spans) in &places {
-        let known = touched.iter().filter_map(|path| workspace.known(path));
-        let mut found = known.filter_map(|known| Some((known, diagnostics::file_of(known, file)?)));
-        let (known, id) = found.next().ok_or("a file has gone")?;
-        let mut text = known.text(id).to_owned();
-        for span in spans.iter().rev() {
-            text.replace_range(span.start..span.end, name);
-        }
-        texts.insert(file.clone(), text);
+    for known in &touched {
+        symbols = known.references().tied(&symbols);
     }
+    let (texts, changes) = renamed(workspace, &touched, &symbols, name);
+    let touched: Vec<PathBuf> =
+        touched.iter().filter_map(|known| known.path(Analysis::ROOT)).map(Path::to_owned).collect();
     for path in &touched {
         let trials = (workspace.trial(path, &BTreeMap::new()), workspace.trial(path, &texts));
         let (Some(before), Some(after)) = trials else { continue };
@@ -110,12 +92,49 @@ pub fn rename(workspace: &mut Workspace, path: &Path, byte: usize, name: &str) -
             let reason = after.errors.into_iter().next().map(|first| first.message).unwrap_or_default();
             return Err(format!("`{old}` cannot be called `{name}`: {reason}"));
         }
-        if after.names.pattern() != before.names.pattern() {
+        if after.references.pattern() != before.references.pattern() {
             let reason = "a name would stand for something else";
             return Err(format!("`{old}` cannot be called `{name}`: {reason}"));
         }
     }
-    edit(workspace, &touched, &places, name)
+    Ok(json!({ "changes": changes }))
+}
+
+/// Why nothing can be renamed in a document: the syntax of one of its files is broken.
+fn broken(known: &Analysis) -> Option<String> {
+    let broken = known.loaded.diagnostics.iter().find(|found| is_syntax(found))?;
+    let file = broken.place().map_or(Analysis::ROOT, |place| place.file);
+    let file = known.path(file).unwrap_or(Path::new(""));
+    Some(format!("repair the syntax of `{}` first: {}", file.display(), broken.message))
+}
+
+/// The files with the symbols under another name: their texts, and the changes for the editor.
+fn renamed(
+    workspace: &Workspace,
+    touched: &[&Analysis],
+    symbols: &BTreeSet<Symbol>,
+    name: &str,
+) -> (BTreeMap<PathBuf, String>, serde_json::Map<String, Value>) {
+    // A file that several documents use may have names that only one of them resolves.
+    let mut places: BTreeMap<PathBuf, BTreeSet<Span>> = BTreeMap::new();
+    for known in touched {
+        for occurrence in known.references().of(symbols) {
+            let Some(file) = known.path(occurrence.span.file) else { continue };
+            let span = Span { file: Analysis::ROOT, ..occurrence.span };
+            places.entry(file.to_owned()).or_default().insert(span);
+        }
+    }
+    let (mut texts, mut changes) = (BTreeMap::new(), serde_json::Map::new());
+    for (file, spans) in places {
+        let mut found = touched.iter().filter_map(|known| Some((known, diagnostics::file_of(known, &file)?)));
+        let Some((known, id)) = found.next() else { continue };
+        let mut text = known.text(id).to_owned();
+        spans.iter().rev().for_each(|span| text.replace_range(span.start..span.end, name));
+        let edit = |span: &Span| json!({ "range": known.range(Span { file: id, ..*span }), "newText": name });
+        changes.insert(workspace.uri(&file), spans.iter().map(edit).collect());
+        texts.insert(file, text);
+    }
+    (texts, changes)
 }
 
 fn is_syntax(found: &Diagnostic) -> bool {
@@ -124,11 +143,11 @@ fn is_syntax(found: &Diagnostic) -> bool {
 
 /// The files that declare the symbols.
 pub fn home(analysis: &Analysis, symbols: &BTreeSet<Symbol>) -> BTreeSet<PathBuf> {
-    let declaring = analysis.names.of(symbols).filter(|occurrence| occurrence.declares);
+    let declaring = analysis.references().of(symbols).filter(|occurrence| occurrence.declares);
     declaring.filter_map(|occurrence| analysis.path(occurrence.span.file)).map(Path::to_owned).collect()
 }
 
-/// A name is a word that is none of the language's.
+/// Refuses a text that does not have the form of a name.
 fn check_name(name: &str) -> Result<(), String> {
     let is_start = |first: char| first.is_ascii_alphabetic() || first == '_';
     let is_word = name.starts_with(is_start)
@@ -139,21 +158,4 @@ fn check_name(name: &str) -> Result<(), String> {
     } else {
         Err(format!("`{name}` is no name: names are ASCII letters, digits and `_`"))
     }
-}
-
-fn edit(
-    workspace: &Workspace,
-    touched: &[PathBuf],
-    places: &BTreeMap<PathBuf, BTreeSet<Span>>,
-    name: &str,
-) -> Result<Value, String> {
-    let mut changes = serde_json::Map::new();
-    for (file, spans) in places {
-        let known = touched.iter().filter_map(|path| workspace.known(path));
-        let mut found = known.filter_map(|known| Some((known, diagnostics::file_of(known, file)?)));
-        let (known, id) = found.next().ok_or("a file has gone")?;
-        let of = |span: &Span| serde_json::json!({ "range": known.range(Span { file: id, ..*span }), "newText": name });
-        changes.insert(workspace.uri(file), spans.iter().map(of).collect());
-    }
-    Ok(serde_json::json!({ "changes": changes }))
 }

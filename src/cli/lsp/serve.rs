@@ -1,4 +1,4 @@
-//! The process: reads, answers, and publishes what is wrong whenever nothing else waits.
+//! The process: it reads messages, answers requests, and publishes mistakes when no message waits.
 
 use std::collections::VecDeque;
 use std::io::BufReader;
@@ -13,19 +13,19 @@ use super::server::{Server, error_reply, parsed};
 use super::transport;
 use super::transport::TransportError;
 
-/// JSON-RPC and LSP: a request that the editor no longer wants.
+/// Error code of LSP for a request that the editor has cancelled.
 const REQUEST_CANCELLED: i64 = -32800;
 
 /// What the reading thread hands over.
 type Incoming = Result<Vec<u8>, TransportError>;
 
-/// Serves until the editor says `exit` or goes away.
+/// Serves until the editor sends `exit` or closes the input.
 ///
 /// # Errors
 /// If the input is not the protocol, or ends without `shutdown`.
 pub fn serve() -> Result<(), Failure> {
     let (sender, receiver) = mpsc::channel();
-    // It ends with the process: a read from stdin cannot be interrupted.
+    // The thread ends with the process, because a read from stdin cannot be interrupted.
     std::thread::spawn(move || {
         let mut input = BufReader::new(std::io::stdin());
         while let Some(message) = transport::read(&mut input).transpose() {
@@ -57,8 +57,8 @@ pub fn serve() -> Result<(), Failure> {
     }
 }
 
-/// Takes in all that has come; waits for something where there is nothing else to do. Whether the input
-/// has ended.
+/// Queues every message that has arrived, and waits for one if there is nothing else to do. Returns whether
+/// the input has ended.
 fn take(
     receiver: &Receiver<Incoming>,
     waiting: &mut VecDeque<Value>,
@@ -89,7 +89,7 @@ fn cancelled(message: &Value) -> Option<&Value> {
     (message["method"] == "$/cancelRequest").then(|| &message["params"]["id"])
 }
 
-/// Answers a waiting request without doing it; one that is done already has its answer.
+/// Answers a waiting request as cancelled. A request that is done has its answer already.
 fn cancel(id: &Value, waiting: &mut VecDeque<Value>) {
     let is_meant = |message: &Value| message["method"].is_string() && message.get("id") == Some(id);
     if let Some(place) = waiting.iter().position(is_meant) {
@@ -98,7 +98,7 @@ fn cancel(id: &Value, waiting: &mut VecDeque<Value>) {
     }
 }
 
-/// An editor that has gone away is noticed at the end of the input.
+/// Writes a message. A failure is ignored: the end of the input follows and ends the server.
 fn send(messages: Vec<Value>) {
     let mut output = std::io::stdout().lock();
     for message in messages {

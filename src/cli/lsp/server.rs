@@ -6,9 +6,9 @@ use std::path::PathBuf;
 
 use serde_json::{Value, json};
 
+use crate::check::Symbol;
 use crate::syntax;
 
-use super::names::Symbol;
 use super::workspace::{Analysis, Document, Workspace};
 use super::{complete, diagnostics, highlight, hints, hover, outline, rename, uri};
 
@@ -30,7 +30,7 @@ enum Refusal {
     Params(&'static str),
     #[error("no open document `{0}`")]
     NotOpen(String),
-    /// Asked rightly, and not possible: a sentence for the author.
+    /// The request is well formed but not possible. Holds a sentence for the author.
     #[error("{0}")]
     Impossible(String),
 }
@@ -58,10 +58,10 @@ enum Stage {
 #[derive(Debug, Default)]
 pub struct Server {
     stage: Stage,
-    /// Set by `exit`: whether it came in order.
+    /// Set by `exit`: whether `shutdown` came before it.
     exit: Option<bool>,
     workspace: Workspace,
-    /// Whether something has changed since mistakes were last published.
+    /// Whether a document or file has changed since mistakes were last published.
     news: bool,
     /// Documents whose text changed since then.
     touched: BTreeSet<PathBuf>,
@@ -96,7 +96,7 @@ impl Server {
                 self.notice(method, &message["params"]);
                 Vec::new()
             }
-            // An answer to a question that was never asked.
+            // A reply to a request that the server never sent.
             (Some(_), None) if message.get("result").or(message.get("error")).is_some() => Vec::new(),
             _ => {
                 let what =
@@ -110,6 +110,7 @@ impl Server {
         match (self.stage, method) {
             (Stage::Fresh, "initialize") => {
                 self.stage = Stage::Running;
+                self.workspace.folders = folders(params);
                 return reply(id, capabilities());
             }
             (Stage::Fresh, _) => return error_reply(id, NOT_INITIALIZED, "`initialize` comes first"),
@@ -121,7 +122,7 @@ impl Server {
             }
             (Stage::Running, _) => {}
         }
-        // A mistake of ours must not take the editor's other documents down with it.
+        // A panic of ours must not end the server, which serves all documents.
         let result = std::panic::catch_unwind(AssertUnwindSafe(|| self.result(method, params)));
         match result {
             Ok(Ok(result)) => reply(id, result),
@@ -187,14 +188,14 @@ impl Server {
         let (path, byte) = self.place(params)?;
         self.analysis(&path)?;
         let analysis = self.workspace.known(&path).ok_or(Refusal::Params("position"))?;
-        let Some(occurrence) = analysis.names.at(Analysis::ROOT, byte) else { return Ok(Value::Null) };
+        let Some(occurrence) = analysis.references().at(Analysis::ROOT, byte) else { return Ok(Value::Null) };
         if let [Symbol::File(file)] = occurrence.symbols.as_slice() {
             let start = json!({ "line": 0, "character": 0 });
             let range = json!({ "start": start, "end": start });
             return Ok(json!([{ "uri": self.workspace.uri(file), "range": range }]));
         }
-        let mut spans = analysis.names.declarations(&occurrence.symbols);
-        // From an `override` to what it replaces.
+        let mut spans = analysis.references().declarations_of(&occurrence.symbols);
+        // At an `override`, go to the declaration that it replaces.
         spans.retain(|span| !occurrence.declares || *span != occurrence.span);
         if spans.is_empty() && occurrence.declares {
             spans.push(occurrence.span);
@@ -210,11 +211,11 @@ impl Server {
             self.analysis(&path)?;
         }
         let analysis = self.workspace.known(&path).ok_or(Refusal::Params("position"))?;
-        let Some(occurrence) = analysis.names.at(Analysis::ROOT, byte) else { return Ok(json!([])) };
+        let Some(occurrence) = analysis.references().at(Analysis::ROOT, byte) else { return Ok(json!([])) };
         let symbols: BTreeSet<Symbol> = occurrence.symbols.iter().cloned().collect();
         let home = rename::home(analysis, &symbols);
         let mut found: Vec<Value> = Vec::new();
-        // The document itself first, then others that mean the same declaration.
+        // The document itself comes first, then others that use the same declaration.
         let others = self.workspace.paths().into_iter().filter(|other| *other != path);
         for other in std::iter::once(path.clone()).chain(others) {
             let Some(known) = self.workspace.known(&other) else { continue };
@@ -223,7 +224,7 @@ impl Server {
             if !is_same {
                 continue;
             }
-            for occurrence in known.names.of(&symbols).filter(|o| with_declarations || !o.declares) {
+            for occurrence in known.references().of(&symbols).filter(|o| with_declarations || !o.declares) {
                 let place = diagnostics::location(occurrence.span, known, &self.workspace);
                 found.extend(place.filter(|place| !found.contains(place)));
             }
@@ -234,13 +235,13 @@ impl Server {
     fn highlights(&mut self, params: &Value) -> Result<Value, Refusal> {
         let (path, byte) = self.place(params)?;
         let analysis = self.analysis(&path)?;
-        let Some(occurrence) = analysis.names.at(Analysis::ROOT, byte) else { return Ok(json!([])) };
+        let Some(occurrence) = analysis.references().at(Analysis::ROOT, byte) else { return Ok(json!([])) };
         let symbols: BTreeSet<Symbol> = occurrence.symbols.iter().cloned().collect();
-        let here = analysis.names.of(&symbols).filter(|o| o.span.file == Analysis::ROOT);
+        let here = analysis.references().of(&symbols).filter(|o| o.span.file == Analysis::ROOT);
         Ok(here.map(|o| json!({ "range": analysis.range(o.span) })).collect())
     }
 
-    /// One change, from the first character that differs to the last; none of a broken file, which stays as it is.
+    /// One edit, from the first character that differs to the last. A broken file is not formatted.
     fn formatting(&mut self, params: &Value) -> Result<Value, Refusal> {
         let path = self.document(params)?;
         let analysis = self.analysis(&path)?;
@@ -259,7 +260,7 @@ impl Server {
         let rest = (&text[before..], &formatted[before..]);
         let mut after: usize =
             rest.0.chars().rev().zip(rest.1.chars().rev()).take_while(same).map(|(a, _)| a.len_utf8()).sum();
-        // No place in an editor lies between the two characters of a line's end.
+        // An editor has no position between the `\r` and the `\n` that end a line.
         let splits = |at: usize| text[..at].ends_with('\r') && text[at..].starts_with('\n');
         before -= usize::from(splits(before));
         after -= usize::from(splits(text.len() - after));
@@ -268,7 +269,7 @@ impl Server {
         Ok(json!([{ "range": analysis.range(span), "newText": text }]))
     }
 
-    /// Acts on a notification; one that is not known is let be, as the protocol wants it.
+    /// Acts on a notification. An unknown one is ignored, as the protocol wants it.
     fn notice(&mut self, method: &str, params: &Value) {
         if method == "exit" {
             self.exit = Some(self.stage == Stage::ShutDown);
@@ -289,7 +290,7 @@ impl Server {
             "textDocument/didOpen" | "textDocument/didChange" => {
                 let text = match method {
                     "textDocument/didOpen" => document["text"].as_str(),
-                    // The whole text each time, and the last one counts.
+                    // Each change holds the whole text, so the last one counts.
                     _ => params["contentChanges"].as_array().and_then(|all| all.last()?["text"].as_str()),
                 };
                 let Some(text) = text else { return };
@@ -313,7 +314,7 @@ impl Server {
         self.news = true;
     }
 
-    /// The mistakes of all files where they are not what the editor shows.
+    /// Messages with the mistakes of every file for which the editor shows other ones.
     pub fn publish(&mut self) -> Vec<Value> {
         self.news = false;
         let touched = std::mem::take(&mut self.touched);
@@ -383,10 +384,18 @@ fn byte(analysis: &Analysis, position: &Value, name: &'static str) -> Result<usi
     Ok(analysis.byte(line, column))
 }
 
-/// A message, or the answer to what is none.
+/// The message in a body, or the error reply to a body that is not JSON.
 pub fn parsed(body: &[u8]) -> Result<Value, Value> {
     serde_json::from_slice(body)
         .map_err(|error| error_reply(&Value::Null, PARSE_ERROR, &format!("the message is not JSON: {error}")))
+}
+
+/// The folders that the editor has open, as `initialize` names them.
+fn folders(params: &Value) -> Vec<PathBuf> {
+    let named = params["workspaceFolders"].as_array().into_iter().flatten();
+    let named: Vec<&str> = named.filter_map(|folder| folder["uri"].as_str()).collect();
+    let root = params["rootUri"].as_str().filter(|_| named.is_empty());
+    named.into_iter().chain(root).map(uri::to_path).collect()
 }
 
 fn reply(id: &Value, result: Value) -> Value {
@@ -402,7 +411,7 @@ fn capabilities() -> Value {
     json!({
         "capabilities": {
             "positionEncoding": "utf-16",
-            // 1: the whole text each time.
+            // 1: every change holds the whole text.
             "textDocumentSync": { "openClose": true, "change": 1, "save": {} },
             "hoverProvider": true,
             "completionProvider": { "triggerCharacters": [".", ":", "\"", "[", "("] },

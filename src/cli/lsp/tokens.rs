@@ -1,7 +1,6 @@
-//! A text cut into words and marks, for what must be told from unfinished text, where no tree is.
+//! A text cut into words and marks. Completion needs it: unfinished text has no tree.
 //!
-//! Texts and comments are skipped by the rules of the grammar. Units are not put together: `m/s` is
-//! three tokens.
+//! Text literals and comments end as the grammar says. A unit is not put together: `m/s` is three tokens.
 
 /// A word, a number, a text or a mark.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -24,7 +23,7 @@ impl Token<'_> {
     }
 }
 
-/// The tokens of a text, and what it ends in.
+/// The tokens of a text, and whether it ends in code, a comment or a text literal.
 pub fn tokens(text: &str) -> (Vec<Token<'_>>, Ending) {
     let mut found = Vec::new();
     let mut at = 0;
@@ -64,7 +63,7 @@ pub enum Ending {
     Text(usize),
 }
 
-/// The word around a byte, or before it, and where it begins; none in a comment.
+/// The word at a byte, or that ends there, and its start; `None` in a comment.
 pub fn word_at(text: &str, byte: usize) -> Option<(usize, &str)> {
     let line_start = text[..byte.min(text.len())].rfind('\n').map_or(0, |newline| newline + 1);
     let line_end = text[line_start..].find('\n').map_or(text.len(), |newline| line_start + newline);
@@ -78,8 +77,7 @@ fn is_word(character: char) -> bool {
     character.is_ascii_alphanumeric() || character == '_'
 }
 
-/// Length of the literal at the beginning of a text, quotes included; `None` if it does not end on its
-/// line.
+/// Length of the literal at the start of a text, quotes included; `None` if it does not end on its line.
 fn end_of_text(text: &str) -> Option<usize> {
     let mut escaped = false;
     for (at, character) in text.char_indices().skip(1) {

@@ -1,17 +1,17 @@
 //! Messages between an editor and the server: JSON-RPC 2.0 behind `Content-Length` headers, as the
 //! Language Server Protocol 3.17 has it.
 //!
-//! A body that is no JSON can be answered, because its length is known. A header that cannot be read
-//! cannot: where the next message begins is lost.
+//! A body that is not JSON gets an error as its answer, because its length is known. After a broken header
+//! the server ends: it cannot know where the next message begins.
 
 use std::io::{BufRead, Read, Write};
 
 use serde_json::Value;
 
-/// Longer messages are refused: the largest file that avastra reads, in JSON.
+/// Longer messages are refused. The largest file that avastra reads fits into one, in JSON.
 const MESSAGE_BYTES_MAX: u64 = 128 << 20;
 
-/// Longer header lines are none.
+/// A longer header line is rejected as not LSP.
 const HEADER_BYTES_MAX: u64 = 1024;
 
 /// Why no more messages can be read.
@@ -30,7 +30,7 @@ pub enum TransportError {
 /// The body of the next message; `None` at the end of the input.
 ///
 /// # Errors
-/// If what comes is no message.
+/// If the input is not a message.
 pub fn read(input: &mut impl BufRead) -> Result<Option<Vec<u8>>, TransportError> {
     let mut length: Option<u64> = None;
     let mut first = true;

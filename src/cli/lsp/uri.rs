@@ -1,14 +1,14 @@
 //! Names of files: `file://` URIs in an editor, paths here.
 //!
 //! A document that is no file (`untitled:…`) keeps its URI for a path: it can be read from the editor
-//! alone, and what it uses is looked for beside nothing.
+//! alone, and the paths that it uses are relative to no folder.
 
 use std::path::{Component, Path, PathBuf};
 
 /// The path that a URI names.
 pub fn to_path(uri: &str) -> PathBuf {
     let Some(rest) = uri.strip_prefix("file://") else { return PathBuf::from(uri) };
-    // `file://host/path`: the host is not ours to reach, and an editor sends none.
+    // `file://host/path`: the host is ignored. Editors send none.
     let path = rest.find('/').map_or(rest, |slash| &rest[slash..]);
     let text = decoded(path);
     // `file:///c:/space.ava` on Windows.
@@ -28,7 +28,7 @@ pub fn from_path(path: &Path) -> String {
     format!("file://{}{encoded}", if encoded.starts_with('/') { "" } else { "/" })
 }
 
-/// `%20` and the like as the bytes that they mean; what is no such thing stays as it is.
+/// Replaces escapes like `%20` by the bytes that they mean. A broken escape stays as it is.
 fn decoded(text: &str) -> String {
     let bytes = text.as_bytes();
     let mut found = Vec::with_capacity(bytes.len());
@@ -49,7 +49,7 @@ fn decoded(text: &str) -> String {
     String::from_utf8_lossy(&found).into_owned()
 }
 
-/// Without `.` and `..`, so that two spellings of a file are one.
+/// Removes `.` and `..`, so that two spellings of a file give one path.
 pub fn normal(path: &Path) -> PathBuf {
     let mut parts: Vec<Component<'_>> = Vec::new();
     for part in path.components() {

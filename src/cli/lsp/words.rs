@@ -1,4 +1,4 @@
-//! The words that nobody declares, as lists for the editor. The keywords stand in `syntax::keyword`, the
+//! The words that no file declares, as lists for the editor. The keywords stand in `syntax::keyword`, the
 //! engine's words in `model::vocabulary`.
 
 use crate::model::vocabulary::{Body, Colour, LaneChoice, Side, Site, SpawnField, TYPES, Then, Verb, Word};
@@ -12,12 +12,12 @@ pub fn of<W: Word>() -> Vec<Entry> {
     W::ALL.iter().map(|word| (word.name(), word.meaning())).collect()
 }
 
-/// Types that nobody declares.
+/// The types of the language.
 pub fn types() -> Vec<Entry> {
     TYPES.iter().map(|(word, _, meaning)| (*word, *meaning)).collect()
 }
 
-/// The facts that are known at a site and are one word, without a `.`.
+/// The facts that are known at a site, without those that have a `.`.
 pub fn facts(site: Site) -> Vec<Entry> {
     let plain = site.facts().filter(|fact| fact.thing().is_none());
     plain.map(|fact| (fact.name(), fact.meaning())).collect()

@@ -1,8 +1,8 @@
-//! What the editor has open, and what is known of it.
+//! The documents that the editor has open, and what the checker knows of each.
 //!
-//! Every open document is the root of a load, with all that it uses: as `avastra check` would read it,
-//! but what is open is read from the editor. A load is done again only when one of the files that it
-//! read has changed; maps are understood once for each content.
+//! Every open document is loaded with all that it uses, as `avastra check` would load it, except that open
+//! files are read from the editor. A document is loaded again only when a file that it read has changed. Maps
+//! are kept by content.
 
 use std::cell::RefCell;
 use std::collections::{BTreeMap, BTreeSet};
@@ -10,14 +10,13 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use crate::check;
-use crate::check::{Loaded, MapCache, ReadError};
+use crate::check::{Loaded, MapCache, ReadError, References};
 use crate::cli::load;
 use crate::model;
 use crate::model::Space;
 use crate::syntax::Diagnostic;
 use crate::syntax::ast::{FileId, Span};
 
-use super::names::Names;
 use super::position::Lines;
 use super::uri;
 
@@ -34,26 +33,27 @@ pub struct Document {
 #[derive(Debug)]
 pub struct Analysis {
     pub loaded: Loaded,
-    pub names: Names,
-    /// By [`FileId`].
+    /// The lines of each file, by [`FileId`].
     lines: Vec<Lines>,
-    /// Every file that was asked for, maps and absent ones included.
+    /// Every file that the load tried to read, maps and missing files included.
     inputs: BTreeSet<PathBuf>,
-    /// The space as it was when it was last sound.
+    /// The last sound space of the document.
     sound: Option<Arc<Space>>,
     /// Whether an input has changed since.
     stale: bool,
 }
 
-/// What a document would be with other texts.
+/// The result of checking a document with other texts.
 #[derive(Debug)]
 pub struct Trial {
     pub errors: Vec<Diagnostic>,
-    pub names: Names,
+    pub references: References,
 }
 
 #[derive(Debug, Default)]
 pub struct Workspace {
+    /// The folders that the editor has open.
+    pub folders: Vec<PathBuf>,
     documents: BTreeMap<PathBuf, Document>,
     analyses: BTreeMap<PathBuf, Analysis>,
     maps: MapCache,
@@ -71,7 +71,7 @@ impl Workspace {
         self.changed(path);
     }
 
-    /// Notes that a file is not what it was.
+    /// Notes that a file has changed: every analysis that read it is stale.
     pub fn changed(&mut self, path: &Path) {
         for analysis in self.analyses.values_mut().filter(|analysis| analysis.inputs.contains(path)) {
             analysis.stale = true;
@@ -87,13 +87,14 @@ impl Workspace {
         self.documents.keys().cloned().collect()
     }
 
-    /// The name by which the editor knows a file.
+    /// The URI by which the editor knows a file.
     pub fn uri(&self, path: &Path) -> String {
         self.documents.get(path).map_or_else(|| uri::from_path(path), |document| document.uri.clone())
     }
 
-    /// What is known of an open document, up to date.
+    /// The analysis of an open document, brought up to date.
     pub fn analysis(&mut self, path: &Path) -> Option<&Analysis> {
+        self.documents.get(path)?;
         if self.analyses.get(path).is_none_or(|known| known.stale) {
             let before = self.analyses.remove(path).and_then(|known| known.sound);
             let mut analysis = self.analyse(path)?;
@@ -103,14 +104,13 @@ impl Workspace {
         self.analyses.get(path)
     }
 
-    /// The same, of a document whose analysis is known to be up to date.
+    /// The last analysis of a document, up to date or not.
     pub fn known(&self, path: &Path) -> Option<&Analysis> {
         self.analyses.get(path)
     }
 
     fn analyse(&mut self, path: &Path) -> Option<Analysis> {
         let documents = &self.documents;
-        documents.get(path)?;
         let inputs = RefCell::new(BTreeSet::new());
         let read = |path: &Path| {
             inputs.borrow_mut().insert(path.to_owned());
@@ -121,14 +121,25 @@ impl Workspace {
         if loaded.diagnostics.iter().any(is_unknown) {
             check::suggest_uses(&mut loaded, &load::nearby(path));
         }
-        let names = Names::new(&loaded.files, &loaded.sources);
         let ids = 0..u32::try_from(loaded.files.len()).expect("a file's id is its position");
         let lines = ids.map(|id| Lines::new(loaded.sources.text(FileId(id)))).collect();
         let inputs = inputs.into_inner();
-        Some(Analysis { loaded, names, lines, inputs, sound: None, stale: false })
+        Some(Analysis { loaded, lines, inputs, sound: None, stale: false })
     }
 
-    /// A document with other texts in place of some, and nothing kept.
+    /// The files of the open folders that are not open themselves and use one of these files.
+    pub fn closed_users(&mut self, used: &BTreeSet<PathBuf>) -> Vec<Analysis> {
+        let files: BTreeSet<PathBuf> = self.folders.iter().flat_map(|folder| load::below(folder)).collect();
+        let uses = |workspace: &Workspace, file: &Path| {
+            let read = |path: &Path| read(&workspace.documents, path);
+            check::files_used(file, &read).iter().any(|file| used.contains(file))
+        };
+        let closed: Vec<PathBuf> =
+            files.into_iter().filter(|file| !self.documents.contains_key(file) && uses(self, file)).collect();
+        closed.iter().filter_map(|file| self.analyse(file)).collect()
+    }
+
+    /// Checks a document with other texts for some files, and keeps nothing of it.
     pub fn trial(&mut self, path: &Path, texts: &BTreeMap<PathBuf, String>) -> Option<Trial> {
         let documents = &self.documents;
         let read = |path: &Path| match texts.get(path) {
@@ -136,13 +147,12 @@ impl Workspace {
             None => read(documents, path),
         };
         let loaded = check::load_with(path, &read, &mut self.maps).ok()?;
-        let names = Names::new(&loaded.files, &loaded.sources);
         let errors = loaded.diagnostics.into_iter().filter(Diagnostic::is_error).collect();
-        Some(Trial { errors, names })
+        Some(Trial { errors, references: loaded.references })
     }
 }
 
-/// A text from the editor, else from the disk.
+/// The text of a file: from the editor if it is open there, else from the disk.
 fn read(documents: &BTreeMap<PathBuf, Document>, path: &Path) -> Result<String, ReadError> {
     match documents.get(path) {
         Some(document) => Ok(document.text.clone()),
@@ -154,11 +164,16 @@ impl Analysis {
     /// The document itself.
     pub const ROOT: FileId = FileId(0);
 
+    /// What each name stands for.
+    pub fn references(&self) -> &References {
+        &self.loaded.references
+    }
+
     pub fn text(&self, file: FileId) -> &str {
         self.loaded.sources.text(file)
     }
 
-    /// The text of a span; empty if it lies nowhere.
+    /// The text of a span; empty if the span is in no file.
     pub fn slice(&self, span: Span) -> &str {
         self.text(span.file).get(span.start..span.end).unwrap_or_default()
     }
@@ -184,7 +199,7 @@ impl Analysis {
         self.lines[0].byte(self.text(Analysis::ROOT), line, column)
     }
 
-    /// The space; while the files are broken, as it was when it was last sound.
+    /// The space, or the last sound space while the files are broken.
     pub fn space(&self) -> Option<&Space> {
         self.sound.as_deref()
     }
