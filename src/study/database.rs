@@ -8,8 +8,8 @@ use rusqlite::{Connection, Row, params};
 use crate::run::DatabaseError;
 
 use crate::study::job::Job;
+use crate::study::ready::Study;
 use crate::study::record::{CellRecord, CollisionRecord, EpisodeRecord, FailureClass, Spent, TrainedRecord};
-use crate::study::study::Study;
 
 /// Layout of the tables; raised whenever a column changes. Begins at 1001, so that a `run.db` is never taken for a
 /// `study.db`.

@@ -4,8 +4,8 @@ use std::sync::atomic::AtomicBool;
 
 use crate::run::on_threads;
 
+use crate::study::ready::Study;
 use crate::study::record::{CellRecord, EpisodeRecord, Spent, TrainedRecord};
-use crate::study::study::Study;
 
 /// One training, or one repetition of an agent that has nothing to learn, with its evaluation.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -10,16 +10,16 @@ mod database;
 mod file;
 mod job;
 mod measures;
+mod ready;
 mod record;
 mod results;
 mod settings;
 pub mod statistics;
-mod study;
 
 pub use database::StudyDatabase;
 pub use file::StudyFile;
 pub use job::{Event, play_jobs};
+pub use ready::Study;
 pub use record::{CellRecord, Spent};
 pub use results::{AgentResults, BaselineComparison, Rate, RoadResults, StudyResults};
 pub use settings::StudySettings;
-pub use study::Study;
