@@ -1,20 +1,20 @@
-//! How close somebody came to the ego vehicle, as AV-Fuzzer measures it (Li et al., ISSRE 2020).
+//! How close an obstacle came to the ego vehicle, as AV-Fuzzer measures it (Li et al., ISSRE 2020).
 //!
-//! Constants after its published code: D is the distance of centres, ΔD what of it would be left after
-//! braking, both at most 130 m; they are looked at four times a second there, at every tick here.
+//! The constants are those of its published code. D is the distance between centres, ΔD what would be left
+//! of it after braking, both at most 130 m. AV-Fuzzer looks four times a second; this file looks every tick.
 
 use crate::geometry::wrap_angle;
 use crate::sim::World;
 
-/// Nobody is farther away than this, m.
+/// An obstacle that is farther away counts as this far away, m.
 const FAR_M: f64 = 130.0;
-/// Length of a car: who is nearer than this is beside the ego vehicle, m.
+/// Length of a car, m: an obstacle less than this ahead counts as beside the ego vehicle.
 const CAR_M: f64 = 4.6;
-/// Farther ahead than this nobody has to be braked for, m.
+/// An obstacle farther ahead than this needs no braking, m.
 const AHEAD_M_MAX: f64 = 20.0;
-/// Nor farther aside, m.
+/// An obstacle farther to the side than this needs no braking, m.
 const ASIDE_M_MAX: f64 = 2.0;
-/// An ego vehicle that is turned by more than this against who is behind it cuts in, rad.
+/// The ego vehicle cuts in on a vehicle behind it if their headings differ by more than this, rad.
 const CUT_IN_RAD: f64 = core::f64::consts::PI / 180.0;
 
 /// The closest values over some time.
@@ -22,7 +22,7 @@ const CUT_IN_RAD: f64 = core::f64::consts::PI / 180.0;
 pub struct Closeness {
     /// Least distance between the centres of the ego vehicle and an obstacle, m.
     pub distance_m: f64,
-    /// Least of what such a distance leaves after braking, m; negative if it is too short.
+    /// Least distance that is left after braking, m; negative if the way to brake is too short.
     pub margin_m: f64,
 }
 
@@ -33,7 +33,7 @@ impl Default for Closeness {
 }
 
 impl Closeness {
-    /// Takes in the world as it is.
+    /// Updates the values from the world of this moment.
     pub fn note(&mut self, world: &World) {
         let ego = world.ego_outline().pose;
         for obstacle in world.obstacles() {
@@ -57,14 +57,14 @@ impl Closeness {
         }
     }
 
-    /// AV-Fuzzer's fitness: higher is closer, at least 0. It divides by the number of other vehicles,
-    /// which is the same in all its scenarios.
+    /// AV-Fuzzer's fitness: higher is closer, at least 0. AV-Fuzzer also divides by the number of other
+    /// vehicles, which is constant over its scenarios.
     pub fn fitness(&self) -> f64 {
         (FAR_M - 0.5 * (self.distance_m + self.margin_m)).max(0.0)
     }
 }
 
-/// Way to a standstill (m) at a speed, as AV-Fuzzer has fitted it to its vehicle.
+/// Braking distance (m) at a speed, as AV-Fuzzer has fitted it to its vehicle.
 fn braking_m(speed_mps: f64) -> f64 {
     (0.0467 * speed_mps * speed_mps + 0.4116 * speed_mps - 1.9913 + 0.5).max(0.0)
 }

@@ -1,6 +1,6 @@
 //! Collision probability (ProC): how near the ego vehicle is to a crash, in `[0, 1]`.
 //!
-//! Paper, "Collision Probability Measurement", Eqs. 9–16, with the repairs that make them hold:
+//! Paper, "Collision Probability Measurement", Eqs. 9–16, with these repairs:
 //! distances are between outlines, so that ProC reaches 1 at contact; decelerations are magnitudes;
 //! a safety distance is never below the least gap; oncoming traffic adds its own braking distance.
 //! ProC is a ratio of distances, not the probability of anything; the name is the paper's.
@@ -11,14 +11,14 @@ use crate::sim::{Obstacle, World};
 
 use super::released_probability::released_probability;
 
-/// Which reading of ProC.
+/// The ways to compute ProC.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ProcKind {
     /// Ours: the paper's equations, repaired, with a lateral margin.
     #[default]
     Avastra,
-    /// The paper's equations, repaired where they cannot run: [`ProcSettings::paper`].
+    /// The paper's equations, repaired only where they cannot be computed: [`ProcSettings::paper`].
     Paper,
     /// What the published package computes: [`super::released_probability`].
     Released,
@@ -35,7 +35,7 @@ impl ProcKind {
     }
 }
 
-/// Constants of ProC. `default()` is avastra's own reading.
+/// Constants of ProC. `default()` is that of [`ProcKind::Avastra`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ProcSettings {
     /// Braking of every vehicle, magnitude, m/s². Paper: 6 (Berkeley algorithm).
@@ -61,7 +61,7 @@ impl Default for ProcSettings {
 }
 
 impl ProcSettings {
-    /// As printed: no lateral margin, so that parallel traffic beside the ego vehicle is no danger.
+    /// As the paper prints it: no lateral margin, so that parallel traffic beside the ego vehicle is no danger.
     pub fn paper() -> ProcSettings {
         ProcSettings { lateral_margin_m: 0.0, ..ProcSettings::default() }
     }
@@ -84,8 +84,8 @@ pub fn longitudinal_safety_distance_m(
     (follower_m - leader_m).max(0.0) + gap_m_min
 }
 
-/// Safety distance (m) of two that drive towards each other: both must stop. Ours, after RSS; the
-/// paper has no such case and would subtract the oncoming speed.
+/// Safety distance (m) of two vehicles that drive towards each other: both must stop. Ours, after RSS;
+/// the paper has no such case and would subtract the oncoming speed.
 pub fn opposing_safety_distance_m(
     ego_mps: f64,
     ego_decel_mps2: f64,
@@ -115,20 +115,20 @@ pub fn probability(safety_distance_m: f64, current_distance_m: f64) -> f64 {
     ((safety_distance_m - current_distance_m) / safety_distance_m).clamp(0.0, 1.0)
 }
 
-/// Both dimensions together, Eq. 16.
+/// The probabilities of both dimensions as one, Eq. 16.
 pub fn combined(longitudinal: f64, lateral: f64) -> f64 {
     let (most, least) = (longitudinal.max(lateral), longitudinal.min(lateral));
     most + (1.0 - most) * least
 }
 
-/// ProC of the ego vehicle against everybody around it, at this moment.
+/// ProC of the ego vehicle with regard to all obstacles, at this moment.
 ///
-/// An obstacle is in the same lane if its centre lies within half the width that the route's lane has
-/// there. Then Eq. 9 applies, with who is behind as the follower, or the safety distance of two who
-/// drive towards each other. Otherwise Eq. 10 applies, with the angle β from the ego's heading to that
-/// of the lane in which the obstacle drives, or to where somebody on foot is turned. Of all obstacles
-/// the greatest probability of each dimension counts; Eq. 16 joins the two. Those of whom `is_hit` says
-/// that the ego vehicle has hit them already are left out.
+/// An obstacle is in the ego vehicle's lane if its centre lies within half the width of the route's lane.
+/// Then Eq. 9 applies, with the vehicle behind as the follower, or the opposing safety distance if the two
+/// drive towards each other. Otherwise Eq. 10 applies; its angle β is between the headings of the ego
+/// vehicle and of the obstacle's lane, or of the pedestrian. The greatest probability of each
+/// dimension counts, and Eq. 16 joins the two. Obstacles that the ego vehicle has hit already (`is_hit`)
+/// are left out.
 pub fn collision_probability(world: &World, settings: &ProcSettings, is_hit: &dyn Fn(u32) -> bool) -> f64 {
     let (mut longitudinal, mut lateral) = (0.0_f64, 0.0_f64);
     for obstacle in world.obstacles() {
@@ -137,7 +137,7 @@ pub fn collision_probability(world: &World, settings: &ProcSettings, is_hit: &dy
         }
         let current_m = obstacle.distance_m;
         let position = obstacle.outline.pose.position;
-        // No place of the route that is farther along it than this could be the nearest.
+        // Places of the route that are farther along it than this cannot be the nearest.
         let reach_m = 2.0 * (position - world.ego().rear_axle.position).norm() + world.ego_offset_m().abs();
         let beside = world.scene().route.path.project_near(position, world.ego_station_m(), reach_m);
         if beside.offset_m.abs() <= route_half_width_m(world, beside.station_m) {

@@ -1,8 +1,8 @@
 //! Measures of danger beside ProC: TTC, THW, DRAC, required deceleration, RSS, PET.
 //!
 //! Definitions after Westhofen et al., "Criticality Metrics for Automated Driving" (2022), and for RSS
-//! Shalev-Shwartz, Shammah and Shashua (2017). Here they are of the true world, not of what a driving
-//! system believes, and take road users to keep velocity and heading. Looked at ten times a second.
+//! Shalev-Shwartz, Shammah and Shashua (2017). They are computed ten times a second, from the true world
+//! and not from what a driving system believes, as if road users kept velocity and heading.
 
 use crate::ads::Rss;
 use crate::geometry::{OrientedBox, Pose, Sweep, Vec2, distance_m, first_contact, wrap_angle};
@@ -14,7 +14,7 @@ const HORIZON_S: f64 = 8.0;
 const PET_S_MAX: f64 = 5.0;
 /// Ways that differ less in heading than this do not cross, rad: 30°.
 const CROSSING_RAD: f64 = core::f64::consts::PI / 6.0;
-/// Slower than this nobody follows or needs to brake, m/s.
+/// A slower ego vehicle has no time headway, m/s.
 const STANDING_MPS: f64 = 0.1;
 
 /// The most critical values over some time, of all road users around the ego vehicle.
@@ -23,19 +23,19 @@ pub struct Criticality {
     /// Least time to collision, s: until the outlines would touch. `None` if they never would within
     /// 8 s.
     pub ttc_s: Option<f64>,
-    /// Least time headway, s: gap to whoever drives ahead in the ego vehicle's way, over its speed.
+    /// Least time headway, s: the gap to a vehicle ahead in the ego vehicle's way, over the ego vehicle's speed.
     pub thw_s: Option<f64>,
-    /// Greatest deceleration rate to avoid a crash, m/s²: `(v1 - v2)² / 2d` towards a slower one ahead.
+    /// Greatest deceleration rate to avoid a crash, m/s²: `(v1 - v2)² / 2d` towards a slower vehicle ahead.
     pub drac_mps2: f64,
-    /// Greatest deceleration that would stop the ego vehicle short of a place where it would touch
-    /// somebody, m/s²: `v / 2 TTC`. In contrast to DRAC it sees those who cross or come towards.
+    /// Greatest deceleration that would stop the ego vehicle before an expected contact, m/s²:
+    /// `v / 2 TTC`. Unlike DRAC it includes crossing and oncoming road users.
     pub required_mps2: f64,
-    /// Time in which both distances to somebody were unsafe by RSS, s.
+    /// Time in which both distances to a road user were unsafe by RSS, s.
     pub rss_unsafe_s: f64,
 }
 
 impl Criticality {
-    /// The most critical values of two times together.
+    /// The most critical values of two periods.
     pub fn and(&self, other: &Criticality) -> Criticality {
         let least = |a: Option<f64>, b: Option<f64>| match (a, b) {
             (Some(a), Some(b)) => Some(a.min(b)),
@@ -50,8 +50,8 @@ impl Criticality {
         }
     }
 
-    /// Takes in the world of this moment; looks at one tick of five. `is_hit` says who has been hit
-    /// already and is left out.
+    /// Updates the values from the world of this moment, at one tick of five. Obstacles that have been hit
+    /// already (`is_hit`) are left out.
     pub fn note(&mut self, world: &World, is_hit: &dyn Fn(u32) -> bool) {
         if !world.ticks().is_multiple_of(FRAME_TICKS) {
             return;
@@ -82,14 +82,14 @@ impl Criticality {
     }
 }
 
-/// Deceleration (m/s²) by which a follower comes to a leader's speed just before it reaches it; 0 if it
-/// is no faster.
+/// Deceleration (m/s²) with which a follower comes down to the leader's speed just before the two touch;
+/// 0 if the follower is not faster.
 pub fn deceleration_to_avoid_mps2(follower_mps: f64, leader_mps: f64, gap_m: f64) -> f64 {
     let closing_mps = (follower_mps - leader_mps).max(0.0);
     if closing_mps == 0.0 {
         return 0.0;
     }
-    // A gap of nothing would ask for infinitely much: a millimetre is none.
+    // A gap of 0 would ask for an infinite deceleration, so a gap is at least a millimetre.
     closing_mps * closing_mps / (2.0 * gap_m.max(1e-3))
 }
 
@@ -112,13 +112,13 @@ pub fn time_to_collision_s(world: &World, obstacle: &Obstacle) -> Option<f64> {
 
 /// An obstacle in the frame of the ego vehicle.
 struct Seen {
-    /// Between the outlines along the ego vehicle's heading, m; negative beside each other.
+    /// Gap between the outlines along the ego vehicle's heading, m; negative if they are beside each other.
     gap_m: f64,
-    /// The same across it.
+    /// Gap between the outlines across the ego vehicle's heading, m.
     side_gap_m: f64,
-    /// Its speed along the ego vehicle's heading, m/s.
+    /// The obstacle's speed along the ego vehicle's heading, m/s.
     along_mps: f64,
-    /// Its speed across, towards the ego vehicle, m/s.
+    /// The obstacle's speed across that heading, towards the ego vehicle, m/s.
     towards_mps: f64,
     is_in_front: bool,
 }
@@ -141,13 +141,13 @@ impl Seen {
         }
     }
 
-    /// Whether it is what the ego vehicle follows: straight ahead and not coming towards it.
+    /// Whether the ego vehicle follows the obstacle: it is straight ahead and does not come towards it.
     fn is_ahead(&self) -> bool {
         self.is_in_front && self.gap_m > 0.0 && self.side_gap_m < 0.0 && self.along_mps >= 0.0
     }
 
-    /// Whether both distances are unsafe by RSS, and the ego vehicle is the one to respond: to whom is
-    /// beside or behind, the other is.
+    /// Whether both distances are unsafe by RSS and the ego vehicle must respond: an obstacle beside or behind
+    /// must respond itself.
     fn is_unsafe(&self, speed_mps: f64, rss: &Rss) -> bool {
         let safe_m = if self.along_mps >= 0.0 {
             rss.longitudinal_m(speed_mps, self.along_mps)
@@ -161,7 +161,7 @@ impl Seen {
     }
 }
 
-/// Post-encroachment time: between one leaving a place where ways cross and the other coming there.
+/// Post-encroachment time: from when one road user leaves a place where ways cross until the other comes.
 #[derive(Debug, Clone, Default)]
 pub struct Encroachment {
     /// Outline of the ego vehicle every 0.1 s.
@@ -169,7 +169,7 @@ pub struct Encroachment {
     others: Vec<Trail>,
 }
 
-/// Where an obstacle was, every 0.1 s.
+/// The outlines of an obstacle, every 0.1 s.
 #[derive(Debug, Clone)]
 struct Trail {
     id: u32,
@@ -178,7 +178,7 @@ struct Trail {
 }
 
 impl Encroachment {
-    /// Takes in the world of this moment; looks at one tick of five.
+    /// Records the world of this moment, at one tick of five.
     pub fn note(&mut self, world: &World) {
         if !world.ticks().is_multiple_of(FRAME_TICKS) {
             return;
@@ -196,8 +196,8 @@ impl Encroachment {
         }
     }
 
-    /// The least post-encroachment time with anybody, s; `None` above 5 s. Those of whom `is_hit` says
-    /// that the ego vehicle has hit them are left out: they and it were at one place at one time.
+    /// The least post-encroachment time with any obstacle, s; `None` above 5 s. Obstacles that the ego
+    /// vehicle has hit (`is_hit`) are left out: both were at one place at one time.
     pub fn least_s(&self, is_hit: &dyn Fn(u32) -> bool) -> Option<f64> {
         let most = (PET_S_MAX / FRAME_S) as usize;
         let mut least = most + 1;
@@ -217,7 +217,7 @@ impl Encroachment {
     }
 }
 
-/// Whether two outlines of ways that cross lie on each other.
+/// Whether two outlines overlap, with headings that cross.
 fn crosses(ego: &OrientedBox, other: &OrientedBox) -> bool {
     let reach_m = ego.radius_m() + other.radius_m();
     let apart_m = ego.pose.position - other.pose.position;
@@ -241,7 +241,7 @@ mod tests {
 
     #[test]
     fn the_time_between_two_at_a_crossing_is_found() {
-        // The ego vehicle leaves the crossing to the right at 10 m/s; somebody comes up from below later.
+        // The ego vehicle leaves the crossing to the right at 10 m/s; a vehicle comes up from below later.
         let mut encroachment = Encroachment::default();
         let outline = |x_m, y_m, heading_rad| OrientedBox::new(Pose::new(x_m, y_m, heading_rad), 4.0, 2.0);
         let upwards_rad = core::f64::consts::FRAC_PI_2;

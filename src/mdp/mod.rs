@@ -1,8 +1,8 @@
 //! The Markov decision process of the paper: its 19 state variables, the collision probability and the
 //! reward.
 //!
-//! Beside the paper's equations stand the usual measures of criticality. A space may say by itself what a
-//! collision probability is worth (`reward { … }`): `model` evaluates that.
+//! `criticality` has the usual measures of danger beside them. A space may define a reward of its own
+//! (`reward { … }`), which `model` evaluates.
 
 mod closeness;
 mod collision_probability;

@@ -35,22 +35,22 @@ pub const BEYOND_NAMES: [&str; BEYOND_LEN] = [
     "time",
 ];
 
-/// How far ahead a junction is looked for, m, and what stands for nobody around, as in `state`.
+/// How far ahead a junction is searched for, m; also stands for the distance if there is no obstacle.
 const LOOK_AHEAD_M: f64 = 100.0;
-/// Step of that search, m.
+/// Step of the search for a junction, m.
 const LOOK_STEP_M: f64 = 5.0;
 
-/// One look of an agent.
+/// What an agent sees at one moment.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Observation {
     /// The paper's variables, shape `(STATE_LEN,)`.
     pub state: StateVector,
-    /// Those beyond, shape `(BEYOND_LEN,)`.
+    /// The variables beyond the paper's, shape `(BEYOND_LEN,)`.
     pub beyond: Array1<f32>,
 }
 
 impl Observation {
-    /// Reads it off the world and the driving system.
+    /// Reads all variables from the world and the driving system.
     pub fn new(world: &World, status: &Status) -> Observation {
         Observation {
             state: observe(world, status),
@@ -58,7 +58,7 @@ impl Observation {
         }
     }
 
-    /// Everything 0: what an agent may be tried on without a world.
+    /// All variables 0, to try an agent without a world.
     pub fn zeros() -> Observation {
         Observation { state: StateVector::zeros(STATE_LEN), beyond: Array1::zeros(BEYOND_LEN) }
     }

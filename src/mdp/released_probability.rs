@@ -2,9 +2,9 @@
 //!
 //! Read from iSE-UET-VNU/AVASTRA and DeepCollision, re-implemented. Distances are between centres, so that
 //! ProC can be small at a contact; the difference of braking distances is taken without its sign, so that
-//! a gap that opens looks as dangerous as one that closes; "same lane" is told from the slopes of the
-//! velocities, without the map; and it is looked at twice a second. One thing is not followed: who has
-//! been hit already is left out, as everywhere here.
+//! a gap that opens looks as dangerous as one that closes; the slopes of the velocities, and not the map,
+//! decide which vehicles share a lane; and ProC is computed twice a second. One thing differs from the
+//! package: obstacles that have been hit already are left out, as in our own ProC.
 
 use crate::geometry::Vec2;
 use crate::model::vocabulary::Body;
@@ -12,11 +12,11 @@ use crate::sim::World;
 
 use super::collision_probability::{combined, probability};
 
-/// Ticks between two looks: 0.5 s.
+/// Ticks from one computation to the next: 0.5 s.
 const PERIOD_TICKS: u64 = 25;
-/// Slopes that differ by less are of one direction. This and all that follows is the package's.
+/// Slopes that differ by less count as one direction. This and the following constants are the package's.
 const SLOPE_DIFFERENCE_MAX: f64 = 0.6;
-/// Stands for a velocity of 0.
+/// Stands for 0 where the package avoids a division by it.
 const LEAST: f64 = 1e-4;
 /// Braking of vehicles and of pedestrians, m/s².
 const DECEL_MPS2: f64 = 6.0;
@@ -24,8 +24,8 @@ const PEDESTRIAN_DECEL_MPS2: f64 = 1.5;
 /// Added to both safety distances, m.
 const MARGIN_M: f64 = 5.0;
 
-/// ProC at this moment; 0 at the ticks in between the package's looks. Those of whom `is_hit` says that
-/// the ego vehicle has hit them already are left out.
+/// ProC at this moment; 0 at the ticks at which the package does not compute it. Obstacles that the ego
+/// vehicle has hit already (`is_hit`) are left out.
 pub fn released_probability(world: &World, is_hit: &dyn Fn(u32) -> bool) -> f64 {
     if !world.ticks().is_multiple_of(PERIOD_TICKS) {
         return 0.0;
@@ -69,7 +69,7 @@ fn longitudinal_m(ego_mps: f64, other_mps: f64, other_decel_mps2: f64) -> f64 {
 
 fn lateral_m(ego_mps: f64, (own, other): (f64, f64)) -> f64 {
     let angle_rad = libm::atan(((own - other) / (1.0 + own * other)).abs());
-    // (v sin β)² / (a sin β), shortened: the package's own form is not a number for parallel ways.
+    // (v sin β)² / (a sin β), with sin β cancelled: the package's own form is NaN for parallel ways.
     ego_mps * ego_mps * libm::sin(angle_rad) / DECEL_MPS2 + MARGIN_M
 }
 
@@ -79,10 +79,10 @@ mod tests {
 
     #[test]
     fn its_faults_are_followed() {
-        // 10 m/s behind 20 m/s, and the other way round: the same 30 m.
+        // 10 m/s behind 20 m/s, and 20 m/s behind 10 m/s: 30 m in both cases.
         assert_eq!(longitudinal_m(10.0, 20.0, 6.0), longitudinal_m(20.0, 10.0, 6.0));
         assert!((longitudinal_m(10.0, 20.0, 6.0) - 30.0).abs() < 1e-12);
-        // Two abreast on a road to the north-east are in different lanes, one behind the other in one.
+        // On a road to the north-east, two vehicles abreast are in two lanes, and two in a row in one lane.
         let north_east = slope(Vec2::new(1.0, 1.0));
         assert!(is_same_lane((north_east, north_east), slope(Vec2::new(2.0, 2.0))));
         assert!(!is_same_lane((north_east, north_east), slope(Vec2::new(2.0, -2.0))));

@@ -1,36 +1,36 @@
-//! What a step is worth to whoever looks for crashes (paper, "Reward Function", Eq. 8).
+//! The reward of a step in the search for crashes (paper, "Reward Function", Eq. 8).
 //!
 //! A collision is a contact that begins in the step. An obstacle that the ego vehicle has hit already
-//! has no collision probability any more: a wreck against the bumper would be worth a collision at
-//! every step.
+//! has no collision probability any more: otherwise a wreck against the bumper would be worth a collision
+//! at every step.
 
 /// Constants of the reward.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RewardSettings {
-    /// R_col.
+    /// Reward of a collision that counts, R_col.
     pub collision: f64,
-    /// For a collision that the space's verdict does not count.
+    /// Reward of a collision that the space's verdict does not count.
     pub uncounted: f64,
     /// A collision probability up to this is safe.
     pub safe_proc_max: f64,
-    /// Whether that bound itself is safe. Paper: it is; the published package: it is not.
+    /// Whether exactly `safe_proc_max` is safe. Paper: yes; the published package: no.
     pub bound_is_safe: bool,
-    /// For a safe step.
+    /// Reward of a safe step.
     pub safe: f64,
 }
 
-/// What came of a step.
+/// The outcome of a step.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct StepOutcome {
     /// Largest collision probability, in `[0, 1]`.
     pub proc: f64,
-    /// A contact began.
+    /// Whether a contact began.
     pub collided: bool,
-    /// A contact began that the verdict counts.
+    /// Whether a contact began that the verdict counts.
     pub counted: bool,
 }
 
-/// Eq. 8.
+/// The reward of a step, Eq. 8.
 pub fn reward(settings: &RewardSettings, outcome: StepOutcome) -> f64 {
     let bound = settings.safe_proc_max;
     if outcome.counted {

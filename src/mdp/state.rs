@@ -1,12 +1,12 @@
 //! The 19 state variables: 7 of the surroundings (paper, Table 1), 12 of the driving system (Table 2).
 //!
-//! Raw values in SI units; scaling for a network is the learner's business. Perceived and true
-//! objects are matched by identity; an object that is missed or imagined is no difference and is
-//! counted apart.
+//! Raw values in SI units; the learner scales them for its network. Perceived and true objects are
+//! matched by identity; a missed object or a ghost adds no difference, and [`perception_counts`]
+//! counts it.
 //!
-//! Where nobody is around, `speedNearestObs` is 0 (the published package: 100, no speed that anybody
-//! drives); `distToNearestObs` already tells that nobody is there. `trafficLight` is 0 both for yellow
-//! and for no light ahead. Both are ours.
+//! Without an obstacle, `speedNearestObs` is 0 (the published package: 100, faster than any vehicle);
+//! `distToNearestObs` already tells that there is none. `trafficLight` is 0 both for yellow and for no
+//! light ahead. Both choices are ours.
 
 use ndarray::Array1;
 
@@ -45,17 +45,17 @@ pub const STATE_NAMES: [&str; STATE_LEN] = [
 pub type StateVector = Array1<f32>;
 
 /// Distance that stands for "no obstacle around", m, as in the published package.
-const NOBODY_M: f64 = 100.0;
-/// How far ahead a traffic light or a junction is looked for, m.
+const NO_OBSTACLE_M: f64 = 100.0;
+/// How far ahead a traffic light or a junction is searched for, m.
 const LOOK_AHEAD_M: f64 = 100.0;
-/// A junction nearer than this counts as being at it, m, as in the published package.
+/// The ego vehicle is at a junction that is nearer than this, m, as in the published package.
 const NEAR_JUNCTION_M: f64 = 20.0;
-/// Obstacles farther away are beyond every sensor, m.
+/// No sensor reaches obstacles that are farther away, m.
 const SENSOR_REACH_M: f64 = 120.0;
 /// A localisation error below this has no direction, m.
 const DEVIATION_M_MIN: f64 = 1e-3;
 
-/// Reads the state vector off the world and the driving system.
+/// Reads the state vector from the world and the driving system.
 pub fn observe(world: &World, status: &Status) -> StateVector {
     let surroundings = surroundings(world);
     let driving_system = driving_system(world, status);
@@ -71,8 +71,8 @@ fn surroundings(world: &World) -> [f64; 7] {
         hour(world.time_of_day()),
         signal_ahead(world),
         world.obstacles().len() as f64,
-        nearest.map_or(NOBODY_M, |(distance_m, _)| distance_m),
-        // Ours: the package's 100 would be the fastest obstacle of all.
+        nearest.map_or(NO_OBSTACLE_M, |(distance_m, _)| distance_m),
+        // Ours: the package's 100 would read as an obstacle faster than any other.
         nearest.map_or(0.0, |(_, speed_mps)| speed_mps),
         road_condition(world),
     ]
@@ -100,7 +100,7 @@ fn driving_system(world: &World, status: &Status) -> [f64; 12] {
     ]
 }
 
-/// Clock of the published package, h.
+/// Time of day as the published package sets its clock, h.
 fn hour(time: TimeOfDay) -> f64 {
     match time {
         TimeOfDay::Morning => 10.0,
@@ -123,7 +123,7 @@ fn signal_ahead(world: &World) -> f64 {
     match next.map(|line| world.signal(line.signal)) {
         Some(SignalColour::Red) => -1.0,
         Some(SignalColour::Green) => 1.0,
-        // Neither tells that the way is free or closed, so both stand between red and green.
+        // Neither says whether the way is free or closed, so both stand between red and green.
         Some(SignalColour::Yellow) | None => 0.0,
     }
 }
@@ -159,7 +159,7 @@ fn deviation_angle_rad(deviation: Vec2) -> f64 {
     libm::atan2(deviation.y, deviation.x)
 }
 
-/// What the differences of Eqs. 3–6 cannot show, because it has no counterpart.
+/// Objects that the differences of Eqs. 3–6 cannot show, because they have no counterpart.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct PerceptionCounts {
     /// Obstacles that are there and are not perceived.
@@ -253,7 +253,7 @@ mod tests {
             height_m: 1.05,
             predicted: Vec::new(),
         };
-        // The second is a ghost: far off, but no difference to anything that exists.
+        // The second object is a ghost: it is far away, but there is no true object to differ from.
         let found =
             perception_differences([truth].iter(), &[object(Some(1), 10.5, -3.1), object(None, 90.0, 0.0)]);
         assert!((found.position_m - 0.5).abs() < 1e-12);

@@ -4,11 +4,11 @@
 
 /// A name that is declared nowhere.
 pub const UNKNOWN: &str = "AV0101";
-/// Declared twice.
+/// A name that is declared twice.
 pub const DUPLICATE: &str = "AV0102";
 /// A variant of several enums, where nothing says which enum is meant.
 pub const AMBIGUOUS: &str = "AV0103";
-/// Exists, but cannot be used in this place.
+/// A name that exists, but cannot be used in this place.
 pub const NOT_HERE: &str = "AV0104";
 /// Functions that call each other in a circle.
 pub const RECURSION: &str = "AV0105";
@@ -39,7 +39,7 @@ pub const UNKNOWN_UNIT: &str = "AV0203";
 pub const UNORDERED: &str = "AV0204";
 /// Cases that are not covered.
 pub const NOT_EXHAUSTIVE: &str = "AV0205";
-/// A case that never gets its turn.
+/// A case that is never reached.
 pub const NEVER_REACHED: &str = "AV0206";
 /// A number that cannot be computed exactly.
 pub const NUMBER: &str = "AV0207";
@@ -47,7 +47,7 @@ pub const NUMBER: &str = "AV0207";
 pub const TOO_MANY_VARIANTS: &str = "AV0208";
 /// A setting out of its range.
 pub const SETTING: &str = "AV0209";
-/// An episode that is to stop for an unknown reason.
+/// An unknown reason to stop in `stop` of `episode`.
 pub const STOP: &str = "AV0210";
 /// Arguments that are too many or too few.
 pub const ARGUMENTS: &str = "AV0211";
@@ -58,7 +58,7 @@ pub const ARGUMENTS: &str = "AV0211";
 pub const INFINITE: &str = "AV0301";
 /// A table with too many rows.
 pub const TOO_MANY_ROWS: &str = "AV0302";
-/// Two rows that are one action.
+/// Two rows with equal draws, effects and rules.
 pub const TWINS: &str = "AV0303";
 /// A range, a list or a `where` that leaves nothing.
 pub const EMPTY: &str = "AV0304";
@@ -141,7 +141,7 @@ pub const POLICY_VARIABLE: &str = "AV0705";
 pub const POLICY_ROW: &str = "AV0706";
 /// A line that applies to no state.
 pub const POLICY_NOWHERE: &str = "AV0707";
-/// A line, or a row of it, that never gets its turn.
+/// A line, or a row of it, that never acts.
 pub const POLICY_SHADOWED: &str = "AV0708";
 
 // Static claims.

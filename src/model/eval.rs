@@ -1,4 +1,4 @@
-//! The one evaluator of expressions: what a rule, a function or a verdict is worth in f64.
+//! The one evaluator of expressions: it computes rules, functions and verdicts in `f64`.
 //!
 //! Evaluation cannot fail: the checker has resolved names and types, functions cannot recurse, and a
 //! division by 0 gives infinity or NaN. NaN satisfies no comparison but `!=`.
@@ -8,11 +8,11 @@ use crate::model::space::{COUNTED, FnDef, RoadFacts, Space, WordExpr};
 use crate::model::value::{Memory, Value};
 use crate::model::vocabulary::{Fact, LaneChoice};
 
-/// Numbers that differ by at most this part of the larger one are `==`: it forgives the digits that an
+/// Numbers that differ by at most this part of the larger one are `==`. This tolerates the digits that an
 /// author rounds away, but no measurable distance.
 const EQUAL_PART: f64 = 1e-9;
 
-/// The facts that an expression may read. Facts that its place in the file does not offer keep their
+/// The facts that an expression may read. Facts that are not known at its place in the file keep their
 /// defaults.
 #[derive(Debug, Clone, Copy)]
 pub struct Facts<'a> {
@@ -25,18 +25,18 @@ pub struct Facts<'a> {
     pub outcome: OutcomeFacts,
 }
 
-/// What verdicts and rewards may look at.
+/// The facts that verdicts and rewards may read.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct OutcomeFacts {
     /// The ego vehicle touched something.
     pub collision: bool,
-    /// It had touched the same thing before.
+    /// The ego vehicle had touched this obstacle before.
     pub repeated: bool,
-    /// The thing appeared too late for anybody.
+    /// The obstacle appeared too late for any driver.
     pub sudden: bool,
-    /// The thing ran into the ego vehicle's side or rear.
+    /// The obstacle ran into the ego vehicle's side or rear.
     pub struck: bool,
-    /// A careful reference driver would not have touched it. Only known of judged collisions.
+    /// A careful reference driver would not have touched the obstacle. Known for judged collisions alone.
     pub avoidable: bool,
     /// Collision probability of the step, in `[0, 1]`.
     pub proc: f64,
@@ -115,7 +115,7 @@ fn arithmetic(op: Arithmetic, left: f64, right: f64) -> f64 {
     }
 }
 
-/// Numbers by size, variants by position, truth values by equality.
+/// Compares numbers by size, variants by position, and truth values by equality.
 pub(crate) fn compare(op: Comparison, left: Value, right: Value) -> bool {
     match (left, right) {
         (Value::Number(left), Value::Number(right)) => compare_numbers(op, left, right),
@@ -134,7 +134,7 @@ fn compare_numbers(op: Comparison, left: f64, right: f64) -> bool {
 }
 
 impl<W: Copy> WordExpr<W> {
-    /// The word that the expression comes to.
+    /// The word that the expression gives.
     pub fn word(&self, functions: &[FnDef], facts: &Facts<'_>) -> W {
         match self {
             WordExpr::Fixed(word) => *word,

@@ -30,7 +30,7 @@ pub enum ExprKind {
     Not(Box<Expr>),
     Negate(Box<Expr>),
     Arithmetic(Arithmetic, Box<Expr>, Box<Expr>),
-    /// Numbers, or variants of one ordered enum.
+    /// Compares numbers, or variants of one ordered enum.
     Compare(Comparison, Box<Expr>, Box<Expr>),
     And(Box<Expr>, Box<Expr>),
     Or(Box<Expr>, Box<Expr>),
@@ -81,7 +81,7 @@ impl Comparison {
         }
     }
 
-    /// Whether it holds, compared exactly.
+    /// Whether the comparison holds, without a tolerance.
     pub fn holds<T: PartialOrd>(self, left: T, right: T) -> bool {
         match self {
             Comparison::Equal => left == right,
@@ -93,7 +93,7 @@ impl Comparison {
         }
     }
 
-    /// The operator that it is written with.
+    /// The operator that stands for the comparison in a file.
     pub fn operator(self) -> BinaryOp {
         match self {
             Comparison::Equal => BinaryOp::Equal,
@@ -139,7 +139,7 @@ impl Comparison {
 
 impl Expr {
     /// Calls `visit` for this expression and everything inside it; bodies of called functions are
-    /// not entered, because they know nothing but their arguments.
+    /// not entered, because they know only their arguments.
     pub fn walk(&self, visit: &mut dyn FnMut(&Expr)) {
         visit(self);
         match &self.kind {
@@ -186,7 +186,7 @@ impl Expr {
         found
     }
 
-    /// Whether it asks about a spawn, which is known only once the world has been asked.
+    /// Whether the expression names a gap of a spawn, which is known only once the world has found a place.
     pub fn needs_survey(&self) -> bool {
         self.any(|kind| matches!(kind, ExprKind::Fact(Fact::SpawnGap | Fact::SafetyGap)))
     }

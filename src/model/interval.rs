@@ -130,7 +130,7 @@ impl Interval {
         product.unwrap_or(Interval::ALL)
     }
 
-    /// All, if the divisor may be 0.
+    /// The quotient; all numbers if the divisor may be 0.
     pub fn div(&self, other: &Interval) -> Interval {
         if other.contains(Rational::ZERO) {
             return Interval::ALL;
@@ -234,7 +234,7 @@ mod tests {
         fn arithmetic_encloses(a in -50..50_i32, b in 0..50_i32, c in -50..50_i32, d in 0..50_i32, s in 0..8_i32, t in 0..8_i32) {
             let left = Interval::closed(fraction(a, 4), fraction(a + b, 4));
             let right = Interval::closed(fraction(c, 4), fraction(c + d, 4));
-            // A point of each.
+            // One point of each interval.
             let x = fraction(a * 8 + b * s, 32);
             let y = fraction(c * 8 + d * t, 32);
             prop_assert!(left.add(&right).contains(x.checked_add(y).unwrap()));

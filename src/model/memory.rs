@@ -8,7 +8,7 @@ use crate::rng;
 use crate::rng::{Rng, Stream};
 
 impl Space {
-    /// The memory at the beginning of an episode; what is `any` is drawn from [`Stream::Reset`].
+    /// The memory at the beginning of an episode; `any` states are drawn from [`Stream::Reset`].
     pub fn initial_memory(&self, seed: u64) -> Memory {
         let mut rng = rng::stream(seed, Stream::Reset, 0);
         let mut memory = Memory::default();
@@ -86,7 +86,7 @@ impl Space {
         after
     }
 
-    /// The checker allows `any` states only for finite types.
+    /// Draws a value of a type. The checker allows `any` states only for finite types.
     fn draw(&self, ty: Type, rng: &mut Rng) -> Value {
         match ty {
             Type::Bool => Value::Bool(rng::below(rng, 2) == 1),

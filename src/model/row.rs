@@ -16,7 +16,7 @@ pub struct Row {
     pub axes: Vec<(Arc<str>, Value)>,
     /// `drive_ahead(lane: Left, mode: Near, then: Change)`.
     pub label: String,
-    /// Indices in `Space::rules` of the rules that bind it, optional ones included.
+    /// Indices in `Space::rules` of the rules that bind the row, optional ones included.
     pub rules: Arc<[usize]>,
     /// What is proved of the row on each road of `Space::roads` under the default rules.
     pub roads: Vec<Reach>,

@@ -61,7 +61,7 @@ pub struct ScenarioStep {
     pub drawn: Vec<(Arc<str>, Value)>,
 }
 
-/// What a scenario says will happen.
+/// A claim of a scenario about what happens.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Claim {
     /// `expect collision with npc#2 at 14.22 s`.

@@ -36,13 +36,13 @@ pub struct Space {
     pub episode: EpisodeDef,
     /// The first case that applies gives the reward.
     pub reward: Vec<RewardCase>,
-    /// As declared; one of them is [`COUNTED`].
+    /// In the order of declaration; one of them is [`COUNTED`].
     pub verdicts: Vec<VerdictDef>,
     /// The roads of `episode.roads`, in that order; every declared road if there is no `episode`.
     pub roads: Vec<Road>,
     /// The action table: actions as declared, axes left to right, the last varying fastest.
     pub rows: Vec<Row>,
-    /// By action: what `where`s and rules say about its single numbers.
+    /// For each action: the bounds that `where`s and rules set for each of its drawn numbers.
     pub(crate) bounds: Vec<Vec<Bound>>,
 }
 
@@ -53,7 +53,7 @@ pub struct EnumDef {
     pub variants: Vec<String>,
     /// Whether `<` compares its variants.
     pub ordered: bool,
-    /// How often each variant is drawn beside the others; 1 unless `odds` says so.
+    /// How often each variant is drawn, relative to the others; 1 unless `odds` names it.
     pub odds: Vec<u32>,
     pub span: Span,
 }
@@ -79,9 +79,9 @@ pub struct StateDef {
 
 #[derive(Debug, Clone, PartialEq)]
 pub enum Initial {
-    /// Drawn at reset, each cell by itself.
+    /// Each cell is drawn at reset.
     Any,
-    /// The same value for every cell.
+    /// One value for all cells.
     Value(Expr),
 }
 
@@ -90,9 +90,9 @@ pub enum Initial {
 pub enum StateMeaning {
     /// Nothing: only the space's rules and effects use it.
     Private,
-    /// `time`.
+    /// The state `time`: the time of day for each variant.
     Time(Vec<TimeOfDay>),
-    /// `sky`: phenomenon of each key, level of each variant.
+    /// The state `sky`: the phenomenon for each key, the level for each variant.
     Sky(Vec<Phenomenon>, Vec<Level>),
 }
 
@@ -110,7 +110,7 @@ pub struct FnDef {
 pub struct ActionDef {
     pub name: String,
     pub docs: Vec<String>,
-    /// `each` and `any` ones, as declared. They are the locals of the action's expressions.
+    /// `each` and `any` parameters, in the order of declaration: the locals of the action's expressions.
     pub parameters: Vec<Parameter>,
     pub effects: Vec<EffectDef>,
     pub span: Span,
@@ -120,10 +120,10 @@ pub struct ActionDef {
 pub struct Parameter {
     pub name: Arc<str>,
     pub ty: Type,
-    /// `each` (an axis of the table) as opposed to `any` (drawn).
+    /// True for `each` (an axis of the table), false for `any` (drawn).
     pub axis: bool,
     pub domain: Domain,
-    /// `where`: may name the parameters before it.
+    /// The `where` condition, which may name the parameters before this one.
     pub condition: Option<Expr>,
     pub span: Span,
 }
@@ -141,9 +141,9 @@ impl ActionDef {
 /// The values that a parameter may have.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Domain {
-    /// One of the list is drawn; a value that stands there twice is twice as likely.
+    /// A list, of which one value is drawn; a value that it holds twice is twice as likely.
     Values(Vec<Value>),
-    /// Both ends included, SI.
+    /// A range, both ends included, SI.
     Range(Rational, Rational),
 }
 
@@ -194,12 +194,12 @@ pub struct SpawnDef {
     pub speed: Expr,
     /// m.
     pub distance: Expr,
-    /// Whether it was written `behind`; the verb decides where that is.
+    /// Whether the file says `behind`; the verb decides which place that is.
     pub behind: bool,
     pub span: Span,
 }
 
-/// A word of the engine, fixed or from a value of one of the author's enums.
+/// A word of the engine: fixed, or chosen by a value of one of the author's enums.
 #[derive(Debug, Clone, PartialEq)]
 pub enum WordExpr<W> {
     Fixed(W),
@@ -227,10 +227,10 @@ pub struct RuleDef {
 
 #[derive(Debug, Clone, PartialEq)]
 pub enum RuleBody {
-    /// A condition, compiled once for every action that it binds. State in it is the state after
-    /// the action.
+    /// A condition, compiled once for every action that it binds. States in it have their values
+    /// after the action.
     Holds(Vec<RuleBinding>),
-    /// `allowed[from][to]` for a state variable; binds the actions that set it.
+    /// `allowed[from][to]` for a state variable; the rule binds the actions that set it.
     Moves { state: usize, allowed: Vec<Vec<bool>>, actions: Vec<usize> },
 }
 
@@ -255,7 +255,7 @@ pub struct EpisodeDef {
 
 #[derive(Debug, Clone, PartialEq)]
 pub struct RewardCase {
-    /// `None` is `_`.
+    /// `None` for `_`.
     pub condition: Option<Expr>,
     pub value: Expr,
 }

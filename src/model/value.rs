@@ -58,7 +58,7 @@ pub struct Memory {
 }
 
 impl Memory {
-    /// All cells, flat; [`StateDef::first_cell`](super::StateDef) says which is whose.
+    /// All cells, flat; [`StateDef::first_cell`](super::StateDef) says where the cells of a state begin.
     pub fn cells(&self) -> &[Value] {
         &self.cells
     }

@@ -66,7 +66,7 @@ macro_rules! facts {
                 match self { $(Fact::$fact => $ty),+ }
             }
 
-            /// Where it is known first; see [`Site::knows`].
+            /// The first site where the fact is known; see [`Site::knows`].
             fn site(self) -> Site {
                 match self { $(Fact::$fact => Site::$site),+ }
             }
@@ -74,7 +74,7 @@ macro_rules! facts {
     };
 }
 
-/// Where an expression stands, as far as it decides which facts are known there.
+/// Where an expression stands, which decides the facts that it may read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Site {
     /// In functions, constants, parameters and effects, which see no facts.
@@ -97,7 +97,7 @@ impl Site {
     }
 }
 
-/// The types that nobody declares, with their spelling and a sentence.
+/// The types of the language itself, with their spelling and a sentence.
 pub const TYPES: &[(&str, Type, &str)] = &[
     ("Bool", Type::Bool, "`true` or `false`."),
     ("Int", Type::Int, "A whole number; may stand wherever a ratio may."),
@@ -115,7 +115,7 @@ const SPEED: Type = Type::Quantity(Dimension::SPEED);
 
 facts! {
     RoadLimit "road.limit" SPEED, Rule = "A `Speed`: the lowest limit along the route.";
-    SpawnGap "spawn_gap" LENGTH, Rule = "A `Length`: the gap between the ego vehicle and who appears.";
+    SpawnGap "spawn_gap" LENGTH, Rule = "A `Length`: the gap from the ego vehicle to the road user that appears.";
     SafetyGap "safety_gap" LENGTH, Rule = "A `Length`: the gap that a careful driver needs.";
     Proc "proc" RATIO, Reward = "A `Ratio`: the collision probability of the step.";
     Collision "collision" Type::Bool, Reward = "A `Bool`: the ego vehicle collided.";
@@ -125,25 +125,25 @@ facts! {
     Avoidable "avoidable" Type::Bool, Verdict = "A `Bool`: a careful reference driver avoids it. Verdicts only.";
 }
 
-/// `lane in road.lanes`: spelt like a fact, but a set that nothing else can be done with.
+/// `lane in road.lanes`: spelt like a fact, but a set, which may only stand after `in`.
 pub const ROAD_LANES: (&str, &str) =
     ("road.lanes", "The lanes in the ego vehicle's direction: `lane in road.lanes`.");
 
 impl Fact {
-    /// The thing that it is asked of: `road` for `road.limit`.
+    /// The thing before the `.`: `road` for `road.limit`.
     pub fn thing(self) -> Option<&'static str> {
         self.name().split_once('.').map(|(thing, _)| thing)
     }
 }
 
-/// The things of which something may be asked.
+/// The things that have facts: the words before a `.`.
 pub fn things() -> Vec<&'static str> {
     let mut things: Vec<&str> = Fact::ALL.iter().filter_map(|fact| fact.thing()).collect();
     things.dedup();
     things
 }
 
-/// What may be asked of a thing (`road`): the words behind its `.`, each with its sentence.
+/// The facts of a thing (`road`): the words after its `.`, each with its sentence.
 pub fn parts_of(thing: &str) -> Vec<(&'static str, &'static str)> {
     let facts = Fact::ALL.iter().map(|fact| (fact.name(), fact.meaning()));
     let dotted =
@@ -221,7 +221,7 @@ words! {
     Trace "trace" = "The digest of the whole state stream: `expect trace == \"sha256:…\"`.",
 }
 
-/// In place of an action in a scenario.
+/// Stands for an action in a step of a scenario.
 pub const WAIT: (&str, &str) = ("wait", "A step without an action: `3: wait()`.");
 
 words! {
@@ -243,7 +243,7 @@ words! {
 }
 
 words! {
-    /// It matters to nothing but the picture, yet it belongs to the scenario.
+    /// Paint changes nothing but the picture, yet it is part of the scenario.
     Colour "A paint.": Pink, Red, Yellow, Black, White, Skyblue
 }
 
@@ -262,7 +262,7 @@ words! {
 }
 
 words! {
-    /// A crossing road user comes from there.
+    /// The side from which a crossing road user comes.
     Side "A side, seen from the ego vehicle's lane.": Left, Right
 }
 

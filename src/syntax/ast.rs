@@ -1,6 +1,6 @@
-//! What a file says, as its author wrote it: the tree between text and meaning.
+//! The syntax tree: what a file says, as its author wrote it.
 //!
-//! Every node carries the bytes it came from, so that later stages can point at them. Nothing is
+//! Every node carries the span of its text, so that later stages can point at it. Nothing is
 //! resolved here: names are spellings, numbers keep their digits, units are words. Comments other
 //! than documentation are not in the tree; `format` takes them from the source.
 
@@ -21,14 +21,14 @@ pub struct Span {
 }
 
 impl Span {
-    /// The span of what was never text.
+    /// The span of a node that was built instead of read.
     pub const NONE: Span = Span { file: FileId(0), start: 0, end: 0 };
 
     pub fn new(file: FileId, start: usize, end: usize) -> Self {
         Span { file, start, end }
     }
 
-    /// From the start of `self` to the end of `last`, which must be in the same file.
+    /// The span from the start of `self` to the end of `last`, which must be in the same file.
     pub fn to(self, last: Span) -> Span {
         Span { end: last.end, ..self }
     }
@@ -91,7 +91,7 @@ pub struct Doc {
 pub struct File {
     /// Its `//!` lines.
     pub docs: Vec<Doc>,
-    /// As declared; `language` and `use` are items like the others.
+    /// In the order of the text; `language` and `use` are items like the others.
     pub items: Vec<Item>,
     #[serde(skip)]
     pub span: Span,
@@ -127,7 +127,7 @@ pub enum ItemKind {
     Expect(Expect),
     Scenario(Scenario),
     Policy(Policy),
-    /// `override` before a declaration: it stands in place of the one of that kind and name in a
+    /// `override` before a declaration: it replaces the declaration of that kind and name in a
     /// used file.
     Override(Box<ItemKind>),
 }
@@ -141,7 +141,7 @@ impl ItemKind {
         }
     }
 
-    /// The keyword that begins it.
+    /// The keyword that begins the declaration.
     pub fn keyword(&self) -> &'static str {
         match self {
             ItemKind::Language(_) => "language",
@@ -219,7 +219,7 @@ accessors! {
 pub struct Use {
     pub path: Text,
     pub digest: Option<Text>,
-    /// Actions, groups and rules that are left out of what the file offers.
+    /// Actions, groups and rules of the used file that are left out.
     pub without: Vec<Name>,
 }
 
@@ -227,15 +227,15 @@ pub struct Use {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Enum {
     pub name: Name,
-    /// Whether `<` stood between the variants. A lone variant is not ordered.
+    /// Whether `<` stood between the variants. A single variant is not ordered.
     pub ordered: bool,
     pub variants: Vec<Name>,
 }
 
-/// `odds Vehicle { BoxTruck | SchoolBus => 2 }`: how often a variant is drawn, beside the others.
+/// `odds Vehicle { BoxTruck | SchoolBus => 2 }`: how often a variant is drawn, relative to the others.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Odds {
-    /// The enum.
+    /// Name of the enum.
     pub name: Name,
     pub arms: Vec<Arm>,
 }
@@ -248,11 +248,11 @@ pub struct State {
     pub initial: Initial,
 }
 
-/// What a state is when an episode begins.
+/// The value of a state when an episode begins.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[expect(clippy::large_enum_variant, reason = "a file has a handful, and a box would burden every reader")]
 pub enum Initial {
-    /// Drawn.
+    /// `any`: the value is drawn.
     Any,
     Value(Expr),
 }
@@ -307,9 +307,9 @@ pub struct ActionParam {
     pub mode: ParamMode,
     pub name: Name,
     pub ty: Type,
-    /// `in` what follows: a range or a list. Either mode may have it.
+    /// The expression after `in`: a range or a list. Both modes may have one.
     pub within: Option<Expr>,
-    /// `where` what follows. Either mode may have it.
+    /// The expression after `where`. Both modes may have one.
     pub condition: Option<Expr>,
     #[serde(skip)]
     pub span: Span,
@@ -318,9 +318,9 @@ pub struct ActionParam {
 /// How a parameter gets its value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub enum ParamMode {
-    /// An axis of the action table.
+    /// `each`: the parameter is an axis of the action table.
     Each,
-    /// Drawn when the action runs.
+    /// `any`: the value is drawn when the action runs.
     Any,
 }
 
@@ -340,7 +340,7 @@ pub enum EffectKind {
     Spawn { body: Expr, place: Place, distance: Expr, fields: Vec<Field> },
 }
 
-/// On which side of the ego vehicle, along its route.
+/// Whether a road user appears ahead of the ego vehicle or behind it, along its route.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub enum Place {
     Ahead,
@@ -357,7 +357,7 @@ pub struct Group {
 /// A named constraint.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Rule {
-    /// Off unless asked for.
+    /// Whether the rule is off unless `--with` names it.
     pub optional: bool,
     pub name: Name,
     pub body: RuleBody,
@@ -412,11 +412,11 @@ pub struct Verdict {
     pub condition: Expr,
 }
 
-/// A claim that somebody will check: `expect count(actions) == 45`, `expect collision with npc#2 at 14.22 s`.
+/// A claim to be checked: `expect count(actions) == 45`, `expect collision with npc#2 at 14.22 s`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Expect {
     pub claim: Expr,
-    /// `with`, `at` and `by`, in the order in which they stand.
+    /// `with`, `at` and `by`, in the order of the text.
     pub clauses: Vec<Clause>,
     #[serde(skip)]
     pub span: Span,
@@ -438,11 +438,11 @@ pub enum ClauseKind {
     By,
 }
 
-/// One concrete timeline.
+/// A scenario: one concrete timeline over a space.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Scenario {
     pub name: Name,
-    /// Where it came from; may be empty.
+    /// Where the scenario came from; may be empty.
     pub origin: Vec<Field>,
     pub road: Name,
     /// The states at the start; may be empty.
@@ -478,14 +478,14 @@ pub struct Arg {
     pub value: Expr,
 }
 
-/// What an agent learned.
+/// A policy: what an agent learned.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Policy {
     pub name: Name,
     pub origin: Vec<Field>,
-    /// The exact face; empty if the file has none.
+    /// The exact face, the network; empty if the file has none.
     pub net: Vec<Field>,
-    /// What it says that it achieves, for either face.
+    /// What the policy claims to achieve, with each face.
     pub claims: Vec<Field>,
     /// The readable face: the first line that applies acts. Empty if the file has none.
     pub rules: Vec<PolicyLine>,
@@ -495,7 +495,7 @@ pub struct Policy {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PolicyLine {
     pub condition: Option<Expr>,
-    /// At least one: the first that is legal acts.
+    /// At least one call; the first that is legal acts.
     pub actions: Vec<Call>,
     #[serde(skip)]
     pub span: Span,
@@ -544,7 +544,7 @@ pub enum ExprKind {
     Number(Number),
     Text(String),
     Bool(bool),
-    /// A variable, a parameter, a variant, a state: whatever the checker finds.
+    /// A parameter, a constant, a variant or a state; the checker decides which.
     Name(String),
     Unary {
         op: UnaryOp,
@@ -600,7 +600,7 @@ pub enum ExprKind {
 /// `A | B => value`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Arm {
-    /// Empty for `_`, which takes the rest.
+    /// Empty for `_`, which matches every variant that is left.
     pub patterns: Vec<Name>,
     pub value: Expr,
     #[serde(skip)]
@@ -678,7 +678,7 @@ impl BinaryOp {
         }
     }
 
-    /// How tightly it binds: larger binds tighter.
+    /// How tightly the operator binds: a larger number binds tighter.
     pub fn precedence(self) -> u8 {
         match self {
             BinaryOp::Implies => 1,

@@ -1,7 +1,7 @@
-//! From pest's pairs to declarations. Expressions are next door.
+//! Builds declarations from pest's pairs. Expressions are built in `expression`.
 //!
-//! The grammar guarantees the shape of every pair, so a missing part is our mistake and not the
-//! author's: `expect` says which rule promises it.
+//! The grammar guarantees the shape of every pair, so a missing part is a bug of ours and not a
+//! mistake of the author: each `expect` says which rule promises the part.
 
 use std::cell::Cell;
 
@@ -21,12 +21,12 @@ pub type Built<T> = Result<T, Box<Diagnostic>>;
 /// Builds the tree of one declaration.
 pub struct Builder {
     pub file: FileId,
-    /// Operators between the declaration and the expression under construction: with the depth of
-    /// brackets, what bounds the height of the tree.
+    /// Number of operators around the expression that is being built. Together with the depth of
+    /// brackets it bounds the height of the tree.
     pub operators_above: Cell<usize>,
 }
 
-/// The parts of a pair that carry meaning, in order.
+/// The parts of a pair in order, without the marks and keywords that the tree does not keep.
 pub struct Parts<'i>(std::iter::Peekable<std::vec::IntoIter<Pair<'i, Rule>>>);
 
 impl<'i> Parts<'i> {
@@ -339,7 +339,7 @@ impl Builder {
         let number = self.number(parts.next());
         let action = self.call(parts.next())?;
         let drawn = parts.take(Rule::drawn).map_or(Ok(Vec::new()), |drawn| {
-            // `with` is kept by the grammar's other users, so it stands before the fields here too.
+            // Clauses need `with` as a part of the pair, so it stands before the fields here too.
             let fields = drawn.into_inner().find(|part| part.as_rule() == Rule::fields);
             self.fields(fields.expect("`with` has fields"))
         })?;
@@ -369,10 +369,10 @@ impl Builder {
     }
 }
 
-/// Where the last token of a pair ends.
+/// The byte after the last token of a pair.
 ///
-/// A rule that ends in something optional that is absent keeps the blanks and comments it had skipped
-/// in front of it, so pest's own end may lie far behind. Every rule that is not a token ends in one.
+/// If the optional end of a rule is absent, pest's own end includes the blanks and comments that were
+/// skipped in search of it, and may lie far behind. Every rule that is not a token ends in a token.
 pub fn end_of(pair: &Pair<'_, Rule>) -> usize {
     let mut last = pair.clone();
     while let Some(inner) = last.clone().into_inner().next_back() {
@@ -381,7 +381,7 @@ pub fn end_of(pair: &Pair<'_, Rule>) -> usize {
     last.as_span().end()
 }
 
-/// Resolves escapes; the error is the byte at which an unknown one begins.
+/// Resolves escapes; the error is the byte at which an unknown escape begins.
 fn unescape(inside: &str) -> Result<String, usize> {
     let mut value = String::with_capacity(inside.len());
     let mut characters = inside.char_indices();

@@ -1,15 +1,15 @@
 //! What a compiler says to an author: a code, a message, the places it is about, and what to do.
 //!
 //! Every stage that reads source text reports through these types; only this file knows how they
-//! are drawn. Codes are never reused or renumbered. When to stop and what to exit with is the
-//! caller's business.
+//! are drawn. Codes are never reused or renumbered. The caller decides when to stop, and with which
+//! exit status.
 
 use annotate_snippets::{Annotation, AnnotationKind, Group, Level, Origin, Renderer, Snippet};
 use serde::Serialize;
 
 use crate::syntax::ast::{FileId, Span};
 
-/// How bad it is. Errors stop a compilation.
+/// How severe a diagnostic is. Errors stop a compilation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Severity {
@@ -18,13 +18,13 @@ pub enum Severity {
     Note,
 }
 
-/// A place that a diagnostic is about, and what is to be said there.
+/// A place that a diagnostic is about, and the text to show there.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Label {
     pub span: Span,
     /// May be empty: the place is then only underlined.
     pub text: String,
-    /// Where the mistake is, as opposed to what it clashes with.
+    /// Whether the mistake is here. The other labels show what it conflicts with.
     pub primary: bool,
 }
 
@@ -41,20 +41,20 @@ pub struct Diagnostic {
     pub notes: Vec<String>,
     /// What to do about it.
     pub help: Option<String>,
-    /// Changes that a machine may make: each by itself takes this mistake away.
+    /// Changes that a tool may make: each of them alone removes the mistake.
     pub fixes: Vec<Fix>,
 }
 
 /// A change of the source.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Fix {
-    /// As a command: ``write `drive_ahead` ``.
+    /// What the change does, as a command: ``write `drive_ahead` ``.
     pub title: String,
-    /// They do not overlap.
+    /// Edits that do not overlap.
     pub edits: Vec<Edit>,
 }
 
-/// A text in place of another; an empty span inserts.
+/// Replaces the text of a span; an empty span inserts.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Edit {
     pub span: Span,
@@ -70,7 +70,7 @@ impl Diagnostic {
         Diagnostic::new(code, Severity::Warning, message)
     }
 
-    /// Something worth knowing that asks for no change.
+    /// A remark: worth knowing, but it asks for no change.
     pub fn remark(code: &'static str, message: impl Into<String>) -> Self {
         Diagnostic::new(code, Severity::Note, message)
     }
@@ -109,13 +109,13 @@ impl Diagnostic {
         self
     }
 
-    /// Adds a change of one place that takes the mistake away.
+    /// Adds a change of one place that removes the mistake.
     pub fn fix(mut self, title: impl Into<String>, span: Span, text: impl Into<String>) -> Self {
         self.fixes.push(Fix { title: title.into(), edits: vec![Edit { span, text: text.into() }] });
         self
     }
 
-    /// Says what was probably meant, and offers to write it.
+    /// Names the word that the author probably meant, and offers to write it.
     pub fn meant(self, span: Span, word: &str) -> Self {
         self.help(format!("did you mean `{word}`?")).fix(format!("write `{word}`"), span, word)
     }
@@ -142,7 +142,7 @@ impl Sources {
         Sources::default()
     }
 
-    /// Keeps a text under the name by which diagnostics call it.
+    /// Adds a text, under the name that diagnostics show.
     pub fn add(&mut self, name: impl Into<String>, text: impl Into<String>) -> FileId {
         let id = u32::try_from(self.files.len()).expect("fewer than four thousand million files");
         self.files.push((name.into(), text.into()));
@@ -174,7 +174,7 @@ impl Sources {
 pub enum Style {
     /// With colours, for a terminal.
     Human,
-    /// Without.
+    /// Without colours.
     Plain,
 }
 
@@ -233,7 +233,7 @@ fn snippet<'a>(
     let labels = || diagnostic.labels.iter().filter(|label| label.span.file == file);
     let first = floor_boundary(text, labels().map(|label| label.span.start).min()?);
     let last = floor_boundary(text, labels().map(|label| label.span.end).max()?).max(first);
-    // Only the lines in question are handed over, so that a mistake costs no more in a long file.
+    // The renderer gets these lines alone, so that a mistake costs no more in a long file.
     let start = text[..first].rfind('\n').map_or(0, |newline| newline + 1);
     let end = text[last..].find('\n').map_or(text.len(), |newline| last + newline);
     let line = text[..start].bytes().filter(|byte| *byte == b'\n').count() + 1;
@@ -253,12 +253,12 @@ fn floor_boundary(text: &str, offset: usize) -> usize {
     text.floor_char_boundary(offset.min(text.len()))
 }
 
-/// So many names are looked at for one that was misspelt: a file with thousands of both would take long.
+/// Most names that are compared with a misspelt one: a file may have thousands of both.
 const CANDIDATES_MAX: usize = 1000;
 
 /// The candidate that the author may have meant by `word`, if one is near enough.
 pub fn nearest<'a>(word: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
-    // A third of the word may be wrong: more, and the guess is noise.
+    // At most a third of the word may be wrong; beyond that the guess is noise.
     let distance_max = (word.chars().count() / 3).max(1);
     candidates
         .into_iter()
@@ -275,7 +275,7 @@ pub fn listed<S: AsRef<str>>(words: &[S]) -> String {
     enumerated(&quoted, "and")
 }
 
-/// `a, b or c`, with that conjunction.
+/// `a, b or c`, with the given conjunction.
 pub(super) fn enumerated(words: &[String], conjunction: &str) -> String {
     match words {
         [] => String::new(),

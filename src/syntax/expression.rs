@@ -1,4 +1,4 @@
-//! From pest's flat expressions to trees: precedence, associativity, and how high a tree may grow.
+//! Builds trees from pest's flat expressions: precedence, associativity, and how high a tree may grow.
 
 use pest::iterators::Pair;
 
@@ -7,14 +7,14 @@ use crate::syntax::build::{Builder, Built, Parts};
 use crate::syntax::grammar::Rule;
 use crate::syntax::{DEPTH_MAX, Diagnostic, code};
 
-/// Binding strength of what is not a [`BinaryOp`]; see [`BinaryOp::precedence`].
+/// Binding strength of `not`, on the scale of [`strength`].
 pub const NOT_PRECEDENCE: u8 = 8;
 /// `lo .. hi` binds looser than sums and tighter than comparisons.
 pub const RANGE_PRECEDENCE: u8 = 11;
 /// Unary minus binds tighter than every infix operator.
 pub const NEGATE_PRECEDENCE: u8 = 16;
 
-/// Twice [`BinaryOp::precedence`], which leaves room between the levels for the rest.
+/// Twice [`BinaryOp::precedence`], which leaves room between the levels for `..`.
 pub fn strength(op: BinaryOp) -> u8 {
     2 * op.precedence()
 }
@@ -35,7 +35,7 @@ impl Infix {
     }
 }
 
-/// The flat form, read from the left.
+/// The flat form of an expression, read from the left.
 type Tokens<'i> = std::iter::Peekable<std::vec::IntoIter<Pair<'i, Rule>>>;
 
 impl Builder {
@@ -46,8 +46,8 @@ impl Builder {
         self.below(operators, span, || self.climb(&mut tokens.into_iter().peekable(), 0))
     }
 
-    /// Builds something under that many operators. A chain makes a tree as high as it is long, and
-    /// every later stage walks trees by recursion: so chains are bounded like brackets.
+    /// Runs `build` under this many more operators. A chain of operators makes a tree as high as the chain
+    /// is long, and later stages walk trees by recursion: so chains are bounded like brackets.
     fn below<T>(&self, operators: usize, span: Span, build: impl FnOnce() -> Built<T>) -> Built<T> {
         let above = self.operators_above.get();
         if above + operators > DEPTH_MAX {
@@ -64,7 +64,7 @@ impl Builder {
         built
     }
 
-    /// Precedence climbing: everything that binds at least as tightly as `least`.
+    /// Precedence climbing: reads on as long as operators bind at least as tightly as `least`.
     fn climb(&self, tokens: &mut Tokens<'_>, least: u8) -> Built<Expr> {
         let mut left = self.prefixed(tokens)?;
         while let Some(token) = tokens.peek() {
@@ -90,7 +90,7 @@ impl Builder {
         Ok(left)
     }
 
-    /// `a < b < c` means something to an author and nothing to a compiler.
+    /// Refuses `a < b < c`, which the language does not have.
     fn refuse_chain(&self, op: Infix, next: Option<&Pair<'_, Rule>>) -> Built<()> {
         let Some(next) = next.filter(|next| infix(next).strength() == op.strength()) else {
             return Ok(());
@@ -205,7 +205,7 @@ impl Builder {
             }
         };
         let lane = self.name(parts.next());
-        // The keyword `at` is a part, because clauses need it to be one.
+        // Skips `at`: clauses need this keyword as a part of the pair.
         parts.next();
         Ok(ExprKind::LanePoint { road, lane, station: self.number(parts.next()) })
     }

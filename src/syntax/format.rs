@@ -1,4 +1,4 @@
-//! One style for every file, without options, and never at the cost of what the file says.
+//! The formatter: one style for every file, without options. It never changes what a file says.
 
 use crate::syntax::ast::{File, FileId};
 use crate::syntax::print::print_with;
@@ -8,15 +8,15 @@ use crate::syntax::{Diagnostic, parse};
 /// Why a text was not formatted.
 #[derive(Debug, thiserror::Error)]
 pub enum FormatError {
-    /// It must be repaired first.
+    /// The text does not parse.
     #[error("the file has mistakes in its syntax")]
     Syntax(Vec<Diagnostic>),
-    /// Our own mistake, caught before it could do harm.
+    /// A bug of the printer, noticed before a file was written.
     #[error("formatting would change what the file says, so it is left as it is; please report this")]
     Meaning,
 }
 
-/// The same text in the one style. Formatting again changes nothing.
+/// The text in the one style. Formatting the result again changes nothing.
 ///
 /// # Errors
 /// [`FormatError::Syntax`] with diagnostics for `file`, if the text does not parse.
@@ -36,7 +36,7 @@ pub fn format(file: FileId, text: &str) -> Result<String, FormatError> {
     Ok(formatted)
 }
 
-/// Whether two trees say the same, wherever in a text they say it.
+/// Whether two trees are equal but for their spans.
 pub fn same_meaning(one: &File, other: &File) -> bool {
     // Spans are left out when a tree is serialised, and nothing else is.
     let data = |file: &File| serde_json::to_value(file).expect("a tree has no maps with odd keys");

@@ -1,6 +1,6 @@
 //! The parser that pest makes of `grammar/ava.pest`, and the author's words for its rules.
 //!
-//! `Rule` is seen by `parse`, `build` and `expression` and by nothing outside `syntax`.
+//! `parse`, `build` and `expression` use `Rule`; nothing outside `syntax` does.
 
 /// Generated from the grammar.
 #[derive(pest_derive::Parser)]
@@ -77,8 +77,8 @@ pub fn words(rule: Rule) -> Option<&'static str> {
     })
 }
 
-/// Whether the rule continues an expression: expected after every one, and therefore only worth
-/// saying where nothing else is.
+/// Whether the rule continues an expression. It may follow every expression, so a message names it only
+/// where nothing else is expected.
 pub fn continues_expression(rule: Rule) -> bool {
     matches!(
         rule,
@@ -105,8 +105,8 @@ pub fn continues_expression(rule: Rule) -> bool {
     )
 }
 
-/// Whether the rule is a mark or keyword that the tree does not keep: which one it was follows from
-/// the rule that holds it.
+/// Whether the rule is a mark or keyword that the tree does not keep, because the rule around it tells
+/// which one it was.
 pub fn is_plain_terminal(rule: Rule) -> bool {
     matches!(
         rule,

@@ -6,7 +6,7 @@
 /// A keyword and what it means.
 pub type Keyword = (&'static str, &'static str);
 
-/// What begins a declaration.
+/// Keywords that begin a declaration.
 pub const DECLARATIONS: &[Keyword] = &[
     ("language", "The version of the language that the file is written in; its first line: `language 1`."),
     ("use", "Takes everything that another file declares: `use \"roads.ava\"`."),
@@ -32,7 +32,7 @@ pub const DECLARATIONS: &[Keyword] = &[
     ("override", "Stands in place of the declaration of that kind and name in a used file."),
 ];
 
-/// What begins or joins a part of a declaration.
+/// Keywords that begin or join parts of a declaration.
 pub const CLAUSES: &[Keyword] = &[
     ("digest", "The content that a used file must have: `use \"a.ava\" digest \"sha256:…\"`."),
     ("without", "What is left out of a used file: `use \"a.ava\" without set_time`."),

@@ -2,9 +2,9 @@
 //!
 //! Knows nothing of the language; `print` makes the documents.
 
-/// A line is broken rather than longer than this, in characters.
+/// A longer line is broken where it can be, characters.
 pub const WIDTH: usize = 110;
-/// Blanks of one level.
+/// Blanks of one level of indentation.
 pub const INDENT: usize = 2;
 
 /// A piece of text that may be laid out in two ways.
@@ -19,9 +19,9 @@ pub enum Layout {
     IfBroken(&'static str),
     /// This text, or nothing in a broken group.
     IfFlat(&'static str),
-    /// One after the other.
+    /// Parts, one after the other.
     Row(Vec<Layout>),
-    /// One level deeper.
+    /// A part, one level of indentation deeper.
     Nest(Box<Layout>),
     /// On one line if it fits; otherwise every `Line` and `Break` directly in it breaks.
     Group(Box<Layout>),
@@ -68,7 +68,7 @@ impl Layout {
         out
     }
 
-    /// The text, when it begins in this column of a line that is indented so far.
+    /// The text, if it begins in `column` of a line with this indentation.
     pub fn render(&self, indent: usize, column: usize) -> String {
         let mut out = String::new();
         lay_out(self, &mut out, indent, column, WIDTH);
@@ -76,7 +76,7 @@ impl Layout {
     }
 }
 
-/// Lays out with an explicit stack of what is still to come: indentation, whether broken, and what.
+/// Lays out. The stack holds the parts still to come, with their indentation and whether they are broken.
 fn lay_out(layout: &Layout, out: &mut String, indent: usize, column: usize, width: usize) {
     let mut column = column;
     let mut todo = vec![(indent, false, layout)];
@@ -112,7 +112,7 @@ fn lay_out(layout: &Layout, out: &mut String, indent: usize, column: usize, widt
     }
 }
 
-/// Whether a group laid flat, with what follows it up to where a line may end, takes no more than `room`.
+/// Whether a group on one line, with the text after it up to the next possible line break, fits in `room`.
 fn fits(inside: &Layout, after: &[(usize, bool, &Layout)], room: usize) -> bool {
     let mut left = room;
     let mut todo = vec![(false, inside)];

@@ -1,8 +1,8 @@
-//! From text to tree, with as many mistakes reported as can be told apart.
+//! Parses a text into a tree, and reports every mistake that can be told from the others.
 //!
 //! pest stops at the first mistake. So a text that fails is read again with a rule that sets aside
-//! what it cannot read, up to the next line that begins a declaration, and each slice set aside
-//! is then read by itself for its own message. What could be read is in the tree all the same.
+//! what it cannot read, up to the next line that begins a declaration. Each slice set aside is then
+//! read alone, for a message of its own. The tree holds everything that could be read.
 
 use pest::Parser;
 use pest::error::{ErrorVariant, InputLocation};
@@ -16,13 +16,13 @@ use crate::syntax::keyword::{CLAUSES, DECLARATIONS, OPERATORS};
 use crate::syntax::scan::{Comment, Scan, scan};
 use crate::syntax::{Diagnostic, code, nearest};
 
-/// Brackets and operators within one another, at most.
+/// Most brackets within one another, and most operators within one another.
 pub const DEPTH_MAX: usize = 64;
 
 /// The version of the language that this compiler reads.
 pub const LANGUAGE: u64 = 1;
 
-/// Mistakes reported for one file, at most: more help nobody.
+/// Most mistakes that are reported for one file.
 const DIAGNOSTICS_MAX: usize = 100;
 
 /// The words that begin a declaration.
@@ -30,7 +30,7 @@ fn declarations() -> impl Iterator<Item = &'static str> {
     DECLARATIONS.iter().map(|(word, _)| *word)
 }
 
-/// The words that stand inside a declaration, without those of two letters: they are near to too many others.
+/// The keywords inside declarations. Keywords of two letters are left out: too many words are near to them.
 fn words_inside() -> impl Iterator<Item = &'static str> {
     let words = CLAUSES.iter().chain(OPERATORS).map(|(word, _)| *word);
     words.filter(|word| word.len() > 2).chain(["rule", "expect"])
@@ -48,7 +48,7 @@ pub fn parse(file: FileId, text: &str) -> (File, Vec<Diagnostic>) {
     let (tree, mistakes) = reader.read();
     let version = reader.check_version(&tree, mistakes.is_empty() && scanned.problems.is_empty());
     if let Some(newer) = version.iter().find(|found| found.code == code::VERSION) {
-        // Whatever else looks wrong may be right in that version.
+        // Everything else that looks wrong may be right in that version.
         return (tree, vec![newer.clone()]);
     }
     let found = scanned.problems.into_iter().chain(mistakes).chain(version).collect();
@@ -66,7 +66,7 @@ pub fn parse_fields(text: &str) -> Option<Vec<Field>> {
     Builder::new(file).fields(fields).ok()
 }
 
-/// In the order of the text, without more of them than anybody reads.
+/// Sorts mistakes by their place, and keeps the first [`DIAGNOSTICS_MAX`].
 fn sorted(mut found: Vec<Diagnostic>) -> Vec<Diagnostic> {
     found.sort_by_key(Diagnostic::place);
     let more = found.len().saturating_sub(DIAGNOSTICS_MAX);
@@ -88,8 +88,8 @@ impl Reader<'_> {
         let pairs =
             AvaParser::parse(Rule::file, self.text).or_else(|_| AvaParser::parse(Rule::recovered, self.text));
         let Some(whole) = pairs.ok().and_then(|mut pairs| pairs.next()) else {
-            // Unreachable by the grammar, which recovers from everything; but the promise not to
-            // panic is worth more than the proof.
+            // This cannot happen, because the grammar recovers from everything; but the promise not
+            // to panic is worth more than the proof.
             let mistake = Diagnostic::error(code::SYNTAX, "the file cannot be read");
             return (File::default(), vec![mistake.at(Span::new(self.file, 0, self.text.len()), "")]);
         };
@@ -132,12 +132,12 @@ impl Reader<'_> {
         docs.collect()
     }
 
-    /// What is wrong with a slice that was set aside after the good declaration `previous`.
+    /// The mistake in a slice that was set aside; `previous` is the declaration before it.
     fn explain(&self, start: usize, end: usize, previous: (usize, usize)) -> Option<Diagnostic> {
         let starts_before = |problem: &Diagnostic| problem.place().is_some_and(|place| place.start < start);
         let next_problem = self.scan.problems.get(self.scan.problems.partition_point(starts_before));
         if next_problem.and_then(Diagnostic::place).is_some_and(|place| place.start <= end) {
-            // Already said, and better than the grammar could.
+            // The scan has reported it, and better than the grammar could.
             return None;
         }
         let (start, found) = self.token_after(start);
@@ -148,7 +148,7 @@ impl Reader<'_> {
             let (at, expected) = self.failure(start, end);
             return Some(self.expected(at, expected, (start, end)));
         }
-        // What came before may have ended too early: `f(1 2)` reads as far as `f`.
+        // The previous declaration may have ended too early: `f(1 2)` is read as far as `f`.
         let (at, expected) = self.failure(previous.0, end);
         if at > start {
             return Some(self.expected(at, expected, (previous.0, end)));
@@ -161,7 +161,7 @@ impl Reader<'_> {
     /// Where the reading of one declaration fails, and what was expected there.
     fn failure(&self, start: usize, end: usize) -> (usize, String) {
         match AvaParser::parse(Rule::lone_item, &self.text[start..end]) {
-            // It can be read by itself, so what follows it is to blame; point at its end.
+            // The slice can be read alone, so the mistake comes after it: point at its end.
             Ok(_) => (end, "a declaration".to_owned()),
             Err(error) => {
                 let (InputLocation::Pos(at) | InputLocation::Span((at, _))) = error.location;
@@ -174,8 +174,8 @@ impl Reader<'_> {
         }
     }
 
-    /// A word or mark where the next declaration could begin, or the last one, which ended at
-    /// `previous_end`, go on with what was `expected`.
+    /// Reports a word or mark that begins no declaration. On the line where the previous declaration ended
+    /// (at `previous_end`), it could also have been what was `expected` there.
     fn not_a_declaration(&self, found: &str, span: Span, previous_end: usize, expected: &str) -> Diagnostic {
         let is_word = found.starts_with(|first: char| first.is_ascii_alphabetic() || first == '_');
         let continues_line = !self.text[previous_end..span.start].contains('\n') && previous_end > 0;
@@ -203,7 +203,7 @@ impl Reader<'_> {
         }
     }
 
-    /// Something else was expected at a byte of a slice.
+    /// Reports that something else was expected at a byte of a slice.
     fn expected(&self, at: usize, expected: String, (start, end): (usize, usize)) -> Diagnostic {
         let (token_start, found) = self.token_after(at);
         let at_end = token_start >= end;
@@ -218,7 +218,7 @@ impl Reader<'_> {
         }
         let before = self.end_of_token_before(token_start);
         if at_end || self.text[before..token_start].contains('\n') {
-            // The next line is innocent: what is missing is missing here.
+            // The next line is right: something is missing at the end of this one.
             return Diagnostic::error(code::SYNTAX, format!("expected {expected}"))
                 .at(Span::new(self.file, before, before), "here");
         }
@@ -253,7 +253,7 @@ impl Reader<'_> {
         let rest = &self.text[at..];
         let word =
             rest.find(|next: char| !(next.is_ascii_alphanumeric() || next == '_')).unwrap_or(rest.len());
-        // What a message quotes should fit on a line.
+        // A quotation in a message should fit on a line.
         let len = match word {
             0 => ["==", "!=", "<=", ">=", "=>", "->", ".."]
                 .iter()
@@ -282,8 +282,8 @@ impl Reader<'_> {
         }
     }
 
-    /// `language` must come first, once, and be known. `sound` says that nothing else is wrong:
-    /// only then is it certain that the line is missing and not merely unreadable.
+    /// Checks that `language` comes first and once, with a known version. `sound` says that nothing else is
+    /// wrong: only then is it certain that the line is missing and not merely unreadable.
     fn check_version(&self, tree: &File, sound: bool) -> Vec<Diagnostic> {
         let mut declared = tree.items.iter().filter_map(|item| Some((item.span, item.kind.as_language()?)));
         let Some((span, number)) = declared.next() else {

@@ -1,6 +1,6 @@
-//! Trees as text, in the one style there is. Comments are woven in when there is a source.
+//! Prints trees in the one style. If there is a source, its comments are printed too.
 //!
-//! The unit of work is the *entry*: whatever begins a line of its own, like a declaration, a
+//! The printer works by *entries*: an entry begins a line of its own, like a declaration, a
 //! parameter, an effect, a field, an arm or a step. Comments that stand before an entry stay before
 //! it, a comment at the end of its line stays there, and a comment in the middle of an entry moves
 //! before it. One blank line between entries is kept; more are not.
@@ -33,8 +33,8 @@ pub fn print_expr(expr: &Expr) -> String {
     expression(expr).flat()
 }
 
-/// The text of a tree that was read from `source`, with those of its comments that are not in the
-/// tree, in the order of the source.
+/// The text of a tree that was read from `source`. `comments` are those that are not in the tree, in the
+/// order of the source.
 pub fn print_with(file: &File, source: &str, comments: &[Comment]) -> String {
     let mut printer =
         Printer { out: String::new(), level: 0, source, comments, limit: source.len(), opened: true };
@@ -47,9 +47,9 @@ struct Printer<'a> {
     level: usize,
     /// Empty if the tree was built.
     source: &'a str,
-    /// Those not yet printed.
+    /// Comments that are not printed yet.
     comments: &'a [Comment],
-    /// Where the entry around the present one ends in the source: a comment behind that is not its.
+    /// End in the source of the block around the current entry: a later comment stands outside the block.
     limit: usize,
     /// Whether a block has just been opened: no blank line follows.
     opened: bool,
@@ -115,7 +115,7 @@ impl Printer<'_> {
         }
     }
 
-    /// An entry that is printed as a whole.
+    /// Prints an entry as a whole.
     fn entry(&mut self, span: Span, layout: &Layout) {
         self.comments_before(span.end);
         self.line(span.start);
@@ -123,7 +123,7 @@ impl Printer<'_> {
         self.trailing_comment(span.end);
     }
 
-    /// An entry that holds entries; `print` writes it, beginning on a new line.
+    /// Prints an entry that holds entries; `print` writes it, beginning on a new line.
     fn entry_of_entries(&mut self, span: Span, print: impl FnOnce(&mut Self)) {
         self.comments_before(span.start);
         self.line(span.start);
@@ -131,8 +131,8 @@ impl Printer<'_> {
         self.trailing_comment(span.end);
     }
 
-    /// Entries in braces, one a line; the opening brace is printed. `end` is where they end in the
-    /// source: comments up to there belong inside.
+    /// Prints entries in braces, one a line. `end` is where the block ends in the source: comments before
+    /// it belong inside.
     fn block(&mut self, end: usize, entries: impl FnOnce(&mut Self)) {
         let limit = std::mem::replace(&mut self.limit, end);
         self.out.push('{');
@@ -147,7 +147,7 @@ impl Printer<'_> {
         self.out.push('}');
     }
 
-    /// Lays something out from where the line has got to.
+    /// Prints a layout from the current column on.
     fn put(&mut self, layout: &Layout) {
         let text = layout.render(self.level * INDENT, self.column());
         self.out.push_str(&text);
@@ -158,7 +158,7 @@ impl Printer<'_> {
         self.out[line..].chars().count()
     }
 
-    /// Whether so much more fits on the line.
+    /// Whether the layout fits on the rest of the line.
     fn fits(&self, layout: &Layout) -> bool {
         self.column() + layout.flat().chars().count() <= WIDTH
     }
@@ -172,8 +172,8 @@ impl Printer<'_> {
     }
 
     fn item(&mut self, item: &Item, previous: Option<&Item>) {
-        // A declaration that was built stands apart from its neighbours, unless both are short and
-        // of a kind.
+        // A blank line separates declarations that were built, unless both are short and of one
+        // kind.
         let short = |item: &Item| item.docs.is_empty() && one_line(&item.kind);
         let together = |previous: &Item| {
             short(previous) && short(item) && previous.kind.keyword() == item.kind.keyword()
@@ -283,7 +283,7 @@ impl Printer<'_> {
             && self.comment_between(span.start, span.end)
     }
 
-    /// `head A | B`: on one line if it fits and nothing is said about the names one by one.
+    /// `head A | B`: on one line if it fits and no name has a comment of its own.
     fn list(&mut self, head: &str, separator: &str, names: &[Name], span: Span) {
         if !self.comment_between(span.start, span.end) {
             return self.put(&separated(head, separator, names));
@@ -313,8 +313,8 @@ impl Printer<'_> {
         self.out.push_str(words);
     }
 
-    /// What follows `=` or `:` of a declaration: `match` opens its arms there, anything else goes
-    /// to the next line if it must.
+    /// Prints the expression after `=` or `:` of a declaration. The arms of a `match` open on that line;
+    /// another expression goes to the next line if it does not fit.
     fn value(&mut self, value: &Expr) {
         if let ExprKind::Match { .. } = &value.kind {
             self.words(" ");
@@ -378,7 +378,7 @@ impl Printer<'_> {
         });
     }
 
-    /// Parameters, one a line.
+    /// Prints parameters, one a line.
     fn params(&mut self, params: &[ActionParam], end: usize) {
         let limit = std::mem::replace(&mut self.limit, self.source.len());
         self.words("(");
@@ -442,7 +442,7 @@ impl Printer<'_> {
     fn section(&mut self, keyword: &str, entries: &[Field]) {
         let (Some(first), Some(last)) = (entries.first(), entries.last()) else { return };
         let (start, end) = (first.span.start, last.span.end);
-        // Those before the first field end up above the section, also from inside the field.
+        // Comments before the first field, or inside it, move above the section.
         self.comments_before(first.span.end);
         self.plain_line(false);
         self.words(&format!("{keyword} "));

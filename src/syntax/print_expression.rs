@@ -4,17 +4,17 @@ use crate::syntax::ast::{Arg, Arm, BinaryOp, Call, Expr, ExprKind, Field, Number
 use crate::syntax::expression::{NEGATE_PRECEDENCE, NOT_PRECEDENCE, RANGE_PRECEDENCE, strength};
 use crate::syntax::layout::Layout;
 
-/// Binding strength of what needs no parentheses anywhere but before `.` and `[`.
+/// Binding strength of an expression that needs parentheses before `.` and `[` alone.
 const OPERAND: u8 = u8::MAX - 1;
-/// Binding strength of what may stand before `.` and `[`.
+/// Binding strength of an expression that never needs parentheses.
 const BASE: u8 = u8::MAX;
 
-/// An expression wherever any expression may stand.
+/// An expression in a place where any expression may stand.
 pub fn expression(expr: &Expr) -> Layout {
     within(expr, 0)
 }
 
-/// An expression where only those that bind at least so tightly go without parentheses.
+/// An expression, in parentheses unless it binds at least as tightly as `least`.
 fn within(expr: &Expr, least: u8) -> Layout {
     let bare = bare(expr);
     if binding(expr) < least { Layout::row([Layout::text("("), bare, Layout::text(")")]) } else { bare }
@@ -164,7 +164,7 @@ pub fn quoted(value: &str) -> String {
             '\\' => out.push_str("\\\\"),
             '\n' => out.push_str("\\n"),
             '\t' => out.push_str("\\t"),
-            // Whatever could change how the line looks is spelt out.
+            // Characters that could change how the line looks are printed as escapes.
             '\u{200e}' | '\u{200f}' | '\u{061c}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}' => {
                 out.push_str(&format!("\\u{{{:x}}}", u32::from(character)));
             }
@@ -186,7 +186,8 @@ pub fn begins_with_minus(expr: &Expr) -> bool {
     }
 }
 
-/// An expression where the line before it could be continued by a minus.
+/// An expression at the begin of a line. With a leading minus it would continue the line before, so it
+/// gets parentheses.
 pub fn expression_on_new_line(expr: &Expr) -> Layout {
     if begins_with_minus(expr) { within(expr, BASE) } else { expression(expr) }
 }

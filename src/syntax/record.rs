@@ -43,7 +43,7 @@ pub struct LabelRecord {
     pub primary: bool,
 }
 
-/// A change that a machine may make.
+/// A change that a tool may make.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FixRecord {
     pub title: String,
@@ -54,11 +54,11 @@ pub struct FixRecord {
 pub struct EditRecord {
     #[serde(flatten)]
     pub place: PlaceRecord,
-    /// What stands there afterwards.
+    /// The text that stands there after the change.
     pub text: String,
 }
 
-/// The same diagnostic as data.
+/// Turns a diagnostic into data.
 pub fn record(diagnostic: &Diagnostic, sources: &Sources) -> DiagnosticRecord {
     let labels = diagnostic.labels.iter().map(|label| LabelRecord {
         place: place(label.span, sources),
@@ -96,8 +96,8 @@ fn place(span: Span, sources: &Sources) -> PlaceRecord {
     }
 }
 
-/// The text of a file after the first fix of each diagnostic that lies in it, and how many were
-/// made. A fix that overlaps an earlier one is left for the next time.
+/// The text of a file after the first fix of each of its diagnostics, and how many fixes were made. A
+/// fix that overlaps an earlier one is left for the next call.
 pub fn apply_fixes(file: FileId, text: &str, diagnostics: &[Diagnostic]) -> (String, usize) {
     let mut edits: Vec<&Edit> = Vec::new();
     let mut made = 0;

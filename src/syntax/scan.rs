@@ -1,5 +1,5 @@
-//! One pass over a text before the grammar sees it: comments, brackets, and characters that have
-//! no business there.
+//! One pass over a text before the grammar sees it: comments, brackets, and characters that the
+//! language does not have.
 //!
 //! The grammar recurses only through brackets, so their depth, which is measured here, bounds its
 //! stack whatever the input. Texts and comments are skipped by the same rules as in `ava.pest`.
@@ -120,7 +120,7 @@ impl Scanner<'_> {
         self.hidden_characters(start);
     }
 
-    /// `/* … */` is another language's comment. What is inside says nothing, so it is passed over.
+    /// Reports `/* … */`, a comment of other languages, and skips what is inside.
     fn foreign_comment(&mut self) {
         let start = self.at;
         let inside = start + "/*".len();
@@ -183,15 +183,15 @@ impl Scanner<'_> {
         }
     }
 
-    /// A closer that fits an open bracket closes it and what was forgotten inside it; one that fits
-    /// none is left to the grammar.
+    /// Closes the innermost open bracket that fits; brackets that are still open inside it are unclosed. A
+    /// closing bracket that fits none is left to the grammar.
     fn closes(&mut self, bracket: char) {
         let opener = match bracket {
             ')' => '(',
             ']' => '[',
             _ => '{',
         };
-        // Only the innermost few are looked at, so that hostile input stays linear.
+        // Only the innermost few are searched, so that hostile input takes linear time.
         let innermost = self.open.iter().rev().take(DEPTH_MAX);
         if let Some(back) = innermost.map(|(open, _)| *open).position(|open| open == opener) {
             let keep = self.open.len() - 1 - back;
@@ -200,7 +200,7 @@ impl Scanner<'_> {
         }
     }
 
-    /// Characters that make a text look like what it is not: bidirectional overrides and the like.
+    /// Reports characters that make a text look like another: bidirectional overrides and the like.
     fn hidden_characters(&mut self, start: usize) {
         for (offset, character) in self.text[start..self.at].char_indices() {
             if is_bidi(character) {
@@ -211,7 +211,7 @@ impl Scanner<'_> {
         }
     }
 
-    /// A run of characters that mean nothing outside comments and texts.
+    /// Reports a run of characters that mean nothing outside comments and texts.
     fn invalid(&mut self) {
         let start = self.at;
         let rest = &self.text[start..];
@@ -228,7 +228,7 @@ impl Scanner<'_> {
                 && (!character.is_ascii() || character.is_ascii_control())
                 && !matches!(character, '\n' | '\t' | '\r')
         };
-        // A sign with a known counterpart stands alone, so that the advice fits it.
+        // A sign with a known counterpart is reported alone, so that the advice fits it.
         let taken = if meant.is_some() { 1 } else { usize::MAX };
         self.at += rest.chars().take_while(run).take(taken).map(char::len_utf8).sum::<usize>();
         let span = self.span(start);
@@ -266,7 +266,7 @@ fn bidi(character: char, span: Span) -> Diagnostic {
     .fix("delete it", span, "")
 }
 
-/// What an author meant by a sign that a word processor made prettier.
+/// The plain sign that an author meant, where a word processor put a prettier one.
 fn meant(character: char) -> Option<&'static str> {
     Some(match character {
         '“' | '”' | '„' | '«' | '»' => "\"",

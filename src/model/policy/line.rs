@@ -1,11 +1,11 @@
-//! The readable face of a policy: lines of which the first that applies acts.
+//! The readable face of a policy: its lines. The first line that applies acts.
 //!
 //! A condition compares one variable with one value; a line applies if all of its conditions hold. The first
 //! row of the line that is legal at the moment acts; if none is legal, the step passes without an action.
 
 use crate::model::expr::Comparison;
 
-/// A line: where all conditions hold, the first of the rows that is legal.
+/// A line: if all conditions hold, the first legal row acts.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PolicyRule {
     /// Empty for `_`.

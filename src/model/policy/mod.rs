@@ -1,4 +1,4 @@
-//! Policies: what an agent has learned, as a file says it.
+//! Policies: what an agent has learned, as it stands in a file.
 //!
 //! The network's numbers mean nothing here: only their count and the file's digest are checked, and `agent`
 //! gives them meaning. The readable face (`line`) is checked completely.
@@ -51,7 +51,7 @@ pub struct PolicyOrigin {
     /// Settings of the driving system that are not its defaults, as one line of YAML.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub profile: Option<String>,
-    /// Digest of all its settings, where it was given any.
+    /// Digest of all settings of the driving system; `None` if it was given none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub profile_digest: Option<String>,
     pub engine: String,
@@ -83,15 +83,15 @@ pub struct PolicyClaims {
     pub rules: Option<RulesClaims>,
 }
 
-/// What the readable face of a policy says of itself. Shares and means are rounded to four decimals.
+/// What a policy claims of its readable face. Shares and means are rounded to four decimals.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RulesClaims {
-    /// Number of states in which it was compared with the network: all that its episodes reached.
+    /// Number of states in which the rules were compared with the network: all that their episodes reached.
     pub states: u64,
-    /// Share of the states in which both choose the same row.
+    /// Share of these states in which both choose one and the same row.
     pub fidelity: f64,
-    /// Mean Q-value lost by its choice, as the network sees it.
+    /// Mean Q-value that the choices of the rules lose, by the network's own Q-values.
     pub regret: f64,
     pub collisions: u64,
     pub counted: u64,

@@ -1,7 +1,7 @@
-//! The variables that the rules of a policy may speak of: the paper's 19, then those beyond.
+//! The variables that the rules of a policy may name: the paper's 19, then those beyond.
 //!
-//! The order is that of an observation, and the values are its values. What is a category there has
-//! words here. The names are ours, in the spelling of the language; the paper's stand beside them.
+//! Order and values are those of an observation; a category has a word for each of its values. The names
+//! are ours, in the spelling of the language; the paper's stand beside them.
 
 use crate::units;
 use crate::units::{Dimension, Rational};
@@ -10,21 +10,21 @@ use crate::units::{Dimension, Rational};
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Variable {
     pub name: &'static str,
-    /// What an observation calls it: the paper's spelling, where the paper has it.
+    /// The variable's name in an observation: the paper's spelling, if the paper has the variable.
     pub observed_as: &'static str,
     pub kind: VariableKind,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum VariableKind {
-    /// A number of this unit word (empty: a plain number) between two ends that it cannot pass.
+    /// A number in this unit (empty: a plain number), between two bounds that it cannot pass.
     Quantity { unit: &'static str, low: Option<f64>, high: Option<f64> },
     /// One of these words, each with its value in an observation.
     Words { words: &'static [(&'static str, f32)], ordered: bool },
 }
 
 impl Variable {
-    /// Dimension of its numbers.
+    /// Dimension of the variable's numbers.
     pub fn dimension(&self) -> Dimension {
         match self.kind {
             VariableKind::Quantity { unit, .. } => {
@@ -34,7 +34,7 @@ impl Variable {
         }
     }
 
-    /// How many SI units one of its unit is.
+    /// The value of one of its units in SI.
     pub fn factor(&self) -> Rational {
         match self.kind {
             VariableKind::Quantity { unit, .. } => {
@@ -44,7 +44,7 @@ impl Variable {
         }
     }
 
-    /// The word for a value of an observation; none where it is a quantity.
+    /// The word for a value of an observation; `None` for a quantity.
     pub fn word(&self, value: f32) -> Option<&'static str> {
         let VariableKind::Words { words, .. } = self.kind else { return None };
         words.iter().find(|(_, of)| *of == value).map(|(word, _)| *word)
@@ -93,7 +93,7 @@ const fn words(
 pub const VARIABLES: &[Variable] = &[
     between(("weather", "weather"), "", 0.0, 111.0),
     words("time", "timeOfDay", &[("Morning", 10.0), ("Noon", 14.0), ("Night", 20.0)]),
-    // Yellow and no light at all are one value of the paper's.
+    // Yellow and no light share one value in the paper.
     words("traffic_light", "trafficLight", &[("Red", -1.0), ("Neither", 0.0), ("Green", 1.0)]),
     from_zero("obstacles", "numObs", ""),
     from_zero("dist_nearest", "distToNearestObs", "m"),
