@@ -10,6 +10,7 @@ mod modular;
 mod reference;
 mod registry;
 mod selected;
+mod settings;
 mod status;
 mod steering;
 #[cfg(test)]

@@ -7,67 +7,38 @@
 use std::sync::{Arc, LazyLock};
 
 use nalgebra::{Matrix4, Vector4};
-use serde::{Deserialize, Serialize};
 
 use crate::geometry::{Pose, wrap_angle};
 use crate::sim::{DT_S, EgoMotion, VehicleParameters};
 
 use super::guide::Guide;
+use super::settings::section;
 
 /// Number of speeds in the table: 1 to 30 m/s.
 const SPEEDS: usize = 30;
 const ITERATIONS_MAX: usize = 600;
 const CONVERGED: f64 = 1e-4;
 
-/// Settings of the lateral controller.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct SteeringConfig {
-    /// Weight of the lateral error, in `[0.001, 100]`. Apollo `matrix_q`: 0.05.
-    pub weight_offset: f64,
-    /// Weight of the heading error, in `[0.001, 100]`. Apollo `matrix_q`: 1.0.
-    pub weight_heading: f64,
-    /// Weight of the steering angle, in `[0.01, 100]`. Apollo `matrix_r`: 1.0.
-    pub weight_steer: f64,
-    /// Cornering stiffness of an axle, N/rad, in `[1000, 10000000]`. Apollo `cf`, `cr`: 155494.663.
-    pub cornering_stiffness_nprad: f64,
-    /// Mass of the vehicle, kg, in `[100, 100000]`. Apollo: four wheels of 530.
-    pub mass_kg: f64,
-    /// Lateral acceleration that bounds the steering angle, m/s², in `[0.5, 20]`. Apollo `max_lateral_acceleration`: 5.0.
-    pub lateral_acceleration_mps2_max: f64,
-    /// The curvature is read this far ahead to make up for the lag of the steering, s, in `[0, 1]`. Ours.
-    pub preview_s: f64,
-    /// Below this speed the wheel is not moved, m/s, in `[0.01, 2]`. Apollo `lock_steer_speed`: 0.081.
-    pub lock_speed_mps: f64,
-}
-
-impl Default for SteeringConfig {
-    fn default() -> SteeringConfig {
-        SteeringConfig {
-            weight_offset: 0.05,
-            weight_heading: 1.0,
-            weight_steer: 1.0,
-            cornering_stiffness_nprad: 155_494.663,
-            mass_kg: 1000.0 * VehicleParameters::MKZ.mass_t,
-            lateral_acceleration_mps2_max: 5.0,
-            preview_s: 0.3,
-            lock_speed_mps: 0.081,
-        }
+section! {
+    /// Settings of the lateral controller.
+    pub struct SteeringConfig {
+        /// Weight of the lateral error, in `[0.001, 100]`. Apollo `matrix_q`: 0.05.
+        weight_offset: f64 = 0.05, 0.001..=100.0;
+        /// Weight of the heading error, in `[0.001, 100]`. Apollo `matrix_q`: 1.0.
+        weight_heading: f64 = 1.0, 0.001..=100.0;
+        /// Weight of the steering angle, in `[0.01, 100]`. Apollo `matrix_r`: 1.0.
+        weight_steer: f64 = 1.0, 0.01..=100.0;
+        /// Cornering stiffness of an axle, N/rad, in `[1000, 10000000]`. Apollo `cf`, `cr`: 155494.663.
+        cornering_stiffness_nprad: f64 = 155_494.663, 1000.0..=10_000_000.0;
+        /// Mass of the vehicle, kg, in `[100, 100000]`. Apollo: four wheels of 530.
+        mass_kg: f64 = 1000.0 * VehicleParameters::MKZ.mass_t, 100.0..=100_000.0;
+        /// Lateral acceleration that bounds the steering angle, m/s², in `[0.5, 20]`. Apollo `max_lateral_acceleration`: 5.0.
+        lateral_acceleration_mps2_max: f64 = 5.0, 0.5..=20.0;
+        /// The curvature is read this far ahead to make up for the lag of the steering, s, in `[0, 1]`. Ours.
+        preview_s: f64 = 0.3, 0.0..=1.0;
+        /// Below this speed the wheel is not moved, m/s, in `[0.01, 2]`. Apollo `lock_steer_speed`: 0.081.
+        lock_speed_mps: f64 = 0.081, 0.01..=2.0;
     }
-}
-
-impl SteeringConfig {
-    /// Least and greatest value of every number.
-    pub(super) const RANGES: &[(&str, f64, f64)] = &[
-        ("weight_offset", 0.001, 100.0),
-        ("weight_heading", 0.001, 100.0),
-        ("weight_steer", 0.01, 100.0),
-        ("cornering_stiffness_nprad", 1000.0, 10_000_000.0),
-        ("mass_kg", 100.0, 100_000.0),
-        ("lateral_acceleration_mps2_max", 0.5, 20.0),
-        ("preview_s", 0.0, 1.0),
-        ("lock_speed_mps", 0.01, 2.0),
-    ];
 }
 
 /// How a path lies beside the guide at a station.

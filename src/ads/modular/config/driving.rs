@@ -3,9 +3,8 @@
 use serde::{Deserialize, Serialize};
 
 use crate::ads::guide::SpeedRules;
+use crate::ads::settings::section;
 use crate::ads::steering::SteeringConfig;
-
-use super::settings::section;
 
 section! {
     /// Where objects will be.

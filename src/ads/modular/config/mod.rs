@@ -9,7 +9,6 @@ mod driving;
 mod module;
 mod read;
 mod sensing;
-mod settings;
 mod weaknesses;
 
 use serde::{Deserialize, Serialize};

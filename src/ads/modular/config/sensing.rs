@@ -1,6 +1,6 @@
 //! Settings of the parts that find out what is: localisation, perception, tracking.
 
-use super::settings::section;
+use crate::ads::settings::section;
 
 section! {
     /// Pose error of RTK and LiDAR map matching.

@@ -28,7 +28,7 @@ macro_rules! section {
 
         impl $section {
             /// Least and greatest value of every number.
-            pub(super) const RANGES: &[(&str, f64, f64)] =
+            pub(in crate::ads) const RANGES: &[(&str, f64, f64)] =
                 &[$($((stringify!($name), $low, $high),)?)*];
         }
     };
