@@ -10,6 +10,7 @@ use super::status::Status;
 
 /// The first driver until a moment, the second from then on. Until then the second drives, too, but its
 /// commands are not obeyed.
+#[derive(Clone)]
 pub struct Handover {
     first: Box<dyn Ads>,
     second: Box<dyn Ads>,
@@ -34,14 +35,5 @@ impl Ads for Handover {
 
     fn status(&self) -> &Status {
         if self.is_over { self.second.status() } else { self.first.status() }
-    }
-
-    fn clone_box(&self) -> Box<dyn Ads> {
-        Box::new(Handover {
-            first: self.first.clone_box(),
-            second: self.second.clone_box(),
-            at_s: self.at_s,
-            is_over: self.is_over,
-        })
     }
 }

@@ -114,7 +114,7 @@ fn all_keep_a_straight_lane_repeat_themselves_and_copy() {
         assert!(first.gap_m_min > 1.2, "{}: {}", entry.name, first.gap_m_min);
         assert_eq!(first.ads.status(), again.ads.status());
 
-        let mut copy = first.ads.clone_box();
+        let mut copy = first.ads.clone();
         for _ in 0..200 {
             first.measure();
             assert_eq!(copy.drive(&first.sensed), first.tick(), "{}", entry.name);

@@ -53,10 +53,6 @@ impl Ads for Broken {
     fn status(&self) -> &Status {
         self.driver.status()
     }
-
-    fn clone_box(&self) -> Box<dyn Ads> {
-        Box::new(self.clone())
-    }
 }
 
 fn vehicle(world: &mut World, distance_m: f64, speed_mps: f64) {

@@ -256,7 +256,7 @@ fn attempt(moment: &Moment, draw: &Draw) -> Try {
     let scene = Arc::clone(world.scene());
     for (request, id) in newcomers {
         found.unfair = found.unfair.or_else(|| fairness::complaint(&world, &request, id));
-        let mut ads = moment.ads.clone_box();
+        let mut ads = moment.ads.clone();
         let mut sensed: Sensed = world.sensed();
         let Some(seen) = sighting::watch(world.clone(), ads.as_mut(), &mut sensed, id, judge::HORIZON_S)
         else {

@@ -153,8 +153,4 @@ impl Ads for Modular {
     fn status(&self) -> &Status {
         &self.status
     }
-
-    fn clone_box(&self) -> Box<dyn Ads> {
-        Box::new(self.clone())
-    }
 }

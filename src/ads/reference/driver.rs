@@ -172,8 +172,4 @@ impl<M: Model> Ads for Reference<M> {
     fn status(&self) -> &Status {
         self.route.status()
     }
-
-    fn clone_box(&self) -> Box<dyn Ads> {
-        Box::new(self.clone())
-    }
 }

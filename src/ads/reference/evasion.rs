@@ -89,8 +89,4 @@ impl Ads for Evasion {
     fn status(&self) -> &Status {
         &self.status
     }
-
-    fn clone_box(&self) -> Box<dyn Ads> {
-        Box::new(self.clone())
-    }
 }

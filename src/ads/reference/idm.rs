@@ -322,10 +322,6 @@ impl Ads for Idm {
     fn status(&self) -> &Status {
         &self.status
     }
-
-    fn clone_box(&self) -> Box<dyn Ads> {
-        Box::new(self.clone())
-    }
 }
 
 /// The model's acceleration, m/s², with the gap (m) and speed (m/s) of what is ahead.
