@@ -149,12 +149,6 @@ pub fn first_contact(a: &Sweep, b: &Sweep) -> Option<FirstContact> {
     }
 }
 
-/// Distance along a ray to a box, m, if it is hit within `reach_m`; 0 from inside. `direction` is a
-/// unit vector.
-pub fn ray_hit_m(origin: Vec2, direction: Vec2, reach_m: f64, target: &OrientedBox) -> Option<f64> {
-    Frame::of(target).ray_hit_m(origin, direction, reach_m)
-}
-
 /// A box with its axes worked out once, for several questions about distances.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Frame {
@@ -339,32 +333,28 @@ fn clipped(polygon: &[Vec2], inside: impl Fn(Vec2) -> f64) -> Vec<Vec2> {
 }
 
 #[cfg(test)]
-fn cuboid(shape: &OrientedBox) -> parry2d::shape::Cuboid {
-    parry2d::shape::Cuboid::new(parry2d::math::Vector::new(shape.half_length_m, shape.half_width_m))
-}
-
-#[cfg(test)]
-fn parry_pose(shape: &OrientedBox) -> parry2d::math::Pose {
-    parry2d::math::Pose::new(to_parry(shape.pose.position), shape.pose.heading_rad)
-}
-
-#[cfg(test)]
-fn parry_distance_m(a: &OrientedBox, b: &OrientedBox) -> f64 {
-    parry2d::query::distance(&parry_pose(a), &cuboid(a), &parry_pose(b), &cuboid(b))
-        .expect("two boxes are always comparable")
-        .distance
-}
-
-#[cfg(test)]
-fn to_parry(point: Vec2) -> parry2d::math::Vector {
-    parry2d::math::Vector::new(point.x, point.y)
-}
-
-#[cfg(test)]
 mod tests {
     use super::*;
     use parry2d::query::RayCast;
     use proptest::prelude::*;
+
+    fn cuboid(shape: &OrientedBox) -> parry2d::shape::Cuboid {
+        parry2d::shape::Cuboid::new(parry2d::math::Vector::new(shape.half_length_m, shape.half_width_m))
+    }
+
+    fn parry_pose(shape: &OrientedBox) -> parry2d::math::Pose {
+        parry2d::math::Pose::new(to_parry(shape.pose.position), shape.pose.heading_rad)
+    }
+
+    fn parry_distance_m(a: &OrientedBox, b: &OrientedBox) -> f64 {
+        parry2d::query::distance(&parry_pose(a), &cuboid(a), &parry_pose(b), &cuboid(b))
+            .expect("two boxes are always comparable")
+            .distance
+    }
+
+    fn to_parry(point: Vec2) -> parry2d::math::Vector {
+        parry2d::math::Vector::new(point.x, point.y)
+    }
 
     prop_compose! {
         fn any_box()(x_m in -8.0_f64..8.0, y_m in -8.0_f64..8.0, heading_rad in -3.2_f64..3.2,
@@ -380,7 +370,7 @@ mod tests {
             let (origin, direction) = (Vec2::new(x_m, y_m), Pose::new(0.0, 0.0, heading_rad).forward());
             let ray = parry2d::query::Ray::new(to_parry(origin), to_parry(direction));
             let parrys = cuboid(&target).cast_ray(&parry_pose(&target), &ray, reach_m, true);
-            match (ray_hit_m(origin, direction, reach_m, &target), parrys) {
+            match (Frame::of(&target).ray_hit_m(origin, direction, reach_m), parrys) {
                 (Some(ours_m), Some(parrys_m)) => prop_assert!((ours_m - parrys_m).abs() < 1e-6),
                 (None, None) => {}
                 // The two may differ only on a ray that grazes a corner or ends on a side.
@@ -388,7 +378,7 @@ mod tests {
                     let grown = |by_m: f64| {
                         let (length_m, width_m) = (2.0 * target.half_length_m, 2.0 * target.half_width_m);
                         let grown = OrientedBox::new(target.pose, length_m + by_m, width_m + by_m);
-                        ray_hit_m(origin, direction, reach_m, &grown).is_some()
+                        Frame::of(&grown).ray_hit_m(origin, direction, reach_m).is_some()
                     };
                     prop_assert!(grown(1e-6) && !grown(-1e-6), "{ours:?} {parrys:?}");
                 }
@@ -437,12 +427,6 @@ mod tests {
     }
 
     #[test]
-    fn distance_is_between_surfaces() {
-        assert!((distance_m(&car(0.0, 0.0, 0.0), &car(10.0, 0.0, 0.0)) - 6.0).abs() < 1e-9);
-        assert_eq!(distance_m(&car(0.0, 0.0, 0.0), &car(1.0, 1.0, 0.5)), 0.0);
-    }
-
-    #[test]
     fn a_fast_crossing_is_not_missed() {
         // In one motion the second box passes wholly through the first.
         let still = Sweep { start: car(0.0, 0.0, 0.0), end: Pose::new(0.0, 0.0, 0.0) };
@@ -454,21 +438,5 @@ mod tests {
         // Its front touches at y = -1, that is after 47 of 100 m.
         assert!((contact.fraction - 0.47).abs() < 1e-5, "{contact:?}");
         assert!((contact.point.y + 1.0).abs() < 1e-3, "{contact:?}");
-    }
-
-    #[test]
-    fn a_near_miss_is_none() {
-        let still = Sweep { start: car(0.0, 0.0, 0.0), end: Pose::new(0.0, 0.0, 0.0) };
-        let passing = Sweep { start: car(-20.0, 2.01, 0.0), end: Pose::new(20.0, 2.01, 0.0) };
-        assert_eq!(first_contact(&still, &passing), None);
-        let grazing = Sweep { start: car(-20.0, 1.99, 0.0), end: Pose::new(20.0, 1.99, 0.0) };
-        assert!(first_contact(&still, &grazing).is_some());
-    }
-
-    #[test]
-    fn a_ray_finds_the_near_face() {
-        let hit = ray_hit_m(Vec2::new(-10.0, 0.0), Vec2::new(1.0, 0.0), 100.0, &car(0.0, 0.0, 0.0));
-        assert!((hit.expect("it is ahead") - 8.0).abs() < 1e-9);
-        assert_eq!(ray_hit_m(Vec2::new(-10.0, 0.0), Vec2::new(-1.0, 0.0), 100.0, &car(0.0, 0.0, 0.0)), None);
     }
 }

@@ -8,8 +8,7 @@
 
 use crate::geometry::wrap_angle;
 
-use super::lane_change::Stretch;
-use super::map::{LaneIndex, RoadMap, Side};
+use super::map::{LaneIndex, RoadMap};
 
 /// Lanes are parallel if their headings, or one and the reverse of the other, are this near, rad.
 const PARALLEL_RAD: f64 = 0.35;
@@ -109,28 +108,6 @@ impl RoadMap {
         // Rounding leaves tiny gaps between lanes that share a line.
         let median_m = if gap_m > 1e-3 { gap_m } else { 0.0 };
         (median_m <= MEDIAN_M_MAX).then_some(Opposing { lane, station_m, lateral_m, median_m })
-    }
-
-    /// The neighbouring lane into which a vehicle may change at a station: same road, same direction, no median
-    /// between, permitted by the markings, and wide enough.
-    pub fn changeable(&self, lane: LaneIndex, side: Side, station_m: f64) -> Option<LaneIndex> {
-        let lane = self.lane(lane);
-        let mut permitted = lane.changes_m(side).iter();
-        permitted.any(|(from_m, to_m)| (*from_m..=*to_m).contains(&station_m)).then_some(())?;
-        lane.neighbour(side).map(|neighbour| neighbour.lane)
-    }
-
-    /// Where a change from a lane to a side is permitted, from a station on: for each stretch its first station
-    /// and its length, lanes ahead included, m.
-    pub fn changes_from_m(&self, lane: LaneIndex, side: Side, station_m: f64) -> Vec<(f64, f64)> {
-        let stretches = Stretch::from(self, lane, side, station_m);
-        stretches.iter().map(|stretch| (stretch.pairs[0].from_m, stretch.length_m())).collect()
-    }
-
-    /// How far a lane change that begins at a station may last, lanes ahead included, m; 0 where none may
-    /// begin.
-    pub fn change_room_m(&self, lane: LaneIndex, side: Side, station_m: f64) -> f64 {
-        Stretch::room_m(self, lane, side, station_m)
     }
 
     /// The ways through a junction, by rising index of the lanes they come from and use.

@@ -171,19 +171,23 @@ fn holds(outline: &[Vec2], point: Vec2) -> bool {
 mod tests {
     use super::*;
 
+    fn straight(from: (f64, f64), to: (f64, f64)) -> Path {
+        Path::new([from, to].map(|(x_m, y_m)| (Vec2::new(x_m, y_m), 0.0, 0.0))).unwrap()
+    }
+
     #[test]
     fn paths_cross_where_they_do() {
-        let east = Path::line(Vec2::new(0.0, 0.0), Vec2::new(10.0, 0.0)).unwrap();
-        let north = Path::line(Vec2::new(4.0, -3.0), Vec2::new(4.0, 3.0)).unwrap();
+        let east = straight((0.0, 0.0), (10.0, 0.0));
+        let north = straight((4.0, -3.0), (4.0, 3.0));
         assert_eq!(crossings(&east, &north), [(4.0, 3.0)]);
-        let beside = Path::line(Vec2::new(0.0, 1.0), Vec2::new(10.0, 1.0)).unwrap();
+        let beside = straight((0.0, 1.0), (10.0, 1.0));
         assert!(crossings(&east, &beside).is_empty());
         assert_eq!(merge(&east, &beside), Some((0.0, 0.0)));
     }
 
     #[test]
     fn a_path_is_inside_a_polygon_between_its_edges() {
-        let east = Path::line(Vec2::new(0.0, 0.0), Vec2::new(10.0, 0.0)).unwrap();
+        let east = straight((0.0, 0.0), (10.0, 0.0));
         let corners = [(2.0, -1.0), (5.0, -1.0), (5.0, 1.0), (2.0, 1.0)];
         let square: Vec<Vec2> = corners.iter().map(|(x, y)| Vec2::new(*x, *y)).collect();
         assert_eq!(spans_inside(&east, &square), [(2.0, 5.0)]);

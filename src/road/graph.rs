@@ -8,7 +8,7 @@ use super::centre_line::{CentreLine, NoCentreLine, centre_line};
 use super::index::LaneGrid;
 use super::lane_change::permitted;
 use super::map::{Junction, Lane, LaneIndex, LaneKey, Neighbour, RoadError, RoadMap, Turn};
-use super::opendrive::{Contact, Document, RoadElement, RoadLink, SectionElement};
+use super::opendrive::{Contact, Document, RoadElement, RoadLink, SectionElement, wrong};
 use super::signals::{add_crosswalks, add_signals};
 
 /// The limit of a road whose file states none: 50 km/h, usual in towns.
@@ -137,10 +137,7 @@ impl<'a> Builder<'a> {
                     let index = LaneIndex(self.map.lanes.len());
                     self.lanes.insert((road_index, section_index, element.id), index);
                     let limit_mps = limit_mps.unwrap_or(LIMIT_MPS_DEFAULT);
-                    self.map.lanes.push(Lane {
-                        keeps_left: road.left_hand,
-                        ..new_lane(key, centre, limit_mps, junction)
-                    });
+                    self.map.lanes.push(new_lane(key, centre, limit_mps, road.left_hand, junction));
                 }
             }
         }
@@ -380,11 +377,6 @@ fn loose_links(map: &RoadMap) -> Option<String> {
     ))
 }
 
-/// An error at a line of the file.
-pub fn wrong(line: u32, message: impl Into<String>) -> RoadError {
-    RoadError::Map { line, message: message.into() }
-}
-
 fn end_section(road: &RoadElement, contact: Contact) -> usize {
     match contact {
         Contact::Start => 0,
@@ -392,14 +384,20 @@ fn end_section(road: &RoadElement, contact: Contact) -> usize {
     }
 }
 
-fn new_lane(key: LaneKey, centre: CentreLine, speed_limit_mps: f64, junction: Option<usize>) -> Lane {
+fn new_lane(
+    key: LaneKey,
+    centre: CentreLine,
+    speed_limit_mps: f64,
+    keeps_left: bool,
+    junction: Option<usize>,
+) -> Lane {
     Lane {
         key,
         turn: if junction.is_some() { turn(&centre.path) } else { Turn::Straight },
         centre: centre.path,
         widths_m: centre.widths_m,
         speed_limit_mps,
-        keeps_left: false,
+        keeps_left,
         successors: Vec::new(),
         predecessors: Vec::new(),
         left: None,

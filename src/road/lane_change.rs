@@ -148,28 +148,6 @@ impl Stretch {
         begun.collect()
     }
 
-    /// How far a lane change that begins at a station may last, m; 0 where none may begin. It is the length of
-    /// the stretch from there, computed without building the stretch, because drivers ask ten times a second. A
-    /// loop that does not come back to the first lane is followed up to [`STRETCH_M_MAX`].
-    pub fn room_m(map: &RoadMap, source: LaneIndex, side: Side, station_m: f64) -> f64 {
-        let lane = map.lane(source);
-        let Some(target) = lane.neighbour(side).map(|neighbour| neighbour.lane) else { return 0.0 };
-        let here = |(from_m, to_m): &&(f64, f64)| *from_m < station_m + AT_ONCE_M && *to_m > station_m;
-        let Some((from_m, to_m)) = lane.changes_m(side).iter().find(here) else { return 0.0 };
-        let mut last = Pair { source, target, from_m: from_m.max(station_m), to_m: *to_m };
-        let mut room_m = last.to_m - last.from_m;
-        while room_m < STRETCH_M_MAX {
-            match last.next(map, side) {
-                Some(next) if next.source != source => {
-                    room_m += next.to_m;
-                    last = next;
-                }
-                _ => break,
-            }
-        }
-        room_m
-    }
-
     /// Appends the lanes ahead as long as they stay side by side.
     fn extended(mut self, map: &RoadMap) -> Stretch {
         while self.length_m() < STRETCH_M_MAX {
@@ -252,6 +230,38 @@ impl Stretch {
             self.lane(map, place).centre.pose_at(place.station_m),
             target.centre.pose_at(self.target_station_m(map, place)),
         )
+    }
+}
+
+impl RoadMap {
+    /// Where a change from a lane to a side is permitted, from a station on: for each stretch its first station
+    /// and its length, lanes ahead included, m.
+    pub fn changes_from_m(&self, lane: LaneIndex, side: Side, station_m: f64) -> Vec<(f64, f64)> {
+        let stretches = Stretch::from(self, lane, side, station_m);
+        stretches.iter().map(|stretch| (stretch.pairs[0].from_m, stretch.length_m())).collect()
+    }
+
+    /// How far a lane change that begins at a station may last, lanes ahead included, m; 0 where none may
+    /// begin. It is the length of the stretch from there, computed without building the stretch, because drivers
+    /// ask ten times a second. A loop that does not come back to the first lane is followed up to
+    /// [`STRETCH_M_MAX`].
+    pub fn change_room_m(&self, source: LaneIndex, side: Side, station_m: f64) -> f64 {
+        let lane = self.lane(source);
+        let Some(target) = lane.neighbour(side).map(|neighbour| neighbour.lane) else { return 0.0 };
+        let here = |(from_m, to_m): &&(f64, f64)| *from_m < station_m + AT_ONCE_M && *to_m > station_m;
+        let Some((from_m, to_m)) = lane.changes_m(side).iter().find(here) else { return 0.0 };
+        let mut last = Pair { source, target, from_m: from_m.max(station_m), to_m: *to_m };
+        let mut room_m = last.to_m - last.from_m;
+        while room_m < STRETCH_M_MAX {
+            match last.next(self, side) {
+                Some(next) if next.source != source => {
+                    room_m += next.to_m;
+                    last = next;
+                }
+                _ => break,
+            }
+        }
+        room_m
     }
 }
 

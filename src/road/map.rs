@@ -262,11 +262,7 @@ impl Lane {
 
     /// Width at a station, clamped to the lane, m.
     pub fn width_at(&self, station_m: f64) -> f64 {
-        let points = self.centre.points();
-        let after = points.partition_point(|point| point.station_m <= station_m).clamp(1, points.len() - 1);
-        let (a, b) = (&points[after - 1], &points[after]);
-        let fraction = ((station_m - a.station_m) / (b.station_m - a.station_m)).clamp(0.0, 1.0);
-        self.widths_m[after - 1] + (self.widths_m[after] - self.widths_m[after - 1]) * fraction
+        self.interpolated(&self.widths_m, station_m)
     }
 
     /// The lane's own station beside a station of the road's reference line, clamped to the lane, m.
@@ -283,12 +279,13 @@ impl Lane {
 
     /// Station of the road's reference line beside a station of the lane, clamped to the lane, m.
     pub fn road_station_m(&self, station_m: f64) -> f64 {
-        let points = self.centre.points();
-        let after = points.partition_point(|point| point.station_m <= station_m).clamp(1, points.len() - 1);
-        let (a, b) = (&points[after - 1], &points[after]);
-        let fraction = ((station_m - a.station_m) / (b.station_m - a.station_m)).clamp(0.0, 1.0);
-        let (from_m, to_m) = (self.road_stations_m[after - 1], self.road_stations_m[after]);
-        from_m + (to_m - from_m) * fraction
+        self.interpolated(&self.road_stations_m, station_m)
+    }
+
+    /// A value at a station, from those at the vertices of the centre line.
+    fn interpolated(&self, values: &[f64], station_m: f64) -> f64 {
+        let (index, fraction) = self.centre.locate(station_m);
+        values[index] + (values[index + 1] - values[index]) * fraction.clamp(0.0, 1.0)
     }
 
     /// The first and the last station of the road's reference line beside the lane, m.

@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 
 use crate::geometry::{Pose, Vec2};
 
-use super::graph::{Builder, wrong};
+use super::graph::Builder;
 use super::map::{Crosswalk, LaneIndex, RoadError, Sign, SignKind, Signal, StopLine};
-use super::opendrive::{Meaning, Orientation, Outline, RoadElement, RoadLink, SignalElement};
+use super::opendrive::{Meaning, Orientation, Outline, RoadElement, RoadLink, SignalElement, wrong};
 
 /// Signal heads of one group that are nearer to each other than this share a stop line, m.
 const SHARED_LINE_M: f64 = 1.0;

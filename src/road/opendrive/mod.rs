@@ -14,3 +14,4 @@ pub use elements::{
     SignalElement,
 };
 pub use read::read;
+pub use xml::wrong;

@@ -73,9 +73,11 @@ fn a_lane_change_never_crosses_a_median() {
     let map = boulevard("RHT");
     let place = |road: &str, lane: i32, s_m: f64| map.place(road, lane, s_m).unwrap();
     let (inner, outer) = (place("1", -1, 10.0), place("1", -2, 10.0));
-    assert_eq!(map.changeable(inner.lane, Side::Left, 10.0), None);
-    assert_eq!(map.changeable(inner.lane, Side::Right, 10.0), Some(outer.lane));
-    assert_eq!(map.changeable(outer.lane, Side::Left, 10.0), Some(inner.lane));
+    assert_eq!(map.change_room_m(inner.lane, Side::Left, 10.0), 0.0);
+    for (from, side, to) in [(inner, Side::Right, outer), (outer, Side::Left, inner)] {
+        assert_eq!(map.lane(from.lane).neighbour(side).unwrap().lane, to.lane);
+        assert!(map.change_room_m(from.lane, side, 10.0) > 0.0);
+    }
     assert!(Route::find(&map, inner, place("2", -1, 80.0)).is_err());
     assert!(Route::find(&map, inner, place("1", -2, 80.0)).is_ok());
     // A median between two lanes of one road is not crossed either: here a strip of grass of 2 m.
@@ -86,7 +88,7 @@ fn a_lane_change_never_crosses_a_median() {
     let map = RoadMap::from_opendrive("strip", text).unwrap();
     let right = map.lane(LaneIndex(0)).right.unwrap();
     assert!(right.same_direction && (right.gap_m - 2.0).abs() < 1e-9);
-    assert_eq!(map.changeable(LaneIndex(0), Side::Right, 50.0), None);
+    assert_eq!(map.change_room_m(LaneIndex(0), Side::Right, 50.0), 0.0);
 }
 
 #[test]

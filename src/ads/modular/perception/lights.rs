@@ -8,7 +8,7 @@
 
 use std::sync::Arc;
 
-use crate::geometry::{OrientedBox, Vec2, ray_hit_m};
+use crate::geometry::{Frame, OrientedBox, Vec2};
 use crate::sim::{FRAME_S, Scene, Sensed, SensedObject, SignalColour, VehicleParameters};
 
 use super::super::config::PerceptionConfig;
@@ -71,7 +71,7 @@ fn hides(object: &SensedObject, eye: Vec2, lamp: Vec2, distance_m: f64) -> bool 
     }
     let outline = OrientedBox::new(object.pose, object.length_m, object.width_m);
     let direction = (lamp - eye) / distance_m;
-    let hit_m = ray_hit_m(eye, direction, distance_m, &outline);
+    let hit_m = Frame::of(&outline).ray_hit_m(eye, direction, distance_m);
     hit_m.is_some_and(|hit_m| EYE_M + (LAMP_M - EYE_M) * hit_m / distance_m < object.height_m)
 }
 
