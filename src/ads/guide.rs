@@ -363,7 +363,7 @@ mod tests {
     }
 
     #[test]
-    fn who_moves_is_followed_as_if_looked_for_anew() {
+    fn a_moving_point_is_followed_as_if_searched_anew() {
         let guide = Guide::new(&winding(), &RULES);
         let (from_m, to_m, reach_m) = (20.0, 330.0, 5.0);
         let (mut near, mut far) = (0, 0);

@@ -99,7 +99,7 @@ impl Output {
     }
 
     fn collected(&self) -> std::sync::MutexGuard<'_, Vec<DiagnosticRecord>> {
-        self.collected.lock().expect("nobody panics while collecting")
+        self.collected.lock().expect("no thread panics while collecting")
     }
 
     pub fn failure(&self, failure: &Failure) {

@@ -131,7 +131,7 @@ fn in_words(outcome: &Result<Regression, String>) -> (&'static str, String) {
             ("still fails", format!("the same obstacle is hit at {time_s:.2} s"))
         }
         Ok(Regression::Fixed) => ("fixed", String::new()),
-        Ok(Regression::OtherCrash) => ("changed", "somebody else is hit".to_owned()),
+        Ok(Regression::OtherCrash) => ("changed", "another obstacle is hit".to_owned()),
         Ok(Regression::Struck) => ("changed", "the same obstacle runs into the ego vehicle".to_owned()),
         Ok(Regression::NeverMet) => ("changed", "the obstacle never appears".to_owned()),
         Err(reason) => ("error", reason.clone()),

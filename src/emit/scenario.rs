@@ -189,11 +189,11 @@ fn expects(log: &EpisodeLog, summary: &EpisodeSummary, steps: usize) -> Vec<Expe
     let mut expects = Vec::new();
     for finding in summary.collisions.iter().filter(|finding| finding.collision.step < steps) {
         let contact = &finding.collision.contact;
-        let who = || tree::clause(ClauseKind::With, tree::road_user(contact.obstacle));
+        let obstacle = || tree::clause(ClauseKind::With, tree::road_user(contact.obstacle));
         let at = tree::clause(ClauseKind::At, tree::rounded(contact.time_s, 2, Dimension::DURATION));
-        expects.push(tree::expect(tree::name("collision"), vec![who(), at]));
+        expects.push(tree::expect(tree::name("collision"), vec![obstacle(), at]));
         if finding.counted {
-            expects.push(tree::expect(tree::name("counted"), vec![who()]));
+            expects.push(tree::expect(tree::name("counted"), vec![obstacle()]));
         }
         let drivers = &finding.judgement.avoided_by;
         let by = (!drivers.is_empty()).then(|| {
@@ -201,7 +201,7 @@ fn expects(log: &EpisodeLog, summary: &EpisodeSummary, steps: usize) -> Vec<Expe
             tree::clause(ClauseKind::By, tree::list(drivers.collect()))
         });
         let class = tree::name(finding.judgement.class.name());
-        expects.push(tree::expect(class, by.into_iter().chain([who()]).collect()));
+        expects.push(tree::expect(class, by.into_iter().chain([obstacle()]).collect()));
         if let Some([first, rest @ ..]) = finding.cause.as_deref() {
             let first = tree::name(first.name());
             let modules = rest.iter().map(|module| tree::name(module.name()));
@@ -209,10 +209,10 @@ fn expects(log: &EpisodeLog, summary: &EpisodeSummary, steps: usize) -> Vec<Expe
                 [] => first,
                 _ => tree::list(core::iter::once(first).chain(modules).collect()),
             };
-            expects.push(tree::expect(tree::equal(tree::name("cause"), modules), vec![who()]));
+            expects.push(tree::expect(tree::equal(tree::name("cause"), modules), vec![obstacle()]));
         }
         if finding.minimal {
-            expects.push(tree::expect(tree::name("minimal"), vec![who()]));
+            expects.push(tree::expect(tree::name("minimal"), vec![obstacle()]));
         }
     }
     let proc = log.steps[..steps].iter().map(|step| tree::rounded(step.proc, 3, Dimension::RATIO));

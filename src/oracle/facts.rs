@@ -131,21 +131,21 @@ mod tests {
     }
 
     #[test]
-    fn who_hit_whom() {
+    fn the_vehicle_that_struck_the_other_is_found() {
         let mkz = VehicleParameters::MKZ;
         let cases = [
             ("front", collision(2.35, 0.3, 8.0, 0.0), false),
             ("standing", collision(2.35, 0.3, 0.5, 0.0), true),
             ("rear", collision(-2.35, 0.0, 8.0, 0.0), true),
             ("flank", collision(0.0, 1.03, 8.0, 0.0), true),
-            ("front corner, turning into somebody who stands", collision(2.0, 1.03, 8.0, 0.0), false),
+            ("front corner, turning into a standing vehicle", collision(2.0, 1.03, 8.0, 0.0), false),
             ("front corner, hit from the left", collision(2.0, 1.03, 8.0, -1.5), true),
             ("front corner, hit from the right", collision(2.0, -1.03, 8.0, 1.5), true),
-            ("front corner, somebody on the right moving away", collision(2.0, -1.03, 8.0, -1.5), false),
+            ("front corner, a vehicle on the right moving away", collision(2.0, -1.03, 8.0, -1.5), false),
             ("the corner itself, front by a hair", collision(2.35002, 1.03, 8.0, -1.5), false),
             ("the corner itself, side by a hair", collision(2.35, 1.03002, 8.0, -1.5), false),
             (
-                "the corner itself, by somebody faster than the ego vehicle",
+                "the corner itself, by a vehicle faster than the ego vehicle",
                 collision(2.35, 1.03, 4.0, -9.0),
                 true,
             ),

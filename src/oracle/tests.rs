@@ -1,4 +1,4 @@
-//! Collisions made by hand, whose verdicts can be told beforehand.
+//! Collisions made by hand, whose verdicts are known beforehand.
 
 use std::sync::Arc;
 
@@ -13,7 +13,7 @@ use crate::sim::{Control, DT_S, Scene, Sensed, Start, World};
 use super::avoidable::{AvoidabilitySettings, Judgement, judge_one};
 use super::hazard::onset;
 
-/// A lane each way along +x for 800 m, 3 m wide: too narrow to pass anybody in it.
+/// A lane each way along +x for 800 m, 3 m wide: too narrow to pass another vehicle.
 const NARROW: &str = r#"<OpenDRIVE><header name="narrow"/>
 <road id="1" length="800" junction="-1"><link/><type s="0" type="town"><speed max="50" unit="km/h"/></type>
 <planView><geometry s="0" x="0" y="0" hdg="0" length="800"><line/></geometry></planView>
@@ -73,7 +73,7 @@ fn appear(world: &mut World, body: Body, verb: Verb, distance_m: f64, speed_mps:
     world.apply(&Effect::Spawn(request)).expect("there is room");
 }
 
-/// When whatever is to happen happens, s: the ego vehicle is at its cruising speed.
+/// Time of the event, s: the ego vehicle has reached its cruising speed by then.
 const EVENT_S: f64 = 12.0;
 
 /// Drives with weak brakes, makes `event` happen, and judges the first contact.
@@ -100,7 +100,7 @@ fn judged(brake_pct_max: f64, event: impl Fn(&mut World)) -> Judgement {
 
 #[test]
 fn an_ordinary_stop_of_the_leader_is_avoidable() {
-    // The leader slows down behind somebody who creeps; brakes of half a m/s² do not.
+    // The leader slows down behind a creeping vehicle; the ego vehicle, with brakes of half a m/s², does not.
     let judgement = judged(17.0, |world| {
         vehicle(world, 115.0, 0.5);
         vehicle(world, 30.0, 10.0);
@@ -109,7 +109,7 @@ fn an_ordinary_stop_of_the_leader_is_avoidable() {
     assert_eq!(judgement.avoided_by, ["cc", "fsm", "rss", "r157"]);
 }
 
-/// Somebody 30 km/h slower appears so far ahead of an ego vehicle at about 11 m/s.
+/// Judges a vehicle that is 30 km/h slower and appears this far ahead of an ego vehicle at about 11 m/s.
 fn appears(distance_m: f64) -> Judgement {
     judged(0.0, |world| {
         let own_mps = world.ego().speed_mps;
@@ -151,5 +151,5 @@ fn what_was_never_in_sight_has_no_onset() {
     assert_eq!(onset(&[hidden.clone()], 1, met), None, "20 m away and no way leads there");
     let there = hidden.obstacle(1).expect("it was put there").outline;
     assert_eq!(onset(&[hidden.clone()], 1, there), Some(0));
-    assert_eq!(onset(&[hidden], 2, there), None, "nobody of that number");
+    assert_eq!(onset(&[hidden], 2, there), None, "no obstacle has that number");
 }

@@ -250,7 +250,7 @@ mod tests {
     }
 
     #[test]
-    fn who_comes_is_told_from_who_passes() {
+    fn a_vehicle_that_comes_is_told_from_one_that_passes() {
         let walker = OrientedBox::new(Pose::new(0.0, 0.0, 0.0), 0.5, 0.5);
         let car = |x_m, y_m| OrientedBox::new(Pose::new(x_m, y_m, 0.0), 4.0, 2.0);
         let speed = Vec2::new(10.0, 0.0);

@@ -78,7 +78,7 @@ mod tests {
     }
 
     #[test]
-    fn nobody_needs_room_for_a_gap_that_opens() {
+    fn a_gap_that_opens_needs_no_room() {
         assert_eq!(behind_leader_m(10.0, 12.0, 0.85), 0.0);
         assert_eq!(from_behind_m(10.0, 12.0, 8.0), 0.0);
         assert!(behind_leader_m(15.0, 0.0, 0.52) > behind_leader_m(15.0, 0.0, 0.85));

@@ -84,7 +84,7 @@ fn ahead_and_then_into_the_lane_of_the_ego_vehicle() {
 }
 
 #[test]
-fn what_nobody_could_carry_out_is_refused() {
+fn impossible_spawns_are_refused() {
     let mut world = testing::world(&testing::straight());
     drive(&mut world, 8.0, 5.0);
     let ahead = request(Verb::DriveAhead, 50.0, 10.0);
@@ -357,7 +357,7 @@ fn an_unsignalled_crossing_flows() {
         assert_eq!(world.incidents(), []);
         for obstacle in world.obstacles() {
             let pose = obstacle.outline.pose;
-            // Those behind the ego vehicle stand behind it.
+            // Vehicles behind the standing ego vehicle stand too.
             if pose.position.x < -100.0 && pose.position.y < 0.0 {
                 continue;
             }
@@ -370,12 +370,12 @@ fn an_unsignalled_crossing_flows() {
         }
     }
     let longest_s = f64::from(stood.values().map(|(_, most)| *most).max().unwrap_or(0)) * DT_S;
-    assert!(longest_s < 15.0, "somebody stood for {longest_s} s");
+    assert!(longest_s < 15.0, "a vehicle stood for {longest_s} s");
     assert!(passed.len() > 60, "{} passed in 180 s", passed.len());
 }
 
 #[test]
-fn nobody_changes_lanes_across_a_median() {
+fn no_vehicle_changes_lanes_across_a_median() {
     let mut world = testing::world(&testing::divided());
     drive(&mut world, 8.0, 5.0);
     for (verb, lane) in [
@@ -387,7 +387,7 @@ fn nobody_changes_lanes_across_a_median() {
         let refusal = world.survey(&wish).expect_err("there is no way over");
         assert!(refusal.starts_with("no lane ") || refusal.starts_with("no room "), "{refusal}");
     }
-    // Nor does a vehicle come that would have to pass.
+    // A vehicle that would have to pass does not appear either.
     world.survey(&request(Verb::Overtake, 15.0, 12.0)).expect_err("there is no way past");
 }
 
@@ -416,7 +416,7 @@ fn a_crosser_and_an_ego_vehicle_that_wait_for_each_other_part() {
 }
 
 #[test]
-fn who_appears_in_plain_view_leaves_time_to_notice() {
+fn a_vehicle_that_appears_in_plain_view_leaves_time_to_notice() {
     let mut world = testing::world(&testing::straight());
     drive(&mut world, 12.0, 10.0);
     // Faster than the ego vehicle, so no brakes are needed; but it was not there a moment ago.

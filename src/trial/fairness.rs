@@ -21,7 +21,7 @@ pub(super) fn complaint(world: &World, request: &SpawnRequest, id: u32) -> Optio
     let overlaps =
         world.obstacles().any(|other| other.id != id && distance_m(&other.outline, &newcomer.outline) <= 0.0);
     if overlaps || newcomer.distance_m <= 0.0 {
-        return Some("it appears on somebody".to_owned());
+        return Some("it appears inside another road user".to_owned());
     }
     let ego_mps = world.ego().speed_mps;
     let along_mps = world.ego_outline().pose.forward().dot(&newcomer.velocity_mps);

@@ -251,7 +251,7 @@ fn ended(seen: &Sighting, what: &str) -> String {
         Ending::TimeOver => format!("{HORIZON_S:.0} s were over before {what}"),
         Ending::Arrived => format!("the ego vehicle arrived before {what}"),
         Ending::TouchedEgo => format!("it touched the ego vehicle before {what}"),
-        Ending::TouchedOther => format!("it touched somebody else before {what}"),
+        Ending::TouchedOther => format!("it touched another road user before {what}"),
         Ending::Left => format!("it left before {what}"),
     }
 }

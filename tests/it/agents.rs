@@ -1,5 +1,5 @@
-//! Every agent of the registry in whole episodes: it replays, it does not depend on the number of
-//! workers, and a search that was cut short goes on as if it had not been.
+//! Every agent of the registry in whole episodes: they replay, they do not depend on the number of
+//! workers, and a search that was interrupted ends like one that was not.
 
 use std::sync::atomic::AtomicBool;
 
@@ -43,7 +43,7 @@ fn training(entry: &Entry, checkpoint: Option<(usize, &[u8])>) -> Option<Trainin
 }
 
 #[test]
-fn whoever_can_act_at_once_replays_and_does_not_depend_on_the_workers() {
+fn an_agent_that_acts_at_once_replays_and_does_not_depend_on_the_workers() {
     for entry in agent::REGISTRY.iter().filter(|entry| matches!(entry.kind, Kind::Ready(_))) {
         let run = run_of(entry, 5);
         let judged = |jobs| {

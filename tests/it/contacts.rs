@@ -1,5 +1,5 @@
-//! No contact is missed and none invented: first contacts are compared with those of a twin, which looks at
-//! single moments, every hundredth of a millisecond, and then bisects the last step.
+//! No contact is missed and none invented: first contacts are compared with those of a twin. The twin looks
+//! at single moments, every hundredth of a millisecond, and then bisects the last step.
 //!
 //! The twin shares nothing with the code under test but the definition of the motion: between two
 //! ticks boxes move straight and turn evenly. It has no broad phase, and it tells overlap from gap by
@@ -40,7 +40,7 @@ struct Case {
 struct Touch {
     /// Time of the first overlap, s.
     time_s: f64,
-    /// Whether they overlap by more than a graze later on.
+    /// Whether the boxes overlap by more than a graze later on.
     deep: bool,
 }
 
@@ -391,7 +391,7 @@ fn the_contacts_of_whole_episodes_are_the_twins() {
     assert!(contacts >= 20 && misses > 10_000, "{contacts} {misses}");
 }
 
-/// Time, place, side and speed of a contact within a tick.
+/// Asserts that time, place, side and speed of a contact are those that the twin finds.
 fn same(case: &Case, touch: &Touch, contact: &Contact, tick: u64) {
     let within_s = contact.time_s - tick as f64 * DT_S;
     assert!((within_s - touch.time_s).abs() < TIME_S, "{contact:?} {touch:?}");
@@ -400,8 +400,8 @@ fn same(case: &Case, touch: &Touch, contact: &Contact, tick: u64) {
         assert!(from_box_m(shape, contact.point) <= GAP_M, "{contact:?}");
     }
     assert!((ego.pose.to_world(contact.on_ego) - contact.point).norm() < 1e-9, "{contact:?}");
-    // Measured by differences of the distance just before. A fixed line would be wrong: where the face that is
-    // met turns, its corner that sticks out farthest is not the one that is met.
+    // The closing speed is measured by differences of the distance just before. A fixed line would be wrong:
+    // if the face that is met turns, the corner farthest out is not the corner that is met.
     let step_s = (within_s / 4.0).min(1e-5);
     if step_s > 0.0 {
         let gap_m = |steps: f64| case.distance_m(within_s - steps * step_s);

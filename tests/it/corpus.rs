@@ -54,7 +54,7 @@ fn every_code_is_provoked_and_every_error_twice() {
     assert!(missing.is_empty(), "{}", missing.join("\n"));
 }
 
-/// A name that a file nearby declares: the diagnostic says which `use` is missing.
+/// If a file nearby declares an unknown name, the diagnostic says which `use` is missing.
 #[test]
 fn a_missing_use_is_named() {
     each_case("missing_use", |path| {
@@ -193,7 +193,7 @@ fn codes_and_shells_are_explained() {
     }
 }
 
-/// What an override changes, as `diff` says it.
+/// `diff` shows what an override changes.
 #[test]
 fn differences_are_told_by_their_meaning() {
     let space = "scenarios/avastra45.ava";

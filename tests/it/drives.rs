@@ -63,7 +63,7 @@ fn a_healthy_driving_system_mostly_survives_ambient_traffic() {
     }
     // The weaknesses of `modular` show in ordinary traffic too, above all that it does not brake for some
     // crossing vehicles; reference drivers do not look to the side, where the tail of a bus swings.
-    let of = |name: &str| failed.iter().filter(|who| who.starts_with(name)).count();
+    let of = |name: &str| failed.iter().filter(|drive| drive.starts_with(name)).count();
     assert_eq!(of("idm "), 0, "{failed:#?}");
     assert!(of("modular ") <= 2, "{failed:#?}");
     assert!(failed.len() * 20 <= drives, "{} of {drives}: {failed:#?}", failed.len());
@@ -82,22 +82,22 @@ fn drive(scene: &Arc<Scene>, entry: &ads::Entry, seed: u64, limit_mps: f64) {
     let mut world = World::new(scene.clone(), &start);
     let mut driver = (entry.build)(scene, seed);
     let mut sensed = world.sensed();
-    let who = format!("{} on {}, {start:?}", entry.name, scene.map.name);
+    let case = format!("{} on {}, {start:?}", entry.name, scene.map.name);
     while !world.arrived() {
-        assert!(world.time_s() < 240.0, "{who}: does not arrive");
+        assert!(world.time_s() < 240.0, "{case}: does not arrive");
         world.sense(&mut sensed);
         let contacts = world.tick(&driver.drive(&sensed));
-        assert!(contacts.is_empty(), "{who}: {contacts:?}");
-        assert!(world.ego().speed_mps <= 1.05 * limit_mps, "{who}: {} m/s", world.ego().speed_mps);
+        assert!(contacts.is_empty(), "{case}: {contacts:?}");
+        assert!(world.ego().speed_mps <= 1.05 * limit_mps, "{case}: {} m/s", world.ego().speed_mps);
         let (offset_m, station_m) = (world.ego_offset_m(), world.ego_station_m());
         // A vehicle that waits for a gap keeps to the lane that the route has left already.
         if scene.route.changes.iter().any(|change| (change.begin_m..change.latest_m).contains(&station_m)) {
             continue;
         }
         let room_m = (room_m(scene, &world)).min(OFFSET_M_MAX);
-        assert!(offset_m.abs() <= room_m, "{who}: {offset_m} m off at {station_m} m, with {room_m} m");
+        assert!(offset_m.abs() <= room_m, "{case}: {offset_m} m off at {station_m} m, with {room_m} m");
     }
-    assert_eq!(world.red_runs(), 0, "{who}: ran a red light");
+    assert_eq!(world.red_runs(), 0, "{case}: ran a red light");
 }
 
 /// Half the width of a lane marking, m: a wheel on the line has not left the lane.

@@ -18,7 +18,7 @@ struct Editor {
 }
 
 impl Editor {
-    /// A server that nobody has spoken to.
+    /// A server that has got no message yet.
     fn start() -> Editor {
         let mut process = Command::new(env!("CARGO_BIN_EXE_avastra"))
             .arg("lsp")
@@ -54,7 +54,7 @@ impl Editor {
         self.send(&json!({ "jsonrpc": "2.0", "method": method, "params": params }).to_string());
     }
 
-    /// The next message of the server.
+    /// Waits for the next message of the server.
     fn hear(&mut self) -> Value {
         let mut length = 0;
         loop {
@@ -86,7 +86,7 @@ impl Editor {
         }
     }
 
-    /// Opens a document, or gives it another text; its mistakes.
+    /// Opens a document, or gives it another text. Returns its mistakes.
     fn write(&mut self, uri: &str, text: &str) -> Vec<Value> {
         self.version += 1;
         if self.version == 1 || text.is_empty() {
@@ -104,7 +104,7 @@ impl Editor {
         self.mistakes(uri)
     }
 
-    /// The next list of mistakes of a document.
+    /// Waits for the next list of mistakes of a document.
     fn mistakes(&mut self, uri: &str) -> Vec<Value> {
         loop {
             let message = self.hear();
@@ -144,7 +144,7 @@ impl Editor {
         text(&found.expect("it can be asked")["contents"]["value"])
     }
 
-    /// Ends the input; exit status and what was said on stderr.
+    /// Ends the input. Returns exit status and stderr.
     fn end(mut self) -> (i32, String) {
         drop(self.input.take());
         let mut said = String::new();
@@ -271,21 +271,21 @@ fn a_used_file_is_read_from_the_editor() {
     let text = "language 1\nuse \"b.ava\"\nfn twice() -> Length = far * 2\n";
     let mut editor = Editor::ready();
     assert_eq!(editor.write(&a, text), Vec::<Value>::new());
-    // In the editor it says something else than on the disk.
+    // The editor's text of the used file differs from the one on the disk.
     let document = json!({ "uri": b, "version": 7, "text": "language 1\nlet far = 50 s\n" });
     editor.tell("textDocument/didOpen", json!({ "textDocument": document }));
     let found = editor.mistakes(&a);
     assert_eq!(text_of(&found), ["AV0201"], "{}", shown(&found));
-    // A mistake in it stands in it.
+    // A mistake in the used file is reported there.
     let document = json!({ "uri": b, "version": 8 });
     let changes = json!([{ "text": "language 1\nlet far = \n" }]);
     editor.tell("textDocument/didChange", json!({ "textDocument": document, "contentChanges": changes }));
     assert_eq!(editor.mistakes(&a), Vec::<Value>::new());
     assert_eq!(text_of(&editor.mistakes(&b)), ["AV0001"]);
-    // Closed, it is what the disk says.
+    // Once the used file is closed, the text on the disk counts.
     editor.tell("textDocument/didClose", json!({ "textDocument": { "uri": b } }));
     assert_eq!(editor.mistakes(&b), Vec::<Value>::new());
-    // Changed on the disk behind the editor's back.
+    // The file changes on the disk, and the editor did not change it.
     std::fs::write(scratch.path().join("b.ava"), "language 1\nlet fur = 50 m\n").expect("it is writable");
     editor.tell("workspace/didChangeWatchedFiles", json!({ "changes": [{ "uri": b, "type": 2 }] }));
     assert_eq!(text_of(&editor.mistakes(&a)), ["AV0101"]);
@@ -329,7 +329,7 @@ fn hovers_say_what_the_compiler_knows() {
     let exact = editor.hover("language 1\nlet fast = 50 km|/h\n");
     all.push_str(&format!("## 50 km/h\n\n{exact}\n\n"));
     editor.write(&space_uri(), &shipped());
-    // The name of a parameter itself, and a broken line elsewhere: what was known before still is.
+    // With the name of a parameter, and a broken line elsewhere, everything known before is still known.
     let broken = marked("any vehicle: Vehicle,\n  any colour: Colour,\n  any sp")
         .replace("group environment =", "group environment = = =");
     all.push_str(&format!("## in a broken file\n\n{}\n", editor.hover(&broken)));
@@ -704,7 +704,7 @@ fn whatever_comes_is_answered() {
     assert_eq!(editor.hear()["error"]["code"], -32700);
     editor.raw(b"Content-Length: 2\r\n\r\n\xff\xfe");
     assert_eq!(editor.hear()["error"]["code"], -32700);
-    // Notices that are unknown, answers that nobody asked for, documents that lack their text.
+    // Unknown notices, answers without a request, documents without their text.
     editor.tell("$/setTrace", json!({ "value": "off" }));
     editor.tell("textDocument/didOpen", json!({ "textDocument": { "uri": "file:///x.ava" } }));
     editor.tell("textDocument/didChange", json!({ "textDocument": { "uri": 7 }, "contentChanges": 3 }));
@@ -748,8 +748,8 @@ fn a_request_can_be_cancelled_while_it_waits() {
     add(json!({ "id": 901, "method": "textDocument/inlayHint", "params": params }));
     add(json!({ "method": "$/cancelRequest", "params": { "id": 901 } }));
     editor.raw(burst.as_bytes());
-    // The first may be done before the burst is read to its end; the second is done or cancelled, and
-    // each has one answer.
+    // The first request may be done before the burst is read to its end; the second is done or cancelled.
+    // Each has one answer.
     let mut answers = vec![editor.hear(), editor.hear()];
     answers.sort_by_key(|answer| answer["id"].as_u64());
     assert_eq!(answers[0]["id"], 900);

@@ -16,7 +16,7 @@ use crate::world::{read, run_of};
 const EPISODES: u32 = 50;
 /// A fault, and where one of its crashes is found.
 struct Planted {
-    /// Shipped as `scenarios/ads/faults/NAME.yaml`; it begins with the module at fault.
+    /// The fault is shipped as `scenarios/ads/faults/NAME.yaml`; its name begins with the module at fault.
     name: &'static str,
     space: &'static str,
     /// The search for a crash begins at this episode.

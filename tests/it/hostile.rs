@@ -1,4 +1,4 @@
-//! Hostile texts: those that the fuzz target kept, and some made to be slow or large. `fuzz/` makes up more of
+//! Hostile texts: those that the fuzz target kept, and some made to be slow or large. `fuzz/` makes more of
 //! them.
 
 #[path = "../../fuzz/examine.rs"]
@@ -35,7 +35,7 @@ fn no_case_breaks_a_law() {
     }
 }
 
-/// Every prefix of a small space with something of everything, cut in the middle of words.
+/// Every prefix of a small space with every kind of declaration, cut in the middle of words.
 #[test]
 fn every_prefix_of_a_space_is_examined() {
     let text = std::fs::read_to_string(root().join("tests/cases/format/override.ava")).expect("it is there");
@@ -44,7 +44,7 @@ fn every_prefix_of_a_space_is_examined() {
     }
 }
 
-/// Texts of 64 KB, each made to find something whose cost grows faster than the text.
+/// Texts of 64 KB; each is made to find a cost that grows faster than the text.
 #[test]
 fn texts_made_to_be_slow_are_not() {
     let full = |head: &str, line: &dyn Fn(usize) -> String| {

@@ -63,7 +63,7 @@ fn cli_alone_touches_files_and_the_environment() {
     }
 }
 
-/// Position of the module that a file belongs to; none for `lib.rs` and `main.rs`.
+/// Position in [`ORDER`] of the module that a file belongs to; `None` for `lib.rs` and `main.rs`.
 fn rank(path: &Path) -> Option<usize> {
     let inside = path.strip_prefix(root().join("src")).expect("it was found there");
     let module = inside.iter().next()?.to_str()?.trim_end_matches(".rs");

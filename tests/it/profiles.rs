@@ -55,7 +55,7 @@ fn a_scenario_keeps_the_profile_that_it_was_found_with() {
         .map(|entry| entry.expect("it reads").path())
         .collect();
     files.sort();
-    let file = files.first().expect("who yields to nobody hits somebody");
+    let file = files.first().expect("a system that never yields hits an obstacle");
     let text = std::fs::read_to_string(file).expect("it was written");
     assert!(text.contains("never_yields: true"), "{text}");
 
@@ -75,7 +75,7 @@ fn a_scenario_keeps_the_profile_that_it_was_found_with() {
     let (status, _, stderr) = outcome(&mut avastra(&drawn));
     assert!(status == 0 && Path::new(&svg).is_file(), "{stderr}");
 
-    // The scenario names the reference drivers that judge it; they must exist.
+    // A scenario names the reference drivers that judge it; they must exist.
     let other = file.with_file_name("other.ava");
     let engine = text.lines().find(|line| line.contains("engine: ")).expect("it names its world");
     let told_by = |driver: &str| {

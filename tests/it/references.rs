@@ -11,11 +11,10 @@ use crate::world::{run_against, space};
 /// Episodes on each road.
 const EPISODES: u32 = 12;
 
-/// No other careful driver would have avoided the obstacles that one of them does hit, and that happens in at
-/// most one episode of thirty: an obstacle crosses so late that only swerving at once would help, and the
-/// models brake.
+/// A careful driver hits an obstacle in at most one episode of thirty, and then no other careful driver would
+/// have avoided it: it crosses so late that only swerving at once would help, and the models brake.
 #[test]
-fn careful_drivers_run_into_nobody_whom_another_avoids() {
+fn careful_drivers_hit_no_obstacle_that_another_avoids() {
     let space = space("avastra45.ava");
     for ads in ["cc", "fsm", "rss"] {
         let run = run_against(ads, space.clone(), EPISODES, 19, &[]);

@@ -3,8 +3,8 @@
 //!
 //! The predicates are written here by hand, from the paper and not from the space's file.
 //!
-//! The audit: every rule has a draw that breaks this rule alone. The draw is refused in the rule's name, and
-//! passes without the rule; so a lost point of enforcement fails here.
+//! The audit: every rule has a draw that breaks this rule alone. The draw is refused with the rule's name,
+//! and passes without the rule. So this test fails if a rule is no longer enforced somewhere.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -42,7 +42,7 @@ fn no_episode_breaks_a_rule_and_each_switch_frees_its_own() {
     }
 }
 
-/// Which of [`RULES`] some step broke, in as many episodes on each road, without some rules.
+/// Which of [`RULES`] some step broke, in this many episodes on each road, with the rules in `without` off.
 fn broken(episodes: u32, without: &[&str]) -> [bool; 5] {
     let run = &run(episodes, 5, without);
     let mut broken = [false; 5];
@@ -273,7 +273,7 @@ fn every_rule_refuses_its_own_breach_and_no_other_does() {
     }
 }
 
-/// The checker of scenarios refuses the same draws. Rules that ask the world are left to the replay.
+/// The checker of scenarios refuses these draws too. Rules that ask the world are left to the replay.
 #[test]
 fn a_scenario_with_a_breach_does_not_compile() {
     let compiled = |breach: &Breach, origin: &str| -> Vec<String> {

@@ -1,4 +1,4 @@
-//! Studies: their results, that nothing but their file decides the results, and the files that are refused.
+//! Studies: their results depend on their file alone, and bad files are refused.
 
 use std::path::Path;
 use std::process::Stdio;
@@ -127,7 +127,7 @@ fn a_quick_study_says_that_it_is_none() {
     let results = &result["results"];
     assert_eq!((&results["quick"], &results["cells"]), (&true.into(), &16.into()));
     let rate = &results["together"][0]["episodes"]["collisions_per_1000_km"];
-    assert_eq!(rate["events"], 0, "nobody is there to be hit: {rate}");
+    assert_eq!(rate["events"], 0, "there is no obstacle to hit: {rate}");
     assert!(rate["high"].as_f64().expect("a bound") > 0.0);
     assert!(result["timing"][0]["wall_s"].as_f64().is_some_and(|wall_s| wall_s > 0.0));
 }
@@ -184,7 +184,7 @@ fn every_shipped_study_can_begin() {
     for entry in std::fs::read_dir(folder).expect("it is there").flatten() {
         let text = std::fs::read_to_string(entry.path()).expect("it is readable");
         let study = loaded(&text);
-        // No episode of an evaluation is one of a training.
+        // No episode is used both for training and for evaluation.
         let settings = study.settings();
         let seeds = |begin: u64, count: u32| -> Vec<u64> {
             let number = |number| avastra::rng::child_seed(begin, avastra::rng::Stream::Episode, number);

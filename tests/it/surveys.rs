@@ -58,7 +58,7 @@ struct Survey {
     route_crosswalks: Vec<(Near, Near)>,
     /// Number of lanes with which the route is in conflict.
     conflict_count: Option<usize>,
-    /// Lanes with which the route is in conflict, by the way through the junction that they belong to.
+    /// Lanes with which the route is in conflict, named by their ways through the junction.
     #[serde(default)]
     conflicts: BTreeMap<String, Conflict>,
     #[serde(default)]
@@ -178,7 +178,7 @@ impl Differences {
         });
     }
 
-    /// For things in order: as many as surveyed, and each as surveyed.
+    /// Compares things in order: there are as many as surveyed, and each is as surveyed.
     fn each<T: Debug, S>(
         &mut self,
         what: &str,
@@ -220,7 +220,7 @@ fn roads_agree_with_their_surveys() {
     assert!(differences.0.is_empty(), "{}", differences.0.join("\n"));
 }
 
-/// Start and goal lie where they were surveyed, and are found there.
+/// Checks that start and goal lie where they were surveyed, and are found there.
 fn places(found: &mut Differences, road: &Road, survey: &Survey) {
     for (what, place, (x, y, heading_rad)) in
         [("start", road.start, survey.start), ("goal", road.goal, survey.goal)]
@@ -238,8 +238,8 @@ fn places(found: &mut Differences, road: &Road, survey: &Survey) {
     }
 }
 
-/// The route has the surveyed length, follows the surveyed line once its lane changes are over, and is not
-/// too tight.
+/// Checks that the route has the surveyed length, follows the surveyed line once its lane changes are over,
+/// and is not too tight.
 fn route(found: &mut Differences, route: &Route, survey: &Survey) {
     found.near("length to the goal", route.goal_m, survey.goal_m);
     if let Some(beyond_m) = survey.beyond_goal_m {
@@ -270,7 +270,7 @@ fn route(found: &mut Differences, route: &Route, survey: &Survey) {
     found.holds(1.0 / bend_per_m > least_m, || format!("a bend with a radius of {} m", 1.0 / bend_per_m));
 }
 
-/// Stop lines and crosswalks.
+/// Checks stop lines and crosswalks.
 fn stops(found: &mut Differences, road: &Road, survey: &Survey) {
     found.each("stop lines", &road.route.stop_lines, &survey.stop_lines, |found, line, surveyed| {
         let signal = &road.map.signals[line.signal];
@@ -331,7 +331,7 @@ fn neighbours(found: &mut Differences, road: &Road, survey: &Survey) {
     }
 }
 
-/// Lane centres of the map run along every surveyed lane, in its direction.
+/// Checks that lane centres of the map run along every surveyed lane, in its direction.
 fn carriageways(found: &mut Differences, map: &RoadMap, survey: &Survey) {
     for (name, leg) in &survey.legs {
         let length_m: f64 = leg.pieces.iter().map(|(length_m, _)| length_m).sum();
@@ -384,7 +384,7 @@ fn junctions(found: &mut Differences, map: &RoadMap, survey: &Survey) {
     }
 }
 
-/// The way through a junction that a lane is, as `road/lane > road/lane`.
+/// The way through a junction that a lane belongs to, as `road/lane > road/lane`.
 fn way_of(map: &RoadMap, lane: LaneIndex) -> String {
     let lane = map.lane(lane);
     let name = |index: &LaneIndex| format!("{}/{}", map.lane(*index).key.road, map.lane(*index).key.lane);
@@ -392,7 +392,7 @@ fn way_of(map: &RoadMap, lane: LaneIndex) -> String {
     format!("{} > {}", names(&lane.predecessors), names(&lane.successors))
 }
 
-/// Each lane begins where those before it end, in position and heading; few come from nowhere.
+/// Checks that each lane begins where those before it end, in position and heading; few have none before.
 fn links(found: &mut Differences, map: &RoadMap, survey: &Survey) {
     for lane in &map.lanes {
         let end = lane.centre.pose_at(lane.centre.length_m());

@@ -1,5 +1,5 @@
-//! Writes updates of the learner on made-up transitions, which PyTorch computes again:
-//! `tests/interop/torch.sh`.
+//! Writes updates of the learner on made-up transitions. `tests/interop/torch.sh` lets PyTorch compute them
+//! again.
 
 use avastra::agent::{Adam, Hyperparameters, Kind, Network, Shape, Transition};
 use avastra::rng::Stream;

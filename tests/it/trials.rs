@@ -32,16 +32,16 @@ const REALISED_PART_MIN: [(&str, f64); 5] = [
 fn every_row_does_what_it_says_or_it_is_said_why_not() {
     let cells = cells("avastra45.ava", TrialSettings { drives: 6, tries: 3, seed: 1 });
     for cell in &cells {
-        let who = format!("{} on {}", cell.label, cell.road);
+        let trial = format!("{} on {}", cell.label, cell.road);
         let failed: usize = cell.failures.iter().map(|failure| failure.count).sum();
         let refused: usize = cell.refusals.iter().map(|refusal| refusal.count).sum();
-        assert_eq!(cell.realised + failed, cell.tried, "{who}");
-        assert_eq!(cell.legal + refused, cell.moments, "{who}");
-        assert_eq!(cell.outcome == Outcome::Masked, cell.legal == 0, "{who}");
-        assert!(cell.unfair.is_empty(), "{who}: {:?}", cell.unfair);
-        // A vehicle must never do this, however the scene ends.
+        assert_eq!(cell.realised + failed, cell.tried, "{trial}");
+        assert_eq!(cell.legal + refused, cell.moments, "{trial}");
+        assert_eq!(cell.outcome == Outcome::Masked, cell.legal == 0, "{trial}");
+        assert!(cell.unfair.is_empty(), "{trial}: {:?}", cell.unfair);
+        // These complaints must never occur, however the trial ends.
         let wild = |why: &str| why.starts_with("it drives") || why.starts_with("it does not appear");
-        assert!(!cell.failures.iter().any(|failure| wild(&failure.reason)), "{who}: {:?}", cell.failures);
+        assert!(!cell.failures.iter().any(|failure| wild(&failure.reason)), "{trial}: {:?}", cell.failures);
     }
     for (verb, part_min) in REALISED_PART_MIN {
         let of_verb = || cells.iter().filter(|cell| cell.label.starts_with(verb));
@@ -56,7 +56,7 @@ fn every_row_does_what_it_says_or_it_is_said_why_not() {
 }
 
 #[test]
-fn nobody_comes_across_a_median() {
+fn no_vehicle_comes_across_a_median() {
     let cells = cells("avastra45.ava", TrialSettings { drives: 2, tries: 1, seed: 3 });
     let far =
         cells.iter().filter(|cell| cell.road == "boulevard" && cell.label.starts_with("drive_opposite"));

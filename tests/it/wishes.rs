@@ -20,7 +20,7 @@ fn row(table: &ActionTable, label: &str) -> usize {
     rows.position(|row| row.label == label).unwrap_or_else(|| panic!("no row `{label}`"))
 }
 
-/// The legal draws of a row on a road, over so many seeds.
+/// The legal draws of a row on a road, one for each of this many seeds at most.
 fn draws(table: &ActionTable, row: usize, road: usize, memory: &Memory, seeds: u64) -> Vec<Draw> {
     let rules = RulesInForce::new(table.space(), &[], &[]).expect("no rule is named");
     let road = &table.space().roads[road];
@@ -88,7 +88,7 @@ fn it_is_always_night() {
 }
 
 #[test]
-fn nobody_walks_on_the_crossroad_alone() {
+fn only_the_crossroad_has_no_pedestrians() {
     let table = wish("no_pedestrians_on_one_road");
     for row in table.rows().iter().filter(|row| row.label.starts_with("pedestrian")) {
         for (road, reach) in table.space().roads.iter().zip(&row.roads) {
@@ -129,7 +129,7 @@ fn snow_is_seen_and_felt() {
 }
 
 #[test]
-fn the_limit_of_the_school_binds_everybody() {
+fn the_limit_of_the_school_binds_every_vehicle() {
     let table = wish("school_zone");
     let limit_mps = 30.0 / 3.6;
     let road = &table.space().roads[0];
@@ -168,7 +168,7 @@ fn the_formula_is_the_authors_own() {
 }
 
 #[test]
-fn everybody_is_slower_in_the_rain() {
+fn every_vehicle_is_slower_in_the_rain() {
     let table = wish("slower_in_rain");
     let row = row(&table, "cross_road(side: Left, mode: Far, then: Keep)");
     let fastest_mps = |rain: &str| {

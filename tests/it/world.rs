@@ -1,4 +1,4 @@
-//! What the tests share: the shipped space ready to play, a world with room, a small learner.
+//! Shared by the tests: the shipped space ready to play, a world with room, a small learner.
 
 use std::path::Path;
 use std::sync::Arc;

@@ -238,7 +238,7 @@ fn weakness_g_passes_a_light_that_turns_red_late() {
 }
 
 #[test]
-fn weakness_h_does_not_let_in_who_comes_over_from_beside() {
+fn weakness_h_does_not_let_in_a_vehicle_from_beside() {
     let mended = config(|config| config.weaknesses.h_blind_to_side_and_rear = false);
     let gap_m = |config: &ModularConfig| {
         let scene = straight();

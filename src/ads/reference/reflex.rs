@@ -116,7 +116,7 @@ mod tests {
     }
 
     #[test]
-    fn who_has_just_braked_does_not_react_anew() {
+    fn a_driver_that_has_just_braked_does_not_react_anew() {
         let mut reflex = Reflex::new(HUMAN);
         for _ in 0..200 {
             reflex.step(9.0, 0.01);

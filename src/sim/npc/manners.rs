@@ -249,14 +249,14 @@ mod tests {
     }
 
     #[test]
-    fn of_two_who_come_together_one_waits() {
+    fn of_two_vehicles_that_meet_one_waits() {
         let (own, other) = (passage(20.0, 10.0), passage(20.0, 10.0));
         assert!(!waits(&own, &other, true, false));
         assert!(waits(&own, &other, false, false));
     }
 
     #[test]
-    fn a_gap_is_enough_and_who_is_inside_is_not_run_into() {
+    fn a_gap_is_enough_and_a_vehicle_inside_is_not_run_into() {
         let own = passage(5.0, 10.0);
         assert!(!waits(&own, &passage(60.0, 10.0), false, false), "it is through before the other comes");
         assert!(!waits(&own, &passage(-10.0, 10.0), true, false), "it has left");

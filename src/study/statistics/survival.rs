@@ -59,7 +59,7 @@ mod tests {
     }
 
     #[test]
-    fn nobody_fails() {
+    fn without_a_failure_the_mean_is_the_horizon() {
         assert_eq!(restricted_mean(&lifetimes(&[(30.0, false), (35.0, false)]), 60.0), Some(60.0));
     }
 }

@@ -132,7 +132,7 @@ mod tests {
     }
 
     #[test]
-    fn crosswalks_are_left_to_who_is_on_them_or_comes() {
+    fn crosswalks_are_left_to_pedestrians_on_them_or_near() {
         assert!(stops_for(-7.0, 1.2, 0.0), "comes from the right");
         assert!(!stops_for(-7.0, -1.2, 0.0), "goes away");
         assert!(!stops_for(-9.0, 1.2, 0.0), "is too far");

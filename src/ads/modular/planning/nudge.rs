@@ -207,7 +207,7 @@ mod tests {
     }
 
     #[test]
-    fn it_leaves_the_lane_for_nobody_and_squeezes_past_nobody() {
+    fn obstacles_that_cannot_be_passed_are_not_passed() {
         assert!(planned(&[(Body::Sedan, 60.0, -1.75)]).passing().is_none(), "in the middle");
         assert!(planned(&[(Body::Pedestrian, 60.0, -3.5)]).passing().is_none(), "a pedestrian");
         assert!(planned(&[(Body::Sedan, 16.0, -3.5)]).passing().is_none(), "too near");
