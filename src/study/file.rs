@@ -9,7 +9,6 @@ use crate::run::DEFAULT_ADS;
 #[serde(deny_unknown_fields)]
 pub struct StudyFile {
     /// The question that it answers, in a sentence; printed above the result.
-    #[serde(default)]
     pub question: Option<String>,
     /// The space (`.ava`).
     pub space: String,
@@ -20,7 +19,6 @@ pub struct StudyFile {
     #[serde(default = "default_ads")]
     pub ads: String,
     /// Profile of the `modular` driving system; without one it has its default settings.
-    #[serde(default)]
     pub ads_config: Option<String>,
     /// Vehicles of ambient traffic around the ego vehicle.
     #[serde(default)]
@@ -66,30 +64,23 @@ pub struct AgentFile {
     /// The agent, as in `avastra run --agent` and `avastra train --agent`.
     pub name: String,
     /// Its name in the result; by default `name`.
-    #[serde(default)]
     pub label: Option<String>,
     /// The preset of a learning agent; by default its own.
-    #[serde(default)]
     pub preset: Option<String>,
     /// Settings that differ from the preset: the name of a file, or the settings themselves.
-    #[serde(default)]
     pub config: Option<Value>,
     /// Independent trainings of a learning agent; without a number 10.
-    #[serde(default)]
     pub trainings: Option<u32>,
     /// Episodes of a training, on all its roads together; without a number 750.
-    #[serde(default)]
     pub episodes: Option<u32>,
     /// Roads that one training goes round, to be evaluated on each road of the study; none named: a training
     /// for each road of the study, on that road alone.
     #[serde(default)]
     pub train_roads: Vec<String>,
     /// Independent repetitions of the evaluation, of an agent that has nothing to learn; without a number 10.
-    #[serde(default)]
     pub repeats: Option<u32>,
     /// Profile of the driving system for this agent, in place of the study's: the name of a file, or the settings
     /// that differ from the default.
-    #[serde(default)]
     pub ads_config: Option<Value>,
     /// Rules switched off for this agent.
     #[serde(default)]

@@ -6,128 +6,76 @@ use std::collections::BTreeSet;
 use crate::study::statistics::{Lifetime, restricted_mean};
 
 use crate::study::file::EvaluationPlan;
-use crate::study::record::{CellRecord, CollisionRecord, EpisodeRecord, FailureClass};
+use crate::study::record::{CellRecord, CollisionRecord, EpisodeRecord, FailureClass, TrainedRecord};
+
+/// Computes a number; `None` if the cell has no such number, for example the time to a collision without any
+/// collision.
+type Compute = fn(&CellRecord, &EvaluationPlan) -> Option<f64>;
 
 /// A number that is computed for each cell.
 pub struct Measure {
     pub name: &'static str,
     /// Whether agents are compared by it.
     pub is_compared: bool,
-    /// Computes it; `None` if the cell has no such number, for example the time to a collision without any
-    /// collision.
-    pub of: fn(&CellRecord, &EvaluationPlan) -> Option<f64>,
+    pub of: Compute,
+}
+
+const fn compared(name: &'static str, of: Compute) -> Measure {
+    Measure { name, is_compared: true, of }
+}
+
+const fn shown(name: &'static str, of: Compute) -> Measure {
+    Measure { name, is_compared: false, of }
 }
 
 /// Every measure. If not said otherwise, a number is a total over the episodes of one seed, averaged over the
 /// seeds.
 pub const MEASURES: &[Measure] = &[
-    Measure {
-        name: "counted",
-        is_compared: true,
-        of: |cell, plan| number(cell, plan, |found| found.counted),
-    },
-    Measure { name: "collisions", is_compared: true, of: |cell, plan| number(cell, plan, |_| true) },
+    compared("counted", |cell, plan| number(cell, plan, |found| found.counted)),
+    compared("collisions", |cell, plan| number(cell, plan, |_| true)),
     // Avoidable by a careful driver.
-    Measure {
-        name: "avoidable",
-        is_compared: false,
-        of: |cell, plan| number(cell, plan, |found| found.avoidability == "avoidable"),
-    },
+    shown("avoidable", |cell, plan| number(cell, plan, |found| found.avoidability == "avoidable")),
     // Avoidable without any delay only.
-    Measure {
-        name: "beyond_reference",
-        is_compared: false,
-        of: |cell, plan| number(cell, plan, |found| found.avoidability == "beyond_reference"),
-    },
-    Measure {
-        name: "unavoidable",
-        is_compared: false,
-        of: |cell, plan| number(cell, plan, |found| found.avoidability == "unavoidable"),
-    },
+    shown("beyond_reference", |cell, plan| {
+        number(cell, plan, |found| found.avoidability == "beyond_reference")
+    }),
+    shown("unavoidable", |cell, plan| number(cell, plan, |found| found.avoidability == "unavoidable")),
     // With an obstacle hit before.
-    Measure {
-        name: "repeated",
-        is_compared: false,
-        of: |cell, plan| number(cell, plan, |found| found.repeated),
-    },
+    shown("repeated", |cell, plan| number(cell, plan, |found| found.repeated)),
     // Just after it appeared.
-    Measure { name: "sudden", is_compared: false, of: |cell, plan| number(cell, plan, |found| found.sudden) },
+    shown("sudden", |cell, plan| number(cell, plan, |found| found.sudden)),
     // The other ran into the ego vehicle.
-    Measure { name: "struck", is_compared: false, of: |cell, plan| number(cell, plan, |found| found.struck) },
+    shown("struck", |cell, plan| number(cell, plan, |found| found.struck)),
     // Episodes with a counted collision.
-    Measure {
-        name: "colliding",
-        is_compared: true,
-        of: |cell, plan| per_seed(cell, plan, |episode| f64::from(episode.counted() > 0)),
-    },
-    Measure { name: "distinct", is_compared: true, of: distinct },
+    compared("colliding", |cell, plan| per_seed(cell, plan, |episode| f64::from(episode.counted() > 0))),
+    compared("distinct", distinct),
     // Distinct failures under all seeds together.
-    Measure {
-        name: "distinct_all",
-        is_compared: false,
-        of: |cell, _| Some(failures(&cell.episodes).len() as f64),
-    },
+    shown("distinct_all", |cell, _| Some(failures(&cell.episodes).len() as f64)),
     // Time to the first counted collision, where there is one, s.
-    Measure { name: "ttfc_s", is_compared: false, of: |cell, _| ttfc_s(cell) },
+    shown("ttfc_s", |cell, _| ttfc_s(cell)),
     // Time to the first counted collision, restricted mean, s.
-    Measure {
-        name: "ttfc_restricted_s",
-        is_compared: true,
-        of: |cell, plan| restricted_mean(&lifetimes(&cell.episodes), plan.horizon_s),
-    },
+    compared("ttfc_restricted_s", |cell, plan| restricted_mean(&lifetimes(&cell.episodes), plan.horizon_s)),
     // Red lights run.
-    Measure {
-        name: "red_runs",
-        is_compared: false,
-        of: |cell, plan| per_seed(cell, plan, |episode| f64::from(episode.red_runs)),
-    },
+    shown("red_runs", |cell, plan| per_seed(cell, plan, |episode| f64::from(episode.red_runs))),
     // Share of time above the speed limit.
-    Measure {
-        name: "speeding_share",
-        is_compared: false,
-        of: |cell, _| time_share(cell, |episode| episode.speeding_s),
-    },
+    shown("speeding_share", |cell, _| time_share(cell, |episode| episode.speeding_s)),
     // Share of time beside the lane.
-    Measure {
-        name: "astray_share",
-        is_compared: false,
-        of: |cell, _| time_share(cell, |episode| episode.astray_s),
-    },
+    shown("astray_share", |cell, _| time_share(cell, |episode| episode.astray_s)),
     // Share of episodes that end at the goal.
-    Measure {
-        name: "arrived_share",
-        is_compared: false,
-        of: |cell, _| Some(mean(cell.episodes.iter().map(|episode| f64::from(episode.ended == "arrived")))),
-    },
+    shown("arrived_share", |cell, _| {
+        Some(mean(cell.episodes.iter().map(|episode| f64::from(episode.ended == "arrived"))))
+    }),
     // Simulated time of the evaluation, h.
-    Measure {
-        name: "evaluation_h",
-        is_compared: false,
-        of: |cell, _| {
-            Some(
-                cell.episodes.iter().map(|episode| episode.duration_s + episode.branched_s).sum::<f64>()
-                    / 3600.0,
-            )
-        },
-    },
+    shown("evaluation_h", |cell, _| {
+        let all_s = cell.episodes.iter().map(|episode| episode.duration_s + episode.branched_s);
+        Some(all_s.sum::<f64>() / 3600.0)
+    }),
     // Simulated time of the training, h.
-    Measure {
-        name: "training_h",
-        is_compared: false,
-        of: |cell, _| {
-            of_training(cell, |cell| {
-                cell.trained.iter().map(|episode| episode.simulated_s).sum::<f64>() / 3600.0
-            })
-        },
-    },
+    shown("training_h", |cell, _| {
+        of_training(cell, |episode| episode.simulated_s).map(|all_s| all_s / 3600.0)
+    }),
     // Counted collisions of the training.
-    Measure {
-        name: "training_counted",
-        is_compared: false,
-        of: |cell, _| {
-            of_training(cell, |cell| cell.trained.iter().map(|episode| f64::from(episode.counted)).sum())
-        },
-    },
+    shown("training_counted", |cell, _| of_training(cell, |episode| f64::from(episode.counted))),
 ];
 
 /// The distinct failures among the counted collisions of episodes.
@@ -181,6 +129,7 @@ fn time_share(cell: &CellRecord, of: impl Fn(&EpisodeRecord) -> f64) -> Option<f
     (all_s > 0.0).then(|| cell.episodes.iter().map(of).sum::<f64>() / all_s)
 }
 
-fn of_training(cell: &CellRecord, of: impl Fn(&CellRecord) -> f64) -> Option<f64> {
-    cell.training_seed.map(|_| of(cell))
+/// The total over the episodes of the training, if there was one.
+fn of_training(cell: &CellRecord, of: impl Fn(&TrainedRecord) -> f64) -> Option<f64> {
+    cell.training_seed.map(|_| cell.trained.iter().map(of).sum())
 }

@@ -10,7 +10,7 @@ use crate::rng::Stream;
 use crate::run::{Arena, EpisodeSummary, choose};
 
 /// The outcome of a number of episodes.
-#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+#[derive(Debug, Clone, Default, PartialEq, serde::Serialize)]
 pub struct Evaluation {
     /// Episodes on each road.
     pub episodes: u64,
@@ -35,16 +35,7 @@ pub fn evaluate(
     (episodes, seed): (u64, u64),
 ) -> Evaluation {
     let mut traces = Sha256::new();
-    let mut found = Evaluation {
-        episodes,
-        seed,
-        collisions: 0,
-        counted: 0,
-        colliding: 0,
-        return_mean: 0.0,
-        trace: [0; 32],
-        simulated_s: 0.0,
-    };
+    let mut found = Evaluation { episodes, seed, ..Evaluation::default() };
     let mut sum = 0.0;
     for number in 0..episodes * arena.roads() as u64 {
         let seed = rng::child_seed(seed, Stream::Evaluation, number);
