@@ -8,7 +8,6 @@ use std::path::Path;
 use rusqlite::{Connection, Transaction, params};
 
 use crate::action::Draw;
-use crate::ads::Module;
 use crate::episode::{EpisodeLog, Outcome};
 use crate::mdp::STATE_NAMES;
 use crate::model::vocabulary::Word;
@@ -64,17 +63,7 @@ impl Database {
     /// # Errors
     /// If the file cannot be opened or is a database of another layout.
     pub fn open(path: &Path) -> Result<Database, DatabaseError> {
-        let mut connection = Connection::open(path)?;
-        let version: i64 = connection.pragma_query_value(None, "user_version", |row| row.get(0))?;
-        if version == 0 {
-            let transaction = connection.transaction()?;
-            transaction.execute_batch(SCHEMA)?;
-            transaction.execute_batch(&step_table())?;
-            transaction.pragma_update(None, "user_version", SCHEMA_VERSION)?;
-            transaction.commit()?;
-        } else if version != SCHEMA_VERSION {
-            return Err(DatabaseError::Layout { found: version });
-        }
+        let connection = connect(path, SCHEMA_VERSION, &format!("{SCHEMA}{}", step_table()))?;
         Ok(Database { connection })
     }
 
@@ -167,6 +156,24 @@ impl Database {
             },
         )?)
     }
+}
+
+/// Opens a database, making its tables if the file is new.
+///
+/// # Errors
+/// If the file cannot be opened, or has another layout than `version`.
+pub(crate) fn connect(path: &Path, version: i64, tables: &str) -> Result<Connection, DatabaseError> {
+    let mut connection = Connection::open(path)?;
+    let found: i64 = connection.pragma_query_value(None, "user_version", |row| row.get(0))?;
+    if found == 0 {
+        let transaction = connection.transaction()?;
+        transaction.execute_batch(tables)?;
+        transaction.pragma_update(None, "user_version", version)?;
+        transaction.commit()?;
+    } else if found != version {
+        return Err(DatabaseError::Layout { found });
+    }
+    Ok(connection)
 }
 
 /// How often a reason kept an action from being carried out.
@@ -311,9 +318,6 @@ fn add_collision(
     let Finding { collision, facts, judgement, .. } = finding;
     let contact = &collision.contact;
     let severity = oracle::severity(collision);
-    let in_words =
-        |modules: &Vec<Module>| modules.iter().map(|module| module.name()).collect::<Vec<_>>().join(" ");
-    let cause = finding.cause.as_ref().map(in_words);
     transaction
         .prepare_cached(
             "INSERT INTO collision VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
@@ -343,7 +347,7 @@ fn add_collision(
             severity.relative_speed_mps,
             severity.delta_v_mps,
             severity.obstacle_delta_v_mps,
-            cause,
+            finding.cause_in_words(),
             finding.shape.map(Shape::name),
         ])?;
     Ok(())

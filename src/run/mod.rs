@@ -19,16 +19,16 @@ mod threads;
 
 pub use arena::Arena;
 pub(crate) use arena::{carry_out, choose, legal, offers};
-pub(crate) use database::add_all;
 pub use database::{Database, DatabaseError, RefusalCount, Totals};
+pub(crate) use database::{add_all, connect};
 pub use gauges::Gauges;
 pub use groups::Group;
 pub(crate) use groups::kind;
 pub use play::{Run, play};
 pub(crate) use profile::under_test;
 pub use profile::{DEFAULT_ADS, Profile, driving_system, recorded, trained_against};
-pub(crate) use settings::check_episodes;
 pub use settings::{EPISODES_MAX, PolicyReference, RunError, RunSettings, VERSION};
+pub(crate) use settings::{agent_named, check_episodes};
 pub use shape::Shape;
 pub use stage::Stage;
 pub use summary::{EpisodeSummary, Finding};

@@ -7,7 +7,6 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use crate::action::ActionTable;
-use crate::agent;
 use crate::agent::{Agent, Kind, QPolicy};
 use crate::episode;
 use crate::episode::{Choice, EpisodeLog, Moment, Watch};
@@ -15,12 +14,11 @@ use crate::model::Space;
 use crate::oracle;
 use crate::rng;
 use crate::rng::Stream;
-use crate::syntax::listed;
 
 use crate::run::arena::{Arena, choose};
 use crate::run::gauges::Gauges;
 use crate::run::profile::under_test;
-use crate::run::settings::{RunError, RunSettings, check_episodes};
+use crate::run::settings::{RunError, RunSettings, agent_named, check_episodes};
 use crate::run::summary::EpisodeSummary;
 use crate::run::threads::on_threads;
 
@@ -41,11 +39,7 @@ impl Run {
     /// If the settings name a road, a driving system, an agent or a rule that does not exist, a name
     /// twice, or a number of episodes that is not possible.
     pub fn new(table: ActionTable, settings: RunSettings) -> Result<Run, RunError> {
-        let agent = agent::by_name(&settings.agent).ok_or_else(|| {
-            let known = listed(&agent::REGISTRY.iter().map(|entry| entry.name).collect::<Vec<_>>());
-            RunError::Agent { name: settings.agent.clone(), known }
-        })?;
-        match agent.kind {
+        match agent_named(&settings.agent)?.kind {
             Kind::Ready(build) => Run::with_agent(table, settings, Box::new(build)),
             Kind::Learning(_) | Kind::Searching(_) => Err(RunError::Untrained { name: settings.agent }),
         }

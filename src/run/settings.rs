@@ -6,6 +6,7 @@ use crate::model::Space;
 use crate::oracle;
 use crate::oracle::AvoidabilitySettings;
 use crate::sim::ENGINE;
+use crate::syntax::listed;
 
 use crate::run::profile::{DEFAULT_ADS, Profile};
 
@@ -129,6 +130,15 @@ pub enum RunError {
 
 /// Most episodes that a run may have on each road.
 pub const EPISODES_MAX: u32 = 1_000_000;
+
+/// # Errors
+/// If there is no agent of that name.
+pub(crate) fn agent_named(name: &str) -> Result<&'static agent::Entry, RunError> {
+    agent::by_name(name).ok_or_else(|| {
+        let known = listed(&agent::REGISTRY.iter().map(|entry| entry.name).collect::<Vec<_>>());
+        RunError::Agent { name: name.to_owned(), known }
+    })
+}
 
 /// # Errors
 /// If this many episodes on a road are not possible.

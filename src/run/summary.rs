@@ -46,6 +46,14 @@ pub struct Finding {
     pub shape: Option<Shape>,
 }
 
+impl Finding {
+    /// The names of the modules at fault, with a space between them.
+    pub(crate) fn cause_in_words(&self) -> Option<String> {
+        let modules = self.cause.as_ref()?;
+        Some(modules.iter().map(|module| module.name()).collect::<Vec<_>>().join(" "))
+    }
+}
+
 impl EpisodeSummary {
     /// Judges every collision of a log by playing it again from its setup, and applies the space's verdict.
     pub fn judged(

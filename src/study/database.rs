@@ -5,7 +5,7 @@ use std::path::Path;
 
 use rusqlite::{Connection, Row, params};
 
-use crate::run::DatabaseError;
+use crate::run::{DatabaseError, connect};
 
 use crate::study::job::Job;
 use crate::study::ready::Study;
@@ -50,17 +50,7 @@ impl StudyDatabase {
     /// # Errors
     /// If the file cannot be opened or is a database of another layout.
     pub fn open(path: &Path) -> Result<StudyDatabase, DatabaseError> {
-        let mut connection = Connection::open(path)?;
-        let version: i64 = connection.pragma_query_value(None, "user_version", |row| row.get(0))?;
-        if version == 0 {
-            let transaction = connection.transaction()?;
-            transaction.execute_batch(SCHEMA)?;
-            transaction.pragma_update(None, "user_version", SCHEMA_VERSION)?;
-            transaction.commit()?;
-        } else if version != SCHEMA_VERSION {
-            return Err(DatabaseError::Layout { found: version });
-        }
-        Ok(StudyDatabase { connection })
+        Ok(StudyDatabase { connection: connect(path, SCHEMA_VERSION, SCHEMA)? })
     }
 
     /// Adds all cells of a job, or nothing.

@@ -1,6 +1,5 @@
 //! What is kept of a job: every evaluated episode with its collisions, and the learning curve.
 
-use crate::ads::Module;
 use crate::episode::EpisodeLog;
 use crate::model::vocabulary::Word;
 use crate::oracle;
@@ -140,8 +139,6 @@ impl EpisodeRecord {
 impl CollisionRecord {
     fn new(finding: &Finding) -> CollisionRecord {
         let severity = oracle::severity(&finding.collision);
-        let in_words =
-            |modules: &Vec<Module>| modules.iter().map(|module| module.name()).collect::<Vec<_>>().join(" ");
         CollisionRecord {
             time_s: finding.collision.contact.time_s,
             counted: finding.counted,
@@ -154,7 +151,7 @@ impl CollisionRecord {
                 manoeuvre: finding.collision.verb.name().to_owned(),
                 approach: severity.approach.to_owned(),
                 side: severity.side.to_owned(),
-                cause: finding.cause.as_ref().map(in_words),
+                cause: finding.cause_in_words(),
             },
         }
     }

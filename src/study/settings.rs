@@ -4,10 +4,9 @@ use std::collections::BTreeSet;
 
 use crate::action::ActionTable;
 use crate::ads::ModularConfig;
-use crate::agent;
 use crate::agent::{Kind, Settings};
 use crate::oracle::AvoidabilitySettings;
-use crate::run::{EPISODES_MAX, Profile, RunError, VERSION};
+use crate::run::{EPISODES_MAX, Profile, RunError, VERSION, agent_named};
 use crate::sim::ENGINE;
 use crate::syntax::listed;
 
@@ -75,8 +74,6 @@ pub struct TrainingPlan {
 /// Why a study cannot begin.
 #[derive(Debug, thiserror::Error)]
 pub enum StudyError {
-    #[error("{0}")]
-    File(String),
     #[error("no agent is named: list at least one under `agents`")]
     NoAgent,
     #[error("two agents are called `{label}`: give one of them another `label`")]
@@ -160,11 +157,7 @@ fn agent_settings(
     read: &dyn Fn(&str) -> Result<String, String>,
 ) -> Result<AgentSettings, StudyError> {
     let label = file.label.unwrap_or_else(|| file.name.clone());
-    let entry = agent::by_name(&file.name).ok_or_else(|| {
-        let known = listed(&agent::REGISTRY.iter().map(|entry| entry.name).collect::<Vec<_>>());
-        let error = RunError::Agent { name: file.name.clone(), known };
-        StudyError::Agent { label: label.clone(), error }
-    })?;
+    let entry = agent_named(&file.name).map_err(|error| StudyError::Agent { label: label.clone(), error })?;
     let (repeats, training) = match entry.kind {
         Kind::Ready(_) => {
             let learning = [

@@ -9,7 +9,6 @@ use ndarray::Array1;
 
 use crate::action::ActionTable;
 use crate::ads::Ads;
-use crate::agent;
 use crate::agent::{
     Agent, Beginning, Experience, Kind, Lesson, QPolicy, Rows, Settings, Trainable, Trajectory,
 };
@@ -22,11 +21,10 @@ use crate::oracle::AvoidabilitySettings;
 use crate::rng;
 use crate::rng::Stream;
 use crate::run::{
-    Arena, EpisodeSummary, Finding, Profile, RunError, RunSettings, carry_out, check_episodes, legal, offers,
-    under_test,
+    Arena, EpisodeSummary, Finding, Profile, RunError, RunSettings, agent_named, carry_out, check_episodes,
+    legal, offers, under_test,
 };
 use crate::sim::{Contact, World};
-use crate::syntax::listed;
 
 /// Everything that is needed to repeat a training; written to `run.yaml`.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -332,11 +330,7 @@ fn experiences(
 /// Looks everything up that the settings name.
 fn prepared(table: ActionTable, settings: &TrainSettings) -> Result<(Arena, Arc<Rows>), RunError> {
     check_episodes(settings.episodes)?;
-    let agent = agent::by_name(&settings.agent).ok_or_else(|| {
-        let known = listed(&agent::REGISTRY.iter().map(|entry| entry.name).collect::<Vec<_>>());
-        RunError::Agent { name: settings.agent.clone(), known }
-    })?;
-    if matches!(agent.kind, Kind::Ready(_)) {
+    if matches!(agent_named(&settings.agent)?.kind, Kind::Ready(_)) {
         return Err(RunError::Unteachable { name: settings.agent.clone() });
     }
     let table = with_period(table, settings.hyperparameters.observation_period_s());
