@@ -40,7 +40,7 @@ pub fn last(output: &Output) -> Result<ActionTable, Failure> {
     };
     let path = load::read(Path::new(LAST)).map_err(|_| no_table())?;
     let path = PathBuf::from(path.trim_end());
-    let text = load::read(&path).map_err(|error| Failure::file("read", &path, error))?;
+    let text = load::text(&path)?;
     let file: TableFile = serde_yaml::from_str(&text).map_err(|error| Failure::file("read", &path, error))?;
     let table = load::table(output, Path::new(&file.space))?;
     if table.file() != file {

@@ -17,7 +17,7 @@ pub fn fmt(output: &Output, arguments: &FmtArguments) -> Result<(), Failure> {
     let mut texts = Vec::new();
     for path in &arguments.files {
         let from_stdin = path == Path::new("-");
-        let text = if from_stdin { stdin()? } else { file(path)? };
+        let text = if from_stdin { stdin()? } else { load::text(path)? };
         let formatted = formatted(output, path, &text)?;
         let is_formatted = formatted == text;
         if arguments.check {
@@ -47,10 +47,6 @@ fn formatted(output: &Output, path: &Path, text: &str) -> Result<String, Failure
         }
         FormatError::Meaning => Failure::file("format", path, error),
     })
-}
-
-fn file(path: &Path) -> Result<String, Failure> {
-    load::read(path).map_err(|error| Failure::file("read", path, error))
 }
 
 fn stdin() -> Result<String, Failure> {

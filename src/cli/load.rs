@@ -56,10 +56,7 @@ pub fn nearby(path: &Path) -> Vec<(String, String)> {
     let mut found = Vec::new();
     for prefix in ["", "../"] {
         let directory = Path::new(".").join(folder).join(prefix);
-        let Ok(entries) = std::fs::read_dir(directory) else { continue };
-        let mut files: Vec<PathBuf> = entries.flatten().map(|entry| entry.path()).collect();
-        files.retain(|file| file.extension().is_some_and(|extension| extension == "ava"));
-        files.sort();
+        let Ok(files) = sources_in(&directory) else { continue };
         if files.len() > NEARBY_MAX {
             continue;
         }
@@ -69,6 +66,23 @@ pub fn nearby(path: &Path) -> Vec<(String, String)> {
         }
     }
     found
+}
+
+/// Source files in a directory, sorted.
+///
+/// # Errors
+/// If the directory cannot be read.
+pub fn sources_in(directory: &Path) -> Result<Vec<PathBuf>, Failure> {
+    let entries = std::fs::read_dir(directory).map_err(|error| Failure::file("read", directory, error))?;
+    let mut files: Vec<PathBuf> = entries.flatten().map(|entry| entry.path()).collect();
+    files.retain(|file| is_source(file));
+    files.sort();
+    Ok(files)
+}
+
+/// Whether a file is one of the language, by its name.
+pub fn is_source(file: &Path) -> bool {
+    file.extension().is_some_and(|extension| extension == "ava")
 }
 
 /// Source files below a folder, sorted. Hidden folders and folders of build outputs are passed over, and so
@@ -85,13 +99,12 @@ pub fn below(folder: &Path) -> Vec<PathBuf> {
                 return found;
             }
             let name = entry.file_name().to_string_lossy().into_owned();
-            let is_source = entry.path().extension().is_some_and(|extension| extension == "ava");
             // The type of a link is not followed: links may go in a circle.
             match entry.file_type() {
                 Ok(kind) if kind.is_dir() && !name.starts_with('.') && !PASSED_OVER.contains(&&*name) => {
                     open.push(entry.path());
                 }
-                Ok(kind) if kind.is_file() && is_source => found.push(entry.path()),
+                Ok(kind) if kind.is_file() && is_source(&entry.path()) => found.push(entry.path()),
                 _ => {}
             }
         }
@@ -133,8 +146,7 @@ pub fn scenario(output: &Output, path: &Path) -> Result<(ActionTable, Scenario),
 /// # Errors
 /// If the file cannot be read, or is no profile.
 pub fn profile(path: &Path) -> Result<ModularConfig, Failure> {
-    let text = read(path).map_err(|error| Failure::file("read", path, error))?;
-    ModularConfig::from_yaml(&text).map_err(|error| Failure::file("use", path, error))
+    ModularConfig::from_yaml(&text(path)?).map_err(|error| Failure::file("use", path, error))
 }
 
 /// What a file that avastra wrote holds.
@@ -173,6 +185,14 @@ pub fn policy(output: &Output, path: &Path) -> Result<(ActionTable, Policy), Fai
 fn space(loaded: Loaded, path: &Path) -> Result<Arc<Space>, Failure> {
     let space = loaded.space.filter(|space| !space.actions.is_empty());
     space.ok_or_else(|| Failure::usage(format!("`{}` declares no action", path.display())))
+}
+
+/// The text of a file that a command needs.
+///
+/// # Errors
+/// If it cannot be read.
+pub fn text(path: &Path) -> Result<String, Failure> {
+    read(path).map_err(|error| Failure::file("read", path, error))
 }
 
 /// Reads a text file; everything that avastra reads comes this way.

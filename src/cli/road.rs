@@ -61,7 +61,7 @@ pub fn road(output: &Output, arguments: &RoadArguments) -> Result<(), Failure> {
 /// The map, and the route between the places given or that of the space's road.
 fn read(output: &Output, arguments: &RoadArguments) -> Result<(Arc<RoadMap>, Option<Route>), Failure> {
     let path = &arguments.file;
-    let (map, route) = if path.extension().is_some_and(|extension| extension == "ava") {
+    let (map, route) = if load::is_source(path) {
         let loaded = load::load(output, path)?;
         let roads = loaded.space.as_ref().map_or(&[][..], |space| &space.roads);
         let named = |name: &String| roads.iter().find(|road| road.name == *name);
@@ -79,7 +79,7 @@ fn read(output: &Output, arguments: &RoadArguments) -> Result<(Arc<RoadMap>, Opt
         if arguments.road.is_some() {
             return Err(Failure::usage("`--road` names a road of a space; this file is a map"));
         }
-        let text = load::read(path).map_err(|error| Failure::file("read", path, error))?;
+        let text = load::text(path)?;
         let stem = path.file_stem().unwrap_or_default().to_string_lossy();
         let map = RoadMap::from_opendrive(&stem, &text);
         (Arc::new(map.map_err(|error| Failure::file("read", path, error))?), None)

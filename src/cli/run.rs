@@ -20,7 +20,7 @@ use super::interrupt::stop_on_interrupt;
 use super::output::Output;
 use super::parallel::jobs;
 use super::progress::{Progress, plural};
-use super::run_directory::{Begun, RunDirectory, write};
+use super::run_directory::{RunDirectory, write};
 use super::verify::acting;
 use super::{compile, load, run_directory};
 
@@ -33,8 +33,9 @@ pub fn run(output: &Output, arguments: &RunArguments) -> Result<(), Failure> {
         Some(path) => resumed(output, path)?,
         None => begun(output, arguments)?,
     };
-    let done =
-        directory.database.episodes().map_err(|error| Failure::file("read", &directory.path, error))?;
+    let path = directory.path.clone();
+    let unread = |error| Failure::file("read", &path, error);
+    let done = directory.database.episodes().map_err(unread)?;
     let todo: Vec<usize> = (0..run.episodes()).filter(|number| !done.contains(number)).collect();
     output.tell(&heading(&run, &directory.path));
 
@@ -51,20 +52,17 @@ pub fn run(output: &Output, arguments: &RunArguments) -> Result<(), Failure> {
     })?;
     drop(progress);
 
-    let totals =
-        directory.database.totals().map_err(|error| Failure::file("read", &directory.path, error))?;
-    let refusals =
-        directory.database.refusals().map_err(|error| Failure::file("read", &directory.path, error))?;
+    let totals = directory.database.totals().map_err(unread)?;
+    let refusals = directory.database.refusals().map_err(unread)?;
     output.say(&totals_text(&totals, started.elapsed().as_secs_f64(), todo.len()));
     if !refusals.is_empty() {
         output.say(&refusals_text(&refusals));
     }
-    let groups =
-        directory.database.groups().map_err(|error| Failure::file("read", &directory.path, error))?;
+    let groups = directory.database.groups().map_err(unread)?;
     if !groups.is_empty() {
         output.say(&groups_text(&groups));
     }
-    let critical = critical_files(&directory.path)?;
+    let critical = load::sources_in(&directory.path.join("critical"))?;
     output.say(&critical_text(&directory.path, &critical));
     output.result(
         "run",
@@ -129,10 +127,7 @@ pub fn roads_or_all(named: &[String], space: &Space) -> Vec<String> {
 
 /// The rest of an interrupted run.
 fn resumed(output: &Output, path: &Path) -> Result<(Run, RunDirectory), Failure> {
-    let settings: RunSettings = run_directory::settings(path)?;
-    let begun =
-        Begun { avastra: &settings.avastra, engine: &settings.engine, space_digest: &settings.space_digest };
-    let table = begun.table(output, "run", &path.join(&settings.space))?;
+    let (settings, table): (RunSettings, _) = run_directory::resume(output, path, "run", "run")?;
     let policy = match &settings.policy {
         None => None,
         Some(reference) => {
@@ -269,64 +264,54 @@ fn totals_text(totals: &Totals, elapsed_s: f64, played: usize) -> String {
 /// Refused actions, by reason.
 fn refusals_text(refusals: &[RefusalCount]) -> String {
     let all: i64 = refusals.iter().map(|refusal| refusal.times).sum();
-    let mut text = format!("refused: {}", plural(all as usize, "action"));
-    for refusal in refusals.iter().take(NAMED_MAX) {
-        text.push_str(&format!("\n  {} × {}", refusal.times, refusal.reason));
-    }
-    if refusals.len() > NAMED_MAX {
-        text.push_str(&format!("\n  and for {} other reasons", refusals.len() - NAMED_MAX));
-    }
-    text
+    let line = |refusal: &RefusalCount| format!("{} × {}", refusal.times, refusal.reason);
+    let head = format!("refused: {}", plural(all as usize, "action"));
+    cut_short(head, refusals, line, |more| format!("and for {more} other reasons"))
 }
 
 /// Distinct failures, each with how often it was found and a scenario that shows it.
 fn groups_text(groups: &[Group]) -> String {
-    let mut text = format!("{}:", plural(groups.len(), "distinct failure"));
-    for group in groups.iter().take(NAMED_MAX) {
+    let line = |group: &Group| {
         let cause = match group.cause.as_deref() {
             None => String::new(),
             Some("") => ", no cause found".to_owned(),
             Some(modules) => format!(", {}", modules.replace(' ', " and ")),
         };
         let shape = group.shape.as_ref().map_or(String::new(), |shape| format!(" ({shape})"));
-        text.push_str(&format!(
-            "\n  {} × {} ({}, {}), hit by the {}{shape}{cause}: {}_{:04}",
+        format!(
+            "{} × {} ({}, {}), hit by the {}{shape}{cause}: {}_{:04}",
             group.count, group.kind, group.manoeuvre, group.approach, group.side, group.road, group.episode
-        ));
-    }
-    if groups.len() > NAMED_MAX {
-        text.push_str(&format!("\n  and {} others", groups.len() - NAMED_MAX));
-    }
-    text
-}
-
-/// Paths of the emitted scenarios, sorted.
-fn critical_files(directory: &Path) -> Result<Vec<PathBuf>, Failure> {
-    let critical = directory.join("critical");
-    let entries = std::fs::read_dir(&critical).map_err(|error| Failure::file("read", &critical, error))?;
-    let mut files: Vec<PathBuf> = entries
-        .flatten()
-        .map(|entry| entry.path())
-        .filter(|path| path.extension().is_some_and(|extension| extension == "ava"))
-        .collect();
-    files.sort();
-    Ok(files)
+        )
+    };
+    let head = format!("{}:", plural(groups.len(), "distinct failure"));
+    cut_short(head, groups, line, |more| format!("and {more} others"))
 }
 
 fn critical_text(directory: &Path, files: &[PathBuf]) -> String {
     if files.is_empty() {
         return "no critical scenario".to_owned();
     }
-    let mut text = format!("\n{} with a counted collision:", plural(files.len(), "scenario"));
-    for file in files.iter().take(NAMED_MAX) {
-        text.push_str(&format!("\n  {}", file.display()));
-    }
-    if files.len() > NAMED_MAX {
-        text.push_str(&format!("\n  and {} more", files.len() - NAMED_MAX));
-    }
+    let head = format!("\n{} with a counted collision:", plural(files.len(), "scenario"));
+    let mut text =
+        cut_short(head, files, |file| file.display().to_string(), |more| format!("and {more} more"));
     // A shell splits a path at its spaces, and must still expand the star.
     let directory = directory.display().to_string();
     let directory = if directory.contains(' ') { format!("'{directory}'") } else { directory };
     text.push_str(&format!("\nreplay them with: avastra replay {directory}/critical/*.ava"));
     text
+}
+
+/// The head and a line for each of the first items; `rest` says how many more there are.
+fn cut_short<T>(
+    head: String,
+    items: &[T],
+    line: impl Fn(&T) -> String,
+    rest: impl Fn(usize) -> String,
+) -> String {
+    let mut lines = vec![head];
+    lines.extend(items.iter().take(NAMED_MAX).map(|item| format!("  {}", line(item))));
+    if items.len() > NAMED_MAX {
+        lines.push(format!("  {}", rest(items.len() - NAMED_MAX)));
+    }
+    lines.join("\n")
 }

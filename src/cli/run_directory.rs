@@ -42,24 +42,45 @@ pub fn write_settings(directory: &Path, settings: &impl serde::Serialize) -> Res
     write(&directory.join("run.yaml"), &text)
 }
 
-/// The settings in a run directory's `run.yaml`.
-pub fn settings<S: serde::de::DeserializeOwned>(directory: &Path) -> Result<S, Failure> {
-    settings_in(directory, "run.yaml", "run")
+/// What every kind of settings begins with.
+#[derive(serde::Deserialize)]
+struct Begun {
+    avastra: String,
+    engine: String,
+    space: PathBuf,
+    space_digest: String,
 }
 
-/// The settings of any kind of directory: `name` is their file, `what` the kind in a word.
-pub fn settings_in<S: serde::de::DeserializeOwned>(
+/// The settings of an interrupted run, training or study, and the table of its space, if neither the space nor
+/// avastra has changed since. The settings are in the file `KIND.yaml`; `what` is what was begun, in a word.
+pub fn resume<S: serde::de::DeserializeOwned>(
+    output: &Output,
     directory: &Path,
-    name: &str,
+    kind: &str,
     what: &str,
-) -> Result<S, Failure> {
-    let path = directory.join(name);
+) -> Result<(S, ActionTable), Failure> {
+    let path = directory.join(format!("{kind}.yaml"));
     if !path.is_file() {
         let directory = directory.display();
-        return Err(Failure::usage(format!("`{directory}` is no {what} directory: it has no {name}")));
+        return Err(Failure::usage(format!("`{directory}` is no {kind} directory: it has no {kind}.yaml")));
     }
-    let text = load::read(&path).map_err(|error| Failure::file("read", &path, error))?;
-    serde_yaml::from_str(&text).map_err(|error| Failure::file("read", &path, error))
+    let text = load::text(&path)?;
+    let settings = serde_yaml::from_str(&text).map_err(|error| Failure::file("read", &path, error))?;
+    let begun: Begun = serde_yaml::from_str(&text).map_err(|error| Failure::file("read", &path, error))?;
+    if (begun.engine.as_str(), begun.avastra.as_str()) != (ENGINE, VERSION) {
+        return Err(Failure::usage(format!(
+            "the {what} was begun by avastra {} in world `{}`, this is avastra {VERSION} in `{ENGINE}`: begin a new one",
+            begun.avastra, begun.engine
+        )));
+    }
+    let table = load::table(output, &directory.join(&begun.space))?;
+    if table.space().digest != begun.space_digest {
+        return Err(Failure::usage(format!(
+            "`{}` has changed since the {what} was begun: begin a new one",
+            table.space().path.display()
+        )));
+    }
+    Ok((settings, table))
 }
 
 impl RunDirectory {
@@ -73,34 +94,6 @@ impl RunDirectory {
     /// Where the critical scenario of an episode is kept.
     pub fn critical(&self, name: &str) -> PathBuf {
         self.path.join("critical").join(format!("{name}.ava"))
-    }
-}
-
-/// What an interrupted run, training or study was begun with.
-pub struct Begun<'a> {
-    pub avastra: &'a str,
-    pub engine: &'a str,
-    pub space_digest: &'a str,
-}
-
-impl Begun<'_> {
-    /// The table of the space, if neither the space nor avastra has changed since. `what` is what was begun, in a
-    /// word.
-    pub fn table(&self, output: &Output, what: &str, space: &Path) -> Result<ActionTable, Failure> {
-        if (self.engine, self.avastra) != (ENGINE, VERSION) {
-            return Err(Failure::usage(format!(
-                "the {what} was begun by avastra {} in world `{}`, this is avastra {VERSION} in `{ENGINE}`: begin a new one",
-                self.avastra, self.engine
-            )));
-        }
-        let table = load::table(output, space)?;
-        if table.space().digest != self.space_digest {
-            return Err(Failure::usage(format!(
-                "`{}` has changed since the {what} was begun: begin a new one",
-                table.space().path.display()
-            )));
-        }
-        Ok(table)
     }
 }
 

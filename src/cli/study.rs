@@ -16,7 +16,7 @@ use super::interrupt::stop_on_interrupt;
 use super::output::Output;
 use super::parallel::jobs;
 use super::progress::{Progress, plural};
-use super::run_directory::{Begun, write};
+use super::run_directory::write;
 use super::{load, run_directory};
 
 /// Plays what a study still lacks and prints its result.
@@ -69,7 +69,7 @@ pub fn study(output: &Output, arguments: &StudyArguments) -> Result<(), Failure>
 /// A new study, from its file.
 fn begun(output: &Output, path: &Path, quick: bool) -> Result<Study, Failure> {
     let refuse = |reason: String| Failure::file("use", path, reason);
-    let text = load::read(path).map_err(|error| Failure::file("read", path, error))?;
+    let text = load::text(path)?;
     let file = StudyFile::from_yaml(&text).map_err(refuse)?;
     let beside = |name: &str| path.parent().unwrap_or(Path::new("")).join(name);
     let table = load::table(output, &beside(&file.space))?;
@@ -87,10 +87,7 @@ fn begun(output: &Output, path: &Path, quick: bool) -> Result<Study, Failure> {
 
 /// The rest of an interrupted study.
 fn resumed(output: &Output, path: &Path) -> Result<Study, Failure> {
-    let settings: StudySettings = run_directory::settings_in(path, "study.yaml", "study")?;
-    let begun =
-        Begun { avastra: &settings.avastra, engine: &settings.engine, space_digest: &settings.space_digest };
-    let table = begun.table(output, "study", &path.join(&settings.space))?;
+    let (settings, table) = run_directory::resume(output, path, "study", "study")?;
     Study::new(table, settings).map_err(Failure::usage)
 }
 

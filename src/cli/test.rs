@@ -36,7 +36,9 @@ pub fn test(output: &Output, arguments: &TestArguments) -> Result<(), Failure> {
         run::driving_system(name)?;
     }
     let mut cases = Vec::new();
-    for file in scenario_files(&arguments.directory)? {
+    let critical = arguments.directory.join("critical");
+    let directory = if critical.is_dir() { &critical } else { &arguments.directory };
+    for file in load::sources_in(directory)? {
         let Some(case) = play(output, arguments, profile.as_ref(), &file)? else { continue };
         let (word, reason) = in_words(&case.outcome);
         let reason = if reason.is_empty() { String::new() } else { format!(": {reason}") };
@@ -136,17 +138,6 @@ fn in_words(outcome: &Result<Regression, String>) -> (&'static str, String) {
         Ok(Regression::NeverMet) => ("changed", "the obstacle never appears".to_owned()),
         Err(reason) => ("error", reason.clone()),
     }
-}
-
-/// Scenario files in a directory and its `critical`, sorted.
-fn scenario_files(directory: &Path) -> Result<Vec<PathBuf>, Failure> {
-    let critical = directory.join("critical");
-    let directory = if critical.is_dir() { critical } else { directory.to_owned() };
-    let entries = std::fs::read_dir(&directory).map_err(|error| Failure::file("read", &directory, error))?;
-    let mut files: Vec<PathBuf> = entries.flatten().map(|entry| entry.path()).collect();
-    files.retain(|path| path.extension().is_some_and(|extension| extension == "ava"));
-    files.sort();
-    Ok(files)
 }
 
 /// The results as JUnit XML, by the schema of Jenkins' xUnit plugin.

@@ -19,7 +19,7 @@ use super::interrupt::stop_on_interrupt;
 use super::output::Output;
 use super::progress::{TrainingProgress, plural};
 use super::run::roads_or_all;
-use super::run_directory::{Begun, RunDirectory, write};
+use super::run_directory::{RunDirectory, write};
 use super::{distill, load, run_directory};
 
 /// Episodes between two checkpoints: at most so many are played again after a kill.
@@ -82,7 +82,7 @@ fn settings(arguments: &TrainArguments) -> Result<Settings, Failure> {
     })?;
     let (text, path) = match &arguments.config {
         None => (String::new(), Path::new("--preset")),
-        Some(path) => (load::read(path).map_err(|error| Failure::file("read", path, error))?, path.as_path()),
+        Some(path) => (load::text(path)?, path.as_path()),
     };
     let settings = Settings::from_yaml(entry, arguments.preset.as_deref(), &text).ok_or_else(|| {
         let name = entry.name;
@@ -93,10 +93,7 @@ fn settings(arguments: &TrainArguments) -> Result<Settings, Failure> {
 
 /// The rest of an interrupted training.
 fn resumed(output: &Output, path: &Path) -> Result<(Training, RunDirectory), Failure> {
-    let settings: TrainSettings = run_directory::settings(path)?;
-    let begun =
-        Begun { avastra: &settings.avastra, engine: &settings.engine, space_digest: &settings.space_digest };
-    let table = begun.table(output, "training", &path.join(&settings.space))?;
+    let (settings, table): (TrainSettings, _) = run_directory::resume(output, path, "run", "training")?;
     let mut directory = RunDirectory::open(path.to_owned())?;
     let checkpoint =
         directory.database.return_to_checkpoint().map_err(|error| Failure::file("resume", path, error))?;
