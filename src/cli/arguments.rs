@@ -88,7 +88,7 @@ pub enum Command {
     /// Run emitted scenarios again and check every claim they make.
     Replay(ReplayArguments),
     /// Check every claim of emitted scenarios and policies.
-    Verify(VerifyArguments),
+    Verify(FilesArguments),
     /// Say which module of the driving system an emitted scenario's crash is the fault of.
     Diagnose(DiagnoseArguments),
     /// Find the smallest scenario that still makes the same crash.
@@ -402,8 +402,8 @@ pub struct StudyArguments {
     pub quick: bool,
 }
 
-#[derive(Debug, Args)]
-pub struct VerifyArguments {
+#[derive(Debug, Clone, Args)]
+pub struct FilesArguments {
     #[arg(required = true, value_name = "FILE")]
     pub files: Vec<PathBuf>,
     /// Worker threads over files [default: one for each core].
@@ -413,8 +413,6 @@ pub struct VerifyArguments {
 
 #[derive(Debug, Args)]
 pub struct ReplayArguments {
-    #[arg(required = true, value_name = "FILE")]
-    pub files: Vec<PathBuf>,
     /// Replay against another driving system: shows what happens, checks no claim.
     #[arg(long)]
     pub ads: Option<String>,
@@ -422,15 +420,12 @@ pub struct ReplayArguments {
     /// recorded one.
     #[arg(long, value_name = "FILE")]
     pub ads_config: Option<PathBuf>,
-    /// Worker threads over files [default: one for each core].
-    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=1024))]
-    pub jobs: Option<u32>,
+    #[command(flatten)]
+    pub many: FilesArguments,
 }
 
 #[derive(Debug, Args)]
 pub struct DiagnoseArguments {
-    #[arg(required = true, value_name = "FILE")]
-    pub files: Vec<PathBuf>,
     /// Another profile of `modular` than the recorded one.
     #[arg(long, value_name = "FILE")]
     pub ads_config: Option<PathBuf>,
@@ -445,21 +440,17 @@ pub struct DiagnoseArguments {
     /// start.
     #[arg(long)]
     pub mechanisms: bool,
-    /// Worker threads over files [default: one for each core].
-    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=1024))]
-    pub jobs: Option<u32>,
+    #[command(flatten)]
+    pub many: FilesArguments,
 }
 
 #[derive(Debug, Args)]
 pub struct ShrinkArguments {
-    #[arg(required = true, value_name = "FILE")]
-    pub files: Vec<PathBuf>,
     /// Where to write, if there is one file [default: STEM.shrunk.ava beside each].
     #[arg(long, short)]
     pub output: Option<PathBuf>,
-    /// Worker threads over files [default: one for each core].
-    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=1024))]
-    pub jobs: Option<u32>,
+    #[command(flatten)]
+    pub many: FilesArguments,
 }
 
 #[derive(Debug, Args)]

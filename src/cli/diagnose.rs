@@ -29,9 +29,9 @@ pub fn diagnose(output: &Output, arguments: &DiagnoseArguments) -> Result<(), Fa
     }
     let baseline = arguments.baseline.as_deref().map(load::profile).transpose()?.unwrap_or_default();
     let inquire = |file: &PathBuf| explain(output, arguments, profile.as_ref(), &baseline, file);
-    let [file] = arguments.files.as_slice() else {
-        let found = each_file(&arguments.files, arguments.jobs, inquire);
-        return many(output, &arguments.files, found);
+    let [file] = arguments.many.files.as_slice() else {
+        let found = each_file(&arguments.many, inquire);
+        return many(output, &arguments.many.files, found);
     };
     let found = inquire(file)?;
     output.tell(&heading(&found.collision));
@@ -149,14 +149,14 @@ fn mechanisms(
     arguments: &DiagnoseArguments,
     profile: Option<&ModularConfig>,
 ) -> Result<(), Failure> {
-    let found = each_file(&arguments.files, arguments.jobs, |file| {
+    let found = each_file(&arguments.many, |file| {
         let (table, scenario) = load::scenario(output, file)?;
         let Case { stage, ads, log, index } = Case::of(&table, &scenario, profile)?;
         oracle::mechanisms(&stage.setup(&ads), &log, index).map_err(Failure::usage)
     });
     let mut crashes: Vec<Vec<WithoutMechanism>> = Vec::new();
     let mut results = Vec::new();
-    for (file, found) in arguments.files.iter().zip(found) {
+    for (file, found) in arguments.many.files.iter().zip(found) {
         match found {
             Ok(found) => {
                 results.push(serde_json::json!({ "file": file, "without": found }));
@@ -167,7 +167,7 @@ fn mechanisms(
     }
     let shares = oracle::mechanism_shares(&crashes);
     output.say(&shares_text(crashes.len(), &shares));
-    let errors = arguments.files.len() - crashes.len();
+    let errors = arguments.many.files.len() - crashes.len();
     output.result(
         "diagnose",
         serde_json::json!({

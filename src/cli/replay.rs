@@ -20,16 +20,15 @@ use super::progress::plural;
 /// Replays the scenario of every file; with `--ads` or another profile only tells what happens.
 pub fn replay(output: &Output, arguments: &ReplayArguments) -> Result<(), Failure> {
     let profile = arguments.ads_config.as_deref().map(load::profile).transpose()?;
-    let played =
-        each_file(&arguments.files, arguments.jobs, |path| play(output, arguments, profile.as_ref(), path));
+    let played = each_file(&arguments.many, |path| play(output, arguments, profile.as_ref(), path));
     let (mut refuted, mut confirmed, mut refuted_files) = (0, 0, 0);
     let (mut results, mut failed) = (Vec::new(), None);
-    for (path, played) in arguments.files.iter().zip(played) {
+    for (path, played) in arguments.many.files.iter().zip(played) {
         let played = match played {
             Ok(played) => played,
             // A broken file does not hide the results of the others.
             Err(failure) => {
-                if arguments.files.len() > 1 {
+                if arguments.many.files.len() > 1 {
                     output.tell(&format!("{}: {failure}", path.display()));
                 }
                 failed = failed.or(Some(failure));
@@ -51,7 +50,7 @@ pub fn replay(output: &Output, arguments: &ReplayArguments) -> Result<(), Failur
         }
         results.push(played.result);
     }
-    if arguments.files.len() > 1 && confirmed + refuted > 0 {
+    if arguments.many.files.len() > 1 && confirmed + refuted > 0 {
         let files = plural(results.len(), "scenario");
         output.say(&format!(
             "\n{files}: {} confirmed, {refuted} refuted in {refuted_files} of them",

@@ -19,7 +19,7 @@ use super::run_directory::write;
 
 /// Writes each file's scenario as small as possible, and checks every claim of what it wrote.
 pub fn shrink(output: &Output, arguments: &ShrinkArguments) -> Result<(), Failure> {
-    if let [file] = arguments.files.as_slice() {
+    if let [file] = arguments.many.files.as_slice() {
         let path = arguments.output.clone().unwrap_or_else(|| beside(file));
         let small = smaller(output, file, &path)?;
         output.say(&small.in_words());
@@ -33,9 +33,9 @@ pub fn shrink(output: &Output, arguments: &ShrinkArguments) -> Result<(), Failur
             "`--output {path}` is for one file: of several, each is written beside its own"
         )));
     }
-    let found = each_file(&arguments.files, arguments.jobs, |file| smaller(output, file, &beside(file)));
+    let found = each_file(&arguments.many, |file| smaller(output, file, &beside(file)));
     let mut done: Vec<Small> = Vec::new();
-    for (file, found) in arguments.files.iter().zip(found) {
+    for (file, found) in arguments.many.files.iter().zip(found) {
         match found {
             Ok(small) => {
                 output.tell(&small.in_words());
@@ -44,7 +44,7 @@ pub fn shrink(output: &Output, arguments: &ShrinkArguments) -> Result<(), Failur
             Err(failure) => output.say(&format!("{}: {failure}", file.display())),
         }
     }
-    let errors = arguments.files.len() - done.len();
+    let errors = arguments.many.files.len() - done.len();
     let kept = done.iter().filter(|small| small.refuted == 0).count();
     let before = median(done.iter().map(|small| small.before));
     let after = median(done.iter().map(|small| small.after));

@@ -1,6 +1,6 @@
 //! `avastra verify`: checks every claim of emitted scenarios and policies.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 
 use crate::action::ActionTable;
@@ -10,7 +10,7 @@ use crate::model::{Policy, digest_text};
 use crate::sim::ENGINE;
 use crate::train::{evaluate, judge_rules, rounded, training_arena};
 
-use super::arguments::{ReplayArguments, VerifyArguments};
+use super::arguments::{FilesArguments, ReplayArguments};
 use super::error::Failure;
 use super::load::Emitted;
 use super::output::Output;
@@ -18,7 +18,7 @@ use super::progress::plural;
 use super::{load, replay};
 
 /// Replays scenarios, and plays the evaluations of policies again.
-pub fn verify(output: &Output, arguments: &VerifyArguments) -> Result<(), Failure> {
+pub fn verify(output: &Output, arguments: &FilesArguments) -> Result<(), Failure> {
     let (mut scenarios, mut policies, mut failed) = (Vec::new(), Vec::new(), None);
     for path in &arguments.files {
         match load::emitted(output, path) {
@@ -43,8 +43,8 @@ pub fn verify(output: &Output, arguments: &VerifyArguments) -> Result<(), Failur
     }
     if !scenarios.is_empty() {
         // Its result comes after the policies': a failure of theirs must not hide it.
-        let jobs = arguments.jobs;
-        let recorded = ReplayArguments { files: scenarios, ads: None, ads_config: None, jobs };
+        let many = FilesArguments { files: scenarios, ..arguments.clone() };
+        let recorded = ReplayArguments { many, ads: None, ads_config: None };
         let outcome = replay::replay(output, &recorded);
         match outcome {
             Err(Failure::Refuted { claims }) => refuted += claims,
@@ -133,7 +133,6 @@ pub fn acting(table: &ActionTable, policy: &Policy, face: Face) -> Result<QPolic
 }
 
 fn report(output: &Output, path: &Path, policy: &Policy, wrong: &[String]) {
-    let path: PathBuf = path.to_owned();
     match (&policy.claims, wrong) {
         (None, _) => output.say(&format!("{}: {} makes no claim", path.display(), policy.name)),
         (Some(claims), []) => {
