@@ -78,86 +78,25 @@ pub fn words(rule: Rule) -> Option<&'static str> {
 }
 
 /// Whether the rule continues an expression. It may follow every expression, so a message names it only
-/// where nothing else is expected.
+/// where nothing else is expected. Rules are ordered as they stand in the grammar.
 pub fn continues_expression(rule: Rule) -> bool {
-    matches!(
-        rule,
-        Rule::infix
-            | Rule::unit
-            | Rule::index
-            | Rule::field_access
-            | Rule::arguments
-            | Rule::op_implies
-            | Rule::op_or
-            | Rule::op_and
-            | Rule::op_in
-            | Rule::op_equal
-            | Rule::op_not_equal
-            | Rule::op_less_equal
-            | Rule::op_less
-            | Rule::op_greater_equal
-            | Rule::op_greater
-            | Rule::op_range
-            | Rule::op_add
-            | Rule::op_subtract
-            | Rule::op_multiply
-            | Rule::op_divide
-    )
+    let continues = [Rule::infix, Rule::unit, Rule::index, Rule::field_access, Rule::arguments];
+    continues.contains(&rule) || (Rule::op_implies..=Rule::op_divide).contains(&rule)
 }
 
 /// Whether the rule is a mark or keyword that the tree does not keep, because the rule around it tells
 /// which one it was.
 pub fn is_plain_terminal(rule: Rule) -> bool {
-    matches!(
+    let is_kept = matches!(
         rule,
-        Rule::EOI
-            | Rule::colon
-            | Rule::comma
-            | Rule::equals
-            | Rule::arrow
-            | Rule::fat_arrow
-            | Rule::bar
-            | Rule::less
-            | Rule::slash
-            | Rule::open_brace
-            | Rule::close_brace
-            | Rule::open_paren
-            | Rule::close_paren
-            | Rule::open_bracket
-            | Rule::close_bracket
-            | Rule::kw_override
-            | Rule::kw_language
-            | Rule::kw_use
-            | Rule::kw_digest
-            | Rule::kw_without
-            | Rule::kw_enum
-            | Rule::kw_odds
-            | Rule::kw_state
-            | Rule::kw_let
-            | Rule::kw_fn
-            | Rule::kw_action
-            | Rule::kw_in
-            | Rule::kw_where
-            | Rule::kw_set
-            | Rule::kw_spawn
-            | Rule::kw_group
-            | Rule::kw_rule
-            | Rule::kw_on
-            | Rule::kw_road
-            | Rule::kw_episode
-            | Rule::kw_reward
-            | Rule::kw_verdict
-            | Rule::kw_expect
-            | Rule::kw_scenario
-            | Rule::kw_origin
-            | Rule::kw_start
-            | Rule::kw_steps
-            | Rule::kw_policy
-            | Rule::kw_net
-            | Rule::kw_claims
-            | Rule::kw_rules
-            | Rule::kw_when
-            | Rule::kw_match
-            | Rule::kw_lane
-    )
+        Rule::kw_each
+            | Rule::kw_any
+            | Rule::kw_ahead
+            | Rule::kw_behind
+            | Rule::kw_optional
+            | Rule::kw_with
+            | Rule::kw_at
+            | Rule::kw_by
+    );
+    rule == Rule::EOI || (Rule::colon..=Rule::kw_lane).contains(&rule) && !is_kept
 }
