@@ -3,7 +3,8 @@
 //! Scales are fixed numbers, not running means, so that a policy means the same on every road. They bring
 //! the usual range of a variable to about one; rare values may exceed it.
 
-use crate::mdp::{Observation, STATE_LEN, STATE_NAMES, variable};
+use crate::mdp::{Observation, STATE_LEN, variable};
+use crate::model::policy::{VARIABLES, VariableKind};
 
 use super::hyperparameters::{Encoding, StateSet};
 
@@ -26,24 +27,12 @@ const DEEP_COLLISION: [&str; 12] = [
     "speed",
 ];
 
-/// Variables that the extended set adds to the paper's 19.
-const EXTENSION: [&str; 8] = [
-    "nearestAhead",
-    "nearestLeft",
-    "nearestSpeedAhead",
-    "nearestSpeedLeft",
-    "routeLeft",
-    "junctionAhead",
-    "laneOffset",
-    "time",
-];
-
 /// How one variable is encoded when it is scaled.
 enum Scale {
     /// Divided by this.
     By(f32),
-    /// One input for each of these values: 1 for the value that the variable has, 0 for the others.
-    OneHot(&'static [f32]),
+    /// One input for each of these words: 1 for the one that the variable has, 0 for the others.
+    OneHot(&'static [(&'static str, f32)]),
     /// The three phenomena that the paper packs into one number.
     Weather,
 }
@@ -58,15 +47,14 @@ pub struct Features {
 
 impl Features {
     pub fn new(set: StateSet, encoding: Encoding) -> Features {
-        let named = |names: &[&str]| -> Vec<usize> {
-            names.iter().map(|name| variable(name).expect("the name is a variable's")).collect()
-        };
+        let named = |name: &str| variable(name).expect("the name is a variable's");
         let variables = match set {
             StateSet::Full => (0..STATE_LEN).collect(),
             StateSet::External => (0..EXTERNAL_LEN).collect(),
             StateSet::Internal => (EXTERNAL_LEN..STATE_LEN).collect(),
-            StateSet::DeepCollision => named(&DEEP_COLLISION),
-            StateSet::Extended => (0..STATE_LEN).chain(named(&EXTENSION)).collect(),
+            StateSet::DeepCollision => DEEP_COLLISION.map(named).to_vec(),
+            // Where the nearest obstacle and the road ahead are: the last of the variables.
+            StateSet::Extended => (0..STATE_LEN).chain(named("nearestAhead")..VARIABLES.len()).collect(),
         };
         let mut features = Features { variables, encoding, len: 0 };
         features.len = features.encode(&Observation::zeros()).len();
@@ -91,8 +79,8 @@ impl Features {
             match (self.encoding, scale(index)) {
                 (Encoding::Raw, _) => inputs.push(value),
                 (Encoding::Scaled, Scale::By(unit)) => inputs.push(value / unit),
-                (Encoding::Scaled, Scale::OneHot(values)) => {
-                    inputs.extend(values.iter().map(|&one| f32::from(u8::from(value == one))));
+                (Encoding::Scaled, Scale::OneHot(words)) => {
+                    inputs.extend(words.iter().map(|&(_, one)| f32::from(u8::from(value == one))));
                 }
                 (Encoding::Scaled, Scale::Weather) => {
                     let phenomena = ["rain", "fog", "wetness"];
@@ -107,13 +95,12 @@ impl Features {
 
 /// Scale of a variable, by its index.
 fn scale(index: usize) -> Scale {
-    let name = STATE_NAMES.get(index).copied();
-    let name = name.unwrap_or_else(|| crate::mdp::BEYOND_NAMES[index - STATE_LEN]);
-    match name {
+    let variable = &VARIABLES[index];
+    if let VariableKind::Words { words, ordered: false } = variable.kind {
+        return Scale::OneHot(words);
+    }
+    match variable.observed_as {
         "weather" => Scale::Weather,
-        "timeOfDay" => Scale::OneHot(&[10.0, 14.0, 20.0]),
-        "trafficLight" => Scale::OneHot(&[-1.0, 0.0, 1.0]),
-        "roadCondition" => Scale::OneHot(&[0.0, 1.0, 2.0, 3.0]),
         "numObs" | "speed" | "speedNearestObs" | "nearestSpeedAhead" | "nearestSpeedLeft" => Scale::By(10.0),
         "distToNearestObs" | "nearestAhead" => Scale::By(50.0),
         "nearestLeft" => Scale::By(10.0),

@@ -18,7 +18,7 @@ pub use collision_probability::{
     longitudinal_safety_distance_m, opposing_safety_distance_m, probability,
 };
 pub use criticality::{Criticality, Encroachment, deceleration_to_avoid_mps2, time_to_collision_s};
-pub use observation::{BEYOND_LEN, BEYOND_NAMES, Observation, variable};
+pub use observation::{BEYOND_LEN, Observation, variable};
 pub use released_probability::released_probability;
 pub use reward::{RewardSettings, StepOutcome, reward};
-pub use state::{PerceptionCounts, STATE_LEN, STATE_NAMES, StateVector, observe, perception_counts};
+pub use state::{PerceptionCounts, STATE_LEN, StateVector, observe, perception_counts};

@@ -7,33 +7,13 @@
 use ndarray::Array1;
 
 use crate::ads::Status;
+use crate::model::policy::VARIABLES;
 use crate::sim::World;
 
-use super::state::{STATE_LEN, STATE_NAMES, StateVector, observe};
+use super::state::{STATE_LEN, StateVector, observe};
 
-/// Number of the variables beyond the paper's.
-pub const BEYOND_LEN: usize = 17;
-
-/// Names of the variables beyond the paper's, in order.
-pub const BEYOND_NAMES: [&str; BEYOND_LEN] = [
-    "egoX",
-    "egoY",
-    "egoZ",
-    "rain",
-    "fog",
-    "wetness",
-    "egoRoll",
-    "egoHeading",
-    "egoPitch",
-    "nearestAhead",
-    "nearestLeft",
-    "nearestSpeedAhead",
-    "nearestSpeedLeft",
-    "routeLeft",
-    "junctionAhead",
-    "laneOffset",
-    "time",
-];
+/// Number of the variables beyond the paper's; they are the last of [`VARIABLES`].
+pub const BEYOND_LEN: usize = VARIABLES.len() - STATE_LEN;
 
 /// How far ahead a junction is searched for, m; also stands for the distance if there is no obstacle.
 const LOOK_AHEAD_M: f64 = 100.0;
@@ -69,9 +49,9 @@ impl Observation {
     }
 }
 
-/// Index of a variable, as [`Observation::get`] takes it.
+/// Index of a variable by the paper's spelling, as [`Observation::get`] takes it.
 pub fn variable(name: &str) -> Option<usize> {
-    STATE_NAMES.iter().chain(&BEYOND_NAMES).position(|known| *known == name)
+    VARIABLES.iter().position(|known| known.observed_as == name)
 }
 
 fn beyond(world: &World) -> [f64; BEYOND_LEN] {

@@ -15,31 +15,8 @@ use crate::geometry::{Vec2, wrap_angle};
 use crate::model::vocabulary::TimeOfDay;
 use crate::sim::{Obstacle, SignalColour, World};
 
-/// Number of state variables.
+/// Number of state variables; they are the first of [`VARIABLES`](crate::model::policy::VARIABLES).
 pub const STATE_LEN: usize = 19;
-
-/// The state variables' names in the paper, in order.
-pub const STATE_NAMES: [&str; STATE_LEN] = [
-    "weather",
-    "timeOfDay",
-    "trafficLight",
-    "numObs",
-    "distToNearestObs",
-    "speedNearestObs",
-    "roadCondition",
-    "distDeviation",
-    "angleDeviation",
-    "positionDiff",
-    "directionDiff",
-    "sizeDiff",
-    "velocityDiff",
-    "throttle",
-    "steerRate",
-    "steerTarget",
-    "accRate",
-    "brakePercentage",
-    "speed",
-];
 
 /// One state: shape `(STATE_LEN,)`.
 pub type StateVector = Array1<f32>;

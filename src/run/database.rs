@@ -9,7 +9,8 @@ use rusqlite::{Connection, Transaction, params};
 
 use crate::action::Draw;
 use crate::episode::{EpisodeLog, Outcome};
-use crate::mdp::STATE_NAMES;
+use crate::mdp::STATE_LEN;
+use crate::model::policy::VARIABLES;
 use crate::model::vocabulary::Word;
 use crate::oracle;
 
@@ -224,7 +225,9 @@ pub struct Totals {
 }
 
 fn step_table() -> String {
-    let states: Vec<String> = STATE_NAMES.iter().map(|name| format!("{name} REAL NOT NULL")).collect();
+    let paper = VARIABLES[..STATE_LEN].iter();
+    let states: Vec<String> =
+        paper.map(|variable| format!("{} REAL NOT NULL", variable.observed_as)).collect();
     format!(
         "CREATE TABLE step (
            episode INTEGER NOT NULL REFERENCES episode, step INTEGER NOT NULL, time_s REAL NOT NULL,
