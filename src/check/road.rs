@@ -81,8 +81,8 @@ impl Checker {
             }
         };
         let facts = facts(&block.name.text, &map, &route);
-        let (name, span) = (block.name.text.clone(), block.name.span);
-        Some(Road { name, docs: docs(item), map_path, map, start, goal, route, facts, span })
+        let name = block.name.text.clone();
+        Some(Road { name, docs: docs(item), map_path, map, start, goal, route, facts })
     }
 
     /// Notes the names and numbers of a road, whether its map can be read or not.

@@ -279,7 +279,6 @@ pub struct Road {
     pub goal: LanePlace,
     pub route: Route,
     pub facts: RoadFacts,
-    pub span: Span,
 }
 
 /// What rules may ask about a road.

@@ -32,11 +32,6 @@ impl Dimension {
         Dimension { metres, seconds, radians }
     }
 
-    /// The dimension with that type name.
-    pub fn from_name(name: &str) -> Option<Dimension> {
-        Dimension::NAMED.iter().find(|(_, word, _)| *word == name).map(|(dimension, _, _)| *dimension)
-    }
-
     /// The dimension of a product; `None` beyond exponents of ±127.
     pub fn times(self, other: Dimension) -> Option<Dimension> {
         Some(Dimension {
