@@ -3,10 +3,9 @@
 use crate::check::checker::{Checker, each};
 use crate::check::names::unknown;
 use crate::check::report::Report;
-use crate::model::expr::Comparison;
 use crate::model::vocabulary::{SpaceClaim, Word};
 use crate::model::{Reach, Row, Space, code};
-use crate::syntax::ast::{ItemKind, Span};
+use crate::syntax::ast::{BinaryOp, ItemKind, Span};
 use crate::syntax::{Diagnostic, ast};
 
 impl Checker {
@@ -66,9 +65,7 @@ impl Checker {
             }
             ast::ExprKind::Binary { op, left, right, .. } => {
                 let (left, right) = (self.count(left, space)?, self.count(right, space)?);
-                let Some(comparison) = Comparison::from_operator(*op) else {
-                    return self.reject(not_static(span));
-                };
+                let BinaryOp::Compare(comparison) = op else { return self.reject(not_static(span)) };
                 if comparison.holds(left, right) {
                     return Some(());
                 }

@@ -533,25 +533,9 @@ impl Checker {
             BinaryOp::Implies => ExprKind::Implies,
             BinaryOp::Or => ExprKind::Or,
             BinaryOp::And => ExprKind::And,
-            BinaryOp::Equal => return self.comparison(Comparison::Equal, left, right, place, span),
-            BinaryOp::NotEqual => return self.comparison(Comparison::NotEqual, left, right, place, span),
-            BinaryOp::Less => return self.comparison(Comparison::Less, left, right, place, span),
-            BinaryOp::LessEqual => return self.comparison(Comparison::LessEqual, left, right, place, span),
-            BinaryOp::Greater => return self.comparison(Comparison::Greater, left, right, place, span),
-            BinaryOp::GreaterEqual => {
-                return self.comparison(Comparison::GreaterEqual, left, right, place, span);
-            }
             BinaryOp::In => return self.membership(left, right, place, span),
-            BinaryOp::Add => return self.arithmetic(Arithmetic::Add, op_span, left, right, place, span),
-            BinaryOp::Subtract => {
-                return self.arithmetic(Arithmetic::Subtract, op_span, left, right, place, span);
-            }
-            BinaryOp::Multiply => {
-                return self.arithmetic(Arithmetic::Multiply, op_span, left, right, place, span);
-            }
-            BinaryOp::Divide => {
-                return self.arithmetic(Arithmetic::Divide, op_span, left, right, place, span);
-            }
+            BinaryOp::Compare(op) => return self.comparison(op, left, right, place, span),
+            BinaryOp::Arithmetic(op) => return self.arithmetic(op, op_span, left, right, place, span),
         };
         // Both sides are looked at, so that mistakes in both are reported.
         let left = self.typed(left, place, Type::Bool);
@@ -614,7 +598,7 @@ impl Checker {
             _ => None,
         };
         if let Some(road) = road {
-            if !matches!(op, Comparison::Equal | Comparison::NotEqual) {
+            if op.orders() {
                 self.note_roads(core::slice::from_ref(road));
                 let error = Diagnostic::error(code::UNORDERED, "roads have no order");
                 let error = error.at(span, format!("`{}` needs one", op.symbol()));
@@ -633,9 +617,8 @@ impl Checker {
             self.mismatch("cannot be compared", span, &left, &right);
             return None;
         }
-        let orders = !matches!(op, Comparison::Equal | Comparison::NotEqual);
         match left.ty {
-            Type::Bool if orders => {
+            Type::Bool if op.orders() => {
                 let error = Diagnostic::error(code::UNORDERED, "truth values have no order");
                 self.report(
                     error
@@ -644,7 +627,7 @@ impl Checker {
                 );
                 return None;
             }
-            Type::Enum(of) if orders && !self.enums[of.0].ordered => {
+            Type::Enum(of) if op.orders() && !self.enums[of.0].ordered => {
                 let of = &self.enums[of.0];
                 let error = Diagnostic::error(code::UNORDERED, format!("`{}` has no order", of.name))
                     .at(span, format!("`{}` needs one", op.symbol()))

@@ -17,7 +17,7 @@ use crate::model::{
     AMBIENT_MAX, Domain, Initial, Memory, Parameter, Row, RulesInForce, SIGNAL_PHASE_S, Space, StateDef,
     Value, code, locals,
 };
-use crate::syntax::ast::{BinaryOp, ClauseKind};
+use crate::syntax::ast::{BinaryOp, ClauseKind, Comparison};
 use crate::syntax::{Diagnostic, ast, listed};
 use crate::units::{Dimension, Rational};
 
@@ -451,40 +451,43 @@ impl<'a> Reader<'a> {
                 let class = Avoidability::ALL.into_iter().find(|class| class.name() == name)?;
                 self.avoidability(class, expect)
             }
-            ast::ExprKind::Binary { op: BinaryOp::Equal, left, right, .. } => match (&left.kind, &right.kind)
-            {
-                (ast::ExprKind::Name(name), ast::ExprKind::List(items)) if name == "proc" => {
-                    let values = items.iter().map(|item| self.take(figure(item, Dimension::RATIO)));
-                    values.collect::<Option<_>>().map(Claim::Proc)
-                }
-                (ast::ExprKind::Name(name), ast::ExprKind::Text(text))
-                    if name == ScenarioClaim::Trace.name() =>
-                {
-                    if !is_digest(text) {
-                        let error = Diagnostic::error(code::UNKNOWN_CLAIM, "this is the digest of no trace");
-                        let error = error.at(right.span, "not `sha256:` and 64 digits from 0 to f");
-                        return self.reject(error.help("`avastra replay FILE` says which digest was found"));
+            ast::ExprKind::Binary { op: BinaryOp::Compare(Comparison::Equal), left, right, .. } => {
+                match (&left.kind, &right.kind) {
+                    (ast::ExprKind::Name(name), ast::ExprKind::List(items)) if name == "proc" => {
+                        let values = items.iter().map(|item| self.take(figure(item, Dimension::RATIO)));
+                        values.collect::<Option<_>>().map(Claim::Proc)
                     }
-                    Some(Claim::Trace(text.clone()))
-                }
-                (ast::ExprKind::Name(name), _) if name == ScenarioClaim::Cause.name() => {
-                    let modules = self.modules(right)?;
-                    let (obstacle, _) = self.clauses(&expect.clauses, false)?;
-                    Some(Claim::Cause { modules, obstacle })
-                }
-                (ast::ExprKind::Name(name), ast::ExprKind::Name(end))
-                    if name == ScenarioClaim::End.name() =>
-                {
-                    if !ENDS.contains(&end.as_str()) {
-                        let message = format!("an episode does not end `{end}`");
-                        let error = Diagnostic::error(code::UNKNOWN_CLAIM, message);
-                        let error = error.at(right.span, "unknown end");
-                        return self.reject(error.help(format!("ends are {}", listed(&ENDS))));
+                    (ast::ExprKind::Name(name), ast::ExprKind::Text(text))
+                        if name == ScenarioClaim::Trace.name() =>
+                    {
+                        if !is_digest(text) {
+                            let error =
+                                Diagnostic::error(code::UNKNOWN_CLAIM, "this is the digest of no trace");
+                            let error = error.at(right.span, "not `sha256:` and 64 digits from 0 to f");
+                            return self
+                                .reject(error.help("`avastra replay FILE` says which digest was found"));
+                        }
+                        Some(Claim::Trace(text.clone()))
                     }
-                    Some(Claim::End(end.clone()))
+                    (ast::ExprKind::Name(name), _) if name == ScenarioClaim::Cause.name() => {
+                        let modules = self.modules(right)?;
+                        let (obstacle, _) = self.clauses(&expect.clauses, false)?;
+                        Some(Claim::Cause { modules, obstacle })
+                    }
+                    (ast::ExprKind::Name(name), ast::ExprKind::Name(end))
+                        if name == ScenarioClaim::End.name() =>
+                    {
+                        if !ENDS.contains(&end.as_str()) {
+                            let message = format!("an episode does not end `{end}`");
+                            let error = Diagnostic::error(code::UNKNOWN_CLAIM, message);
+                            let error = error.at(right.span, "unknown end");
+                            return self.reject(error.help(format!("ends are {}", listed(&ENDS))));
+                        }
+                        Some(Claim::End(end.clone()))
+                    }
+                    _ => self.reject(unclear()),
                 }
-                _ => self.reject(unclear()),
-            },
+            }
             _ => self.reject(unclear()),
         }
     }

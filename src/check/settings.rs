@@ -6,7 +6,7 @@ use crate::check::report::Report;
 use crate::model::expr::{Expr, ExprKind};
 use crate::model::vocabulary::{EpisodeField, Fact, Site, StopReason, Word};
 use crate::model::{COUNTED, EpisodeDef, RewardCase, TICK_MS, Type, VerdictDef, code};
-use crate::syntax::ast::{BinaryOp, ItemKind, Span};
+use crate::syntax::ast::{BinaryOp, Comparison, ItemKind, Span};
 use crate::syntax::{Diagnostic, ast};
 use crate::units::{Dimension, Rational};
 
@@ -131,9 +131,12 @@ impl Checker {
                     parts.extend([&**left, &**right]);
                     continue;
                 }
-                ast::ExprKind::Binary { op: BinaryOp::GreaterEqual, left, right, .. } => {
-                    (reason(left), Some(right))
-                }
+                ast::ExprKind::Binary {
+                    op: BinaryOp::Compare(Comparison::GreaterEqual),
+                    left,
+                    right,
+                    ..
+                } => (reason(left), Some(right)),
                 _ => (reason(part), None),
             };
             match (reason, count) {

@@ -3,7 +3,7 @@
 //! Layout is `fmt`'s business, not ours.
 
 use crate::model::code;
-use crate::syntax::ast::{BinaryOp, Expr, ExprKind, ItemKind, Name};
+use crate::syntax::ast::{BinaryOp, Comparison, Expr, ExprKind, ItemKind, Name};
 use crate::syntax::{Diagnostic, ast, print_expr};
 
 /// One warning for each oddity.
@@ -118,8 +118,8 @@ fn compared(expr: &Expr, into: &mut Vec<Diagnostic>) {
                 _ => return,
             };
             let holds = match op {
-                BinaryOp::Equal => truth,
-                BinaryOp::NotEqual => !truth,
+                BinaryOp::Compare(Comparison::Equal) => truth,
+                BinaryOp::Compare(Comparison::NotEqual) => !truth,
                 _ => return,
             };
             let other = match &other.kind {

@@ -75,7 +75,7 @@ fn condition(condition: &Condition) -> Expr {
             tree::signed(decimal(condition.value.abs(), false), condition.value < 0.0, unit)
         }
     };
-    tree::binary(condition.comparison.operator(), tree::name(variable.name), value)
+    tree::binary(BinaryOp::Compare(condition.comparison), tree::name(variable.name), value)
 }
 
 /// The call that names a row, its values in the order of the axes.

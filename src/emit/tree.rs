@@ -2,8 +2,8 @@
 
 use crate::model::{Space, Type, Value};
 use crate::syntax::ast::{
-    Arg, BinaryOp, Call, Clause, ClauseKind, Doc, Expect, Expr, ExprKind, Field, Item, ItemKind, Name,
-    Number, Span,
+    Arg, BinaryOp, Call, Clause, ClauseKind, Comparison, Doc, Expect, Expr, ExprKind, Field, Item, ItemKind,
+    Name, Number, Span,
 };
 use crate::units::{Dimension, decimal};
 
@@ -85,7 +85,7 @@ pub fn call(function: &str, args: Vec<(String, Expr)>) -> Call {
 }
 
 pub fn equal(left: Expr, right: Expr) -> Expr {
-    binary(BinaryOp::Equal, left, right)
+    binary(BinaryOp::Compare(Comparison::Equal), left, right)
 }
 
 pub fn binary(op: BinaryOp, left: Expr, right: Expr) -> Expr {

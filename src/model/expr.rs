@@ -2,7 +2,8 @@
 
 use crate::model::value::{EnumIndex, Type};
 use crate::model::vocabulary::{Fact, LaneChoice};
-use crate::syntax::ast::{BinaryOp, Span};
+use crate::syntax::ast::Span;
+pub use crate::syntax::ast::{Arithmetic, Comparison};
 use crate::units::Rational;
 
 /// An expression with its type and the place where it was written.
@@ -48,93 +49,6 @@ pub enum ExprKind {
         arm_of: Vec<usize>,
         arms: Vec<Expr>,
     },
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Arithmetic {
-    Add,
-    Subtract,
-    Multiply,
-    Divide,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Comparison {
-    Equal,
-    NotEqual,
-    Less,
-    LessEqual,
-    Greater,
-    GreaterEqual,
-}
-
-impl Comparison {
-    /// The same comparison read from right to left.
-    pub fn mirrored(self) -> Comparison {
-        match self {
-            Comparison::Equal => Comparison::Equal,
-            Comparison::NotEqual => Comparison::NotEqual,
-            Comparison::Less => Comparison::Greater,
-            Comparison::LessEqual => Comparison::GreaterEqual,
-            Comparison::Greater => Comparison::Less,
-            Comparison::GreaterEqual => Comparison::LessEqual,
-        }
-    }
-
-    /// Whether the comparison holds, without a tolerance.
-    pub fn holds<T: PartialOrd>(self, left: T, right: T) -> bool {
-        match self {
-            Comparison::Equal => left == right,
-            Comparison::NotEqual => left != right,
-            Comparison::Less => left < right,
-            Comparison::LessEqual => left <= right,
-            Comparison::Greater => left > right,
-            Comparison::GreaterEqual => left >= right,
-        }
-    }
-
-    /// The operator that stands for the comparison in a file.
-    pub fn operator(self) -> BinaryOp {
-        match self {
-            Comparison::Equal => BinaryOp::Equal,
-            Comparison::NotEqual => BinaryOp::NotEqual,
-            Comparison::Less => BinaryOp::Less,
-            Comparison::LessEqual => BinaryOp::LessEqual,
-            Comparison::Greater => BinaryOp::Greater,
-            Comparison::GreaterEqual => BinaryOp::GreaterEqual,
-        }
-    }
-
-    /// The comparison that the operator stands for; `None` for the other operators.
-    pub fn from_operator(operator: BinaryOp) -> Option<Comparison> {
-        match operator {
-            BinaryOp::Equal => Some(Comparison::Equal),
-            BinaryOp::NotEqual => Some(Comparison::NotEqual),
-            BinaryOp::Less => Some(Comparison::Less),
-            BinaryOp::LessEqual => Some(Comparison::LessEqual),
-            BinaryOp::Greater => Some(Comparison::Greater),
-            BinaryOp::GreaterEqual => Some(Comparison::GreaterEqual),
-            BinaryOp::Implies
-            | BinaryOp::Or
-            | BinaryOp::And
-            | BinaryOp::In
-            | BinaryOp::Add
-            | BinaryOp::Subtract
-            | BinaryOp::Multiply
-            | BinaryOp::Divide => None,
-        }
-    }
-
-    pub fn symbol(self) -> &'static str {
-        match self {
-            Comparison::Equal => "==",
-            Comparison::NotEqual => "!=",
-            Comparison::Less => "<",
-            Comparison::LessEqual => "<=",
-            Comparison::Greater => ">",
-            Comparison::GreaterEqual => ">=",
-        }
-    }
 }
 
 impl Expr {

@@ -613,28 +613,31 @@ pub enum UnaryOp {
     Negate,
 }
 
-impl UnaryOp {
-    pub fn symbol(self) -> &'static str {
-        match self {
-            UnaryOp::Not => "not",
-            UnaryOp::Negate => "-",
-        }
-    }
-}
-
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub enum BinaryOp {
     Implies,
     Or,
     And,
+    /// Membership in a list, a range or `road.lanes`.
+    In,
+    #[serde(untagged)]
+    Compare(Comparison),
+    #[serde(untagged)]
+    Arithmetic(Arithmetic),
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub enum Comparison {
     Equal,
     NotEqual,
     Less,
     LessEqual,
     Greater,
     GreaterEqual,
-    /// Membership in a list, a range or `road.lanes`.
-    In,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub enum Arithmetic {
     Add,
     Subtract,
     Multiply,
@@ -646,17 +649,17 @@ impl BinaryOp {
         BinaryOp::Implies,
         BinaryOp::Or,
         BinaryOp::And,
-        BinaryOp::Equal,
-        BinaryOp::NotEqual,
-        BinaryOp::Less,
-        BinaryOp::LessEqual,
-        BinaryOp::Greater,
-        BinaryOp::GreaterEqual,
         BinaryOp::In,
-        BinaryOp::Add,
-        BinaryOp::Subtract,
-        BinaryOp::Multiply,
-        BinaryOp::Divide,
+        BinaryOp::Compare(Comparison::Equal),
+        BinaryOp::Compare(Comparison::NotEqual),
+        BinaryOp::Compare(Comparison::Less),
+        BinaryOp::Compare(Comparison::LessEqual),
+        BinaryOp::Compare(Comparison::Greater),
+        BinaryOp::Compare(Comparison::GreaterEqual),
+        BinaryOp::Arithmetic(Arithmetic::Add),
+        BinaryOp::Arithmetic(Arithmetic::Subtract),
+        BinaryOp::Arithmetic(Arithmetic::Multiply),
+        BinaryOp::Arithmetic(Arithmetic::Divide),
     ];
 
     pub fn symbol(self) -> &'static str {
@@ -664,17 +667,12 @@ impl BinaryOp {
             BinaryOp::Implies => "implies",
             BinaryOp::Or => "or",
             BinaryOp::And => "and",
-            BinaryOp::Equal => "==",
-            BinaryOp::NotEqual => "!=",
-            BinaryOp::Less => "<",
-            BinaryOp::LessEqual => "<=",
-            BinaryOp::Greater => ">",
-            BinaryOp::GreaterEqual => ">=",
             BinaryOp::In => "in",
-            BinaryOp::Add => "+",
-            BinaryOp::Subtract => "-",
-            BinaryOp::Multiply => "*",
-            BinaryOp::Divide => "/",
+            BinaryOp::Compare(comparison) => comparison.symbol(),
+            BinaryOp::Arithmetic(Arithmetic::Add) => "+",
+            BinaryOp::Arithmetic(Arithmetic::Subtract) => "-",
+            BinaryOp::Arithmetic(Arithmetic::Multiply) => "*",
+            BinaryOp::Arithmetic(Arithmetic::Divide) => "/",
         }
     }
 
@@ -685,15 +683,50 @@ impl BinaryOp {
             BinaryOp::Or => 2,
             BinaryOp::And => 3,
             // 4 is `not`.
-            BinaryOp::Equal
-            | BinaryOp::NotEqual
-            | BinaryOp::Less
-            | BinaryOp::LessEqual
-            | BinaryOp::Greater
-            | BinaryOp::GreaterEqual
-            | BinaryOp::In => 5,
-            BinaryOp::Add | BinaryOp::Subtract => 6,
-            BinaryOp::Multiply | BinaryOp::Divide => 7,
+            BinaryOp::Compare(_) | BinaryOp::In => 5,
+            BinaryOp::Arithmetic(Arithmetic::Add | Arithmetic::Subtract) => 6,
+            BinaryOp::Arithmetic(Arithmetic::Multiply | Arithmetic::Divide) => 7,
+        }
+    }
+}
+
+impl Comparison {
+    /// The same comparison read from right to left.
+    pub fn mirrored(self) -> Comparison {
+        match self {
+            Comparison::Less => Comparison::Greater,
+            Comparison::LessEqual => Comparison::GreaterEqual,
+            Comparison::Greater => Comparison::Less,
+            Comparison::GreaterEqual => Comparison::LessEqual,
+            Comparison::Equal | Comparison::NotEqual => self,
+        }
+    }
+
+    /// Whether it asks for an order, and not only whether both sides are the same.
+    pub fn orders(self) -> bool {
+        !matches!(self, Comparison::Equal | Comparison::NotEqual)
+    }
+
+    /// Whether the comparison holds, without a tolerance.
+    pub fn holds<T: PartialOrd>(self, left: T, right: T) -> bool {
+        match self {
+            Comparison::Equal => left == right,
+            Comparison::NotEqual => left != right,
+            Comparison::Less => left < right,
+            Comparison::LessEqual => left <= right,
+            Comparison::Greater => left > right,
+            Comparison::GreaterEqual => left >= right,
+        }
+    }
+
+    pub fn symbol(self) -> &'static str {
+        match self {
+            Comparison::Equal => "==",
+            Comparison::NotEqual => "!=",
+            Comparison::Less => "<",
+            Comparison::LessEqual => "<=",
+            Comparison::Greater => ">",
+            Comparison::GreaterEqual => ">=",
         }
     }
 }

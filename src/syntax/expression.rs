@@ -76,7 +76,7 @@ impl Builder {
             // `implies` groups to the right, everything else to the left.
             let right_groups = matches!(op, Infix::Binary(BinaryOp::Implies));
             let right = self.climb(tokens, op.strength() + u8::from(!right_groups))?;
-            if op.strength() == strength(BinaryOp::Equal) || op.strength() == RANGE_PRECEDENCE {
+            if matches!(op, Infix::Binary(BinaryOp::Compare(_) | BinaryOp::In) | Infix::Range) {
                 self.refuse_chain(op, tokens.peek())?;
             }
             let span = left.span.to(right.span);

@@ -76,7 +76,7 @@ fn bare(expr: &Expr) -> Layout {
 /// A chain of operators of one strength breaks before each of them, or not at all.
 fn binary(op: BinaryOp, left: &Expr, right: &Expr) -> Layout {
     let level = strength(op);
-    let compares = level == strength(BinaryOp::Equal);
+    let compares = matches!(op, BinaryOp::Compare(_) | BinaryOp::In);
     // `implies` groups to the right, comparisons not at all, the rest to the left.
     let groups_right = op == BinaryOp::Implies;
     let left_least = level + u8::from(groups_right || compares);

@@ -99,21 +99,23 @@ fn condition(expr: &Expr) -> Result<Condition, Diagnostic> {
             .at(expr.span, "no such comparison")
             .help("write `when ego_speed > 8 m/s and time == Night`; for `or`, write two lines")
     };
-    let ExprKind::Binary { op, op_span, left, right } = &expr.kind else { return Err(unclear()) };
-    let comparison = Comparison::from_operator(*op).ok_or_else(unclear)?;
+    let ExprKind::Binary { op: BinaryOp::Compare(comparison), op_span, left, right } = &expr.kind else {
+        return Err(unclear());
+    };
+    let comparison = *comparison;
     let ExprKind::Name(name) = &left.kind else { return Err(unclear()) };
     let index = variable(name, left.span)?;
     let variable = &VARIABLES[index];
     let value = match variable.kind {
         VariableKind::Words { words, ordered } => {
-            if !ordered && !matches!(comparison, Comparison::Equal | Comparison::NotEqual) {
+            if !ordered && comparison.orders() {
                 let error = Diagnostic::error(code::UNORDERED, format!("`{name}` has no order"));
                 return Err(error.at(*op_span, "cannot compare").help("compare it by `==` or `!=`"));
             }
             word(variable, words, right)?
         }
         VariableKind::Quantity { .. } => {
-            if matches!(comparison, Comparison::NotEqual) {
+            if comparison == Comparison::NotEqual {
                 return Err(unclear());
             }
             number(variable, right)?
