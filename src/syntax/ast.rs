@@ -107,29 +107,62 @@ pub struct Item {
     pub span: Span,
 }
 
-/// What is declared.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub enum ItemKind {
-    Language(Number),
-    Use(Use),
-    Enum(Enum),
-    Odds(Odds),
-    State(State),
-    Let(Let),
-    Fn(Fn),
-    Action(Action),
-    Group(Group),
-    Rule(Rule),
-    Road(Block),
-    Episode(Vec<Field>),
-    Reward(Vec<Case>),
-    Verdict(Verdict),
-    Expect(Expect),
-    Scenario(Scenario),
-    Policy(Policy),
-    /// `override` before a declaration: it replaces the declaration of that kind and name in a
-    /// used file.
-    Override(Box<ItemKind>),
+/// Declares the kinds of declarations. A row is the kind, what it holds, its keyword, the method that gives
+/// what it holds (`None` for another kind), and the field of its name if it has one.
+macro_rules! kinds {
+    ($($kind:ident($declared:ty) $keyword:literal $as_kind:ident $($name:ident)?;)+) => {
+        /// What is declared.
+        #[derive(Debug, Clone, PartialEq, Serialize)]
+        pub enum ItemKind {
+            $($kind($declared),)+
+            /// `override` before a declaration: it replaces the declaration of that kind and name in a
+            /// used file.
+            Override(Box<ItemKind>),
+        }
+
+        impl ItemKind {
+            /// The keyword that begins the declaration.
+            pub fn keyword(&self) -> &'static str {
+                match self {
+                    $(ItemKind::$kind(_) => $keyword,)+
+                    ItemKind::Override(_) => "override",
+                }
+            }
+
+            /// What the declaration is called, if it has a name.
+            pub fn name(&self) -> Option<&Name> {
+                match self {
+                    $($(ItemKind::$kind(declared) => Some(&declared.$name),)?)+
+                    ItemKind::Override(inner) => inner.name(),
+                    _ => None,
+                }
+            }
+
+            $(pub fn $as_kind(&self) -> Option<&$declared> {
+                if let ItemKind::$kind(declared) = self { Some(declared) } else { None }
+            })+
+        }
+    };
+}
+
+kinds! {
+    Language(Number) "language" as_language;
+    Use(Use) "use" as_use;
+    Enum(Enum) "enum" as_enum name;
+    Odds(Odds) "odds" as_odds name;
+    State(State) "state" as_state name;
+    Let(Let) "let" as_let name;
+    Fn(Fn) "fn" as_fn name;
+    Action(Action) "action" as_action name;
+    Group(Group) "group" as_group name;
+    Rule(Rule) "rule" as_rule name;
+    Road(Block) "road" as_road name;
+    Episode(Vec<Field>) "episode" as_episode;
+    Reward(Vec<Case>) "reward" as_reward;
+    Verdict(Verdict) "verdict" as_verdict name;
+    Expect(Expect) "expect" as_expect;
+    Scenario(Scenario) "scenario" as_scenario name;
+    Policy(Policy) "policy" as_policy name;
 }
 
 impl ItemKind {
@@ -140,73 +173,6 @@ impl ItemKind {
             kind => kind,
         }
     }
-
-    /// The keyword that begins the declaration.
-    pub fn keyword(&self) -> &'static str {
-        match self {
-            ItemKind::Language(_) => "language",
-            ItemKind::Use(_) => "use",
-            ItemKind::Enum(_) => "enum",
-            ItemKind::Odds(_) => "odds",
-            ItemKind::State(_) => "state",
-            ItemKind::Let(_) => "let",
-            ItemKind::Fn(_) => "fn",
-            ItemKind::Action(_) => "action",
-            ItemKind::Group(_) => "group",
-            ItemKind::Rule(_) => "rule",
-            ItemKind::Road(_) => "road",
-            ItemKind::Episode(_) => "episode",
-            ItemKind::Reward(_) => "reward",
-            ItemKind::Verdict(_) => "verdict",
-            ItemKind::Expect(_) => "expect",
-            ItemKind::Scenario(_) => "scenario",
-            ItemKind::Policy(_) => "policy",
-            ItemKind::Override(_) => "override",
-        }
-    }
-
-    /// What the declaration is called, if it has a name.
-    pub fn name(&self) -> Option<&Name> {
-        match self {
-            ItemKind::Enum(item) => Some(&item.name),
-            ItemKind::Odds(item) => Some(&item.name),
-            ItemKind::State(item) => Some(&item.name),
-            ItemKind::Let(item) => Some(&item.name),
-            ItemKind::Fn(item) => Some(&item.name),
-            ItemKind::Action(item) => Some(&item.name),
-            ItemKind::Group(item) => Some(&item.name),
-            ItemKind::Rule(item) => Some(&item.name),
-            ItemKind::Road(item) => Some(&item.name),
-            ItemKind::Verdict(item) => Some(&item.name),
-            ItemKind::Scenario(item) => Some(&item.name),
-            ItemKind::Policy(item) => Some(&item.name),
-            ItemKind::Override(inner) => inner.name(),
-            ItemKind::Language(_)
-            | ItemKind::Use(_)
-            | ItemKind::Episode(_)
-            | ItemKind::Reward(_)
-            | ItemKind::Expect(_) => None,
-        }
-    }
-}
-
-/// For each kind a method that gives its declaration, or `None` for a declaration of another kind.
-macro_rules! accessors {
-    ($($name:ident: $kind:ident($declared:ty)),* $(,)?) => {
-        impl ItemKind {
-            $(pub fn $name(&self) -> Option<&$declared> {
-                if let ItemKind::$kind(declared) = self { Some(declared) } else { None }
-            })*
-        }
-    };
-}
-
-accessors! {
-    as_language: Language(Number), as_use: Use(Use), as_enum: Enum(Enum), as_odds: Odds(Odds),
-    as_state: State(State), as_let: Let(Let), as_fn: Fn(Fn), as_action: Action(Action),
-    as_group: Group(Group), as_rule: Rule(Rule), as_road: Road(Block), as_episode: Episode(Vec<Field>),
-    as_reward: Reward(Vec<Case>), as_verdict: Verdict(Verdict), as_expect: Expect(Expect),
-    as_scenario: Scenario(Scenario), as_policy: Policy(Policy),
 }
 
 /// `use "roads.ava" digest "sha256:…"`.

@@ -3,6 +3,7 @@
 use crate::syntax::ast::{Arg, Arm, BinaryOp, Call, Expr, ExprKind, Field, Number, UnaryOp};
 use crate::syntax::expression::{NEGATE_PRECEDENCE, NOT_PRECEDENCE, RANGE_PRECEDENCE, strength};
 use crate::syntax::layout::Layout;
+use crate::syntax::scan::is_bidi;
 
 /// Binding strength of an expression that needs parentheses before `.` and `[` alone.
 const OPERAND: u8 = u8::MAX - 1;
@@ -165,10 +166,9 @@ pub fn quoted(value: &str) -> String {
             '\n' => out.push_str("\\n"),
             '\t' => out.push_str("\\t"),
             // Characters that could change how the line looks are printed as escapes.
-            '\u{200e}' | '\u{200f}' | '\u{061c}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}' => {
-                out.push_str(&format!("\\u{{{:x}}}", u32::from(character)));
+            _ if is_bidi(character) || character.is_control() => {
+                out.push_str(&format!("\\u{{{:x}}}", u32::from(character)))
             }
-            _ if character.is_control() => out.push_str(&format!("\\u{{{:x}}}", u32::from(character))),
             _ => out.push(character),
         }
     }

@@ -250,7 +250,8 @@ impl Scanner<'_> {
     }
 }
 
-fn is_bidi(character: char) -> bool {
+/// Whether the character changes the direction in which the text around it is shown.
+pub fn is_bidi(character: char) -> bool {
     matches!(character, '\u{200e}' | '\u{200f}' | '\u{061c}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
 }
 
