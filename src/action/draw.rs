@@ -50,7 +50,7 @@ impl<'a> Judge<'a> {
             None => failures.push((1, refusal)),
         };
         // With nothing to draw, every try gives the same result.
-        let fixed = self.action.parameters.iter().all(|parameter| parameter.axis);
+        let fixed = self.action.drawn().next().is_none();
         for _ in 0..if fixed { 1 } else { DRAWS_MAX } {
             match self.draw_values(&mut rng).and_then(|values| self.judge(&values).map_err(first)) {
                 Ok(draw) => return Ok(draw),
@@ -68,11 +68,11 @@ impl<'a> Judge<'a> {
     /// Everything that is wrong with the values.
     pub fn check(&self, values: &[(Arc<str>, Value)]) -> Result<Draw, Vec<Refusal>> {
         let mut refusals = Vec::new();
-        let drawn = || self.action.parameters.iter().filter(|parameter| !parameter.axis);
-        for (name, _) in values.iter().filter(|(name, _)| !drawn().any(|parameter| parameter.name == *name)) {
+        let is_drawn = |name: &Arc<str>| self.action.drawn().any(|parameter| parameter.name == *name);
+        for (name, _) in values.iter().filter(|(name, _)| !is_drawn(name)) {
             refusals.push(refuse(None, format!("`{}` draws no `{name}`", self.action.name)));
         }
-        for parameter in drawn() {
+        for parameter in self.action.drawn() {
             match values.iter().find(|(name, _)| *name == parameter.name) {
                 None => refusals.push(refuse(None, format!("`{}` is missing", parameter.name))),
                 Some((_, value)) if !parameter.domain.holds(*value) => {
@@ -94,10 +94,7 @@ impl<'a> Judge<'a> {
     pub fn nearest(&self, wanted: &[(Arc<str>, Value)]) -> Result<Draw, Vec<Refusal>> {
         let values = self.values(wanted, |wanted, room| nearest(room, wanted.number()));
         let values = values.map_err(|refusal| vec![refusal])?;
-        let drawn = self.action.parameters.iter().zip(values).filter(|(parameter, _)| !parameter.axis);
-        let drawn: Vec<(Arc<str>, Value)> =
-            drawn.map(|(parameter, value)| (parameter.name.clone(), value)).collect();
-        self.check(&drawn)
+        self.check(&self.action.drawn_of(&values))
     }
 
     /// Asks the world about every spawn, then applies every rule in force to a complete set of values.
@@ -126,8 +123,7 @@ impl<'a> Judge<'a> {
         if !refusals.is_empty() {
             return Err(refusals);
         }
-        let drawn = self.action.parameters.iter().zip(values).filter(|(parameter, _)| !parameter.axis);
-        let values = drawn.map(|(parameter, value)| (parameter.name.clone(), *value)).collect();
+        let values = self.action.drawn_of(values);
         Ok(Draw { row: self.row.row.index, values, effects, memory_after: after })
     }
 
@@ -183,8 +179,7 @@ impl<'a> Judge<'a> {
     }
 
     fn draw_values(&self, rng: &mut Rng) -> Result<Vec<Value>, Refusal> {
-        let drawn = self.action.parameters.iter().filter(|parameter| !parameter.axis);
-        let chosen = drawn.filter_map(|parameter| match &parameter.domain {
+        let chosen = self.action.drawn().filter_map(|parameter| match &parameter.domain {
             Domain::Values(choices) => {
                 let choice = choices[rng::below(rng, choices.len() as u32) as usize];
                 Some((parameter.name.clone(), choice))

@@ -169,7 +169,7 @@ impl ActionTable {
 
     fn draws(&self, row: &Row, road: usize) -> Vec<DrawRecord> {
         let Reach::Open(ranges) = &row.roads[road] else { return Vec::new() };
-        let drawn = self.space().actions[row.action].parameters.iter().filter(|parameter| !parameter.axis);
+        let drawn = self.space().actions[row.action].drawn();
         drawn
             .map(|parameter| {
                 let range = ranges.iter().find(|(name, _)| *name == parameter.name);

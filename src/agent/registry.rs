@@ -7,6 +7,7 @@ use crate::mdp::Observation;
 use crate::rng::Rng;
 
 use super::branch::Branch;
+use super::hyperparameters::SettingsError;
 use super::presets::Preset;
 use super::search::{AvFuzzerSettings, GoExploreSettings};
 use super::settings::Settings;
@@ -57,9 +58,9 @@ pub enum Kind {
     Ready(fn() -> Box<dyn Agent>),
     /// It must be trained: its presets, the default first. See [`super::Learner`].
     Learning(&'static [Preset]),
-    /// It searches over many episodes, and what it found can act: its default settings. See
-    /// [`super::Trainable`].
-    Searching(fn() -> Settings),
+    /// It searches over many episodes, and what it found can act: how its settings are read from the changes
+    /// of a YAML text. See [`super::Trainable`].
+    Searching(fn(&str) -> Result<Settings, SettingsError>),
 }
 
 /// Every agent of avastra.
@@ -97,12 +98,14 @@ pub const REGISTRY: &[Entry] = &[
     Entry {
         name: "av-fuzzer",
         summary: "AV-Fuzzer's genetic search over scripts of rows",
-        kind: Kind::Searching(|| Settings::AvFuzzer(AvFuzzerSettings::default())),
+        kind: Kind::Searching(|text| Settings::of_search(text, AvFuzzerSettings::check, Settings::AvFuzzer)),
     },
     Entry {
         name: "go-explore",
         summary: "returns to promising moments by snapshots and explores from there",
-        kind: Kind::Searching(|| Settings::GoExplore(GoExploreSettings::default())),
+        kind: Kind::Searching(|text| {
+            Settings::of_search(text, GoExploreSettings::check, Settings::GoExplore)
+        }),
     },
 ];
 
@@ -145,8 +148,8 @@ mod tests {
                 };
                 presets.iter().map(learner).collect()
             }
-            Kind::Searching(settings) => {
-                let mut search = settings().build(rows(), seed);
+            Kind::Searching(read) => {
+                let mut search = read("").unwrap().build(rows(), seed);
                 let beginning = search.beginning(0, seed);
                 assert_eq!((beginning.seed, beginning.from), (seed, None), "it knows no other start yet");
                 vec![(search, true)]

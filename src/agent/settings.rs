@@ -32,41 +32,34 @@ impl Settings {
         preset: Option<&str>,
         text: &str,
     ) -> Option<Result<Settings, SettingsError>> {
-        let default = match entry.kind {
+        let read = match entry.kind {
             Kind::Ready(_) => return None,
             Kind::Learning(presets) => {
                 return Some(
                     Hyperparameters::from_yaml(presets, preset, text).map(Box::new).map(Settings::Learning),
                 );
             }
-            Kind::Searching(default) => default(),
+            Kind::Searching(read) => read,
         };
         Some(match preset {
             Some(preset) => {
                 Err(SettingsError::Text(format!("no preset `{preset}`: `{}` has none", entry.name)))
             }
-            None => default.changed(text),
+            None => read(text),
         })
     }
 
-    /// The settings of a search with the changes of a YAML text.
-    fn changed(self, text: &str) -> Result<Settings, SettingsError> {
-        fn read<T: DeserializeOwned + Default>(text: &str) -> Result<T, SettingsError> {
-            let read: Option<T> =
-                serde_yaml::from_str(text).map_err(|error| SettingsError::Text(error.to_string()))?;
-            Ok(read.unwrap_or_default())
-        }
-        let settings = match self {
-            Settings::Learning(_) => return Ok(self),
-            Settings::AvFuzzer(_) => Settings::AvFuzzer(read(text)?),
-            Settings::GoExplore(_) => Settings::GoExplore(read(text)?),
-        };
-        match &settings {
-            Settings::Learning(_) => {}
-            Settings::AvFuzzer(search) => search.check()?,
-            Settings::GoExplore(search) => search.check()?,
-        }
-        Ok(settings)
+    /// The settings of a search: its defaults with the changes of a YAML text, checked.
+    pub(super) fn of_search<T: DeserializeOwned + Default>(
+        text: &str,
+        check: fn(&T) -> Result<(), SettingsError>,
+        settings: fn(T) -> Settings,
+    ) -> Result<Settings, SettingsError> {
+        let read: Option<T> =
+            serde_yaml::from_str(text).map_err(|error| SettingsError::Text(error.to_string()))?;
+        let read = read.unwrap_or_default();
+        check(&read)?;
+        Ok(settings(read))
     }
 
     /// An agent that knows nothing yet.

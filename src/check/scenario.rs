@@ -326,19 +326,18 @@ impl<'a> Reader<'a> {
         in_force: &RulesInForce,
     ) -> Option<Vec<(Arc<str>, Value)>> {
         let action = &self.space.actions[row.action];
-        let drawn = || action.parameters.iter().filter(|parameter| !parameter.axis);
         let mut sound = true;
         self.fields_once("drawn value", &step.drawn);
         for field in &step.drawn {
-            if !drawn().any(|parameter| *parameter.name == *field.name.text) {
-                let names = drawn().map(|parameter| &*parameter.name);
+            if !action.drawn().any(|parameter| *parameter.name == *field.name.text) {
+                let names = action.drawn().map(|parameter| &*parameter.name);
                 self.report(unknown("drawn value", &field.name.text, field.name.span, names));
                 sound = false;
             }
         }
         let mut values = Vec::new();
         let mut missing = Vec::new();
-        for parameter in drawn() {
+        for parameter in action.drawn() {
             let Some(field) = step.drawn.iter().find(|field| *parameter.name == *field.name.text) else {
                 missing.push(parameter);
                 continue;

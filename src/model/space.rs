@@ -129,6 +129,17 @@ pub struct Parameter {
 }
 
 impl ActionDef {
+    /// The parameters that are drawn.
+    pub(crate) fn drawn(&self) -> impl Iterator<Item = &Parameter> {
+        self.parameters.iter().filter(|parameter| !parameter.axis)
+    }
+
+    /// The values of the parameters that are drawn, given those of all, as declared.
+    pub(crate) fn drawn_of(&self, values: &[Value]) -> Vec<(Arc<str>, Value)> {
+        let drawn = self.parameters.iter().zip(values).filter(|(parameter, _)| !parameter.axis);
+        drawn.map(|(parameter, value)| (parameter.name.clone(), *value)).collect()
+    }
+
     /// The drawn parameters with a range, by index; the others have a list of values.
     pub(crate) fn drawn_numbers(&self) -> impl Iterator<Item = usize> {
         let is_open = |(_, parameter): &(usize, &Parameter)| {

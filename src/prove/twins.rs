@@ -90,7 +90,7 @@ fn form(space: &Space, row: &Row) -> String {
         .collect();
     let reduced = |expr: &Expr| reduce(expr, functions, &locals);
     let mut parts: Vec<String> = Vec::new();
-    for parameter in action.parameters.iter().filter(|parameter| !parameter.axis) {
+    for parameter in action.drawn() {
         let condition = parameter.condition.as_ref().map(reduced);
         parts.push(format!("any {:?} {:?} {condition:?}", parameter.ty, parameter.domain));
     }

@@ -83,9 +83,7 @@ impl Search<'_> {
                     return None;
                 }
                 if let Some(values) = self.numbers(chosen, &memory, wish) {
-                    let drawn = action.parameters.iter().zip(values).filter(|(parameter, _)| !parameter.axis);
-                    let values = drawn.map(|(parameter, value)| (parameter.name.clone(), value)).collect();
-                    return Some(Witness { values, memory });
+                    return Some(Witness { values: action.drawn_of(&values), memory });
                 }
             }
         }
