@@ -42,10 +42,7 @@ pub fn distill(output: &Output, arguments: &DistillArguments) -> Result<(), Fail
     }
     let arena = train::training_arena(&table, &policy, &acting, &policy.origin.roads)?;
     let policy = with_rules(&arena, &acting, policy);
-    let path = arguments.output.clone().unwrap_or_else(|| {
-        let stem = arguments.file.file_stem().unwrap_or_default().to_string_lossy();
-        arguments.file.with_file_name(format!("{stem}.distilled.ava"))
-    });
+    let path = arguments.output.clone().unwrap_or_else(|| arguments.file.with_extension("distilled.ava"));
     let folder = path.parent().map_or(PathBuf::new(), PathBuf::from);
     let space_path = load::relative(&folder, &table.space().path)?;
     write(&path, &emit::policy_text(&policy, table.space(), &space_path))?;

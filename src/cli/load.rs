@@ -8,6 +8,7 @@ use crate::ads::ModularConfig;
 use crate::check;
 use crate::check::{Loaded, ReadError};
 use crate::model::{Policy, Scenario, Space};
+use crate::run::{Profile, driving_system};
 
 use super::error::Failure;
 use super::output::Output;
@@ -147,6 +148,18 @@ pub fn scenario(output: &Output, path: &Path) -> Result<(ActionTable, Scenario),
 /// If the file cannot be read, or is no profile.
 pub fn profile(path: &Path) -> Result<ModularConfig, Failure> {
     ModularConfig::from_yaml(&text(path)?).map_err(|error| Failure::file("use", path, error))
+}
+
+/// The profile in a file; without a file, the one that the driving system comes with, if there is one.
+///
+/// # Errors
+/// As [`profile`].
+pub fn profile_or_own(path: Option<&Path>, ads: &str) -> Result<Option<Profile>, Failure> {
+    let settings = match path {
+        Some(path) => Some(profile(path)?),
+        None => driving_system(ads).ok().and_then(|ads| ads.profile().copied()),
+    };
+    Ok(settings.as_ref().map(Profile::new))
 }
 
 /// What a file that avastra wrote holds.

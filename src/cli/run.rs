@@ -9,10 +9,7 @@ use crate::agent::Face;
 use crate::emit;
 use crate::episode::EpisodeLog;
 use crate::model::{Policy, Space};
-use crate::run;
-use crate::run::{
-    EpisodeSummary, Group, PolicyReference, Profile, RefusalCount, Run, RunSettings, Totals, play,
-};
+use crate::run::{EpisodeSummary, Group, PolicyReference, RefusalCount, Run, RunSettings, Totals, play};
 
 use super::arguments::{FaceArgument, RunArguments};
 use super::error::Failure;
@@ -20,7 +17,7 @@ use super::interrupt::stop_on_interrupt;
 use super::output::Output;
 use super::parallel::jobs;
 use super::progress::{Progress, plural};
-use super::run_directory::{RunDirectory, write};
+use super::run_directory::RunDirectory;
 use super::verify::acting;
 use super::{compile, load, run_directory};
 
@@ -44,9 +41,8 @@ pub fn run(output: &Output, arguments: &RunArguments) -> Result<(), Failure> {
     let started = Instant::now();
     let mut progress =
         Progress::new(run.episodes() as u64, done.len() as u64, output.quiet || output.is_json());
-    let space_path = space_path(&run, &directory)?;
     play(&run, &todo, jobs(arguments.jobs), &stop, &mut |summary, log| {
-        keep(&run, &mut directory, &space_path, &summary, &log)?;
+        keep(&run, &mut directory, &summary, &log)?;
         progress.episode(summary.counted());
         Ok::<_, Failure>(())
     })?;
@@ -86,16 +82,12 @@ fn begun(output: &Output, arguments: &RunArguments) -> Result<(Run, RunDirectory
         (None, None) => compile::last(output)?,
     };
     let space = table.space();
-    let profile = match &arguments.ads_config {
-        Some(path) => Some(load::profile(path)?),
-        None => run::driving_system(&arguments.ads).ok().and_then(|ads| ads.profile().copied()),
-    };
     let agent = policy.as_ref().map_or(&arguments.agent, |(_, policy)| &policy.name);
     let settings = RunSettings::new(space, agent, arguments.episodes, arguments.seed);
     let settings = RunSettings {
         roads: roads_or_all(&arguments.road, space),
         ads: arguments.ads.clone(),
-        profile: profile.as_ref().map(Profile::new),
+        profile: load::profile_or_own(arguments.ads_config.as_deref(), &arguments.ads)?,
         ambient: arguments.ambient,
         causes: arguments.causes,
         without: arguments.rules.without.clone(),
@@ -178,33 +170,18 @@ fn ready(
 fn keep(
     run: &Run,
     directory: &mut RunDirectory,
-    space_path: &str,
     summary: &EpisodeSummary,
     log: &EpisodeLog,
 ) -> Result<(), Failure> {
     if summary.counted() > 0 {
-        let name = format!("{}_{:04}", log.road, summary.episode);
-        let source = emit::Provenance {
-            command: "run",
-            name: &name,
-            space_path,
-            episode: summary.episode,
-            agent: &run.settings().agent,
-            without: &run.settings().without,
-            with: &run.settings().with,
-        };
-        let file = emit::scenario(run.table(), log, summary, &source);
-        write(&directory.critical(&name), &crate::syntax::print(&file))?;
+        let settings = run.settings();
+        let rules = [&settings.without[..], &settings.with];
+        directory.write_critical("run", run.table(), (log, summary), &settings.agent, rules)?;
     }
     directory
         .database
         .add(summary, log, |draw| emit::action_text(run.table(), draw))
         .map_err(|error| Failure::file("write", &directory.path.join("run.db"), error))
-}
-
-/// Path of the space, from a file in `critical/`.
-fn space_path(run: &Run, directory: &RunDirectory) -> Result<String, Failure> {
-    load::relative(&directory.path.join("critical"), &run.space().path)
 }
 
 fn heading(run: &Run, directory: &Path) -> String {

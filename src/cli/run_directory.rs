@@ -4,7 +4,9 @@ use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 use crate::action::ActionTable;
-use crate::run::{Database, VERSION};
+use crate::emit;
+use crate::episode::EpisodeLog;
+use crate::run::{Database, EpisodeSummary, VERSION};
 use crate::sim::ENGINE;
 
 use super::error::Failure;
@@ -91,9 +93,23 @@ impl RunDirectory {
         Ok(RunDirectory { path, database })
     }
 
-    /// Where the critical scenario of an episode is kept.
-    pub fn critical(&self, name: &str) -> PathBuf {
-        self.path.join("critical").join(format!("{name}.ava"))
+    /// Writes the counted collisions of an episode as a scenario, `critical/ROAD_NNNN.ava`. `agent` is the one that
+    /// played it, `rules` are those switched off and those switched on.
+    pub fn write_critical(
+        &self,
+        command: &str,
+        table: &ActionTable,
+        (log, summary): (&EpisodeLog, &EpisodeSummary),
+        agent: &str,
+        [without, with]: [&[String]; 2],
+    ) -> Result<(), Failure> {
+        let name = format!("{}_{:04}", log.road, summary.episode);
+        let critical = self.path.join("critical");
+        let space_path = load::relative(&critical, &table.space().path)?;
+        let (name, space_path, episode) = (name.as_str(), space_path.as_str(), summary.episode);
+        let source = emit::Provenance { command, name, space_path, episode, agent, without, with };
+        let file = emit::scenario(table, log, summary, &source);
+        write(&critical.join(format!("{name}.ava")), &crate::syntax::print(&file))
     }
 }
 

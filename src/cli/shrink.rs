@@ -17,10 +17,13 @@ use super::parallel::each_file;
 use super::progress::plural;
 use super::run_directory::write;
 
+/// The written file stands beside the scenario, with this for its extension.
+const EXTENSION: &str = "shrunk.ava";
+
 /// Writes each file's scenario as small as possible, and checks every claim of what it wrote.
 pub fn shrink(output: &Output, arguments: &ShrinkArguments) -> Result<(), Failure> {
     if let [file] = arguments.many.files.as_slice() {
-        let path = arguments.output.clone().unwrap_or_else(|| beside(file));
+        let path = arguments.output.clone().unwrap_or_else(|| file.with_extension(EXTENSION));
         let small = smaller(output, file, &path)?;
         output.say(&small.in_words());
         small.actions_left.iter().for_each(|action| output.tell(&format!("  {action}")));
@@ -33,7 +36,7 @@ pub fn shrink(output: &Output, arguments: &ShrinkArguments) -> Result<(), Failur
             "`--output {path}` is for one file: of several, each is written beside its own"
         )));
     }
-    let found = each_file(&arguments.many, |file| smaller(output, file, &beside(file)));
+    let found = each_file(&arguments.many, |file| smaller(output, file, &file.with_extension(EXTENSION)));
     let mut done: Vec<Small> = Vec::new();
     for (file, found) in arguments.many.files.iter().zip(found) {
         match found {
@@ -198,11 +201,6 @@ fn refuted(output: &Output, path: &Path) -> Result<usize, Failure> {
 /// Steps, and how many of them do something.
 fn size(script: &Script) -> (usize, usize) {
     (script.steps.len(), script.steps.iter().flatten().count())
-}
-
-fn beside(file: &Path) -> PathBuf {
-    let stem = file.file_stem().unwrap_or_default().to_string_lossy();
-    file.with_file_name(format!("{stem}.shrunk.ava"))
 }
 
 #[cfg(test)]

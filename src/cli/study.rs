@@ -5,7 +5,6 @@ use std::sync::atomic::Ordering;
 use std::time::Instant;
 
 use crate::report;
-use crate::run::{Profile, driving_system};
 use crate::study::{
     CellRecord, Event, Spent, Study, StudyDatabase, StudyFile, StudyResults, StudySettings, play_jobs,
 };
@@ -73,11 +72,7 @@ fn begun(output: &Output, path: &Path, quick: bool) -> Result<Study, Failure> {
     let file = StudyFile::from_yaml(&text).map_err(refuse)?;
     let beside = |name: &str| path.parent().unwrap_or(Path::new("")).join(name);
     let table = load::table(output, &beside(&file.space))?;
-    let profile = match &file.ads_config {
-        Some(name) => Some(load::profile(&beside(name))?),
-        None => driving_system(&file.ads).ok().and_then(|ads| ads.profile().copied()),
-    };
-    let profile = profile.as_ref().map(Profile::new);
+    let profile = load::profile_or_own(file.ads_config.as_deref().map(beside).as_deref(), &file.ads)?;
     let read = |name: &str| load::read(&beside(name)).map_err(|error| error.to_string());
     let settings = StudySettings::new(file, &table, profile, &read);
     let settings = settings.map_err(|error| refuse(error.to_string()))?;

@@ -104,14 +104,22 @@ fn resumed(output: &Output, path: &Path) -> Result<(Training, RunDirectory), Fai
     Ok((training, directory))
 }
 
-/// Commits an episode, with a checkpoint every so often, at the end, and when the user stops.
+/// Writes an episode's counted collisions as a scenario and commits it, with a checkpoint every so often, at the end, and when the user stops.
 fn keep(
     training: &Training,
     directory: &mut RunDirectory,
     trained: &TrainedEpisode,
     stop: &AtomicBool,
 ) -> Result<(), Failure> {
-    write_critical(training, directory, trained)?;
+    let settings = training.settings();
+    // A training with an observation period of its own writes no scenario, because a replay would use the period
+    // of the space.
+    if trained.summary.counted() > 0 && settings.hyperparameters.observation_period_s().is_none() {
+        let log = training.log_of_space(&trained.log);
+        let rules = [&settings.without[..], &settings.with];
+        let episode = (&log, &trained.summary);
+        directory.write_critical("train", training.table(), episode, &settings.agent, rules)?;
+    }
     let is_due = training.episodes().is_multiple_of(CHECKPOINT_EPISODES)
         || training.is_done()
         || stop.load(Ordering::Relaxed);
@@ -120,33 +128,6 @@ fn keep(
         .database
         .add_trained(trained, checkpoint.as_deref(), |draw| emit::action_text(training.table(), draw))
         .map_err(|error| Failure::file("write", &directory.path.join("run.db"), error))
-}
-
-/// Writes the counted collisions of an episode as a scenario. A training with an observation period of its own
-/// writes none, because a replay would use the period of the space.
-fn write_critical(
-    training: &Training,
-    directory: &RunDirectory,
-    trained: &TrainedEpisode,
-) -> Result<(), Failure> {
-    let settings = training.settings();
-    if trained.summary.counted() == 0 || settings.hyperparameters.observation_period_s().is_some() {
-        return Ok(());
-    }
-    let name = format!("{}_{:04}", trained.log.road, trained.summary.episode);
-    let space_path = load::relative(&directory.path.join("critical"), &training.table().space().path)?;
-    let source = emit::Provenance {
-        command: "train",
-        name: &name,
-        space_path: &space_path,
-        episode: trained.summary.episode,
-        agent: &settings.agent,
-        without: &settings.without,
-        with: &settings.with,
-    };
-    let file =
-        emit::scenario(training.table(), &training.log_of_space(&trained.log), &trained.summary, &source);
-    write(&directory.critical(&name), &crate::syntax::print(&file))
 }
 
 /// Evaluates the policy, writes it, and prints the result of the training.

@@ -14,14 +14,12 @@ use super::arguments::TableArguments;
 use super::error::Failure;
 use super::load;
 use super::output::Output;
+use super::run::roads_or_all;
 use super::run_directory::write;
 
 /// Tries the rows of a table and prints the results.
 pub fn trials(output: &Output, arguments: &TableArguments, table: ActionTable) -> Result<(), Failure> {
-    let roads: Vec<String> = match &arguments.road {
-        Some(road) => vec![road.clone()],
-        None => table.space().roads.iter().map(|road| road.name.clone()).collect(),
-    };
+    let roads = roads_or_all(arguments.road.as_slice(), table.space());
     let wanted = &arguments.trials;
     let arena = Arena::new(table, &roads, driving_system(&wanted.ads)?, &[], &[])?;
     let settings = TrialSettings { drives: wanted.drives, tries: wanted.tries, seed: wanted.seed };

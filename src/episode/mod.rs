@@ -10,6 +10,6 @@ mod script;
 mod setup;
 
 pub use log::{Collision, End, EpisodeLog, Outcome, StepLog};
-pub use run::{Choice, Moment, Snapshot, Watch, go_on, run, run_to_last};
+pub use run::{Choice, Moment, Snapshot, Watch, run, run_from};
 pub use script::{Script, ScriptedAction};
 pub use setup::{Setup, scene, start};

@@ -42,13 +42,13 @@ impl<'a> Moment<'a> {
         copy.into_log(self.setup, End::Script)
     }
 
-    /// A snapshot of this moment, for [`go_on`].
+    /// A snapshot of this moment, for [`run_from`].
     pub fn snapshot(&self) -> Snapshot {
         Snapshot(self.play.clone())
     }
 }
 
-/// A kept moment of an episode, from which [`go_on`] can play as often as wanted.
+/// A kept moment of an episode, from which [`run_from`] can play as often as wanted.
 #[derive(Clone)]
 pub struct Snapshot(Play);
 
@@ -69,37 +69,19 @@ pub enum Choice {
 
 /// Plays one episode. `choose` is called once a step, `watch` after every tick and once before the first.
 pub fn run(setup: &Setup, choose: &mut dyn FnMut(&Moment) -> Choice, watch: &mut Watch) -> EpisodeLog {
-    run_to_last(setup, choose, watch, &mut |_| {})
+    run_from(setup, None, choose, watch, &mut |_| {})
 }
 
-/// As [`run`]; `last` gets the moment at which the next choice would have been due.
-pub fn run_to_last(
+/// As [`run`], from a kept moment of an episode with this setup, if there is one; the log covers the whole episode.
+/// `last` gets the moment at which the next choice would have been due.
+pub fn run_from(
     setup: &Setup,
+    from: Option<Snapshot>,
     choose: &mut dyn FnMut(&Moment) -> Choice,
     watch: &mut Watch,
     last: &mut dyn FnMut(&Moment),
 ) -> EpisodeLog {
-    to_the_end(setup, Play::new(setup), choose, watch, last)
-}
-
-/// As [`run_to_last`], from a kept moment of an episode with this setup. The log covers the whole episode.
-pub fn go_on(
-    setup: &Setup,
-    from: Snapshot,
-    choose: &mut dyn FnMut(&Moment) -> Choice,
-    watch: &mut Watch,
-    last: &mut dyn FnMut(&Moment),
-) -> EpisodeLog {
-    to_the_end(setup, from.0, choose, watch, last)
-}
-
-fn to_the_end(
-    setup: &Setup,
-    mut play: Play,
-    choose: &mut dyn FnMut(&Moment) -> Choice,
-    watch: &mut Watch,
-    last: &mut dyn FnMut(&Moment),
-) -> EpisodeLog {
+    let mut play = from.map_or_else(|| Play::new(setup), |Snapshot(play)| play);
     watch(&play.world, play.ads.as_ref(), &[]);
     let end = loop {
         let observation = Observation::new(&play.world, play.ads.status());

@@ -282,10 +282,7 @@ fn play(
         let legal = legal(&moment.setup().table.offers(moment.situation));
         last = Some((moment.observation.clone(), legal));
     };
-    let log = match from {
-        Some(snapshot) => episode::go_on(setup, snapshot.clone(), &mut choose, &mut watch, &mut at_last),
-        None => episode::run_to_last(setup, &mut choose, &mut watch, &mut at_last),
-    };
+    let log = episode::run_from(setup, from.cloned(), &mut choose, &mut watch, &mut at_last);
     Played { log, choices, last, snapshots, closeness }
 }
 
