@@ -9,7 +9,7 @@ use std::sync::Arc;
 use serde_json::{Value, json};
 
 use crate::report::draw;
-use crate::road::{Lane, LaneIndex, LanePlace, Neighbour, RoadMap, Route, Side};
+use crate::road::{Lane, LaneIndex, LaneKey, LanePlace, Neighbour, RoadMap, Route, Side};
 
 use super::arguments::RoadArguments;
 use super::error::Failure;
@@ -37,16 +37,18 @@ pub fn road(output: &Output, arguments: &RoadArguments) -> Result<(), Failure> {
         output.say(words(&map, route.as_ref()).trim_end());
         return Ok(());
     }
-    let lanes: Vec<Value> = (0..map.lanes.len()).map(|index| lane_json(&map, LaneIndex(index))).collect();
+    let lanes = (0..map.lanes.len()).map(|index| lane_json(&map, LaneIndex(index)));
+    let junctions = (0..map.junctions.len()).map(|index| junction_json(&map, index));
+    let signals = (0..map.signals.len()).map(|index| signal_json(&map, index));
     output.result(
         "road",
         json!({
             "file": arguments.file,
             "name": map.name,
             "pose_fields": ["station_m", "s_m", "x_m", "y_m", "heading_rad", "width_m"],
-            "lanes": lanes,
-            "junctions": junctions_json(&map),
-            "signals": signals_json(&map),
+            "lanes": lanes.collect::<Vec<_>>(),
+            "junctions": junctions.collect::<Vec<_>>(),
+            "signals": signals.collect::<Vec<_>>(),
             "crosswalks": map.crosswalks.iter().map(|crosswalk| json!({
                 "id": crosswalk.id,
                 "outline_m": crosswalk.outline.iter().map(|corner| [corner.x, corner.y]).collect::<Vec<_>>(),
@@ -124,13 +126,12 @@ fn words(map: &RoadMap, route: Option<&Route>) -> String {
         lines.push(format!("junction `{title}`: {groups}; {}", listed(&ways)));
     }
     for (index, signal) in map.signals.iter().enumerate() {
-        let held: Vec<String> = stop_lines(map, index).map(|(lane, _)| name(map, lane)).collect();
         let (x, y) = (signal.position.x, signal.position.y);
         lines.push(format!(
             "signal `{}` at {x:.1}, {y:.1}: group {}; stops {}",
             signal.id,
             signal.group,
-            listed(&held)
+            listed(&names(map, &stopped(map, index)))
         ));
     }
     lines.extend(route.map(|route| route_words(map, route)));
@@ -168,12 +169,12 @@ fn lane_words(map: &RoadMap, index: LaneIndex) -> String {
 }
 
 fn route_words(map: &RoadMap, route: &Route) -> String {
-    let lanes: Vec<String> = route.lanes.iter().map(|part| name(map, part.lane)).collect();
+    let lanes: Vec<LaneIndex> = route.lanes.iter().map(|part| part.lane).collect();
     let stops: Vec<String> = route.stop_lines.iter().map(|line| format!("{:.1} m", line.station_m)).collect();
     let crosswalks: Vec<String> =
         route.crosswalks_m.iter().map(|(from_m, to_m)| format!("{from_m:.1} to {to_m:.1} m")).collect();
     let mut lines = vec![
-        format!("route: {:.1} m to the goal, along {}", route.goal_m, lanes.join(", ")),
+        format!("route: {:.1} m to the goal, along {}", route.goal_m, names(map, &lanes).join(", ")),
         format!("  stop lines at {}; crosswalks from {}", listed(&stops), listed(&crosswalks)),
         format!("  {}", plural(route.conflicts.len(), "conflict")),
     ];
@@ -207,14 +208,11 @@ fn lane_json(map: &RoadMap, index: LaneIndex) -> Value {
         "length_m": lane.centre.length_m(),
         "speed_limit_mps": lane.speed_limit_mps,
         "junction": lane.junction.map(|junction| &map.junctions[junction].id),
-        "predecessors": lane.predecessors.iter().map(|lane| key(map, *lane)).collect::<Vec<_>>(),
-        "successors": lane.successors.iter().map(|lane| key(map, *lane)).collect::<Vec<_>>(),
+        "predecessors": keys(map, &lane.predecessors),
+        "successors": keys(map, &lane.successors),
         "left": beside(Side::Left),
         "right": beside(Side::Right),
-        "stop_lines": lane.stop_lines.iter().map(|line| json!({
-            "station_m": line.station_m,
-            "signal": map.signals[line.signal].id,
-        })).collect::<Vec<_>>(),
+        "stop_lines": lane.stop_lines.iter().map(|line| stop_line_json(map, line.station_m, line.signal)).collect::<Vec<_>>(),
         "poses": poses(lane),
     })
 }
@@ -232,40 +230,35 @@ fn poses(lane: &Lane) -> Vec<[f64; 6]> {
     stations_m.map(pose).collect()
 }
 
-fn junctions_json(map: &RoadMap) -> Vec<Value> {
-    let connections = |index| {
-        let ways = map.connections(index).into_iter().map(|way| {
-            json!({
-                "from": key(map, way.from),
-                "lanes": way.lanes.iter().map(|lane| key(map, *lane)).collect::<Vec<_>>(),
-                "to": key(map, way.to),
-            })
-        });
-        ways.collect::<Vec<_>>()
-    };
-    let all = map.junctions.iter().enumerate().map(|(index, junction)| {
-        json!({
-            "id": junction.id,
-            "name": junction.name,
-            "groups": junction.groups,
-            "connections": connections(index),
-        })
-    });
-    all.collect()
+fn junction_json(map: &RoadMap, index: usize) -> Value {
+    let junction = &map.junctions[index];
+    let ways = map.connections(index).into_iter();
+    let connections = ways.map(
+        |way| json!({ "from": key(map, way.from), "lanes": keys(map, &way.lanes), "to": key(map, way.to) }),
+    );
+    json!({
+        "id": junction.id,
+        "name": junction.name,
+        "groups": junction.groups,
+        "connections": connections.collect::<Vec<_>>(),
+    })
 }
 
-fn signals_json(map: &RoadMap) -> Vec<Value> {
-    let all = map.signals.iter().enumerate().map(|(index, signal)| {
-        json!({
-            "id": signal.id,
-            "x_m": signal.position.x,
-            "y_m": signal.position.y,
-            "junction": signal.junction.map(|junction| &map.junctions[junction].id),
-            "group": signal.group,
-            "lanes": stop_lines(map, index).map(|(lane, _)| key(map, lane)).collect::<Vec<_>>(),
-        })
-    });
-    all.collect()
+fn signal_json(map: &RoadMap, index: usize) -> Value {
+    let signal = &map.signals[index];
+    json!({
+        "id": signal.id,
+        "x_m": signal.position.x,
+        "y_m": signal.position.y,
+        "junction": signal.junction.map(|junction| &map.junctions[junction].id),
+        "group": signal.group,
+        "lanes": keys(map, &stopped(map, index)),
+    })
+}
+
+/// `signal` is an index.
+fn stop_line_json(map: &RoadMap, station_m: f64, signal: usize) -> Value {
+    json!({ "station_m": station_m, "signal": map.signals[signal].id })
 }
 
 fn route_json(map: &RoadMap, route: &Route) -> Value {
@@ -278,16 +271,8 @@ fn route_json(map: &RoadMap, route: &Route) -> Value {
             "enter_m": part.enter_m,
             "to_m": part.to_m,
         })).collect::<Vec<_>>(),
-        "changes": route.changes.iter().map(|change| json!({
-            "begin_m": change.begin_m,
-            "end_m": change.end_m,
-            "latest_m": change.latest_m,
-            "lateral_m": change.lateral_m,
-        })).collect::<Vec<_>>(),
-        "stop_lines": route.stop_lines.iter().map(|line| json!({
-            "station_m": line.station_m,
-            "signal": map.signals[line.signal].id,
-        })).collect::<Vec<_>>(),
+        "changes": route.changes,
+        "stop_lines": route.stop_lines.iter().map(|line| stop_line_json(map, line.station_m, line.signal)).collect::<Vec<_>>(),
         "crosswalks_m": route.crosswalks_m,
         "conflicts": route.conflicts.iter().map(|conflict| json!({
             "station_m": conflict.station_m,
@@ -298,17 +283,23 @@ fn route_json(map: &RoadMap, route: &Route) -> Value {
     })
 }
 
-/// Lanes that a signal stops, with the station of the line, m.
-fn stop_lines(map: &RoadMap, signal: usize) -> impl Iterator<Item = (LaneIndex, f64)> {
-    map.lanes.iter().enumerate().flat_map(move |(index, lane)| {
-        let lines = lane.stop_lines.iter().filter(move |line| line.signal == signal);
-        lines.map(move |line| (LaneIndex(index), line.station_m))
-    })
+/// Lanes that a signal stops, once for each of its lines.
+fn stopped(map: &RoadMap, signal: usize) -> Vec<LaneIndex> {
+    let lanes = map.lanes.iter().enumerate();
+    lanes
+        .flat_map(|(index, lane)| {
+            let lines = lane.stop_lines.iter().filter(move |line| line.signal == signal);
+            lines.map(move |_| LaneIndex(index))
+        })
+        .collect()
 }
 
-fn key(map: &RoadMap, lane: LaneIndex) -> Value {
-    let key = &map.lane(lane).key;
-    json!({ "road": key.road, "section": key.section, "lane": key.lane })
+fn key(map: &RoadMap, lane: LaneIndex) -> &LaneKey {
+    &map.lane(lane).key
+}
+
+fn keys<'a>(map: &'a RoadMap, lanes: &[LaneIndex]) -> Vec<&'a LaneKey> {
+    lanes.iter().map(|lane| key(map, *lane)).collect()
 }
 
 /// Road and lane, and the lane section from the second on.

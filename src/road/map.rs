@@ -12,7 +12,7 @@ use super::{graph, opendrive};
 pub struct LaneIndex(pub usize);
 
 /// The name of a lane in its OpenDRIVE file.
-#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, serde::Serialize)]
 pub struct LaneKey {
     pub road: String,
     /// Index of the lane section within the road.

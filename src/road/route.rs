@@ -43,7 +43,7 @@ pub struct RouteLane {
 }
 
 /// A lane change of a route. The path performs it as early as it is comfortable.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct RouteLaneChange {
     /// Here the path leaves the centre of the source lane, m.
     pub begin_m: f64,
@@ -56,6 +56,7 @@ pub struct RouteLaneChange {
     pub lateral_m: f64,
     /// Station and distance between the two centres there (m, positive to the left), from `begin_m` to the end
     /// of the stretch on which the change is permitted.
+    #[serde(skip)]
     pub(super) shifts_m: Vec<(f64, f64)>,
 }
 
