@@ -22,15 +22,12 @@ pub const AMBIENT_MAX: u32 = 20;
 /// Why the world must not be asked for a spawn with these figures, whatever the rules say; `None` if it
 /// may. NaN is out of bounds, too.
 pub(crate) fn spawn_out_of_bounds(speed_mps: f64, distance_m: f64) -> Option<String> {
-    if !SPAWN_SPEED_MPS.contains(&speed_mps) {
-        let (low, high) = (SPAWN_SPEED_MPS.start(), SPAWN_SPEED_MPS.end());
-        return Some(format!("the spawn's speed is {speed_mps} m/s, possible is {low} .. {high} m/s"));
-    }
-    if !SPAWN_DISTANCE_M.contains(&distance_m) {
-        let (low, high) = (SPAWN_DISTANCE_M.start(), SPAWN_DISTANCE_M.end());
-        return Some(format!("the spawn's distance is {distance_m} m, possible is {low} .. {high} m"));
-    }
-    None
+    let figures =
+        [("speed", speed_mps, "m/s", SPAWN_SPEED_MPS), ("distance", distance_m, "m", SPAWN_DISTANCE_M)];
+    let (what, value, unit, range) =
+        figures.into_iter().find(|(_, value, _, range)| !range.contains(value))?;
+    let (low, high) = range.into_inner();
+    Some(format!("the spawn's {what} is {value} {unit}, possible is {low} .. {high} {unit}"))
 }
 
 #[cfg(test)]
