@@ -129,7 +129,7 @@ impl Checker {
                     Domain::Values((0..count).map(|variant| Value::Variant(of, variant)).collect())
                 }
                 Type::Int | Type::Quantity(_) => {
-                    let name = self.type_name(ty);
+                    let name = self.references.type_name(ty);
                     let message = format!("`{}` has no end of values", declared.name.text);
                     let error = Diagnostic::error(code::INFINITE, message)
                         .at(declared.ty.span, format!("any `{name}`"));
@@ -142,7 +142,7 @@ impl Checker {
             domain => domain,
         };
         if axis && matches!(domain, Domain::Range(..)) {
-            let name = self.type_name(ty);
+            let name = self.references.type_name(ty);
             let message = format!("`each` over `{}` has no end of rows", declared.name.text);
             let error = Diagnostic::error(code::INFINITE, message)
                 .at(declared.ty.span, format!("a range of `{name}`"));
@@ -174,7 +174,7 @@ impl Checker {
             ast::ExprKind::Range { low, high } => {
                 if !is_number(ty) {
                     self.look_at(within, &place, Some(ty));
-                    let name = self.type_name(ty);
+                    let name = self.references.type_name(ty);
                     let error = Diagnostic::error(code::TYPE_MISMATCH, format!("`{name}` has no ranges"));
                     return self.reject(error.at(within.span, "a range of numbers"));
                 }

@@ -14,7 +14,7 @@ use crate::check::{style, unused};
 use crate::model::expr::{Expr, ExprKind};
 use crate::model::rules::bounds;
 use crate::model::vocabulary::TYPES;
-use crate::model::{ActionDef, EnumDef, EnumIndex, FnDef, GroupDef, Space, StateDef, Type, Value, code};
+use crate::model::{ActionDef, EnumDef, FnDef, GroupDef, Space, StateDef, Type, Value, code};
 use crate::prove;
 use crate::prove::{Known, Values, enclose};
 use crate::syntax::ast::{FileId, ItemKind, Span};
@@ -234,12 +234,11 @@ impl Checker {
 
     /// The type with this name.
     pub(super) fn named_type(&mut self, name: &ast::Name) -> Option<Type> {
-        let built_in = TYPES.iter().find(|(word, ..)| *word == name.text).map(|(_, ty, _)| *ty);
-        match built_in {
+        let found = self.references.type_named(&name.text);
+        match found {
+            None | Some(Type::Enum(_)) => self.references.uses(name.span, Symbol::Enum(name.text.clone())),
             Some(_) => self.references.note(name.span, Symbol::Type(name.text.clone()), false),
-            None => self.references.uses(name.span, Symbol::Enum(name.text.clone())),
         }
-        let found = built_in.or(self.enum_names.get(&name.text).map(|index| Type::Enum(EnumIndex(index))));
         found.or_else(|| {
             let candidates = TYPES.iter().map(|(word, ..)| *word).chain(self.enum_names.all());
             self.reject(unknown("type", &name.text, name.span, candidates))

@@ -362,7 +362,7 @@ impl Checker {
     /// The engine's word for each variant of an enum, for values that reach the world.
     pub(super) fn words<W: Word>(&mut self, kind: &str, ty: Type, span: Span) -> Option<Vec<W>> {
         let Type::Enum(of) = ty else {
-            let name = self.type_name(ty);
+            let name = self.references.type_name(ty);
             let message = format!("type mismatch: wanted a {kind}, found `{name}`");
             let error = Diagnostic::error(code::TYPE_MISMATCH, message);
             return self.reject(error.at(span, format!("this is a `{name}`")));

@@ -53,8 +53,9 @@ impl fmt::Display for Change {
 /// Every difference from one space to another, declarations first; `None` if one is unsound.
 pub fn differences(old: &Loaded, new: &Loaded) -> Option<Vec<Difference>> {
     let (old_space, new_space) = (old.space.as_deref()?, new.space.as_deref()?);
-    let mut found = declarations(old, new);
-    found.extend(rules(old, new, old_space, new_space));
+    let (old_texts, new_texts) = (texts(old), texts(new));
+    let mut found = declarations(&old_texts, &new_texts);
+    found.extend(rules((old_space, &old_texts), (new_space, &new_texts)));
     found.extend(rows(old_space, new_space));
     found.extend(reaches(old_space, new_space));
     Some(found)
@@ -65,7 +66,9 @@ fn difference(change: Change, subject: String, detail: impl Into<String>) -> Dif
 }
 
 /// The formatted text of every declaration, by keyword and name.
-fn texts(loaded: &Loaded) -> BTreeMap<(String, String), String> {
+type Texts = BTreeMap<(String, String), String>;
+
+fn texts(loaded: &Loaded) -> Texts {
     let items = standing_items(loaded);
     let named = items.iter().filter(|item| {
         !matches!(
@@ -86,8 +89,7 @@ fn texts(loaded: &Loaded) -> BTreeMap<(String, String), String> {
 }
 
 /// Differences between declarations other than rules and actions, which are compared by their meaning.
-fn declarations(old: &Loaded, new: &Loaded) -> Vec<Difference> {
-    let (old, new) = (texts(old), texts(new));
+fn declarations(old: &Texts, new: &Texts) -> Vec<Difference> {
     let mut found = Vec::new();
     let of_table = |keyword: &str| matches!(keyword, "rule" | "action");
     for ((keyword, name), text) in old.iter().filter(|((keyword, _), _)| !of_table(keyword)) {
@@ -113,16 +115,18 @@ fn flat(text: &str) -> String {
     text.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
-fn rules(old: &Loaded, new: &Loaded, old_space: &Space, new_space: &Space) -> Vec<Difference> {
-    let (old_texts, new_texts) = (texts(old), texts(new));
-    let text = |texts: &BTreeMap<(String, String), String>, name: &str| {
-        texts.get(&("rule".to_owned(), format!(" `{name}`"))).cloned().unwrap_or_default()
+fn rules(
+    (old_space, old_texts): (&Space, &Texts),
+    (new_space, new_texts): (&Space, &Texts),
+) -> Vec<Difference> {
+    let text = |texts: &Texts, name: &str| {
+        texts.get(&("rule".to_owned(), format!(" `{name}`"))).map_or(String::new(), |text| flat(text))
     };
     let mut found = Vec::new();
     for (index, rule) in old_space.rules.iter().enumerate() {
         let subject = format!("rule `{}`", rule.name);
         let Some(other) = new_space.rules.iter().position(|known| known.name == rule.name) else {
-            found.push(difference(Change::Removed, subject, flat(&text(&old_texts, &rule.name))));
+            found.push(difference(Change::Removed, subject, text(old_texts, &rule.name)));
             continue;
         };
         let optional = new_space.rules[other].optional;
@@ -133,7 +137,7 @@ fn rules(old: &Loaded, new: &Loaded, old_space: &Space, new_space: &Space) -> Ve
             };
             found.push(difference(change, subject.clone(), detail));
         }
-        let (before, after) = (flat(&text(&old_texts, &rule.name)), flat(&text(&new_texts, &rule.name)));
+        let (before, after) = (text(old_texts, &rule.name), text(new_texts, &rule.name));
         let written = || format!("{before} → {after}");
         match compared((old_space, index), (new_space, other)) {
             Some((change, detail)) => found.push(difference(change, subject, detail)),
@@ -144,7 +148,7 @@ fn rules(old: &Loaded, new: &Loaded, old_space: &Space, new_space: &Space) -> Ve
     for rule in &new_space.rules {
         if !old_space.rules.iter().any(|known| known.name == rule.name) {
             let subject = format!("rule `{}`", rule.name);
-            found.push(difference(Change::Added, subject, flat(&text(&new_texts, &rule.name))));
+            found.push(difference(Change::Added, subject, text(new_texts, &rule.name)));
         }
     }
     found
@@ -152,8 +156,7 @@ fn rules(old: &Loaded, new: &Loaded, old_space: &Space, new_space: &Space) -> Ve
 
 /// Whether a rule forbids more or less than before, by its moves or by what it leaves of each range.
 fn compared(old: (&Space, usize), new: (&Space, usize)) -> Option<(Change, String)> {
-    let mut tighter = Vec::new();
-    let mut looser = Vec::new();
+    let mut turns = Turns::default();
     if let (
         RuleBody::Moves { state, allowed: before, .. },
         RuleBody::Moves { state: other, allowed: after, .. },
@@ -170,8 +173,8 @@ fn compared(old: (&Space, usize), new: (&Space, usize)) -> Option<(Change, Strin
                 let (Some(from_now), Some(to_now)) = (find(from_name), find(to_name)) else { continue };
                 let word = format!("{from_name} -> {to_name}");
                 match (before[from][to], after[from_now][to_now]) {
-                    (true, false) => tighter.push(word),
-                    (false, true) => looser.push(word),
+                    (true, false) => turns.tighter.push(word),
+                    (false, true) => turns.looser.push(word),
                     _ => {}
                 }
             }
@@ -181,46 +184,50 @@ fn compared(old: (&Space, usize), new: (&Space, usize)) -> Option<(Change, Strin
             let Some(other) = new.0.rows.iter().find(|other| other.label == row.label) else { continue };
             let unbound = !other.rules.contains(&new.1);
             if unbound {
-                looser.push(format!("binds `{}` no longer", row.label));
+                turns.looser.push(format!("binds `{}` no longer", row.label));
                 continue;
             }
             for (road, same) in shared_roads(old.0, new.0) {
                 let (before, after) = (left(old, row, road), left(new, other, same));
-                judge(&before, &after, &road.name, &mut tighter, &mut looser);
+                turns.judge(&before, &after, &road.name);
             }
         }
         for row in new.0.rows.iter().filter(|row| row.rules.contains(&new.1)) {
             let known = old.0.rows.iter().find(|other| other.label == row.label);
             if known.is_some_and(|known| !known.rules.contains(&old.1)) {
-                tighter.push(format!("binds `{}`", row.label));
+                turns.tighter.push(format!("binds `{}`", row.label));
             }
         }
     }
-    let shown = |parts: &mut Vec<String>| {
-        let mut kept: Vec<String> = Vec::new();
-        parts.drain(..).for_each(|part| {
-            if !kept.contains(&part) {
-                kept.push(part)
+    let shown = |parts: &[String]| {
+        let mut kept: Vec<&str> = Vec::new();
+        for part in parts {
+            if !kept.contains(&part.as_str()) {
+                kept.push(part);
             }
-        });
+        }
         match kept.len() {
             0..=4 => kept.join("; "),
             more => format!("{}; and {} more", kept[..4].join("; "), more - 4),
         }
     };
-    match (tighter.is_empty(), looser.is_empty()) {
-        (true, true) => None,
-        (false, true) => Some((Change::Tightened, shown(&mut tighter))),
-        (true, false) => Some((Change::Loosened, shown(&mut looser))),
-        (false, false) => Some((
-            Change::Changed,
-            format!("tighter: {}; looser: {}", shown(&mut tighter), shown(&mut looser)),
-        )),
-    }
+    let (tighter, looser) = (shown(&turns.tighter), shown(&turns.looser));
+    let change = turns.change()?;
+    Some((
+        change,
+        match change {
+            Change::Tightened => tighter,
+            Change::Loosened => looser,
+            _ => format!("tighter: {tighter}; looser: {looser}"),
+        },
+    ))
 }
 
+/// A range for each name.
+type Ranges = Vec<(String, Interval)>;
+
 /// What one rule alone leaves of each range of a row; `None` if it leaves nothing.
-fn left((space, rule): (&Space, usize), row: &Row, road: &Road) -> Option<Vec<(String, Interval)>> {
+fn left((space, rule): (&Space, usize), row: &Row, road: &Road) -> Option<Ranges> {
     let alone = RulesInForce::only(space, rule);
     let settled = RowRules { space, row, road: Some(&road.facts), in_force: &alone }.settle()?;
     let drawn = space.actions[row.action].parameters.iter().zip(settled).filter(|(p, _)| !p.axis);
@@ -231,31 +238,40 @@ fn left((space, rule): (&Space, usize), row: &Row, road: &Road) -> Option<Vec<(S
     Some(ranges.collect())
 }
 
-fn judge(
-    before: &Option<Vec<(String, Interval)>>,
-    after: &Option<Vec<(String, Interval)>>,
-    road: &str,
-    tighter: &mut Vec<String>,
-    looser: &mut Vec<String>,
-) {
-    match (before, after) {
-        (None, Some(_)) => looser.push(format!("no longer forbids everything on {road}")),
-        (Some(_), None) => tighter.push(format!("forbids everything on {road}")),
-        (None, None) => {}
-        (Some(before), Some(after)) => {
-            for (name, was) in before {
-                let Some((_, is)) = after.iter().find(|(known, _)| known == name) else { continue };
-                let shared = was.intersect(is);
-                let word = format!("{name} {was} → {is} on {road}");
-                match (shared == *is, shared == *was) {
-                    (true, true) => {}
-                    (true, false) => tighter.push(word),
-                    (false, true) => looser.push(word),
-                    (false, false) => {
-                        tighter.push(word.clone());
-                        looser.push(word);
-                    }
-                }
+/// How something forbids more than before, and how less.
+#[derive(Default)]
+struct Turns {
+    tighter: Vec<String>,
+    looser: Vec<String>,
+}
+
+impl Turns {
+    fn change(&self) -> Option<Change> {
+        match (self.tighter.is_empty(), self.looser.is_empty()) {
+            (true, true) => None,
+            (false, true) => Some(Change::Tightened),
+            (true, false) => Some(Change::Loosened),
+            (false, false) => Some(Change::Changed),
+        }
+    }
+
+    /// Compares what is left of each range on a road; `None` if nothing is.
+    fn judge(&mut self, before: &Option<Ranges>, after: &Option<Ranges>, road: &str) {
+        let (before, after) = match (before, after) {
+            (None, None) => return,
+            (None, Some(_)) => return self.looser.push(format!("no longer forbids everything on {road}")),
+            (Some(_), None) => return self.tighter.push(format!("forbids everything on {road}")),
+            (Some(before), Some(after)) => (before, after),
+        };
+        for (name, was) in before {
+            let Some((_, is)) = after.iter().find(|(known, _)| known == name) else { continue };
+            let shared = was.intersect(is);
+            let word = format!("{name} {was} → {is} on {road}");
+            if shared != *was {
+                self.tighter.push(word.clone());
+            }
+            if shared != *is {
+                self.looser.push(word);
             }
         }
     }
@@ -296,26 +312,15 @@ fn reaches(old: &Space, new: &Space) -> Vec<Difference> {
         for (index, road) in old.roads.iter().enumerate() {
             let Some(same) = new.roads.iter().position(|known| known.name == road.name) else { continue };
             let action = &old.actions[row.action].name;
-            let (mut tighter, mut looser) = (Vec::new(), Vec::new());
+            let mut turns = Turns::default();
             let ranges = |reach: &Reach| match reach {
                 Reach::Open(ranges) => Some(ranges.iter().map(|(name, i)| (name.to_string(), *i)).collect()),
                 Reach::Dead { .. } => None,
             };
-            judge(
-                &ranges(&row.roads[index]),
-                &ranges(&other.roads[same]),
-                &road.name,
-                &mut tighter,
-                &mut looser,
-            );
-            let change = match (tighter.is_empty(), looser.is_empty()) {
-                (true, true) => continue,
-                (false, true) => Change::Tightened,
-                (true, false) => Change::Loosened,
-                (false, false) => Change::Changed,
-            };
-            let detail = if tighter.is_empty() { looser.join("; ") } else { tighter.join("; ") };
-            let difference = difference(change, format!("draws of `{action}`"), detail);
+            turns.judge(&ranges(&row.roads[index]), &ranges(&other.roads[same]), &road.name);
+            let Some(change) = turns.change() else { continue };
+            let parts = if turns.tighter.is_empty() { turns.looser } else { turns.tighter };
+            let difference = difference(change, format!("draws of `{action}`"), parts.join("; "));
             if !found.contains(&difference) {
                 found.push(difference);
             }

@@ -49,21 +49,21 @@ impl Checker {
         if fits(found.ty, wanted) {
             return Some(found);
         }
-        let (wanted_name, found_name) = (self.type_name(wanted), self.type_name(found.ty));
+        let (wanted_name, found_name) =
+            (self.references.type_name(wanted), self.references.type_name(found.ty));
         let both_numbers = is_number(wanted) && is_number(found.ty);
         let (code, what) =
             if both_numbers { (code::UNIT_MISMATCH, "unit") } else { (code::TYPE_MISMATCH, "type") };
         let error =
             Diagnostic::error(code, format!("{what} mismatch: wanted `{wanted_name}`, found `{found_name}`"))
                 .at(found.span, format!("this is {}", article(&found_name)));
-        self.report(match wanted {
+        self.reject(match wanted {
             Type::Enum(of) if self.enums[of.0].variants.len() <= 12 => {
                 let variants: Vec<&str> = self.enums[of.0].variants.iter().map(String::as_str).collect();
                 error.help(format!("a `{wanted_name}` is {}", one_of(&variants)))
             }
             Type::Enum(_) | Type::Bool | Type::Int | Type::Quantity(_) => error,
-        });
-        None
+        })
     }
 
     /// An expression of any type. `hint` decides between variants of the same name.
@@ -130,8 +130,7 @@ impl Checker {
 
     fn misplaced(&mut self, what: &str, span: Span) -> Option<Expr> {
         let error = Diagnostic::error(code::TYPE_MISMATCH, format!("{what} cannot be computed with"));
-        self.report(error.at(span, "not a value of an expression"));
-        None
+        self.reject(error.at(span, "not a value of an expression"))
     }
 
     /// A number literal in SI units.
@@ -146,8 +145,7 @@ impl Checker {
             Some(word) => match units::unit(&word.text) {
                 Some(unit) => (value.checked_mul(unit.factor()), Type::Quantity(unit.dimension)),
                 None => {
-                    self.report(unknown_unit(word));
-                    return None;
+                    return self.reject(unknown_unit(word));
                 }
             },
         };
@@ -156,14 +154,11 @@ impl Checker {
     }
 
     fn exact(&mut self, value: Option<Rational>, span: Span) -> Option<Rational> {
-        if value.is_none() {
-            self.report(
-                Diagnostic::error(code::NUMBER, "the number is too large or too fine to be held exactly")
-                    .at(span, "about 38 digits are possible")
-                    .help("round it, or take a unit that is larger or smaller"),
-            );
-        }
-        value
+        value.or_else(|| {
+            let message = "the number is too large or too fine to be held exactly";
+            let error = Diagnostic::error(code::NUMBER, message).at(span, "about 38 digits are possible");
+            self.reject(error.help("round it, or take a unit that is larger or smaller"))
+        })
     }
 
     /// Resolves a name: parameters first, then constants, states, facts and variants.
@@ -200,8 +195,7 @@ impl Checker {
                     Some(note) => error.note(note),
                     None => error,
                 };
-                self.report(error);
-                return None;
+                return self.reject(error);
             }
             (_, owners) => {
                 let enums: Vec<&str> = owners.iter().map(|of| self.enums[*of].name.as_str()).collect();
@@ -210,8 +204,9 @@ impl Checker {
                     format!("`{name}` is a variant of {}", listed(&enums)),
                 );
                 let error = error.at(span, "which one is meant does not follow from here");
-                self.report(error.help("compare it with what has the wanted type, or rename one of the two"));
-                return None;
+                return self.reject(
+                    error.help("compare it with what has the wanted type, or rename one of the two"),
+                );
             }
         };
         let index = self.enums[of].variants.iter().position(|variant| variant == name)?;
@@ -294,8 +289,7 @@ impl Checker {
                 self.look_at(base, place, None);
                 let things = one_of(&things);
                 let error = Diagnostic::error(code::UNKNOWN, format!("only {things} has fields"));
-                self.report(error.at(base.span, format!("not {things}")));
-                return None;
+                return self.reject(error.at(base.span, format!("not {things}")));
             }
         };
         let name = format!("{thing}.{}", part.text);
@@ -341,14 +335,12 @@ impl Checker {
                     .at(base.span, "not a state"),
             };
             self.look_at(index, place, None);
-            self.report(error);
-            return None;
+            return self.reject(error);
         };
         let Some(key_of) = state.key else {
             self.look_at(index, place, None);
             let error = Diagnostic::error(code::TYPE_MISMATCH, format!("`{}` is not a map", state.name));
-            self.report(error.at(span, "takes no key").beside(state.span, "declared here"));
-            return None;
+            return self.reject(error.at(span, "takes no key").beside(state.span, "declared here"));
         };
         let key = self.typed(index, place, Type::Enum(key_of))?;
         let kind = match key.kind {
@@ -369,12 +361,11 @@ impl Checker {
             self.look_at_arguments(&call.args, place);
             if self.functions_to_come.contains(&call.name.text) {
                 let error = Diagnostic::error(code::NOT_HERE, "a constant cannot call functions");
-                self.report(error.at(call.span, "called here").help("make it a `fn` without parameters"));
-                return None;
+                return self
+                    .reject(error.at(call.span, "called here").help("make it a `fn` without parameters"));
             }
             let error = unknown("function", &call.name.text, call.name.span, self.function_names.all());
-            self.report(error);
-            return None;
+            return self.reject(error);
         };
         // A function whose own header is broken was reported there.
         let Some((parameters, result, header)) = self.signatures.get(index).cloned().flatten() else {
@@ -390,10 +381,9 @@ impl Checker {
                 if parameters.len() == 1 { "" } else { "s" },
                 call.args.len()
             );
-            self.report(
+            return self.reject(
                 Diagnostic::error(code::ARGUMENTS, message).at(call.span, "").beside(header, "declared here"),
             );
-            return None;
         }
         let mut arguments: Vec<Option<Expr>> = vec![None; parameters.len()];
         for (position, argument) in call.args.iter().enumerate() {
@@ -405,8 +395,7 @@ impl Checker {
                         self.look_at_arguments(&call.args[position..], place);
                         let names = parameters.iter().map(|(parameter, _)| parameter.as_str());
                         let error = unknown("argument", &name.text, name.span, names);
-                        self.report(error);
-                        return None;
+                        return self.reject(error);
                     }
                 },
             };
@@ -444,8 +433,7 @@ impl Checker {
             Type::Bool => vec!["false".to_owned(), "true".to_owned()],
             Type::Int | Type::Quantity(_) => {
                 let error = Diagnostic::error(code::TYPE_MISMATCH, "`match` needs an enum or a truth value");
-                self.report(error.at(subject.span, "this is a number"));
-                return None;
+                return self.reject(error.at(subject.span, "this is a number"));
             }
         };
         let mut arm_of: Vec<Option<usize>> = vec![None; variants.len()];
@@ -468,8 +456,7 @@ impl Checker {
         if !missing.is_empty() {
             let error = Diagnostic::error(code::NOT_EXHAUSTIVE, "`match` does not cover every case");
             let error = error.at(span, format!("missing: {}", listed(&missing)));
-            self.report(error.help("add an arm for each, or `_ => …` for the rest"));
-            return None;
+            return self.reject(error.help("add an arm for each, or `_ => …` for the rest"));
         }
         let arms: Option<Vec<Expr>> = bodies.into_iter().collect();
         let arms = arms?;
@@ -513,11 +500,10 @@ impl Checker {
         if is_number(found.ty) {
             return Some(found);
         }
-        let name = self.type_name(found.ty);
+        let name = self.references.type_name(found.ty);
         let error =
             Diagnostic::error(code::TYPE_MISMATCH, format!("type mismatch: wanted a number, found `{name}`"));
-        self.report(error.at(found.span, format!("this is {}", article(&name))));
-        None
+        self.reject(error.at(found.span, format!("this is {}", article(&name))))
     }
 
     fn binary(
@@ -568,8 +554,9 @@ impl Checker {
             Arithmetic::Divide => a.per(b),
         };
         let Some(result) = result else {
-            self.report(Diagnostic::error(code::UNIT_MISMATCH, "the dimension is out of range").at(span, ""));
-            return None;
+            return self.reject(
+                Diagnostic::error(code::UNIT_MISMATCH, "the dimension is out of range").at(span, ""),
+            );
         };
         let ty = if both_whole && op != Arithmetic::Divide { Type::Int } else { Type::Quantity(result) };
         Some(Expr { kind: ExprKind::Arithmetic(op, Box::new(left), Box::new(right)), ty, span })
@@ -577,7 +564,7 @@ impl Checker {
 
     /// Two sides of different dimension or type.
     fn mismatch(&mut self, what: &str, at: Span, left: &Expr, right: &Expr) {
-        let (a, b) = (self.type_name(left.ty), self.type_name(right.ty));
+        let (a, b) = (self.references.type_name(left.ty), self.references.type_name(right.ty));
         let code =
             if is_number(left.ty) && is_number(right.ty) { code::UNIT_MISMATCH } else { code::TYPE_MISMATCH };
         let error = Diagnostic::error(code, format!("`{a}` and `{b}` {what}")).at(at, "");
@@ -602,8 +589,7 @@ impl Checker {
                 self.note_roads(core::slice::from_ref(road));
                 let error = Diagnostic::error(code::UNORDERED, "roads have no order");
                 let error = error.at(span, format!("`{}` needs one", op.symbol()));
-                self.report(error.help("write `road == corner`, or `road in [corner, boulevard]`"));
-                return None;
+                return self.reject(error.help("write `road == corner`, or `road in [corner, boulevard]`"));
             }
             let is_there = self.on_road(core::slice::from_ref(road), place, span)?;
             let kind = match op {
@@ -620,12 +606,11 @@ impl Checker {
         match left.ty {
             Type::Bool if op.orders() => {
                 let error = Diagnostic::error(code::UNORDERED, "truth values have no order");
-                self.report(
+                return self.reject(
                     error
                         .at(span, format!("`{}` needs one", op.symbol()))
                         .help("compare them with `==` or `!=`, or join them with `and`, `or`, `implies`"),
                 );
-                return None;
             }
             Type::Enum(of) if op.orders() && !self.enums[of.0].ordered => {
                 let of = &self.enums[of.0];
@@ -633,8 +618,7 @@ impl Checker {
                     .at(span, format!("`{}` needs one", op.symbol()))
                     .beside(of.span, "declared with `|`")
                     .help("declare its variants with `<` between them, or compare with `==` or `in [..]`");
-                self.report(error);
-                return None;
+                return self.reject(error);
             }
             Type::Bool | Type::Enum(_) | Type::Int | Type::Quantity(_) => {}
         }
@@ -676,11 +660,10 @@ impl Checker {
                 let low = self.typed(low, place, ty);
                 let high = self.typed(high, place, ty);
                 if !is_number(ty) {
-                    self.report(
+                    return self.reject(
                         Diagnostic::error(code::TYPE_MISMATCH, "a range holds numbers")
                             .at(value.span, "not a number"),
                     );
-                    return None;
                 }
                 ExprKind::InRange(value, Box::new(low?), Box::new(high?))
             }
@@ -695,8 +678,7 @@ impl Checker {
             {
                 self.note_part(base, field);
                 if !place.knows("road") {
-                    self.report(unknown_here("road", right.span));
-                    return None;
+                    return self.reject(unknown_here("road", right.span));
                 }
                 let lanes = self.words::<LaneChoice>("lane", ty, value.span)?;
                 ExprKind::InLanes(value, lanes)
@@ -705,8 +687,7 @@ impl Checker {
                 self.look_at(right, place, Some(ty));
                 let error =
                     Diagnostic::error(code::TYPE_MISMATCH, "`in` needs a list, a range or `road.lanes`");
-                self.report(error.at(right.span, "none of them"));
-                return None;
+                return self.reject(error.at(right.span, "none of them"));
             }
         };
         Some(Expr { kind, ty: Type::Bool, span })
@@ -716,31 +697,23 @@ impl Checker {
     fn on_road(&mut self, names: &[ast::Expr], place: &Place<'_>, span: Span) -> Option<Expr> {
         self.note_roads(names);
         if !place.knows("road") {
-            self.report(unknown_here("road", span));
-            return None;
+            return self.reject(unknown_here("road", span));
         }
-        let mut roads = Some(Vec::new());
-        for name in names {
-            let found = match &name.kind {
-                ast::ExprKind::Name(text) if self.road_names.contains(text) => Some(text.clone()),
-                ast::ExprKind::Name(text) => {
-                    let known = self.road_names.iter().map(String::as_str);
-                    let error = unknown("road", text, name.span, known);
-                    self.report(error);
-                    None
-                }
-                _ => {
-                    let error = Diagnostic::error(code::TYPE_MISMATCH, "wanted the name of a road");
-                    self.report(error.at(name.span, "not a name").help("write `road == corner`"));
-                    None
-                }
-            };
-            roads = roads.zip(found).map(|(mut roads, found)| {
-                roads.push(found);
-                roads
-            });
-        }
-        Some(Expr { kind: ExprKind::OnRoad(roads?), ty: Type::Bool, span })
+        let road = |name: &ast::Expr| match &name.kind {
+            ast::ExprKind::Name(text) if self.road_names.contains(text) => Some(text.clone()),
+            ast::ExprKind::Name(text) => {
+                let known = self.road_names.iter().map(String::as_str);
+                self.reject(unknown("road", text, name.span, known))
+            }
+            _ => {
+                let error = Diagnostic::error(code::TYPE_MISMATCH, "wanted the name of a road");
+                self.reject(error.at(name.span, "not a name").help("write `road == corner`"))
+            }
+        };
+        // Every unknown road is reported, not just the first.
+        let roads: Vec<Option<String>> = names.iter().map(road).collect();
+        let roads = roads.into_iter().collect::<Option<_>>()?;
+        Some(Expr { kind: ExprKind::OnRoad(roads), ty: Type::Bool, span })
     }
 
     /// Notes the names among the expressions as roads.
@@ -758,15 +731,6 @@ impl Checker {
             && !place.locals.iter().any(|(local, _)| local == "road")
             && !self.constants.iter().any(|(constant, _)| constant == "road")
             && !self.states.iter().any(|state| state.name == "road")
-    }
-
-    pub(super) fn type_name(&self, ty: Type) -> String {
-        match ty {
-            Type::Bool => "Bool".to_owned(),
-            Type::Int => "Int".to_owned(),
-            Type::Quantity(dimension) => dimension.to_string(),
-            Type::Enum(of) => self.enums[of.0].name.clone(),
-        }
     }
 }
 

@@ -15,7 +15,7 @@ use crate::model::policy::Policy;
 use crate::model::scenario::Scenario;
 use crate::model::{Space, code, digest};
 use crate::road::RoadMap;
-use crate::syntax::ast::{FileId, ItemKind};
+use crate::syntax::ast::{FileId, ItemKind, Span};
 use crate::syntax::{Diagnostic, Severity, Sources, ast, parse};
 
 /// Why a file cannot be read, in a few words: `no such file`, `a directory`, `not text`.
@@ -195,7 +195,7 @@ fn whole_digest(files: &[LoadedFile], root: &Path, maps: &mut MapReader<'_>) -> 
         }
         let beside = |other: &str| (normal(&folder(&name).join(other)), normal(&folder(&path).join(other)));
         open.extend(uses(file).map(|used| beside(&used.path.value)));
-        for map in maps_named(file) {
+        for (map, _) in maps_named(file) {
             let (name, path) = beside(map);
             let text = maps.text(&path).as_ref().ok()?;
             found.insert(spelt(&name), digest(text.as_bytes()));
@@ -224,12 +224,12 @@ pub(super) fn path_from(file: &LoadedFile, written: &str) -> PathBuf {
     normal(&folder(&file.path).join(written))
 }
 
-/// The maps that a file's roads name, as written.
-fn maps_named(file: &LoadedFile) -> impl Iterator<Item = &str> {
+/// The maps that a file's roads name, as written, and where.
+pub(super) fn maps_named(file: &LoadedFile) -> impl Iterator<Item = (&str, Span)> {
     let roads = file.tree.items.iter().filter_map(|item| item.kind.plain().as_road());
     let fields = roads.flat_map(|block| block.fields.iter().filter(|field| field.name.text == "map"));
     fields.filter_map(|field| match &field.value.kind {
-        ast::ExprKind::Text(path) => Some(path.as_str()),
+        ast::ExprKind::Text(path) => Some((path.as_str(), field.value.span)),
         _ => None,
     })
 }
@@ -341,7 +341,7 @@ fn folder(path: &Path) -> PathBuf {
 }
 
 /// The path without `.` and, where possible, without `..`, so that a file has one path.
-fn normal(path: &Path) -> PathBuf {
+pub fn normal(path: &Path) -> PathBuf {
     let mut parts: Vec<Component<'_>> = Vec::new();
     for part in path.components() {
         match (part, parts.last()) {

@@ -32,7 +32,7 @@ mod suggest;
 mod unused;
 
 pub use difference::{Change, Difference, differences};
-pub use load::{Loaded, LoadedFile, MapCache, ReadError, ReadFile, files_used, load, load_with};
+pub use load::{Loaded, LoadedFile, MapCache, ReadError, ReadFile, files_used, load, load_with, normal};
 pub use references::{Declaration, Occurrence, References, Symbol};
 pub use scenario::scenario;
 pub use suggest::suggest_uses;

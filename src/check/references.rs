@@ -7,10 +7,10 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 
-use crate::check::load::{LoadedFile, path_from, used_path, uses};
+use crate::check::load::{LoadedFile, maps_named, path_from, used_path, uses};
 use crate::model::vocabulary::{TYPES, Word};
 use crate::model::{EnumDef, EnumIndex, Type};
-use crate::syntax::ast::{ExprKind, FileId, Item, ItemKind, Name, Number, ParamMode, Span};
+use crate::syntax::ast::{FileId, Item, ItemKind, Name, Number, ParamMode, Span};
 use crate::syntax::{Sources, ast};
 
 /// What a name stands for. Two declarations of one kind and name are one symbol: an `override` and what it
@@ -247,14 +247,8 @@ impl References {
                     references.uses(name.span, Symbol::Rule(name.text.clone()));
                 }
             }
-            let roads = file.tree.items.iter().filter_map(|item| match item.kind.plain() {
-                ItemKind::Road(block) => Some(block),
-                _ => None,
-            });
-            for map in roads.flat_map(|road| &road.fields).filter(|field| field.name.text == "map") {
-                if let ExprKind::Text(path) = &map.value.kind {
-                    references.note(map.value.span, Symbol::File(path_from(file, path)), false);
-                }
+            for (path, span) in maps_named(file) {
+                references.note(span, Symbol::File(path_from(file, path)), false);
             }
         }
         references

@@ -50,7 +50,7 @@ pub(super) fn number(expr: &ast::Expr, dimension: Dimension) -> Result<f64, Diag
         ast::ExprKind::Unary { op: UnaryOp::Negate, operand } => {
             number(operand, dimension).map(|value| -value)
         }
-        ast::ExprKind::Number(literal) => read(literal, dimension),
+        ast::ExprKind::Number(literal) => in_unit(literal, dimension, Rational::ONE, "wanted"),
         _ => Err(Diagnostic::error(code::TYPE_MISMATCH, "wanted a number").at(expr.span, "not one")),
     }
 }
@@ -82,27 +82,36 @@ fn decimals(expr: &ast::Expr) -> usize {
     }
 }
 
-fn read(literal: &ast::Number, dimension: Dimension) -> Result<f64, Diagnostic> {
+/// The number of a literal in a unit of its own, which is given by its factor to SI. `what` begins the complaint
+/// about another dimension: "wanted", or what has the dimension.
+///
+/// # Errors
+/// If its unit is unknown or of another dimension, or if it is too large.
+pub(super) fn in_unit(
+    literal: &ast::Number,
+    dimension: Dimension,
+    own: Rational,
+    what: &str,
+) -> Result<f64, Diagnostic> {
     let (found, factor) = match &literal.unit {
         None => (Dimension::RATIO, Rational::ONE),
-        Some(word) => match units::unit(&word.text) {
-            Some(unit) => (unit.dimension, unit.factor()),
-            None => return Err(unknown_unit(word)),
-        },
+        Some(word) => {
+            let unit = units::unit(&word.text).ok_or_else(|| unknown_unit(word))?;
+            (unit.dimension, unit.factor())
+        }
     };
     if found != dimension {
-        let message = format!("unit mismatch: wanted `{dimension}`, found `{found}`");
-        return Err(
-            Diagnostic::error(code::UNIT_MISMATCH, message).at(literal.span, format!("this is `{found}`"))
-        );
+        let message = format!("unit mismatch: {what} `{dimension}`, found `{found}`");
+        let error = Diagnostic::error(code::UNIT_MISMATCH, message);
+        return Err(error.at(literal.span, format!("this is `{found}`")));
     }
-    let too_large = || Diagnostic::error(code::NUMBER, "the number is too large").at(literal.span, "");
-    if factor == Rational::ONE {
+    let value = if factor == own {
         // The text is parsed as `f64` directly, so that the value is the same to the last bit.
-        return literal.digits.parse::<f64>().ok().filter(|value| value.is_finite()).ok_or_else(too_large);
-    }
-    exact_digits(&literal.digits)
-        .and_then(|digits| digits.checked_mul(factor))
-        .map(Rational::to_f64)
-        .ok_or_else(too_large)
+        literal.digits.parse::<f64>().ok().filter(|value| value.is_finite())
+    } else {
+        let digits = exact_digits(&literal.digits);
+        digits.and_then(|digits| digits.checked_mul(factor)?.checked_div(own)).map(Rational::to_f64)
+    };
+    let too_large = || Diagnostic::error(code::NUMBER, "the number is too large").at(literal.span, "");
+    value.ok_or_else(too_large)
 }

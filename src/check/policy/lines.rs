@@ -1,17 +1,15 @@
 //! Checks the rules of a policy, line by line. The checks are proofs over boxes of states: what they report
 //! about a line is true for every state.
 
-use crate::check::expression::{exact_digits, unknown_unit};
 use crate::check::names::unknown;
 use crate::check::scenario::row;
+use crate::check::scenario_value::in_unit;
 use crate::model::expr::Comparison;
 use crate::model::policy::{Condition, PolicyRule};
 use crate::model::{Reach, Row, RulesInForce, Space, StateMeaning, code};
 use crate::prove::forbids;
 use crate::syntax::ast::{BinaryOp, Expr, ExprKind, Span, UnaryOp};
 use crate::syntax::{Diagnostic, ast, listed, nearest};
-use crate::units;
-use crate::units::{Dimension, Rational};
 
 use crate::check::policy::region::Region;
 use crate::model::policy::{PolicyOrigin, VARIABLES, Variable, VariableKind, variable_index};
@@ -177,27 +175,7 @@ fn number(variable: &Variable, given: &Expr) -> Result<f64, Diagnostic> {
         let message = format!("`{}` is a number", variable.name);
         return Err(Diagnostic::error(code::TYPE_MISMATCH, message).at(given.span, "no number"));
     };
-    let (found, factor) = match &literal.unit {
-        None => (Dimension::RATIO, Rational::ONE),
-        Some(word) => {
-            let unit = units::unit(&word.text).ok_or_else(|| unknown_unit(word))?;
-            (unit.dimension, unit.factor())
-        }
-    };
-    let wanted = variable.dimension();
-    if found != wanted {
-        let message = format!("unit mismatch: `{}` is `{wanted}`, found `{found}`", variable.name);
-        let error = Diagnostic::error(code::UNIT_MISMATCH, message);
-        return Err(error.at(literal.span, format!("this is `{found}`")));
-    }
-    let too_large = || Diagnostic::error(code::NUMBER, "the number is too large").at(literal.span, "");
-    if factor == variable.factor() {
-        return literal.digits.parse::<f64>().ok().filter(|value| value.is_finite()).ok_or_else(too_large);
-    }
-    exact_digits(&literal.digits)
-        .and_then(|digits| digits.checked_mul(factor)?.checked_div(variable.factor()))
-        .map(Rational::to_f64)
-        .ok_or_else(too_large)
+    in_unit(literal, variable.dimension(), variable.factor(), &format!("`{}` is", variable.name))
 }
 
 /// Reports a line whose conditions no state fulfils.

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use serde_json::{Value, json};
 
-use crate::check::Symbol;
+use crate::check::{Symbol, normal};
 use crate::model::Type;
 use crate::syntax::keyword;
 use crate::units;
@@ -13,7 +13,7 @@ use crate::units;
 use super::context::Kind;
 use super::words::Entry;
 use super::workspace::Analysis;
-use super::{context, hover, uri, words};
+use super::{context, hover, words};
 
 // Kinds of completions, by the protocol's numbers.
 const FUNCTION: u32 = 3;
@@ -177,7 +177,7 @@ impl List<'_> {
         let root = &self.analysis.loaded.files[0].path;
         let folder = root.parent().unwrap_or(Path::new(""));
         let beginning = written.rfind('/').map_or("", |slash| &written[..=slash]);
-        let directory = uri::normal(&folder.join(beginning));
+        let directory = normal(&folder.join(beginning));
         // A directory that cannot be read gives no proposals.
         let Ok(entries) = std::fs::read_dir(directory) else { return };
         let mut names: Vec<String> = entries

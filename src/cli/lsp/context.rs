@@ -177,9 +177,7 @@ impl<'a> Place<'a> {
             && !self.fresh_line
             && self.keyword() != "language"
         {
-            let mut kinds = vec![Kind::Units];
-            kinds.extend(self.after_value());
-            return kinds;
+            return vec![Kind::Units, Kind::Operators];
         }
         match self.keyword() {
             "use" => match self.has("without") {
@@ -339,7 +337,7 @@ impl<'a> Place<'a> {
 
     fn in_outcome(&self) -> Vec<Kind> {
         if !self.wants_operand() && !self.begins_entry() {
-            return self.after_value();
+            return vec![Kind::Operators];
         }
         let mut kinds = vec![Kind::Words(words::facts(Site::Verdict))];
         kinds.extend(self.value(None));
@@ -459,7 +457,7 @@ impl<'a> Place<'a> {
             return kinds;
         }
         if !self.wants_operand() {
-            return self.after_value();
+            return vec![Kind::Operators];
         }
         let wanted = self.hint().or(ty);
         // A condition may begin with a value of any type.
@@ -469,10 +467,6 @@ impl<'a> Place<'a> {
         let mut kinds: Vec<Kind> = self.locals.iter().map(local).collect();
         kinds.push(Kind::Value(wanted));
         kinds
-    }
-
-    fn after_value(&self) -> Vec<Kind> {
-        vec![Kind::Operators]
     }
 
     /// The variants for the start of an arm of `match`; `None` elsewhere.

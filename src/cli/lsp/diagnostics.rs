@@ -96,34 +96,23 @@ pub fn fixes(analysis: &Analysis, workspace: &Workspace, from: usize, to: usize)
     let mut actions = Vec::new();
     for diagnostic in analysis.loaded.diagnostics.iter().filter(touches) {
         let shown = to_json(diagnostic, analysis, workspace);
-        for fix in &diagnostic.fixes {
-            let edits = fix.edits.iter().map(|edit| (edit.span, edit.text.as_str()));
-            let Some(edit) = edit(edits, analysis, workspace) else { continue };
+        'fixes: for fix in &diagnostic.fixes {
+            let mut changes: BTreeMap<String, Vec<Value>> = BTreeMap::new();
+            for edit in &fix.edits {
+                let Some(path) = analysis.path(edit.span.file) else { continue 'fixes };
+                let edit = json!({ "range": analysis.range(edit.span), "newText": edit.text });
+                changes.entry(workspace.uri(path)).or_default().push(edit);
+            }
             actions.push(json!({
                 "title": fix.title,
                 "kind": "quickfix",
                 "diagnostics": [shown],
                 "isPreferred": diagnostic.fixes.len() == 1,
-                "edit": edit,
+                "edit": { "changes": changes },
             }));
         }
     }
     actions
-}
-
-/// Edits of several files as an editor takes them; `None` if the span of an edit is in no file.
-pub fn edit<'a>(
-    edits: impl Iterator<Item = (Span, &'a str)>,
-    analysis: &Analysis,
-    workspace: &Workspace,
-) -> Option<Value> {
-    let mut changes: BTreeMap<String, Vec<Value>> = BTreeMap::new();
-    for (span, text) in edits {
-        let path = analysis.path(span.file)?;
-        let edit = json!({ "range": analysis.range(span), "newText": text });
-        changes.entry(workspace.uri(path)).or_default().push(edit);
-    }
-    Some(json!({ "changes": changes }))
 }
 
 /// The file of an analysis with that path.

@@ -3,7 +3,9 @@
 //! A document that is no file (`untitled:…`) keeps its URI for a path: it can be read from the editor
 //! alone, and the paths that it uses are relative to no folder.
 
-use std::path::{Component, Path, PathBuf};
+use std::path::{Path, PathBuf};
+
+use crate::check::normal;
 
 /// The path that a URI names.
 pub fn to_path(uri: &str) -> PathBuf {
@@ -47,21 +49,6 @@ fn decoded(text: &str) -> String {
         }
     }
     String::from_utf8_lossy(&found).into_owned()
-}
-
-/// Removes `.` and `..`, so that two spellings of a file give one path.
-pub fn normal(path: &Path) -> PathBuf {
-    let mut parts: Vec<Component<'_>> = Vec::new();
-    for part in path.components() {
-        match (part, parts.last()) {
-            (Component::CurDir, _) => {}
-            (Component::ParentDir, Some(Component::Normal(_))) => {
-                parts.pop();
-            }
-            _ => parts.push(part),
-        }
-    }
-    parts.iter().collect()
 }
 
 #[cfg(test)]
