@@ -316,15 +316,15 @@ impl Checker {
     }
 
     fn index(&mut self, base: &ast::Expr, index: &ast::Expr, place: &Place<'_>, span: Span) -> Option<Expr> {
-        match &base.kind {
-            ast::ExprKind::Name(name) => self.references.uses(base.span, Symbol::State(name.clone())),
-            _ => self.look_at(base, place, None),
-        }
         let state = match &base.kind {
-            ast::ExprKind::Name(name) if place.states => {
-                self.states.iter().find(|state| state.name == *name).cloned()
+            ast::ExprKind::Name(name) => {
+                self.references.uses(base.span, Symbol::State(name.clone()));
+                self.states.iter().find(|state| place.states && state.name == *name).cloned()
             }
-            _ => None,
+            _ => {
+                self.look_at(base, place, None);
+                None
+            }
         };
         let Some(state) = state else {
             let maps =

@@ -99,22 +99,16 @@ pub fn load_with(root: &Path, read: &ReadFile<'_>, cache: &mut MapCache) -> Resu
         found.into_iter().partition(|found| found.severity == Severity::Note);
     diagnostics.extend(found.into_iter().filter(|_| is_whole));
     let space = space.filter(|_| !diagnostics.iter().any(Diagnostic::is_error));
-    let mut scenario = None;
-    let has_scenario = files[0].tree.items.iter().any(|item| item.kind.as_scenario().is_some());
-    if let (Some(space), true) = (&space, has_scenario) {
-        match scenario::scenario(&files[0].tree, space) {
-            Ok(found) => scenario = Some(found),
-            Err(found) => diagnostics.extend(found),
-        }
-    }
-    let mut policy = None;
-    let has_policy = files[0].tree.items.iter().any(|item| item.kind.as_policy().is_some());
-    if let (Some(space), true) = (&space, has_policy) {
-        match policy::policy(sources.text(FileId(0)), &files[0].tree, space) {
-            Ok(found) => policy = Some(found),
-            Err(found) => diagnostics.extend(found),
-        }
-    }
+    let root = &files[0].tree;
+    let has_scenario = root.items.iter().any(|item| item.kind.as_scenario().is_some());
+    let scenario = space
+        .as_ref()
+        .filter(|_| has_scenario)
+        .and_then(|space| scenario::scenario(root, space).map_err(|found| diagnostics.extend(found)).ok());
+    let has_policy = root.items.iter().any(|item| item.kind.as_policy().is_some());
+    let policy = space.as_ref().filter(|_| has_policy).and_then(|space| {
+        policy::policy(sources.text(FileId(0)), root, space).map_err(|found| diagnostics.extend(found)).ok()
+    });
     // Remarks are about the space. They are shown when the space itself is checked, not for each of its
     // scenarios and policies.
     if has_scenario || has_policy || diagnostics.iter().any(Diagnostic::is_error) {

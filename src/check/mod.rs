@@ -34,7 +34,6 @@ mod unused;
 pub use difference::{Change, Difference, differences};
 pub use load::{Loaded, LoadedFile, MapCache, ReadError, ReadFile, files_used, load, load_with, normal};
 pub use references::{Declaration, Occurrence, References, Symbol};
-pub use scenario::scenario;
 pub use suggest::suggest_uses;
 
 #[cfg(test)]

@@ -7,6 +7,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 
+use crate::check::checker::docs;
 use crate::check::load::{LoadedFile, maps_named, path_from, used_path, uses};
 use crate::model::vocabulary::{TYPES, Word};
 use crate::model::{EnumDef, EnumIndex, Type};
@@ -398,7 +399,7 @@ impl References {
         let of =
             |span, docs, parts, axis| Declaration { span, docs, parts, axis, ty: None, key: None, overrides };
         let symbols = parts.iter().map(|(_, part, _, _)| part.clone()).collect();
-        let docs = item.docs.iter().map(|doc| doc.text.clone()).collect();
+        let docs = docs(item);
         self.insert(name, symbol(name.text.clone()), of(item.span, docs, symbols, false));
         for (name, part, span, axis) in parts {
             self.insert(name, part, of(span, Vec::new(), Vec::new(), axis));

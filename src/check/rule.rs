@@ -73,15 +73,20 @@ impl Checker {
             }
             bindings.push(RuleBinding { action, condition });
         }
-        if bindings.is_empty() && !self.has_errors() {
-            let message = format!("`{}` binds no action", rule.name.text);
-            let error =
-                Diagnostic::error(code::BINDS_NOTHING, message).at(rule.name.span, "would never be enforced");
-            self.report(
-                error.help("a rule without `on` binds the actions that spawn, or that set a state it names"),
-            );
+        if bindings.is_empty() {
+            let help = "a rule without `on` binds the actions that spawn, or that set a state it names";
+            self.binds_nothing(rule, help);
         }
         Some(RuleBody::Holds(bindings))
+    }
+
+    /// Reports a rule that binds no action, unless a broken declaration may be why.
+    fn binds_nothing(&mut self, rule: &ast::Rule, help: &str) {
+        if !self.has_errors() {
+            let message = format!("`{}` binds no action", rule.name.text);
+            let error = Diagnostic::error(code::BINDS_NOTHING, message);
+            self.report(error.at(rule.name.span, "would never be enforced").help(help));
+        }
     }
 
     /// Looks at a rule's condition for an action that it cannot bind.
@@ -119,13 +124,10 @@ impl Checker {
         };
         let open = !compiled.needs_survey() && !compiled.reads_memory();
         let all = self.actions.iter().enumerate();
-        Some(
-            all.filter(|(index, a)| {
-                a.as_ref().is_some_and(|a| open || binds(a) || self.half_broken.contains(index))
-            })
-            .map(|(index, _)| index)
-            .collect(),
-        )
+        let bound = all.filter(|(index, a)| {
+            a.as_ref().is_some_and(|a| open || binds(a) || self.half_broken.contains(index))
+        });
+        Some(bound.map(|(index, _)| index).collect())
     }
 
     /// Reports a name that is a parameter of some actions but not of every bound action. Gives the bound actions
@@ -211,11 +213,8 @@ impl Checker {
         let all = self.actions.iter().enumerate();
         let actions: Vec<usize> =
             all.filter(|(_, a)| a.as_ref().is_some_and(sets)).map(|(index, _)| index).collect();
-        if actions.is_empty() && !self.has_errors() {
-            let message = format!("`{}` binds no action", rule.name.text);
-            let error =
-                Diagnostic::error(code::BINDS_NOTHING, message).at(rule.name.span, "would never be enforced");
-            self.report(error.help(format!("no action sets `{}`: give one the effect", definition.name)));
+        if actions.is_empty() {
+            self.binds_nothing(rule, &format!("no action sets `{}`: give one the effect", definition.name));
         }
         Some(RuleBody::Moves { state: index, allowed, actions })
     }

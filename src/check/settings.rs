@@ -3,6 +3,7 @@
 use crate::check::checker::{Checker, docs, each};
 use crate::check::expression::Place;
 use crate::check::report::Report;
+use crate::check::rule::names_in;
 use crate::model::expr::{Expr, ExprKind};
 use crate::model::vocabulary::{EpisodeField, Fact, Site, StopReason, Word};
 use crate::model::{COUNTED, EpisodeDef, RewardCase, TICK_MS, Type, VerdictDef, code};
@@ -119,7 +120,9 @@ impl Checker {
     /// `arrived`, `stalled >= 4`, or both with `or` between them.
     fn stop(&mut self, value: &ast::Expr, episode: &mut EpisodeDef) {
         episode.stop_arrived = false;
-        self.note_reasons(value);
+        for name in names_in(value) {
+            self.references.word_named::<StopReason>(name.span, &name.text);
+        }
         let mut parts = vec![value];
         let reason = |expr: &ast::Expr| match &expr.kind {
             ast::ExprKind::Name(name) => StopReason::from_name(name),
@@ -151,18 +154,6 @@ impl Checker {
                     self.report(error.at(part.span, "unknown reason").help(help));
                 }
             }
-        }
-    }
-
-    /// Notes the names of reasons to stop.
-    fn note_reasons(&mut self, reason: &ast::Expr) {
-        match &reason.kind {
-            ast::ExprKind::Name(name) => self.references.word_named::<StopReason>(reason.span, name),
-            ast::ExprKind::Binary { left, right, .. } => {
-                self.note_reasons(left);
-                self.note_reasons(right);
-            }
-            _ => {}
         }
     }
 

@@ -75,6 +75,11 @@ pub fn keywords() -> impl Iterator<Item = &'static Keyword> {
     [DECLARATIONS, CLAUSES, OPERATORS, LITERALS].into_iter().flatten()
 }
 
+/// What a keyword means.
+pub fn meaning(word: &str) -> Option<&'static str> {
+    keywords().find(|(known, _)| *known == word).map(|(_, meaning)| *meaning)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -59,9 +59,7 @@ impl List<'_> {
             Kind::Declarations => self.words(keyword::DECLARATIONS, KEYWORD, LIKELY),
             Kind::Words(entries) => self.words(entries, FIELD, WANTED),
             Kind::Keyword(word) => {
-                let meaning =
-                    keyword::keywords().find(|(known, _)| known == word).map(|(_, meaning)| *meaning);
-                self.add(word, KEYWORD, LIKELY, "", meaning.map(str::to_owned));
+                self.add(word, KEYWORD, LIKELY, "", keyword::meaning(word).map(str::to_owned));
             }
             Kind::Types => {
                 self.kind(&Kind::Enums);

@@ -5,11 +5,11 @@
 
 use serde_json::{Value, json};
 
-use crate::cli::doc::{range_on, unit};
+use crate::cli::doc::unit;
 use crate::model::{Domain, Interval, Space};
 use crate::syntax::ast::{Action, ActionParam, ItemKind, ParamMode};
 
-use super::hover::{find_action, row_numbers};
+use super::hover::{find_action, ranges_left, row_numbers};
 use super::workspace::Analysis;
 
 /// The hints between two bytes of the document.
@@ -37,14 +37,9 @@ pub fn hints(analysis: &Analysis, from: usize, to: usize) -> Vec<Value> {
 /// The range that the rules leave on any road, if it is smaller than the written one. The tooltip lists it
 /// road by road.
 fn range(analysis: &Analysis, space: &Space, action: &Action, param: &ActionParam) -> Option<Value> {
-    let (index, of) = find_action(space, &action.name.text)?;
-    let of = of.parameters.iter().find(|parameter| *parameter.name == *param.name.text)?;
+    let (of, left) = ranges_left(space, &action.name.text, &param.name.text)?;
     let Domain::Range(low, high) = &of.domain else { return None };
     let unit = unit(of.ty);
-    let roads = space.roads.iter().enumerate();
-    let left: Vec<(&str, Interval)> = roads
-        .filter_map(|(road, known)| Some((known.name.as_str(), range_on(space, index, of, road)?)))
-        .collect();
     let all = left.iter().map(|(_, interval)| *interval).reduce(|all, interval| all.hull(&interval))?;
     if left.iter().all(|(_, interval)| *interval == Interval::closed(*low, *high)) {
         return None;

@@ -6,7 +6,7 @@ use core::fmt::Write;
 use crate::check::{Declaration, Symbol};
 use crate::cli::doc::{range_on, unit};
 use crate::cli::progress::plural;
-use crate::model::{ActionDef, Reach, RuleBody, Space};
+use crate::model::{ActionDef, Interval, Parameter, Reach, RuleBody, Space};
 use crate::syntax::ast::Span;
 use crate::syntax::{keyword, listed};
 use crate::units;
@@ -38,7 +38,7 @@ pub fn hover(analysis: &Analysis, byte: usize) -> Option<(Span, String)> {
     }
     let text = analysis.text(Analysis::ROOT);
     let (start, word) = tokens::word_at(text, byte)?;
-    let meaning = keyword::keywords().find(|(known, _)| *known == word).map(|(_, meaning)| *meaning)?;
+    let meaning = keyword::meaning(word)?;
     let span = Span::new(Analysis::ROOT, start, start + word.len());
     Some((span, format!("**{word}**\n\n{meaning}")))
 }
@@ -140,22 +140,24 @@ fn when(analysis: &Analysis) -> &'static str {
 
 /// The values of a drawn parameter that the rules leave, road by road.
 fn ranges(analysis: &Analysis, action: &str, name: &str) -> String {
-    let Some(space) = analysis.space() else { return String::new() };
-    let Some((index, of)) = find_action(space, action) else { return String::new() };
-    let Some(of) = of.parameters.iter().find(|parameter| *parameter.name == *name) else {
-        return String::new();
-    };
+    let known = analysis.space().and_then(|space| ranges_left(space, action, name));
+    let Some((of, left)) = known.filter(|(_, left)| !left.is_empty()) else { return String::new() };
     let unit = unit(of.ty);
-    let mut lines = String::new();
-    for (road, known) in space.roads.iter().enumerate() {
-        if let Some(left) = range_on(space, index, of, road) {
-            let _ = write!(lines, "\n- `{}`: {left} {unit}", known.name);
-        }
-    }
-    match lines.is_empty() {
-        true => lines,
-        false => format!("\n\nAfter the rules{}:\n{lines}", when(analysis)),
-    }
+    let lines: String = left.iter().map(|(road, left)| format!("\n- `{road}`: {left} {unit}")).collect();
+    format!("\n\nAfter the rules{}:\n{lines}", when(analysis))
+}
+
+/// A parameter of an action, and the range that the rules leave of it on each road.
+pub fn ranges_left<'a>(
+    space: &'a Space,
+    action: &str,
+    name: &str,
+) -> Option<(&'a Parameter, Vec<(&'a str, Interval)>)> {
+    let (index, action) = find_action(space, action)?;
+    let of = action.parameters.iter().find(|parameter| *parameter.name == *name)?;
+    let roads = space.roads.iter().enumerate();
+    let left = roads.filter_map(|(road, known)| Some((&*known.name, range_on(space, index, of, road)?)));
+    Some((of, left.collect()))
 }
 
 pub fn find_action<'a>(space: &'a Space, name: &str) -> Option<(usize, &'a ActionDef)> {

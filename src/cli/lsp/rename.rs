@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 use serde_json::{Value, json};
 
-use crate::check::Symbol;
+use crate::check::{Loaded, Symbol};
 use crate::model::COUNTED;
 use crate::syntax::ast::Span;
 use crate::syntax::{Diagnostic, keyword};
@@ -24,7 +24,7 @@ pub fn prepare(analysis: &Analysis, byte: usize) -> Result<Span, String> {
     let Some(occurrence) = analysis.references().at(Analysis::ROOT, byte) else {
         let word = tokens::word_at(analysis.text(Analysis::ROOT), byte).map(|(_, word)| word);
         return Err(match word {
-            Some(word) if keyword::keywords().any(|(known, _)| *known == word) => {
+            Some(word) if keyword::meaning(word).is_some() => {
                 format!("`{word}` is a word of the language")
             }
             Some(word) => format!("`{word}` is declared nowhere"),
@@ -88,8 +88,10 @@ pub fn rename(workspace: &mut Workspace, path: &Path, byte: usize, name: &str) -
     for path in &touched {
         let trials = (workspace.trial(path, &BTreeMap::new()), workspace.trial(path, &texts));
         let (Some(before), Some(after)) = trials else { continue };
-        if after.errors.len() > before.errors.len() {
-            let reason = after.errors.into_iter().next().map(|first| first.message).unwrap_or_default();
+        let errors = |loaded: &Loaded| loaded.diagnostics.iter().filter(|found| found.is_error()).count();
+        if errors(&after) > errors(&before) {
+            let first = after.diagnostics.into_iter().find(Diagnostic::is_error);
+            let reason = first.map(|first| first.message).unwrap_or_default();
             return Err(format!("`{old}` cannot be called `{name}`: {reason}"));
         }
         if after.references.pattern() != before.references.pattern() {

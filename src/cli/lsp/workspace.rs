@@ -43,13 +43,6 @@ pub struct Analysis {
     stale: bool,
 }
 
-/// The result of checking a document with other texts.
-#[derive(Debug)]
-pub struct Trial {
-    pub errors: Vec<Diagnostic>,
-    pub references: References,
-}
-
 #[derive(Debug, Default)]
 pub struct Workspace {
     /// The folders that the editor has open.
@@ -140,15 +133,13 @@ impl Workspace {
     }
 
     /// Checks a document with other texts for some files, and keeps nothing of it.
-    pub fn trial(&mut self, path: &Path, texts: &BTreeMap<PathBuf, String>) -> Option<Trial> {
+    pub fn trial(&mut self, path: &Path, texts: &BTreeMap<PathBuf, String>) -> Option<Loaded> {
         let documents = &self.documents;
         let read = |path: &Path| match texts.get(path) {
             Some(text) => Ok(text.clone()),
             None => read(documents, path),
         };
-        let loaded = check::load_with(path, &read, &mut self.maps).ok()?;
-        let errors = loaded.diagnostics.into_iter().filter(Diagnostic::is_error).collect();
-        Some(Trial { errors, references: loaded.references })
+        check::load_with(path, &read, &mut self.maps).ok()
     }
 }
 
