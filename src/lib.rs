@@ -1,5 +1,5 @@
-//! avastra: a language in which people say what may happen around a self-driving car, and the
-//! machinery that finds out which of it makes the car crash.
+//! avastra: a language for what may happen around a self-driving car, and a search for the actions that
+//! make the car crash.
 //!
 //! The modules stand in reading order, and each may use only those above it; `tests/it/layers.rs`
 //! keeps it so. `ARCHITECTURE.md` has the picture.

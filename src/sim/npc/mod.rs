@@ -5,7 +5,7 @@
 //! | in what order a driver decides and moves | `driver` |
 //! | which vehicle it follows, and how close | `leader`; in tight turns `foresight` |
 //! | where it stops for a red or yellow light | `red_light` |
-//! | for whom it waits at a junction, and for how long | `manners` |
+//! | which vehicles it waits for at a junction, and for how long | `manners` |
 //! | when and how it changes lanes | `change` |
 
 mod change;
