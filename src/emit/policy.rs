@@ -7,9 +7,9 @@ use crate::model::policy::{
 };
 use crate::model::{Policy, Space};
 use crate::syntax::ast::{
-    Arg, BinaryOp, Call, Expr, ExprKind, Field, File, FileId, ItemKind, Name, PolicyLine, Span, Text, Use,
+    Arg, BinaryOp, Call, Expr, ExprKind, Field, File, FileId, ItemKind, Name, PolicyLine, Span,
 };
-use crate::syntax::{LANGUAGE, ast, parse, print};
+use crate::syntax::{ast, parse, print};
 use crate::units::decimal;
 
 use super::tree;
@@ -39,18 +39,9 @@ fn file(policy: &Policy, space: &Space, space_path: &str, digest: String) -> Fil
         claims: policy.claims.as_ref().map_or(Vec::new(), fields),
         rules: policy.rules.iter().map(|rule| line(space, rule)).collect(),
     };
-    let digest = Some(Text::new(space.digest.clone(), Span::NONE));
-    let space_use = Use { path: Text::new(space_path, Span::NONE), digest, without: Vec::new() };
+    let headline = "Emitted by `avastra train`; play it with `avastra run --policy FILE`.";
     let docs = policy.docs.iter().map(tree::doc).collect();
-    File {
-        docs: vec![tree::doc("Emitted by `avastra train`; play it with `avastra run --policy FILE`.")],
-        items: vec![
-            tree::item(Vec::new(), ItemKind::Language(tree::digits(LANGUAGE.to_string()))),
-            tree::item(Vec::new(), ItemKind::Use(space_use)),
-            tree::item(docs, ItemKind::Policy(item)),
-        ],
-        span: Span::NONE,
-    }
+    tree::file(headline, space, space_path, docs, ItemKind::Policy(item))
 }
 
 /// `when ego_speed > 8.25 m/s and time == Night => pedestrian(from: Left)`.

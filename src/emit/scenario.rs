@@ -10,10 +10,7 @@ use crate::model::{ActionDef, Space, StateDef, Value, digest_text};
 use crate::oracle::AvoidabilitySettings;
 use crate::run::{EpisodeSummary, Finding};
 use crate::sim::ENGINE;
-use crate::syntax::LANGUAGE;
-use crate::syntax::ast::{
-    ClauseKind, Expect, Expr, Field, File, ItemKind, Name, Scenario, Span, Step, Text, Use,
-};
+use crate::syntax::ast::{ClauseKind, Expect, Expr, Field, File, ItemKind, Name, Scenario, Span, Step};
 use crate::units::Dimension;
 
 use super::tree;
@@ -77,17 +74,7 @@ fn file(
         steps: (0..steps).map(|number| step(table, log, number)).collect(),
         expects,
     };
-    let digest = Some(Text::new(space.digest.clone(), Span::NONE));
-    let space_use = Use { path: Text::new(source.space_path, Span::NONE), digest, without: Vec::new() };
-    File {
-        docs: vec![tree::doc(emitted)],
-        items: vec![
-            tree::item(Vec::new(), ItemKind::Language(tree::digits(LANGUAGE.to_string()))),
-            tree::item(Vec::new(), ItemKind::Use(space_use)),
-            tree::item(vec![tree::doc(headline)], ItemKind::Scenario(item)),
-        ],
-        span: Span::NONE,
-    }
+    tree::file(emitted, space, source.space_path, vec![tree::doc(headline)], ItemKind::Scenario(item))
 }
 
 /// An action as it was drawn, in one line: `drive_ahead(lane: Left, …) with { speed: 11 m/s, … }`.

@@ -1,14 +1,27 @@
 //! Small constructors for syntax trees that do not come from text.
 
 use crate::model::{Space, Type, Value};
+use crate::syntax::LANGUAGE;
 use crate::syntax::ast::{
-    Arg, BinaryOp, Call, Clause, ClauseKind, Comparison, Doc, Expect, Expr, ExprKind, Field, Item, ItemKind,
-    Name, Number, Span,
+    Arg, BinaryOp, Call, Clause, ClauseKind, Comparison, Doc, Expect, Expr, ExprKind, Field, File, Item,
+    ItemKind, Name, Number, Span, Text, Use,
 };
 use crate::units::{Dimension, decimal};
 
-pub fn item(docs: Vec<Doc>, kind: ItemKind) -> Item {
-    Item { docs, kind, span: Span::NONE }
+/// A file with one item, made in a space. `headline` says which command wrote the file; `docs` are the item's.
+pub fn file(headline: &str, space: &Space, space_path: &str, docs: Vec<Doc>, kind: ItemKind) -> File {
+    let item = |docs, kind| Item { docs, kind, span: Span::NONE };
+    let digest = Some(Text::new(space.digest.clone(), Span::NONE));
+    let space_use = Use { path: Text::new(space_path, Span::NONE), digest, without: Vec::new() };
+    File {
+        docs: vec![doc(headline)],
+        items: vec![
+            item(Vec::new(), ItemKind::Language(digits(LANGUAGE.to_string()))),
+            item(Vec::new(), ItemKind::Use(space_use)),
+            item(docs, kind),
+        ],
+        span: Span::NONE,
+    }
 }
 
 pub fn doc(text: impl Into<String>) -> Doc {
