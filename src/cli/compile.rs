@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use crate::action::{ActionTable, TableFile};
-use crate::syntax::listed;
+use crate::run::road_named;
 
 use super::arguments::{CompileArguments, TableArguments};
 use super::error::Failure;
@@ -57,7 +57,7 @@ pub fn last(output: &Output) -> Result<ActionTable, Failure> {
 pub fn table(output: &Output, arguments: &TableArguments) -> Result<(), Failure> {
     let table = load::table(output, &arguments.file)?;
     if let Some(road) = &arguments.road {
-        known_road(&table, road)?;
+        road_named(table.space(), road)?;
     }
     if arguments.r#try {
         return trials::trials(output, arguments, table);
@@ -65,18 +65,6 @@ pub fn table(output: &Output, arguments: &TableArguments) -> Result<(), Failure>
     output.say(table.text(arguments.road.as_deref()).trim_end());
     output.result("table", table.file());
     Ok(())
-}
-
-/// Index of a road of the space.
-///
-/// # Errors
-/// If there is none of that name; the message lists those there are.
-pub fn known_road(table: &ActionTable, name: &str) -> Result<usize, Failure> {
-    let roads = &table.space().roads;
-    roads.iter().position(|road| road.name == name).ok_or_else(|| {
-        let known: Vec<&str> = roads.iter().map(|road| road.name.as_str()).collect();
-        Failure::usage(format!("no road `{name}` in this space: it has {}", listed(&known)))
-    })
 }
 
 /// `45 rows of 10 actions, 8 rules, 1 road`.

@@ -7,10 +7,10 @@ use crate::check::state_argument::memory_from;
 use crate::emit;
 use crate::episode;
 use crate::model::RulesInForce;
+use crate::run::road_named;
 use crate::sim::World;
 
 use super::arguments::WhyArguments;
-use super::compile::known_road;
 use super::error::Failure;
 use super::load;
 use super::output::Output;
@@ -30,7 +30,7 @@ pub fn why(output: &Output, arguments: &WhyArguments) -> Result<(), Failure> {
         )));
     };
     let road = match &arguments.road {
-        Some(name) => known_road(&table, name)?,
+        Some(name) => road_named(space, name)?,
         None => 0,
     };
     let road = &space.roads[road];

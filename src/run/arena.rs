@@ -11,7 +11,7 @@ use crate::agent::{Agent, Branch, Trial};
 use crate::episode;
 use crate::episode::{Choice, Moment};
 use crate::mdp::ProcKind;
-use crate::model::{Road, RulesInForce};
+use crate::model::{Road, RulesInForce, Space};
 use crate::oracle::AvoidabilitySettings;
 use crate::rng;
 use crate::rng::Stream;
@@ -47,11 +47,7 @@ impl Arena {
         }
         let space = table.space();
         let roads = roads.iter().map(|name| {
-            let index = space.roads.iter().position(|road| &road.name == name);
-            let index = index.ok_or_else(|| {
-                let known = listed(&space.roads.iter().map(|road| road.name.as_str()).collect::<Vec<_>>());
-                RunError::Road { name: name.clone(), known }
-            })?;
+            let index = road_named(space, name)?;
             Ok((index, Arc::new(episode::scene(&space.roads[index]))))
         });
         let roads = roads.collect::<Result<_, RunError>>()?;
@@ -96,6 +92,17 @@ impl Arena {
             proc: ProcKind::default(),
         }
     }
+}
+
+/// Index of a road of the space.
+///
+/// # Errors
+/// If there is none of that name; the message lists those there are.
+pub fn road_named(space: &Space, name: &str) -> Result<usize, RunError> {
+    space.roads.iter().position(|road| road.name == name).ok_or_else(|| {
+        let known = listed(&space.roads.iter().map(|road| road.name.as_str()).collect::<Vec<_>>());
+        RunError::Road { name: name.to_owned(), known }
+    })
 }
 
 /// Lets an agent choose among the offers of the moment. With nothing legal, the step passes.

@@ -17,7 +17,7 @@ mod stage;
 mod summary;
 mod threads;
 
-pub use arena::Arena;
+pub use arena::{Arena, road_named};
 pub(crate) use arena::{carry_out, choose, legal, offers};
 pub use database::{Database, DatabaseError, RefusalCount, Totals};
 pub(crate) use database::{add_all, connect};
