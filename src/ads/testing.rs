@@ -40,11 +40,7 @@ pub fn two_lanes(open_m: f64) -> Arc<Scene> {
         lane(-1, &mark),
         lane(-2, "")
     );
-    let map = RoadMap::from_opendrive("two lanes", &text).expect("the road is sound");
-    let start = map.place("1", -2, 0.0).expect("the road begins");
-    let goal = map.place("1", -1, 350.0).expect("the road is long");
-    let route = Route::find(&map, start, goal).expect("a lane change leads there");
-    Arc::new(Scene::new(map.into(), route))
+    crate::sim::testing::scene(&text, ("1", -2, 0.0), ("1", -1, 350.0))
 }
 
 /// Straights, a right-angled bend of 15 m radius to the left and a hairpin of 10 m to the right,

@@ -1,14 +1,11 @@
 //! Collisions made by hand, whose verdicts are known beforehand.
 
-use std::sync::Arc;
-
-use crate::action::{Effect, SpawnRequest};
+use crate::action::Effect;
 use crate::ads;
 use crate::ads::{Ads, Status};
 use crate::model::Avoidability;
-use crate::model::vocabulary::{Body, Colour, LaneChoice, Level, Side, Then, TimeOfDay, Verb};
-use crate::road::{RoadMap, Route};
-use crate::sim::{Control, DT_S, Scene, Sensed, Start, World};
+use crate::model::vocabulary::Verb;
+use crate::sim::{Control, DT_S, Sensed, Start, World, testing};
 
 use super::avoidable::{AvoidabilitySettings, Judgement, judge_one};
 use super::hazard::onset;
@@ -22,19 +19,8 @@ const NARROW: &str = r#"<OpenDRIVE><header name="narrow"/>
 </laneSection></lanes></road></OpenDRIVE>"#;
 
 fn world() -> World {
-    let map = RoadMap::from_opendrive("narrow", NARROW).expect("the map is sound");
-    let place = |s_m| map.place("1", -1, s_m).expect("it is on the map");
-    let route = Route::find(&map, place(10.0), place(790.0)).expect("one lane leads there");
-    let start = Start {
-        time: TimeOfDay::Noon,
-        rain: Level::None,
-        fog: Level::None,
-        wetness: Level::None,
-        signal_phase_s: 0.0,
-        seed: 1,
-        ambient: 0,
-    };
-    World::new(Arc::new(Scene::new(map.into(), route)), &start)
+    let scene = testing::scene(NARROW, ("1", -1, 10.0), ("1", -1, 790.0));
+    World::new(scene, &Start { seed: 1, ..testing::start() })
 }
 
 /// IDM with weak brakes, or none.
@@ -56,24 +42,14 @@ impl Ads for Broken {
 }
 
 fn vehicle(world: &mut World, distance_m: f64, speed_mps: f64) {
-    appear(world, Body::Sedan, Verb::DriveAhead, distance_m, speed_mps);
+    appear(world, Verb::DriveAhead, distance_m, speed_mps);
 }
 
-fn appear(world: &mut World, body: Body, verb: Verb, distance_m: f64, speed_mps: f64) {
-    let request = SpawnRequest {
-        body,
-        colour: Colour::Red,
-        verb,
-        lane: LaneChoice::Current,
-        side: Side::Right,
-        then: Then::Keep,
-        speed_mps,
-        distance_m,
-    };
+fn appear(world: &mut World, verb: Verb, distance_m: f64, speed_mps: f64) {
+    let request = testing::request(verb, distance_m, speed_mps);
     world.apply(&Effect::Spawn(request)).expect("there is room");
 }
 
-/// Time of the event, s: the ego vehicle has reached its cruising speed by then.
 const EVENT_S: f64 = 12.0;
 
 /// Drives with weak brakes, makes `event` happen, and judges the first contact.
@@ -137,7 +113,7 @@ fn between_human_and_machine_lies_the_beyond() {
 
 #[test]
 fn the_hazard_of_a_pedestrian_begins_with_the_first_step() {
-    let judgement = judged(0.0, |world| appear(world, Body::Pedestrian, Verb::Walk, 46.0, 1.4));
+    let judgement = judged(0.0, |world| appear(world, Verb::Walk, 46.0, 1.4));
     // Pedestrians wait for a second at the kerb, 5 m aside.
     assert!((judgement.onset_s - (EVENT_S + 1.0)).abs() < 0.11, "{judgement:?}");
     assert_ne!(judgement.class, Avoidability::Unavoidable, "{judgement:?}");

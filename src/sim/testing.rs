@@ -2,8 +2,9 @@
 
 use std::sync::Arc;
 
+use crate::action::SpawnRequest;
 use crate::geometry::Vec2;
-use crate::model::vocabulary::{Level, TimeOfDay};
+use crate::model::vocabulary::{Body, Colour, LaneChoice, Level, Side, Then, TimeOfDay, Verb};
 use crate::road::{RoadMap, Route};
 
 use super::scene::Scene;
@@ -31,6 +32,21 @@ pub fn start() -> Start {
         signal_phase_s: 0.0,
         seed: 7,
         ambient: 0,
+    }
+}
+
+/// A road user that appears in the ego vehicle's lane, or from the right: on foot if the verb is.
+pub fn request(verb: Verb, distance_m: f64, speed_mps: f64) -> SpawnRequest {
+    let on_foot = matches!(verb, Verb::Walk | Verb::Stand);
+    SpawnRequest {
+        body: if on_foot { Body::Pedestrian } else { Body::Sedan },
+        colour: Colour::Red,
+        verb,
+        lane: LaneChoice::Current,
+        side: Side::Right,
+        then: Then::Keep,
+        speed_mps,
+        distance_m,
     }
 }
 
@@ -178,7 +194,8 @@ pub fn corner() -> Arc<Scene> {
     Arc::new(Scene::new(map.into(), route.expect("there is a way")))
 }
 
-fn scene(opendrive: &str, start: (&str, i32, f64), goal: (&str, i32, f64)) -> Arc<Scene> {
+/// A map with the way between two places on it.
+pub fn scene(opendrive: &str, start: (&str, i32, f64), goal: (&str, i32, f64)) -> Arc<Scene> {
     let map = RoadMap::from_opendrive("test", opendrive).expect("the map is sound");
     let place = |(road, lane, s_m): (&str, i32, f64)| map.place(road, lane, s_m).expect("it is on the map");
     let route = Route::find(&map, place(start), place(goal)).expect("there is a way");

@@ -4,26 +4,13 @@ use std::sync::Arc;
 
 use proptest::prelude::*;
 
+use super::testing::request;
 use super::{
     Contact, Control, DT_S, Incident, Obstacle, Scene, Start, VehicleParameters, World, pedals_for, testing,
 };
 use crate::action::{Effect, SpawnRequest, Surroundings};
 use crate::geometry::{distance_m, wrap_angle};
-use crate::model::vocabulary::{Body, Colour, LaneChoice, Level, Phenomenon, Side, Then, Verb, Word};
-
-fn request(verb: Verb, distance_m: f64, speed_mps: f64) -> SpawnRequest {
-    let on_foot = matches!(verb, Verb::Walk | Verb::Stand);
-    SpawnRequest {
-        body: if on_foot { Body::Pedestrian } else { Body::Sedan },
-        colour: Colour::Red,
-        verb,
-        lane: LaneChoice::Current,
-        side: Side::Right,
-        then: Then::Keep,
-        speed_mps,
-        distance_m,
-    }
-}
+use crate::model::vocabulary::{Body, LaneChoice, Level, Phenomenon, Side, Then, Verb, Word};
 
 /// Holds a speed and the route, whatever is in the way, by aiming at a point ahead (pure pursuit).
 fn hold(world: &World, speed_mps: f64) -> Control {
