@@ -87,7 +87,7 @@ pub fn load_with(root: &Path, read: &ReadFile<'_>, cache: &mut MapCache) -> Resu
     // checked for the names alone, and the checker's diagnostics are dropped.
     let is_whole = !diagnostics.iter().any(Diagnostic::is_error);
     let folders = files.iter().map(|file| folder(&file.path)).collect();
-    let mut maps = MapReader { read, folders, texts: BTreeMap::new(), known: BTreeMap::new(), cache };
+    let mut maps = MapReader { read, folders, texts: BTreeMap::new(), cache };
     if is_whole {
         diagnostics.extend(check_digests(&files, &mut maps));
     }
@@ -294,7 +294,6 @@ struct MapReader<'a> {
     /// Folder of each file, by [`FileId`].
     folders: Vec<PathBuf>,
     texts: BTreeMap<PathBuf, Result<String, ReadError>>,
-    known: BTreeMap<PathBuf, Result<Arc<RoadMap>, String>>,
     cache: &'a mut MapCache,
 }
 
@@ -311,22 +310,14 @@ impl Maps for MapReader<'_> {
         let FileId(file) = name.span.file;
         let folder = self.folders.get(file as usize).cloned().unwrap_or_default();
         let path = normal(&folder.join(&name.value));
-        if !self.known.contains_key(&path) {
-            let stem = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
-            let map = match self.text(&path).clone() {
-                Err(error) => Err(error.to_string()),
-                Ok(text) => {
-                    let read = |stem: &str| RoadMap::from_opendrive(stem, &text).map(Arc::new);
-                    let key = (stem, digest(text.as_bytes()));
-                    let found = self.cache.known.get(&key).cloned();
-                    let map = found.unwrap_or_else(|| read(&key.0).map_err(|error| error.to_string()));
-                    self.cache.known.entry(key).or_insert(map).clone()
-                }
-            };
-            self.known.insert(path.clone(), map);
-        }
-        let map = &self.known[&path];
-        map.clone().map(|map| (path, map))
+        let stem = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
+        let read = self.read;
+        let text = self.texts.entry(path.clone()).or_insert_with(|| read(&path));
+        let text = text.as_ref().map_err(ToString::to_string)?;
+        let parse = || RoadMap::from_opendrive(&stem, text).map(Arc::new).map_err(|error| error.to_string());
+        let key = (stem.clone(), digest(text.as_bytes()));
+        let map = self.cache.known.entry(key).or_insert_with(parse).clone()?;
+        Ok((path, map))
     }
 }
 

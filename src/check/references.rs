@@ -348,29 +348,26 @@ impl References {
         match item.kind.plain() {
             ItemKind::Enum(of) => {
                 let variant = |name: &Name| Symbol::Variant(of.name.text.clone(), name.text.clone());
-                let parts = of.variants.iter().map(|name| (name, variant(name), whole, false));
+                let parts = of.variants.iter().map(|name| (Some(name), variant(name), whole, false));
                 self.declare(item, Symbol::Enum, parts.collect());
             }
             ItemKind::State(_) => self.declare(item, Symbol::State, Vec::new()),
             ItemKind::Let(_) => self.declare(item, Symbol::Constant, Vec::new()),
             ItemKind::Fn(of) => {
                 let argument = |name: &Name| Symbol::Argument(of.name.text.clone(), name.text.clone());
-                let parts = of.params.iter().map(|p| (&p.name, argument(&p.name), p.name.span, false));
+                let parts = of.params.iter().map(|p| (Some(&p.name), argument(&p.name), p.name.span, false));
                 self.declare(item, Symbol::Function, parts.collect());
             }
             ItemKind::Action(of) => {
                 let parameter = |name: &Name| Symbol::Parameter(of.name.text.clone(), name.text.clone());
                 let is_axis = |p: &ast::ActionParam| p.mode == ParamMode::Each;
-                let parts = of.params.iter().map(|p| (&p.name, parameter(&p.name), p.span, is_axis(p)));
+                let parts = of.params.iter().map(|p| (Some(&p.name), parameter(&p.name), p.span, is_axis(p)));
                 self.declare(item, Symbol::Action, parts.collect());
             }
             ItemKind::Group(of) => {
-                self.declare(item, Symbol::Group, Vec::new());
-                let known = self.declarations.get_mut(&Symbol::Group(of.name.text.clone()));
-                // Another declaration of that name may stand.
-                if let Some(known) = known.filter(|known| known.span == whole) {
-                    known.parts = of.members.iter().map(|name| Symbol::Action(name.text.clone())).collect();
-                }
+                let member = |name: &Name| Symbol::Action(name.text.clone());
+                let parts = of.members.iter().map(|name| (None, member(name), whole, false));
+                self.declare(item, Symbol::Group, parts.collect());
             }
             ItemKind::Rule(_) => self.declare(item, Symbol::Rule, Vec::new()),
             ItemKind::Road(_) => self.declare(item, Symbol::Road, Vec::new()),
@@ -387,12 +384,13 @@ impl References {
         }
     }
 
-    /// Notes a declaration with its parts: name, symbol, span of the part, and whether it is an axis.
+    /// Notes a declaration with its parts: the name unless it is declared elsewhere, symbol, span of the part, and
+    /// whether it is an axis.
     fn declare(
         &mut self,
         item: &Item,
         symbol: fn(String) -> Symbol,
-        parts: Vec<(&Name, Symbol, Span, bool)>,
+        parts: Vec<(Option<&Name>, Symbol, Span, bool)>,
     ) {
         let Some(name) = item.kind.name() else { return };
         let overrides = matches!(item.kind, ItemKind::Override(_));
@@ -402,7 +400,9 @@ impl References {
         let docs = docs(item);
         self.insert(name, symbol(name.text.clone()), of(item.span, docs, symbols, false));
         for (name, part, span, axis) in parts {
-            self.insert(name, part, of(span, Vec::new(), Vec::new(), axis));
+            if let Some(name) = name {
+                self.insert(name, part, of(span, Vec::new(), Vec::new(), axis));
+            }
         }
     }
 
