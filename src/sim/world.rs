@@ -432,7 +432,7 @@ impl Surroundings for World {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::vocabulary::{Body, Colour, LaneChoice, Side, Then, Verb};
+    use crate::model::vocabulary::Verb;
     use crate::sim::testing;
 
     #[test]
@@ -440,17 +440,7 @@ mod tests {
         let mut world = testing::world(&testing::straight());
         world.ego.motion.speed_mps = 10.0;
         for distance_m in [8.0, 10.0] {
-            let request = SpawnRequest {
-                body: Body::Pedestrian,
-                colour: Colour::Red,
-                verb: Verb::Stand,
-                lane: LaneChoice::Current,
-                side: Side::Right,
-                then: Then::Keep,
-                speed_mps: 0.0,
-                distance_m,
-            };
-            world.spawn(&request).expect("there is room");
+            world.spawn(&testing::request(Verb::Stand, distance_m, 0.0)).expect("there is room");
         }
         // Side by side, where no request would put them.
         let beside = world.users[0].obstacle.outline.pose.position + Vec2::new(0.0, 0.7);

@@ -58,8 +58,8 @@ impl World {
 
 #[cfg(test)]
 mod tests {
-    use crate::action::{Effect, SpawnRequest};
-    use crate::model::vocabulary::{Body, Colour, LaneChoice, Side, Then, Verb};
+    use crate::action::Effect;
+    use crate::model::vocabulary::Verb;
     use crate::sim::testing;
 
     use super::*;
@@ -67,16 +67,7 @@ mod tests {
     #[test]
     fn the_same_commands_give_the_recording_again_and_others_another_ego_vehicle() {
         let mut world = testing::world(&testing::straight());
-        let request = SpawnRequest {
-            body: Body::Sedan,
-            colour: Colour::Red,
-            verb: Verb::DriveAhead,
-            lane: LaneChoice::Current,
-            side: Side::Right,
-            then: Then::Keep,
-            speed_mps: 6.0,
-            distance_m: 30.0,
-        };
+        let request = testing::request(Verb::DriveAhead, 30.0, 6.0);
         world.apply(&Effect::Spawn(request)).expect("there is room");
         let (mut same, mut braked) = (world.clone(), world.clone());
         let throttle = Control { throttle_pct: 40.0, ..Control::default() };
