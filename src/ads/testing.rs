@@ -4,7 +4,9 @@ use std::sync::Arc;
 
 use crate::geometry::{OrientedBox, Pose, distance_m, unit_vector, wrap_angle};
 use crate::model::vocabulary::Body;
+use crate::road::testing::{lanes, road, street};
 use crate::road::{RoadMap, Route, RouteStopLine, Signal};
+use crate::sim;
 use crate::sim::{
     Conditions, Control, DT_S, EgoMotion, Scene, Sensed, SensedObject, SignalColour, VehicleParameters,
     pedal_acceleration_mps2,
@@ -26,21 +28,10 @@ pub fn straight() -> Arc<Scene> {
 /// y = -5.25 m, and has its goal after 350 m in the left-hand one, at y = -1.75 m. A solid line closes
 /// the way between them after `open_m`.
 pub fn two_lanes(open_m: f64) -> Arc<Scene> {
-    let lane = |id: i32, mark: &str| {
-        format!(
-            r#"<lane id="{id}" type="driving"><width sOffset="0" a="3.5" b="0" c="0" d="0"/>{mark}</lane>"#
-        )
-    };
     let mark = format!(r#"<roadMark sOffset="0" type="broken"/><roadMark sOffset="{open_m}" type="solid"/>"#);
-    let text = format!(
-        r#"<OpenDRIVE><header name="two lanes"/><road id="1" length="400" junction="-1">
-        <type s="0" type="town"><speed max="50" unit="km/h"/></type>
-        <planView><geometry s="0" x="0" y="0" hdg="0" length="400"><line/></geometry></planView>
-        <lanes><laneSection s="0"><right>{}{}</right></laneSection></lanes></road></OpenDRIVE>"#,
-        lane(-1, &mark),
-        lane(-2, "")
-    );
-    crate::sim::testing::scene(&text, ("1", -2, 0.0), ("1", -1, 350.0))
+    let lanes = lanes(&[(-1, "driving", 3.5, &mark), (-2, "driving", 3.5, "")]);
+    let road = street("1", [0.0, 0.0, 0.0, 400.0], "-1", "", &lanes, "");
+    sim::testing::scene(&road, ("1", -2, 0.0), ("1", -1, 350.0))
 }
 
 /// Straights, a right-angled bend of 15 m radius to the left and a hairpin of 10 m to the right,
@@ -90,14 +81,9 @@ fn scene(pieces: &[(f64, f64, f64)]) -> Arc<Scene> {
             pose.heading_rad += curvature * step_m;
         }
     }
-    let width = "<width sOffset=\"0\" a=\"3.5\" b=\"0\" c=\"0\" d=\"0\"/>";
-    let text = format!(
-        "<OpenDRIVE><header name=\"by hand\"/><road id=\"1\" length=\"{station_m}\" junction=\"-1\"><link/>\
-         <type s=\"0\" type=\"town\"><speed max=\"50\" unit=\"km/h\"/></type><planView>{plan}</planView>\
-         <lanes><laneSection s=\"0\"><left><lane id=\"1\" type=\"driving\">{width}</lane></left>\
-         <center><lane id=\"0\" type=\"none\"/></center>\
-         <right><lane id=\"-1\" type=\"driving\">{width}</lane></right></laneSection></lanes></road></OpenDRIVE>"
-    );
+    let lanes = lanes(&[(1, "driving", 3.5, ""), (-1, "driving", 3.5, "")]);
+    let road = road("1", station_m, "-1", "", &plan, &lanes, "");
+    let text = format!(r#"<OpenDRIVE><header name="by hand"/>{road}</OpenDRIVE>"#);
     let mut map = RoadMap::from_opendrive("by hand", &text).expect("the road is sound");
     let start = map.place("1", -1, 0.0).expect("the road begins");
     let goal = map.place("1", -1, station_m - 40.0).expect("the road is long");

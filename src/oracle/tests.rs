@@ -5,21 +5,17 @@ use crate::ads;
 use crate::ads::{Ads, Status};
 use crate::model::Avoidability;
 use crate::model::vocabulary::Verb;
+use crate::road::testing::{lanes, street};
 use crate::sim::{Control, DT_S, Sensed, Start, World, testing};
 
 use super::avoidable::{AvoidabilitySettings, Judgement, judge_one};
 use super::hazard::onset;
 
-/// A lane each way along +x for 800 m, 3 m wide: too narrow to pass another vehicle.
-const NARROW: &str = r#"<OpenDRIVE><header name="narrow"/>
-<road id="1" length="800" junction="-1"><link/><type s="0" type="town"><speed max="50" unit="km/h"/></type>
-<planView><geometry s="0" x="0" y="0" hdg="0" length="800"><line/></geometry></planView>
-<lanes><laneSection s="0"><center><lane id="0" type="none"/></center>
-<right><lane id="-1" type="driving"><width sOffset="0" a="3" b="0" c="0" d="0"/></lane></right>
-</laneSection></lanes></road></OpenDRIVE>"#;
-
+/// A lane along +x for 800 m, 3 m wide: too narrow to pass another vehicle.
 fn world() -> World {
-    let scene = testing::scene(NARROW, ("1", -1, 10.0), ("1", -1, 790.0));
+    let lanes = lanes(&[(-1, "driving", 3.0, "")]);
+    let road = street("1", [0.0, 0.0, 0.0, 800.0], "-1", "", &lanes, "");
+    let scene = testing::scene(&road, ("1", -1, 10.0), ("1", -1, 790.0));
     World::new(scene, &Start { seed: 1, ..testing::start() })
 }
 

@@ -15,6 +15,8 @@ mod route;
 mod search;
 mod signals;
 #[cfg(test)]
+pub(crate) mod testing;
+#[cfg(test)]
 mod tests;
 
 pub use abreast::{Connection, Opposing};

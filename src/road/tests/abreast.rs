@@ -1,5 +1,6 @@
 //! What lies beside a lane: on its own road, across a median, in a junction.
 
+use crate::road::testing::{lanes, street};
 use crate::road::{LaneIndex, RoadMap, Route, Side};
 
 use super::places::corner;
@@ -81,11 +82,9 @@ fn a_lane_change_never_crosses_a_median() {
     assert!(Route::find(&map, inner, place("2", -1, 80.0)).is_err());
     assert!(Route::find(&map, inner, place("1", -2, 80.0)).is_ok());
     // A median between two lanes of one road is not crossed either: here a strip of grass of 2 m.
-    let text = r#"<OpenDRIVE><header name="strip"/><road id="1" length="100" junction="-1"><planView>
-        <geometry s="0" x="0" y="0" hdg="0" length="100"><line/></geometry></planView><lanes><laneSection s="0"><right>
-        <lane id="-1" type="driving"><width a="3"/></lane><lane id="-2" type="median"><width a="2"/></lane>
-        <lane id="-3" type="driving"><width a="3"/></lane></right></laneSection></lanes></road></OpenDRIVE>"#;
-    let map = RoadMap::from_opendrive("strip", text).unwrap();
+    let lanes = lanes(&[(-1, "driving", 3.0, ""), (-2, "median", 2.0, ""), (-3, "driving", 3.0, "")]);
+    let road = street("1", [0.0, 0.0, 0.0, 100.0], "-1", "", &lanes, "");
+    let map = RoadMap::from_opendrive("strip", &format!("<OpenDRIVE>{road}</OpenDRIVE>")).unwrap();
     let right = map.lane(LaneIndex(0)).right.unwrap();
     assert!(right.same_direction && (right.gap_m - 2.0).abs() < 1e-9);
     assert_eq!(map.change_room_m(LaneIndex(0), Side::Right, 50.0), 0.0);
