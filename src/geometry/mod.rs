@@ -9,6 +9,6 @@ mod pose;
 mod smooth_step;
 
 pub use contact::{FirstContact, Frame, Sweep, distance_m, first_contact};
-pub use path::{Path, PathPoint, Projection, TangentProjection};
+pub use path::{Bounds, Path, PathPoint, Projection, TangentProjection};
 pub use pose::{OrientedBox, Pose, Vec2, unit_vector, wrap_angle};
 pub use smooth_step::{SMOOTH_STEP_BEND_MAX, SMOOTH_STEP_SLOPE_MAX, SmoothStep, smooth_step};

@@ -64,13 +64,14 @@ const BLOCK: usize = 16;
 
 /// A box with its sides along the axes.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Bounds {
-    least: Vec2,
-    most: Vec2,
+pub struct Bounds {
+    pub least: Vec2,
+    pub most: Vec2,
 }
 
 impl Bounds {
-    fn of(points: &[PathPoint]) -> Bounds {
+    /// Around some points, of which there is at least one.
+    pub fn of(points: &[PathPoint]) -> Bounds {
         let begin = points[0].position;
         points.iter().fold(Bounds { least: begin, most: begin }, |bounds, point| Bounds {
             least: bounds.least.inf(&point.position),
@@ -79,9 +80,20 @@ impl Bounds {
     }
 
     /// Squared distance to the box, m²; rounded down, so that no point of a segment in it is nearer.
-    fn distance_m2_min(&self, point: Vec2) -> f64 {
+    pub fn distance_m2_min(&self, point: Vec2) -> f64 {
         let outside = (self.least - point).sup(&(point - self.most)).sup(&Vec2::zeros());
         outside.norm_squared() * (1.0 - 1e-9)
+    }
+
+    /// The box that reaches farther by `room_m` on each side.
+    pub fn grown(&self, room_m: f64) -> Bounds {
+        let room = Vec2::repeat(room_m);
+        Bounds { least: self.least - room, most: self.most + room }
+    }
+
+    /// Whether the boxes share a point.
+    pub fn meets(&self, other: &Bounds) -> bool {
+        (0..2).all(|axis| self.least[axis] <= other.most[axis] && other.least[axis] <= self.most[axis])
     }
 }
 
@@ -131,6 +143,11 @@ impl Path {
 
     pub fn length_m(&self) -> f64 {
         self.points[self.points.len() - 1].station_m
+    }
+
+    /// The box around the whole path.
+    pub fn bounds(&self) -> Bounds {
+        Bounds::of(&self.points)
     }
 
     /// The pose at a station; beyond the ends the path goes on straight.

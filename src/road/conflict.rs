@@ -1,6 +1,6 @@
 //! Where other lanes cross or join a route inside junctions, and where it meets crosswalks.
 
-use crate::geometry::{Path, PathPoint, Vec2, wrap_angle};
+use crate::geometry::{Bounds, Path, PathPoint, Vec2, wrap_angle};
 
 use super::map::{LaneIndex, RoadMap};
 use super::route::{Conflict, RouteLane};
@@ -85,13 +85,11 @@ fn dense(path: &Path) -> Vec<PathPoint> {
 /// Where two paths cross: (station on the first, station on the second), m.
 fn crossings(a: &Path, b: &Path) -> Vec<(f64, f64)> {
     let mut found: Vec<(f64, f64)> = Vec::new();
-    let (low, high) = extent(b);
+    // A little larger because of rounding.
+    let near = b.bounds().grown(1e-3);
     for p in a.points().windows(2) {
         // Most segments of a route are far from the other lane: their boxes tell so quickly.
-        let (from, to) = (p[0].position, p[1].position);
-        let apart =
-            |axis: usize| from[axis].max(to[axis]) < low[axis] || from[axis].min(to[axis]) > high[axis];
-        if apart(0) || apart(1) {
+        if !Bounds::of(p).meets(&near) {
             continue;
         }
         for q in b.points().windows(2) {
@@ -107,17 +105,6 @@ fn crossings(a: &Path, b: &Path) -> Vec<(f64, f64)> {
         }
     }
     found
-}
-
-/// Least and greatest corner of a box around a path, a little larger because of rounding.
-fn extent(path: &Path) -> (Vec2, Vec2) {
-    const ROOM_M: f64 = 1e-3;
-    let (mut low, mut high) = (Vec2::repeat(f64::INFINITY), Vec2::repeat(f64::NEG_INFINITY));
-    for point in path.points() {
-        low = low.inf(&point.position);
-        high = high.sup(&point.position);
-    }
-    (low - Vec2::repeat(ROOM_M), high + Vec2::repeat(ROOM_M))
 }
 
 /// The fractions along two segments at which they cross; `None` if they do not cross or are parallel.

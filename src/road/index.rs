@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::geometry::{Path, Pose, Projection, Vec2};
+use crate::geometry::{Bounds, Path, Pose, Projection, Vec2};
 
 use super::map::{Lane, LaneIndex};
 
@@ -25,8 +25,8 @@ pub struct LaneGrid {
     cells: BTreeMap<(i64, i64), Vec<Stretch>>,
     /// Half the width of the widest lane, m.
     half_width_m: f64,
-    /// Least and greatest coordinates of each lane's centre line.
-    boxes: Vec<(Vec2, Vec2)>,
+    /// The box around each lane's centre line.
+    boxes: Vec<Bounds>,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -40,14 +40,7 @@ impl LaneGrid {
     pub fn new(lanes: &[Lane]) -> LaneGrid {
         let widths_m = lanes.iter().flat_map(|lane| &lane.widths_m);
         let widest_m = widths_m.copied().fold(0.0, f64::max);
-        let boxes = lanes.iter().map(|lane| {
-            let points = lane.centre.points();
-            let corner = |pick: fn(&Vec2, &Vec2) -> Vec2| {
-                points.iter().fold(points[0].position, |found, point| pick(&found, &point.position))
-            };
-            (corner(|a, b| a.inf(b)), corner(|a, b| a.sup(b)))
-        });
-        let boxes = boxes.collect();
+        let boxes = lanes.iter().map(|lane| lane.centre.bounds()).collect();
         let mut grid = LaneGrid { cells: BTreeMap::new(), half_width_m: widest_m / 2.0, boxes };
         for (index, lane) in lanes.iter().enumerate() {
             let stretches = (lane.centre.length_m() / STRETCH_M).ceil().max(1.0);
@@ -94,8 +87,8 @@ impl LaneGrid {
     ) -> Vec<(LaneIndex, Projection)> {
         let forward = pose.forward();
         let left = Vec2::new(-forward.y, forward.x);
-        let may_be = |(from, to): &(Vec2, Vec2)| {
-            let (middle, half) = ((from + to) / 2.0 - pose.position, (to - from) / 2.0);
+        let may_be = |&Bounds { least, most }: &Bounds| {
+            let (middle, half) = ((least + most) / 2.0 - pose.position, (most - least) / 2.0);
             let within =
                 |axis: &Vec2, reach_m: f64| axis.dot(&middle).abs() <= reach_m + axis.abs().dot(&half);
             within(&forward, ahead_m + SLACK_M) && within(&left, reach_m + SLACK_M)
@@ -112,18 +105,13 @@ impl LaneGrid {
         let (low, high) = (cell(point - margin), cell(point + margin));
         let cells = (high.0 - low.0 + 1).saturating_mul(high.1 - low.1 + 1);
         if cells > CELLS_MAX {
-            let outside = |from: &Vec2, to: &Vec2| {
-                let beyond = (from - point).sup(&(point - to)).sup(&Vec2::zeros());
-                beyond.norm_squared() > radius_m * radius_m
-            };
-            let in_reach =
-                lanes.iter().zip(&self.boxes).enumerate().filter_map(|(index, (lane, (from, to)))| {
-                    if outside(from, to) {
-                        return None;
-                    }
-                    let projection = lane.centre.project(point);
-                    (projection.distance_m <= radius_m).then_some((LaneIndex(index), projection))
-                });
+            let in_reach = lanes.iter().zip(&self.boxes).enumerate().filter_map(|(index, (lane, bounds))| {
+                if bounds.distance_m2_min(point) > radius_m * radius_m {
+                    return None;
+                }
+                let projection = lane.centre.project(point);
+                (projection.distance_m <= radius_m).then_some((LaneIndex(index), projection))
+            });
             return in_reach.collect();
         }
         let mut found: BTreeMap<LaneIndex, Projection> = BTreeMap::new();

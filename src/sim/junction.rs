@@ -6,7 +6,7 @@
 //! conflict: a vehicle on one of them follows the vehicle ahead. Stop and yield signs of a map are not
 //! obeyed, so no road has priority; where signals differ, they decide before any of this.
 
-use crate::geometry::{Path, PathPoint, Vec2, wrap_angle};
+use crate::geometry::{Path, wrap_angle};
 use crate::road::{LaneIndex, RoadMap, Turn};
 
 /// Centre lines nearer than this are in conflict, m: two of the widest bodies (2.44 m) and 0.36 m of
@@ -78,7 +78,7 @@ fn conflict(map: &RoadMap, a: LaneIndex, b: LaneIndex) -> Option<((f64, f64), (f
     if lane_a.predecessors.iter().any(|from| lane_b.predecessors.contains(from)) {
         return None;
     }
-    if !boxes_meet(&lane_a.centre, &lane_b.centre) {
+    if !lane_a.centre.bounds().grown(CORRIDOR_M).meets(&lane_b.centre.bounds()) {
         return None;
     }
     let on_a = stretch_near(&lane_a.centre, &lane_b.centre)?;
@@ -97,18 +97,6 @@ fn stretch_near(path: &Path, other: &Path) -> Option<(f64, f64)> {
         }
     }
     stretch
-}
-
-/// Whether the rectangles around two paths come near enough for a conflict.
-fn boxes_meet(a: &Path, b: &Path) -> bool {
-    let corners = |path: &Path| {
-        let fold = |pick: fn(&Vec2, &Vec2) -> Vec2, points: &[PathPoint]| {
-            points.iter().fold(points[0].position, |found, point| pick(&found, &point.position))
-        };
-        (fold(|a, b| a.inf(b), path.points()), fold(|a, b| a.sup(b), path.points()))
-    };
-    let ((low_a, high_a), (low_b, high_b)) = (corners(a), corners(b));
-    (0..2).all(|axis| low_a[axis] <= high_b[axis] + CORRIDOR_M && low_b[axis] <= high_a[axis] + CORRIDOR_M)
 }
 
 /// Whether `a` goes before `b`.

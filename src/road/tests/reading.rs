@@ -3,6 +3,7 @@
 use proptest::prelude::*;
 
 use crate::geometry::{Vec2, unit_vector, wrap_angle};
+use crate::road::testing::street;
 use crate::road::{Lane, RoadError, RoadMap, Route, SignKind};
 
 const CORNER: &str = include_str!("../../../scenarios/roads/corner.xodr");
@@ -145,12 +146,8 @@ fn crosswalks_have_corners_in_either_frame() {
 /// In SUMO's maps no junction names the controllers, and there are arrow lights.
 #[test]
 fn lights_without_a_junctions_controller_are_grouped_by_their_arms() {
-    let road = |id: u32, x: f64, y: f64, hdg: f64, link: &str, signals: &str| {
-        format!(
-            r#"<road id="{id}" length="50" junction="-1"><link>{link}</link><planView>
-            <geometry s="0" x="{x}" y="{y}" hdg="{hdg}" length="50"><line/></geometry></planView>
-            <lanes>{TWO_LANES}</lanes><signals>{signals}</signals></road>"#
-        )
+    let road = |id: &str, [x, y, heading]: [f64; 3], link: &str, signals: &str| {
+        street(id, [x, y, heading, 50.0], "-1", link, TWO_LANES, &format!("<signals>{signals}</signals>"))
     };
     let ahead = r#"<successor elementType="junction" elementId="9"/>"#;
     let light = |id: &str, kind: &str| {
@@ -158,9 +155,9 @@ fn lights_without_a_junctions_controller_are_grouped_by_their_arms() {
     };
     let text = format!(
         r#"<OpenDRIVE><header name="arms"/>{}{}{}<junction id="9" name=""/></OpenDRIVE>"#,
-        road(1, -60.0, 0.0, 0.0, ahead, &(light("a", "1000001") + &light("b", "1000011"))),
-        road(2, 0.0, -60.0, core::f64::consts::FRAC_PI_2, ahead, &light("c", "1000011")),
-        road(3, 100.0, 0.0, 0.0, "", &light("lone", "1000001")),
+        road("1", [-60.0, 0.0, 0.0], ahead, &(light("a", "1000001") + &light("b", "1000011"))),
+        road("2", [0.0, -60.0, core::f64::consts::FRAC_PI_2], ahead, &light("c", "1000011")),
+        road("3", [100.0, 0.0, 0.0], "", &light("lone", "1000001")),
     );
     let map = read(&text);
     let groups: Vec<_> = map.signals.iter().map(|signal| (signal.junction, signal.group)).collect();
