@@ -37,7 +37,7 @@ pub const REGISTRY: &[Entry] = &[
     Entry {
         name: "cc",
         summary: "reference driver: competent and careful human of UN R157, after JAMA",
-        build: |scene, _seed| Box::new(Reference::new(scene, CarefulHuman::Anticipating)),
+        build: |scene, _seed| Box::new(Reference::new(scene, CarefulHuman)),
     },
     Entry {
         name: "fsm",

@@ -13,6 +13,7 @@
 //! | [`Path::project_from`] | a point at a right angle near a guess, within 2 cm; none far aside | drivers, for every other road user |
 //! | `ads::guide` | the tangent of the nearest even sample | a driving system, for every predicted position |
 
+use super::beside::Beside;
 use super::pose::{Pose, Vec2, wrap_angle};
 
 /// A vertex of a [`Path`].
@@ -35,17 +36,6 @@ pub struct Projection {
     pub offset_m: f64,
     /// Distance to the nearest point of the path, m; larger than `|offset_m|` beyond the ends.
     pub distance_m: f64,
-}
-
-/// Where a point lies beside a path, with the direction of the path there: see [`Path::project_from`].
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct TangentProjection {
-    /// m along the path; beyond the ends it goes on straight.
-    pub station_m: f64,
-    /// m to the left of the path.
-    pub offset_m: f64,
-    /// Unit vector along the path there.
-    pub forward: Vec2,
 }
 
 /// A directed curve: at least two vertices, stations strictly rising from 0.
@@ -186,14 +176,14 @@ impl Path {
 
     /// Where a point lies beside the path, by stepping along tangents from a guess that is at most a bend
     /// away: much quicker than a search. `None` for points so far aside that the steps do not settle.
-    pub fn project_from(&self, point: Vec2, guess_m: f64) -> Option<TangentProjection> {
+    pub fn project_from(&self, point: Vec2, guess_m: f64) -> Option<Beside> {
         let mut station_m = guess_m;
         for _ in 0..5 {
             let pose = self.pose_at(station_m);
             let (forward, away) = (pose.forward(), point - pose.position);
             let ahead_m = forward.dot(&away);
             if ahead_m.abs() < 0.02 {
-                return Some(TangentProjection { station_m, offset_m: forward.perp(&away), forward });
+                return Some(Beside { station_m, offset_m: forward.perp(&away), forward });
             }
             station_m += ahead_m;
         }

@@ -52,6 +52,13 @@ pub fn start() -> Start {
     }
 }
 
+/// Every bit that later ticks depend on.
+pub fn bits(world: &World) -> Vec<u64> {
+    let mut bits = Vec::new();
+    world.trace(&mut |word| bits.push(word));
+    bits
+}
+
 /// A road user that appears in the ego vehicle's lane, or from the right: on foot if the verb is.
 pub fn request(verb: Verb, distance_m: f64, speed_mps: f64) -> SpawnRequest {
     let on_foot = matches!(verb, Verb::Walk | Verb::Stand);

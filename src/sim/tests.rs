@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use proptest::prelude::*;
 
-use super::testing::request;
+use super::testing::{bits, request};
 use super::{
     Contact, Control, DT_S, Incident, Obstacle, Scene, Start, VehicleParameters, World, pedals_for, testing,
 };
@@ -227,12 +227,6 @@ fn an_eleventh_removes_the_oldest() {
     }
     let ids: Vec<u32> = world.obstacles().map(|obstacle| obstacle.id).collect();
     assert_eq!(ids, (2..=11).collect::<Vec<u32>>());
-}
-
-fn bits(world: &World) -> Vec<u64> {
-    let mut bits = Vec::new();
-    world.trace(&mut |word| bits.push(word));
-    bits
 }
 
 /// A world in which everything that can be spawned was asked for.

@@ -26,22 +26,14 @@ const BRAKING_MPS2: f64 = 0.774 * GRAVITY_MPS2;
 /// A vehicle within this distance of its course merely wanders, m.
 const WANDER_M: f64 = 0.375;
 
-/// The driver, by when a cut-in is noticed: implementations read the regulation in two ways.
+/// The driver: notices a cut-in when it has left its course by more than drivers wander, and has been evaluated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum CarefulHuman {
-    /// When it has left its course by more than drivers wander, and has been evaluated for 0.4 s.
-    Anticipating,
-    /// When it is in the way, without evaluation: the reading behind the published cut-in grids.
-    Late,
-}
+pub struct CarefulHuman;
 
 impl Model for CarefulHuman {
     fn braking(&self) -> Braking {
         Braking {
-            evaluation_s: match self {
-                CarefulHuman::Anticipating => 0.4,
-                CarefulHuman::Late => 0.0,
-            },
+            evaluation_s: 0.4,
             reaction_s: 0.75,
             release_mps2: 0.4,
             jerk_mps3: 12.65,
@@ -57,9 +49,7 @@ impl Model for CarefulHuman {
             && encounter.headway_s() < CRITICAL_S
             && encounter.closing_mps() > 0.0;
         let is_noticed = encounter.crosses || encounter.aside_m > WANDER_M;
-        let will_meet = *self == CarefulHuman::Anticipating
-            && is_noticed
-            && encounter.meeting_s.is_some_and(|time_s| time_s <= CRITICAL_S);
+        let will_meet = is_noticed && encounter.meeting_s.is_some_and(|time_s| time_s <= CRITICAL_S);
         if closing_in || braking_ahead || will_meet { BRAKING_MPS2 } else { 0.0 }
     }
 }

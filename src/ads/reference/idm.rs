@@ -12,10 +12,10 @@
 use std::sync::Arc;
 
 use crate::ads::driver::Ads;
-use crate::ads::guide::{Beside, Guide, SpeedRules};
+use crate::ads::guide::{Guide, SpeedRules};
 use crate::ads::status::{PerceivedObject, Reason, Status};
 use crate::ads::steering::{Steering, SteeringConfig};
-use crate::geometry::{Vec2, unit_vector};
+use crate::geometry::{Beside, Vec2, unit_vector};
 use crate::road::RouteLaneChange;
 use crate::sim::{
     Control, DT_S, FRAME_TICKS, Following, Scene, Sensed, SensedObject, SignalColour, VehicleParameters,

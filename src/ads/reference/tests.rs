@@ -5,7 +5,7 @@ use super::encounter::Encounter;
 use super::fsm::FuzzySafety;
 use super::model::Model;
 use super::r157::MinimalPerformance;
-use super::reflex::Reflex;
+use super::reflex::{Braking, Reflex};
 use super::rss::Rss;
 
 /// Cars of the grid, m; the gap across between two in the middle of lanes of 3.5 m; a look, s.
@@ -26,8 +26,8 @@ struct CutIn {
 ///
 /// The published simulation moves with the speed at the end of a look, and moves both cars once before
 /// the first decision. Some cases lie so near to the grid's borders that both matter.
-fn crashes(model: &impl Model, cut_in: CutIn) -> bool {
-    let mut reflex = Reflex::new(model.braking());
+fn crashes(model: &impl Model, braking: Braking, cut_in: CutIn) -> bool {
+    let mut reflex = Reflex::new(braking);
     let (mut own_mps, mut own_mps2) = (cut_in.own_kmph / 3.6, 0.0);
     let other_mps = cut_in.other_kmph / 3.6;
     let mut gap_m = cut_in.gap_m + (other_mps - own_mps) * LOOK_S;
@@ -60,13 +60,15 @@ fn crashes(model: &impl Model, cut_in: CutIn) -> bool {
     false
 }
 
-/// Which models crash: FSM, RSS, the regulation's minimum, the careful human.
+/// Which models crash: FSM, RSS, the regulation's minimum, the careful human. The published grid reads the
+/// regulation so that the human notices a cut-in when it is in the way, without evaluation.
 fn grid(cut_in: CutIn) -> [bool; 4] {
+    let (fsm, rss) = (FuzzySafety::default(), Rss::default());
     [
-        crashes(&FuzzySafety::default(), cut_in),
-        crashes(&Rss::default(), cut_in),
-        crashes(&MinimalPerformance, cut_in),
-        crashes(&CarefulHuman::Late, cut_in),
+        crashes(&fsm, fsm.braking(), cut_in),
+        crashes(&rss, rss.braking(), cut_in),
+        crashes(&MinimalPerformance, MinimalPerformance.braking(), cut_in),
+        crashes(&CarefulHuman, Braking { evaluation_s: 0.0, ..CarefulHuman.braking() }, cut_in),
     ]
 }
 
@@ -108,7 +110,7 @@ fn a_careful_human_needs_the_published_distance() {
     for (speed_kmph, published_m) in
         [(10.0, 4.4), (20.0, 10.0), (30.0, 16.5), (40.0, 24.1), (50.0, 32.7), (60.0, 42.4)]
     {
-        let mut reflex = Reflex::new(CarefulHuman::Anticipating.braking());
+        let mut reflex = Reflex::new(CarefulHuman.braking());
         let (mut speed_mps, mut way_m): (f64, f64) = (speed_kmph / 3.6, 0.0);
         while speed_mps > 0.0 {
             let next_mps = (speed_mps - reflex.step(9.0, 0.001) * 0.001).max(0.0);

@@ -71,16 +71,11 @@ mod tests {
         world.apply(&Effect::Spawn(request)).expect("there is room");
         let (mut same, mut braked) = (world.clone(), world.clone());
         let throttle = Control { throttle_pct: 40.0, ..Control::default() };
-        let bits = |world: &World| {
-            let mut bits = Vec::new();
-            world.trace(&mut |word| bits.push(word));
-            bits
-        };
         for _ in 0..200 {
             assert!(world.tick(&throttle).is_empty());
             assert!(same.tick_recorded(&throttle, &world).is_empty());
             braked.tick_recorded(&Control { brake_pct: 100.0, ..Control::default() }, &world);
-            assert_eq!(bits(&same), bits(&world));
+            assert_eq!(testing::bits(&same), testing::bits(&world));
         }
         assert_eq!(braked.ego().speed_mps, 0.0);
         let first = |world: &World| *world.obstacles().next().expect("it drives on");

@@ -2,8 +2,8 @@
 
 use core::ops::Range;
 
-use crate::ads::guide::{Beside, Guide, Span};
-use crate::geometry::Vec2;
+use crate::ads::guide::Guide;
+use crate::geometry::{Beside, Span, Vec2};
 use crate::sim::VehicleParameters;
 
 use super::super::prediction::{Forecast, STEP_S, STEPS};

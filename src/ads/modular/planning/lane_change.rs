@@ -6,8 +6,9 @@
 
 use std::sync::Arc;
 
-use crate::ads::guide::{Beside, Guide};
+use crate::ads::guide::Guide;
 use crate::ads::status::Reason;
+use crate::geometry::Beside;
 use crate::road::RouteLaneChange;
 use crate::sim::{FRAME_S, Scene, VehicleParameters};
 

@@ -4,9 +4,9 @@
 //! piecewise-jerk optimiser is replaced by a quintic shift of bounded lateral acceleration. Pedestrians
 //! and moving road users are not passed in this way.
 
-use crate::ads::guide::{Guide, Span};
+use crate::ads::guide::Guide;
 use crate::ads::steering::Aside;
-use crate::geometry::smooth_step;
+use crate::geometry::{Span, smooth_step};
 use crate::sim::{Scene, VehicleParameters};
 
 use super::super::config::PlanningConfig;

@@ -5,9 +5,9 @@
 
 use std::sync::Arc;
 
-use crate::ads::guide::{Guide, Span};
+use crate::ads::guide::Guide;
 use crate::ads::status::{Manoeuvre, Reason};
-use crate::geometry::Pose;
+use crate::geometry::{Pose, Span};
 use crate::sim::{Scene, SignalColour, VehicleParameters};
 
 use super::super::config::{ModularConfig, PlanningConfig, Weaknesses};
