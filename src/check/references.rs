@@ -1,8 +1,9 @@
 //! What the names of the loaded files stand for: where each thing is declared, and where it is used.
 //!
 //! [`References::declared`] notes the declarations of all files, overridden ones and ones that are left out
-//! included. The checker then notes every use at the place where it resolves the name. The editor's server
-//! reads the record and resolves nothing itself.
+//! included. The checker then notes every use in a space at the place where it resolves the name; the uses in
+//! scenarios and policies are noted by a pass of their own (`scenario_names`), because their readers do not
+//! run on a broken space. The editor's server reads the record and resolves nothing itself.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
