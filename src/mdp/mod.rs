@@ -13,12 +13,8 @@ mod reward;
 mod state;
 
 pub use closeness::Closeness;
-pub use collision_probability::{
-    ProcKind, ProcSettings, collision_probability, combined, lateral_safety_distance_m,
-    longitudinal_safety_distance_m, opposing_safety_distance_m, probability,
-};
-pub use criticality::{Criticality, Encroachment, deceleration_to_avoid_mps2, time_to_collision_s};
-pub use observation::{BEYOND_LEN, Observation, variable};
-pub use released_probability::released_probability;
+pub use collision_probability::{ProcKind, ProcSettings, collision_probability};
+pub use criticality::{Criticality, Encroachment};
+pub use observation::{Observation, variable};
 pub use reward::{RewardSettings, StepOutcome, reward};
-pub use state::{PerceptionCounts, STATE_LEN, StateVector, observe, perception_counts};
+pub use state::{PerceptionCounts, STATE_LEN, StateVector, perception_counts};
