@@ -15,6 +15,7 @@ pub mod explain;
 mod expression;
 mod load;
 mod names;
+mod operator;
 mod overriding;
 pub mod policy;
 mod report;

@@ -1,0 +1,243 @@
+//! Operators: logic, arithmetic, comparison and `in`, and what may stand on their two sides. Roads are no
+//! values: `road == corner` and `road in [corner, boulevard]` are read here as one condition.
+
+use crate::check::checker::Checker;
+use crate::check::expression::{Place, article, dimension, fits, is_number, unknown_here};
+use crate::check::names::unknown;
+use crate::check::references::Symbol;
+use crate::check::report::Report;
+use crate::model::expr::{Arithmetic, Comparison, Expr, ExprKind};
+use crate::model::vocabulary::LaneChoice;
+use crate::model::{Type, code};
+use crate::syntax::ast::{BinaryOp, Span};
+use crate::syntax::{Diagnostic, ast};
+
+impl Checker {
+    /// Two sides and what joins them.
+    pub(super) fn binary(
+        &mut self,
+        op: BinaryOp,
+        op_span: Span,
+        left: &ast::Expr,
+        right: &ast::Expr,
+        place: &Place<'_>,
+        span: Span,
+    ) -> Option<Expr> {
+        let logic: fn(Box<Expr>, Box<Expr>) -> ExprKind = match op {
+            BinaryOp::Implies => ExprKind::Implies,
+            BinaryOp::Or => ExprKind::Or,
+            BinaryOp::And => ExprKind::And,
+            BinaryOp::In => return self.membership(left, right, place, span),
+            BinaryOp::Compare(op) => return self.comparison(op, left, right, place, span),
+            BinaryOp::Arithmetic(op) => return self.arithmetic(op, op_span, left, right, place, span),
+        };
+        // Both sides are looked at, so that mistakes in both are reported.
+        let left = self.typed(left, place, Type::Bool);
+        let right = self.typed(right, place, Type::Bool);
+        Some(Expr { kind: logic(Box::new(left?), Box::new(right?)), ty: Type::Bool, span })
+    }
+
+    fn arithmetic(
+        &mut self,
+        op: Arithmetic,
+        op_span: Span,
+        left: &ast::Expr,
+        right: &ast::Expr,
+        place: &Place<'_>,
+        span: Span,
+    ) -> Option<Expr> {
+        let left = self.numeric(left, place);
+        let right = self.numeric(right, place);
+        let (left, right) = (left?, right?);
+        let (a, b) = (dimension(left.ty), dimension(right.ty));
+        let both_whole = left.ty == Type::Int && right.ty == Type::Int;
+        let result = match op {
+            Arithmetic::Add | Arithmetic::Subtract if a == b => Some(a),
+            Arithmetic::Add | Arithmetic::Subtract => {
+                let verb = if op == Arithmetic::Add { "added" } else { "subtracted" };
+                self.mismatch(&format!("cannot be {verb}"), op_span, &left, &right);
+                return None;
+            }
+            Arithmetic::Multiply => a.times(b),
+            Arithmetic::Divide => a.per(b),
+        };
+        let Some(result) = result else {
+            return self.reject(
+                Diagnostic::error(code::UNIT_MISMATCH, "the dimension is out of range").at(span, ""),
+            );
+        };
+        let ty = if both_whole && op != Arithmetic::Divide { Type::Int } else { Type::Quantity(result) };
+        Some(Expr { kind: ExprKind::Arithmetic(op, Box::new(left), Box::new(right)), ty, span })
+    }
+
+    /// Two sides of different dimension or type.
+    fn mismatch(&mut self, what: &str, at: Span, left: &Expr, right: &Expr) {
+        let (a, b) = (self.references.type_name(left.ty), self.references.type_name(right.ty));
+        let code =
+            if is_number(left.ty) && is_number(right.ty) { code::UNIT_MISMATCH } else { code::TYPE_MISMATCH };
+        let error = Diagnostic::error(code, format!("`{a}` and `{b}` {what}")).at(at, "");
+        self.report(error.beside(left.span, article(&a)).beside(right.span, article(&b)));
+    }
+
+    fn comparison(
+        &mut self,
+        op: Comparison,
+        left: &ast::Expr,
+        right: &ast::Expr,
+        place: &Place<'_>,
+        span: Span,
+    ) -> Option<Expr> {
+        let road = match (self.names_road(left, place), self.names_road(right, place)) {
+            (true, _) => Some(right),
+            (_, true) => Some(left),
+            _ => None,
+        };
+        if let Some(road) = road {
+            if op.orders() {
+                self.note_roads(core::slice::from_ref(road));
+                let error = Diagnostic::error(code::UNORDERED, "roads have no order");
+                let error = error.at(span, format!("`{}` needs one", op.symbol()));
+                return self.reject(error.help("write `road == corner`, or `road in [corner, boulevard]`"));
+            }
+            let is_there = self.on_road(core::slice::from_ref(road), place, span)?;
+            let kind = match op {
+                Comparison::NotEqual => ExprKind::Not(Box::new(is_there)),
+                _ => is_there.kind,
+            };
+            return Some(Expr { kind, ty: Type::Bool, span });
+        }
+        let (left, right) = self.both_sides(left, right, place)?;
+        if !fits(left.ty, right.ty) && !fits(right.ty, left.ty) {
+            self.mismatch("cannot be compared", span, &left, &right);
+            return None;
+        }
+        match left.ty {
+            Type::Bool if op.orders() => {
+                let error = Diagnostic::error(code::UNORDERED, "truth values have no order");
+                return self.reject(
+                    error
+                        .at(span, format!("`{}` needs one", op.symbol()))
+                        .help("compare them with `==` or `!=`, or join them with `and`, `or`, `implies`"),
+                );
+            }
+            Type::Enum(of) if op.orders() && !self.enums[of.0].ordered => {
+                let of = &self.enums[of.0];
+                let error = Diagnostic::error(code::UNORDERED, format!("`{}` has no order", of.name))
+                    .at(span, format!("`{}` needs one", op.symbol()))
+                    .beside(of.span, "declared with `|`")
+                    .help("declare its variants with `<` between them, or compare with `==` or `in [..]`");
+                return self.reject(error);
+            }
+            Type::Bool | Type::Enum(_) | Type::Int | Type::Quantity(_) => {}
+        }
+        Some(Expr { kind: ExprKind::Compare(op, Box::new(left), Box::new(right)), ty: Type::Bool, span })
+    }
+
+    /// Checks first the side that tells the type of the other.
+    fn both_sides(&mut self, left: &ast::Expr, right: &ast::Expr, place: &Place<'_>) -> Option<(Expr, Expr)> {
+        if self.is_bare_variant(left, place) {
+            let Some(right) = self.expr(right, place, None) else {
+                self.look_at(left, place, None);
+                return None;
+            };
+            return Some((self.expr(left, place, Some(right.ty))?, right));
+        }
+        let left = self.expr(left, place, None);
+        let right = self.expr(right, place, left.as_ref().map(|left| left.ty));
+        Some((left?, right?))
+    }
+
+    fn membership(
+        &mut self,
+        left: &ast::Expr,
+        right: &ast::Expr,
+        place: &Place<'_>,
+        span: Span,
+    ) -> Option<Expr> {
+        if let (true, ast::ExprKind::List(roads)) = (self.names_road(left, place), &right.kind) {
+            return self.on_road(roads, place, span);
+        }
+        let Some(value) = self.expr(left, place, None) else {
+            self.look_at(right, place, None);
+            return None;
+        };
+        let ty = value.ty;
+        let value = Box::new(value);
+        let kind = match &right.kind {
+            ast::ExprKind::Range { low, high } => {
+                let low = self.typed(low, place, ty);
+                let high = self.typed(high, place, ty);
+                if !is_number(ty) {
+                    return self.reject(
+                        Diagnostic::error(code::TYPE_MISMATCH, "a range holds numbers")
+                            .at(value.span, "not a number"),
+                    );
+                }
+                ExprKind::InRange(value, Box::new(low?), Box::new(high?))
+            }
+            ast::ExprKind::List(items) => {
+                let items: Vec<Option<Expr>> = items.iter().map(|item| self.typed(item, place, ty)).collect();
+                let items: Option<Vec<Expr>> = items.into_iter().collect();
+                ExprKind::InList(value, items?)
+            }
+            ast::ExprKind::Field { base, field }
+                if field.text == "lanes"
+                    && matches!(&base.kind, ast::ExprKind::Name(name) if name == "road") =>
+            {
+                self.note_part(base, field);
+                if !place.knows("road") {
+                    return self.reject(unknown_here("road", right.span));
+                }
+                let lanes = self.words::<LaneChoice>("lane", ty, value.span)?;
+                ExprKind::InLanes(value, lanes)
+            }
+            _ => {
+                self.look_at(right, place, Some(ty));
+                let error =
+                    Diagnostic::error(code::TYPE_MISMATCH, "`in` needs a list, a range or `road.lanes`");
+                return self.reject(error.at(right.span, "none of them"));
+            }
+        };
+        Some(Expr { kind, ty: Type::Bool, span })
+    }
+
+    /// `road == corner`: whether the road is one of these.
+    fn on_road(&mut self, names: &[ast::Expr], place: &Place<'_>, span: Span) -> Option<Expr> {
+        self.note_roads(names);
+        if !place.knows("road") {
+            return self.reject(unknown_here("road", span));
+        }
+        let road = |name: &ast::Expr| match &name.kind {
+            ast::ExprKind::Name(text) if self.road_names.contains(text) => Some(text.clone()),
+            ast::ExprKind::Name(text) => {
+                let known = self.road_names.iter().map(String::as_str);
+                self.reject(unknown("road", text, name.span, known))
+            }
+            _ => {
+                let error = Diagnostic::error(code::TYPE_MISMATCH, "wanted the name of a road");
+                self.reject(error.at(name.span, "not a name").help("write `road == corner`"))
+            }
+        };
+        // Every unknown road is reported, not just the first.
+        let roads: Vec<Option<String>> = names.iter().map(road).collect();
+        let roads = roads.into_iter().collect::<Option<_>>()?;
+        Some(Expr { kind: ExprKind::OnRoad(roads), ty: Type::Bool, span })
+    }
+
+    /// Notes the names among the expressions as roads.
+    pub(super) fn note_roads(&mut self, names: &[ast::Expr]) {
+        for expr in names {
+            if let ast::ExprKind::Name(name) = &expr.kind {
+                self.references.uses(expr.span, Symbol::Road(name.clone()));
+            }
+        }
+    }
+
+    /// Whether the expression is the word `road`, and no parameter, constant or state of that name hides it.
+    fn names_road(&self, expr: &ast::Expr, place: &Place<'_>) -> bool {
+        matches!(&expr.kind, ast::ExprKind::Name(name) if name == "road")
+            && !place.locals.iter().any(|(local, _)| local == "road")
+            && !self.constants.iter().any(|(constant, _)| constant == "road")
+            && !self.states.iter().any(|state| state.name == "road")
+    }
+}
