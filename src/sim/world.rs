@@ -25,7 +25,7 @@ use super::signals::SignalClock;
 
 /// Name of this simulated world. Raised whenever the same seed no longer gives the same episode, so
 /// that an old scenario is told apart from a refuted one.
-pub const ENGINE: &str = "plane/3";
+pub const ENGINE: &str = "plane/4";
 
 /// One physics step, s: 50 Hz.
 pub const DT_S: f64 = 0.02;
