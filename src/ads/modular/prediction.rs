@@ -38,10 +38,14 @@ pub struct Prediction {
     forecasts: Vec<Forecast>,
 }
 
-/// An object and its future.
+/// An object and one future that it may have: a hypothesis.
+///
+/// The hypotheses of one object stand one after another, the most probable first.
 #[derive(Debug, Clone)]
 pub struct Forecast {
     pub id: u32,
+    /// How probable this future is, in `(0, 1]`; the sum over an object's hypotheses is 1.
+    pub probability: f64,
     pub body: Body,
     pub heading_rad: f64,
     /// Unit vector along the heading.
@@ -123,6 +127,7 @@ impl Prediction {
             }
             self.forecasts.push(Forecast {
                 id: track.id,
+                probability: 1.0,
                 body: track.body,
                 heading_rad: track.heading_rad,
                 forward: unit_vector(track.heading_rad),

@@ -90,8 +90,12 @@ impl Modular {
     fn report(&mut self) {
         let forecasts = self.prediction.forecasts();
         let perceived = &mut self.status.perceived;
-        perceived.truncate(forecasts.len());
-        for (index, forecast) in forecasts.iter().enumerate() {
+        // Of the hypotheses of one object only the most probable is reported; it comes first.
+        let first = |index: &usize| *index == 0 || forecasts[index - 1].id != forecasts[*index].id;
+        let objects = (0..forecasts.len()).filter(first);
+        perceived.truncate(objects.clone().count());
+        for (index, forecast) in objects.map(|index| &forecasts[index]).enumerate() {
+            debug_assert!(forecast.probability > 0.0, "a future that cannot happen is no hypothesis");
             let pose = Pose { position: forecast.positions[0], heading_rad: forecast.heading_rad };
             let mut predicted =
                 perceived.get_mut(index).map_or_else(Vec::new, |o| core::mem::take(&mut o.predicted));
