@@ -267,6 +267,14 @@ words! {
 }
 
 words! {
+    /// As far as the two meet: whoever has priority may count on the other to give way.
+    Priority "Which of the ego vehicle and a road user has priority over the other.":
+    Ego "ego" = "The ego vehicle: the road user had to give way.",
+    Other "other" = "The road user: the ego vehicle had to give way.",
+    None "none" = "Neither, or both owed each other care.",
+}
+
+words! {
     /// The paper's "lane-change" group.
     Then "Whether a vehicle keeps its lane or changes it.": Keep, Change
 }

@@ -114,7 +114,7 @@ fn face(point: Vec2, ego: &VehicleParameters) -> Face {
 mod tests {
     use super::*;
     use crate::episode::Collision;
-    use crate::model::vocabulary::{Body, Verb};
+    use crate::model::vocabulary::{Body, Priority, Verb};
 
     fn collision(x_m: f64, y_m: f64, ego_speed_mps: f64, obstacle_left_mps: f64) -> Collision {
         let contact = Contact {
@@ -126,6 +126,7 @@ mod tests {
             obstacle_velocity_mps: Vec2::zeros(),
             obstacle_velocity_on_ego_mps: Vec2::new(0.0, obstacle_left_mps),
             closing_speed_mps: 1.0,
+            priority: Priority::None,
         };
         Collision { contact, step: 0, body: Body::Sedan, verb: Verb::DriveAhead, spawned_s: 5.0 }
     }

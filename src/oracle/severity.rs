@@ -63,7 +63,7 @@ fn approach(velocity_mps: Vec2) -> &'static str {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::vocabulary::{Body, Verb};
+    use crate::model::vocabulary::{Body, Priority, Verb};
     use crate::sim::Contact;
 
     #[test]
@@ -77,6 +77,7 @@ mod tests {
             obstacle_velocity_mps: Vec2::zeros(),
             obstacle_velocity_on_ego_mps: Vec2::new(4.0, 3.0),
             closing_speed_mps: 4.0,
+            priority: Priority::None,
         };
         for body in [Body::SchoolBus, Body::Hatchback, Body::Pedestrian] {
             let collision = Collision { contact, step: 0, body, verb: Verb::DriveAhead, spawned_s: 5.0 };

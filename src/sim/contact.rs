@@ -5,6 +5,7 @@
 //! claim about damage. Contacts among obstacles are in `incident`.
 
 use crate::geometry::{Sweep, Vec2, first_contact};
+use crate::model::vocabulary::Priority;
 
 use super::ego::VehicleParameters;
 use super::world::DT_S;
@@ -28,6 +29,8 @@ pub struct Contact {
     pub obstacle_velocity_on_ego_mps: Vec2,
     /// Speed at which the gap between the outlines closed where they met, m/s, not negative.
     pub closing_speed_mps: f64,
+    /// Which of the two had priority, as of the moment when the first of them came into the other's way.
+    pub priority: Priority,
 }
 
 /// One party of a possible contact during one tick.
@@ -56,6 +59,7 @@ pub(super) fn meet(ego: &Party, ego_speed_mps: f64, obstacle: &Party, id: u32, t
             ego_pose.left().dot(&obstacle.velocity_mps),
         ),
         closing_speed_mps: closing_mps.max(0.0),
+        priority: Priority::None,
     })
 }
 

@@ -104,7 +104,7 @@ fn stretch_near(path: &Path, other: &Path) -> Option<(f64, f64)> {
 /// A vehicle that turns left or round yields to oncoming traffic; otherwise the vehicle from the right
 /// goes first (Vienna Convention, article 18; so in Estonia and California). Of two from the same side,
 /// the one that turns less goes first; if they turn alike, the lane that the file names first.
-fn goes_first(map: &RoadMap, a: LaneIndex, b: LaneIndex) -> bool {
+pub(super) fn goes_first(map: &RoadMap, a: LaneIndex, b: LaneIndex) -> bool {
     let approach_rad = |lane: LaneIndex| map.lane(lane).centre.points()[0].heading_rad;
     let angle_rad = wrap_angle(approach_rad(b) - approach_rad(a));
     let rank = |lane: LaneIndex| match map.lane(lane).turn {
