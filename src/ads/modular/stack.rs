@@ -73,7 +73,9 @@ impl Modular {
     /// Perception, tracking, prediction and planning.
     fn cycle(&mut self, sensed: &Sensed, localized: &Pose) {
         self.tracking.update(self.perception.look(sensed, localized));
+        let lights = self.lights.look(sensed, self.station_m);
         let (tracks, age_s) = (self.tracking.published(), self.tracking.age_s());
+        self.prediction.see_lights(lights);
         self.prediction.update(tracks, age_s, sensed.time_s, localized.position);
         self.planner.plan(&Outlook {
             localized,
@@ -81,7 +83,7 @@ impl Modular {
             speed_mps: sensed.ego.speed_mps,
             since_s: if self.ticks == 0 { 0.0 } else { FRAME_S },
             forecasts: self.prediction.forecasts(),
-            lights: self.lights.look(sensed, self.station_m),
+            lights,
         });
         self.report();
     }

@@ -21,6 +21,8 @@ section! {
         off_lane_rad: f64 = 0.6, 0.0..=3.2;
         /// Farther objects are taken to keep their velocity, m, in `[0, 300]`. Apollo's scan box: 80.
         reach_m: f64 = 80.0, 0.0..=300.0;
+        /// Most futures that an object is given, in `[1, 3]`. Ours: straight on, left and right. One is a fault to plant.
+        hypotheses_max: u32 = 3, 1.0..=3.0;
         /// Every object is predicted to stay where it is. A fault to plant.
         frozen: bool = false;
         /// The future is known where a recording of it is at hand (`ads::Foresight`); without one this is no more than weakness (b) switched off. An idealisation, to find causes with.
