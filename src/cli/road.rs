@@ -9,7 +9,7 @@ use std::sync::Arc;
 use serde_json::{Value, json};
 
 use crate::report::draw;
-use crate::road::{Lane, LaneIndex, LaneKey, LanePlace, Neighbour, RoadMap, Route, Side};
+use crate::road::{Lane, LaneIndex, LaneKey, LanePlace, Neighbour, RoadMap, Route, Side, SignKind};
 
 use super::arguments::RoadArguments;
 use super::error::Failure;
@@ -178,6 +178,10 @@ fn route_words(map: &RoadMap, route: &Route) -> String {
         format!("  stop lines at {}; crosswalks from {}", listed(&stops), listed(&crosswalks)),
         format!("  {}", plural(route.conflicts.len(), "conflict")),
     ];
+    lines.extend(route.sign_lines.iter().map(|line| {
+        let does = if line.kind == SignKind::Stop { "stops" } else { "gives way" };
+        format!("  {does} at a sign at {:.1} m", line.station_m)
+    }));
     lines.extend(route.changes.iter().map(|change| {
         let side = if change.lateral_m > 0.0 { "left" } else { "right" };
         format!(
@@ -213,6 +217,7 @@ fn lane_json(map: &RoadMap, index: LaneIndex) -> Value {
         "left": beside(Side::Left),
         "right": beside(Side::Right),
         "stop_lines": lane.stop_lines.iter().map(|line| stop_line_json(map, line.station_m, line.signal)).collect::<Vec<_>>(),
+        "sign_lines": lane.sign_lines.iter().map(|line| sign_line_json(line.station_m, line.kind)).collect::<Vec<_>>(),
         "poses": poses(lane),
     })
 }
@@ -273,6 +278,7 @@ fn route_json(map: &RoadMap, route: &Route) -> Value {
         })).collect::<Vec<_>>(),
         "changes": route.changes,
         "stop_lines": route.stop_lines.iter().map(|line| stop_line_json(map, line.station_m, line.signal)).collect::<Vec<_>>(),
+        "sign_lines": route.sign_lines.iter().map(|line| sign_line_json(line.station_m, line.kind)).collect::<Vec<_>>(),
         "crosswalks_m": route.crosswalks_m,
         "conflicts": route.conflicts.iter().map(|conflict| json!({
             "station_m": conflict.station_m,
@@ -281,6 +287,10 @@ fn route_json(map: &RoadMap, route: &Route) -> Value {
             "angle_rad": conflict.angle_rad,
         })).collect::<Vec<_>>(),
     })
+}
+
+fn sign_line_json(station_m: f64, kind: SignKind) -> Value {
+    json!({"station_m": station_m, "kind": if kind == SignKind::Stop { "stop" } else { "yield" }})
 }
 
 /// Lanes that a signal stops, once for each of its lines.

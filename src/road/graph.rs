@@ -7,9 +7,9 @@ use crate::geometry::{Path, wrap_angle};
 use super::centre_line::{CentreLine, NoCentreLine, centre_line};
 use super::index::LaneGrid;
 use super::lane_change::permitted;
-use super::map::{Junction, Lane, LaneIndex, LaneKey, Neighbour, RoadError, RoadMap, Turn};
+use super::map::{Junction, Lane, LaneIndex, LaneKey, Neighbour, Precedence, RoadError, RoadMap, Turn};
 use super::opendrive::{Contact, Document, RoadElement, RoadLink, SectionElement, wrong};
-use super::signals::{add_crosswalks, add_signals};
+use super::signals::{add_crosswalks, add_signals, set_precedence};
 
 /// The limit of a road whose file states none: 50 km/h, usual in towns.
 const LIMIT_MPS_DEFAULT: f64 = 50.0 / 3.6;
@@ -42,6 +42,7 @@ pub fn build(document: &Document) -> Result<RoadMap, RoadError> {
             map.junctions[junction].lanes.push(LaneIndex(index));
         }
     }
+    set_precedence(&mut map);
     map.grid = LaneGrid::new(&map.lanes);
     Ok(map)
 }
@@ -406,6 +407,8 @@ fn new_lane(
         changes_right_m: Vec::new(),
         junction,
         stop_lines: Vec::new(),
+        sign_lines: Vec::new(),
+        precedence: Precedence::Equal,
         road_stations_m: centre.road_stations_m,
     }
 }

@@ -57,6 +57,11 @@ pub struct Lane {
     pub turn: Turn,
     /// Stop lines on this lane, by rising station.
     pub stop_lines: Vec<StopLine>,
+    /// Where a stop or yield sign holds for this lane, by rising station. Empty where lights hold, too: they
+    /// have precedence.
+    pub sign_lines: Vec<SignLine>,
+    /// What signs say of a lane inside a junction; `Equal` for other lanes, and where lights stand.
+    pub precedence: Precedence,
     /// Station of the road's reference line at each vertex of `centre`, m: rising or falling.
     pub(super) road_stations_m: Vec<f64>,
 }
@@ -94,6 +99,25 @@ pub struct StopLine {
     pub signal: usize,
 }
 
+/// Where a lane must stop or give way because of a sign.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SignLine {
+    pub station_m: f64,
+    /// `Stop` or `Yield`.
+    pub kind: SignKind,
+}
+
+/// How traffic of a lane stands to crossing traffic by its signs: the lower of two goes first.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Precedence {
+    /// It comes along a priority road.
+    Priority,
+    /// No sign says anything.
+    Equal,
+    /// It comes from a stop or yield sign.
+    Yield,
+}
+
 /// A set of lights. All lights of one group show the same colour.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Signal {
@@ -106,7 +130,7 @@ pub struct Signal {
     pub group: usize,
 }
 
-/// A stop or yield sign. Lights have precedence where both stand.
+/// A sign that says who gives way. Lights have precedence where both stand.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sign {
     pub id: String,
@@ -120,6 +144,8 @@ pub struct Sign {
 pub enum SignKind {
     Stop,
     Yield,
+    /// The road has priority, at the next junction or until further notice.
+    PriorityRoad,
 }
 
 #[derive(Debug, Clone, PartialEq)]
@@ -173,6 +199,23 @@ impl RoadMap {
 
     pub fn lane(&self, index: LaneIndex) -> &Lane {
         &self.lanes[index.0]
+    }
+
+    /// A lane inside a junction, and the lanes that lead to it, one before the other, until they are
+    /// [`APPROACH_M`] long or come out of another junction.
+    pub fn approach(&self, lane: LaneIndex) -> impl Iterator<Item = LaneIndex> + '_ {
+        let mut away_m = 0.0;
+        core::iter::successors(Some(lane), move |after| {
+            let before = *self.lane(*after).predecessors.first()?;
+            let is_near = away_m < APPROACH_M && self.lane(before).junction.is_none();
+            away_m += self.lane(before).centre.length_m();
+            is_near.then_some(before)
+        })
+    }
+
+    /// The stop line before a lane inside a junction, or on it.
+    pub fn stop_line_of(&self, lane: LaneIndex) -> Option<StopLine> {
+        self.approach(lane).find_map(|lane| self.lane(lane).stop_lines.last().copied())
     }
 
     /// The place named by an OpenDRIVE road, lane and station (`s` along the road's reference line).
@@ -239,6 +282,9 @@ impl RoadMap {
         best.map(|(_, _, place)| place)
     }
 }
+
+/// How far before a junction its lights and signs may stand, m. Ours.
+const APPROACH_M: f64 = 40.0;
 
 /// How much a metre beside the centre of a lane weighs against a turn, rad.
 const MISFIT_RAD_PER_M: f64 = 0.1;

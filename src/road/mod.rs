@@ -22,7 +22,7 @@ mod tests;
 pub use abreast::{Connection, Opposing};
 pub use lane_change::STRIP_M_MAX;
 pub use map::{
-    Crosswalk, Junction, Lane, LaneIndex, LaneKey, LanePlace, Neighbour, RoadError, RoadMap, Side, Sign,
-    SignKind, Signal, StopLine, Turn,
+    Crosswalk, Junction, Lane, LaneIndex, LaneKey, LanePlace, Neighbour, Precedence, RoadError, RoadMap,
+    Side, Sign, SignKind, SignLine, Signal, StopLine, Turn,
 };
-pub use route::{Conflict, Route, RouteLane, RouteLaneChange, RouteStopLine};
+pub use route::{Conflict, Route, RouteLane, RouteLaneChange, RouteSignLine, RouteStopLine};

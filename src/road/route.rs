@@ -7,7 +7,7 @@ use crate::geometry::{Path, smooth_step, wrap_angle};
 use super::conflict::{conflicts, spans_inside};
 use super::join::Joined;
 use super::lane_change::LENGTH_M_MIN;
-use super::map::{LaneIndex, LanePlace, RoadError, RoadMap};
+use super::map::{LaneIndex, LanePlace, RoadError, RoadMap, SignKind};
 use super::search::{Move, cheapest_way};
 
 /// A way from a start to a goal along lane centres and from lane to lane.
@@ -22,6 +22,8 @@ pub struct Route {
     /// Station of the goal, m.
     pub goal_m: f64,
     pub stop_lines: Vec<RouteStopLine>,
+    /// Where a stop or yield sign holds for the route and no light does, by rising station.
+    pub sign_lines: Vec<RouteSignLine>,
     /// Where the path crosses zebra crossings: from, to, m.
     pub crosswalks_m: Vec<(f64, f64)>,
     /// Where other lanes cross or join the path inside junctions, by rising station.
@@ -64,6 +66,13 @@ pub struct RouteLaneChange {
 pub struct RouteStopLine {
     pub station_m: f64,
     pub signal: usize,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RouteSignLine {
+    pub station_m: f64,
+    /// `Stop` or `Yield`.
+    pub kind: SignKind,
 }
 
 /// A crossing of the route with another lane inside a junction.
@@ -123,18 +132,29 @@ impl Route {
             change.latest_m = change.latest_m.min(latest_m);
             latest_m = change.latest_m - (change.end_m - change.begin_m);
         }
+        // The route uses only a part of a lane that it enters or leaves midway, and it has two ends.
+        let is_on = |lane: &RouteLane, station_m: f64| {
+            let used = lane.enter_m - PART_M..=lane.to_m + PART_M;
+            used.contains(&station_m) && (0.0..=path.length_m()).contains(&station_m)
+        };
         let stop_lines = lanes.iter().flat_map(|lane| {
             let of_lane = map.lane(lane.lane).stop_lines.iter();
             let on_route = of_lane
                 .map(|line| RouteStopLine { station_m: lane.from_m + line.station_m, signal: line.signal });
-            // The route uses only a part of a lane that it enters or leaves midway.
-            on_route.filter(|line| (lane.enter_m - PART_M..=lane.to_m + PART_M).contains(&line.station_m))
+            on_route.filter(|line| is_on(lane, line.station_m))
+        });
+        let sign_lines = lanes.iter().flat_map(|lane| {
+            let of_lane = map.lane(lane.lane).sign_lines.iter();
+            let on_route = of_lane
+                .map(|line| RouteSignLine { station_m: lane.from_m + line.station_m, kind: line.kind });
+            on_route.filter(|line| is_on(lane, line.station_m))
         });
         let mut crosswalks_m: Vec<_> =
             map.crosswalks.iter().flat_map(|crosswalk| spans_inside(&path, &crosswalk.outline)).collect();
         crosswalks_m.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
         Ok(Route {
-            stop_lines: stop_lines.filter(|line| (0.0..=path.length_m()).contains(&line.station_m)).collect(),
+            stop_lines: stop_lines.collect(),
+            sign_lines: sign_lines.collect(),
             crosswalks_m,
             conflicts: conflicts(map, &lanes, &path),
             lanes,

@@ -1,11 +1,13 @@
-//! Traffic lights with their groups and stop lines, stop and yield signs, and crosswalks.
+//! Traffic lights with their groups and stop lines, signs that say who gives way, and crosswalks.
 
 use std::collections::BTreeMap;
 
 use crate::geometry::{Pose, Vec2};
 
 use super::graph::Builder;
-use super::map::{Crosswalk, LaneIndex, RoadError, Sign, SignKind, Signal, StopLine};
+use super::map::{
+    Crosswalk, LaneIndex, Precedence, RoadError, RoadMap, Sign, SignKind, SignLine, Signal, StopLine,
+};
 use super::opendrive::{Meaning, Orientation, Outline, RoadElement, RoadLink, SignalElement, wrong};
 
 /// Signal heads of one group that are nearer to each other than this share a stop line, m.
@@ -22,9 +24,7 @@ pub fn add_signals(builder: &mut Builder) -> Result<(), RoadError> {
             let position = position(road, signal.s_m, signal.t_m);
             let id = signal.id.clone();
             let place = match signal.meaning {
-                Meaning::Stop | Meaning::Yield => {
-                    let stop = signal.meaning == Meaning::Stop;
-                    let kind = if stop { SignKind::Stop } else { SignKind::Yield };
+                Meaning::Sign(kind) => {
                     builder.map.signs.push(Sign { id, kind, position, lanes: Vec::new() });
                     Found::Sign(builder.map.signs.len() - 1)
                 }
@@ -72,6 +72,39 @@ pub fn add_signals(builder: &mut Builder) -> Result<(), RoadError> {
     }
     arms.warn(builder);
     Ok(())
+}
+
+/// Notes on every lane the signs that hold for it, and on the lanes inside junctions what follows from them.
+pub fn set_precedence(map: &mut RoadMap) {
+    for sign in &map.signs {
+        for &(index, station_m) in sign.lanes.iter().filter(|_| sign.kind != SignKind::PriorityRoad) {
+            let lane = &mut map.lanes[index.0];
+            if lane.stop_lines.is_empty() {
+                lane.sign_lines.push(SignLine { station_m, kind: sign.kind });
+                lane.sign_lines.sort_by(|a, b| a.station_m.total_cmp(&b.station_m));
+            }
+        }
+    }
+    let on_priority_road = |lane: LaneIndex| {
+        let mut signs = map.signs.iter().filter(|sign| sign.kind == SignKind::PriorityRoad);
+        signs.any(|sign| sign.lanes.iter().any(|(held, _)| *held == lane))
+    };
+    let precedence = |lane: LaneIndex| {
+        if map.stop_line_of(lane).is_some() {
+            Precedence::Equal
+        } else if map.approach(lane).any(|lane| !map.lane(lane).sign_lines.is_empty()) {
+            Precedence::Yield
+        } else if map.approach(lane).any(on_priority_road) {
+            Precedence::Priority
+        } else {
+            Precedence::Equal
+        }
+    };
+    let inside = map.junctions.iter().flat_map(|junction| junction.lanes.iter().copied());
+    let found: Vec<_> = inside.map(|lane| (lane, precedence(lane))).collect();
+    for (lane, precedence) in found {
+        map.lanes[lane.0].precedence = precedence;
+    }
 }
 
 /// What a signal of the file became: an index in the map's signals or in its signs.

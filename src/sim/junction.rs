@@ -3,8 +3,8 @@
 //!
 //! Made once for a map from its lanes alone. Where the way of another vehicle passes through the area,
 //! and when, is for the drivers to judge (see `manners`). Lanes that leave the same lane are no
-//! conflict: a vehicle on one of them follows the vehicle ahead. Stop and yield signs of a map are not
-//! obeyed, so no road has priority; where signals differ, they decide before any of this.
+//! conflict: a vehicle on one of them follows the vehicle ahead. Where lights differ, they decide before any
+//! of this (see `right_of_way`).
 
 use crate::geometry::{Path, wrap_angle};
 use crate::road::{LaneIndex, RoadMap, Turn};
@@ -101,10 +101,15 @@ fn stretch_near(path: &Path, other: &Path) -> Option<(f64, f64)> {
 
 /// Whether `a` goes before `b`.
 ///
-/// A vehicle that turns left or round yields to oncoming traffic; otherwise the vehicle from the right
+/// Signs decide first: a priority road before a lane without signs, and that before a stop or yield sign.
+/// Where they say the same, a vehicle that turns left or round yields to oncoming traffic; otherwise the vehicle from the right
 /// goes first (Vienna Convention, article 18; so in Estonia and California). Of two from the same side,
 /// the one that turns less goes first; if they turn alike, the lane that the file names first.
 pub(super) fn goes_first(map: &RoadMap, a: LaneIndex, b: LaneIndex) -> bool {
+    let (signs_a, signs_b) = (map.lane(a).precedence, map.lane(b).precedence);
+    if signs_a != signs_b {
+        return signs_a < signs_b;
+    }
     let approach_rad = |lane: LaneIndex| map.lane(lane).centre.points()[0].heading_rad;
     let angle_rad = wrap_angle(approach_rad(b) - approach_rad(a));
     let rank = |lane: LaneIndex| match map.lane(lane).turn {

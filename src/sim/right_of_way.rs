@@ -20,10 +20,8 @@ pub fn right_of_way(
     ego: LaneIndex,
     other: LaneIndex,
 ) -> Priority {
-    let is_red = |lane: LaneIndex| {
-        let stop_line = approach(map, lane).find_map(|lane| map.lane(lane).stop_lines.last());
-        stop_line.is_some_and(|line| colour(line.signal) == SignalColour::Red)
-    };
+    let is_red =
+        |lane: LaneIndex| map.stop_line_of(lane).is_some_and(|line| colour(line.signal) == SignalColour::Red);
     by_lanes(map, (ego, is_red(ego)), (other, is_red(other)))
 }
 
@@ -40,21 +38,6 @@ fn by_lanes(
         (false, false) if goes_first(map, ego, other) => Priority::Ego,
         (false, false) => Priority::Other,
     }
-}
-
-/// How far before a junction its stop lines and signs may stand, m. Ours.
-const APPROACH_M: f64 = 40.0;
-
-/// A lane inside a junction, and the lanes that lead to it, one before the other, up to [`APPROACH_M`] away.
-fn approach(map: &RoadMap, lane: LaneIndex) -> impl Iterator<Item = LaneIndex> {
-    let mut away_m = 0.0;
-    let before = move |after: &LaneIndex| {
-        let before = *map.lane(*after).predecessors.first()?;
-        let here = away_m;
-        away_m += map.lane(before).centre.length_m();
-        (here < APPROACH_M && map.lane(before).junction.is_none()).then_some(before)
-    };
-    core::iter::successors(Some(lane), before)
 }
 
 #[cfg(test)]
@@ -82,5 +65,21 @@ mod tests {
         assert_eq!(decided([Red, Green]), [Priority::Other, Priority::Ego]);
         assert_eq!(decided([Red, Red]), [Priority::None, Priority::None]);
         assert_eq!(decided([Green, Green]), [Priority::Other, Priority::Ego], "the one from the right");
+    }
+
+    #[test]
+    fn signs_decide_before_the_right_and_lights_before_signs() {
+        let decided = |ego: &str, other: &str| {
+            let map = testing::crossing_of(ego, other).map.clone();
+            right_of_way(&map, |_| SignalColour::Green, inside(&map, "2"), inside(&map, "5"))
+        };
+        let (light, stop, yields, priority, none) = ("1000001", "206", "205", "306", "274");
+        assert_eq!(decided(none, none), Priority::Other, "the one from the right");
+        assert_eq!(decided(priority, none), Priority::Ego);
+        assert_eq!(decided(none, yields), Priority::Ego);
+        assert_eq!(decided(priority, stop), Priority::Ego);
+        assert_eq!(decided(yields, priority), Priority::Other);
+        assert_eq!(decided(stop, stop), Priority::Other, "both signs say the same");
+        assert_eq!(decided(light, light), Priority::Other);
     }
 }

@@ -88,18 +88,24 @@ pub fn straight() -> Arc<Scene> {
 /// lane at x = 300, to the right of which a second lane ends at the junction. Signal 0 is the ego
 /// vehicle's, signal 1 the other's; both stop lines are 15 m before the crossing.
 pub fn crossing() -> Arc<Scene> {
-    let light = |id: &str| {
+    crossing_of("1000001", "1000001")
+}
+
+/// As [`crossing`], with signals of other types at the ego vehicle's street and at the other: lights or signs.
+pub fn crossing_of(ego: &str, other: &str) -> Arc<Scene> {
+    let signal = |id: &str, kind: &str| {
         format!(
-            r#"<signals><signal id="{id}" s="285" t="-5" orientation="+" dynamic="yes" type="1000001" subtype="-1"/></signals>"#
+            r#"<signals><signal id="{id}" s="285" t="-5" orientation="+" dynamic="yes" type="{kind}" subtype="-1"/></signals>"#
         )
     };
+    let (ego, other) = (signal("ego", ego), signal("other", other));
     let (one, two, through) = (lanes(&[plain(-1)]), lanes(&[plain(-1), plain(-2)]), lanes(&[THROUGH]));
     let north = core::f64::consts::FRAC_PI_2;
     let roads = [
-        street("1", [0.0, 0.0, 0.0, 290.0], "-1", INTO, &one, &light("ego")),
+        street("1", [0.0, 0.0, 0.0, 290.0], "-1", INTO, &one, &ego),
         street("2", [290.0, 0.0, 0.0, 20.0], "9", &joins("1", "3"), &through, ""),
         street("3", [310.0, 0.0, 0.0, 290.0], "-1", OUT, &one, ""),
-        street("4", [298.25, -300.0, north, 290.0], "-1", INTO, &two, &light("other")),
+        street("4", [298.25, -300.0, north, 290.0], "-1", INTO, &two, &other),
         street("5", [298.25, -10.0, north, 20.0], "9", &joins("4", "6"), &through, ""),
         street("6", [298.25, 10.0, north, 290.0], "-1", OUT, &one, ""),
     ]

@@ -1,5 +1,7 @@
 //! The elements of an OpenDRIVE file that are read, in OpenDRIVE's own terms.
 
+use crate::road::SignKind;
+
 use super::cubic::{Cubics, Jet};
 use super::geometry::ReferenceLine;
 
@@ -111,8 +113,7 @@ pub enum Meaning {
     Light,
     /// A light for pedestrians, cyclists or trams.
     OtherLight,
-    Stop,
-    Yield,
+    Sign(SignKind),
 }
 
 /// The traffic that a signal holds for, by its direction along the reference line.

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use crate::geometry::Vec2;
-use crate::road::RoadError;
+use crate::road::{RoadError, SignKind};
 
 use super::cubic::{Cubic, Cubics};
 use super::elements::{
@@ -300,7 +300,7 @@ impl Reader {
                 }
             };
             let kind = signal.attribute("type").unwrap_or("");
-            let Some(meaning) = (if reference { Some(Meaning::Light) } else { meaning(kind) }) else {
+            let Some(meaning) = (if reference { Some(Meaning::Light) } else { meaning(signal, kind) }) else {
                 self.ignore(format!("signals of type `{kind}`"));
                 continue;
             };
@@ -361,17 +361,36 @@ impl Reader {
     }
 }
 
-/// What a type of signal means: OpenDRIVE's own catalogue for lights; for signs the German numbers, which
-/// CARLA's maps use as well, and the American ones.
-fn meaning(kind: &str) -> Option<Meaning> {
+/// What a signal means: OpenDRIVE's own catalogue for lights; for signs the numbers of the road traffic
+/// regulations of Germany (which CARLA's maps use everywhere), the United States and Great Britain, or else the
+/// name.
+fn meaning(signal: Element, kind: &str) -> Option<Meaning> {
+    let country = signal.attribute("country").unwrap_or("");
+    let is_british = country.eq_ignore_ascii_case("GB") || country.eq_ignore_ascii_case("UK");
     match kind {
         "1000002" | "1000007" | "1000013" => Some(Meaning::OtherLight),
-        "206" | "R1-1" => Some(Meaning::Stop),
-        "205" | "R1-2" => Some(Meaning::Yield),
-        _ => kind
-            .parse()
-            .is_ok_and(|number| (1_000_001..=1_000_020).contains(&number))
-            .then_some(Meaning::Light),
+        "206" | "R1-1" => Some(Meaning::Sign(SignKind::Stop)),
+        "205" | "R1-2" => Some(Meaning::Sign(SignKind::Yield)),
+        // Priority at the next junction, and until further notice.
+        "301" | "306" => Some(Meaning::Sign(SignKind::PriorityRoad)),
+        "601.1" if is_british => Some(Meaning::Sign(SignKind::Stop)),
+        "602" if is_british => Some(Meaning::Sign(SignKind::Yield)),
+        _ if kind.parse().is_ok_and(|number| (1_000_001..=1_000_020).contains(&number)) => {
+            Some(Meaning::Light)
+        }
+        _ => named(signal.attribute("name").unwrap_or("")).map(Meaning::Sign),
+    }
+}
+
+/// The sign of a name such as `Sign_Stop` or `give way`. Names with further words are left: `bus stop`.
+fn named(name: &str) -> Option<SignKind> {
+    let words = name.split(|letter: char| !letter.is_ascii_alphabetic()).filter(|word| !word.is_empty());
+    let plain: String = words.map(str::to_ascii_lowercase).filter(|word| word != "sign").collect();
+    match plain.strip_suffix("sign").unwrap_or(&plain) {
+        "stop" => Some(SignKind::Stop),
+        "yield" | "giveway" => Some(SignKind::Yield),
+        "priorityroad" => Some(SignKind::PriorityRoad),
+        _ => None,
     }
 }
 

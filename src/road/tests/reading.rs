@@ -124,6 +124,46 @@ fn lights_stop_the_lanes_they_are_meant_for() {
 }
 
 #[test]
+fn signs_are_known_by_number_or_name() {
+    let lanes = r#"<laneSection s="0"><right><lane id="-1" type="driving"><width a="3"/></lane></right></laneSection>"#;
+    let kinds = |signal: &str| -> Vec<SignKind> {
+        let tail = format!(r#"<signals><signal id="a" s="90" t="-5" orientation="+" {signal}/></signals>"#);
+        read(&one_road("", "", LINE_100, lanes, &tail)).signs.iter().map(|sign| sign.kind).collect()
+    };
+    for (signal, expected) in [
+        (r#"type="206""#, Some(SignKind::Stop)),
+        (r#"type="205" name="Sign_Yield""#, Some(SignKind::Yield)),
+        (r#"type="306" country="DE""#, Some(SignKind::PriorityRoad)),
+        (r#"type="R1-2" country="US""#, Some(SignKind::Yield)),
+        (r#"type="602" country="GB""#, Some(SignKind::Yield)),
+        (r#"type="602""#, None),
+        (r#"type="-1" name="StopSign""#, Some(SignKind::Stop)),
+        (r#"type="-1" name="give way""#, Some(SignKind::Yield)),
+        (r#"type="-1" name="Priority road""#, Some(SignKind::PriorityRoad)),
+        (r#"type="-1" name="bus stop""#, None),
+        (r#"type="-1" name="Stencil_STOP""#, None),
+    ] {
+        assert_eq!(kinds(signal), Vec::from_iter(expected), "{signal}");
+    }
+}
+
+#[test]
+fn signs_become_lines_of_the_route() {
+    let lanes = r#"<laneSection s="0"><right><lane id="-1" type="driving"><width a="3"/></lane></right></laneSection>"#;
+    let lines = |light: &str| {
+        let sign = r#"<signal id="a" s="70" t="-5" orientation="+" type="205"/>"#;
+        let tail = format!("<signals>{sign}{light}</signals>");
+        let map = read(&one_road("", "", LINE_100, lanes, &tail));
+        let place = |s_m| map.place("1", -1, s_m).unwrap();
+        let route = Route::find(&map, place(10.0), place(90.0)).unwrap();
+        route.sign_lines.iter().map(|line| (line.station_m.round(), line.kind)).collect::<Vec<_>>()
+    };
+    assert_eq!(lines(""), [(60.0, SignKind::Yield)]);
+    let light = r#"<signal id="b" s="72" t="-5" orientation="+" type="1000001"/>"#;
+    assert!(lines(light).is_empty(), "a light has precedence");
+}
+
+#[test]
 fn crosswalks_have_corners_in_either_frame() {
     let tail = r#"<objects>
         <object type="crosswalk" id="local" s="50" t="0" hdg="1.5707963267948966"><outlines><outline>
