@@ -7,7 +7,7 @@ use super::environment::{GRAVITY_MPS2, Grip};
 use super::npc::Driver;
 use super::road_user::{Motion, Obstacle, RoadUser};
 use super::scene::Scene;
-use super::sense::EgoMotion;
+use super::sense::{EgoMotion, RANGE_M};
 use super::signals::SignalClock;
 
 /// The world around one road user during one tick, or around a newcomer that is not in it yet.
@@ -66,6 +66,11 @@ impl Around<'_> {
             }
             Motion::Drive(_) | Motion::Walk(_) | Motion::Stand => None,
         })
+    }
+
+    /// Whether the ego vehicle's sensors would see an obstacle of which nothing hides `visible_fraction`.
+    pub fn is_in_sight(&self, obstacle: &Obstacle, visible_fraction: f64) -> bool {
+        visible_fraction > 0.0 && obstacle.distance_m < RANGE_M.min(self.visibility_m)
     }
 
     /// The hardest braking of a body at a speed on this road, m/s².

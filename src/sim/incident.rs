@@ -1,7 +1,10 @@
-//! Contacts among obstacles. Both obstacles stop where they touch, and leave later.
+//! Contacts among obstacles: where a motion ends at another obstacle, and what the impact does to both.
 //!
 //! Obstacles move one after another, each among the others as they stand at that moment. So no two can
-//! come to overlap, whatever the size of a step. Contacts with the ego vehicle are in `contact`.
+//! come to overlap, whatever the size of a step. The impact is plastic: across the gap that closed, both go
+//! on at the common speed that their momentum gives; along it each keeps its own. Then both slide straight
+//! on with locked wheels until friction stops them (`road_user`). Turning by the impact, bounce and damage
+//! are left out. Contacts with the ego vehicle are in `contact`.
 
 use crate::geometry::{FirstContact, Frame, Pose, Sweep, Vec2, first_contact, wrap_angle};
 
@@ -12,7 +15,7 @@ use super::world::DT_S;
 /// rounding.
 const CLOSE_M: f64 = 1e-3;
 
-/// Two obstacles touched each other. Both stand where it happened, and leave 2 s later.
+/// Two obstacles touched each other. Both slide to rest, and leave when they are out of sight.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Incident {
     /// Since the episode began, s.
@@ -30,6 +33,8 @@ pub(super) struct Bump {
     pub other: usize,
     /// Where the motion ends.
     pub pose: Pose,
+    /// Unit vector towards the other across the gap that closed; zero if they touched already.
+    pub normal: Vec2,
     pub incident: Incident,
 }
 
@@ -72,5 +77,37 @@ pub(super) fn bump(users: &[RoadUser], index: usize, end: &Pose, tick: u64) -> O
         other: users[other].obstacle.id,
         point: contact.point,
     };
-    Some(Bump { other, pose: sweep.at(contact.fraction).pose, incident })
+    Some(Bump { other, pose: sweep.at(contact.fraction).pose, normal: contact.normal, incident })
+}
+
+/// Velocities of two masses after a plastic impact across the unit vector `normal`, m/s; unchanged if the gap
+/// does not close.
+pub(super) fn impact(normal: Vec2, first: (f64, Vec2), second: (f64, Vec2)) -> (Vec2, Vec2) {
+    let ((first_t, first_mps), (second_t, second_mps)) = (first, second);
+    let closing_mps = (first_mps - second_mps).dot(&normal).max(0.0);
+    let lost_mps = closing_mps * second_t / (first_t + second_t);
+    (first_mps - normal * lost_mps, second_mps + normal * (closing_mps - lost_mps))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn momentum_is_kept_and_the_gap_no_longer_closes() {
+        let normal = Vec2::new(0.6, 0.8);
+        for (first, second) in [
+            ((1.55, Vec2::new(12.0, 1.0)), (11.0, Vec2::new(-3.0, 4.0))),
+            ((6.0, Vec2::new(3.0, 9.0)), (0.075, Vec2::zeros())),
+        ] {
+            let (a, b) = impact(normal, first, second);
+            let before = first.1 * first.0 + second.1 * second.0;
+            assert!((a * first.0 + b * second.0 - before).norm() < 1e-12);
+            assert!((a - b).dot(&normal).abs() < 1e-12);
+            // Along the gap nothing changes.
+            assert!((a - first.1).perp(&normal).abs() < 1e-12 && (b - second.1).perp(&normal).abs() < 1e-12);
+        }
+        let (behind, ahead) = ((2.0, Vec2::zeros()), (2.0, normal));
+        assert_eq!(impact(normal, behind, ahead), (behind.1, ahead.1), "the gap opens");
+    }
 }

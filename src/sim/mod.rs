@@ -8,8 +8,8 @@
 //! 2. The other road users move one after another, each among the others as they stand at that moment
 //!    (`road_user`, `around`). A driver looks around every fifth tick and then follows, stops or changes
 //!    lanes (`npc`); a pedestrian walks or waits (`pedestrian`).
-//! 3. A road user that would move into another stops at it (`incident`); one that the ego vehicle touches
-//!    shares its momentum (`contact`). Both leave 2 s later.
+//! 3. A road user that would move into another shares its momentum with it (`incident`), and so does one that
+//!    the ego vehicle touches (`contact`). Both come to rest by friction, and leave when out of sight.
 //! 4. Twice a second, ambient traffic leaves and appears (`ambient`).
 //! 5. Every fifth tick, water rises and drains (`environment`) and lines of sight are worked out (`sense`).
 //!

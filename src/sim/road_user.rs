@@ -7,11 +7,12 @@ use crate::model::vocabulary::{Body, Colour, Verb};
 use super::ambient::COMMANDED_MAX;
 use super::around::Around;
 use super::body::BodyParameters;
+use super::environment::GRAVITY_MPS2;
 use super::npc::Driver;
 use super::pedestrian::Walker;
 use super::world::DT_S;
 
-/// How long a wreck stays where it came to rest, s.
+/// How long a wreck stays where it came to rest, s; longer while the ego vehicle sees it.
 const WRECK_S: f64 = 2.0;
 
 /// A road user other than the ego vehicle, as others may see it.
@@ -55,8 +56,8 @@ pub(super) struct Mover {
     pub motion: Motion,
     /// Whether it and the ego vehicle have touched, whichever ran into the other.
     pub touched: bool,
-    /// Whether it and another obstacle have touched. It stands where that happened.
-    crashed: bool,
+    /// The obstacle that it touched last: it slides to rest.
+    crashed_with: Option<u32>,
     /// Ticks that it has been a wreck at rest.
     rest_ticks: u32,
     /// Part of it that the ego vehicle's sensors saw when they last looked.
@@ -136,26 +137,27 @@ impl RoadUser {
 
 impl Mover {
     pub fn new(size: BodyParameters, motion: Motion) -> Mover {
-        Mover { size, motion, touched: false, crashed: false, rest_ticks: 0, visible_fraction: 1.0 }
+        Mover { size, motion, touched: false, crashed_with: None, rest_ticks: 0, visible_fraction: 1.0 }
     }
 
     /// Whether it does nothing any more but come to rest.
     pub fn is_wreck(&self) -> bool {
-        self.touched || self.crashed
+        self.touched || self.crashed_with.is_some()
     }
 
     /// One tick of the obstacle `this`; `None` if it leaves the world.
     pub fn step(&mut self, this: &Obstacle, around: &Around) -> Option<Moved> {
+        let in_sight = around.is_in_sight(this, self.visible_fraction);
         if self.is_wreck() && this.velocity_mps == Vec2::zeros() {
-            self.rest_ticks += 1;
-            if f64::from(self.rest_ticks) * DT_S >= WRECK_S {
+            self.rest_ticks = self.rest_ticks.saturating_add(1);
+            if f64::from(self.rest_ticks) * DT_S >= WRECK_S && !in_sight {
                 return None;
             }
         }
         let rest = Moved::at_rest(this);
         match &mut self.motion {
-            _ if self.crashed => Some(rest),
-            Motion::Drive(driver) => driver.step(this, &self.size, self.touched, around),
+            _ if self.crashed_with.is_some() => Some(slide(this, around)),
+            Motion::Drive(driver) => driver.step(this, &self.size, self.touched, in_sight, around),
             Motion::Walk(_) if self.touched => Some(rest),
             Motion::Walk(walker) => walker.step(this, around),
             Motion::Stand => Some(rest),
@@ -170,17 +172,18 @@ impl Mover {
         }
     }
 
-    /// It and another obstacle touched: it stands from now on.
-    pub fn crash(&mut self) {
-        self.crashed = true;
+    /// It and another obstacle touched: from now on it slides to rest. Returns the obstacle that it had
+    /// touched last.
+    pub fn crash(&mut self, other: u32) -> Option<u32> {
         if let Motion::Drive(driver) = &mut self.motion {
             driver.speed_mps = 0.0;
         }
+        self.crashed_with.replace(other)
     }
 
     fn trace(&self, sink: &mut dyn FnMut(u64)) {
         sink(u64::from(self.touched));
-        sink(u64::from(self.crashed));
+        sink(u64::from(self.crashed_with.unwrap_or(0)));
         sink(u64::from(self.rest_ticks));
         sink(self.visible_fraction.to_bits());
         match &self.motion {
@@ -189,6 +192,19 @@ impl Mover {
             Motion::Stand => {}
         }
     }
+}
+
+/// A tick with wheels locked: straight on, without turning, slowed by the friction of the road.
+fn slide(this: &Obstacle, around: &Around) -> Moved {
+    let speed_mps = this.velocity_mps.norm();
+    let rest = Moved::at_rest(this);
+    if speed_mps == 0.0 {
+        return rest;
+    }
+    let lost_mps = around.grip.friction(speed_mps) * GRAVITY_MPS2 * DT_S;
+    let velocity_mps = this.velocity_mps * (1.0 - lost_mps / speed_mps).max(0.0);
+    let position = rest.pose.position + (this.velocity_mps + velocity_mps) / 2.0 * DT_S;
+    Moved { pose: Pose { position, ..rest.pose }, velocity_mps, ..rest }
 }
 
 impl Moved {

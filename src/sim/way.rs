@@ -4,13 +4,15 @@
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use crate::geometry::{Path, Vec2};
+use crate::geometry::{Path, Pose, Vec2};
 use crate::rng;
 use crate::rng::Rng;
-use crate::road::{LaneIndex, RouteStopLine};
+use crate::road::{Lane, LaneIndex, RoadMap, RouteStopLine};
 
+use super::body::BodyParameters;
 use super::junction::Area;
 use super::scene::Scene;
+use super::sense::RANGE_M;
 
 /// Lateral acceleration that other drivers accept in a bend, m/s²: upper end of comfort.
 const LATERAL_MPS2: f64 = 3.0;
@@ -20,6 +22,15 @@ const BEND_BRAKING_MPS2: f64 = 2.0;
 
 /// A way reaches at least this far beyond the lanes it was asked for, if the road does, m.
 const REACH_M: f64 = 400.0;
+
+/// A way that is prolonged keeps at least so much behind a vehicle, m: more than the longest body has
+/// behind its centre, so that no rear axle leaves its bend.
+const BEHIND_M: f64 = 15.0;
+
+/// Step and room of the search for lanes beyond the end of a way, m: a way that goes on beside a lane is not
+/// free. Ours.
+const BEYOND_STEP_M: f64 = 6.0;
+const BEYOND_ROOM_M: f64 = 4.5;
 
 /// Number of ways that are kept for a map; each takes some 30 kB.
 const WAYS_MAX: usize = 256;
@@ -39,6 +50,9 @@ pub(super) struct Way {
     speeds_mps_max: Vec<f64>,
     /// Whether lanes go on where it ends.
     open: bool,
+    /// Where a vehicle that does not turn off must stop, m: a closed way goes on straight beyond its end, as
+    /// a road does beyond the edge of a map, but not into other lanes.
+    pub end_m: Option<f64>,
 }
 
 /// Lanes that begin farther ahead than this do not matter yet, m.
@@ -99,9 +113,35 @@ impl Way {
         }
         let open = chain.last().is_some_and(|last| !map.lane(*last).successors.is_empty());
         let speeds_mps_max = bend_speeds_mps(&path);
+        let end_m = if open { None } else { free_end_m(map, &path) };
         let lane_bits = lanes.iter().fold(0, |bits, part| bits | lane_bit(part.lane));
         areas.sort_by(|a, b| a.from_m.total_cmp(&b.from_m).then(a.other.cmp(&b.other)));
-        Some(Way { path, lanes, lane_bits, stop_lines, areas, speeds_mps_max, open })
+        Some(Way { path, lanes, lane_bits, stop_lines, areas, speeds_mps_max, open, end_m })
+    }
+
+    /// Where the outline's centre of a body is that has driven to a station: both axles are on the way.
+    ///
+    /// The station is that of the rear axle plus the distance from there to the centre, so on a straight
+    /// way it is the centre's. In a bend the body is a chord of the way: its middle cuts the bend, and its
+    /// tail swings out less than if the body turned about its centre. A real rear axle cuts a bend farther;
+    /// its driver swings out before to stay in the lane, which is not modelled.
+    pub fn body_at(&self, station_m: f64, body: &BodyParameters) -> Pose {
+        let rear_m = station_m - body.rear_axle_m;
+        let rear = self.path.pose_at(rear_m);
+        let wheelbase = self.path.pose_at(rear_m + body.wheelbase_m).position - rear.position;
+        let length_m = wheelbase.norm();
+        Pose {
+            position: rear.position + wheelbase * (body.rear_axle_m / length_m),
+            heading_rad: libm::atan2(wheelbase.y, wheelbase.x),
+        }
+    }
+
+    /// A path as a way without lanes.
+    #[cfg(test)]
+    pub fn of_path(path: Path) -> Way {
+        let speeds_mps_max = bend_speeds_mps(&path);
+        let (lanes, stop_lines, areas) = (Vec::new(), Vec::new(), Vec::new());
+        Way { path, lanes, lane_bits: 0, stop_lines, areas, speeds_mps_max, open: false, end_m: None }
     }
 
     /// The lane at a station, clamped to the ends, and the station on it.
@@ -147,12 +187,11 @@ impl Way {
         self.open && self.path.length_m() - station_m < REACH_M / 2.0
     }
 
-    /// A longer way that begins with the lane at `station_m`, and that station on the new way.
+    /// A longer way that begins with the lane [`BEHIND_M`] behind `station_m`, and that station on the new way.
     pub fn prolonged(&self, scene: &Scene, station_m: f64, rng: &mut Rng) -> Option<(Arc<Way>, f64)> {
-        let (here, lane_station_m) = self.lane_at(station_m);
-        let first = self.lanes.iter().rposition(|part| part.lane == here && part.from_m <= station_m)?;
-        let rest: Vec<LaneIndex> = self.lanes[first..].iter().map(|part| part.lane).collect();
-        Some((Way::along(scene, &rest, rng)?, lane_station_m))
+        let after = self.lanes.partition_point(|part| part.from_m <= station_m - BEHIND_M).max(1);
+        let rest: Vec<LaneIndex> = self.lanes[after - 1..].iter().map(|part| part.lane).collect();
+        Some((Way::along(scene, &rest, rng)?, station_m - self.lanes[after - 1].from_m))
     }
 }
 
@@ -175,6 +214,25 @@ impl Ways {
         known.insert(chain, Arc::clone(&way));
         Some(way)
     }
+}
+
+/// Where the straight on from a path's end comes too near to a lane, m; `None` if it does not as far as the
+/// sensors reach. The first metres do not count, because lanes side by side end together.
+fn free_end_m(map: &RoadMap, path: &Path) -> Option<f64> {
+    let stations =
+        (1..).map(|step| f64::from(step) * BEYOND_STEP_M).take_while(|beyond_m| *beyond_m <= RANGE_M);
+    let is_taken = |beyond_m: &f64| {
+        let point = path.pose_at(path.length_m() + beyond_m).position;
+        let near = |lane: &Lane| {
+            lane.centre.bounds().distance_m2_min(point) < BEYOND_ROOM_M * BEYOND_ROOM_M
+                && lane.centre.project(point).distance_m < BEYOND_ROOM_M
+        };
+        map.lanes.iter().any(near)
+    };
+    let mut taken = stations.filter(is_taken);
+    taken.next().map(|beyond_m| {
+        path.length_m() + if beyond_m > 2.0 * BEYOND_STEP_M { beyond_m - BEYOND_STEP_M } else { 0.0 }
+    })
 }
 
 fn lane_bit(lane: LaneIndex) -> u64 {

@@ -13,7 +13,7 @@ use super::around::Around;
 use super::contact::{Contact, Party, common_speed_mps, meet};
 use super::ego::{Control, Ego, VehicleParameters};
 use super::environment::Environment;
-use super::incident::{Bump, Incident, bump};
+use super::incident::{Bump, Incident, bump, impact};
 use super::placement;
 use super::road_user::{Moved, Obstacle, RoadUser};
 use super::scene::Scene;
@@ -33,7 +33,8 @@ pub const DT_S: f64 = 0.02;
 /// Speed at which an episode begins, m/s.
 const START_MPS: f64 = 3.0;
 
-/// Commanded obstacles at a time (published package): the next one removes the oldest.
+/// Commanded obstacles at a time (published package). For the next one, the oldest that is out of sight
+/// leaves; in the package the oldest leaves wherever it is.
 const OBSTACLES_MAX: usize = 10;
 
 /// How far along the route the ego vehicle is looked for from where it was, m. More than it drives
@@ -114,8 +115,9 @@ impl World {
 
     /// Advances by [`DT_S`]; returns the contacts that began.
     ///
-    /// An obstacle that the ego vehicle touched once brakes to rest, leaves 2 s later, and touches it no
-    /// more. Two obstacles that touch each other stand at once (see [`World::incidents`]).
+    /// An obstacle that the ego vehicle touched once brakes to rest and touches it no more. Two obstacles
+    /// that touch each other slide to rest (see [`World::incidents`]). A wreck leaves when it has stood for
+    /// 2 s and the ego vehicle does not see it; so do drivers who waited for others for 20 s.
     pub fn tick(&mut self, control: &Control) -> &[Contact] {
         self.contacts.clear();
         self.incidents.clear();
@@ -321,16 +323,28 @@ impl World {
     }
 
     fn spawn(&mut self, request: &SpawnRequest) -> Result<u32, String> {
+        let leaves = self.make_room()?;
         let newcomer = placement::place(&self.around([&self.users, &[]]), request, self.next_id)?;
-        let is_commanded = |user: &RoadUser| !user.obstacle.is_ambient();
-        if self.users.iter().filter(|user| is_commanded(user)).count() == OBSTACLES_MAX {
-            self.users.remove(self.users.iter().position(is_commanded).expect("there are ten of them"));
+        if let Some(index) = leaves {
+            self.users.remove(index);
         }
         self.users.push(newcomer);
         let id = self.next_id;
         self.next_id += 1;
         self.look();
         Ok(id)
+    }
+
+    /// Index of the commanded obstacle that leaves for the next one, if there are as many as there may be.
+    fn make_room(&self) -> Result<Option<usize>, String> {
+        let mut commanded = self.users.iter().enumerate().filter(|(_, user)| !user.obstacle.is_ambient());
+        if commanded.clone().count() < OBSTACLES_MAX {
+            return Ok(None);
+        }
+        let around = self.around([&self.users, &[]]);
+        let is_hidden = |user: &RoadUser| !around.is_in_sight(&user.obstacle, user.mover.visible_fraction);
+        let oldest = commanded.find(|(_, user)| is_hidden(user));
+        oldest.map(|(index, _)| Some(index)).ok_or("ten road users are there already".into())
     }
 
     /// Lets ambient traffic leave and appear; `begins` is before the first tick.
@@ -356,12 +370,21 @@ impl World {
         let (user, later) = rest.split_first_mut().expect("the index is that of a user");
         let before = user.obstacle;
         let Some(mut moved) = user.mover.step(&before, &self.around([earlier, later])) else { return false };
-        if let Some(Bump { other, pose, incident }) = bump(users, index, &moved.pose, self.ticks) {
-            moved = Moved { pose, forward: pose.forward(), velocity_mps: Vec2::zeros(), ..moved };
-            users[index].mover.crash();
-            users[other].mover.crash();
-            users[other].obstacle.velocity_mps = Vec2::zeros();
-            self.incidents.push(incident);
+        if let Some(Bump { other, pose, normal, incident }) = bump(users, index, &moved.pose, self.ticks) {
+            // Obstacles that touch already push where the one that moves goes.
+            let normal = if normal == Vec2::zeros() { moved.velocity_mps.normalize() } else { normal };
+            let mass_t = |index: usize| users[index].mover.size.mass_t;
+            let other_mps = users[other].obstacle.velocity_mps;
+            let (velocity_mps, other_mps) =
+                impact(normal, (mass_t(index), moved.velocity_mps), (mass_t(other), other_mps));
+            moved = Moved { pose, forward: pose.forward(), velocity_mps, ..moved };
+            users[other].obstacle.velocity_mps = other_mps;
+            let known = users[index].mover.crash(incident.other) == Some(incident.other);
+            let known_there = users[other].mover.crash(incident.obstacle) == Some(incident.obstacle);
+            // Two that slide on together may touch in every tick; that is one incident.
+            if !known && !known_there {
+                self.incidents.push(incident);
+            }
         }
         let RoadUser { obstacle, mover } = &mut users[index];
         (obstacle.outline.pose, obstacle.velocity_mps) = (moved.pose, moved.velocity_mps);
@@ -423,6 +446,7 @@ impl World {
 
 impl Surroundings for World {
     fn survey(&self, request: &SpawnRequest) -> Result<SpawnFacts, String> {
+        let _leaves = self.make_room()?;
         let around = self.around([&self.users, &[]]);
         let newcomer = placement::place(&around, request, self.next_id)?;
         Ok(placement::facts(&around, request, &newcomer))

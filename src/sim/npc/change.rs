@@ -16,7 +16,7 @@ use crate::sim::road_user::{Moved, Obstacle};
 use crate::sim::way::Way;
 use crate::sim::world::DT_S;
 
-use super::driver::{Driver, SIDE_ROOM_M, along};
+use super::driver::{Driver, SIDE_ROOM_M};
 use super::leader::extent_m;
 
 /// Room in front and behind that drivers want before changing lanes, m.
@@ -148,21 +148,31 @@ impl Driver {
 
     /// Where it is after a tick in which it drove `way_m`, with the lane change under way moved on. `before`
     /// is where its centre was.
-    pub(super) fn advance_change(&mut self, way_m: f64, before: Vec2) -> Moved {
-        let from = self.way.path.pose_at(self.station_m);
+    pub(super) fn advance_change(&mut self, way_m: f64, before: Vec2, size: &BodyParameters) -> Moved {
+        let from = self.way.body_at(self.station_m, size);
+        // The velocity is measured, because in a bend the centre of a body is slower than its way, and
+        // between two lanes it has neither lane's speed.
+        let at = |pose: Pose, lane_heading_rad| Moved {
+            pose,
+            forward: pose.forward(),
+            lane_heading_rad,
+            velocity_mps: (pose.position - before) / DT_S,
+        };
+        let from_lane_rad = self.lane_heading_rad();
         let Some(change) = &mut self.change else {
-            return along(from, self.speed_mps);
+            return at(from, from_lane_rad);
         };
         let guess_m = change.to_station_m + way_m;
         change.to_station_m =
             change.to.path.project_from(from.position, guess_m).map_or(guess_m, |found| found.station_m);
-        let to = change.to.path.pose_at(change.to_station_m);
+        let to = change.to.body_at(change.to_station_m, size);
+        let to_lane_rad = change.to.path.pose_at(change.to_station_m).heading_rad;
         let progress_per_m = 1.0 / (self.speed_mps.max(CHANGE_FULL_MPS) * change.duration_s);
         change.progress += progress_per_m * way_m;
         if change.progress >= 1.0 {
             (self.way, self.station_m) = (Arc::clone(&change.to), change.to_station_m);
             (self.change, self.hold_m, self.insists_to_m) = (None, None, f64::NEG_INFINITY);
-            return Moved { velocity_mps: (to.position - before) / DT_S, ..along(to, self.speed_mps) };
+            return at(to, to_lane_rad);
         }
         let SmoothStep { value: blend, slope, .. } = smooth_step(change.progress);
         let heading_rad = from.heading_rad + wrap_angle(to.heading_rad - from.heading_rad) * blend;
@@ -171,10 +181,7 @@ impl Driver {
             position: from.position + (to.position - from.position) * blend,
             heading_rad: wrap_angle(heading_rad + turned_rad),
         };
-        // The velocity is measured, because between two lanes in a bend it is neither lane's speed.
-        let lane = if change.progress < 0.5 { from } else { to };
-        let velocity_mps = (pose.position - before) / DT_S;
-        Moved { pose, forward: pose.forward(), lane_heading_rad: lane.heading_rad, velocity_mps }
+        at(pose, if change.progress < 0.5 { from_lane_rad } else { to_lane_rad })
     }
 }
 

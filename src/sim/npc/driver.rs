@@ -9,7 +9,6 @@
 
 use std::sync::Arc;
 
-use crate::geometry::Pose;
 use crate::model::vocabulary::Side;
 use crate::rng;
 use crate::rng::{Rng, Stream};
@@ -49,7 +48,7 @@ pub(in crate::sim) enum Cruise {
 #[derive(Debug, Clone)]
 pub(in crate::sim) struct Driver {
     pub(super) way: Arc<Way>,
-    /// Station of the outline's centre on the way.
+    /// Station on the way: on a straight one, that of the outline's centre (see [`Way::body_at`]).
     pub(super) station_m: f64,
     pub speed_mps: f64,
     pub(super) cruise_mps: f64,
@@ -113,16 +112,30 @@ impl Driver {
     }
 
     /// Where it is before its first tick.
-    pub fn moved(&self) -> Moved {
-        along(self.way.path.pose_at(self.station_m), self.speed_mps)
+    pub fn moved(&self, size: &BodyParameters) -> Moved {
+        let pose = self.way.body_at(self.station_m, size);
+        let forward = pose.forward();
+        Moved {
+            pose,
+            forward,
+            lane_heading_rad: self.lane_heading_rad(),
+            velocity_mps: forward * self.speed_mps,
+        }
     }
 
-    /// One tick; `None` if it leaves the world. One that has `touched` the ego vehicle only brakes.
+    /// Heading of the way where it is, rad.
+    pub(super) fn lane_heading_rad(&self) -> f64 {
+        self.way.path.pose_at(self.station_m).heading_rad
+    }
+
+    /// One tick; `None` if it leaves the world, which it does only while the ego vehicle does not see it
+    /// (`in_sight`). One that has `touched` the ego vehicle only brakes.
     pub fn step(
         &mut self,
         this: &Obstacle,
         size: &BodyParameters,
         touched: bool,
+        in_sight: bool,
         around: &Around,
     ) -> Option<Moved> {
         if !touched && (around.tick + u64::from(this.id)).is_multiple_of(FRAME_TICKS) {
@@ -135,17 +148,18 @@ impl Driver {
         let way_m = (self.speed_mps + speed_mps) / 2.0 * DT_S;
         self.speed_mps = speed_mps;
         self.station_m += way_m;
-        if self.gives_up() {
+        if self.gives_up() && !in_sight {
             return None;
         }
         if let Some(leader) = &mut self.leader {
             leader.gap_m += leader.speed_mps * DT_S - way_m;
         }
-        // A lane that ends under a lane change goes on straight until the change is done.
-        if self.change.is_none() && self.station_m >= self.way.path.length_m() {
+        // A lane that ends under a lane change goes on straight until the change is done. So does one that
+        // ends at the edge of the map while the vehicle is in sight.
+        if self.change.is_none() && self.station_m >= self.way.path.length_m() && !in_sight {
             return None;
         }
-        Some(self.advance_change(way_m, this.outline.pose.position))
+        Some(self.advance_change(way_m, this.outline.pose.position, size))
     }
 
     /// Prolongs the way, begins a lane change that is due, and finds what to follow and what to wait for.
@@ -192,6 +206,10 @@ impl Driver {
         if let Some(gap_m) = self.stop_gap_m(size, around, braking_mps2) {
             wanted_mps2 = wanted_mps2.min(self.follow_mps2(size, &Leader::line(gap_m), free_mps2));
         }
+        if let (None, Some(end_m)) = (&self.change, self.way.end_m) {
+            let gap_m = end_m - self.station_m - size.length_m / 2.0;
+            wanted_mps2 = wanted_mps2.min(self.follow_mps2(size, &Leader::line(gap_m), free_mps2));
+        }
         if let Some(hold_m) = self.hold_m {
             let gap_m = hold_m - self.station_m - size.length_m / 2.0;
             wanted_mps2 = wanted_mps2.min(self.follow_mps2(size, &Leader::line(gap_m), free_mps2));
@@ -199,7 +217,7 @@ impl Driver {
         wanted_mps2
     }
 
-    /// Counts a tick at rest because of others; `true` if it has waited too long and leaves.
+    /// Counts a tick at rest because of others; `true` if it has waited so long that it would leave.
     fn gives_up(&mut self) -> bool {
         let blocked = self.leader.is_some_and(|leader| leader.crosswise && leader.gap_m < GAP_M_MIN + 3.0);
         if self.speed_mps >= STANDS_MPS {
@@ -237,12 +255,6 @@ impl Driver {
         sink(self.plan.len() as u64);
         sink(u64::from(self.draws));
     }
-}
-
-/// At a pose of a lane, driving along it.
-pub(super) fn along(pose: Pose, speed_mps: f64) -> Moved {
-    let forward = pose.forward();
-    Moved { pose, forward, lane_heading_rad: pose.heading_rad, velocity_mps: forward * speed_mps }
 }
 
 /// The stream of one choice of one road user.

@@ -44,7 +44,7 @@ impl Driver {
         // The own poses at those moments, worked out only if there is a vehicle to meet.
         let speed_mps = self.speed_mps.max(CREEP_MPS);
         let own = LazyCell::new(|| {
-            MOMENTS_S.map(|time_s| self.way.path.pose_at(self.station_m + speed_mps * time_s))
+            MOMENTS_S.map(|time_s| self.way.body_at(self.station_m + speed_mps * time_s, size))
         });
         let mut free_m = f64::INFINITY;
         if self.yields_to_ego && matters(around.ego_outline, around.ego.speed_mps) {
@@ -54,11 +54,11 @@ impl Driver {
             };
             free_m = free_m.min(free_way_m(this, &own, speed_mps, around.ego_outline, ego));
         }
-        for (obstacle, _, driver) in around.drivers() {
+        for (obstacle, body, driver) in around.drivers() {
             if driver.change.is_some() || !matters(&obstacle.outline, driver.speed_mps) {
                 continue;
             }
-            let other = |time_s| driver.way.path.pose_at(driver.station_m + driver.speed_mps * time_s);
+            let other = |time_s| driver.way.body_at(driver.station_m + driver.speed_mps * time_s, body);
             free_m = free_m.min(free_way_m(this, &own, speed_mps, &obstacle.outline, other));
         }
         free_m.is_finite().then_some(Leader { gap_m: free_m + STOP_M, speed_mps: 0.0, crosswise: true })

@@ -12,7 +12,8 @@
 //! a wait crosses all areas of the junction and counts as if inside them, so that four that wait for each
 //! other do not all set out at once: they look one after another, and the first to look goes. After
 //! [`PATIENCE_S`] of waiting a driver goes before any vehicle that stands, whatever the order of the lanes;
-//! after [`GIVE_UP_S`] it leaves the world, so that no standstill is forever.
+//! after [`GIVE_UP_S`] it leaves the world as soon as the ego vehicle does not see it. A standstill in sight
+//! may last; an episode ends when the ego vehicle makes no progress.
 //!
 //! **Commanded vehicles and the ego vehicle.** A vehicle that an action made appear keeps these manners
 //! towards all other vehicles, but never yields to the ego vehicle at a junction: to cross or to turn

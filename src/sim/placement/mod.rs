@@ -52,7 +52,7 @@ pub(super) fn place(around: &Around, request: &SpawnRequest, id: u32) -> Result<
         Verb::Walk | Verb::Stand => return on_foot(around, request, size, id),
     };
     check_way(around, &driver, &size)?;
-    let moved = driver.moved();
+    let moved = driver.moved(&size);
     finish(around, request, Mover::new(size, Motion::Drive(driver)), id, moved)
 }
 
