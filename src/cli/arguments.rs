@@ -435,7 +435,7 @@ pub struct DiagnoseArguments {
     /// Say also how many of N small variations of timing, speeds and sensor errors still crash.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000), conflicts_with = "mechanisms")]
     pub likelihood: Option<u32>,
-    /// Instead of modules, the documented weaknesses (a) to (i): the share of the collisions of all files
+    /// Instead of modules, the documented weaknesses: the share of the collisions of all files
     /// that vanish when one alone is switched off, when the obstacle appears (as modules are) or from the
     /// start.
     #[arg(long)]

@@ -190,8 +190,8 @@ fn prefer(best: &mut Vec<usize>, criterion: impl Fn(usize) -> bool) {
 /// Whether a documented weakness belongs to a module: `ModularConfig::idealised` switches it off with it.
 fn owns(module: Module, weakness: &str) -> bool {
     match weakness {
-        "a_late_unstable_tracks" => matches!(module, Module::Perception | Module::Tracking),
-        "b_lane_bound_prediction" => module == Module::Prediction,
+        "late_unstable_tracks" => matches!(module, Module::Perception | Module::Tracking),
+        "lane_bound_prediction" => module == Module::Prediction,
         _ => module == Module::Planning,
     }
 }

@@ -1,7 +1,7 @@
 //! The modular driving system: localisation → perception → tracking → prediction → planning → control.
 //!
 //! Modelled on Apollo 7.0's published structure and constants. Each part has the limits its original
-//! is known for; the documented weaknesses (a) to (i) are switches, and no failure is scripted.
+//! is known for; the documented weaknesses are switches, and no failure is scripted.
 //! Nothing here is a claim about Apollo itself.
 
 mod config;

@@ -56,10 +56,10 @@ impl Modular {
         let latency_frames = config.perception.latency_frames;
         Modular {
             localization: Localization::new(&config.localization, seed),
-            perception: Perception::new(&config.perception, weak.a_late_unstable_tracks, seed),
+            perception: Perception::new(&config.perception, weak.late_unstable_tracks, seed),
             lights: LightReader::new(&config.perception, scene),
-            tracking: Tracking::new(&config.tracking, weak.a_late_unstable_tracks, latency_frames),
-            prediction: Prediction::new(&config.prediction, weak.b_lane_bound_prediction, scene, foresight),
+            tracking: Tracking::new(&config.tracking, weak.late_unstable_tracks, latency_frames),
+            prediction: Prediction::new(&config.prediction, weak.lane_bound_prediction, scene, foresight),
             planner: Planner::new(config, scene, &junctions),
             controller: Controller::new(&config.control),
             junctions,

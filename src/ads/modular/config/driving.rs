@@ -15,7 +15,7 @@ section! {
         still_pedestrian_mps: f64 = 0.2, 0.0..=5.0;
         /// Lateral speed that counts as leaving the lane, m/s, in `[0, 5]`. Ours.
         lateral_speed_mps: f64 = 0.4, 0.0..=5.0;
-        /// For how long that lateral speed must last before it is believed under weakness (b), s, in `[0, 10]`. Apollo `max_tracking_time`: 0.5.
+        /// For how long that lateral speed must last before it is believed under `lane_bound_prediction`, s, in `[0, 10]`. Apollo `max_tracking_time`: 0.5.
         lateral_persistence_s: f64 = 0.5, 0.0..=10.0;
         /// A vehicle turned further from every lane is taken to go straight on, rad, in `[0, 3.2]`. Ours.
         off_lane_rad: f64 = 0.6, 0.0..=3.2;
@@ -25,7 +25,7 @@ section! {
         hypotheses_max: u32 = 3, 1.0..=3.0;
         /// Every object is predicted to stay where it is. A fault to plant.
         frozen: bool = false;
-        /// The future is known where a recording of it is at hand (`ads::Foresight`); without one this is no more than weakness (b) switched off. An idealisation, to find causes with.
+        /// The future is known where a recording of it is at hand (`ads::Foresight`); without one this is no more than `lane_bound_prediction` switched off. An idealisation, to find causes with.
         perfect: bool = false;
     }
 }
@@ -47,7 +47,7 @@ section! {
         emergency_mps2: f64 = 6.0, 1.0..=10.0;
         /// Braking for a planned stop, magnitude, m/s², in `[0.5, 4]`. Ours.
         comfortable_mps2: f64 = 2.0, 0.5..=4.0;
-        /// Rate at which a plan may lower its acceleration under weakness (c), magnitude, m/s³, in `[0.5, 50]`. Apollo: 4.
+        /// Rate at which a plan may lower its acceleration under `bounded_jerk`, magnitude, m/s³, in `[0.5, 50]`. Apollo: 4.
         jerk_mps3_down: f64 = 4.0, 0.5..=50.0;
         /// Rate at which a plan may raise its acceleration, m/s³, in `[0.5, 50]`. Apollo: 2.
         jerk_mps3_up: f64 = 2.0, 0.5..=50.0;
@@ -65,13 +65,11 @@ section! {
         yield_gap_m: f64 = 5.0, 0.5..=20.0;
         /// Two road users at one place closer in time than this are in conflict, s, in `[0, 5]`. Ours.
         conflict_buffer_s: f64 = 1.0, 0.0..=5.0;
-        /// Under weakness (d), a vehicle that is on the way of the ego vehicle for less, crossing it, is not given way to, s, in `[0, 8]`. Apollo issue 14870: yields only briefly; the figure is ours.
-        brief_overlap_s: f64 = 2.0, 0.0..=8.0;
-        /// Under weakness (f), a pedestrian who has stood for longer is ignored, s, in `[0, 60]`. Apollo's crosswalk rule, `stop_timeout`: 4.0; issue 11926.
+        /// Under `standing_pedestrian_ignored`, a pedestrian who has stood for longer is ignored, s, in `[0, 60]`. Apollo's crosswalk rule, `stop_timeout`: 4.0; issue 11926.
         standing_pedestrian_s: f64 = 4.0, 0.0..=60.0;
         /// Gap from the front bumper to a stop line, m, in `[0, 5]`. Apollo `stop_distance`: 1.0.
         stop_line_gap_m: f64 = 1.0, 0.0..=5.0;
-        /// Under weakness (g), a red light that would need harder braking is passed, m/s², in `[1, 8]`. Apollo `max_stop_deceleration`: 4.0.
+        /// Under `late_red_passed`, a red light that would need harder braking is passed, m/s², in `[1, 8]`. Apollo `max_stop_deceleration`: 4.0.
         red_light_mps2_max: f64 = 4.0, 1.0..=8.0;
         /// Gap from the front bumper to an occupied crosswalk, m, in `[0, 5]`. Apollo's crosswalk rule, `stop_distance`: 1.0.
         crosswalk_gap_m: f64 = 1.0, 0.0..=5.0;
@@ -91,7 +89,7 @@ section! {
         change_oncoming_gap_m: f64 = 50.0, 0.0..=200.0;
         /// Time gap to oncoming traffic at the sum of the speeds, s, in `[0, 20]`. Apollo's lane change decider: 5.
         change_oncoming_time_s: f64 = 5.0, 0.0..=20.0;
-        /// Braking when there is no plan, and under weakness (i) when no plan keeps clear, magnitude, m/s², in `[1, 8]`. Apollo `slowdown_profile_deceleration`: 4.0.
+        /// Braking when there is no plan, and under `gentle_fallback` when no plan keeps clear, magnitude, m/s², in `[1, 8]`. Apollo `slowdown_profile_deceleration`: 4.0.
         fallback_mps2: f64 = 4.0, 1.0..=8.0;
         /// Farther than this beside the route there is no plan, m, in `[1, 20]`. Ours.
         lost_offset_m: f64 = 3.0, 1.0..=20.0;

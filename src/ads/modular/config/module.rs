@@ -60,7 +60,7 @@ impl ModularConfig {
             planning: PlanningConfig::default(),
             control: ControlConfig::default(),
             weaknesses: Weaknesses {
-                a_late_unstable_tracks: self.weaknesses.a_late_unstable_tracks,
+                late_unstable_tracks: self.weaknesses.late_unstable_tracks,
                 ..Weaknesses::NONE
             },
         };
@@ -78,18 +78,18 @@ impl ModularConfig {
             Module::Perception => {
                 config.perception =
                     PerceptionConfig { latency_frames: self.perception.latency_frames, ..other.perception };
-                config.weaknesses.a_late_unstable_tracks = other.weaknesses.a_late_unstable_tracks;
+                config.weaknesses.late_unstable_tracks = other.weaknesses.late_unstable_tracks;
             }
             Module::Tracking => config.tracking = other.tracking,
             Module::Prediction => {
                 config.prediction = other.prediction;
-                config.weaknesses.b_lane_bound_prediction = other.weaknesses.b_lane_bound_prediction;
+                config.weaknesses.lane_bound_prediction = other.weaknesses.lane_bound_prediction;
             }
             Module::Planning => {
                 config.planning = other.planning;
                 config.weaknesses = Weaknesses {
-                    a_late_unstable_tracks: self.weaknesses.a_late_unstable_tracks,
-                    b_lane_bound_prediction: self.weaknesses.b_lane_bound_prediction,
+                    late_unstable_tracks: self.weaknesses.late_unstable_tracks,
+                    lane_bound_prediction: self.weaknesses.lane_bound_prediction,
                     ..other.weaknesses
                 };
             }

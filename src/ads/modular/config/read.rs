@@ -272,13 +272,10 @@ mod tests {
 
     #[test]
     fn a_profile_goes_through_a_line_and_keeps_its_digest() {
-        let text = "planning: {cruise_mps: 8, stop_gap_m: 4.5}\nweaknesses: {c_bounded_jerk: false}";
+        let text = "planning: {cruise_mps: 8, stop_gap_m: 4.5}\nweaknesses: {bounded_jerk: false}";
         let config = ModularConfig::from_yaml(text).unwrap();
         let line = config.to_line();
-        assert_eq!(
-            line,
-            "{planning: {cruise_mps: 8.0, stop_gap_m: 4.5}, weaknesses: {c_bounded_jerk: false}}"
-        );
+        assert_eq!(line, "{planning: {cruise_mps: 8.0, stop_gap_m: 4.5}, weaknesses: {bounded_jerk: false}}");
         let again = ModularConfig::from_yaml(&line).unwrap();
         assert_eq!((again, again.digest()), (config, config.digest()));
         assert_ne!(config.digest(), ModularConfig::default().digest());

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 /// Declares the switches, all of them on by default.
 macro_rules! weaknesses {
     ($($(#[$about:meta])* $name:ident,)*) => {
-        /// Weaknesses (a) to (i). With a switch off, the part does what its original should have done.
+        /// The weaknesses. With a switch off, the part does what its original should have done.
         #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
         #[serde(deny_unknown_fields, default)]
         pub struct Weaknesses {
@@ -13,8 +13,8 @@ macro_rules! weaknesses {
         }
 
         impl Weaknesses {
-            /// Their names, from (a) to (i).
-            pub const NAMES: [&str; 9] = [$(stringify!($name)),*];
+            /// Their names, in the order of the modules that have them.
+            pub const NAMES: &[&str] = &[$(stringify!($name)),*];
 
             /// Every weakness switched off.
             pub const NONE: Weaknesses = Weaknesses { $($name: false),* };
@@ -38,22 +38,20 @@ macro_rules! weaknesses {
 }
 
 weaknesses! {
-    /// (a) Tracks are published only in their fourth frame, detection ends with the detector's grid, what is mostly hidden is not detected, and every second frame sees of a large vehicle only the part next to the ego vehicle and takes it for a car. Apollo `pub_track_time_thresh`; issues 14212 and AIasd/ADFuzz 5: unstable detection and tracking across frames. Off: the first frame publishes, the sensors' own range holds, any part in sight will do.
-    a_late_unstable_tracks,
-    /// (b) A vehicle is predicted to keep its lane until its centre is over the edge or its lateral speed has lasted. Apollo issues 11118, 12798, 14212. Off: lateral speed is believed at once.
-    b_lane_bound_prediction,
-    /// (c) The braking of a plan builds up at a bounded rate, in an emergency too. Apollo `longitudinal_jerk_lower_bound` -4. Off: at once.
-    c_bounded_jerk,
-    /// (d) A vehicle that crosses and is on the way only briefly is not given way to. Apollo issue 14870. Off: it is.
-    d_brief_yielding,
-    /// (e) Only the closest of all standing objects is kept clear of, even while it is being passed. Apollo's `STBoundsDecider`: one static obstacle. Off: all of them are.
-    e_closest_static_only,
-    /// (f) A pedestrian who has stood for some time is ignored until moving again. Apollo's crosswalk `stop_timeout`; issue 11926: creeps into a pedestrian. Off: every pedestrian counts.
-    f_standing_pedestrian_ignored,
-    /// (g) A red light that would need hard braking is passed. Apollo `max_stop_deceleration`. Off: it is braked for, however late.
-    g_late_red_passed,
-    /// (h) Traffic beside and behind is not reacted to. Apollo issue 14633, `BACKSIDE_VEHICLE` off. Off: a vehicle that moves over from beside is let in.
-    h_blind_to_side_and_rear,
-    /// (i) When no plan keeps clear, the fallback brakes at 4 m/s² and no harder. Apollo `slowdown_profile_deceleration`. Off: as hard as the vehicle can.
-    i_gentle_fallback,
+    /// Tracks are published only in their fourth frame, detection ends with the detector's grid, what is mostly hidden is not detected, and every second frame sees of a large vehicle only the part next to the ego vehicle and takes it for a car. Apollo `pub_track_time_thresh`; issues 14212 and AIasd/ADFuzz 5: unstable detection and tracking across frames. Off: the first frame publishes, the sensors' own range holds, any part in sight will do.
+    late_unstable_tracks,
+    /// A vehicle is predicted to keep its lane until its centre is over the edge or its lateral speed has lasted. Apollo issues 11118, 12798, 14212. Off: lateral speed is believed at once.
+    lane_bound_prediction,
+    /// The braking of a plan builds up at a bounded rate, in an emergency too. Apollo `longitudinal_jerk_lower_bound` -4. Off: at once.
+    bounded_jerk,
+    /// Only the closest of all standing objects is kept clear of, even while it is being passed. Apollo's `STBoundsDecider`: one static obstacle. Off: all of them are.
+    closest_static_only,
+    /// A pedestrian who has stood for some time is ignored until moving again. Apollo's crosswalk `stop_timeout`; issue 11926: creeps into a pedestrian. Off: every pedestrian counts.
+    standing_pedestrian_ignored,
+    /// A red light that would need hard braking is passed. Apollo `max_stop_deceleration`. Off: it is braked for, however late.
+    late_red_passed,
+    /// Traffic beside and behind is not reacted to. Apollo issue 14633, `BACKSIDE_VEHICLE` off. Off: a vehicle that moves over from beside is let in.
+    blind_to_side_and_rear,
+    /// When no plan keeps clear, the fallback brakes at 4 m/s² and no harder. Apollo `slowdown_profile_deceleration`. Off: as hard as the vehicle can.
+    gentle_fallback,
 }

@@ -175,7 +175,7 @@ impl Planner {
             let (lateral, buffer_m) = (&self.lateral, self.config.lateral_buffer_m);
             self.claims.extend(Claim::of(forecast, guide, lateral, &ahead, buffer_m));
         }
-        if self.weaknesses.e_closest_static_only {
+        if self.weaknesses.closest_static_only {
             self.keep_closest_static(station_m);
         }
         kept_clear::keep_clear(&self.config, &self.junctions, start, &self.claims, &mut self.constraints);
@@ -226,7 +226,7 @@ impl Planner {
     /// Whether a road user beside the vehicle that has come or will come onto its way is let in. Under
     /// weakness (h) none is (Apollo issue 14633).
     fn lets_in(&self, claim: &Claim, span: &Span, point: &Point) -> bool {
-        !self.weaknesses.h_blind_to_side_and_rear
+        !self.weaknesses.blind_to_side_and_rear
             && claim.moving
             && claim.cosine > ALONG_COSINE
             && span.to_m > VehicleParameters::MKZ.rear_m(point.station_m)
@@ -235,9 +235,7 @@ impl Planner {
 
     /// FOLLOW or YIELD or, as `None`, OVERTAKE: for road users that move onto or across the way.
     ///
-    /// There is a conflict if both would be at one place less than `conflict_buffer_s` apart. Under
-    /// weakness (d), a crossing vehicle that will be off the way again within `brief_overlap_s` of coming
-    /// onto it is no reason to wait: the decision flips from YIELD to OVERTAKE (Apollo issue 14870). The
+    /// There is a conflict if both would be at one place less than `conflict_buffer_s` apart. The
     /// ego vehicle goes first only if it would be past by that buffer, or if it can no longer stop and
     /// would still be past.
     fn in_conflict(&self, claim: &Claim, index: usize, start: &Point) -> Option<Constraint> {
@@ -254,9 +252,6 @@ impl Planner {
             let beside = entry.middle_m() < VehicleParameters::MKZ.front_m(then.station_m) - 1.0;
             let follows = !beside || self.lets_in(claim, &entry, &then);
             return follows.then(|| Constraint::follow(claim.id, index));
-        }
-        if claim.on_wheels && claim.exit_s() - claim.entry_s() < config.brief_overlap_s {
-            return None;
         }
         let meeting = claim.spans[step];
         let room_m = meeting.from_m - VehicleParameters::MKZ.front_m(start.station_m);
@@ -276,19 +271,16 @@ impl Planner {
 /// The settings without what belongs to weaknesses that are switched off.
 fn without_absent(config: &PlanningConfig, weaknesses: &Weaknesses) -> PlanningConfig {
     let mut config = *config;
-    if !weaknesses.c_bounded_jerk {
+    if !weaknesses.bounded_jerk {
         config.jerk_mps3_down = JERK_MPS3_UNBOUNDED;
     }
-    if !weaknesses.d_brief_yielding {
-        config.brief_overlap_s = 0.0;
-    }
-    if !weaknesses.f_standing_pedestrian_ignored {
+    if !weaknesses.standing_pedestrian_ignored {
         config.standing_pedestrian_s = f64::INFINITY;
     }
-    if !weaknesses.g_late_red_passed {
+    if !weaknesses.late_red_passed {
         config.red_light_mps2_max = f64::INFINITY;
     }
-    if !weaknesses.i_gentle_fallback {
+    if !weaknesses.gentle_fallback {
         config.fallback_mps2 = config.emergency_mps2;
     }
     config
