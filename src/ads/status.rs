@@ -102,6 +102,8 @@ pub enum Reason {
     KeepClear,
     /// Lost the route: constant braking.
     Fallback,
+    /// Emergency braking before something.
+    Emergency(u32),
 }
 
 impl fmt::Display for Reason {
@@ -117,6 +119,7 @@ impl fmt::Display for Reason {
             Reason::Crosswalk => write!(f, "crosswalk"),
             Reason::KeepClear => write!(f, "keep clear"),
             Reason::Fallback => write!(f, "fallback"),
+            Reason::Emergency(id) => write!(f, "emergency {}", named(*id)),
         }
     }
 }

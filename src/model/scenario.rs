@@ -112,8 +112,8 @@ impl Avoidability {
 }
 
 /// The modules of a driving system that can be at fault, in the words of `expect cause == …`.
-pub const MODULES: [&str; 7] =
-    ["localization", "perception", "tracking", "prediction", "planning", "latency", "control"];
+pub const MODULES: [&str; 8] =
+    ["localization", "perception", "tracking", "prediction", "planning", "latency", "control", "emergency"];
 
 /// How an episode may end, in the words of `expect end == …`.
 pub const ENDS: [&str; 4] = ["arrived", "stalled", "limit", "script"];

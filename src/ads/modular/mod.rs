@@ -1,4 +1,5 @@
-//! The modular driving system: localisation → perception → tracking → prediction → planning → control.
+//! The modular driving system: localisation → perception → tracking → prediction → planning → control,
+//! and emergency braking beside it.
 //!
 //! Modelled on Apollo 7.0's published structure and constants. Each part has the limits its original
 //! is known for; the documented weaknesses are switches, and no failure is scripted.
@@ -6,6 +7,7 @@
 
 mod config;
 mod control;
+mod emergency;
 mod foresight;
 mod junctions;
 mod localization;

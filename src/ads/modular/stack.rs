@@ -6,12 +6,13 @@
 use std::sync::Arc;
 
 use crate::ads::driver::Ads;
-use crate::ads::status::{GHOST_ID_MIN, PerceivedObject, PlannedPoint, Status};
+use crate::ads::status::{GHOST_ID_MIN, PerceivedObject, PlannedPoint, Reason, Status};
 use crate::geometry::Pose;
 use crate::sim::{Control, DT_S, FRAME_S, FRAME_TICKS, Scene, Sensed};
 
 use super::config::ModularConfig;
 use super::control::Controller;
+use super::emergency::Emergency;
 use super::foresight::Foresight;
 use super::junctions::Junctions;
 use super::localization::Localization;
@@ -31,6 +32,9 @@ pub struct Modular {
     prediction: Prediction,
     planner: Planner,
     controller: Controller,
+    emergency: Emergency,
+    /// Hardest braking that the brakes give, m/s².
+    brake_mps2_max: f64,
     ticks: u64,
     /// Where it believes it is on the route, m.
     station_m: f64,
@@ -62,6 +66,8 @@ impl Modular {
             prediction: Prediction::new(&config.prediction, weak.lane_bound_prediction, scene, foresight),
             planner: Planner::new(config, scene, &junctions),
             controller: Controller::new(&config.control),
+            emergency: Emergency::new(&config.emergency),
+            brake_mps2_max: config.control.actuators.brake_mps2_max,
             junctions,
             ticks: 0,
             station_m: 0.0,
@@ -85,6 +91,8 @@ impl Modular {
             forecasts: self.prediction.forecasts(),
             lights,
         });
+        let (guide, lateral) = (self.planner.guide(), self.planner.lateral());
+        self.emergency.look(tracks, age_s, guide, lateral, self.station_m, &sensed.ego);
         self.report();
     }
 
@@ -147,6 +155,10 @@ impl Ads for Modular {
             self.station_m,
             &sensed.ego,
         );
+        let control = self.emergency.brake(control, sensed.ego.speed_mps, self.brake_mps2_max);
+        if let Some(id) = self.emergency.braking_for() {
+            self.status.reason = Reason::Emergency(id);
+        }
         self.status.localized = Some(localized);
         self.status.control = control;
         self.status.steer_rate_radps =

@@ -82,8 +82,39 @@ fn config(change: impl Fn(&mut ModularConfig)) -> ModularConfig {
     config
 }
 
+/// A vehicle of these settings without emergency braking, which would make up for what is tested.
 fn rig_of(scene: &Arc<Scene>, config: &ModularConfig, seed: u64) -> Rig {
-    Rig::new(scene, Box::new(Modular::new(scene, config, seed)), 0.0)
+    let mut config = *config;
+    config.emergency.enabled = false;
+    Rig::new(scene, Box::new(Modular::new(scene, &config, seed)), 0.0)
+}
+
+#[test]
+fn emergency_braking_stops_for_what_the_plan_ignores() {
+    let scene = straight();
+    let end = |enabled: bool| {
+        let config = config(|config| {
+            config.emergency.enabled = enabled;
+            config.weaknesses = super::Weaknesses::NONE;
+            config.weaknesses.bounded_jerk = true;
+            config.weaknesses.gentle_fallback = true;
+        });
+        let mut rig = Rig::new(&scene, Box::new(Modular::new(&scene, &config, 1)), 0.0);
+        rig.run(12.0);
+        rig.gap_m_min = f64::INFINITY;
+        let x_m = rig.station_m() + 3.705 + 18.0 + 2.4;
+        rig.sensed.objects.push(object(1, Body::Sedan, Pose::new(x_m, -1.75, 0.0), 0.0));
+        let mut braked = false;
+        while rig.sensed.ego.speed_mps > 0.1 && rig.gap_m_min > 0.0 {
+            rig.tick();
+            rig.measure();
+            braked |= rig.ads.status().reason == Reason::Emergency(1);
+        }
+        (rig.gap_m_min, rig.sensed.ego.speed_mps, braked)
+    };
+    let (with, without) = (end(true), end(false));
+    assert!(with.2 && !without.2, "{with:?} and {without:?}");
+    assert!(with.0 > without.0 || with.1 < without.1 - 1.0, "{with:?} and {without:?}");
 }
 
 /// Smallest gap to a car that crosses from the right, timed to meet the ego vehicle, m.

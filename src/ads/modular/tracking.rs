@@ -136,6 +136,11 @@ impl Track {
         self.position + unit_vector(self.heading_rad) * self.shift_m
     }
 
+    /// Unit vector along the heading.
+    pub fn forward(&self) -> Vec2 {
+        unit_vector(self.heading_rad)
+    }
+
     /// A published track of a known state.
     #[cfg(test)]
     pub fn for_tests(id: u32, body: Body, pose: Pose, velocity_mps: Vec2) -> Track {

@@ -8,6 +8,7 @@
 mod driving;
 mod module;
 mod read;
+mod safety;
 mod sensing;
 mod weaknesses;
 
@@ -16,6 +17,7 @@ use serde::{Deserialize, Serialize};
 pub use driving::{ControlConfig, PlanningConfig, PredictionConfig};
 pub use module::Module;
 pub use read::ConfigError;
+pub use safety::EmergencyConfig;
 pub use sensing::{LocalizationConfig, PerceptionConfig, TrackingConfig};
 pub use weaknesses::Weaknesses;
 
@@ -29,5 +31,6 @@ pub struct ModularConfig {
     pub prediction: PredictionConfig,
     pub planning: PlanningConfig,
     pub control: ControlConfig,
+    pub emergency: EmergencyConfig,
     pub weaknesses: Weaknesses,
 }

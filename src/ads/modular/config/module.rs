@@ -4,6 +4,7 @@ use crate::model::MODULES;
 
 use super::ModularConfig;
 use super::driving::{ControlConfig, PlanningConfig, PredictionConfig};
+use super::safety::EmergencyConfig;
 use super::sensing::{LocalizationConfig, PerceptionConfig, TrackingConfig};
 use super::weaknesses::Weaknesses;
 
@@ -19,11 +20,13 @@ pub enum Module {
     /// Time between a look and its use.
     Latency,
     Control,
+    /// Emergency braking.
+    Emergency,
 }
 
 impl Module {
     /// In the order in which data passes through them.
-    pub const ALL: [Module; 7] = [
+    pub const ALL: [Module; 8] = [
         Module::Localization,
         Module::Perception,
         Module::Tracking,
@@ -31,6 +34,7 @@ impl Module {
         Module::Planning,
         Module::Latency,
         Module::Control,
+        Module::Emergency,
     ];
 
     /// Its name in tables, files and the claims of scenarios.
@@ -59,6 +63,7 @@ impl ModularConfig {
             prediction: PredictionConfig { perfect: true, ..PredictionConfig::default() },
             planning: PlanningConfig::default(),
             control: ControlConfig::default(),
+            emergency: EmergencyConfig::default(),
             weaknesses: Weaknesses {
                 late_unstable_tracks: self.weaknesses.late_unstable_tracks,
                 ..Weaknesses::NONE
@@ -98,6 +103,7 @@ impl ModularConfig {
                 config.perception.latency_frames = other.perception.latency_frames;
             }
             Module::Control => config.control = other.control,
+            Module::Emergency => config.emergency = other.emergency,
         }
         config
     }

@@ -10,6 +10,7 @@ use crate::syntax::nearest;
 
 use super::ModularConfig;
 use super::driving::{ActuatorsConfig, PedalsConfig, PlanningConfig, PredictionConfig};
+use super::safety::EmergencyConfig;
 use super::sensing::{LocalizationConfig, PerceptionConfig, TrackingConfig};
 
 /// Why a profile cannot be used. The message does not name the file: the caller puts the name before it.
@@ -44,6 +45,7 @@ const SECTIONS: &[(&str, Ranges)] = &[
     ("control.steering", SteeringConfig::RANGES),
     ("control.pedals", PedalsConfig::RANGES),
     ("control.actuators", ActuatorsConfig::RANGES),
+    ("emergency", EmergencyConfig::RANGES),
 ];
 
 impl ModularConfig {

@@ -14,5 +14,6 @@ mod planner;
 mod speed;
 mod standing;
 
+pub use nudge::LateralPlan;
 pub use planner::{Outlook, Planner};
 pub use speed::Trajectory;

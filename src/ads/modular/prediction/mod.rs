@@ -427,7 +427,8 @@ mod tests {
         let track = Track::for_tests(1, Body::Sedan, pose, pose.forward() * 6.0);
         prediction.update(&[track], 0.0, 0.0, Vec2::new(0.0, 0.0));
         // Beyond 80 m from the ego vehicle it is taken to go straight on; near by, round the bend.
-        assert!(path.project(prediction.forecasts()[0].positions[STEPS]).distance_m > 5.0);
+        let straight_on = pose.position + pose.forward() * 48.0;
+        assert!((prediction.forecasts()[0].positions[STEPS] - straight_on).norm() < 1e-9);
         prediction.update(&[track], 0.0, 0.0, pose.position);
         for (step, position) in prediction.forecasts()[0].positions.iter().enumerate() {
             let beside = path.project(*position);
