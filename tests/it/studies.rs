@@ -125,7 +125,7 @@ fn a_quick_study_says_that_it_is_none() {
     assert!(line.starts_with("{\"schema\":1,\"command\":\"study\""), "{line}");
     let result: Value = serde_json::from_str(line).expect("JSON");
     let results = &result["results"];
-    assert_eq!((&results["quick"], &results["cells"]), (&true.into(), &16.into()));
+    assert_eq!((&results["quick"], &results["cells"]), (&true.into(), &8.into()));
     let rate = &results["together"][0]["episodes"]["collisions_per_1000_km"];
     assert_eq!(rate["events"], 0, "there is no obstacle to hit: {rate}");
     assert!(rate["high"].as_f64().expect("a bound") > 0.0);
