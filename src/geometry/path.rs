@@ -60,12 +60,20 @@ pub struct Bounds {
 }
 
 impl Bounds {
-    /// Around some points, of which there is at least one.
+    /// Around the vertices of a path, of which there is at least one.
     pub fn of(points: &[PathPoint]) -> Bounds {
-        let begin = points[0].position;
-        points.iter().fold(Bounds { least: begin, most: begin }, |bounds, point| Bounds {
-            least: bounds.least.inf(&point.position),
-            most: bounds.most.sup(&point.position),
+        Bounds::grow(points[0].position, points.iter().map(|point| point.position))
+    }
+
+    /// Around some points, of which there is at least one.
+    pub fn around(points: &[Vec2]) -> Bounds {
+        Bounds::grow(points[0], points.iter().copied())
+    }
+
+    fn grow(begin: Vec2, points: impl Iterator<Item = Vec2>) -> Bounds {
+        points.fold(Bounds { least: begin, most: begin }, |bounds, point| Bounds {
+            least: bounds.least.inf(&point),
+            most: bounds.most.sup(&point),
         })
     }
 

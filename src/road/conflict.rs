@@ -146,7 +146,7 @@ pub fn spans_inside(path: &Path, outline: &[Vec2]) -> Vec<(f64, f64)> {
 }
 
 /// Whether a polygon holds a point (even-odd rule).
-fn holds(outline: &[Vec2], point: Vec2) -> bool {
+pub fn holds(outline: &[Vec2], point: Vec2) -> bool {
     let edges = outline.iter().zip(outline.iter().cycle().skip(1));
     let crossed = edges.filter(|(a, b)| {
         (a.y > point.y) != (b.y > point.y) && point.x < a.x + (b.x - a.x) * (point.y - a.y) / (b.y - a.y)

@@ -7,9 +7,11 @@ use crate::geometry::{Path, wrap_angle};
 use super::centre_line::{CentreLine, NoCentreLine, centre_line};
 use super::index::LaneGrid;
 use super::lane_change::permitted;
-use super::map::{Junction, Lane, LaneIndex, LaneKey, Neighbour, Precedence, RoadError, RoadMap, Turn};
+use super::map::{
+    Junction, Lane, LaneIndex, LaneKey, Neighbour, Precedence, RoadError, RoadMap, Strip, Turn,
+};
 use super::opendrive::{Contact, Document, RoadElement, RoadLink, SectionElement, wrong};
-use super::signals::{add_crosswalks, add_signals, set_precedence};
+use super::signals::{add_objects, add_signals, set_precedence};
 
 /// The limit of a road whose file states none: 50 km/h, usual in towns.
 const LIMIT_MPS_DEFAULT: f64 = 50.0 / 3.6;
@@ -29,7 +31,8 @@ pub fn build(document: &Document) -> Result<RoadMap, RoadError> {
     builder.link_junctions()?;
     builder.set_neighbours();
     add_signals(&mut builder)?;
-    add_crosswalks(&mut builder);
+    add_objects(&mut builder);
+    builder.add_strips();
     let mut map = builder.map;
     map.warnings.extend(loose_links(&map));
     for lane in &mut map.lanes {
@@ -84,6 +87,8 @@ impl<'a> Builder<'a> {
                 })
                 .collect(),
             crosswalks: Vec::new(),
+            strips: Vec::new(),
+            solids: Vec::new(),
             warnings: document.warnings.clone(),
             grid: LaneGrid::default(),
         };
@@ -149,6 +154,22 @@ impl<'a> Builder<'a> {
             self.map.warnings.push(format!("{limitless} lanes state no speed limit; 50 km/h is taken"));
         }
         Ok(())
+    }
+
+    /// Adds what lies beside the driving lanes. A strip that cannot be drawn is left out: it only helps to find
+    /// the kerb.
+    fn add_strips(&mut self) {
+        for road in &self.document.roads {
+            for section in &road.sections {
+                for element in &section.lanes {
+                    let Some(kind) = element.beside else { continue };
+                    let Ok(CentreLine { path, widths_m, .. }) = centre_line(road, section, element.id) else {
+                        continue;
+                    };
+                    self.map.strips.push(Strip { kind, bounds: path.bounds(), centre: path, widths_m });
+                }
+            }
+        }
     }
 
     fn link_sections(&mut self) {

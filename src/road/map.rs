@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use crate::geometry::{Path, Vec2, wrap_angle};
+use crate::geometry::{Bounds, Path, Vec2, wrap_angle};
 
 use super::index::LaneGrid;
 use super::{graph, opendrive};
@@ -165,6 +165,34 @@ pub struct Crosswalk {
     pub outline: Vec<Vec2>,
 }
 
+/// A lane that is no driving lane, as far as it matters to people on foot.
+#[derive(Debug, Clone)]
+pub struct Strip {
+    pub kind: StripKind,
+    pub centre: Path,
+    /// Width at each vertex of `centre`, m.
+    pub widths_m: Vec<f64>,
+    /// The box around `centre`.
+    pub bounds: Bounds,
+}
+
+/// A building, a wall, a tree: something through which nobody walks.
+#[derive(Debug, Clone)]
+pub struct Solid {
+    /// Corners, in order.
+    pub outline: Vec<Vec2>,
+    /// The box around them.
+    pub bounds: Bounds,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum StripKind {
+    /// A pavement.
+    Walkway,
+    /// Parking, cycles, trams: vehicles are on it, though cars do not drive along it.
+    Paved,
+}
+
 /// A whole map.
 #[derive(Debug, Clone)]
 pub struct RoadMap {
@@ -174,6 +202,8 @@ pub struct RoadMap {
     pub signs: Vec<Sign>,
     pub junctions: Vec<Junction>,
     pub crosswalks: Vec<Crosswalk>,
+    pub strips: Vec<Strip>,
+    pub solids: Vec<Solid>,
     /// Messages about parts of the file that were read but not understood.
     pub warnings: Vec<String>,
     pub(super) grid: LaneGrid,

@@ -5,6 +5,7 @@
 mod abreast;
 mod centre_line;
 mod conflict;
+mod footway;
 mod graph;
 mod index;
 mod join;
@@ -20,9 +21,10 @@ pub(crate) mod testing;
 mod tests;
 
 pub use abreast::{Connection, Opposing};
+pub use footway::{FootWay, Kerb};
 pub use lane_change::STRIP_M_MAX;
 pub use map::{
     Crosswalk, Junction, Lane, LaneIndex, LaneKey, LanePlace, Neighbour, Precedence, RoadError, RoadMap,
-    Side, Sign, SignKind, SignLine, Signal, StopLine, Turn,
+    Side, Sign, SignKind, SignLine, Signal, Solid, StopLine, Strip, StripKind, Turn,
 };
 pub use route::{Conflict, Route, RouteLane, RouteLaneChange, RouteSignLine, RouteStopLine};

@@ -1,14 +1,16 @@
-//! Traffic lights with their groups and stop lines, signs that say who gives way, and crosswalks.
+//! Traffic lights with their groups and stop lines, signs that say who gives way, crosswalks, and solid things.
 
 use std::collections::BTreeMap;
 
-use crate::geometry::{Pose, Vec2};
+use crate::geometry::{Bounds, Pose, Vec2};
 
 use super::graph::Builder;
 use super::map::{
-    Crosswalk, LaneIndex, Precedence, RoadError, RoadMap, Sign, SignKind, SignLine, Signal, StopLine,
+    Crosswalk, LaneIndex, Precedence, RoadError, RoadMap, Sign, SignKind, SignLine, Signal, Solid, StopLine,
 };
-use super::opendrive::{Meaning, Orientation, Outline, RoadElement, RoadLink, SignalElement, wrong};
+use super::opendrive::{
+    Meaning, ObjectKind, Orientation, Outline, RoadElement, RoadLink, SignalElement, wrong,
+};
 
 /// Signal heads of one group that are nearer to each other than this share a stop line, m.
 const SHARED_LINE_M: f64 = 1.0;
@@ -225,11 +227,11 @@ fn lanes_of(builder: &Builder, road_index: usize, signal: &SignalElement) -> Vec
     indices.map(|index| (index, builder.map.lane(index).station_of(signal.s_m))).collect()
 }
 
-/// Adds all crosswalks, with their corners in the plane.
-pub fn add_crosswalks(builder: &mut Builder) {
+/// Adds all crosswalks and solid things, with their corners in the plane.
+pub fn add_objects(builder: &mut Builder) {
     for road in &builder.document.roads {
         for object in &road.objects {
-            let outline = match &object.outline {
+            let outline: Vec<Vec2> = match &object.outline {
                 Outline::Local(corners) => {
                     let heading_rad = road.reference.at(object.s_m).heading_rad + object.heading_rad;
                     let pose = Pose { position: position(road, object.s_m, object.t_m), heading_rad };
@@ -237,7 +239,15 @@ pub fn add_crosswalks(builder: &mut Builder) {
                 }
                 Outline::Road(corners) => corners.iter().map(|(s, t)| position(road, *s, *t)).collect(),
             };
-            builder.map.crosswalks.push(Crosswalk { id: object.id.clone(), outline });
+            match object.kind {
+                ObjectKind::Crosswalk => {
+                    builder.map.crosswalks.push(Crosswalk { id: object.id.clone(), outline });
+                }
+                ObjectKind::Solid => {
+                    let bounds = Bounds::around(&outline);
+                    builder.map.solids.push(Solid { outline, bounds });
+                }
+            }
         }
     }
 }

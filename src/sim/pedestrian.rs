@@ -1,7 +1,11 @@
-//! Pedestrians who cross the road: wait, walk straight over, stay a moment, leave.
+//! Pedestrians who cross the road: they wait at the kerb, walk straight over to the other, and go out of sight.
 //!
-//! The published package's pedestrian waits 1 s at the kerb and walks on, whatever comes. Here that is the
-//! most frequent of four manners, drawn once from the pedestrian's own stream:
+//! A pedestrian sets out when it would meet the ego vehicle in the middle of that vehicle's way, but waits at
+//! least 1 s (published package) and at most 10 s. Behind the other kerb it walks on as far as there is room, and
+//! leaves the world when the ego vehicle cannot see it.
+//!
+//! The published package's pedestrian walks on, whatever comes. Here that is the most frequent of four manners,
+//! drawn once from the pedestrian's own stream:
 //!
 //! | share | manner | what it does |
 //! |---|---|---|
@@ -10,23 +14,27 @@
 //! | 15 % | startled | stops once, for 1 to 2 s, when a vehicle would reach it within 1.5 s |
 //! | 15 % | hurried | runs, at most 8 km/h (Euro NCAP's running adult), while a vehicle would be there within 3 s |
 //!
-//! The shares and times are ours; no source counts them. All pedestrians cross in the end, and none walks
-//! into the side of a vehicle: they wait before it, pass each other on the right, and leave after 10 s
-//! without a way on. A pedestrian who is hit stops (see `road_user`).
+//! The shares and times are ours; no source counts them. No pedestrian walks into the side of a vehicle: they wait
+//! before it, pass each other on the right, and turn round after 10 s without a way on. A pedestrian who is hit
+//! stops (see `road_user`).
 
-use crate::geometry::{OrientedBox, Pose, Vec2, distance_m};
+use crate::geometry::{OrientedBox, Pose, Vec2, distance_m, wrap_angle};
 use crate::rng;
 use crate::rng::Rng;
 
 use super::around::Around;
 use super::road_user::{Moved, Obstacle};
-use super::sense::FRAME_TICKS;
+use super::sense::{FRAME_TICKS, RANGE_M, visible_fraction};
 use super::world::DT_S;
 
-/// At the kerb before setting out, s (published package).
+/// Least time at the kerb before setting out, s (published package).
 const WAIT_S: f64 = 1.0;
-/// On the other side before leaving, s.
-const STAY_S: f64 = 2.0;
+/// Longest time at the kerb for the sake of a meeting, s. Ours.
+const WAIT_S_MAX: f64 = 10.0;
+/// Farther than this behind the ego vehicle's centre, nothing is in its sight, m. Ours.
+const BEHIND_M: f64 = 10.0;
+/// Before setting out and in a hurry, pedestrians look at the ground in front of them up to this far, m: a lane.
+const LOOK_M: f64 = 3.5;
 /// Running adult of Euro NCAP (8 km/h), m/s.
 const RUN_MPS_MAX: f64 = 8.0 / 3.6;
 /// Factor of the walking pace in a hurry. Ours.
@@ -46,7 +54,7 @@ const MEET_M: f64 = 3.0;
 /// How far to the right it is passed, m, and the speed of stepping aside, m/s.
 const ASIDE_M: f64 = 0.9;
 const ASIDE_MPS: f64 = 0.7;
-/// A pedestrian who cannot go on for so long leaves, s.
+/// A pedestrian who cannot go on for so long turns round, s.
 const GIVE_UP_S: f64 = 10.0;
 
 /// What a pedestrian does when a vehicle comes near.
@@ -69,18 +77,35 @@ impl Manner {
     }
 }
 
+/// A walk over a road.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Walk {
+    /// Where it begins, facing its end.
+    pub from: Pose,
+    /// From kerb to kerb, m.
+    pub way_m: f64,
+    /// How far it goes on behind the other kerb, m.
+    pub beyond_m: f64,
+    pub speed_mps: f64,
+    /// Time after which setting out leads to a meeting with the ego vehicle, s. Negative if it is too late.
+    pub meets_s: f64,
+}
+
 #[derive(Debug, Clone)]
 pub(super) struct Walker {
-    /// Where the walk begins, facing its end.
     from: Pose,
+    /// From the beginning to the other kerb, and to where the walk ends, m.
     way_m: f64,
+    end_m: f64,
     speed_mps: f64,
     manner: Manner,
     /// How long a startled pedestrian stops, ticks; 0 once it has stopped.
     startle_ticks: u32,
-    /// Way walked so far, m, and offset to the left of the straight line, m.
+    /// Distance from the beginning, m, and offset to the left of the straight line, m.
     walked_m: f64,
     aside_m: f64,
+    /// Whether it walks back to where it began.
+    returns: bool,
     /// Pace and offset that it wants since its last look.
     pace_mps: f64,
     wants_aside_m: f64,
@@ -88,56 +113,78 @@ pub(super) struct Walker {
     begins_tick: u64,
     /// Latest tick of the first step.
     begins_tick_max: u64,
-    /// Ticks without a way on, and ticks spent on the other side.
+    /// Ticks without a way on.
     stuck_ticks: u32,
-    stayed_ticks: u32,
 }
 
 impl Walker {
-    /// A pedestrian who is to walk `way_m` ahead from a pose; the manner is drawn.
-    pub fn new(from: Pose, way_m: f64, speed_mps: f64, spawn_tick: u64, rng: &mut Rng) -> Walker {
-        let begins_tick = spawn_tick + ticks(WAIT_S);
+    /// A pedestrian who is to walk; the manner is drawn.
+    pub fn new(walk: Walk, spawn_tick: u64, rng: &mut Rng) -> Walker {
+        let Walk { from, way_m, beyond_m, speed_mps, meets_s } = walk;
+        let begins_tick = spawn_tick + ticks(meets_s.clamp(WAIT_S, WAIT_S_MAX));
         let manner = Manner::draw(rng);
         Walker {
             from,
             way_m,
+            end_m: way_m + beyond_m,
             speed_mps,
             manner,
             startle_ticks: ticks(rng::between(rng, 1.0, 2.0)) as u32,
             walked_m: 0.0,
             aside_m: 0.0,
+            returns: false,
             pace_mps: speed_mps,
             wants_aside_m: 0.0,
             begins_tick,
             begins_tick_max: begins_tick + ticks(CLOSE_S),
             stuck_ticks: 0,
-            stayed_ticks: 0,
         }
+    }
+
+    /// The strip of ground that it still has to walk over, of its own width.
+    pub fn strip(&self, this: &OrientedBox) -> OrientedBox {
+        let (from_m, to_m) = if self.returns { (0.0, self.walked_m) } else { (self.walked_m, self.end_m) };
+        let middle = self.from.offset((from_m + to_m) / 2.0, 0.0);
+        OrientedBox::new(middle, to_m - from_m, 2.0 * this.half_width_m)
     }
 
     /// Where it is at the end of a tick; `None` once it has left.
     pub fn step(&mut self, this: &Obstacle, around: &Around) -> Option<Moved> {
-        if (around.tick + u64::from(this.id)).is_multiple_of(FRAME_TICKS) {
-            self.look(this, around);
+        let looks = (around.tick + u64::from(this.id)).is_multiple_of(FRAME_TICKS);
+        if self.is_over() {
+            return (!looks || is_in_sight(this, around)).then_some(Moved::at_rest(this));
         }
-        if self.walked_m >= self.way_m {
-            self.stayed_ticks += 1;
-            return (f64::from(self.stayed_ticks) * DT_S < STAY_S).then_some(Moved::at_rest(this));
+        if looks {
+            self.look(this, around);
         }
         if around.tick < self.begins_tick {
             return Some(Moved::at_rest(this));
         }
         if self.pace_mps == 0.0 {
             self.stuck_ticks += 1;
-            return (f64::from(self.stuck_ticks) * DT_S < GIVE_UP_S).then_some(Moved::at_rest(this));
+            if f64::from(self.stuck_ticks) * DT_S < GIVE_UP_S {
+                return Some(Moved::at_rest(this));
+            }
+            self.stuck_ticks = 0;
+            if self.walked_m >= self.way_m {
+                // It is over the road, so this place is as good as any.
+                self.end_m = self.walked_m;
+            } else if self.walked_m > 0.0 {
+                self.returns = !self.returns;
+                self.wants_aside_m = 0.0;
+            }
+            return Some(Moved { velocity_mps: Vec2::zeros(), ..self.moved(this) });
         }
         self.stuck_ticks = 0;
-        self.walked_m = (self.walked_m + self.pace_mps * DT_S).min(self.way_m);
+        let step_m = self.pace_mps * DT_S;
+        self.walked_m = if self.returns {
+            (self.walked_m - step_m).max(0.0)
+        } else {
+            (self.walked_m + step_m).min(self.end_m)
+        };
         let aside_m = (self.wants_aside_m - self.aside_m).clamp(-ASIDE_MPS * DT_S, ASIDE_MPS * DT_S);
         self.aside_m += aside_m;
-        let pose = self.from.offset(self.walked_m, self.aside_m);
-        let velocity_mps = (pose.position - this.outline.pose.position) / DT_S;
-        Some(Moved { pose, forward: this.forward, lane_heading_rad: pose.heading_rad, velocity_mps })
+        Some(self.moved(this))
     }
 
     pub fn trace(&self, sink: &mut dyn FnMut(u64)) {
@@ -146,6 +193,7 @@ impl Walker {
             self.from.position.y,
             self.from.heading_rad,
             self.way_m,
+            self.end_m,
             self.speed_mps,
             self.walked_m,
             self.aside_m,
@@ -154,7 +202,7 @@ impl Walker {
         ] {
             sink(value.to_bits());
         }
-        for count in [self.startle_ticks, self.stuck_ticks, self.stayed_ticks] {
+        for count in [self.startle_ticks, self.stuck_ticks, u32::from(self.returns)] {
             sink(u64::from(count));
         }
         sink(self.begins_tick);
@@ -162,25 +210,47 @@ impl Walker {
         sink(self.manner as u64);
     }
 
+    /// Whether it has come to the end of its walk, or back to the beginning.
+    fn is_over(&self) -> bool {
+        if self.returns { self.walked_m <= 0.0 } else { self.walked_m >= self.end_m }
+    }
+
+    /// Where it is now, with the velocity since it was at `this`.
+    fn moved(&self, this: &Obstacle) -> Moved {
+        let turn_rad = if self.returns { core::f64::consts::PI } else { 0.0 };
+        let position = self.from.offset(self.walked_m, self.aside_m).position;
+        let pose = Pose { position, heading_rad: wrap_angle(self.from.heading_rad + turn_rad) };
+        let velocity_mps = (position - this.outline.pose.position) / DT_S;
+        Moved { pose, forward: pose.forward(), lane_heading_rad: pose.heading_rad, velocity_mps }
+    }
+
     /// Looks, ten times a second, for vehicles that come and for what is in the way, and sets the pace.
     fn look(&mut self, this: &Obstacle, around: &Around) {
         let waits = around.tick < self.begins_tick && self.walked_m == 0.0;
-        let soonest_s = soonest_s(&this.outline, around);
+        // Whether a vehicle would soon be where it stands, or on the next lane's width of its way.
+        let comes_close = || {
+            [0.0, LOOK_M / 2.0, LOOK_M].into_iter().any(|ahead_m| {
+                let there = OrientedBox { pose: this.outline.pose.offset(ahead_m, 0.0), ..this.outline };
+                soonest_s(&there, around) < CLOSE_S
+            })
+        };
         if waits {
             let held_to = (around.tick + FRAME_TICKS + 1).min(self.begins_tick_max);
-            if self.manner == Manner::Hesitant && soonest_s < CLOSE_S && held_to > self.begins_tick {
+            if self.manner == Manner::Hesitant && held_to > self.begins_tick && comes_close() {
                 self.begins_tick = held_to;
             }
             return;
         }
-        self.wants_aside_m = if self.meets_pedestrian(around) { -ASIDE_M } else { 0.0 };
+        // On the right of its own direction.
+        let right_m = if self.returns { ASIDE_M } else { -ASIDE_M };
+        self.wants_aside_m = if self.meets_pedestrian(around) { right_m } else { 0.0 };
         let startled = self.manner == Manner::Startled && self.startle_ticks > 0;
         if self.is_blocked(this, around) {
             self.pace_mps = 0.0;
-        } else if startled && (soonest_s < STARTLE_S || self.pace_mps == 0.0) {
+        } else if startled && (self.pace_mps == 0.0 || soonest_s(&this.outline, around) < STARTLE_S) {
             self.startle_ticks = self.startle_ticks.saturating_sub(FRAME_TICKS as u32);
             self.pace_mps = 0.0;
-        } else if self.manner == Manner::Hurried && soonest_s < CLOSE_S {
+        } else if self.manner == Manner::Hurried && comes_close() {
             self.pace_mps = (self.speed_mps * HURRY).min(RUN_MPS_MAX).max(self.speed_mps);
         } else {
             self.pace_mps = self.speed_mps;
@@ -201,9 +271,19 @@ impl Walker {
     fn meets_pedestrian(&self, around: &Around) -> bool {
         around.obstacles().filter(|other| !other.body.is_vehicle()).any(|other| {
             let there = self.from.to_local(other.outline.pose.position);
-            (-1.0..MEET_M).contains(&(there.x - self.walked_m)) && there.y.abs() < 2.0 * ASIDE_M
+            let ahead_m = if self.returns { self.walked_m - there.x } else { there.x - self.walked_m };
+            (-1.0..MEET_M).contains(&ahead_m) && there.y.abs() < 2.0 * ASIDE_M
         })
     }
+}
+
+/// Whether the ego vehicle can see an obstacle: not far behind it, in range, and not wholly hidden.
+fn is_in_sight(this: &Obstacle, around: &Around) -> bool {
+    let there = around.ego_outline.pose.to_local(this.outline.pose.position);
+    let eye = around.ego_outline.pose.position;
+    there.x > -BEHIND_M
+        && there.norm() < RANGE_M.min(around.visibility_m)
+        && visible_fraction(eye, this, around.obstacles()) > 0.0
 }
 
 /// Time until the first vehicle would reach an outline if all vehicles keep their velocity, s.

@@ -217,15 +217,44 @@ fn a_pedestrian_run_over_is_one_contact() {
 }
 
 #[test]
-fn a_pedestrian_crosses_from_the_left() {
+fn a_pedestrian_crosses_the_whole_road_and_leaves_out_of_sight() {
     let mut world = testing::world(&testing::straight());
     let walker = SpawnRequest { body: Body::Pedestrian, side: Side::Left, ..request(Verb::Walk, 40.0, 1.4) };
     let walker = spawn(&mut world, walker);
-    assert!((walker.outline.pose.position.y - 3.25).abs() < 1e-9);
-    drive(&mut world, 0.0, 8.5);
-    assert!((y_m(&world, walker.id) + 6.75).abs() < 1e-6);
-    drive(&mut world, 0.0, 2.0);
+    assert!((walker.outline.pose.position.y - 7.75).abs() < 0.03);
+    drive(&mut world, 0.0, 20.0);
+    assert!(y_m(&world, walker.id) < -15.7, "8 m beyond the other kerb");
+    drive(&mut world, 0.0, 20.0);
+    assert!(world.obstacle(walker.id).is_some(), "it is in sight");
+    drive(&mut world, 10.0, 10.0);
     assert_eq!(world.obstacle(walker.id), None);
+}
+
+#[test]
+fn a_pedestrian_meets_the_ego_vehicle() {
+    let mut met = 0;
+    for seed in 0..20 {
+        let mut world = World::new(testing::straight(), &Start { seed, ..testing::start() });
+        drive(&mut world, 13.8, 12.0);
+        spawn(&mut world, request(Verb::Walk, 100.0, 1.4));
+        met += drive(&mut world, 13.8, 9.0).len();
+    }
+    // All but some of those that see a vehicle come.
+    assert!(met >= 11, "{met}");
+}
+
+#[test]
+fn a_pedestrian_without_a_way_on_turns_round() {
+    let mut world = testing::world(&testing::straight());
+    let parked =
+        spawn(&mut world, SpawnRequest { lane: LaneChoice::Right, ..request(Verb::DriveAhead, 40.0, 0.0) });
+    let walker = spawn(&mut world, request(Verb::Walk, 42.15, 1.0));
+    drive(&mut world, 0.0, 8.0);
+    let blocked_m = y_m(&world, walker.id);
+    assert!((-7.5..-6.2).contains(&blocked_m), "{blocked_m}");
+    drive(&mut world, 0.0, 12.0);
+    assert!((y_m(&world, walker.id) + 7.75).abs() < 0.03, "{}", y_m(&world, walker.id));
+    assert!(distance_m(&parked.outline, &world.obstacle(walker.id).unwrap().outline) > 1.0);
 }
 
 #[test]

@@ -14,6 +14,7 @@ mod faults;
 mod hostile;
 mod language;
 mod layers;
+mod pedestrians;
 mod policies;
 mod profiles;
 mod references;

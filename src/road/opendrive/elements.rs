@@ -1,6 +1,6 @@
 //! The elements of an OpenDRIVE file that are read, in OpenDRIVE's own terms.
 
-use crate::road::SignKind;
+use crate::road::{SignKind, StripKind};
 
 use super::cubic::{Cubics, Jet};
 use super::geometry::ReferenceLine;
@@ -63,6 +63,8 @@ pub struct LaneElement {
     pub line: u32,
     /// Whether cars may drive on it, in one direction.
     pub driving: bool,
+    /// What a lane that is no driving lane is to people on foot.
+    pub beside: Option<StripKind>,
     /// Width over the distance from the section's begin.
     pub widths: Cubics,
     pub borders: Cubics,
@@ -124,14 +126,22 @@ pub enum Orientation {
     Both,
 }
 
-/// A crosswalk.
+/// A crosswalk, or a thing that stands beside the road.
 #[derive(Debug, Clone)]
 pub struct ObjectElement {
     pub id: String,
+    pub kind: ObjectKind,
     pub s_m: f64,
     pub t_m: f64,
     pub heading_rad: f64,
     pub outline: Outline,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ObjectKind {
+    Crosswalk,
+    /// A building, a wall, a tree: nobody walks through it.
+    Solid,
 }
 
 #[derive(Debug, Clone)]

@@ -1,7 +1,7 @@
 //! Reading OpenDRIVE (ASAM, 1.4 to 1.8): an XML text becomes typed elements that know their line.
 //!
 //! Left out on purpose: heights (with a warning where a road is not flat), surfaces, railroads
-//! and everything that does not say where a vehicle may drive, must stop or may be crossed.
+//! and everything that does not say where a vehicle may drive or must stop, or where people may walk.
 
 mod cubic;
 mod elements;
@@ -10,8 +10,8 @@ mod read;
 mod xml;
 
 pub use elements::{
-    Contact, Document, MarkRule, Meaning, Orientation, Outline, RoadElement, RoadLink, SectionElement,
-    SignalElement,
+    Contact, Document, MarkRule, Meaning, ObjectKind, Orientation, Outline, RoadElement, RoadLink,
+    SectionElement, SignalElement,
 };
 pub use read::read;
 pub use xml::wrong;

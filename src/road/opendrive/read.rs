@@ -3,13 +3,13 @@
 use std::collections::BTreeMap;
 
 use crate::geometry::Vec2;
-use crate::road::{RoadError, SignKind};
+use crate::road::{RoadError, SignKind, StripKind};
 
 use super::cubic::{Cubic, Cubics};
 use super::elements::{
     ConnectionElement, Contact, ControllerElement, Document, JunctionElement, LaneElement, MarkElement,
-    MarkRule, Meaning, ObjectElement, Orientation, Outline, RoadElement, RoadLink, SectionElement,
-    SignalElement,
+    MarkRule, Meaning, ObjectElement, ObjectKind, Orientation, Outline, RoadElement, RoadLink,
+    SectionElement, SignalElement,
 };
 use super::geometry::{Piece, ReferenceLine, Shape};
 use super::xml::{Element, Lines, wrong};
@@ -123,7 +123,7 @@ impl Reader {
             lane_offset: cubics(lanes.children("laneOffset"), "s")?,
             sections: self.sections(lanes, &id, length_m)?,
             signals: self.signals(road)?,
-            objects: self.crosswalks(road)?,
+            objects: self.objects(road)?,
             id,
             length_m,
         })
@@ -244,6 +244,7 @@ impl Reader {
             self.ignore(format!("lanes of direction `{direction}`"));
             driving = false;
         }
+        let beside = if driving { None } else { strip_kind(kind) };
         let widths = cubics(lane.children("width"), "sOffset")?;
         let borders = cubics(lane.children("border"), "sOffset")?;
         if driving && widths.is_empty() && borders.is_empty() {
@@ -256,6 +257,7 @@ impl Reader {
             id,
             line: lane.line(),
             driving,
+            beside,
             widths,
             borders,
             predecessors: linked("predecessor")?,
@@ -328,23 +330,39 @@ impl Reader {
         Ok(all)
     }
 
-    fn crosswalks(&mut self, road: Element) -> Result<Vec<ObjectElement>, RoadError> {
+    fn objects(&mut self, road: Element) -> Result<Vec<ObjectElement>, RoadError> {
         let mut all = Vec::new();
         for object in road.child("objects").into_iter().flat_map(|objects| objects.children("object")) {
-            let kind = object.attribute("type").unwrap_or("");
-            if kind != "crosswalk" {
-                self.ignore(format!("objects of type `{kind}`"));
+            let word = object.attribute("type").unwrap_or("");
+            let Some(kind) = object_kind(word) else {
+                self.ignore(format!("objects of type `{word}`"));
+                continue;
+            };
+            let id = match kind {
+                ObjectKind::Crosswalk => object.text("id")?,
+                ObjectKind::Solid => object.attribute("id").unwrap_or(""),
+            };
+            let (s_m, t_m) = (object.number("s")?, object.number_or("t", 0.0)?);
+            if kind == ObjectKind::Solid
+                && let Some(corners) = stretched(object, s_m, t_m)?
+            {
+                let (outline, heading_rad) = (Outline::Road(corners), 0.0);
+                all.push(ObjectElement { id: id.to_owned(), kind, s_m, t_m, heading_rad, outline });
                 continue;
             }
             let Some(outline) = outline(object)? else {
-                self.warn(object, "ignored a crosswalk without an outline of three corners");
+                match kind {
+                    ObjectKind::Crosswalk => {
+                        self.warn(object, "ignored a crosswalk without an outline of three corners");
+                    }
+                    ObjectKind::Solid => self.ignore(format!("objects of type `{word}` without an outline")),
+                }
                 continue;
             };
-            let id = object.text("id")?;
-            let (s_m, t_m) = (object.number("s")?, object.number_or("t", 0.0)?);
             for (moved_m, t_m) in repeats(object, s_m, t_m)? {
                 all.push(ObjectElement {
                     id: id.to_owned(),
+                    kind,
                     s_m: s_m + moved_m,
                     t_m,
                     heading_rad: object.number_or("hdg", 0.0)?,
@@ -391,6 +409,30 @@ fn named(name: &str) -> Option<SignKind> {
         "yield" | "giveway" => Some(SignKind::Yield),
         "priorityroad" => Some(SignKind::PriorityRoad),
         _ => None,
+    }
+}
+
+/// What an object is to people on foot; `None` for one that is nothing to them, like paint.
+fn object_kind(kind: &str) -> Option<ObjectKind> {
+    match kind {
+        "crosswalk" => Some(ObjectKind::Crosswalk),
+        "building" | "barrier" | "railing" | "soundBarrier" | "wall" | "fence" | "guardRail" | "obstacle"
+        | "pole" | "streetLamp" | "gantry" | "tree" | "vegetation" | "car" | "van" | "truck" | "bus"
+        | "trailer" => Some(ObjectKind::Solid),
+        _ => None,
+    }
+}
+
+/// What a lane that cars do not drive on is to people on foot; `None` for verges and medians, where they may
+/// stand but do not walk along.
+fn strip_kind(kind: &str) -> Option<StripKind> {
+    match kind {
+        "sidewalk" | "walking" => Some(StripKind::Walkway),
+        "parking" | "stop" | "biking" | "bus" | "taxi" | "HOV" | "bidirectional" | "tram" | "rail" => {
+            Some(StripKind::Paved)
+        }
+        // A driving lane of another direction attribute.
+        _ => is_driving(kind).then_some(StripKind::Paved),
     }
 }
 
@@ -562,6 +604,28 @@ fn repeats(object: Element, s_m: f64, t_m: f64) -> Result<Vec<(f64, f64)>, RoadE
         places.push((0.0, t_m));
     }
     Ok(places)
+}
+
+/// Corners, along the road, of one body stretched over a length: what `repeat` without a distance means for a
+/// wall or a barrier. Stretched bodies are taken as straight between stations 5 m apart.
+fn stretched(object: Element, s_m: f64, t_m: f64) -> Result<Option<Vec<(f64, f64)>>, RoadError> {
+    const STRETCH_M: f64 = 5.0;
+    let Some(repeat) = object.child("repeat") else { return Ok(None) };
+    let length_m = repeat.number_or("length", 0.0)?;
+    if repeat.number_or("distance", 0.0)? > 1e-3 || !(0.0..=ROAD_M_MAX).contains(&length_m) {
+        return Ok(None);
+    }
+    let begin_m = repeat.number_or("s", s_m)?;
+    let (from_m, to_m) = (repeat.number_or("tStart", t_m)?, repeat.number_or("tEnd", t_m)?);
+    let width_m = repeat.number_or("widthStart", object.number_or("width", 0.0)?)?;
+    let times = (length_m / STRETCH_M).ceil().max(1.0) as u32;
+    let at = |index: u32, left_m: f64| {
+        let fraction = f64::from(index) / f64::from(times);
+        (begin_m + length_m * fraction, from_m + (to_m - from_m) * fraction + left_m)
+    };
+    let there = (0..=times).map(|index| at(index, width_m / 2.0));
+    let back = (0..=times).rev().map(|index| at(index, -width_m / 2.0));
+    Ok(Some(there.chain(back).collect()))
 }
 
 fn outline(object: Element) -> Result<Option<Outline>, RoadError> {

@@ -3,5 +3,6 @@
 
 mod abreast;
 mod changes;
+mod footway;
 mod places;
 mod reading;

@@ -56,7 +56,7 @@ pub(super) fn cross_road(
 }
 
 /// Time until the ego vehicle's front is `distance_m` farther on, if nothing is in its way, s.
-fn arrival_s(around: &Around, distance_m: f64) -> f64 {
+pub(super) fn arrival_s(around: &Around, distance_m: f64) -> f64 {
     let (map, route) = (&around.scene.map, &around.scene.route);
     let mut station_m = VehicleParameters::MKZ.front_m(around.ego_station_m);
     let end_m = station_m + distance_m;

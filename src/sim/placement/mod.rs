@@ -1,25 +1,24 @@
 //! Where a spawn puts its road user, and whether there is room.
 //!
 //! `distance_m` is always the gap between the outlines along the ego vehicle's route. What lies at
-//! that distance is each verb's business; the offsets at the roadside and the waiting times are those
-//! of the published package (its absolute offsets are not: they ignore the lanes). Traffic drives on
-//! the right.
+//! that distance is each verb's business; the waiting times are those of the published package (its
+//! offsets are not: they ignore the lanes). A pedestrian who walks begins at a kerb, at most 10 m from the asked
+//! place (`on_foot`). Traffic drives on the right.
 
 mod crossing;
 mod driving;
 mod lanes;
+mod on_foot;
 
 use std::sync::Arc;
 
 use crate::action::{SpawnFacts, SpawnRequest};
-use crate::geometry::{Pose, Vec2, wrap_angle};
-use crate::model::vocabulary::{Side, Verb};
+use crate::model::vocabulary::Verb;
 
 use crate::sim::around::Around;
 use crate::sim::body::BodyParameters;
 use crate::sim::ego::VehicleParameters;
-use crate::sim::npc::{Cruise, Driver, Manoeuvre, choices};
-use crate::sim::pedestrian::Walker;
+use crate::sim::npc::{Cruise, Driver, Manoeuvre};
 use crate::sim::road_user::{Motion, Moved, Mover, RoadUser};
 use crate::sim::sense::{RANGE_M, visible_fraction};
 use crate::sim::way::Way;
@@ -27,9 +26,8 @@ use crate::sim::{body, safety};
 
 use crossing::cross_road;
 use driving::{drive_ahead, drive_opposite, overtake};
+use on_foot::on_foot;
 
-/// Where pedestrians begin and end, beside the middle of the ego vehicle's lane, m.
-const KERB_M: f64 = 5.0;
 /// Fastest and farthest that a request may ask for, m/s and m: beyond any road of a scenario, and
 /// small enough for every sum that is made of them.
 const SPEED_MPS_MAX: f64 = 70.0;
@@ -166,41 +164,4 @@ fn ahead_m(around: &Around, request: &SpawnRequest, size: &BodyParameters) -> Re
         return Err("the route ends before that distance".into());
     }
     Ok(station_m)
-}
-
-fn on_foot(
-    around: &Around,
-    request: &SpawnRequest,
-    size: BodyParameters,
-    id: u32,
-) -> Result<RoadUser, String> {
-    let station_m = ahead_m(around, request, &size)?;
-    let lane = around.scene.route.path.pose_at(station_m);
-    let (left_m, turn_rad) = match request.side {
-        Side::Left => (KERB_M, -core::f64::consts::FRAC_PI_2),
-        Side::Right => (-KERB_M, core::f64::consts::FRAC_PI_2),
-    };
-    let facing = |at: Pose| Pose { heading_rad: wrap_angle(at.heading_rad + turn_rad), ..at };
-    let (pose, motion) = if request.verb == Verb::Stand {
-        (facing(lane), Motion::Stand)
-    } else {
-        let from = facing(lane.offset(0.0, left_m));
-        (
-            from,
-            Motion::Walk(Walker::new(
-                from,
-                2.0 * KERB_M,
-                request.speed_mps,
-                around.tick,
-                &mut choices(around.seed, id, 0),
-            )),
-        )
-    };
-    let moved = Moved {
-        pose,
-        forward: pose.forward(),
-        lane_heading_rad: pose.heading_rad,
-        velocity_mps: Vec2::zeros(),
-    };
-    finish(around, request, Mover::new(size, motion), id, moved)
 }

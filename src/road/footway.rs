@@ -1,0 +1,210 @@
+//! Ways across a road on foot: from kerb to kerb, over all lanes between.
+//!
+//! The carriageway is what driving lanes cover, inside junctions too, and the strips for parking, cycles and trams.
+//! A way ends where the ground is free for as long as a refuge island is wide: at the other kerb, or on a median. It
+//! never leads through a junction, except over a crosswalk, nor through anything solid. Parked vehicles are not on the map.
+
+use crate::geometry::{OrientedBox, Vec2};
+
+use super::conflict::holds;
+use super::map::{RoadMap, Strip, StripKind};
+
+/// The least free width on which a person can stand between lanes, m: AASHTO's narrowest refuge island, 6 feet.
+const REFUGE_M: f64 = 1.8;
+/// Distance from the edge of the carriageway at which people stand, m: half their width and the 0.5 m that the
+/// German guideline RASt 06 keeps free beside a carriageway.
+const KERB_M: f64 = 0.75;
+/// A walkway that begins within this distance behind the edge is where people stand, m. Ours.
+const VERGE_M: f64 = 4.0;
+/// A kerb farther than this from the place asked about is not looked for, m.
+const HALF_ROAD_M: f64 = 40.0;
+/// How far people walk on behind the other kerb, if there is room, m. Ours.
+const BEYOND_M: f64 = 8.0;
+/// Least distance of a person's centre from lanes and from anything solid, m.
+const ROOM_M: f64 = 0.5;
+/// Lanes farther from a point than this count as this far, m.
+const REACH_M: f64 = 3.0;
+/// Least step along a way, m, and the step in which free ground is checked, m.
+const STEP_M: f64 = 0.02;
+const CHECK_M: f64 = 0.25;
+
+/// One end of a way on foot.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Kerb {
+    /// Where a person stands.
+    pub place: Vec2,
+    /// From the place asked about to `place`, m.
+    pub way_m: f64,
+    /// From the place asked about to the outer edge of the last driving lane, m.
+    pub edge_m: f64,
+    /// How far the ground is free straight on behind `place`, m; at most 8.
+    pub beyond_m: f64,
+}
+
+/// A way across the road on foot. It is straight and leads through the place asked about.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FootWay {
+    pub left: Kerb,
+    pub right: Kerb,
+}
+
+/// Distances of a point to the nearest surfaces, m: negative on them, at most [`REACH_M`].
+struct Ground {
+    street_m: f64,
+    junction_m: f64,
+    paved_m: f64,
+}
+
+impl Ground {
+    fn room_m(&self) -> f64 {
+        self.street_m.min(self.junction_m).min(self.paved_m)
+    }
+}
+
+impl RoadMap {
+    /// The way on foot across the road through a point of a lane; `left` is the unit vector to one side.
+    ///
+    /// # Errors
+    /// Why people do not cross there, in words that complete "cannot spawn: …".
+    pub fn foot_way(&self, middle: Vec2, left: Vec2) -> Result<FootWay, &'static str> {
+        let over_crosswalk = self.crosswalk_at(middle).is_some();
+        Ok(FootWay {
+            left: self.kerb(middle, left, over_crosswalk)?,
+            right: self.kerb(middle, -left, over_crosswalk)?,
+        })
+    }
+
+    /// The direction in which the crosswalk that holds a point leads over the road, a unit vector. It is that of the
+    /// longest side of its outline.
+    pub fn crosswalk_at(&self, point: Vec2) -> Option<Vec2> {
+        let crosswalk = self.crosswalks.iter().find(|crosswalk| holds(&crosswalk.outline, point))?;
+        let corners = &crosswalk.outline;
+        let sides = corners.iter().zip(corners.iter().cycle().skip(1)).map(|(a, b)| b - a);
+        let longest = sides.max_by(|a, b| a.norm_squared().total_cmp(&b.norm_squared()))?;
+        let length_m = longest.norm();
+        (length_m > 1e-6).then(|| longest / length_m)
+    }
+
+    /// Distance from a point to the nearest driving lane, m: negative on it, at most 3.
+    pub fn lane_room_m(&self, point: Vec2) -> f64 {
+        let ground = self.ground(point);
+        ground.street_m.min(ground.junction_m)
+    }
+
+    /// Whether a vehicle could stand there beside the driving lanes: off them and off crosswalks, and in nothing
+    /// solid.
+    pub fn is_free_to_park(&self, outline: &OrientedBox) -> bool {
+        let steps = |half_m: f64| (2.0 * half_m / CHECK_M / 2.0).ceil().max(1.0) as i32;
+        let (along, across) = (steps(outline.half_length_m), steps(outline.half_width_m));
+        let part = |index: i32, steps: i32| 2.0 * f64::from(index) / f64::from(steps) - 1.0;
+        (0..=along).all(|i| {
+            (0..=across).all(|j| {
+                let (ahead_m, left_m) =
+                    (outline.half_length_m * part(i, along), outline.half_width_m * part(j, across));
+                let point = outline.pose.offset(ahead_m, left_m).position;
+                self.lane_room_m(point) >= 0.0
+                    && self.crosswalk_at(point).is_none()
+                    && !self.is_solid(point, CHECK_M)
+            })
+        })
+    }
+
+    /// Whether anything solid is within `room_m` of a point.
+    pub fn is_solid(&self, point: Vec2, room_m: f64) -> bool {
+        self.solids.iter().any(|solid| {
+            let corners = || solid.outline.iter().zip(solid.outline.iter().cycle().skip(1));
+            solid.bounds.distance_m2_min(point) <= room_m * room_m
+                && (holds(&solid.outline, point)
+                    || corners().any(|(a, b)| distance_m2(point, *a, *b) < room_m * room_m))
+        })
+    }
+
+    /// The end of a way that leads from a point in a direction.
+    fn kerb(&self, from: Vec2, along: Vec2, over_crosswalk: bool) -> Result<Kerb, &'static str> {
+        let (mut at_m, mut paved_m, mut edge_m) = (0.0, 0.0, 0.0);
+        loop {
+            let ground = self.ground(from + along * at_m);
+            let room_m = ground.room_m();
+            if room_m > 0.0 {
+                if at_m - paved_m >= REFUGE_M {
+                    break;
+                }
+                at_m += room_m.max(STEP_M);
+            } else {
+                if ground.junction_m <= 0.0 && ground.street_m > 0.0 && !over_crosswalk {
+                    return Err("a junction is there");
+                }
+                at_m += (-room_m).max(STEP_M);
+                paved_m = at_m;
+                if ground.street_m.min(ground.junction_m) <= 0.0 {
+                    edge_m = at_m;
+                }
+            }
+            if at_m > HALF_ROAD_M {
+                return Err("the road has no kerb there");
+            }
+        }
+        let is_walkway =
+            |at_m: &f64| self.strip_room_m(StripKind::Walkway, from + along * (paved_m + at_m)) <= 0.0;
+        let behind_m = (1..).map(|step| f64::from(step) * CHECK_M).take_while(|at_m| *at_m <= VERGE_M);
+        let way_m = paved_m + behind_m.clone().find(is_walkway).unwrap_or(0.0).max(KERB_M);
+        let place = from + along * way_m;
+        let is_free = |point: Vec2| self.ground(point).room_m() >= ROOM_M && !self.is_solid(point, ROOM_M);
+        if !is_free(place) {
+            return Err("there is no room at the kerb");
+        }
+        let mut checked_m = 0.0;
+        while checked_m < way_m {
+            if self.is_solid(from + along * checked_m, ROOM_M) {
+                return Err("something solid stands in the way");
+            }
+            checked_m += CHECK_M;
+        }
+        let mut beyond_m = 0.0;
+        while beyond_m < BEYOND_M && is_free(place + along * (beyond_m + CHECK_M)) {
+            beyond_m += CHECK_M;
+        }
+        Ok(Kerb { place, way_m, edge_m, beyond_m })
+    }
+
+    fn ground(&self, point: Vec2) -> Ground {
+        let mut ground = Ground { street_m: REACH_M, junction_m: REACH_M, paved_m: REACH_M };
+        for (index, projection) in self.grid.near(&self.lanes, point, REACH_M) {
+            let lane = self.lane(index);
+            let room_m = projection.distance_m - lane.width_at(projection.station_m) / 2.0;
+            let nearest_m =
+                if lane.junction.is_some() { &mut ground.junction_m } else { &mut ground.street_m };
+            *nearest_m = nearest_m.min(room_m);
+        }
+        ground.paved_m = self.strip_room_m(StripKind::Paved, point);
+        ground
+    }
+
+    /// Distance from a point to the nearest strip of a kind, m: negative on it, at most [`REACH_M`].
+    fn strip_room_m(&self, kind: StripKind, point: Vec2) -> f64 {
+        let strips = self.strips.iter().filter(|strip| strip.kind == kind);
+        strips.fold(REACH_M, |nearest_m, strip| nearest_m.min(strip.room_m(point)))
+    }
+}
+
+impl Strip {
+    /// Distance of a point, m: negative on the strip.
+    fn room_m(&self, point: Vec2) -> f64 {
+        let widest_m = self.widths_m.iter().copied().fold(0.0, f64::max);
+        let reach_m = REACH_M + widest_m / 2.0;
+        if self.bounds.distance_m2_min(point) > reach_m * reach_m {
+            return REACH_M;
+        }
+        let beside = self.centre.project(point);
+        let (index, fraction) = self.centre.locate(beside.station_m);
+        let (from_m, to_m) = (self.widths_m[index], self.widths_m[index + 1]);
+        beside.distance_m - (from_m + (to_m - from_m) * fraction.clamp(0.0, 1.0)) / 2.0
+    }
+}
+
+/// Squared distance of a point to the segment between two others, m².
+fn distance_m2(point: Vec2, a: Vec2, b: Vec2) -> f64 {
+    let side = b - a;
+    let part = ((point - a).dot(&side) / side.norm_squared().max(1e-12)).clamp(0.0, 1.0);
+    (point - a - side * part).norm_squared()
+}
