@@ -24,15 +24,13 @@ use crate::rng::Rng;
 
 use super::around::Around;
 use super::road_user::{Moved, Obstacle};
-use super::sense::{FRAME_TICKS, RANGE_M, visible_fraction};
+use super::sense::FRAME_TICKS;
 use super::world::DT_S;
 
 /// Least time at the kerb before setting out, s (published package).
 const WAIT_S: f64 = 1.0;
 /// Longest time at the kerb for the sake of a meeting, s. Ours.
 const WAIT_S_MAX: f64 = 10.0;
-/// Farther than this behind the ego vehicle's centre, nothing is in its sight, m. Ours.
-const BEHIND_M: f64 = 10.0;
 /// Before setting out and in a hurry, pedestrians look at the ground in front of them up to this far, m: a lane.
 const LOOK_M: f64 = 3.5;
 /// Running adult of Euro NCAP (8 km/h), m/s.
@@ -148,13 +146,12 @@ impl Walker {
         OrientedBox::new(middle, to_m - from_m, 2.0 * this.half_width_m)
     }
 
-    /// Where it is at the end of a tick; `None` once it has left.
-    pub fn step(&mut self, this: &Obstacle, around: &Around) -> Option<Moved> {
-        let looks = (around.tick + u64::from(this.id)).is_multiple_of(FRAME_TICKS);
+    /// Where it is at the end of a tick; `None` once it has left, which the ego vehicle does not see (`in_sight`).
+    pub fn step(&mut self, this: &Obstacle, in_sight: bool, around: &Around) -> Option<Moved> {
         if self.is_over() {
-            return (!looks || is_in_sight(this, around)).then_some(Moved::at_rest(this));
+            return in_sight.then_some(Moved::at_rest(this));
         }
-        if looks {
+        if (around.tick + u64::from(this.id)).is_multiple_of(FRAME_TICKS) {
             self.look(this, around);
         }
         if around.tick < self.begins_tick {
@@ -275,15 +272,6 @@ impl Walker {
             (-1.0..MEET_M).contains(&ahead_m) && there.y.abs() < 2.0 * ASIDE_M
         })
     }
-}
-
-/// Whether the ego vehicle can see an obstacle: not far behind it, in range, and not wholly hidden.
-fn is_in_sight(this: &Obstacle, around: &Around) -> bool {
-    let there = around.ego_outline.pose.to_local(this.outline.pose.position);
-    let eye = around.ego_outline.pose.position;
-    there.x > -BEHIND_M
-        && there.norm() < RANGE_M.min(around.visibility_m)
-        && visible_fraction(eye, this, around.obstacles()) > 0.0
 }
 
 /// Time until the first vehicle would reach an outline if all vehicles keep their velocity, s.

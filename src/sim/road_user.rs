@@ -159,7 +159,7 @@ impl Mover {
             _ if self.crashed_with.is_some() => Some(slide(this, around)),
             Motion::Drive(driver) => driver.step(this, &self.size, self.touched, in_sight, around),
             Motion::Walk(_) if self.touched => Some(rest),
-            Motion::Walk(walker) => walker.step(this, around),
+            Motion::Walk(walker) => walker.step(this, in_sight, around),
             Motion::Stand => Some(rest),
         }
     }

@@ -226,7 +226,7 @@ fn a_pedestrian_crosses_the_whole_road_and_leaves_out_of_sight() {
     assert!(y_m(&world, walker.id) < -15.7, "8 m beyond the other kerb");
     drive(&mut world, 0.0, 20.0);
     assert!(world.obstacle(walker.id).is_some(), "it is in sight");
-    drive(&mut world, 10.0, 10.0);
+    drive(&mut world, 13.0, 20.0);
     assert_eq!(world.obstacle(walker.id), None);
 }
 
