@@ -1,5 +1,6 @@
 //! What a row does to the world once its parameters are drawn.
 
+use crate::model::SpawnFacts;
 use crate::model::vocabulary::{Body, Colour, LaneChoice, Level, Phenomenon, Side, Then, TimeOfDay, Verb};
 
 /// One change of the world. A row has one or more, applied in order.
@@ -27,15 +28,6 @@ pub struct SpawnRequest {
     /// Gap to the ego vehicle along its route, m; behind the ego vehicle for `Overtake`. `sim::placement`
     /// says for each verb what exactly lies at that distance.
     pub distance_m: f64,
-}
-
-/// What a rule may ask about a spawn before it happens.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SpawnFacts {
-    /// Distance between the outlines of the ego vehicle and the newcomer, m.
-    pub spawn_gap_m: f64,
-    /// Gap that a careful and competent driver would need there, m; 0 if the two do not approach.
-    pub safety_gap_m: f64,
 }
 
 /// What the action table may ask the world.

@@ -7,7 +7,7 @@
 use std::cell::Cell;
 
 use crate::model::rules::{Demand, RowRules};
-use crate::model::vocabulary::{Verb, Word};
+use crate::model::vocabulary::{Known, Verb, Word};
 use crate::model::{
     EffectDef, Facts, Memory, Reach, Road, Row, RulesInForce, Space, SpawnDef, Value, code, evaluate, locals,
 };
@@ -57,7 +57,7 @@ pub(super) fn unfair(
 ) -> Option<Witness> {
     let in_force = RulesInForce::by_default(space);
     let rules = RowRules { space, row, road: Some(&road.facts), in_force: &in_force };
-    let asks = |demand| matches!(demand, Demand::Holds(condition) if condition.needs_survey());
+    let asks = |demand| matches!(demand, Demand::Holds(condition) if condition.known() == Known::Spawn);
     if rules.demands().any(|(_, demand)| asks(demand)) {
         return None;
     }

@@ -13,7 +13,7 @@ use crate::model::expr::{Expr, ExprKind};
 use crate::model::rules::{Candidate, Demand, Room, RowRules};
 use crate::model::{
     ActionDef, Domain, EffectDef, End, Facts, Initial, Interval, Memory, Parameter, Road, Row, RulesInForce,
-    Space, StateDef, Type, Value, evaluate, locals, spawn_out_of_bounds,
+    Space, SpawnFacts, StateDef, Type, Value, WorldFacts, evaluate, locals, spawn_out_of_bounds,
 };
 use crate::prove::enclose::Values;
 use crate::units::Rational;
@@ -160,7 +160,7 @@ impl Search<'_> {
         let after = &space.memory_after(self.rules.row.action, values, before);
         let facts = Facts { road: self.rules.road, ..Facts::new(values, after) };
         let number = |expr: &Expr| evaluate(expr, &space.functions, &facts).number();
-        let mut gaps_m = Vec::new();
+        let mut spawns = Vec::new();
         for effect in &action.effects {
             let EffectDef::Spawn(spawn) = effect else { continue };
             let (speed_mps, distance_m) = (number(&spawn.speed), number(&spawn.distance));
@@ -168,9 +168,10 @@ impl Search<'_> {
                 return false;
             }
             // The spawn lands where it was asked to, and no gap is unfair.
-            gaps_m.push((distance_m, 0.0));
+            spawns.push(SpawnFacts { spawn_gap_m: distance_m, safety_gap_m: 0.0 });
         }
-        let candidate = Candidate { values, before, after, gaps_m: &gaps_m };
+        let world = WorldFacts { spawns };
+        let candidate = Candidate { values, before, after, world: Some(&world) };
         self.rules.breaches(candidate).next().is_none() && wish(values, after)
     }
 
