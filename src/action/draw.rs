@@ -115,7 +115,7 @@ impl<'a> Judge<'a> {
                 Err(reason) => refusals.push(refuse(None, format!("cannot spawn: {reason}"))),
             }
         }
-        let world = WorldFacts { spawns };
+        let world = WorldFacts { ego_speed_mps: self.situation.surroundings.ego_speed_mps(), spawns };
         let candidate = Candidate { values, before, after: &after, world: Some(&world) };
         refusals.extend(self.row.breaches(candidate).map(|breach| {
             let rule = breach.rule().map(|rule| self.row.space.rules[rule].name.clone());

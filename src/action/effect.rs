@@ -37,4 +37,7 @@ pub trait Surroundings {
     /// # Errors
     /// A reason that completes "cannot spawn: …", for example `no lane on the left`.
     fn survey(&self, request: &SpawnRequest) -> Result<SpawnFacts, String>;
+
+    /// Speed of the ego vehicle, m/s, at least 0.
+    fn ego_speed_mps(&self) -> f64;
 }

@@ -31,6 +31,7 @@ pub struct Facts<'a> {
 /// [`Known::World`]: crate::model::vocabulary::Known::World
 #[derive(Debug, Clone)]
 pub struct WorldFacts {
+    pub ego_speed_mps: f64,
     /// Each spawn of the action for which the world has found a place.
     pub spawns: Vec<SpawnFacts>,
 }
@@ -110,6 +111,7 @@ pub fn evaluate(expr: &Expr, functions: &[FnDef], facts: &Facts<'_>) -> Value {
 fn fact_value(fact: Fact, facts: &Facts<'_>) -> Value {
     match fact {
         Fact::RoadLimit => Value::Number(facts.road.map_or(f64::NAN, |road| road.limit_mps)),
+        Fact::EgoSpeed => Value::Number(facts.world.map_or(f64::NAN, |world| world.ego_speed_mps)),
         Fact::SpawnGap => Value::Number(facts.spawn.map_or(f64::NAN, |spawn| spawn.spawn_gap_m)),
         Fact::SafetyGap => Value::Number(facts.spawn.map_or(f64::NAN, |spawn| spawn.safety_gap_m)),
         Fact::Proc => Value::Number(facts.outcome.proc),

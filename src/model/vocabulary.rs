@@ -134,6 +134,7 @@ const SPEED: Type = Type::Quantity(Dimension::SPEED);
 
 facts! {
     RoadLimit "road.limit" SPEED, Road = "A `Speed`: the lowest limit along the route.";
+    EgoSpeed "ego.speed" SPEED, World = "A `Speed`: how fast the ego vehicle is when the action is chosen.";
     SpawnGap "spawn_gap" LENGTH, Spawn = "A `Length`: the gap from the ego vehicle to the road user that appears.";
     SafetyGap "safety_gap" LENGTH, Spawn = "A `Length`: the gap that a careful driver needs.";
     Proc "proc" RATIO, Step = "A `Ratio`: the collision probability of the step.";

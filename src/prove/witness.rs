@@ -170,9 +170,15 @@ impl Search<'_> {
             // The spawn lands where it was asked to, and no gap is unfair.
             spawns.push(SpawnFacts { spawn_gap_m: distance_m, safety_gap_m: 0.0 });
         }
-        let world = WorldFacts { spawns };
-        let candidate = Candidate { values, before, after, world: Some(&world) };
-        self.rules.breaches(candidate).next().is_none() && wish(values, after)
+        let limit_mps = self.rules.road.map_or(0.0, |road| road.limit_mps);
+        let mut world = WorldFacts { ego_speed_mps: limit_mps, spawns };
+        // The ego vehicle drives at the limit, at half of it, or stands.
+        let runs = [1.0, 0.5, 0.0].into_iter().any(|part| {
+            world.ego_speed_mps = part * limit_mps;
+            let candidate = Candidate { values, before, after, world: Some(&world) };
+            self.rules.breaches(candidate).next().is_none()
+        });
+        runs && wish(values, after)
     }
 
     /// Memories to try: the initial one first, then every value of the cells that the rules or effects of the

@@ -427,6 +427,10 @@ impl Surroundings for World {
         let newcomer = placement::place(&around, request, self.next_id)?;
         Ok(placement::facts(&around, request, &newcomer))
     }
+
+    fn ego_speed_mps(&self) -> f64 {
+        self.ego.motion.speed_mps
+    }
 }
 
 #[cfg(test)]
