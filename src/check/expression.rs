@@ -8,7 +8,7 @@ use crate::model::expr::{Expr, ExprKind};
 use crate::model::vocabulary::{Fact, ROAD_LANES, Site, Word, parts_of, things};
 use crate::model::{EnumIndex, Type, code};
 use crate::syntax::ast::{Span, UnaryOp};
-use crate::syntax::{Diagnostic, ast, listed, nearest};
+use crate::syntax::{Diagnostic, ast, listed, nearest, one_of};
 use crate::units;
 use crate::units::{Dimension, Rational};
 
@@ -556,15 +556,6 @@ pub(super) fn dimension(ty: Type) -> Dimension {
 /// A whole number may stand for a ratio; otherwise types must be equal.
 pub(super) fn fits(found: Type, wanted: Type) -> bool {
     found == wanted || found == Type::Int && wanted == Type::Quantity(Dimension::RATIO)
-}
-
-/// `a`, `b` or `c`.
-fn one_of<S: AsRef<str>>(words: &[S]) -> String {
-    let quoted: Vec<String> = words.iter().map(|word| format!("`{}`", word.as_ref())).collect();
-    match quoted.split_last() {
-        Some((last, rest)) if !rest.is_empty() => format!("{} or {last}", rest.join(", ")),
-        _ => quoted.concat(),
-    }
 }
 
 pub(super) fn article(name: &str) -> String {

@@ -80,15 +80,16 @@ fn settings(arguments: &TrainArguments) -> Result<Settings, Failure> {
         let known = listed(&trained.map(|entry| entry.name).collect::<Vec<_>>());
         Failure::usage(format!("no agent `{}` that learns: there are {known}", arguments.agent))
     })?;
-    let (text, path) = match &arguments.config {
-        None => (String::new(), Path::new("--preset")),
-        Some(path) => (load::text(path)?, path.as_path()),
-    };
+    let text = arguments.config.as_deref().map(load::text).transpose()?.unwrap_or_default();
     let settings = Settings::from_yaml(entry, arguments.preset.as_deref(), &text).ok_or_else(|| {
         let name = entry.name;
         Failure::usage(format!("`{name}` has nothing to learn: `avastra run --agent {name}` plays it"))
     })?;
-    settings.map_err(|error| Failure::file("take", path, error))
+    settings.map_err(|error| match &arguments.config {
+        Some(path) => Failure::file("take", path, error),
+        // The preset alone can be wrong.
+        None => Failure::usage(format!("cannot take `--preset`: {error}")),
+    })
 }
 
 /// The rest of an interrupted training.

@@ -245,6 +245,13 @@ words! {
 pub const WAIT: (&str, &str) = ("wait", "A step without an action: `3: wait()`.");
 
 words! {
+    /// Its sentence is the form in which it must be declared.
+    WorldState "A state that the world reads.":
+    Time "time" = "time: Time",
+    Sky "sky" = "sky: Sky -> Level",
+}
+
+words! {
     /// 10:00, 14:00 and 20:00 in the published package.
     TimeOfDay "A period of the day.": Morning, Noon, Night
 }

@@ -99,7 +99,7 @@ fn remark(space: &Space, row: &Row, road: &Road, spawn: &SpawnDef, found: &Witne
     let facts = Facts { road: Some(&road.facts), ..Facts::new(&values, &after) };
     let verb = spawn.verb.word(&space.functions, &facts);
     let rounded = |value: f64| decimal((value * 100.0).round() / 100.0, false);
-    let message = format!("`{}` can appear where nobody could avoid it", action.name);
+    let message = format!("`{}` can appear where a careful driver could not avoid it", action.name);
     Diagnostic::remark(code::UNFAIR, message)
         .at(spawn.distance.span, format!("{} m in `{}`", rounded(figures.distance_m), row.label))
         .note(format!(
