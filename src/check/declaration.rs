@@ -1,4 +1,4 @@
-//! Enums, constants, functions and states.
+//! Checks the declarations of enums, constants, functions and states.
 
 use crate::check::checker::{Checker, Signature, docs};
 use crate::check::expression::Place;

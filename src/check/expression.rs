@@ -136,7 +136,7 @@ impl Checker {
     /// A number literal in SI units.
     pub(super) fn number(&mut self, number: &ast::Number) -> Option<Expr> {
         self.references.number(number);
-        let value = self.exact(exact_digits(&number.digits), number.span)?;
+        let value = self.exact(Rational::from_literal(&number.digits), number.span)?;
         let (value, ty) = match &number.unit {
             None if value.is_integer() && !number.digits.contains(['.', 'e', 'E']) => {
                 (Some(value), Type::Int)
@@ -222,7 +222,7 @@ impl Checker {
         self.references.word_named::<Fact>(span, name);
     }
 
-    /// A name that exists, but not here.
+    /// Why a name that exists cannot be used here; `None` if there is no such name.
     fn lacking(&self, name: &str, place: &Place<'_>) -> Option<String> {
         if place.knows(name) {
             let mut asked: Vec<String> =
@@ -526,19 +526,6 @@ pub(crate) fn unknown_unit(word: &ast::Name) -> Diagnostic {
     match meant.or(nearest(&word.text, words())) {
         Some(near) => error.meant(word.span, near),
         None => error.help(format!("the units are {}", words().collect::<Vec<_>>().join(", "))),
-    }
-}
-
-/// Reads `12`, `0.50` and `1e-9` exactly, if they fit.
-pub(crate) fn exact_digits(digits: &str) -> Option<Rational> {
-    let (mantissa, exponent) = digits.split_once(['e', 'E']).unwrap_or((digits, "0"));
-    let exponent: i32 = exponent.parse().ok()?;
-    let power = 10_i128.checked_pow(exponent.unsigned_abs())?;
-    let mantissa = Rational::from_decimal(mantissa)?;
-    if exponent >= 0 {
-        mantissa.checked_mul(Rational::new(power, 1)?)
-    } else {
-        mantissa.checked_mul(Rational::new(1, power)?)
     }
 }
 

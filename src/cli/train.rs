@@ -15,11 +15,13 @@ use crate::train::{Evaluation, TrainSettings, TrainedEpisode, Training, evaluate
 use super::arguments::TrainArguments;
 use super::distill::rules_text;
 use super::error::Failure;
+use super::files::write;
 use super::interrupt::stop_on_interrupt;
 use super::output::Output;
-use super::progress::{TrainingProgress, plural};
+use super::output::plural;
+use super::progress::TrainingProgress;
 use super::run::roads_or_all;
-use super::run_directory::{RunDirectory, write};
+use super::run_directory::RunDirectory;
 use super::{distill, load, run_directory};
 
 /// Episodes between two checkpoints: at most so many are played again after a kill.
@@ -105,7 +107,8 @@ fn resumed(output: &Output, path: &Path) -> Result<(Training, RunDirectory), Fai
     Ok((training, directory))
 }
 
-/// Writes an episode's counted collisions as a scenario and commits it, with a checkpoint every so often, at the end, and when the user stops.
+/// Writes an episode's counted collisions as a scenario and commits it. A checkpoint goes with it every so often, at
+/// the end, and when the user stops.
 fn keep(
     training: &Training,
     directory: &mut RunDirectory,

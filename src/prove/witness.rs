@@ -25,7 +25,8 @@ const BOXES_IN_ALL_MAX: usize = 20_000;
 /// The most choices of listed values, and the most memories, that are tried.
 const CHOICES_MAX: usize = 256;
 const MEMORIES_MAX: usize = 64;
-/// Ranges whose ends are tried in every combination; the ranges beyond share the choice of the last.
+/// The first ranges of a row: every combination of their ends is tried. All later ranges take the same end as the
+/// last of these.
 const CORNER_BITS: usize = 3;
 
 /// Values with which a row runs, and the memory before it.
