@@ -3,6 +3,7 @@
 use core::fmt;
 
 use crate::action::table::ActionTable;
+use crate::model::vocabulary::Known;
 use crate::model::{Reach, RuleBody};
 use crate::prove::{Removal, removals};
 
@@ -48,7 +49,9 @@ pub fn audit(table: &ActionTable) -> Audit {
         let masks = table.rows().iter().filter(|row| row.roads.iter().any(helps));
         let enforced = match &rule.body {
             RuleBody::Moves { .. } => Enforcement::Transition,
-            RuleBody::Holds(bindings) if bindings.iter().any(|binding| binding.condition.needs_survey()) => {
+            RuleBody::Holds(bindings)
+                if bindings.iter().any(|binding| binding.condition.known() > Known::Road) =>
+            {
                 Enforcement::Survey
             }
             RuleBody::Holds(_) => Enforcement::Draw,

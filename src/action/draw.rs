@@ -6,8 +6,8 @@ use crate::action::table::{Draw, Refusal, Situation};
 use crate::action::{Effect, SpawnRequest};
 use crate::model::rules::{Candidate, Room, RowRules};
 use crate::model::{
-    ActionDef, Domain, EffectDef, Facts, Memory, Parameter, Space, SpawnDef, StateMeaning, Value, evaluate,
-    locals, spawn_out_of_bounds,
+    ActionDef, Domain, EffectDef, Facts, Memory, Parameter, Space, SpawnDef, StateMeaning, Value, WorldFacts,
+    evaluate, locals, spawn_out_of_bounds,
 };
 use crate::rng;
 use crate::rng::{Rng, Stream};
@@ -103,7 +103,7 @@ impl<'a> Judge<'a> {
         let after = self.row.space.memory_after(self.row.row.action, values, before);
         let effects = self.effects(values, &after);
         let mut refusals = Vec::new();
-        let mut gaps_m = Vec::new();
+        let mut spawns = Vec::new();
         for effect in &effects {
             let Effect::Spawn(request) = effect else { continue };
             if let Some(reason) = spawn_out_of_bounds(request.speed_mps, request.distance_m) {
@@ -111,11 +111,12 @@ impl<'a> Judge<'a> {
                 continue;
             }
             match self.situation.surroundings.survey(request) {
-                Ok(facts) => gaps_m.push((facts.spawn_gap_m, facts.safety_gap_m)),
+                Ok(facts) => spawns.push(facts),
                 Err(reason) => refusals.push(refuse(None, format!("cannot spawn: {reason}"))),
             }
         }
-        let candidate = Candidate { values, before, after: &after, gaps_m: &gaps_m };
+        let world = WorldFacts { ego_speed_mps: self.situation.surroundings.ego_speed_mps(), spawns };
+        let candidate = Candidate { values, before, after: &after, world: Some(&world) };
         refusals.extend(self.row.breaches(candidate).map(|breach| {
             let rule = breach.rule().map(|rule| self.row.space.rules[rule].name.clone());
             refuse(rule, self.row.words(breach, candidate))

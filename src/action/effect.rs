@@ -1,5 +1,6 @@
 //! What a row does to the world once its parameters are drawn.
 
+use crate::model::SpawnFacts;
 use crate::model::vocabulary::{Body, Colour, LaneChoice, Level, Phenomenon, Side, Then, TimeOfDay, Verb};
 
 /// One change of the world. A row has one or more, applied in order.
@@ -29,15 +30,6 @@ pub struct SpawnRequest {
     pub distance_m: f64,
 }
 
-/// What a rule may ask about a spawn before it happens.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SpawnFacts {
-    /// Distance between the outlines of the ego vehicle and the newcomer, m.
-    pub spawn_gap_m: f64,
-    /// Gap that a careful and competent driver would need there, m; 0 if the two do not approach.
-    pub safety_gap_m: f64,
-}
-
 /// What the action table may ask the world.
 pub trait Surroundings {
     /// Where a spawn would put its road user, in numbers; or why it cannot, in words.
@@ -45,4 +37,7 @@ pub trait Surroundings {
     /// # Errors
     /// A reason that completes "cannot spawn: …", for example `no lane on the left`.
     fn survey(&self, request: &SpawnRequest) -> Result<SpawnFacts, String>;
+
+    /// Speed of the ego vehicle, m/s, at least 0.
+    fn ego_speed_mps(&self) -> f64;
 }

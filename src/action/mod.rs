@@ -9,8 +9,9 @@ mod effect;
 mod file;
 mod table;
 
+pub use crate::model::SpawnFacts;
 pub use audit::{Audit, Enforcement, RuleAudit, audit};
-pub use effect::{Effect, SpawnFacts, SpawnRequest, Surroundings};
+pub use effect::{Effect, SpawnRequest, Surroundings};
 pub use file::{AxisRecord, DrawRecord, RoadRecord, RowRecord, RuleRecord, TableFile};
 pub use table::{ActionTable, Draw, Offer, Refusal, Situation};
 

@@ -329,10 +329,6 @@ impl Hyperparameters {
             within(name, value, 1..=most, "a whole number from 1, and not enormous")
         };
         let widths = &self.hidden_units;
-        let deviation = match self.initialization {
-            Initialization::Normal(deviation) => deviation,
-            Initialization::He => 0.0,
-        };
         require([
             unit("safe_proc_max", self.safe_proc_max),
             unit("discount", self.discount),
@@ -346,7 +342,6 @@ impl Hyperparameters {
             positive("learning_rate", self.learning_rate),
             positive("priority_floor", self.priority_floor),
             positive("priority_first", self.priority_first),
-            positive("gradient_norm_max", self.gradient_norm_max.unwrap_or(1.0)),
             reward("collision_reward", self.collision_reward),
             reward("uncounted_reward", self.uncounted_reward),
             reward("safe_reward", self.safe_reward),
@@ -367,12 +362,6 @@ impl Hyperparameters {
             within("rules_rounds", self.rules_rounds, 1..=1000, "from 1 to 1000"),
             within("rules_episodes", self.rules_episodes, 1..=1000, "from 1 to 1000"),
             within("updates_per_step", self.updates_per_step, 0..=64, "up to 64"),
-            within(
-                "observation_period_s",
-                self.observation_period_s.unwrap_or(6.0),
-                0.5..=60.0,
-                "from 0.5 to 60",
-            ),
             Requirement {
                 name: "hidden_units",
                 is_met: (1..=4).contains(&widths.len())
@@ -380,8 +369,20 @@ impl Hyperparameters {
                 value: format!("{widths:?}"),
                 wanted: "one to four widths from 1 to 4096",
             },
-            within("initialization", deviation, 0.0..=10.0, "`he`, or normal from 0 to 10"),
-        ])
+        ])?;
+        let deviation = match self.initialization {
+            Initialization::Normal(deviation) => Some(deviation),
+            Initialization::He => None,
+        };
+        // What is absent needs no value.
+        let optional = [
+            self.gradient_norm_max.map(|length| positive("gradient_norm_max", length)),
+            self.observation_period_s
+                .map(|period_s| within("observation_period_s", period_s, 0.5..=60.0, "from 0.5 to 60")),
+            deviation
+                .map(|value| within("initialization", value, 0.0..=10.0, "`he`, or normal from 0 to 10")),
+        ];
+        require(optional.into_iter().flatten())
     }
 }
 

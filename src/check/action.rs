@@ -31,12 +31,17 @@ impl Checker {
         let (names, actions) = self.declared("action", items, ItemKind::as_action);
         self.action_names = names;
         for (item, declared) in actions {
-            let action = self.action(item, declared);
+            let (action, is_whole) = self.action(item, declared).unzip();
+            if is_whole == Some(false) {
+                self.half_broken.push(self.actions.len());
+            }
             self.actions.push(action);
         }
     }
 
-    pub(super) fn action(&mut self, item: &ast::Item, declared: &ast::Action) -> Option<ActionDef> {
+    /// The action, and whether all its effects are sound. The sound ones are kept in any case, so that rules on
+    /// this action are checked too.
+    pub(super) fn action(&mut self, item: &ast::Item, declared: &ast::Action) -> Option<(ActionDef, bool)> {
         let owner = Symbol::Action(declared.name.text.clone());
         let mut locals: Vec<(String, Type)> = Vec::new();
         let mut parameters = Vec::new();
@@ -81,17 +86,15 @@ impl Checker {
         }
         let effects: Vec<Option<EffectDef>> =
             declared.effects.iter().map(|effect| self.effect(effect, &place)).collect();
-        if effects.iter().any(Option::is_none) {
-            // The sound effects are kept, so that rules on this action are checked too.
-            self.half_broken.push(self.actions.len());
-        }
-        Some(ActionDef {
+        let is_whole = effects.iter().all(Option::is_some);
+        let action = ActionDef {
             name: declared.name.text.clone(),
             docs: docs(item),
             parameters,
             effects: effects.into_iter().flatten().collect(),
             span: declared.name.span,
-        })
+        };
+        Some((action, is_whole))
     }
 
     fn parameter(

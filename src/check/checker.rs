@@ -54,7 +54,7 @@ pub(super) struct Checker {
     pub(super) doubles: BTreeSet<Span>,
 }
 
-/// What the declarations of a space come to.
+/// What checking the declarations of a space gives.
 pub(super) struct Checked {
     /// `None` if it is not sound.
     pub space: Option<Space>,
@@ -72,8 +72,8 @@ pub(super) struct Root {
     pub docs: Vec<String>,
 }
 
-/// Checks the declarations of all files of a space, imports first. Of the declarations `aside` it notes the
-/// names alone. Without maps there is no space.
+/// Checks the declarations of all files of a space, imports first. The declarations `aside` do not stand: only their
+/// names are noted. Without maps there is no space.
 pub(super) fn space(
     root: Root,
     items: &[&ast::Item],

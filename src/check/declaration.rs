@@ -1,4 +1,4 @@
-//! Enums, constants, functions and states.
+//! Checks the declarations of enums, constants, functions and states.
 
 use crate::check::checker::{Checker, Signature, docs};
 use crate::check::expression::Place;
@@ -7,7 +7,7 @@ use crate::check::references::Symbol;
 use crate::check::report::Report;
 use crate::check::rule::names_in;
 use crate::model::expr::{Expr, ExprKind};
-use crate::model::vocabulary::{Level, Phenomenon, TimeOfDay, Word};
+use crate::model::vocabulary::{Level, Phenomenon, TimeOfDay, Word, WorldState};
 use crate::model::{EnumDef, EnumIndex, FnDef, Initial, StateDef, StateMeaning, Type, code};
 use crate::prove::VARIANTS_MAX;
 use crate::syntax::ast::{ItemKind, Span};
@@ -340,22 +340,21 @@ impl Checker {
 
     /// `time` and `sky` set the time of day and the weather; any other state is only the author's record.
     fn meaning(&mut self, name: &ast::Name, key: Option<EnumIndex>, ty: Type) -> Option<StateMeaning> {
-        match (name.text.as_str(), key) {
-            ("time", None) => {
+        let Some(state) = WorldState::from_name(&name.text) else { return Some(StateMeaning::Private) };
+        match (state, key) {
+            (WorldState::Time, None) => {
                 Some(StateMeaning::Time(self.words::<TimeOfDay>("time of day", ty, name.span)?))
             }
-            ("sky", Some(key)) => {
+            (WorldState::Sky, Some(key)) => {
                 let phenomena = self.words::<Phenomenon>("phenomenon", Type::Enum(key), name.span);
                 let levels = self.words::<Level>("level", ty, name.span);
                 Some(StateMeaning::Sky(phenomena?, levels?))
             }
-            ("time" | "sky", _) => {
-                let shape = if name.text == "time" { "`time: Time`" } else { "`sky: Sky -> Level`" };
+            (WorldState::Time | WorldState::Sky, _) => {
                 let message = format!("`{}` is a state of the world", name.text);
                 let error = Diagnostic::error(code::TYPE_MISMATCH, message);
-                self.reject(error.at(name.span, format!("must be declared as {shape}")))
+                self.reject(error.at(name.span, format!("must be declared as `{}`", state.meaning())))
             }
-            _ => Some(StateMeaning::Private),
         }
     }
 

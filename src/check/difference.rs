@@ -199,28 +199,7 @@ fn compared(old: (&Space, usize), new: (&Space, usize)) -> Option<(Change, Strin
             }
         }
     }
-    let shown = |parts: &[String]| {
-        let mut kept: Vec<&str> = Vec::new();
-        for part in parts {
-            if !kept.contains(&part.as_str()) {
-                kept.push(part);
-            }
-        }
-        match kept.len() {
-            0..=4 => kept.join("; "),
-            more => format!("{}; and {} more", kept[..4].join("; "), more - 4),
-        }
-    };
-    let (tighter, looser) = (shown(&turns.tighter), shown(&turns.looser));
-    let change = turns.change()?;
-    Some((
-        change,
-        match change {
-            Change::Tightened => tighter,
-            Change::Loosened => looser,
-            _ => format!("tighter: {tighter}; looser: {looser}"),
-        },
-    ))
+    turns.in_words()
 }
 
 /// A range for each name.
@@ -246,12 +225,26 @@ struct Turns {
 }
 
 impl Turns {
-    fn change(&self) -> Option<Change> {
-        match (self.tighter.is_empty(), self.looser.is_empty()) {
+    /// The change as a whole, and its parts in words; `None` if there is no change.
+    fn in_words(&self) -> Option<(Change, String)> {
+        let shown = |parts: &[String]| {
+            let mut kept: Vec<&str> = Vec::new();
+            for part in parts {
+                if !kept.contains(&part.as_str()) {
+                    kept.push(part);
+                }
+            }
+            match kept.len() {
+                0..=4 => kept.join("; "),
+                more => format!("{}; and {} more", kept[..4].join("; "), more - 4),
+            }
+        };
+        let (tighter, looser) = (shown(&self.tighter), shown(&self.looser));
+        match (tighter.is_empty(), looser.is_empty()) {
             (true, true) => None,
-            (false, true) => Some(Change::Tightened),
-            (true, false) => Some(Change::Loosened),
-            (false, false) => Some(Change::Changed),
+            (false, true) => Some((Change::Tightened, tighter)),
+            (true, false) => Some((Change::Loosened, looser)),
+            (false, false) => Some((Change::Changed, format!("tighter: {tighter}; looser: {looser}"))),
         }
     }
 
@@ -318,9 +311,8 @@ fn reaches(old: &Space, new: &Space) -> Vec<Difference> {
                 Reach::Dead { .. } => None,
             };
             turns.judge(&ranges(&row.roads[index]), &ranges(&other.roads[same]), &road.name);
-            let Some(change) = turns.change() else { continue };
-            let parts = if turns.tighter.is_empty() { turns.looser } else { turns.tighter };
-            let difference = difference(change, format!("draws of `{action}`"), parts.join("; "));
+            let Some((change, detail)) = turns.in_words() else { continue };
+            let difference = difference(change, format!("draws of `{action}`"), detail);
             if !found.contains(&difference) {
                 found.push(difference);
             }

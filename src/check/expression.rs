@@ -8,7 +8,7 @@ use crate::model::expr::{Expr, ExprKind};
 use crate::model::vocabulary::{Fact, ROAD_LANES, Site, Word, parts_of, things};
 use crate::model::{EnumIndex, Type, code};
 use crate::syntax::ast::{Span, UnaryOp};
-use crate::syntax::{Diagnostic, ast, listed, nearest};
+use crate::syntax::{Diagnostic, ast, listed, nearest, one_of};
 use crate::units;
 use crate::units::{Dimension, Rational};
 
@@ -136,7 +136,7 @@ impl Checker {
     /// A number literal in SI units.
     pub(super) fn number(&mut self, number: &ast::Number) -> Option<Expr> {
         self.references.number(number);
-        let value = self.exact(exact_digits(&number.digits), number.span)?;
+        let value = self.exact(Rational::from_literal(&number.digits), number.span)?;
         let (value, ty) = match &number.unit {
             None if value.is_integer() && !number.digits.contains(['.', 'e', 'E']) => {
                 (Some(value), Type::Int)
@@ -222,7 +222,7 @@ impl Checker {
         self.references.word_named::<Fact>(span, name);
     }
 
-    /// A name that exists, but not here.
+    /// Why a name that exists cannot be used here; `None` if there is no such name.
     fn lacking(&self, name: &str, place: &Place<'_>) -> Option<String> {
         if place.knows(name) {
             let mut asked: Vec<String> =
@@ -529,19 +529,6 @@ pub(crate) fn unknown_unit(word: &ast::Name) -> Diagnostic {
     }
 }
 
-/// Reads `12`, `0.50` and `1e-9` exactly, if they fit.
-pub(crate) fn exact_digits(digits: &str) -> Option<Rational> {
-    let (mantissa, exponent) = digits.split_once(['e', 'E']).unwrap_or((digits, "0"));
-    let exponent: i32 = exponent.parse().ok()?;
-    let power = 10_i128.checked_pow(exponent.unsigned_abs())?;
-    let mantissa = Rational::from_decimal(mantissa)?;
-    if exponent >= 0 {
-        mantissa.checked_mul(Rational::new(power, 1)?)
-    } else {
-        mantissa.checked_mul(Rational::new(1, power)?)
-    }
-}
-
 pub(super) fn is_number(ty: Type) -> bool {
     matches!(ty, Type::Int | Type::Quantity(_))
 }
@@ -556,15 +543,6 @@ pub(super) fn dimension(ty: Type) -> Dimension {
 /// A whole number may stand for a ratio; otherwise types must be equal.
 pub(super) fn fits(found: Type, wanted: Type) -> bool {
     found == wanted || found == Type::Int && wanted == Type::Quantity(Dimension::RATIO)
-}
-
-/// `a`, `b` or `c`.
-fn one_of<S: AsRef<str>>(words: &[S]) -> String {
-    let quoted: Vec<String> = words.iter().map(|word| format!("`{}`", word.as_ref())).collect();
-    match quoted.split_last() {
-        Some((last, rest)) if !rest.is_empty() => format!("{} or {last}", rest.join(", ")),
-        _ => quoted.concat(),
-    }
 }
 
 pub(super) fn article(name: &str) -> String {

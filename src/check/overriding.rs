@@ -12,11 +12,9 @@ use crate::check::load::{LoadedFile, used_path, used_paths, uses as uses_of};
 use crate::check::names::unknown;
 use crate::check::unused::names_of_expr;
 use crate::model::code;
+use crate::model::vocabulary::{Fact, Known, Word};
 use crate::syntax::ast::{EffectKind, Item, ItemKind, Name, RuleBody, Span, Use};
 use crate::syntax::{Diagnostic, nearest};
-
-/// The facts about a spawn that a rule may use.
-const GAPS: [&str; 2] = ["spawn_gap", "safety_gap"];
 
 /// A declaration that stands, and the index of its file.
 struct Standing<'a> {
@@ -192,10 +190,12 @@ fn keeps_something(
 fn touched<'a>(items: impl Iterator<Item = &'a Item>) -> BTreeSet<String> {
     let actions = items.filter_map(|item| item.kind.plain().as_action());
     let effects = actions.flat_map(|action| &action.effects);
+    let gaps = Fact::ALL.iter().filter(|fact| fact.known() == Known::Spawn);
+    let gaps: Vec<String> = gaps.map(|fact| fact.name().to_owned()).collect();
     effects
         .flat_map(|effect| match &effect.kind {
             EffectKind::Set { state, .. } => vec![state.text.clone()],
-            EffectKind::Spawn { .. } => GAPS.map(str::to_owned).to_vec(),
+            EffectKind::Spawn { .. } => gaps.clone(),
         })
         .collect()
 }

@@ -6,6 +6,7 @@ use crate::check::names::unknown;
 use crate::check::references::Symbol;
 use crate::check::report::Report;
 use crate::model::expr::{Expr, ExprKind};
+use crate::model::vocabulary::Known;
 use crate::model::{ActionDef, EffectDef, RuleBinding, RuleBody, RuleDef, Type, code};
 use crate::syntax::ast::ItemKind;
 use crate::syntax::{Diagnostic, ast, listed};
@@ -62,7 +63,7 @@ impl Checker {
             let spawns = definition.effects.iter().any(|effect| matches!(effect, EffectDef::Spawn(_)));
             let place = Place { locals: &locals, owner: Some(&owner), ..Place::RULE };
             let Some(condition) = self.typed(condition, &place, Type::Bool) else { continue };
-            if condition.needs_survey() && !spawns && !self.half_broken.contains(&action) {
+            if condition.known() == Known::Spawn && !spawns && !self.half_broken.contains(&action) {
                 let message =
                     format!("`{}` asks about a spawn, and `{}` has none", rule.name.text, definition.name);
                 let error = Diagnostic::error(code::NO_SPAWN, message).at(condition.span, "needs a spawn");
@@ -118,11 +119,11 @@ impl Checker {
         let compiled = self.typed(condition, &Place::RULE, Type::Bool)?;
         let binds = |action: &ActionDef| {
             action.effects.iter().any(|effect| match effect {
-                EffectDef::Spawn(_) => compiled.needs_survey(),
+                EffectDef::Spawn(_) => compiled.known() == Known::Spawn,
                 EffectDef::Set(set) => reads_state(&compiled, &self.states[set.state]),
             })
         };
-        let open = !compiled.needs_survey() && !compiled.reads_memory();
+        let open = compiled.known() != Known::Spawn && !compiled.reads_memory();
         let all = self.actions.iter().enumerate();
         let bound = all.filter(|(index, a)| {
             a.as_ref().is_some_and(|a| open || binds(a) || self.half_broken.contains(index))

@@ -38,7 +38,7 @@ pub(super) fn breaches(space: &Space, moment: &Moment<'_>, in_force: &RulesInFor
     let road = moment.road.map(|road| &space.roads[road].facts);
     let rules = RowRules { space, row: moment.row, road, in_force };
     let candidate =
-        Candidate { values: moment.locals, before: moment.before(), after: moment.after, gaps_m: &[] };
+        Candidate { values: moment.locals, before: moment.before(), after: moment.after, world: None };
     let error = |breach: Breach<'_>| {
         let rule = &space.rules[breach.rule()?];
         let message = format!("step {} breaks rule `{}`", moment.step.number.digits, rule.name);

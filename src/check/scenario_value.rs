@@ -1,6 +1,6 @@
 //! Values in scenarios. They are literals, and each is read back to exactly the `f64` that was written.
 
-use crate::check::expression::{exact_digits, unknown_unit};
+use crate::check::expression::unknown_unit;
 use crate::check::names::unknown;
 use crate::model::scenario::Figure;
 use crate::model::{Space, Type, Value, code};
@@ -109,7 +109,7 @@ pub(super) fn in_unit(
         // The text is parsed as `f64` directly, so that the value is the same to the last bit.
         literal.digits.parse::<f64>().ok().filter(|value| value.is_finite())
     } else {
-        let digits = exact_digits(&literal.digits);
+        let digits = Rational::from_literal(&literal.digits);
         digits.and_then(|digits| digits.checked_mul(factor)?.checked_div(own)).map(Rational::to_f64)
     };
     let too_large = || Diagnostic::error(code::NUMBER, "the number is too large").at(literal.span, "");

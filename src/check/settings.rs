@@ -1,4 +1,4 @@
-//! Episode, reward and verdicts.
+//! Checks the `episode`, `reward` and `verdict` declarations: which fields they may have, and of which type.
 
 use crate::check::checker::{Checker, docs, each};
 use crate::check::expression::Place;

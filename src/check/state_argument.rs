@@ -1,11 +1,14 @@
 //! The parser of `--state`: the states of a space for `avastra why`, the variables of a policy for
 //! `avastra explain-policy`. Mistakes come back as one sentence, because a command line has no place to point at.
 
+use std::collections::BTreeSet;
+
 use crate::check::names::unknown;
 use crate::check::policy::value_of;
 use crate::check::report::Report;
 use crate::check::scenario::Reader;
 use crate::model::{Memory, Space};
+use crate::syntax::ast::Field;
 use crate::syntax::{Diagnostic, parse_fields};
 
 /// The memory that a text describes as the `start` of a scenario does, for example
@@ -15,9 +18,7 @@ use crate::syntax::{Diagnostic, parse_fields};
 /// # Errors
 /// The first mistake, in words.
 pub fn memory_from(space: &Space, text: &str, seed: u64) -> Result<Memory, String> {
-    let fields = parse_fields(text).ok_or_else(|| {
-        format!("cannot read `{text}` as states: write `time: Night, sky: {{ Rain: High }}`")
-    })?;
+    let fields = fields_of(text, "states", "time: Night, sky: { Rain: High }")?;
     let mut reader = Reader { space, diagnostics: Vec::new() };
     let mut memory = space.initial_memory(seed);
     for field in &fields {
@@ -38,9 +39,19 @@ pub fn memory_from(space: &Space, text: &str, seed: u64) -> Result<Memory, Strin
 /// # Errors
 /// The first mistake, in words.
 pub fn values_from(text: &str) -> Result<Vec<(usize, f32)>, String> {
-    let fields = parse_fields(text)
-        .ok_or_else(|| format!("cannot read `{text}` as a state: write `ego_speed: 12 m/s, time: Night`"))?;
+    let fields = fields_of(text, "a state", "ego_speed: 12 m/s, time: Night")?;
     fields.iter().map(|field| value_of(&field.name, &field.value).map_err(in_words)).collect()
+}
+
+/// The fields of a text, each given once.
+fn fields_of(text: &str, what: &str, example: &str) -> Result<Vec<Field>, String> {
+    let fields =
+        parse_fields(text).ok_or_else(|| format!("cannot read `{text}` as {what}: write `{example}`"))?;
+    let mut names = BTreeSet::new();
+    match fields.iter().find(|field| !names.insert(&field.name.text)) {
+        Some(again) => Err(format!("`{}` is given twice", again.name.text)),
+        None => Ok(fields),
+    }
 }
 
 /// The message of a mistake, and what to do about it.

@@ -125,6 +125,8 @@ fn states_can_be_given_as_text() {
     let error = memory_from(&space, "tim: Night", 0).unwrap_err();
     assert_eq!(error, "unknown state `tim`; did you mean `time`?");
     assert!(memory_from(&space, "}", 0).is_err());
+    let error = memory_from(&space, "time: Night, sky: None, time: Noon", 0).unwrap_err();
+    assert_eq!(error, "`time` is given twice");
 }
 
 #[test]

@@ -7,6 +7,7 @@
 use std::collections::BTreeSet;
 
 use crate::model::code;
+use crate::model::vocabulary::{Word, WorldState};
 use crate::syntax::ast::{ItemKind, Name, ParamMode};
 use crate::syntax::{Diagnostic, ast};
 
@@ -51,7 +52,7 @@ pub(super) fn report(own: &[&ast::Item], all: &[&ast::Item]) -> Vec<Diagnostic> 
             }
             // The world reads `time` and `sky`, whether the file does or not.
             ItemKind::State(declared)
-                if is_unused(&declared.name) && !matches!(declared.name.text.as_str(), "time" | "sky") =>
+                if is_unused(&declared.name) && WorldState::from_name(&declared.name.text).is_none() =>
             {
                 diagnostics.push(warning("state", &declared.name));
             }

@@ -9,10 +9,10 @@ use crate::syntax::ast::FileId;
 
 use super::arguments::{CheckArguments, Dump};
 use super::error::Failure;
+use super::files::write;
 use super::load;
 use super::output::Output;
-use super::progress::plural;
-use super::run_directory::write;
+use super::output::plural;
 
 /// Checks each file by itself; the mistakes of all are printed before the command fails.
 pub fn check(output: &Output, arguments: &CheckArguments) -> Result<(), Failure> {

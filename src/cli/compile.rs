@@ -7,9 +7,9 @@ use crate::run::road_named;
 
 use super::arguments::{CompileArguments, TableArguments};
 use super::error::Failure;
+use super::files::write;
 use super::output::Output;
-use super::progress::plural;
-use super::run_directory::write;
+use super::output::plural;
 use super::{load, trials};
 
 /// The file that names the table for `avastra run` without a space.

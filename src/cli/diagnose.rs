@@ -10,15 +10,15 @@ use crate::model::Scenario;
 use crate::model::vocabulary::Word;
 use crate::oracle;
 use crate::oracle::{Diagnosis, Likelihood, MechanismShare, Share, WeaknessFinding, WithoutMechanism};
+use crate::run;
 use crate::run::Stage;
 
 use super::arguments::DiagnoseArguments;
 use super::error::Failure;
 use super::load;
 use super::output::Output;
+use super::output::plural;
 use super::parallel::each_file;
-use super::progress::plural;
-use super::replay::driver;
 
 /// Says which module is at fault for every file's first counted collision or, with `--mechanisms`, which share of
 /// all collisions each documented weakness causes.
@@ -59,11 +59,10 @@ impl Case<'_> {
         scenario: &'a Scenario,
         profile: Option<&ModularConfig>,
     ) -> Result<Case<'a>, Failure> {
-        let (ads, _) = driver(None, profile, scenario)?;
+        let (ads, _) = run::selected_for(None, profile, scenario)?;
         let stage = Stage::new(table, scenario)?;
-        let log = stage.play(&ads, &mut |_, _, _| {});
-        let judgements = stage.judge(&ads, &log);
-        let Some(&index) = oracle::counted(table.space(), &log, &judgements).first() else {
+        let (log, _, first) = stage.first_counted(&ads);
+        let Some(index) = first else {
             let count = plural(log.collisions.len(), "collision");
             return Err(Failure::usage(format!(
                 "`{}` has no counted collision to explain with this driving system ({count} in all)",

@@ -12,9 +12,9 @@ use crate::train;
 
 use super::arguments::DistillArguments;
 use super::error::Failure;
+use super::files::write;
 use super::load;
 use super::output::Output;
-use super::run_directory::write;
 use super::verify::{acting, same_world};
 
 /// Distils rules anew, with other settings than those of the training, and writes the policy with them.

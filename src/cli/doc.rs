@@ -6,10 +6,10 @@ use crate::model::{ActionDef, Domain, Interval, Parameter, Reach, RuleBody, Rule
 
 use super::arguments::DocArguments;
 use super::error::Failure;
+use super::files::write;
 use super::load;
 use super::output::Output;
-use super::progress::plural;
-use super::run_directory::write;
+use super::output::plural;
 
 /// Prints the page, or writes it.
 pub fn doc(output: &Output, arguments: &DocArguments) -> Result<(), Failure> {

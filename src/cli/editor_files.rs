@@ -2,9 +2,9 @@
 
 use super::arguments::EditorFilesArguments;
 use super::error::Failure;
+use super::files::write;
 use super::lsp::editor_files::files;
 use super::output::Output;
-use super::run_directory::write;
 
 /// Writes the files, in place of older ones.
 pub fn editor_files(output: &Output, arguments: &EditorFilesArguments) -> Result<(), Failure> {

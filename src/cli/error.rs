@@ -12,15 +12,15 @@ pub enum Failure {
     #[error("cannot {doing} `{}`: {reason}", path.display())]
     File { doing: &'static str, path: PathBuf, reason: String },
     /// The diagnostics are on stderr already.
-    #[error("{count} in the source", count = super::progress::plural(*errors, "mistake"))]
+    #[error("{count} in the source", count = super::output::plural(*errors, "mistake"))]
     Source { errors: usize },
-    #[error("{count} not formatted", count = super::progress::plural(*files, "file"))]
+    #[error("{count} not formatted", count = super::output::plural(*files, "file"))]
     Unformatted { files: usize },
-    #[error("{count} refuted", count = super::progress::plural(*claims, "claim"))]
+    #[error("{count} refuted", count = super::output::plural(*claims, "claim"))]
     Refuted { claims: usize },
-    #[error("{count} found", count = super::progress::plural(*collisions, "counted collision"))]
+    #[error("{count} found", count = super::output::plural(*collisions, "counted collision"))]
     Collision { collisions: usize },
-    #[error("{count} failing", count = super::progress::plural(*scenarios, "scenario"))]
+    #[error("{count} failing", count = super::output::plural(*scenarios, "scenario"))]
     Failing { scenarios: usize },
     /// Ctrl-C: what was done is saved.
     #[error("interrupted; go on with `avastra {command} --resume {}`", directory.display())]

@@ -8,7 +8,7 @@ use super::arguments::ExplainPolicyArguments;
 use super::error::Failure;
 use super::load;
 use super::output::Output;
-use super::progress::plural;
+use super::output::plural;
 use super::verify::acting;
 
 /// Rows and variables that are listed; JSON has them all.

@@ -5,9 +5,9 @@ use crate::emit;
 
 use super::arguments::ExportWeightsArguments;
 use super::error::Failure;
+use super::files::write;
 use super::load;
 use super::output::Output;
-use super::run_directory::write;
 use super::verify::acting;
 
 /// Writes the weights as safetensors.

@@ -7,9 +7,9 @@ use crate::syntax::{FormatError, Sources};
 
 use super::arguments::FmtArguments;
 use super::error::Failure;
+use super::files::write;
 use super::load;
 use super::output::Output;
-use super::run_directory::write;
 
 /// Rewrites files that are not formatted, or with `--check` counts them.
 pub fn fmt(output: &Output, arguments: &FmtArguments) -> Result<(), Failure> {

@@ -1,4 +1,5 @@
-//! Files into checked programs, with their diagnostics printed.
+//! Loads files for the commands: each is read, checked and its diagnostics printed; a command gets a table, a
+//! scenario, a policy or a profile, or an error.
 
 use std::path::{Component, Path, PathBuf};
 use std::sync::Arc;
@@ -162,10 +163,9 @@ pub fn profile_or_own(path: Option<&Path>, ads: &str) -> Result<Option<Profile>,
     Ok(settings.as_ref().map(Profile::new))
 }
 
-/// What a file that avastra wrote holds.
+/// What a file that avastra wrote holds, with the table of its space.
 pub enum Emitted {
-    Scenario,
-    /// With the table of its space.
+    Scenario(ActionTable, Box<Scenario>),
     Policy(ActionTable, Box<Policy>),
 }
 
@@ -178,8 +178,8 @@ pub fn emitted(output: &Output, path: &Path) -> Result<Emitted, Failure> {
     if let Some(policy) = loaded.policy.take() {
         return Ok(Emitted::Policy(ActionTable::new(space(loaded, path)?), Box::new(policy)));
     }
-    if loaded.scenario.is_some() {
-        return Ok(Emitted::Scenario);
+    if let Some(scenario) = loaded.scenario.take() {
+        return Ok(Emitted::Scenario(ActionTable::new(space(loaded, path)?), Box::new(scenario)));
     }
     Err(Failure::usage(format!("`{}` has neither a scenario nor a policy", path.display())))
 }
@@ -191,7 +191,7 @@ pub fn emitted(output: &Output, path: &Path) -> Result<Emitted, Failure> {
 pub fn policy(output: &Output, path: &Path) -> Result<(ActionTable, Policy), Failure> {
     match emitted(output, path)? {
         Emitted::Policy(table, policy) => Ok((table, *policy)),
-        Emitted::Scenario => Err(Failure::usage(format!("`{}` is no policy", path.display()))),
+        Emitted::Scenario(..) => Err(Failure::usage(format!("`{}` is no policy", path.display()))),
     }
 }
 

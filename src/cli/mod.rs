@@ -13,6 +13,7 @@ mod error;
 mod explain;
 mod explain_policy;
 mod export_weights;
+mod files;
 mod fmt;
 mod interrupt;
 mod load;

@@ -2,8 +2,8 @@
 
 use super::arguments::NewArguments;
 use super::error::Failure;
+use super::files::write;
 use super::output::Output;
-use super::run_directory::write;
 
 /// What is written: name in the directory, and text.
 const FILES: [(&str, &str); 3] = [

@@ -135,3 +135,8 @@ fn print(text: &str) {
 pub fn remark(text: &str) {
     let _ = writeln!(std::io::stderr(), "{text}");
 }
+
+/// `1 collision`, `2 collisions`.
+pub fn plural(count: usize, noun: &str) -> String {
+    if count == 1 { format!("1 {noun}") } else { format!("{count} {noun}s") }
+}

@@ -1,5 +1,6 @@
 //! Progress of long work: a bar on a terminal, plain lines otherwise.
 
+use super::output::plural;
 use std::collections::VecDeque;
 use std::io::IsTerminal;
 
@@ -103,9 +104,4 @@ impl Drop for Count {
             bar.finish_and_clear();
         }
     }
-}
-
-/// `1 collision`, `2 collisions`.
-pub fn plural(count: usize, noun: &str) -> String {
-    if count == 1 { format!("1 {noun}") } else { format!("{count} {noun}s") }
 }

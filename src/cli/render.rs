@@ -7,15 +7,15 @@ use crate::ads::Selected;
 use crate::geometry::Vec2;
 use crate::model::{Claim, Scenario};
 use crate::report::{Snapshot, picture};
+use crate::run;
 use crate::run::Stage;
 use crate::sim::DT_S;
 
 use super::arguments::RenderArguments;
 use super::error::Failure;
+use super::files::write;
 use super::load;
 use super::output::Output;
-use super::replay::driver;
-use super::run_directory::write;
 
 /// A contact is marked this long after it happened, s.
 const CONTACT_SHOWN_S: f64 = 1.0;
@@ -30,7 +30,7 @@ pub fn render(output: &Output, arguments: &RenderArguments) -> Result<(), Failur
     let scenario = &scenario;
     let times_s = times(arguments, scenario, table.space().episode.step_s)?;
     let profile = arguments.ads_config.as_deref().map(load::profile).transpose()?;
-    let (ads, _) = driver(arguments.ads.as_deref(), profile.as_ref(), scenario)?;
+    let (ads, _) = run::selected_for(arguments.ads.as_deref(), profile.as_ref(), scenario)?;
     let moments = moments(&table, scenario, &ads, &times_s)?;
     // A strip ends with its scenario.
     if moments.is_empty() || (!arguments.strip && moments.len() < times_s.len()) {

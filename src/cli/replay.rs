@@ -2,20 +2,20 @@
 
 use std::path::Path;
 
-use crate::ads::{ModularConfig, Selected};
+use crate::ads::ModularConfig;
 use crate::episode::Collision;
 use crate::model::vocabulary::Word;
 use crate::model::{Avoidability, Scenario};
 use crate::oracle;
 use crate::run;
-use crate::run::{Gauges, RunError, Stage};
+use crate::run::{Gauges, Stage};
 
 use super::arguments::ReplayArguments;
 use super::error::Failure;
 use super::load;
 use super::output::Output;
+use super::output::plural;
 use super::parallel::each_file;
-use super::progress::plural;
 
 /// Replays the scenario of every file; with `--ads` or another profile only tells what happens.
 pub fn replay(output: &Output, arguments: &ReplayArguments) -> Result<(), Failure> {
@@ -84,7 +84,7 @@ fn play(
     path: &Path,
 ) -> Result<Played, Failure> {
     let (table, scenario) = load::scenario(output, path)?;
-    let (ads, is_recorded) = driver(arguments.ads.as_deref(), profile, &scenario)?;
+    let (ads, is_recorded) = run::selected_for(arguments.ads.as_deref(), profile, &scenario)?;
     let stage = Stage::new(&table, &scenario)?;
     let mut gauges = Gauges::default();
     let log = stage.play(&ads, &mut |world, _, contacts| gauges.note(world, contacts));
@@ -114,22 +114,6 @@ fn play(
         "severities": severities, "criticality": criticality, "pet_s": pet_s,
     });
     Ok(Played { claims: None, told, result, scenario })
-}
-
-/// The driving system to play with, and whether it is the one that the scenario records.
-pub fn driver(
-    ads: Option<&str>,
-    profile: Option<&ModularConfig>,
-    scenario: &Scenario,
-) -> Result<(Selected, bool), RunError> {
-    if ads.is_none() && profile.is_none() {
-        return Ok((run::recorded(scenario)?, true));
-    }
-    let recorded = scenario.origin.ads.as_deref().unwrap_or(run::DEFAULT_ADS);
-    let selected = run::driving_system(ads.unwrap_or(recorded))?;
-    let Some(profile) = profile else { return Ok((selected, false)) };
-    let same = ads.is_none() && scenario.origin.profile_digest == Some(profile.digest());
-    Ok((selected.with_profile(*profile)?, same))
 }
 
 /// How hard a collision was, in a line.

@@ -13,10 +13,10 @@ use crate::road::{Lane, LaneIndex, LaneKey, LanePlace, Neighbour, RoadMap, Route
 
 use super::arguments::RoadArguments;
 use super::error::Failure;
+use super::files::write;
 use super::load;
 use super::output::Output;
-use super::progress::plural;
-use super::run_directory::write;
+use super::output::plural;
 
 /// Distance between two printed poses of a lane, m.
 const SPACING_M: f64 = 1.0;

@@ -10,6 +10,7 @@ use crate::run::{Database, EpisodeSummary, VERSION};
 use crate::sim::ENGINE;
 
 use super::error::Failure;
+use super::files::write;
 use super::load;
 use super::output::Output;
 
@@ -111,24 +112,6 @@ impl RunDirectory {
         let file = emit::scenario(table, log, summary, &source);
         write(&critical.join(format!("{name}.ava")), &crate::syntax::print(&file))
     }
-}
-
-/// Writes a file completely or not at all: after a kill the old one is still there. A symbolic link is followed;
-/// what is no regular file (a pipe, a terminal, the null device) is written to and not replaced.
-pub fn write(path: &Path, text: &(impl AsRef<[u8]> + ?Sized)) -> Result<(), Failure> {
-    let followed = std::fs::canonicalize(path);
-    let path = followed.as_deref().unwrap_or(path);
-    if path.exists() && !path.is_file() {
-        return std::fs::write(path, text).map_err(|error| Failure::file("write", path, error));
-    }
-    if let Some(parent) = path.parent().filter(|parent| !parent.as_os_str().is_empty()) {
-        std::fs::create_dir_all(parent).map_err(|error| Failure::file("create", parent, error))?;
-    }
-    let mut partial = path.as_os_str().to_owned();
-    partial.push(".partial");
-    let partial = PathBuf::from(partial);
-    std::fs::write(&partial, text).map_err(|error| Failure::file("write", &partial, error))?;
-    std::fs::rename(&partial, path).map_err(|error| Failure::file("write", path, error))
 }
 
 fn make_empty(path: &Path) -> Result<(), Failure> {

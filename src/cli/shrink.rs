@@ -11,11 +11,11 @@ use crate::run::{EpisodeSummary, Stage};
 
 use super::arguments::ShrinkArguments;
 use super::error::Failure;
+use super::files::write;
 use super::load;
 use super::output::Output;
+use super::output::plural;
 use super::parallel::each_file;
-use super::progress::plural;
-use super::run_directory::write;
 
 /// The written file stands beside the scenario, with this for its extension.
 const EXTENSION: &str = "shrunk.ava";
@@ -116,9 +116,8 @@ fn smaller(output: &Output, file: &Path, path: &Path) -> Result<Small, Failure> 
     let (table, scenario) = load::scenario(output, file)?;
     let ads = run::recorded(&scenario)?;
     let stage = Stage::new(&table, &scenario)?;
-    let log = stage.play(&ads, &mut |_, _, _| {});
-    let judgements = stage.judge(&ads, &log);
-    let Some(&index) = oracle::counted(table.space(), &log, &judgements).first() else {
+    let (log, judgements, first) = stage.first_counted(&ads);
+    let Some(index) = first else {
         let name = &scenario.name;
         return Err(Failure::usage(format!("`{name}` has no counted collision that could be kept")));
     };

@@ -11,11 +11,12 @@ use crate::study::{
 
 use super::arguments::StudyArguments;
 use super::error::Failure;
+use super::files::write;
 use super::interrupt::stop_on_interrupt;
 use super::output::Output;
+use super::output::plural;
 use super::parallel::jobs;
-use super::progress::{Progress, plural};
-use super::run_directory::write;
+use super::progress::Progress;
 use super::{load, run_directory};
 
 /// Plays what a study still lacks and prints its result.

@@ -4,29 +4,35 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
+use crate::action::ActionTable;
 use crate::ads::ModularConfig;
+use crate::model::Scenario;
 use crate::oracle;
 use crate::oracle::Regression;
 use crate::run;
-use crate::run::Stage;
+use crate::run::{RunError, Stage};
 
 use super::arguments::TestArguments;
 use super::error::Failure;
+use super::files::write;
 use super::load;
 use super::load::Emitted;
 use super::output::Output;
-use super::progress::plural;
-use super::replay::driver;
-use super::run_directory::write;
+use super::output::plural;
 
 /// The result for one scenario.
 struct Case {
     file: PathBuf,
     scenario: String,
     road: String,
-    /// The outcome, or why the scenario could not be played.
-    outcome: Result<Regression, String>,
+    outcome: Outcome,
     elapsed_s: f64,
+}
+
+enum Outcome {
+    Played(Regression),
+    /// Why the scenario could not be played.
+    NotPlayed(String),
 }
 
 /// Plays every scenario of a directory against a driving system.
@@ -40,7 +46,7 @@ pub fn test(output: &Output, arguments: &TestArguments) -> Result<(), Failure> {
     let directory = if critical.is_dir() { &critical } else { &arguments.directory };
     for file in load::sources_in(directory)? {
         let Some(case) = play(output, arguments, profile.as_ref(), &file)? else { continue };
-        let (word, reason) = in_words(&case.outcome);
+        let (word, reason) = case.outcome.in_words();
         let reason = if reason.is_empty() { String::new() } else { format!(": {reason}") };
         output.tell(&format!("{word:<12}{}{reason}", case.file.display()));
         cases.push(case);
@@ -51,8 +57,11 @@ pub fn test(output: &Output, arguments: &TestArguments) -> Result<(), Failure> {
     if let Some(path) = &arguments.junit {
         write(path, &junit(&arguments.directory, &cases))?;
     }
-    let count = |wanted: &str| cases.iter().filter(|case| in_words(&case.outcome).0 == wanted).count();
-    let [fails, fixed, changed, errors] = ["still fails", "fixed", "changed", "error"].map(count);
+    let count = |is: &dyn Fn(&Outcome) -> bool| cases.iter().filter(|case| is(&case.outcome)).count();
+    let fails = count(&|outcome| matches!(outcome, Outcome::Played(Regression::StillFails { .. })));
+    let fixed = count(&|outcome| matches!(outcome, Outcome::Played(Regression::Fixed)));
+    let changed = count(&Outcome::is_changed);
+    let errors = count(&|outcome| matches!(outcome, Outcome::NotPlayed(_)));
     output.say(&format!(
         "{}: {fails} still fail, {fixed} fixed, {changed} changed, {errors} not played",
         plural(cases.len(), "scenario")
@@ -60,7 +69,7 @@ pub fn test(output: &Output, arguments: &TestArguments) -> Result<(), Failure> {
     let listed: Vec<serde_json::Value> = cases
         .iter()
         .map(|case| {
-            let (outcome, reason) = in_words(&case.outcome);
+            let (outcome, reason) = case.outcome.in_words();
             serde_json::json!({ "file": case.file, "scenario": case.scenario,
                                 "outcome": outcome, "reason": reason })
         })
@@ -70,8 +79,7 @@ pub fn test(output: &Output, arguments: &TestArguments) -> Result<(), Failure> {
         serde_json::json!({ "still_fails": fails, "fixed": fixed, "changed": changed,
                             "errors": errors, "scenarios": listed }),
     );
-    let failing =
-        cases.iter().filter(|case| matches!(&case.outcome, Ok(found) if found.is_failure())).count();
+    let failing = count(&Outcome::is_failure);
     if errors > 0 {
         return Err(Failure::usage(format!("{} could not be played", plural(errors, "scenario"))));
     }
@@ -87,69 +95,87 @@ fn play(
 ) -> Result<Option<Case>, Failure> {
     #[allow(clippy::disallowed_methods, reason = "this is cli, and the time goes nowhere but the report")]
     let started = Instant::now();
-    let mut case = Case {
-        file: file.to_owned(),
-        scenario: file.file_stem().unwrap_or_default().to_string_lossy().into_owned(),
-        road: String::new(),
-        outcome: Err(String::new()),
-        elapsed_s: 0.0,
-    };
-    match load::emitted(output, file) {
+    let (scenario, road, outcome) = match load::emitted(output, file) {
         Ok(Emitted::Policy(..)) => return Ok(None),
-        Ok(Emitted::Scenario) => case.outcome = compare(output, arguments, profile, file, &mut case),
-        Err(failure) => case.outcome = Err(failure.to_string()),
-    }
-    case.elapsed_s = started.elapsed().as_secs_f64();
-    Ok(Some(case))
+        Ok(Emitted::Scenario(table, scenario)) => {
+            let road = table.space().roads[scenario.road].name.clone();
+            let outcome = compare(arguments, profile, &table, &scenario);
+            (scenario.name, road, outcome.unwrap_or_else(|error| Outcome::NotPlayed(error.to_string())))
+        }
+        Err(failure) => {
+            let name = file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+            (name, String::new(), Outcome::NotPlayed(failure.to_string()))
+        }
+    };
+    Ok(Some(Case {
+        file: file.to_owned(),
+        scenario,
+        road,
+        outcome,
+        elapsed_s: started.elapsed().as_secs_f64(),
+    }))
 }
 
 /// The crash of a scenario with the driving system that it was found with, and with the one under test.
 fn compare(
-    output: &Output,
     arguments: &TestArguments,
     profile: Option<&ModularConfig>,
-    file: &Path,
-    case: &mut Case,
-) -> Result<Regression, String> {
-    let (table, scenario) = load::scenario(output, file).map_err(|failure| failure.to_string())?;
-    case.scenario.clone_from(&scenario.name);
-    case.road.clone_from(&table.space().roads[scenario.road].name);
-    let recorded = run::recorded(&scenario).map_err(|error| error.to_string())?;
-    let (ads, _) = driver(arguments.ads.as_deref(), profile, &scenario).map_err(|error| error.to_string())?;
-    let stage = Stage::new(&table, &scenario).map_err(|error| error.to_string())?;
-    let log = stage.play(&recorded, &mut |_, _, _| {});
-    let judgements = stage.judge(&recorded, &log);
-    let counted = oracle::counted(table.space(), &log, &judgements);
-    let Some(&index) = counted.first() else {
-        return Err("it has no counted collision with the driving system that it was found with".to_owned());
-    };
-    Ok(oracle::regression(&stage.setup(&recorded), &log, index, &ads))
+    table: &ActionTable,
+    scenario: &Scenario,
+) -> Result<Outcome, RunError> {
+    let recorded = run::recorded(scenario)?;
+    let (ads, _) = run::selected_for(arguments.ads.as_deref(), profile, scenario)?;
+    let stage = Stage::new(table, scenario)?;
+    let (log, _, first) = stage.first_counted(&recorded);
+    Ok(match first {
+        Some(index) => Outcome::Played(oracle::regression(&stage.setup(&recorded), &log, index, &ads)),
+        None => {
+            let reason = "it has no counted collision with the driving system that it was found with";
+            Outcome::NotPlayed(reason.to_owned())
+        }
+    })
 }
 
-/// The outcome in one of four words, and why.
-fn in_words(outcome: &Result<Regression, String>) -> (&'static str, String) {
-    match outcome {
-        Ok(Regression::StillFails { time_s }) => {
-            ("still fails", format!("the same obstacle is hit at {time_s:.2} s"))
+impl Outcome {
+    fn is_failure(&self) -> bool {
+        matches!(self, Outcome::Played(found) if found.is_failure())
+    }
+
+    /// It says nothing about the driving system.
+    fn is_skipped(&self) -> bool {
+        matches!(self, Outcome::Played(Regression::NeverMet | Regression::Struck))
+    }
+
+    fn is_changed(&self) -> bool {
+        matches!(self, Outcome::Played(Regression::OtherCrash)) || self.is_skipped()
+    }
+
+    /// One of four words, and why.
+    fn in_words(&self) -> (&'static str, String) {
+        match self {
+            Outcome::Played(Regression::StillFails { time_s }) => {
+                ("still fails", format!("the same obstacle is hit at {time_s:.2} s"))
+            }
+            Outcome::Played(Regression::Fixed) => ("fixed", String::new()),
+            Outcome::Played(Regression::OtherCrash) => ("changed", "another obstacle is hit".to_owned()),
+            Outcome::Played(Regression::Struck) => {
+                ("changed", "the same obstacle runs into the ego vehicle".to_owned())
+            }
+            Outcome::Played(Regression::NeverMet) => ("changed", "the obstacle never appears".to_owned()),
+            Outcome::NotPlayed(reason) => ("error", reason.clone()),
         }
-        Ok(Regression::Fixed) => ("fixed", String::new()),
-        Ok(Regression::OtherCrash) => ("changed", "another obstacle is hit".to_owned()),
-        Ok(Regression::Struck) => ("changed", "the same obstacle runs into the ego vehicle".to_owned()),
-        Ok(Regression::NeverMet) => ("changed", "the obstacle never appears".to_owned()),
-        Err(reason) => ("error", reason.clone()),
     }
 }
 
 /// The results as JUnit XML, by the schema of Jenkins' xUnit plugin.
 fn junit(directory: &Path, cases: &[Case]) -> String {
-    let is_failure = |case: &&Case| matches!(&case.outcome, Ok(found) if found.is_failure());
-    let is_skipped = |case: &&Case| matches!(&case.outcome, Ok(Regression::NeverMet | Regression::Struck));
+    let count = |is: fn(&Outcome) -> bool| cases.iter().filter(|case| is(&case.outcome)).count();
     let counts = format!(
         "tests=\"{}\" failures=\"{}\" errors=\"{}\" skipped=\"{}\" time=\"{:.3}\"",
         cases.len(),
-        cases.iter().filter(is_failure).count(),
-        cases.iter().filter(|case| case.outcome.is_err()).count(),
-        cases.iter().filter(is_skipped).count(),
+        count(Outcome::is_failure),
+        count(|outcome| matches!(outcome, Outcome::NotPlayed(_))),
+        count(Outcome::is_skipped),
         cases.iter().map(|case| case.elapsed_s).sum::<f64>()
     );
     let name = escaped(&directory.display().to_string());
@@ -158,18 +184,17 @@ fn junit(directory: &Path, cases: &[Case]) -> String {
          <testsuite name=\"{name}\" {counts}>\n"
     );
     for case in cases {
-        let (word, reason) = in_words(&case.outcome);
+        let (word, reason) = case.outcome.in_words();
         let reason = escaped(&reason);
-        let inside = match &case.outcome {
-            Err(_) => format!("\n      <error type=\"{word}\" message=\"{reason}\"/>\n    "),
-            Ok(found) if found.is_failure() => {
-                format!("\n      <failure type=\"{word}\" message=\"{reason}\"/>\n    ")
-            }
-            Ok(Regression::NeverMet | Regression::Struck) => {
-                format!("\n      <skipped type=\"{word}\" message=\"{reason}\"/>\n    ")
-            }
-            Ok(_) => String::new(),
+        let element = match &case.outcome {
+            Outcome::NotPlayed(_) => Some("error"),
+            outcome if outcome.is_failure() => Some("failure"),
+            outcome if outcome.is_skipped() => Some("skipped"),
+            Outcome::Played(_) => None,
         };
+        let inside = element.map_or_else(String::new, |element| {
+            format!("\n      <{element} type=\"{word}\" message=\"{reason}\"/>\n    ")
+        });
         writeln!(
             text,
             "    <testcase classname=\"{}\" name=\"{}\" time=\"{:.3}\">{inside}</testcase>",
@@ -216,11 +241,11 @@ mod tests {
             elapsed_s: 0.25,
         };
         let cases = [
-            case("a", Ok(Regression::StillFails { time_s: 14.221 })),
-            case("b", Ok(Regression::Fixed)),
-            case("c", Ok(Regression::OtherCrash)),
-            case("d", Ok(Regression::NeverMet)),
-            case("e <&> \"\u{1}\"", Err("cannot read `x` & \"y\"\nat all".to_owned())),
+            case("a", Outcome::Played(Regression::StillFails { time_s: 14.221 })),
+            case("b", Outcome::Played(Regression::Fixed)),
+            case("c", Outcome::Played(Regression::OtherCrash)),
+            case("d", Outcome::Played(Regression::NeverMet)),
+            case("e <&> \"\u{1}\"", Outcome::NotPlayed("cannot read `x` & \"y\"\nat all".to_owned())),
         ];
         let text = junit(Path::new("runs/<1>"), &cases);
         let document = roxmltree::Document::parse(&text).expect(&text);

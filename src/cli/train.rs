@@ -15,11 +15,13 @@ use crate::train::{Evaluation, TrainSettings, TrainedEpisode, Training, evaluate
 use super::arguments::TrainArguments;
 use super::distill::rules_text;
 use super::error::Failure;
+use super::files::write;
 use super::interrupt::stop_on_interrupt;
 use super::output::Output;
-use super::progress::{TrainingProgress, plural};
+use super::output::plural;
+use super::progress::TrainingProgress;
 use super::run::roads_or_all;
-use super::run_directory::{RunDirectory, write};
+use super::run_directory::RunDirectory;
 use super::{distill, load, run_directory};
 
 /// Episodes between two checkpoints: at most so many are played again after a kill.
@@ -80,15 +82,16 @@ fn settings(arguments: &TrainArguments) -> Result<Settings, Failure> {
         let known = listed(&trained.map(|entry| entry.name).collect::<Vec<_>>());
         Failure::usage(format!("no agent `{}` that learns: there are {known}", arguments.agent))
     })?;
-    let (text, path) = match &arguments.config {
-        None => (String::new(), Path::new("--preset")),
-        Some(path) => (load::text(path)?, path.as_path()),
-    };
+    let text = arguments.config.as_deref().map(load::text).transpose()?.unwrap_or_default();
     let settings = Settings::from_yaml(entry, arguments.preset.as_deref(), &text).ok_or_else(|| {
         let name = entry.name;
         Failure::usage(format!("`{name}` has nothing to learn: `avastra run --agent {name}` plays it"))
     })?;
-    settings.map_err(|error| Failure::file("take", path, error))
+    settings.map_err(|error| match &arguments.config {
+        Some(path) => Failure::file("take", path, error),
+        // The preset alone can be wrong.
+        None => Failure::usage(format!("cannot take `--preset`: {error}")),
+    })
 }
 
 /// The rest of an interrupted training.
@@ -104,7 +107,8 @@ fn resumed(output: &Output, path: &Path) -> Result<(Training, RunDirectory), Fai
     Ok((training, directory))
 }
 
-/// Writes an episode's counted collisions as a scenario and commits it, with a checkpoint every so often, at the end, and when the user stops.
+/// Writes an episode's counted collisions as a scenario and commits it. A checkpoint goes with it every so often, at
+/// the end, and when the user stops.
 fn keep(
     training: &Training,
     directory: &mut RunDirectory,

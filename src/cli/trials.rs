@@ -12,10 +12,10 @@ use crate::trial::{Cell, TrialSettings, Trials};
 
 use super::arguments::TableArguments;
 use super::error::Failure;
+use super::files::write;
 use super::load;
 use super::output::Output;
 use super::run::roads_or_all;
-use super::run_directory::write;
 
 /// Tries the rows of a table and prints the results.
 pub fn trials(output: &Output, arguments: &TableArguments, table: ActionTable) -> Result<(), Failure> {

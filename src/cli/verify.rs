@@ -14,7 +14,7 @@ use super::arguments::{FilesArguments, ReplayArguments};
 use super::error::Failure;
 use super::load::Emitted;
 use super::output::Output;
-use super::progress::plural;
+use super::output::plural;
 use super::{load, replay};
 
 /// Replays scenarios, and plays the evaluations of policies again.
@@ -22,7 +22,7 @@ pub fn verify(output: &Output, arguments: &FilesArguments) -> Result<(), Failure
     let (mut scenarios, mut policies, mut failed) = (Vec::new(), Vec::new(), None);
     for path in &arguments.files {
         match load::emitted(output, path) {
-            Ok(Emitted::Scenario) => scenarios.push(path.clone()),
+            Ok(Emitted::Scenario(..)) => scenarios.push(path.clone()),
             Ok(Emitted::Policy(table, policy)) => policies.push((path, table, *policy)),
             // A broken file does not hide the results of the others.
             Err(failure) => {
@@ -104,8 +104,10 @@ fn figures(claims: &RulesClaims) -> [(&'static str, String); 8] {
     ]
 }
 
+/// Checks that a policy was trained in this version of the simulated world.
+///
 /// # Errors
-/// If the policy was trained in another world than this.
+/// If it was not.
 pub fn same_world(policy: &Policy) -> Result<(), Failure> {
     let (name, engine) = (&policy.name, &policy.origin.engine);
     if engine == ENGINE {

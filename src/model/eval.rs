@@ -20,9 +20,29 @@ pub struct Facts<'a> {
     pub locals: &'a [Value],
     pub memory: &'a Memory,
     pub road: Option<&'a RoadFacts>,
-    /// `(spawn_gap, safety_gap)`, m.
-    pub gaps_m: (f64, f64),
+    pub world: Option<&'a WorldFacts>,
+    /// The spawn that the expression is about.
+    pub spawn: Option<SpawnFacts>,
     pub outcome: OutcomeFacts,
+}
+
+/// What rules may ask the world at a draw ([`Known::World`] and later).
+///
+/// [`Known::World`]: crate::model::vocabulary::Known::World
+#[derive(Debug, Clone)]
+pub struct WorldFacts {
+    pub ego_speed_mps: f64,
+    /// Each spawn of the action for which the world has found a place.
+    pub spawns: Vec<SpawnFacts>,
+}
+
+/// What a rule may ask about a spawn before it happens.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SpawnFacts {
+    /// Distance between the outlines of the ego vehicle and the newcomer, m.
+    pub spawn_gap_m: f64,
+    /// Gap that a careful and competent driver would need there, m; 0 if the two do not approach.
+    pub safety_gap_m: f64,
 }
 
 /// The facts that verdicts and rewards may read.
@@ -45,7 +65,7 @@ pub struct OutcomeFacts {
 impl<'a> Facts<'a> {
     pub fn new(locals: &'a [Value], memory: &'a Memory) -> Facts<'a> {
         let outcome = OutcomeFacts::default();
-        Facts { locals, memory, road: None, gaps_m: (f64::NAN, f64::NAN), outcome }
+        Facts { locals, memory, road: None, world: None, spawn: None, outcome }
     }
 }
 
@@ -91,8 +111,9 @@ pub fn evaluate(expr: &Expr, functions: &[FnDef], facts: &Facts<'_>) -> Value {
 fn fact_value(fact: Fact, facts: &Facts<'_>) -> Value {
     match fact {
         Fact::RoadLimit => Value::Number(facts.road.map_or(f64::NAN, |road| road.limit_mps)),
-        Fact::SpawnGap => Value::Number(facts.gaps_m.0),
-        Fact::SafetyGap => Value::Number(facts.gaps_m.1),
+        Fact::EgoSpeed => Value::Number(facts.world.map_or(f64::NAN, |world| world.ego_speed_mps)),
+        Fact::SpawnGap => Value::Number(facts.spawn.map_or(f64::NAN, |spawn| spawn.spawn_gap_m)),
+        Fact::SafetyGap => Value::Number(facts.spawn.map_or(f64::NAN, |spawn| spawn.safety_gap_m)),
         Fact::Proc => Value::Number(facts.outcome.proc),
         Fact::Collision => Value::Bool(facts.outcome.collision),
         Fact::Repeated => Value::Bool(facts.outcome.repeated),

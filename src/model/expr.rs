@@ -1,7 +1,7 @@
 //! Typed expressions: names are resolved, units are gone (all numbers are SI), every type fits.
 
 use crate::model::value::{EnumIndex, Type};
-use crate::model::vocabulary::{Fact, LaneChoice};
+use crate::model::vocabulary::{Fact, Known, LaneChoice};
 use crate::syntax::ast::Span;
 pub use crate::syntax::ast::{Arithmetic, Comparison};
 use crate::units::Rational;
@@ -100,9 +100,15 @@ impl Expr {
         found
     }
 
-    /// Whether the expression names a gap of a spawn, which is known only once the world has found a place.
-    pub fn needs_survey(&self) -> bool {
-        self.any(|kind| matches!(kind, ExprKind::Fact(Fact::SpawnGap | Fact::SafetyGap)))
+    /// From when on all facts are known that the expression names; [`Known::Road`] if it names none.
+    pub fn known(&self) -> Known {
+        let mut latest = Known::Road;
+        self.walk(&mut |expr| {
+            if let ExprKind::Fact(fact) = expr.kind {
+                latest = latest.max(fact.known());
+            }
+        });
+        latest
     }
 
     pub fn reads_memory(&self) -> bool {

@@ -22,7 +22,7 @@ pub mod vocabulary;
 
 pub use digest::{digest, digest_text};
 pub(crate) use eval::compare;
-pub use eval::{Facts, OutcomeFacts, evaluate};
+pub use eval::{Facts, OutcomeFacts, SpawnFacts, WorldFacts, evaluate};
 pub use interval::{End, Interval};
 pub(crate) use limits::spawn_out_of_bounds;
 pub use limits::{AMBIENT_MAX, SIGNAL_PHASE_S, SPAWN_DISTANCE_M, SPAWN_SPEED_MPS, TICK_MS};

@@ -1,8 +1,8 @@
 //! The table of the engine's words: facts, fields, claims, and what a `spawn`, a `set time` or a `set sky`
 //! may mean.
 //!
-//! A row holds the spelling of a word and one sentence for people; a fact also has its type and the site
-//! where it is known. The checker, the editor's server, the highlighter and the test of LANGUAGE.md read
+//! A row holds the spelling of a word and one sentence for people; a fact also has its type and says when it
+//! becomes known, from which follows where it may be read and when a rule that reads it is judged. The checker, the editor's server, the highlighter and the test of LANGUAGE.md read
 //! the rows. Keywords stand in `syntax::keyword`, because the grammar knows them.
 //!
 //! Enums are the author's; the names of their variants must be found here wherever a value reaches
@@ -56,9 +56,9 @@ macro_rules! words {
     (@last $first:expr, $second:expr) => { $second };
 }
 
-/// Declares the facts: words with a type and the site where they are known.
+/// Declares the facts: words with a type and the moment from which they are known.
 macro_rules! facts {
-    ($($fact:ident $spelling:literal $ty:expr, $site:ident = $meaning:literal;)+) => {
+    ($($fact:ident $spelling:literal $ty:expr, $known:ident = $meaning:literal;)+) => {
         words! { Fact "What an expression may ask about the world.": $($fact $spelling = $meaning),+ }
 
         impl Fact {
@@ -66,12 +66,27 @@ macro_rules! facts {
                 match self { $(Fact::$fact => $ty),+ }
             }
 
-            /// The first site where the fact is known; see [`Site::knows`].
-            fn site(self) -> Site {
-                match self { $(Fact::$fact => Site::$site),+ }
+            pub fn known(self) -> Known {
+                match self { $(Fact::$fact => Known::$known),+ }
             }
         }
     };
+}
+
+/// From when on a fact is known; later ones come later in an episode.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Known {
+    /// Without the world, once the road is known: the checker judges rules about it, and numbers are drawn
+    /// within their bounds.
+    Road,
+    /// At the draw, in the world; without a world it is left to the replay.
+    World,
+    /// At the draw, for each spawn, once the world has found a place for it.
+    Spawn,
+    /// After the step.
+    Step,
+    /// After a collision was judged.
+    Judgement,
 }
 
 /// Where an expression stands, which decides the facts that it may read.
@@ -88,7 +103,11 @@ pub enum Site {
 impl Site {
     /// Whether the fact is known here. A verdict knows what a reward knows, and how the collision was judged.
     pub fn knows(self, fact: Fact) -> bool {
-        fact.site() == self || fact.site() == Site::Reward && self == Site::Verdict
+        match fact.known() {
+            Known::Road | Known::World | Known::Spawn => self == Site::Rule,
+            Known::Step => matches!(self, Site::Reward | Site::Verdict),
+            Known::Judgement => self == Site::Verdict,
+        }
     }
 
     /// The facts that are known here.
@@ -114,15 +133,16 @@ const RATIO: Type = Type::Quantity(Dimension::RATIO);
 const SPEED: Type = Type::Quantity(Dimension::SPEED);
 
 facts! {
-    RoadLimit "road.limit" SPEED, Rule = "A `Speed`: the lowest limit along the route.";
-    SpawnGap "spawn_gap" LENGTH, Rule = "A `Length`: the gap from the ego vehicle to the road user that appears.";
-    SafetyGap "safety_gap" LENGTH, Rule = "A `Length`: the gap that a careful driver needs.";
-    Proc "proc" RATIO, Reward = "A `Ratio`: the collision probability of the step.";
-    Collision "collision" Type::Bool, Reward = "A `Bool`: the ego vehicle collided.";
-    Repeated "repeated" Type::Bool, Reward = "A `Bool`: with an obstacle that it has hit before.";
-    Sudden "sudden" Type::Bool, Reward = "A `Bool`: with an obstacle that appeared a moment ago.";
-    Struck "struck" Type::Bool, Reward = "A `Bool`: the obstacle ran into the side or the rear of the ego vehicle.";
-    Avoidable "avoidable" Type::Bool, Verdict = "A `Bool`: a careful reference driver avoids it. Verdicts only.";
+    RoadLimit "road.limit" SPEED, Road = "A `Speed`: the lowest limit along the route.";
+    EgoSpeed "ego.speed" SPEED, World = "A `Speed`: how fast the ego vehicle is when the action is chosen.";
+    SpawnGap "spawn_gap" LENGTH, Spawn = "A `Length`: the gap from the ego vehicle to the road user that appears.";
+    SafetyGap "safety_gap" LENGTH, Spawn = "A `Length`: the gap that a careful driver needs.";
+    Proc "proc" RATIO, Step = "A `Ratio`: the collision probability of the step.";
+    Collision "collision" Type::Bool, Step = "A `Bool`: the ego vehicle collided.";
+    Repeated "repeated" Type::Bool, Step = "A `Bool`: with an obstacle that it has hit before.";
+    Sudden "sudden" Type::Bool, Step = "A `Bool`: with an obstacle that appeared a moment ago.";
+    Struck "struck" Type::Bool, Step = "A `Bool`: the obstacle ran into the side or the rear of the ego vehicle.";
+    Avoidable "avoidable" Type::Bool, Judgement = "A `Bool`: a careful reference driver avoids it. Verdicts only.";
 }
 
 /// `lane in road.lanes`: spelt like a fact, but a set, which may only stand after `in`.
@@ -223,6 +243,13 @@ words! {
 
 /// Stands for an action in a step of a scenario.
 pub const WAIT: (&str, &str) = ("wait", "A step without an action: `3: wait()`.");
+
+words! {
+    /// Its sentence is the form in which it must be declared.
+    WorldState "A state that the world reads.":
+    Time "time" = "time: Time",
+    Sky "sky" = "sky: Sky -> Level",
+}
 
 words! {
     /// 10:00, 14:00 and 20:00 in the published package.

@@ -159,7 +159,7 @@ fn fact_values(fact: Fact, known: &Known<'_>) -> Values {
             Some(road) => Values::Number(Interval::point(road.limit)),
             None => Values::Number(Interval::NOT_NEGATIVE),
         },
-        Fact::SpawnGap | Fact::SafetyGap => Values::Number(Interval::NOT_NEGATIVE),
+        Fact::EgoSpeed | Fact::SpawnGap | Fact::SafetyGap => Values::Number(Interval::NOT_NEGATIVE),
         Fact::Proc => Values::Number(Interval::closed(Rational::ZERO, Rational::ONE)),
         Fact::Collision | Fact::Repeated | Fact::Sudden | Fact::Struck | Fact::Avoidable => {
             Values::UNKNOWN_TRUTH

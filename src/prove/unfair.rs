@@ -7,7 +7,7 @@
 use std::cell::Cell;
 
 use crate::model::rules::{Demand, RowRules};
-use crate::model::vocabulary::{Verb, Word};
+use crate::model::vocabulary::{Known, Verb, Word};
 use crate::model::{
     EffectDef, Facts, Memory, Reach, Road, Row, RulesInForce, Space, SpawnDef, Value, code, evaluate, locals,
 };
@@ -57,7 +57,7 @@ pub(super) fn unfair(
 ) -> Option<Witness> {
     let in_force = RulesInForce::by_default(space);
     let rules = RowRules { space, row, road: Some(&road.facts), in_force: &in_force };
-    let asks = |demand| matches!(demand, Demand::Holds(condition) if condition.needs_survey());
+    let asks = |demand| matches!(demand, Demand::Holds(condition) if condition.known() == Known::Spawn);
     if rules.demands().any(|(_, demand)| asks(demand)) {
         return None;
     }
@@ -65,6 +65,11 @@ pub(super) fn unfair(
         let figures = figures(space, road, spawn, values, memory);
         figures.needed_m > figures.distance_m + MARGIN_M
     })
+}
+
+/// Way from a speed to rest: reaction, then full brakes, m.
+fn braked_m(speed_mps: f64) -> f64 {
+    speed_mps * REACTION_S + speed_mps * speed_mps / (2.0 * BRAKING_MPS2)
 }
 
 /// The spawn, and the gap that a driver at the road's limit needs.
@@ -80,7 +85,6 @@ fn figures(space: &Space, road: &Road, spawn: &SpawnDef, values: &[Value], memor
     let number = |expr| evaluate(expr, &space.functions, &facts).number();
     let (speed_mps, distance_m) = (number(&spawn.speed), number(&spawn.distance));
     let ego_mps = road.facts.limit_mps;
-    let braked_m = |mps: f64| mps * REACTION_S + mps * mps / (2.0 * BRAKING_MPS2);
     let needed_m = match spawn.verb.word(&space.functions, &facts) {
         Verb::DriveAhead => braked_m((ego_mps - speed_mps).max(0.0)),
         Verb::DriveOpposite => braked_m(ego_mps) + speed_mps * (REACTION_S + ego_mps / BRAKING_MPS2),
@@ -99,7 +103,7 @@ fn remark(space: &Space, row: &Row, road: &Road, spawn: &SpawnDef, found: &Witne
     let facts = Facts { road: Some(&road.facts), ..Facts::new(&values, &after) };
     let verb = spawn.verb.word(&space.functions, &facts);
     let rounded = |value: f64| decimal((value * 100.0).round() / 100.0, false);
-    let message = format!("`{}` can appear where nobody could avoid it", action.name);
+    let message = format!("`{}` can appear where a careful driver could not avoid it", action.name);
     Diagnostic::remark(code::UNFAIR, message)
         .at(spawn.distance.span, format!("{} m in `{}`", rounded(figures.distance_m), row.label))
         .note(format!(
@@ -122,8 +126,7 @@ mod tests {
     #[test]
     fn the_bound_lies_just_below_the_published_distances() {
         for (speed_kmph, distance_m) in [(10.0, 4.4), (30.0, 16.5), (50.0, 32.7), (60.0, 42.4)] {
-            let speed_mps: f64 = speed_kmph / 3.6;
-            let bound_m = speed_mps * REACTION_S + speed_mps * speed_mps / (2.0 * BRAKING_MPS2);
+            let bound_m = braked_m(speed_kmph / 3.6);
             assert!(bound_m < distance_m && bound_m > 0.8 * distance_m, "{speed_kmph} km/h: {bound_m}");
         }
     }

@@ -13,7 +13,7 @@ use crate::model::expr::{Expr, ExprKind};
 use crate::model::rules::{Candidate, Demand, Room, RowRules};
 use crate::model::{
     ActionDef, Domain, EffectDef, End, Facts, Initial, Interval, Memory, Parameter, Road, Row, RulesInForce,
-    Space, StateDef, Type, Value, evaluate, locals, spawn_out_of_bounds,
+    Space, SpawnFacts, StateDef, Type, Value, WorldFacts, evaluate, locals, spawn_out_of_bounds,
 };
 use crate::prove::enclose::Values;
 use crate::units::Rational;
@@ -25,7 +25,8 @@ const BOXES_IN_ALL_MAX: usize = 20_000;
 /// The most choices of listed values, and the most memories, that are tried.
 const CHOICES_MAX: usize = 256;
 const MEMORIES_MAX: usize = 64;
-/// Ranges whose ends are tried in every combination; the ranges beyond share the choice of the last.
+/// The first ranges of a row: every combination of their ends is tried. All later ranges take the same end as the
+/// last of these.
 const CORNER_BITS: usize = 3;
 
 /// Values with which a row runs, and the memory before it.
@@ -160,7 +161,7 @@ impl Search<'_> {
         let after = &space.memory_after(self.rules.row.action, values, before);
         let facts = Facts { road: self.rules.road, ..Facts::new(values, after) };
         let number = |expr: &Expr| evaluate(expr, &space.functions, &facts).number();
-        let mut gaps_m = Vec::new();
+        let mut spawns = Vec::new();
         for effect in &action.effects {
             let EffectDef::Spawn(spawn) = effect else { continue };
             let (speed_mps, distance_m) = (number(&spawn.speed), number(&spawn.distance));
@@ -168,10 +169,17 @@ impl Search<'_> {
                 return false;
             }
             // The spawn lands where it was asked to, and no gap is unfair.
-            gaps_m.push((distance_m, 0.0));
+            spawns.push(SpawnFacts { spawn_gap_m: distance_m, safety_gap_m: 0.0 });
         }
-        let candidate = Candidate { values, before, after, gaps_m: &gaps_m };
-        self.rules.breaches(candidate).next().is_none() && wish(values, after)
+        let limit_mps = self.rules.road.map_or(0.0, |road| road.limit_mps);
+        let mut world = WorldFacts { ego_speed_mps: limit_mps, spawns };
+        // The ego vehicle drives at the limit, at half of it, or stands.
+        let runs = [1.0, 0.5, 0.0].into_iter().any(|part| {
+            world.ego_speed_mps = part * limit_mps;
+            let candidate = Candidate { values, before, after, world: Some(&world) };
+            self.rules.breaches(candidate).next().is_none()
+        });
+        runs && wish(values, after)
     }
 
     /// Memories to try: the initial one first, then every value of the cells that the rules or effects of the

@@ -26,7 +26,7 @@ pub use groups::Group;
 pub(crate) use groups::kind;
 pub use play::{Run, play};
 pub(crate) use profile::under_test;
-pub use profile::{DEFAULT_ADS, Profile, driving_system, recorded, trained_against};
+pub use profile::{DEFAULT_ADS, Profile, driving_system, recorded, selected_for, trained_against};
 pub use settings::{EPISODES_MAX, PolicyReference, RunError, RunSettings, VERSION};
 pub(crate) use settings::{agent_named, check_episodes};
 pub use shape::Shape;

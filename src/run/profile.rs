@@ -60,6 +60,26 @@ pub fn recorded(scenario: &Scenario) -> Result<Selected, RunError> {
     selected(&scenario.name, ads, origin.profile.as_deref(), origin.profile_digest.as_deref())
 }
 
+/// The driving system to play with, and whether it is the one that the scenario records.
+/// Without a name and a profile it is that one; without a name, its driving system with another profile.
+///
+/// # Errors
+/// If there is no driving system of that name, or it has no profile.
+pub fn selected_for(
+    ads: Option<&str>,
+    profile: Option<&ModularConfig>,
+    scenario: &Scenario,
+) -> Result<(Selected, bool), RunError> {
+    if ads.is_none() && profile.is_none() {
+        return Ok((recorded(scenario)?, true));
+    }
+    let recorded = scenario.origin.ads.as_deref().unwrap_or(DEFAULT_ADS);
+    let selected = driving_system(ads.unwrap_or(recorded))?;
+    let Some(profile) = profile else { return Ok((selected, false)) };
+    let same = ads.is_none() && scenario.origin.profile_digest == Some(profile.digest());
+    Ok((selected.with_profile(*profile)?, same))
+}
+
 /// The driving system that a policy was trained against, and its settings.
 ///
 /// # Errors

@@ -131,8 +131,10 @@ pub enum RunError {
 /// Most episodes that a run may have on each road.
 pub const EPISODES_MAX: u32 = 1_000_000;
 
+/// The agent of that name.
+///
 /// # Errors
-/// If there is no agent of that name.
+/// If there is none.
 pub(crate) fn agent_named(name: &str) -> Result<&'static agent::Entry, RunError> {
     agent::by_name(name).ok_or_else(|| {
         let known = listed(&agent::REGISTRY.iter().map(|entry| entry.name).collect::<Vec<_>>());
@@ -140,8 +142,10 @@ pub(crate) fn agent_named(name: &str) -> Result<&'static agent::Entry, RunError>
     })
 }
 
+/// Checks how many episodes a run is to play on each road.
+///
 /// # Errors
-/// If this many episodes on a road are not possible.
+/// If it is none, or more than [`EPISODES_MAX`].
 pub(crate) fn check_episodes(episodes: u32) -> Result<(), RunError> {
     let fits = (1..=EPISODES_MAX).contains(&episodes);
     if fits { Ok(()) } else { Err(RunError::Episodes { found: episodes }) }

@@ -75,6 +75,14 @@ impl<'a> Stage<'a> {
         episode::run(&self.setup(ads), &mut |moment| script.choose(self.table, moment), watch)
     }
 
+    /// Plays it, and finds its first counted collision, if there is one.
+    pub fn first_counted(&self, ads: &Selected) -> (EpisodeLog, Vec<Judgement>, Option<usize>) {
+        let log = self.play(ads, &mut |_, _, _| {});
+        let judgements = self.judge(ads, &log);
+        let first = oracle::counted(self.table.space(), &log, &judgements).first().copied();
+        (log, judgements, first)
+    }
+
     /// Checks its claims against a log of it.
     pub fn verify(&self, ads: &Selected, log: &EpisodeLog) -> Vec<ClaimResult> {
         let setup = self.setup(ads);

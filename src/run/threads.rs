@@ -1,4 +1,4 @@
-//! Work on threads: the one loop of every command that plays more than one episode.
+//! Work on threads: the one loop of every command that plays episodes by number.
 
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc;

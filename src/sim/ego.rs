@@ -233,9 +233,8 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
+    use crate::sim::DT_S;
     use crate::sim::environment::Grip;
-
-    const DT_S: f64 = 0.02;
 
     /// Way from `speed_mps` to rest under full brakes, m.
     fn stopping_m(speed_mps: f64, friction: f64) -> f64 {

@@ -6,6 +6,7 @@ use std::sync::Arc;
 
 use crate::action::{Effect, SpawnFacts, SpawnRequest, Surroundings};
 use crate::geometry::{Frame, OrientedBox, Sweep, Vec2};
+use crate::model::TICK_MS;
 use crate::model::vocabulary::{Level, TimeOfDay};
 
 use super::ambient::{Ambient, RENEWAL_TICKS, is_gone};
@@ -28,7 +29,7 @@ use super::signals::SignalClock;
 pub const ENGINE: &str = "plane/4";
 
 /// One physics step, s: 50 Hz.
-pub const DT_S: f64 = 0.02;
+pub const DT_S: f64 = TICK_MS as f64 / 1000.0;
 
 /// Speed at which an episode begins, m/s.
 const START_MPS: f64 = 3.0;
@@ -450,6 +451,10 @@ impl Surroundings for World {
         let around = self.around([&self.users, &[]]);
         let newcomer = placement::place(&around, request, self.next_id)?;
         Ok(placement::facts(&around, request, &newcomer))
+    }
+
+    fn ego_speed_mps(&self) -> f64 {
+        self.ego.motion.speed_mps
     }
 }
 

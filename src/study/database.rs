@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use rusqlite::types::Type as Kind;
 use rusqlite::{Connection, Row, params};
 
 use crate::run::{DatabaseError, connect};
@@ -124,7 +125,10 @@ impl StudyDatabase {
                     agent: row.get(1)?,
                     road: row.get(2)?,
                     number: row.get(3)?,
-                    training_seed: row.get::<_, Option<String>>(4)?.map(|seed| seed_of(&seed)).transpose()?,
+                    training_seed: row
+                        .get::<_, Option<String>>(4)?
+                        .map(|seed| seed_of(4, &seed))
+                        .transpose()?,
                     trained: Vec::new(),
                     episodes: Vec::new(),
                     spent: Spent { wall_s: row.get(5)?, cpu_s: row.get(6)? },
@@ -235,7 +239,7 @@ fn trained_episode(row: &Row) -> Result<TrainedRecord, rusqlite::Error> {
 /// An episode without its collisions: they are in a table of their own.
 fn evaluated_episode(row: &Row) -> Result<EpisodeRecord, rusqlite::Error> {
     Ok(EpisodeRecord {
-        seed: seed_of(&row.get::<_, String>(1)?)?,
+        seed: seed_of(1, &row.get::<_, String>(1)?)?,
         number: row.get(2)?,
         ended: row.get(3)?,
         duration_s: row.get(4)?,
@@ -267,6 +271,8 @@ fn collision(row: &Row) -> Result<CollisionRecord, rusqlite::Error> {
     })
 }
 
-fn seed_of(text: &str) -> Result<u64, rusqlite::Error> {
-    text.parse().map_err(|_| rusqlite::Error::InvalidColumnName(format!("`{text}` is no seed")))
+/// A seed in a column of text: SQLite's integers have a sign.
+fn seed_of(column: usize, text: &str) -> Result<u64, rusqlite::Error> {
+    text.parse()
+        .map_err(|error| rusqlite::Error::FromSqlConversionFailure(column, Kind::Text, Box::new(error)))
 }

@@ -99,6 +99,8 @@ fn default_seed() -> u64 {
 }
 
 impl StudyFile {
+    /// Reads the text of a study file.
+    ///
     /// # Errors
     /// If the text has another form: the reason, with its place.
     pub fn from_yaml(text: &str) -> Result<StudyFile, String> {

@@ -271,15 +271,24 @@ pub fn nearest<'a>(word: &str, candidates: impl IntoIterator<Item = &'a str>) ->
 
 /// A list of the author's words: `` `a`, `b` and `c` ``.
 pub fn listed<S: AsRef<str>>(words: &[S]) -> String {
-    let quoted: Vec<String> = words.iter().map(|word| format!("`{}`", word.as_ref())).collect();
-    enumerated(&quoted, "and")
+    enumerated(&quoted(words), "and")
+}
+
+/// `a`, `b` or `c`.
+pub(crate) fn one_of<S: AsRef<str>>(words: &[S]) -> String {
+    enumerated(&quoted(words), "or")
+}
+
+fn quoted<S: AsRef<str>>(words: &[S]) -> Vec<String> {
+    words.iter().map(|word| format!("`{}`", word.as_ref())).collect()
 }
 
 /// `a, b or c`, with the given conjunction.
-pub(super) fn enumerated(words: &[String], conjunction: &str) -> String {
-    match words {
+pub(super) fn enumerated<S: AsRef<str>>(words: &[S], conjunction: &str) -> String {
+    let words: Vec<&str> = words.iter().map(S::as_ref).collect();
+    match words.as_slice() {
         [] => String::new(),
-        [only] => only.clone(),
+        [only] => (*only).to_owned(),
         [most @ .., last] => format!("{} {conjunction} {last}", most.join(", ")),
     }
 }

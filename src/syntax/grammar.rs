@@ -7,6 +7,9 @@
 #[grammar = "../grammar/ava.pest"]
 pub struct AvaParser;
 
+/// What an author calls a name.
+pub const NAME: &str = "a name";
+
 /// What an author calls a rule, in a sentence that begins "expected …". `None` for rules that are
 /// possible in so many places that naming them would not help.
 pub fn words(rule: Rule) -> Option<&'static str> {
@@ -14,7 +17,7 @@ pub fn words(rule: Rule) -> Option<&'static str> {
         Rule::item | Rule::declaration_keyword | Rule::next_declaration => "a declaration",
         Rule::overriding => "a declaration after `override`",
         Rule::expression | Rule::operand | Rule::prefix => "an expression",
-        Rule::name | Rule::names => "a name",
+        Rule::name | Rule::names => NAME,
         Rule::argument | Rule::argument_name => "an argument",
         Rule::pattern | Rule::arm => "a variant or `_`",
         Rule::integer => "a whole number",
@@ -64,7 +67,6 @@ pub fn words(rule: Rule) -> Option<&'static str> {
         Rule::kw_at => "`at`",
         Rule::kw_with | Rule::drawn => "`with`",
         Rule::kw_by => "`by`",
-        Rule::clause => "`with`, `at` or `by`",
         Rule::kw_expect | Rule::expect => "`expect`",
         Rule::kw_origin | Rule::origin => "`origin`",
         Rule::kw_start | Rule::start => "`start`",

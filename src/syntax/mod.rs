@@ -17,6 +17,7 @@ mod print_expression;
 mod record;
 mod scan;
 
+pub(crate) use diagnostic::one_of;
 pub use diagnostic::{Diagnostic, Edit, Fix, Label, Severity, Sources, Style, listed, nearest, render};
 pub use format::{FormatError, format, same_meaning};
 pub use parse::{DEPTH_MAX, LANGUAGE, parse, parse_fields};

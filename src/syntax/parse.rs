@@ -10,8 +10,8 @@ use pest::iterators::Pair;
 
 use crate::syntax::ast::{Doc, Field, File, FileId, Item, Span};
 use crate::syntax::build::{Builder, end_of};
-use crate::syntax::diagnostic::enumerated;
-use crate::syntax::grammar::{AvaParser, Rule, continues_expression, words};
+use crate::syntax::diagnostic::{enumerated, one_of};
+use crate::syntax::grammar::{AvaParser, NAME, Rule, continues_expression, words};
 use crate::syntax::keyword::{CLAUSES, DECLARATIONS, OPERATORS};
 use crate::syntax::scan::{Comment, Scan, scan};
 use crate::syntax::{Diagnostic, code, nearest};
@@ -24,6 +24,9 @@ pub const LANGUAGE: u64 = 1;
 
 /// Most mistakes that are reported for one file.
 const DIAGNOSTICS_MAX: usize = 100;
+
+/// What is expected where nothing better is known.
+const DECLARATION: &str = "a declaration";
 
 /// The words that begin a declaration.
 fn declarations() -> impl Iterator<Item = &'static str> {
@@ -153,21 +156,21 @@ impl Reader<'_> {
         if at > start {
             return Some(self.expected(at, expected, (previous.0, end)));
         }
-        let expected = if at == start { expected } else { "a declaration".to_owned() };
+        let expected = if at == start { expected } else { vec![DECLARATION] };
         let span = Span::new(self.file, start, start + found.len());
         Some(self.not_a_declaration(found, span, previous.1, &expected))
     }
 
-    /// Where the reading of one declaration fails, and what was expected there.
-    fn failure(&self, start: usize, end: usize) -> (usize, String) {
+    /// Where the reading of one declaration fails, and what was expected there, in the author's words.
+    fn failure(&self, start: usize, end: usize) -> (usize, Vec<&'static str>) {
         match AvaParser::parse(Rule::lone_item, &self.text[start..end]) {
             // The slice can be read alone, so the mistake comes after it: point at its end.
-            Ok(_) => (end, "a declaration".to_owned()),
+            Ok(_) => (end, vec![DECLARATION]),
             Err(error) => {
                 let (InputLocation::Pos(at) | InputLocation::Span((at, _))) = error.location;
                 let expected = match error.variant {
                     ErrorVariant::ParsingError { positives, .. } => in_words(&positives),
-                    ErrorVariant::CustomError { message } => message,
+                    ErrorVariant::CustomError { .. } => vec![DECLARATION],
                 };
                 (start + at, expected)
             }
@@ -176,12 +179,17 @@ impl Reader<'_> {
 
     /// Reports a word or mark that begins no declaration. On the line where the previous declaration ended
     /// (at `previous_end`), it could also have been what was `expected` there.
-    fn not_a_declaration(&self, found: &str, span: Span, previous_end: usize, expected: &str) -> Diagnostic {
+    fn not_a_declaration(
+        &self,
+        found: &str,
+        span: Span,
+        previous_end: usize,
+        expected: &[&str],
+    ) -> Diagnostic {
         let is_word = found.starts_with(|first: char| first.is_ascii_alphabetic() || first == '_');
         let continues_line = !self.text[previous_end..span.start].contains('\n') && previous_end > 0;
         if continues_line {
-            let expected = expected.replace(" or ", ", ");
-            let message = format!("expected {expected} or the next line, found `{found}`");
+            let message = format!("expected {} or the next line, found `{found}`", expected.join(", "));
             return Diagnostic::error(code::SYNTAX, message).at(span, "unexpected");
         }
         if !is_word {
@@ -196,15 +204,15 @@ impl Reader<'_> {
         let unknown = Diagnostic::error(code::DECLARATION, format!("no declaration begins with `{found}`"));
         match nearest(found, declarations()) {
             Some(meant) => unknown.at(span, "unknown declaration").meant(span, meant),
-            None => unknown.at(span, "unknown declaration").note(format!(
-                "declarations begin with {}",
-                enumerated(&declarations().map(|word| format!("`{word}`")).collect::<Vec<_>>(), "or")
-            )),
+            None => unknown
+                .at(span, "unknown declaration")
+                .note(format!("declarations begin with {}", one_of(&declarations().collect::<Vec<_>>()))),
         }
     }
 
     /// Reports that something else was expected at a byte of a slice.
-    fn expected(&self, at: usize, expected: String, (start, end): (usize, usize)) -> Diagnostic {
+    fn expected(&self, at: usize, words: Vec<&str>, (start, end): (usize, usize)) -> Diagnostic {
+        let expected = enumerated(&words, "or");
         let (token_start, found) = self.token_after(at);
         let at_end = token_start >= end;
         let before_end = self.scan.unclosed.partition_point(|opener| opener.start < end);
@@ -222,10 +230,9 @@ impl Reader<'_> {
             return Diagnostic::error(code::SYNTAX, format!("expected {expected}"))
                 .at(Span::new(self.file, before, before), "here");
         }
-        let wants_name = expected.contains("a name");
         let mistake = Diagnostic::error(code::SYNTAX, format!("expected {expected}, found `{found}`"))
             .at(Span::new(self.file, token_start, token_start + found.len()), "unexpected");
-        if wants_name && found.starts_with(|first: char| first.is_ascii_alphabetic()) {
+        if words.contains(&NAME) && found.starts_with(|first: char| first.is_ascii_alphabetic()) {
             return mistake.help(format!("`{found}` is a word of the language; choose another name"));
         }
         let is_word = words_inside().any(|word| word == found);
@@ -335,22 +342,24 @@ impl Reader<'_> {
 }
 
 /// What was expected, in the author's words.
-fn in_words(rules: &[Rule]) -> String {
-    let mut expected: Vec<String> = Vec::new();
-    for rule in rules.iter().filter(|rule| !continues_expression(**rule)) {
-        if let Some(word) = words(*rule)
-            && !expected.iter().any(|known| known == word)
-        {
-            expected.push(word.to_owned());
+fn in_words(rules: &[Rule]) -> Vec<&'static str> {
+    let mut expected = Vec::new();
+    let each = |rule: &Rule| match rule {
+        Rule::clause => vec![Rule::kw_with, Rule::kw_at, Rule::kw_by],
+        rule => vec![*rule],
+    };
+    for rule in rules.iter().flat_map(each).filter(|rule| !continues_expression(*rule)) {
+        if let Some(word) = words(rule).filter(|word| !expected.contains(word)) {
+            expected.push(word);
         }
     }
-    if !expected.is_empty() {
-        return enumerated(&expected, "or");
+    if expected.is_empty() {
+        let only = match rules {
+            [only] => words(*only),
+            _ => None,
+        };
+        let continues = rules.iter().any(|rule| continues_expression(*rule));
+        expected.push(only.unwrap_or(if continues { "an operator" } else { DECLARATION }));
     }
-    let only = match rules {
-        [only] => words(*only),
-        _ => None,
-    };
-    let continues = rules.iter().any(|rule| continues_expression(*rule));
-    only.unwrap_or(if continues { "an operator" } else { "a declaration" }).to_owned()
+    expected
 }

@@ -154,6 +154,8 @@ mod tests {
     #[test]
     fn bad_spans_are_records_too() {
         let sources = Sources::new();
-        record(&Diagnostic::warning("AV0001", "odd").at(Span::new(FileId(9), 4, 7), "x"), &sources);
+        let data =
+            record(&Diagnostic::warning("AV0001", "odd").at(Span::new(FileId(9), 4, 7), "x"), &sources);
+        assert_eq!(data.message, "odd");
     }
 }

@@ -14,7 +14,7 @@
 //! | walk | it appears beside the route on the asked side and walks over the route's path |
 //! | stand | it stands on the route's path |
 //!
-//! Of the vehicles that are to keep their lane, none changes it; one that is to change it does so once.
+//! A vehicle that is to keep its lane does not change it; a vehicle that is to change it does so once.
 //! An overtaker in the ego vehicle's own lane changes it once to get past, and comes back if it is
 //! to change. Changes inside junctions, where lanes lie over each other, are not counted.
 

@@ -58,6 +58,15 @@ impl Rational {
         Rational::new(if negative { -numerator } else { numerator }, denominator)
     }
 
+    /// Reads a number as files write it: `12`, `0.50` or `1e-9`.
+    pub fn from_literal(text: &str) -> Option<Rational> {
+        let (mantissa, exponent) = text.split_once(['e', 'E']).unwrap_or((text, "0"));
+        let exponent: i32 = exponent.parse().ok()?;
+        let power = 10_i128.checked_pow(exponent.unsigned_abs())?;
+        let factor = if exponent >= 0 { Rational::new(power, 1)? } else { Rational::new(1, power)? };
+        Rational::from_decimal(mantissa)?.checked_mul(factor)
+    }
+
     /// The exact value of a finite f64, if it fits.
     pub fn from_f64(value: f64) -> Option<Rational> {
         if !value.is_finite() {

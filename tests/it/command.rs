@@ -89,7 +89,7 @@ fn what_cannot_be_read_is_said_so() {
 #[test]
 fn what_does_not_exist_is_named_with_what_does() {
     let space = "scenarios/avastra45.ava";
-    let cases: [(&[&str], &str); 8] = [
+    let cases: [(&[&str], &str); 9] = [
         (&["run", space, "--road", "nowhere"], "`corner`"),
         (&["run", space, "--ads", "apolo"], "`modular`, `idm`, `cc`"),
         (&["run", space, "--agent", "rndom"], "`random`"),
@@ -97,6 +97,7 @@ fn what_does_not_exist_is_named_with_what_does() {
         (&["run", "--resume", "scenarios"], "no run.yaml"),
         (&["why", space, "--row", "45"], "rows 0 to 44"),
         (&["why", space, "--row", "0", "--state", "tiem: Night"], "time"),
+        (&["why", space, "--row", "0", "--state", "time: Noon, time: Night"], "`time` is given twice"),
         (&["render", space, "--at", "1"], "no scenario"),
     ];
     for (arguments, hint) in cases {

@@ -368,6 +368,7 @@ fn proposals_fit_their_place() {
         "rule r on all: |",
         "rule r on all: pace |",
         "rule r on all: pace <= road.|",
+        "rule r on all: pace <= ego.|",
         "rule r on all: from == |",
         "rule r: sky[Rain] == |",
         "rule r: road == |",

@@ -366,4 +366,8 @@ impl Surroundings for Full {
     fn survey(&self, _request: &SpawnRequest) -> Result<SpawnFacts, String> {
         Err("no room".to_owned())
     }
+
+    fn ego_speed_mps(&self) -> f64 {
+        10.0
+    }
 }

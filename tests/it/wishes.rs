@@ -1,7 +1,8 @@
-//! Ten files as a newcomer writes them, each with a wish. A test for each shows that the wish came true.
+//! Files as a newcomer writes them, each with a wish. A test for each shows that the wish came true.
 
 use avastra::action::{ActionTable, Draw, Offer, Situation};
 use avastra::check::state_argument::memory_from;
+use avastra::episode::{Choice, Moment};
 use avastra::model::vocabulary::{Level, TimeOfDay};
 use avastra::model::{End, Memory, OutcomeFacts, Reach, RulesInForce, Value};
 use avastra::syntax::ast::FileId;
@@ -9,7 +10,7 @@ use avastra::syntax::{Diagnostic, format};
 
 use crate::cases::{cases, root};
 use crate::command::{avastra, outcome};
-use crate::world::{Wide, read, space_at};
+use crate::world::{Wide, assert_replays, read, run_of, space_at};
 
 fn wish(name: &str) -> ActionTable {
     ActionTable::new(space_at(&format!("tests/cases/wishes/{name}.ava")))
@@ -62,9 +63,9 @@ fn left(table: &ActionTable, row: usize, road: usize, name: &str) -> (f64, f64) 
 }
 
 #[test]
-fn ten_wishes_compile_as_they_are_written() {
+fn wishes_compile_as_they_are_written() {
     let wishes = cases("wishes");
-    assert_eq!(wishes.len(), 10);
+    assert_eq!(wishes.len(), 11);
     for (stem, path) in wishes {
         let text = read(&path).expect("a case is readable");
         assert!(text.starts_with("//! Wish: "), "{stem}");
@@ -181,6 +182,47 @@ fn every_vehicle_is_slower_in_the_rain() {
     assert!(fastest_mps("None") > 0.9 * limit_mps && fastest_mps("Light") > 0.9 * limit_mps);
     assert!(fastest_mps("Moderate") <= 0.9 * limit_mps);
     assert!(fastest_mps("High") <= limit_mps - 5.0 / 3.6);
+}
+
+#[test]
+fn pedestrians_come_only_while_the_ego_vehicle_drives() {
+    let table = wish("only_while_driving");
+    let rows = ["pedestrian(from: Left)", "pedestrian(from: Right)"].map(|label| row(&table, label));
+    let run = run_of(table.space().clone(), 1, 2, &[]);
+    let (mut slow, mut walked) = (0, 0);
+    for number in 0..run.episodes() {
+        let mut choose = |moment: &Moment| {
+            let speed_mps = moment.situation.surroundings.ego_speed_mps();
+            let offers = rows.map(|row| table.offer(moment.situation, row));
+            for offer in &offers {
+                let Offer::Refused(refusal) = offer else { continue };
+                let refused = refusal.rule.as_deref() == Some("only_while_driving");
+                assert!(!refused || speed_mps < 8.0, "{refusal:?} at {speed_mps} m/s");
+            }
+            let legal = offers.into_iter().find_map(|offer| match offer {
+                Offer::Legal(draw) => Some(draw),
+                Offer::Refused(_) => None,
+            });
+            assert!(legal.is_none() || speed_mps >= 8.0, "{legal:?} at {speed_mps} m/s");
+            slow += usize::from(speed_mps < 8.0);
+            walked += usize::from(legal.is_some());
+            legal.map_or(Choice::Pass, Choice::Act)
+        };
+        let log = run.play(number, &mut choose, &mut |_, _, _| {});
+        assert_replays(&run, number, &log);
+    }
+    assert!(slow > 0 && walked > 0, "{slow} {walked}");
+}
+
+#[test]
+fn what_the_world_refuses_is_said_with_its_speed() {
+    let space = "tests/cases/wishes/only_while_driving.ava";
+    let reason = "rule `only_while_driving` says no: ego.speed = 3 m/s, wanted >= 8 m/s";
+    let (_, stdout, _) = outcome(&mut avastra(&["why", space, "--row", "13"]));
+    assert!(stdout.contains(reason), "{stdout}");
+    let scenario = "tests/cases/diagnostics/ego_speed_is_left_to_the_replay.ava";
+    let (status, stdout, _) = outcome(&mut avastra(&["replay", scenario]));
+    assert!(status != 0 && stdout.contains("`only_while_driving`: ego.speed = 3 m/s"), "{stdout}");
 }
 
 #[test]

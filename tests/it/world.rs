@@ -24,6 +24,10 @@ impl Surroundings for Wide {
     fn survey(&self, request: &SpawnRequest) -> Result<SpawnFacts, String> {
         Ok(SpawnFacts { spawn_gap_m: request.distance_m, safety_gap_m: self.safety_gap_m })
     }
+
+    fn ego_speed_mps(&self) -> f64 {
+        10.0
+    }
 }
 
 /// Reads a file as the command line does.

@@ -32,6 +32,10 @@ impl Surroundings for Plain {
     fn survey(&self, request: &SpawnRequest) -> Result<SpawnFacts, String> {
         Ok(SpawnFacts { spawn_gap_m: request.distance_m, safety_gap_m: self.safety_gap_m })
     }
+
+    fn ego_speed_mps(&self) -> f64 {
+        10.0
+    }
 }
 
 /// A world without room for any spawn.
@@ -40,6 +44,10 @@ struct Full;
 impl Surroundings for Full {
     fn survey(&self, _request: &SpawnRequest) -> Result<SpawnFacts, String> {
         Err("no room".to_owned())
+    }
+
+    fn ego_speed_mps(&self) -> f64 {
+        10.0
     }
 }
 

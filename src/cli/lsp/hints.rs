@@ -1,5 +1,5 @@
-//! What the compiler knows and the text does not say: behind the name of an action its rows, and behind a
-//! drawn range the part that the rules leave.
+//! Inlay hints: an editor shows the rows of an action behind its name, and behind a drawn range the part of it that
+//! the rules leave.
 //!
 //! Hints are shown only while the space is sound: row numbers from an earlier state could be wrong.
 

@@ -5,7 +5,8 @@ use core::fmt::Write;
 
 use crate::check::{Declaration, Symbol};
 use crate::cli::doc::{range_on, unit};
-use crate::cli::progress::plural;
+use crate::cli::output::plural;
+use crate::model::vocabulary::{Word, WorldState};
 use crate::model::{ActionDef, Interval, Parameter, Reach, RuleBody, Space};
 use crate::syntax::ast::Span;
 use crate::syntax::{keyword, listed};
@@ -80,10 +81,7 @@ pub fn describe(analysis: &Analysis, symbol: &Symbol) -> Option<String> {
             format!("{text}\n\n`{name}`: variant {} of {} of `{of}`", place + 1, variants.len())
         }
         Symbol::State(name) => {
-            let world = match name.as_str() {
-                "time" | "sky" => "\n\nThe world reads it.",
-                _ => "",
-            };
+            let world = WorldState::from_name(name).map_or("", |_| "\n\nThe world reads it.");
             format!("{text}{typed}{world}")
         }
         Symbol::Constant(_) => format!("{text}{typed}"),
@@ -227,7 +225,7 @@ fn facts_of(space: &Space, name: &str) -> Option<String> {
 /// A number with its unit, and its exact value in SI.
 fn number(digits: &str, word: &str) -> Option<String> {
     let unit = units::unit(word)?;
-    let exact = Rational::from_decimal(digits)?.checked_mul(unit.factor())?;
+    let exact = Rational::from_literal(digits)?.checked_mul(unit.factor())?;
     let si = unit.dimension.si_unit();
     let shown = units::decimal((exact.to_f64() * 1e6).round() / 1e6, false);
     let exactly = exact.to_string();

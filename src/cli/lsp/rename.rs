@@ -10,6 +10,7 @@ use serde_json::{Value, json};
 
 use crate::check::{Loaded, Symbol};
 use crate::model::COUNTED;
+use crate::model::vocabulary::{Word, WorldState};
 use crate::syntax::ast::Span;
 use crate::syntax::{Diagnostic, keyword};
 
@@ -42,7 +43,7 @@ fn fixed(symbol: &Symbol) -> Option<String> {
     match symbol {
         Symbol::Engine(word, _) => Some(format!("`{word}` is a word of the engine")),
         Symbol::Type(word) => Some(format!("`{word}` is a type of the language")),
-        Symbol::State(word) if matches!(word.as_str(), "time" | "sky") => {
+        Symbol::State(word) if WorldState::from_name(word).is_some() => {
             Some(format!("the world reads the state `{word}` by this name"))
         }
         Symbol::Verdict(word) if word == COUNTED => {

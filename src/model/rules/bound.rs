@@ -5,6 +5,7 @@ use crate::model::interval::{End, Interval};
 use crate::model::rules::Demand;
 use crate::model::space::{ActionDef, RuleDef};
 use crate::model::value::Type;
+use crate::model::vocabulary::Known;
 
 /// `local op limit`, wherever all guards hold.
 #[derive(Debug, Clone, PartialEq)]
@@ -71,7 +72,7 @@ fn collect(condition: &Expr, rule: Option<usize>, guards: &mut Vec<Expr>, into: 
         {
             let mut parts = guards.iter().chain([limit]);
             let needs = parts.clone().flat_map(locals).collect();
-            let is_known_early = !parts.any(|expr| expr.needs_survey() || expr.reads_memory());
+            let is_known_early = parts.all(|expr| expr.known() == Known::Road && !expr.reads_memory());
             let (limit, guards) = (limit.clone(), guards.clone());
             into.push(Bound { rule, local: *local, op, limit, guards, is_known_early, needs });
         }

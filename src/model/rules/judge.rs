@@ -1,10 +1,11 @@
 //! The judgement: which rules a complete choice of values breaks.
 
-use crate::model::eval::{Facts, evaluate};
+use crate::model::eval::{Facts, SpawnFacts, WorldFacts, evaluate};
 use crate::model::expr::{Expr, ExprKind};
 use crate::model::rules::{Demand, RowRules};
 use crate::model::space::Parameter;
 use crate::model::value::{Memory, Value};
+use crate::model::vocabulary::{Known, Word};
 
 /// A complete choice for a row, and what it would do.
 #[derive(Clone, Copy)]
@@ -14,8 +15,9 @@ pub(crate) struct Candidate<'a> {
     pub before: &'a Memory,
     /// The memory after the action.
     pub after: &'a Memory,
-    /// `(spawn_gap, safety_gap)` of each spawn, m. A rule that asks about a gap holds where there is none.
-    pub gaps_m: &'a [(f64, f64)],
+    /// What the world says. Without it, a rule that asks the world holds; a rule that asks about a spawn also
+    /// holds where there is none.
+    pub world: Option<&'a WorldFacts>,
 }
 
 /// One rule, or one `where`, that a candidate breaks.
@@ -30,8 +32,7 @@ pub(crate) enum Breach<'a> {
     /// A rule that asks about the gap of a spawn; m.
     Gap {
         rule: usize,
-        spawn_gap_m: f64,
-        safety_gap_m: f64,
+        spawn: SpawnFacts,
     },
     /// A state makes a move that the rule does not allow.
     Move {
@@ -59,14 +60,20 @@ impl<'a> RowRules<'a> {
     fn breach(self, rule: usize, demand: Demand<'a>, candidate: Candidate<'a>) -> Option<Breach<'a>> {
         let facts = self.facts(candidate);
         match demand {
-            Demand::Holds(condition) if condition.needs_survey() => {
-                let is_broken =
-                    |gaps_m: &&(f64, f64)| !self.holds(condition, Facts { gaps_m: **gaps_m, ..facts });
-                let (spawn_gap_m, safety_gap_m) = *candidate.gaps_m.iter().find(is_broken)?;
-                Some(Breach::Gap { rule, spawn_gap_m, safety_gap_m })
-            }
             Demand::Holds(condition) => {
-                (!self.holds(condition, facts)).then_some(Breach::Condition { rule, condition })
+                let breach = Breach::Condition { rule, condition };
+                match condition.known() {
+                    Known::World if candidate.world.is_none() => None,
+                    Known::Road | Known::World => (!self.holds(condition, facts)).then_some(breach),
+                    Known::Spawn => {
+                        let mut spawns = candidate.world?.spawns.iter().copied();
+                        let is_broken = |spawn: &SpawnFacts| {
+                            !self.holds(condition, Facts { spawn: Some(*spawn), ..facts })
+                        };
+                        Some(Breach::Gap { rule, spawn: spawns.find(is_broken)? })
+                    }
+                    Known::Step | Known::Judgement => unreachable!("no rule may read what comes after it"),
+                }
             }
             Demand::Moves { state, allowed } => {
                 let cell = self.space.states[state].first_cell;
@@ -77,7 +84,7 @@ impl<'a> RowRules<'a> {
     }
 
     fn facts(self, candidate: Candidate<'a>) -> Facts<'a> {
-        Facts { road: self.road, ..Facts::new(candidate.values, candidate.after) }
+        Facts { road: self.road, world: candidate.world, ..Facts::new(candidate.values, candidate.after) }
     }
 
     fn holds(self, condition: &Expr, facts: Facts<'_>) -> bool {
@@ -89,7 +96,7 @@ impl<'a> RowRules<'a> {
         match breach {
             Breach::Where(parameter) => format!("the `where` of `{}` does not hold", parameter.name),
             Breach::Condition { condition, .. } => self.figures(condition, candidate),
-            Breach::Gap { spawn_gap_m, safety_gap_m, .. } => {
+            Breach::Gap { spawn: SpawnFacts { spawn_gap_m, safety_gap_m }, .. } => {
                 format!("the gap would be {spawn_gap_m:.1} m, a fair one is {safety_gap_m:.1} m")
             }
             Breach::Move { state, from, to, .. } => {
@@ -100,8 +107,8 @@ impl<'a> RowRules<'a> {
         }
     }
 
-    /// The parameters that a broken condition names, with their values, and the other side of a
-    /// comparison.
+    /// The parameters and the facts of the world that a broken condition names, with their values, and the other
+    /// side of a comparison.
     fn figures(self, condition: &Expr, candidate: Candidate<'a>) -> String {
         let mut shown = Vec::new();
         for (index, parameter) in self.space.actions[self.row.action].parameters.iter().enumerate() {
@@ -110,6 +117,17 @@ impl<'a> RowRules<'a> {
                 shown.push(format!("{} = {value}", parameter.name));
             }
         }
+        condition.walk(&mut |part| {
+            if let ExprKind::Fact(fact) = part.kind
+                && fact.known() == Known::World
+            {
+                let value = evaluate(part, &self.space.functions, &self.facts(candidate));
+                let figure = format!("{} = {}", fact.name(), self.space.show(value, part.ty));
+                if !shown.contains(&figure) {
+                    shown.push(figure);
+                }
+            }
+        });
         if let ExprKind::Compare(op, _, right) = &condition.kind {
             let wanted = evaluate(right, &self.space.functions, &self.facts(candidate));
             shown.push(format!("wanted {} {}", op.symbol(), self.space.show(wanted, right.ty)));

@@ -101,7 +101,7 @@ pub fn superiority(first: &[f64], second: &[f64]) -> Option<(f64, Interval)> {
         let spread = 1.0 + typical * (1.0 - truth) / (2.0 - truth) + typical * truth / (1.0 + truth);
         (truth * (1.0 - truth) * spread / pairs).sqrt()
     };
-    // The true values from which the observed one lies no farther than chance explains.
+    // The interval holds each true value that chance alone could turn into the observed one.
     let low = bisect(0.0, found, |truth| found - truth <= Z * deviation(truth));
     let high = bisect(found, 1.0, |truth| truth - found > Z * deviation(truth));
     Some((found, Interval { low, high: Some(high) }))

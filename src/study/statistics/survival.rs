@@ -17,7 +17,7 @@ pub fn restricted_mean(lifetimes: &[Lifetime], horizon_s: f64) -> Option<f64> {
         return None;
     }
     let mut lifetimes = lifetimes.to_vec();
-    // Of a failure and a censoring at the same moment, the failure comes first.
+    // If one run fails and another is censored at the same moment, the failure comes first.
     lifetimes.sort_by(|one, other| one.time_s.total_cmp(&other.time_s).then(other.failed.cmp(&one.failed)));
     let (mut area, mut surviving, mut since_s) = (0.0, 1.0, 0.0);
     for (index, lifetime) in lifetimes.iter().enumerate() {
