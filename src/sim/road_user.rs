@@ -1,6 +1,8 @@
 //! A road user other than the ego vehicle: what others may see of it (`Obstacle`), and what moves it
 //! (`Mover`): a driver, two legs, or nothing.
 
+use std::sync::Arc;
+
 use crate::geometry::{OrientedBox, Pose, Vec2, distance_m};
 use crate::model::vocabulary::{Body, Colour, Verb};
 
@@ -10,6 +12,7 @@ use super::body::BodyParameters;
 use super::environment::GRAVITY_MPS2;
 use super::npc::Driver;
 use super::pedestrian::Walker;
+use super::right_of_way::Rights;
 use super::world::DT_S;
 
 /// How long a wreck stays where it came to rest, s; longer while the ego vehicle sees it.
@@ -62,6 +65,8 @@ pub(super) struct Mover {
     rest_ticks: u32,
     /// Part of it that the ego vehicle's sensors saw when they last looked.
     pub visible_fraction: f64,
+    /// Who gives way to whom, it or the ego vehicle.
+    pub rights: Rights,
 }
 
 #[derive(Debug, Clone)]
@@ -137,7 +142,15 @@ impl RoadUser {
 
 impl Mover {
     pub fn new(size: BodyParameters, motion: Motion) -> Mover {
-        Mover { size, motion, touched: false, crashed_with: None, rest_ticks: 0, visible_fraction: 1.0 }
+        Mover {
+            size,
+            motion,
+            touched: false,
+            crashed_with: None,
+            rest_ticks: 0,
+            visible_fraction: 1.0,
+            rights: Rights::default(),
+        }
     }
 
     /// Whether it does nothing any more but come to rest.
@@ -157,7 +170,15 @@ impl Mover {
         let rest = Moved::at_rest(this);
         match &mut self.motion {
             _ if self.crashed_with.is_some() => Some(slide(this, around)),
-            Motion::Drive(driver) => driver.step(this, &self.size, self.touched, in_sight, around),
+            Motion::Drive(driver) => {
+                let (way, before_m) = (Arc::clone(driver.shared_way()), driver.station_m());
+                let moved = driver.step(this, &self.size, self.touched, in_sight, around);
+                if Arc::ptr_eq(&way, driver.shared_way()) {
+                    let front_m = this.outline.half_length_m;
+                    self.rights.pass(&way, before_m + front_m, driver.station_m() + front_m, around);
+                }
+                moved
+            }
             Motion::Walk(_) if self.touched => Some(rest),
             Motion::Walk(walker) => walker.step(this, in_sight, around),
             Motion::Stand => Some(rest),
@@ -186,6 +207,7 @@ impl Mover {
         sink(u64::from(self.crashed_with.unwrap_or(0)));
         sink(u64::from(self.rest_ticks));
         sink(self.visible_fraction.to_bits());
+        self.rights.trace(sink);
         match &self.motion {
             Motion::Drive(driver) => driver.trace(sink),
             Motion::Walk(walker) => walker.trace(sink),

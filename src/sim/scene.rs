@@ -5,6 +5,7 @@ use std::sync::Arc;
 use crate::road::{LaneIndex, RoadMap, Route};
 
 use super::junction::ConflictAreas;
+use super::right_of_way::{RouteArea, route_areas};
 use super::way::Ways;
 
 /// What stays the same during all episodes of one road. Shared, never copied.
@@ -14,6 +15,7 @@ pub struct Scene {
     /// Where the ego vehicle is to go.
     pub route: Route,
     areas: ConflictAreas,
+    route_areas: Vec<RouteArea>,
     ways: Ways,
     /// Lanes outside junctions, each with the sum of the lengths up to its end, m.
     streets: Vec<(LaneIndex, f64)>,
@@ -27,7 +29,9 @@ impl Scene {
             end_m += lane.centre.length_m();
             streets.push((LaneIndex(index), end_m));
         }
-        Scene { areas: ConflictAreas::new(&map), ways: Ways::default(), streets, map, route }
+        let areas = ConflictAreas::new(&map);
+        let route_areas = route_areas(&areas, &route);
+        Scene { areas, route_areas, ways: Ways::default(), streets, map, route }
     }
 
     /// The place at a fraction of all streets laid end to end, so that every metre is equally likely.
@@ -40,6 +44,11 @@ impl Scene {
 
     pub(super) fn ways(&self) -> &Ways {
         &self.ways
+    }
+
+    /// Where the ways of others cross or join the route, by rising station.
+    pub(super) fn route_areas(&self) -> &[RouteArea] {
+        &self.route_areas
     }
 
     pub(super) fn conflict_areas(&self) -> &ConflictAreas {

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use crate::action::SpawnRequest;
 use crate::geometry::Vec2;
 use crate::model::vocabulary::{Body, Colour, LaneChoice, Level, Side, Then, TimeOfDay, Verb};
-use crate::road::testing::{lanes, street};
+use crate::road::testing::{lanes, road, street};
 use crate::road::{RoadMap, Route};
 
 use super::scene::Scene;
@@ -119,6 +119,96 @@ pub fn crossing_of(ego: &str, other: &str) -> Arc<Scene> {
         connection("4", "5")
     );
     scene(&map, ("1", -1, 100.0), ("3", -1, 190.0))
+}
+
+/// Where the route of [`oncoming`] leads.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Heading {
+    Straight,
+    Left,
+}
+
+/// A street from west (road 1) to east (road 3) through a junction at the origin, with a lane each way, 200 m
+/// to each side. The ego vehicle comes from the west, 100 m before the junction, and goes straight on (through
+/// road 2) or turns left to the north (road 5). A vehicle from the east goes straight on or turns left to the
+/// south (through road 8). All have the same light.
+pub fn oncoming(heading: Heading) -> Arc<Scene> {
+    let (both, one) = (lanes(&[plain(1), plain(-1)]), lanes(&[plain(-1)]));
+    let link = |id: i32, from: i32| {
+        let link = format!(r#"<link><predecessor id="{from}"/><successor id="{from}"/></link>"#);
+        format!(r#"<lane id="{id}" type="driving"><width a="3.5"/>{link}</lane>"#)
+    };
+    let through = format!(
+        r#"<laneSection s="0"><left>{}</left><right>{}</right></laneSection>"#,
+        link(1, 1),
+        link(-1, -1)
+    );
+    let turn = |from: i32| {
+        let link = format!(r#"<link><predecessor id="{from}"/><successor id="-1"/></link>"#);
+        format!(
+            r#"<laneSection s="0"><right><lane id="-1" type="driving"><width a="3.5"/>{link}</lane></right></laneSection>"#
+        )
+    };
+    let arc = |x_m: f64, heading_rad: f64| {
+        let length_m = 5.0 * core::f64::consts::PI;
+        format!(
+            r#"<geometry s="0" x="{x_m}" y="0" hdg="{heading_rad}" length="{length_m}"><arc curvature="0.1"/></geometry>"#
+        )
+    };
+    let ends = |from: (&str, &str), to: &str| {
+        let (from, contact) = from;
+        format!(
+            r#"<predecessor elementType="road" elementId="{from}" contactPoint="{contact}"/>
+            <successor elementType="road" elementId="{to}" contactPoint="start"/>"#
+        )
+    };
+    let light = |id: &str, s_m: f64, orientation: &str| {
+        format!(
+            r#"<signals><signal id="{id}" s="{s_m}" t="0" orientation="{orientation}" dynamic="yes" type="1000001"/></signals>"#
+        )
+    };
+    let (pi, turned_m) = (core::f64::consts::PI, 5.0 * core::f64::consts::PI);
+    let (north, south) = (pi / 2.0, -pi / 2.0);
+    let roads = [
+        street("1", [-210.0, 0.0, 0.0, 200.0], "-1", INTO, &both, &light("west", 198.0, "+")),
+        street("3", [10.0, 0.0, 0.0, 200.0], "-1", OUT, &both, &light("east", 2.0, "-")),
+        street("5", [0.0, 10.0, north, 190.0], "-1", OUT, &one, ""),
+        street("6", [0.0, -10.0, south, 190.0], "-1", OUT, &one, ""),
+        street("2", [-10.0, 0.0, 0.0, 20.0], "9", &ends(("1", "end"), "3"), &through, ""),
+        road("7", turned_m, "9", &ends(("1", "end"), "5"), &arc(-10.0, 0.0), &turn(-1), ""),
+        road("8", turned_m, "9", &ends(("3", "start"), "6"), &arc(10.0, pi), &turn(1), ""),
+    ]
+    .concat();
+    let connection = |incoming: &str, connecting: &str, contact: &str, (from, to): (i32, i32)| {
+        format!(
+            r#"<connection id="{incoming}-{connecting}" incomingRoad="{incoming}" connectingRoad="{connecting}"
+            contactPoint="{contact}"><laneLink from="{from}" to="{to}"/></connection>"#
+        )
+    };
+    let connections = [
+        connection("1", "2", "start", (-1, -1)),
+        connection("3", "2", "end", (1, 1)),
+        connection("1", "7", "start", (-1, -1)),
+        connection("3", "8", "start", (1, -1)),
+    ]
+    .concat();
+    let map = format!(
+        r#"{roads}<controller id="c"><control signalId="west"/><control signalId="east"/></controller>
+        <junction id="9" name="middle">{connections}<controller id="c" sequence="0"/></junction>"#
+    );
+    let goal = match heading {
+        Heading::Straight => ("3", -1, 150.0),
+        Heading::Left => ("5", -1, 150.0),
+    };
+    scene(&map, ("1", -1, 100.0), goal)
+}
+
+/// As [`straight`], with a zebra crossing 6 m wide where the ego vehicle's front is after 70 m.
+pub fn zebra() -> Arc<Scene> {
+    let lanes = lanes(&[2, 1, -1, -2].map(plain));
+    let zebra = r#"<objects><object type="crosswalk" id="zebra" s="172" t="0" length="6" width="16" hdg="0"/></objects>"#;
+    let road = street("1", [0.0, 0.0, 0.0, 600.0], "-1", "", &lanes, zebra);
+    scene(&road, ("1", -1, 100.0), ("1", -1, 500.0))
 }
 
 /// Four one-lane streets through the origin, to the east, north, west and south, 200 m each way, that

@@ -16,6 +16,7 @@ use super::ego::{Control, Ego, VehicleParameters};
 use super::environment::Environment;
 use super::incident::{Bump, Incident, bump, impact};
 use super::placement;
+use super::right_of_way::PassedLight;
 use super::road_user::{Moved, Obstacle, RoadUser};
 use super::scene::Scene;
 use super::sense::{
@@ -68,6 +69,7 @@ pub struct World {
     ego_station_m: f64,
     ego_offset_m: f64,
     red_runs: u32,
+    ego_passed: Option<PassedLight>,
     environment: Environment,
     conditions: Conditions,
     signals: SignalClock,
@@ -93,6 +95,7 @@ impl World {
             ego_station_m: 0.0,
             ego_offset_m: 0.0,
             red_runs: 0,
+            ego_passed: None,
             conditions: environment.conditions(START_MPS),
             environment,
             signals: SignalClock::new(start.signal_phase_s),
@@ -122,6 +125,9 @@ impl World {
     pub fn tick(&mut self, control: &Control) -> &[Contact] {
         self.contacts.clear();
         self.incidents.clear();
+        if self.ticks.is_multiple_of(FRAME_TICKS) {
+            self.watch_rights();
+        }
         let start = self.ego.outline;
         let friction = self.environment.grip().friction(self.ego.motion.speed_mps);
         self.ego.step(control, friction, DT_S);
@@ -284,6 +290,7 @@ impl World {
         sink(self.ego_station_m.to_bits());
         sink(self.ego_offset_m.to_bits());
         sink(u64::from(self.red_runs));
+        PassedLight::trace(self.ego_passed.as_ref(), sink);
         self.environment.trace(sink);
         sink(self.conditions.friction.to_bits());
         self.signals.trace(sink);
@@ -364,6 +371,16 @@ impl World {
         self.ambient = ambient;
     }
 
+    /// Looks who came into whose way, the ego vehicle or a road user.
+    fn watch_rights(&mut self) {
+        let mut users = core::mem::take(&mut self.users);
+        let around = self.around([&[], &[]]);
+        for RoadUser { obstacle, mover } in &mut users {
+            mover.rights.watch(obstacle, &mover.motion, self.ego_passed, &around);
+        }
+        self.users = users;
+    }
+
     /// Moves one road user and finds what it touches; `false` if it left.
     /// `ego_mps` is the ego vehicle's speed before any contact of this tick.
     fn tick_user(&mut self, index: usize, users: &mut [RoadUser], ego: &Party, ego_mps: f64) -> bool {
@@ -398,6 +415,8 @@ impl World {
             velocity_mps: moved.velocity_mps,
         };
         if let Some(contact) = meet(ego, ego_mps, &other, before.id, self.ticks) {
+            let around = self.around([&[], &[]]);
+            let priority = mover.rights.at_contact(obstacle, &mover.motion, &around);
             let heading = self.ego.frame.forward();
             let along_mps = heading.dot(&moved.velocity_mps);
             // Impacts chain: the second acts on the speed that the first left.
@@ -405,7 +424,7 @@ impl World {
             self.ego.motion.speed_mps = common_mps;
             // A vehicle that is pushed forward goes on at what the push gives; one that is stopped stays.
             mover.touch((moved.forward.dot(&heading) * common_mps).max(0.0));
-            self.contacts.push(contact);
+            self.contacts.push(Contact { priority, ..contact });
         }
         true
     }
@@ -437,6 +456,9 @@ impl World {
         self.ego_station_m = found.station_m;
         self.ego_offset_m = found.offset_m;
         let passed = front_before_m..self.ego_front_m();
+        let colour = |signal| self.signal(signal);
+        let light = PassedLight::between(&route.stop_lines, passed.start, passed.end, colour);
+        self.ego_passed = light.or(self.ego_passed);
         self.red_runs += route
             .stop_lines
             .iter()
@@ -461,8 +483,37 @@ impl Surroundings for World {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::vocabulary::Verb;
+    use crate::model::vocabulary::{Body, Colour, Verb};
+    use crate::road::LaneIndex;
+    use crate::sim::body::parameters;
+    use crate::sim::npc::{Cruise, Driver, choices};
+    use crate::sim::road_user::{Motion, Mover};
     use crate::sim::testing;
+    use crate::sim::way::Way;
+
+    impl World {
+        /// Puts a sedan on a lane of a road, at a station of its way, with a speed that it keeps where it can; its
+        /// way leads through the other road. It does not yield to the ego vehicle.
+        pub(crate) fn put(&mut self, road: &str, lane: i32, through: &str, station_m: f64, speed_mps: f64) {
+            let map = &self.scene.map;
+            let first = map.place(road, lane, 100.0).expect("the lane is there").lane;
+            let next = map.lane(first).successors.iter().copied();
+            let next = next.filter(|lane| map.lane(*lane).key.road == through);
+            let lanes: Vec<LaneIndex> = [first].into_iter().chain(next).collect();
+            let mut rng = choices(self.seed, self.next_id, 0);
+            let way = Way::along(&self.scene, &lanes, &mut rng).expect("the lanes follow each other");
+            let size = parameters(Body::Sedan);
+            let driver =
+                Driver::new(&self.scene, way, station_m, Cruise::Commanded(speed_mps), Vec::new(), 1);
+            let moved = driver.moved(&size);
+            let mover = Mover::new(size, Motion::Drive(driver));
+            let around = self.around([&self.users, &[]]);
+            let verb = Verb::CrossRoad;
+            let user = RoadUser::new(&around, self.next_id, Body::Sedan, Colour::Red, verb, mover, moved);
+            self.users.push(user);
+            self.next_id += 1;
+        }
+    }
 
     #[test]
     fn of_two_contacts_in_a_tick_neither_sees_the_other() {

@@ -111,6 +111,18 @@ impl Driver {
         &self.way
     }
 
+    pub fn shared_way(&self) -> &Arc<Way> {
+        &self.way
+    }
+
+    pub fn station_m(&self) -> f64 {
+        self.station_m
+    }
+
+    pub fn is_changing_lanes(&self) -> bool {
+        self.change.is_some()
+    }
+
     /// Where it is before its first tick.
     pub fn moved(&self, size: &BodyParameters) -> Moved {
         let pose = self.way.body_at(self.station_m, size);

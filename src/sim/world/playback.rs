@@ -1,8 +1,8 @@
 //! A world with another ego vehicle: everything else moves as it did in a recording, tick by tick,
 //! whatever the ego vehicle does now.
 //!
-//! A recording is the worlds after each tick, in order. Impacts are left out: a playback tells whether
-//! there is a contact, not what comes of it.
+//! A recording is the worlds after each tick, in order. Impacts and priority are left out: a playback tells
+//! whether there is a contact, not what comes of it.
 
 use crate::geometry::{OrientedBox, Sweep};
 use crate::sim::contact::{Contact, Party, meet};
@@ -26,6 +26,7 @@ impl World {
             ego_station_m: self.ego_station_m,
             ego_offset_m: self.ego_offset_m,
             red_runs: self.red_runs,
+            ego_passed: self.ego_passed,
             contacts: Vec::new(),
             ..recorded.clone()
         };
