@@ -228,8 +228,8 @@ fn it_passes_a_parked_car_within_its_lane() {
 }
 
 #[test]
-fn standing_pedestrian_ignored_creeps_into_a_pedestrian_who_stands() {
-    let mended = config(|config| config.weaknesses.standing_pedestrian_ignored = false);
+fn creeps_to_standing_pedestrian_creeps_into_a_pedestrian_who_stands() {
+    let mended = config(|config| config.weaknesses.creeps_to_standing_pedestrian = false);
     let gap_m = |config: &ModularConfig| {
         let scene = straight();
         let mut rig = rig_of(&scene, config, 1);
@@ -262,25 +262,34 @@ fn late_red_passed_passes_a_light_that_turns_red_late() {
     assert!(slowest_mps(&mended) < 5.0, "{}", slowest_mps(&mended));
 }
 
+/// A car crosses slowly, the ego vehicle stands and yields; then the car accelerates. Least gap, m.
+fn gap_to_one_that_accelerates(config: &ModularConfig, seed: u64) -> f64 {
+    let scene = straight();
+    let mut rig = rig_of(&scene, config, seed);
+    rig.run(10.0);
+    let meeting_m = rig.station_m() + 45.0;
+    let from = Pose::new(meeting_m, -13.75, core::f64::consts::FRAC_PI_2);
+    rig.sensed.objects.push(object(1, Body::Sedan, from, 1.2));
+    for _ in 0..1000 {
+        rig.tick();
+        let car = &mut rig.sensed.objects[0];
+        if car.pose.position.y > -7.0 {
+            car.velocity_mps.y = (car.velocity_mps.y + 3.0 * crate::sim::DT_S).min(10.0);
+        }
+    }
+    assert!(rig.sensed.ego.speed_mps > 8.0, "it goes on");
+    rig.gap_m_min
+}
+
 #[test]
-fn blind_to_side_and_rear_does_not_let_in_a_vehicle_from_beside() {
-    let mended = config(|config| config.weaknesses.blind_to_side_and_rear = false);
-    let gap_m = |config: &ModularConfig| {
-        let scene = straight();
-        let mut rig = rig_of(&scene, config, 1);
-        rig.run(12.0);
-        rig.gap_m_min = f64::INFINITY;
-        let x_m = rig.station_m() + 3.705 - 4.0;
-        rig.sensed.objects.push(object(1, Body::Sedan, Pose::new(x_m, 1.75, 0.0), 0.0));
-        rig.sensed.objects[0].velocity_mps = Vec2::new(rig.sensed.ego.speed_mps, -0.5);
-        // It stays in the middle of the lane once it is there.
-        rig.run(7.0);
-        rig.sensed.objects[0].velocity_mps.y = 0.0;
-        rig.run(3.0);
-        rig.gap_m_min
-    };
-    assert_eq!(gap_m(&ModularConfig::default()), 0.0);
-    assert!(gap_m(&mended) > 0.0);
+fn it_stays_where_it_yields_when_the_other_accelerates() {
+    let steady = config(|config| config.weaknesses.decides_anew = false);
+    for seed in 0..5 {
+        for config in [&ModularConfig::default(), &steady] {
+            let gap_m = gap_to_one_that_accelerates(config, seed);
+            assert!(gap_m > 0.5, "{gap_m}");
+        }
+    }
 }
 
 /// The vehicle on the two-lane road, whose route changes from y = -5.25 m to y = -1.75 m.

@@ -65,8 +65,20 @@ section! {
         yield_gap_m: f64 = 5.0, 0.5..=20.0;
         /// Two road users at one place closer in time than this are in conflict, s, in `[0, 5]`. Ours.
         conflict_buffer_s: f64 = 1.0, 0.0..=5.0;
-        /// Under `standing_pedestrian_ignored`, a pedestrian who has stood for longer is ignored, s, in `[0, 60]`. Apollo's crosswalk rule, `stop_timeout`: 4.0; issue 11926.
+        /// Safe distance to a road user's region of the station-time graph, m, in `[0, 100]`. Apollo's DP `safe_distance`: 20.
+        dp_safe_distance_m: f64 = 20.0, 0.0..=100.0;
+        /// Safe time before and after such a region, s, in `[0.1, 20]`. Apollo's DP `safe_time_buffer`: 3.
+        dp_safe_time_s: f64 = 3.0, 0.1..=20.0;
+        /// A decision is left only if the cost without it is lower by this part, in `[0, 1]`. Ours.
+        decision_margin: f64 = 0.3, 0.0..=1.0;
+        /// Less probable hypotheses count in the cost alone, in `[0, 1]`. Ours.
+        hypothesis_min: f64 = 0.1, 0.0..=1.0;
+        /// The same for hypotheses that would take the ego vehicle's right of way, in `[0, 1]`. Ours.
+        hypothesis_min_owing: f64 = 0.5, 0.0..=1.0;
+        /// Under `creeps_to_standing_pedestrian`, a pedestrian who has stood for longer is crept towards, s, in `[0, 60]`. Apollo's crosswalk rule, `stop_timeout`: 4.0.
         standing_pedestrian_s: f64 = 4.0, 0.0..=60.0;
+        /// Under `creeps_to_standing_pedestrian`, the speed of that, m/s, in `[0.1, 3]`. Apollo issue 11926: 3 km/h.
+        creep_to_pedestrian_mps: f64 = 0.83, 0.1..=3.0;
         /// Gap from the front bumper to a stop line, m, in `[0, 5]`. Apollo `stop_distance`: 1.0.
         stop_line_gap_m: f64 = 1.0, 0.0..=5.0;
         /// Under `late_red_passed`, a red light that would need harder braking is passed, m/s², in `[1, 8]`. Apollo `max_stop_deceleration`: 4.0.

@@ -44,14 +44,16 @@ weaknesses! {
     lane_bound_prediction,
     /// The braking of a plan builds up at a bounded rate, in an emergency too. Apollo `longitudinal_jerk_lower_bound` -4. Off: at once.
     bounded_jerk,
-    /// Only the closest of all standing objects is kept clear of, even while it is being passed. Apollo's `STBoundsDecider`: one static obstacle. Off: all of them are.
+    /// Only the closest of all standing objects is kept clear of. Apollo's `STBoundsDecider`: one static obstacle. That it may be the one that is just being passed is ours. Off: all of them are.
     closest_static_only,
-    /// A pedestrian who has stood for some time is ignored until moving again. Apollo's crosswalk `stop_timeout`; issue 11926: creeps into a pedestrian. Off: every pedestrian counts.
-    standing_pedestrian_ignored,
+    /// A pedestrian who has stood on the way for some time is crept towards. Apollo issue 11926: creeps at 3 km/h into a pedestrian; that it begins with the crosswalk rule's `stop_timeout` is ours. Off: every pedestrian is stopped for.
+    creeps_to_standing_pedestrian,
     /// A red light that would need hard braking is passed. Apollo `max_stop_deceleration`. Off: it is braked for, however late.
     late_red_passed,
-    /// Traffic beside and behind is not reacted to. Apollo issue 14633, `BACKSIDE_VEHICLE` off. Off: a vehicle that moves over from beside is let in.
+    /// What will come onto the way at the front bumper or behind it does not count until it is there. Apollo issue 14633: the speed bounds drop what begins below 0.01 m and after 0.1 s. Off: it counts.
     blind_to_side_and_rear,
-    /// When no plan keeps clear, the fallback brakes at 4 m/s² and no harder. Apollo `slowdown_profile_deceleration`. Off: as hard as the vehicle can.
+    /// When not even the hardest braking of a plan keeps clear, the fallback brakes at 4 m/s² and no harder. Apollo `slowdown_profile_deceleration`; that it builds up at a bounded rate is ours. Off: as hard as the vehicle can.
     gentle_fallback,
+    /// Decisions about road users are taken anew in every cycle, so that a small change flips them. Apollo issue 14870: yields only briefly; that its cause lies here is ours. Off: a decision is kept until the other is much cheaper.
+    decides_anew,
 }

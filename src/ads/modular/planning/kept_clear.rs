@@ -8,10 +8,11 @@ use crate::sim::{Scene, VehicleParameters};
 use super::super::config::PlanningConfig;
 use super::super::junctions::Junctions;
 use super::super::prediction::Forecast;
-use super::corridor::Claim;
+use super::claim::Claim;
 use super::planner::HORIZON_M;
-use super::speed::{Constraint, Point};
+use super::speed::Constraint;
 use super::standing::Standing;
+use super::trajectory::Point;
 
 /// A pedestrian so near to a crosswalk is on it, m. Apollo expands it by 2.
 const CROSSWALK_MARGIN_M: f64 = 2.0;

@@ -1,19 +1,23 @@
 //! Planning: a path and a speed along the route that obey limits and lights and keep clear of road users.
 //!
 //! Path: the lane, a shift within it past what stands at its edge, the route's lane changes once their
-//! gap is safe. Speed: stop fences, following, giving way. Left out, of Apollo's tasks: lane borrowing
-//! (below 5 m/s only), the optimisers (a speed law and a quintic shift stand for them), stop signs
-//! (maps have none here), pull-over and parking.
+//! gap is safe. Speed: the station-time graph decides about each road user, a speed law drives the decisions, and
+//! a last check stands after it. Left out, of Apollo's tasks: the optimisers (a speed law and a quintic shift
+//! stand for them), pull-over and parking.
 
-mod corridor;
+mod claim;
+mod decisions;
 mod kept_clear;
 mod lane_change;
 mod lights;
 mod nudge;
 mod planner;
+mod rights;
 mod speed;
+mod st_graph;
 mod standing;
+mod trajectory;
 
 pub use nudge::LateralPlan;
 pub use planner::{Outlook, Planner};
-pub use speed::Trajectory;
+pub use trajectory::Trajectory;

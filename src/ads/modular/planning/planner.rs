@@ -1,33 +1,45 @@
-//! One planning cycle: chooses the path, collects the constraints and plans a speed under them.
+//! One planning cycle: chooses the path, collects what holds the vehicle back, decides about each road user,
+//! drives the decisions, and checks what comes out.
 //!
-//! The most restrictive acceleration is taken, and the same law is rolled forward for 8 s, which
-//! gives the trajectory.
+//! 1. *Path*: lane, lane change, or a shift past what stands.
+//! 2. *Rules*: lights, crosswalks, junctions kept clear.
+//! 3. *Decisions*: STOP for what stands on the way, FOLLOW for what drives along it; YIELD or OVERTAKE for all
+//!    else, by the station-time graph (`decisions`).
+//! 4. *Speed*: the law in `speed` is rolled forward for 8 s under all of them. An OVERTAKE holds only if the
+//!    rolled trajectory passes in time.
+//! 5. *Last check*: whatever was decided, the trajectory must touch nothing.
 
 use std::sync::Arc;
 
 use crate::ads::guide::Guide;
 use crate::ads::status::{Manoeuvre, Reason};
-use crate::geometry::{Pose, Span};
+use crate::geometry::Pose;
 use crate::sim::{Scene, SignalColour, VehicleParameters};
 
 use super::super::config::{ModularConfig, PlanningConfig, Weaknesses};
 use super::super::junctions::Junctions;
 use super::super::prediction::Forecast;
-use super::corridor::Claim;
+use super::claim::{Claim, Role, Stance};
+use super::decisions::{Decisions, Situation};
 use super::lane_change::LaneChanges;
 use super::lights::Lights;
 use super::nudge::LateralPlan;
-use super::speed::{Constraint, Point, Trajectory};
+use super::rights::Rights;
+use super::speed::Constraint;
 use super::standing::Standing;
+use super::trajectory::{Point, Trajectory};
 use super::{kept_clear, speed};
 
 /// Claims and lights that begin farther ahead do not matter yet, m. Apollo's ST graph ends at 100.
 pub(super) const HORIZON_M: f64 = 100.0;
-/// A road user that moves along the route with more than this part of its speed is a leader; otherwise it
-/// crosses. Cosine of 60°.
-const ALONG_COSINE: f64 = 0.5;
 /// Traffic beside that is slower by more than this falls back by itself, m/s.
 const FALLS_BACK_MPS: f64 = 2.0;
+/// Rounds in which a plan is mended: each keeps clear of one more road user.
+const ROUNDS: usize = 3;
+/// The last check counts what comes so near in time as a contact, s: predictions are half a second apart.
+const CHECK_S: f64 = 0.25;
+/// Room that the last check leaves, m.
+const CHECK_ROOM_M: f64 = 1.0;
 
 #[derive(Debug, Clone)]
 pub struct Planner {
@@ -40,10 +52,12 @@ pub struct Planner {
     changes: LaneChanges,
     lights: Lights,
     standing: Standing,
+    rights: Rights,
     manoeuvre: Manoeuvre,
     trajectory: Trajectory,
     claims: Vec<Claim>,
     constraints: Vec<Constraint>,
+    decisions: Decisions,
 }
 
 /// What a cycle plans from.
@@ -75,10 +89,12 @@ impl Planner {
             lateral: LateralPlan::default(),
             changes,
             standing: Standing::default(),
+            rights: Rights::of(scene),
             manoeuvre: Manoeuvre::LaneFollow,
             trajectory: Trajectory::default(),
             claims: Vec::new(),
             constraints: Vec::new(),
+            decisions: Decisions::default(),
         }
     }
 
@@ -107,29 +123,16 @@ impl Planner {
         self.choose_path(outlook);
         let beside = self.guide.locate(outlook.localized.position, Some(station_m));
         let off_m = beside.offset_m - self.lateral.aside(station_m).offset_m;
+        let start = Point { station_m, speed_mps, acceleration_mps2 };
         if off_m.abs() > self.config.lost_offset_m {
-            self.trajectory = Trajectory::braking(station_m, speed_mps, self.config.fallback_mps2);
+            self.trajectory = Trajectory::braking(start, self.config.fallback_mps2, Reason::Fallback);
             return;
         }
-        let start = Point { station_m, speed_mps, acceleration_mps2 };
         self.collect(outlook, &start);
-        self.roll(start);
-        let known = self.constraints.len();
-        if !self.config.never_yields {
-            for (index, claim) in self.claims.iter().enumerate() {
-                self.constraints.extend(self.in_conflict(claim, index, &start));
-            }
-        }
-        if self.constraints.len() > known {
-            self.roll(start);
-        }
-        if !self.trajectory.keeps_clear(&self.constraints, &self.claims) {
-            // Weakness (i); without it, this braking is as hard as that of the plan before.
-            let emergency_mps2 = self.config.fallback_mps2.min(self.config.emergency_mps2);
-            let config = PlanningConfig { emergency_mps2, ..self.config };
-            let trajectory = &mut self.trajectory;
-            speed::roll(&config, &self.guide, start, &self.constraints, &self.claims, trajectory);
-        }
+        self.decide(start);
+        self.drive(start);
+        self.check(start);
+        self.decisions.remember(&self.claims);
     }
 
     /// Lane, lane change or a shift within the lane.
@@ -152,8 +155,7 @@ impl Planner {
         };
     }
 
-    /// Collects the constraints of rules and of road users on the way already. They decide when crossings
-    /// ahead are reached, so they come before the constraints of crossing road users.
+    /// Collects the constraints of rules, and what road users claim of the way.
     fn collect(&mut self, outlook: &Outlook, start: &Point) {
         let &Outlook { station_m, speed_mps, forecasts, .. } = outlook;
         let constraints = &mut self.constraints;
@@ -162,30 +164,41 @@ impl Planner {
         self.changes.constrain(constraints);
         let (config, scene, guide) = (&self.config, &self.scene, &self.guide);
         kept_clear::crosswalks(config, scene, guide, start, forecasts, &self.standing, constraints);
-        self.claims.clear();
         let passed = self.lateral.passing().map(|(id, _)| id);
-        for forecast in forecasts {
-            // Weakness (f): a pedestrian who has stood for so long does not count.
-            let ignored = self.standing.time_s(forecast.id) > config.standing_pedestrian_s;
-            // The path leads past what is being passed.
-            if ignored || (passed == Some(forecast.id) && !forecast.moving) {
-                continue;
-            }
-            let ahead = station_m..station_m + HORIZON_M;
-            let (lateral, buffer_m) = (&self.lateral, self.config.lateral_buffer_m);
-            self.claims.extend(Claim::of(forecast, guide, lateral, &ahead, buffer_m));
-        }
+        let ahead = station_m..station_m + HORIZON_M;
+        let mut claims = core::mem::take(&mut self.claims);
+        claims.clear();
+        // The path leads past what is being passed.
+        let others = forecasts.iter().filter(|forecast| passed != Some(forecast.id) || forecast.moving);
+        claims.extend(others.filter_map(|forecast| {
+            let claim = Claim::of(forecast, guide, &self.lateral, &ahead, config.lateral_buffer_m)?;
+            self.matters(&claim, start).then_some(claim)
+        }));
+        claims.iter_mut().for_each(|claim| claim.owes_way = self.rights.owes_way(claim));
+        self.claims = claims;
         if self.weaknesses.closest_static_only {
             self.keep_closest_static(station_m);
         }
         kept_clear::keep_clear(&self.config, &self.junctions, start, &self.claims, &mut self.constraints);
-        for (index, claim) in self.claims.iter().enumerate().filter(|(_, claim)| claim.is_now()) {
-            self.constraints.extend(self.in_the_way(claim, index, start));
+    }
+
+    /// Whether the plan reacts to a claim at all.
+    fn matters(&self, claim: &Claim, start: &Point) -> bool {
+        let front_m = VehicleParameters::MKZ.front_m(start.station_m);
+        let entry = claim.spans[claim.first];
+        match claim.role(self.config.static_mps) {
+            Role::Stands => entry.middle_m() >= front_m - 1.0,
+            Role::Leads => entry.middle_m() >= front_m - 1.0 || lets_in(claim, start),
+            Role::Merges | Role::Crosses if self.config.never_yields => false,
+            // Apollo's speed bounds leave out what begins at the front bumper or behind it, but not at once.
+            Role::Merges | Role::Crosses => {
+                !self.weaknesses.blind_to_side_and_rear || claim.is_now() || entry.from_m > front_m
+            }
         }
     }
 
-    /// Weakness (e): keeps only the closest of all standing objects, which may be the one that is just
-    /// being passed.
+    /// Weakness `closest_static_only`: keeps only the closest of all standing objects, which may be the one
+    /// that is just being passed.
     fn keep_closest_static(&mut self, station_m: f64) {
         let rear_m = VehicleParameters::MKZ.rear_m(station_m);
         let stands = |claim: &Claim| !claim.moving && claim.spans[0].to_m > rear_m;
@@ -200,6 +213,101 @@ impl Planner {
         self.claims.retain(|claim| !stands(claim) || claim.spans[0].from_m <= closest_m);
     }
 
+    /// STOP and FOLLOW for what is on the way already, a ranked decision about all else.
+    fn decide(&mut self, start: Point) {
+        let stop_m = self.constraints.iter().map(Constraint::stop_m).fold(f64::INFINITY, f64::min);
+        for index in 0..self.claims.len() {
+            let claim = &self.claims[index];
+            if !claim.is_contested(&self.config) && claim.binds(&self.config) {
+                self.constraints.extend(self.behind(index, &start));
+            }
+        }
+        let situation = Situation {
+            config: &self.config,
+            guide: &self.guide,
+            start,
+            stop_m,
+            hysteresis: !self.weaknesses.decides_anew,
+        };
+        self.decisions.decide(&situation, &mut self.claims);
+    }
+
+    /// Rolls the law forward under the decisions, and yields to what cannot be passed before in time.
+    fn drive(&mut self, start: Point) {
+        for index in 0..self.claims.len() {
+            if self.claims[index].stance == Stance::Yield {
+                self.constraints.extend(self.behind(index, &start));
+            }
+        }
+        self.roll(start);
+        let front_m = VehicleParameters::MKZ.front_m(start.station_m);
+        for _ in 0..ROUNDS {
+            let late = self.claims.iter().position(|claim| {
+                let config = &self.config;
+                let room_m = claim.near_m() - CHECK_ROOM_M - front_m;
+                claim.stance == Stance::Overtake
+                    && self.trajectory.meets(claim, config.conflict_buffer_s).is_some()
+                    && kept_clear::can_stop(config, config.emergency_mps2, room_m, start.speed_mps)
+            });
+            let Some(index) = late else { return };
+            self.claims[index].stance = Stance::Yield;
+            self.constraints.extend(self.behind(index, &start));
+            self.roll(start);
+        }
+    }
+
+    /// The last check of a plan: whatever was decided, it brakes as hard as it must, up to the emergency limit,
+    /// if it would touch anything that binds; if that is of no use, it takes what keeps clear for longest.
+    fn check(&mut self, start: Point) {
+        let planned = self.constraints.len();
+        for _ in 0..ROUNDS {
+            let Some((index, time_s, near_m)) = self.first_contact(&start) else { return };
+            let claim = &self.claims[index];
+            let along = claim.role(self.config.static_mps) == Role::Leads;
+            let until_s = if along { time_s + CHECK_S } else { claim.exit_s() + CHECK_S };
+            let line = Constraint::last_line(claim.reason(&self.config), near_m - CHECK_ROOM_M, until_s);
+            self.constraints.push(line);
+            self.roll(start);
+        }
+        let Some((_, braking_for_s, _)) = self.first_contact(&start) else { return };
+        let braking = self.trajectory.clone();
+        let all = core::mem::take(&mut self.constraints);
+        let others = all[..planned].iter().filter(|constraint| !constraint.is_yielding());
+        self.constraints.extend(others);
+        self.roll(start);
+        let goes_on_for_s = self.first_contact(&start).map_or(f64::INFINITY, |(_, time_s, _)| time_s);
+        self.constraints = all;
+        if goes_on_for_s > braking_for_s {
+            return;
+        }
+        self.trajectory = braking;
+        if self.weaknesses.gentle_fallback {
+            let config = PlanningConfig { emergency_mps2: self.config.fallback_mps2, ..self.config };
+            let trajectory = &mut self.trajectory;
+            speed::roll(&config, &self.guide, start, &self.constraints, &self.claims, trajectory);
+        }
+    }
+
+    /// The first contact with what binds: index of the claim, time (s) and station (m). What the vehicle touches
+    /// or is beside of already does not count: no plan can keep clear of it.
+    fn first_contact(&self, start: &Point) -> Option<(usize, f64, f64)> {
+        let vehicle = VehicleParameters::MKZ;
+        let (rear_m, front_m) = (vehicle.rear_m(start.station_m), vehicle.front_m(start.station_m));
+        let mut first: Option<(usize, f64, f64)> = None;
+        for (index, claim) in self.claims.iter().enumerate() {
+            let beside = claim.is_now() && claim.spans[0].from_m < front_m && claim.spans[0].to_m > rear_m;
+            if beside || !claim.binds(&self.config) || self.is_crept_to(claim) {
+                continue;
+            }
+            if let Some((time_s, near_m)) = self.trajectory.meets(claim, CHECK_S)
+                && first.is_none_or(|(_, first_s, _)| time_s < first_s)
+            {
+                first = Some((index, time_s, near_m));
+            }
+        }
+        first
+    }
+
     fn roll(&mut self, start: Point) {
         let trajectory = &mut self.trajectory;
         speed::roll(&self.config, &self.guide, start, &self.constraints, &self.claims, trajectory);
@@ -210,61 +318,44 @@ impl Planner {
         self.trajectory.reason
     }
 
-    /// STOP or FOLLOW: for road users that are on the way now and stand or go along it.
-    fn in_the_way(&self, claim: &Claim, index: usize, start: &Point) -> Option<Constraint> {
-        let config = &self.config;
-        let span = claim.spans[0];
-        if span.middle_m() < VehicleParameters::MKZ.front_m(start.station_m) - 1.0 {
-            return self.lets_in(claim, &span, start).then(|| Constraint::follow(claim.id, index));
+    /// The constraint that keeps the vehicle behind a road user, if there is room left before it.
+    fn behind(&self, index: usize, start: &Point) -> Option<Constraint> {
+        let (config, claim) = (&self.config, &self.claims[index]);
+        match claim.role(config.static_mps) {
+            Role::Stands if self.is_crept_to(claim) => {
+                Some(Constraint::creep(config, claim.id, claim.spans[0].from_m))
+            }
+            Role::Stands => Some(Constraint::stop(config, claim.id, claim.spans[0].from_m)),
+            Role::Leads | Role::Merges => Some(Constraint::follow(claim.id, index)),
+            Role::Crosses => {
+                let until_s = claim.exit_s() + config.conflict_buffer_s;
+                let is_ahead = claim.near_m() > VehicleParameters::MKZ.front_m(start.station_m);
+                is_ahead.then(|| Constraint::give_way(config, claim.id, claim.near_m(), until_s))
+            }
         }
-        if claim.speed_mps < config.static_mps || !claim.moving {
-            return Some(Constraint::stop(config, claim.id, span.from_m));
-        }
-        (claim.cosine > ALONG_COSINE).then(|| Constraint::follow(claim.id, index))
     }
 
-    /// Whether a road user beside the vehicle that has come or will come onto its way is let in. Under
-    /// weakness (h) none is (Apollo issue 14633).
-    fn lets_in(&self, claim: &Claim, span: &Span, point: &Point) -> bool {
-        !self.weaknesses.blind_to_side_and_rear
-            && claim.moving
-            && claim.cosine > ALONG_COSINE
-            && span.to_m > VehicleParameters::MKZ.rear_m(point.station_m)
-            && claim.speed_mps > point.speed_mps - FALLS_BACK_MPS
+    /// Weakness `creeps_to_standing_pedestrian`: a pedestrian who has stood for so long is crept towards.
+    fn is_crept_to(&self, claim: &Claim) -> bool {
+        claim.role(self.config.static_mps) == Role::Stands
+            && self.standing.time_s(claim.id) > self.config.standing_pedestrian_s
     }
+}
 
-    /// FOLLOW or YIELD or, as `None`, OVERTAKE: for road users that move onto or across the way.
-    ///
-    /// There is a conflict if both would be at one place less than `conflict_buffer_s` apart. The
-    /// ego vehicle goes first only if it would be past by that buffer, or if it can no longer stop and
-    /// would still be past.
-    fn in_conflict(&self, claim: &Claim, index: usize, start: &Point) -> Option<Constraint> {
-        let (config, trajectory) = (&self.config, &self.trajectory);
-        let along = claim.cosine > ALONG_COSINE;
-        if !claim.moving || (claim.is_now() && along) {
-            return None;
+/// Whether a road user beside the vehicle that has come onto its way is let in: unless it is behind or falls
+/// back by itself.
+fn lets_in(claim: &Claim, start: &Point) -> bool {
+    claim.spans[0].to_m > VehicleParameters::MKZ.rear_m(start.station_m)
+        && claim.speed_mps > start.speed_mps - FALLS_BACK_MPS
+}
+
+impl Claim {
+    fn reason(&self, config: &PlanningConfig) -> Reason {
+        match self.role(config.static_mps) {
+            Role::Stands => Reason::Stop(self.id),
+            Role::Leads | Role::Merges => Reason::Follow(self.id),
+            Role::Crosses => Reason::Yield(self.id),
         }
-        let step = claim.first_conflict(trajectory, config.conflict_buffer_s)?;
-        let entry = claim.spans[claim.first];
-        let past = |time_s: f64| entry.to_m < VehicleParameters::MKZ.rear_m(trajectory.at(time_s).station_m);
-        if along {
-            let then = trajectory.at(claim.entry_s());
-            let beside = entry.middle_m() < VehicleParameters::MKZ.front_m(then.station_m) - 1.0;
-            let follows = !beside || self.lets_in(claim, &entry, &then);
-            return follows.then(|| Constraint::follow(claim.id, index));
-        }
-        let meeting = claim.spans[step];
-        let room_m = meeting.from_m - VehicleParameters::MKZ.front_m(start.station_m);
-        let too_late = start.speed_mps * start.speed_mps > 2.0 * config.emergency_mps2 * room_m.max(0.0);
-        if past(claim.entry_s() - config.conflict_buffer_s) || (too_late && past(claim.entry_s())) {
-            return None;
-        }
-        // It crosses behind the front bumper: the best is to drive on.
-        if claim.cosine > -ALONG_COSINE && room_m < 0.0 {
-            return None;
-        }
-        let until_s = claim.exit_s() + config.conflict_buffer_s;
-        Some(Constraint::give_way(config, claim.id, meeting.from_m, until_s))
     }
 }
 
@@ -274,17 +365,37 @@ fn without_absent(config: &PlanningConfig, weaknesses: &Weaknesses) -> PlanningC
     if !weaknesses.bounded_jerk {
         config.jerk_mps3_down = JERK_MPS3_UNBOUNDED;
     }
-    if !weaknesses.standing_pedestrian_ignored {
+    if !weaknesses.creeps_to_standing_pedestrian {
         config.standing_pedestrian_s = f64::INFINITY;
     }
     if !weaknesses.late_red_passed {
         config.red_light_mps2_max = f64::INFINITY;
-    }
-    if !weaknesses.gentle_fallback {
-        config.fallback_mps2 = config.emergency_mps2;
     }
     config
 }
 
 /// Jerk that allows any change of acceleration between two points of a plan, m/s³.
 const JERK_MPS3_UNBOUNDED: f64 = 1e4;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ads::modular::planning::claim::testing::crosser;
+    use crate::ads::testing::straight;
+
+    #[test]
+    fn blind_to_side_and_rear_drops_what_will_come_at_the_bumper() {
+        let scene = straight();
+        let start = Point { station_m: 50.0, speed_mps: 2.0, acceleration_mps2: 0.0 };
+        let front_m = VehicleParameters::MKZ.front_m(start.station_m);
+        let matters = |blind: bool, ahead_m: f64, from_s: f64| {
+            let mut config = ModularConfig::default();
+            config.weaknesses.blind_to_side_and_rear = blind;
+            let planner = Planner::new(&config, &scene, &Arc::new(Junctions::of(&scene)));
+            planner.matters(&crosser(front_m + ahead_m, from_s, 4.0), &start)
+        };
+        assert!(!matters(true, -1.0, 2.0) && matters(false, -1.0, 2.0), "moves over from beside");
+        assert!(matters(true, 1.0, 2.0), "comes in ahead");
+        assert!(matters(true, -1.0, 0.0), "is there already");
+    }
+}

@@ -9,14 +9,9 @@ use crate::ads::status::Reason;
 use crate::sim::{Following, VehicleParameters};
 
 use super::super::config::PlanningConfig;
-use super::corridor::Claim;
+use super::claim::Claim;
+use super::trajectory::{POINT_S, Point, Trajectory};
 
-/// Time between points of a trajectory, s.
-pub const POINT_S: f64 = 0.1;
-/// Points of a trajectory: 8 s.
-const POINTS: usize = 81;
-/// Every so many points a plan is checked for contact.
-const CHECK_POINTS: usize = 4;
 /// Time in which a speed error is to vanish, s.
 const SPEED_ERROR_S: f64 = 0.6;
 /// Look-ahead on the permitted speed, s.
@@ -27,92 +22,6 @@ const STOPPED_SHORT_M: f64 = 0.3;
 const EMERGENCY_GAP_M: f64 = 1.0;
 /// Gap to a leader that the kinematic bound preserves, m.
 const LEADER_GAP_M: f64 = 2.5;
-
-/// A point of a plan: rear axle along the route.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Point {
-    pub station_m: f64,
-    pub speed_mps: f64,
-    pub acceleration_mps2: f64,
-}
-
-/// A plan of 8 s, every 0.1 s.
-#[derive(Debug, Clone)]
-pub struct Trajectory {
-    pub points: [Point; POINTS],
-    /// The constraint that decides its beginning.
-    pub reason: Reason,
-}
-
-impl Default for Trajectory {
-    fn default() -> Trajectory {
-        Trajectory { points: [Point::default(); POINTS], reason: Reason::Start }
-    }
-}
-
-impl Trajectory {
-    /// The point a time (s) after the beginning, interpolated; the last one afterwards.
-    pub fn at(&self, time_s: f64) -> Point {
-        let place = (time_s / POINT_S).max(0.0);
-        let index = place as usize;
-        if index >= POINTS - 1 {
-            return self.points[POINTS - 1];
-        }
-        let fraction = place - index as f64;
-        let (a, b) = (&self.points[index], &self.points[index + 1]);
-        let mix = |a: f64, b: f64| a + (b - a) * fraction;
-        Point {
-            station_m: mix(a.station_m, b.station_m),
-            speed_mps: mix(a.speed_mps, b.speed_mps),
-            acceleration_mps2: mix(a.acceleration_mps2, b.acceleration_mps2),
-        }
-    }
-
-    /// Whether the plan stops short of everything that it is to stop for, and touches no leader.
-    pub fn keeps_clear(&self, constraints: &[Constraint], claims: &[Claim]) -> bool {
-        constraints.iter().all(|constraint| {
-            let room_m = |index: usize| {
-                let time_s = index as f64 * POINT_S;
-                let front_m = VehicleParameters::MKZ.front_m(self.points[index].station_m);
-                match &constraint.kind {
-                    Kind::Fence { touch_m, until_s, .. } => {
-                        touch_m.filter(|_| time_s <= *until_s).map(|touch_m| touch_m - front_m)
-                    }
-                    Kind::Leader(index) => {
-                        let claim = &claims[*index];
-                        (time_s <= claim.exit_s()).then(|| claim.near_end_m(time_s) - front_m)
-                    }
-                }
-            };
-            // No plan can keep clear of what is touched already, or beside.
-            let is_open = room_m(0).is_none_or(|room_m| room_m > 0.0);
-            !is_open || (0..POINTS).step_by(CHECK_POINTS).all(|index| room_m(index).is_none_or(|m| m > 0.0))
-        })
-    }
-
-    /// Constant braking to rest, for a vehicle that has lost the route.
-    pub fn braking(station_m: f64, speed_mps: f64, decel_mps2: f64) -> Trajectory {
-        let mut trajectory = Trajectory { reason: Reason::Fallback, ..Trajectory::default() };
-        let mut point = Point { station_m, speed_mps, acceleration_mps2: -decel_mps2 };
-        for slot in &mut trajectory.points {
-            *slot = point;
-            point = point.after(-decel_mps2);
-        }
-        trajectory
-    }
-}
-
-impl Point {
-    /// One point on, at an acceleration; there is no driving backwards.
-    fn after(&self, acceleration_mps2: f64) -> Point {
-        let speed_mps = (self.speed_mps + acceleration_mps2 * POINT_S).max(0.0);
-        Point {
-            station_m: self.station_m + (self.speed_mps + speed_mps) / 2.0 * POINT_S,
-            speed_mps,
-            acceleration_mps2: if speed_mps > 0.0 { acceleration_mps2 } else { acceleration_mps2.max(0.0) },
-        }
-    }
-}
 
 /// Something that bounds the acceleration.
 #[derive(Debug, Clone, Copy)]
@@ -126,6 +35,10 @@ enum Kind {
     /// The front bumper stops at `stop_m`; `touch_m` is where it would hit, if there is anything to
     /// hit. Void after `until_s`.
     Fence { stop_m: f64, touch_m: Option<f64>, until_s: f64 },
+    /// The front bumper comes to a place at no more than a creeping speed, and goes on with it.
+    Creep { stop_m: f64, speed_mps: f64 },
+    /// Between two places of the front bumper the speed is limited.
+    Limit { from_m: f64, to_m: f64, speed_mps: f64 },
     /// Index in the claims.
     Leader(usize),
 }
@@ -156,6 +69,22 @@ impl Constraint {
         Constraint { reason: Reason::Yield(id), kind }
     }
 
+    /// Stays before `stop_m` whatever may happen there until `until_s`; braking may be as hard as that needs.
+    pub fn last_line(reason: Reason, stop_m: f64, until_s: f64) -> Constraint {
+        Constraint { reason, kind: Kind::Fence { stop_m, touch_m: Some(stop_m), until_s } }
+    }
+
+    /// As [`Constraint::stop`], but creeps on.
+    pub fn creep(config: &PlanningConfig, id: u32, from_m: f64) -> Constraint {
+        let (stop_m, speed_mps) = (from_m - config.stop_gap_m, config.creep_to_pedestrian_mps);
+        Constraint { reason: Reason::Stop(id), kind: Kind::Creep { stop_m, speed_mps } }
+    }
+
+    /// No faster than `speed_mps` between two places.
+    pub fn limit(reason: Reason, from_m: f64, to_m: f64, speed_mps: f64) -> Constraint {
+        Constraint { reason, kind: Kind::Limit { from_m, to_m, speed_mps } }
+    }
+
     /// The road user `id` of claim `index`, which drives ahead, or will.
     pub fn follow(id: u32, index: usize) -> Constraint {
         Constraint { reason: Reason::Follow(id), kind: Kind::Leader(index) }
@@ -176,23 +105,63 @@ impl Constraint {
                     emergency,
                 })
             }
-            Kind::Leader(index) => {
-                let claim = &claims[*index];
-                if time_s > claim.exit_s() {
+            Kind::Creep { stop_m, speed_mps: creep_mps } => {
+                let creeping_mps2 = (creep_mps - speed_mps) / SPEED_ERROR_S;
+                let acceleration_mps2 = fence_mps2(config, speed_mps, stop_m - front_m).max(creeping_mps2);
+                Some(Bound { acceleration_mps2, emergency: false })
+            }
+            Kind::Limit { from_m, to_m, speed_mps: limit_mps } => {
+                if front_m > *to_m || front_m < *from_m - speed_mps * PREVIEW_S {
                     return None;
                 }
-                let gap_m = claim.near_end_m(time_s) - front_m;
-                let closing_mps = (speed_mps - claim.along_mps).max(0.0);
-                let hardest_mps2 = braking_mps2(closing_mps, gap_m - EMERGENCY_GAP_M);
-                let emergency = hardest_mps2 > config.deceleration_mps2_max;
-                let planned = leader_mps2(config, speed_mps, claim.along_mps, gap_m);
-                Some(Bound {
-                    acceleration_mps2: if emergency { planned.min(-hardest_mps2) } else { planned },
-                    emergency,
-                })
+                let slowing_mps2 = ((limit_mps - speed_mps) / SPEED_ERROR_S).max(-config.comfortable_mps2);
+                Some(Bound { acceleration_mps2: slowing_mps2, emergency: false })
             }
+            Kind::Leader(index) => leader_bound(config, &claims[*index], time_s, front_m, speed_mps),
         }
     }
+
+    /// Whether it holds the vehicle back from the way of a crossing road user.
+    pub fn is_yielding(&self) -> bool {
+        matches!(self.reason, Reason::Yield(_))
+    }
+
+    /// The last place for the front bumper that this allows for good, m.
+    pub fn stop_m(&self) -> f64 {
+        match &self.kind {
+            Kind::Fence { stop_m, until_s, .. } if until_s.is_infinite() => *stop_m,
+            _ => f64::INFINITY,
+        }
+    }
+}
+
+/// What a leader allows. One that has yet to come onto the way is fallen back behind at the comfortable rate
+/// at most: there is time until it is there.
+fn leader_bound(
+    config: &PlanningConfig,
+    claim: &Claim,
+    time_s: f64,
+    front_m: f64,
+    speed_mps: f64,
+) -> Option<Bound> {
+    if time_s > claim.exit_s() {
+        return None;
+    }
+    let (near_m, along_mps) = claim.near_end(time_s);
+    let gap_m = near_m - front_m;
+    let planned_mps2 = leader_mps2(config, speed_mps, along_mps, gap_m);
+    if time_s < claim.entry_s() {
+        return Some(Bound {
+            acceleration_mps2: planned_mps2.max(-config.comfortable_mps2),
+            emergency: false,
+        });
+    }
+    let hardest_mps2 = braking_mps2((speed_mps - along_mps).max(0.0), gap_m - EMERGENCY_GAP_M);
+    let emergency = hardest_mps2 > config.deceleration_mps2_max;
+    Some(Bound {
+        acceleration_mps2: if emergency { planned_mps2.min(-hardest_mps2) } else { planned_mps2 },
+        emergency,
+    })
 }
 
 /// Rolls the law forward from `start` into `trajectory`.
@@ -205,9 +174,9 @@ pub fn roll(
     trajectory: &mut Trajectory,
 ) {
     let mut point = start;
-    for index in 0..POINTS {
+    for (index, slot) in trajectory.points.iter_mut().enumerate() {
         let time_s = index as f64 * POINT_S;
-        trajectory.points[index] = point;
+        *slot = point;
         let mut wanted_mps2 = free_mps2(config, guide, &point);
         let mut floor_mps2 = -config.deceleration_mps2_max;
         let mut reason = Reason::Cruise;
@@ -281,6 +250,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
+    use crate::ads::modular::planning::trajectory::POINTS;
     use crate::ads::testing::straight;
 
     fn rolled(start: Point, constraints: &[Constraint]) -> Trajectory {

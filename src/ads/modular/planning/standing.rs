@@ -31,6 +31,8 @@ impl Standing {
             let position = walker.positions[0];
             let fresh = Stood { id: walker.id, place: position, time_s: 0.0, seen: true };
             match self.known.iter_mut().find(|stood| stood.id == walker.id) {
+                // A pedestrian may have several futures, but is in one place.
+                Some(stood) if stood.seen => {}
                 Some(stood) if (position - stood.place).norm() > PLACE_M => *stood = fresh,
                 Some(stood) => {
                     stood.time_s += FRAME_S;
