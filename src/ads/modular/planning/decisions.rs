@@ -144,8 +144,23 @@ mod tests {
 
     #[test]
     fn a_decision_is_kept_until_the_other_is_much_cheaper() {
-        // A gap that is good enough to begin with is not good enough to change one's mind for.
-        let moments = [(2.0, 3.0), (5.0, 6.0), (2.0, 3.0)];
-        println!("{:?} {:?}", decided(true, 6.0, &moments), decided(false, 6.0, &moments));
+        // A car that came soon comes a little later: decided anew, some gaps are just good enough.
+        let mut kept = 0;
+        for decimetre in 0..120 {
+            for half_s in 4..12 {
+                let speed_mps = f64::from(decimetre) / 10.0;
+                let later_s = f64::from(half_s) / 2.0;
+                let moments = [(1.0, 2.0), (later_s, later_s + 1.0)];
+                let (steady, anew) =
+                    (decided(true, speed_mps, &moments), decided(false, speed_mps, &moments));
+                assert!(
+                    steady == anew || (steady[1], anew[1]) == (steady[0], Stance::Overtake),
+                    "{steady:?} {anew:?}"
+                );
+                kept += usize::from(steady != anew);
+            }
+        }
+        assert!(kept > 0);
+        assert_eq!(decided(true, 10.0, &[(1.0, 2.0), (6.0, 7.0)]), [Stance::Yield, Stance::Overtake]);
     }
 }
