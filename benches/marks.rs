@@ -33,7 +33,7 @@ use avastra::mdp::{ProcSettings, collision_probability};
 use avastra::model::Space;
 use avastra::model::vocabulary::{Body, Colour, LaneChoice, Level, Side, Then, TimeOfDay, Verb};
 use avastra::run::{Run, RunSettings};
-use avastra::sim::{Scene, Sensed, Start, World};
+use avastra::sim::{Scene, Sensed, Start, TrafficProfile, World};
 use avastra::{ads, episode};
 
 const REPEATS: usize = 7;
@@ -104,6 +104,7 @@ fn crowded(scene: &Arc<Scene>) -> World {
         signal_phase_s: 0.0,
         seed: 1,
         ambient: 0,
+        traffic: TrafficProfile::default(),
     };
     let mut world = World::new(scene.clone(), &start);
     let verbs = [Verb::DriveAhead, Verb::DriveOpposite, Verb::Overtake, Verb::Walk];
@@ -255,6 +256,7 @@ fn run(space: Arc<Space>) -> Run {
         episodes: EPISODES,
         seed: 1,
         ambient: 0,
+        traffic: None,
         causes: false,
         without: Vec::new(),
         with: Vec::new(),

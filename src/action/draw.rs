@@ -105,7 +105,13 @@ impl<'a> Judge<'a> {
         let mut refusals = Vec::new();
         let mut spawns = Vec::new();
         for effect in &effects {
-            let Effect::Spawn(request) = effect else { continue };
+            let Effect::Spawn(request) = effect else {
+                let refusal =
+                    self.situation.surroundings.weather_refusal().map(|reason| refuse(None, reason));
+                // One reason is enough for an action that sets several.
+                refusals.extend(refusal.filter(|refusal| !refusals.contains(refusal)));
+                continue;
+            };
             if let Some(reason) = spawn_out_of_bounds(request.speed_mps, request.distance_m) {
                 refusals.push(refuse(None, reason));
                 continue;

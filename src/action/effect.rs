@@ -40,4 +40,9 @@ pub trait Surroundings {
 
     /// Speed of the ego vehicle, m/s, at least 0.
     fn ego_speed_mps(&self) -> f64;
+
+    /// Why the time of day and the weather cannot change now, in words.
+    fn weather_refusal(&self) -> Option<String> {
+        None
+    }
 }

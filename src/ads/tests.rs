@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use crate::geometry::Pose;
 use crate::model::vocabulary::{Body, Level, TimeOfDay, Word};
-use crate::sim::{Scene, Start, World};
+use crate::sim::{Scene, Start, TrafficProfile, World};
 
 use super::driver::Ads;
 use super::registry::REGISTRY;
@@ -41,6 +41,7 @@ fn all_drive_the_corner_in_any_weather() {
                 signal_phase_s: seed as f64 * 3.7,
                 seed,
                 ambient: 0,
+                traffic: TrafficProfile::default(),
             };
             let mut ads = (entry.build)(&scene, seed);
             let (world, offset_m_max, over_limit_max) = drive_alone(&scene, ads.as_mut(), &start);

@@ -87,6 +87,8 @@ impl<'a> Reader<'a> {
                 OriginField::Profile => origin.profile = self.text(value),
                 OriginField::ProfileDigest => origin.profile_digest = self.text(value),
                 OriginField::Engine => origin.engine = self.text(value),
+                OriginField::Traffic => origin.traffic = self.text(value),
+                OriginField::TrafficDigest => origin.traffic_digest = self.text(value),
                 OriginField::Avoidability => origin.avoidability = self.text(value),
                 OriginField::With => origin.with = self.rule_names(value),
                 OriginField::Without => origin.without = self.rule_names(value),

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use crate::sim::TrafficProfile;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
 /// Finds out which of the things that may happen around a self-driving car make it crash.
@@ -268,6 +269,9 @@ pub struct RunArguments {
     /// Vehicles of ambient traffic around the ego vehicle, besides those that actions make appear.
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=i64::from(crate::model::AMBIENT_MAX)))]
     pub ambient: u32,
+    /// How other vehicles drive: `careful`, `released` (as LGSVL's vehicles did), or a file [default: careful].
+    #[arg(long, value_name = "NAME|FILE", value_parser = super::load::traffic)]
+    pub traffic: Option<TrafficProfile>,
     /// Say of each counted collision which module of the driving system is at fault; takes some twenty
     /// replays for each.
     #[arg(long)]
@@ -281,7 +285,7 @@ pub struct RunArguments {
     #[arg(long)]
     pub out: Option<PathBuf>,
     /// Go on with an interrupted run directory; its own settings hold.
-    #[arg(long, value_name = "DIR", conflicts_with_all = ["file", "road", "ads", "ads_config", "agent", "policy", "face", "episodes", "seed", "ambient", "causes", "out", "without", "with"])]
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["file", "road", "ads", "ads_config", "agent", "policy", "face", "episodes", "seed", "ambient", "traffic", "causes", "out", "without", "with"])]
     pub resume: Option<PathBuf>,
     /// Exit with status 4 if a counted collision was found.
     #[arg(long)]
@@ -316,13 +320,16 @@ pub struct TrainArguments {
     pub episodes: u32,
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
+    /// How other vehicles drive, as in `avastra run` [default: careful].
+    #[arg(long, value_name = "NAME|FILE", value_parser = super::load::traffic)]
+    pub traffic: Option<TrafficProfile>,
     #[command(flatten)]
     pub rules: RuleArguments,
     /// Run directory, new or empty [default: the next free runs/NNNN].
     #[arg(long)]
     pub out: Option<PathBuf>,
     /// Go on with an interrupted run directory; its own settings hold.
-    #[arg(long, value_name = "DIR", conflicts_with_all = ["file", "road", "ads", "ads_config", "agent", "preset", "config", "episodes", "seed", "out", "without", "with"])]
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["file", "road", "ads", "ads_config", "agent", "preset", "config", "episodes", "seed", "traffic", "out", "without", "with"])]
     pub resume: Option<PathBuf>,
 }
 

@@ -10,6 +10,7 @@ use crate::check;
 use crate::check::{Loaded, ReadError};
 use crate::model::{Policy, Scenario, Space};
 use crate::run::{Profile, driving_system};
+use crate::sim::TrafficProfile;
 
 use super::error::Failure;
 use super::output::Output;
@@ -161,6 +162,20 @@ pub fn profile_or_own(path: Option<&Path>, ads: &str) -> Result<Option<Profile>,
         None => driving_system(ads).ok().and_then(|ads| ads.profile().copied()),
     };
     Ok(settings.as_ref().map(Profile::new))
+}
+
+/// The traffic profile of that name, or in that file.
+///
+/// # Errors
+/// If there is no such name, or the file cannot be used; in words for the one who wrote the name.
+pub fn traffic(wanted: &str) -> Result<TrafficProfile, String> {
+    let is_file = [".yaml", ".yml", "/"].iter().any(|part| wanted.contains(part));
+    let profile = if is_file {
+        TrafficProfile::from_yaml(&read(Path::new(wanted)).map_err(|error| error.to_string())?)
+    } else {
+        TrafficProfile::shipped(wanted)
+    };
+    profile.map_err(|error| error.to_string())
 }
 
 /// What a file that avastra wrote holds, with the table of its space.

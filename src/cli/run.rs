@@ -9,7 +9,9 @@ use crate::agent::Face;
 use crate::emit;
 use crate::episode::EpisodeLog;
 use crate::model::{Policy, Space};
-use crate::run::{EpisodeSummary, Group, PolicyReference, RefusalCount, Run, RunSettings, Totals, play};
+use crate::run::{
+    EpisodeSummary, Group, PolicyReference, RefusalCount, Run, RunSettings, Totals, TrafficRecord, play,
+};
 
 use super::arguments::{FaceArgument, RunArguments};
 use super::error::Failure;
@@ -90,6 +92,7 @@ fn begun(output: &Output, arguments: &RunArguments) -> Result<(Run, RunDirectory
         ads: arguments.ads.clone(),
         profile: load::profile_or_own(arguments.ads_config.as_deref(), &arguments.ads)?,
         ambient: arguments.ambient,
+        traffic: arguments.traffic.as_ref().and_then(TrafficRecord::new),
         causes: arguments.causes,
         without: arguments.rules.without.clone(),
         with: arguments.rules.with.clone(),
@@ -191,8 +194,9 @@ fn heading(run: &Run, directory: &Path) -> String {
         0 => String::new(),
         wanted => format!(", {} of ambient traffic", plural(wanted as usize, "vehicle")),
     };
+    let traffic = if settings.traffic.is_some() { ", under a traffic profile" } else { "" };
     format!(
-        "{}: {} against {}, {} on {}{ambient}, seed {}, into {}",
+        "{}: {} against {}, {} on {}{ambient}{traffic}, seed {}, into {}",
         run.space().path.display(),
         settings.agent,
         settings.ads,

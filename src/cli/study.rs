@@ -5,6 +5,7 @@ use std::sync::atomic::Ordering;
 use std::time::Instant;
 
 use crate::report;
+use crate::run::TrafficRecord;
 use crate::study::{
     CellRecord, Event, Spent, Study, StudyDatabase, StudyFile, StudyResults, StudySettings, play_jobs,
 };
@@ -75,7 +76,13 @@ fn begun(output: &Output, path: &Path, quick: bool) -> Result<Study, Failure> {
     let table = load::table(output, &beside(&file.space))?;
     let profile = load::profile_or_own(file.ads_config.as_deref().map(beside).as_deref(), &file.ads)?;
     let read = |name: &str| load::read(&beside(name)).map_err(|error| error.to_string());
-    let settings = StudySettings::new(file, &table, profile, &read);
+    let traffic = file.traffic.as_ref().map(|wanted| {
+        // A name is a name; a file lies beside the study's.
+        if wanted.contains('.') { beside(wanted).display().to_string() } else { wanted.clone() }
+    });
+    let traffic = traffic.as_deref().map(load::traffic).transpose().map_err(refuse)?;
+    let traffic = traffic.as_ref().and_then(TrafficRecord::new);
+    let settings = StudySettings::new(file, &table, profile, traffic, &read);
     let settings = settings.map_err(|error| refuse(error.to_string()))?;
     let settings = if quick { settings.quick() } else { settings };
     Study::new(table, settings).map_err(|error| refuse(error.to_string()))

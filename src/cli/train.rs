@@ -8,7 +8,7 @@ use crate::agent::{Kind, QPolicy, Settings};
 use crate::emit;
 use crate::model::policy::{PolicyClaims, PolicyOrigin};
 use crate::model::{Policy, Space, digest_text};
-use crate::run::{Profile, RunSettings};
+use crate::run::{Profile, RunSettings, TrafficRecord};
 use crate::syntax::listed;
 use crate::train::{Evaluation, TrainSettings, TrainedEpisode, Training, evaluate, rounded};
 
@@ -63,6 +63,7 @@ fn begun(output: &Output, arguments: &TrainArguments) -> Result<(Training, RunDi
         roads: roads_or_all(&arguments.road, space),
         ads: arguments.ads.clone(),
         profile: profile.as_ref().map(Profile::new),
+        traffic: arguments.traffic.as_ref().and_then(TrafficRecord::new),
         without: arguments.rules.without.clone(),
         with: arguments.rules.with.clone(),
         ..RunSettings::new(space, &arguments.agent, arguments.episodes, arguments.seed)

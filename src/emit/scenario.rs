@@ -9,7 +9,7 @@ use crate::model::vocabulary::Word;
 use crate::model::{ActionDef, Space, StateDef, Value, digest_text};
 use crate::oracle::AvoidabilitySettings;
 use crate::run::{EpisodeSummary, Finding};
-use crate::sim::ENGINE;
+use crate::sim::{ENGINE, TrafficProfile};
 use crate::syntax::ast::{ClauseKind, Expect, Expr, Field, File, ItemKind, Name, Scenario, Span, Step};
 use crate::units::Dimension;
 
@@ -107,6 +107,11 @@ fn origin(log: &EpisodeLog, source: &Provenance, avoidability: &AvoidabilitySett
         fields.push(tree::field("profile_digest", tree::text(profile.digest())));
     }
     fields.push(tree::field("engine", tree::text(ENGINE)));
+    let traffic = &log.start.traffic;
+    if *traffic != TrafficProfile::default() {
+        fields.push(tree::field("traffic", tree::text(traffic.to_line())));
+        fields.push(tree::field("traffic_digest", tree::text(traffic.digest())));
+    }
     if *avoidability != AvoidabilitySettings::default() {
         fields.push(tree::field("avoidability", tree::text(avoidability.to_line())));
     }

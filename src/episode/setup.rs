@@ -8,7 +8,7 @@ use crate::mdp::ProcKind;
 use crate::model::{Memory, Road, RulesInForce, Space};
 use crate::rng;
 use crate::rng::Stream;
-use crate::sim::{Scene, Start};
+use crate::sim::{Scene, Start, TrafficProfile};
 
 /// Signals begin anywhere in this span, s: a whole number of cycles of two, three and four groups.
 const SIGNAL_PHASE_S: f64 = 204.0;
@@ -37,11 +37,11 @@ pub fn scene(road: &Road) -> Scene {
     Scene::new(road.map.clone(), road.route.clone())
 }
 
-/// The start of an episode with this seed and memory, without ambient traffic.
+/// The start of an episode with this seed and memory, without ambient traffic, under the default traffic profile.
 pub fn start(space: &Space, memory: &Memory, seed: u64) -> Start {
     let mut rng = rng::stream(seed, Stream::Reset, 1);
     // A multiple of 1/64 s is a short decimal in a file.
     let signal_phase_s = (rng::between(&mut rng, 0.0, SIGNAL_PHASE_S) * 64.0).floor() / 64.0;
     let (time, [rain, fog, wetness]) = space.weather(memory);
-    Start { time, rain, fog, wetness, signal_phase_s, seed, ambient: 0 }
+    Start { time, rain, fog, wetness, signal_phase_s, seed, ambient: 0, traffic: TrafficProfile::default() }
 }

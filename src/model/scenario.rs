@@ -30,6 +30,9 @@ pub struct Origin {
     /// Digest of all its settings.
     pub profile_digest: Option<String>,
     pub engine: Option<String>,
+    /// The traffic profile as one line of YAML, and its digest; the default if not given.
+    pub traffic: Option<String>,
+    pub traffic_digest: Option<String>,
     /// Settings of the verdict whether collisions were avoidable, as one line of YAML; the defaults if not
     /// given.
     pub avoidability: Option<String>,

@@ -220,6 +220,8 @@ words! {
     Profile "profile" = "The settings of the driving system that differ from the default.",
     ProfileDigest "profile_digest" = "The digest of all settings of the driving system.",
     Engine "engine" = "The version of the world's physics.",
+    Traffic "traffic" = "How other vehicles drove, if not as they usually do.",
+    TrafficDigest "traffic_digest" = "The digest of all settings of the traffic.",
     Avoidability "avoidability" = "The reference drivers, if they are not the usual ones.",
     With "with" = "The optional rules that were on.",
     Without "without" = "The rules that were off.",

@@ -15,7 +15,7 @@ use crate::model::{Road, RulesInForce, Space};
 use crate::oracle::AvoidabilitySettings;
 use crate::rng;
 use crate::rng::Stream;
-use crate::sim::Scene;
+use crate::sim::{Scene, Start, TrafficProfile};
 use crate::syntax::listed;
 
 use crate::run::settings::RunError;
@@ -26,6 +26,7 @@ pub struct Arena {
     table: ActionTable,
     rules: RulesInForce,
     ads: Selected,
+    traffic: TrafficProfile,
     /// Index of each road in the space, with its scene.
     roads: Vec<(usize, Arc<Scene>)>,
 }
@@ -52,7 +53,12 @@ impl Arena {
         });
         let roads = roads.collect::<Result<_, RunError>>()?;
         let rules = RulesInForce::new(space, with, without)?;
-        Ok(Arena { table, rules, ads, roads })
+        Ok(Arena { table, rules, ads, traffic: TrafficProfile::default(), roads })
+    }
+
+    /// The same with other manners of other vehicles.
+    pub fn with_traffic(self, traffic: TrafficProfile) -> Arena {
+        Arena { traffic, ..self }
     }
 
     pub fn table(&self) -> &ActionTable {
@@ -86,7 +92,7 @@ impl Arena {
             rules: &self.rules,
             ads: self.ads.clone(),
             seed,
-            start: episode::start(space, &memory, seed),
+            start: Start { traffic: self.traffic, ..episode::start(space, &memory, seed) },
             memory,
             period_shifts: Vec::new(),
             proc: ProcKind::default(),

@@ -25,8 +25,11 @@ pub use gauges::Gauges;
 pub use groups::Group;
 pub(crate) use groups::kind;
 pub use play::{Run, play};
-pub(crate) use profile::under_test;
-pub use profile::{DEFAULT_ADS, Profile, driving_system, recorded, selected_for, trained_against};
+pub use profile::{
+    DEFAULT_ADS, Profile, TrafficRecord, driving_system, recorded, recorded_traffic, selected_for,
+    trained_against,
+};
+pub(crate) use profile::{traffic_of, under_test};
 pub use settings::{EPISODES_MAX, PolicyReference, RunError, RunSettings, VERSION};
 pub(crate) use settings::{agent_named, check_episodes};
 pub use shape::Shape;

@@ -17,7 +17,7 @@ use crate::rng::Stream;
 
 use crate::run::arena::{Arena, choose};
 use crate::run::gauges::Gauges;
-use crate::run::profile::under_test;
+use crate::run::profile::{traffic_of, under_test};
 use crate::run::settings::{RunError, RunSettings, agent_named, check_episodes};
 use crate::run::summary::EpisodeSummary;
 use crate::run::threads::on_threads;
@@ -57,7 +57,9 @@ impl Run {
         check_episodes(settings.episodes)?;
         settings.avoidability.check()?;
         let ads = under_test(&settings.ads, settings.profile.as_ref())?;
-        let arena = Arena::new(table, &settings.roads, ads, &settings.with, &settings.without)?;
+        let traffic = traffic_of(settings.traffic.as_ref())?;
+        let arena =
+            Arena::new(table, &settings.roads, ads, &settings.with, &settings.without)?.with_traffic(traffic);
         if settings.causes && !arena.has_modules() {
             return Err(RunError::NoModules(oracle::NoModules { ads: settings.ads }));
         }

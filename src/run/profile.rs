@@ -3,6 +3,7 @@
 use crate::ads;
 use crate::ads::{ModularConfig, Selected};
 use crate::model::{Policy, Scenario};
+use crate::sim::TrafficProfile;
 use crate::syntax::listed;
 
 use crate::run::settings::RunError;
@@ -32,6 +33,55 @@ pub struct Profile {
 impl Profile {
     pub fn new(settings: &ModularConfig) -> Profile {
         Profile { digest: settings.digest(), settings: *settings }
+    }
+}
+
+/// How other vehicles drive, with a digest as in [`Profile`].
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TrafficRecord {
+    pub digest: String,
+    pub settings: TrafficProfile,
+}
+
+impl TrafficRecord {
+    /// What a run records of a traffic profile: nothing of the default.
+    pub fn new(traffic: &TrafficProfile) -> Option<TrafficRecord> {
+        let is_default = *traffic == TrafficProfile::default();
+        (!is_default).then(|| TrafficRecord { digest: traffic.digest(), settings: *traffic })
+    }
+}
+
+/// The traffic profile that the settings of a run or a training record; without a record the default.
+///
+/// # Errors
+/// If its settings mean something else in this version.
+pub(crate) fn traffic_of(record: Option<&TrafficRecord>) -> Result<TrafficProfile, RunError> {
+    match record {
+        None => Ok(TrafficProfile::default()),
+        Some(record) if record.settings.digest() != record.digest => {
+            Err(RunError::TrafficDigest { what: "the run".to_owned() })
+        }
+        Some(record) => Ok(record.settings),
+    }
+}
+
+/// The traffic profile that a scenario was made with.
+///
+/// # Errors
+/// If its settings do not exist any more or mean something else.
+pub fn recorded_traffic(scenario: &Scenario) -> Result<TrafficProfile, RunError> {
+    let origin = &scenario.origin;
+    let traffic = match &origin.traffic {
+        None => TrafficProfile::default(),
+        Some(line) => TrafficProfile::from_yaml(line)
+            .map_err(|error| RunError::Traffic { name: scenario.name.clone(), error })?,
+    };
+    match &origin.traffic_digest {
+        Some(digest) if *digest != traffic.digest() => {
+            Err(RunError::TrafficDigest { what: format!("`{}`", scenario.name) })
+        }
+        _ => Ok(traffic),
     }
 }
 

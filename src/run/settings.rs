@@ -5,10 +5,10 @@ use crate::agent;
 use crate::model::Space;
 use crate::oracle;
 use crate::oracle::AvoidabilitySettings;
-use crate::sim::ENGINE;
+use crate::sim::{ENGINE, TrafficError};
 use crate::syntax::listed;
 
-use crate::run::profile::{DEFAULT_ADS, Profile};
+use crate::run::profile::{DEFAULT_ADS, Profile, TrafficRecord};
 
 /// Version of avastra, as settings record it.
 pub const VERSION: &str = env!("CARGO_PKG_VERSION");
@@ -40,6 +40,9 @@ pub struct RunSettings {
     /// Vehicles of ambient traffic.
     #[serde(default)]
     pub ambient: u32,
+    /// How other vehicles drive, if not as in the default.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub traffic: Option<TrafficRecord>,
     /// Whether each counted collision is diagnosed.
     #[serde(default)]
     pub causes: bool,
@@ -69,6 +72,7 @@ impl RunSettings {
             episodes,
             seed,
             ambient: 0,
+            traffic: None,
             causes: false,
             without: Vec::new(),
             with: Vec::new(),
@@ -124,6 +128,12 @@ pub enum RunError {
          happen alike; name a profile with `--ads-config FILE` to see what happens with that"
     )]
     ProfileDigest { what: String, ads: String },
+    #[error("the traffic of `{name}`: {error}")]
+    Traffic { name: String, error: TrafficError },
+    #[error(
+        "{what} was made with a traffic profile that means something else in this version: nothing need happen alike"
+    )]
+    TrafficDigest { what: String },
     #[error("`{scenario}` was made in world `{engine}`; this is `{ENGINE}`, where nothing need happen alike")]
     Engine { scenario: String, engine: String },
 }

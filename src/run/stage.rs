@@ -10,8 +10,9 @@ use crate::mdp::ProcKind;
 use crate::model::{RulesInForce, Scenario};
 use crate::oracle;
 use crate::oracle::{AvoidabilitySettings, ClaimResult, Judgement, Replays};
-use crate::sim::{ENGINE, Scene, Start};
+use crate::sim::{ENGINE, Scene, Start, TrafficProfile};
 
+use crate::run::profile::recorded_traffic;
 use crate::run::settings::RunError;
 
 /// A scenario that is ready to play: its road and the rules that it was made with.
@@ -20,12 +21,13 @@ pub struct Stage<'a> {
     scenario: &'a Scenario,
     rules: RulesInForce,
     scene: Arc<Scene>,
+    traffic: TrafficProfile,
     avoidability: AvoidabilitySettings,
 }
 
 impl<'a> Stage<'a> {
     /// # Errors
-    /// If the scenario was made in another world or with rules that do not exist, or names reference drivers that
+    /// If the scenario was made in another world, with rules or traffic that do not exist, or names reference drivers that
     /// do not exist.
     pub fn new(table: &'a ActionTable, scenario: &'a Scenario) -> Result<Stage<'a>, RunError> {
         let origin = &scenario.origin;
@@ -36,7 +38,8 @@ impl<'a> Stage<'a> {
         let scene = Arc::new(episode::scene(&table.space().roads[scenario.road]));
         let line = origin.avoidability.as_deref();
         let avoidability = line.map(AvoidabilitySettings::from_line).transpose()?.unwrap_or_default();
-        Ok(Stage { table, scenario, rules, scene, avoidability })
+        let traffic = recorded_traffic(scenario)?;
+        Ok(Stage { table, scenario, rules, scene, traffic, avoidability })
     }
 
     /// How the avoidability of its collisions is judged: as the file records it.
@@ -61,6 +64,7 @@ impl<'a> Stage<'a> {
                 signal_phase_s: start.signal_phase_s,
                 seed: start.traffic_seed.unwrap_or(seed),
                 ambient: start.ambient,
+                traffic: self.traffic,
                 ..episode::start(space, &memory, seed)
             },
             memory,

@@ -5,7 +5,7 @@
 //! They leave when they are well beyond that range behind it, or farther than [`AROUND_M`] away. Place,
 //! body, colour and speed are drawn from a stream of their own, with one index for each attempt, so that
 //! commanded traffic draws the same with and without them. They drive at 80 to 100 % of each lane's limit,
-//! keep their lane, turn as drawn, and yield (`npc::manners`) to the ego vehicle, too. They count
+//! change lanes where they gain by it (`npc::mobil`), turn as drawn, and yield (`npc::manners`) to the ego vehicle, too. They count
 //! neither towards the ten obstacles of the published package nor among `npc#1`, `npc#2`, …: their
 //! ids begin above [`COMMANDED_MAX`].
 
@@ -94,7 +94,8 @@ fn draw(around: &Around, nearest_m: f64, id: u32, rng: &mut Rng) -> Option<RoadU
     let bodies = Body::ALL.iter().filter(|body| body.is_vehicle()).count() as u32;
     let body = *Body::ALL.iter().filter(|body| body.is_vehicle()).nth(rng::below(rng, bodies) as usize)?;
     let colour = Colour::ALL[rng::below(rng, Colour::ALL.len() as u32) as usize];
-    let cruise = Cruise::Limit(rng::between(rng, 0.8, 1.0));
+    let cruise =
+        Cruise::Limit(rng::between(rng, around.traffic.limit_part_min, around.traffic.limit_part_max));
     let size = body::parameters(body);
     let centre = &around.scene.map.lane(lane).centre;
     let away = centre.pose_at(station_m).position - around.ego_outline.pose.position;

@@ -9,6 +9,7 @@ use super::road_user::{Motion, Obstacle, RoadUser};
 use super::scene::Scene;
 use super::sense::{EgoMotion, RANGE_M};
 use super::signals::SignalClock;
+use super::traffic::TrafficProfile;
 
 /// The world around one road user during one tick, or around a newcomer that is not in it yet.
 #[derive(Clone, Copy)]
@@ -28,6 +29,7 @@ pub(super) struct Around<'a> {
     pub friction: f64,
     pub grip: &'a Grip,
     pub visibility_m: f64,
+    pub traffic: &'a TrafficProfile,
     /// Seed of the choices of road users.
     pub seed: u64,
 }

@@ -15,6 +15,7 @@
 //!
 //! Between ticks an action may change the sky or the time of day, or make a road user appear
 //! (`World::apply`). `placement` decides where it appears, along which `way`, or why it cannot;
+//! `traffic` holds the manners that a run can change;
 //! `safety` says how much room a careful driver would need. `junction` knows where lanes cross and which
 //! goes first, `signals` the colour of every light at every tick.
 
@@ -40,6 +41,7 @@ mod signals;
 pub(crate) mod testing;
 #[cfg(test)]
 mod tests;
+mod traffic;
 mod way;
 mod world;
 
@@ -52,4 +54,5 @@ pub use right_of_way::right_of_way;
 pub use road_user::Obstacle;
 pub use scene::Scene;
 pub use sense::{Conditions, EgoMotion, FRAME_S, FRAME_TICKS, Sensed, SensedObject, SignalColour};
+pub use traffic::{TrafficError, TrafficProfile};
 pub use world::{DT_S, ENGINE, Start, World};

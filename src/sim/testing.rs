@@ -9,6 +9,7 @@ use crate::road::testing::{lanes, road, street};
 use crate::road::{RoadMap, Route};
 
 use super::scene::Scene;
+use super::traffic::TrafficProfile;
 use super::world::{Start, World};
 
 /// A driving lane without links.
@@ -49,6 +50,7 @@ pub fn start() -> Start {
         signal_phase_s: 0.0,
         seed: 7,
         ambient: 0,
+        traffic: TrafficProfile::default(),
     }
 }
 

@@ -8,8 +8,8 @@ use super::body::BodyParameters;
 use super::testing::{bits, request};
 use super::way::Way;
 use super::{
-    Contact, Control, DT_S, Incident, Obstacle, Scene, Start, VehicleParameters, World, body, pedals_for,
-    testing,
+    Contact, Control, DT_S, Incident, Obstacle, Scene, Start, TrafficProfile, VehicleParameters, World, body,
+    pedals_for, testing,
 };
 use crate::action::{Effect, SpawnRequest, Surroundings};
 use crate::geometry::{OrientedBox, Path, Pose, Vec2, distance_m, wrap_angle};
@@ -329,6 +329,100 @@ fn vehicles_that_touch_slide_to_rest_by_friction() {
     }
     assert!(crashes > 0, "the hatchback touches the pedestrian");
     assert!(last.iter().all(|now| now.velocity_mps.norm() < 0.2));
+}
+
+/// A world of another traffic profile.
+fn released(scene: &Arc<Scene>) -> World {
+    let traffic = TrafficProfile::shipped("released").expect("it is sound");
+    World::new(Arc::clone(scene), &Start { traffic, ..testing::start() })
+}
+
+#[test]
+fn released_vehicles_see_what_their_rays_meet_and_stop_at_once() {
+    for ahead_m in [60.0, 20.0] {
+        let mut world = released(&testing::straight());
+        drive(&mut world, 8.0, 5.0);
+        let ahead = spawn(&mut world, request(Verb::DriveAhead, 30.0, 12.0));
+        spawn(&mut world, request(Verb::Stand, 30.0 + ahead_m, 1.0));
+        let mut hardest_mps2: f64 = 0.0;
+        let mut was_mps = 12.0;
+        for _ in 0..500 {
+            let control = hold(&world, 0.0);
+            world.tick(&control);
+            let now_mps = world.obstacle(ahead.id).expect("it is in sight").velocity_mps.norm();
+            hardest_mps2 = hardest_mps2.max((was_mps - now_mps) / DT_S);
+            was_mps = now_mps;
+        }
+        assert!(was_mps < 0.1, "{was_mps}");
+        // At 4 to 8 1/s of 12 m/s, which no tyre gives.
+        assert!(hardest_mps2 > 15.0, "{hardest_mps2}");
+        assert_eq!(world.incidents(), []);
+    }
+}
+
+#[test]
+fn released_weather_rests_and_the_oldest_leaves_in_sight() {
+    let mut world = released(&testing::straight());
+    assert_eq!(world.weather_refusal(), None);
+    world.apply(&Effect::Sky(Phenomenon::Rain, Level::Light)).expect("the sky obeys");
+    assert!(world.weather_refusal().expect("it rests").contains("30 s"));
+    drive(&mut world, 0.0, 29.9);
+    assert!(world.weather_refusal().is_some());
+    drive(&mut world, 0.0, 0.1);
+    assert_eq!(world.weather_refusal(), None);
+    for i in 0..11 {
+        let walks = request(Verb::Walk, 10.0 * f64::from(i + 1), 1.0);
+        spawn(&mut world, SpawnRequest { side: Side::ALL[i as usize % 2], ..walks });
+    }
+    let ids: Vec<u32> = world.obstacles().map(|obstacle| obstacle.id).collect();
+    assert_eq!(ids, (2..=11).collect::<Vec<u32>>());
+    let mut careful = testing::world(&testing::straight());
+    careful.apply(&Effect::Sky(Phenomenon::Rain, Level::Light)).expect("the sky obeys");
+    assert_eq!(careful.weather_refusal(), None);
+}
+
+#[test]
+fn released_lane_changes_begin_beside_a_vehicle_that_the_sphere_misses() {
+    // A vehicle in the own lane, a little behind: two metres and a second are not left, but the sphere is empty.
+    for (profile, changes) in [("careful", false), ("released", true)] {
+        let traffic = TrafficProfile::shipped(profile).expect("it is sound");
+        let mut world = World::new(testing::straight(), &Start { traffic, ..testing::start() });
+        drive(&mut world, 10.0, 8.0);
+        let beside = SpawnRequest {
+            lane: LaneChoice::Right,
+            then: Then::Change,
+            ..request(Verb::DriveAhead, 1.0, 10.0)
+        };
+        let beside = spawn(&mut world, beside);
+        drive(&mut world, 10.0, 2.5);
+        assert_eq!(y_m(&world, beside.id) > -5.2, changes, "{profile}");
+    }
+}
+
+#[test]
+fn ambient_vehicles_change_lanes_where_they_gain() {
+    let count = |traffic: TrafficProfile| {
+        let mut changed = std::collections::BTreeSet::new();
+        for seed in 0..4 {
+            let start = Start { seed, traffic, ambient: 10, ..testing::start() };
+            let mut world = World::new(testing::straight(), &start);
+            let mut lanes = std::collections::BTreeMap::new();
+            for _ in 0..3000 {
+                let control = hold(&world, 5.0);
+                world.tick(&control);
+                assert_eq!(world.incidents(), []);
+                for obstacle in world.obstacles() {
+                    let lane = (obstacle.outline.pose.position.y / 3.5).floor() as i32;
+                    if *lanes.entry(obstacle.id).or_insert(lane) != lane {
+                        changed.insert((seed, obstacle.id));
+                    }
+                }
+            }
+        }
+        changed.len()
+    };
+    assert!(count(TrafficProfile::default()) > 2);
+    assert_eq!(count(TrafficProfile { mobil: false, ..TrafficProfile::default() }), 0);
 }
 
 /// A world in which everything that can be spawned was asked for.

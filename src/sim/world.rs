@@ -24,6 +24,7 @@ use super::sense::{
     visible_fraction,
 };
 use super::signals::SignalClock;
+use super::traffic::TrafficProfile;
 
 /// Name of this simulated world. Raised whenever the same seed no longer gives the same episode, so
 /// that an old scenario is told apart from a refuted one.
@@ -56,6 +57,8 @@ pub struct Start {
     pub seed: u64,
     /// Vehicles of ambient traffic that are kept around the ego vehicle, at most `model::AMBIENT_MAX`.
     pub ambient: u32,
+    /// How other vehicles drive.
+    pub traffic: TrafficProfile,
 }
 
 /// The whole state of an episode: `Clone` is a snapshot.
@@ -77,6 +80,9 @@ pub struct World {
     users: Vec<RoadUser>,
     next_id: u32,
     ambient: Ambient,
+    traffic: TrafficProfile,
+    /// Tick from which time of day and weather may change.
+    weather_tick: u64,
     /// Seed of the choices of other road users.
     seed: u64,
     // What the last tick has to tell. No later tick reads it.
@@ -102,6 +108,8 @@ impl World {
             users: Vec::with_capacity(OBSTACLES_MAX),
             next_id: 1,
             ambient: Ambient::new(start.ambient),
+            traffic: start.traffic,
+            weather_tick: 0,
             seed: start.seed,
             contacts: Vec::new(),
             incidents: Vec::new(),
@@ -172,6 +180,7 @@ impl World {
             Effect::Sky(phenomenon, level) => self.environment.set(*phenomenon, *level),
             Effect::Spawn(request) => return self.spawn(request).map(Some),
         }
+        self.weather_tick = self.ticks + (self.traffic.weather_rest_s / DT_S).round() as u64;
         self.conditions = self.environment.conditions(self.ego.motion.speed_mps);
         Ok(None)
     }
@@ -296,6 +305,7 @@ impl World {
         self.signals.trace(sink);
         sink(u64::from(self.next_id));
         self.ambient.trace(sink);
+        sink(self.weather_tick);
         sink(self.seed);
         for user in &self.users {
             user.trace(sink);
@@ -326,6 +336,7 @@ impl World {
             friction: self.conditions.friction,
             grip: self.environment.grip(),
             visibility_m: self.conditions.visibility_m,
+            traffic: &self.traffic,
             seed: self.seed,
         }
     }
@@ -350,7 +361,10 @@ impl World {
             return Ok(None);
         }
         let around = self.around([&self.users, &[]]);
-        let is_hidden = |user: &RoadUser| !around.is_in_sight(&user.obstacle, user.mover.visible_fraction);
+        let is_hidden = |user: &RoadUser| {
+            self.traffic.oldest_leaves_in_sight
+                || !around.is_in_sight(&user.obstacle, user.mover.visible_fraction)
+        };
         let oldest = commanded.find(|(_, user)| is_hidden(user));
         oldest.map(|(index, _)| Some(index)).ok_or("ten road users are there already".into())
     }
@@ -477,6 +491,11 @@ impl Surroundings for World {
 
     fn ego_speed_mps(&self) -> f64 {
         self.ego.motion.speed_mps
+    }
+
+    fn weather_refusal(&self) -> Option<String> {
+        let left_s = self.weather_tick.saturating_sub(self.ticks) as f64 * DT_S;
+        (left_s > 0.0).then(|| format!("this traffic profile keeps the weather for {left_s} s more"))
     }
 }
 

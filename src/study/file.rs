@@ -23,6 +23,8 @@ pub struct StudyFile {
     /// Vehicles of ambient traffic around the ego vehicle.
     #[serde(default)]
     pub ambient: u32,
+    /// How other vehicles drive: the name of a traffic profile, or a file; without it as they usually do.
+    pub traffic: Option<String>,
     /// All seeds of trainings and evaluations are derived from this one, each kind by a stream of its own.
     #[serde(default = "default_seed")]
     pub first_seed: u64,

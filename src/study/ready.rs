@@ -126,6 +126,7 @@ impl Study {
             ads: study.ads.clone(),
             profile: agent.profile.as_ref().or(study.profile.as_ref()).cloned(),
             ambient: study.ambient,
+            traffic: study.traffic.clone(),
             causes: study.causes,
             without: agent.without.clone(),
             with: agent.with.clone(),

@@ -6,7 +6,7 @@ use crate::action::ActionTable;
 use crate::ads::ModularConfig;
 use crate::agent::{Kind, Settings};
 use crate::oracle::AvoidabilitySettings;
-use crate::run::{EPISODES_MAX, Profile, RunError, VERSION, agent_named};
+use crate::run::{EPISODES_MAX, Profile, RunError, TrafficRecord, VERSION, agent_named};
 use crate::sim::ENGINE;
 use crate::syntax::listed;
 
@@ -32,6 +32,9 @@ pub struct StudySettings {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub profile: Option<Profile>,
     pub ambient: u32,
+    /// How other vehicles drive, if not as in the default.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub traffic: Option<TrafficRecord>,
     pub first_seed: u64,
     pub evaluation: EvaluationPlan,
     pub causes: bool,
@@ -108,6 +111,7 @@ impl StudySettings {
         file: StudyFile,
         table: &ActionTable,
         profile: Option<Profile>,
+        traffic: Option<TrafficRecord>,
         read: &dyn Fn(&str) -> Result<String, String>,
     ) -> Result<StudySettings, StudyError> {
         let space = table.space();
@@ -126,6 +130,7 @@ impl StudySettings {
             ads: file.ads,
             profile,
             ambient: file.ambient,
+            traffic,
             first_seed: file.first_seed,
             evaluation: file.evaluation,
             causes: file.causes,

@@ -21,8 +21,8 @@ use crate::oracle::AvoidabilitySettings;
 use crate::rng;
 use crate::rng::Stream;
 use crate::run::{
-    Arena, EpisodeSummary, Finding, Profile, RunError, RunSettings, agent_named, carry_out, check_episodes,
-    legal, offers, under_test,
+    Arena, EpisodeSummary, Finding, Profile, RunError, RunSettings, TrafficRecord, agent_named, carry_out,
+    check_episodes, legal, offers, traffic_of, under_test,
 };
 use crate::sim::{Contact, World};
 
@@ -51,6 +51,9 @@ pub struct TrainSettings {
     /// Vehicles of ambient traffic.
     #[serde(default)]
     pub ambient: u32,
+    /// How other vehicles drive, if not as in the default.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub traffic: Option<TrafficRecord>,
     /// Rules switched off.
     pub without: Vec<String>,
     /// Optional rules switched on.
@@ -74,6 +77,7 @@ impl TrainSettings {
             episodes: run.episodes,
             seed: run.seed,
             ambient: run.ambient,
+            traffic: run.traffic,
             without: run.without,
             with: run.with,
             hyperparameters,
@@ -333,7 +337,8 @@ fn prepared(table: ActionTable, settings: &TrainSettings) -> Result<(Arena, Arc<
     let table = with_period(table, settings.hyperparameters.observation_period_s());
     let rows = Arc::new(Rows::new(&table, settings.hyperparameters.actions())?);
     let ads = under_test(&settings.ads, settings.profile.as_ref())?;
-    Ok((Arena::new(table, &settings.roads, ads, &settings.with, &settings.without)?, rows))
+    let arena = Arena::new(table, &settings.roads, ads, &settings.with, &settings.without)?;
+    Ok((arena.with_traffic(traffic_of(settings.traffic.as_ref())?), rows))
 }
 
 /// The table with another observation period.

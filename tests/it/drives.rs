@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use avastra::model::vocabulary::{Level, TimeOfDay, Word};
-use avastra::sim::{Scene, Start, World};
+use avastra::sim::{Scene, Start, TrafficProfile, World};
 use avastra::{ads, episode};
 
 use crate::world::space;
@@ -74,7 +74,8 @@ fn start(seed: u64) -> Start {
     let pick = |n: u64| Level::ALL[(seed / n % 4) as usize];
     let time = TimeOfDay::ALL[(seed % 3) as usize];
     let signal_phase_s = (seed * 7 % 60) as f64;
-    Start { time, rain: pick(3), fog: pick(12), wetness: pick(5), signal_phase_s, seed, ambient: 0 }
+    let traffic = TrafficProfile::default();
+    Start { time, rain: pick(3), fog: pick(12), wetness: pick(5), signal_phase_s, seed, ambient: 0, traffic }
 }
 
 fn drive(scene: &Arc<Scene>, entry: &ads::Entry, seed: u64, limit_mps: f64) {

@@ -26,6 +26,7 @@ mod tables;
 mod traces;
 mod torch;
 mod training;
+mod traffic;
 mod trials;
 mod wishes;
 mod world;

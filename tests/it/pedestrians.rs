@@ -53,6 +53,7 @@ fn walks(scene: &Arc<Scene>, side: Side) -> usize {
         signal_phase_s: 3.0,
         seed: 5,
         ambient: 0,
+        traffic: Default::default(),
     };
     let mut world = World::new(scene.clone(), &start);
     let entry = ads::REGISTRY.iter().find(|entry| entry.name == "idm").expect("it is registered");

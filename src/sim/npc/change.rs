@@ -1,11 +1,14 @@
 //! Lane changes of other drivers: what they plan, when they begin one, and how they move over.
 //!
 //! A change is a smooth step from the way in one lane to that in another; its length depends on the speed
-//! and the distance. All drivers obey markings, and none changes lanes inside a junction.
+//! and the distance. All drivers obey markings, and none changes lanes inside a junction. How much room they
+//! want, and how fast they move over, is the traffic profile's.
 
 use std::sync::Arc;
 
-use crate::geometry::{Path, Pose, SMOOTH_STEP_SLOPE_MAX, SmoothStep, Vec2, smooth_step, wrap_angle};
+use crate::geometry::{
+    OrientedBox, Path, Pose, SMOOTH_STEP_SLOPE_MAX, SmoothStep, Vec2, distance_m, smooth_step, wrap_angle,
+};
 use crate::model::vocabulary::Side;
 use crate::road;
 use crate::road::{LaneIndex, Neighbour};
@@ -13,18 +16,16 @@ use crate::road::{LaneIndex, Neighbour};
 use crate::sim::around::Around;
 use crate::sim::body::BodyParameters;
 use crate::sim::road_user::{Moved, Obstacle};
+use crate::sim::traffic::TrafficProfile;
 use crate::sim::way::Way;
 use crate::sim::world::DT_S;
 
 use super::driver::{Driver, SIDE_ROOM_M};
 use super::leader::extent_m;
 
-/// Room in front and behind that drivers want before changing lanes, m.
-const MIRROR_ROOM_M: f64 = 2.0;
-/// Highest lateral speed of a lane change, m/s: bound of a cut-in in UN R157.
-const CHANGE_MPS_MAX: f64 = 1.8;
-/// A lane change takes at least this long, s.
-const CHANGE_S_MIN: f64 = 2.0;
+/// The sphere of LGSVL's check: its radius, and how far its centre is beside the corner of the front, m.
+const SPHERE_M: f64 = 1.0;
+const SPHERE_ASIDE_M: f64 = 2.0;
 /// Below this speed a lane change slows down with the vehicle, which cannot slide sideways, m/s.
 const CHANGE_FULL_MPS: f64 = 5.0;
 /// Neighbouring lanes whose centres are farther apart than this have parted, m.
@@ -66,9 +67,16 @@ pub(super) struct Change {
 }
 
 impl Driver {
-    /// Begins the next lane change of the plan if it is due, there is a lane, and it is free.
+    /// Begins the next lane change of the plan if it is due, or one for its own gain, there is a lane, and it
+    /// is free.
     pub(super) fn begin_change(&mut self, this: &Obstacle, size: &BodyParameters, around: &Around) {
-        let Some(next) = self.plan.last() else { return };
+        let Some(next) = self.plan.last() else {
+            let Some(side) = self.wants_side(this, size, around) else { return };
+            if let Some(begun) = self.change_to(side, this, size, around) {
+                self.set_out(begun, this, around);
+            }
+            return;
+        };
         let due = match next.when {
             When::Tick(tick) => around.tick >= tick,
             When::AheadOfEgo(gap_m) => {
@@ -94,12 +102,22 @@ impl Driver {
                 None => None,
             },
         };
-        let Some((to, to_station_m, side)) = begun else { return };
-        let aside_m = (to.path.pose_at(to_station_m).position - this.outline.pose.position).norm();
-        self.change =
-            Some(Change { to, to_station_m, progress: 0.0, duration_s: change_duration_s(aside_m) });
-        self.last_change = side;
+        let Some(begun) = begun else { return };
+        self.set_out(begun, this, around);
         self.plan.pop();
+    }
+
+    /// Begins a change to a way, at the own station there.
+    fn set_out(
+        &mut self,
+        (to, to_station_m, side): (Arc<Way>, f64, Option<Side>),
+        this: &Obstacle,
+        around: &Around,
+    ) {
+        let aside_m = (to.path.pose_at(to_station_m).position - this.outline.pose.position).norm();
+        let duration_s = change_duration_s(aside_m, around.traffic);
+        self.change = Some(Change { to, to_station_m, progress: 0.0, duration_s });
+        self.last_change = side;
     }
 
     /// The way in the neighbouring lane, if there is one and room in it, and the own station there.
@@ -118,8 +136,8 @@ impl Driver {
         // `change_room_m` ends at markings that forbid a change, and at junctions, where lanes part.
         let room_m = map.change_room_m(here, on_road(side), here_m);
         if there.distance_m > CHANGE_M_MAX
-            || room_m < change_length_m(self.speed_mps, there.distance_m)
-            || !self.is_free(centre, there.station_m, size, around)
+            || room_m < change_length_m(self.speed_mps, there.distance_m, around.traffic)
+            || !self.may_enter(side, centre, there.station_m, this, size, around)
         {
             return None;
         }
@@ -128,7 +146,28 @@ impl Driver {
         Some((way, there.station_m, Some(side)))
     }
 
-    /// Whether no vehicle is beside it in another lane, or would be within a second.
+    /// Whether the profile's check of the other lane lets it change.
+    fn may_enter(
+        &self,
+        side: Side,
+        path: &Path,
+        station_m: f64,
+        this: &Obstacle,
+        size: &BodyParameters,
+        around: &Around,
+    ) -> bool {
+        if !around.traffic.change_by_sphere {
+            return self.is_free(path, station_m, size, around);
+        }
+        let left = Vec2::new(-this.forward.y, this.forward.x);
+        let aside_m = size.width_m / 2.0 + SPHERE_ASIDE_M;
+        let aside = if side == Side::Left { left * aside_m } else { left * -aside_m };
+        let centre = this.outline.pose.position + this.forward * (size.length_m / 2.0) + aside;
+        let point = OrientedBox::new(Pose { position: centre, ..this.outline.pose }, 0.0, 0.0);
+        around.others().all(|(outline, _)| distance_m(&point, outline) > SPHERE_M)
+    }
+
+    /// Whether no vehicle is beside it in another lane or would be soon, and none has to brake hard for it.
     fn is_free(&self, path: &Path, station_m: f64, size: &BodyParameters, around: &Around) -> bool {
         let here = path.pose_at(station_m);
         let forward = here.forward();
@@ -142,7 +181,7 @@ impl Driver {
             let apart_m = (other.station_m - station_m).abs() - half_length_m - size.length_m / 2.0;
             let closing_mps = (velocity_mps.dot(&forward) - self.speed_mps)
                 * if other.station_m < station_m { 1.0 } else { -1.0 };
-            aside_m > SIDE_ROOM_M || apart_m > MIRROR_ROOM_M + closing_mps.max(0.0)
+            aside_m > SIDE_ROOM_M || apart_m > change_gap_m(closing_mps.max(0.0), around.traffic)
         })
     }
 
@@ -200,18 +239,26 @@ pub(in crate::sim) fn can_change(
     ahead.take_while(|(lane, _)| !in_junction(*lane)).any(|(lane, at_m)| {
         let Some(target) = lane_beside(around, lane, side) else { return false };
         let here = map.lane(lane).centre.pose_at(at_m).position;
-        let length_m = change_length_m(speed_mps, map.lane(target).centre.project(here).distance_m);
+        let length_m =
+            change_length_m(speed_mps, map.lane(target).centre.project(here).distance_m, around.traffic);
         map.changes_from_m(lane, on_road(side), at_m).iter().any(|(_, room_m)| *room_m >= length_m)
     })
 }
 
-fn change_duration_s(aside_m: f64) -> f64 {
-    (SMOOTH_STEP_SLOPE_MAX * aside_m / CHANGE_MPS_MAX).max(CHANGE_S_MIN)
+fn change_duration_s(aside_m: f64, traffic: &TrafficProfile) -> f64 {
+    (SMOOTH_STEP_SLOPE_MAX * aside_m / traffic.change_mps_max).max(traffic.change_s_min)
+}
+
+/// Gap that a change needs to another vehicle in the other lane, m, if it closes at a speed: the room of the
+/// profile, and enough for the one behind to slow down as hard as is safe.
+fn change_gap_m(closing_mps: f64, traffic: &TrafficProfile) -> f64 {
+    let braking_m = closing_mps * closing_mps / (2.0 * traffic.change_safe_mps2);
+    traffic.change_room_m + braking_m.max(closing_mps * traffic.change_time_s)
 }
 
 /// Way that a lane change of `aside_m` to the side takes at a speed, m.
-fn change_length_m(speed_mps: f64, aside_m: f64) -> f64 {
-    speed_mps.max(CHANGE_FULL_MPS) * change_duration_s(aside_m)
+fn change_length_m(speed_mps: f64, aside_m: f64, traffic: &TrafficProfile) -> f64 {
+    speed_mps.max(CHANGE_FULL_MPS) * change_duration_s(aside_m, traffic)
 }
 
 fn on_road(side: Side) -> road::Side {
@@ -230,4 +277,19 @@ pub(in crate::sim) fn lane_beside(around: &Around, lane: LaneIndex, side: Side) 
     };
     let reachable = |neighbour: &Neighbour| neighbour.same_direction && neighbour.gap_m <= road::STRIP_M_MAX;
     neighbour.filter(reachable).map(|neighbour| neighbour.lane)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_change_leaves_the_vehicle_behind_room_to_slow_down() {
+        let traffic = TrafficProfile::default();
+        assert_eq!(change_gap_m(0.0, &traffic), 2.0);
+        assert_eq!(change_gap_m(6.0, &traffic), 8.0, "a second");
+        assert_eq!(change_gap_m(12.0, &traffic), 20.0, "144 / (2 · 4)");
+        // One lane of 3.5 m at 1.8 m/s.
+        assert!((change_duration_s(3.5, &traffic) * 1.8 - 3.5 * SMOOTH_STEP_SLOPE_MAX).abs() < 1e-12);
+    }
 }

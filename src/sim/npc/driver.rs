@@ -55,6 +55,8 @@ pub(in crate::sim) struct Driver {
     /// Part of the limits that it drives at; `None` if its speed was asked for.
     limit_part: Option<f64>,
     pub(super) yields_to_ego: bool,
+    /// 1 to 3 in a profile that has it; 0 before the first look.
+    pub(super) aggression: u32,
     pub(super) leader: Option<Leader>,
     /// Station at which it waits for others, or will.
     pub(super) hold_m: Option<f64>,
@@ -94,7 +96,8 @@ impl Driver {
             station_m,
             cruise_mps,
             limit_part,
-            yields_to_ego: limit_part.is_some(),
+            yields_to_ego: false,
+            aggression: 0,
             leader: None,
             hold_m: None,
             insists_to_m: f64::NEG_INFINITY,
@@ -154,8 +157,13 @@ impl Driver {
             self.look(this, size, around);
         }
         let braking_mps2 = around.braking_mps2(size, self.speed_mps);
-        let wanted_mps2 = if touched { -braking_mps2 } else { self.wanted_mps2(size, around, braking_mps2) };
-        let acceleration_mps2 = wanted_mps2.clamp(-braking_mps2, size.acceleration_mps2_max);
+        let acceleration_mps2 = if touched {
+            -braking_mps2
+        } else if around.traffic.rays {
+            self.wanted_mps2(size, around, braking_mps2)
+        } else {
+            self.wanted_mps2(size, around, braking_mps2).clamp(-braking_mps2, size.acceleration_mps2_max)
+        };
         let speed_mps = (self.speed_mps + acceleration_mps2 * DT_S).max(0.0);
         let way_m = (self.speed_mps + speed_mps) / 2.0 * DT_S;
         self.speed_mps = speed_mps;
@@ -183,16 +191,22 @@ impl Driver {
                 (self.way, self.station_m) = (way, station_m);
             }
         }
+        self.yields_to_ego = self.is_ambient() && around.traffic.yields_to_ego;
         if let Some(part) = self.limit_part {
             self.cruise_mps = part * self.way.limit_mps(around.scene, self.station_m);
         }
         if self.change.is_none() {
             self.begin_change(this, size, around);
         }
-        let beside = self.foresee(this, size, around);
-        let leader = self.find_leader(this, size, around);
-        let nearer = |a: &Leader, b: &Leader| a.gap_m.total_cmp(&b.gap_m);
-        self.leader = leader.into_iter().chain(beside).min_by(nearer);
+        self.leader = if around.traffic.rays {
+            self.take_temper(this.id, around);
+            self.ray_leader(this, size, around)
+        } else {
+            let beside = self.foresee(this, size, around);
+            let leader = self.find_leader(this, size, around);
+            let nearer = |a: &Leader, b: &Leader| a.gap_m.total_cmp(&b.gap_m);
+            leader.into_iter().chain(beside).min_by(nearer)
+        };
         let held = self.hold_m.is_some();
         self.hold_m = self.find_hold_m(this, size, around);
         if held && self.hold_m.is_none() && self.speed_mps < SETS_OUT_MPS {
@@ -207,6 +221,17 @@ impl Driver {
             bend_mps = bend_mps.min(change.to.speed_mps_max(change.to_station_m));
         }
         let wish_mps = self.cruise_mps.min(bend_mps).max(0.1);
+        let front_m = self.station_m + size.length_m / 2.0;
+        let end_m = if self.change.is_none() { self.way.end_m } else { None };
+        let line_ahead_m = [
+            self.stop_gap_m(size, around, braking_mps2),
+            end_m.map(|end_m| end_m - front_m),
+            self.hold_m.map(|hold_m| hold_m - front_m),
+        ];
+        let line_ahead_m = line_ahead_m.into_iter().flatten().fold(f64::INFINITY, f64::min);
+        if around.traffic.rays {
+            return self.tending_mps2(size, around, wish_mps, line_ahead_m);
+        }
         let ratio = self.speed_mps / wish_mps;
         // To be too fast is no emergency.
         let free_mps2 =
@@ -215,16 +240,8 @@ impl Driver {
         if let Some(leader) = &self.leader {
             wanted_mps2 = wanted_mps2.min(self.follow_mps2(size, leader, free_mps2));
         }
-        if let Some(gap_m) = self.stop_gap_m(size, around, braking_mps2) {
-            wanted_mps2 = wanted_mps2.min(self.follow_mps2(size, &Leader::line(gap_m), free_mps2));
-        }
-        if let (None, Some(end_m)) = (&self.change, self.way.end_m) {
-            let gap_m = end_m - self.station_m - size.length_m / 2.0;
-            wanted_mps2 = wanted_mps2.min(self.follow_mps2(size, &Leader::line(gap_m), free_mps2));
-        }
-        if let Some(hold_m) = self.hold_m {
-            let gap_m = hold_m - self.station_m - size.length_m / 2.0;
-            wanted_mps2 = wanted_mps2.min(self.follow_mps2(size, &Leader::line(gap_m), free_mps2));
+        if line_ahead_m < f64::INFINITY {
+            wanted_mps2 = wanted_mps2.min(self.follow_mps2(size, &Leader::line(line_ahead_m), free_mps2));
         }
         wanted_mps2
     }
@@ -238,6 +255,11 @@ impl Driver {
             self.waited_ticks += 1;
         }
         f64::from(self.waited_ticks) * DT_S >= GIVE_UP_S
+    }
+
+    /// Whether no action commanded it.
+    pub(super) fn is_ambient(&self) -> bool {
+        self.limit_part.is_some()
     }
 
     /// The stream of its next draw of where to go.
@@ -258,6 +280,7 @@ impl Driver {
         sink(self.hold_m.unwrap_or(f64::INFINITY).to_bits());
         sink(self.insists_to_m.to_bits());
         sink(u64::from(self.waited_ticks));
+        sink(u64::from(self.aggression));
         if let Some(change) = &self.change {
             for value in [change.to_station_m, change.progress, change.duration_s] {
                 sink(value.to_bits());

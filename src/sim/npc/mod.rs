@@ -6,13 +6,16 @@
 //! | which vehicle it follows, and how close | `leader`; in tight turns `foresight` |
 //! | where it stops for a red or yellow light | `red_light` |
 //! | which vehicles it waits for at a junction, and for how long | `manners` |
-//! | when and how it changes lanes | `change` |
+//! | when and how it changes lanes | `change`; for its own gain `mobil` |
+//! | what it sees and does under the profile `released` | `rays` |
 
 mod change;
 mod driver;
 mod foresight;
 mod leader;
 mod manners;
+mod mobil;
+mod rays;
 mod red_light;
 
 pub(super) use change::{Manoeuvre, Towards, When, can_change, lane_beside};
