@@ -39,6 +39,16 @@ pub enum Manoeuvre {
     AwaitGap,
 }
 
+impl Manoeuvre {
+    /// The manoeuvre with the number of its object replaced.
+    pub(super) fn renumbered(self, number: impl Fn(u32) -> u32) -> Manoeuvre {
+        match self {
+            Manoeuvre::Nudge(id) => Manoeuvre::Nudge(number(id)),
+            Manoeuvre::LaneFollow | Manoeuvre::LaneChange | Manoeuvre::AwaitGap => self,
+        }
+    }
+}
+
 impl fmt::Display for Manoeuvre {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
@@ -102,8 +112,30 @@ pub enum Reason {
     KeepClear,
     /// Lost the route: constant braking.
     Fallback,
+    /// A module is too late: the degraded mode brakes.
+    Degraded,
     /// Emergency braking before something.
     Emergency(u32),
+}
+
+impl Reason {
+    /// The reason with the number of its object replaced.
+    pub(super) fn renumbered(self, number: impl Fn(u32) -> u32) -> Reason {
+        match self {
+            Reason::Stop(id) => Reason::Stop(number(id)),
+            Reason::Follow(id) => Reason::Follow(number(id)),
+            Reason::Yield(id) => Reason::Yield(number(id)),
+            Reason::Emergency(id) => Reason::Emergency(number(id)),
+            Reason::Start
+            | Reason::Cruise
+            | Reason::RedLight
+            | Reason::LaneChange
+            | Reason::Crosswalk
+            | Reason::KeepClear
+            | Reason::Degraded
+            | Reason::Fallback => self,
+        }
+    }
 }
 
 impl fmt::Display for Reason {
@@ -119,6 +151,7 @@ impl fmt::Display for Reason {
             Reason::Crosswalk => write!(f, "crosswalk"),
             Reason::KeepClear => write!(f, "keep clear"),
             Reason::Fallback => write!(f, "fallback"),
+            Reason::Degraded => write!(f, "degraded mode"),
             Reason::Emergency(id) => write!(f, "emergency {}", named(*id)),
         }
     }

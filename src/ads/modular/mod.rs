@@ -18,6 +18,7 @@ mod stack;
 #[cfg(test)]
 mod tests;
 mod tracking;
+mod watchdog;
 
 pub use config::{ConfigError, ModularConfig, Module, Weaknesses};
 pub use foresight::Foresight;

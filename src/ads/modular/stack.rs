@@ -8,7 +8,7 @@ use std::sync::Arc;
 use crate::ads::driver::Ads;
 use crate::ads::status::{GHOST_ID_MIN, PerceivedObject, PlannedPoint, Reason, Status};
 use crate::geometry::Pose;
-use crate::sim::{Control, DT_S, FRAME_S, FRAME_TICKS, Scene, Sensed};
+use crate::sim::{Control, DT_S, FRAME_TICKS, Scene, Sensed};
 
 use super::config::ModularConfig;
 use super::control::Controller;
@@ -20,6 +20,7 @@ use super::perception::{LightReader, Perception};
 use super::planning::{Outlook, Planner};
 use super::prediction::Prediction;
 use super::tracking::Tracking;
+use super::watchdog::Watchdog;
 
 /// The driving system under test.
 #[derive(Debug, Clone)]
@@ -33,6 +34,7 @@ pub struct Modular {
     planner: Planner,
     controller: Controller,
     emergency: Emergency,
+    watchdog: Watchdog,
     /// Hardest braking that the brakes give, m/s².
     brake_mps2_max: f64,
     ticks: u64,
@@ -67,6 +69,7 @@ impl Modular {
             planner: Planner::new(config, scene, &junctions),
             controller: Controller::new(&config.control),
             emergency: Emergency::new(&config.emergency),
+            watchdog: Watchdog::new(&config.latency),
             brake_mps2_max: config.control.actuators.brake_mps2_max,
             junctions,
             ticks: 0,
@@ -78,22 +81,34 @@ impl Modular {
 
     /// Perception, tracking, prediction and planning.
     fn cycle(&mut self, sensed: &Sensed, localized: &Pose) {
-        self.tracking.update(self.perception.look(sensed, localized));
+        if let Some(since_s) = self.watchdog.looks(sensed.time_s) {
+            self.tracking.resume(since_s);
+            self.tracking.delay(self.watchdog.load_frames(sensed.objects.len()));
+            self.tracking.update(self.perception.look(sensed, localized));
+        }
         let lights = self.lights.look(sensed, self.station_m);
-        let (tracks, age_s) = (self.tracking.published(), self.tracking.age_s());
+        let (tracks, age_s) =
+            (self.tracking.published(), self.tracking.age_s() + self.watchdog.perception_s());
         self.prediction.see_lights(lights);
         self.prediction.update(tracks, age_s, sensed.time_s, localized.position);
-        self.planner.plan(&Outlook {
-            localized,
-            station_m: self.station_m,
-            speed_mps: sensed.ego.speed_mps,
-            since_s: if self.ticks == 0 { 0.0 } else { FRAME_S },
-            forecasts: self.prediction.forecasts(),
-            lights,
-        });
+        if let Some(since_s) = self.watchdog.plans(sensed.time_s) {
+            self.planner.plan(&Outlook {
+                localized,
+                station_m: self.station_m,
+                speed_mps: sensed.ego.speed_mps,
+                since_s: if self.ticks == 0 { 0.0 } else { since_s },
+                forecasts: self.prediction.forecasts(),
+                lights,
+            });
+        }
         let (guide, lateral) = (self.planner.guide(), self.planner.lateral());
         self.emergency.look(tracks, age_s, guide, lateral, self.station_m, &sensed.ego);
         self.report();
+    }
+
+    /// Id of the object that a track shows, for those who look on.
+    fn truth_of(&self, id: u32) -> u32 {
+        self.prediction.forecasts().iter().find(|forecast| forecast.id == id).map_or(id, |found| found.truth)
     }
 
     /// Writes perceptions and plan into the status; its buffers are reused.
@@ -112,7 +127,7 @@ impl Modular {
             predicted.clear();
             predicted.extend_from_slice(&forecast.positions[1..]);
             let object = PerceivedObject {
-                id: (forecast.id < GHOST_ID_MIN).then_some(forecast.id),
+                id: (forecast.truth < GHOST_ID_MIN).then_some(forecast.truth),
                 body: forecast.body,
                 pose,
                 velocity_mps: forecast.velocity_mps,
@@ -134,14 +149,18 @@ impl Modular {
             let pose = if aside.offset_m == 0.0 { on_guide } else { on_guide.offset(0.0, aside.offset_m) };
             PlannedPoint { pose, speed_mps: point.speed_mps }
         }));
-        self.status.reason = self.planner.reason();
-        self.status.manoeuvre = self.planner.manoeuvre();
+        self.status.reason = self.planner.reason().renumbered(|id| self.truth_of(id));
+        self.status.manoeuvre = self.planner.manoeuvre().renumbered(|id| self.truth_of(id));
     }
 }
 
 impl Ads for Modular {
     fn drive(&mut self, sensed: &Sensed) -> Control {
-        let localized = self.localization.locate(sensed, !self.junctions.inside(self.station_m));
+        let localizes = self.watchdog.localizes(sensed.time_s);
+        let localized = match self.status.localized {
+            Some(last) if !localizes => last,
+            _ => self.localization.locate(sensed, !self.junctions.inside(self.station_m)),
+        };
         let near_m = (self.ticks > 0).then_some(self.station_m);
         self.station_m = self.planner.guide().locate(localized.position, near_m).station_m;
         let in_cycle = self.ticks % FRAME_TICKS;
@@ -150,15 +169,21 @@ impl Ads for Modular {
         }
         let control = self.controller.follow(
             &self.planner,
-            in_cycle as f64 * DT_S,
+            self.watchdog.trajectory_s(),
             &localized,
             self.station_m,
             &sensed.ego,
         );
         let control = self.emergency.brake(control, sensed.ego.speed_mps, self.brake_mps2_max);
         if let Some(id) = self.emergency.braking_for() {
-            self.status.reason = Reason::Emergency(id);
+            self.status.reason = Reason::Emergency(self.truth_of(id));
         }
+        let control = if self.watchdog.is_degraded() {
+            self.status.reason = Reason::Degraded;
+            self.watchdog.brake(control)
+        } else {
+            control
+        };
         self.status.localized = Some(localized);
         self.status.control = control;
         self.status.steer_rate_radps =

@@ -10,6 +10,7 @@ mod module;
 mod read;
 mod safety;
 mod sensing;
+mod timing;
 mod weaknesses;
 
 use serde::{Deserialize, Serialize};
@@ -19,6 +20,7 @@ pub use module::Module;
 pub use read::ConfigError;
 pub use safety::EmergencyConfig;
 pub use sensing::{LocalizationConfig, PerceptionConfig, TrackingConfig};
+pub use timing::LatencyConfig;
 pub use weaknesses::Weaknesses;
 
 /// Settings of [`Modular`](super::Modular). Keys that a file leaves out keep their default.
@@ -32,5 +34,6 @@ pub struct ModularConfig {
     pub planning: PlanningConfig,
     pub control: ControlConfig,
     pub emergency: EmergencyConfig,
+    pub latency: LatencyConfig,
     pub weaknesses: Weaknesses,
 }

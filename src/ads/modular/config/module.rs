@@ -6,6 +6,7 @@ use super::ModularConfig;
 use super::driving::{ControlConfig, PlanningConfig, PredictionConfig};
 use super::safety::EmergencyConfig;
 use super::sensing::{LocalizationConfig, PerceptionConfig, TrackingConfig};
+use super::timing::LatencyConfig;
 use super::weaknesses::Weaknesses;
 
 /// A part of the modular driving system that a failure can be blamed on.
@@ -17,7 +18,7 @@ pub enum Module {
     Tracking,
     Prediction,
     Planning,
-    /// Time between a look and its use.
+    /// Time between a look and its use, and what watches it.
     Latency,
     Control,
     /// Emergency braking.
@@ -45,7 +46,7 @@ impl Module {
 
 impl ModularConfig {
     /// This system with one module without error: no noise, no planted fault, no weakness of its
-    /// own. Weakness (a) belongs to perception (range, occlusion, flicker) and to tracking
+    /// own. `late_unstable_tracks` belongs to perception (range, occlusion, flicker) and to tracking
     /// (publication): each of the two loses its share by its `perfect` switch.
     ///
     /// Planning keeps its way of driving (speeds, gaps) only as far as the default has it: a profile
@@ -64,6 +65,7 @@ impl ModularConfig {
             planning: PlanningConfig::default(),
             control: ControlConfig::default(),
             emergency: EmergencyConfig::default(),
+            latency: LatencyConfig { per_object_s: 0.0, ..LatencyConfig::default() },
             weaknesses: Weaknesses {
                 late_unstable_tracks: self.weaknesses.late_unstable_tracks,
                 ..Weaknesses::NONE
@@ -72,7 +74,7 @@ impl ModularConfig {
         self.with_module_of(module, &ideal)
     }
 
-    /// This system with one module as another profile has it. Weakness (a) goes with perception.
+    /// This system with one module as another profile has it. `late_unstable_tracks` goes with perception.
     pub fn with_module_of(&self, module: Module, other: &ModularConfig) -> ModularConfig {
         let mut config = *self;
         match module {
@@ -101,6 +103,7 @@ impl ModularConfig {
             Module::Latency => {
                 config.localization.latency_s = other.localization.latency_s;
                 config.perception.latency_frames = other.perception.latency_frames;
+                config.latency = other.latency;
             }
             Module::Control => config.control = other.control,
             Module::Emergency => config.emergency = other.emergency,

@@ -12,6 +12,7 @@ use super::ModularConfig;
 use super::driving::{ActuatorsConfig, PedalsConfig, PlanningConfig, PredictionConfig};
 use super::safety::EmergencyConfig;
 use super::sensing::{LocalizationConfig, PerceptionConfig, TrackingConfig};
+use super::timing::LatencyConfig;
 
 /// Why a profile cannot be used. The message does not name the file: the caller puts the name before it.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -46,6 +47,7 @@ const SECTIONS: &[(&str, Ranges)] = &[
     ("control.pedals", PedalsConfig::RANGES),
     ("control.actuators", ActuatorsConfig::RANGES),
     ("emergency", EmergencyConfig::RANGES),
+    ("latency", LatencyConfig::RANGES),
 ];
 
 impl ModularConfig {

@@ -27,9 +27,9 @@ section! {
 section! {
     /// Detection of objects and of the colours of traffic lights.
     pub struct PerceptionConfig {
-        /// Reach of the LiDAR in clear air, m, in `[0, 300]`: vehicles. Sensor data sheets, 10 % reflectance: 120. Weakness (a) ends it at `grid_m`.
+        /// Reach of the LiDAR in clear air, m, in `[0, 300]`: vehicles. Sensor data sheets, 10 % reflectance: 120. `late_unstable_tracks` ends it at `grid_m`.
         lidar_vehicle_m: f64 = 120.0, 0.0..=300.0;
-        /// Reach of the LiDAR in clear air, m, in `[0, 300]`: pedestrians. 60. Weakness (a) ends it at `small_m`.
+        /// Reach of the LiDAR in clear air, m, in `[0, 300]`: pedestrians. 60. `late_unstable_tracks` ends it at `small_m`.
         lidar_pedestrian_m: f64 = 60.0, 0.0..=300.0;
         /// Where the detector's grid ends, m, in `[0, 300]`. Apollo's PointPillars: 74.88.
         grid_m: f64 = 74.88, 0.0..=300.0;
@@ -55,7 +55,7 @@ section! {
         detection_chance_max: f64 = 0.98, 0.0..=1.0;
         /// Mean length of a run of missed frames, s, in `[0.1, 10]`. Flicker of detections: 0.3 to 0.5; the share of missed frames does not depend on it.
         miss_run_s: f64 = 0.4, 0.1..=10.0;
-        /// An object of which less is in sight is not detected under weakness (a), in `[0, 1]`. Published occlusion levels: 0.2.
+        /// An object of which less is in sight is not detected under `late_unstable_tracks`, in `[0, 1]`. Published occlusion levels: 0.2.
         visible_fraction_min: f64 = 0.2, 0.0..=1.0;
         /// Ghosts that begin in a second in clear air, 1/s, in `[0, 10]`. Sensor defaults of the literature: 0.002.
         ghosts_per_s: f64 = 0.002, 0.0..=10.0;
@@ -73,10 +73,14 @@ section! {
         heading_sigma_rad: f64 = 0.052, 0.0..=1.0;
         /// Relative error of the size of an object, kept for its life, in `[0, 0.2]`. nuScenes: 0.05.
         size_sigma: f64 = 0.05, 0.0..=0.2;
-        /// Under weakness (a) a vehicle longer than this flickers, m, in `[0, 30]`. Ours.
+        /// Under `late_unstable_tracks` a vehicle longer than this flickers and splits, m, in `[0, 30]`. Ours.
         large_vehicle_m: f64 = 7.0, 0.0..=30.0;
         /// Length of the part then seen, m, in `[1, 30]`. Ours.
         flicker_length_m: f64 = 4.5, 1.0..=30.0;
+        /// Share of the time in which such a vehicle is detected as two under `late_unstable_tracks`, in `[0, 0.9]`. Apollo issue 14212: inconsistent perception of a truck; the figure is ours.
+        split_share: f64 = 0.05, 0.0..=0.9;
+        /// Mean length of such a time, s, in `[0.1, 10]`. Ours: long enough for the parts to be published.
+        split_run_s: f64 = 1.0, 0.1..=10.0;
         /// Colours of traffic lights are read from here on, m, in `[0, 300]`, or from the meteorological optical range. The camera's: 120.
         light_range_m: f64 = 120.0, 0.0..=300.0;
         /// A colour that goes out of sight is taken to hold for so long, s, in `[0, 10]`. Ours.
@@ -93,10 +97,14 @@ section! {
 section! {
     /// Tracks out of detections.
     pub struct TrackingConfig {
-        /// Frames in a row before a track is published under weakness (a), in `[1, 100]`. Apollo `pub_track_time_thresh` 3: the fourth.
+        /// Detections of a track, in a row or not, before it is published under `late_unstable_tracks`, in `[1, 100]`. Apollo `pub_track_time_thresh` 3: the fourth.
         frames_to_publish: u32 = 4, 1.0..=100.0;
         /// A track unseen for longer is dropped, s, in `[0, 5]`. Apollo's tracker reserves 0.3.
         reserve_s: f64 = 0.3, 0.0..=5.0;
+        /// A detection farther from where a track is expected does not belong to it, m, in `[0.1, 50]`. Apollo's fusion, `s_match_distance_thresh_`: 4.0.
+        gate_m: f64 = 4.0, 0.1..=50.0;
+        /// A track whose centre lies in the outline of an older one, grown by this on each side, is a duplicate and dropped, m, in `[0, 20]`. Ours; more is a fault to plant.
+        duplicate_m: f64 = 0.0, 0.0..=20.0;
         /// Acceleration that the tracker expects of vehicles, standard deviation, m/s², in `[0.1, 20]`. Ours.
         vehicle_acceleration_sigma_mps2: f64 = 3.0, 0.1..=20.0;
         /// Acceleration that the tracker expects of pedestrians, standard deviation, m/s², in `[0.1, 20]`. Ours.

@@ -6,7 +6,8 @@ use crate::model::vocabulary::Body;
 /// One object in one frame, on the map.
 #[derive(Debug, Clone, Copy)]
 pub struct Detection {
-    pub id: u32,
+    /// Id of what it shows: an annotation that no tracker is given, except an idealised one.
+    pub truth: u32,
     pub body: Body,
     /// Pose as measured: centre of the whole object, see `shift_m`.
     pub pose: Pose,

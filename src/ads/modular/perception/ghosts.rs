@@ -63,7 +63,7 @@ impl Ghosts {
             self.alive.push(Ghost { id, position: localized.offset(ahead_m, left_m).position, rest_s });
         }
         detections.extend(self.alive.iter().map(|ghost| Detection {
-            id: ghost.id,
+            truth: ghost.id,
             body: Body::Hatchback,
             pose: Pose { position: ghost.position, heading_rad: localized.heading_rad },
             shift_m: 0.0,

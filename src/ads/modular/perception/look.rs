@@ -4,8 +4,8 @@
 //! hides it; far away by day the camera alone does. Misses come in runs, not one by one: a chain of
 //! two states in which the share of misses is one minus that chance. Each object has a random stream of
 //! its own, so that a change of one object does not change the luck of the others.
-//! Left out: confusion of identities and of classes beside the flicker of large vehicles, headings
-//! turned round, and a latency that grows with the number of objects.
+//! A large vehicle is at times taken for its near part alone, and for runs of frames for two vehicles.
+//! Left out: confusion of classes beside that, and headings turned round.
 
 use crate::geometry::{Pose, Vec2, unit_vector, wrap_angle};
 use crate::model::vocabulary::Body;
@@ -21,7 +21,7 @@ use super::ranges::Ranges;
 #[derive(Debug, Clone)]
 pub struct Perception {
     config: PerceptionConfig,
-    /// Weakness (a): the detector's grid, occlusion, flicker.
+    /// `late_unstable_tracks`: the detector's grid, occlusion, flicker.
     limited: bool,
     seed: u64,
     frame: u64,
@@ -40,6 +40,8 @@ struct Watched {
     /// Whether it has been detected at all, and whether it was missed in the last frame.
     seen: bool,
     missed: bool,
+    /// Whether it is detected as two vehicles now.
+    split: bool,
     size_factor: f64,
     frame: u64,
 }
@@ -73,15 +75,25 @@ impl Perception {
             let index = self.watch(object.id);
             let known = !self.watched[index].missed;
             let detection_chance = self.detection_chance(&ranges, object, known);
-            let flickers = self.flickers(object);
+            let large =
+                self.limited && object.length_m > self.config.large_vehicle_m && object.body.is_vehicle();
             let watched = &mut self.watched[index];
             watched.draw(detection_chance, self.config.miss_run_s);
             if watched.missed {
                 continue;
             }
+            if large {
+                watched.draw_split(&self.config);
+            }
             let noise: [f64; 3] = core::array::from_fn(|_| rng::normal(&mut watched.rng));
-            let detection = measure(&self.config, object, watched, flickers, sensed, localized, &noise);
-            self.detections.push(detection);
+            let flickers = large && (self.frame + u64::from(object.id)).is_multiple_of(2);
+            let detection =
+                measure(&self.config, object, watched, flickers || watched.split, sensed, localized, &noise);
+            if watched.split {
+                self.detections.extend(parts(object, &detection));
+            } else {
+                self.detections.push(detection);
+            }
         }
         let frame = self.frame;
         self.watched.retain(|watched| watched.frame == frame);
@@ -104,7 +116,15 @@ impl Perception {
         let index = self.watched.iter().position(|watched| watched.id == id).unwrap_or_else(|| {
             let mut rng = rng::stream(self.seed, Stream::Perception, u64::from(id));
             let size_factor = 1.0 + self.config.size_sigma * rng::normal(&mut rng).clamp(-3.0, 3.0);
-            self.watched.push(Watched { id, rng, seen: false, missed: true, size_factor, frame: 0 });
+            self.watched.push(Watched {
+                id,
+                rng,
+                seen: false,
+                missed: true,
+                split: false,
+                size_factor,
+                frame: 0,
+            });
             self.watched.len() - 1
         });
         self.watched[index].frame = self.frame;
@@ -121,17 +141,17 @@ impl Perception {
         }
         object.visible_fraction * ranges.detection_chance(config, object, known)
     }
-
-    /// Whether this frame sees of it only the near part.
-    fn flickers(&self, object: &SensedObject) -> bool {
-        self.limited
-            && object.length_m > self.config.large_vehicle_m
-            && object.body.is_vehicle()
-            && (self.frame + u64::from(object.id)).is_multiple_of(2)
-    }
 }
 
 impl Watched {
+    /// Whether the next frame sees one large vehicle or two: a chain of two states, as for misses.
+    fn draw_split(&mut self, config: &PerceptionConfig) {
+        let luck = rng::unit(&mut self.rng);
+        let ends = (FRAME_S / config.split_run_s).min(1.0);
+        let begins = ends * config.split_share / (1.0 - config.split_share);
+        self.split = if self.split { luck >= ends } else { luck < begins };
+    }
+
     /// The next state of the chain, whose share of misses is one minus the chance. Before the first
     /// detection there is no run of misses to be in: frames are independent.
     fn draw(&mut self, detection_chance: f64, miss_run_s: f64) {
@@ -153,13 +173,23 @@ impl Watched {
     }
 }
 
+/// A large vehicle detected as two: the near part that was measured, which a tracker knows by its near
+/// end, and the rest as an object of its own.
+fn parts(object: &SensedObject, near: &Detection) -> [Detection; 2] {
+    let rest_m = (object.length_m - near.length_m).max(1.0);
+    let towards = if near.shift_m < 0.0 { -1.0 } else { 1.0 };
+    let ahead = unit_vector(near.pose.heading_rad) * (-towards * near.length_m / 2.0);
+    let pose = Pose { position: near.pose.position + ahead, ..near.pose };
+    [*near, Detection { pose, shift_m: 0.0, length_m: rest_m, ..*near }]
+}
+
 /// The object as it is, placed on the map from where the vehicle believes it is.
 fn exactly(object: &SensedObject, sensed: &Sensed, localized: &Pose) -> Detection {
     let from_ego = sensed.ego.rear_axle.to_local(object.pose.position);
     let turned_rad = object.pose.heading_rad - sensed.ego.rear_axle.heading_rad;
     let heading_rad = wrap_angle(localized.heading_rad + turned_rad);
     Detection {
-        id: object.id,
+        truth: object.id,
         body: object.body,
         pose: Pose { position: localized.to_world(from_ego), heading_rad },
         shift_m: 0.0,
@@ -237,7 +267,7 @@ mod tests {
     }
 
     #[test]
-    fn weakness_a_hides_what_is_mostly_hidden_and_ends_with_the_grid() {
+    fn unstable_perception_hides_what_is_mostly_hidden_and_ends_with_the_grid() {
         let config = PerceptionConfig { camera_alone_light: 1.0, ..PerceptionConfig::default() };
         let night = |object| SensedObject { visible_fraction: 0.15, ..object };
         assert_eq!(count(&config, true, night(at(Body::Sedan, 20.0))), 0);
@@ -252,7 +282,7 @@ mod tests {
     }
 
     #[test]
-    fn weakness_a_lets_a_bus_flicker_in_size_and_class() {
+    fn unstable_perception_lets_a_bus_flicker_in_size_and_class() {
         let config = PerceptionConfig::default();
         let bus = at(Body::SchoolBus, 20.0);
         let cars = |limited| seen(&config, limited, bus).iter().filter(|d| d.body == Body::SUV).count();
@@ -260,6 +290,28 @@ mod tests {
         assert_eq!(cars(false), 0);
         let car = seen(&config, true, bus).into_iter().find(|d| d.body == Body::SUV).unwrap();
         assert!(car.length_m < 6.0 && car.shift_m < -3.0, "{car:?}");
+    }
+
+    #[test]
+    fn a_bus_is_at_times_detected_as_two() {
+        let config = PerceptionConfig { split_share: 0.3, ..PerceptionConfig::default() };
+        let bus = at(Body::SchoolBus, 20.0);
+        let mut perception = Perception::new(&config, true, 3);
+        let sensed = sensed(vec![bus]);
+        let (mut twice, frames) = (0, 2000);
+        for _ in 0..frames {
+            let found = perception.look(&sensed, &sensed.ego.rear_axle);
+            if let [near, far] = found {
+                twice += 1;
+                assert_eq!(near.truth, far.truth);
+                // Together they are as long as the bus, bumper to bumper.
+                let apart_m = far.pose.position.x - (near.pose.position.x + near.shift_m);
+                assert!((apart_m - bus.length_m / 2.0).abs() < 0.7, "{apart_m}");
+            }
+        }
+        let share = f64::from(twice) / f64::from(frames);
+        assert!((share - 0.3).abs() < 0.12, "{share}");
+        assert!(seen(&PerceptionConfig { split_share: 0.9, ..config }, false, bus).len() <= 400);
     }
 
     #[test]

@@ -25,7 +25,7 @@ pub struct Ranges {
 }
 
 impl Ranges {
-    /// `limited` is weakness (a): the detector's grid ends before the LiDAR does.
+    /// `limited` is the weakness `late_unstable_tracks`: the detector's grid ends before the LiDAR does.
     pub fn in_conditions(config: &PerceptionConfig, limited: bool, conditions: &Conditions) -> Ranges {
         let extinction_per_m = extinction_per_m(conditions);
         let dark = 1.0 - conditions.light.clamp(0.0, 1.0);

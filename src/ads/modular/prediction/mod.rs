@@ -4,7 +4,7 @@
 //! that keeps the lane and one that leaves it; their probabilities come from noisy tracks and may be wrong.
 //! It is believed to leave its lane only once its centre is over the edge or its lateral speed has lasted
 //! half a second: a documented weakness of the system modelled (Apollo issues 11118, 12798, 14212), kept on
-//! purpose and switchable (b). Along each lane it follows its leader, slows down for bends and stops at
+//! purpose and switchable. Along each lane it follows its leader, slows down for bends and stops at
 //! lights that are known to be red. Pedestrians at the kerb may set out. What is far away or on no lane keeps
 //! its velocity. Left out: indicators, reactions to the ego vehicle, and Apollo's learned predictors, which
 //! have in common with this that they follow lanes.
@@ -67,6 +67,8 @@ pub struct Prediction {
 #[derive(Debug, Clone)]
 pub struct Forecast {
     pub id: u32,
+    /// Id of the object that the track shows; see [`Track::truth`].
+    pub truth: u32,
     /// How probable this future is, in `(0, 1]`; the sum over an object's hypotheses is 1.
     pub probability: f64,
     pub body: Body,
@@ -109,7 +111,7 @@ struct Placed {
 }
 
 impl Prediction {
-    /// `lane_bound` is weakness (b). A foresight is used only by a perfect prediction.
+    /// `lane_bound` is the weakness `lane_bound_prediction`. A foresight is used only by a perfect prediction.
     pub fn new(
         config: &PredictionConfig,
         lane_bound: bool,
@@ -186,6 +188,7 @@ impl Prediction {
         let near = (position - ego).norm() < self.config.reach_m;
         let mut forecast = Forecast {
             id: track.id,
+            truth: track.truth,
             probability: 1.0,
             body: track.body,
             heading_rad: track.heading_rad,
@@ -198,7 +201,7 @@ impl Prediction {
             positions: core::array::from_fn(|step| position + velocity_mps * (step as f64 * STEP_S)),
         };
         let foreseen = self.foresight.as_ref().is_some_and(|foresight| {
-            foresight.positions(track.id, time_s, position, STEP_S, &mut forecast.positions)
+            foresight.positions(track.truth, time_s, position, STEP_S, &mut forecast.positions)
         });
         if foreseen {
             forecast.moving |= (forecast.positions[STEPS] - position).norm() > 1.0;
@@ -454,7 +457,7 @@ mod tests {
     }
 
     #[test]
-    fn weakness_b_believes_in_leaving_the_lane_half_a_second_late() {
+    fn lane_bound_prediction_believes_in_leaving_the_lane_half_a_second_late() {
         let config = PredictionConfig::default();
         let late_s = believed_s(&config, true);
         let soon_s = believed_s(&config, false);

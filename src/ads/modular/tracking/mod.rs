@@ -1,0 +1,281 @@
+//! Tracks out of detections, when a track is published, and how late it is used.
+//!
+//! As Apollo's fusion: detections are associated with tracks by distance within a gate, each track is a Kalman
+//! filter, and a track is published once it has had more than three detections, in a row or not. Detections
+//! carry no identity, so tracks can swap; of two tracks in one place the younger is taken for a duplicate,
+//! so objects that touch can merge; and a large vehicle that is detected in parts splits.
+
+mod association;
+mod track;
+
+use std::collections::VecDeque;
+
+use crate::sim::FRAME_S;
+
+use self::association::Association;
+use super::config::TrackingConfig;
+use super::perception::Detection;
+use super::watchdog::LOAD_FRAMES_MAX;
+
+pub use track::Track;
+
+/// How long a perfect tracker remembers what it saw, s.
+const PERFECT_RESERVE_S: f64 = 5.0;
+
+#[derive(Debug, Clone)]
+pub struct Tracking {
+    config: TrackingConfig,
+    frames_to_publish: u32,
+    latency_frames: usize,
+    /// How many frames later still the tracks are used now.
+    load_frames: usize,
+    /// Number of tracks begun so far.
+    begun: u32,
+    tracks: Vec<Track>,
+    association: Association,
+    /// Published tracks of the last frames, newest last.
+    published: VecDeque<Vec<Track>>,
+}
+
+impl Tracking {
+    /// `late` is the weakness `late_unstable_tracks`: a track must last before it is published.
+    pub fn new(config: &TrackingConfig, late: bool, latency_frames: u32) -> Tracking {
+        let frames_to_publish = if late && !config.perfect { config.frames_to_publish } else { 1 };
+        Tracking {
+            config: *config,
+            frames_to_publish,
+            latency_frames: latency_frames as usize,
+            load_frames: 0,
+            begun: 0,
+            tracks: Vec::new(),
+            association: Association::default(),
+            published: VecDeque::new(),
+        }
+    }
+
+    /// Sets how many frames later than usual tracks are used from now on: perception is late under load.
+    pub fn delay(&mut self, load_frames: usize) {
+        self.load_frames = load_frames.min(LOAD_FRAMES_MAX);
+    }
+
+    /// Forgets all tracks if the last frame was `since_s` ago and that is longer than any is reserved.
+    pub fn resume(&mut self, since_s: f64) {
+        if since_s > FRAME_S + self.config.reserve_s {
+            self.tracks.clear();
+            self.published.clear();
+        }
+    }
+
+    /// One frame of detections.
+    pub fn update(&mut self, detections: &[Detection]) {
+        for track in &mut self.tracks {
+            track.unseen_s += FRAME_S;
+            track.advance(&self.config);
+        }
+        let found = self.association.find(&self.config, &self.tracks, detections);
+        for (detection, index) in detections.iter().zip(found) {
+            let track = match index {
+                Some(index) => {
+                    self.tracks[*index].correct(detection);
+                    &mut self.tracks[*index]
+                }
+                None => {
+                    self.begun += 1;
+                    self.tracks.push(Track::begin(self.begun, detection));
+                    self.tracks.last_mut().expect("it was just added")
+                }
+            };
+            if self.config.perfect {
+                track.know(detection);
+            }
+        }
+        let frames_to_publish = self.frames_to_publish;
+        let reserve_s = if self.config.perfect { PERFECT_RESERVE_S } else { self.config.reserve_s };
+        self.tracks.retain_mut(|track| {
+            track.published |= track.frames >= frames_to_publish;
+            track.unseen_s <= reserve_s + 1e-9
+        });
+        if !self.config.perfect {
+            self.drop_duplicates();
+        }
+        // The oldest list is overwritten: after the first frames nothing is allocated.
+        let mut newest = if self.published.len() > self.latency_frames + LOAD_FRAMES_MAX {
+            self.published.pop_front().expect("it is longer than nothing")
+        } else {
+            Vec::new()
+        };
+        newest.clear();
+        newest.extend(self.tracks.iter().filter(|track| track.published));
+        for track in &mut newest {
+            track.velocity_mps *= self.config.velocity_factor;
+        }
+        self.published.push_back(newest);
+    }
+
+    /// Drops every track whose centre lies in the outline of one that has been seen more often.
+    fn drop_duplicates(&mut self) {
+        let room_m = self.config.duplicate_m;
+        let mut index = 0;
+        while index < self.tracks.len() {
+            let own = &self.tracks[index];
+            let is_duplicate = self.tracks.iter().enumerate().any(|(number, other)| {
+                let older = (other.frames, own.id) > (own.frames, other.id);
+                number != index
+                    && older
+                    && own.body.is_vehicle() == other.body.is_vehicle()
+                    && other.holds(own.centre(), room_m)
+            });
+            if is_duplicate {
+                self.tracks.remove(index);
+            } else {
+                index += 1;
+            }
+        }
+    }
+
+    /// The tracks that are used now: those of some frames ago.
+    pub fn published(&self) -> &[Track] {
+        let newest = self.published.len().checked_sub(1 + self.latency_frames + self.load_frames);
+        newest.map_or(&[], |index| &self.published[index])
+    }
+
+    /// Age of the tracks that are used now, s.
+    pub fn age_s(&self) -> f64 {
+        (self.latency_frames + self.load_frames) as f64 * FRAME_S
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::{Pose, Vec2};
+    use crate::model::vocabulary::Body;
+
+    fn car(x_m: f64) -> Detection {
+        Detection {
+            truth: 7,
+            body: Body::SUV,
+            pose: Pose::new(x_m, 2.0, 0.0),
+            shift_m: 0.0,
+            length_m: 4.7,
+            width_m: 1.9,
+            height_m: 1.7,
+            sigma_m: 0.1,
+            true_velocity_mps: Vec2::new(8.0, 0.0),
+            true_heading_rad: 0.0,
+        }
+    }
+
+    /// Frame (from 1) in which something is first published.
+    fn first_published(tracking: &mut Tracking) -> u32 {
+        let published = |frame: &u32| {
+            tracking.update(&[car(0.8 * f64::from(*frame))]);
+            !tracking.published().is_empty()
+        };
+        (1..60).find(published).expect("in the end it is published")
+    }
+
+    #[test]
+    fn late_tracks_and_latency_each_delay_the_first_sight() {
+        let config = TrackingConfig::default();
+        let first = |late, latency_frames| first_published(&mut Tracking::new(&config, late, latency_frames));
+        assert_eq!([first(true, 0), first(false, 0), first(true, 1), first(false, 5)], [4, 1, 5, 6]);
+        let slow = TrackingConfig { frames_to_publish: 15, ..config };
+        assert_eq!(first_published(&mut Tracking::new(&slow, true, 0)), 15);
+        let perfect = TrackingConfig { perfect: true, ..slow };
+        assert_eq!(first_published(&mut Tracking::new(&perfect, true, 0)), 1);
+    }
+
+    #[test]
+    fn a_track_learns_the_velocity_and_outlives_three_misses() {
+        for (config, misses) in [
+            (TrackingConfig::default(), 3),
+            (TrackingConfig { reserve_s: 1.0, ..TrackingConfig::default() }, 10),
+            (TrackingConfig { perfect: true, ..TrackingConfig::default() }, 50),
+        ] {
+            let mut tracking = Tracking::new(&config, true, 0);
+            for frame in 0..20 {
+                tracking.update(&[car(30.0 + 0.8 * f64::from(frame))]);
+            }
+            let velocity_mps = tracking.published()[0].velocity_mps;
+            let error_mps = (velocity_mps - Vec2::new(8.0, 0.0)).norm();
+            assert!(if config.perfect { error_mps == 0.0 } else { error_mps < 0.2 }, "{velocity_mps}");
+            for miss in 1..=misses + 1 {
+                tracking.update(&[]);
+                assert_eq!(tracking.published().len(), usize::from(miss <= misses), "miss {miss}");
+            }
+        }
+    }
+
+    fn walker(truth: u32, x_m: f64, y_m: f64) -> Detection {
+        Detection {
+            truth,
+            body: Body::Pedestrian,
+            pose: Pose::new(x_m, y_m, 0.0),
+            length_m: 0.5,
+            width_m: 0.5,
+            ..car(0.0)
+        }
+    }
+
+    #[test]
+    fn detections_count_whether_in_a_row_or_not() {
+        let mut tracking = Tracking::new(&TrackingConfig::default(), true, 0);
+        for frame in 0..7 {
+            let seen = [walker(1, 10.0, 2.0)];
+            tracking.update(&seen[..usize::from(frame % 2 == 0)]);
+            assert_eq!(tracking.published().len(), usize::from(frame == 6), "frame {frame}");
+        }
+    }
+
+    /// The objects that the two tracks of two pedestrians show before and after they have met halfway. They
+    /// walk towards each other, past each other at `aside_m`, and are out of sight while they pass.
+    fn met(config: &TrackingConfig, aside_m: f64) -> (Vec<u32>, Vec<u32>) {
+        let mut tracking = Tracking::new(config, true, 0);
+        let mut before = Vec::new();
+        for frame in 0..60 {
+            let way_m = 0.13 * f64::from(frame);
+            let both = [walker(1, way_m, 0.0), walker(2, 7.67 - way_m, aside_m)];
+            // The one turns back where they meet, which the tracks do not expect.
+            let turned = frame > 28;
+            let both = if turned { [walker(2, way_m, 0.0), walker(1, 7.67 - way_m, aside_m)] } else { both };
+            tracking.update(&both);
+            if frame == 20 {
+                before = tracking.published().iter().map(|track| track.truth).collect();
+            }
+        }
+        (before, tracking.published().iter().map(|track| track.truth).collect())
+    }
+
+    #[test]
+    fn pedestrians_who_meet_and_turn_swap_their_tracks_unless_it_is_perfect() {
+        let (before, after) = met(&TrackingConfig::default(), 0.9);
+        assert_eq!((before, after), (vec![1, 2], vec![2, 1]));
+        let (before, after) = met(&TrackingConfig { perfect: true, ..TrackingConfig::default() }, 0.9);
+        assert_eq!(before, after);
+    }
+
+    #[test]
+    fn what_is_in_one_place_is_one_track() {
+        let published = |config: &TrackingConfig, apart_m: f64| {
+            let mut tracking = Tracking::new(config, true, 0);
+            for _ in 0..10 {
+                tracking.update(&[walker(1, 10.0, 2.0), walker(2, 10.0, 2.0 + apart_m)]);
+            }
+            tracking.published().len()
+        };
+        let default = TrackingConfig::default();
+        assert_eq!([published(&default, 0.2), published(&default, 1.0)], [1, 2]);
+        let merging = TrackingConfig { duplicate_m: 3.0, ..default };
+        assert_eq!([published(&merging, 1.0), published(&merging, 4.0)], [1, 2]);
+        assert_eq!(published(&TrackingConfig { perfect: true, ..merging }, 0.2), 2);
+    }
+
+    #[test]
+    fn a_planted_fault_scales_the_velocity() {
+        let config = TrackingConfig { velocity_factor: 0.0, ..TrackingConfig::default() };
+        let mut tracking = Tracking::new(&config, true, 0);
+        (0..20).for_each(|frame| tracking.update(&[car(0.8 * f64::from(frame))]));
+        assert_eq!(tracking.published()[0].velocity_mps, Vec2::zeros());
+    }
+}
