@@ -1,25 +1,31 @@
 //! Driving systems: what drives the ego vehicle. They see `Sensed` and the HD map, never the `World`.
 //!
-//! `modular` is the system under test, `reference` holds drivers to compare it with; `guide` and
-//! `steering` serve both.
+//! `modular` is the system under test; `frenet` and `reactive` are two more of other kinds, `reference` holds
+//! drivers to judge by. `guide` and `steering` serve all, `sight` and `stops` the two others.
 
 mod driver;
+mod frenet;
 mod guide;
 mod handover;
 mod modular;
+mod reactive;
 mod reference;
 mod registry;
 mod selected;
 mod settings;
+mod sight;
 mod status;
 mod steering;
+mod stops;
 #[cfg(test)]
 mod testing;
 #[cfg(test)]
 mod tests;
 
 pub use driver::Ads;
+pub use frenet::Frenet;
 pub use modular::{ConfigError, Foresight, Modular, ModularConfig, Module, Weaknesses};
+pub use reactive::Reactive;
 pub use reference::{CarefulHuman, Evasion, FuzzySafety, Idm, MinimalPerformance, Reference, Rss, in_sight};
 pub use registry::{Entry, REGISTRY, by_name};
 pub use selected::{NoSettings, Selected};

@@ -5,7 +5,9 @@ use std::sync::Arc;
 use crate::sim::Scene;
 
 use super::driver::Ads;
+use super::frenet::Frenet;
 use super::modular::{Modular, ModularConfig};
+use super::reactive::Reactive;
 use super::reference::{CarefulHuman, FuzzySafety, Idm, MinimalPerformance, Reference, Rss};
 
 /// A driving system that can be asked for by name.
@@ -28,6 +30,16 @@ pub const REGISTRY: &[Entry] = &[
         name: "modular",
         summary: "localisation, perception, prediction, planning and control after Apollo 7.0",
         build: |scene, seed| Box::new(Modular::new(scene, &ModularConfig::default(), seed)),
+    },
+    Entry {
+        name: "frenet",
+        summary: "plans by sampling in a Frenet frame (Werling), with the proposals and scores of PDM-Closed",
+        build: |scene, _seed| Box::new(Frenet::new(scene)),
+    },
+    Entry {
+        name: "reactive",
+        summary: "reacts only: Stanley steering, adaptive cruise control, emergency braking, lane change assistant",
+        build: |scene, _seed| Box::new(Reactive::new(scene)),
     },
     Entry {
         name: "idm",

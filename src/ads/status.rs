@@ -98,6 +98,8 @@ pub enum Reason {
     Cruise,
     /// A red or yellow light.
     RedLight,
+    /// A stop sign at which the vehicle has not stood yet.
+    StopSign,
     /// Something that stands in the way.
     Stop(u32),
     /// Something that moves ahead in the same direction.
@@ -129,6 +131,7 @@ impl Reason {
             Reason::Start
             | Reason::Cruise
             | Reason::RedLight
+            | Reason::StopSign
             | Reason::LaneChange
             | Reason::Crosswalk
             | Reason::KeepClear
@@ -144,6 +147,7 @@ impl fmt::Display for Reason {
             Reason::Start => write!(f, "start"),
             Reason::Cruise => write!(f, "cruise"),
             Reason::RedLight => write!(f, "red light"),
+            Reason::StopSign => write!(f, "stop sign"),
             Reason::Stop(id) => write!(f, "stop {}", named(*id)),
             Reason::Follow(id) => write!(f, "follow {}", named(*id)),
             Reason::Yield(id) => write!(f, "yield {}", named(*id)),

@@ -5,7 +5,8 @@ use std::sync::Arc;
 
 use crate::geometry::Pose;
 use crate::model::vocabulary::{Body, Level, TimeOfDay, Word};
-use crate::sim::{Scene, Start, TrafficProfile, World};
+use crate::road::testing::{lanes as lanes_of, street};
+use crate::sim::{DT_S, Scene, Start, TrafficProfile, World};
 
 use super::driver::Ads;
 use super::registry::REGISTRY;
@@ -77,5 +78,46 @@ fn all_keep_a_straight_lane_repeat_themselves_and_copy() {
             first.measure();
             assert_eq!(copy.drive(&first.sensed), first.tick(), "{}", entry.name);
         }
+    }
+}
+
+/// Three lanes of 3.5 m to the east; the route is on the middle one (y = -5.25) from x = 20.
+fn three_lanes() -> Arc<Scene> {
+    let broken = r#"<roadMark sOffset="0" type="broken"/>"#;
+    let lanes = [-1, -2, -3].map(|id| (id, "driving", 3.5, broken));
+    let road = street("1", [0.0, 0.0, 0.0, 600.0], "-1", "", &lanes_of(&lanes), "");
+    crate::sim::testing::scene(&road, ("1", -2, 20.0), ("1", -2, 500.0))
+}
+
+/// The common test "cutin-brake": A, 60 m ahead, brakes from 4 s on; B, 25 m ahead in the left lane, moves over
+/// from 2 s on, and brakes from 5 s on to stop behind A. Least gap (m), and the driver's speed at the end.
+fn cut_in_and_brake(ads: &dyn Fn(&Arc<Scene>) -> Box<dyn Ads>) -> (f64, f64) {
+    let scene = three_lanes();
+    let mut rig = Rig::new(&scene, ads(&scene), 14.0);
+    rig.sensed.signals.clear();
+    rig.sensed.objects = vec![
+        object(1, Body::Sedan, Pose::new(20.0 + 60.0, -5.25, 0.0), 12.0),
+        object(2, Body::Sedan, Pose::new(20.0 + 25.0, -1.75, 0.0), 12.0),
+    ];
+    for _ in 0..600 {
+        let time_s = rig.sensed.time_s;
+        for (object, brakes_s) in rig.sensed.objects.iter_mut().zip([4.0, 5.0]) {
+            if time_s >= brakes_s {
+                object.velocity_mps.x = (object.velocity_mps.x - 6.0 * DT_S).max(0.0);
+            }
+        }
+        let cutter = &mut rig.sensed.objects[1];
+        cutter.velocity_mps.y = if time_s >= 2.0 && cutter.pose.position.y > -5.25 { -1.5 } else { 0.0 };
+        rig.tick();
+    }
+    rig.measure();
+    (rig.gap_m_min, rig.sensed.ego.speed_mps)
+}
+
+#[test]
+fn a_cut_in_that_brakes_is_survived() {
+    for entry in REGISTRY {
+        let (gap_m_min, speed_mps) = cut_in_and_brake(&|scene| (entry.build)(scene, 5));
+        assert!(gap_m_min > 0.0 && speed_mps < 0.5, "{}: {gap_m_min} m, {speed_mps} m/s", entry.name);
     }
 }
