@@ -182,6 +182,7 @@ impl<'a> Judge<'a> {
             then: spawn.then.word(functions, &facts),
             speed_mps: evaluate(&spawn.speed, functions, &facts).number(),
             distance_m: evaluate(&spawn.distance, functions, &facts).number(),
+            cover: spawn.cover.as_ref().map(|cover| cover.word(functions, &facts)),
         }
     }
 

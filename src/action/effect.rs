@@ -28,6 +28,18 @@ pub struct SpawnRequest {
     /// Gap to the ego vehicle along its route, m; behind the ego vehicle for `Overtake`. `sim::placement`
     /// says for each verb what exactly lies at that distance.
     pub distance_m: f64,
+    /// A vehicle that is parked with it, so that it steps out from behind; for `Walk` alone.
+    pub cover: Option<Body>,
+}
+
+impl Effect {
+    /// How many road users it makes appear. Their ids follow each other; the one that was asked for is the first.
+    pub fn newcomers(&self) -> u32 {
+        match self {
+            Effect::Spawn(request) => 1 + u32::from(request.cover.is_some()),
+            Effect::Time(_) | Effect::Sky(..) => 0,
+        }
+    }
 }
 
 /// What the action table may ask the world.

@@ -258,10 +258,16 @@ impl Checker {
                 let value = self.typed(value, place, ty)?;
                 Some(EffectDef::Set(Box::new(SetDef { state: index, key, value, span: effect.span })))
             }
-            ast::EffectKind::Spawn { body, place: side, distance, fields } => {
+            ast::EffectKind::Spawn { body, place: side, distance, cover, fields } => {
                 let behind = *side == ast::Place::Behind;
+                let cover = cover.as_ref().map(|cover| self.word::<Body>("body", cover, place));
                 let spawn = self.spawn(body, behind, distance, fields, place, effect.span)?;
-                Some(EffectDef::Spawn(Box::new(spawn)))
+                let cover = match cover {
+                    Some(cover) => Some(cover?),
+                    None => None,
+                };
+                self.check_cover(cover.as_ref(), &spawn.verb, effect.span);
+                Some(EffectDef::Spawn(Box::new(SpawnDef { cover, ..spawn })))
             }
         }
     }
@@ -329,8 +335,24 @@ impl Checker {
             speed: speed?,
             distance: distance?,
             behind,
+            cover: None,
             span,
         })
+    }
+
+    /// Reports a cover that is no vehicle, and one for a road user that does not walk.
+    fn check_cover(&mut self, cover: Option<&WordExpr<Body>>, verb: &WordExpr<Verb>, span: Span) {
+        let Some(cover) = cover else { return };
+        if let Some(body) = possible(cover).into_iter().find(|body| !body.is_vehicle()) {
+            let message = format!("a `{}` hides nobody", body.name());
+            let error = Diagnostic::error(code::IMPOSSIBLE_SPAWN, message).at(span, "spawned here");
+            self.report(error.help("write a vehicle after `from behind`"));
+        }
+        if let Some(verb) = possible(verb).into_iter().find(|verb| *verb != Verb::Walk) {
+            let message = format!("`{}` does not begin behind a parked vehicle", verb.name());
+            let error = Diagnostic::error(code::IMPOSSIBLE_SPAWN, message).at(span, "spawned here");
+            self.report(error.help("`from behind` is for a pedestrian that does `Walk`"));
+        }
     }
 
     /// Reports a vehicle that walks, a pedestrian that drives, and a wrong `ahead` or `behind`: only a vehicle that

@@ -149,9 +149,8 @@ fn names_of_effect<'a>(effect: &'a ast::Effect, used: &mut BTreeSet<&'a str>) {
             key.iter().for_each(|key| names_of_expr(key, used));
             names_of_expr(value, used);
         }
-        ast::EffectKind::Spawn { body, distance, fields, .. } => {
-            names_of_expr(body, used);
-            names_of_expr(distance, used);
+        ast::EffectKind::Spawn { body, distance, cover, fields, .. } => {
+            [body, distance].into_iter().chain(cover).for_each(|expr| names_of_expr(expr, used));
             names_of_fields(fields, used);
         }
     }

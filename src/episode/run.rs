@@ -166,7 +166,9 @@ impl Play {
         let mut spawned = Vec::new();
         for effect in &draw.effects {
             match self.world.apply(effect) {
-                Ok(newcomer) => spawned.extend(newcomer),
+                Ok(newcomer) => {
+                    spawned.extend(newcomer.into_iter().flat_map(|id| id..id + effect.newcomers()))
+                }
                 Err(reason) => {
                     self.world = before;
                     return Outcome::Refused { row: draw.row, rule: None, reason };

@@ -39,7 +39,8 @@ pub struct WorldFacts {
 /// What a rule may ask about a spawn before it happens.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SpawnFacts {
-    /// Distance between the outlines of the ego vehicle and the newcomer, m.
+    /// Distance between the outlines of the ego vehicle and the newcomer, or the vehicle that is parked with it,
+    /// whichever is nearer, m.
     pub spawn_gap_m: f64,
     /// Gap that a careful and competent driver would need there, m; 0 if the two do not approach.
     pub safety_gap_m: f64,

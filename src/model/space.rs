@@ -207,6 +207,8 @@ pub struct SpawnDef {
     pub distance: Expr,
     /// Whether the file says `behind`; the verb decides which place that is.
     pub behind: bool,
+    /// The parked vehicle from behind which a pedestrian steps.
+    pub cover: Option<WordExpr<Body>>,
     pub span: Span,
 }
 

@@ -129,7 +129,7 @@ fn spawn_form(spawn: &SpawnDef, reduced: &impl Fn(&Expr) -> Expr) -> String {
         }
     }
     format!(
-        "spawn {} {} {} {} {} {} {:?} {:?} {}",
+        "spawn {} {} {} {} {} {} {:?} {:?} {} {}",
         word(&spawn.body, reduced),
         word(&spawn.colour, reduced),
         word(&spawn.verb, reduced),
@@ -139,6 +139,7 @@ fn spawn_form(spawn: &SpawnDef, reduced: &impl Fn(&Expr) -> Expr) -> String {
         reduced(&spawn.speed).kind,
         reduced(&spawn.distance).kind,
         spawn.behind,
+        spawn.cover.as_ref().map_or(String::new(), |cover| word(cover, reduced)),
     )
 }
 

@@ -5,6 +5,7 @@ use crate::geometry::{OrientedBox, Vec2};
 use super::body::BodyParameters;
 use super::environment::{GRAVITY_MPS2, Grip};
 use super::npc::Driver;
+use super::pedestrian::Walker;
 use super::road_user::{Motion, Obstacle, RoadUser};
 use super::scene::Scene;
 use super::sense::{EgoMotion, RANGE_M};
@@ -67,6 +68,14 @@ impl Around<'_> {
                 Some((&user.obstacle, &user.mover.size, driver))
             }
             Motion::Drive(_) | Motion::Walk(_) | Motion::Stand => None,
+        })
+    }
+
+    /// Every pedestrian who walks, with its obstacle.
+    pub fn walkers(&self) -> impl Iterator<Item = (&Obstacle, &Walker)> {
+        self.users().filter_map(|user| match &user.mover.motion {
+            Motion::Walk(walker) => Some((&user.obstacle, walker)),
+            Motion::Drive(_) | Motion::Stand => None,
         })
     }
 

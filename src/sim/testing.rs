@@ -73,6 +73,7 @@ pub fn request(verb: Verb, distance_m: f64, speed_mps: f64) -> SpawnRequest {
         then: Then::Keep,
         speed_mps,
         distance_m,
+        cover: None,
     }
 }
 

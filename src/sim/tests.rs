@@ -244,6 +244,33 @@ fn a_pedestrian_meets_the_ego_vehicle() {
 }
 
 #[test]
+fn a_pedestrian_steps_out_from_behind_a_parked_vehicle() {
+    let mut world = testing::world(&testing::straight());
+    drive(&mut world, 10.0, 6.0);
+    let hidden = SpawnRequest { cover: Some(Body::BoxTruck), ..request(Verb::Walk, 60.0, 1.4) };
+    let facts = world.survey(&hidden).expect("there is room");
+    let walker = world.apply(&Effect::Spawn(hidden)).expect("there is room").expect("it has an id");
+    let parked = *world.obstacle(walker + 1).expect("the truck came with it");
+    assert_eq!(facts.spawn_gap_m, parked.distance_m);
+    assert!(facts.safety_gap_m > 10.0 && facts.safety_gap_m < 30.0, "{facts:?}");
+    assert!((parked.outline.pose.position.y + 7.0 + 0.2 + 1.2).abs() < 0.03, "{parked:?}");
+    let visible = |world: &World| {
+        let sensed = world.sensed();
+        sensed.objects.iter().find(|object| object.id == walker).expect("it is in range").visible_fraction
+    };
+    assert_eq!(visible(&world), 0.0);
+    while y_m(&world, walker) < -6.5 {
+        assert!(world.time_s() < 30.0);
+        drive(&mut world, 4.0, 0.1);
+    }
+    assert_eq!(visible(&world), 1.0);
+    // The truck stays where it is.
+    assert_eq!(world.obstacle(walker + 1).map(|truck| truck.outline), Some(parked.outline));
+    let driver = SpawnRequest { cover: Some(Body::SUV), ..request(Verb::DriveAhead, 90.0, 5.0) };
+    assert!(world.survey(&driver).is_err_and(|why| why.starts_with("only a pedestrian")));
+}
+
+#[test]
 fn a_pedestrian_without_a_way_on_turns_round() {
     let mut world = testing::world(&testing::straight());
     let parked =

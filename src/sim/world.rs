@@ -342,31 +342,31 @@ impl World {
     }
 
     fn spawn(&mut self, request: &SpawnRequest) -> Result<u32, String> {
-        let leaves = self.make_room()?;
-        let newcomer = placement::place(&self.around([&self.users, &[]]), request, self.next_id)?;
-        if let Some(index) = leaves {
+        let leave = self.make_room(request)?;
+        let placed = placement::place(&self.around([&self.users, &[]]), request, self.next_id)?;
+        for index in leave.into_iter().rev() {
             self.users.remove(index);
         }
-        self.users.push(newcomer);
         let id = self.next_id;
-        self.next_id += 1;
+        self.next_id += 1 + u32::from(placed.cover.is_some());
+        self.users.extend([placed.asked].into_iter().chain(placed.cover));
         self.look();
         Ok(id)
     }
 
-    /// Index of the commanded obstacle that leaves for the next one, if there are as many as there may be.
-    fn make_room(&self) -> Result<Option<usize>, String> {
-        let mut commanded = self.users.iter().enumerate().filter(|(_, user)| !user.obstacle.is_ambient());
-        if commanded.clone().count() < OBSTACLES_MAX {
-            return Ok(None);
-        }
+    /// Indices of the commanded obstacles that leave for new ones, if there are as many as there may be.
+    fn make_room(&self, request: &SpawnRequest) -> Result<Vec<usize>, String> {
+        let commanded = self.users.iter().enumerate().filter(|(_, user)| !user.obstacle.is_ambient());
+        let wanted = commanded.clone().count() + Effect::Spawn(*request).newcomers() as usize;
+        let too_many = wanted.saturating_sub(OBSTACLES_MAX);
         let around = self.around([&self.users, &[]]);
         let is_hidden = |user: &RoadUser| {
             self.traffic.oldest_leaves_in_sight
                 || !around.is_in_sight(&user.obstacle, user.mover.visible_fraction)
         };
-        let oldest = commanded.find(|(_, user)| is_hidden(user));
-        oldest.map(|(index, _)| Some(index)).ok_or("ten road users are there already".into())
+        let hidden = commanded.filter(|(_, user)| too_many > 0 && is_hidden(user));
+        let oldest: Vec<usize> = hidden.take(too_many).map(|(index, _)| index).collect();
+        if oldest.len() < too_many { Err("ten road users are there already".into()) } else { Ok(oldest) }
     }
 
     /// Lets ambient traffic leave and appear; `begins` is before the first tick.
@@ -483,10 +483,10 @@ impl World {
 
 impl Surroundings for World {
     fn survey(&self, request: &SpawnRequest) -> Result<SpawnFacts, String> {
-        let _leaves = self.make_room()?;
+        let _leave = self.make_room(request)?;
         let around = self.around([&self.users, &[]]);
-        let newcomer = placement::place(&around, request, self.next_id)?;
-        Ok(placement::facts(&around, request, &newcomer))
+        let newcomers = placement::place(&around, request, self.next_id)?;
+        Ok(placement::facts(&around, request, &newcomers))
     }
 
     fn ego_speed_mps(&self) -> f64 {

@@ -303,7 +303,8 @@ pub enum EffectKind {
     /// `set sky = None`, `set sky[what] = how`.
     Set { state: Name, key: Option<Expr>, value: Expr },
     /// `spawn vehicle ahead distance { speed: speed }`.
-    Spawn { body: Expr, place: Place, distance: Expr, fields: Vec<Field> },
+    /// With a `cover`: `spawn Pedestrian ahead distance from behind SUV { … }`.
+    Spawn { body: Expr, place: Place, distance: Expr, cover: Option<Expr>, fields: Vec<Field> },
 }
 
 /// Whether a road user appears ahead of the ego vehicle or behind it, along its route.

@@ -242,7 +242,13 @@ impl Builder {
                 _ => Place::Behind,
             };
             let distance = self.expression(parts.next())?;
-            EffectKind::Spawn { body, place, distance, fields: self.fields(parts.next())? }
+            let cover = parts.take(Rule::cover).map(|cover| {
+                let mut parts = Parts::of(cover);
+                parts.take(Rule::kw_behind);
+                self.expression(parts.next())
+            });
+            let cover = cover.transpose()?;
+            EffectKind::Spawn { body, place, distance, cover, fields: self.fields(parts.next())? }
         };
         Ok(Effect { kind, span })
     }

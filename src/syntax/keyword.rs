@@ -43,6 +43,7 @@ pub const CLAUSES: &[Keyword] = &[
     ("spawn", "Lets a road user appear: `spawn vehicle ahead 20 m { speed: speed, does: DriveAhead }`."),
     ("ahead", "Before the ego vehicle, along its route."),
     ("behind", "Behind the ego vehicle, along its route: where an overtaker comes from."),
+    ("from", "With `behind`, what hides a pedestrian: `spawn Pedestrian ahead 30 m from behind SUV { … }`."),
     ("on", "The actions that a rule binds, or the state whose changes it orders."),
     ("with", "Values of drawn parameters, or the road user that a claim is about."),
     ("at", "The time of a claim, or the station of a place on a lane."),

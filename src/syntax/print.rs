@@ -582,19 +582,18 @@ fn effect(effect: &Effect) -> Layout {
         EffectKind::Set { state, key, value } => {
             Layout::group([assigned(state, key.as_ref()), Layout::nest([Layout::Line, expression(value)])])
         }
-        EffectKind::Spawn { body, place, distance, fields: entries } => {
+        EffectKind::Spawn { body, place, distance, cover, fields: entries } => {
             let place = match place {
                 Place::Ahead => " ahead ",
                 Place::Behind => " behind ",
             };
-            Layout::row([
-                Layout::text("spawn "),
-                expression(body),
-                Layout::text(place),
-                expression(distance),
-                Layout::text(" "),
-                fields(entries),
-            ])
+            let mut parts =
+                vec![Layout::text("spawn "), expression(body), Layout::text(place), expression(distance)];
+            if let Some(cover) = cover {
+                parts.extend([Layout::text(" from behind "), expression(cover)]);
+            }
+            parts.extend([Layout::text(" "), fields(entries)]);
+            Layout::Row(parts)
         }
     }
 }

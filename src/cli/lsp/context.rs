@@ -259,11 +259,17 @@ impl<'a> Place<'a> {
                 kinds.extend(self.value(None));
                 kinds
             }
+            (1, "behind") if self.last(1) == "from" => {
+                let mut kinds = vec![Kind::Words(words::engine_words("body"))];
+                kinds.extend(self.value(None));
+                kinds
+            }
             (1, _) if self.begins_entry() => effects,
             (1, "=") => self.value(self.set_type()),
             (1, _) if self.wants_operand() => self.value(None),
             (1, _) => {
-                let mut kinds = vec![Kind::Keyword("ahead"), Kind::Keyword("behind"), Kind::Operators];
+                let places = ["ahead", "behind", "from"].map(Kind::Keyword);
+                let mut kinds: Vec<Kind> = places.into_iter().chain([Kind::Operators]).collect();
                 kinds.extend(effects);
                 kinds
             }

@@ -35,11 +35,18 @@ const DISTANCE_M_MAX: f64 = 1000.0;
 /// Least gap between a newcomer and any other road user, m.
 const ROOM_M: f64 = 0.5;
 
-/// The road user that a request would make appear, with a new id.
+/// What a request makes appear.
+pub(super) struct Newcomers {
+    pub asked: RoadUser,
+    /// The vehicle that is parked with it; its id follows.
+    pub cover: Option<RoadUser>,
+}
+
+/// The road user that a request would make appear, with a new id, and its cover.
 ///
 /// # Errors
 /// Why it cannot, in words that complete "cannot spawn: …".
-pub(super) fn place(around: &Around, request: &SpawnRequest, id: u32) -> Result<RoadUser, String> {
+pub(super) fn place(around: &Around, request: &SpawnRequest, id: u32) -> Result<Newcomers, String> {
     check(request)?;
     let size = body::parameters(request.body);
     let driver = match request.verb {
@@ -51,7 +58,8 @@ pub(super) fn place(around: &Around, request: &SpawnRequest, id: u32) -> Result<
     };
     check_way(around, &driver, &size)?;
     let moved = driver.moved(&size);
-    finish(around, request, Mover::new(size, Motion::Drive(driver)), id, moved)
+    let asked = finish(around, request, Mover::new(size, Motion::Drive(driver)), id, moved)?;
+    Ok(Newcomers { asked, cover: None })
 }
 
 /// Refuses what no road user could do. Requests of scripts come from outside, so nothing is taken for
@@ -62,6 +70,9 @@ fn check(request: &SpawnRequest) -> Result<(), String> {
     }
     if !(0.0..=DISTANCE_M_MAX).contains(&request.distance_m) {
         return Err(format!("the distance is not between 0 and {DISTANCE_M_MAX} m"));
+    }
+    if request.cover.is_some_and(|cover| !cover.is_vehicle() || request.verb != Verb::Walk) {
+        return Err("only a pedestrian who walks comes from behind a vehicle".into());
     }
     match request.verb {
         Verb::Walk | Verb::Stand if request.body.is_vehicle() => Err("only a pedestrian walks".into()),
@@ -82,7 +93,11 @@ fn check(request: &SpawnRequest) -> Result<(), String> {
 /// A newcomer in plain view (not from behind, and not hidden by others, fog or distance) needs at least
 /// the way that the ego vehicle drives while a careful driver perceives and reacts, even if it would be
 /// no danger: it must not seem to come from nowhere.
-pub(super) fn facts(around: &Around, request: &SpawnRequest, newcomer: &RoadUser) -> SpawnFacts {
+///
+/// A parked vehicle that appears with a pedestrian is nearer than the pedestrian, and the gap is that to the
+/// vehicle: both appear where a careful driver could still stop.
+pub(super) fn facts(around: &Around, request: &SpawnRequest, newcomers: &Newcomers) -> SpawnFacts {
+    let newcomer = &newcomers.asked;
     let along_mps = around.ego_outline.pose.forward().dot(&newcomer.obstacle.velocity_mps);
     let (ego_mps, friction) = (around.ego.speed_mps, around.friction);
     let braking_gap_m = match request.verb {
@@ -97,7 +112,8 @@ pub(super) fn facts(around: &Around, request: &SpawnRequest, newcomer: &RoadUser
         Verb::DriveOpposite => 0.0,
         Verb::CrossRoad | Verb::Walk | Verb::Stand => safety::behind_leader_m(ego_mps, 0.0, friction),
     };
-    let spawn_gap_m = newcomer.obstacle.distance_m;
+    let cover_m = newcomers.cover.as_ref().map_or(f64::INFINITY, |cover| cover.obstacle.distance_m);
+    let spawn_gap_m = newcomer.obstacle.distance_m.min(cover_m);
     let is_behind = request.verb == Verb::Overtake;
     let sight_m = RANGE_M.min(around.visibility_m);
     let in_view = || {

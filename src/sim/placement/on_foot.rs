@@ -1,27 +1,36 @@
-//! People on foot: who crosses the road goes from kerb to kerb, timed to meet the ego vehicle.
+//! People on foot: who crosses the road goes from kerb to kerb, timed to meet the ego vehicle, and may step out from
+//! behind a parked vehicle that appears with it.
 
 use core::f64::consts::FRAC_PI_2;
 
 use crate::action::SpawnRequest;
 use crate::geometry::{OrientedBox, Pose, Vec2, distance_m, wrap_angle};
-use crate::model::vocabulary::{Side, Verb};
+use crate::model::vocabulary::{Body, Side, Verb};
 use crate::road::{FootWay, Kerb};
 
 use crate::sim::around::Around;
+use crate::sim::body;
 use crate::sim::body::BodyParameters;
 use crate::sim::ego::VehicleParameters;
 use crate::sim::npc::choices;
 use crate::sim::pedestrian::{Walk, Walker};
-use crate::sim::road_user::{Motion, Moved, Mover, RoadUser};
+use crate::sim::road_user::{Motion, Moved, Mover, Obstacle, RoadUser};
+use crate::sim::sense::visible_fraction;
 
 use super::crossing::arrival_s;
-use super::{ahead_m, finish};
+use super::{Newcomers, ROOM_M, ahead_m, finish};
 
 /// A crosswalk within this distance of the asked place is used, m. Ours.
 const CROSSWALK_M: f64 = 5.0;
 /// A place with a kerb is looked for along the route up to 10 m from the asked one: step, m, and number of steps. Ours.
 const MOVED_STEP_M: f64 = 1.0;
 const MOVED_STEPS: u32 = 10;
+/// How far beside the outermost lane vehicles park, m: less than the 12 inches that most American codes allow.
+const PARKED_M: f64 = 0.2;
+/// How far before a way over the road a vehicle is parked that hides its beginning, m. Ours.
+const BEFORE_M: f64 = 1.0;
+/// How far within the outer side of that vehicle people stand, m: their own width. Ours.
+const HIDDEN_M: f64 = 0.5;
 /// Half the width of the strip that must be free of parked vehicles for somebody to walk, m.
 const HALF_STRIP_M: f64 = 0.5;
 
@@ -39,20 +48,29 @@ pub(super) fn on_foot(
     request: &SpawnRequest,
     size: BodyParameters,
     id: u32,
-) -> Result<RoadUser, String> {
+) -> Result<Newcomers, String> {
     let asked_m = ahead_m(around, request, &size)?;
     if request.verb == Verb::Stand {
         let lane = around.scene.route.path.pose_at(asked_m);
         let turn_rad = if request.side == Side::Left { -FRAC_PI_2 } else { FRAC_PI_2 };
         let pose = Pose { heading_rad: wrap_angle(lane.heading_rad + turn_rad), ..lane };
-        return finish(around, request, Mover::new(size, Motion::Stand), id, at(pose));
+        let asked = finish(around, request, Mover::new(size, Motion::Stand), id, at(pose))?;
+        return Ok(Newcomers { asked, cover: None });
     }
     let mut refusal = None;
     for station_m in stations(around, asked_m) {
-        match crossing(around, request.side, station_m).and_then(|way| walk(around, request, size, id, &way))
-        {
-            Ok(newcomer) => return Ok(newcomer),
-            // The reason of the asked place is what an author wants to know.
+        let found = crossing(around, request.side, station_m).and_then(|mut way| {
+            let cover =
+                request.cover.map(|body| park(around, request, body, id + 1, &mut way)).transpose()?;
+            let asked = walk(around, request, size, id, &way)?;
+            if let Some(cover) = &cover {
+                check_hidden(around, &asked, cover)?;
+            }
+            Ok(Newcomers { asked, cover })
+        });
+        match found {
+            Ok(newcomers) => return Ok(newcomers),
+            // The reason of the first place is what an author wants to know.
             Err(why) => refusal = refusal.or(Some(why)),
         }
     }
@@ -118,6 +136,63 @@ fn walk(
     };
     let walker = Walker::new(walk, around.tick, &mut choices(around.seed, id, 0));
     finish(around, request, Mover::new(size, Motion::Walk(walker)), id, at(from))
+}
+
+/// A vehicle that is parked beside the outermost lane, before a way over the road as the ego vehicle comes. The way
+/// then begins beside its front or rear, behind its outer half, where it hides whoever stands there.
+fn park(
+    around: &Around,
+    request: &SpawnRequest,
+    body: Body,
+    id: u32,
+    way: &mut Crossing,
+) -> Result<RoadUser, String> {
+    let size = body::parameters(body);
+    let (map, path) = (&around.scene.map, &around.scene.route.path);
+    let outward = |station_m: f64| {
+        let left = path.pose_at(station_m).left();
+        if request.side == Side::Left { left } else { -left }
+    };
+    let inner_m = way.from.edge_m + PARKED_M;
+    let station_m = way.station_m - BEFORE_M - size.length_m / 2.0;
+    if station_m < 0.0 {
+        return Err("there is no room to park".into());
+    }
+    let position = path.pose_at(station_m).position + outward(station_m) * (inner_m + size.width_m / 2.0);
+    // It stands in the direction of the lane beside it.
+    let beside = path.pose_at(station_m).position + outward(station_m) * (way.from.edge_m - PARKED_M);
+    let lane =
+        map.nearest(beside, path.pose_at(station_m).heading_rad, 1.0).ok_or("there is no room to park")?;
+    let heading_rad = map.lane(lane.lane).centre.pose_at(lane.station_m).heading_rad;
+    let pose = Pose { position, heading_rad };
+    let outline = OrientedBox::new(pose, size.length_m, size.width_m);
+    if !map.is_free_to_park(&outline) {
+        return Err("there is no room to park".into());
+    }
+    let in_the_way = |(walking, walker): (&Obstacle, &Walker)| {
+        distance_m(&walker.strip(&walking.outline), &outline) < HALF_STRIP_M
+    };
+    if around.walkers().any(in_the_way) {
+        return Err("a pedestrian would walk into the parked vehicle".into());
+    }
+    let way_m = inner_m + size.width_m - HIDDEN_M;
+    let outward = (way.from.place - way.to.place).normalize();
+    way.from.place += outward * (way_m - way.from.way_m);
+    way.from.way_m = way_m;
+    if map.lane_room_m(way.from.place) < HIDDEN_M || map.is_solid(way.from.place, HIDDEN_M) {
+        return Err("there is no room at the kerb".into());
+    }
+    let mover = Mover::new(size, Motion::Stand);
+    let parked = RoadUser::new(around, id, body, request.colour, Verb::Stand, mover, at(pose));
+    if parked.has_room(around, ROOM_M) { Ok(parked) } else { Err("another road user is there".into()) }
+}
+
+/// Refuses a place at which a cover does not hide a pedestrian, but for what stands out above its roof.
+fn check_hidden(around: &Around, pedestrian: &RoadUser, cover: &RoadUser) -> Result<(), String> {
+    let eye = around.ego_outline.pose.position;
+    let above = (1.0 - cover.obstacle.height_m / pedestrian.obstacle.height_m).max(0.0);
+    let seen = visible_fraction(eye, &pedestrian.obstacle, core::iter::once(&cover.obstacle));
+    if seen > above + 1e-9 { Err("the parked vehicle would not hide the pedestrian".into()) } else { Ok(()) }
 }
 
 /// Whether a parked vehicle is on the way from a pose straight ahead.
