@@ -24,9 +24,10 @@ const BEYOND_M: f64 = 8.0;
 const ROOM_M: f64 = 0.5;
 /// Lanes farther from a point than this count as this far, m.
 const REACH_M: f64 = 3.0;
-/// Least step along a way, m, and the step in which free ground is checked, m.
-const STEP_M: f64 = 0.02;
+/// Least step along a way, m; narrower gaps between lanes are not noticed.
 const CHECK_M: f64 = 0.25;
+/// Distance between the points of a parked vehicle's sides that are checked, m.
+const PARKED_CHECK_M: f64 = 1.0;
 
 /// One end of a way on foot.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -92,19 +93,17 @@ impl RoadMap {
     }
 
     /// Whether a vehicle could stand there beside the driving lanes: off them and off crosswalks, and in nothing
-    /// solid.
+    /// solid. Points along its sides are checked; every lane is wider than the gaps between them.
     pub fn is_free_to_park(&self, outline: &OrientedBox) -> bool {
-        let steps = |half_m: f64| (2.0 * half_m / CHECK_M / 2.0).ceil().max(1.0) as i32;
-        let (along, across) = (steps(outline.half_length_m), steps(outline.half_width_m));
-        let part = |index: i32, steps: i32| 2.0 * f64::from(index) / f64::from(steps) - 1.0;
-        (0..=along).all(|i| {
-            (0..=across).all(|j| {
-                let (ahead_m, left_m) =
-                    (outline.half_length_m * part(i, along), outline.half_width_m * part(j, across));
-                let point = outline.pose.offset(ahead_m, left_m).position;
+        let steps = (2.0 * outline.half_length_m / PARKED_CHECK_M).ceil().max(1.0) as u32;
+        [1.0, -1.0].into_iter().all(|side| {
+            (0..=steps).all(|step| {
+                let part = 2.0 * f64::from(step) / f64::from(steps) - 1.0;
+                let point =
+                    outline.pose.offset(outline.half_length_m * part, outline.half_width_m * side).position;
                 self.lane_room_m(point) >= 0.0
                     && self.crosswalk_at(point).is_none()
-                    && !self.is_solid(point, CHECK_M)
+                    && !self.is_solid(point, PARKED_CHECK_M / 2.0)
             })
         })
     }
@@ -122,23 +121,31 @@ impl RoadMap {
     /// The end of a way that leads from a point in a direction.
     fn kerb(&self, from: Vec2, along: Vec2, over_crosswalk: bool) -> Result<Kerb, &'static str> {
         let (mut at_m, mut paved_m, mut edge_m) = (0.0, 0.0, 0.0);
+        let (mut on_road, mut on_lane) = (true, true);
         loop {
             let ground = self.ground(from + along * at_m);
             let room_m = ground.room_m();
             if room_m > 0.0 {
+                if on_road {
+                    // The last step may have led beyond the edge.
+                    paved_m = at_m - room_m;
+                    edge_m = if on_lane { paved_m } else { edge_m };
+                }
+                on_road = false;
                 if at_m - paved_m >= REFUGE_M {
                     break;
                 }
-                at_m += room_m.max(STEP_M);
+                at_m += room_m.max(CHECK_M);
             } else {
                 if ground.junction_m <= 0.0 && ground.street_m > 0.0 && !over_crosswalk {
                     return Err("a junction is there");
                 }
-                at_m += (-room_m).max(STEP_M);
-                paved_m = at_m;
-                if ground.street_m.min(ground.junction_m) <= 0.0 {
-                    edge_m = at_m;
+                let lane_m = ground.street_m.min(ground.junction_m);
+                if on_lane && lane_m > 0.0 {
+                    edge_m = at_m - lane_m;
                 }
+                (on_road, on_lane) = (true, lane_m <= 0.0);
+                at_m += (-room_m).max(CHECK_M);
             }
             if at_m > HALF_ROAD_M {
                 return Err("the road has no kerb there");
@@ -160,11 +167,28 @@ impl RoadMap {
             }
             checked_m += CHECK_M;
         }
-        let mut beyond_m = 0.0;
-        while beyond_m < BEYOND_M && is_free(place + along * (beyond_m + CHECK_M)) {
-            beyond_m += CHECK_M;
+        Ok(Kerb { place, way_m, edge_m, beyond_m: self.free_m(place, along) })
+    }
+
+    /// How far the ground is free of lanes and of anything solid from a free place on, m; at most [`BEYOND_M`].
+    fn free_m(&self, place: Vec2, along: Vec2) -> f64 {
+        let (mut free_m, mut known_m) = (0.0, 0.0);
+        while free_m < BEYOND_M {
+            let next_m = free_m + CHECK_M;
+            let point = place + along * next_m;
+            if next_m > known_m {
+                let room_m = self.ground(point).room_m() - ROOM_M;
+                if room_m < 0.0 {
+                    break;
+                }
+                known_m = next_m + room_m;
+            }
+            if self.is_solid(point, ROOM_M) {
+                break;
+            }
+            free_m = next_m;
         }
-        Ok(Kerb { place, way_m, edge_m, beyond_m })
+        free_m
     }
 
     fn ground(&self, point: Vec2) -> Ground {

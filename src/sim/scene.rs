@@ -1,8 +1,9 @@
 //! A road as the world needs it: the map, the ego vehicle's route, and what follows from both.
 
-use std::sync::Arc;
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex, PoisonError};
 
-use crate::road::{LaneIndex, RoadMap, Route};
+use crate::road::{FootWay, LaneIndex, RoadMap, Route};
 
 use super::junction::ConflictAreas;
 use super::right_of_way::{RouteArea, route_areas};
@@ -17,6 +18,7 @@ pub struct Scene {
     areas: ConflictAreas,
     route_areas: Vec<RouteArea>,
     ways: Ways,
+    foot_ways: FootWays,
     /// Lanes outside junctions, each with the sum of the lengths up to its end, m.
     streets: Vec<(LaneIndex, f64)>,
 }
@@ -31,7 +33,15 @@ impl Scene {
         }
         let areas = ConflictAreas::new(&map);
         let route_areas = route_areas(&areas, &route);
-        Scene { areas, route_areas, ways: Ways::default(), streets, map, route }
+        Scene {
+            areas,
+            route_areas,
+            ways: Ways::default(),
+            foot_ways: FootWays::default(),
+            streets,
+            map,
+            route,
+        }
     }
 
     /// The place at a fraction of all streets laid end to end, so that every metre is equally likely.
@@ -40,6 +50,34 @@ impl Scene {
         let index = self.streets.partition_point(|street| street.1 <= at_m).min(self.streets.len() - 1);
         let begin_m = if index == 0 { 0.0 } else { self.streets[index - 1].1 };
         Some((self.streets[index].0, at_m - begin_m))
+    }
+
+    /// The way on foot over the road at a station of the route, along the crosswalk if one is there.
+    ///
+    /// # Errors
+    /// Why people do not cross there, in words that complete "cannot spawn: …".
+    pub(super) fn foot_way(&self, station_m: f64) -> Result<FootWay, &'static str> {
+        // Even if a thread panicked while it held the lock, the ways in here are whole.
+        let known = || self.foot_ways.0.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(way) = known().get(&station_m.to_bits()) {
+            return *way;
+        }
+        let here = self.route.path.pose_at(station_m);
+        let mut left = here.left();
+        if let Some(along) = self.map.crosswalk_at(here.position) {
+            let along = if along.dot(&left) < 0.0 { -along } else { along };
+            // An outline that is longer along the road than across says nothing of the way over it.
+            if along.dot(&left) > core::f64::consts::FRAC_1_SQRT_2 {
+                left = along;
+            }
+        }
+        let way = self.map.foot_way(here.position, left);
+        let mut known = known();
+        if known.len() >= FOOT_WAYS_MAX {
+            known.clear();
+        }
+        known.insert(station_m.to_bits(), way);
+        way
     }
 
     pub(super) fn ways(&self) -> &Ways {
@@ -55,3 +93,10 @@ impl Scene {
         &self.areas
     }
 }
+
+/// Number of ways on foot that are kept for a road: several rows and draws of a moment ask for the same.
+const FOOT_WAYS_MAX: usize = 256;
+
+/// The ways on foot that were asked for lately, by the bits of their station.
+#[derive(Debug, Default)]
+struct FootWays(Mutex<BTreeMap<u64, Result<FootWay, &'static str>>>);

@@ -64,7 +64,7 @@ pub(super) fn on_foot(
                 request.cover.map(|body| park(around, request, body, id + 1, &mut way)).transpose()?;
             let asked = walk(around, request, size, id, &way)?;
             if let Some(cover) = &cover {
-                check_hidden(around, &asked, cover)?;
+                check_cover(around, &asked, cover)?;
             }
             Ok(Newcomers { asked, cover })
         });
@@ -93,19 +93,9 @@ fn stations(around: &Around, asked_m: f64) -> impl Iterator<Item = f64> {
     crosswalk.into_iter().chain([asked_m]).chain(nearby).filter(move |station_m| ends_m.contains(station_m))
 }
 
-/// The way over the road at a station of the route, along the crosswalk if one is there.
+/// The way over the road at a station of the route.
 fn crossing(around: &Around, side: Side, station_m: f64) -> Result<Crossing, String> {
-    let map = &around.scene.map;
-    let here = around.scene.route.path.pose_at(station_m);
-    let mut left = here.left();
-    if let Some(along) = map.crosswalk_at(here.position) {
-        let along = if along.dot(&left) < 0.0 { -along } else { along };
-        // An outline that is longer along the road than across says nothing of the way over it.
-        if along.dot(&left) > core::f64::consts::FRAC_1_SQRT_2 {
-            left = along;
-        }
-    }
-    let FootWay { left, right } = map.foot_way(here.position, left)?;
+    let FootWay { left, right } = around.scene.foot_way(station_m)?;
     let (from, to) = if side == Side::Left { (left, right) } else { (right, left) };
     Ok(Crossing { station_m, from, to })
 }
@@ -187,8 +177,14 @@ fn park(
     if parked.has_room(around, ROOM_M) { Ok(parked) } else { Err("another road user is there".into()) }
 }
 
-/// Refuses a place at which a cover does not hide a pedestrian, but for what stands out above its roof.
-fn check_hidden(around: &Around, pedestrian: &RoadUser, cover: &RoadUser) -> Result<(), String> {
+/// Refuses a place at which a cover stands in the pedestrian's way, as it may in a bend, or does not hide the
+/// pedestrian but for what stands out above its roof.
+fn check_cover(around: &Around, pedestrian: &RoadUser, cover: &RoadUser) -> Result<(), String> {
+    if let Motion::Walk(walker) = &pedestrian.mover.motion
+        && distance_m(&walker.strip(&pedestrian.obstacle.outline), &cover.obstacle.outline) < HALF_STRIP_M
+    {
+        return Err("there is no room to park".into());
+    }
     let eye = around.ego_outline.pose.position;
     let above = (1.0 - cover.obstacle.height_m / pedestrian.obstacle.height_m).max(0.0);
     let seen = visible_fraction(eye, &pedestrian.obstacle, core::iter::once(&cover.obstacle));
