@@ -1,7 +1,7 @@
 //! Which rules a scenario's steps break. The conditions are those that are enforced when actions are drawn; here
 //! a mistake is reported before the scenario is replayed, with its cause and a legal alternative.
 //!
-//! Rules about a gap in the world can be judged only by the replay.
+//! Rules that ask the world can be judged only by the replay.
 
 use crate::model::expr::{Comparison, ExprKind};
 use crate::model::rules::{Breach, Candidate, RowRules};
@@ -26,19 +26,13 @@ pub(super) struct Moment<'a> {
     pub road: Option<usize>,
 }
 
-impl Moment<'_> {
-    fn before(&self) -> &Memory {
-        &self.history[self.history.len() - 1].1
-    }
-}
-
 /// One error for each rule in force that the step breaks. What the world would answer is not known here,
 /// so that a rule that asks it holds.
 pub(super) fn breaches(space: &Space, moment: &Moment<'_>, in_force: &RulesInForce) -> Vec<Diagnostic> {
     let road = moment.road.map(|road| &space.roads[road].facts);
     let rules = RowRules { space, row: moment.row, road, in_force };
-    let candidate =
-        Candidate { values: moment.locals, before: moment.before(), after: moment.after, world: None };
+    let (_, before) = moment.history.last().expect("it begins with the start");
+    let candidate = Candidate { values: moment.locals, before, after: moment.after, world: None };
     let error = |breach: Breach<'_>| {
         let rule = &space.rules[breach.rule()?];
         let message = format!("step {} breaks rule `{}`", moment.step.number.digits, rule.name);
