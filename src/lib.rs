@@ -6,6 +6,7 @@
 
 pub mod units;
 pub mod rng;
+pub mod statistics;
 pub mod geometry;
 pub mod road;
 pub mod syntax;

@@ -37,7 +37,34 @@ impl Place<'_> {
     }
 }
 
+/// What a bare name stands for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Named {
+    /// The parameter, constant or state of that index.
+    Local(usize),
+    Constant(usize),
+    State(usize),
+    Fact(Fact),
+    /// A variant of an enum, or no name that is known here.
+    Variant,
+}
+
 impl Checker {
+    /// What a bare name means: whichever of these comes first.
+    fn named(&self, name: &str, place: &Place<'_>) -> Named {
+        let local = || place.locals.iter().position(|(local, _)| local == name).map(Named::Local);
+        let constant = || self.constants.iter().position(|(known, _)| known == name).map(Named::Constant);
+        let state = || self.states.iter().position(|state| state.name == name && place.states);
+        let fact = || place.fact(name).map(Named::Fact);
+        let found = local().or_else(constant).or_else(|| state().map(Named::State)).or_else(fact);
+        found.unwrap_or(Named::Variant)
+    }
+
+    /// Whether a name can only be a variant here, so that its type must come from elsewhere.
+    pub(super) fn is_bare_variant(&self, expr: &ast::Expr, place: &Place<'_>) -> bool {
+        matches!(&expr.kind, ast::ExprKind::Name(name) if self.named(name, place) == Named::Variant)
+    }
+
     /// An expression of a wanted type; `None` once the mistake is reported.
     pub(super) fn typed(&mut self, expr: &ast::Expr, place: &Place<'_>, wanted: Type) -> Option<Expr> {
         let found = self.expr(expr, place, Some(wanted))?;
@@ -161,11 +188,44 @@ impl Checker {
         })
     }
 
-    /// Resolves a name: parameters first, then constants, states, facts and variants.
     fn name(&mut self, name: &str, span: Span, place: &Place<'_>, hint: Option<Type>) -> Option<Expr> {
-        if let Some(found) = self.variable(name, span, place) {
-            return found;
+        let make = |kind, ty| Some(Expr { kind, ty, span });
+        match self.named(name, place) {
+            Named::Local(index) => {
+                if let Some(owner) = place.owner {
+                    self.references.uses_parameter(&ast::Name::new(name, span), owner);
+                }
+                make(ExprKind::Local(index), place.locals[index].1)
+            }
+            Named::Constant(index) => {
+                self.references.uses(span, Symbol::Constant(name.to_owned()));
+                self.constants[index].1.clone().map(|value| Expr { span, ..value })
+            }
+            Named::State(index) => {
+                self.references.uses(span, Symbol::State(name.to_owned()));
+                let state = &self.states[index];
+                if state.key.is_none() {
+                    return make(ExprKind::Cell(state.first_cell), state.ty);
+                }
+                let error = Diagnostic::error(code::TYPE_MISMATCH, format!("`{name}` is a map"));
+                self.reject(error.at(span, "a key is missing").help(format!("write `{name}[key]`")))
+            }
+            Named::Fact(fact) => {
+                self.references.word(span, fact);
+                make(ExprKind::Fact(fact), fact.ty())
+            }
+            Named::Variant => self.bare_variant(name, span, place, hint),
         }
+    }
+
+    /// A variant of the wanted enum, or of the only one that has it.
+    fn bare_variant(
+        &mut self,
+        name: &str,
+        span: Span,
+        place: &Place<'_>,
+        hint: Option<Type>,
+    ) -> Option<Expr> {
         let owners: Vec<usize> = (0..self.enums.len())
             .filter(|of| self.enums[*of].variants.iter().any(|variant| variant == name))
             .collect();
@@ -241,42 +301,6 @@ impl Checker {
             ));
         }
         None
-    }
-
-    /// A parameter, constant, plain state or fact; `Some(None)` once a mistake is reported.
-    fn variable(&mut self, name: &str, span: Span, place: &Place<'_>) -> Option<Option<Expr>> {
-        if let Some(index) = place.locals.iter().position(|(local, _)| local == name) {
-            if let Some(owner) = place.owner {
-                self.references.uses_parameter(&ast::Name::new(name, span), owner);
-            }
-            return Some(Some(Expr { kind: ExprKind::Local(index), ty: place.locals[index].1, span }));
-        }
-        if let Some((_, value)) = self.constants.iter().find(|(constant, _)| constant == name) {
-            self.references.uses(span, Symbol::Constant(name.to_owned()));
-            return Some(value.clone().map(|value| Expr { span, ..value }));
-        }
-        if let Some(state) = self.states.iter().find(|state| state.name == name && place.states) {
-            self.references.uses(span, Symbol::State(name.to_owned()));
-            if state.key.is_some() {
-                let error = Diagnostic::error(code::TYPE_MISMATCH, format!("`{name}` is a map"));
-                self.report(error.at(span, "a key is missing").help(format!("write `{name}[key]`")));
-                return Some(None);
-            }
-            return Some(Some(Expr { kind: ExprKind::Cell(state.first_cell), ty: state.ty, span }));
-        }
-        let fact = place.fact(name)?;
-        self.references.word(span, fact);
-        Some(Some(Expr { kind: ExprKind::Fact(fact), ty: fact.ty(), span }))
-    }
-
-    /// Whether a name can only be a variant here, so that its type must come from elsewhere.
-    pub(super) fn is_bare_variant(&self, expr: &ast::Expr, place: &Place<'_>) -> bool {
-        let ast::ExprKind::Name(name) = &expr.kind else { return false };
-        let is_state = place.states && self.states.iter().any(|state| state.name == *name);
-        let is_local = place.locals.iter().any(|(local, _)| local == name);
-        let is_constant = self.constants.iter().any(|(constant, _)| constant == name);
-        let is_variable = is_local || is_constant || is_state || place.fact(name).is_some();
-        !is_variable
     }
 
     /// `road.limit`: a fact about a thing.

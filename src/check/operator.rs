@@ -235,9 +235,6 @@ impl Checker {
 
     /// Whether the expression is the word `road`, and no parameter, constant or state of that name hides it.
     fn names_road(&self, expr: &ast::Expr, place: &Place<'_>) -> bool {
-        matches!(&expr.kind, ast::ExprKind::Name(name) if name == "road")
-            && !place.locals.iter().any(|(local, _)| local == "road")
-            && !self.constants.iter().any(|(constant, _)| constant == "road")
-            && !self.states.iter().any(|state| state.name == "road")
+        matches!(&expr.kind, ast::ExprKind::Name(name) if name == "road") && self.is_bare_variant(expr, place)
     }
 }

@@ -1,12 +1,12 @@
 //! Which rules a scenario's steps break. The conditions are those that are enforced when actions are drawn; here
 //! a mistake is reported before the scenario is replayed, with its cause and a legal alternative.
 //!
-//! Rules about a gap in the world can be judged only by the replay.
+//! Rules that ask the world can be judged only by the replay.
 
-use crate::model::expr::{Comparison, Expr, ExprKind};
+use crate::model::expr::{Comparison, ExprKind};
 use crate::model::rules::{Breach, Candidate, RowRules};
 use crate::model::vocabulary::{LaneChoice, Word};
-use crate::model::{Facts, Memory, Row, RuleDef, RulesInForce, Space, Value, code, compare, evaluate};
+use crate::model::{Memory, Row, RuleDef, RulesInForce, Space, Value, code};
 use crate::prove::{next_rows, shortest_way};
 use crate::syntax::{Diagnostic, ast, listed};
 
@@ -26,25 +26,19 @@ pub(super) struct Moment<'a> {
     pub road: Option<usize>,
 }
 
-impl Moment<'_> {
-    fn before(&self) -> &Memory {
-        &self.history[self.history.len() - 1].1
-    }
-}
-
 /// One error for each rule in force that the step breaks. What the world would answer is not known here,
 /// so that a rule that asks it holds.
 pub(super) fn breaches(space: &Space, moment: &Moment<'_>, in_force: &RulesInForce) -> Vec<Diagnostic> {
     let road = moment.road.map(|road| &space.roads[road].facts);
     let rules = RowRules { space, row: moment.row, road, in_force };
-    let candidate =
-        Candidate { values: moment.locals, before: moment.before(), after: moment.after, world: None };
+    let (_, before) = moment.history.last().expect("it begins with the start");
+    let candidate = Candidate { values: moment.locals, before, after: moment.after, world: None };
     let error = |breach: Breach<'_>| {
         let rule = &space.rules[breach.rule()?];
         let message = format!("step {} breaks rule `{}`", moment.step.number.digits, rule.name);
         let error = Diagnostic::error(code::BROKEN_RULE, message);
         match breach {
-            Breach::Condition { rule, condition } => broken_condition(space, rule, condition, moment, error),
+            Breach::Condition { .. } => broken_condition(rules, breach, candidate, moment, error),
             Breach::Move { state, from, to, .. } => {
                 let error = error.at(moment.step.span, rules.words(breach, candidate));
                 Some(forbidden_move(space, rule, (state, from, to), moment, error))
@@ -97,30 +91,23 @@ fn forbidden_move(
     }
 }
 
-/// Adds the values with which the condition fails, and the nearest legal value.
+/// Points at the values that break the condition, and adds the nearest legal value.
 fn broken_condition(
-    space: &Space,
-    rule: usize,
-    condition: &Expr,
+    rules: RowRules<'_>,
+    breach: Breach<'_>,
+    candidate: Candidate<'_>,
     moment: &Moment<'_>,
     error: Diagnostic,
 ) -> Option<Diagnostic> {
+    let Breach::Condition { rule, condition } = breach else { return None };
     // Without a known road its facts are not known either.
-    let road = &space.roads[moment.road?];
-    let facts = Facts { road: Some(&road.facts), ..Facts::new(moment.locals, moment.after) };
-    let action = &space.actions[moment.row.action];
+    let road = rules.road?;
+    let space = rules.space;
     let mut error = error.beside(space.rules[rule].span, "does not allow it");
     let mut nearest = None;
-    for bound in space.bounds[moment.row.action].iter().filter(|bound| bound.rule == Some(rule)) {
-        let holds = |guard: &Expr| evaluate(guard, &space.functions, &facts).truth();
-        if !bound.guards.iter().all(holds) {
-            continue;
-        }
-        let parameter = &action.parameters[bound.local];
-        let limit = evaluate(&bound.limit, &space.functions, &facts);
-        if compare(bound.op, moment.locals[bound.local], limit) {
-            continue;
-        }
+    let mut is_placed = false;
+    for (bound, limit) in rules.broken_bounds(rule, candidate) {
+        let parameter = &space.actions[moment.row.action].parameters[bound.local];
         let field = moment.step.drawn.iter().find(|field| *field.name.text == *parameter.name);
         let Some(field) = field.filter(|_| !parameter.axis) else { continue };
         let shown = space.show(limit, parameter.ty);
@@ -128,33 +115,20 @@ fn broken_condition(
             field.value.span,
             format!("`{}` must be {} {shown} on `{}`", parameter.name, bound.op.symbol(), road.name),
         );
+        is_placed = true;
         let reaches =
             matches!(bound.op, Comparison::Equal | Comparison::LessEqual | Comparison::GreaterEqual);
         if reaches && parameter.domain.holds(limit) && nearest.is_none() {
             nearest = Some((field, shown));
         }
     }
-    if error.labels.iter().all(|label| !label.primary) {
-        let named = action.parameters.iter().enumerate().filter(|(local, _)| {
-            condition.any(|kind| matches!(kind, ExprKind::Local(named) if named == local))
-        });
-        let figures: Vec<String> = named
-            .map(|(local, parameter)| {
-                format!("`{}` is {}", parameter.name, space.show(moment.locals[local], parameter.ty))
-            })
-            .collect();
-        let label = match figures.is_empty() {
-            true => format!("its condition does not hold on `{}`", road.name),
-            false => format!("{} on `{}`", figures.join(", "), road.name),
-        };
+    if !is_placed {
+        let label = format!("{} on `{}`", rules.words(breach, candidate), road.name);
         error = error.at(moment.step.span, label);
     }
     if condition.any(|kind| matches!(kind, ExprKind::InLanes(..))) {
-        let there: Vec<&str> = LaneChoice::ALL
-            .iter()
-            .filter(|lane| road.facts.has_lane(**lane))
-            .map(|lane| lane.name())
-            .collect();
+        let there: Vec<&str> =
+            LaneChoice::ALL.iter().filter(|lane| road.has_lane(**lane)).map(|lane| lane.name()).collect();
         error = error.note(format!("the way through `{}` has the lanes {}", road.name, listed(&there)));
     }
     Some(match nearest {

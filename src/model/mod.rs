@@ -21,7 +21,6 @@ mod value;
 pub mod vocabulary;
 
 pub use digest::{digest, digest_text};
-pub(crate) use eval::compare;
 pub use eval::{Facts, OutcomeFacts, SpawnFacts, WorldFacts, evaluate};
 pub use interval::{End, Interval};
 pub(crate) use limits::spawn_out_of_bounds;

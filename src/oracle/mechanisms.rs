@@ -7,10 +7,10 @@
 
 use crate::ads::{ModularConfig, Weaknesses};
 use crate::episode::{EpisodeLog, Setup};
+use crate::statistics::proportion;
 
 use super::cause::{Inquiry, NoModules};
 use super::crash::{Crash, Fate};
-use super::variation::proportion;
 
 /// A crash with one documented weakness switched off.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
@@ -90,7 +90,7 @@ fn share(fates: impl Iterator<Item = Fate> + Clone) -> Share {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::oracle::wilson;
+    use crate::statistics::wilson;
 
     #[test]
     fn a_share_counts_what_vanishes_among_all_crashes_of_a_system_that_has_the_weakness() {

@@ -21,5 +21,5 @@ pub use facts::{counted, facts};
 pub use mechanisms::{MechanismShare, Share, WithoutMechanism, mechanism_shares, mechanisms};
 pub use severity::{Severity, severity};
 pub use shrink::{Shrunk, shrink, spare_steps};
-pub use variation::{Likelihood, likelihood, wilson};
+pub use variation::{Likelihood, likelihood};
 pub use verify::{ClaimResult, Replays, verify};

@@ -15,6 +15,7 @@ use crate::model::{Type, Value};
 use crate::rng;
 use crate::rng::{Rng, Stream};
 use crate::sim::DT_S;
+use crate::statistics::proportion;
 use crate::units::Dimension;
 
 use super::crash::{Crash, play};
@@ -50,29 +51,6 @@ pub fn likelihood(setup: &Setup, log: &EpisodeLog, index: usize, variations: u32
     let crashes = crashes.count() as u32;
     let (share, [low, high]) = proportion(crashes, variations);
     Likelihood { variations, crashes, share, low, high }
-}
-
-/// A share by its count, 0 without trials, and its 95 % interval.
-pub(super) fn proportion(count: u32, trials: u32) -> (f64, [f64; 2]) {
-    let share = if trials == 0 { 0.0 } else { f64::from(count) / f64::from(trials) };
-    (share, wilson(count, trials).into())
-}
-
-/// 95 % interval of a share by its count, after Wilson 1927; from 0 to 1 without trials.
-pub fn wilson(count: u32, trials: u32) -> (f64, f64) {
-    if trials == 0 {
-        return (0.0, 1.0);
-    }
-    // 97.5 % quantile of the normal distribution.
-    const Z: f64 = 1.959_963_984_540_054;
-    let (n, p) = (f64::from(trials), f64::from(count) / f64::from(trials));
-    let centre = p + Z * Z / (2.0 * n);
-    let half = Z * (p * (1.0 - p) / n + Z * Z / (4.0 * n * n)).sqrt();
-    let whole = 1.0 + Z * Z / n;
-    // At the ends rounding must not lose the exact 0 and 1.
-    let low = if count == 0 { 0.0 } else { (centre - half) / whole };
-    let high = if count == trials { 1.0 } else { (centre + half) / whole };
-    (low, high)
 }
 
 /// A scenario with small changes, played.
@@ -141,25 +119,4 @@ fn choose(crash: &Crash, seed: u64, moment: &Moment) -> Choice {
 /// Standard normal, no farther out than [`CUT`].
 fn cut_normal(rng: &mut Rng) -> f64 {
     rng::normal(rng).clamp(-CUT, CUT)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn intervals_are_wilsons() {
-        // Newcombe 1998, table I, method 3: 81 of 263, 15 of 148, 0 of 20, 1 of 29.
-        for (count, trials, low, high) in [
-            (81, 263, 0.2553, 0.3662),
-            (15, 148, 0.0624, 0.1605),
-            (0, 20, 0.0, 0.1611),
-            (1, 29, 0.0061, 0.1718),
-        ] {
-            let found = wilson(count, trials);
-            assert!((found.0 - low).abs() < 5e-5 && (found.1 - high).abs() < 5e-5, "{count}: {found:?}");
-        }
-        assert_eq!(wilson(20, 20), (1.0 - wilson(0, 20).1, 1.0));
-        assert_eq!(wilson(0, 0), (0.0, 1.0));
-    }
 }

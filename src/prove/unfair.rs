@@ -47,7 +47,7 @@ pub(super) fn report(space: &Space) -> Vec<Diagnostic> {
 }
 
 /// Values with which a row spawns within the stopping distance on a road; `None` if none are found, or if a
-/// rule asks the world about the gap and so decides by itself.
+/// rule asks the world, about the gap or the speed of the ego vehicle, and so decides by itself.
 pub(super) fn unfair(
     space: &Space,
     row: &Row,
@@ -57,7 +57,7 @@ pub(super) fn unfair(
 ) -> Option<Witness> {
     let in_force = RulesInForce::by_default(space);
     let rules = RowRules { space, row, road: Some(&road.facts), in_force: &in_force };
-    let asks = |demand| matches!(demand, Demand::Holds(condition) if condition.known() == Known::Spawn);
+    let asks = |demand| matches!(demand, Demand::Holds(condition) if condition.known() > Known::Road);
     if rules.demands().any(|(_, demand)| asks(demand)) {
         return None;
     }

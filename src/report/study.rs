@@ -1,6 +1,6 @@
 //! The result of a study as tables for people. Everything else that it holds is in `results.json`.
 
-use crate::study::statistics::{Estimate, Interval};
+use crate::statistics::{Estimate, Interval};
 use crate::study::{AgentResults, BaselineComparison, Rate, RoadResults, StudyResults};
 
 /// Measures by which comparisons are printed.

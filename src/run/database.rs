@@ -20,6 +20,7 @@ use crate::run::summary::{EpisodeSummary, Finding};
 /// Layout of the tables; raised whenever a column changes.
 const SCHEMA_VERSION: i64 = 4;
 
+/// `learning` and `checkpoint` belong to a training (`train::record`) and stay empty in a run.
 const SCHEMA: &str = "
 CREATE TABLE episode (
   episode INTEGER PRIMARY KEY, road TEXT NOT NULL, seed TEXT NOT NULL, ended TEXT NOT NULL,
@@ -38,13 +39,22 @@ CREATE TABLE collision (
   obstacle_delta_v_mps REAL NOT NULL, cause TEXT, shape TEXT,
   PRIMARY KEY (episode, number)
 ) STRICT;
+CREATE TABLE learning (
+  episode INTEGER PRIMARY KEY REFERENCES episode, return REAL NOT NULL, collisions INTEGER NOT NULL,
+  counted INTEGER NOT NULL, epsilon REAL NOT NULL, loss REAL, updates INTEGER NOT NULL,
+  steps INTEGER NOT NULL, simulated_s REAL NOT NULL
+) STRICT;
+CREATE TABLE checkpoint (
+  only INTEGER PRIMARY KEY CHECK (only = 1), episodes INTEGER NOT NULL, digest TEXT NOT NULL,
+  learner BLOB NOT NULL
+) STRICT;
 ";
 
 /// Why a run database cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum DatabaseError {
-    #[error("it has layout {found}, this version of avastra reads {SCHEMA_VERSION}")]
-    Layout { found: i64 },
+    #[error("it has layout {found}, this version of avastra reads {wanted}")]
+    Layout { found: i64, wanted: i64 },
     #[error("it names an episode {found}")]
     Episode { found: i64 },
     #[error("its checkpoint is damaged: begin a new training")]
@@ -172,7 +182,7 @@ pub(crate) fn connect(path: &Path, version: i64, tables: &str) -> Result<Connect
         transaction.pragma_update(None, "user_version", version)?;
         transaction.commit()?;
     } else if found != version {
-        return Err(DatabaseError::Layout { found });
+        return Err(DatabaseError::Layout { found, wanted: version });
     }
     Ok(connection)
 }

@@ -3,7 +3,7 @@
 
 use std::collections::BTreeSet;
 
-use crate::study::statistics::{Lifetime, restricted_mean};
+use crate::statistics::{Lifetime, restricted_mean};
 
 use crate::study::file::EvaluationPlan;
 use crate::study::record::{CellRecord, CollisionRecord, EpisodeRecord, FailureClass, TrainedRecord};

@@ -4,7 +4,9 @@
 //! jobs: one training and its evaluation, or one repetition of an agent that has nothing to learn. Jobs know nothing
 //! of each other, so the result depends neither on how many run at a time nor on interruptions. [`play_jobs`] plays
 //! them on threads, each road of a job becomes a [`CellRecord`] in [`StudyDatabase`], and [`StudyResults`] are
-//! computed from the cells alone: a number for each cell and measure (`measures`), then `statistics` over them.
+//! computed from the cells alone: a number for each cell and measure (`measures`), then [`statistics`] over them.
+//!
+//! [`statistics`]: crate::statistics
 
 mod database;
 mod file;
@@ -14,7 +16,6 @@ mod ready;
 mod record;
 mod results;
 mod settings;
-pub mod statistics;
 
 pub use database::StudyDatabase;
 pub use file::StudyFile;

@@ -4,11 +4,10 @@
 
 use std::collections::BTreeMap;
 
-use crate::oracle::wilson;
 use crate::rng;
 use crate::rng::Stream;
-use crate::study::statistics::{
-    Estimate, Interval, RankTest, holm, mann_whitney, mean, poisson, ratio_of_means, superiority,
+use crate::statistics::{
+    Estimate, Interval, RankTest, holm, mann_whitney, mean, poisson, ratio_of_means, superiority, wilson,
 };
 
 use crate::study::file::EvaluationPlan;

@@ -11,17 +11,6 @@ use crate::run::{Database, DatabaseError, add_all};
 
 use crate::train::training::TrainedEpisode;
 
-const TABLES: &str = "
-    CREATE TABLE IF NOT EXISTS learning (
-        episode INTEGER PRIMARY KEY REFERENCES episode, return REAL NOT NULL, collisions INTEGER NOT NULL,
-        counted INTEGER NOT NULL, epsilon REAL NOT NULL, loss REAL, updates INTEGER NOT NULL,
-        steps INTEGER NOT NULL, simulated_s REAL NOT NULL
-    ) STRICT;
-    CREATE TABLE IF NOT EXISTS checkpoint (
-        only INTEGER PRIMARY KEY CHECK (only = 1), episodes INTEGER NOT NULL, digest TEXT NOT NULL,
-        learner BLOB NOT NULL
-    ) STRICT;";
-
 /// An agent as it was after so many episodes.
 pub struct Checkpoint {
     pub episodes: usize,
@@ -42,7 +31,6 @@ impl Database {
         let transaction = self.connection.transaction()?;
         let episode = trained.summary.episode;
         add_all(&transaction, &trained.summary, &trained.log, in_words)?;
-        transaction.execute_batch(TABLES)?;
         transaction.prepare_cached("INSERT INTO learning VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)")?.execute(
             params![
                 episode as i64,
@@ -82,7 +70,6 @@ impl Database {
     /// If the file cannot be read or written, or the checkpoint is damaged.
     pub fn return_to_checkpoint(&mut self) -> Result<Option<Checkpoint>, DatabaseError> {
         let transaction = self.connection.transaction()?;
-        transaction.execute_batch(TABLES)?;
         let kept: Option<(i64, String, Vec<u8>)> = transaction
             .query_row("SELECT episodes, digest, learner FROM checkpoint", [], |row| {
                 Ok((row.get(0)?, row.get(1)?, row.get(2)?))

@@ -5,9 +5,30 @@ use std::path::{Path, PathBuf};
 use crate::cases::root;
 
 /// From left to right, as in `src/lib.rs` and ARCHITECTURE.md.
-const ORDER: [&str; 22] = [
-    "units", "rng", "geometry", "road", "syntax", "model", "prove", "check", "action", "sim", "ads", "mdp",
-    "agent", "episode", "oracle", "run", "train", "trial", "study", "emit", "report", "cli",
+const ORDER: [&str; 23] = [
+    "units",
+    "rng",
+    "statistics",
+    "geometry",
+    "road",
+    "syntax",
+    "model",
+    "prove",
+    "check",
+    "action",
+    "sim",
+    "ads",
+    "mdp",
+    "agent",
+    "episode",
+    "oracle",
+    "run",
+    "train",
+    "trial",
+    "study",
+    "emit",
+    "report",
+    "cli",
 ];
 
 #[test]

@@ -4,6 +4,8 @@ use std::path::Path;
 use std::process::Stdio;
 use std::time::Duration;
 
+use avastra::run::Database;
+use avastra::study::StudyDatabase;
 use serde_json::Value;
 
 use crate::cases::{expect_snapshot, root};
@@ -217,4 +219,13 @@ fn loaded(text: &str) -> avastra::study::Study {
     };
     let settings = avastra::study::StudySettings::new(file, &table, None, None, &read).expect("it is sound");
     avastra::study::Study::new(table, settings).expect("all that it names is there")
+}
+
+#[test]
+fn a_database_of_another_kind_is_refused_by_its_layout() {
+    let scratch = tempfile::tempdir().expect("a scratch directory");
+    let path = scratch.path().join("run.db");
+    Database::open(&path).expect("it is new");
+    let refused = StudyDatabase::open(&path).err().expect("it is not a study's").to_string();
+    assert!(refused.ends_with("this version of avastra reads 1001"), "{refused}");
 }

@@ -1,4 +1,5 @@
-//! The shipped spaces as tables, and the rules of avastra45 against predicates written by hand.
+//! The shipped spaces as tables, and draws against what proofs say of them. What each rule refuses is tested in
+//! `tests/it/rules.rs`.
 
 mod rules;
 mod sound;
@@ -23,36 +24,17 @@ fn table(path: &str) -> ActionTable {
     ActionTable::new(loaded.space.unwrap())
 }
 
-/// A world in which everything fits and the gap is the distance asked for.
-struct Plain {
-    safety_gap_m: f64,
-}
+/// A world in which everything fits, no gap is too small, and the gap is the distance asked for.
+struct Plain;
 
 impl Surroundings for Plain {
     fn survey(&self, request: &SpawnRequest) -> Result<SpawnFacts, String> {
-        Ok(SpawnFacts { spawn_gap_m: request.distance_m, safety_gap_m: self.safety_gap_m })
+        Ok(SpawnFacts { spawn_gap_m: request.distance_m, safety_gap_m: 0.0 })
     }
 
     fn ego_speed_mps(&self) -> f64 {
         10.0
     }
-}
-
-/// A world without room for any spawn.
-struct Full;
-
-impl Surroundings for Full {
-    fn survey(&self, _request: &SpawnRequest) -> Result<SpawnFacts, String> {
-        Err("no room".to_owned())
-    }
-
-    fn ego_speed_mps(&self) -> f64 {
-        10.0
-    }
-}
-
-fn named(names: &[&str]) -> Vec<String> {
-    names.iter().map(|name| (*name).to_owned()).collect()
 }
 
 fn value_of(values: &[(Arc<str>, crate::model::Value)], name: &str) -> Option<crate::model::Value> {

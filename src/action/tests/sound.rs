@@ -100,7 +100,6 @@ proptest! {
         let names: Vec<String> = loose.rules.iter().map(|rule| rule.name.clone()).collect();
         let rules = RulesInForce::new(&loose, &names, &[]).unwrap();
         let road = &loose.roads[0];
-        let world = Plain { safety_gap_m: 0.0 };
         // A space with dead rows is refused; its error names the rows by number.
         let named_dead = |row: usize| verdicts.diagnostics.iter().any(|found| {
             found.code == crate::model::code::DEAD
@@ -115,7 +114,7 @@ proptest! {
             for draw in 0..40 {
                 let memory = loose.initial_memory(seed + draw);
                 let situation =
-                    Situation { memory: &memory, road, rules: &rules, surroundings: &world, seed: seed + draw, step: 0 };
+                    Situation { memory: &memory, road, rules: &rules, surroundings: &Plain, seed: seed + draw, step: 0 };
                 let offer = table.offer(&situation, row.index);
                 prop_assert!(!(is_dead && matches!(offer, Offer::Legal(_))), "dead row drawn\n{}", text);
                 // Draws alone would not find every value, so a grid over the declared ranges is tried too.
@@ -147,7 +146,7 @@ proptest! {
             for draw in 0..64 {
                 let memory = loose.initial_memory(seed + draw);
                 let situation =
-                    Situation { memory: &memory, road, rules: &rules, surroundings: &world, seed, step: 0 };
+                    Situation { memory: &memory, road, rules: &rules, surroundings: &Plain, seed, step: 0 };
                 let share = [draw % 8, draw / 8].map(|part| part as f64 / 7.0);
                 let numbers = loose.actions[row.action].parameters.iter().filter(|parameter| !parameter.axis);
                 let values: Vec<(Arc<str>, Value)> = numbers
@@ -172,7 +171,7 @@ proptest! {
                 let strict = ActionTable::new(space.clone());
                 let in_force = RulesInForce::new(space, &[], &[]).unwrap();
                 let situation = Situation {
-                    memory: &found.memory, road: &space.roads[0], rules: &in_force, surroundings: &world, seed, step: 0,
+                    memory: &found.memory, road: &space.roads[0], rules: &in_force, surroundings: &Plain, seed, step: 0,
                 };
                 let judged = strict.check(&situation, row.index, &found.values);
                 prop_assert!(judged.is_ok(), "{:?}\n{}", judged, text);
@@ -212,11 +211,10 @@ fn a_chain_of_equalities_is_solved_from_its_end() {
     let road = &space.roads[0];
     assert!(witness(&space, row, road).is_some());
     let rules = RulesInForce::by_default(&space);
-    let world = Plain { safety_gap_m: 0.0 };
     let memory = space.initial_memory(0);
     for step in 0..8 {
         let situation =
-            Situation { memory: &memory, road, rules: &rules, surroundings: &world, seed: 0, step };
+            Situation { memory: &memory, road, rules: &rules, surroundings: &Plain, seed: 0, step };
         let offer = ActionTable::new(space.clone()).offer(&situation, row.index);
         assert!(matches!(offer, Offer::Legal(_)), "{offer:?}");
     }
@@ -236,15 +234,9 @@ fn shipped_rows_have_witnesses_that_run() {
                 }
                 let found =
                     witness(space, row, road).unwrap_or_else(|| panic!("{} on {}", row.label, road.name));
-                let world = Plain { safety_gap_m: 0.0 };
-                let situation = Situation {
-                    memory: &found.memory,
-                    road,
-                    rules: &rules,
-                    surroundings: &world,
-                    seed: 0,
-                    step: 0,
-                };
+                let memory = &found.memory;
+                let situation =
+                    Situation { memory, road, rules: &rules, surroundings: &Plain, seed: 0, step: 0 };
                 let judged = table.check(&situation, row.index, &found.values);
                 assert!(judged.is_ok(), "{} on {}: {judged:?}", row.label, road.name);
             }

@@ -1,8 +1,8 @@
 //! The judgement: which rules a complete choice of values breaks.
 
-use crate::model::eval::{Facts, SpawnFacts, WorldFacts, evaluate};
+use crate::model::eval::{Facts, SpawnFacts, WorldFacts, compare, evaluate};
 use crate::model::expr::{Expr, ExprKind};
-use crate::model::rules::{Demand, RowRules};
+use crate::model::rules::{Bound, Demand, RowRules};
 use crate::model::space::Parameter;
 use crate::model::value::{Memory, Value};
 use crate::model::vocabulary::{Known, Word};
@@ -95,7 +95,7 @@ impl<'a> RowRules<'a> {
     pub fn words(self, breach: Breach<'_>, candidate: Candidate<'a>) -> String {
         match breach {
             Breach::Where(parameter) => format!("the `where` of `{}` does not hold", parameter.name),
-            Breach::Condition { condition, .. } => self.figures(condition, candidate),
+            Breach::Condition { rule, condition } => self.figures(rule, condition, candidate),
             Breach::Gap { spawn: SpawnFacts { spawn_gap_m, safety_gap_m }, .. } => {
                 format!("the gap would be {spawn_gap_m:.1} m, a fair one is {safety_gap_m:.1} m")
             }
@@ -107,30 +107,59 @@ impl<'a> RowRules<'a> {
         }
     }
 
-    /// The parameters and the facts of the world that a broken condition names, with their values, and the other
-    /// side of a comparison.
-    fn figures(self, condition: &Expr, candidate: Candidate<'a>) -> String {
+    /// The bounds of a rule on single numbers that the candidate breaks, each with its limit.
+    pub fn broken_bounds(
+        self,
+        rule: usize,
+        candidate: Candidate<'a>,
+    ) -> impl Iterator<Item = (&'a Bound, Value)> {
+        let facts = self.facts(candidate);
+        self.space.bounds[self.row.action].iter().filter_map(move |bound| {
+            let applies =
+                bound.rule == Some(rule) && bound.guards.iter().all(|guard| self.holds(guard, facts));
+            let limit = applies.then(|| evaluate(&bound.limit, &self.space.functions, &facts))?;
+            (!compare(bound.op, candidate.values[bound.local], limit)).then_some((bound, limit))
+        })
+    }
+
+    /// The parameters and the facts of the world that a broken condition names, with their values, and what was
+    /// wanted: the first broken bound, or the right side of a comparison that bounds no single number.
+    fn figures(self, rule: usize, condition: &Expr, candidate: Candidate<'a>) -> String {
+        let parameters = &self.space.actions[self.row.action].parameters;
         let mut shown = Vec::new();
-        for (index, parameter) in self.space.actions[self.row.action].parameters.iter().enumerate() {
+        for (index, parameter) in parameters.iter().enumerate() {
             if condition.any(|kind| matches!(kind, ExprKind::Local(local) if *local == index)) {
                 let value = self.space.show(candidate.values[index], parameter.ty);
                 shown.push(format!("{} = {value}", parameter.name));
             }
         }
+        let facts = self.facts(candidate);
+        let value = |expr: &Expr| self.space.show(evaluate(expr, &self.space.functions, &facts), expr.ty);
         condition.walk(&mut |part| {
             if let ExprKind::Fact(fact) = part.kind
                 && fact.known() == Known::World
             {
-                let value = evaluate(part, &self.space.functions, &self.facts(candidate));
-                let figure = format!("{} = {}", fact.name(), self.space.show(value, part.ty));
+                let figure = format!("{} = {}", fact.name(), value(part));
                 if !shown.contains(&figure) {
                     shown.push(figure);
                 }
             }
         });
-        if let ExprKind::Compare(op, _, right) = &condition.kind {
-            let wanted = evaluate(right, &self.space.functions, &self.facts(candidate));
-            shown.push(format!("wanted {} {}", op.symbol(), self.space.show(wanted, right.ty)));
+        match (self.broken_bounds(rule, candidate).next(), &condition.kind) {
+            (Some((bound, limit)), kind) => {
+                let Parameter { name, ty, .. } = &parameters[bound.local];
+                let (op, limit) = (bound.op.symbol(), self.space.show(limit, *ty));
+                let local = ExprKind::Local(bound.local);
+                let is_left = matches!(kind, ExprKind::Compare(_, left, _) if left.kind == local);
+                shown.push(match is_left {
+                    true => format!("wanted {op} {limit}"),
+                    false => format!("wanted {name} {op} {limit}"),
+                });
+            }
+            (None, ExprKind::Compare(op, _, right)) => {
+                shown.push(format!("wanted {} {}", op.symbol(), value(right)));
+            }
+            (None, _) => {}
         }
         match shown.is_empty() {
             true => "its condition does not hold".to_owned(),

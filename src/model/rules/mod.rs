@@ -11,10 +11,10 @@
 //!    `speed <= road.limit`. [`RowRules::solve`] chooses numbers within these bounds, so that few choices
 //!    are in vain. It need not find every bound, because it does not have the last word.
 //! 4. [`RowRules::breaches`] has the last word. It takes a complete [`Candidate`] (values, the memory before
-//!    and after, the gaps of its spawns) and returns every rule in force that the candidate breaks.
+//!    and after, what the world says) and returns every rule in force that the candidate breaks.
 //!
 //! Drawing and replaying (`action`), the search for witnesses (`prove::witness`) and the checker of scenarios
-//! judge by `breaches`; they differ only in where the gaps of a spawn come from. Proofs (`prove::reach`)
+//! judge by `breaches`; they differ only in what the world says, if it is asked. Proofs (`prove::reach`)
 //! work on sets of values and cannot call it, but they go over the same demands and bounds.
 
 mod bound;

@@ -1,6 +1,6 @@
 //! Two samples compared by ranks alone, without any assumption about their distributions.
 
-use crate::study::statistics::{Interval, bisect};
+use crate::statistics::{Interval, bisect};
 
 /// Samples up to this size are compared exactly, if no value occurs twice. Ours: for larger ones the normal
 /// approximation is as good.

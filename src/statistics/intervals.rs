@@ -3,7 +3,7 @@
 use crate::rng;
 use crate::rng::Rng;
 
-use crate::study::statistics::bisect;
+use crate::statistics::bisect;
 
 /// An interval that covers the true value in 95 of 100 samples.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
@@ -61,6 +61,29 @@ fn student_within(bound: f64, degrees: usize) -> f64 {
         sum += term;
     }
     if is_odd { core::f64::consts::FRAC_2_PI * (angle_rad + sine * sum) } else { sine * sum }
+}
+
+/// A share by its count, 0 without trials, and its 95 % interval.
+pub fn proportion(count: u32, trials: u32) -> (f64, [f64; 2]) {
+    let share = if trials == 0 { 0.0 } else { f64::from(count) / f64::from(trials) };
+    (share, wilson(count, trials).into())
+}
+
+/// 95 % interval of a share by its count, after Wilson 1927; from 0 to 1 without trials.
+pub fn wilson(count: u32, trials: u32) -> (f64, f64) {
+    if trials == 0 {
+        return (0.0, 1.0);
+    }
+    // 97.5 % quantile of the normal distribution.
+    const Z: f64 = 1.959_963_984_540_054;
+    let (n, p) = (f64::from(trials), f64::from(count) / f64::from(trials));
+    let centre = p + Z * Z / (2.0 * n);
+    let half = Z * (p * (1.0 - p) / n + Z * Z / (4.0 * n * n)).sqrt();
+    let whole = 1.0 + Z * Z / n;
+    // At the ends rounding must not lose the exact 0 and 1.
+    let low = if count == 0 { 0.0 } else { (centre - half) / whole };
+    let high = if count == trials { 1.0 } else { (centre + half) / whole };
+    (low, high)
 }
 
 /// The exact interval of the mean of a Poisson variable, of which `count` was observed (Garwood 1936).
@@ -184,5 +207,21 @@ mod tests {
         // One in eight resamples of three values, one of which is not 0, has nothing in it: no upper bound.
         let (_, interval) = ratio_of_means(&[4.0], &[0.0, 0.0, 3.0], &mut rng).unwrap();
         assert_eq!((interval.low, interval.high), (4.0 / 3.0, None));
+    }
+
+    #[test]
+    fn intervals_are_wilsons() {
+        // Newcombe 1998, table I, method 3: 81 of 263, 15 of 148, 0 of 20, 1 of 29.
+        for (count, trials, low, high) in [
+            (81, 263, 0.2553, 0.3662),
+            (15, 148, 0.0624, 0.1605),
+            (0, 20, 0.0, 0.1611),
+            (1, 29, 0.0061, 0.1718),
+        ] {
+            let found = wilson(count, trials);
+            assert!((found.0 - low).abs() < 5e-5 && (found.1 - high).abs() < 5e-5, "{count}: {found:?}");
+        }
+        assert_eq!(wilson(20, 20), (1.0 - wilson(0, 20).1, 1.0));
+        assert_eq!(wilson(0, 0), (0.0, 1.0));
     }
 }

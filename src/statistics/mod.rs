@@ -7,7 +7,7 @@ mod intervals;
 mod ranks;
 mod survival;
 
-pub use intervals::{Estimate, Interval, mean, poisson, ratio_of_means};
+pub use intervals::{Estimate, Interval, mean, poisson, proportion, ratio_of_means, wilson};
 pub use ranks::{RankTest, holm, mann_whitney, superiority};
 pub use survival::{Lifetime, restricted_mean};
 
