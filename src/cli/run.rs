@@ -230,6 +230,9 @@ fn totals_text(totals: &Totals, elapsed_s: f64, played: usize) -> String {
     if let Some(first_s) = totals.first_counted_s_mean {
         text.push_str(&format!(", the first after {first_s:.1} s on average"));
     }
+    if totals.red_runs > 0 {
+        text.push_str(&format!("\n{} passed", plural(totals.red_runs as usize, "red light")));
+    }
     if totals.collisions > 0 {
         text.push_str(&format!(
             "\nof all: {} sudden, {} where the other ran into the ego vehicle",
