@@ -2,6 +2,7 @@
 //! under `snapshots/`.
 
 mod agents;
+mod alarms;
 mod cases;
 mod command;
 mod corpus;

@@ -38,7 +38,7 @@ macro_rules! weaknesses {
 }
 
 weaknesses! {
-    /// Tracks are published only in their fourth frame, detection ends with the detector's grid, what is mostly hidden is not detected, and every second frame sees of a large vehicle only the part next to the ego vehicle and takes it for a car. Apollo `pub_track_time_thresh`; issues 14212 and AIasd/ADFuzz 5: unstable detection and tracking across frames. Off: the first frame publishes, the sensors' own range holds, any part in sight will do.
+    /// Tracks are published only after their fourth detection, detection ends with the detector's grid, what is mostly hidden is not detected, every second frame sees of a large vehicle only the part next to the ego vehicle and takes it for a car, and at times it is detected as two. Apollo `pub_track_time_thresh`; issues 14212 and AIasd/ADFuzz 5: unstable detection and tracking across frames. Off: the first frame publishes, the sensors' own range holds, any part in sight will do.
     late_unstable_tracks,
     /// A vehicle is predicted to keep its lane until its centre is over the edge or its lateral speed has lasted. Apollo issues 11118, 12798, 14212. Off: lateral speed is believed at once.
     lane_bound_prediction,
