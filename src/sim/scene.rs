@@ -95,7 +95,7 @@ impl Scene {
 }
 
 /// Number of ways on foot that are kept for a road: several rows and draws of a moment ask for the same.
-const FOOT_WAYS_MAX: usize = 256;
+const FOOT_WAYS_MAX: usize = 2048;
 
 /// The ways on foot that were asked for lately, by the bits of their station.
 #[derive(Debug, Default)]

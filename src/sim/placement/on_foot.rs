@@ -22,9 +22,8 @@ use super::{Newcomers, ROOM_M, ahead_m, finish};
 
 /// A crosswalk within this distance of the asked place is used, m. Ours.
 const CROSSWALK_M: f64 = 5.0;
-/// A place with a kerb is looked for along the route up to 10 m from the asked one: step, m, and number of steps. Ours.
-const MOVED_STEP_M: f64 = 1.0;
-const MOVED_STEPS: u32 = 10;
+/// A place with a kerb is looked for along the route up to this far from the asked one, m. Ours.
+const MOVED_M_MAX: u32 = 10;
 /// How far beside the outermost lane vehicles park, m: less than the 12 inches that most American codes allow.
 const PARKED_M: f64 = 0.2;
 /// How far before a way over the road a vehicle is parked that hides its beginning, m. Ours.
@@ -78,7 +77,7 @@ pub(super) fn on_foot(
 }
 
 /// Stations of the route at which to try, the best first: the middle of a crosswalk at the asked place, the asked
-/// place, then those behind it, because a rule may ask for a gap, and those before it.
+/// place, then those farther on, because a rule may ask for a gap, and those nearer.
 fn stations(around: &Around, asked_m: f64) -> impl Iterator<Item = f64> {
     let route = &around.scene.route;
     let front_m = VehicleParameters::MKZ.front_m(around.ego_station_m);
@@ -86,11 +85,16 @@ fn stations(around: &Around, asked_m: f64) -> impl Iterator<Item = f64> {
     let near = route.crosswalks_m.iter().filter(|span| beyond_m(span) <= CROSSWALK_M);
     let crosswalk =
         near.min_by(|a, b| beyond_m(a).total_cmp(&beyond_m(b))).map(|(a_m, b_m)| (a_m + b_m) / 2.0);
-    let nearby = [MOVED_STEP_M, -MOVED_STEP_M]
-        .into_iter()
-        .flat_map(move |step_m| (1..=MOVED_STEPS).map(move |step| asked_m + step_m * f64::from(step)));
+    // Whole metres of the route, so that all draws of a row look at the same places, which the scene keeps.
+    let farther = (1..=MOVED_M_MAX).map(move |moved_m| asked_m.floor() + f64::from(moved_m));
+    let nearer = (1..=MOVED_M_MAX).map(move |moved_m| asked_m.ceil() - f64::from(moved_m));
     let ends_m = front_m..=route.path.length_m();
-    crosswalk.into_iter().chain([asked_m]).chain(nearby).filter(move |station_m| ends_m.contains(station_m))
+    crosswalk
+        .into_iter()
+        .chain([asked_m])
+        .chain(farther)
+        .chain(nearer)
+        .filter(move |station_m| ends_m.contains(station_m))
 }
 
 /// The way over the road at a station of the route.
