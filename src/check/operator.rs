@@ -7,7 +7,7 @@ use crate::check::names::unknown;
 use crate::check::references::Symbol;
 use crate::check::report::Report;
 use crate::model::expr::{Arithmetic, Comparison, Expr, ExprKind};
-use crate::model::vocabulary::LaneChoice;
+use crate::model::vocabulary::{LaneChoice, PRIORITY, Priority, Site, Word};
 use crate::model::{Type, code};
 use crate::syntax::ast::{BinaryOp, Span};
 use crate::syntax::{Diagnostic, ast};
@@ -106,6 +106,24 @@ impl Checker {
             };
             return Some(Expr { kind, ty: Type::Bool, span });
         }
+        let asked = match (self.names_priority(left, place), self.names_priority(right, place)) {
+            (true, _) => Some(right),
+            (_, true) => Some(left),
+            _ => None,
+        };
+        if let Some(word) = asked {
+            if op.orders() {
+                let error = Diagnostic::error(code::UNORDERED, "priority has no order");
+                let error = error.at(span, format!("`{}` needs one", op.symbol()));
+                return self.reject(error.help("write `priority == ego`, or `priority in [other, none]`"));
+            }
+            let is_so = self.has_priority(core::slice::from_ref(word), place, span)?;
+            let kind = match op {
+                Comparison::NotEqual => ExprKind::Not(Box::new(is_so)),
+                _ => is_so.kind,
+            };
+            return Some(Expr { kind, ty: Type::Bool, span });
+        }
         let (left, right) = self.both_sides(left, right, place)?;
         if !fits(left.ty, right.ty) && !fits(right.ty, left.ty) {
             self.mismatch("cannot be compared", span, &left, &right);
@@ -156,6 +174,9 @@ impl Checker {
     ) -> Option<Expr> {
         if let (true, ast::ExprKind::List(roads)) = (self.names_road(left, place), &right.kind) {
             return self.on_road(roads, place, span);
+        }
+        if let (true, ast::ExprKind::List(words)) = (self.names_priority(left, place), &right.kind) {
+            return self.has_priority(words, place, span);
         }
         let Some(value) = self.expr(left, place, None) else {
             self.look_at(right, place, None);
@@ -224,6 +245,30 @@ impl Checker {
         Some(Expr { kind: ExprKind::OnRoad(roads), ty: Type::Bool, span })
     }
 
+    /// `priority == ego`: whether priority was one of these.
+    fn has_priority(&mut self, words: &[ast::Expr], place: &Place<'_>, span: Span) -> Option<Expr> {
+        if place.site != Site::Verdict {
+            let error = Diagnostic::error(code::NOT_HERE, "`priority` is not known here");
+            return self.reject(error.at(span, "only verdicts see who had to give way"));
+        }
+        // Every unknown word is reported, not just the first.
+        let found: Vec<Option<Priority>> = words.iter().map(|word| self.priority_word(word)).collect();
+        let kind = ExprKind::HasPriority(found.into_iter().collect::<Option<_>>()?);
+        Some(Expr { kind, ty: Type::Bool, span })
+    }
+
+    fn priority_word(&mut self, word: &ast::Expr) -> Option<Priority> {
+        let ast::ExprKind::Name(name) = &word.kind else {
+            let error = Diagnostic::error(code::TYPE_MISMATCH, "wanted `ego`, `other` or `none`");
+            return self.reject(error.at(word.span, "not a name"));
+        };
+        let Some(priority) = Priority::from_name(name) else {
+            return self.reject(unknown("priority", name, word.span, Priority::names()));
+        };
+        self.references.word(word.span, priority);
+        Some(priority)
+    }
+
     /// Notes the names among the expressions as roads.
     pub(super) fn note_roads(&mut self, names: &[ast::Expr]) {
         for expr in names {
@@ -233,8 +278,22 @@ impl Checker {
         }
     }
 
-    /// Whether the expression is the word `road`, and no parameter, constant or state of that name hides it.
+    /// Whether the expression is the word `road`.
     fn names_road(&self, expr: &ast::Expr, place: &Place<'_>) -> bool {
-        matches!(&expr.kind, ast::ExprKind::Name(name) if name == "road") && self.is_bare_variant(expr, place)
+        self.names(expr, "road", place)
+    }
+
+    /// Whether the expression is the word `priority`, which is then noted.
+    fn names_priority(&mut self, expr: &ast::Expr, place: &Place<'_>) -> bool {
+        let is_named = self.names(expr, PRIORITY.0, place);
+        if is_named {
+            self.references.note(expr.span, Symbol::Engine(PRIORITY.0, PRIORITY.1), false);
+        }
+        is_named
+    }
+
+    /// Whether the expression is a word, and no parameter, constant or state of that name hides it.
+    fn names(&self, expr: &ast::Expr, word: &str, place: &Place<'_>) -> bool {
+        matches!(&expr.kind, ast::ExprKind::Name(name) if name == word) && self.is_bare_variant(expr, place)
     }
 }

@@ -12,7 +12,7 @@ use crate::model::rules::RowRules;
 use crate::model::scenario::{
     Avoidability, Claim, ENDS, Figure, MODULES, Origin, Scenario, ScenarioStart, ScenarioStep,
 };
-use crate::model::vocabulary::{Fact, OriginField, ScenarioClaim, StartField, WAIT, Word};
+use crate::model::vocabulary::{Fact, OriginField, Priority, ScenarioClaim, StartField, WAIT, Word};
 use crate::model::{
     AMBIENT_MAX, Domain, Initial, Memory, Parameter, Row, RulesInForce, SIGNAL_PHASE_S, Space, StateDef,
     Value, code, locals,
@@ -432,7 +432,8 @@ impl<'a> Reader<'a> {
         let unclear = || {
             Diagnostic::error(code::UNKNOWN_CLAIM, "unknown claim").at(expect.span, "cannot be checked").help(
                 "claims are `collision with npc#2 at 14.22 s`, `proc == [0.5]`, `trace == \"sha256:…\"`, \
-                 `end == arrived`, `avoidable by [cc, fsm]`, `cause == perception`, `minimal`, or the name of a verdict",
+                 `end == arrived`, `avoidable by [cc, fsm]`, `cause == perception`, `priority == other`, \
+                 `minimal`, or the name of a verdict",
             )
         };
         match &expect.claim.kind {
@@ -475,6 +476,11 @@ impl<'a> Reader<'a> {
                         let (obstacle, _) = self.clauses(&expect.clauses, false)?;
                         Some(Claim::Cause { modules, obstacle })
                     }
+                    (ast::ExprKind::Name(name), _) if name == ScenarioClaim::Priority.name() => {
+                        let priority = self.priority(right)?;
+                        let (obstacle, _) = self.clauses(&expect.clauses, false)?;
+                        Some(Claim::Priority { priority, obstacle })
+                    }
                     (ast::ExprKind::Name(name), ast::ExprKind::Name(end))
                         if name == ScenarioClaim::End.name() =>
                     {
@@ -491,6 +497,18 @@ impl<'a> Reader<'a> {
             }
             _ => self.reject(unclear()),
         }
+    }
+
+    /// `ego`, `other` or `none`.
+    fn priority(&mut self, value: &ast::Expr) -> Option<Priority> {
+        let ast::ExprKind::Name(name) = &value.kind else {
+            let error = Diagnostic::error(code::TYPE_MISMATCH, "wanted `ego`, `other` or `none`");
+            return self.reject(error.at(value.span, "not a name"));
+        };
+        let Some(priority) = Priority::from_name(name) else {
+            return self.reject(unknown("priority", name, value.span, Priority::names()));
+        };
+        Some(priority)
     }
 
     /// `perception`, or `[tracking, planning]`.

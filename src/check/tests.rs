@@ -4,6 +4,7 @@ use std::path::Path;
 
 use crate::check::state_argument::memory_from;
 use crate::check::{Loaded, ReadError, load, suggest_uses};
+use crate::model::vocabulary::{Priority, Word};
 use crate::model::{Avoidability, Claim, OutcomeFacts, Reach, code};
 use crate::syntax::{Style, render};
 
@@ -164,6 +165,18 @@ fn rewards_and_verdicts_are_computed() {
     let careless = OutcomeFacts { avoidable: true, ..crash };
     assert_eq!([crash, careless].map(|outcome| space.counts(outcome)), [false, true]);
     assert_eq!(space.verdict("unknown", crash), None);
+
+    for (condition, expected) in [
+        ("priority == ego", [true, false, false]),
+        ("priority != ego", [false, true, true]),
+        ("other == priority", [false, true, false]),
+        ("priority in [ego, none]", [true, false, true]),
+    ] {
+        let loaded = load_files(&[("a.ava", &format!("{BASE}verdict counted: {condition}\n"))]);
+        let space = loaded.space.unwrap();
+        let counts = |priority| space.counts(OutcomeFacts { priority, ..crash });
+        assert_eq!(Priority::ALL.iter().copied().map(counts).collect::<Vec<_>>(), expected, "{condition}");
+    }
 }
 
 #[test]

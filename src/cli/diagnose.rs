@@ -19,6 +19,7 @@ use super::load;
 use super::output::Output;
 use super::output::plural;
 use super::parallel::each_file;
+use super::replay::priority_text;
 
 /// Says which module is at fault for every file's first counted collision or, with `--mechanisms`, which share of
 /// all collisions each documented weakness causes.
@@ -205,11 +206,12 @@ fn shares_text(crashes: usize, shares: &[MechanismShare]) -> String {
 
 fn heading(collision: &Collision) -> String {
     format!(
-        "{} npc#{} ({}) is hit at {:.2} s",
+        "{} npc#{} ({}) is hit at {:.2} s; {}",
         collision.body.name(),
         collision.contact.obstacle,
         collision.verb.name(),
-        collision.contact.time_s
+        collision.contact.time_s,
+        priority_text(collision.contact.priority)
     )
 }
 

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use crate::ads::ModularConfig;
 use crate::episode::Collision;
-use crate::model::vocabulary::Word;
+use crate::model::vocabulary::{Priority, Word};
 use crate::model::{Avoidability, Scenario};
 use crate::oracle;
 use crate::run;
@@ -90,10 +90,12 @@ fn play(
     let log = stage.play(&ads, &mut |world, _, contacts| gauges.note(world, contacts));
     let (criticality, pet_s) = gauges.of_steps(&log);
     let severities: Vec<oracle::Severity> = log.collisions.iter().map(oracle::severity).collect();
+    let priorities: Vec<&str> =
+        log.collisions.iter().map(|collision| collision.contact.priority.name()).collect();
     if is_recorded {
         let claims = stage.verify(&ads, &log);
         let result = serde_json::json!({ "file": path, "scenario": scenario.name, "claims": claims,
-            "severities": severities, "criticality": criticality, "pet_s": pet_s });
+            "severities": severities, "priorities": priorities, "criticality": criticality, "pet_s": pet_s });
         let lines = log.collisions.iter().zip(&severities);
         let told = lines.map(|(collision, severity)| severity_text(collision, severity));
         let told = told.collect::<Vec<_>>().join("\n");
@@ -111,7 +113,7 @@ fn play(
     let result = serde_json::json!({
         "file": path, "scenario": scenario.name, "ads": name,
         "collisions": log.collisions.len(), "counted": counted, "judgements": judgements,
-        "severities": severities, "criticality": criticality, "pet_s": pet_s,
+        "severities": severities, "priorities": priorities, "criticality": criticality, "pet_s": pet_s,
     });
     Ok(Played { claims: None, told, result, scenario })
 }
@@ -119,7 +121,7 @@ fn play(
 /// How hard a collision was, in a line.
 fn severity_text(collision: &Collision, severity: &oracle::Severity) -> String {
     format!(
-        "  {} npc#{} ({}) hit at {:.2} s by the ego vehicle's {}: closing at {:.1} m/s, delta-v {:.1} m/s, the other's {:.1} m/s",
+        "  {} npc#{} ({}) hit at {:.2} s by the ego vehicle's {}: closing at {:.1} m/s, delta-v {:.1} m/s, the other's {:.1} m/s; {}",
         collision.body.name(),
         collision.contact.obstacle,
         severity.approach,
@@ -127,8 +129,18 @@ fn severity_text(collision: &Collision, severity: &oracle::Severity) -> String {
         severity.side,
         severity.closing_speed_mps,
         severity.delta_v_mps,
-        severity.obstacle_delta_v_mps
+        severity.obstacle_delta_v_mps,
+        priority_text(collision.contact.priority)
     )
+}
+
+/// Who had to give way, in words.
+pub fn priority_text(priority: Priority) -> &'static str {
+    match priority {
+        Priority::Ego => "the ego vehicle had priority",
+        Priority::Other => "the other had priority",
+        Priority::None => "neither had priority",
+    }
 }
 
 fn report(output: &Output, path: &Path, scenario: &Scenario, verdicts: &[oracle::ClaimResult]) {

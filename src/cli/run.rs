@@ -239,6 +239,10 @@ fn totals_text(totals: &Totals, elapsed_s: f64, played: usize) -> String {
             totals.sudden, totals.struck
         ));
         text.push_str(&format!(
+            "\nof all: {} in which the ego vehicle had priority, {} in which the other had",
+            totals.wronged, totals.wrong
+        ));
+        text.push_str(&format!(
             "\nof all: {} avoidable by a careful driver, {} only without any delay, {} unavoidable",
             totals.avoidable, totals.beyond_reference, totals.unavoidable
         ));

@@ -194,6 +194,8 @@ fn expects(log: &EpisodeLog, summary: &EpisodeSummary, steps: usize) -> Vec<Expe
         });
         let class = tree::name(finding.judgement.class.name());
         expects.push(tree::expect(class, by.into_iter().chain([obstacle()]).collect()));
+        let priority = tree::name(contact.priority.name());
+        expects.push(tree::expect(tree::equal(tree::name("priority"), priority), vec![obstacle()]));
         if let Some([first, rest @ ..]) = finding.cause.as_deref() {
             let first = tree::name(first.name());
             let modules = rest.iter().map(|module| tree::name(module.name()));

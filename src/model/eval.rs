@@ -6,7 +6,7 @@
 use crate::model::expr::{Arithmetic, Comparison, Expr, ExprKind};
 use crate::model::space::{COUNTED, FnDef, RoadFacts, Space, WordExpr};
 use crate::model::value::{Memory, Value};
-use crate::model::vocabulary::{Fact, LaneChoice};
+use crate::model::vocabulary::{Fact, LaneChoice, Priority};
 
 /// Numbers that differ by at most this part of the larger one are `==`. This tolerates the digits that an
 /// author rounds away, but no measurable distance.
@@ -55,8 +55,10 @@ pub struct OutcomeFacts {
     pub repeated: bool,
     /// The obstacle appeared too late for any driver.
     pub sudden: bool,
-    /// The obstacle ran into the ego vehicle's side or rear.
+    /// The obstacle ran into the side or rear of an ego vehicle that did not have to give way.
     pub struck: bool,
+    /// Who had to give way. Known for collisions alone.
+    pub priority: Priority,
     /// A careful reference driver would not have touched the obstacle. Known for judged collisions alone.
     pub avoidable: bool,
     /// Collision probability of the step, in `[0, 1]`.
@@ -105,6 +107,7 @@ pub fn evaluate(expr: &Expr, functions: &[FnDef], facts: &Facts<'_>) -> Value {
         }
         ExprKind::InLanes(inner, lanes) => Value::Bool(has_lane(facts, lanes[value(inner).variant()])),
         ExprKind::OnRoad(names) => Value::Bool(facts.road.is_some_and(|road| names.contains(&road.name))),
+        ExprKind::HasPriority(list) => Value::Bool(list.contains(&facts.outcome.priority)),
         ExprKind::Match { subject, arm_of, arms } => value(&arms[arm_of[value(subject).variant()]]),
     }
 }

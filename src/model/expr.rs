@@ -1,7 +1,7 @@
 //! Typed expressions: names are resolved, units are gone (all numbers are SI), every type fits.
 
 use crate::model::value::{EnumIndex, Type};
-use crate::model::vocabulary::{Fact, Known, LaneChoice};
+use crate::model::vocabulary::{Fact, Known, LaneChoice, Priority};
 use crate::syntax::ast::Span;
 pub use crate::syntax::ast::{Arithmetic, Comparison};
 use crate::units::Rational;
@@ -43,6 +43,8 @@ pub enum ExprKind {
     InLanes(Box<Expr>, Vec<LaneChoice>),
     /// `road == corner`, `road in [corner, boulevard]`: whether the road is one of these.
     OnRoad(Vec<String>),
+    /// `priority == ego`, `priority in [other, none]`: whether priority was one of these.
+    HasPriority(Vec<Priority>),
     /// The arm for each variant of the subject's enum is `arms[arm_of[variant]]`.
     Match {
         subject: Box<Expr>,
@@ -63,6 +65,7 @@ impl Expr {
             | ExprKind::Local(_)
             | ExprKind::Cell(_)
             | ExprKind::OnRoad(_)
+            | ExprKind::HasPriority(_)
             | ExprKind::Fact(_) => {}
             ExprKind::CellAt(_, inner)
             | ExprKind::Not(inner)

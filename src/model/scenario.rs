@@ -4,6 +4,7 @@ use core::fmt;
 use std::sync::Arc;
 
 use crate::model::value::{Memory, Value};
+use crate::model::vocabulary::Priority;
 
 /// One timeline over a space.
 #[derive(Debug, Clone, PartialEq)]
@@ -81,6 +82,8 @@ pub enum Claim {
     /// `expect cause == perception with npc#2`, `expect cause == [tracking, planning]`: the module at
     /// fault, or the two that are at fault together; in words of [`MODULES`].
     Cause { modules: Vec<String>, obstacle: Option<u32> },
+    /// `expect priority == other with npc#2`: who had priority in the collision.
+    Priority { priority: Priority, obstacle: Option<u32> },
     /// `expect minimal with npc#2`: if any one step is left out, with its time or without, there is no such
     /// collision.
     Minimal { obstacle: Option<u32> },

@@ -141,13 +141,19 @@ facts! {
     Collision "collision" Type::Bool, Step = "A `Bool`: the ego vehicle collided.";
     Repeated "repeated" Type::Bool, Step = "A `Bool`: with an obstacle that it has hit before.";
     Sudden "sudden" Type::Bool, Step = "A `Bool`: with an obstacle that appeared a moment ago.";
-    Struck "struck" Type::Bool, Step = "A `Bool`: the obstacle ran into the side or the rear of the ego vehicle.";
+    Struck "struck" Type::Bool, Step = "A `Bool`: the obstacle ran into the side or the rear of an ego vehicle that did not have to give way.";
     Avoidable "avoidable" Type::Bool, Judgement = "A `Bool`: a careful reference driver avoids it. Verdicts only.";
 }
 
 /// `lane in road.lanes`: spelt like a fact, but a set, which may only stand after `in`.
 pub const ROAD_LANES: (&str, &str) =
     ("road.lanes", "The lanes in the ego vehicle's direction: `lane in road.lanes`.");
+
+/// `priority == ego`: spelt like a fact, but only a condition, as `road == corner` is.
+pub const PRIORITY: (&str, &str) = (
+    "priority",
+    "Whether the ego vehicle or the road user had to give way: `priority == ego`, `priority in [other, none]`. Verdicts only.",
+);
 
 impl Fact {
     /// The thing before the `.`: `road` for `road.limit`.
@@ -238,6 +244,7 @@ words! {
 words! {
     ScenarioClaim "What a scenario may claim beside facts and verdicts.":
     Cause "cause" = "The module at fault: `expect cause == perception`.",
+    Priority "priority" = "Who had priority in a collision: `expect priority == other with npc#2`.",
     End "end" = "How the episode ends: `expect end == arrived`.",
     Minimal "minimal" = "Without any one of its steps the scenario loses its crash.",
     Trace "trace" = "The digest of the whole state stream: `expect trace == \"sha256:…\"`.",
@@ -306,6 +313,12 @@ words! {
 words! {
     /// The paper's "lane-change" group.
     Then "Whether a vehicle keeps its lane or changes it.": Keep, Change
+}
+
+impl Default for Priority {
+    fn default() -> Priority {
+        Priority::None
+    }
 }
 
 impl Level {

@@ -2,13 +2,15 @@
 //!
 //! The rule that combines these facts into "counted" is the space's own `verdict`. Sudden appearance
 //! is judged as in the published package; side and rear hits, which its authors sorted out by hand,
-//! are decided here by contact point and motion. Its "overlapping" cannot occur, because no obstacle
+//! are decided here by contact point and motion, unless the ego vehicle had to give way (`sim::right_of_way`):
+//! one that turns across oncoming traffic is hit in the flank, and is not the one that was run into. Its "overlapping" cannot occur, because no obstacle
 //! appears within another's outline. Its "repeated" does not occur either, because an obstacle that was
 //! touched once touches nothing again; the word stays for worlds in which it can. Not taken over: that a
 //! second pedestrian of an episode never counts.
 
-use crate::episode::EpisodeLog;
+use crate::episode::{Collision, EpisodeLog};
 use crate::geometry::Vec2;
+use crate::model::vocabulary::Priority;
 use crate::model::{Avoidability, OutcomeFacts, Space};
 use crate::sim::{Contact, VehicleParameters};
 
@@ -26,12 +28,20 @@ const SIDEWAYS_MPS: f64 = 0.1;
 /// The facts about one collision of a log; `judgement` is the verdict on it.
 pub fn facts(log: &EpisodeLog, index: usize, judgement: &Judgement) -> OutcomeFacts {
     let collision = &log.collisions[index];
-    let earlier = &log.collisions[..index];
+    let same = |other: &Collision| other.contact.obstacle == collision.contact.obstacle;
+    let repeated = log.collisions[..index].iter().any(same);
+    OutcomeFacts { repeated, ..facts_of(collision, judgement) }
+}
+
+/// As [`facts`], for a collision by itself.
+pub(super) fn facts_of(collision: &Collision, judgement: &Judgement) -> OutcomeFacts {
     OutcomeFacts {
         collision: true,
-        repeated: earlier.iter().any(|other| other.contact.obstacle == collision.contact.obstacle),
+        repeated: false,
         sudden: collision.contact.time_s - collision.spawned_s <= SUDDEN_S,
-        struck: struck(&collision.contact, &VehicleParameters::MKZ),
+        struck: collision.contact.priority != Priority::Other
+            && struck(&collision.contact, &VehicleParameters::MKZ),
+        priority: collision.contact.priority,
         avoidable: judgement.class == Avoidability::Avoidable,
         // Contact is certainty.
         proc: 1.0,
@@ -48,7 +58,7 @@ pub fn counted(space: &Space, log: &EpisodeLog, judgements: &[Judgement]) -> Vec
 /// exactly.
 const CORNER_M: f64 = 1e-3;
 
-/// Whether the obstacle ran into the ego vehicle rather than the other way round.
+/// Whether the obstacle ran into the ego vehicle rather than the other way round, whoever had to give way.
 ///
 /// True if the ego vehicle stood; if it was hit at the rear; if it was hit at the side behind its
 /// front axle, or before it by an obstacle moving towards that side; and at a front corner if the
@@ -113,7 +123,6 @@ fn face(point: Vec2, ego: &VehicleParameters) -> Face {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::episode::Collision;
     use crate::model::vocabulary::{Body, Priority, Verb};
 
     fn collision(x_m: f64, y_m: f64, ego_speed_mps: f64, obstacle_left_mps: f64) -> Collision {

@@ -1,14 +1,22 @@
 //! Collisions made by hand, whose verdicts are known beforehand.
 
+use std::path::Path;
+use std::sync::Arc;
+
 use crate::action::Effect;
 use crate::ads;
 use crate::ads::{Ads, Status};
-use crate::model::Avoidability;
-use crate::model::vocabulary::Verb;
+use crate::check::{self, ReadError};
+use crate::episode::Collision;
+use crate::geometry::{OrientedBox, Vec2};
+use crate::model::vocabulary::{Body, Priority, Verb};
+use crate::model::{Avoidability, Space};
 use crate::road::testing::{lanes, street};
-use crate::sim::{Control, DT_S, Sensed, Start, World, testing};
+use crate::sim::testing::Heading;
+use crate::sim::{Contact, Control, DT_S, Sensed, Start, VehicleParameters, World, testing};
 
 use super::avoidable::{AvoidabilitySettings, Judgement, judge_one};
+use super::facts::{facts_of, struck};
 use super::hazard::onset;
 
 /// A lane along +x for 800 m, 3 m wide: too narrow to pass another vehicle.
@@ -50,6 +58,13 @@ const EVENT_S: f64 = 12.0;
 
 /// Drives with weak brakes, makes `event` happen, and judges the first contact.
 fn judged(brake_pct_max: f64, event: impl Fn(&mut World)) -> Judgement {
+    let (recording, contact, met) = crashed(brake_pct_max, event);
+    let recent = &recording[recording.len().saturating_sub(500)..];
+    judge_one(recent, &contact, met, &AvoidabilitySettings::default())
+}
+
+/// The worlds before the first contact, the contact, and where the ego vehicle was then.
+fn crashed(brake_pct_max: f64, event: impl Fn(&mut World)) -> (Vec<World>, Contact, OrientedBox) {
     let mut world = world();
     let mut broken = Broken { driver: ads::Idm::new(world.scene()), brake_pct_max };
     let mut recording: Vec<World> = Vec::new();
@@ -62,8 +77,7 @@ fn judged(brake_pct_max: f64, event: impl Fn(&mut World)) -> Judgement {
         let control = broken.drive(&sensed);
         let contact = world.tick(&control).first().copied();
         if let Some(contact) = contact {
-            let recent = &recording[recording.len().saturating_sub(500)..];
-            return judge_one(recent, &contact, world.ego_outline(), &AvoidabilitySettings::default());
+            return (recording, contact, world.ego_outline());
         }
         recording.push(world.clone());
     }
@@ -109,9 +123,12 @@ fn between_human_and_machine_lies_the_beyond() {
 
 #[test]
 fn the_hazard_of_a_pedestrian_begins_with_the_first_step() {
-    let judgement = judged(0.0, |world| appear(world, Verb::Walk, 46.0, 1.4));
-    // Pedestrians wait for a second at the kerb, 5 m aside.
-    assert!((judgement.onset_s - (EVENT_S + 1.0)).abs() < 0.11, "{judgement:?}");
+    let (recording, contact, met) = crashed(0.0, |world| appear(world, Verb::Walk, 46.0, 1.4));
+    let walks = |world: &&World| world.obstacle(1).is_some_and(|walker| walker.velocity_mps != Vec2::zeros());
+    let first_step_s = recording.iter().find(walks).expect("it walked").time_s();
+    let recent = &recording[recording.len().saturating_sub(500)..];
+    let judgement = judge_one(recent, &contact, met, &AvoidabilitySettings::default());
+    assert!((judgement.onset_s - first_step_s).abs() < 0.11, "{judgement:?}, {first_step_s}");
     assert_ne!(judgement.class, Avoidability::Unavoidable, "{judgement:?}");
 }
 
@@ -124,4 +141,93 @@ fn what_was_never_in_sight_has_no_onset() {
     let there = hidden.obstacle(1).expect("it was put there").outline;
     assert_eq!(onset(&[hidden.clone()], 1, there), Some(0));
     assert_eq!(onset(&[hidden], 2, there), None, "no obstacle has that number");
+}
+
+/// IDM that sees no other road user.
+#[derive(Debug, Clone)]
+struct Blind(ads::Idm);
+
+impl Ads for Blind {
+    fn drive(&mut self, sensed: &Sensed) -> Control {
+        self.0.drive(&Sensed { objects: Vec::new(), ..sensed.clone() })
+    }
+
+    fn status(&self) -> &Status {
+        self.0.status()
+    }
+}
+
+/// A blind ego vehicle goes through a junction at a green light, and a vehicle comes from the other side: when
+/// the ego vehicle's front is at `front_m`, it is put at a station of its way through a road, with a speed.
+fn meets(
+    heading: Heading,
+    front_m: f64,
+    (through, station_m, speed_mps): (&str, f64, f64),
+) -> Option<(Contact, Judgement)> {
+    let scene = testing::oncoming(heading);
+    let mut world = World::new(scene, &Start { seed: 1, ..testing::start() });
+    let mut blind = Blind(ads::Idm::new(world.scene()));
+    let mut recording: Vec<World> = Vec::new();
+    let mut sensed = world.sensed();
+    let mut is_put = false;
+    for _ in 0..1500 {
+        if !is_put && VehicleParameters::MKZ.front_m(world.ego_station_m()) >= front_m {
+            world.put("3", 1, through, station_m, speed_mps);
+            is_put = true;
+        }
+        world.sense(&mut sensed);
+        let control = blind.drive(&sensed);
+        if let Some(contact) = world.tick(&control).first().copied() {
+            let judgement =
+                judge_one(&recording, &contact, world.ego_outline(), &AvoidabilitySettings::default());
+            return Some((contact, judgement));
+        }
+        recording.push(world.clone());
+    }
+    None
+}
+
+fn shipped_space() -> Arc<Space> {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios/avastra45.ava");
+    let read = |path: &Path| std::fs::read_to_string(path).map_err(|error| ReadError(error.to_string()));
+    check::load(&path, &read).expect("it can be read").space.expect("the shipped space is sound")
+}
+
+fn counts(contact: Contact, judgement: &Judgement) -> bool {
+    let collision = Collision { contact, step: 0, body: Body::Sedan, verb: Verb::CrossRoad, spawned_s: 0.0 };
+    shipped_space().counts(facts_of(&collision, judgement))
+}
+
+#[test]
+fn who_turns_across_a_green_light_wrongs_the_ego_vehicle() {
+    let (contact, judgement) = meets(Heading::Straight, 70.0, ("8", 188.0, 9.0)).expect("they meet");
+    assert_eq!(contact.priority, Priority::Ego, "{contact:?}");
+    assert!(!struck(&contact, &VehicleParameters::MKZ), "the ego vehicle's front hits it: {contact:?}");
+    assert!(!counts(contact, &judgement), "{judgement:?}");
+    let had_to_give_way = Contact { priority: Priority::Other, ..contact };
+    assert_eq!(counts(had_to_give_way, &judgement), judgement.class == Avoidability::Avoidable);
+}
+
+#[test]
+fn an_ego_vehicle_that_turns_across_is_at_fault_though_hit_in_the_flank() {
+    let found = (130..200)
+        .step_by(3)
+        .filter_map(|station_m| meets(Heading::Left, 85.0, ("2", f64::from(station_m), 13.0)));
+    let found: Vec<(Contact, Judgement)> = found.collect();
+    let in_the_flank = found.iter().find(|(contact, _)| struck(contact, &VehicleParameters::MKZ));
+    let (contact, judgement) = in_the_flank.unwrap_or_else(|| panic!("{found:?}")).clone();
+    assert_eq!(contact.priority, Priority::Other, "{contact:?}");
+    assert_eq!(judgement.class, Avoidability::Avoidable, "{judgement:?}");
+    assert!(counts(contact, &judgement));
+}
+
+/// Judges a blind ego vehicle at 11.2 m/s before which a pedestrian stands, `distance_m` away when it appears.
+fn stands(distance_m: f64) -> Avoidability {
+    judged(0.0, |world| appear(world, Verb::Stand, distance_m, 1.0)).class
+}
+
+#[test]
+fn un_r157_puts_the_border_of_a_standing_pedestrian_at_24_m() {
+    assert_ne!(stands(20.0), Avoidability::Avoidable);
+    assert_eq!(stands(28.0), Avoidability::Avoidable);
 }

@@ -2,6 +2,7 @@
 
 use crate::ads::Module;
 use crate::episode::{Collision, EpisodeLog, Outcome};
+use crate::model::vocabulary::Word;
 use crate::model::{Claim, Scenario, Space, digest_text};
 
 use super::avoidable::Judgement;
@@ -70,10 +71,11 @@ fn check(
                 match space.verdict(name, facts) {
                     Some(true) => Ok(()),
                     _ => Err(format!(
-                        "repeated: {}, sudden: {}, struck: {}, {}",
+                        "repeated: {}, sudden: {}, struck: {}, priority: {}, {}",
                         facts.repeated,
                         facts.sudden,
                         facts.struck,
+                        facts.priority.name(),
                         in_words(&judgements[index])
                     )),
                 }
@@ -97,6 +99,14 @@ fn check(
                 if same { Ok(()) } else { Err(format!("[{}]", found.join(", "))) }
             };
             let claim = format!("cause [{}]{}", modules.join(", "), with(*obstacle));
+            judged(claim, collision(log, *obstacle).and_then(judge))
+        }
+        Claim::Priority { priority, obstacle } => {
+            let judge = |index: usize| match log.collisions[index].contact.priority {
+                found if found == *priority => Ok(()),
+                found => Err(format!("priority {}", found.name())),
+            };
+            let claim = format!("priority {}{}", priority.name(), with(*obstacle));
             judged(claim, collision(log, *obstacle).and_then(judge))
         }
         Claim::Minimal { obstacle } => {

@@ -146,6 +146,7 @@ pub(crate) fn enclose(expr: &Expr, known: &Known<'_>) -> Values {
             None => Values::UNKNOWN_TRUTH,
             Some(road) => Values::truth(names.contains(&road.name)),
         },
+        ExprKind::HasPriority(_) => Values::UNKNOWN_TRUTH,
         ExprKind::Match { subject, arm_of, arms } => {
             let chosen = positions(values(subject).variants()).map(|variant| values(&arms[arm_of[variant]]));
             chosen.reduce(Values::union).unwrap_or_else(|| values(&arms[0]))

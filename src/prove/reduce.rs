@@ -37,6 +37,7 @@ pub(super) fn reduce(expr: &Expr, functions: &[FnDef], locals: &[Expr]) -> Expr 
         ExprKind::InRange(of, low, high) => ExprKind::InRange(inner(of), inner(low), inner(high)),
         ExprKind::InList(of, list) => ExprKind::InList(inner(of), all(list)),
         ExprKind::OnRoad(names) => ExprKind::OnRoad(names.clone()),
+        ExprKind::HasPriority(list) => ExprKind::HasPriority(list.clone()),
         ExprKind::InLanes(of, lanes) => ExprKind::InLanes(inner(of), lanes.clone()),
         ExprKind::Match { subject, arm_of, arms } => {
             let subject = inner(subject);
@@ -65,6 +66,7 @@ fn fold(expr: Expr) -> Expr {
                 | ExprKind::Fact(_)
                 | ExprKind::InLanes(..)
                 | ExprKind::OnRoad(_)
+                | ExprKind::HasPriority(_)
         )
     };
     if expr.any(open) {

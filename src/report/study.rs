@@ -57,6 +57,8 @@ fn verdict_table(road: &RoadResults) -> String {
         ("unavoidable", "unavoidable"),
         ("sudden", "sudden"),
         ("struck", "struck"),
+        ("ego's priority", "wronged"),
+        ("other's priority", "wrong"),
         ("red runs", "red_runs"),
         ("speeding", "speeding_share"),
         ("beside lane", "astray_share"),

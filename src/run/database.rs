@@ -18,7 +18,7 @@ use crate::run::shape::Shape;
 use crate::run::summary::{EpisodeSummary, Finding};
 
 /// Layout of the tables; raised whenever a column changes.
-const SCHEMA_VERSION: i64 = 4;
+const SCHEMA_VERSION: i64 = 5;
 
 /// `learning` and `checkpoint` belong to a training (`train::record`) and stay empty in a run.
 const SCHEMA: &str = "
@@ -36,7 +36,7 @@ CREATE TABLE collision (
   repeated INTEGER NOT NULL, sudden INTEGER NOT NULL, struck INTEGER NOT NULL, counted INTEGER NOT NULL,
   avoidability TEXT NOT NULL, hazard_onset_s REAL NOT NULL, avoided_by TEXT NOT NULL, evasion TEXT,
   side TEXT NOT NULL, approach TEXT NOT NULL, relative_speed_mps REAL NOT NULL, delta_v_mps REAL NOT NULL,
-  obstacle_delta_v_mps REAL NOT NULL, cause TEXT, shape TEXT,
+  obstacle_delta_v_mps REAL NOT NULL, cause TEXT, shape TEXT, priority TEXT NOT NULL,
   PRIMARY KEY (episode, number)
 ) STRICT;
 CREATE TABLE learning (
@@ -139,7 +139,9 @@ impl Database {
                         (SELECT coalesce(sum(avoidability = 'avoidable'), 0) FROM collision),
                         (SELECT coalesce(sum(avoidability = 'beyond_reference'), 0) FROM collision),
                         (SELECT coalesce(sum(avoidability = 'unavoidable'), 0) FROM collision),
-                        coalesce(sum(branched_s), 0.0)
+                        coalesce(sum(branched_s), 0.0),
+                        (SELECT coalesce(sum(priority = 'ego'), 0) FROM collision),
+                        (SELECT coalesce(sum(priority = 'other'), 0) FROM collision)
                  FROM episode",
             [],
             |row| {
@@ -163,6 +165,8 @@ impl Database {
                     beyond_reference: row.get(16)?,
                     unavoidable: row.get(17)?,
                     branched_s: row.get(18)?,
+                    wronged: row.get(19)?,
+                    wrong: row.get(20)?,
                 })
             },
         )?)
@@ -232,6 +236,9 @@ pub struct Totals {
     pub unavoidable: i64,
     /// Time that agents with lookahead simulated in branches, outside the episodes, s.
     pub branched_s: f64,
+    /// Collisions in which the ego vehicle had priority, and in which the other had; the rest is neither.
+    pub wronged: i64,
+    pub wrong: i64,
 }
 
 fn step_table() -> String {
@@ -333,7 +340,7 @@ fn add_collision(
     let severity = oracle::severity(collision);
     transaction
         .prepare_cached(
-            "INSERT INTO collision VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+            "INSERT INTO collision VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
         )?
         .execute(params![
             episode as i64,
@@ -362,6 +369,7 @@ fn add_collision(
             severity.obstacle_delta_v_mps,
             finding.cause_in_words(),
             finding.shape.map(Shape::name),
+            facts.priority.name(),
         ])?;
     Ok(())
 }

@@ -14,7 +14,7 @@ use crate::study::record::{CellRecord, CollisionRecord, EpisodeRecord, FailureCl
 
 /// Layout of the tables; raised whenever a column changes. Begins at 1001, so that a `run.db` is never taken for a
 /// `study.db`.
-const SCHEMA_VERSION: i64 = 1001;
+const SCHEMA_VERSION: i64 = 1002;
 
 /// Seeds are text: SQLite's integers have a sign.
 const SCHEMA: &str = "
@@ -36,7 +36,7 @@ CREATE TABLE collision (
   cell INTEGER NOT NULL REFERENCES cell, episode INTEGER NOT NULL, number INTEGER NOT NULL, time_s REAL NOT NULL,
   counted INTEGER NOT NULL, repeated INTEGER NOT NULL, sudden INTEGER NOT NULL, struck INTEGER NOT NULL,
   avoidability TEXT NOT NULL, kind TEXT NOT NULL, manoeuvre TEXT NOT NULL, approach TEXT NOT NULL,
-  side TEXT NOT NULL, cause TEXT, PRIMARY KEY (cell, episode, number)
+  side TEXT NOT NULL, cause TEXT, priority TEXT NOT NULL, PRIMARY KEY (cell, episode, number)
 ) STRICT;
 ";
 
@@ -154,7 +154,7 @@ impl StudyDatabase {
         }
         let collisions = self.by_cell(
             "SELECT cell, episode, time_s, counted, repeated, sudden, struck, avoidability, kind, manoeuvre,
-                    approach, side, cause
+                    approach, side, cause, priority
              FROM collision ORDER BY cell, episode, number",
             |row| Ok((row.get::<_, u32>(1)? as usize, collision(row)?)),
         )?;
@@ -202,7 +202,7 @@ fn add_episode(
         ],
     )?;
     let mut insert = connection
-        .prepare_cached("INSERT INTO collision VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)")?;
+        .prepare_cached("INSERT INTO collision VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)")?;
     for (number, found) in episode.collisions.iter().enumerate() {
         let FailureClass { kind, manoeuvre, approach, side, cause } = &found.failure;
         insert.execute(params![
@@ -220,6 +220,7 @@ fn add_episode(
             approach,
             side,
             cause,
+            found.priority,
         ])?;
     }
     Ok(())
@@ -268,6 +269,7 @@ fn collision(row: &Row) -> Result<CollisionRecord, rusqlite::Error> {
             side: row.get(11)?,
             cause: row.get(12)?,
         },
+        priority: row.get(13)?,
     })
 }
 

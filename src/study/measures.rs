@@ -46,6 +46,10 @@ pub const MEASURES: &[Measure] = &[
     shown("sudden", |cell, plan| number(cell, plan, |found| found.sudden)),
     // The other ran into the ego vehicle.
     shown("struck", |cell, plan| number(cell, plan, |found| found.struck)),
+    // The ego vehicle had priority.
+    shown("wronged", |cell, plan| number(cell, plan, |found| found.priority == "ego")),
+    // The other had.
+    shown("wrong", |cell, plan| number(cell, plan, |found| found.priority == "other")),
     // Episodes with a counted collision.
     compared("colliding", |cell, plan| per_seed(cell, plan, |episode| f64::from(episode.counted() > 0))),
     compared("distinct", distinct),

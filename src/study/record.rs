@@ -76,6 +76,8 @@ pub struct CollisionRecord {
     pub sudden: bool,
     pub struck: bool,
     pub avoidability: String,
+    /// Who had priority: `ego`, `other` or `none`.
+    pub priority: String,
     pub failure: FailureClass,
 }
 
@@ -146,6 +148,7 @@ impl CollisionRecord {
             sudden: finding.facts.sudden,
             struck: finding.facts.struck,
             avoidability: finding.judgement.class.name().to_owned(),
+            priority: finding.facts.priority.name().to_owned(),
             failure: FailureClass {
                 kind: kind(finding.collision.body.name()).to_owned(),
                 manoeuvre: finding.collision.verb.name().to_owned(),

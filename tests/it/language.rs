@@ -5,9 +5,9 @@ use std::path::Path;
 
 use avastra::check::{Loaded, load};
 use avastra::model::vocabulary::{
-    Body, Colour, EpisodeField, Fact, LaneChoice, Level, OriginField, Phenomenon, ROAD_LANES, RoadField,
-    ScenarioClaim, Side, SpaceClaim, SpawnField, StartField, StopReason, TYPES, Then, TimeOfDay, Verb, WAIT,
-    Word,
+    Body, Colour, EpisodeField, Fact, LaneChoice, Level, OriginField, PRIORITY, Phenomenon, Priority,
+    ROAD_LANES, RoadField, ScenarioClaim, Side, SpaceClaim, SpawnField, StartField, StopReason, TYPES, Then,
+    TimeOfDay, Verb, WAIT, Word,
 };
 use avastra::model::{Avoidability, COUNTED, ENDS, MODULES};
 use avastra::syntax::Diagnostic;
@@ -90,13 +90,13 @@ fn every_word_of_the_language_is_on_the_page() {
     let mut on_page: BTreeSet<&str> = page.split(|c: char| !(c.is_alphanumeric() || c == '_')).collect();
     // Units and the like do not consist of letters alone.
     on_page.extend(page.split([' ', '`', ',', '|', '\n', ')', '(', '}']));
-    let all: [Vec<&str>; 21] = [
+    let all: [Vec<&str>; 22] = [
         keywords().map(|(word, _)| *word).collect(),
         UNITS.iter().map(|unit| unit.word).collect(),
         ENDS.to_vec(),
         MODULES.to_vec(),
         Avoidability::ALL.map(Avoidability::name).to_vec(),
-        vec![COUNTED, ROAD_LANES.0, WAIT.0],
+        vec![COUNTED, ROAD_LANES.0, PRIORITY.0, WAIT.0],
         Fact::names().collect(),
         RoadField::names().collect(),
         StartField::names().collect(),
@@ -109,6 +109,7 @@ fn every_word_of_the_language_is_on_the_page() {
         LaneChoice::names().collect(),
         Level::names().collect(),
         Phenomenon::names().collect(),
+        Priority::names().collect(),
         Side::names().collect(),
         Then::names().collect(),
         TimeOfDay::names().collect(),

@@ -1,7 +1,9 @@
 //! The words that no file declares, as lists for the editor. The keywords stand in `syntax::keyword`, the
 //! engine's words in `model::vocabulary`.
 
-use crate::model::vocabulary::{Body, Colour, LaneChoice, Side, Site, SpawnField, TYPES, Then, Verb, Word};
+use crate::model::vocabulary::{
+    Body, Colour, LaneChoice, PRIORITY, Side, Site, SpawnField, TYPES, Then, Verb, Word,
+};
 use crate::model::{ENDS, MODULES};
 
 /// A word and what it means.
@@ -20,7 +22,8 @@ pub fn types() -> Vec<Entry> {
 /// The facts that are known at a site, without those that have a `.`.
 pub fn facts(site: Site) -> Vec<Entry> {
     let plain = site.facts().filter(|fact| fact.thing().is_none());
-    plain.map(|fact| (fact.name(), fact.meaning())).collect()
+    let priority = (site == Site::Verdict).then_some(PRIORITY);
+    plain.map(|fact| (fact.name(), fact.meaning())).chain(priority).collect()
 }
 
 /// The words for a field of a spawn; `body` is what stands before `ahead` or `behind`.
