@@ -6,6 +6,12 @@
 //! watches for some time before it takes over. If none of the careful drivers avoids the collision,
 //! evasive manoeuvres that begin at the onset without any delay are tried.
 //!
+//! Beside that, each careful driver is asked to the letter of UN R157 (`letter`): the ego vehicle drives along its
+//! recorded path at its recorded speed until the model reacts, and then only brakes. The regulation speaks of a
+//! vehicle that keeps its lane and speed on a motorway. A careful driver in a town does more: it slows down for
+//! bends and for those that have priority before there is a risk. So the first replay counts, and the letter is
+//! reported: where only the first avoids a collision, foresight was missing rather than a reaction.
+//!
 //! A driver avoids the collision if until 4 s after the recorded contact it does not touch the obstacle,
 //! and does not run into any other road user. A contact in which another road user runs into the ego
 //! vehicle does not count, because recorded road users do not give way to a car that is now elsewhere.
@@ -13,15 +19,17 @@
 use std::collections::VecDeque;
 
 use crate::ads;
-use crate::ads::{Ads, Evasion};
+use crate::ads::{Ads, Careful, Evasion};
 use crate::episode::{EpisodeLog, Watch};
-use crate::geometry::OrientedBox;
+use crate::geometry::{OrientedBox, Pose, wrap_angle};
 use crate::model::Avoidability;
-use crate::sim::{Contact, DT_S, FRAME_TICKS, VehicleParameters, World};
+use crate::sim::{Contact, DT_S, EgoMotion, FRAME_TICKS, VehicleParameters, World};
 use crate::syntax::listed;
 
 use super::facts::struck;
 use super::hazard::onset;
+
+const GRAVITY_MPS2: f64 = 9.81;
 
 /// Settings of the verdict. Every run records them.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -101,6 +109,8 @@ pub struct Judgement {
     pub onset_s: f64,
     /// Reference drivers that avoid the collision.
     pub avoided_by: Vec<String>,
+    /// Careful drivers that avoid it to the letter of UN R157, by braking alone.
+    pub r157_letter: Vec<String>,
     /// The evasive manoeuvre that avoids it, looked for if no careful driver does.
     pub evasion: Option<String>,
 }
@@ -150,6 +160,10 @@ pub fn judge_one(
     };
     let careful: Vec<String> = settings.careful.iter().filter(avoids).cloned().collect();
     let reported: Vec<String> = settings.reported.iter().filter(avoids).cloned().collect();
+    let brakes_in_time = |name: &&String| {
+        ads::careful(name, recording[from].scene()).is_some_and(|mut driver| case.brakes(driver.as_mut()))
+    };
+    let r157_letter: Vec<String> = settings.careful.iter().filter(brakes_in_time).cloned().collect();
     let evasion = if careful.is_empty() { case.evasion() } else { None };
     let class = if !careful.is_empty() {
         Avoidability::Avoidable
@@ -159,7 +173,7 @@ pub fn judge_one(
         Avoidability::Unavoidable
     };
     let onset_s = recording[from].time_s();
-    Judgement { class, onset_s, avoided_by: [careful, reported].concat(), evasion }
+    Judgement { class, onset_s, avoided_by: [careful, reported].concat(), r157_letter, evasion }
 }
 
 /// A collision that is to be driven again.
@@ -174,13 +188,38 @@ struct Case<'a> {
 impl Case<'_> {
     /// Whether a driver that watches first avoids the collision.
     fn avoids(&self, driver: &mut dyn Ads) -> bool {
+        self.show(driver);
+        self.drive(driver, &mut |_| true)
+    }
+
+    /// Shows a driver the time before the onset.
+    fn show(&self, driver: &mut dyn Ads) {
         let watched = self.from - self.from.min(ticks(self.settings.watch_s));
         let mut sensed = self.recording[watched].sensed();
         for world in &self.recording[watched..self.from] {
             world.sense(&mut sensed);
             driver.drive(&sensed);
         }
-        self.drive(driver, &mut |_| true)
+    }
+
+    /// Whether a driver's model avoids the collision to the letter of UN R157: by braking on the recorded path,
+    /// from the recorded speed. After the recorded contact the driver drives on by itself.
+    fn brakes(&self, driver: &mut dyn Careful) -> bool {
+        self.show(driver);
+        let recording = &self.recording[self.from..];
+        let mut world = recording[0].clone();
+        let mut sensed = world.sensed();
+        let mut held = Held::new(recording);
+        for recorded in &recording[1..] {
+            world.sense(&mut sensed);
+            driver.drive(&sensed);
+            let grip_mps2 = world.conditions().friction * GRAVITY_MPS2;
+            let motion = held.step(recorded.ego(), driver.braking_mps2().min(grip_mps2));
+            if self.is_hit(world.tick_placed(motion, recorded)) {
+                return false;
+            }
+        }
+        self.is_clear_after(&mut world, driver, &mut |_| true)
     }
 
     /// The first manoeuvre that avoids the collision on the road, in words.
@@ -206,10 +245,21 @@ impl Case<'_> {
                 return false;
             }
         }
+        self.is_clear_after(&mut world, driver, allowed)
+    }
+
+    /// Whether nothing happens for some time after the recorded contact.
+    fn is_clear_after(
+        &self,
+        world: &mut World,
+        driver: &mut (impl Ads + ?Sized),
+        allowed: &mut dyn FnMut(&World) -> bool,
+    ) -> bool {
+        let mut sensed = world.sensed();
         for _ in 0..ticks(self.settings.after_s) {
             world.sense(&mut sensed);
             let control = driver.drive(&sensed);
-            if self.is_hit(world.tick(&control)) || !self.is_fine(&world, allowed) {
+            if self.is_hit(world.tick(&control)) || !self.is_fine(world, allowed) {
                 return false;
             }
         }
@@ -224,6 +274,58 @@ impl Case<'_> {
 
     fn is_fine(&self, world: &World, allowed: &mut dyn FnMut(&World) -> bool) -> bool {
         !world.ticks().is_multiple_of(FRAME_TICKS) || allowed(world)
+    }
+}
+
+/// An ego vehicle that moves as recorded until a model brakes, and from then on only brakes, on the recorded path.
+struct Held<'a> {
+    recording: &'a [World],
+    /// Way to each recorded place, m.
+    ways_m: Vec<f64>,
+    tick: usize,
+    /// Speed and way since the model brakes; `None` before.
+    braked: Option<(f64, f64)>,
+}
+
+impl<'a> Held<'a> {
+    fn new(recording: &'a [World]) -> Held<'a> {
+        let mut ways_m = vec![0.0];
+        for pair in recording.windows(2) {
+            let step = pair[1].ego().rear_axle.position - pair[0].ego().rear_axle.position;
+            ways_m.push(ways_m[ways_m.len() - 1] + step.norm());
+        }
+        Held { recording, ways_m, tick: 0, braked: None }
+    }
+
+    /// The motion at the end of the next tick; `recorded` is the recorded one.
+    fn step(&mut self, recorded: EgoMotion, braking_mps2: f64) -> EgoMotion {
+        let before_mps =
+            self.braked.map_or(self.recording[self.tick].ego().speed_mps, |(speed_mps, _)| speed_mps);
+        let before_m = self.braked.map_or(self.ways_m[self.tick], |(_, way_m)| way_m);
+        self.tick += 1;
+        if self.braked.is_none() && braking_mps2 <= 0.0 {
+            return recorded;
+        }
+        let speed_mps = (before_mps - braking_mps2 * DT_S).max(0.0);
+        let way_m = before_m + (before_mps + speed_mps) / 2.0 * DT_S;
+        self.braked = Some((speed_mps, way_m));
+        let acceleration_mps2 = (speed_mps - before_mps) / DT_S;
+        EgoMotion { speed_mps, acceleration_mps2, ..self.at(way_m) }
+    }
+
+    /// The recorded motion at a way; beyond the last place the path goes on straight.
+    fn at(&self, way_m: f64) -> EgoMotion {
+        let last = self.recording.len() - 1;
+        let after = self.ways_m.partition_point(|at_m| *at_m <= way_m).clamp(1, last.max(1));
+        let Some(next) = self.recording.get(after) else { return self.recording[last].ego() };
+        let (here, next) = (self.recording[after - 1].ego(), next.ego());
+        let length_m = self.ways_m[after] - self.ways_m[after - 1];
+        let beyond_m = way_m - self.ways_m[after - 1];
+        let fraction = if length_m > 1e-9 { beyond_m / length_m } else { 0.0 };
+        let (a, b) = (here.rear_axle, next.rear_axle);
+        let turn_rad = wrap_angle(b.heading_rad - a.heading_rad) * fraction.min(1.0);
+        let position = a.position + (b.position - a.position) * fraction;
+        EgoMotion { rear_axle: Pose { position, heading_rad: wrap_angle(a.heading_rad + turn_rad) }, ..here }
     }
 }
 

@@ -36,7 +36,7 @@ CREATE TABLE collision (
   repeated INTEGER NOT NULL, sudden INTEGER NOT NULL, struck INTEGER NOT NULL, counted INTEGER NOT NULL,
   avoidability TEXT NOT NULL, hazard_onset_s REAL NOT NULL, avoided_by TEXT NOT NULL, evasion TEXT,
   side TEXT NOT NULL, approach TEXT NOT NULL, relative_speed_mps REAL NOT NULL, delta_v_mps REAL NOT NULL,
-  obstacle_delta_v_mps REAL NOT NULL, cause TEXT, shape TEXT, priority TEXT NOT NULL,
+  obstacle_delta_v_mps REAL NOT NULL, cause TEXT, shape TEXT, priority TEXT NOT NULL, r157_letter TEXT NOT NULL,
   PRIMARY KEY (episode, number)
 ) STRICT;
 CREATE TABLE learning (
@@ -340,7 +340,7 @@ fn add_collision(
     let severity = oracle::severity(collision);
     transaction
         .prepare_cached(
-            "INSERT INTO collision VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+            "INSERT INTO collision VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
         )?
         .execute(params![
             episode as i64,
@@ -370,6 +370,7 @@ fn add_collision(
             finding.cause_in_words(),
             finding.shape.map(Shape::name),
             facts.priority.name(),
+            judgement.r157_letter.join(" "),
         ])?;
     Ok(())
 }

@@ -182,6 +182,12 @@ impl Ego {
             yaw_rate_radps: turned_rad / dt_s,
             steer_rad,
         };
+        self.place(self.motion);
+    }
+
+    /// Sets the motion, whatever moves the vehicle.
+    pub fn place(&mut self, motion: EgoMotion) {
+        self.motion = motion;
         self.outline = outline_at(&self.motion.rear_axle);
         self.frame = Frame::of(&self.outline);
     }

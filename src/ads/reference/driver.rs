@@ -52,6 +52,8 @@ pub struct Reference<M> {
     watched: BTreeMap<u32, Watched>,
     ticks: u64,
     station_m: Option<f64>,
+    /// What the model gave in the last tick, m/s².
+    braking_mps2: f64,
 }
 
 /// What is remembered of a road user from look to look.
@@ -74,6 +76,7 @@ impl<M: Model> Reference<M> {
             watched: BTreeMap::new(),
             ticks: 0,
             station_m: None,
+            braking_mps2: 0.0,
         }
     }
 
@@ -140,6 +143,18 @@ fn remember(before: Option<&Watched>, encounter: &mut Encounter) -> Watched {
     Watched { other_mps, side_gap_m, aside_m }
 }
 
+/// A driving system that can say how hard it would brake by its model alone.
+pub trait Careful: Ads {
+    /// Deceleration that the model gave in the last tick, m/s²; 0 before it reacts.
+    fn braking_mps2(&self) -> f64;
+}
+
+impl<M: Model> Careful for Reference<M> {
+    fn braking_mps2(&self) -> f64 {
+        self.braking_mps2
+    }
+}
+
 impl<M: Model> Ads for Reference<M> {
     fn drive(&mut self, sensed: &Sensed) -> Control {
         let position = sensed.ego.rear_axle.position;
@@ -153,6 +168,7 @@ impl<M: Model> Ads for Reference<M> {
         self.ticks += 1;
         let (demand_mps2, because_of) = self.demand.unwrap_or((0.0, 0));
         let now_mps2 = self.reflex.step(demand_mps2, DT_S);
+        self.braking_mps2 = now_mps2;
         // The models mean what the car does, which follows the pedal with a lag.
         let lag_s = VehicleParameters::MKZ.pedal_lag_s;
         let braking_mps2 = now_mps2 + (self.reflex.after(demand_mps2, DT_S) - now_mps2) * (lag_s / DT_S);

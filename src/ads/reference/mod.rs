@@ -1,5 +1,9 @@
 //! Reference drivers: what to compare a driving system with, and to judge its collisions by.
 
+use std::sync::Arc;
+
+use crate::sim::Scene;
+
 mod cc;
 mod driver;
 mod encounter;
@@ -14,9 +18,20 @@ mod rss;
 mod tests;
 
 pub use cc::CarefulHuman;
-pub use driver::{Reference, in_sight};
+pub use driver::{Careful, Reference, in_sight};
 pub use evasion::Evasion;
 pub use fsm::FuzzySafety;
 pub use idm::Idm;
 pub use r157::MinimalPerformance;
 pub use rss::Rss;
+
+/// The reference driver of that name, if it follows a published model; its names are those of the registry.
+pub fn careful(name: &str, scene: &Arc<Scene>) -> Option<Box<dyn Careful>> {
+    match name {
+        "cc" => Some(Box::new(Reference::new(scene, CarefulHuman))),
+        "fsm" => Some(Box::new(Reference::new(scene, FuzzySafety::default()))),
+        "rss" => Some(Box::new(Reference::new(scene, Rss::default()))),
+        "r157" => Some(Box::new(Reference::new(scene, MinimalPerformance))),
+        _ => None,
+    }
+}

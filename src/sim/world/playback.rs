@@ -6,8 +6,9 @@
 
 use crate::geometry::{OrientedBox, Sweep};
 use crate::sim::contact::{Contact, Party, meet};
-use crate::sim::ego::Control;
+use crate::sim::ego::{Control, Ego};
 use crate::sim::road_user::RoadUser;
+use crate::sim::sense::EgoMotion;
 
 use super::{DT_S, FRAME_TICKS, World};
 
@@ -16,10 +17,20 @@ impl World {
     /// `recorded`, the recorded world one tick later. Returns the contacts of this tick; one that lasts
     /// is returned again in every tick.
     pub fn tick_recorded(&mut self, control: &Control, recorded: &World) -> &[Contact] {
+        let friction = self.conditions.friction;
+        self.play(|ego| ego.step(control, friction, DT_S), recorded)
+    }
+
+    /// As [`World::tick_recorded`], with an ego vehicle that moves as `motion` says, whatever moves it.
+    pub fn tick_placed(&mut self, motion: EgoMotion, recorded: &World) -> &[Contact] {
+        self.play(|ego| ego.place(motion), recorded)
+    }
+
+    fn play(&mut self, move_ego: impl FnOnce(&mut Ego), recorded: &World) -> &[Contact] {
         let before: Vec<(u32, OrientedBox)> =
             self.obstacles().map(|obstacle| (obstacle.id, obstacle.outline)).collect();
         let ego_before = self.ego.outline;
-        self.ego.step(control, self.conditions.friction, DT_S);
+        move_ego(&mut self.ego);
         self.follow_route();
         *self = World {
             ego: self.ego.clone(),
