@@ -210,15 +210,17 @@ fn who_turns_across_a_green_light_wrongs_the_ego_vehicle() {
 
 #[test]
 fn an_ego_vehicle_that_turns_across_is_at_fault_though_hit_in_the_flank() {
-    let found = (130..200)
-        .step_by(3)
-        .filter_map(|station_m| meets(Heading::Left, 85.0, ("2", f64::from(station_m), 13.0)));
-    let found: Vec<(Contact, Judgement)> = found.collect();
-    let in_the_flank = found.iter().find(|(contact, _)| struck(contact, &VehicleParameters::MKZ));
-    let (contact, judgement) = in_the_flank.unwrap_or_else(|| panic!("{found:?}")).clone();
+    let mut stations = (130..200).step_by(3);
+    let met = stations.find_map(|station_m| meets(Heading::Left, 85.0, ("2", f64::from(station_m), 13.0)));
+    let (contact, judgement) = met.expect("one of them is there at the right moment");
     assert_eq!(contact.priority, Priority::Other, "{contact:?}");
     assert_eq!(judgement.class, Avoidability::Avoidable, "{judgement:?}");
     assert!(counts(contact, &judgement));
+    // A moment later the other would have run into the right flank.
+    let in_the_flank = Contact { on_ego: Vec2::new(0.0, -1.03), ..contact };
+    assert!(struck(&in_the_flank, &VehicleParameters::MKZ));
+    assert!(counts(in_the_flank, &judgement), "whoever has to give way is not the one that is run into");
+    assert!(!counts(Contact { priority: Priority::Ego, ..in_the_flank }, &judgement));
 }
 
 /// Judges a blind ego vehicle at 11.2 m/s before which a pedestrian stands, `distance_m` away when it appears.

@@ -1,9 +1,9 @@
 //! The intelligent driver model (Treiber, Hennecke, Helbing 2000) on the route, with true knowledge.
 //!
 //! It sees everything within 120 m, hidden or not, looking around ten times a second. Around the
-//! model stand three rules of our own: it stops at red and yellow lights where it can, brakes for what is
-//! on its way, and gives way to what would cross its way at nearly the same time. Predictions are straight
-//! lines at constant speed.
+//! model stand rules of our own: it stops at red and yellow lights where it can and at stop signs, brakes for
+//! what is on its way, and gives way to what would cross its way at nearly the same time, unless it has priority
+//! and the other is not seen to take it (`giving_way`). Predictions are straight lines at constant speed.
 //!
 //! It begins a lane change of the route once no vehicle in the target lane would have to brake hard for
 //! it, nor it for them (the safety criterion of MOBIL: Kesting, Treiber, Helbing 2007); until then it
@@ -15,12 +15,15 @@ use crate::ads::driver::Ads;
 use crate::ads::guide::{Guide, SpeedRules};
 use crate::ads::status::{PerceivedObject, Reason, Status};
 use crate::ads::steering::{Steering, SteeringConfig};
+use crate::ads::stops::Signs;
 use crate::geometry::{Beside, Vec2, unit_vector};
 use crate::road::RouteLaneChange;
 use crate::sim::{
     Control, DT_S, FRAME_TICKS, Following, Scene, Sensed, SensedObject, SignalColour, VehicleParameters,
     pedals_for,
 };
+
+use super::giving_way::goes_before;
 
 /// The model's parameters, for towns.
 const MODEL: Following =
@@ -64,6 +67,7 @@ pub struct Idm {
     steer_rad: f64,
     /// What it keeps away from, looked for every fifth tick.
     ahead: Vec<Ahead>,
+    signs: Signs,
     ticks: u64,
     status: Status,
 }
@@ -96,6 +100,7 @@ impl Idm {
             station_m: None,
             steer_rad: 0.0,
             ahead: Vec::new(),
+            signs: Signs::default(),
             ticks: 0,
             status: Status::default(),
         }
@@ -130,8 +135,9 @@ impl Idm {
         let mut ahead = core::mem::take(&mut self.ahead);
         ahead.clear();
         ahead.extend(self.lights(sensed, front_m));
+        ahead.extend(self.sign(sensed, front_m));
         let objects = sensed.objects.iter().filter(|object| object.distance_m < SIGHT_M);
-        ahead.extend(objects.filter_map(|object| self.ahead(object, sensed.ego.speed_mps, front_m)));
+        ahead.extend(objects.filter_map(|object| self.ahead(sensed, object, front_m)));
         ahead.extend(self.last_chance());
         self.ahead = ahead;
         self.report(sensed);
@@ -214,8 +220,20 @@ impl Idm {
         })
     }
 
+    /// The stop sign that it stops for, as something that stands a little behind its line.
+    fn sign(&mut self, sensed: &Sensed, front_m: f64) -> Option<Ahead> {
+        let stop = self.signs.next_stop(&self.scene, front_m, sensed.ego.speed_mps)?;
+        Some(Ahead {
+            near_m: stop.station_m - LINE_GAP_M + MODEL.gap_m_min,
+            age_s: 0.0,
+            speed_mps: 0.0,
+            reason: stop.reason,
+        })
+    }
+
     /// What a road user means for the ego vehicle: a leader, something in the way, or something that crosses it.
-    fn ahead(&self, object: &SensedObject, speed_mps: f64, front_m: f64) -> Option<Ahead> {
+    fn ahead(&self, sensed: &Sensed, object: &SensedObject, front_m: f64) -> Option<Ahead> {
+        let speed_mps = sensed.ego.speed_mps;
         let half_way_m = VehicleParameters::MKZ.width_m / 2.0 + SIDE_M;
         let rear_m = front_m - VehicleParameters::MKZ.length_m;
         let forward = unit_vector(object.pose.heading_rad);
@@ -252,6 +270,9 @@ impl Idm {
             let (near_m, far_m) = (span.from_m, span.to_m);
             let ego_from_m = rear_m + speed_mps * (time_s - CONFLICT_S).max(0.0);
             if near_m <= ego_to_m && far_m >= ego_from_m && near_m >= front_m {
+                if goes_before(&self.scene, sensed, object, front_m) {
+                    return None;
+                }
                 let speed_mps = object.velocity_mps.dot(&beside.forward).max(0.0);
                 let near_m = near_m - speed_mps * time_s - CROSSING_GAP_M + MODEL.gap_m_min;
                 return Some(Ahead { near_m, age_s: 0.0, speed_mps, reason: Reason::Yield(object.id) });

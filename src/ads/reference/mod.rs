@@ -9,6 +9,7 @@ mod driver;
 mod encounter;
 mod evasion;
 mod fsm;
+mod giving_way;
 mod idm;
 mod model;
 mod r157;
