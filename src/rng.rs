@@ -33,6 +33,8 @@ pub enum Stream {
     Ambient = 8,
     /// Small changes of a scenario, to see whether it still crashes.
     Variation = 9,
+    /// Other errors of a driving system in the same episode, to see what chance does.
+    Noise = 10,
     /// First weights of a network.
     Initialization = 21,
     /// Which transitions a learner draws for an update.

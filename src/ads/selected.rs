@@ -2,6 +2,8 @@
 
 use std::sync::Arc;
 
+use crate::rng;
+use crate::rng::Stream;
 use crate::sim::Scene;
 
 use super::driver::Ads;
@@ -15,6 +17,8 @@ pub struct Selected {
     entry: &'static Entry,
     profile: Option<ModularConfig>,
     foresight: Option<Arc<Foresight>>,
+    /// The number of other errors than those of the episode's seed.
+    noise: Option<u32>,
     /// The driving system that takes over, and when, s.
     successor: Option<(Box<Selected>, f64)>,
 }
@@ -30,7 +34,7 @@ impl Selected {
     /// The driving system with its default settings.
     pub fn new(entry: &'static Entry) -> Selected {
         let profile = (entry.name == MODULAR).then(ModularConfig::default);
-        Selected { entry, profile, foresight: None, successor: None }
+        Selected { entry, profile, foresight: None, noise: None, successor: None }
     }
 
     /// With a profile.
@@ -49,6 +53,11 @@ impl Selected {
         Selected { foresight: Some(foresight), ..self }
     }
 
+    /// With other errors of its sensors in the same episode: a number for each.
+    pub fn with_other_noise(self, number: u32) -> Selected {
+        Selected { noise: Some(number), ..self }
+    }
+
     /// Drives up to a moment of the episode, s; from there on `successor` drives, which has watched until then.
     pub fn until(self, at_s: f64, successor: Selected) -> Selected {
         Selected { successor: Some((Box::new(successor), at_s)), ..self }
@@ -65,9 +74,13 @@ impl Selected {
 
     /// A fresh driver for one episode.
     pub fn build(&self, scene: &Arc<Scene>, seed: u64) -> Box<dyn Ads> {
+        let own_seed =
+            self.noise.map_or(seed, |number| rng::child_seed(seed, Stream::Noise, u64::from(number)));
         let first: Box<dyn Ads> = match &self.profile {
-            Some(profile) => Box::new(Modular::with_foresight(scene, profile, seed, self.foresight.clone())),
-            None => (self.entry.build)(scene, seed),
+            Some(profile) => {
+                Box::new(Modular::with_foresight(scene, profile, own_seed, self.foresight.clone()))
+            }
+            None => (self.entry.build)(scene, own_seed),
         };
         match &self.successor {
             Some((second, at_s)) => Box::new(Handover::new(first, second.build(scene, seed), *at_s)),

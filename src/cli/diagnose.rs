@@ -217,23 +217,25 @@ fn heading(collision: &Collision) -> String {
 
 fn table_text(diagnosis: &Diagnosis) -> String {
     let mut text = format!(
-        "\n{:<14}{:<20}{:<20}{}",
-        "module", "as in the baseline", "without its errors", "its errors alone"
+        "\n{:<14}{:<20}{:<20}{:<18}{:<14}{}",
+        "module", "as in the baseline", "without its errors", "its errors alone", "other noise", "varied"
     );
+    let percent = |share: Option<f64>| share.map_or(String::new(), |share| format!("{:.0} %", share * 100.0));
     for found in &diagnosis.modules {
-        let prevented =
-            found.prevented.map_or(String::new(), |share| format!("prevents {:.0} %", share * 100.0));
         let line = format!(
-            "\n{:<14}{:<20}{:<20}{:<18}{prevented}",
+            "{:<14}{:<20}{:<20}{:<18}{:<14}{}",
             found.module.name(),
             found.restored.map_or("the same", oracle::Fate::in_words),
             found.idealised.in_words(),
-            found.alone.in_words()
+            found.alone.in_words(),
+            percent(found.share),
+            percent(found.prevented)
         );
         text.push('\n');
-        text.push_str(line.trim());
+        text.push_str(line.trim_end());
     }
     text.push_str(&format!("\n{:<34}{}", "all of them", diagnosis.ideal.in_words()));
+    text.push_str(&format!("\n{:<72}{}", "nothing changed (chance)", percent(Some(diagnosis.placebo))));
     for [first, second] in &diagnosis.pairs {
         text.push_str(&format!(
             "\n{} and {}: no crash without the errors of both",
@@ -262,10 +264,21 @@ fn sentence(diagnosis: &Diagnosis) -> String {
         .collect();
     let finding = |module: Module| diagnosis.modules.iter().find(|found| found.module == module);
     match diagnosis.cause.as_slice() {
-        [] if diagnosis.varied_crashes.is_some() => {
-            "it hung by a hair: small variations do not crash, and no module can be named".to_owned()
+        [] if diagnosis.varied_crashes.is_some() || !others.is_empty() => {
+            "it hung by a hair: chance prevents it as often as any module, and none can be named".to_owned()
         }
         [] => "no module is at fault alone, nor are two together".to_owned(),
+        [module] if diagnosis.brittle => {
+            let name = module.name();
+            let senses = match others.as_slice() {
+                [] => String::new(),
+                names => format!("; {} would have made up for it", names.join(", ")),
+            };
+            format!(
+                "{name} is brittle: all modules are within their specifications, and it could not bear their \
+                 errors{senses}"
+            )
+        }
         [module] => {
             let found = finding(*module);
             let alone = found.is_some_and(|found| found.alone == oracle::Fate::Crash);

@@ -1,14 +1,22 @@
 //! Which module of a driving system is at fault for a collision.
 //!
-//! The ego vehicle drives as it did until the obstacle appears. From then on the same system drives with
-//! one module without its errors (`ads::Module`), which has watched from the start, so that the hazard
-//! is the same to the bit; other road users decide for themselves. A module *suffices* if the collision
-//! vanishes without its errors. If no module suffices alone, pairs are tried.
+//! The ego vehicle drives as it did until the obstacle appears. From then on the same system drives with one
+//! module changed (`ads::Module`), which has watched from the start, so that the hazard is the same to the bit;
+//! other road users decide for themselves. A *baseline* is the specification: how good each module should be.
 //!
-//! Several modules may suffice: good brakes make up for bad eyes, and one crash does not tell which of the
-//! two is at fault. A *baseline* says how good eyes and brakes should be: if the collision vanishes with a
-//! module as the baseline has it, only such modules are candidates. Where several are left, these criteria
-//! decide, in this order:
+//! - A module that differs from the baseline is **outside its specification**. If the collision vanishes with
+//!   it as in the baseline, it is at fault.
+//! - Where no such module is found, all are within their specifications: their errors are those that they may
+//!   have. The fault then lies with a module that decides (prediction, planning, control, emergency braking):
+//!   one without whose errors and weaknesses the collision vanishes. If the collision also vanishes without the
+//!   errors of a module that senses (localisation, perception, tracking, latency), the deciding one is
+//!   **brittle**: it could not bear what it must expect. Where no deciding module makes up for the senses,
+//!   planning is brittle, because it drives no slower than it can see.
+//!
+//! **Chance.** The collision is played again with other sensor noise and nothing else changed; the share that
+//! vanishes is the placebo. A module whose change makes no more of them vanish is not named.
+//!
+//! Where several modules are left, these criteria decide, in this order:
 //!
 //! 1. the errors of the module alone lead to the collision, all other modules being as in the baseline, or
 //!    without errors (asked only if the collision vanishes with all modules so);
@@ -17,7 +25,8 @@
 //! 3. the module has a documented weakness, and the collision vanishes without that weakness alone;
 //! 4. the module comes first on the data's way.
 //!
-//! Left out: errors from before the obstacle appeared.
+//! Left out: errors from before the obstacle appeared. Whether noise that was drawn is larger than its
+//! specification allows is not measured: a profile draws what it is set to draw, so the settings tell.
 
 use std::sync::Arc;
 
@@ -27,7 +36,7 @@ use crate::episode::{EpisodeLog, Setup};
 use super::crash::{Crash, Fate, play};
 use super::variation::Variation;
 
-/// Number of variations that are played where several modules suffice.
+/// Number of variations that are played where several modules suffice, and of replays with other noise.
 pub const VARIATIONS: u32 = 8;
 
 /// The takeover is at most this long before the collision, s: longer than any reaction or braking, because
@@ -44,13 +53,18 @@ pub struct NoModules {
 /// The cause of a collision, and what it was found by.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Diagnosis {
-    /// The module at fault; two if only both together suffice; none if no two do.
+    /// The module at fault; two if only both together suffice; none if no two do, or if it was chance.
     pub cause: Vec<Module>,
+    /// Whether all modules are within their specifications, and the one at fault could not bear the errors that
+    /// others may have.
+    pub brittle: bool,
     pub modules: Vec<ModuleFinding>,
     /// The collision if no module has errors.
     pub ideal: Fate,
     /// The collision without each documented weakness that is switched on.
     pub weaknesses: Vec<WeaknessFinding>,
+    /// Of the replays with other sensor noise alone, the share in which the collision vanishes.
+    pub placebo: f64,
     /// How many of [`VARIATIONS`] small variations led to the collision. Played only to tell modules apart.
     pub varied_crashes: Option<u32>,
     /// Pairs that suffice, looked for if no module does alone.
@@ -70,8 +84,10 @@ pub struct ModuleFinding {
     /// The collision with the errors of this module alone: all others are as in the baseline, if this one
     /// differs from it, or else without errors.
     pub alone: Fate,
-    /// Of the collisions under small variations, the share that vanishes with it restored, if that
-    /// suffices, or else idealised. Played only to tell modules apart.
+    /// Of the replays with other sensor noise, the share that vanishes with it restored, if that suffices, or
+    /// else idealised: to compare with the placebo. Played only for modules that suffice.
+    pub share: Option<f64>,
+    /// As `share`, of the collisions under small variations. Played only to tell modules apart.
     pub prevented: Option<f64>,
 }
 
@@ -79,6 +95,8 @@ pub struct ModuleFinding {
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct WeaknessFinding {
     pub weakness: &'static str,
+    /// The module that it belongs to.
+    pub module: Module,
     pub without: Fate,
 }
 
@@ -108,61 +126,39 @@ pub fn diagnose(
     let crash = Crash::new(setup, log, index);
     let inquiry = Inquiry::new(&crash)?;
     let own = inquiry.profile;
-    let mut modules: Vec<ModuleFinding> = Vec::new();
-    for module in Module::ALL {
-        let others = Module::ALL.into_iter().filter(|other| *other != module);
-        let alone = others.fold(own, |config, other| config.idealised(other));
-        let restored = own.with_module_of(module, baseline);
-        let differs = restored != own;
-        modules.push(ModuleFinding {
-            module,
-            restored: differs.then(|| inquiry.fate(&restored)),
-            idealised: inquiry.fate(&own.idealised(module)),
-            alone: inquiry.fate(&if differs { baseline.with_module_of(module, &own) } else { alone }),
-            prevented: None,
-        });
-    }
+    let mut modules: Vec<ModuleFinding> =
+        Module::ALL.into_iter().map(|module| inquiry.finding(module, baseline)).collect();
     let ideal = inquiry.fate(&Module::ALL.into_iter().fold(own, |config, module| config.idealised(module)));
-    let off = own.weaknesses.each_off().into_iter();
-    let weaknesses: Vec<WeaknessFinding> = off
-        .map(|(weakness, weaknesses)| {
-            let without = inquiry.fate(&ModularConfig { weaknesses, ..own });
-            WeaknessFinding { weakness, without }
-        })
-        .collect();
-    // Indices of the modules that may be the cause; each criterion leaves fewer.
-    let mut best: Vec<usize> = (0..modules.len()).collect();
-    best.retain(|&index| modules[index].suffices());
-    prefer(&mut best, |index| modules[index].restored == Some(Fate::Vanished));
-    let mut pairs = Vec::new();
-    if best.is_empty() {
-        pairs = inquiry.pairs();
+    let weaknesses = inquiry.weaknesses();
+    let placebo = inquiry.vanished(&own);
+    let Suspects { kind, mut cures } = Suspects::of(&modules);
+    let pairs = if cures.is_empty() { inquiry.pairs() } else { Vec::new() };
+    // Chance never outranks: a change must do more than other noise does.
+    for &index in &cures {
+        modules[index].share = Some(inquiry.vanished(&modules[index].cured(&own, baseline)));
     }
-    let is_restored = best.iter().any(|&index| modules[index].restored == Some(Fate::Vanished));
+    cures.retain(|&index| modules[index].share > Some(placebo));
+    let mut best = match kind {
+        Kind::Sensing { planning } if !cures.is_empty() => vec![planning],
+        Kind::Outside | Kind::Deciding { .. } | Kind::Sensing { .. } => cures,
+    };
+    let is_restored = kind == Kind::Outside;
     let flawless = if is_restored { inquiry.fate(baseline) } else { ideal };
     if flawless == Fate::Vanished {
         prefer(&mut best, |index| modules[index].alone == Fate::Crash);
     }
-    let mut varied_crashes = None;
-    if best.len() > 1 {
-        let candidates = best.iter().map(|&index| match modules[index].restored {
-            Some(Fate::Vanished) => own.with_module_of(modules[index].module, baseline),
-            _ => own.idealised(modules[index].module),
-        });
-        let (crashes, vanished) = varied(&crash, &candidates.collect::<Vec<_>>());
-        varied_crashes = Some(crashes);
+    let varied_crashes = (best.len() > 1).then(|| prevented(&crash, &own, baseline, &mut modules, &best));
+    if let Some(crashes) = varied_crashes {
         if crashes == 0 {
             best.clear();
         }
-        for (&index, count) in best.iter().zip(vanished) {
-            modules[index].prevented = Some(f64::from(count) / f64::from(crashes));
-        }
         let most = best.iter().filter_map(|&index| modules[index].prevented).fold(0.0, f64::max);
         prefer(&mut best, |index| modules[index].prevented >= Some(most));
-        let to_blame = |found: &WeaknessFinding| found.without == Fate::Vanished;
         prefer(&mut best, |index| {
-            let owned = |found: &WeaknessFinding| owns(modules[index].module, found.weakness);
-            !is_restored && weaknesses.iter().any(|found| to_blame(found) && owned(found))
+            let to_blame = |found: &WeaknessFinding| {
+                found.without == Fate::Vanished && found.module == modules[index].module
+            };
+            !is_restored && weaknesses.iter().any(to_blame)
         });
     }
     let cause = match (best.first(), pairs.first()) {
@@ -170,7 +166,56 @@ pub fn diagnose(
         (None, Some(pair)) => pair.to_vec(),
         (None, None) => Vec::new(),
     };
-    Ok(Diagnosis { cause, modules, ideal, weaknesses, varied_crashes, pairs, from_s: inquiry.from_s })
+    let is_brittle = matches!(kind, Kind::Deciding { brittle: true } | Kind::Sensing { .. });
+    let brittle = is_brittle && !best.is_empty();
+    let from_s = inquiry.from_s;
+    Ok(Diagnosis { cause, brittle, modules, ideal, weaknesses, placebo, varied_crashes, pairs, from_s })
+}
+
+/// Which modules may be at fault, before chance and the criteria.
+struct Suspects {
+    kind: Kind,
+    /// Indices of the modules whose change makes the collision vanish.
+    cures: Vec<usize>,
+}
+
+/// What the suspects have in common.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Kind {
+    /// They are outside their specifications.
+    Outside,
+    /// They decide, and all modules are within their specifications.
+    Deciding { brittle: bool },
+    /// They sense, within their specifications; planning, the module with this index, could not bear it.
+    Sensing { planning: usize },
+}
+
+impl Suspects {
+    fn of(modules: &[ModuleFinding]) -> Suspects {
+        let those = |criterion: &dyn Fn(&ModuleFinding) -> bool| {
+            (0..modules.len()).filter(|&index| criterion(&modules[index])).collect::<Vec<usize>>()
+        };
+        let outside = those(&|found| found.restored == Some(Fate::Vanished));
+        let deciding = those(&|found| found.idealised == Fate::Vanished && decides(found.module));
+        let sensing = those(&|found| found.idealised == Fate::Vanished && !decides(found.module));
+        let planning = modules.iter().position(|found| found.module == Module::Planning);
+        let planning = planning.expect("every module is looked at");
+        if !outside.is_empty() {
+            Suspects { kind: Kind::Outside, cures: outside }
+        } else if !deciding.is_empty() {
+            Suspects { kind: Kind::Deciding { brittle: !sensing.is_empty() }, cures: deciding }
+        } else {
+            Suspects { kind: Kind::Sensing { planning }, cures: sensing }
+        }
+    }
+}
+
+/// Whether a module decides what the vehicle does, with what others tell it.
+fn decides(module: Module) -> bool {
+    match module {
+        Module::Prediction | Module::Planning | Module::Control | Module::Emergency => true,
+        Module::Localization | Module::Perception | Module::Tracking | Module::Latency => false,
+    }
 }
 
 impl ModuleFinding {
@@ -178,21 +223,20 @@ impl ModuleFinding {
     pub fn suffices(&self) -> bool {
         self.restored == Some(Fate::Vanished) || self.idealised == Fate::Vanished
     }
+
+    /// The profile with this module restored, if that suffices, or else idealised.
+    fn cured(&self, own: &ModularConfig, baseline: &ModularConfig) -> ModularConfig {
+        match self.restored {
+            Some(Fate::Vanished) => own.with_module_of(self.module, baseline),
+            _ => own.idealised(self.module),
+        }
+    }
 }
 
 /// Keeps the modules that meet a criterion, if any do.
 fn prefer(best: &mut Vec<usize>, criterion: impl Fn(usize) -> bool) {
     if best.iter().any(|&index| criterion(index)) {
         best.retain(|&index| criterion(index));
-    }
-}
-
-/// Whether a documented weakness belongs to a module: `ModularConfig::idealised` switches it off with it.
-fn owns(module: Module, weakness: &str) -> bool {
-    match weakness {
-        "late_unstable_tracks" => matches!(module, Module::Perception | Module::Tracking),
-        "lane_bound_prediction" => module == Module::Prediction,
-        _ => module == Module::Planning,
     }
 }
 
@@ -220,8 +264,53 @@ impl<'a> Inquiry<'a> {
         if *profile == self.profile {
             return Fate::Crash;
         }
-        let ads = taken_over(&self.crash.setup.ads, profile, &self.foresight, self.from_s);
+        let ads = taken_over(&self.crash.setup.ads, profile, &self.foresight, self.from_s, None);
         self.crash.fate(&self.crash.play(&ads))
+    }
+
+    /// What one module has to do with the collision.
+    fn finding(&self, module: Module, baseline: &ModularConfig) -> ModuleFinding {
+        let own = self.profile;
+        let restored = own.with_module_of(module, baseline);
+        let differs = restored != own;
+        let others = Module::ALL.into_iter().filter(|other| *other != module);
+        let alone = if differs {
+            baseline.with_module_of(module, &own)
+        } else {
+            others.fold(own, |config, other| config.idealised(other))
+        };
+        ModuleFinding {
+            module,
+            restored: differs.then(|| self.fate(&restored)),
+            idealised: self.fate(&own.idealised(module)),
+            alone: self.fate(&alone),
+            share: None,
+            prevented: None,
+        }
+    }
+
+    /// The collision without each documented weakness that is switched on.
+    fn weaknesses(&self) -> Vec<WeaknessFinding> {
+        let own = self.profile;
+        let off = own.weaknesses.each_off().into_iter();
+        off.map(|(weakness, weaknesses)| {
+            let without = ModularConfig { weaknesses, ..own };
+            // A weakness belongs to the module that takes it along.
+            let owner = |module: &Module| own.with_module_of(*module, &without) != own;
+            let module = Module::ALL.into_iter().find(owner).expect("each weakness has its module");
+            WeaknessFinding { weakness, module, without: self.fate(&without) }
+        })
+        .collect()
+    }
+
+    /// The share of replays with other sensor noise in which the collision vanishes, with a profile that takes
+    /// over when the obstacle appears.
+    fn vanished(&self, profile: &ModularConfig) -> f64 {
+        let vanished = (1..=VARIATIONS).filter(|&number| {
+            let ads = taken_over(&self.crash.setup.ads, profile, &self.foresight, self.from_s, Some(number));
+            self.crash.fate(&self.crash.play(&ads)) == Fate::Vanished
+        });
+        f64::from(vanished.count() as u32) / f64::from(VARIATIONS)
     }
 
     /// Pairs of modules that suffice together.
@@ -239,6 +328,23 @@ impl<'a> Inquiry<'a> {
     }
 }
 
+/// How many variations lead to the collision. Notes for each of some modules the share that it prevents.
+fn prevented(
+    crash: &Crash,
+    own: &ModularConfig,
+    baseline: &ModularConfig,
+    modules: &mut [ModuleFinding],
+    suspects: &[usize],
+) -> u32 {
+    let profiles: Vec<ModularConfig> =
+        suspects.iter().map(|&index| modules[index].cured(own, baseline)).collect();
+    let (crashes, vanished) = varied(crash, &profiles);
+    for (&index, count) in suspects.iter().zip(vanished).filter(|_| crashes > 0) {
+        modules[index].prevented = Some(f64::from(count) / f64::from(crashes));
+    }
+    crashes
+}
+
 /// How many variations lead to the collision, and for each profile, how many of them no longer do.
 fn varied(crash: &Crash, profiles: &[ModularConfig]) -> (u32, Vec<u32>) {
     let (mut crashes, mut vanished) = (0_u32, vec![0_u32; profiles.len()]);
@@ -248,7 +354,7 @@ fn varied(crash: &Crash, profiles: &[ModularConfig]) -> (u32, Vec<u32>) {
         crashes += 1;
         let from_s = collision.spawned_s.max(collision.contact.time_s - LOOK_BACK_S);
         for (profile, count) in profiles.iter().zip(&mut vanished) {
-            let ads = taken_over(&crash.setup.ads, profile, &variation.foresight, from_s);
+            let ads = taken_over(&crash.setup.ads, profile, &variation.foresight, from_s, None);
             let fate = crash.fate(&variation.play(crash, &ads));
             *count += u32::from(fate == Fate::Vanished);
         }
@@ -256,9 +362,21 @@ fn varied(crash: &Crash, profiles: &[ModularConfig]) -> (u32, Vec<u32>) {
     (crashes, vanished)
 }
 
-/// A driving system that another profile of it takes over from, knowing the future.
-fn taken_over(ads: &Selected, profile: &ModularConfig, foresight: &Arc<Foresight>, from_s: f64) -> Selected {
+/// A driving system that another profile of it takes over from, knowing the future; with a number, its sensors
+/// have other noise.
+fn taken_over(
+    ads: &Selected,
+    profile: &ModularConfig,
+    foresight: &Arc<Foresight>,
+    from_s: f64,
+    noise: Option<u32>,
+) -> Selected {
     let successor =
         ads.clone().with_profile(*profile).expect("a driving system with a profile takes another");
-    ads.clone().until(from_s, successor.with_foresight(foresight.clone()))
+    let successor = successor.with_foresight(foresight.clone());
+    let successor = match noise {
+        None => successor,
+        Some(number) => successor.with_other_noise(number),
+    };
+    ads.clone().until(from_s, successor)
 }
