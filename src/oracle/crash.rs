@@ -9,9 +9,8 @@ use std::sync::Arc;
 use crate::ads::{Foresight, Selected};
 use crate::episode;
 use crate::episode::{Choice, Collision, EpisodeLog, Moment, Outcome, Script, Setup};
-use crate::sim::VehicleParameters;
 
-use super::facts::struck;
+use super::facts::at_fault;
 
 /// What became of a collision in another play.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
@@ -21,7 +20,7 @@ pub enum Fate {
     Crash,
     /// It runs into another road user.
     Other,
-    /// It touches no road user, or only others that ran into it.
+    /// It touches no road user, or only others that ran into it or had to give way.
     Vanished,
     /// The obstacle never appeared: the play says nothing.
     Absent,
@@ -48,7 +47,7 @@ pub enum Regression {
     Fixed,
     /// It runs into another road user.
     OtherCrash,
-    /// The same obstacle runs into it.
+    /// The same obstacle runs into it, or had to give way.
     Struck,
     /// The obstacle never appears, because another drive left no legal place for it.
     NeverMet,
@@ -116,16 +115,18 @@ impl<'a> Crash<'a> {
         if log.collisions.iter().any(|collision| collision.contact.obstacle == obstacle) {
             return Fate::Crash;
         }
-        let at_fault = |collision: &Collision| !struck(&collision.contact, &VehicleParameters::MKZ);
-        if log.collisions.iter().any(at_fault) { Fate::Other } else { Fate::Vanished }
+        if log.collisions.iter().any(|collision| at_fault(&collision.contact)) {
+            Fate::Other
+        } else {
+            Fate::Vanished
+        }
     }
 
-    /// The collision in another play, if the ego vehicle ran into the obstacle there, too.
+    /// The collision in another play, if the ego vehicle is at fault there, too.
     pub fn again<'l>(&self, log: &'l EpisodeLog) -> Option<&'l Collision> {
         let obstacle = self.obstacle(log)?;
-        let same = |collision: &&Collision| {
-            collision.contact.obstacle == obstacle && !struck(&collision.contact, &VehicleParameters::MKZ)
-        };
+        let same =
+            |collision: &&Collision| collision.contact.obstacle == obstacle && at_fault(&collision.contact);
         log.collisions.iter().find(same)
     }
 

@@ -78,6 +78,16 @@ pub(super) fn struck(contact: &Contact, ego: &VehicleParameters) -> bool {
     }
 }
 
+/// Whether the ego vehicle is at fault in a contact: it had to give way, or where neither had, it ran into the
+/// obstacle.
+pub(super) fn at_fault(contact: &Contact) -> bool {
+    match contact.priority {
+        Priority::Other => true,
+        Priority::Ego => false,
+        Priority::None => !struck(contact, &VehicleParameters::MKZ),
+    }
+}
+
 /// Speed of the obstacle towards a side of the ego vehicle, m/s; `leftward` as in [`Face`].
 fn towards_mps(contact: &Contact, leftward: f64) -> f64 {
     -leftward * contact.obstacle_velocity_on_ego_mps.y
