@@ -47,10 +47,10 @@ fn main() {
     let scene = Arc::new(episode::scene(&space.roads[0]));
     let world = crowded(&scene);
     println!("# {} obstacles around the ego vehicle", world.obstacles().len());
-    for name in ["modular", "idm"] {
+    for name in ["modular", "frenet", "reactive", "idm"] {
         mark(&format!("ticks_per_s_{name}"), "ticks/s", || ticks_per_s(&world, &scene, name));
     }
-    for name in ["modular", "idm"] {
+    for name in ["modular", "frenet", "reactive", "idm"] {
         mark(&format!("allocations_per_tick_{name}"), "", || {
             let mut drive = Drive::new(&world, &scene, name);
             // Buffers grow during the first frames.

@@ -27,9 +27,9 @@ const HARDEST_MPS2: f64 = 6.0;
 const OVER_M: f64 = 1.0;
 /// A pedestrian this near to a crosswalk, along the road, is on it, m (Apollo expands it by as much).
 const CROSSWALK_MARGIN_M: f64 = 2.0;
-/// Beside the way, pedestrians who come onto a crosswalk count up to this distance, m (Apollo: 6 to 8).
+/// A pedestrian on the way to a crosswalk counts up to this distance beside the route, m (Apollo: 6 to 8).
 const CROSSWALK_SIDE_M: f64 = 6.0;
-/// Half of the way that is left to a pedestrian who stands on a crosswalk, m. Ours: the lane.
+/// A pedestrian that stands on a crosswalk counts up to this distance beside the route, m. Ours: the lane.
 const ON_THE_WAY_M: f64 = 1.75;
 /// Slower than this across the way, a pedestrian does not come, m/s.
 const ACROSS_MPS: f64 = 0.2;
@@ -144,7 +144,7 @@ mod tests {
     }
 
     #[test]
-    fn a_crosswalk_holds_for_who_is_on_it_or_comes() {
+    fn a_crosswalk_holds_while_a_pedestrian_is_on_it_or_comes() {
         let mut route = straight().route.clone();
         route.crosswalks_m.push((80.0, 84.0));
         let scene = Arc::new(Scene::new(straight().map.clone(), route));

@@ -91,7 +91,7 @@ fn what_does_not_exist_is_named_with_what_does() {
     let space = "scenarios/avastra45.ava";
     let cases: [(&[&str], &str); 9] = [
         (&["run", space, "--road", "nowhere"], "`corner`"),
-        (&["run", space, "--ads", "apolo"], "`modular`, `idm`, `cc`"),
+        (&["run", space, "--ads", "apolo"], "`modular`, `frenet`, `reactive`, `idm`, `cc`"),
         (&["run", space, "--agent", "rndom"], "`random`"),
         (&["run", space, "--without", "npc_gpa"], "npc_gap"),
         (&["run", "--resume", "scenarios"], "no run.yaml"),

@@ -14,8 +14,8 @@ use super::lateral::{Lanes, Lateral};
 use super::proposal::{MODEL, Outlook, Point, Proposal, SPEED_PARTS, STEP_S, STEPS};
 use super::traffic::Other;
 
-/// A collision sooner than this is braked for as hard as possible, s (PDM-Closed; there only below 5 m/s, and
-/// with 4.05 m/s²: what is faster there drives on into what it hits).
+/// A collision sooner than this is braked for as hard as possible, s (PDM-Closed). There only below 5 m/s and
+/// with 4.05 m/s²; at every speed and with all brakes is ours.
 const EMERGENCY_S: f64 = 2.0;
 /// The plan is read this far ahead to make up for the lag of the pedals, s. Ours.
 const PREVIEW_S: f64 = 0.16;
@@ -38,7 +38,7 @@ pub struct Frenet {
     steering: Arc<Steering>,
     sight: Sight,
     signs: Signs,
-    /// What is driven, since how many ticks; `None` before the first look.
+    /// The plan that is driven, and for how many ticks it has been; `None` before the first look.
     plan: Option<Proposal>,
     since_ticks: u64,
     ticks: u64,
@@ -89,7 +89,7 @@ impl Frenet {
         self.stops.extend(lights(&self.scene, sensed, front_m));
         self.stops.extend(self.signs.next_stop(&self.scene, front_m, start.speed_mps));
         self.stops.extend(crosswalks(&self.scene, &guide, self.sight.known(), front_m, start.speed_mps));
-        // Something that stands there makes the vehicle stop a gap before it.
+        // The model stops a gap before such a place, so it is put a gap beyond the place to wait at.
         let wait = self.lanes.wait_m().map(|wait_m| wait_m + MODEL.gap_m_min);
         self.stops.extend(wait.map(|station_m| Stop { station_m, reason: Reason::LaneChange }));
 

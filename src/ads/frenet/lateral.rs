@@ -30,9 +30,9 @@ const EDGE_M: f64 = 0.1;
 /// A strip between two lanes that is wider than this ends the lane, m.
 const STRIP_M_MAX: f64 = 0.5;
 /// Braking that a lane change may ask of a vehicle behind, m/s². MOBIL's safety criterion (Kesting, Treiber,
-/// Helbing 2007: at most 4); the half of it is ours.
+/// Helbing 2007: at most 4); half of that is ours.
 const SAFE_MPS2: f64 = 2.0;
-/// Deviation that a goal outside the lane to change to counts as, m. Ours.
+/// While a change is due, staying in the lane counts as this deviation, m. Ours.
 const WRONG_LANE_M: f64 = 2.0;
 
 /// Goals nearer to each other than this are one, m. Ours.

@@ -5,8 +5,9 @@
 //! against forecasts of the others (`traffic`), scores what comes out, and drives the best. If the best would
 //! collide soon, it brakes as hard as it can.
 //!
-//! What it lacks is what the publications lack: it knows no right of way beside lights and crosswalks, takes
-//! whatever follows it or drives beside it to be at fault, and looks no farther ahead than 4 s. Left out of
+//! What it lacks is what the publications lack: it knows no right of way beside lights, stop signs and
+//! crosswalks, leaves room to the vehicles that follow it or drive beside it to those, and looks no farther
+//! ahead than 4 s. Left out of
 //! them are nuPlan's map formats, the simulated tracker (a plan is taken to be driven as planned) and Werling's
 //! following and stopping quintics.
 

@@ -24,7 +24,7 @@ use super::traffic::Other;
 pub const STEPS: usize = 40;
 pub const STEP_S: f64 = 0.1;
 
-/// Parts of the limit that are driven at (PDM-Closed).
+/// The speeds of proposals, as parts of the limit (PDM-Closed).
 pub const SPEED_PARTS: [f64; 5] = [0.2, 0.4, 0.6, 0.8, 1.0];
 /// PDM-Closed's driver model.
 pub const MODEL: Following =
@@ -32,12 +32,11 @@ pub const MODEL: Following =
 /// Hardest braking, m/s²: the vehicle's limit.
 pub const HARDEST_MPS2: f64 = 6.0;
 
-/// Room kept free on each side, m (Apollo `static_obstacle_nudge_l_buffer`; PDM-Closed: none, but it knows
-/// every place to the millimetre).
+/// Room kept free on each side, m: Apollo's `static_obstacle_nudge_l_buffer`. PDM-Closed keeps none.
 pub const SIDE_M: f64 = 0.3;
-/// Slower than this the ego vehicle stands: whoever then touches it is at fault, m/s. Ours (nuPlan: 0.005).
+/// Slower than this the ego vehicle stands, m/s: a contact is then the fault of the other. Ours (nuPlan: 0.005).
 const STANDS_MPS: f64 = 0.1;
-/// What stands or goes ahead slower than this is stopped for, not followed, m/s. Ours.
+/// The reason for keeping away from a slower road user ahead is called a stop, not following, m/s. Ours.
 const FOLLOWED_MPS: f64 = 0.5;
 
 /// Weights of nuPlan's metrics in PDM-Closed.
@@ -71,14 +70,14 @@ pub struct Point {
     pub acceleration_mps2: f64,
 }
 
-/// What proposals are rolled out in.
+/// The situation in which proposals are rolled out.
 #[derive(Debug)]
 pub struct Outlook<'a> {
     pub guide: &'a Guide,
     pub others: &'a [Other],
     pub stops: &'a [Stop],
     pub start: Point,
-    /// Speed that the parts are parts of, m/s.
+    /// The speed of the fastest proposal, m/s.
     pub limit_mps: f64,
 }
 
@@ -89,7 +88,7 @@ pub struct Proposal {
     pub points: [Point; STEPS + 1],
     /// What holds it back most in its first second.
     pub reason: Reason,
-    /// The first step with a collision at fault, and whom with.
+    /// The first step with a collision at fault, and the id of the road user.
     pub collision: Option<(usize, u32)>,
     collision_time_kept: bool,
     comfortable: bool,
@@ -121,11 +120,9 @@ impl Outlook<'_> {
         let mut reason = (f64::INFINITY, Reason::Cruise);
         for step in 0..=STEPS {
             let Point { station_m, speed_mps, .. } = points[step];
-            let allowed_mps = part
-                * self
-                    .guide
-                    .speed_mps_max(station_m)
-                    .min(self.guide.speed_mps_max(station_m + 0.6 * speed_mps));
+            let (here_mps, soon_mps) =
+                (self.guide.speed_mps_max(station_m), self.guide.speed_mps_max(station_m + 0.6 * speed_mps));
+            let allowed_mps = part * here_mps.min(soon_mps);
             let free_mps2 = profile
                 .acceleration_mps2(step as f64 * STEP_S)
                 .min(MODEL.acceleration_mps2)
@@ -232,9 +229,11 @@ impl Outlook<'_> {
         proposal
     }
 
-    /// Whether the ego vehicle would touch a road user at a step, and be at fault: in its lane, it is not for
-    /// what follows it or drives beside it (nuPlan; there, nor for what crosses into its side, which would let
-    /// the vehicle drive on before anyone's feet). What is as near now cannot be avoided any more.
+    /// Whether the ego vehicle would touch a road user at a step, and be at fault.
+    ///
+    /// A vehicle in its lane is not at fault for what follows it or drives beside it (nuPlan). nuPlan excuses
+    /// contacts with crossing road users at its side, too; here they count, so that pedestrians are waited for.
+    /// A road user that is as near already when the proposal begins is left out: no proposal can avoid it.
     fn hits(&self, other: &Other, step: usize, station_m: f64, offset_m: f64, lateral: &Lateral) -> bool {
         let car = VehicleParameters::MKZ;
         let touches = |step: usize, station_m: f64, offset_m: f64| {
@@ -268,7 +267,7 @@ impl Outlook<'_> {
 
 /// Half the width of the way that the vehicle takes, with the room on each side, m.
 pub const HALF_WAY_M: f64 = VehicleParameters::MKZ.width_m / 2.0 + SIDE_M;
-/// What has its middle farther behind the front bumper is passed already, m.
+/// A road user whose middle is farther behind the front bumper has been passed, m.
 const BESIDE_M: f64 = 1.0;
 /// A smaller interaction is no reason, m/s².
 const HELD_MPS2: f64 = 0.3;
@@ -278,7 +277,7 @@ impl Proposal {
         self.points[STEPS].station_m - self.points[0].station_m
     }
 
-    /// nuPlan's score among proposals of which the best makes `most_m`, less Werling's costs.
+    /// nuPlan's score where the farthest proposal makes `most_m`, less Werling's costs.
     pub fn score(&self, most_m: f64) -> f64 {
         let progress = if most_m > PROGRESS_M_MIN { self.progress_m() / most_m } else { 1.0 };
         let points = WEIGHT_PROGRESS * progress

@@ -1,8 +1,8 @@
 //! Other road users in the frame of the guide, now and in every tenth of a second to come.
 //!
-//! A vehicle in a lane keeps to it at its present speed and offset, and goes straight on at a fork; whatever
-//! moves across its lane, and whoever is on foot, keeps its velocity (PDM-Closed: constant velocity for all).
-//! No signal is obeyed and no one gives way in these forecasts.
+//! A vehicle in a lane keeps to it at its present speed and offset, and goes straight on at a fork. A vehicle
+//! that moves across its lane, and every pedestrian, keeps its velocity (PDM-Closed: constant velocity for all).
+//! In these forecasts no road user obeys a signal or gives way.
 
 use crate::ads::guide::Guide;
 use crate::geometry::{Beside, Pose, Span, Vec2, unit_vector, wrap_angle};
@@ -186,7 +186,7 @@ mod tests {
         SpeedRules { cruise_mps: 11.0, lateral_acceleration_mps2_max: 2.0, slowdown_mps2: 1.5 };
 
     #[test]
-    fn a_vehicle_follows_its_lane_and_who_crosses_goes_straight_on() {
+    fn a_vehicle_follows_its_lane_and_a_pedestrian_goes_straight_on() {
         let scene = winding();
         let guide = Guide::new(&scene, &RULES);
         let at = |station_m: f64| scene.route.path.pose_at(station_m).offset(0.0, 0.5);

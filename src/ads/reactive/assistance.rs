@@ -5,10 +5,10 @@
 //! | cruise control | ISO 15622:2018, full speed range | time gap, limits of braking, jerk and acceleration by speed |
 //! | its law | Rajamani, Vehicle Dynamics and Control, constant time gap | acceleration from gap and speeds |
 //! | emergency braking | UN R152 | speed range for cars and for pedestrians, braking of 5 m/s² or more |
-//! | lane change | ISO 17387, type III | zone beside and behind, time to collision of what comes from behind |
+//! | lane change | ISO 17387, type III | zone beside and behind, time to collision of vehicles from behind |
 //!
 //! The standards state what a system must reach at least; this one reaches that and no more. Left out: warnings
-//! and the override by a driver. Unlike many sold systems it also reacts to what it has never seen move.
+//! and the override by a driver. Unlike many sold systems it reacts to vehicles, too, that it never saw move.
 
 use crate::ads::guide::Guide;
 use crate::ads::status::Reason;
@@ -45,20 +45,22 @@ const EMERGENCY_MPS2: f64 = 6.0;
 /// and a look is up to 0.1 s old. Ours.
 const BUILD_UP_S: f64 = 0.3;
 
-/// The corridor: the vehicle's width and this much on each side, m. Ours: what enters a lane of 3.5 m by 0.3 m,
-/// which UN R157 calls a cut-in, is in it.
+/// The corridor is the vehicle's width and this much on each side, m. Ours: a vehicle that enters a lane of 3.5 m
+/// by 0.3 m, which UN R157 calls a cut-in, is in it.
 const SIDE_M: f64 = 0.4;
-/// What enters it within this time counts as in it, s. Ours.
+/// A road user that enters it within this time counts as in it, s. Ours.
 const ENTER_S: f64 = 1.0;
 /// Slower sideways than this, nothing enters, m/s. Ours: drivers wander at up to 0.3.
 const SIDEWAYS_MPS: f64 = 0.4;
 /// Range along the road, m: long-range radar.
 const RANGE_M: f64 = 120.0;
-/// Half the field of view of the front camera and radar: 50°, a usual figure of data sheets, as cosine.
+/// Half the field of view of the front camera: 50°, a usual figure of data sheets, as cosine.
 const FIELD_COSINE: f64 = 0.642_787_609_686_539_4;
-/// What has its middle farther behind the front bumper is beside, m.
+/// The camera looks through the windscreen, this far behind the front bumper, m. Ours.
+const CAMERA_M: f64 = 1.8;
+/// A road user whose middle is farther behind the front bumper is beside the vehicle, m.
 const BESIDE_M: f64 = 1.0;
-/// What goes slower than this ahead is stopped for, not followed, m/s.
+/// The reason for keeping away from a slower road user ahead is called a stop, not following, m/s. Ours.
 const FOLLOWED_MPS: f64 = 0.5;
 
 /// Zone behind the rear bumper in which no vehicle may be in the lane to change to, m (ISO 17387).
@@ -87,7 +89,7 @@ impl Target {
     /// A road user, if it is in the corridor or enters it.
     pub fn seen(guide: &Guide, object: &SensedObject, ego: &EgoMotion, front_m: f64) -> Option<Target> {
         let car = VehicleParameters::MKZ;
-        let eye = ego.rear_axle.offset(car.rear_axle_to_front_m, 0.0);
+        let eye = ego.rear_axle.offset(car.rear_axle_to_front_m - CAMERA_M, 0.0);
         let towards = object.pose.position - eye.position;
         if eye.forward().dot(&towards) < FIELD_COSINE * towards.norm() - object.length_m / 2.0 {
             return None;
@@ -140,8 +142,8 @@ impl Target {
 pub struct Pedals {
     /// The last command of the cruise control, m/s².
     last_mps2: f64,
-    /// Whether emergency braking is under way.
-    in_emergency: bool,
+    /// The road user for which emergency braking is under way.
+    emergency: Option<u32>,
 }
 
 impl Pedals {
@@ -161,10 +163,10 @@ impl Pedals {
         // Once begun, it goes on until the gap no longer closes.
         let urgent = targets.iter().find(|target| {
             let closes = speed_mps > target.along_mps.max(0.0);
-            target.is_urgent(speed_mps) || self.in_emergency && closes && target.enters_s == 0.0
+            target.is_urgent(speed_mps) || self.emergency == Some(target.id) && closes
         });
-        self.in_emergency = urgent.is_some();
-        urgent.map_or(wanted, |target| (-EMERGENCY_MPS2, Reason::Emergency(target.id)))
+        self.emergency = urgent.map(|target| target.id);
+        self.emergency.map_or(wanted, |id| (-EMERGENCY_MPS2, Reason::Emergency(id)))
     }
 }
 
@@ -193,8 +195,8 @@ fn by_speed((slow, fast): (f64, f64), speed_mps: f64) -> f64 {
     slow + (fast - slow) * part
 }
 
-/// Whether the lane `lateral_m` to the left is free for a change: nothing beside, nothing that comes from behind
-/// too fast, and a time gap to what is ahead.
+/// Whether the lane `lateral_m` to the left is free for a change: no vehicle beside, none too fast from behind,
+/// and a time gap to the one ahead.
 pub fn is_free(guide: &Guide, known: &[SensedObject], lateral_m: f64, front_m: f64, speed_mps: f64) -> bool {
     let car = VehicleParameters::MKZ;
     let rear_m = front_m - car.length_m;

@@ -51,7 +51,7 @@ fn it_stops_at_a_red_light_and_goes_on_at_green() {
 }
 
 #[test]
-fn it_brakes_hard_for_who_steps_into_its_corridor_and_for_none_beside() {
+fn it_brakes_hard_for_a_step_into_its_corridor_and_not_for_a_pedestrian_beside() {
     let mut rig = rig(&straight(), 10.0);
     let walker = |y_m: f64| Pose::new(40.0, y_m, core::f64::consts::FRAC_PI_2);
     rig.sensed.objects.push(object(1, Body::Pedestrian, walker(-7.4), 1.4));
