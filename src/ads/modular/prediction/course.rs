@@ -61,7 +61,8 @@ pub fn find(
         .and_then(|_| lane.predecessors.iter().find(|before| map.lane(**before).successors.len() > 1));
     match fork {
         Some(&before) => {
-            for &sibling in map.lane(before).successors.iter().take(COURSES_MAX) {
+            let others = map.lane(before).successors.iter().copied().filter(|lane| *lane != place.lane);
+            for sibling in core::iter::once(place.lane).chain(others).take(COURSES_MAX) {
                 let found = map.lane(sibling).centre.project_near(position, place.station_m, FRAME_REACH_M);
                 let off_m = found.distance_m - map.lane(sibling).width_at(found.station_m) / 2.0;
                 let lane_rad = map.lane(sibling).centre.pose_at(found.station_m).heading_rad;
