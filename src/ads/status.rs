@@ -110,6 +110,12 @@ pub enum Reason {
     LaneChange,
     /// A crosswalk that a pedestrian is on or comes onto.
     Crosswalk,
+    /// Comes slowly to a junction at which others go first.
+    Approach,
+    /// Creeps into such a junction, or waits there, until nothing enters.
+    Creep,
+    /// No faster than it can stop within what it sees.
+    Sight,
     /// A junction that could not be left at once.
     KeepClear,
     /// Lost the route: constant braking.
@@ -134,6 +140,9 @@ impl Reason {
             | Reason::StopSign
             | Reason::LaneChange
             | Reason::Crosswalk
+            | Reason::Approach
+            | Reason::Creep
+            | Reason::Sight
             | Reason::KeepClear
             | Reason::Degraded
             | Reason::Fallback => self,
@@ -153,6 +162,9 @@ impl fmt::Display for Reason {
             Reason::Yield(id) => write!(f, "yield {}", named(*id)),
             Reason::LaneChange => write!(f, "lane change"),
             Reason::Crosswalk => write!(f, "crosswalk"),
+            Reason::Approach => write!(f, "approach"),
+            Reason::Creep => write!(f, "creep"),
+            Reason::Sight => write!(f, "sight"),
             Reason::KeepClear => write!(f, "keep clear"),
             Reason::Fallback => write!(f, "fallback"),
             Reason::Degraded => write!(f, "degraded mode"),

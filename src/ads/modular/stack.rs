@@ -99,6 +99,7 @@ impl Modular {
                 since_s: if self.ticks == 0 { 0.0 } else { since_s },
                 forecasts: self.prediction.forecasts(),
                 lights,
+                conditions: &sensed.conditions,
             });
         }
         let (guide, lateral) = (self.planner.guide(), self.planner.lateral());

@@ -105,6 +105,28 @@ section! {
         fallback_mps2: f64 = 4.0, 1.0..=8.0;
         /// Farther than this beside the route there is no plan, m, in `[1, 20]`. Ours.
         lost_offset_m: f64 = 3.0, 1.0..=20.0;
+        /// Speed at which an unprotected turn is approached and crept into, m/s, in `[0.5, 10]`. Apollo's unprotected left turn, `approach_cruise_speed`: 2.78.
+        approach_mps: f64 = 2.78, 0.5..=10.0;
+        /// Under `creep_skipped_at_speed` the approach begins this far before the line, m, in `[0, 100]`; without it, in time. Apollo `start_traffic_light_scenario_distance`: 5.0.
+        approach_m: f64 = 5.0, 0.0..=100.0;
+        /// Speed at which a junction without lights and signs is approached if others go first, m/s, in `[0.5, 20]`. Apollo's bare intersection, `approach_cruise_speed`: 6.7.
+        bare_approach_mps: f64 = 6.7, 0.5..=20.0;
+        /// Creeping ends this far behind the line, m, in `[0, 20]`. Apollo's creep decider: 2.0.
+        creep_m: f64 = 2.0, 0.0..=20.0;
+        /// Creeping goes on until nothing comes onto the way within so long, s, in `[0, 20]`. Apollo's creep decider, `min_boundary_t`: 6.0.
+        creep_clear_s: f64 = 6.0, 0.0..=20.0;
+        /// Under `creep_skipped_at_speed`, a faster vehicle does not creep, m/s, in `[0, 20]`. Apollo `max_adc_speed_before_creep`: 5.56.
+        creep_skip_mps: f64 = 5.56, 0.0..=20.0;
+        /// Under `creep_times_out`, creeping ends after so long, s, in `[0, 60]`. Apollo `creep_timeout_sec`: 10.0.
+        creep_timeout_s: f64 = 10.0, 0.0..=60.0;
+        /// Time at rest before a stop sign, s, in `[0, 20]`. Apollo's stop sign scenario, `stop_duration_sec`: 1.0.
+        stop_sign_s: f64 = 1.0, 0.0..=20.0;
+        /// Reaction time of the sight distance, s, in `[0, 5]`: publication of a track, and half the time in which braking builds up. Ours; AASHTO has 2.5 for people.
+        sight_reaction_s: f64 = 1.0, 0.0..=5.0;
+        /// Bounds the speed by what can be seen. Off is a fault to plant.
+        sight_bounds_speed: bool = true;
+        /// Takes the right of way of others for its own and the other way round. A fault to plant.
+        priority_misread: bool = false;
         /// Never gives way to what crosses or joins. A fault to plant.
         never_yields: bool = false;
     }

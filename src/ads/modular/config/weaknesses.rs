@@ -56,4 +56,8 @@ weaknesses! {
     gentle_fallback,
     /// Decisions about road users are taken anew in every cycle, so that a small change flips them. Apollo issue 14870: yields only briefly; that its cause lies here is ours. Off: a decision is kept until the other is much cheaper.
     decides_anew,
+    /// An unprotected turn is approached late, and a vehicle that is still fast at the line goes without creeping. Apollo `max_adc_speed_before_creep`, `start_traffic_light_scenario_distance`. Off: it slows down in time, and always creeps.
+    creep_skipped_at_speed,
+    /// Creeping into an unprotected turn ends after some time, whatever comes. Apollo `creep_timeout_sec`. Off: it goes on until nothing enters.
+    creep_times_out,
 }

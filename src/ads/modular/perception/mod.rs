@@ -9,3 +9,4 @@ mod ranges;
 pub use detection::Detection;
 pub use lights::LightReader;
 pub use look::Perception;
+pub use ranges::surely_seen_m;

@@ -66,6 +66,14 @@ impl Ranges {
     }
 }
 
+/// Distance at which a pedestrian in plain view is detected in nearly every frame, m: two widths of the fall of
+/// the chance before the place where it is one half.
+pub fn surely_seen_m(config: &PerceptionConfig, conditions: &Conditions) -> f64 {
+    let ranges = Ranges::in_conditions(config, true, conditions);
+    let camera_m = config.camera_weight * (ranges.camera_pedestrian_m - ranges.lidar_pedestrian_m);
+    (0.8 - 2.0 * 0.08) * (ranges.lidar_pedestrian_m + camera_m)
+}
+
 /// Distance at which something of full contrast is lost, m: the meteorological optical range, and less
 /// in rain.
 pub fn sight_m(conditions: &Conditions) -> f64 {

@@ -101,6 +101,10 @@ impl Claim {
     ///
     /// One that would break the ego vehicle's right of way must be the more probable one.
     pub fn binds(&self, config: &PlanningConfig) -> bool {
+        // A planted fault: it goes, whoever comes.
+        if config.priority_misread && self.owes_way {
+            return false;
+        }
         let least = if self.owes_way { config.hypothesis_min_owing } else { config.hypothesis_min };
         self.probability >= least
     }

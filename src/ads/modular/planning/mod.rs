@@ -13,8 +13,10 @@ mod lights;
 mod nudge;
 mod planner;
 mod rights;
+mod sight;
 mod speed;
 mod st_graph;
+mod stages;
 mod standing;
 mod trajectory;
 

@@ -2,7 +2,7 @@
 //! drives the decisions, and checks what comes out.
 //!
 //! 1. *Path*: lane, lane change, or a shift past what stands.
-//! 2. *Rules*: lights, crosswalks, junctions kept clear.
+//! 2. *Rules*: lights, crosswalks, junctions kept clear, the stages of turns and signs, what can be seen.
 //! 3. *Decisions*: STOP for what stands on the way, FOLLOW for what drives along it; YIELD or OVERTAKE for all
 //!    else, by the station-time graph (`decisions`).
 //! 4. *Speed*: the law in `speed` is rolled forward for 8 s under all of them. An OVERTAKE holds only if the
@@ -14,7 +14,7 @@ use std::sync::Arc;
 use crate::ads::guide::Guide;
 use crate::ads::status::{Manoeuvre, Reason};
 use crate::geometry::Pose;
-use crate::sim::{Scene, SignalColour, VehicleParameters};
+use crate::sim::{Conditions, Scene, SignalColour, VehicleParameters};
 
 use super::super::config::{ModularConfig, PlanningConfig, Weaknesses};
 use super::super::junctions::Junctions;
@@ -25,7 +25,9 @@ use super::lane_change::LaneChanges;
 use super::lights::Lights;
 use super::nudge::LateralPlan;
 use super::rights::Rights;
+use super::sight::Sight;
 use super::speed::Constraint;
+use super::stages::Stages;
 use super::standing::Standing;
 use super::trajectory::{Point, Trajectory};
 use super::{kept_clear, speed};
@@ -53,6 +55,8 @@ pub struct Planner {
     lights: Lights,
     standing: Standing,
     rights: Rights,
+    stages: Stages,
+    sight: Sight,
     manoeuvre: Manoeuvre,
     trajectory: Trajectory,
     claims: Vec<Claim>,
@@ -72,6 +76,8 @@ pub struct Outlook<'a> {
     pub forecasts: &'a [Forecast],
     /// What is known of the light of each stop line of the route.
     pub lights: &'a [Option<SignalColour>],
+    /// Weather and light, which the vehicle measures itself.
+    pub conditions: &'a Conditions,
 }
 
 impl Planner {
@@ -79,6 +85,7 @@ impl Planner {
         let weaknesses = config.weaknesses;
         let config = without_absent(&config.planning, &weaknesses);
         let changes = LaneChanges::new(scene);
+        let rights = Rights::of(&config, scene);
         Planner {
             guide: Arc::new(changes.guide(&config)),
             lights: Lights::new(&config, scene),
@@ -89,7 +96,9 @@ impl Planner {
             lateral: LateralPlan::default(),
             changes,
             standing: Standing::default(),
-            rights: Rights::of(scene),
+            stages: Stages::new(&config, scene, junctions, &rights),
+            sight: Sight::new(scene, junctions),
+            rights,
             manoeuvre: Manoeuvre::LaneFollow,
             trajectory: Trajectory::default(),
             claims: Vec::new(),
@@ -179,7 +188,10 @@ impl Planner {
         if self.weaknesses.closest_static_only {
             self.keep_closest_static(station_m);
         }
-        kept_clear::keep_clear(&self.config, &self.junctions, start, &self.claims, &mut self.constraints);
+        let (config, constraints) = (&self.config, &mut self.constraints);
+        kept_clear::keep_clear(config, &self.junctions, start, &self.claims, constraints);
+        self.stages.constrain(config, &self.weaknesses, start, &self.claims, constraints);
+        self.sight.constrain(config, &self.guide, start, outlook.conditions, forecasts, constraints);
     }
 
     /// Whether the plan reacts to a claim at all.

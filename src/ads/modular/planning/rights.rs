@@ -9,6 +9,7 @@ use crate::model::vocabulary::Priority;
 use crate::road::LaneIndex;
 use crate::sim::{Scene, SignalColour, right_of_way};
 
+use super::super::config::PlanningConfig;
 use super::claim::Claim;
 
 /// Two places of the route this near are one crossing, m: half a vehicle and half a lane.
@@ -32,18 +33,25 @@ struct Meeting {
 }
 
 impl Rights {
-    pub fn of(scene: &Scene) -> Rights {
+    pub fn of(config: &PlanningConfig, scene: &Scene) -> Rights {
         let meetings = scene.route.conflicts.iter().map(|conflict| {
             let own = scene.route.lane_at(conflict.station_m).lane;
+            let ego_first =
+                never_green_together(scene, own, conflict.lane) || goes_first(scene, own, conflict.lane);
             Meeting {
                 station_m: conflict.station_m,
                 cosine: libm::cos(conflict.angle_rad),
                 sine: libm::sin(conflict.angle_rad),
-                ego_first: never_green_together(scene, own, conflict.lane)
-                    || goes_first(scene, own, conflict.lane),
+                ego_first: ego_first != config.priority_misread,
             }
         });
         Rights { meetings: meetings.collect() }
+    }
+
+    /// The first crossing between two stations at which another lane goes first, m.
+    pub fn first_to_wait_for_m(&self, from_m: f64, to_m: f64) -> Option<f64> {
+        let stations = self.meetings.iter().filter(|meeting| !meeting.ego_first);
+        stations.map(|meeting| meeting.station_m).find(|at_m| (from_m..=to_m).contains(at_m))
     }
 
     /// Whether what a road user would do on the way takes the ego vehicle's right of way.
