@@ -349,6 +349,26 @@ fn it_changes_lanes_where_the_gap_is_safe() {
 }
 
 #[test]
+fn it_breaks_off_a_lane_change_that_is_no_longer_safe() {
+    let mut rig = changing(300.0);
+    while rig.sensed.ego.rear_axle.position.y < -5.2 {
+        rig.tick();
+    }
+    assert_eq!(rig.ads.status().manoeuvre, Manoeuvre::LaneChange);
+    // A faster car that was not seen before is beside.
+    let (x_m, speed_mps) = (rig.sensed.ego.rear_axle.position.x, rig.sensed.ego.speed_mps);
+    rig.sensed.objects.push(object(1, Body::Sedan, Pose::new(x_m - 6.0, -1.75, 0.0), speed_mps + 2.0));
+    let mut farthest_m = f64::NEG_INFINITY;
+    for _ in 0..150 {
+        rig.tick();
+        farthest_m = rig.sensed.ego.rear_axle.position.y.max(farthest_m);
+    }
+    assert!(farthest_m < -3.5 && rig.gap_m_min > 0.3, "{farthest_m} {}", rig.gap_m_min);
+    rig.run(20.0);
+    assert!((rig.sensed.ego.rear_axle.position.y + 1.75).abs() < 0.3, "it changes once the car has passed");
+}
+
+#[test]
 fn it_waits_for_a_gap_where_a_change_is_just_possible() {
     let mut rig = changing(100.0);
     let queue = |i: u32| object(i + 1, Body::Sedan, Pose::new(f64::from(i) * 8.0, -1.75, 0.0), 0.0);

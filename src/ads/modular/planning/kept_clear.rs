@@ -1,5 +1,5 @@
 //! Traffic rules beside the lights: crosswalks and junctions to be kept clear (Apollo's `Crosswalk` and
-//! `KeepClear`). Stop signs are left out because no map says where they stand.
+//! `KeepClear`). Stop and yield signs are in `stages`.
 
 use crate::ads::guide::Guide;
 use crate::ads::status::Reason;
@@ -18,7 +18,7 @@ use super::trajectory::Point;
 const CROSSWALK_MARGIN_M: f64 = 2.0;
 /// Slower than this across the way, a pedestrian neither comes nor goes, m/s.
 const ACROSS_MPS: f64 = 0.2;
-/// Apollo's `stop_timeout`, s: it belongs to this rule and holds whether weakness (f) is on or not.
+/// Apollo's `stop_timeout`, s: it belongs to this rule and holds whether `creeps_to_standing_pedestrian` is on or not.
 const CROSSWALK_PATIENCE_S: f64 = 4.0;
 
 /// A stop before each crosswalk ahead that a pedestrian is on, or comes onto.

@@ -2,13 +2,13 @@
 //!
 //! The vehicle stays in its lane until the target lane is clear by the rule of Apollo's lane change
 //! decider (`IsClearToChangeLane`), and stops where a short change is just possible. A change that has
-//! begun is carried through; Apollo may break one off.
+//! begun is broken off while most of the vehicle is still in its lane, if the other is no longer clear.
 
 use std::sync::Arc;
 
 use crate::ads::guide::Guide;
 use crate::ads::status::Reason;
-use crate::geometry::Beside;
+use crate::geometry::{Beside, smooth_step};
 use crate::road::RouteLaneChange;
 use crate::sim::{FRAME_S, Scene, VehicleParameters};
 
@@ -22,6 +22,13 @@ const LOOK_M: f64 = 200.0;
 /// Time for which a lane must have been clear, s: a new track takes almost half of it to be published.
 /// Apollo waits as long after a failed attempt.
 const CLEAR_S: f64 = 1.0;
+
+/// A change of which a greater part is done is carried through: the outline is half over the line. Ours.
+const BREAK_OFF_PART: f64 = 0.35;
+/// A change is broken off when less than this part of the gaps is left that it began with. Ours.
+const BREAK_OFF_GAPS: f64 = 0.5;
+/// A station before every road, m: a change that begins there is over everywhere.
+const LONG_AGO_M: f64 = -1e6;
 
 #[derive(Debug, Clone)]
 pub struct LaneChanges {
@@ -70,7 +77,8 @@ impl LaneChanges {
     ) -> bool {
         let Some((index, change)) = self.next() else { return false };
         let soon = station_m >= change.begin_m - speed_mps * CLEAR_S && !self.under_way(station_m);
-        if !soon || !is_clear(config, guide, change.lateral_m, station_m, speed_mps, forecasts) {
+        let lateral_m = |_| change.lateral_m;
+        if !soon || !is_clear(config, guide, &lateral_m, station_m, speed_mps, forecasts) {
             self.clear_s = 0.0;
             return false;
         }
@@ -81,6 +89,46 @@ impl LaneChanges {
             self.clear_s = 0.0;
         }
         begins
+    }
+
+    /// Breaks off the change that is under way if it must and can be. Returns how far beside the source lane the
+    /// path is, m, and its slope.
+    pub fn break_off(
+        &mut self,
+        config: &PlanningConfig,
+        guide: &Guide,
+        station_m: f64,
+        speed_mps: f64,
+        forecasts: &[Forecast],
+    ) -> Option<(f64, f64)> {
+        let part = |change: &RouteLaneChange, begin_m: f64| {
+            (begin_m <= station_m).then(|| (station_m - begin_m) / change.length_from_m(begin_m))
+        };
+        let mut changes = self.scene.route.changes.iter().zip(&self.begins_m);
+        let early = |(change, begin_m): (&RouteLaneChange, &f64)| {
+            part(change, *begin_m).is_some_and(|part| smooth_step(part).value < BREAK_OFF_PART)
+        };
+        let index = changes.position(early)?;
+        let (change, begin_m) = (&self.scene.route.changes[index], self.begins_m[index]);
+        let gaps = PlanningConfig {
+            change_gap_m: BREAK_OFF_GAPS * config.change_gap_m,
+            change_time_s: BREAK_OFF_GAPS * config.change_time_s,
+            change_oncoming_gap_m: BREAK_OFF_GAPS * config.change_oncoming_gap_m,
+            change_oncoming_time_s: BREAK_OFF_GAPS * config.change_oncoming_time_s,
+            ..*config
+        };
+        // The guide leads over already: what is left of the way to the target lane differs from place to place.
+        let left_m = |at_m: f64| {
+            change.postponed_offset_m(at_m, LONG_AGO_M) - change.postponed_offset_m(at_m, begin_m)
+        };
+        if is_clear(&gaps, guide, &left_m, station_m, speed_mps, forecasts) {
+            return None;
+        }
+        let done_m = |at_m: f64| change.postponed_offset_m(at_m, begin_m) - change.source_offset_m(at_m);
+        let found = (done_m(station_m), done_m(station_m + 0.5) - done_m(station_m - 0.5));
+        self.begins_m[index] = f64::INFINITY;
+        self.clear_s = 0.0;
+        Some(found)
     }
 
     /// A stop where the next change is just possible.
@@ -99,11 +147,11 @@ impl LaneChanges {
 }
 
 /// Apollo's rule: the gap in front and behind is at least 10 m and 3 s at the difference of the speeds,
-/// to oncoming traffic 50 m and 5 s at their sum.
+/// to oncoming traffic 50 m and 5 s at their sum. `lateral_m` is how far beside the guide the target lane is.
 fn is_clear(
     config: &PlanningConfig,
     guide: &Guide,
-    lateral_m: f64,
+    lateral_m: &dyn Fn(f64) -> f64,
     station_m: f64,
     speed_mps: f64,
     forecasts: &[Forecast],
@@ -113,7 +161,7 @@ fn is_clear(
         (VehicleParameters::MKZ.rear_m(station_m), VehicleParameters::MKZ.front_m(station_m));
     forecasts.iter().all(|forecast| {
         let at = guide.project(forecast.positions[0], station_m - LOOK_M, station_m + LOOK_M);
-        let in_target = Beside { offset_m: at.offset_m - lateral_m, ..at };
+        let in_target = Beside { offset_m: at.offset_m - lateral_m(at.station_m), ..at };
         let taken = in_target.taken(forecast.forward, forecast.length_m, forecast.width_m, half_way_m);
         let Some(span) = taken else { return true };
         let along_mps = forecast.velocity_mps.dot(&at.forward);
@@ -162,7 +210,7 @@ mod tests {
             .collect();
         let mut prediction = Prediction::new(&Default::default(), true, &scene, None);
         prediction.update(&tracks, 0.0, 0.0, Vec2::zeros());
-        is_clear(&config, &guide, 3.5, 100.0, 10.0, prediction.forecasts())
+        is_clear(&config, &guide, &|_| 3.5, 100.0, 10.0, prediction.forecasts())
     }
 
     #[test]

@@ -3,7 +3,7 @@
 //! Path: the lane, a shift within it past what stands at its edge, the route's lane changes once their
 //! gap is safe. Speed: the station-time graph decides about each road user, a speed law drives the decisions, and
 //! a last check stands after it. Left out, of Apollo's tasks: the optimisers (a speed law and a quintic shift
-//! stand for them), pull-over and parking.
+//! stand for them), lane borrowing (see `nudge`), pull-over and parking.
 
 mod claim;
 mod decisions;

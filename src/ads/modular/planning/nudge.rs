@@ -1,8 +1,10 @@
-//! The path beside the guide: a shift within the lane past a vehicle that stands at its edge.
+//! The path beside the guide: a shift within the lane past vehicles that stand at its edge, and the way back
+//! from a lane change that was broken off.
 //!
 //! Apollo's path bounds keep 0.3 m from static obstacles, 3 m before and 2 m behind them; its
-//! piecewise-jerk optimiser is replaced by a quintic shift of bounded lateral acceleration. Pedestrians
-//! and moving road users are not passed in this way.
+//! piecewise-jerk optimiser is replaced by a quintic shift of bounded lateral acceleration. Vehicles that stand
+//! in a row are passed as one. Pedestrians and moving road users are not passed in this way. Left out is lane
+//! borrowing, a shift into the next lane: behind what stands, the stop gap leaves no room to turn out of the lane.
 
 use crate::ads::guide::Guide;
 use crate::ads::steering::Aside;
@@ -23,11 +25,46 @@ const LATERAL_MPS2: f64 = 1.5;
 const LENGTH_M_MIN: f64 = 5.0;
 /// Room left to the edge of the lane, m. Ours.
 const EDGE_M: f64 = 0.1;
+/// Vehicles that stand so near behind one another are passed as one, m. Ours.
+const ROW_GAP_M: f64 = 15.0;
+/// The way back from a lane change that was broken off: its time, s, and its least length, m. Ours.
+const RETURN_S: f64 = 2.5;
+const RETURN_M_MIN: f64 = 10.0;
 
 /// Where the path lies beside the guide.
 #[derive(Debug, Clone, Default)]
 pub struct LateralPlan {
     bump: Option<Bump>,
+    /// All that is passed, the first of them first.
+    row: Vec<u32>,
+    way_back: Option<WayBack>,
+}
+
+/// The way back to the guide from a place beside it: a cubic that begins with the slope of the way before.
+#[derive(Debug, Clone, Copy)]
+struct WayBack {
+    from_m: f64,
+    length_m: f64,
+    offset_m: f64,
+    slope: f64,
+}
+
+impl WayBack {
+    fn aside(&self, station_m: f64) -> Aside {
+        let t = ((station_m - self.from_m) / self.length_m).clamp(0.0, 1.0);
+        let (offset_m, rise_m) = (self.offset_m, self.slope * self.length_m);
+        let value_m = offset_m * (1.0 - t * t * (3.0 - 2.0 * t)) + rise_m * t * (1.0 - t) * (1.0 - t);
+        if station_m < self.from_m || t >= 1.0 {
+            return Aside { offset_m: value_m, ..Aside::default() };
+        }
+        let slope_m = 6.0 * offset_m * t * (t - 1.0) + rise_m * (1.0 - t) * (1.0 - 3.0 * t);
+        let bend_m = 6.0 * offset_m * (2.0 * t - 1.0) + rise_m * (6.0 * t - 4.0);
+        Aside {
+            offset_m: value_m,
+            slope: slope_m / self.length_m,
+            curvature_per_m: bend_m / (self.length_m * self.length_m),
+        }
+    }
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -50,8 +87,26 @@ struct Edge {
     left_m: f64,
 }
 
+impl Edge {
+    /// This edge and another as one.
+    fn with(&self, other: &Edge) -> Edge {
+        Edge {
+            id: self.id,
+            span: Span {
+                from_m: self.span.from_m.min(other.span.from_m),
+                to_m: self.span.to_m.max(other.span.to_m),
+            },
+            right_m: self.right_m.min(other.right_m),
+            left_m: self.left_m.max(other.left_m),
+        }
+    }
+}
+
 impl LateralPlan {
     pub fn aside(&self, station_m: f64) -> Aside {
+        if let Some(way_back) = &self.way_back {
+            return way_back.aside(station_m);
+        }
         let Some(bump) = &self.bump else { return Aside::default() };
         if station_m <= bump.up_m.0 || station_m >= bump.down_m.1 {
             return Aside::default();
@@ -73,7 +128,26 @@ impl LateralPlan {
 
     /// Greatest distance of the path from the guide, m.
     pub fn offset_m_max(&self) -> f64 {
-        self.bump.map_or(0.0, |bump| bump.offset_m.abs())
+        let way_back_m =
+            self.way_back.map_or(0.0, |way| way.offset_m.abs() + (way.slope * way.length_m).abs());
+        self.bump.map_or(way_back_m, |bump| bump.offset_m.abs())
+    }
+
+    /// Begins the way back to the guide from a place `offset_m` beside it, whose path rises by `slope`.
+    pub fn return_from(&mut self, station_m: f64, speed_mps: f64, offset_m: f64, slope: f64) {
+        let length_m = (RETURN_S * speed_mps).max(RETURN_M_MIN);
+        self.bump = None;
+        self.way_back = Some(WayBack { from_m: station_m, length_m, offset_m, slope });
+    }
+
+    /// Whether the vehicle is on its way back to the guide.
+    pub fn is_returning(&self) -> bool {
+        self.way_back.is_some()
+    }
+
+    /// Whether an object is among those that are being passed.
+    pub fn passes(&self, id: u32) -> bool {
+        self.bump.is_some() && self.row.contains(&id)
     }
 
     /// What is being passed, and where it stands.
@@ -91,13 +165,14 @@ impl LateralPlan {
         speed_mps: f64,
         forecasts: &[Forecast],
     ) {
+        self.way_back = self.way_back.filter(|way| station_m < way.from_m + way.length_m);
         if let Some(bump) = self.bump {
             let gone = !forecasts.iter().any(|forecast| forecast.id == bump.id && !forecast.moving);
             if station_m > bump.down_m.1 || (gone && station_m < bump.up_m.0) {
                 self.bump = None;
             }
         }
-        if self.bump.is_some() {
+        if self.bump.is_some() || self.way_back.is_some() {
             return;
         }
         let half_way_m = VehicleParameters::MKZ.width_m / 2.0;
@@ -123,19 +198,32 @@ impl LateralPlan {
         let nearest = edges()
             .filter(|edge| in_the_way(edge) && edge.span.from_m > front_m)
             .min_by(|a, b| a.span.from_m.total_cmp(&b.span.from_m));
-        let Some(edge) = nearest else { return };
-        let vehicle = |forecast: &Forecast| forecast.id == edge.id && forecast.body.is_vehicle();
-        if !forecasts.iter().any(vehicle) {
-            return;
-        }
-        let clear_m = half_way_m + config.nudge_buffer_m;
-        let offset_m =
-            if edge.left_m + edge.right_m < 0.0 { edge.left_m + clear_m } else { edge.right_m - clear_m };
+        let Some(mut edge) = nearest else { return };
+        let is_vehicle =
+            |id: u32| forecasts.iter().any(|forecast| forecast.id == id && forecast.body.is_vehicle());
         let on = scene.route.lane_at(edge.span.from_m);
         let lane_m = scene.map.lane(on.lane).width_at(edge.span.from_m - on.from_m);
-        if offset_m.abs() > lane_m / 2.0 - half_way_m - EDGE_M {
+        let clear_m = half_way_m + config.nudge_buffer_m;
+        let shift_m = |edge: &Edge| {
+            let left = edge.left_m + edge.right_m < 0.0;
+            let offset_m = if left { edge.left_m + clear_m } else { edge.right_m - clear_m };
+            (offset_m.abs() <= lane_m / 2.0 - half_way_m - EDGE_M).then_some(offset_m)
+        };
+        if !is_vehicle(edge.id) || shift_m(&edge).is_none() {
             return;
         }
+        self.row.clear();
+        self.row.push(edge.id);
+        while let Some((id, longer)) = edges().find_map(|other| {
+            let next = other.span.from_m < edge.span.to_m + ROW_GAP_M && in_the_way(&other);
+            let longer = edge.with(&other);
+            let fits = next && !self.row.contains(&other.id) && is_vehicle(other.id);
+            (fits && shift_m(&longer).is_some()).then_some((other.id, longer))
+        }) {
+            self.row.push(id);
+            edge = longer;
+        }
+        let Some(offset_m) = shift_m(&edge) else { return };
         let (before_m, behind_m) = (VehicleParameters::MKZ.front_m(0.0), -VehicleParameters::MKZ.rear_m(0.0));
         let length_m = (speed_mps * (5.78 * offset_m.abs() / LATERAL_MPS2).sqrt()).max(LENGTH_M_MIN);
         let (wanted_m, last_m) =
@@ -152,7 +240,7 @@ impl LateralPlan {
             up_m: (up_to_m - length_m, up_to_m),
             down_m: (down_from_m, down_from_m + length_m),
         };
-        let free = edges().filter(|other| other.id != edge.id).all(|other| {
+        let free = edges().filter(|other| !self.row.contains(&other.id)).all(|other| {
             let abreast = other.span.from_m < bump.down_m.1 + before_m && other.span.to_m > bump.up_m.0;
             !abreast || other.left_m < offset_m - clear_m || other.right_m > offset_m + clear_m
         });
@@ -203,6 +291,33 @@ mod tests {
             assert!(((after.offset_m - before.offset_m) / (2.0 * h) - here.slope).abs() < 1e-4, "{at_m}");
             assert!(((after.slope - before.slope) / (2.0 * h) - here.curvature_per_m).abs() < 1e-4, "{at_m}");
             assert!(8.0 * 8.0 * here.curvature_per_m.abs() < 1.6, "{here:?}");
+        }
+    }
+
+    #[test]
+    fn vehicles_in_a_row_are_passed_as_one() {
+        let row =
+            planned(&[(Body::Sedan, 60.0, -3.5), (Body::Sedan, 70.0, -3.45), (Body::Sedan, 110.0, -3.5)]);
+        let (_, span) = row.passing().expect("there is room in the lane");
+        assert!(row.passes(1) && row.passes(2) && !row.passes(3));
+        assert!(span.to_m > 72.0 && span.to_m < 74.0, "{span:?}");
+    }
+
+    #[test]
+    fn the_way_back_has_its_own_derivatives() {
+        let mut plan = LateralPlan::default();
+        plan.return_from(100.0, 8.0, 0.8, 0.06);
+        assert!(
+            (plan.aside(100.0).offset_m - 0.8).abs() < 1e-9 && (plan.aside(100.0).slope - 0.06).abs() < 1e-9
+        );
+        assert!(plan.aside(120.0).offset_m.abs() < 1e-9);
+        let h = 1e-3;
+        for metre in 1..20 {
+            let at_m = 100.0 + f64::from(metre) - 0.5;
+            let (before, here, after) = (plan.aside(at_m - h), plan.aside(at_m), plan.aside(at_m + h));
+            assert!(((after.offset_m - before.offset_m) / (2.0 * h) - here.slope).abs() < 1e-5, "{at_m}");
+            assert!(((after.slope - before.slope) / (2.0 * h) - here.curvature_per_m).abs() < 1e-5, "{at_m}");
+            assert!(here.offset_m.abs() < 1.1 && 64.0 * here.curvature_per_m.abs() < 2.0, "{here:?}");
         }
     }
 

@@ -148,8 +148,14 @@ impl Planner {
     fn choose_path(&mut self, outlook: &Outlook) {
         let &Outlook { station_m, speed_mps, forecasts, .. } = outlook;
         self.standing.update(forecasts);
-        if self.changes.seek(&self.config, &self.guide, station_m, speed_mps, forecasts) {
-            self.guide = Arc::new(self.changes.guide(&self.config));
+        let (config, guide) = (&self.config, &self.guide);
+        if let Some((off_m, slope)) = self.changes.break_off(config, guide, station_m, speed_mps, forecasts) {
+            self.lateral.return_from(station_m, speed_mps, off_m, slope);
+            self.guide = Arc::new(self.changes.guide(config));
+        } else if !self.lateral.is_returning()
+            && self.changes.seek(config, guide, station_m, speed_mps, forecasts)
+        {
+            self.guide = Arc::new(self.changes.guide(config));
         }
         self.manoeuvre = if self.changes.under_way(station_m) {
             Manoeuvre::LaneChange
@@ -173,12 +179,11 @@ impl Planner {
         self.changes.constrain(constraints);
         let (config, scene, guide) = (&self.config, &self.scene, &self.guide);
         kept_clear::crosswalks(config, scene, guide, start, forecasts, &self.standing, constraints);
-        let passed = self.lateral.passing().map(|(id, _)| id);
         let ahead = station_m..station_m + HORIZON_M;
         let mut claims = core::mem::take(&mut self.claims);
         claims.clear();
         // The path leads past what is being passed.
-        let others = forecasts.iter().filter(|forecast| passed != Some(forecast.id) || forecast.moving);
+        let others = forecasts.iter().filter(|forecast| !self.lateral.passes(forecast.id) || forecast.moving);
         claims.extend(others.filter_map(|forecast| {
             let claim = Claim::of(forecast, guide, &self.lateral, &ahead, config.lateral_buffer_m)?;
             self.matters(&claim, start).then_some(claim)

@@ -2,7 +2,7 @@
 //!
 //! A braking parabola for places to stop at, the intelligent driver model (Treiber) for leaders with
 //! a kinematic bound beneath it, a look-ahead on the speed that limits and curves allow. All of it
-//! goes through Apollo's jerk limits, the emergency too: that is its documented weakness (c).
+//! goes through Apollo's jerk limits, the emergency too: that is its documented weakness `bounded_jerk`.
 
 use crate::ads::guide::Guide;
 use crate::ads::status::Reason;

@@ -1,4 +1,5 @@
-//! How long pedestrians have stood: weakness (f) ignores those who have stood for some time.
+//! How long pedestrians have stood: weakness `creeps_to_standing_pedestrian` creeps towards those who have stood for
+//! some time.
 //!
 //! Tracked speeds are too noisy to tell that a pedestrian stands; staying in one place tells it.
 
