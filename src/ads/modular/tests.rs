@@ -356,8 +356,8 @@ fn it_breaks_off_a_lane_change_that_is_no_longer_safe() {
     }
     assert_eq!(rig.ads.status().manoeuvre, Manoeuvre::LaneChange);
     // A faster car that was not seen before is beside.
-    let (x_m, speed_mps) = (rig.sensed.ego.rear_axle.position.x, rig.sensed.ego.speed_mps);
-    rig.sensed.objects.push(object(1, Body::Sedan, Pose::new(x_m - 6.0, -1.75, 0.0), speed_mps + 2.0));
+    let x_m = rig.sensed.ego.rear_axle.position.x;
+    rig.sensed.objects.push(object(1, Body::Sedan, Pose::new(x_m - 6.0, -1.75, 0.0), 14.0));
     let mut farthest_m = f64::NEG_INFINITY;
     for _ in 0..150 {
         rig.tick();
