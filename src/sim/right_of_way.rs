@@ -18,7 +18,8 @@
 //! A pedestrian on a crosswalk has priority (21), unless the light for the ego vehicle is green. Elsewhere a
 //! pedestrian may not step onto the road without regard to distance and speed of what comes (20.6), and a
 //! driver must not endanger pedestrians and be able to stop for what can be foreseen (21.1, 13.1). So the ego
-//! vehicle has priority only over one who comes too late for its brakes, and otherwise neither has.
+//! vehicle has priority only over one that steps onto the carriageway too late for its brakes, and otherwise
+//! neither has.
 //!
 //! The state is kept for each road user ([`Rights`]), looked at ten times a second, and read at a contact.
 
@@ -64,6 +65,8 @@ const LANE_M: f64 = 50.0;
 const ASIDE_M: f64 = 6.0;
 /// A pedestrian within this distance of the strip that the ego vehicle drives on is in its way, m. Ours.
 const BESIDE_M: f64 = 0.5;
+/// Farther to the side of that strip a pedestrian is on another road, m: six lanes.
+const CARRIAGEWAY_M: f64 = 21.0;
 /// A pedestrian this near to a crosswalk is on it or about to step on it, m. Ours.
 const KERB_M: f64 = 1.0;
 /// A light this far before a crosswalk holds for it, m. Ours.
@@ -263,7 +266,12 @@ impl Rights {
 
     fn watch_pedestrian(&mut self, this: &Obstacle, around: &Around) {
         let strip = Strip::of(this, around);
-        let shares = strip.aside_m < BESIDE_M && strip.ahead_m > -this.outline.half_length_m - strip.length_m;
+        let position = this.outline.pose.position;
+        // The step onto the carriageway is what counts: from there on the ego vehicle may expect the rest.
+        let is_on_road = || around.scene.map.nearest(position, this.outline.pose.heading_rad, 0.0).is_some();
+        let shares = strip.aside_m < CARRIAGEWAY_M
+            && strip.ahead_m > -this.outline.half_length_m - strip.length_m
+            && (strip.aside_m < BESIDE_M || is_on_road());
         if shares {
             let known = self.meeting.filter(|_| self.shares == Some(true));
             let priority = known.map_or_else(|| on_foot(&strip, around), |meeting| meeting.priority);
@@ -516,7 +524,7 @@ impl Strip {
     }
 }
 
-/// Who has priority over a pedestrian that is in the ego vehicle's way from now on.
+/// Who has priority, the ego vehicle or a pedestrian that steps onto the carriageway or into its way now.
 fn on_foot(strip: &Strip, around: &Around) -> Priority {
     let route = &around.scene.route;
     let crosswalks = || route.crosswalks_m.iter();
