@@ -40,7 +40,7 @@ pub(super) enum Ending {
     TouchedEgo,
     /// The road user touched another one.
     TouchedOther,
-    /// The road user left the world.
+    /// The road user left the world, or drove over the edge of the map.
     Left,
 }
 
@@ -61,6 +61,7 @@ pub(super) fn watch(
 ) -> Option<Sighting> {
     let scene = world.scene().clone();
     let begin_s = world.time_s();
+    let drives = world.obstacle(id)?.body.is_vehicle();
     let mut frames = vec![frame(&scene, &world, id, begin_s)?];
     let ending = loop {
         if world.time_s() - begin_s >= horizon_s - DT_S / 2.0 {
@@ -74,6 +75,9 @@ pub(super) fn watch(
         let ends = touched || bumped;
         if ends || world.ticks().is_multiple_of(FRAME_TICKS) {
             match frame(&scene, &world, id, begin_s) {
+                Some(frame) if drives && is_off_map(&scene, &frames[frames.len() - 1], &frame) => {
+                    break Ending::Left;
+                }
                 Some(frame) => frames.push(frame),
                 None => break Ending::Left,
             }
@@ -89,6 +93,16 @@ pub(super) fn watch(
         }
     };
     Some(Sighting { frames, ending })
+}
+
+/// Whether a vehicle drove over the edge of the map between two frames. It goes on there while it is in sight, and
+/// there is no road by which to judge it.
+fn is_off_map(scene: &Scene, before: &Frame, now: &Frame) -> bool {
+    let at_edge = |(index, _): (LaneIndex, f64)| {
+        let lane = scene.map.lane(index);
+        lane.successors.is_empty() || lane.predecessors.is_empty()
+    };
+    now.lane.is_none() && before.lane.is_some_and(at_edge)
 }
 
 fn frame(scene: &Scene, world: &World, id: u32, begin_s: f64) -> Option<Frame> {
