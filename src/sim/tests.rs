@@ -358,6 +358,45 @@ fn vehicles_that_touch_slide_to_rest_by_friction() {
     assert!(last.iter().all(|now| now.velocity_mps.norm() < 0.2));
 }
 
+#[test]
+fn vehicles_stand_at_a_stop_sign_before_they_cross() {
+    let (none, stop) = ("274", "206");
+    for (sign, stands) in [(stop, true), (none, false)] {
+        let mut crossed = 0;
+        for seed in 0..6 {
+            let start = Start { seed, ambient: 12, ..testing::start() };
+            let mut world = World::new(testing::crossing_of(none, sign), &start);
+            // Ambient traffic is around the ego vehicle, which waits some way before the crossing.
+            drive(&mut world, 8.0, 13.0);
+            // The least speed of each vehicle while its front is within 5 m before the line, m/s.
+            let mut least_mps = std::collections::BTreeMap::new();
+            for _ in 0..4000 {
+                world.tick(&Control { brake_pct: 100.0, ..Control::default() });
+                for obstacle in world.obstacles().filter(|obstacle| obstacle.forward.y > 0.9) {
+                    let front_m = obstacle.outline.pose.position.y + obstacle.outline.half_length_m;
+                    let speed_mps = obstacle.velocity_mps.norm();
+                    if front_m < -25.0 {
+                        least_mps.insert(obstacle.id, f64::INFINITY);
+                    }
+                    // Only a vehicle whose whole approach was seen.
+                    let Some(least): Option<&mut f64> = least_mps.get_mut(&obstacle.id) else { continue };
+                    if (-20.0..-15.0).contains(&front_m) {
+                        *least = least.min(speed_mps);
+                    } else if front_m > 0.0 && least.is_finite() {
+                        if stands {
+                            // The velocity is the mean of a tick.
+                            assert!(*least < 0.2, "{seed} {least}");
+                        }
+                        crossed += u32::from(*least > 1.0 || stands);
+                        *least = f64::INFINITY;
+                    }
+                }
+            }
+        }
+        assert!(crossed > 0, "{sign}");
+    }
+}
+
 /// A world of another traffic profile.
 fn released(scene: &Arc<Scene>) -> World {
     let traffic = TrafficProfile::shipped("released").expect("it is sound");

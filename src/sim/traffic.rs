@@ -150,15 +150,19 @@ impl TrafficProfile {
         Ok(())
     }
 
-    /// All settings in one line of YAML, for [`TrafficProfile::from_yaml`].
+    /// What differs from the default, in one line of YAML for [`TrafficProfile::from_yaml`].
     pub fn to_line(&self) -> String {
-        serde_json::to_string(self).expect("a profile is plain data")
+        let settings = |profile| serde_json::to_value(profile).expect("a profile is plain data");
+        let (mut own, usual) = (settings(*self), settings(TrafficProfile::default()));
+        own.as_object_mut().expect("a profile has fields").retain(|key, value| *value != usual[key.as_str()]);
+        own.to_string()
     }
 
     /// Digest of all settings, `sha256:` and 64 digits.
     pub fn digest(&self) -> String {
         let mut digest = "sha256:".to_owned();
-        for byte in Sha256::digest(self.to_line().as_bytes()) {
+        let text = serde_json::to_string(self).expect("a profile is plain data");
+        for byte in Sha256::digest(text.as_bytes()) {
             write!(digest, "{byte:02x}").expect("a string takes everything");
         }
         digest
@@ -180,6 +184,7 @@ mod tests {
         let released = TrafficProfile::shipped("released").expect("it is sound");
         assert!(released.rays && released.change_by_sphere && !released.yields_to_ego && !released.mobil);
         assert_eq!(released.weather_rest_s, 30.0);
+        assert_eq!(careful.to_line(), "{}");
         for profile in [careful, released] {
             assert_eq!(TrafficProfile::from_yaml(&profile.to_line()), Ok(profile));
         }

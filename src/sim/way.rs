@@ -7,7 +7,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use crate::geometry::{Path, Pose, Vec2};
 use crate::rng;
 use crate::rng::Rng;
-use crate::road::{Lane, LaneIndex, RoadMap, RouteStopLine};
+use crate::road::{Lane, LaneIndex, RoadMap, RouteStopLine, SignKind};
 
 use super::body::BodyParameters;
 use super::junction::Area;
@@ -44,6 +44,8 @@ pub(super) struct Way {
     lane_bits: u64,
     /// By rising station.
     pub stop_lines: Vec<RouteStopLine>,
+    /// Lines of stop signs, by rising station, m.
+    pub stop_signs_m: Vec<f64>,
     /// Where others may cross or join, by rising station on the way.
     pub areas: Vec<Area>,
     /// Highest speed at each vertex of `path`, m/s.
@@ -89,6 +91,7 @@ impl Way {
         let path = Path::join(chain.iter().map(|lane| &map.lane(*lane).centre))?;
         let mut lanes: Vec<WayLane> = Vec::new();
         let mut stop_lines = Vec::new();
+        let mut stop_signs_m = Vec::new();
         let mut areas = Vec::new();
         let mut end: Option<(f64, Vec2)> = None;
         for index in chain {
@@ -102,6 +105,8 @@ impl Way {
                     .iter()
                     .map(|line| RouteStopLine { station_m: from_m + line.station_m, signal: line.signal }),
             );
+            let stops = lane.sign_lines.iter().filter(|line| line.kind == SignKind::Stop);
+            stop_signs_m.extend(stops.map(|line| from_m + line.station_m));
             let on_lane = scene.conflict_areas().of(*index).iter();
             areas.extend(on_lane.map(|area| Area {
                 from_m: from_m + area.from_m,
@@ -116,7 +121,7 @@ impl Way {
         let end_m = if open { None } else { free_end_m(map, &path) };
         let lane_bits = lanes.iter().fold(0, |bits, part| bits | lane_bit(part.lane));
         areas.sort_by(|a, b| a.from_m.total_cmp(&b.from_m).then(a.other.cmp(&b.other)));
-        Some(Way { path, lanes, lane_bits, stop_lines, areas, speeds_mps_max, open, end_m })
+        Some(Way { path, lanes, lane_bits, stop_lines, stop_signs_m, areas, speeds_mps_max, open, end_m })
     }
 
     /// Where the outline's centre of a body is that has driven to a station: both axles are on the way.
@@ -141,7 +146,18 @@ impl Way {
     pub fn of_path(path: Path) -> Way {
         let speeds_mps_max = bend_speeds_mps(&path);
         let (lanes, stop_lines, areas) = (Vec::new(), Vec::new(), Vec::new());
-        Way { path, lanes, lane_bits: 0, stop_lines, areas, speeds_mps_max, open: false, end_m: None }
+        let stop_signs_m = Vec::new();
+        Way {
+            path,
+            lanes,
+            lane_bits: 0,
+            stop_lines,
+            stop_signs_m,
+            areas,
+            speeds_mps_max,
+            open: false,
+            end_m: None,
+        }
     }
 
     /// The lane at a station, clamped to the ends, and the station on it.
@@ -253,4 +269,27 @@ fn bend_speeds_mps(path: &Path) -> Vec<f64> {
         speeds[i] = speeds[i].min(braked_mps);
     }
     speeds
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sim::testing;
+
+    #[test]
+    fn a_way_that_ends_at_the_edge_of_the_map_goes_on_straight() {
+        let scene = testing::crossing();
+        let of = |road: &str, lane: i32| {
+            let at = |key: &crate::road::LaneKey| key.road == road && key.lane == lane;
+            LaneIndex(scene.map.lanes.iter().position(|lane| at(&lane.key)).expect("it is there"))
+        };
+        let way =
+            |lane| Way::along(&scene, &[lane], &mut crate::rng::stream(1, crate::rng::Stream::Traffic, 0));
+        let out = way(of("6", -1)).expect("it is a lane");
+        assert!(!out.open && out.end_m.is_none());
+        // The second lane of the crossing street ends before the junction: whoever is in it must stop.
+        let bay = way(of("4", -2)).expect("it is a lane");
+        let end_m = bay.end_m.expect("lanes lie beyond");
+        assert!((end_m - bay.path.length_m()).abs() < 2.0 * BEYOND_STEP_M, "{end_m}");
+    }
 }

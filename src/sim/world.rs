@@ -17,7 +17,7 @@ use super::environment::Environment;
 use super::incident::{Bump, Incident, bump, impact};
 use super::placement;
 use super::right_of_way::PassedLight;
-use super::road_user::{Moved, Obstacle, RoadUser};
+use super::road_user::{Motion, Moved, Obstacle, RoadUser};
 use super::scene::Scene;
 use super::sense::{
     Conditions, EgoMotion, FRAME_S, FRAME_TICKS, RANGE_M, Sensed, SensedObject, SignalColour,
@@ -404,7 +404,8 @@ impl World {
         let Some(mut moved) = user.mover.step(&before, &self.around([earlier, later])) else { return false };
         if let Some(Bump { other, pose, normal, incident }) = bump(users, index, &moved.pose, self.ticks) {
             // Obstacles that touch already push where the one that moves goes.
-            let normal = if normal == Vec2::zeros() { moved.velocity_mps.normalize() } else { normal };
+            let pushes = moved.velocity_mps.try_normalize(0.0).unwrap_or(moved.forward);
+            let normal = if normal == Vec2::zeros() { pushes } else { normal };
             let mass_t = |index: usize| users[index].mover.size.mass_t;
             let other_mps = users[other].obstacle.velocity_mps;
             let (velocity_mps, other_mps) =

@@ -210,7 +210,8 @@ impl Driver {
         change.progress += progress_per_m * way_m;
         if change.progress >= 1.0 {
             (self.way, self.station_m) = (Arc::clone(&change.to), change.to_station_m);
-            (self.change, self.hold_m, self.insists_to_m) = (None, None, f64::NEG_INFINITY);
+            (self.change, self.hold_m) = (None, None);
+            (self.insists_to_m, self.stopped_to_m) = (f64::NEG_INFINITY, f64::NEG_INFINITY);
             return at(to, to_lane_rad);
         }
         let SmoothStep { value: blend, slope, .. } = smooth_step(change.progress);

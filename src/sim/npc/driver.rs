@@ -4,7 +4,7 @@
 //! road and a kinematic floor, because IDM alone assumes brakes without limit. Ten times a second,
 //! which is their reaction time, drivers look for a leader (`leader`, `foresight`), for a reason to wait
 //! at a junction (`manners`) and for the occasion of their next lane change (`change`); in every tick
-//! they slow down for bends, stop at red lights (`red_light`) and follow. What else they do to the ego
+//! they slow down for bends, stop at red lights (`red_light`) and stop signs (`stop_sign`) and follow. What else they do to the ego
 //! vehicle is the scenario's business.
 
 use std::sync::Arc;
@@ -62,6 +62,8 @@ pub(in crate::sim) struct Driver {
     pub(super) hold_m: Option<f64>,
     /// After a wait it goes on up to this station, whatever comes.
     pub(super) insists_to_m: f64,
+    /// It has stood at the stop sign's line at this station, and at those before.
+    pub(super) stopped_to_m: f64,
     /// Ticks at rest because of others.
     pub(super) waited_ticks: u32,
     pub(super) change: Option<Change>,
@@ -101,6 +103,7 @@ impl Driver {
             leader: None,
             hold_m: None,
             insists_to_m: f64::NEG_INFINITY,
+            stopped_to_m: f64::NEG_INFINITY,
             waited_ticks: 0,
             change: None,
             last_change: None,
@@ -136,6 +139,11 @@ impl Driver {
             lane_heading_rad: self.lane_heading_rad(),
             velocity_mps: forward * self.speed_mps,
         }
+    }
+
+    /// Whether its lane and the map have ended. A lane change is done first.
+    fn is_beyond_map(&self) -> bool {
+        self.change.is_none() && self.station_m >= self.way.path.length_m()
     }
 
     /// Heading of the way where it is, rad.
@@ -176,7 +184,7 @@ impl Driver {
         }
         // A lane that ends under a lane change goes on straight until the change is done. So does one that
         // ends at the edge of the map while the vehicle is in sight.
-        if self.change.is_none() && self.station_m >= self.way.path.length_m() && !in_sight {
+        if self.is_beyond_map() && !in_sight {
             return None;
         }
         Some(self.advance_change(way_m, this.outline.pose.position, size))
@@ -188,9 +196,11 @@ impl Driver {
             let mut rng = self.draw(this.id, around);
             if let Some((way, station_m)) = self.way.prolonged(around.scene, self.station_m, &mut rng) {
                 self.insists_to_m += station_m - self.station_m;
+                self.stopped_to_m += station_m - self.station_m;
                 (self.way, self.station_m) = (way, station_m);
             }
         }
+        self.note_stop(size);
         self.yields_to_ego = self.is_ambient() && around.traffic.yields_to_ego;
         if let Some(part) = self.limit_part {
             self.cruise_mps = part * self.way.limit_mps(around.scene, self.station_m);
@@ -225,6 +235,7 @@ impl Driver {
         let end_m = if self.change.is_none() { self.way.end_m } else { None };
         let line_ahead_m = [
             self.stop_gap_m(size, around, braking_mps2),
+            self.sign_gap_m(size, braking_mps2),
             end_m.map(|end_m| end_m - front_m),
             self.hold_m.map(|hold_m| hold_m - front_m),
         ];
@@ -279,6 +290,7 @@ impl Driver {
         sink(u64::from(leader.crosswise));
         sink(self.hold_m.unwrap_or(f64::INFINITY).to_bits());
         sink(self.insists_to_m.to_bits());
+        sink(self.stopped_to_m.to_bits());
         sink(u64::from(self.waited_ticks));
         sink(u64::from(self.aggression));
         if let Some(change) = &self.change {

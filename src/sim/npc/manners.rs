@@ -8,7 +8,7 @@
 //!   comes;
 //! - room behind it, if the vehicle ahead stands: no vehicle stops in an area.
 //!
-//! No driver waits for a vehicle that waits itself or stands at a red light. A driver that sets out after
+//! No driver waits for a vehicle that waits itself, stands at a red light or has yet to stop at a sign. A driver that sets out after
 //! a wait crosses all areas of the junction and counts as if inside them, so that four that wait for each
 //! other do not all set out at once: they look one after another, and the first to look goes. After
 //! [`PATIENCE_S`] of waiting a driver goes before any vehicle that stands, whatever the order of the lanes;
@@ -184,9 +184,10 @@ impl Driver {
         let front_m = self.station_m + size.length_m / 2.0;
         let in_m = from_m - front_m;
         let braking_mps2 = around.braking_mps2(size, self.speed_mps);
-        let red_gap_m = self.stop_gap_m(size, around, braking_mps2);
-        let holds =
-            self.hold_m.is_some_and(|hold_m| hold_m < from_m) || red_gap_m.is_some_and(|gap_m| gap_m < in_m);
+        let line_gap_m = [self.stop_gap_m(size, around, braking_mps2), self.sign_gap_m(size, braking_mps2)];
+        let stops_before = |gap_m: &f64| *gap_m < in_m;
+        let holds = self.hold_m.is_some_and(|hold_m| hold_m < from_m)
+            || line_gap_m.iter().flatten().any(stops_before);
         let stops_m = self.speed_mps * self.speed_mps / (2.0 * COMMITTED_MPS2);
         Passage {
             in_m,

@@ -24,6 +24,9 @@ const EGO_GAINS_MPS2: f64 = 1.5;
 const EGO_LATERAL_MPS2: f64 = 2.0;
 /// A stop line within this distance behind a newcomer counts as passed when it appears, m.
 const BEYOND_LINE_M: f64 = 30.0;
+/// How long a vehicle stands at a stop sign, s, and its braking before it, m/s². Ours, and that of the drivers' model.
+const STANDS_S: f64 = 1.0;
+const STOPS_MPS2: f64 = 2.0;
 /// Step in which a drive towards a rendezvous is timed, m.
 const TIMING_M: f64 = 1.0;
 
@@ -131,7 +134,7 @@ fn rendezvous(
 /// going back from there at the speed that each bend allows.
 ///
 /// # Errors
-/// If the way begins nearer, or a signal on it will not be green.
+/// If the way begins nearer, a signal on it will not be green, or a stop sign leaves no time.
 fn approach_m(
     around: &Around,
     request: &SpawnRequest,
@@ -151,11 +154,21 @@ fn approach_m(
         let lines =
             way.stop_lines.iter().filter(|line| (front_m..front_m + step_m).contains(&line.station_m));
         passed_lines.extend(lines.map(|line| (line.signal, left_s.max(0.0))));
+        if way.stop_signs_m.iter().any(|line_m| (front_m..front_m + step_m).contains(line_m)) {
+            left_s -= STANDS_S + speed_mps / 2.0 * (1.0 / STOPS_MPS2 + 1.0 / size.acceleration_mps2_max);
+            if left_s < 0.0 {
+                return Err("it would have to stop at a sign".into());
+            }
+        }
         if front_m < size.length_m {
             return Err("the crossing road is too short".into());
         }
     }
     // No vehicle appears just beyond a line at which it would have had to stop.
+    let beyond = front_m - BEYOND_LINE_M..front_m;
+    if way.stop_signs_m.iter().any(|line_m| beyond.contains(line_m)) {
+        return Err("it would have had to stop at a sign".into());
+    }
     let behind =
         way.stop_lines.iter().filter(|line| (front_m - BEYOND_LINE_M..front_m).contains(&line.station_m));
     passed_lines.extend(behind.map(|line| (line.signal, 0.0)));
