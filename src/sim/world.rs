@@ -17,7 +17,7 @@ use super::environment::Environment;
 use super::incident::{Bump, Incident, bump, impact};
 use super::placement;
 use super::right_of_way::PassedLight;
-use super::road_user::{Motion, Moved, Obstacle, RoadUser};
+use super::road_user::{Moved, Obstacle, RoadUser};
 use super::scene::Scene;
 use super::sense::{
     Conditions, EgoMotion, FRAME_S, FRAME_TICKS, RANGE_M, Sensed, SensedObject, SignalColour,
