@@ -5,6 +5,7 @@ use std::path::Path;
 use assert_cmd::Command;
 
 use crate::cases::{cases, each_case, root};
+use crate::world::FLICKER;
 
 /// `avastra` with arguments, in the repository.
 pub fn avastra(arguments: &[&str]) -> Command {
@@ -117,7 +118,8 @@ fn compile_and_run_write_the_same_files_twice() {
         stdout
     };
     in_scratch(&["compile", &space]);
-    let settings = ["--seed", "7", "--episodes", "20"];
+    let profile = root().join(FLICKER).display().to_string();
+    let settings = ["--seed", "7", "--episodes", "10", "--ads-config", &profile];
     in_scratch(&[&["run", "--jobs", "1"], &settings[..]].concat());
     in_scratch(&[&["run", "--jobs", "2"], &settings[..]].concat());
     let critical = |run: &str| -> Vec<(String, String)> {

@@ -339,7 +339,7 @@ type Before = (OrientedBox, Vec<Obstacle>);
 
 /// A run against a driving system that sees almost nothing, so that there are contacts to find.
 fn blind() -> Run {
-    let usual = run(15, 5, &[]);
+    let usual = run(25, 5, &[]);
     let mut config = ModularConfig::default();
     config.perception.range_factor = 0.1;
     config.perception.blind_to_pedestrians = true;

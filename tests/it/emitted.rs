@@ -10,7 +10,7 @@ use avastra::run::{EpisodeSummary, Run, RunSettings, play};
 use avastra::{emit, oracle};
 
 use crate::cases::{expect_snapshot, root};
-use crate::world::{assert_replays, read, run, run_of, space_at};
+use crate::world::{assert_replays, read, run, run_of, run_with_flicker, space_at};
 
 const EPISODES: u32 = 12;
 
@@ -55,7 +55,7 @@ fn the_number_of_workers_changes_nothing() {
 
 #[test]
 fn emitted_scenarios_keep_every_claim() {
-    let run = run(60, 3, &[]);
+    let run = run_with_flicker(20, 3);
     let mut emitted = 0;
     for (number, (summary, log)) in judged(&run, 2) {
         if summary.counted() == 0 {

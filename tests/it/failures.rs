@@ -3,13 +3,26 @@
 use std::path::PathBuf;
 
 use crate::command::{avastra, outcome};
+use crate::world::FLICKER;
 
 #[test]
 fn found_scenarios_are_explained_shrunk_and_tested_again() {
     let scratch = tempfile::tempdir().expect("a scratch directory");
     let path = |name: &str| scratch.path().join(name).display().to_string();
     let out = path("run");
-    let settings = ["--road", "corner", "--episodes", "40", "--seed", "5", "--causes", "--out", &out];
+    let settings = [
+        "--road",
+        "corner",
+        "--episodes",
+        "20",
+        "--seed",
+        "5",
+        "--ads-config",
+        FLICKER,
+        "--causes",
+        "--out",
+        &out,
+    ];
     let (status, stdout, stderr) =
         outcome(&mut avastra(&[&["run", "scenarios/avastra45.ava"], &settings[..]].concat()));
     assert_eq!(status, 0, "{stderr}");
@@ -25,7 +38,7 @@ fn found_scenarios_are_explained_shrunk_and_tested_again() {
         let line = text.lines().find(|line| line.contains("expect cause == "))?.to_owned();
         Some((file.display().to_string(), text, line))
     });
-    let (file, text, claim) = with_cause.expect("a crash of forty episodes has a cause");
+    let (file, text, claim) = with_cause.expect("a crash of twenty episodes has a cause");
     let (status, stdout, stderr) = outcome(&mut avastra(&["replay", &file]));
     assert_eq!(status, 0, "{stdout}{stderr}");
     assert!(stdout.contains("delta-v"), "{stdout}");

@@ -6,6 +6,7 @@ use avastra::run::RunSettings;
 use avastra::sim::TrafficProfile;
 
 use crate::command::{avastra, outcome};
+use crate::world::FLICKER;
 
 const SPACE: &str = "scenarios/avastra45.ava";
 
@@ -25,7 +26,8 @@ fn settings(directory: &Path) -> (String, RunSettings) {
 fn a_run_under_released_traffic_is_recorded_and_its_scenarios_replay() {
     let scratch = tempfile::tempdir().expect("a scratch directory");
     let directory = scratch.path().join("released");
-    let (status, _, stderr) = run(&directory, &["--episodes", "100", "--traffic", "released"]);
+    let (status, _, stderr) =
+        run(&directory, &["--episodes", "20", "--traffic", "released", "--ads-config", FLICKER]);
     assert_eq!(status, 0, "{stderr}");
     let released = TrafficProfile::shipped("released").expect("it is sound");
     let record = settings(&directory).1.traffic.expect("it is not the default");

@@ -4,16 +4,20 @@ use std::path::Path;
 use std::sync::Arc;
 
 use avastra::action::{ActionTable, SpawnFacts, SpawnRequest, Surroundings};
+use avastra::ads::ModularConfig;
 use avastra::check::ReadError;
 use avastra::episode::{EpisodeLog, Script};
 use avastra::model::Space;
-use avastra::run::{Run, RunSettings};
+use avastra::run::{Profile, Run, RunSettings};
 
 use crate::cases::root;
 
 /// Settings of a learner with a few neurons, whose rules are distilled from a few episodes.
 pub const SMALL: &str = "learning_starts: 30\nupdates_per_step: 1\nhidden_units: [8]\nbatch_len: 8\n\
                          rules_leaves: 6\nrules_rounds: 2\nrules_episodes: 3\n";
+
+/// A profile with a planted fault: random search finds crashes of it soon, and few or none of the default's.
+pub const FLICKER: &str = "scenarios/ads/faults/perception_flicker.yaml";
 
 /// A world in which every spawn has room, and its gap is the distance asked for.
 pub struct Wide {
@@ -61,6 +65,15 @@ pub fn assert_replays(run: &Run, number: usize, log: &EpisodeLog) {
 /// A run of masked random search against the modular driving system.
 pub fn run(episodes: u32, seed: u64, without: &[&str]) -> Run {
     run_of(space("avastra45.ava"), episodes, seed, without)
+}
+
+/// A run in the shipped space against a driving system whose detections flicker, so that there are crashes.
+pub fn run_with_flicker(episodes: u32, seed: u64) -> Run {
+    let usual = run(episodes, seed, &[]);
+    let text = std::fs::read_to_string(root().join(FLICKER)).expect("it is shipped");
+    let config = ModularConfig::from_yaml(&text).expect("it is sound");
+    let settings = RunSettings { profile: Some(Profile::new(&config)), ..usual.settings().clone() };
+    Run::new(usual.table().clone(), settings).expect("only the settings of the driving system are others")
 }
 
 /// A run of masked random search in any space, against the modular driving system.
