@@ -315,6 +315,7 @@ words! {
     Then "Whether a vehicle keeps its lane or changes it.": Keep, Change
 }
 
+#[allow(clippy::derivable_impls, reason = "the macro has no place for the mark of a default")]
 impl Default for Priority {
     fn default() -> Priority {
         Priority::None

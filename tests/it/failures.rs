@@ -2,6 +2,8 @@
 
 use std::path::PathBuf;
 
+use avastra::ads::Weaknesses;
+
 use crate::command::{avastra, outcome};
 use crate::world::FLICKER;
 
@@ -72,7 +74,7 @@ fn found_scenarios_are_explained_shrunk_and_tested_again() {
     assert_eq!((status, sum, found["errors"].as_u64()), (0, 2, Some(0)), "{found}");
     let (status, found) = json(&[&["diagnose", "--mechanisms"], &both[..]].concat());
     let shares = found["mechanisms"].as_array().expect("a list");
-    assert_eq!((status, shares.len(), found["crashes"].as_u64()), (0, 9, Some(2)));
+    assert_eq!((status, shares.len(), found["crashes"].as_u64()), (0, Weaknesses::NAMES.len(), Some(2)));
     for share in shares.iter().flat_map(|found| [&found["from_onset"], &found["from_start"]]) {
         let [low, at, high] = ["low", "share", "high"].map(|name| share[name].as_f64().expect("a number"));
         assert!(0.0 <= low && low <= at && at <= high && high <= 1.0, "{share}");

@@ -10,6 +10,7 @@ use serde_json::Value;
 
 use crate::cases::{expect_snapshot, root};
 use crate::command::{avastra, outcome};
+use crate::world::FLICKER;
 
 /// Plays the smoke study into a directory.
 fn smoke(out: &Path, jobs: &str) -> (i32, String, String) {
@@ -106,6 +107,7 @@ fn cells_are_runs(whole: &Value) {
         let out = scratch.path().join(number.to_string()).display().to_string();
         let run =
             ["run", "scenarios/avastra45.ava", "--road", "corner", "--episodes", "3", "--format", "json"];
+        let run = [&run[..], &["--ads-config", FLICKER]].concat();
         let seed = seed.as_str().expect("a text");
         let (status, stdout, stderr) =
             outcome(&mut avastra(&[&run[..], &["--seed", seed, "--out", &out]].concat()));

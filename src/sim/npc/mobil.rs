@@ -167,12 +167,14 @@ mod tests {
     fn naive_gain_mps2(speed_mps: f64, length_m: f64, own: Lane, beside: Lane, politeness: f64) -> f64 {
         let ahead = |other: Other| (other.gap_m, other.speed_mps);
         let accelerate = |front_m: f64, speed_mps: f64, leader: Option<(f64, f64)>| {
-            let free = 2.0 * (1.0 - (speed_mps / speed_mps.max(14.0)).powi(4));
+            let ratio = speed_mps / speed_mps.max(14.0);
+            let free = 2.0 * (1.0 - ratio * ratio * ratio * ratio);
             let Some((rear_m, leader_mps)) = leader else { return free };
             let wanted_m = 2.0
                 + (1.2 * speed_mps + speed_mps * (speed_mps - leader_mps) / (2.0 * (2.0_f64 * 2.0).sqrt()))
                     .max(0.0);
-            free - 2.0 * (wanted_m / (rear_m - front_m).max(0.1)).powi(2)
+            let closeness = wanted_m / (rear_m - front_m).max(0.1);
+            free - 2.0 * closeness * closeness
         };
         // The own front is at 0 and its rear at -length.
         let me = (-length_m, speed_mps);
