@@ -122,6 +122,13 @@ impl Guide {
         }
     }
 
+    /// The position of [`Guide::pose_at`], without the work for its heading.
+    pub fn position_at(&self, station_m: f64) -> Vec2 {
+        let (index, fraction) = self.segment(station_m);
+        let (a, b) = (&self.samples[index], &self.samples[index + 1]);
+        a.position + (b.position - a.position) * fraction
+    }
+
     /// 1/m, positive to the left.
     pub fn curvature_at(&self, station_m: f64) -> f64 {
         let (index, fraction) = self.segment(station_m);
@@ -233,7 +240,8 @@ impl Guide {
     }
 
     fn index(&self, station_m: f64) -> usize {
-        ((station_m / SPACING_M).max(0.0) as usize).min(self.samples.len() - 1)
+        // The conversion makes 0 of what is negative.
+        ((station_m / SPACING_M) as usize).min(self.samples.len() - 1)
     }
 
     /// Segment and fraction of it; the fraction leaves `[0, 1]` beyond the ends.

@@ -31,4 +31,4 @@ pub use reference::{
 };
 pub use registry::{Entry, REGISTRY, by_name};
 pub use selected::{NoSettings, Selected};
-pub use status::{GHOST_ID_MIN, Manoeuvre, PerceivedObject, PlannedPoint, Reason, Status};
+pub use status::{GHOST_ID_MIN, Manoeuvre, PerceivedObject, Reason, Status};

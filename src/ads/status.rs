@@ -13,7 +13,7 @@ pub struct Status {
     pub localized: Option<Pose>,
     pub perceived: Vec<PerceivedObject>,
     /// Planned positions of the rear axle, every 0.1 s from the moment of planning.
-    pub planned: Vec<PlannedPoint>,
+    pub planned: Vec<Vec2>,
     pub control: Control,
     /// Apollo's `steering_rate`: its command is constant, so this is the measured rate, rad/s.
     pub steer_rate_radps: f64,
@@ -79,12 +79,6 @@ pub struct PerceivedObject {
     pub height_m: f64,
     /// Predicted positions of the centre, every 0.5 s from the moment of planning.
     pub predicted: Vec<Vec2>,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct PlannedPoint {
-    pub pose: Pose,
-    pub speed_mps: f64,
 }
 
 /// The most restrictive constraint of a plan. `Display` gives a few words, for example `follow 3`;

@@ -145,7 +145,10 @@ impl Path {
 
     /// The box around the whole path.
     pub fn bounds(&self) -> Bounds {
-        Bounds::of(&self.points)
+        self.blocks.iter().fold(self.blocks[0], |bounds, block| Bounds {
+            least: bounds.least.inf(&block.least),
+            most: bounds.most.sup(&block.most),
+        })
     }
 
     /// The pose at a station; beyond the ends the path goes on straight.
@@ -157,6 +160,13 @@ impl Path {
             position: a.position + (b.position - a.position) * fraction,
             heading_rad: wrap_angle(a.heading_rad + turn_rad),
         }
+    }
+
+    /// The position of [`Path::pose_at`], without the work for its heading.
+    pub fn position_at(&self, station_m: f64) -> Vec2 {
+        let (index, fraction) = self.locate(station_m);
+        let (a, b) = (&self.points[index], &self.points[index + 1]);
+        a.position + (b.position - a.position) * fraction
     }
 
     /// 1/m, positive to the left; 0 beyond the ends.
@@ -228,12 +238,23 @@ impl Path {
         let within = |block: usize| (block * BLOCK).max(first)..((block + 1) * BLOCK).min(last);
         let bound = |block: usize| self.blocks[block].distance_m2_min(point);
         // The nearest box is a guess: the distance to what is in it rules out most other boxes.
-        let guess =
-            blocks.clone().min_by(|a, b| bound(*a).total_cmp(&bound(*b))).expect("a path has segments");
-        let reach_m2 = self.nearest(point, within(guess)).distance_m2;
+        let mut guess = (*blocks.start(), f64::INFINITY);
+        for block in blocks.clone() {
+            let bound_m2 = bound(block);
+            if bound_m2 < guess.1 {
+                guess = (block, bound_m2);
+            }
+        }
+        let guessed = self.nearest(point, within(guess.0));
         let mut best = Nearest { segment: first, fraction: 0.0, distance_m2: f64::INFINITY };
-        for block in blocks.filter(|block| bound(*block) <= reach_m2) {
-            let found = self.nearest(point, within(block));
+        for block in blocks {
+            let found = if block == guess.0 {
+                guessed
+            } else if bound(block) <= guessed.distance_m2 {
+                self.nearest(point, within(block))
+            } else {
+                continue;
+            };
             if found.distance_m2 < best.distance_m2 {
                 best = found;
             }
@@ -273,7 +294,8 @@ impl Path {
 
     /// Index of the segment that holds a station, clamped to the ends.
     fn segment(&self, station_m: f64) -> usize {
-        let cell = (station_m.max(0.0) * self.cells_per_m) as usize;
+        // The conversion makes 0 of what is negative.
+        let cell = (station_m * self.cells_per_m) as usize;
         let mut index = self.cells[cell.min(self.cells.len() - 1)] as usize;
         while index + 2 < self.points.len() && self.points[index + 1].station_m <= station_m {
             index += 1;
@@ -294,6 +316,7 @@ impl Path {
 }
 
 /// The nearest point of a path, and its distance.
+#[derive(Debug, Clone, Copy)]
 struct Nearest {
     segment: usize,
     /// Part of the segment before the point, in `[0, 1]`.

@@ -124,8 +124,7 @@ impl Panel<'_> {
         for object in &moment.status.perceived {
             self.perceived(object);
         }
-        let planned: Vec<Vec2> = moment.status.planned.iter().map(|p| p.pose.position).collect();
-        self.canvas.polyline(&planned, r##"stroke="#12913a" stroke-width="2.5""##);
+        self.canvas.polyline(&moment.status.planned, r##"stroke="#12913a" stroke-width="2.5""##);
         if let Some(point) = moment.contact {
             self.cross(point);
         }

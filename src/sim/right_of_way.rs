@@ -428,12 +428,15 @@ impl Side {
         let away = around.ego_outline.pose.position - here;
         let guess_m = driver.station_m() + this.forward.dot(&away);
         let ego = path.project_from(around.ego_outline.pose.position, guess_m)?;
+        if ego.offset_m.abs() > ASIDE_M {
+            return None;
+        }
         let other = path.project_from(here, driver.station_m())?;
         let (ego_length_m, ego_width_m) = extent(around.ego_outline, around.ego_forward, ego.forward);
         let (other_length_m, other_width_m) = extent(&this.outline, this.forward, other.forward);
         let across_m = other.offset_m - ego.offset_m;
         let apart_m = (other.station_m - ego.station_m).abs() - ego_length_m - other_length_m;
-        if ego.offset_m.abs() > ASIDE_M || apart_m > LANE_M {
+        if apart_m > LANE_M {
             return None;
         }
         let towards = if across_m >= 0.0 { 1.0 } else { -1.0 };

@@ -171,11 +171,11 @@ impl Mover {
         match &mut self.motion {
             _ if self.crashed_with.is_some() => Some(slide(this, around)),
             Motion::Drive(driver) => {
-                let (way, before_m) = (Arc::clone(driver.shared_way()), driver.station_m());
+                let (way, before_m) = (Arc::as_ptr(driver.shared_way()), driver.station_m());
                 let moved = driver.step(this, &self.size, self.touched, in_sight, around);
-                if Arc::ptr_eq(&way, driver.shared_way()) {
+                if way == Arc::as_ptr(driver.shared_way()) {
                     let front_m = this.outline.half_length_m;
-                    self.rights.pass(&way, before_m + front_m, driver.station_m() + front_m, around);
+                    self.rights.pass(driver.way(), before_m + front_m, driver.station_m() + front_m, around);
                 }
                 moved
             }

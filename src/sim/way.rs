@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use crate::geometry::{Path, Pose, Vec2};
+use crate::geometry::{Bounds, Path, Pose, Vec2};
 use crate::rng;
 use crate::rng::Rng;
 use crate::road::{Lane, LaneIndex, RoadMap, RouteStopLine, SignKind};
@@ -132,11 +132,11 @@ impl Way {
     /// its driver swings out before to stay in the lane, which is not modelled.
     pub fn body_at(&self, station_m: f64, body: &BodyParameters) -> Pose {
         let rear_m = station_m - body.rear_axle_m;
-        let rear = self.path.pose_at(rear_m);
-        let wheelbase = self.path.pose_at(rear_m + body.wheelbase_m).position - rear.position;
+        let rear = self.path.position_at(rear_m);
+        let wheelbase = self.path.position_at(rear_m + body.wheelbase_m) - rear;
         let length_m = wheelbase.norm();
         Pose {
-            position: rear.position + wheelbase * (body.rear_axle_m / length_m),
+            position: rear + wheelbase * (body.rear_axle_m / length_m),
             heading_rad: libm::atan2(wheelbase.y, wheelbase.x),
         }
     }
@@ -235,15 +235,23 @@ impl Ways {
 /// Where the straight on from a path's end comes too near to a lane, m; `None` if it does not as far as the
 /// sensors reach. The first metres do not count, because lanes side by side end together.
 fn free_end_m(map: &RoadMap, path: &Path) -> Option<f64> {
+    let beyond = |beyond_m: f64| path.position_at(path.length_m() + beyond_m);
+    // Few lanes are near at all. The room is a little larger here, so that rounding leaves none out.
+    let straight_on = Bounds::around(&[beyond(0.0), beyond(RANGE_M)]).grown(BEYOND_ROOM_M + 0.01);
+    let near: Vec<(&Lane, Bounds)> = map
+        .lanes
+        .iter()
+        .map(|lane| (lane, lane.centre.bounds()))
+        .filter(|(_, bounds)| bounds.meets(&straight_on))
+        .collect();
     let stations =
         (1..).map(|step| f64::from(step) * BEYOND_STEP_M).take_while(|beyond_m| *beyond_m <= RANGE_M);
     let is_taken = |beyond_m: &f64| {
-        let point = path.pose_at(path.length_m() + beyond_m).position;
-        let near = |lane: &Lane| {
-            lane.centre.bounds().distance_m2_min(point) < BEYOND_ROOM_M * BEYOND_ROOM_M
+        let point = beyond(*beyond_m);
+        near.iter().any(|(lane, bounds)| {
+            bounds.distance_m2_min(point) < BEYOND_ROOM_M * BEYOND_ROOM_M
                 && lane.centre.project(point).distance_m < BEYOND_ROOM_M
-        };
-        map.lanes.iter().any(near)
+        })
     };
     let mut taken = stations.filter(is_taken);
     taken.next().map(|beyond_m| {

@@ -4,10 +4,9 @@ use std::sync::Arc;
 
 use crate::ads::driver::Ads;
 use crate::ads::sight::Sight;
-use crate::ads::status::{Manoeuvre, PlannedPoint, Reason, Status};
+use crate::ads::status::{Manoeuvre, Reason, Status};
 use crate::ads::steering::{Steering, SteeringConfig};
 use crate::ads::stops::{Signs, Stop, crosswalks, lights};
-use crate::geometry::Pose;
 use crate::sim::{Control, DT_S, FRAME_TICKS, Scene, Sensed, VehicleParameters, pedals_for};
 
 use super::lateral::{Lanes, Lateral};
@@ -135,11 +134,8 @@ impl Frenet {
         let guide = self.lanes.guide();
         self.status.planned.clear();
         self.status.planned.extend(plan.points.iter().map(|point| {
-            let aside = plan.lateral.aside(point.station_m);
-            let on_guide = guide.pose_at(point.station_m);
-            let position = on_guide.offset(0.0, aside.offset_m).position;
-            let heading_rad = on_guide.heading_rad + libm::atan(aside.slope);
-            PlannedPoint { pose: Pose { position, heading_rad }, speed_mps: point.speed_mps }
+            let offset_m = plan.lateral.aside(point.station_m).offset_m;
+            guide.pose_at(point.station_m).offset(0.0, offset_m).position
         }));
         self.status.localized = Some(sensed.ego.rear_axle);
         self.sight.report(&mut self.status.perceived);

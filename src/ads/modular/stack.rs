@@ -6,7 +6,7 @@
 use std::sync::Arc;
 
 use crate::ads::driver::Ads;
-use crate::ads::status::{GHOST_ID_MIN, PerceivedObject, PlannedPoint, Reason, Status};
+use crate::ads::status::{GHOST_ID_MIN, PerceivedObject, Reason, Status};
 use crate::geometry::Pose;
 use crate::sim::{Control, DT_S, FRAME_TICKS, Scene, Sensed};
 
@@ -145,10 +145,13 @@ impl Modular {
         let (guide, lateral) = (self.planner.guide(), self.planner.lateral());
         self.status.planned.clear();
         self.status.planned.extend(self.planner.trajectory().points.iter().map(|point| {
-            let (on_guide, aside) = (guide.pose_at(point.station_m), lateral.aside(point.station_m));
+            let offset_m = lateral.aside(point.station_m).offset_m;
             // Most plans lie on the guide, and a place beside it takes trigonometry.
-            let pose = if aside.offset_m == 0.0 { on_guide } else { on_guide.offset(0.0, aside.offset_m) };
-            PlannedPoint { pose, speed_mps: point.speed_mps }
+            if offset_m == 0.0 {
+                guide.position_at(point.station_m)
+            } else {
+                guide.pose_at(point.station_m).offset(0.0, offset_m).position
+            }
         }));
         self.status.reason = self.planner.reason().renumbered(|id| self.truth_of(id));
         self.status.manoeuvre = self.planner.manoeuvre().renumbered(|id| self.truth_of(id));

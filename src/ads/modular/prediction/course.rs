@@ -259,18 +259,17 @@ impl Course {
     }
 }
 
-/// A place that moves on along a course: found by walking on rather than by searching.
+/// A place that moves on along a course from lane to lane.
 #[derive(Debug)]
 pub struct Walk {
     /// Index of the lane among the course's, and where it begins from the vehicle's first lane on, m.
     lane: usize,
     begin_m: f64,
-    segment: usize,
 }
 
 impl Walk {
     pub fn new() -> Walk {
-        Walk { lane: 0, begin_m: 0.0, segment: 0 }
+        Walk { lane: 0, begin_m: 0.0 }
     }
 
     /// The vertices around the place `ahead_m` ahead of the vehicle, and how far beyond the first of them
@@ -286,15 +285,11 @@ impl Walk {
         while self.lane + 1 < course.count && station_m - self.begin_m > centre.length_m() {
             self.begin_m += centre.length_m();
             self.lane += 1;
-            self.segment = 0;
             centre = &map.lane(course.lanes[self.lane]).centre;
         }
         let on_lane_m = station_m - self.begin_m;
-        let points = centre.points();
-        while self.segment + 2 < points.len() && points[self.segment + 1].station_m <= on_lane_m {
-            self.segment += 1;
-        }
-        let (a, b) = (&points[self.segment], &points[self.segment + 1]);
+        let (points, segment) = (centre.points(), centre.vertex_after(on_lane_m).saturating_sub(1));
+        let (a, b) = (&points[segment], &points[segment + 1]);
         (a, b, on_lane_m - a.station_m)
     }
 }
