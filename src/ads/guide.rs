@@ -241,7 +241,7 @@ impl Guide {
 
     fn index(&self, station_m: f64) -> usize {
         // The conversion makes 0 of what is negative.
-        ((station_m / SPACING_M) as usize).min(self.samples.len() - 1)
+        ((station_m / SPACING_M) as u32 as usize).min(self.samples.len() - 1)
     }
 
     /// Segment and fraction of it; the fraction leaves `[0, 1]` beyond the ends.

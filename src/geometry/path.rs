@@ -52,6 +52,9 @@ pub struct Path {
 /// Number of segments that share a box: a projection looks only into boxes that can hold its answer.
 const BLOCK: usize = 16;
 
+/// Number of cells for each vertex: bends have many vertices close together, and a cell should hold few of them.
+const CELLS_PER_VERTEX: usize = 4;
+
 /// A box with its sides along the axes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Bounds {
@@ -118,10 +121,10 @@ impl Path {
         if points.len() < 2 {
             return None;
         }
-        // As many cells as vertices, so that a cell is on average as long as a segment.
-        let cells_per_m = points.len() as f64 / points[points.len() - 1].station_m;
+        let cell_count = points.len() * CELLS_PER_VERTEX;
+        let cells_per_m = cell_count as f64 / points[points.len() - 1].station_m;
         let mut segment = 0;
-        let cells = (0..points.len()).map(|cell| {
+        let cells = (0..cell_count).map(|cell| {
             let from_m = cell as f64 / cells_per_m;
             while segment + 2 < points.len() && points[segment + 1].station_m <= from_m {
                 segment += 1;
@@ -295,7 +298,7 @@ impl Path {
     /// Index of the segment that holds a station, clamped to the ends.
     fn segment(&self, station_m: f64) -> usize {
         // The conversion makes 0 of what is negative.
-        let cell = (station_m * self.cells_per_m) as usize;
+        let cell = (station_m * self.cells_per_m) as u32 as usize;
         let mut index = self.cells[cell.min(self.cells.len() - 1)] as usize;
         while index + 2 < self.points.len() && self.points[index + 1].station_m <= station_m {
             index += 1;

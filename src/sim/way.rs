@@ -32,7 +32,7 @@ const BEHIND_M: f64 = 15.0;
 const BEYOND_STEP_M: f64 = 6.0;
 const BEYOND_ROOM_M: f64 = 4.5;
 
-/// Number of ways that are kept for a map; each takes some 30 kB.
+/// Number of ways that are kept for a map; each takes some 40 kB.
 const WAYS_MAX: usize = 256;
 
 /// A chain of lanes as a vehicle follows it.
