@@ -6,10 +6,11 @@ use std::sync::Arc;
 use crate::geometry::Pose;
 use crate::model::vocabulary::{Body, Level, TimeOfDay, Word};
 use crate::road::testing::{lanes as lanes_of, street};
-use crate::sim::{DT_S, Scene, Start, TrafficProfile, World};
+use crate::sim::{DT_S, Scene, SignalColour, Start, TrafficProfile, VehicleParameters, World};
 
 use super::driver::Ads;
-use super::registry::REGISTRY;
+use super::registry::{REGISTRY, by_name};
+use super::status::Reason;
 use super::testing::{Rig, corner, object, straight};
 
 /// The world after a drive without obstacles, the farthest that the ego vehicle was beside the route, m, and its
@@ -78,6 +79,24 @@ fn all_keep_a_straight_lane_repeat_themselves_and_copy() {
             first.measure();
             assert_eq!(copy.drive(&first.sensed), first.tick(), "{}", entry.name);
         }
+    }
+}
+
+/// The drivers that share the rules' stops (`stops`), and how long each may take to come to rest, s.
+#[test]
+fn a_red_light_is_stopped_at_and_left_at_green() {
+    let scene = straight();
+    for (name, stops_s) in [("frenet", 30.0), ("reactive", 25.0)] {
+        let entry = by_name(name).expect("it is registered");
+        let mut rig = Rig::new(&scene, (entry.build)(&scene, 5), 10.0);
+        rig.sensed.signals[0] = SignalColour::Red;
+        rig.run(stops_s);
+        let front_m = VehicleParameters::MKZ.front_m(rig.station_m());
+        assert!(rig.sensed.ego.speed_mps == 0.0 && (97.0..100.0).contains(&front_m), "{name}: {front_m}");
+        assert_eq!(rig.ads.status().reason, Reason::RedLight, "{name}");
+        rig.sensed.signals[0] = SignalColour::Green;
+        rig.run(10.0);
+        assert!(rig.station_m() > 130.0, "{name}: {}", rig.station_m());
     }
 }
 

@@ -87,42 +87,22 @@ impl Checker {
         place: &Place<'_>,
         span: Span,
     ) -> Option<Expr> {
-        let road = match (self.names_road(left, place), self.names_road(right, place)) {
-            (true, _) => Some(right),
-            (_, true) => Some(left),
-            _ => None,
-        };
-        if let Some(road) = road {
+        let is_road = [self.names_road(left, place), self.names_road(right, place)];
+        if let Some(road) = beside_word(left, right, is_road) {
             if op.orders() {
                 self.note_roads(core::slice::from_ref(road));
-                let error = Diagnostic::error(code::UNORDERED, "roads have no order");
-                let error = error.at(span, format!("`{}` needs one", op.symbol()));
-                return self.reject(error.help("write `road == corner`, or `road in [corner, boulevard]`"));
+                let help = "write `road == corner`, or `road in [corner, boulevard]`";
+                return self.unordered("roads have no order", op, span, help);
             }
-            let is_there = self.on_road(core::slice::from_ref(road), place, span)?;
-            let kind = match op {
-                Comparison::NotEqual => ExprKind::Not(Box::new(is_there)),
-                _ => is_there.kind,
-            };
-            return Some(Expr { kind, ty: Type::Bool, span });
+            return Some(equal_or_not(op, self.on_road(core::slice::from_ref(road), place, span)?));
         }
-        let asked = match (self.names_priority(left, place), self.names_priority(right, place)) {
-            (true, _) => Some(right),
-            (_, true) => Some(left),
-            _ => None,
-        };
-        if let Some(word) = asked {
+        let is_priority = [self.names_priority(left, place), self.names_priority(right, place)];
+        if let Some(word) = beside_word(left, right, is_priority) {
             if op.orders() {
-                let error = Diagnostic::error(code::UNORDERED, "priority has no order");
-                let error = error.at(span, format!("`{}` needs one", op.symbol()));
-                return self.reject(error.help("write `priority == ego`, or `priority in [other, none]`"));
+                let help = "write `priority == ego`, or `priority in [other, none]`";
+                return self.unordered("priority has no order", op, span, help);
             }
-            let is_so = self.has_priority(core::slice::from_ref(word), place, span)?;
-            let kind = match op {
-                Comparison::NotEqual => ExprKind::Not(Box::new(is_so)),
-                _ => is_so.kind,
-            };
-            return Some(Expr { kind, ty: Type::Bool, span });
+            return Some(equal_or_not(op, self.has_priority(core::slice::from_ref(word), place, span)?));
         }
         let (left, right) = self.both_sides(left, right, place)?;
         if !fits(left.ty, right.ty) && !fits(right.ty, left.ty) {
@@ -131,12 +111,8 @@ impl Checker {
         }
         match left.ty {
             Type::Bool if op.orders() => {
-                let error = Diagnostic::error(code::UNORDERED, "truth values have no order");
-                return self.reject(
-                    error
-                        .at(span, format!("`{}` needs one", op.symbol()))
-                        .help("compare them with `==` or `!=`, or join them with `and`, `or`, `implies`"),
-                );
+                let help = "compare them with `==` or `!=`, or join them with `and`, `or`, `implies`";
+                return self.unordered("truth values have no order", op, span, help);
             }
             Type::Enum(of) if op.orders() && !self.enums[of.0].ordered => {
                 let of = &self.enums[of.0];
@@ -222,6 +198,12 @@ impl Checker {
         Some(Expr { kind, ty: Type::Bool, span })
     }
 
+    /// Reports that an operator asks for an order where there is none.
+    fn unordered(&mut self, what: &str, op: Comparison, span: Span, help: &str) -> Option<Expr> {
+        let error = Diagnostic::error(code::UNORDERED, what).at(span, format!("`{}` needs one", op.symbol()));
+        self.reject(error.help(help))
+    }
+
     /// `road == corner`: whether the road is one of these.
     fn on_road(&mut self, names: &[ast::Expr], place: &Place<'_>, span: Span) -> Option<Expr> {
         self.note_roads(names);
@@ -295,5 +277,25 @@ impl Checker {
     /// Whether the expression is a word, and no parameter, constant or state of that name hides it.
     fn names(&self, expr: &ast::Expr, word: &str, place: &Place<'_>) -> bool {
         matches!(&expr.kind, ast::ExprKind::Name(name) if name == word) && self.is_bare_variant(expr, place)
+    }
+}
+
+/// If one side is a word of the language, the other side.
+fn beside_word<'a>(left: &'a ast::Expr, right: &'a ast::Expr, is_word: [bool; 2]) -> Option<&'a ast::Expr> {
+    match is_word {
+        [true, _] => Some(right),
+        [_, true] => Some(left),
+        [false, false] => None,
+    }
+}
+
+/// What `==` gives, or its opposite for `!=`.
+fn equal_or_not(op: Comparison, is_so: Expr) -> Expr {
+    match op {
+        Comparison::NotEqual => {
+            let span = is_so.span;
+            Expr { kind: ExprKind::Not(Box::new(is_so)), ty: Type::Bool, span }
+        }
+        _ => is_so,
     }
 }

@@ -6,7 +6,7 @@ use crate::ads::status::Reason;
 use crate::ads::testing::{Rig, object, straight, two_lanes, winding};
 use crate::geometry::{Pose, Vec2};
 use crate::model::vocabulary::Body;
-use crate::sim::{Scene, SignalColour};
+use crate::sim::Scene;
 
 use super::Reactive;
 
@@ -35,19 +35,6 @@ fn it_stops_behind_what_stands_and_follows_what_drives() {
     rig.run(20.0);
     assert!((rig.sensed.ego.speed_mps - 6.0).abs() < 0.3, "{}", rig.sensed.ego.speed_mps);
     assert_eq!(rig.ads.status().reason, Reason::Follow(1));
-}
-
-#[test]
-fn it_stops_at_a_red_light_and_goes_on_at_green() {
-    let mut rig = rig(&straight(), 10.0);
-    rig.sensed.signals[0] = SignalColour::Red;
-    rig.run(25.0);
-    let front_m = rig.station_m() + 3.705;
-    assert!(rig.sensed.ego.speed_mps == 0.0 && (97.0..100.0).contains(&front_m), "{front_m}");
-    assert_eq!(rig.ads.status().reason, Reason::RedLight);
-    rig.sensed.signals[0] = SignalColour::Green;
-    rig.run(10.0);
-    assert!(rig.station_m() > 130.0, "{}", rig.station_m());
 }
 
 #[test]
