@@ -2,14 +2,16 @@
 
 use std::path::PathBuf;
 
-use crate::sim::TrafficProfile;
+use clap::builder::TypedValueParser;
 use clap::{Args, Parser, Subcommand, ValueEnum};
+
+use crate::sim::TrafficProfile;
+
+use super::help::Named;
 
 /// Finds out which of the things that may happen around a self-driving car make it crash.
 #[derive(Debug, Parser)]
 #[command(name = "avastra", version, max_term_width = 100)]
-#[command(after_help = "Exit status: 0 ok, 1 usage or file, 2 mistakes in a source file, \
-                        3 a claim refuted, 4 collision found: by `run --fail-on-collision`, or by `test` in a scenario that still fails.")]
 pub struct Arguments {
     #[command(subcommand)]
     pub command: Command,
@@ -17,26 +19,29 @@ pub struct Arguments {
     pub output: OutputArguments,
 }
 
+// Values have no help of their own, here and below: with any, clap prints every option in three lines.
 #[derive(Debug, Clone, Args)]
+#[command(next_help_heading = "Every command")]
 pub struct OutputArguments {
-    /// How to print: for people, plain text without colour or drawing, JSON, or SARIF.
+    /// How to print.
     #[arg(long, global = true, value_enum, default_value_t = Format::Human)]
     pub format: Format,
     /// When to use colour.
-    #[arg(long, global = true, value_enum, default_value_t = When::Auto)]
+    #[arg(long, global = true, value_enum, default_value_t = When::Auto, value_name = "WHEN")]
     pub color: When,
     /// Print results and errors only.
-    #[arg(long, short, global = true)]
+    #[arg(long, short, global = true, conflicts_with = "verbose")]
     pub quiet: bool,
+    /// Print all: whole lists, and notes about used files.
+    #[arg(long, short, global = true)]
+    pub verbose: bool,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum Format {
     Human,
     Plain,
-    /// The last line on stdout is one object with the result.
     Json,
-    /// Diagnostics alone, as one SARIF 2.1.0 log on stdout.
     Sarif,
 }
 
@@ -104,6 +109,7 @@ pub enum Command {
 
 #[derive(Debug, Args)]
 pub struct CheckArguments {
+    /// Spaces, scenarios, policies.
     #[arg(required = true, value_name = "FILE")]
     pub files: Vec<PathBuf>,
     /// List each rule, the rows it binds and where it is enforced.
@@ -134,12 +140,15 @@ pub struct ExplainArguments {
 
 #[derive(Debug, Args)]
 pub struct DiffArguments {
+    /// A space.
     pub old: PathBuf,
+    /// The space that it became.
     pub new: PathBuf,
 }
 
 #[derive(Debug, Args)]
 pub struct DocArguments {
+    /// The space.
     pub file: PathBuf,
     /// Where to write [default: stdout].
     #[arg(long, short)]
@@ -154,6 +163,7 @@ pub struct NewArguments {
 
 #[derive(Debug, Args)]
 pub struct CompletionsArguments {
+    /// The shell.
     #[arg(value_enum)]
     pub shell: clap_complete::Shell,
 }
@@ -166,6 +176,7 @@ pub enum Dump {
 
 #[derive(Debug, Args)]
 pub struct CompileArguments {
+    /// The space.
     pub file: PathBuf,
     /// Where to write the table [default: build/STEM.table.yaml].
     #[arg(long, short)]
@@ -174,6 +185,7 @@ pub struct CompileArguments {
 
 #[derive(Debug, Args)]
 pub struct TableArguments {
+    /// The space.
     pub file: PathBuf,
     /// Only what this road allows, with the reason where it does not.
     #[arg(long)]
@@ -194,8 +206,9 @@ pub struct TrialArguments {
     #[arg(long, requires = "try", default_value_t = 8, value_parser = clap::value_parser!(u32).range(1..=1000))]
     pub drives: u32,
     /// Driving system of the ego vehicle.
-    #[arg(long, requires = "try", default_value = crate::run::DEFAULT_ADS)]
+    #[arg(long, requires = "try", default_value = crate::run::DEFAULT_ADS, value_parser = Named::ADS)]
     pub ads: String,
+    /// Seed of the drives and tries.
     #[arg(long, requires = "try", default_value_t = 1)]
     pub seed: u64,
     /// Write one try of each row and road as a scenario, one that failed if there is any.
@@ -205,6 +218,7 @@ pub struct TrialArguments {
 
 #[derive(Debug, Args)]
 pub struct WhyArguments {
+    /// The space.
     pub file: PathBuf,
     /// Number of the row in the table.
     #[arg(long)]
@@ -247,13 +261,13 @@ pub struct RunArguments {
     #[arg(long)]
     pub road: Vec<String>,
     /// Driving system under test.
-    #[arg(long, default_value = crate::run::DEFAULT_ADS)]
+    #[arg(long, default_value = crate::run::DEFAULT_ADS, value_parser = Named::ADS)]
     pub ads: String,
     /// Profile of the `modular` driving system, for example scenarios/ads/cautious.yaml [default: as it comes].
     #[arg(long, value_name = "FILE")]
     pub ads_config: Option<PathBuf>,
     /// Who chooses the actions.
-    #[arg(long, default_value = "random")]
+    #[arg(long, default_value = "random", value_parser = Named::AGENT)]
     pub agent: String,
     /// Let a trained policy choose them; without FILE on its own space.
     #[arg(long, value_name = "POLICY", conflicts_with = "agent")]
@@ -264,13 +278,14 @@ pub struct RunArguments {
     /// Episodes on each road.
     #[arg(long, default_value_t = 100, value_parser = clap::value_parser!(u32).range(1..=i64::from(crate::run::EPISODES_MAX)))]
     pub episodes: u32,
+    /// Seed of the whole run.
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
     /// Vehicles of ambient traffic around the ego vehicle, besides those that actions make appear.
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=i64::from(crate::model::AMBIENT_MAX)))]
     pub ambient: u32,
-    /// How other vehicles drive: `careful`, `released` (as LGSVL's vehicles did), or a file [default: careful].
-    #[arg(long, value_name = "NAME|FILE", value_parser = super::load::traffic)]
+    /// How other vehicles drive: a name, or a profile like scenarios/traffic/careful.yaml [default: careful].
+    #[arg(long, value_name = "NAME|FILE", value_parser = Named::TRAFFIC.try_map(|name| super::load::traffic(&name)))]
     pub traffic: Option<TrafficProfile>,
     /// Say of each counted collision which module of the driving system is at fault; takes some twenty
     /// replays for each.
@@ -301,16 +316,16 @@ pub struct TrainArguments {
     #[arg(long)]
     pub road: Vec<String>,
     /// Driving system under test.
-    #[arg(long, default_value = crate::run::DEFAULT_ADS)]
+    #[arg(long, default_value = crate::run::DEFAULT_ADS, value_parser = Named::ADS)]
     pub ads: String,
     /// Profile of the `modular` driving system [default: as it comes].
     #[arg(long, value_name = "FILE")]
     pub ads_config: Option<PathBuf>,
     /// Who learns.
-    #[arg(long, default_value = "ddqn")]
+    #[arg(long, default_value = "ddqn", value_parser = Named::TRAINED)]
     pub agent: String,
-    /// Settings to begin with [default: the agent's own].
-    #[arg(long)]
+    /// Settings to begin with; searches have none [default: the agent's first].
+    #[arg(long, value_parser = Named::PRESET)]
     pub preset: Option<String>,
     /// Settings that differ from the preset, as YAML.
     #[arg(long, value_name = "YAML")]
@@ -318,10 +333,11 @@ pub struct TrainArguments {
     /// Episodes on all roads together.
     #[arg(long, default_value_t = 750, value_parser = clap::value_parser!(u32).range(1..=i64::from(crate::run::EPISODES_MAX)))]
     pub episodes: u32,
+    /// Seed of the whole training.
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
-    /// How other vehicles drive, as in `avastra run` [default: careful].
-    #[arg(long, value_name = "NAME|FILE", value_parser = super::load::traffic)]
+    /// How other vehicles drive: a name, or a profile like scenarios/traffic/careful.yaml [default: careful].
+    #[arg(long, value_name = "NAME|FILE", value_parser = Named::TRAFFIC.try_map(|name| super::load::traffic(&name)))]
     pub traffic: Option<TrafficProfile>,
     #[command(flatten)]
     pub rules: RuleArguments,
@@ -411,6 +427,7 @@ pub struct StudyArguments {
 
 #[derive(Debug, Clone, Args)]
 pub struct FilesArguments {
+    /// Scenarios, as `avastra run` writes them; `verify` takes policies, too.
     #[arg(required = true, value_name = "FILE")]
     pub files: Vec<PathBuf>,
     /// Worker threads over files [default: one for each core].
@@ -421,7 +438,7 @@ pub struct FilesArguments {
 #[derive(Debug, Args)]
 pub struct ReplayArguments {
     /// Replay against another driving system: shows what happens, checks no claim.
-    #[arg(long)]
+    #[arg(long, value_parser = Named::ADS)]
     pub ads: Option<String>,
     /// Replay against another profile of `modular`: claims are checked only if it means the same as the
     /// recorded one.
@@ -465,7 +482,7 @@ pub struct TestArguments {
     /// Directory of scenarios, or a run directory.
     pub directory: PathBuf,
     /// Driving system under test [default: the one that each scenario was found with].
-    #[arg(long)]
+    #[arg(long, value_parser = Named::ADS)]
     pub ads: Option<String>,
     /// Profile of the `modular` driving system.
     #[arg(long, value_name = "FILE")]
@@ -477,6 +494,7 @@ pub struct TestArguments {
 
 #[derive(Debug, Args)]
 pub struct RenderArguments {
+    /// The scenario.
     pub file: PathBuf,
     /// Moments to draw, in s since the start; several make a strip.
     #[arg(long, value_delimiter = ',', value_name = "T", allow_negative_numbers = true)]
@@ -488,7 +506,7 @@ pub struct RenderArguments {
     #[arg(long, short)]
     pub output: Option<PathBuf>,
     /// Draw the drive of another driving system.
-    #[arg(long)]
+    #[arg(long, value_parser = Named::ADS)]
     pub ads: Option<String>,
     /// Draw the drive of another profile of `modular`.
     #[arg(long, value_name = "FILE")]

@@ -4,8 +4,8 @@ use std::path::Path;
 
 use crate::action::{ActionTable, audit};
 use crate::check::Loaded;
-use crate::syntax::apply_fixes;
 use crate::syntax::ast::FileId;
+use crate::syntax::{Diagnostic, apply_fixes};
 
 use super::arguments::{CheckArguments, Dump};
 use super::error::Failure;
@@ -24,9 +24,7 @@ pub fn check(output: &Output, arguments: &CheckArguments) -> Result<(), Failure>
             loaded = load::read_and_check(path)?;
         }
         output.diagnostics(&loaded.sources, &loaded.diagnostics);
-        if !output.quiet {
-            output.diagnostics(&loaded.sources, &loaded.remarks);
-        }
+        output.diagnostics(&loaded.sources, &shown(output, std::mem::take(&mut loaded.remarks)));
         let wrong = loaded.diagnostics.iter().filter(|diagnostic| diagnostic.is_error()).count();
         errors += wrong;
         warnings += loaded.diagnostics.len() - wrong;
@@ -53,6 +51,14 @@ pub fn check(output: &Output, arguments: &CheckArguments) -> Result<(), Failure>
         errors += warnings;
     }
     if errors > 0 { Err(Failure::Source { errors }) } else { Ok(()) }
+}
+
+/// Remarks about the file itself; what is remarked about a file that it uses is told where that file is checked, and
+/// with `--verbose`.
+fn shown(output: &Output, mut remarks: Vec<Diagnostic>) -> Vec<Diagnostic> {
+    let is_own = |remark: &Diagnostic| remark.place().is_none_or(|place| place.file == FileId::default());
+    remarks.retain(|remark| !output.quiet && (output.verbose || is_own(remark)));
+    remarks
 }
 
 /// Makes the changes that the diagnostics offer in the file itself; whether there were any.

@@ -14,7 +14,7 @@ use super::arguments::DistillArguments;
 use super::error::Failure;
 use super::files::write;
 use super::load;
-use super::output::Output;
+use super::output::{Output, plural};
 use super::verify::{acting, same_world};
 
 /// Distils rules anew, with other settings than those of the training, and writes the policy with them.
@@ -81,12 +81,12 @@ pub fn with_rules(arena: &Arena, acting: &QPolicy, policy: Policy) -> Policy {
 pub fn rules_text(lines: usize, network_return: f64, rules: &RulesClaims) -> String {
     format!(
         "its {lines} rules choose as the network in {:.1} % of {} states and lose {:.3} of Q-value in each; \
-         by themselves: {} counted in {} episodes, return {:.2} where the network has {:.2}",
+         by themselves: {} counted in {}, return {:.2} where the network has {:.2}",
         100.0 * rules.fidelity,
         rules.states,
         rules.regret,
         rules.counted,
-        rules.colliding,
+        plural(rules.colliding as usize, "episode"),
         rules.return_mean,
         network_return,
     )

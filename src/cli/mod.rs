@@ -15,6 +15,7 @@ mod explain_policy;
 mod export_weights;
 mod files;
 mod fmt;
+mod help;
 mod interrupt;
 mod load;
 pub mod lsp;
@@ -38,7 +39,7 @@ mod why;
 
 use std::process::ExitCode;
 
-use clap::Parser;
+use clap::FromArgMatches;
 
 use arguments::{Arguments, Command};
 use error::Failure;
@@ -46,7 +47,8 @@ use output::Output;
 
 /// Runs the command that the process was started with.
 pub fn main() -> ExitCode {
-    let arguments = match Arguments::try_parse() {
+    let parsed = help::command().try_get_matches().and_then(|found| Arguments::from_arg_matches(&found));
+    let arguments = match parsed {
         Ok(arguments) => arguments,
         Err(error) => {
             // Help and version are not failures; every other message of clap's is a usage error.

@@ -14,6 +14,7 @@ pub struct Output {
     format: Format,
     colour: bool,
     pub quiet: bool,
+    pub verbose: bool,
     /// Diagnostics for SARIF, which prints them in one piece at the end.
     collected: Mutex<Vec<DiagnosticRecord>>,
 }
@@ -36,11 +37,13 @@ impl Output {
             When::Auto => {
                 arguments.format == Format::Human
                     && std::io::stderr().is_terminal()
-                    && std::env::var_os("NO_COLOR").is_none()
+                    && std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty())
+                    && !is_dumb()
             }
         };
         let collected = Mutex::default();
-        Output { format: arguments.format, colour, quiet: arguments.quiet, collected }
+        let (quiet, verbose) = (arguments.quiet, arguments.verbose);
+        Output { format: arguments.format, colour, quiet, verbose, collected }
     }
 
     pub fn is_json(&self) -> bool {
@@ -121,8 +124,14 @@ pub fn usage_in_json(failure: &Failure) {
     let arguments: Vec<String> = std::env::args().collect();
     let asks = |pair: &[String]| pair[0] == "--format" && pair[1] == "json";
     if arguments.windows(2).any(asks) || arguments.iter().any(|argument| argument == "--format=json") {
-        Output { format: Format::Json, colour: false, quiet: false, collected: Mutex::default() }
-            .failure(failure);
+        Output {
+            format: Format::Json,
+            colour: false,
+            quiet: false,
+            verbose: false,
+            collected: Mutex::default(),
+        }
+        .failure(failure);
     }
 }
 
@@ -134,6 +143,32 @@ fn print(text: &str) {
 /// A line on stderr.
 pub fn remark(text: &str) {
     let _ = writeln!(std::io::stderr(), "{text}");
+}
+
+/// Whether the terminal says that it can only print one line after another.
+pub fn is_dumb() -> bool {
+    std::env::var_os("TERM").is_some_and(|name| name == "dumb")
+}
+
+/// What every terminal shows in a line; longer text is folded.
+pub const COLUMNS: usize = 80;
+
+/// A text in lines of at most `width` letters, cut between words; at least one line. A longer word has a line of
+/// its own.
+pub fn folded(text: &str, width: usize) -> Vec<String> {
+    let mut lines = vec![String::new()];
+    for word in text.split_whitespace() {
+        let last = lines.last_mut().expect("there is always a line");
+        if last.is_empty() {
+            last.push_str(word);
+        } else if last.chars().count() + 1 + word.chars().count() <= width {
+            last.push(' ');
+            last.push_str(word);
+        } else {
+            lines.push(word.to_owned());
+        }
+    }
+    lines
 }
 
 /// `1 collision`, `2 collisions`.

@@ -253,13 +253,13 @@ fn write_policy(policy: &Policy, space: &Space, directory: &Path) -> Result<Path
 /// The policy's headline: what it is, in a sentence.
 fn headline(settings: &TrainSettings, evaluation: &Evaluation) -> String {
     format!(
-        "{} ({}) after {} episodes on {}: {} counted collisions in {} episodes of its own.",
+        "{} ({}) after {} on {}: {} in {} of its own.",
         settings.agent,
         settings.hyperparameters.preset(),
-        settings.episodes,
+        plural(settings.episodes as usize, "episode"),
         settings.roads.join(", "),
-        evaluation.counted,
-        evaluation.episodes * settings.roads.len() as u64,
+        plural(evaluation.counted as usize, "counted collision"),
+        plural(evaluation.episodes as usize * settings.roads.len(), "episode"),
     )
 }
 

@@ -111,10 +111,15 @@ impl TrafficProfile {
         match SHIPPED.iter().find(|(shipped, _)| *shipped == name) {
             Some((_, text)) => TrafficProfile::from_yaml(text),
             None => {
-                let known = listed(&SHIPPED.map(|(name, _)| name));
+                let known = listed(&TrafficProfile::shipped_names());
                 Err(TrafficError::Name { name: name.to_owned(), known })
             }
         }
+    }
+
+    /// The names that [`TrafficProfile::shipped`] knows.
+    pub fn shipped_names() -> Vec<&'static str> {
+        SHIPPED.map(|(name, _)| name).to_vec()
     }
 
     /// Reads a profile; what it leaves out is as in the default.

@@ -12,6 +12,7 @@ mod editor;
 mod emitted;
 mod failures;
 mod faults;
+mod help;
 mod hostile;
 mod language;
 mod layers;

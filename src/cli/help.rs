@@ -1,0 +1,332 @@
+//! What `--help` says beyond each option's own line: examples for every command, what the names of a closed set mean,
+//! and the exit status.
+//!
+//! The examples are read back by a test with the parser that they teach; `tests/it/help.rs` runs them.
+
+use clap::builder::{PossibleValue, StringValueParser, TypedValueParser};
+use clap::error::Error;
+use clap::{Arg, Command, CommandFactory};
+
+use crate::ads;
+use crate::agent;
+use crate::agent::Kind;
+use crate::sim::TrafficProfile;
+
+use super::arguments::Arguments;
+use super::output::{COLUMNS, folded};
+
+const STATUS: &str = "\
+Exit status:
+  0    all is well
+  1    wrong usage, or a file that cannot be read, used or written
+  2    mistakes in a source file; for `fmt --check`, a file is not formatted
+  3    a claim is refuted
+  4    a counted collision (`run --fail-on-collision`), or a failing `test`
+  130  Ctrl-C; what was done is saved, and `--resume` goes on
+
+`avastra COMMAND --help` has examples. `avastra explain` lists every diagnostic.";
+
+/// For every command, lines to type: what stands after `avastra`, and what that does.
+const EXAMPLES: &[(&str, &[(&str, &str)])] = &[
+    (
+        "check",
+        &[
+            ("check scenarios/avastra45.ava", "list every mistake"),
+            ("check --strict --fix mine.ava", "make the changes on offer; fail on warnings"),
+            ("check --audit scenarios/avastra45.ava", "where each rule is enforced"),
+            ("check --dump actions --format json scenarios/avastra45.ava", "the table, for tools"),
+        ],
+    ),
+    (
+        "compile",
+        &[
+            ("compile scenarios/avastra45.ava", "write build/avastra45.table.yaml"),
+            ("compile scenarios/avastra45.ava -o table.yaml", ""),
+        ],
+    ),
+    (
+        "table",
+        &[
+            ("table scenarios/avastra45.ava", "the rows, numbered"),
+            ("table scenarios/avastra45.ava --road corner", "what one road allows"),
+            ("table scenarios/avastra45.ava --try --tries 2", "drive each row and judge it"),
+        ],
+    ),
+    (
+        "why",
+        &[
+            ("why scenarios/avastra45.ava --row 12", "at the start, on the first road"),
+            ("why scenarios/avastra45.ava --row 0 --road corner --state 'time: Night'", ""),
+        ],
+    ),
+    (
+        "fmt",
+        &[
+            ("fmt mine.ava roads.ava", "rewrite both"),
+            ("fmt --check scenarios/avastra45.ava", "for a continuous build"),
+            ("fmt -", "from stdin to stdout, for an editor"),
+        ],
+    ),
+    ("explain", &[("explain", "all codes"), ("explain AV0401", "one code, with an example")]),
+    (
+        "diff",
+        &[(
+            "diff scenarios/avastra45.ava scenarios/deepcollision52.ava",
+            "rows, rules and draws that differ",
+        )],
+    ),
+    ("doc", &[("doc scenarios/avastra45.ava", ""), ("doc scenarios/avastra45.ava -o avastra45.md", "")]),
+    ("new", &[("new mine", "write mine/space.ava, mine/roads.ava and a map")]),
+    (
+        "completions",
+        &[
+            ("completions bash > ~/.local/share/bash-completion/completions/avastra", ""),
+            ("completions zsh > ~/.zfunc/_avastra", ""),
+        ],
+    ),
+    ("lsp", &[("lsp", "an editor starts it; editors/vscode is an extension")]),
+    (
+        "run",
+        &[
+            ("run scenarios/avastra45.ava --episodes 20", "20 episodes on each road"),
+            ("run scenarios/avastra45.ava --ads-config scenarios/ads/degraded.yaml", "dirty sensors"),
+            ("run scenarios/avastra45.ava --ads reactive --traffic released", ""),
+            ("run scenarios/avastra45.ava --road corner --without npc_gap", "with one rule switched off"),
+            ("run --policy policies/corner.ava", "let a learned policy choose"),
+            ("run --resume runs/0001", "go on after Ctrl-C"),
+        ],
+    ),
+    (
+        "train",
+        &[
+            ("train scenarios/avastra45.ava --road corner --episodes 750", ""),
+            ("train scenarios/avastra45.ava --agent go-explore", "a search in place of a learner"),
+            ("train --resume runs/0001", "go on after Ctrl-C"),
+        ],
+    ),
+    ("distill", &[("distill policies/corner.ava --leaves 8 -o short.ava", "at most 8 readable rules")]),
+    (
+        "explain-policy",
+        &[
+            ("explain-policy policies/corner.ava", ""),
+            ("explain-policy policies/corner.ava --state 'ego_speed: 12 m/s, time: Night'", ""),
+        ],
+    ),
+    ("export-weights", &[("export-weights policies/corner.ava -o corner.safetensors", "")]),
+    (
+        "study",
+        &[
+            ("study scenarios/studies/rq1.yaml", "compare agents; takes hours"),
+            ("study scenarios/studies/rq1.yaml --quick", "see that it works"),
+            ("study --resume runs/0001", "go on after Ctrl-C"),
+        ],
+    ),
+    (
+        "replay",
+        &[
+            ("replay runs/0001/critical/*.ava", "check every claim"),
+            ("replay runs/0001/critical/corner_0004.ava --ads idm", "the same scene, another driver"),
+        ],
+    ),
+    (
+        "verify",
+        &[
+            ("verify runs/0001/critical/*.ava", "check every claim of scenarios"),
+            ("verify policies/corner.ava", "play the evaluation of a policy again"),
+        ],
+    ),
+    (
+        "diagnose",
+        &[
+            ("diagnose runs/0001/critical/corner_0004.ava", "which module is at fault"),
+            ("diagnose --mechanisms runs/0001/critical/*.ava", "which weakness, over all files"),
+        ],
+    ),
+    ("shrink", &[("shrink runs/0001/critical/*.ava", "write the smallest that still crash")]),
+    (
+        "test",
+        &[
+            ("test runs/0001", "do its scenarios still crash?"),
+            ("test runs/0001 --ads-config scenarios/ads/cautious.yaml --junit out.xml", ""),
+        ],
+    ),
+    (
+        "render",
+        &[
+            ("render runs/0001/critical/corner_0004.ava --strip", "the seconds up to the crash"),
+            ("render runs/0001/critical/corner_0004.ava --at 12.5 -o moment.svg", ""),
+        ],
+    ),
+    (
+        "road",
+        &[
+            ("road scenarios/roads/corner.xodr", "describe a map in words"),
+            ("road scenarios/avastra45.ava --road corner --svg corner.svg", "draw it"),
+        ],
+    ),
+];
+
+/// The whole command line, with all that `--help` says.
+pub fn command() -> Command {
+    let mut command = Arguments::command().after_help(STATUS);
+    for (name, examples) in EXAMPLES {
+        let notes = match *name {
+            "run" => format!("\n\n{}\n\n{}", agents(is_ready), driving_systems()),
+            "train" => format!("\n\n{}\n\n{ONE_THREAD}", agents(is_trained)),
+            _ => String::new(),
+        };
+        let text = format!("{}{notes}", examples_text(examples));
+        command = command.mut_subcommand(name, |command| command.after_help(text));
+    }
+    command
+}
+
+const ONE_THREAD: &str = "\
+A training has no `--jobs`: each of its episodes is chosen with what was learned from
+the one before. Train other seeds beside it, or let `avastra study` do so.";
+
+/// Where what a name means begins.
+const NAMED_AT: usize = 18;
+
+/// Where the explanations begin; an example that is longer has its own in the next line.
+const EXPLAINED_AT: usize = 44;
+
+fn examples_text(examples: &[(&str, &str)]) -> String {
+    let mut text = "Examples:".to_owned();
+    for (line, what) in examples {
+        let line = format!("  avastra {line}");
+        match what {
+            &"" => text.push_str(&format!("\n{line}")),
+            what if line.len() + 2 <= EXPLAINED_AT => text.push_str(&format!("\n{line:EXPLAINED_AT$}{what}")),
+            what => text.push_str(&format!("\n{line}\n{:EXPLAINED_AT$}{what}", "")),
+        }
+    }
+    text
+}
+
+fn is_ready(entry: &agent::Entry) -> bool {
+    matches!(entry.kind, Kind::Ready(_))
+}
+
+fn is_trained(entry: &agent::Entry) -> bool {
+    !is_ready(entry)
+}
+
+fn agents(wanted: fn(&agent::Entry) -> bool) -> String {
+    let agents = agent::REGISTRY.iter().filter(|entry| wanted(entry));
+    named("Agents:", agents.map(|entry| (entry.name, entry.summary)))
+}
+
+fn driving_systems() -> String {
+    named("Driving systems:", ads::REGISTRY.iter().map(|entry| (entry.name, entry.summary)))
+}
+
+fn named<'a>(heading: &str, entries: impl Iterator<Item = (&'a str, &'a str)>) -> String {
+    let mut text = heading.to_owned();
+    for (name, summary) in entries {
+        let summary = folded(summary, COLUMNS - NAMED_AT);
+        text.push_str(&format!("\n  {name:<width$}{}", summary[0], width = NAMED_AT - 2));
+        summary[1..].iter().for_each(|line| text.push_str(&format!("\n{:NAMED_AT$}{line}", "")));
+    }
+    text
+}
+
+/// A name from a closed set. Help and completions list the set; a name outside it is refused by the command that
+/// takes it, in words that say more than clap's.
+#[derive(Clone)]
+pub struct Named(fn() -> Vec<&'static str>);
+
+impl Named {
+    pub const ADS: Named = Named(|| ads::REGISTRY.iter().map(|entry| entry.name).collect());
+    /// Agents that can act at once.
+    pub const AGENT: Named =
+        Named(|| agent::REGISTRY.iter().filter(|entry| is_ready(entry)).map(|entry| entry.name).collect());
+    /// Agents that are trained.
+    pub const TRAINED: Named =
+        Named(|| agent::REGISTRY.iter().filter(|entry| is_trained(entry)).map(|entry| entry.name).collect());
+    /// The presets of all agents.
+    pub const PRESET: Named = Named(|| {
+        let mut names: Vec<&str> = Vec::new();
+        for entry in agent::REGISTRY {
+            let Kind::Learning(presets) = entry.kind else { continue };
+            for preset in presets {
+                if !names.contains(&preset.name) {
+                    names.push(preset.name);
+                }
+            }
+        }
+        names
+    });
+    /// The traffic profiles that avastra comes with.
+    pub const TRAFFIC: Named = Named(TrafficProfile::shipped_names);
+}
+
+impl TypedValueParser for Named {
+    type Value = String;
+
+    fn parse_ref(
+        &self,
+        command: &Command,
+        argument: Option<&Arg>,
+        value: &std::ffi::OsStr,
+    ) -> Result<String, Error> {
+        StringValueParser::new().parse_ref(command, argument, value)
+    }
+
+    fn possible_values(&self) -> Option<Box<dyn Iterator<Item = PossibleValue> + '_>> {
+        Some(Box::new((self.0)().into_iter().map(PossibleValue::new)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The words of a line as a shell would take it, as far as the examples go: quotes, and output sent elsewhere.
+    fn words(line: &str) -> Vec<String> {
+        let line = line.split(" > ").next().unwrap_or(line);
+        let mut words = Vec::new();
+        for (index, part) in line.split('\'').enumerate() {
+            match index % 2 {
+                0 => words.extend(part.split_whitespace().map(str::to_owned)),
+                _ => words.push(part.to_owned()),
+            }
+        }
+        words
+    }
+
+    #[test]
+    fn every_command_has_examples_that_parse() {
+        let shown: Vec<String> = command()
+            .get_subcommands()
+            .filter(|command| !command.is_hide_set())
+            .map(|command| command.get_name().to_owned())
+            .collect();
+        let taught: Vec<&str> = EXAMPLES.iter().map(|(name, _)| *name).collect();
+        let missing: Vec<&String> = shown.iter().filter(|name| !taught.contains(&name.as_str())).collect();
+        assert!(missing.is_empty(), "no example for {missing:?}");
+        for (name, examples) in EXAMPLES {
+            for (line, _) in *examples {
+                let words = words(line);
+                assert_eq!(words[0], *name, "{line}");
+                let all = std::iter::once("avastra".to_owned()).chain(words);
+                command().try_get_matches_from(all).unwrap_or_else(|error| panic!("{line}: {error}"));
+            }
+        }
+    }
+
+    #[test]
+    fn help_fits_80_columns_with_an_option_in_a_line_or_two() {
+        let help = |words: &[&str]| {
+            let error = command().term_width(80).try_get_matches_from(words).expect_err("help is asked for");
+            error.to_string()
+        };
+        let names = EXAMPLES.iter().map(|(name, _)| vec!["avastra", *name]);
+        for words in names.chain([vec!["avastra"]]) {
+            let text = help(&[&words[..], &["--help"]].concat());
+            assert!(text.lines().all(|line| line.chars().count() <= 80), "{text}");
+            assert_eq!(text, help(&[&words[..], &["-h"]].concat()));
+            assert!(text.contains("  -v, --verbose "), "{text}");
+        }
+    }
+}
