@@ -13,9 +13,9 @@
 //! | braking | min(brakes, μ·g), forces inside the friction circle | physics | `ego`, `around` |
 //! | light | 0.8, 1, 0.15 of a camera's light | ours: a low sun costs contrast, street lamps leave the range of low beams | here |
 //! | sight through fog and rain | R·e^(σR) = R₀, σ = 2.996 / MOR (Koschmieder) + 1.076·R^0.67 dB/km (Carbonneau) | as named | `ads::modular::perception` |
-//! | detection by class, position noise | ranges of LiDAR and camera for cars and pedestrians, noise per metre | `scenarios/ads/default.yaml` | `ads::modular::perception` |
-//! | night | camera ranges fall with the light, LiDAR's do not | low beams: 35 to 50 % on pedestrians, 70 % on lit vehicles | `ads::modular::perception` |
-//! | localisation | error grows to a factor at 50 mm/h or 1.5 mm | LiDAR map matching, ×1.5 to 3 | `ads::modular::localization` |
+//! | detection by class, position noise | ranges of LiDAR and camera for cars and pedestrians, noise per metre | as `scenarios/ads/default.yaml` says | `ads::modular::perception` |
+//! | night | camera ranges fall with the light, LiDAR's do not | ours: low beams leave 40 % on pedestrians, 70 % on lit vehicles | `ads::modular::perception` |
+//! | localisation | error grows to a factor at 50 mm/h or 1.5 mm | ours | `ads::modular::localization` |
 //! | line of sight | rays against outlines; low bodies hide the lower part | geometry | `sense` |
 //!
 //! The level that an action sets is where the water on the road begins; from then on it follows the rain.

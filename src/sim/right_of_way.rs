@@ -12,8 +12,8 @@
 //! To give way means not to make the other change its speed or direction *abruptly* (article 1), so what counts
 //! is the moment when the first of the two comes into the other's way. A vehicle that then leaves the other
 //! room to brake gently has given way, and has from now on priority over it: nobody may drive into a junction
-//! or a lane that is taken (18.7, 13.5). What is abrupt, UN R79 says for lane changes: more than 3 m/s² after
-//! 0.4 s.
+//! or a lane that is taken (18.5, 13.5). What is abrupt, UN R79 says for lane changes: more than 3 m/s² after
+//! 0.4 s. The second of headway that it asks for beside that is left out.
 //!
 //! A pedestrian on a crosswalk has priority (21), unless the light for the ego vehicle is green. Elsewhere a
 //! pedestrian may not step onto the road without regard to distance and speed of what comes (20.6), and a

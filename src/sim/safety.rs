@@ -6,8 +6,9 @@
 //!
 //! Δv (0.4 + 0.75) + way while the brake builds up + (Δv left)² / 2a.
 //!
-//! Left out is the deceleration of 0.4 m/s² by the released accelerator, which the regulation's driver
-//! has before the brake. The regulation knows only leaders; [`oncoming_m`] and [`from_behind_m`] are ours.
+//! Left out is the deceleration of 0.4 m/s² by the released accelerator, which esmini's and the JRC's
+//! versions of the driver have before the brake; the regulation's table has none. The regulation knows
+//! only leaders; [`oncoming_m`] and [`from_behind_m`] are ours.
 
 use super::environment::GRAVITY_MPS2;
 

@@ -60,17 +60,17 @@ profile! {
         change_time_s: f64 = 1.0, 0.0..=10.0;
         /// No change that makes another vehicle brake harder than this, magnitude, m/s², in `[0.5, 100]`. MOBIL (Kesting, Treiber and Helbing 2007), `b_safe`: 4.
         change_safe_mps2: f64 = 4.0, 0.5..=100.0;
-        /// Highest lateral speed of a lane change, m/s, in `[0.2, 5]`: bound of a cut-in in UN R157.
+        /// Highest lateral speed of a lane change, m/s, in `[0.2, 5]`: with which UN R157's careful driver reckons at a cut-in (0.72 m in 0.4 s).
         change_mps_max: f64 = 1.8, 0.2..=5.0;
         /// A lane change takes at least this long, s, in `[0.5, 20]`. Ours.
         change_s_min: f64 = 2.0, 0.5..=20.0;
-        /// Whether instead of all this a driver changes lanes at once if a sphere of 1 m, 2 m beside the corner of its front, is empty. LGSVL.
+        /// Whether instead of all this a driver changes lanes at once if a sphere of 1 m, 2 m beside the corner of its front, is empty. LGSVL up to 2021.2.
         change_by_sphere: bool = false;
         /// Whether ambient vehicles change lanes for their own gain, by MOBIL. Otherwise they keep their lane.
         mobil: bool = true;
-        /// MOBIL's politeness: what a gain of the followers counts against the own, in `[0, 1]`. Kesting et al.: 0.2 to 0.5 is realistic.
+        /// MOBIL's politeness: what a gain of the followers counts against the own, in `[0, 1]`. Treiber's page of MOBIL: up to 0.5 is realistic.
         politeness: f64 = 0.3, 0.0..=1.0;
-        /// Gain that a change must bring, m/s², in `[0, 5]`. MOBIL: 0.1; Treiber's traffic-simulation.de: 0.2.
+        /// Gain that a change must bring, m/s², in `[0, 5]`. MOBIL: 0.1; Treiber's page of it: 0.2.
         change_gain_mps2: f64 = 0.2, 0.0..=5.0;
         /// So much less gain for a change to the right, and more for one to the left, m/s², in `[0, 5]`. Ours: below the gain, so that on streets no vehicle changes for nothing; MOBIL has 0.3 for motorways.
         right_bias_mps2: f64 = 0.1, 0.0..=5.0;

@@ -3,8 +3,7 @@
 //! Apollo's cascade: the station error becomes a wanted speed, the speed error an acceleration, to
 //! which the plan's own acceleration is added, read a little ahead; the calibration table turns it
 //! into pedals. Steering is `ads::steering`. Left out: Apollo's low-pass filters of the steering
-//! angle (10 Hz, above what the actuator follows) and its calibration by speed (the published rows
-//! hardly change with it).
+//! angle (10 Hz, above what the actuator follows) and its calibration by speed (see `sim::ego`).
 
 use std::sync::Arc;
 

@@ -5,7 +5,7 @@
 //! | cruise control | ISO 15622:2018, full speed range | time gap, limits of braking, jerk and acceleration by speed |
 //! | its law | Rajamani, Vehicle Dynamics and Control, constant time gap | acceleration from gap and speeds |
 //! | emergency braking | UN R152 | speed range for cars and for pedestrians, braking of 5 m/s² or more |
-//! | lane change | ISO 17387, type III | zone beside and behind, time to collision of vehicles from behind |
+//! | lane change | ISO 17387:2008, type III | zone beside and behind, time to collision of vehicles from behind |
 //!
 //! The standards state what a system must reach at least; this one reaches that and no more. Left out: warnings
 //! and the override by a driver. Unlike many sold systems it reacts to vehicles, too, that it never saw move.
@@ -34,7 +34,7 @@ const ACCELERATION_MPS2: f64 = 2.0;
 const LINE_GAP_M: f64 = 1.0;
 const LINE_MPS2: f64 = 2.0;
 
-/// Speeds from which emergency braking acts, m/s: UN R152, 10 km/h for cars and 20 km/h for pedestrians.
+/// Speeds from which emergency braking acts, m/s: UN R152 (5.2.1.3, 5.2.2.3), 10 km/h for cars and 20 km/h for pedestrians.
 const EMERGENCY_VEHICLE_MPS: f64 = 10.0 / 3.6;
 const EMERGENCY_PEDESTRIAN_MPS: f64 = 20.0 / 3.6;
 /// And up to which, m/s: UN R152, 60 km/h.

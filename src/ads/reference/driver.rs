@@ -23,8 +23,8 @@ use super::idm::Idm;
 use super::model::Model;
 use super::reflex::Reflex;
 
-/// Comfortable deceleration for other road users, m/s² (IDM's, and of the same size as what passengers
-/// call comfortable).
+/// Comfortable deceleration for other road users, m/s² (what Treiber's page of the
+/// IDM uses).
 const COMFORTABLE_MPS2: f64 = 3.0;
 /// Part of an outline that must be in sight for the road user to be recognised. Ours.
 const SEEN_PART_MIN: f64 = 0.25;

@@ -25,7 +25,7 @@ use crate::sim::{
 
 use super::giving_way::goes_before;
 
-/// The model's parameters, for towns.
+/// The model's parameters, for towns. Ours.
 const MODEL: Following =
     Following { gap_m_min: 3.0, time_gap_s: 1.5, acceleration_mps2: 2.0, comfortable_mps2: 3.0 };
 /// Hardest braking, m/s²: the vehicle's limit.

@@ -2,7 +2,7 @@
 //!
 //! UN R157, 5.2.5.2: a cut-in that is 0.3 m into the lane must be avoided if its time to collision is
 //! above Δv / (2 · 6 m/s²) + 0.35 s. So the least that complies brakes at 6 m/s², 0.35 s after that
-//! bound is reached; one look of 0.1 s is added to the bound, as in the published implementation.
+//! bound is reached; one look of 0.1 s is added to the bound, as in the JRC's implementation (JRC-FSM).
 //!
 //! The text speaks of cut-ins. Beyond it, the bound holds here for a vehicle that is ahead already, and
 //! for road users that cross or come towards, as soon as their way leads into the ego vehicle's.
@@ -15,8 +15,8 @@ const DECELERATION_MPS2: f64 = 6.0;
 const RESPONSE_S: f64 = 0.35;
 /// One look of a system that looks ten times a second, s.
 const LOOK_S: f64 = 0.1;
-/// Side gap of two cars of 1.9 m at which one is 0.3 m into the other's lane of 3.5 m, m: the published
-/// implementation's reading.
+/// Side gap of two cars of 1.9 m at which one is 0.3 m into the other's lane of 3.5 m, m: the reading of
+/// JRC-FSM.
 const INTRUSION_SIDE_GAP_M: f64 = 0.5;
 
 /// The regulation's minimal performance.

@@ -23,7 +23,8 @@ use crate::sim::world::DT_S;
 use super::driver::{Driver, SIDE_ROOM_M};
 use super::leader::extent_m;
 
-/// The sphere of LGSVL's check: its radius, and how far its centre is beside the corner of the front, m.
+/// The sphere of LGSVL's check up to 2021.2: its radius, and how far its centre is beside the corner of the
+/// front, m.
 const SPHERE_M: f64 = 1.0;
 const SPHERE_ASIDE_M: f64 = 2.0;
 /// Below this speed a lane change slows down with the vehicle, which cannot slide sideways, m/s.

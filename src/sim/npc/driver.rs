@@ -25,9 +25,9 @@ use super::change::{Change, Manoeuvre};
 use super::leader::Leader;
 use super::manners::{GIVE_UP_S, STANDS_MPS};
 
-/// IDM: comfortable deceleration, m/s².
+/// IDM: comfortable deceleration, m/s². Ours.
 pub(super) const COMFORT_MPS2: f64 = 2.0;
-/// IDM: gap at standstill, m.
+/// IDM: gap at standstill, m: that of its authors.
 pub(super) const GAP_M_MIN: f64 = 2.0;
 /// How far drivers look ahead beyond the way on which they could stop gently, m.
 pub(super) const LOOK_AHEAD_M: f64 = 25.0;

@@ -12,7 +12,7 @@ use crate::sim::road_user::Obstacle;
 
 use super::driver::{COMFORT_MPS2, Driver, GAP_M_MIN, LOOK_AHEAD_M, SIDE_ROOM_M};
 
-/// IDM: time gap, s.
+/// IDM: time gap, s. Ours.
 pub(super) const TIME_GAP_S: f64 = 1.2;
 /// A vehicle at more than this angle to the way stands across it or against it (cosine of 45°).
 const CROSSWISE_COS_MAX: f64 = core::f64::consts::FRAC_1_SQRT_2;

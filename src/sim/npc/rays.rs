@@ -3,7 +3,8 @@
 //! Three rays run straight ahead from the front, from its middle and its corners, whatever the way does. What
 //! they meet within a stop distance makes the driver stop. The stop distance grows with the speed and falls
 //! with a driver's aggression, 1 to 3. The speed tends to its target at a fixed rate, whatever tyres could do.
-//! Figures from `NPCLaneFollowBehaviour` of LGSVL's simulator 2021; they stand in `sim::traffic`.
+//! Figures from `NPCLaneFollowBehaviour` of LGSVL's simulator 2021.3; they stand in `sim::traffic`. There the stop
+//! distance at the limit is cut to whole metres (20, 10 and 6 m straight through junctions).
 
 use crate::geometry::{Frame, Vec2};
 use crate::rng;

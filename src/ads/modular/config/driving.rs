@@ -11,15 +11,15 @@ section! {
     pub struct PredictionConfig {
         /// Slower vehicles are taken to stand, m/s, in `[0, 5]`. Apollo `still_obstacle_speed_threshold`: 0.99.
         still_vehicle_mps: f64 = 0.99, 0.0..=5.0;
-        /// Slower pedestrians are taken to stand, m/s, in `[0, 5]`. Apollo: 0.2.
+        /// Slower pedestrians are taken to stand, m/s, in `[0, 5]`. Apollo `still_pedestrian_speed_threshold`: 0.2.
         still_pedestrian_mps: f64 = 0.2, 0.0..=5.0;
         /// Lateral speed that counts as leaving the lane, m/s, in `[0, 5]`. Ours.
         lateral_speed_mps: f64 = 0.4, 0.0..=5.0;
-        /// For how long that lateral speed must last before it is believed under `lane_bound_prediction`, s, in `[0, 10]`. Apollo `max_tracking_time`: 0.5.
+        /// For how long that lateral speed must last before it is believed under `lane_bound_prediction`, s, in `[0, 10]`. Ours.
         lateral_persistence_s: f64 = 0.5, 0.0..=10.0;
         /// A vehicle turned further from every lane is taken to go straight on, rad, in `[0, 3.2]`. Ours.
         off_lane_rad: f64 = 0.6, 0.0..=3.2;
-        /// Farther objects are taken to keep their velocity, m, in `[0, 300]`. Apollo's scan box: 80.
+        /// Farther objects are taken to keep their velocity, m, in `[0, 300]`. Ours; Apollo looks for objects to be cautious of as far (`scan_length`: 80).
         reach_m: f64 = 80.0, 0.0..=300.0;
         /// Most futures that an object is given, in `[1, 3]`. Ours: straight on, left and right. One is a fault to plant.
         hypotheses_max: u32 = 3, 1.0..=3.0;
@@ -35,7 +35,7 @@ section! {
     pub struct PlanningConfig {
         /// Speed on a free road, m/s, in `[1, 40]`. Apollo's upstream `planning.conf`, `default_cruise_speed`: 11.18 (25 mph); the flag's own default is 5.0.
         cruise_mps: f64 = 11.18, 1.0..=40.0;
-        /// Lateral acceleration in curves, m/s², in `[0.5, 6]`. Apollo's DP `max_centric_acceleration_limit`: 2.0.
+        /// Lateral acceleration in curves, m/s², in `[0.5, 6]`. Apollo's speed bounds, `max_centric_acceleration_limit`: 2.0.
         lateral_acceleration_mps2_max: f64 = 2.0, 0.5..=6.0;
         /// Slowing down for curves and limits ahead, magnitude, m/s², in `[0.5, 6]`. Ours.
         slowdown_mps2: f64 = 1.5, 0.5..=6.0;
@@ -43,23 +43,23 @@ section! {
         acceleration_mps2_max: f64 = 2.0, 0.5..=4.0;
         /// Hardest braking of a plan, magnitude, m/s², in `[1, 8]`. Apollo's DP `max_deceleration`: 4.0.
         deceleration_mps2_max: f64 = 4.0, 1.0..=8.0;
-        /// Hardest braking when that does not suffice, magnitude, m/s², in `[1, 10]`. Apollo's vehicle limit: 6.0.
+        /// Hardest braking when that does not suffice, magnitude, m/s², in `[1, 10]`. The vehicle's limit, Apollo `max_deceleration`: 6.0.
         emergency_mps2: f64 = 6.0, 1.0..=10.0;
         /// Braking for a planned stop, magnitude, m/s², in `[0.5, 4]`. Ours.
         comfortable_mps2: f64 = 2.0, 0.5..=4.0;
-        /// Rate at which a plan may lower its acceleration under `bounded_jerk`, magnitude, m/s³, in `[0.5, 50]`. Apollo: 4.
+        /// Rate at which a plan may lower its acceleration under `bounded_jerk`, magnitude, m/s³, in `[0.5, 50]`. Apollo `longitudinal_jerk_lower_bound`: -4.0.
         jerk_mps3_down: f64 = 4.0, 0.5..=50.0;
-        /// Rate at which a plan may raise its acceleration, m/s³, in `[0.5, 50]`. Apollo: 2.
+        /// Rate at which a plan may raise its acceleration, m/s³, in `[0.5, 50]`. Apollo `longitudinal_jerk_upper_bound`: 2.0.
         jerk_mps3_up: f64 = 2.0, 0.5..=50.0;
         /// Room kept free on each side, m, in `[0, 2]`. Apollo `obstacle_lat_buffer`: 0.4.
         lateral_buffer_m: f64 = 0.4, 0.0..=2.0;
-        /// Room left to what stands at the edge of the lane and is passed within it, m, in `[0, 2]`. Apollo `static_obstacle_nudge_l_buffer`: 0.3.
+        /// Room left to what stands at the edge of the lane and is passed within it, m, in `[0, 2]`. Apollo `static_obstacle_nudge_l_buffer`: 0.3, which there tells what blocks the lane; its path bounds keep `obstacle_lat_buffer`.
         nudge_buffer_m: f64 = 0.3, 0.0..=2.0;
         /// Gap to what stands in the way, m, in `[0.5, 20]`. Apollo `min_stop_distance_obstacle`: 6.0.
         stop_gap_m: f64 = 6.0, 0.5..=20.0;
-        /// Gap to a leader at rest, m, in `[0.5, 20]`. Apollo `follow_min_distance` 3.0 to the stop gap 6.0.
+        /// Gap to a leader at rest, m, in `[0.5, 20]`. Ours: between Apollo's `follow_min_distance` 3.0 and the stop gap.
         follow_gap_m: f64 = 5.0, 0.5..=20.0;
-        /// Time gap to a leader, s, in `[0.1, 5]`. Apollo `follow_min_time_sec`: 2.0.
+        /// Time gap to a leader, s, in `[0.1, 5]`. Ours; Apollo's gap has 2.5 (`follow_time_buffer`).
         follow_time_s: f64 = 2.0, 0.1..=5.0;
         /// Gap to the way of something that crosses, m, in `[0.5, 20]`. Apollo `yield_distance`: 5.0.
         yield_gap_m: f64 = 5.0, 0.5..=20.0;
@@ -67,7 +67,7 @@ section! {
         conflict_buffer_s: f64 = 1.0, 0.0..=5.0;
         /// Safe distance to a road user's region of the station-time graph, m, in `[0, 100]`. Apollo's DP `safe_distance`: 20.
         dp_safe_distance_m: f64 = 20.0, 0.0..=100.0;
-        /// Safe time before and after such a region, s, in `[0.1, 20]`. Apollo's DP `safe_time_buffer`: 3.
+        /// Safe time before and after such a region, s, in `[0.1, 20]`. Ours; Apollo's DP has `safe_time_buffer` 3.0, but its cost does not read it.
         dp_safe_time_s: f64 = 3.0, 0.1..=20.0;
         /// A decision is left only if the cost without it is lower by this part, in `[0, 1]`. Ours.
         decision_margin: f64 = 0.3, 0.0..=1.0;
@@ -105,23 +105,23 @@ section! {
         fallback_mps2: f64 = 4.0, 1.0..=8.0;
         /// Farther than this beside the route there is no plan, m, in `[1, 20]`. Ours.
         lost_offset_m: f64 = 3.0, 1.0..=20.0;
-        /// Speed at which an unprotected turn is approached and crept into, m/s, in `[0.5, 10]`. Apollo's unprotected left turn, `approach_cruise_speed`: 2.78.
+        /// Speed at which an unprotected turn is approached and crept into, m/s, in `[0.5, 10]`. Apollo's unprotected left turn, `approach_cruise_speed`: 2.78; that it also holds while creeping is ours.
         approach_mps: f64 = 2.78, 0.5..=10.0;
-        /// Under `creep_skipped_at_speed` the approach begins this far before the line, m, in `[0, 100]`; without it, in time. Apollo `start_traffic_light_scenario_distance`: 5.0.
+        /// Under `creep_skipped_at_speed` the approach begins this far before the line, m, in `[0, 100]`; without it, in time. Ours: Apollo's unprotected left turn begins 30 m before (`start_traffic_light_scenario_distance`), only its other lights 5 m.
         approach_m: f64 = 5.0, 0.0..=100.0;
-        /// Speed at which a junction without lights and signs is approached if others go first, m/s, in `[0.5, 20]`. Apollo's bare intersection, `approach_cruise_speed`: 6.7.
+        /// Speed at which a junction without lights and signs is approached if others go first, m/s, in `[0.5, 20]`. Apollo's bare intersection, `approach_cruise_speed`: 6.7056 (15 mph).
         bare_approach_mps: f64 = 6.7, 0.5..=20.0;
-        /// Creeping ends this far behind the line, m, in `[0, 20]`. Apollo's creep decider: 2.0.
+        /// Creeping ends this far behind the line, m, in `[0, 20]`. Apollo's creep decider, `FindCreepDistance`: 2.0.
         creep_m: f64 = 2.0, 0.0..=20.0;
         /// Creeping goes on until nothing comes onto the way within so long, s, in `[0, 20]`. Apollo's creep decider, `min_boundary_t`: 6.0.
         creep_clear_s: f64 = 6.0, 0.0..=20.0;
         /// Under `creep_skipped_at_speed`, a faster vehicle does not creep, m/s, in `[0, 20]`. Apollo `max_adc_speed_before_creep`: 5.56.
         creep_skip_mps: f64 = 5.56, 0.0..=20.0;
-        /// Under `creep_times_out`, creeping ends after so long, s, in `[0, 60]`. Apollo `creep_timeout_sec`: 10.0.
+        /// Under `creep_times_out`, creeping ends after so long, s, in `[0, 60]`. Apollo `creep_timeout_sec`: 10.0, after which the way must be clear there as well.
         creep_timeout_s: f64 = 10.0, 0.0..=60.0;
         /// Time at rest before a stop sign, s, in `[0, 20]`. Apollo's stop sign scenario, `stop_duration_sec`: 1.0.
         stop_sign_s: f64 = 1.0, 0.0..=20.0;
-        /// Reaction time of the sight distance, s, in `[0, 5]`: publication of a track, and half the time in which braking builds up. Ours; AASHTO has 2.5 for people.
+        /// Reaction time of the sight distance, s, in `[0, 5]`: publication of a track, and half the time in which braking builds up. Ours; AASHTO's Green Book has 2.5 for people.
         sight_reaction_s: f64 = 1.0, 0.0..=5.0;
         /// Bounds the speed by what can be seen. Off is a fault to plant.
         sight_bounds_speed: bool = true;
@@ -156,23 +156,23 @@ section! {
     pub struct PedalsConfig {
         /// Speed wanted per metre of station error, 1/s, in `[0, 5]`. Apollo station PID `kp`: 0.2.
         station_kp: f64 = 0.2, 0.0..=5.0;
-        /// Bound of the station error, m, in `[0, 10]`. Apollo: 2.
+        /// Bound of the station error, m, in `[0, 10]`. Apollo `station_error_limit`: 2.0.
         station_error_m_max: f64 = 2.0, 0.0..=10.0;
-        /// Bound of the speed error, m/s, in `[0, 10]`. Apollo: 2.
+        /// Bound of the speed error, m/s, in `[0, 10]`. Apollo `speed_controller_input_limit`: 2.0.
         speed_error_mps_max: f64 = 2.0, 0.0..=10.0;
         /// Up to this speed the low gains hold, m/s, in `[0, 20]`. Apollo `switch_speed`: 2.
         switch_mps: f64 = 2.0, 0.0..=20.0;
-        /// Acceleration per speed error at low speed, 1/s, in `[0, 5]`. Apollo: 0.5.
+        /// Acceleration per speed error at low speed, 1/s, in `[0, 5]`. Apollo `low_speed_pid_conf`, `kp`: 0.5.
         speed_kp_low: f64 = 0.5, 0.0..=5.0;
-        /// Acceleration per speed error above `switch_mps`, 1/s, in `[0, 5]`. Apollo: 1.0.
+        /// Acceleration per speed error above `switch_mps`, 1/s, in `[0, 5]`. Apollo `high_speed_pid_conf`, `kp`: 1.0.
         speed_kp_high: f64 = 1.0, 0.0..=5.0;
-        /// Acceleration per speed error and second, 1/s², in `[0, 5]`. Apollo: 0.3.
+        /// Acceleration per speed error and second, 1/s², in `[0, 5]`. Apollo `ki`: 0.3.
         speed_ki: f64 = 0.3, 0.0..=5.0;
-        /// Bound of the integral part, m/s², in `[0, 5]`. Apollo's saturation: 0.3.
+        /// Bound of the integral part, m/s², in `[0, 5]`. Apollo `integrator_saturation_level`: 0.3.
         integral_mps2_max: f64 = 0.3, 0.0..=5.0;
-        /// The plan's acceleration is read this far ahead, s, in `[0, 1]`. Apollo: 20 cycles of 10 ms.
+        /// The plan's acceleration is read this far ahead, s, in `[0, 1]`. Apollo `preview_window`: 20 cycles of 10 ms.
         preview_s: f64 = 0.2, 0.0..=1.0;
-        /// Braking held at rest, magnitude, m/s², in `[0, 6]`. Apollo `standstill_acceleration`: 3.0.
+        /// Braking held at rest, magnitude, m/s², in `[0, 6]`. Apollo `standstill_acceleration`: -3.0.
         standstill_mps2: f64 = 3.0, 0.0..=6.0;
         /// Planned speeds below this mean a full stop, m/s, in `[0, 2]`. Apollo `max_abs_speed_when_stopped`: 0.2.
         stopped_mps: f64 = 0.2, 0.0..=2.0;
@@ -182,9 +182,9 @@ section! {
 section! {
     /// What the commands may be, and how late they are.
     pub struct ActuatorsConfig {
-        /// No harder braking is commanded, magnitude, m/s², in `[0.5, 10]`. Apollo's calibration table ends at 8.5. Less is a fault to plant.
+        /// No harder braking is commanded, magnitude, m/s², in `[0.5, 10]`. The vehicle's full brake; Apollo's calibration table has 8.1 to 9.2. Less is a fault to plant.
         brake_mps2_max: f64 = 8.5, 0.5..=10.0;
-        /// No more throttle is commanded than gives this, m/s², in `[0, 10]`. Apollo's calibration table: 4.95.
+        /// No more throttle is commanded than gives this, m/s², in `[0, 10]`. The vehicle at 80 %; Apollo's calibration table has 4.8 to 5.1 from 4.6 m/s on.
         throttle_mps2_max: f64 = 4.95, 0.0..=10.0;
         /// First-order lag of the commanded steering angle beside the actuator's own, s, in `[0, 5]`. A fault to plant: none by default.
         steer_lag_s: f64 = 0.0, 0.0..=5.0;

@@ -2,8 +2,9 @@
 //!
 //! Constants that belong to a method rather than to the system modelled (step sizes, filter gains,
 //! look-aheads) stand with their use in the parts. `scenarios/ads/default.yaml` is the default
-//! written out, `scenarios/ads/faults/` holds faults to plant. "Apollo" is Apollo 7.0; "ours" marks
-//! what its published configuration leaves open.
+//! written out, `scenarios/ads/faults/` holds faults to plant. "Apollo" is Apollo 7.0: its
+//! sources, its configuration, and its calibration for LGSVL. "Ours" marks what no source gives, and what differs
+//! from one.
 
 mod driving;
 mod module;

@@ -7,21 +7,21 @@ section! {
     pub struct EmergencyConfig {
         /// Whether there is any. Off is a fault to plant.
         enabled: bool = true;
-        /// It begins to brake for vehicles from this speed on, m/s, in `[0, 20]`. UN R152: 10 km/h.
+        /// It begins to brake for vehicles from this speed on, m/s, in `[0, 20]`. UN R152, 5.2.1.3: 10 km/h.
         speed_mps_min: f64 = 2.78, 0.0..=20.0;
-        /// It begins to brake for pedestrians from this speed on, m/s, in `[0, 20]`. UN R152 demands it from 20 km/h, Euro NCAP tests from 10 km/h: the latter.
+        /// It begins to brake for pedestrians from this speed on, m/s, in `[0, 20]`. UN R152, 5.2.2.3, demands it from 20 km/h, Euro NCAP (AEB/LSS VRU 4.5.1) tests from 10 km/h: the latter.
         pedestrian_speed_mps_min: f64 = 2.78, 0.0..=20.0;
-        /// It begins to brake up to this speed, m/s, in `[0, 60]`. UN R152: 60 km/h.
+        /// It begins to brake up to this speed, m/s, in `[0, 60]`. UN R152 demands it to 60 km/h.
         speed_mps_max: f64 = 16.67, 0.0..=60.0;
-        /// Longest time to collision at which it brakes, s, in `[0, 5]`. Forward collision warnings of Euro NCAP's tests: about 1.6.
+        /// Longest time to collision at which it brakes, s, in `[0, 5]`. Ours.
         partial_s: f64 = 1.6, 0.0..=5.0;
-        /// Time to collision from which it brakes fully, s, in `[0, 5]`. Published systems: 0.6 to 1.0.
+        /// Time to collision from which it brakes fully, s, in `[0, 5]`. Ours.
         full_s: f64 = 1.0, 0.0..=5.0;
-        /// It leaves to the planner what less braking avoids, m/s², in `[0, 10]`. Between AASHTO's design deceleration of 3.4 and Apollo's hardest plan of 4.0.
+        /// It leaves to the planner what less braking avoids, m/s², in `[0, 10]`. Ours: between AASHTO's design deceleration of 3.4 and Apollo's hardest plan of 4.0.
         needed_mps2_min: f64 = 3.5, 0.0..=10.0;
-        /// Partial braking, magnitude, m/s², in `[0.5, 10]`; full braking follows when it does not suffice. Published systems: 3 to 5.
+        /// Partial braking, magnitude, m/s², in `[0.5, 10]`; full braking follows when it does not suffice. Ours.
         partial_mps2: f64 = 4.0, 0.5..=10.0;
-        /// Full braking, magnitude, m/s², in `[0.5, 10]`. UN R152 demands 5.0; the vehicle's limit is 6.0. Less is a fault to plant.
+        /// Full braking, magnitude, m/s², in `[0.5, 10]`. UN R152, 5.2.1.2, demands 5.0; the vehicle's limit is 6.0. Less is a fault to plant.
         full_mps2: f64 = 6.0, 0.5..=10.0;
         /// How fast the braking builds up, m/s³, in `[1, 100]`. From nothing to full in 0.4 s, as brakes with a pump do. Ours.
         jerk_mps3: f64 = 15.0, 1.0..=100.0;

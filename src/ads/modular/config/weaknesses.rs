@@ -44,20 +44,20 @@ weaknesses! {
     lane_bound_prediction,
     /// The braking of a plan builds up at a bounded rate, in an emergency too. Apollo `longitudinal_jerk_lower_bound` -4. Off: at once.
     bounded_jerk,
-    /// Only the closest of all standing objects is kept clear of. Apollo's `STBoundsDecider`: one static obstacle. That it may be the one that is just being passed is ours. Off: all of them are.
+    /// Only the closest of all standing objects is kept clear of. Apollo's `STObstaclesProcessor`: one static obstacle. That it may be the one that is just being passed is ours. Off: all of them are.
     closest_static_only,
     /// A pedestrian who has stood on the way for some time is crept towards. Apollo issue 11926: creeps at 3 km/h into a pedestrian; that it begins with the crosswalk rule's `stop_timeout` is ours. Off: every pedestrian is stopped for.
     creeps_to_standing_pedestrian,
     /// A red light that would need hard braking is passed. Apollo `max_stop_deceleration`. Off: it is braked for, however late.
     late_red_passed,
-    /// What will come onto the way at the front bumper or behind it does not count until it is there. Apollo issue 14633: the speed bounds drop what begins below 0.01 m and after 0.1 s. Off: it counts.
+    /// What will come onto the way at the front bumper or behind it does not count until it is there. Apollo issue 14633: `STObstaclesProcessor` drops what begins below 0.01 m and after 0.1 s. Off: it counts.
     blind_to_side_and_rear,
     /// When not even the hardest braking of a plan keeps clear, the fallback brakes at 4 m/s² and no harder. Apollo `slowdown_profile_deceleration`; that it builds up at a bounded rate is ours. Off: as hard as the vehicle can.
     gentle_fallback,
     /// Decisions about road users are taken anew in every cycle, so that a small change flips them. Apollo issue 14870: yields only briefly; that its cause lies here is ours. Off: a decision is kept until the other is much cheaper.
     decides_anew,
-    /// An unprotected turn is approached late, and a vehicle that is still fast at the line goes without creeping. Apollo `max_adc_speed_before_creep`, `start_traffic_light_scenario_distance`. Off: it slows down in time, and always creeps.
+    /// An unprotected turn is approached late, and a vehicle that is still fast at the line goes without creeping. Apollo `max_adc_speed_before_creep`; that it begins so late is ours. Off: it slows down in time, and always creeps.
     creep_skipped_at_speed,
-    /// Creeping into an unprotected turn ends after some time, whatever comes. Apollo `creep_timeout_sec`. Off: it goes on until nothing enters.
+    /// Creeping into an unprotected turn ends after some time, whatever comes. Apollo `creep_timeout_sec`; there the way must be clear as well: that it need not be is ours. Off: it goes on until nothing enters.
     creep_times_out,
 }

@@ -47,7 +47,8 @@ pub fn crosswalks(
             let velocity_mps = walker.velocity_mps;
             let left_mps = beside.forward.x * velocity_mps.y - beside.forward.y * velocity_mps.x;
             let away_mps = left_mps * beside.offset_m.signum();
-            // Apollo's `stop_timeout`: a pedestrian who does not go lets the vehicle go first.
+            // Apollo's `stop_timeout`: a pedestrian who does not go lets the vehicle go first. There it is only for
+            // those beside the lane; here for all.
             if standing.time_s(walker.id) > CROSSWALK_PATIENCE_S {
                 return false;
             }

@@ -17,8 +17,8 @@ use super::speed::Constraint;
 
 /// A bumper this far over the line while the light let it go has passed it, m. Ours.
 const PASSED_M: f64 = 0.5;
-/// A bumper this far over the line is in the junction, which the vehicle must then clear, m. Apollo's
-/// traffic-light rule, `min_pass_s_distance`: 4.0.
+/// A bumper this far over the line is in the junction, which the vehicle must then clear, m. Ours;
+/// the `min_pass_s_distance` of Apollo's scenarios at lights is 3.0.
 const INSIDE_M: f64 = 4.0;
 
 #[derive(Debug, Clone)]

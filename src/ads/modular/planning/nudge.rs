@@ -1,7 +1,7 @@
 //! The path beside the guide: a shift within the lane past vehicles that stand at its edge, and the way back
 //! from a lane change that was broken off.
 //!
-//! Apollo's path bounds keep 0.3 m from static obstacles, 3 m before and 2 m behind them; its
+//! Apollo's path bounds keep 0.4 m from static obstacles, 3 m before and 2 m behind them (here `nudge_buffer_m`); its
 //! piecewise-jerk optimiser is replaced by a quintic shift of bounded lateral acceleration. Vehicles that stand
 //! in a row are passed as one. Pedestrians and moving road users are not passed in this way. Left out is lane
 //! borrowing, a shift into the next lane: behind what stands, the stop gap leaves no room to turn out of the lane.

@@ -25,7 +25,7 @@ const ROWS: usize = 51;
 /// Regions that fit into a set of bits; the nearest come first, others do not matter yet.
 const REGIONS_MAX: usize = 32;
 
-/// Apollo's `speed_heuristic_config`: `default_obstacle_cost`, `default_speed_cost`.
+/// Apollo's `speed_heuristic_optimizer_config`: `default_obstacle_cost`, `default_speed_cost`.
 const OBSTACLE_COST: f64 = 1e4;
 const SPEED_COST: f64 = 1e3;
 /// `exceed_speed_penalty` and `low_speed_penalty`, factors of the speed cost.

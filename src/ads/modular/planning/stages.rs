@@ -6,9 +6,10 @@
 //! station-time graph hold alone. A junction is protected, and has no stages, if a light lets the vehicle
 //! through and nothing that may go at the same time goes first.
 //!
-//! Two weaknesses of the original are kept: `creep_skipped_at_speed` (a vehicle that comes faster goes without
-//! creeping) and `creep_times_out`. Left out: right turns at a red light (the vehicle waits for green), and the
-//! order of arrival at all-way stops. Ours: creeping ends as soon as nothing enters, not at its end only.
+//! Two weaknesses: `creep_skipped_at_speed` (a vehicle that comes faster goes without creeping) is the original's,
+//! but for its late approach; `creep_times_out` is ours, since the original's timeout asks for a clear way, too.
+//! Left out: right turns at a red light (the vehicle waits for green), and the order of arrival at all-way stops.
+//! Ours: creeping ends as soon as nothing enters, not at its end only.
 
 use crate::ads::status::Reason;
 use crate::road::{SignKind, Turn};
@@ -152,7 +153,7 @@ impl Passage {
         let stop = Constraint::line(Reason::StopSign, self.line_m - config.stop_line_gap_m);
         match self.stage {
             Stage::Approach => {
-                // Apollo begins so late that a fast vehicle is still fast at the line.
+                // So late that a fast vehicle is still fast at the line. Ours: Apollo begins 30 m before.
                 let excess_m2ps2 = start.speed_mps * start.speed_mps - self.approach_mps * self.approach_mps;
                 let needed_m = excess_m2ps2.max(0.0) / (2.0 * config.comfortable_mps2);
                 let is_late = weaknesses.creep_skipped_at_speed;

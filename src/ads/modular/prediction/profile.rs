@@ -21,11 +21,11 @@ const BEND_MPS2: f64 = 3.0;
 /// second one, m/s². AASHTO's design deceleration is 3.4, Apollo's `max_stop_deceleration` 4.0.
 const STOP_MPS2: f64 = 2.0;
 const STOP_MPS2_MAX: f64 = 4.0;
-/// No predicted vehicle brakes harder, m/s². UN R152 tests with leaders that brake at 4.
+/// No predicted vehicle brakes harder, m/s². Ours: as hard as a plan of the ego vehicle.
 const BRAKING_MPS2_MAX: f64 = 4.0;
 /// No leader is followed at a larger gap, m: the model's wanted gap at 20 m/s is 32.
 const LEADER_M_MAX: f64 = 60.0;
-/// The Intelligent Driver Model with its authors' city parameters (Treiber 2000), the time gap 1.5 s.
+/// The Intelligent Driver Model. Ours; Treiber's page of it has 2 m, 1.8 s, 1 and 3 m/s².
 const FOLLOWING: Following =
     Following { gap_m_min: 2.0, time_gap_s: 1.5, acceleration_mps2: 1.0, comfortable_mps2: 2.0 };
 
