@@ -12,6 +12,8 @@ pub struct Status {
     /// Where it believes its rear axle is.
     pub localized: Option<Pose>,
     pub perceived: Vec<PerceivedObject>,
+    /// Ids of the true objects that the last look detected, known or not: an annotation for judges.
+    pub detected: Vec<u32>,
     /// Planned positions of the rear axle, every 0.1 s from the moment of planning.
     pub planned: Vec<Vec2>,
     pub control: Control,
@@ -118,6 +120,8 @@ pub enum Reason {
     Degraded,
     /// Emergency braking before something.
     Emergency(u32),
+    /// It has touched something: it brakes to rest and stays.
+    Contact,
 }
 
 impl Reason {
@@ -139,6 +143,7 @@ impl Reason {
             | Reason::Sight
             | Reason::KeepClear
             | Reason::Degraded
+            | Reason::Contact
             | Reason::Fallback => self,
         }
     }
@@ -163,6 +168,7 @@ impl fmt::Display for Reason {
             Reason::Fallback => write!(f, "fallback"),
             Reason::Degraded => write!(f, "degraded mode"),
             Reason::Emergency(id) => write!(f, "emergency {}", named(*id)),
+            Reason::Contact => write!(f, "stop after a contact"),
         }
     }
 }

@@ -9,7 +9,9 @@ use crate::episode::{Collision, EpisodeLog};
 use crate::model::Scenario;
 use crate::model::vocabulary::Word;
 use crate::oracle;
-use crate::oracle::{Diagnosis, Likelihood, MechanismShare, Share, WeaknessFinding, WithoutMechanism};
+use crate::oracle::{
+    Diagnosis, Likelihood, Measure, MechanismShare, Share, WeaknessFinding, WithoutMechanism,
+};
 use crate::run;
 use crate::run::Stage;
 
@@ -38,6 +40,7 @@ pub fn diagnose(output: &Output, arguments: &DiagnoseArguments) -> Result<(), Fa
     output.tell(&heading(&found.collision));
     output.say(&table_text(&found.diagnosis));
     output.say(&weaknesses_text(&found.diagnosis.weaknesses));
+    output.say(&measured_text(&found.diagnosis.measured));
     output.say(&format!("\n{}", sentence(&found.diagnosis)));
     if let Some(likelihood) = &found.likelihood {
         output.say(&likelihood_text(likelihood));
@@ -88,6 +91,7 @@ impl Explained {
         serde_json::json!({
             "file": file, "scenario": self.scenario, "ads": self.ads,
             "obstacle": self.collision.contact.obstacle, "time_s": self.collision.contact.time_s,
+            "priority": self.collision.contact.priority.name(),
             "diagnosis": self.diagnosis, "likelihood": self.likelihood,
         })
     }
@@ -254,6 +258,16 @@ fn weaknesses_text(weaknesses: &[WeaknessFinding]) -> String {
     text
 }
 
+fn measured_text(measured: &[Measure]) -> String {
+    let mut text =
+        format!("\n{:<14}{:<44}{:>8}{:>18}", "module", "in the 5 s before", "worst", "specification");
+    for found in measured {
+        let module = found.module.name();
+        text.push_str(&format!("\n{module:<14}{:<44}{:>8.2}{:>18.2}", found.what, found.worst, found.bound));
+    }
+    text
+}
+
 /// The cause in a sentence.
 fn sentence(diagnosis: &Diagnosis) -> String {
     let others: Vec<&str> = diagnosis
@@ -264,6 +278,14 @@ fn sentence(diagnosis: &Diagnosis) -> String {
         .collect();
     let finding = |module: Module| diagnosis.modules.iter().find(|found| found.module == module);
     match diagnosis.cause.as_slice() {
+        [module] if diagnosis.by_measure => {
+            let found = diagnosis.measured.iter().find(|found| found.module == *module);
+            let error = found.map_or(String::new(), |found| {
+                format!(": {} was {:.2}, beyond {:.2}", found.what, found.worst, found.bound)
+            });
+            let name = module.name();
+            format!("{name} is at fault by what it gave this time, as other noise prevents the crash{error}")
+        }
         [] if diagnosis.varied_crashes.is_some() || !others.is_empty() => {
             "it hung by a hair: chance prevents it as often as any module, and none can be named".to_owned()
         }

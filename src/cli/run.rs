@@ -209,10 +209,11 @@ fn heading(run: &Run, directory: &Path) -> String {
 
 fn totals_text(totals: &Totals, elapsed_s: f64, played: usize) -> String {
     let mut text = format!(
-        "\n{}: {} arrived, {} stalled, {} at the step limit; {:.1} km in {:.1} min of simulated time",
+        "\n{}: {} arrived, {} stalled, {} blocked by others, {} at the step limit; {:.1} km in {:.1} min of simulated time",
         plural(totals.episodes as usize, "episode"),
         totals.arrived,
         totals.stalled,
+        totals.blocked,
         totals.step_limit,
         totals.driven_m / 1000.0,
         totals.simulated_s / 60.0,
@@ -267,8 +268,13 @@ fn groups_text(groups: &[Group]) -> String {
             Some(modules) => format!(", {}", modules.replace(' ', " and ")),
         };
         let shape = group.shape.as_ref().map_or(String::new(), |shape| format!(" ({shape})"));
+        let priority = match group.priority.as_str() {
+            "ego" => ", ego first",
+            "other" => ", the other first",
+            _ => "",
+        };
         format!(
-            "{} × {} ({}, {}), hit by the {}{shape}{cause}: {}_{:04}",
+            "{} × {} ({}, {}{priority}), hit by the {}{shape}{cause}: {}_{:04}",
             group.count, group.kind, group.manoeuvre, group.approach, group.side, group.road, group.episode
         )
     };

@@ -86,6 +86,9 @@ pub enum End {
     Arrived,
     /// No progress for several steps: truncated.
     Stalled,
+    /// The same, because something stood in the way that would not go: wrecks, or vehicles that wait for each
+    /// other. It says nothing about the driving system.
+    Blocked,
     /// The space's limit of steps was reached: truncated.
     StepLimit,
     /// The script of a replay has no more steps.
@@ -97,6 +100,7 @@ impl End {
         match self {
             End::Arrived => "arrived",
             End::Stalled => "stalled",
+            End::Blocked => "blocked",
             End::StepLimit => "limit",
             End::Script => "script",
         }
@@ -109,7 +113,7 @@ mod tests {
 
     #[test]
     fn every_end_can_be_claimed() {
-        let ends = [End::Arrived, End::Stalled, End::StepLimit, End::Script];
+        let ends = [End::Arrived, End::Stalled, End::Blocked, End::StepLimit, End::Script];
         assert_eq!(ends.map(End::name), crate::model::ENDS);
     }
 }

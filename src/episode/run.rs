@@ -246,7 +246,7 @@ impl Play {
         if episode.stop_arrived && self.world.arrived() {
             Some(End::Arrived)
         } else if episode.stalled_steps.is_some_and(|limit| self.stalled >= limit) {
-            Some(End::Stalled)
+            Some(if self.world.is_blocked() { End::Blocked } else { End::Stalled })
         } else if self.steps.len() >= episode.step_limit as usize {
             Some(End::StepLimit)
         } else {

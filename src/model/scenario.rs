@@ -122,7 +122,7 @@ pub const MODULES: [&str; 8] =
     ["localization", "perception", "tracking", "prediction", "planning", "latency", "control", "emergency"];
 
 /// How an episode may end, in the words of `expect end == …`.
-pub const ENDS: [&str; 4] = ["arrived", "stalled", "limit", "script"];
+pub const ENDS: [&str; 5] = ["arrived", "stalled", "blocked", "limit", "script"];
 
 /// A number with the precision to which it was written, SI.
 #[derive(Debug, Clone, Copy, PartialEq)]

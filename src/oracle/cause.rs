@@ -14,7 +14,10 @@
 //!   planning is brittle, because it drives no slower than it can see.
 //!
 //! **Chance.** The collision is played again with other sensor noise and nothing else changed; the share that
-//! vanishes is the placebo. A module whose change makes no more of them vanish is not named.
+//! vanishes is the placebo. A module whose change makes no more of them vanish is not named by it. What chance
+//! prevents, chance has made: then the errors that were drawn are **measured** in the seconds before the collision
+//! (see `measured`), and the module whose error was farthest beyond its specification is named, if the collision
+//! vanishes without it.
 //!
 //! Where several modules are left, these criteria decide, in this order:
 //!
@@ -25,8 +28,7 @@
 //! 3. the module has a documented weakness, and the collision vanishes without that weakness alone;
 //! 4. the module comes first on the data's way.
 //!
-//! Left out: errors from before the obstacle appeared. Whether noise that was drawn is larger than its
-//! specification allows is not measured: a profile draws what it is set to draw, so the settings tell.
+//! Left out: errors from before the obstacle appeared.
 
 use std::sync::Arc;
 
@@ -34,6 +36,7 @@ use crate::ads::{Foresight, ModularConfig, Module, Selected};
 use crate::episode::{EpisodeLog, Setup};
 
 use super::crash::{Crash, Fate, play};
+use super::measured::{Measure, measure};
 use super::variation::Variation;
 
 /// Number of variations that are played where several modules suffice, and of replays with other noise.
@@ -65,6 +68,10 @@ pub struct Diagnosis {
     pub weaknesses: Vec<WeaknessFinding>,
     /// Of the replays with other sensor noise alone, the share in which the collision vanishes.
     pub placebo: f64,
+    /// The errors of the modules that sense, in the seconds before the collision.
+    pub measured: Vec<Measure>,
+    /// Whether the module at fault is named by its measured error, because chance does as much as any change.
+    pub by_measure: bool,
     /// How many of [`VARIATIONS`] small variations led to the collision. Played only to tell modules apart.
     pub varied_crashes: Option<u32>,
     /// Pairs that suffice, looked for if no module does alone.
@@ -161,15 +168,37 @@ pub fn diagnose(
             !is_restored && weaknesses.iter().any(to_blame)
         });
     }
-    let cause = match (best.first(), pairs.first()) {
-        (Some(&index), _) => vec![modules[index].module],
-        (None, Some(pair)) => pair.to_vec(),
-        (None, None) => Vec::new(),
+    let measured = measure(&crash, baseline);
+    let unlucky = by_measure(&measured, &modules).filter(|_| best.is_empty());
+    let cause = match (best.first(), unlucky, pairs.first()) {
+        (Some(&index), ..) => vec![modules[index].module],
+        (None, Some(module), _) => vec![module],
+        (None, None, Some(pair)) => pair.to_vec(),
+        (None, None, None) => Vec::new(),
     };
     let is_brittle = matches!(kind, Kind::Deciding { brittle: true } | Kind::Sensing { .. });
     let brittle = is_brittle && !best.is_empty();
-    let from_s = inquiry.from_s;
-    Ok(Diagnosis { cause, brittle, modules, ideal, weaknesses, placebo, varied_crashes, pairs, from_s })
+    let (by_measure, from_s) = (unlucky.is_some(), inquiry.from_s);
+    Ok(Diagnosis {
+        cause,
+        brittle,
+        modules,
+        ideal,
+        weaknesses,
+        placebo,
+        measured,
+        by_measure,
+        varied_crashes,
+        pairs,
+        from_s,
+    })
+}
+
+/// The module whose error was farthest beyond its specification, of those without which the collision vanishes.
+fn by_measure(measured: &[Measure], modules: &[ModuleFinding]) -> Option<Module> {
+    let suffices = |module: Module| modules.iter().any(|found| found.module == module && found.suffices());
+    let beyond = measured.iter().filter(|found| found.excess() > 1.0 && suffices(found.module));
+    beyond.max_by(|a, b| a.excess().total_cmp(&b.excess())).map(|found| found.module)
 }
 
 /// Which modules may be at fault, before chance and the criteria.
@@ -379,4 +408,38 @@ fn taken_over(
         Some(number) => successor.with_other_noise(number),
     };
     ads.clone().until(from_s, successor)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_chance_made_is_named_by_the_largest_error_that_matters() {
+        let finding = |module, idealised| ModuleFinding {
+            module,
+            restored: None,
+            idealised,
+            alone: Fate::Crash,
+            share: None,
+            prevented: None,
+        };
+        let modules = [
+            finding(Module::Perception, Fate::Vanished),
+            finding(Module::Tracking, Fate::Vanished),
+            finding(Module::Prediction, Fate::Crash),
+        ];
+        let measure = |module, worst| Measure { module, what: "error, m", worst, bound: 1.0 };
+        let named = |perception, tracking, prediction| {
+            let measured = [
+                measure(Module::Perception, perception),
+                measure(Module::Tracking, tracking),
+                measure(Module::Prediction, prediction),
+            ];
+            by_measure(&measured, &modules)
+        };
+        assert_eq!(named(2.0, 1.5, 9.0), Some(Module::Perception), "the collision does not need the third");
+        assert_eq!(named(0.5, 1.5, 0.0), Some(Module::Tracking));
+        assert_eq!(named(0.9, 1.0, 9.0), None, "all within their specification");
+    }
 }

@@ -6,6 +6,7 @@ mod cause;
 mod crash;
 mod facts;
 mod hazard;
+mod measured;
 mod mechanisms;
 mod severity;
 mod shrink;
@@ -18,6 +19,7 @@ pub use avoidable::{AvoidabilityError, AvoidabilitySettings, Judgement, judge, j
 pub use cause::{Diagnosis, ModuleFinding, NoModules, WeaknessFinding, diagnose, fate};
 pub use crash::{Fate, Regression, regression};
 pub use facts::{counted, facts};
+pub use measured::Measure;
 pub use mechanisms::{MechanismShare, Share, WithoutMechanism, mechanism_shares, mechanisms};
 pub use severity::{Severity, severity};
 pub use shrink::{Shrunk, shrink, spare_steps};

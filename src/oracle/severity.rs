@@ -1,7 +1,10 @@
 //! How hard a collision was.
 //!
-//! Delta-v is the change of velocity of a perfectly inelastic impact of two bodies:
-//! `m2 / (m1 + m2) · |v2 - v1|`. Injury models are left out: their curves describe whole populations.
+//! Delta-v is the change of velocity of a perfectly inelastic impact of two bodies across the gap that closes:
+//! `m2 / (m1 + m2)` of the speed at which it closes where they meet. What slides along the contact changes nothing,
+//! so a scrape at 20 m/s is no crash at 20 m/s. Both are taken to be hit in line with their centres; an impact
+//! beside them turns the bodies and changes their velocity less, so this is an upper bound. Injury models are left
+//! out: their curves describe whole populations.
 
 use crate::episode::Collision;
 use crate::geometry::Vec2;
@@ -38,7 +41,7 @@ pub fn severity(collision: &Collision) -> Severity {
     let (ahead_mps, left_mps) = (contact.ego_speed_mps - obstacle_mps.x, obstacle_mps.y);
     let relative_speed_mps = (ahead_mps * ahead_mps + left_mps * left_mps).sqrt();
     let (ego_t, other_t) = (VehicleParameters::MKZ.mass_t, body_mass_t(collision.body));
-    let part = |mass_t: f64| mass_t / (ego_t + other_t) * relative_speed_mps;
+    let part = |mass_t: f64| mass_t / (ego_t + other_t) * contact.closing_speed_mps;
     Severity {
         closing_speed_mps: contact.closing_speed_mps,
         relative_speed_mps,
@@ -83,7 +86,8 @@ mod tests {
             let collision = Collision { contact, step: 0, body, verb: Verb::DriveAhead, spawned_s: 5.0 };
             let found = severity(&collision);
             assert_eq!((found.relative_speed_mps, found.side, found.approach), (5.0, "front", "along"));
-            assert!((found.delta_v_mps + found.obstacle_delta_v_mps - 5.0).abs() < 1e-12);
+            // It closes at 4 m/s; 3 m/s along the bumper do nothing.
+            assert!((found.delta_v_mps + found.obstacle_delta_v_mps - 4.0).abs() < 1e-12);
             let (ego_t, other_t) = (VehicleParameters::MKZ.mass_t, body_mass_t(body));
             assert!((ego_t * found.delta_v_mps - other_t * found.obstacle_delta_v_mps).abs() < 1e-9);
         }

@@ -141,7 +141,8 @@ impl Database {
                         (SELECT coalesce(sum(avoidability = 'unavoidable'), 0) FROM collision),
                         coalesce(sum(branched_s), 0.0),
                         (SELECT coalesce(sum(priority = 'ego'), 0) FROM collision),
-                        (SELECT coalesce(sum(priority = 'other'), 0) FROM collision)
+                        (SELECT coalesce(sum(priority = 'other'), 0) FROM collision),
+                        coalesce(sum(ended = 'blocked'), 0)
                  FROM episode",
             [],
             |row| {
@@ -167,6 +168,7 @@ impl Database {
                     branched_s: row.get(18)?,
                     wronged: row.get(19)?,
                     wrong: row.get(20)?,
+                    blocked: row.get(21)?,
                 })
             },
         )?)
@@ -218,7 +220,9 @@ pub struct Totals {
     pub episodes_with_collision: i64,
     pub episodes_with_counted: i64,
     pub arrived: i64,
+    /// Ended without progress: for a reason of the driving system's own, and because others blocked its way.
     pub stalled: i64,
+    pub blocked: i64,
     pub step_limit: i64,
     pub simulated_s: f64,
     pub driven_m: f64,

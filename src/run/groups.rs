@@ -1,8 +1,8 @@
 //! Groups of like failures: what a run found, by what happened and not by how often.
 //!
 //! Two counted collisions are alike if these are equal: kind of obstacle, its verb, how it moved, where the ego
-//! vehicle was hit, the shape of the ego vehicle's way (see `shape`) and the modules at fault. The last two are
-//! compared only if they were recorded.
+//! vehicle was hit, which of the two had priority, the shape of the ego vehicle's way (see `shape`) and the modules
+//! at fault. The last two are compared only if they were recorded.
 
 use std::collections::BTreeMap;
 
@@ -21,6 +21,8 @@ pub struct Group {
     pub approach: String,
     /// Where the ego vehicle was hit.
     pub side: String,
+    /// Which of the two had priority: `ego`, `other` or `none`.
+    pub priority: String,
     /// The shape of the ego vehicle's way to the collision, if it was recorded: `straight`, `left turn` and so on.
     pub shape: Option<String>,
     /// Modules at fault, if they were looked for; empty if none was found.
@@ -38,7 +40,8 @@ impl Database {
     /// If the file cannot be read.
     pub fn groups(&self) -> Result<Vec<Group>, DatabaseError> {
         let mut statement = self.connection.prepare(
-            "SELECT body, verb, approach, side, shape, cause, collision.episode, road, collision.step
+            "SELECT body, verb, approach, side, shape, cause, collision.episode, road, collision.step,
+                    priority
              FROM collision JOIN episode ON episode.episode = collision.episode
              WHERE collision.counted ORDER BY collision.episode, number",
         )?;
@@ -53,13 +56,15 @@ impl Database {
                 count: 1,
                 episode: row.get(6)?,
                 road: row.get(7)?,
+                priority: row.get(9)?,
             };
             Ok((group, row.get::<_, i64>(8)?))
         })?;
         let mut found: BTreeMap<_, (Group, i64)> = BTreeMap::new();
         for row in rows {
             let (group, step) = row?;
-            let key = [&group.kind, &group.manoeuvre, &group.approach, &group.side].map(Clone::clone);
+            let Group { kind, manoeuvre, approach, side, priority, .. } = &group;
+            let key = [kind, manoeuvre, approach, side, priority].map(Clone::clone);
             match found.entry((key, group.shape.clone(), group.cause.clone())) {
                 std::collections::btree_map::Entry::Vacant(entry) => {
                     entry.insert((group, step));

@@ -182,6 +182,7 @@ impl Ego {
             acceleration_mps2: (next_mps - speed_mps) / dt_s,
             yaw_rate_radps: turned_rad / dt_s,
             steer_rad,
+            touched: self.motion.touched,
         };
         self.place(self.motion);
     }
@@ -209,6 +210,7 @@ impl Ego {
         ] {
             sink(value.to_bits());
         }
+        sink(u64::from(motion.touched));
     }
 }
 

@@ -13,7 +13,11 @@
 //! is the moment when the first of the two comes into the other's way. A vehicle that then leaves the other
 //! room to brake gently has given way, and has from now on priority over it: nobody may drive into a junction
 //! or a lane that is taken (18.5, 13.5). What is abrupt, UN R79 says for lane changes: more than 3 m/s² after
-//! 0.4 s. The second of headway that it asks for beside that is left out.
+//! 0.4 s, to stay the way of a second behind. So a vehicle that cuts in and stops before the one behind it has its
+//! distance back has not given way.
+//!
+//! A vehicle that has crashed is an obstacle: whoever drives must be able to stop for what can be foreseen (13.1).
+//! It has priority, unless it came to lie in the ego vehicle's way too late to brake gently for it; then neither has.
 //!
 //! A pedestrian on a crosswalk has priority (21), unless the light for the ego vehicle is green. Elsewhere a
 //! pedestrian may not step onto the road without regard to distance and speed of what comes (20.6), and a
@@ -44,6 +48,8 @@ mod tests;
 const ABRUPT_MPS2: f64 = 3.0;
 /// Time until the other vehicle begins to brake, s (UN R79, 5.6.4.7).
 const REACTION_S: f64 = 0.4;
+/// Way behind another vehicle that may not be cut off, s at its speed (UN R79, 5.6.4.7).
+const HEADWAY_S: f64 = 1.0;
 /// Hardest braking that is expected for a pedestrian, m/s² (UN R157's careful driver, 0.774 g).
 const EMERGENCY_MPS2: f64 = 0.774 * 9.81;
 /// Vehicles that leave a conflict area this long before the other comes are not in its way, s. Ours.
@@ -159,6 +165,8 @@ pub(super) struct Rights {
     /// first look.
     shares: Option<bool>,
     meeting: Option<Meeting>,
+    /// Who has priority, it as a wreck in the ego vehicle's way or the ego vehicle; `None` as long as it is neither.
+    wreck: Option<Priority>,
 }
 
 /// The road user or the ego vehicle came into the other's way.
@@ -204,6 +212,23 @@ impl Rights {
         }
     }
 
+    /// Looks whether the road user, which has crashed, lies in the ego vehicle's way; ten times a second.
+    pub fn watch_wreck(&mut self, this: &Obstacle, around: &Around) {
+        if self.wreck.is_none() && this.distance_m <= APPROACH_M {
+            self.wreck = room_before_m(this, around).map(|room_m| {
+                let has_time = can_stop(around.ego.speed_mps, room_m, ABRUPT_MPS2);
+                if has_time { Priority::Other } else { Priority::None }
+            });
+        }
+    }
+
+    /// Who had priority, now that the road user, which has crashed, and the ego vehicle touch.
+    pub fn at_contact_with_wreck(&self, this: &Obstacle) -> Priority {
+        // The ego vehicle came to where it stood, or it slid to where the ego vehicle drove.
+        let stands = this.velocity_mps == Vec2::zeros();
+        self.wreck.unwrap_or(if stands { Priority::Other } else { Priority::None })
+    }
+
     /// Who had priority, now that the two touch.
     pub fn at_contact(&self, this: &Obstacle, motion: &Motion, around: &Around) -> Priority {
         let holds = |meeting: &&Meeting| (around.tick - meeting.tick) as f64 * DT_S <= HOLDS_S;
@@ -218,6 +243,7 @@ impl Rights {
     pub fn trace(&self, sink: &mut dyn FnMut(u64)) {
         PassedLight::trace(self.passed.as_ref(), sink);
         sink(self.shares.map_or(2, u64::from));
+        sink(self.wreck.map_or(u64::MAX, |priority| priority as u64));
         if let Some(Meeting { place, priority, tick }) = self.meeting {
             let (ego, other) = match place {
                 Place::Area(ego, other) => (ego.0 as u64, other.0 as u64),
@@ -452,14 +478,15 @@ impl Side {
         })
     }
 
-    /// Whether the vehicle behind can brake gently for the one ahead.
+    /// Whether the vehicle behind keeps its distance to the one ahead if it brakes gently, or not at all.
     fn is_gentle(&self) -> bool {
         let (behind_mps, ahead_mps) =
             if self.ego_is_ahead { (self.other_mps, self.ego_mps) } else { (self.ego_mps, self.other_mps) };
-        let closing_mps = behind_mps - ahead_mps.max(0.0);
+        let ahead_mps = ahead_mps.max(0.0);
+        let room_m = self.apart_m - ahead_mps * HEADWAY_S;
         self.along > 0.0
             && self.apart_m > 0.0
-            && (closing_mps <= 0.0 || can_stop(closing_mps, self.apart_m, ABRUPT_MPS2))
+            && can_stop((behind_mps - ahead_mps).max(0.0), room_m, ABRUPT_MPS2)
     }
 
     /// Who comes into the lane of the other: the one that has to give way.
@@ -497,6 +524,18 @@ impl Side {
         }
         self.comes(other_changes).unwrap_or(Priority::None)
     }
+}
+
+/// Way of the ego vehicle's front to an obstacle that lies across the strip that it drives on, m; `None` if the
+/// obstacle lies beside or behind.
+fn room_before_m(this: &Obstacle, around: &Around) -> Option<f64> {
+    let path = &around.scene.route.path;
+    let front_m = VehicleParameters::MKZ.front_m(around.ego_station_m);
+    let mut beside = path.project_from(this.outline.pose.position, front_m)?;
+    beside.offset_m -= path.project_from(around.ego_outline.pose.position, around.ego_station_m)?.offset_m;
+    let (length_m, width_m) = (2.0 * this.outline.half_length_m, 2.0 * this.outline.half_width_m);
+    let taken = beside.taken(this.forward, length_m, width_m, around.ego_outline.half_width_m)?;
+    (taken.to_m > front_m).then_some(taken.from_m - front_m)
 }
 
 /// Where a pedestrian is, seen along the ego vehicle's route.

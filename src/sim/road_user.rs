@@ -158,6 +158,20 @@ impl Mover {
         self.touched || self.crashed_with.is_some()
     }
 
+    /// Whether it has crashed into another obstacle, or another into it.
+    pub fn has_crashed(&self) -> bool {
+        self.crashed_with.is_some()
+    }
+
+    /// Whether it stands and will not go by itself: a wreck, or a driver that has given up waiting.
+    pub fn is_stuck(&self, this: &Obstacle) -> bool {
+        match &self.motion {
+            _ if self.is_wreck() => this.velocity_mps == Vec2::zeros(),
+            Motion::Drive(driver) => driver.has_given_up(),
+            Motion::Walk(_) | Motion::Stand => false,
+        }
+    }
+
     /// One tick of the obstacle `this`; `None` if it leaves the world.
     pub fn step(&mut self, this: &Obstacle, around: &Around) -> Option<Moved> {
         let in_sight = around.is_in_sight(this, self.visible_fraction);

@@ -46,12 +46,21 @@ pub struct EgoMotion {
     pub yaw_rate_radps: f64,
     /// Angle of the road wheels, rad, positive to the left.
     pub steer_rad: f64,
+    /// Whether it has touched a road user, as its collision sensors tell.
+    pub touched: bool,
 }
 
 impl EgoMotion {
     /// Rolling straight on at a constant speed.
     pub fn straight(rear_axle: Pose, speed_mps: f64) -> EgoMotion {
-        EgoMotion { rear_axle, speed_mps, acceleration_mps2: 0.0, yaw_rate_radps: 0.0, steer_rad: 0.0 }
+        EgoMotion {
+            rear_axle,
+            speed_mps,
+            acceleration_mps2: 0.0,
+            yaw_rate_radps: 0.0,
+            steer_rad: 0.0,
+            touched: false,
+        }
     }
 }
 

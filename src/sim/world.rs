@@ -40,6 +40,9 @@ const START_MPS: f64 = 3.0;
 /// leaves; in the package the oldest leaves wherever it is.
 const OBSTACLES_MAX: usize = 10;
 
+/// What stands farther ahead than this on the route does not block the ego vehicle, m: a queue of five cars.
+const QUEUE_M: f64 = 40.0;
+
 /// How far along the route the ego vehicle is looked for from where it was, m. More than it drives
 /// in a tick, so that it is found again after a corner cut, and less than any loop of a route.
 const ROUTE_SEARCH_M: f64 = 2.0;
@@ -317,6 +320,20 @@ impl World {
         self.ego_front_m() >= self.scene.route.goal_m - 1.0
     }
 
+    /// Whether something stands in the ego vehicle's way that will not go: a wreck, or a driver that waits for
+    /// others that wait for it. Vehicles that stand between them belong to the same queue.
+    pub fn is_blocked(&self) -> bool {
+        let front_m = self.ego_front_m();
+        self.users.iter().filter(|user| user.mover.is_stuck(&user.obstacle)).any(|user| {
+            let Obstacle { outline, forward, .. } = &user.obstacle;
+            let beside = self.scene.route.path.project_from(outline.pose.position, front_m);
+            let (length_m, width_m) = (2.0 * outline.half_length_m, 2.0 * outline.half_width_m);
+            let taken = beside
+                .and_then(|beside| beside.taken(*forward, length_m, width_m, self.ego.outline.half_width_m));
+            taken.is_some_and(|span| span.to_m > front_m && span.from_m < front_m + QUEUE_M)
+        })
+    }
+
     /// Station of the ego vehicle's front bumper on the route, m.
     fn ego_front_m(&self) -> f64 {
         VehicleParameters::MKZ.front_m(self.ego_station_m)
@@ -390,7 +407,11 @@ impl World {
         let mut users = core::mem::take(&mut self.users);
         let around = self.around([&[], &[]]);
         for RoadUser { obstacle, mover } in &mut users {
-            mover.rights.watch(obstacle, &mover.motion, self.ego_passed, &around);
+            if mover.has_crashed() {
+                mover.rights.watch_wreck(obstacle, &around);
+            } else {
+                mover.rights.watch(obstacle, &mover.motion, self.ego_passed, &around);
+            }
         }
         self.users = users;
     }
@@ -431,12 +452,17 @@ impl World {
         };
         if let Some(contact) = meet(ego, ego_mps, &other, before.id, self.ticks) {
             let around = self.around([&[], &[]]);
-            let priority = mover.rights.at_contact(obstacle, &mover.motion, &around);
+            let priority = if mover.has_crashed() {
+                mover.rights.at_contact_with_wreck(obstacle)
+            } else {
+                mover.rights.at_contact(obstacle, &mover.motion, &around)
+            };
             let heading = self.ego.frame.forward();
             let along_mps = heading.dot(&moved.velocity_mps);
             // Impacts chain: the second acts on the speed that the first left.
             let common_mps = common_speed_mps(self.ego.motion.speed_mps, along_mps, mover.size.mass_t);
             self.ego.motion.speed_mps = common_mps;
+            self.ego.motion.touched = true;
             // A vehicle that is pushed forward goes on at what the push gives; one that is stopped stays.
             mover.touch((moved.forward.dot(&heading) * common_mps).max(0.0));
             self.contacts.push(Contact { priority, ..contact });
@@ -503,7 +529,7 @@ impl Surroundings for World {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::vocabulary::{Body, Colour, Verb};
+    use crate::model::vocabulary::{Body, Colour, Priority, Verb};
     use crate::road::LaneIndex;
     use crate::sim::body::parameters;
     use crate::sim::npc::{Cruise, Driver, choices};
@@ -555,6 +581,53 @@ mod tests {
         assert_eq!(first.ego_speed_mps, second.ego_speed_mps);
         let common_mps = |speed_mps| common_speed_mps(speed_mps, 0.0, 0.075);
         assert_eq!(world.ego().speed_mps, common_mps(common_mps(first.ego_speed_mps)));
+    }
+
+    #[test]
+    fn a_wreck_has_priority_unless_it_came_to_lie_there_too_late() {
+        let priority = |distance_m: f64, turned_rad: f64| {
+            let mut world = testing::world(&testing::straight());
+            let drives = |world: &World| Control {
+                throttle_pct: if world.ego().speed_mps < 10.0 { 60.0 } else { 0.0 },
+                ..Control::default()
+            };
+            while world.ego().speed_mps < 10.0 {
+                let control = drives(&world);
+                world.tick(&control);
+            }
+            world.spawn(&testing::request(Verb::DriveAhead, distance_m, 0.1)).expect("there is room");
+            let user = &mut world.users[0];
+            user.obstacle.outline.pose.heading_rad += turned_rad;
+            user.obstacle.forward = user.obstacle.outline.pose.forward();
+            user.obstacle.velocity_mps = Vec2::zeros();
+            user.mover.crash(9);
+            loop {
+                let control = drives(&world);
+                if let Some(contact) = world.tick(&control).first() {
+                    return contact.priority;
+                }
+                assert!(world.time_s() < 60.0);
+            }
+        };
+        // 10 m/s: 4 m until the brakes act, and 17 m to stop gently. How the wreck lies changes nothing.
+        for turned_rad in [0.0, 1.2, 3.0] {
+            assert_eq!(priority(26.0, turned_rad), Priority::Other, "{turned_rad}");
+            assert_eq!(priority(12.0, turned_rad), Priority::None, "{turned_rad}");
+        }
+    }
+
+    #[test]
+    fn a_wreck_in_its_lane_blocks_the_ego_vehicle_and_one_beside_does_not() {
+        let mut world = testing::world(&testing::straight());
+        world.spawn(&testing::request(Verb::DriveAhead, 12.0, 4.0)).expect("there is room");
+        let stop = Control { brake_pct: 100.0, ..Control::default() };
+        (0..100).for_each(|_| drop(world.tick(&stop).to_vec()));
+        assert!(!world.is_blocked(), "it drives");
+        world.users[0].mover.crash(9);
+        (0..200).for_each(|_| drop(world.tick(&stop).to_vec()));
+        assert!(world.is_blocked());
+        world.users[0].obstacle.outline.pose.position += Vec2::new(0.0, 3.5);
+        assert!(!world.is_blocked(), "it stands in the other lane");
     }
 
     #[test]

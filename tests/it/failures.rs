@@ -64,6 +64,9 @@ fn found_scenarios_are_explained_shrunk_and_tested_again() {
     let cause = found["diagnosis"]["cause"][0].as_str().expect("it has a cause");
     assert!(status == 0 && claim.contains(cause), "{found}");
     assert_eq!(found["likelihood"]["variations"], 4);
+    assert!(["ego", "other", "none"].iter().any(|who| found["priority"] == *who), "{found}");
+    let measured = found["diagnosis"]["measured"].as_array().expect("a list");
+    assert!(measured.len() == 4 && measured.iter().all(|one| one["bound"].as_f64() > Some(0.0)), "{found}");
 
     // For several files there is a line each, and a count of each cause.
     let names: Vec<String> = files.iter().take(2).map(|file| file.display().to_string()).collect();

@@ -3,7 +3,8 @@
 //! It takes the published tracks, the motion of the ego vehicle and the path to be driven, extrapolates both
 //! at constant speed along that path, and brakes when a contact of the front is so near that comfortable
 //! braking no longer prevents it. It never does less than control asks. Limits are those of UN R152 and of
-//! Euro NCAP's tests; there is no warning, because no driver is there to be warned. Left out: steering,
+//! Euro NCAP's tests; there is no warning, because no driver is there to be warned. After a contact the vehicle
+//! is braked to rest and stays there. Left out: steering,
 //! junction assistance that guesses at turns of others, and braking for what will strike from the side or
 //! from behind.
 
@@ -127,6 +128,17 @@ impl Emergency {
         }
         let (_, brake_pct) = pedals_for(-self.braking_mps2.min(brake_mps2_max));
         Control { throttle_pct: 0.0, brake_pct: brake_pct.max(control.brake_pct), ..control }
+    }
+
+    /// The command after a contact: full braking to rest, and the brake held.
+    pub fn after_contact(&self, control: Control, brake_mps2_max: f64) -> Control {
+        let (_, brake_pct) = pedals_for(-self.config.full_mps2.min(brake_mps2_max));
+        Control { throttle_pct: 0.0, brake_pct: brake_pct.max(control.brake_pct), ..control }
+    }
+
+    /// Whether the vehicle stops for good after a contact.
+    pub fn stops_after_contact(&self) -> bool {
+        self.config.stops_after_contact
     }
 
     /// The braking that a threat calls for, magnitude, m/s²; 0 if it can be left to the planner.

@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use crate::ads::driver::Ads;
 use crate::ads::status::{GHOST_ID_MIN, PerceivedObject, Reason, Status};
-use crate::geometry::Pose;
+use crate::geometry::{Pose, Vec2};
 use crate::sim::{Control, DT_S, FRAME_TICKS, Scene, Sensed};
 
 use super::config::ModularConfig;
@@ -16,7 +16,7 @@ use super::emergency::Emergency;
 use super::foresight::Foresight;
 use super::junctions::Junctions;
 use super::localization::Localization;
-use super::perception::{LightReader, Perception};
+use super::perception::{LightReader, Perception, sees_empty};
 use super::planning::{Outlook, Planner};
 use super::prediction::Prediction;
 use super::tracking::Tracking;
@@ -84,7 +84,14 @@ impl Modular {
         if let Some(since_s) = self.watchdog.looks(sensed.time_s) {
             self.tracking.resume(since_s);
             self.tracking.delay(self.watchdog.load_frames(sensed.objects.len()));
-            self.tracking.update(self.perception.look(sensed, localized));
+            let near_m = self.tracking.hold_m();
+            let may_be_taken = |place: Vec2| {
+                (place - localized.position).norm() <= near_m && !sees_empty(place, sensed, localized)
+            };
+            let detections = self.perception.look(sensed, localized);
+            self.status.detected.clear();
+            self.status.detected.extend(detections.iter().map(|detection| detection.truth));
+            self.tracking.update(detections, may_be_taken);
         }
         let lights = self.lights.look(sensed, self.station_m);
         let (tracks, age_s) =
@@ -182,7 +189,10 @@ impl Ads for Modular {
         if let Some(id) = self.emergency.braking_for() {
             self.status.reason = Reason::Emergency(self.truth_of(id));
         }
-        let control = if self.watchdog.is_degraded() {
+        let control = if sensed.ego.touched && self.emergency.stops_after_contact() {
+            self.status.reason = Reason::Contact;
+            self.emergency.after_contact(control, self.brake_mps2_max)
+        } else if self.watchdog.is_degraded() {
             self.status.reason = Reason::Degraded;
             self.watchdog.brake(control)
         } else {

@@ -7,7 +7,7 @@ use crate::ads::testing::{Rig, object, straight, two_lanes, winding};
 use crate::geometry::{Pose, Vec2};
 use crate::model::vocabulary::Body;
 use crate::road::RouteLaneChange;
-use crate::sim::{Scene, SignalColour};
+use crate::sim::{DT_S, Scene, SignalColour};
 
 use super::{Modular, ModularConfig, Module};
 
@@ -115,6 +115,56 @@ fn a_late_module_is_braked_for_until_it_is_back() {
     let (braked, free) = (slowest_mps(true, 1.5), slowest_mps(false, 1.5));
     assert!(braked.0 < 8.0 && braked.1 && free.0 > 10.0 && !free.1, "{braked:?} and {free:?}");
     assert!(!slowest_mps(true, 0.3).1, "a short hang is within the limits");
+}
+
+#[test]
+fn after_a_contact_it_brakes_to_rest_and_stays() {
+    let scene = straight();
+    for stops in [true, false] {
+        let config = config(|config| config.emergency.stops_after_contact = stops);
+        let mut rig = Rig::new(&scene, Box::new(Modular::new(&scene, &config, 1)), 0.0);
+        rig.run(10.0);
+        rig.sensed.ego.touched = true;
+        rig.run(3.0);
+        assert_eq!(rig.sensed.ego.speed_mps < 0.01, stops, "{}", rig.sensed.ego.speed_mps);
+        assert_eq!(rig.ads.status().reason == Reason::Contact, stops);
+        rig.run(10.0);
+        assert_eq!(rig.sensed.ego.speed_mps < 0.01, stops);
+    }
+}
+
+#[test]
+fn no_red_light_is_passed_whenever_it_turns_yellow() {
+    let scene = straight();
+    let line_m = scene.route.stop_lines[0].station_m;
+    let front_m = |rig: &Rig| rig.station_m() + 3.705;
+    let (mut stopped, mut passed) = (0, 0);
+    for late_red_passed in [true, false] {
+        for half_metres in 20..80 {
+            let yellow_m = line_m - f64::from(half_metres) / 2.0;
+            let config = config(|config| config.weaknesses.late_red_passed = late_red_passed);
+            let mut rig = Rig::new(&scene, Box::new(Modular::new(&scene, &config, 1)), 11.0);
+            let mut since_yellow_s: f64 = 0.0;
+            for _ in 0..600 {
+                let before_m = front_m(&rig);
+                rig.tick();
+                since_yellow_s += if before_m >= yellow_m { DT_S } else { 0.0 };
+                rig.sensed.signals[0] = match since_yellow_s {
+                    s if s <= 0.0 => SignalColour::Green,
+                    s if s < 3.0 => SignalColour::Yellow,
+                    _ => SignalColour::Red,
+                };
+                let passes = before_m < line_m && front_m(&rig) >= line_m;
+                // With the weakness off it brakes for what it cannot stop for, and stands beyond the line.
+                let excused = !late_red_passed && half_metres < 30;
+                let is_red = rig.sensed.signals[0] == SignalColour::Red;
+                assert!(!passes || !is_red || excused, "yellow {half_metres} half metres before");
+                passed += u32::from(passes);
+            }
+            stopped += u32::from(rig.sensed.ego.speed_mps < 0.1);
+        }
+    }
+    assert!(stopped > 40 && passed > 10, "{stopped} {passed}");
 }
 
 #[test]

@@ -167,8 +167,6 @@ impl Driver {
         let braking_mps2 = around.braking_mps2(size, self.speed_mps);
         let acceleration_mps2 = if touched {
             -braking_mps2
-        } else if around.traffic.rays {
-            self.wanted_mps2(size, around, braking_mps2)
         } else {
             self.wanted_mps2(size, around, braking_mps2).clamp(-braking_mps2, size.acceleration_mps2_max)
         };
@@ -265,6 +263,11 @@ impl Driver {
         } else if self.hold_m.is_some() || blocked {
             self.waited_ticks += 1;
         }
+        self.has_given_up()
+    }
+
+    /// Whether it has waited for others so long that it would leave if it were not seen.
+    pub fn has_given_up(&self) -> bool {
         f64::from(self.waited_ticks) * DT_S >= GIVE_UP_S
     }
 

@@ -2,9 +2,13 @@
 //!
 //! Three rays run straight ahead from the front, from its middle and its corners, whatever the way does. What
 //! they meet within a stop distance makes the driver stop. The stop distance grows with the speed and falls
-//! with a driver's aggression, 1 to 3. The speed tends to its target at a fixed rate, whatever tyres could do.
+//! with a driver's aggression, 1 to 3. The speed tends to its target at a fixed rate.
 //! Figures from `NPCLaneFollowBehaviour` of LGSVL's simulator 2021.3; they stand in `sim::traffic`. There the stop
 //! distance at the limit is cut to whole metres (20, 10 and 6 m straight through junctions).
+//!
+//! That rate is a wish of 23 to 57 m/s², which LGSVL's vehicles got because they have no tyres. Here brakes and
+//! tyres bound it (`Driver::step`), and so that its drivers are no worse for it, they stop from as far away as the
+//! brakes need, where that is more than the published distance.
 
 use crate::geometry::{Frame, Vec2};
 use crate::rng;
@@ -88,7 +92,9 @@ impl Driver {
         let most_m = if goes_straight { profile.stop_junction_m } else { profile.stop_m };
         let at_limit_m = most_m / f64::from(self.aggression.max(1)) * lane.speed_limit_mps / LIMIT_MPS;
         let part = (self.speed_mps / lane.speed_limit_mps).clamp(0.0, 1.0);
-        profile.stop_m_min + (at_limit_m - profile.stop_m_min) * part
+        let published_m = profile.stop_m_min + (at_limit_m - profile.stop_m_min) * part;
+        let braking_mps2 = around.braking_mps2(size, self.speed_mps);
+        published_m.max(LINE_M_MIN + self.speed_mps * self.speed_mps / (2.0 * braking_mps2))
     }
 
     /// Acceleration towards the wanted speed, m/s²: up to `wish_mps`, less before the line that is `line_m` away,
@@ -100,10 +106,12 @@ impl Driver {
         wish_mps: f64,
         line_m: f64,
     ) -> f64 {
+        // A speed that falls in proportion to the way left asks for twice the mean braking at its begin.
+        let from_m = LINE_M.max(wish_mps * wish_mps / around.braking_mps2(size, wish_mps));
         let target_mps = if self.leader.is_some() || line_m < LINE_M_MIN {
             0.0
         } else {
-            wish_mps * (line_m / LINE_M).min(1.0)
+            wish_mps * (line_m / from_m).min(1.0)
         };
         let rate_ps = around.traffic.stop_rate_ps * f64::from(1 + self.aggression.max(1));
         // No speed passes its target within a tick.

@@ -133,6 +133,26 @@ fn one_who_cuts_in_gives_way_unless_there_is_room() {
 }
 
 #[test]
+fn one_who_cuts_in_and_stops_has_not_given_way_before_the_distance_is_back() {
+    let side = |apart_m: f64, other_mps: f64| Side {
+        aside_m: -1.0,
+        apart_m,
+        ego_is_ahead: false,
+        along: 1.0,
+        ego_mps: 10.0,
+        other_mps,
+        ego_towards_mps: 0.0,
+        other_towards_mps: 1.0,
+    };
+    // As fast as the ego vehicle, less than a second before it.
+    assert_eq!(side(4.0, 10.0).at_coming(true), Some(Priority::Ego));
+    assert_eq!(side(11.0, 10.0).at_coming(true), None);
+    // What was found stays while it brakes to rest, and until there is room to brake gently for it.
+    assert!(!side(4.0, 10.0).is_gentle() && !side(6.0, 5.0).is_gentle() && !side(4.0, 0.0).is_gentle());
+    assert!(side(22.0, 0.0).is_gentle());
+}
+
+#[test]
 fn on_foot_the_crosswalk_decides_and_elsewhere_the_time_to_brake() {
     let crosses = |scene: &Arc<Scene>, verb: Verb, distance_m: f64| {
         let mut world = testing::world(scene);

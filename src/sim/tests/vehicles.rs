@@ -130,8 +130,8 @@ fn released_vehicles_see_what_their_rays_meet_and_stop_at_once() {
             was_mps = now_mps;
         }
         assert!(was_mps < 0.1, "{was_mps}");
-        // At 4 to 8 1/s of 12 m/s, which no tyre gives.
-        assert!(hardest_mps2 > 15.0, "{hardest_mps2}");
+        // The wish is 4 to 8 1/s of 12 m/s; tyres give no more than this.
+        assert!((7.0..=8.001).contains(&hardest_mps2), "{hardest_mps2}");
         assert_eq!(world.incidents(), []);
     }
 }

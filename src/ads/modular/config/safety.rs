@@ -7,7 +7,7 @@ section! {
     pub struct EmergencyConfig {
         /// Whether there is any. Off is a fault to plant.
         enabled: bool = true;
-        /// It begins to brake for vehicles from this speed on, m/s, in `[0, 20]`. UN R152, 5.2.1.3: 10 km/h.
+        /// It begins to brake for vehicles from this speed on, m/s, in `[0, 20]`. UN R152, 5.2.1.3, demands it from 10 km/h on; below, the planner alone stops.
         speed_mps_min: f64 = 2.78, 0.0..=20.0;
         /// It begins to brake for pedestrians from this speed on, m/s, in `[0, 20]`. UN R152, 5.2.2.3, demands it from 20 km/h, Euro NCAP (AEB/LSS VRU 4.5.1) tests from 10 km/h: the latter.
         pedestrian_speed_mps_min: f64 = 2.78, 0.0..=20.0;
@@ -29,5 +29,7 @@ section! {
         confirm_s: f64 = 0.2, 0.0..=5.0;
         /// It begins later by so long, s, in `[0, 5]`. A fault to plant: none by default.
         delay_s: f64 = 0.0, 0.0..=5.0;
+        /// After a contact the vehicle brakes to rest and stays. NHTSA's recall 23E-086 (Cruise, 2023) is about one that drove on; multi-collision brakes of series cars brake likewise.
+        stops_after_contact: bool = true;
     }
 }

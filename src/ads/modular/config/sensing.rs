@@ -53,6 +53,8 @@ section! {
         range_factor: f64 = 1.0, 0.05..=2.0;
         /// Chance of detection in a frame far inside the range, in `[0, 1]`. Ours.
         detection_chance_max: f64 = 0.98, 0.0..=1.0;
+        /// Nearer than this the share of missed frames falls with the square of the distance, as the number of LiDAR returns rises, m, in `[0, 100]`; 0: misses are as frequent near by. The law is ours; Waymo's nearest band of detection scores ends at 30.
+        plenty_m: f64 = 30.0, 0.0..=100.0;
         /// Mean length of a run of missed frames, s, in `[0.1, 10]`. Ours; the share of missed frames does not depend on it.
         miss_run_s: f64 = 0.4, 0.1..=10.0;
         /// An object of which less is in sight is not detected under `late_unstable_tracks`, in `[0, 1]`. Ours.
@@ -101,6 +103,14 @@ section! {
         frames_to_publish: u32 = 4, 1.0..=100.0;
         /// A track unseen for longer is dropped, s, in `[0, 5]`. Apollo's LiDAR tracker, `reserved_invisible_time`: 0.3.
         reserve_s: f64 = 0.3, 0.0..=5.0;
+        /// A published track of what stands is held for so long instead, unless its place is seen empty, s, in `[0, 30]`; 0: no track is held. Ours: longer than nearly every run of misses, and than most that passes hides what it passes.
+        hold_s: f64 = 5.0, 0.0..=30.0;
+        /// No track is held farther away than this, m, in `[0, 100]`. Ours: the way to a stop from 11 m/s, and as much again.
+        hold_m: f64 = 30.0, 0.0..=100.0;
+        /// Only a track that was seen in this share of its frames is held, in `[0, 1]`. Apollo's earlier tracker, `track_visible_ratio_minimum`: 0.6.
+        hold_seen_min: f64 = 0.6, 0.0..=1.0;
+        /// What is slower than this stands, m/s, in `[0, 5]`. Apollo's prediction, `still_obstacle_speed_threshold`: 0.99.
+        hold_mps_max: f64 = 0.99, 0.0..=5.0;
         /// A detection farther from where a track is expected does not belong to it, m, in `[0.1, 50]`. Apollo's fusion, `s_match_distance_thresh_`: 4.0.
         gate_m: f64 = 4.0, 0.1..=50.0;
         /// A track whose centre lies in the outline of an older one, grown by this on each side, is a duplicate and dropped, m, in `[0, 20]`. Ours; more is a fault to plant.

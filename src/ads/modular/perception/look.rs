@@ -1,8 +1,9 @@
 //! A look around: which objects are detected in a frame (10 Hz), and how well.
 //!
 //! LiDAR and camera detect an object together with a chance that falls with distance and with what
-//! hides it; far away by day the camera alone does. Misses come in runs, not one by one: a chain of
-//! two states in which the share of misses is one minus that chance. Each object has a random stream of
+//! hides it; far away by day the camera alone does. Near by, returns are plenty and misses rare. Misses come in
+//! runs, not one by one: a chain of two states in which the share of misses is one minus that chance. Each object
+//! has a random stream of
 //! its own, so that a change of one object does not change the luck of the others.
 //! A large vehicle is at times taken for its near part alone, and for runs of frames for two vehicles.
 //! Left out: confusion of classes beside that, and headings turned round.
@@ -139,7 +140,7 @@ impl Perception {
         if blind || hidden || object.visible_fraction <= 0.0 {
             return 0.0;
         }
-        object.visible_fraction * ranges.detection_chance(config, object, known)
+        ranges.detection_chance(config, object, known)
     }
 }
 
@@ -319,6 +320,7 @@ mod tests {
         for (miss_run_s, mean_low, mean_high) in [(0.1, 0.9, 1.2), (0.4, 3.0, 5.0)] {
             let config = PerceptionConfig {
                 detection_chance_max: 0.9,
+                plenty_m: 0.0,
                 miss_run_s,
                 ghosts_per_s: 0.0,
                 ..PerceptionConfig::default()
@@ -336,6 +338,29 @@ mod tests {
             assert!((share - 0.1).abs() < 0.03, "{share}");
             assert!((mean_low..mean_high).contains(&mean), "{mean}");
         }
+    }
+
+    #[test]
+    fn near_by_misses_are_rare_unless_a_fault_says_otherwise() {
+        let misses = |plenty_m: f64, distance_m: f64| {
+            let config =
+                PerceptionConfig { detection_chance_max: 0.9, plenty_m, ..PerceptionConfig::default() };
+            let frames = 50;
+            let of_seed = |seed: u64| {
+                let config = PerceptionConfig { ghosts_per_s: 0.0, ..config };
+                let mut perception = Perception::new(&config, true, seed);
+                let sensed = sensed(vec![at(Body::Sedan, distance_m)]);
+                let found = |_: &u32| perception.look(&sensed, &sensed.ego.rear_axle).is_empty();
+                (0..frames).filter(found).count()
+            };
+            (0..200).map(of_seed).sum::<usize>() as f64 / (200.0 * f64::from(frames))
+        };
+        let (at_4_m, at_15_m, at_30_m) = (misses(30.0, 4.0), misses(30.0, 15.0), misses(30.0, 30.0));
+        assert!(
+            at_4_m < 0.005 && (0.01..0.05).contains(&at_15_m) && at_30_m > 0.06,
+            "{at_4_m} {at_15_m} {at_30_m}"
+        );
+        assert!(misses(0.0, 4.0) > 0.06);
     }
 
     #[test]

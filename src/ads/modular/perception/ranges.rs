@@ -46,9 +46,11 @@ impl Ranges {
         }
     }
 
-    /// Chance that LiDAR and camera together detect a wholly visible object in a frame. `known` says
+    /// Chance that LiDAR and camera together detect an object in a frame, of which a part is in sight. `known` says
     /// that they did in the last one.
     pub fn detection_chance(&self, config: &PerceptionConfig, object: &SensedObject, known: bool) -> f64 {
+        // Half of a surface gives as many returns as all of it from √2 times as far.
+        let distance_m = object.distance_m / object.visible_fraction.sqrt();
         let (lidar_m, camera_m) = if object.body.is_vehicle() {
             (self.lidar_vehicle_m, self.camera_vehicle_m)
         } else {
@@ -57,12 +59,14 @@ impl Ranges {
         let camera_begins = object.distance_m > config.camera_alone_m && self.camera_may_begin;
         let fused_m = lidar_m + config.camera_weight * (camera_m - lidar_m);
         // Beyond one range and a half the chance is below a thousandth: no need to work it out.
-        if object.distance_m > 1.5 * fused_m.max(camera_m) {
+        if distance_m > 1.5 * fused_m.max(camera_m) {
             return 0.0;
         }
-        let fused = in_range(object.distance_m, fused_m);
-        let camera = if known || camera_begins { in_range(object.distance_m, camera_m) } else { 0.0 };
-        config.detection_chance_max * fused.max(camera)
+        let fused = in_range(distance_m, fused_m);
+        let camera = if known || camera_begins { in_range(distance_m, camera_m) } else { 0.0 };
+        let sparse = (distance_m / config.plenty_m.max(1e-3)).min(1.0);
+        let misses = (1.0 - config.detection_chance_max) * sparse * sparse;
+        (1.0 - misses) * fused.max(camera)
     }
 }
 
@@ -134,6 +138,12 @@ mod tests {
             let seen = object(1, body, Pose::new(distance_m, 0.0, 0.0), 0.0);
             ranges.detection_chance(&config, &SensedObject { distance_m, ..seen }, false)
         };
+        let half = |distance_m: f64| {
+            let seen = object(1, Body::Pedestrian, Pose::new(distance_m, 0.0, 0.0), 0.0);
+            let half = SensedObject { distance_m, visible_fraction: 0.5, ..seen };
+            Ranges::in_conditions(&config, true, &CLEAR_DAY).detection_chance(&config, &half, false)
+        };
+        assert_eq!(half(20.0), chance(&CLEAR_DAY, true, Body::Pedestrian, 20.0 / 0.5_f64.sqrt()));
         let fog = Conditions { visibility_m: 50.0, ..CLEAR_DAY };
         let rain = Conditions { rain_mmph: 50.0, ..CLEAR_DAY };
         let night = Conditions { light: 0.0, ..CLEAR_DAY };

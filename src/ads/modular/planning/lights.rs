@@ -2,12 +2,11 @@
 //!
 //! A light that would need harder braking than `red_light_mps2_max` is passed for as long as it would
 //! (Apollo's traffic-light rule, weakness `late_red_passed`). A stop once decided holds until the light is green,
-//! also for a vehicle that has come to rest beyond the line, unless it is in the junction already. A
-//! light whose colour is not known is taken for red, as in Apollo.
+//! also for a vehicle that has come to rest beyond the line, unless it is in the junction already; if it needs it,
+//! the vehicle brakes for it as hard as in an emergency. A light whose colour is not known is taken for red, as in Apollo.
 
 use std::sync::Arc;
 
-use crate::ads::status::Reason;
 use crate::sim::{Scene, SignalColour, VehicleParameters};
 
 use super::super::config::PlanningConfig;
@@ -20,6 +19,9 @@ const PASSED_M: f64 = 0.5;
 /// A bumper this far over the line is in the junction, which the vehicle must then clear, m. Ours;
 /// the `min_pass_s_distance` of Apollo's scenarios at lights is 3.0.
 const INSIDE_M: f64 = 4.0;
+/// From the decision until the brakes follow the plan, s: one frame, and their lag. Without it a vehicle that only
+/// just can stop comes to rest beyond the line. Ours.
+const RESPONSE_S: f64 = 0.25;
 
 #[derive(Debug, Clone)]
 pub struct Lights {
@@ -62,12 +64,12 @@ impl Lights {
                 continue;
             }
             if *choice != Choice::Stop && distance_m >= -PASSED_M {
-                let stops = can_stop(&self.config, self.config.red_light_mps2_max, distance_m, speed_mps);
+                let room_m = distance_m - speed_mps * RESPONSE_S;
+                let stops = can_stop(&self.config, self.config.red_light_mps2_max, room_m, speed_mps);
                 *choice = if stops { Choice::Stop } else { Choice::Pass };
             }
             if *choice == Choice::Stop {
-                let stop_m = line.station_m - self.config.stop_line_gap_m;
-                constraints.push(Constraint::line(Reason::RedLight, stop_m));
+                constraints.push(Constraint::red_light(&self.config, line.station_m));
             }
         }
     }

@@ -56,6 +56,12 @@ impl Constraint {
         Constraint { reason, kind: Kind::Fence { stop_m, touch_m: None, until_s: f64::INFINITY } }
     }
 
+    /// A red light at a line. The stop has been decided: braking may be as hard as staying before the line needs.
+    pub fn red_light(config: &PlanningConfig, line_m: f64) -> Constraint {
+        let (stop_m, touch_m) = (line_m - config.stop_line_gap_m, Some(line_m + EMERGENCY_GAP_M));
+        Constraint { reason: Reason::RedLight, kind: Kind::Fence { stop_m, touch_m, until_s: f64::INFINITY } }
+    }
+
     /// A road user that stands with its near end at `from_m`.
     pub fn stop(config: &PlanningConfig, id: u32, from_m: f64) -> Constraint {
         let kind =

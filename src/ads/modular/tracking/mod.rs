@@ -4,12 +4,17 @@
 //! filter, and a track is published once it has had more than three detections, in a row or not. Detections
 //! carry no identity, so tracks can swap; of two tracks in one place the younger is taken for a duplicate,
 //! so objects that touch can merge; and a large vehicle that is detected in parts splits.
+//!
+//! A track that is not seen any more is dropped soon. One that stands near by is held, because nothing that
+//! stands is gone by not being detected: the vehicle does not drive onto a place that was taken a moment ago
+//! before it has seen the place empty.
 
 mod association;
 mod track;
 
 use std::collections::VecDeque;
 
+use crate::geometry::Vec2;
 use crate::sim::FRAME_S;
 
 use self::association::Association;
@@ -58,7 +63,7 @@ impl Tracking {
         self.load_frames = load_frames.min(LOAD_FRAMES_MAX);
     }
 
-    /// Forgets all tracks if the last frame was `since_s` ago and that is longer than any is reserved.
+    /// Forgets all tracks if the last frame was `since_s` ago and that is longer than a moving one is reserved.
     pub fn resume(&mut self, since_s: f64) {
         if since_s > FRAME_S + self.config.reserve_s {
             self.tracks.clear();
@@ -66,10 +71,10 @@ impl Tracking {
         }
     }
 
-    /// One frame of detections.
-    pub fn update(&mut self, detections: &[Detection]) {
+    /// One frame of detections. `may_be_taken` says of a place whether it is near enough to be held, and was not
+    /// seen empty: asked only for tracks that stand and were not detected.
+    pub fn update(&mut self, detections: &[Detection], may_be_taken: impl Fn(Vec2) -> bool) {
         for track in &mut self.tracks {
-            track.unseen_s += FRAME_S;
             track.advance(&self.config);
         }
         let found = self.association.find(&self.config, &self.tracks, detections);
@@ -90,10 +95,18 @@ impl Tracking {
             }
         }
         let frames_to_publish = self.frames_to_publish;
-        let reserve_s = if self.config.perfect { PERFECT_RESERVE_S } else { self.config.reserve_s };
+        let config = &self.config;
+        let reserve_s = if config.perfect { PERFECT_RESERVE_S } else { config.reserve_s };
         self.tracks.retain_mut(|track| {
             track.published |= track.frames >= frames_to_publish;
-            track.unseen_s <= reserve_s + 1e-9
+            if track.unseen_s <= reserve_s + 1e-9 {
+                return true;
+            }
+            let held = !config.perfect && stands(track, config) && may_be_taken(track.centre());
+            if held {
+                track.stay();
+            }
+            held
         });
         if !self.config.perfect {
             self.drop_duplicates();
@@ -112,14 +125,16 @@ impl Tracking {
         self.published.push_back(newest);
     }
 
-    /// Drops every track whose centre lies in the outline of one that has been seen more often.
+    /// Drops every track whose centre lies in the outline of one that has been seen more often. One that is held
+    /// yields to one that is seen.
     fn drop_duplicates(&mut self) {
-        let room_m = self.config.duplicate_m;
+        let (room_m, reserve_s) = (self.config.duplicate_m, self.config.reserve_s);
+        let rank = |track: &Track| (track.unseen_s <= reserve_s + 1e-9, track.frames);
         let mut index = 0;
         while index < self.tracks.len() {
             let own = &self.tracks[index];
             let is_duplicate = self.tracks.iter().enumerate().any(|(number, other)| {
-                let older = (other.frames, own.id) > (own.frames, other.id);
+                let older = (rank(other), own.id) > (rank(own), other.id);
                 number != index
                     && older
                     && own.body.is_vehicle() == other.body.is_vehicle()
@@ -131,6 +146,11 @@ impl Tracking {
                 index += 1;
             }
         }
+    }
+
+    /// No track is held farther away than this, m.
+    pub fn hold_m(&self) -> f64 {
+        self.config.hold_m
     }
 
     /// The tracks that are used now: those of some frames ago.
@@ -145,10 +165,19 @@ impl Tracking {
     }
 }
 
+/// Whether a track shows for certain something that stands, so that it may be held though unseen.
+fn stands(track: &Track, config: &TrackingConfig) -> bool {
+    track.published
+        && track.unseen_s <= config.hold_s + 1e-9
+        && f64::from(track.frames)
+            >= config.hold_seen_min * (f64::from(track.age_frames) - track.unseen_s / FRAME_S)
+        && track.velocity_mps.norm() <= config.hold_mps_max
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::{Pose, Vec2};
+    use crate::geometry::Pose;
     use crate::model::vocabulary::Body;
 
     fn car(x_m: f64) -> Detection {
@@ -166,10 +195,15 @@ mod tests {
         }
     }
 
+    /// What is not detected was not near enough to be held, or its place was seen empty.
+    fn gone(_: Vec2) -> bool {
+        false
+    }
+
     /// Frame (from 1) in which something is first published.
     fn first_published(tracking: &mut Tracking) -> u32 {
         let published = |frame: &u32| {
-            tracking.update(&[car(0.8 * f64::from(*frame))]);
+            tracking.update(&[car(0.8 * f64::from(*frame))], gone);
             !tracking.published().is_empty()
         };
         (1..60).find(published).expect("in the end it is published")
@@ -195,13 +229,13 @@ mod tests {
         ] {
             let mut tracking = Tracking::new(&config, true, 0);
             for frame in 0..20 {
-                tracking.update(&[car(30.0 + 0.8 * f64::from(frame))]);
+                tracking.update(&[car(30.0 + 0.8 * f64::from(frame))], gone);
             }
             let velocity_mps = tracking.published()[0].velocity_mps;
             let error_mps = (velocity_mps - Vec2::new(8.0, 0.0)).norm();
             assert!(if config.perfect { error_mps == 0.0 } else { error_mps < 0.2 }, "{velocity_mps}");
             for miss in 1..=misses + 1 {
-                tracking.update(&[]);
+                tracking.update(&[], gone);
                 assert_eq!(tracking.published().len(), usize::from(miss <= misses), "miss {miss}");
             }
         }
@@ -223,7 +257,7 @@ mod tests {
         let mut tracking = Tracking::new(&TrackingConfig::default(), true, 0);
         for frame in 0..7 {
             let seen = [walker(1, 10.0, 2.0)];
-            tracking.update(&seen[..usize::from(frame % 2 == 0)]);
+            tracking.update(&seen[..usize::from(frame % 2 == 0)], gone);
             assert_eq!(tracking.published().len(), usize::from(frame == 6), "frame {frame}");
         }
     }
@@ -239,7 +273,7 @@ mod tests {
             // The one turns back where they meet, which the tracks do not expect.
             let turned = frame > 28;
             let both = if turned { [walker(2, way_m, 0.0), walker(1, 7.67 - way_m, aside_m)] } else { both };
-            tracking.update(&both);
+            tracking.update(&both, gone);
             if frame == 20 {
                 before = tracking.published().iter().map(|track| track.truth).collect();
             }
@@ -260,7 +294,7 @@ mod tests {
         let published = |config: &TrackingConfig, apart_m: f64| {
             let mut tracking = Tracking::new(config, true, 0);
             for _ in 0..10 {
-                tracking.update(&[walker(1, 10.0, 2.0), walker(2, 10.0, 2.0 + apart_m)]);
+                tracking.update(&[walker(1, 10.0, 2.0), walker(2, 10.0, 2.0 + apart_m)], gone);
             }
             tracking.published().len()
         };
@@ -271,11 +305,53 @@ mod tests {
         assert_eq!(published(&TrackingConfig { perfect: true, ..merging }, 0.2), 2);
     }
 
+    /// For how many frames of 100 a car that was seen at `moves` from frame to frame is known once it is not
+    /// detected any more, and the way that its track goes meanwhile, m.
+    fn known(moves_m: f64, seen: impl Fn(u32) -> bool, empty_from: u32) -> (u32, f64) {
+        let mut tracking = Tracking::new(&TrackingConfig::default(), true, 0);
+        let at = |frame: u32| car(10.0 + moves_m * f64::from(frame));
+        for frame in 0..30 {
+            let detected = [at(frame)];
+            tracking.update(&detected[..usize::from(seen(frame))], |_| true);
+        }
+        let begin = tracking.published()[0].centre();
+        let mut last = begin;
+        let known = (0..100).filter(|frame| {
+            tracking.update(&[], |_| *frame < empty_from);
+            last = tracking.published().first().map_or(last, Track::centre);
+            !tracking.published().is_empty()
+        });
+        (known.count() as u32, (last - begin).norm())
+    }
+
+    #[test]
+    fn what_stands_near_by_is_held_until_its_place_is_seen_empty() {
+        let (frames, way_m) = known(0.0, |_| true, 100);
+        assert_eq!(frames, 50, "five seconds");
+        assert!(way_m < 0.2, "{way_m}");
+        assert_eq!(known(0.0, |_| true, 20).0, 20, "its place is seen empty");
+        assert_eq!(known(0.0, |_| true, 0).0, 3, "no more than reserved");
+        assert_eq!(known(0.5, |_| true, 100).0, 3, "it moves");
+        assert_eq!(known(0.0, |frame| frame % 2 == 1, 100).0, 3, "it is seldom seen");
+    }
+
+    #[test]
+    fn what_was_held_and_drives_on_is_one_track() {
+        let mut tracking = Tracking::new(&TrackingConfig::default(), true, 0);
+        (0..30).for_each(|_| tracking.update(&[car(10.0)], |_| true));
+        (0..10).for_each(|_| tracking.update(&[], |_| true));
+        for frame in 0..40 {
+            tracking.update(&[car(11.0 + 0.5 * f64::from(frame))], |_| true);
+        }
+        let [track] = tracking.published() else { panic!("{:?}", tracking.published()) };
+        assert!((track.velocity_mps.x - 5.0).abs() < 0.3, "{track:?}");
+    }
+
     #[test]
     fn a_planted_fault_scales_the_velocity() {
         let config = TrackingConfig { velocity_factor: 0.0, ..TrackingConfig::default() };
         let mut tracking = Tracking::new(&config, true, 0);
-        (0..20).for_each(|frame| tracking.update(&[car(0.8 * f64::from(frame))]));
+        (0..20).for_each(|frame| tracking.update(&[car(0.8 * f64::from(frame))], gone));
         assert_eq!(tracking.published()[0].velocity_mps, Vec2::zeros());
     }
 }

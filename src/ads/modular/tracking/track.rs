@@ -33,8 +33,9 @@ pub struct Track {
     pub width_m: f64,
     pub height_m: f64,
     covariance: Covariance,
-    /// Number of its detections so far.
+    /// Number of its detections so far, and of the frames since the first.
     pub(super) frames: u32,
+    pub(super) age_frames: u32,
     pub(super) published: bool,
     pub(super) unseen_s: f64,
 }
@@ -113,6 +114,7 @@ impl Track {
                 velocity: UNKNOWN_VELOCITY_MPS * UNKNOWN_VELOCITY_MPS,
             },
             frames: 1,
+            age_frames: 1,
             published: false,
             unseen_s: 0.0,
         }
@@ -127,6 +129,8 @@ impl Track {
         };
         // An acceleration that is constant over the frame, of that deviation.
         let (by_position, by_velocity) = (FRAME_S * FRAME_S / 2.0 * sigma_mps2, FRAME_S * sigma_mps2);
+        self.age_frames += 1;
+        self.unseen_s += FRAME_S;
         self.position += self.velocity_mps * FRAME_S;
         let before = self.covariance;
         self.covariance = Covariance {
@@ -136,6 +140,13 @@ impl Track {
             mixed: before.mixed + FRAME_S * before.velocity + by_position * by_velocity,
             velocity: before.velocity + by_velocity * by_velocity,
         };
+    }
+
+    /// Takes back what [`Track::advance`] did to the place: what stands stays where it was seen last, though less
+    /// and less surely.
+    pub(super) fn stay(&mut self) {
+        self.position -= self.velocity_mps * FRAME_S;
+        self.velocity_mps = Vec2::zeros();
     }
 
     pub(super) fn correct(&mut self, detection: &Detection) {
