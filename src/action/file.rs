@@ -15,7 +15,7 @@ pub struct TableFile {
     pub version: u32,
     /// Path of the space's root file, as it was given.
     pub space: String,
-    /// `sha256:…` of the root file.
+    /// Digest of the space's meaning.
     pub digest: String,
     pub rules: Vec<RuleRecord>,
     pub rows: Vec<RowRecord>,
@@ -92,7 +92,7 @@ impl ActionTable {
         TableFile {
             version: VERSION,
             space: space.path.display().to_string(),
-            digest: space.digest.clone(),
+            digest: space.meaning.digest().to_owned(),
             rules: rules.collect(),
             rows: self.rows().iter().map(|row| self.row_record(row)).collect(),
         }

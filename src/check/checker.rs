@@ -14,7 +14,7 @@ use crate::check::{style, unused};
 use crate::model::expr::{Expr, ExprKind};
 use crate::model::rules::bounds;
 use crate::model::vocabulary::TYPES;
-use crate::model::{ActionDef, EnumDef, FnDef, GroupDef, Space, StateDef, Type, Value, code};
+use crate::model::{ActionDef, EnumDef, FnDef, GroupDef, Meaning, Space, StateDef, Type, Value, code};
 use crate::prove;
 use crate::prove::{Known, Values, enclose};
 use crate::syntax::ast::{FileId, ItemKind, Span};
@@ -68,7 +68,7 @@ pub(super) struct Root {
     /// when it is the root itself.
     pub file: FileId,
     pub path: PathBuf,
-    pub digest: String,
+    pub meaning: Meaning,
     pub docs: Vec<String>,
 }
 
@@ -114,7 +114,7 @@ pub(super) fn space(
     let bounds = bounds(&actions, &rules);
     let mut space = Space {
         path: root.path,
-        digest: root.digest,
+        meaning: root.meaning,
         docs: root.docs,
         enums: core::mem::take(&mut checker.enums),
         states: core::mem::take(&mut checker.states),

@@ -8,12 +8,13 @@ use std::path::{Component, Path, PathBuf};
 use std::sync::Arc;
 
 use crate::check::checker::{Checked, Root};
+use crate::check::meaning::meaning;
 use crate::check::references::References;
 use crate::check::road::Maps;
 use crate::check::{checker, overriding, policy, scenario, scenario_names};
 use crate::model::policy::Policy;
 use crate::model::scenario::Scenario;
-use crate::model::{Space, code, digest};
+use crate::model::{Meaning, Space, code, digest};
 use crate::road::RoadMap;
 use crate::syntax::ast::{FileId, ItemKind, Span};
 use crate::syntax::{Diagnostic, Severity, Sources, ast, parse};
@@ -30,8 +31,6 @@ pub type ReadFile<'a> = dyn Fn(&Path) -> Result<String, ReadError> + 'a;
 #[derive(Debug, Clone)]
 pub struct LoadedFile {
     pub path: PathBuf,
-    /// `sha256:` and the hexadecimal digest of its bytes.
-    pub digest: String,
     pub tree: ast::File,
 }
 
@@ -60,6 +59,32 @@ pub struct Loaded {
 /// The declarations that stand, overridden ones replaced; imports come before the files that use them.
 pub(super) fn standing_items(loaded: &Loaded) -> Vec<Cow<'_, ast::Item>> {
     overriding::resolve(&loaded.files, &loaded.order).0
+}
+
+/// A path that is written in a file: of a file that it uses, or of a map.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct WrittenPath {
+    /// The text with its quotes.
+    pub span: Span,
+    pub written: String,
+    /// The path that is meant.
+    pub target: PathBuf,
+}
+
+impl Loaded {
+    /// The paths that are written in the files.
+    pub fn written_paths(&self) -> Vec<WrittenPath> {
+        let mut found = Vec::new();
+        for file in &self.files {
+            let used = uses(file).map(|used| (used.path.value.as_str(), used.path.span));
+            found.extend(used.chain(maps_named(file)).map(|(written, span)| WrittenPath {
+                span,
+                written: written.to_owned(),
+                target: path_from(file, written),
+            }));
+        }
+        found
+    }
 }
 
 /// Maps that were read before, by name and content. A caller that loads often, such as the editor's server,
@@ -141,8 +166,8 @@ fn check_space(files: &[LoadedFile], order: &[usize], maps: &mut MapReader<'_>, 
     let root = Root {
         file: FileId(u32::try_from(index).expect("a file's id is its position")),
         path: root.path.clone(),
-        // Without a digest a map could not be read; then there is no space either.
-        digest: is_whole.then(|| whole_digest(files, &root.path, maps)).flatten().unwrap_or_default(),
+        // Without a meaning a map could not be read; then there is no space either.
+        meaning: is_whole.then(|| maps.meaning(files, &root.path)).flatten().unwrap_or_default(),
         docs: root.tree.docs.iter().map(|doc| doc.text.clone()).collect(),
     };
     let (standing, mut diagnostics) = overriding::resolve(files, order);
@@ -160,43 +185,28 @@ fn check_digests(files: &[LoadedFile], maps: &mut MapReader<'_>) -> Vec<Diagnost
     for file in files {
         for used in uses(file) {
             let Some(wanted) = &used.digest else { continue };
-            let target = used_path(file, used);
-            // A map that cannot be read is reported where it is named.
-            let Some(found) = whole_digest(files, &target, maps) else { continue };
-            if wanted.value != found {
-                let message = "the imported file, or what it uses, is not what was meant";
-                let error = Diagnostic::error(code::DIGEST, message).at(wanted.span, "its digest differs");
-                let error = error.note(format!("the file with all it uses has {found}"));
-                diagnostics.push(error.help(
-                    "get back the files as they were, or accept the change by writing its digest here",
-                ));
+            // What cannot be read is reported where it is named.
+            let Some(found) = maps.meaning(files, &used_path(file, used)) else { continue };
+            if found.is_sealed_by(&wanted.value) {
+                continue;
             }
+            let message = "the imported file, or what it uses, does not mean what it meant";
+            let mut error = Diagnostic::error(code::DIGEST, message).at(wanted.span, "its digest differs");
+            if let Some(differences) = found.differences(&wanted.value) {
+                error = error.note(differences);
+            }
+            error = error.note(format!("its digest is now {}", found.digest())).help(
+                "get back the files as they were, or accept the change; for scenarios, `avastra test --accept` accepts \
+                 it if they still play as they claim",
+            );
+            // A policy's digest of itself covers this one: it has to be trained again.
+            if !file.tree.items.iter().any(|item| item.kind.as_policy().is_some()) {
+                error = error.fix("accept the change", wanted.span, format!("\"{}\"", found.seal()));
+            }
+            diagnostics.push(error);
         }
     }
     diagnostics
-}
-
-/// Digest of a file with everything it uses and every map named there, as [`ast::Use`] defines it;
-/// `None` if one of them cannot be read.
-fn whole_digest(files: &[LoadedFile], root: &Path, maps: &mut MapReader<'_>) -> Option<String> {
-    let name = root.file_name().map(PathBuf::from).unwrap_or_default();
-    let mut found: BTreeMap<String, String> = BTreeMap::new();
-    let mut open = vec![(name, root.to_owned())];
-    while let Some((name, path)) = open.pop() {
-        let file = files.iter().find(|file| file.path == path)?;
-        if found.insert(spelt(&name), file.digest.clone()).is_some() {
-            continue;
-        }
-        let beside = |other: &str| (normal(&folder(&name).join(other)), normal(&folder(&path).join(other)));
-        open.extend(uses(file).map(|used| beside(&used.path.value)));
-        for (map, _) in maps_named(file) {
-            let (name, path) = beside(map);
-            let text = maps.text(&path).as_ref().ok()?;
-            found.insert(spelt(&name), digest(text.as_bytes()));
-        }
-    }
-    let lines: String = found.iter().map(|(name, digest)| format!("{digest} {name}\n")).collect();
-    Some(digest(lines.as_bytes()))
 }
 
 pub(super) fn uses(file: &LoadedFile) -> impl Iterator<Item = &ast::Use> {
@@ -228,12 +238,6 @@ pub(super) fn maps_named(file: &LoadedFile) -> impl Iterator<Item = (&str, Span)
     })
 }
 
-/// A path with `/` between its parts, on every system.
-fn spelt(path: &Path) -> String {
-    let parts: Vec<_> = path.components().map(|part| part.as_os_str().to_string_lossy()).collect();
-    parts.join("/")
-}
-
 struct Loader<'a> {
     read: &'a ReadFile<'a>,
     sources: Sources,
@@ -258,12 +262,11 @@ impl<'a> Loader<'a> {
             return Ok(());
         }
         let text = (self.read)(path)?;
-        let digest = digest(text.as_bytes());
         let file = self.sources.add(path.display().to_string(), text);
         let (tree, found) = parse(file, self.sources.text(file));
         self.diagnostics.extend(found);
         let index = self.files.len();
-        self.files.push(LoadedFile { path: path.to_owned(), digest, tree });
+        self.files.push(LoadedFile { path: path.to_owned(), tree });
         let uses: Vec<ast::Use> = uses(&self.files[index]).cloned().collect();
         way.push(path.to_owned());
         for used in uses {
@@ -302,6 +305,11 @@ impl MapReader<'_> {
     fn text(&mut self, path: &Path) -> &Result<String, ReadError> {
         let read = self.read;
         self.texts.entry(path.to_owned()).or_insert_with(|| read(path))
+    }
+
+    /// What a file means with all that it uses, as far as all could be read.
+    fn meaning(&mut self, files: &[LoadedFile], path: &Path) -> Option<Meaning> {
+        meaning(files, path, &mut |map| self.text(map).as_ref().ok().map(|text| digest(text.as_bytes())))
     }
 }
 

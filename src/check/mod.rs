@@ -14,6 +14,7 @@ mod expect;
 pub mod explain;
 mod expression;
 mod load;
+mod meaning;
 mod names;
 mod operator;
 mod overriding;
@@ -33,7 +34,9 @@ mod suggest;
 mod unused;
 
 pub use difference::{Change, Difference, differences};
-pub use load::{Loaded, LoadedFile, MapCache, ReadError, ReadFile, files_used, load, load_with, normal};
+pub use load::{
+    Loaded, LoadedFile, MapCache, ReadError, ReadFile, WrittenPath, files_used, load, load_with, normal,
+};
 pub use references::{Declaration, Occurrence, References, Symbol};
 pub use suggest::suggest_uses;
 

@@ -231,10 +231,57 @@ fn digests_cover_everything_that_is_used() {
     assert_eq!(codes(&load_at("", &user, PART, &map)), Vec::<&str>::new());
     assert_eq!(codes(&load_at("else/where", &user, PART, &map)), Vec::<&str>::new());
     assert_eq!(codes(&load_at("/far/away", &user, PART, &map)), Vec::<&str>::new());
-    assert_eq!(codes(&load_at("", &user, &format!("{PART}\n"), &map)), ["AV0110"]);
+    let shorter = PART.replace("75.27", "70");
+    assert_eq!(codes(&load_at("", &user, &shorter, &map)), ["AV0110"]);
     assert_eq!(codes(&load_at("", &user, PART, &format!("{map}\n"))), ["AV0110"]);
     let moved = load_at("else/where", ROOT, PART, &map).space.unwrap();
-    assert_eq!(moved.digest, plain.space.unwrap().digest);
+    assert_eq!(moved.meaning, plain.space.unwrap().meaning);
+}
+
+#[test]
+fn digests_cover_meaning_and_not_text() {
+    let base = format!(
+        "{BASE}let far = 17 m\nfn twice(x: Length) -> Length = 2 * x\n{CLOCK}rule g on ahead: distance <= far\n"
+    );
+    let meaning = |files: &[(&str, &str)]| {
+        let loaded = load_files(files);
+        loaded.space.clone().unwrap_or_else(|| panic!("{}", shown(&loaded))).meaning.clone()
+    };
+    let of = |text: &str| meaning(&[("a.ava", text)]);
+    let then = of(&base);
+    let same = [
+        ("a comment", base.replace("let far = 17 m", "// why\nlet far = 17 m // m")),
+        ("documentation", base.replace("let far", "/// How far.\nlet far")),
+        ("spaces", base.replace("let far = 17 m", "let  far\n = 17 m")),
+        ("a claim", format!("{base}expect count(actions) == 6\n")),
+        ("the order of helpers", {
+            let far = "let far = 17 m\n";
+            format!("{}{far}", base.replace(far, ""))
+        }),
+    ];
+    for (what, text) in same {
+        assert_eq!(of(&text), then, "{what}");
+    }
+    let (head, helpers) = ("language 1\n", "let far = 17 m\nfn twice(x: Length) -> Length = 2 * x\n");
+    let body = base.replace(helpers, "").replace(head, "");
+    let apart = [
+        ("a.ava", &*format!("{head}use \"helpers.ava\"\n{body}")),
+        ("helpers.ava", &*format!("{head}{helpers}")),
+    ];
+    assert_eq!(meaning(&apart), then, "helpers in a file of their own");
+    let seal = then.seal();
+    let other = [
+        (base.replace("17 m", "13 m"), "changed or new: let `far`"),
+        (base.replace("distance <= far", "distance < far"), "changed or new: rule `g`"),
+        (base.replace("2 * x", "3 * x"), "changed or new: fn `twice`"),
+        (format!("{base}rule h on ahead: distance > 1 m\n"), "changed or new: rule `h`"),
+        (base.replace("rule g on ahead: distance <= far\n", ""), "1 declaration of then missing"),
+    ];
+    for (text, differences) in other {
+        assert_eq!(of(&text).differences(&seal).as_deref(), Some(differences));
+    }
+    let without = [("b.ava", "language 1\nuse \"a.ava\" without g\n"), ("a.ava", &*base)];
+    assert_eq!(meaning(&without).differences(&seal).as_deref(), Some("1 declaration of then missing"));
 }
 
 #[test]

@@ -99,6 +99,8 @@ pub enum Command {
     Diagnose(DiagnoseArguments),
     /// Find the smallest scenario that still makes the same crash.
     Shrink(ShrinkArguments),
+    /// Copy scenarios and policies with all that they use into a folder that can be moved.
+    Pack(PackArguments),
     /// Play emitted scenarios as a regression suite for a driving system.
     Test(TestArguments),
     /// Draw moments of an emitted scenario as SVG.
@@ -299,8 +301,11 @@ pub struct RunArguments {
     /// Run directory, new or empty [default: the next free runs/NNNN].
     #[arg(long)]
     pub out: Option<PathBuf>,
+    /// Put the space and its maps into `critical/space`, so that the scenarios can be moved with them.
+    #[arg(long)]
+    pub self_contained: bool,
     /// Go on with an interrupted run directory; its own settings hold.
-    #[arg(long, value_name = "DIR", conflicts_with_all = ["file", "road", "ads", "ads_config", "agent", "policy", "face", "episodes", "seed", "ambient", "traffic", "causes", "out", "without", "with"])]
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["file", "road", "ads", "ads_config", "agent", "policy", "face", "episodes", "seed", "ambient", "traffic", "causes", "out", "self_contained", "without", "with"])]
     pub resume: Option<PathBuf>,
     /// Exit with status 4 if a counted collision was found.
     #[arg(long)]
@@ -344,8 +349,11 @@ pub struct TrainArguments {
     /// Run directory, new or empty [default: the next free runs/NNNN].
     #[arg(long)]
     pub out: Option<PathBuf>,
+    /// Put the space and its maps into `critical/space`, so that the scenarios can be moved with them.
+    #[arg(long)]
+    pub self_contained: bool,
     /// Go on with an interrupted run directory; its own settings hold.
-    #[arg(long, value_name = "DIR", conflicts_with_all = ["file", "road", "ads", "ads_config", "agent", "preset", "config", "episodes", "seed", "traffic", "out", "without", "with"])]
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["file", "road", "ads", "ads_config", "agent", "preset", "config", "episodes", "seed", "traffic", "out", "self_contained", "without", "with"])]
     pub resume: Option<PathBuf>,
 }
 
@@ -470,7 +478,7 @@ pub struct DiagnoseArguments {
 
 #[derive(Debug, Args)]
 pub struct ShrinkArguments {
-    /// Where to write, if there is one file [default: STEM.shrunk.ava beside each].
+    /// Where to write, if there is one file [default: a folder `shrunk` beside the scenarios].
     #[arg(long, short)]
     pub output: Option<PathBuf>,
     #[command(flatten)]
@@ -478,9 +486,25 @@ pub struct ShrinkArguments {
 }
 
 #[derive(Debug, Args)]
+pub struct PackArguments {
+    #[arg(required = true, value_name = "FILE")]
+    pub files: Vec<PathBuf>,
+    /// The folder that they are copied to.
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+}
+
+#[derive(Debug, Args)]
 pub struct TestArguments {
-    /// Directory of scenarios, or a run directory.
-    pub directory: PathBuf,
+    /// Scenarios, directories of them, and run directories.
+    #[arg(required = true, value_name = "PATH")]
+    pub paths: Vec<PathBuf>,
+    /// Let pass what crashes with another obstacle, or is hit from another side, than its scenario says.
+    #[arg(long)]
+    pub allow_changed: bool,
+    /// Where the space has changed, take the change over into the scenarios that still play as they claim.
+    #[arg(long)]
+    pub accept: bool,
     /// Driving system under test [default: the one that each scenario was found with].
     #[arg(long, value_parser = Named::ADS)]
     pub ads: Option<String>,

@@ -148,8 +148,10 @@ const EXAMPLES: &[(&str, &[(&str, &str)])] = &[
         &[
             ("test runs/0001", "do its scenarios still crash?"),
             ("test runs/0001 --ads-config scenarios/ads/cautious.yaml --junit out.xml", ""),
+            ("test runs/0001 --accept", "take changes of its space over"),
         ],
     ),
+    ("pack", &[("pack runs/0001/critical/*.ava --out suite", "a folder that can be moved")]),
     (
         "render",
         &[

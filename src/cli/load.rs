@@ -24,6 +24,9 @@ const ENTRIES_MAX: usize = 20_000;
 /// Folders of build outputs.
 const PASSED_OVER: [&str; 2] = ["target", "node_modules"];
 
+/// Why a path cannot be used: it would be written into files, which are text.
+const NOT_UTF8: &str = "the path is not UTF-8; rename it";
+
 /// Larger files are refused: neither people nor our commands write them.
 const FILE_BYTES_MAX: u64 = 64 << 20;
 
@@ -33,7 +36,14 @@ const FILE_BYTES_MAX: u64 = 64 << 20;
 /// If the file cannot be read, or the source has mistakes.
 pub fn load(output: &Output, path: &Path) -> Result<Loaded, Failure> {
     // If the root file is missing, the command fails; that is no mistake in a source.
-    let loaded = read_and_check(path)?;
+    sound(output, read_and_check(path)?)
+}
+
+/// Prints the diagnostics of a file.
+///
+/// # Errors
+/// If the source has mistakes.
+fn sound(output: &Output, loaded: Loaded) -> Result<Loaded, Failure> {
     output.diagnostics(&loaded.sources, &loaded.diagnostics);
     match loaded.diagnostics.iter().filter(|diagnostic| diagnostic.is_error()).count() {
         0 => Ok(loaded),
@@ -46,7 +56,20 @@ pub fn load(output: &Output, path: &Path) -> Result<Loaded, Failure> {
 /// # Errors
 /// If the file cannot be read.
 pub fn read_and_check(path: &Path) -> Result<Loaded, Failure> {
-    let mut loaded = check::load(path, &read).map_err(|error| Failure::file("read", path, error))?;
+    check_read(path, &read)
+}
+
+/// Does the same for a file that has another text than the one on the disk.
+///
+/// # Errors
+/// If the file has no path.
+pub fn check_text(path: &Path, text: &str) -> Result<Loaded, Failure> {
+    let own = check::normal(path);
+    check_read(path, &|other| if other == own { Ok(text.to_owned()) } else { read(other) })
+}
+
+fn check_read(path: &Path, read: &check::ReadFile<'_>) -> Result<Loaded, Failure> {
+    let mut loaded = check::load(path, read).map_err(|error| Failure::file("read", path, error))?;
     if loaded.diagnostics.iter().any(crate::syntax::Diagnostic::is_error) {
         check::suggest_uses(&mut loaded, &nearby(path));
     }
@@ -189,7 +212,15 @@ pub enum Emitted {
 /// # Errors
 /// As [`load`], and if the file has neither.
 pub fn emitted(output: &Output, path: &Path) -> Result<Emitted, Failure> {
-    let mut loaded = load(output, path)?;
+    emitted_in(output, path, read_and_check(path)?)
+}
+
+/// What a file that was read and checked holds.
+///
+/// # Errors
+/// As [`emitted`].
+pub fn emitted_in(output: &Output, path: &Path, loaded: Loaded) -> Result<Emitted, Failure> {
+    let mut loaded = sound(output, loaded)?;
     if let Some(policy) = loaded.policy.take() {
         return Ok(Emitted::Policy(ActionTable::new(space(loaded, path)?), Box::new(policy)));
     }
@@ -251,11 +282,18 @@ pub fn relative(directory: &Path, file: &Path) -> Result<String, Failure> {
         let path = if path.as_os_str().is_empty() { Path::new(".") } else { path };
         path.canonicalize().map_err(|error| Failure::file("find", path, reason(&error)))
     };
-    let (directory, file) = (absolute(directory)?, absolute(file)?);
+    path_between(&absolute(directory)?, &absolute(file)?)
+}
+
+/// As [`relative`], by the names alone: both paths begin at the same place and have no `..`.
+///
+/// # Errors
+/// If a file of the language could not write the path, because it is not UTF-8.
+pub fn path_between(directory: &Path, file: &Path) -> Result<String, Failure> {
     let shared = directory.components().zip(file.components()).take_while(|(a, b)| a == b).count();
     let up = directory.components().skip(shared).map(|_| Component::ParentDir);
     let path: PathBuf = up.chain(file.components().skip(shared)).collect();
-    let parts: Vec<String> =
-        path.components().map(|part| part.as_os_str().to_string_lossy().into_owned()).collect();
+    let parts: Option<Vec<&str>> = path.components().map(|part| part.as_os_str().to_str()).collect();
+    let parts = parts.ok_or_else(|| Failure::file("write", file, NOT_UTF8))?;
     Ok(parts.join("/"))
 }

@@ -21,6 +21,7 @@ mod load;
 pub mod lsp;
 mod new;
 mod output;
+mod pack;
 mod parallel;
 mod progress;
 mod render;
@@ -85,6 +86,7 @@ pub fn main() -> ExitCode {
         Command::Replay(arguments) => replay::replay(&output, arguments),
         Command::Diagnose(arguments) => diagnose::diagnose(&output, arguments),
         Command::Shrink(arguments) => shrink::shrink(&output, arguments),
+        Command::Pack(arguments) => pack::pack(&output, arguments),
         Command::Test(arguments) => test::test(&output, arguments),
         Command::Render(arguments) => render::render(&output, arguments),
         Command::Road(arguments) => road::road(&output, arguments),

@@ -18,6 +18,7 @@ use super::error::Failure;
 use super::interrupt::stop_on_interrupt;
 use super::output::Output;
 use super::output::plural;
+use super::pack::pack_space;
 use super::parallel::jobs;
 use super::progress::Progress;
 use super::run_directory::RunDirectory;
@@ -104,6 +105,12 @@ fn begun(output: &Output, arguments: &RunArguments) -> Result<(Run, RunDirectory
     };
     let run = ready(table, settings, policy.as_ref(), face)?;
     let path = run_directory::create(arguments.out.as_deref())?;
+    let run = if arguments.self_contained {
+        let copy = pack_space(output, &run.space().path, &path.join("critical"))?;
+        ready(load::table(output, &copy)?, run.settings().clone(), policy.as_ref(), face)?
+    } else {
+        run
+    };
     let space = load::relative(&path, &run.space().path)?;
     let reference = match (&arguments.policy, &policy) {
         (Some(file), Some((_, policy))) => {

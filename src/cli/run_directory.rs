@@ -77,9 +77,12 @@ pub fn resume<S: serde::de::DeserializeOwned>(
         )));
     }
     let table = load::table(output, &directory.join(&begun.space))?;
-    if table.space().digest != begun.space_digest {
+    let meaning = &table.space().meaning;
+    if !meaning.is_sealed_by(&begun.space_digest) {
+        let differences = meaning.differences(&begun.space_digest);
+        let differences = differences.map_or_else(String::new, |found| format!(" ({found})"));
         return Err(Failure::usage(format!(
-            "`{}` has changed since the {what} was begun: begin a new one",
+            "`{}` has changed since the {what} was begun{differences}: begin a new one",
             table.space().path.display()
         )));
     }

@@ -17,13 +17,13 @@ use super::output::Output;
 use super::output::plural;
 use super::parallel::each_file;
 
-/// The written file stands beside the scenario, with this for its extension.
-const EXTENSION: &str = "shrunk.ava";
+/// The folder of what is written, beside the scenarios. What a run found stays apart from what was made of it.
+const FOLDER: &str = "shrunk";
 
 /// Writes each file's scenario as small as possible, and checks every claim of what it wrote.
 pub fn shrink(output: &Output, arguments: &ShrinkArguments) -> Result<(), Failure> {
     if let [file] = arguments.many.files.as_slice() {
-        let path = arguments.output.clone().unwrap_or_else(|| file.with_extension(EXTENSION));
+        let path = arguments.output.clone().unwrap_or_else(|| apart(file));
         let small = smaller(output, file, &path)?;
         output.say(&small.in_words());
         small.actions_left.iter().for_each(|action| output.tell(&format!("  {action}")));
@@ -33,10 +33,10 @@ pub fn shrink(output: &Output, arguments: &ShrinkArguments) -> Result<(), Failur
     if let Some(path) = &arguments.output {
         let path = path.display();
         return Err(Failure::usage(format!(
-            "`--output {path}` is for one file: of several, each is written beside its own"
+            "`--output {path}` is for one file: of several, each is written to a folder `{FOLDER}`"
         )));
     }
-    let found = each_file(&arguments.many, |file| smaller(output, file, &file.with_extension(EXTENSION)));
+    let found = each_file(&arguments.many, |file| smaller(output, file, &apart(file)));
     let mut done: Vec<Small> = Vec::new();
     for (file, found) in arguments.many.files.iter().zip(found) {
         match found {
@@ -111,6 +111,14 @@ impl Small {
     }
 }
 
+/// Where the shrunk scenario of a file goes: into the folder `shrunk`, which lies in a run directory and not in its
+/// `critical`.
+fn apart(file: &Path) -> PathBuf {
+    let folder = file.parent().unwrap_or(Path::new(""));
+    let folder = if folder.ends_with("critical") { folder.parent().unwrap_or(folder) } else { folder };
+    folder.join(FOLDER).join(file.file_name().unwrap_or_default())
+}
+
 /// Shrinks the scenario of a file into another.
 fn smaller(output: &Output, file: &Path, path: &Path) -> Result<Small, Failure> {
     let (table, scenario) = load::scenario(output, file)?;
@@ -128,9 +136,13 @@ fn smaller(output: &Output, file: &Path, path: &Path) -> Result<Small, Failure> 
         std::fs::create_dir_all(folder).map_err(|error| Failure::file("create", folder, error))?;
     }
     let origin = &scenario.origin;
+    let name = match scenario.name.strip_suffix("_shrunk") {
+        Some(_) => scenario.name.clone(),
+        None => format!("{}_shrunk", scenario.name),
+    };
     let source = emit::Provenance {
         command: "shrink",
-        name: &scenario.name,
+        name: &name,
         space_path: &load::relative(folder, &table.space().path)?,
         episode: origin.episode.unwrap_or(0) as usize,
         agent: origin.policy.as_deref().unwrap_or("none"),
@@ -154,7 +166,7 @@ fn smaller(output: &Output, file: &Path, path: &Path) -> Result<Small, Failure> 
     Ok(Small {
         file: file.to_owned(),
         path: path.to_owned(),
-        scenario: scenario.name.clone(),
+        scenario: name.clone(),
         before: size(&Script::of_log(&log)),
         after: size(&shrunk.script),
         actions_left: actions.collect(),

@@ -6,11 +6,14 @@ use std::time::Instant;
 
 use crate::action::ActionTable;
 use crate::ads::ModularConfig;
-use crate::model::Scenario;
+use crate::check::{Loaded, normal};
+use crate::model::{Scenario, code};
 use crate::oracle;
 use crate::oracle::Regression;
 use crate::run;
 use crate::run::{RunError, Stage};
+use crate::syntax::ast::FileId;
+use crate::syntax::{Diagnostic, apply_fixes};
 
 use super::arguments::TestArguments;
 use super::error::Failure;
@@ -31,31 +34,35 @@ struct Case {
 
 enum Outcome {
     Played(Regression),
+    /// Another crash than the scenario's, which `--allow-changed` lets pass.
+    Allowed(Regression),
     /// Why the scenario could not be played.
     NotPlayed(String),
 }
 
-/// Plays every scenario of a directory against a driving system.
+/// Plays every scenario of a suite against a driving system.
 pub fn test(output: &Output, arguments: &TestArguments) -> Result<(), Failure> {
     let profile = arguments.ads_config.as_deref().map(load::profile).transpose()?;
     if let Some(name) = &arguments.ads {
         run::driving_system(name)?;
     }
+    let mut suite = Suite { output, arguments, profile, outdated: Vec::new(), accepted: 0 };
     let mut cases = Vec::new();
-    let critical = arguments.directory.join("critical");
-    let directory = if critical.is_dir() { &critical } else { &arguments.directory };
-    for file in load::sources_in(directory)? {
-        let Some(case) = play(output, arguments, profile.as_ref(), &file)? else { continue };
+    for file in suite_files(&arguments.paths)? {
+        let Some(case) = suite.play(&file)? else { continue };
         let (word, reason) = case.outcome.in_words();
         let reason = if reason.is_empty() { String::new() } else { format!(": {reason}") };
         output.tell(&format!("{word:<12}{}{reason}", case.file.display()));
         cases.push(case);
     }
+    let named: Vec<String> = arguments.paths.iter().map(|path| path.display().to_string()).collect();
+    let named = named.join(" ");
     if cases.is_empty() {
-        return Err(Failure::usage(format!("no scenario in `{}`", arguments.directory.display())));
+        return Err(Failure::usage(format!("no scenario in `{named}`")));
     }
+    suite.tell_outdated();
     if let Some(path) = &arguments.junit {
-        write(path, &junit(&arguments.directory, &cases))?;
+        write(path, &junit(&named, &cases))?;
     }
     let count = |is: &dyn Fn(&Outcome) -> bool| cases.iter().filter(|case| is(&case.outcome)).count();
     let fails = count(&|outcome| matches!(outcome, Outcome::Played(Regression::StillFails { .. })));
@@ -77,7 +84,7 @@ pub fn test(output: &Output, arguments: &TestArguments) -> Result<(), Failure> {
     output.result(
         "test",
         serde_json::json!({ "still_fails": fails, "fixed": fixed, "changed": changed,
-                            "errors": errors, "scenarios": listed }),
+                            "errors": errors, "accepted": suite.accepted, "scenarios": listed }),
     );
     let failing = count(&Outcome::is_failure);
     if errors > 0 {
@@ -86,89 +93,172 @@ pub fn test(output: &Output, arguments: &TestArguments) -> Result<(), Failure> {
     if failing > 0 { Err(Failure::Failing { scenarios: failing }) } else { Ok(()) }
 }
 
-/// Plays one file; `None` if it holds no scenario.
-fn play(
-    output: &Output,
-    arguments: &TestArguments,
-    profile: Option<&ModularConfig>,
-    file: &Path,
-) -> Result<Option<Case>, Failure> {
-    #[allow(clippy::disallowed_methods, reason = "this is cli, and the time goes nowhere but the report")]
-    let started = Instant::now();
-    let (scenario, road, outcome) = match load::emitted(output, file) {
-        Ok(Emitted::Policy(..)) => return Ok(None),
-        Ok(Emitted::Scenario(table, scenario)) => {
-            let road = table.space().roads[scenario.road].name.clone();
-            let outcome = compare(arguments, profile, &table, &scenario);
-            (scenario.name, road, outcome.unwrap_or_else(|error| Outcome::NotPlayed(error.to_string())))
+/// The files of a suite, each once: files as named, those of directories, and those that a run found.
+fn suite_files(paths: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
+    let mut files: Vec<PathBuf> = Vec::new();
+    for path in paths {
+        let critical = path.join("critical");
+        let found = match path {
+            _ if critical.is_dir() => load::sources_in(&critical)?,
+            path if path.is_dir() => load::sources_in(path)?,
+            path => vec![path.clone()],
+        };
+        for file in found {
+            if !files.iter().any(|known| normal(known) == normal(&file)) {
+                files.push(file);
+            }
         }
-        Err(failure) => {
-            let name = file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-            (name, String::new(), Outcome::NotPlayed(failure.to_string()))
-        }
-    };
-    Ok(Some(Case {
-        file: file.to_owned(),
-        scenario,
-        road,
-        outcome,
-        elapsed_s: started.elapsed().as_secs_f64(),
-    }))
+    }
+    Ok(files)
 }
 
-/// The crash of a scenario with the driving system that it was found with, and with the one under test.
-fn compare(
-    arguments: &TestArguments,
-    profile: Option<&ModularConfig>,
-    table: &ActionTable,
-    scenario: &Scenario,
-) -> Result<Outcome, RunError> {
-    let recorded = run::recorded(scenario)?;
-    let (ads, _) = run::selected_for(arguments.ads.as_deref(), profile, scenario)?;
-    let stage = Stage::new(table, scenario)?;
-    let (log, _, first) = stage.first_counted(&recorded);
-    Ok(match first {
-        Some(index) => Outcome::Played(oracle::regression(&stage.setup(&recorded), &log, index, &ads)),
-        None => {
-            let reason = "it has no counted collision with the driving system that it was found with";
-            Outcome::NotPlayed(reason.to_owned())
+struct Suite<'a> {
+    output: &'a Output,
+    arguments: &'a TestArguments,
+    profile: Option<ModularConfig>,
+    /// Scenarios that use a space which means something else now.
+    outdated: Vec<Loaded>,
+    /// Number of scenarios that `--accept` took the change over into.
+    accepted: usize,
+}
+
+impl Suite<'_> {
+    /// Plays one file; `None` if it holds no scenario.
+    fn play(&mut self, file: &Path) -> Result<Option<Case>, Failure> {
+        #[allow(clippy::disallowed_methods, reason = "this is cli, and the time goes nowhere but the report")]
+        let started = Instant::now();
+        let name = file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        let (scenario, road, outcome) = match self.open(file) {
+            Ok(Emitted::Policy(..)) => return Ok(None),
+            Ok(Emitted::Scenario(table, scenario)) => {
+                let road = table.space().roads[scenario.road].name.clone();
+                let outcome = self.compare(&table, &scenario);
+                (scenario.name, road, outcome.unwrap_or_else(|error| Outcome::NotPlayed(error.to_string())))
+            }
+            Err(failure) => (name, String::new(), Outcome::NotPlayed(failure.to_string())),
+        };
+        let elapsed_s = started.elapsed().as_secs_f64();
+        Ok(Some(Case { file: file.to_owned(), scenario, road, outcome, elapsed_s }))
+    }
+
+    /// Reads a file. One whose space has changed is noted, or accepted.
+    fn open(&mut self, file: &Path) -> Result<Emitted, Failure> {
+        let loaded = load::read_and_check(file)?;
+        if !is_outdated(&loaded) {
+            return load::emitted_in(self.output, file, loaded);
         }
-    })
+        if self.arguments.accept {
+            return self.accept(file, &loaded);
+        }
+        self.outdated.push(loaded);
+        Err(Failure::usage("what it uses does not mean what it meant"))
+    }
+
+    /// Takes the change of its space over into a scenario, if it still plays as it claims.
+    fn accept(&mut self, file: &Path, loaded: &Loaded) -> Result<Emitted, Failure> {
+        let root = FileId::default();
+        let (text, _) = apply_fixes(root, loaded.sources.text(root), &loaded.diagnostics);
+        let emitted = load::emitted_in(self.output, file, load::check_text(file, &text)?)?;
+        let Emitted::Scenario(table, scenario) = &emitted else { return Ok(emitted) };
+        let ads = run::recorded(scenario)?;
+        let stage = Stage::new(table, scenario)?;
+        let log = stage.play(&ads, &mut |_, _, _| {});
+        if let Some(wrong) = stage.verify(&ads, &log).iter().find(|claim| !claim.confirmed) {
+            return Err(Failure::usage(format!(
+                "not accepted, because it does not play as it claims: claimed {}, found {}",
+                wrong.claim, wrong.found
+            )));
+        }
+        write(file, &text)?;
+        self.accepted += 1;
+        self.output.tell(&format!("accepted    {}", file.display()));
+        Ok(emitted)
+    }
+
+    /// One diagnostic for all scenarios of which the same is to be said.
+    fn tell_outdated(&self) {
+        let mut told: Vec<(&Loaded, &Diagnostic, usize)> = Vec::new();
+        for loaded in &self.outdated {
+            for diagnostic in &loaded.diagnostics {
+                match told.iter_mut().find(|(_, other, _)| other.notes == diagnostic.notes) {
+                    Some((_, _, times)) => *times += 1,
+                    None => told.push((loaded, diagnostic, 1)),
+                }
+            }
+        }
+        for (loaded, diagnostic, times) in told {
+            let mut diagnostic = diagnostic.clone();
+            if times > 1 {
+                let others = plural(times - 1, "other scenario");
+                diagnostic = diagnostic.note(format!("the same holds for {others} of the suite"));
+            }
+            self.output.diagnostics(&loaded.sources, &[diagnostic]);
+        }
+    }
+
+    /// The crash of a scenario with the driving system that it was found with, and with the one under test.
+    fn compare(&self, table: &ActionTable, scenario: &Scenario) -> Result<Outcome, RunError> {
+        let recorded = run::recorded(scenario)?;
+        let (ads, _) = run::selected_for(self.arguments.ads.as_deref(), self.profile.as_ref(), scenario)?;
+        let stage = Stage::new(table, scenario)?;
+        let (log, _, first) = stage.first_counted(&recorded);
+        let Some(index) = first else {
+            let reason = "it has no counted collision with the driving system that it was found with";
+            return Ok(Outcome::NotPlayed(reason.to_owned()));
+        };
+        let found = oracle::regression(&stage.setup(&recorded), &log, index, &ads);
+        let is_allowed = self.arguments.allow_changed && found.is_other_crash();
+        Ok(if is_allowed { Outcome::Allowed(found) } else { Outcome::Played(found) })
+    }
+}
+
+/// Whether the only mistakes of a scenario are digests, which it may accept.
+fn is_outdated(loaded: &Loaded) -> bool {
+    let mut errors = loaded.diagnostics.iter().filter(|found| found.is_error()).peekable();
+    errors.peek().is_some() && errors.all(|found| found.code == code::DIGEST && !found.fixes.is_empty())
 }
 
 impl Outcome {
+    /// Whether the driving system still crashes.
     fn is_failure(&self) -> bool {
-        matches!(self, Outcome::Played(found) if found.is_failure())
+        match self {
+            Outcome::Played(Regression::StillFails { .. }) => true,
+            Outcome::Played(found) => found.is_other_crash(),
+            Outcome::Allowed(_) | Outcome::NotPlayed(_) => false,
+        }
     }
 
-    /// It says nothing about the driving system.
+    /// It says nothing about the driving system, or nothing that counts.
     fn is_skipped(&self) -> bool {
-        matches!(self, Outcome::Played(Regression::NeverMet | Regression::Struck))
+        matches!(self, Outcome::Played(Regression::NeverMet) | Outcome::Allowed(_))
     }
 
     fn is_changed(&self) -> bool {
-        matches!(self, Outcome::Played(Regression::OtherCrash)) || self.is_skipped()
+        self.is_skipped() || matches!(self, Outcome::Played(found) if found.is_other_crash())
     }
 
     /// One of four words, and why.
     fn in_words(&self) -> (&'static str, String) {
-        match self {
-            Outcome::Played(Regression::StillFails { time_s }) => {
+        let (found, more) = match self {
+            Outcome::Played(found) => (found, ""),
+            Outcome::Allowed(found) => (found, ", which is allowed"),
+            Outcome::NotPlayed(reason) => return ("error", reason.clone()),
+        };
+        match found {
+            Regression::StillFails { time_s } => {
                 ("still fails", format!("the same obstacle is hit at {time_s:.2} s"))
             }
-            Outcome::Played(Regression::Fixed) => ("fixed", String::new()),
-            Outcome::Played(Regression::OtherCrash) => ("changed", "another obstacle is hit".to_owned()),
-            Outcome::Played(Regression::Struck) => {
-                ("changed", "the same obstacle runs into the ego vehicle".to_owned())
-            }
-            Outcome::Played(Regression::NeverMet) => ("changed", "the obstacle never appears".to_owned()),
-            Outcome::NotPlayed(reason) => ("error", reason.clone()),
+            Regression::Fixed => ("fixed", String::new()),
+            Regression::OtherCrash => ("changed", format!("another obstacle is hit{more}")),
+            Regression::Struck => ("changed", format!("the same obstacle runs into the ego vehicle{more}")),
+            Regression::NeverMet => ("changed", "the obstacle never appears".to_owned()),
         }
     }
 }
 
-/// The results as JUnit XML, by the schema of Jenkins' xUnit plugin.
-fn junit(directory: &Path, cases: &[Case]) -> String {
+/// The results as JUnit XML, by the schema of Jenkins' xUnit plugin. Scenarios of one name are told apart by their
+/// files.
+fn junit(suite: &str, cases: &[Case]) -> String {
     let count = |is: fn(&Outcome) -> bool| cases.iter().filter(|case| is(&case.outcome)).count();
     let counts = format!(
         "tests=\"{}\" failures=\"{}\" errors=\"{}\" skipped=\"{}\" time=\"{:.3}\"",
@@ -178,7 +268,7 @@ fn junit(directory: &Path, cases: &[Case]) -> String {
         count(Outcome::is_skipped),
         cases.iter().map(|case| case.elapsed_s).sum::<f64>()
     );
-    let name = escaped(&directory.display().to_string());
+    let name = escaped(suite);
     let mut text = format!(
         "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<testsuites name=\"avastra\" {counts}>\n  \
          <testsuite name=\"{name}\" {counts}>\n"
@@ -190,16 +280,22 @@ fn junit(directory: &Path, cases: &[Case]) -> String {
             Outcome::NotPlayed(_) => Some("error"),
             outcome if outcome.is_failure() => Some("failure"),
             outcome if outcome.is_skipped() => Some("skipped"),
-            Outcome::Played(_) => None,
+            Outcome::Played(_) | Outcome::Allowed(_) => None,
         };
         let inside = element.map_or_else(String::new, |element| {
             format!("\n      <{element} type=\"{word}\" message=\"{reason}\"/>\n    ")
         });
+        let is_alone = cases.iter().filter(|other| other.scenario == case.scenario).count() == 1;
+        let name = if is_alone {
+            case.scenario.clone()
+        } else {
+            format!("{} ({})", case.scenario, case.file.display())
+        };
         writeln!(
             text,
             "    <testcase classname=\"{}\" name=\"{}\" time=\"{:.3}\">{inside}</testcase>",
             escaped(&case.road),
-            escaped(&case.scenario),
+            escaped(&name),
             case.elapsed_s
         )
         .expect("a string takes everything");
@@ -234,7 +330,7 @@ mod tests {
     #[test]
     fn every_outcome_is_well_formed_xml() {
         let case = |scenario: &str, outcome| Case {
-            file: PathBuf::from("a.ava"),
+            file: PathBuf::from(format!("{scenario}.ava")),
             scenario: scenario.to_owned(),
             road: "corner".to_owned(),
             outcome,
@@ -245,15 +341,20 @@ mod tests {
             case("b", Outcome::Played(Regression::Fixed)),
             case("c", Outcome::Played(Regression::OtherCrash)),
             case("d", Outcome::Played(Regression::NeverMet)),
+            case("f", Outcome::Played(Regression::Struck)),
+            Case { file: PathBuf::from("other/f.ava"), ..case("f", Outcome::Allowed(Regression::Struck)) },
             case("e <&> \"\u{1}\"", Outcome::NotPlayed("cannot read `x` & \"y\"\nat all".to_owned())),
         ];
-        let text = junit(Path::new("runs/<1>"), &cases);
+        let text = junit("runs/<1>", &cases);
         let document = roxmltree::Document::parse(&text).expect(&text);
         let suite = document.root_element().first_element_child().unwrap();
         let counts = ["tests", "failures", "errors", "skipped"].map(|name| suite.attribute(name).unwrap());
-        assert_eq!(counts, ["5", "2", "1", "1"]);
+        assert_eq!(counts, ["7", "3", "1", "2"]);
         assert_eq!(suite.attribute("name"), Some("runs/<1>"));
+        let cases = suite.children().filter(|node| node.has_tag_name("testcase"));
+        let names: Vec<&str> = cases.filter_map(|case| case.attribute("name")).collect();
+        assert_eq!(names[4..6], ["f (f.ava)", "f (other/f.ava)"]);
         let inside = |name: &str| suite.descendants().filter(|node| node.has_tag_name(name)).count();
-        assert_eq!(["testcase", "failure", "error", "skipped"].map(inside), [5, 2, 1, 1]);
+        assert_eq!(["testcase", "failure", "error", "skipped"].map(inside), [7, 3, 1, 2]);
     }
 }

@@ -19,6 +19,7 @@ use super::files::write;
 use super::interrupt::stop_on_interrupt;
 use super::output::Output;
 use super::output::plural;
+use super::pack::pack_space;
 use super::progress::TrainingProgress;
 use super::run::roads_or_all;
 use super::run_directory::RunDirectory;
@@ -69,8 +70,12 @@ fn begun(output: &Output, arguments: &TrainArguments) -> Result<(Training, RunDi
         ..RunSettings::new(space, &arguments.agent, arguments.episodes, arguments.seed)
     };
     let settings = TrainSettings::new(conditions, hyperparameters);
-    let training = Training::new(table, settings)?;
+    let mut training = Training::new(table, settings)?;
     let path = run_directory::create(arguments.out.as_deref())?;
+    if arguments.self_contained {
+        let copy = pack_space(output, &training.table().space().path, &path.join("critical"))?;
+        training = Training::new(load::table(output, &copy)?, training.settings().clone())?;
+    }
     let space = load::relative(&path, &training.table().space().path)?;
     run_directory::write_settings(&path, &TrainSettings { space, ..training.settings().clone() })?;
     Ok((training, RunDirectory::open(path)?))

@@ -11,7 +11,7 @@ use crate::units::{Dimension, decimal};
 /// A file with one item, made in a space. `headline` says which command wrote the file; `docs` are the item's.
 pub fn file(headline: &str, space: &Space, space_path: &str, docs: Vec<Doc>, kind: ItemKind) -> File {
     let item = |docs, kind| Item { docs, kind, span: Span::NONE };
-    let digest = Some(Text::new(space.digest.clone(), Span::NONE));
+    let digest = Some(Text::new(space.meaning.seal(), Span::NONE));
     let space_use = Use { path: Text::new(space_path, Span::NONE), digest, without: Vec::new() };
     File {
         docs: vec![doc(headline)],

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use crate::model::expr::Expr;
+use crate::model::meaning::Meaning;
 use crate::model::row::Row;
 use crate::model::rules::Bound;
 use crate::model::value::{EnumIndex, Type, Value};
@@ -22,9 +23,8 @@ pub const COUNTED: &str = "counted";
 pub struct Space {
     /// Path of the root file, as given.
     pub path: PathBuf,
-    /// Digest of the root file with everything that it uses, maps included: see
-    /// [`Use::digest`](crate::syntax::ast::Use).
-    pub digest: String,
+    /// What all declarations say, maps included: see [`Use::digest`](crate::syntax::ast::Use).
+    pub meaning: Meaning,
     /// Documentation of the root file.
     pub docs: Vec<String>,
     pub enums: Vec<EnumDef>,

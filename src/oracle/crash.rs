@@ -54,9 +54,9 @@ pub enum Regression {
 }
 
 impl Regression {
-    /// Whether the driving system runs into a road user.
-    pub fn is_failure(self) -> bool {
-        matches!(self, Regression::StillFails { .. } | Regression::OtherCrash)
+    /// Whether a crash remains that is not the one of the scenario: with another obstacle, or another side.
+    pub fn is_other_crash(self) -> bool {
+        matches!(self, Regression::OtherCrash | Regression::Struck)
     }
 }
 

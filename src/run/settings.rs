@@ -23,7 +23,7 @@ pub struct RunSettings {
     pub engine: String,
     /// Path of the space, from the run directory.
     pub space: String,
-    /// Digest of the space with all that it uses.
+    /// What the space meant: see `model::Meaning`.
     pub space_digest: String,
     pub roads: Vec<String>,
     pub ads: String,
@@ -63,7 +63,7 @@ impl RunSettings {
             avastra: VERSION.to_owned(),
             engine: ENGINE.to_owned(),
             space: space.path.display().to_string(),
-            space_digest: space.digest.clone(),
+            space_digest: space.meaning.seal(),
             roads: space.roads.iter().map(|road| road.name.clone()).collect(),
             ads: DEFAULT_ADS.to_owned(),
             profile: None,

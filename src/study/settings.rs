@@ -125,7 +125,7 @@ impl StudySettings {
             engine: ENGINE.to_owned(),
             question: file.question,
             space: space.path.display().to_string(),
-            space_digest: space.digest.clone(),
+            space_digest: space.meaning.seal(),
             roads,
             ads: file.ads,
             profile,

@@ -177,10 +177,8 @@ impl ItemKind {
 
 /// `use "roads.ava" digest "sha256:…"`.
 ///
-/// The digest covers the used file with everything that it uses itself, and the maps of all roads
-/// declared there. It is the SHA-256 hash of one line for each of these files, sorted by name: the
-/// digest of its bytes, a space, its name, a line feed. Names are as the files name each other,
-/// resolved against the folder of the used file, so that it does not matter where that folder is.
+/// The digest covers what the used file and all that it uses declare, and their maps: `check::meaning` says what
+/// that is. After the digest and a blank may stand a mark for each declaration, which tells what changed.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Use {
     pub path: Text,

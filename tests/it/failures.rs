@@ -106,7 +106,7 @@ fn found_scenarios_are_explained_shrunk_and_tested_again() {
         assert_eq!((&again["steps"], &again["actions"]), (&shrunk["steps"], &shrunk["actions"]));
     }
     assert_eq!(several["median_steps"].as_f64(), shrunk["steps"].as_f64(), "{several}");
-    assert!(["small", "copy"].iter().all(|stem| scratch.path().join(format!("{stem}.shrunk.ava")).is_file()));
+    assert!(["small", "copy"].iter().all(|stem| scratch.path().join(format!("shrunk/{stem}.ava")).is_file()));
 
     let junit = path("junit.xml");
     let (status, tested) = json(&["test", &out, "--junit", &junit]);

@@ -23,6 +23,7 @@ mod references;
 mod road;
 mod rules;
 mod studies;
+mod suites;
 mod surveys;
 mod tables;
 mod traces;

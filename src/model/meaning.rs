@@ -1,0 +1,123 @@
+//! What a space means, as digests: whether two files mean the same, and which declarations differ if not.
+//!
+//! `check::meaning` says what a digest covers. Here are the digests, and the text that a `use` keeps of them.
+
+use std::collections::BTreeSet;
+
+use crate::model::digest;
+
+/// Hexadecimal digits of a declaration's mark: enough to tell what changed, never used to tell whether.
+const MARK_DIGITS: usize = 4;
+
+/// Largest number of declarations that are named as different.
+const NAMED_MAX: usize = 6;
+
+/// The digest of a space, and a mark for each of its declarations.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Meaning {
+    /// `sha256:…`
+    digest: String,
+    declarations: Vec<Declaration>,
+}
+
+#[derive(Debug, Clone, PartialEq, Eq)]
+struct Declaration {
+    /// For example ``rule `npc_gap` ``.
+    title: String,
+    mark: String,
+}
+
+impl Meaning {
+    /// The meaning of declarations, each with its title and its canonical text. Their order counts.
+    pub fn new(declarations: &[(String, String)]) -> Meaning {
+        let whole: Vec<&str> = declarations.iter().map(|(_, text)| text.as_str()).collect();
+        let mark = |text: &str| digest(text.as_bytes())["sha256:".len()..][..MARK_DIGITS].to_owned();
+        Meaning {
+            digest: digest(whole.join("\n").as_bytes()),
+            declarations: declarations
+                .iter()
+                .map(|(title, text)| Declaration { title: title.clone(), mark: mark(text) })
+                .collect(),
+        }
+    }
+
+    /// `sha256:…`
+    pub fn digest(&self) -> &str {
+        &self.digest
+    }
+
+    /// What a file keeps of the space that it was made in: the digest, and after a blank the marks.
+    pub fn seal(&self) -> String {
+        let marks: String = self.declarations.iter().map(|declaration| declaration.mark.as_str()).collect();
+        format!("{} {marks}", self.digest).trim_end().to_owned()
+    }
+
+    /// Whether a seal, or a digest alone, is of this meaning.
+    pub fn is_sealed_by(&self, seal: &str) -> bool {
+        seal.split(' ').next() == Some(&self.digest)
+    }
+
+    /// Which declarations differ from those of a seal, in words; `None` if the seal has no marks.
+    pub fn differences(&self, seal: &str) -> Option<String> {
+        let (_, marks) = seal.split_once(' ').filter(|(_, marks)| marks.is_ascii() && !marks.is_empty())?;
+        let marks: Vec<&str> =
+            (0..marks.len() / MARK_DIGITS).map(|at| &marks[at * MARK_DIGITS..][..MARK_DIGITS]).collect();
+        let before: BTreeSet<&str> = marks.iter().copied().collect();
+        let now: BTreeSet<&str> =
+            self.declarations.iter().map(|declaration| declaration.mark.as_str()).collect();
+        let differ: Vec<&str> = self
+            .declarations
+            .iter()
+            .filter(|declaration| !before.contains(declaration.mark.as_str()))
+            .map(|declaration| declaration.title.as_str())
+            .collect();
+        // A declaration that changed is missing under its old mark, too.
+        let missing = marks.iter().filter(|mark| !now.contains(**mark)).count().saturating_sub(differ.len());
+        let mut parts = Vec::new();
+        if !differ.is_empty() {
+            let more = differ.len().saturating_sub(NAMED_MAX);
+            let more = if more > 0 { format!(" and {more} more") } else { String::new() };
+            let named = differ[..differ.len().min(NAMED_MAX)].join(", ");
+            parts.push(format!("changed or new: {named}{more}"));
+        }
+        if missing > 0 {
+            let noun = if missing == 1 { "declaration" } else { "declarations" };
+            parts.push(format!("{missing} {noun} of then missing"));
+        }
+        if parts.is_empty() {
+            parts.push("the declarations are the same, their order is not".to_owned());
+        }
+        Some(parts.join("; "))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn meaning(declarations: &[&str]) -> Meaning {
+        let titled = |text: &&str| ((*text).split('=').next().unwrap().trim().to_owned(), (*text).to_owned());
+        Meaning::new(&declarations.iter().map(titled).collect::<Vec<_>>())
+    }
+
+    #[test]
+    fn a_seal_tells_what_changed() {
+        let then = meaning(&["let a = 1", "let b = 2", "let c = 3"]);
+        assert!(then.is_sealed_by(&then.seal()) && then.is_sealed_by(then.digest()));
+        let found = |now: &[&str]| {
+            let now = meaning(now);
+            assert!(!now.is_sealed_by(&then.seal()));
+            now.differences(&then.seal()).expect("there are marks")
+        };
+        assert_eq!(found(&["let a = 1", "let b = 7", "let c = 3"]), "changed or new: let b");
+        assert_eq!(found(&["let a = 1", "let c = 3"]), "1 declaration of then missing");
+        assert_eq!(found(&["let b = 7", "let d = 1", "let e = 2"]), "changed or new: let b, let d, let e");
+        assert_eq!(found(&["let d = 7"]), "changed or new: let d; 2 declarations of then missing");
+        assert_eq!(
+            found(&["let b = 2", "let a = 1", "let c = 3"]),
+            "the declarations are the same, their order is not"
+        );
+        assert_eq!(then.differences(then.digest()), None);
+        assert_eq!(then.differences("sha256:0 ää"), None);
+    }
+}

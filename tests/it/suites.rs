@@ -1,0 +1,199 @@
+//! Found scenarios as a suite that lives: the space may be documented, moved and changed, and the suite says what it
+//! means for it.
+
+use std::path::{Path, PathBuf};
+
+use crate::cases::root;
+use crate::command::{avastra, outcome};
+use crate::world::FLICKER;
+
+/// A copy of the shipped space, and a run in it that found crashes.
+struct Found {
+    scratch: tempfile::TempDir,
+    /// Number of scenarios in `run/critical`.
+    scenarios: usize,
+}
+
+impl Found {
+    fn new(flags: &[&str]) -> Found {
+        let scratch = tempfile::tempdir().expect("a scratch directory");
+        let space = scratch.path().join("space");
+        std::fs::create_dir_all(space.join("roads")).expect("it is writable");
+        let roads =
+            ["corner", "residential", "boulevard", "crossroad"].map(|road| format!("roads/{road}.xodr"));
+        for name in ["avastra45.ava", "roads.ava"].into_iter().chain(roads.iter().map(String::as_str)) {
+            std::fs::copy(root().join("scenarios").join(name), space.join(name)).expect("it is shipped");
+        }
+        let mut found = Found { scratch, scenarios: 0 };
+        let (file, run) = (found.path("space/avastra45.ava"), found.path("run"));
+        let settings =
+            ["--road", "corner", "--episodes", "12", "--seed", "5", "--ads-config", FLICKER, "--out", &run];
+        let (status, _, stderr) = outcome(&mut avastra(&[&["run", &file], &settings[..], flags].concat()));
+        assert_eq!(status, 0, "{stderr}");
+        found.scenarios = found.files("run/critical").len();
+        assert!(found.scenarios >= 2, "a suite needs scenarios");
+        found
+    }
+
+    fn path(&self, name: &str) -> String {
+        self.scratch.path().join(name).display().to_string()
+    }
+
+    fn files(&self, folder: &str) -> Vec<PathBuf> {
+        let entries = std::fs::read_dir(self.scratch.path().join(folder)).expect("it is there").flatten();
+        let mut files: Vec<PathBuf> =
+            entries.map(|entry| entry.path()).filter(|path| path.is_file()).collect();
+        files.sort();
+        files
+    }
+
+    fn edit(&self, name: &str, from: &str, to: &str) {
+        let path = self.scratch.path().join(name);
+        let text = std::fs::read_to_string(&path).expect("it is readable");
+        assert!(text.contains(from), "{name} has no `{from}`");
+        std::fs::write(&path, text.replacen(from, to, 1)).expect("it is writable");
+    }
+
+    fn test(&self, arguments: &[&str]) -> (i32, serde_json::Value, String) {
+        let (status, stdout, stderr) =
+            outcome(&mut avastra(&[&["test", "--format", "json"], arguments].concat()));
+        let line = stdout.lines().next().unwrap_or_else(|| panic!("{stderr}"));
+        (status, serde_json::from_str(line).expect("it is JSON"), stderr)
+    }
+}
+
+#[test]
+fn a_suite_outlives_changes_of_its_space() {
+    let found = Found::new(&[]);
+    let (run, all) = (found.path("run"), found.scenarios as u64);
+    let space = "space/avastra45.ava";
+
+    found.edit(space, "/// Package 0.\n", "// looked at\n/// Package 0: no weather at all.\n");
+    found.edit(space, "let speed_max = 20 m/s\n", "");
+    found.edit(space, "/// A vehicle ahead, in", "let speed_max   =  20 m/s\n/// A vehicle ahead, in");
+    found.edit(space, "expect count(actions) == 45\n", "");
+    let (status, tested, stderr) = found.test(&[&run]);
+    assert_eq!((status, tested["still_fails"].as_u64()), (4, Some(all)), "{stderr}");
+
+    // A change of meaning that none of the scenarios meets: each must be accepted by name.
+    found.edit(space, "let weight_mode = 1.0", "let weight_mode = 1.0\nodds Side { Left => 3 }");
+    let (status, tested, stderr) = found.test(&[&run]);
+    assert_eq!((status, tested["errors"].as_u64()), (1, Some(all)));
+    let diagnostics: Vec<&str> = stderr.lines().filter(|line| line.contains("AV0110")).collect();
+    assert_eq!(diagnostics.len(), 1, "one for the whole suite: {stderr}");
+    let others = format!("the same holds for {} other scenario", all - 1);
+    assert!(
+        diagnostics[0].contains("changed or new: odds `Side`") && diagnostics[0].contains(&others),
+        "{stderr}"
+    );
+    let before: Vec<String> = found.texts();
+    let (status, tested, stderr) = found.test(&["--accept", &run]);
+    assert_eq!(
+        (status, tested["accepted"].as_u64(), tested["still_fails"].as_u64()),
+        (4, Some(all), Some(all)),
+        "{stderr}"
+    );
+    for (then, now) in before.iter().zip(found.texts()) {
+        let differ = then.lines().zip(now.lines()).filter(|(then, now)| then != now).collect::<Vec<_>>();
+        assert!(differ.len() == 1 && differ[0].0.starts_with("use "), "{differ:?}");
+    }
+    assert_eq!(found.test(&[&run]).0, 4);
+
+    // Where the crash is another one now, nothing is accepted.
+    found.edit(space, "fn lead(v: Speed) -> Length = v * 0.5 s", "fn lead(v: Speed) -> Length = v * 0.7 s");
+    found.edit(space, "  Far => 40 m", "  Far => 41 m");
+    let before = found.texts();
+    let (status, tested, _) = found.test(&["--accept", &run]);
+    let kept = tested["errors"].as_u64().expect("a number");
+    assert!(status == 1 && kept > 0 && tested["accepted"].as_u64() == Some(all - kept), "{tested}");
+    let unchanged = before.iter().zip(found.texts()).filter(|(then, now)| *then == now).count();
+    assert_eq!(unchanged as u64, kept);
+}
+
+impl Found {
+    fn texts(&self) -> Vec<String> {
+        let read = |path: &PathBuf| std::fs::read_to_string(path).expect("it is readable");
+        self.files("run/critical").iter().map(read).collect()
+    }
+}
+
+#[test]
+fn a_self_contained_run_is_a_folder_that_moves() {
+    let found = Found::new(&["--self-contained"]);
+    let moved = found.scratch.path().join("elsewhere/suite");
+    std::fs::create_dir_all(moved.parent().expect("it has one")).expect("it is writable");
+    std::fs::rename(found.scratch.path().join("run/critical"), &moved).expect("it moves");
+    std::fs::remove_dir_all(found.scratch.path().join("space")).expect("it is there");
+    let moved = moved.display().to_string();
+    let (status, tested, stderr) = found.test(&[&moved]);
+    assert_eq!((status, tested["still_fails"].as_u64()), (4, Some(found.scenarios as u64)), "{stderr}");
+}
+
+#[test]
+fn packed_scenarios_are_a_folder_that_moves() {
+    let found = Found::new(&[]);
+    let names: Vec<String> =
+        found.files("run/critical").iter().map(|file| file.display().to_string()).collect();
+    let files: Vec<&str> = names.iter().map(String::as_str).collect();
+    let suite = found.path("suite");
+    // Twice: what is there with the same content is no obstacle.
+    for _ in 0..2 {
+        let (status, _, stderr) =
+            outcome(&mut avastra(&[&["pack"], &files[..], &["--out", &suite]].concat()));
+        assert_eq!(status, 0, "{stderr}");
+    }
+    std::fs::remove_dir_all(found.scratch.path().join("space")).expect("it is there");
+    let far = found.path("far");
+    std::fs::rename(&suite, &far).expect("it moves");
+    let (status, _, stderr) = outcome(&mut avastra(&["replay", &format!("{far}/{}", stem(&names[0]))]));
+    assert_eq!(status, 0, "{stderr}");
+
+    // What is shrunk stays apart, under a name of its own. Files and folders together are one suite.
+    let first = format!("{far}/{}", stem(&names[0]));
+    let (status, stdout, stderr) = outcome(&mut avastra(&["shrink", &first, "--format", "json"]));
+    assert_eq!(status, 0, "{stderr}");
+    let shrunk: serde_json::Value = serde_json::from_str(stdout.trim_end()).expect("it is JSON");
+    assert!(shrunk["scenario"].as_str().is_some_and(|name| name.ends_with("_shrunk")), "{shrunk}");
+    assert!(shrunk["output"].as_str().is_some_and(|path| path.contains("far/shrunk/")), "{shrunk}");
+    let copy = found.path("far/copy.ava");
+    std::fs::copy(&first, &copy).expect("it is writable");
+    let junit = found.path("junit.xml");
+    let (_, tested, _) = found.test(&[&first, &copy, &first, &found.path("far/shrunk"), "--junit", &junit]);
+    assert_eq!(tested["scenarios"].as_array().map(Vec::len), Some(3), "{tested}");
+    let xml = std::fs::read_to_string(&junit).expect("it was written");
+    let document = roxmltree::Document::parse(&xml).expect("it is well-formed");
+    let cases = document.descendants().filter(|node| node.has_tag_name("testcase"));
+    let mut names: Vec<_> = cases.map(|case| (case.attribute("classname"), case.attribute("name"))).collect();
+    names.sort_unstable();
+    let count = names.len();
+    names.dedup();
+    assert_eq!((count, names.len()), (3, 3), "{names:?}");
+}
+
+#[test]
+fn what_is_packed_keeps_away_from_what_is_there() {
+    let scratch = tempfile::tempdir().expect("a scratch directory");
+    let path = |name: &str| scratch.path().join(name);
+    for (name, size) in [("one", 1), ("two", 2)] {
+        std::fs::create_dir(path(name)).expect("it is writable");
+        let text = format!("language 1\nstate n: Int = 0\naction go() {{ set n = {size} }}\n");
+        std::fs::write(path(name).join("space.ava"), text).expect("it is writable");
+        let text = format!("language 1\nuse \"{}\"\n", path(name).join("space.ava").display());
+        std::fs::write(path(name).join(format!("{name}.ava")), text).expect("it is writable");
+    }
+    let pack = |name: &str| {
+        let file = path(name).join(format!("{name}.ava")).display().to_string();
+        outcome(&mut avastra(&["pack", &file, "--out", &path("packed").display().to_string()]))
+    };
+    let (status, _, stderr) = pack("one");
+    assert_eq!(status, 0, "{stderr}");
+    // The absolute path became one that moves along.
+    let text = std::fs::read_to_string(path("packed/one.ava")).expect("it was written");
+    assert_eq!(text, "language 1\nuse \"space/space.ava\"\n");
+    let (status, _, stderr) = pack("two");
+    assert!(status == 1 && stderr.contains("with another content"), "{stderr}");
+}
+
+fn stem(path: &str) -> String {
+    Path::new(path).file_name().expect("it has a name").to_string_lossy().into_owned()
+}
