@@ -286,15 +286,21 @@ impl Checker {
             },
         };
         let Some(ty) = value else {
-            if let ast::Initial::Value(initial) = &declared.initial {
-                self.look_at(initial, &Place::default(), None);
-            }
+            self.look_at_initial(&declared.initial);
             return None;
         };
         let symbol = Symbol::State(declared.name.text.clone());
         self.references.typed(&symbol, ty, key);
-        let initial = self.initial(declared, ty)?;
-        // A state with a broken meaning stays declared, so that its uses are not reported as unknown.
+        let cells = key.map_or(1, |of| self.enums[of.0].variants.len());
+        let initial = match &declared.initial {
+            ast::Initial::Keys(keys) => self.initial_keys(declared, keys, key, ty),
+            ast::Initial::Any => self.initial(declared, None, ty).map(|initial| vec![initial; cells]),
+            ast::Initial::Value(value) => {
+                self.initial(declared, Some(value), ty).map(|initial| vec![initial; cells])
+            }
+        };
+        // A state with a broken beginning or meaning stays declared, so that its uses are not reported as unknown.
+        let initial = initial.unwrap_or_else(|| vec![Initial::Any; cells]);
         let meaning = self.meaning(&declared.name, key, ty).unwrap_or(StateMeaning::Private);
         Some(StateDef {
             name: declared.name.text.clone(),
@@ -302,7 +308,7 @@ impl Checker {
             key,
             ty,
             first_cell: 0,
-            cells: key.map_or(1, |of| self.enums[of.0].variants.len()),
+            cells,
             initial,
             meaning,
             span: declared.name.span,
@@ -323,14 +329,69 @@ impl Checker {
         })
     }
 
-    fn initial(&mut self, declared: &ast::State, ty: Type) -> Option<Initial> {
-        match &declared.initial {
-            ast::Initial::Value(value) => {
+    fn look_at_initial(&mut self, initial: &ast::Initial) {
+        let values: Vec<&ast::Expr> = match initial {
+            ast::Initial::Any => Vec::new(),
+            ast::Initial::Value(value) => vec![value],
+            ast::Initial::Keys(keys) => keys.iter().filter_map(|key| key.value.as_ref()).collect(),
+        };
+        values.into_iter().for_each(|value| self.look_at(value, &Place::default(), None));
+    }
+
+    /// How each key of a map begins: as its own line says, or as `_` says.
+    fn initial_keys(
+        &mut self,
+        declared: &ast::State,
+        keys: &[ast::InitialKey],
+        of: Option<EnumIndex>,
+        ty: Type,
+    ) -> Option<Vec<Initial>> {
+        let Some(of) = of else {
+            self.look_at_initial(&declared.initial);
+            let message = format!("`{}` is not a map", declared.name.text);
+            let error = Diagnostic::error(code::TYPE_MISMATCH, message);
+            return self.reject(error.at(declared.ty.span, "has no keys").help("give it one value"));
+        };
+        self.once("key", keys.iter().filter_map(|key| key.key.as_ref()));
+        let mut cells: Vec<Option<Initial>> = vec![None; self.enums[of.0].variants.len()];
+        let mut sound = true;
+        for line in keys {
+            let position = line.key.as_ref().map(|key| self.variant(key, of.0));
+            let initial = self.initial(declared, line.value.as_ref(), ty);
+            sound &= initial.is_some() && position != Some(None);
+            let open = cells.iter_mut().enumerate().filter(|(cell, known)| {
+                known.is_none() && position.flatten().is_none_or(|position| position == *cell)
+            });
+            let taken: Vec<&mut Option<Initial>> = open.map(|(_, known)| known).collect();
+            if taken.is_empty() && line.key.is_none() {
+                let error = Diagnostic::error(code::NEVER_REACHED, "this value is never taken");
+                self.report(error.at(line.span, "the keys before it are all there are").help("remove it"));
+            }
+            if position != Some(None) {
+                taken.into_iter().for_each(|known| *known = initial.clone());
+            }
+        }
+        let variants = &self.enums[of.0].variants;
+        let missing = cells.iter().zip(variants).filter(|(known, _)| known.is_none());
+        let missing: Vec<&str> = missing.map(|(_, key)| key.as_str()).collect();
+        if sound && !missing.is_empty() {
+            let message = format!("`{}` does not say how every key begins", declared.name.text);
+            let error = Diagnostic::error(code::NOT_EXHAUSTIVE, message);
+            let error = error.at(declared.name.span, format!("missing: {}", listed(&missing)));
+            return self.reject(error.help("add a value for each, or `_: …` for the rest"));
+        }
+        cells.into_iter().collect::<Option<_>>().filter(|_| sound)
+    }
+
+    /// How a cell begins; without a value it is drawn.
+    fn initial(&mut self, declared: &ast::State, value: Option<&ast::Expr>, ty: Type) -> Option<Initial> {
+        match value {
+            Some(value) => {
                 let value = self.typed(value, &Place::default(), ty)?;
                 Some(Initial::Value(Expr { kind: self.fold(&value)?, ..value }))
             }
-            ast::Initial::Any if matches!(ty, Type::Bool | Type::Enum(_)) => Some(Initial::Any),
-            ast::Initial::Any => {
+            None if matches!(ty, Type::Bool | Type::Enum(_)) => Some(Initial::Any),
+            None => {
                 let message = format!("`{}` cannot begin as `any` number", declared.name.text);
                 let error = Diagnostic::error(code::INFINITE, message);
                 self.reject(error.at(declared.ty.span, "has no end of values").help("give it a value"))

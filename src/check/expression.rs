@@ -447,17 +447,18 @@ impl Checker {
             _ => None,
         };
         arms.iter().flat_map(|arm| &arm.patterns).for_each(|pattern| self.references.variant(pattern, of));
-        let is_number = subject.as_ref().is_none_or(|subject| is_number(subject.ty));
-        if is_number {
+        if subject.as_ref().is_none_or(|subject| matches!(subject.ty, Type::Quantity(_))) {
             arms.iter().for_each(|arm| self.look_at(&arm.value, place, hint));
         }
         let subject = subject?;
         let variants: Vec<String> = match subject.ty {
             Type::Enum(of) => self.enums[of.0].variants.clone(),
             Type::Bool => vec!["false".to_owned(), "true".to_owned()],
-            Type::Int | Type::Quantity(_) => {
-                let error = Diagnostic::error(code::TYPE_MISMATCH, "`match` needs an enum or a truth value");
-                return self.reject(error.at(subject.span, "this is a number"));
+            Type::Int => return self.matching_number(subject, arms, place, hint, span),
+            Type::Quantity(_) => {
+                let message = "`match` needs an enum, a truth value or a whole number";
+                let error = Diagnostic::error(code::TYPE_MISMATCH, message);
+                return self.reject(error.at(subject.span, "this may have a fraction"));
             }
         };
         let mut arm_of: Vec<Option<usize>> = vec![None; variants.len()];
@@ -487,6 +488,75 @@ impl Checker {
         let ty = arms.first()?.ty;
         let arm_of = arm_of.into_iter().flatten().collect();
         Some(Expr { kind: ExprKind::Match { subject: Box::new(subject), arm_of, arms }, ty, span })
+    }
+
+    /// `match` on a whole number: a choice between an arm and the arms after it, for each arm.
+    fn matching_number(
+        &mut self,
+        subject: Expr,
+        arms: &[ast::Arm],
+        place: &Place<'_>,
+        hint: Option<Type>,
+        span: Span,
+    ) -> Option<Expr> {
+        let mut taken: Vec<i64> = Vec::new();
+        let mut ty = hint;
+        let mut sound = true;
+        let mut chosen: Vec<(Vec<Expr>, Expr)> = Vec::new();
+        let mut rest: Option<Expr> = None;
+        for arm in arms {
+            let before = taken.len();
+            for pattern in &arm.patterns {
+                match pattern.text.parse::<i64>() {
+                    Ok(number) if !taken.contains(&number) => taken.push(number),
+                    Ok(_) => {}
+                    Err(_) => {
+                        sound = false;
+                        let message = format!("`{}` is no whole number", pattern.text);
+                        let error = Diagnostic::error(code::TYPE_MISMATCH, message);
+                        let error = error.at(pattern.span, "the value is an `Int`");
+                        self.report(error.help("write a number, or `_` for all that are left"));
+                    }
+                }
+            }
+            if sound && (rest.is_some() || before == taken.len() && !arm.patterns.is_empty()) {
+                let error = Diagnostic::error(code::NEVER_REACHED, "this arm is never reached");
+                self.report(error.at(arm.span, "earlier arms take everything it names").help("remove it"));
+            }
+            let body = self.expr(&arm.value, place, ty);
+            let body = match (body, ty) {
+                (Some(body), Some(ty)) => self.fit(body, ty),
+                (body, None) => body,
+                (None, Some(_)) => None,
+            };
+            ty = ty.or(body.as_ref().map(|body| body.ty));
+            let Some(body) = body else {
+                sound = false;
+                continue;
+            };
+            let make = |kind, ty| Expr { kind, ty, span: arm.span };
+            let numbers = taken[before..]
+                .iter()
+                .map(|number| make(ExprKind::Number(Rational::integer(*number)), Type::Int));
+            match arm.patterns.is_empty() {
+                true => rest = rest.or(Some(body)),
+                false => chosen.push((numbers.collect(), body)),
+            }
+        }
+        if !sound {
+            return None;
+        }
+        let Some(rest) = rest else {
+            let error = Diagnostic::error(code::NOT_EXHAUSTIVE, "`match` does not cover every case");
+            let error = error.at(span, "missing: all other numbers");
+            return self.reject(error.help("add `_ => …` for the rest"));
+        };
+        Some(chosen.into_iter().rev().fold(rest, |rest, (numbers, body)| {
+            let ty = rest.ty;
+            let is_one = ExprKind::InList(Box::new(subject.clone()), numbers);
+            let subject = Box::new(Expr { kind: is_one, ty: Type::Bool, span: subject.span });
+            Expr { kind: ExprKind::Match { subject, arm_of: vec![1, 0], arms: vec![body, rest] }, ty, span }
+        }))
     }
 
     /// Notes which variants an arm takes, and reports the arm if it takes none.

@@ -7,7 +7,7 @@ use crate::check::references::Symbol;
 use crate::check::report::Report;
 use crate::model::expr::{Expr, ExprKind};
 use crate::model::vocabulary::Known;
-use crate::model::{ActionDef, EffectDef, RuleBinding, RuleBody, RuleDef, Type, code};
+use crate::model::{ActionDef, EffectDef, RuleBinding, RuleBody, RuleDef, SetDef, Type, code};
 use crate::syntax::ast::ItemKind;
 use crate::syntax::{Diagnostic, ast, listed};
 
@@ -27,7 +27,7 @@ impl Checker {
     pub(super) fn rule(&mut self, declared: &ast::Rule) -> Option<RuleBody> {
         match &declared.body {
             ast::RuleBody::Holds { on, condition } => self.holds(declared, on, condition),
-            ast::RuleBody::Moves { state, moves } => self.moves(declared, state, moves),
+            ast::RuleBody::Moves { state, key, moves } => self.moves(declared, state, key.as_ref(), moves),
         }
     }
 
@@ -172,13 +172,21 @@ impl Checker {
         lacking
     }
 
-    fn moves(&mut self, rule: &ast::Rule, state: &ast::Name, moves: &[ast::Move]) -> Option<RuleBody> {
+    fn moves(
+        &mut self,
+        rule: &ast::Rule,
+        state: &ast::Name,
+        key: Option<&ast::Name>,
+        moves: &[ast::Move],
+    ) -> Option<RuleBody> {
         let index = self.state_named(state);
         let definition = index.map(|index| self.states[index].clone());
-        let of = match definition.as_ref().map(|state| (state.ty, state.key)) {
-            Some((Type::Enum(of), None)) => Some(of.0),
+        let of = match definition.as_ref().map(|state| state.ty) {
+            Some(Type::Enum(of)) => Some(of.0),
             _ => None,
         };
+        let keys = definition.as_ref().and_then(|state| state.key);
+        key.into_iter().for_each(|key| self.references.variant(key, keys.map(|of| of.0)));
         if of.is_none() {
             let named = moves.iter().flat_map(|line| line.to.iter().chain([&line.from]));
             named.for_each(|name| self.references.variant(name, None));
@@ -188,8 +196,23 @@ impl Checker {
             let message = format!("`{}` does not move from value to value", state.text);
             let error = Diagnostic::error(code::TYPE_MISMATCH, message);
             return self.reject(
-                error.at(state.span, "must be a plain state of an enum").beside(definition.span, ""),
+                error.at(state.span, "its values must be those of an enum").beside(definition.span, ""),
             );
+        };
+        let position = match (key, keys) {
+            (None, None) => 0,
+            (Some(key), Some(keys)) => self.variant(key, keys.0)?,
+            (None, Some(keys)) => {
+                let example = self.enums[keys.0].variants.first().cloned().unwrap_or_default();
+                let error = Diagnostic::error(code::TYPE_MISMATCH, format!("`{}` is a map", state.text));
+                let error = error.at(state.span, "a key is missing").beside(definition.span, "");
+                return self.reject(error.help(format!("write `{}[{example}]`", state.text)));
+            }
+            (Some(key), None) => {
+                let message = format!("`{}` is not a map", state.text);
+                let error = Diagnostic::error(code::TYPE_MISMATCH, message);
+                return self.reject(error.at(key.span, "takes no key").beside(definition.span, ""));
+            }
         };
         let variants = self.enums[of].variants.clone();
         let mut allowed = vec![vec![false; variants.len()]; variants.len()];
@@ -208,16 +231,22 @@ impl Checker {
             return None;
         }
         self.check_graph(rule, &variants, &allowed);
+        let may_set = |set: &SetDef| match set.key.as_ref().map(|key| &key.kind) {
+            Some(ExprKind::Variant(_, other)) => set.state == index && *other == position,
+            _ => set.state == index,
+        };
         let sets = |action: &ActionDef| {
-            action.effects.iter().any(|effect| matches!(effect, EffectDef::Set(set) if set.state == index))
+            action.effects.iter().any(|effect| matches!(effect, EffectDef::Set(set) if may_set(set)))
         };
         let all = self.actions.iter().enumerate();
         let actions: Vec<usize> =
             all.filter(|(_, a)| a.as_ref().is_some_and(sets)).map(|(index, _)| index).collect();
         if actions.is_empty() {
-            self.binds_nothing(rule, &format!("no action sets `{}`: give one the effect", definition.name));
+            let key = key.map_or(String::new(), |key| format!("[{}]", key.text));
+            let what = format!("`{}{key}`", definition.name);
+            self.binds_nothing(rule, &format!("no action sets {what}: give one the effect"));
         }
-        Some(RuleBody::Moves { state: index, allowed, actions })
+        Some(RuleBody::Moves { state: index, cell: definition.first_cell + position, allowed, actions })
     }
 
     /// Position of a variant of an enum.

@@ -167,15 +167,33 @@ impl<'a> Reader<'a> {
                 },
             }
         }
-        for state in space.states.iter().filter(|state| state.initial == Initial::Any) {
-            if !declared.start.iter().any(|field| field.name.text == state.name) {
-                let error =
-                    Diagnostic::error(code::OPEN_START, format!("the start does not say `{}`", state.name));
-                let error = error.at(declared.name.span, "a scenario leaves nothing to chance");
-                self.report(error.help(format!("add `start {{ {}: … }}`", state.name)));
-            }
+        for state in &space.states {
+            self.check_open(state, declared);
         }
         ScenarioStart { memory, signal_phase_s: start.0, traffic_seed: start.1, ambient: start.2 }
+    }
+
+    /// Reports a state of which the start leaves something to chance.
+    fn check_open(&mut self, state: &StateDef, declared: &ast::Scenario) {
+        let given = declared.start.iter().find(|field| field.name.text == state.name);
+        let key = |cell: usize| state.key.map_or("", |of| self.space.enums[of.0].variants[cell].as_str());
+        let is_given = |cell: usize| match given.map(|field| &field.value.kind) {
+            Some(ast::ExprKind::Record(keys)) => keys.iter().any(|known| known.name.text == key(cell)),
+            Some(_) => true,
+            None => false,
+        };
+        let mut drawn = (0..state.cells).filter(|cell| state.initial[*cell] == Initial::Any);
+        let Some(open) = drawn.find(|cell| !is_given(*cell)) else { return };
+        let (name, example) = match given {
+            None => (state.name.clone(), format!("{}: …", state.name)),
+            Some(_) => (
+                self.space.cell_name(state.first_cell + open),
+                format!("{}: {{ {}: … }}", state.name, key(open)),
+            ),
+        };
+        let error = Diagnostic::error(code::OPEN_START, format!("the start does not say `{name}`"));
+        let error = error.at(declared.name.span, "a scenario leaves nothing to chance");
+        self.report(error.help(format!("add `start {{ {example} }}`")));
     }
 
     /// `time: Noon`, `sky: None` for all keys, `sky: { Rain: High }` for some.

@@ -39,9 +39,9 @@ pub(super) fn breaches(space: &Space, moment: &Moment<'_>, in_force: &RulesInFor
         let error = Diagnostic::error(code::BROKEN_RULE, message);
         match breach {
             Breach::Condition { .. } => broken_condition(rules, breach, candidate, moment, error),
-            Breach::Move { state, from, to, .. } => {
+            Breach::Move { state, cell, from, to, .. } => {
                 let error = error.at(moment.step.span, rules.words(breach, candidate));
-                Some(forbidden_move(space, rule, (state, from, to), moment, error))
+                Some(forbidden_move(space, rule, (state, cell, from, to), moment, error))
             }
             Breach::Where(_) | Breach::Gap { .. } => None,
         }
@@ -53,12 +53,12 @@ pub(super) fn breaches(space: &Space, moment: &Moment<'_>, in_force: &RulesInFor
 fn forbidden_move(
     space: &Space,
     rule: &RuleDef,
-    (state, from, to): (usize, Value, Value),
+    (state, cell, from, to): (usize, usize, Value, Value),
     moment: &Moment<'_>,
     error: Diagnostic,
 ) -> Diagnostic {
     let state = &space.states[state];
-    let shown = |memory: &Memory| space.show(memory.cells()[state.first_cell], state.ty);
+    let shown = |memory: &Memory| space.show(memory.cells()[cell], state.ty);
     let mut timeline = vec![format!("{} at the start", shown(&moment.history[0].1))];
     for pair in moment.history.windows(2) {
         let (before, (number, after)) = (&pair[0].1, &pair[1]);
@@ -68,7 +68,7 @@ fn forbidden_move(
     }
     let error = error.beside(rule.span, "does not allow it").note(format!(
         "`{}` is {}",
-        state.name,
+        space.cell_name(cell),
         timeline.join(", ")
     ));
     let legal = next_rows(space, rule, from);

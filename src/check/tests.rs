@@ -5,7 +5,7 @@ use std::path::Path;
 use crate::check::state_argument::memory_from;
 use crate::check::{Loaded, ReadError, load, suggest_uses};
 use crate::model::vocabulary::{Priority, Word};
-use crate::model::{Avoidability, Claim, OutcomeFacts, Reach, code};
+use crate::model::{Avoidability, Claim, Facts, Memory, OutcomeFacts, Reach, Value, code, evaluate};
 use crate::syntax::{Style, render};
 
 /// A small sound space; tests put declarations of their own after it.
@@ -128,6 +128,65 @@ fn states_can_be_given_as_text() {
     assert!(memory_from(&space, "}", 0).is_err());
     let error = memory_from(&space, "time: Night, sky: None, time: Noon", 0).unwrap_err();
     assert_eq!(error, "`time` is given twice");
+}
+
+#[test]
+fn each_key_of_a_map_begins_and_moves_by_itself() {
+    let text = format!(
+        "{BASE}state calm: Sky -> Bool = {{ Rain: any, Fog: true, _: false }}
+action shower(each how: Level) {{ set sky[Rain] = how }}
+action weather(each what: Sky) {{ set sky[what] = Light }}
+rule slow_rain on sky[Rain] {{
+  None -> None | Light
+  Light -> Light | Moderate
+  Moderate -> High | Light
+  High -> Moderate
+}}
+"
+    );
+    let loaded = load_files(&[("space.ava", &text)]);
+    let space = loaded.space.clone().unwrap_or_else(|| panic!("{}", shown(&loaded)));
+    let calm = space.state("calm").expect("it is declared");
+    let mut rains = [0, 0];
+    for seed in 0..64 {
+        let memory = space.initial_memory(seed);
+        let cells = &memory.cells()[calm.first_cell..];
+        rains[cells[0].variant()] += 1;
+        assert_eq!([cells[1].truth(), cells[2].truth()], [true, false]);
+    }
+    assert!(rains.iter().all(|count| *count > 10), "{rains:?}");
+    let rule = space.rules.iter().position(|rule| rule.name == "slow_rain").expect("it is declared");
+    let bound = space.rows.iter().filter(|row| row.rules.contains(&rule)).map(|row| row.label.as_str());
+    let rows: Vec<&str> = bound.collect();
+    let shower = ["None", "Light", "Moderate", "High"].map(|how| format!("shower(how: {how})"));
+    let expected: Vec<&str> = shower.iter().map(String::as_str).chain(["weather(what: Rain)"]).collect();
+    assert_eq!(rows, expected);
+}
+
+#[test]
+fn whole_numbers_choose_between_arms() {
+    let text = format!(
+        "{BASE}state count: Int = 0
+fn room(n: Int) -> Length = match n {{ 0 | 2 => 30 m  3 => 40 m  _ => 50 m }}
+action more() {{
+  set count = count + 1
+  spawn Sedan ahead room(count) {{ lane: Current, speed: 5 m/s, does: DriveAhead }}
+}}
+rule not_too_often on more: count <= 2
+"
+    );
+    let loaded = load_files(&[("space.ava", &text)]);
+    let space = loaded.space.clone().unwrap_or_else(|| panic!("{}", shown(&loaded)));
+    let count = space.state("count").expect("it is declared").first_cell;
+    let room = space.functions.iter().find(|function| function.name == "room").expect("it is declared");
+    let rooms = [-1.0, 0.0, 1.0, 2.0, 3.0].map(|n| {
+        let locals = [Value::Number(n)];
+        evaluate(&room.body, &space.functions, &Facts::new(&locals, &Memory::default())).number()
+    });
+    assert_eq!(rooms, [50.0, 30.0, 50.0, 30.0, 40.0]);
+    let action = space.actions.iter().position(|action| action.name == "more").expect("it is declared");
+    let memory = space.memory_after(action, &[], &space.initial_memory(0));
+    assert_eq!(memory.cells()[count], Value::Number(1.0));
 }
 
 #[test]

@@ -72,8 +72,13 @@ fn names_of_item<'a>(kind: &'a ItemKind, used: &mut BTreeSet<&'a str>) {
     match kind {
         ItemKind::State(declared) => {
             names_of_type(&declared.ty, used);
-            if let ast::Initial::Value(value) = &declared.initial {
-                names_of_expr(value, used);
+            match &declared.initial {
+                ast::Initial::Any => {}
+                ast::Initial::Value(value) => names_of_expr(value, used),
+                ast::Initial::Keys(keys) => {
+                    used.extend(keys.iter().filter_map(|key| Some(key.key.as_ref()?.text.as_str())));
+                    keys.iter().filter_map(|key| key.value.as_ref()).for_each(|v| names_of_expr(v, used));
+                }
             }
         }
         ItemKind::Let(declared) => names_of_expr(&declared.value, used),
@@ -102,8 +107,8 @@ fn names_of_item<'a>(kind: &'a ItemKind, used: &mut BTreeSet<&'a str>) {
                 used.extend(on.iter().map(|name| name.text.as_str()));
                 names_of_expr(condition, used);
             }
-            ast::RuleBody::Moves { state, moves } => {
-                used.insert(&state.text);
+            ast::RuleBody::Moves { state, key, moves } => {
+                used.extend([state].into_iter().chain(key).map(|name| name.text.as_str()));
                 for line in moves {
                     used.insert(&line.from.text);
                     used.extend(line.to.iter().map(|name| name.text.as_str()));

@@ -2,7 +2,9 @@
 
 use core::fmt::Write;
 
-use crate::model::{ActionDef, Domain, Interval, Parameter, Reach, RuleBody, RuleDef, Space, Type, Value};
+use crate::model::{
+    ActionDef, Domain, Initial, Interval, Parameter, Reach, RuleBody, RuleDef, Space, StateDef, Type, Value,
+};
 
 use super::arguments::DocArguments;
 use super::error::Failure;
@@ -46,12 +48,7 @@ fn page(space: &Space) -> String {
                 Some(key) => format!("{} -> {}", space.enums[key.0].name, type_name(space, state.ty)),
                 None => type_name(space, state.ty),
             };
-            let begins = match &state.initial {
-                crate::model::Initial::Any => "drawn".to_owned(),
-                crate::model::Initial::Value(_) => {
-                    space.show(space.initial_memory(0).cells()[state.first_cell], state.ty)
-                }
-            };
+            let begins = begins(space, state);
             let _ = writeln!(text, "| `{}` | {of} | {begins} | {} |", state.name, inline(&state.docs));
         }
         text.push('\n');
@@ -76,6 +73,25 @@ fn page(space: &Space) -> String {
         let _ = writeln!(text, "- `{}`: {}", verdict.name, inline(&verdict.docs));
     }
     text
+}
+
+/// How a state begins: one word for all its keys if they begin alike.
+fn begins(space: &Space, state: &StateDef) -> String {
+    let memory = space.initial_memory(0);
+    let values = state.initial.iter().zip(&memory.cells()[state.first_cell..]);
+    let words: Vec<String> = values
+        .map(|(initial, value)| match initial {
+            Initial::Any => "drawn".to_owned(),
+            Initial::Value(_) => space.show(*value, state.ty),
+        })
+        .collect();
+    match (words.iter().all(|word| *word == words[0]), state.key) {
+        (false, Some(of)) => {
+            let keys = space.enums[of.0].variants.iter().zip(&words);
+            keys.map(|(key, word)| format!("{key}: {word}")).collect::<Vec<_>>().join(", ")
+        }
+        _ => words[0].clone(),
+    }
 }
 
 fn action_section(text: &mut String, space: &Space, index: usize, action: &ActionDef) {
@@ -108,11 +124,11 @@ fn rule_section(text: &mut String, space: &Space, index: usize, rule: &RuleDef) 
     let optional = if rule.optional { ", optional" } else { "" };
     let _ = write!(text, "### `{}` (binds {}{optional})\n\n", rule.name, plural(rows, "row"));
     text.push_str(&paragraph(&rule.docs));
-    if let RuleBody::Moves { state, allowed, .. } = &rule.body {
+    if let RuleBody::Moves { state, cell, allowed, .. } = &rule.body {
         let state = &space.states[*state];
         let Type::Enum(of) = state.ty else { return };
         let variants = &space.enums[of.0].variants;
-        let _ = writeln!(text, "| `{}` from | to |\n|---|---|", state.name);
+        let _ = writeln!(text, "| `{}` from | to |\n|---|---|", space.cell_name(*cell));
         for (from, to) in allowed.iter().enumerate() {
             let to: Vec<&str> =
                 to.iter().zip(variants).filter(|(allowed, _)| **allowed).map(|(_, to)| to.as_str()).collect();

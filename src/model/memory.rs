@@ -13,8 +13,8 @@ impl Space {
         let mut rng = rng::stream(seed, Stream::Reset, 0);
         let mut memory = Memory::default();
         for state in &self.states {
-            for _ in 0..state.cells {
-                let value = match &state.initial {
+            for initial in &state.initial {
+                let value = match initial {
                     Initial::Any => self.draw(state.ty, &mut rng),
                     Initial::Value(expr) => {
                         evaluate(expr, &self.functions, &Facts::new(&[], &Memory::default()))

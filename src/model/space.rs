@@ -71,7 +71,8 @@ pub struct StateDef {
     pub first_cell: usize,
     /// 1, or the number of keys.
     pub cells: usize,
-    pub initial: Initial,
+    /// How each of its cells begins.
+    pub initial: Vec<Initial>,
     /// What the state stands for in the world.
     pub meaning: StateMeaning,
     pub span: Span,
@@ -79,9 +80,9 @@ pub struct StateDef {
 
 #[derive(Debug, Clone, PartialEq)]
 pub enum Initial {
-    /// Each cell is drawn at reset.
+    /// The cell is drawn at reset.
     Any,
-    /// One value for all cells.
+    /// A constant.
     Value(Expr),
 }
 
@@ -243,8 +244,9 @@ pub enum RuleBody {
     /// A condition, compiled once for every action that it binds. States in it have their values
     /// after the action.
     Holds(Vec<RuleBinding>),
-    /// `allowed[from][to]` for a state variable; the rule binds the actions that set it.
-    Moves { state: usize, allowed: Vec<Vec<bool>>, actions: Vec<usize> },
+    /// `allowed[from][to]` for a plain state, or for one key of a map; `cell` is its position in the memory. The rule
+    /// binds the actions that may set it.
+    Moves { state: usize, cell: usize, allowed: Vec<Vec<bool>>, actions: Vec<usize> },
 }
 
 #[derive(Debug, Clone, PartialEq)]
@@ -314,7 +316,24 @@ impl RoadFacts {
     }
 }
 
+impl StateDef {
+    /// The position of a cell among the cells of this state.
+    pub(crate) fn position_of(&self, cell: usize) -> Option<usize> {
+        cell.checked_sub(self.first_cell).filter(|position| *position < self.cells)
+    }
+}
+
 impl Space {
+    /// A cell of the memory as the language spells it: `time`, `sky[Rain]`.
+    pub fn cell_name(&self, cell: usize) -> String {
+        let found = self.states.iter().find_map(|state| Some((state, state.position_of(cell)?)));
+        let (state, position) = found.expect("every cell belongs to a state");
+        match state.key {
+            None => state.name.clone(),
+            Some(of) => format!("{}[{}]", state.name, self.enums[of.0].variants[position]),
+        }
+    }
+
     /// A value as the language spells it.
     pub fn show(&self, value: Value, ty: Type) -> String {
         match (value, ty) {

@@ -30,6 +30,20 @@ impl Space {
         after
     }
 
+    /// Whether an action may set a cell.
+    pub(crate) fn may_set(&self, action: usize, locals: &[Values], cell: usize) -> bool {
+        let unknown = self.cells_unknown();
+        let known = Known { functions: &self.functions, locals, cells: &unknown, road: None };
+        let may = |set: &SetDef| {
+            let position = self.states[set.state].position_of(cell);
+            position.is_some_and(|position| match set.key.as_ref().map(|key| enclose(key, &known)) {
+                Some(Values::Variants(keys)) => keys >> position & 1 == 1,
+                Some(Values::Truth { .. } | Values::Number(_)) | None => true,
+            })
+        };
+        self.actions[action].effects.iter().any(|effect| matches!(effect, EffectDef::Set(set) if may(set)))
+    }
+
     /// Every value of every cell.
     pub(crate) fn cells_unknown(&self) -> Vec<Values> {
         let unknown = |state: &StateDef| core::iter::repeat_n(self.all_values(state.ty), state.cells);

@@ -22,7 +22,8 @@ pub(crate) fn report(space: &Space) -> Vec<Diagnostic> {
     let mut diagnostics = Vec::new();
     for rule in &space.rules {
         let Some(graph) = graph(space, rule) else { continue };
-        let RuleBody::Moves { state, .. } = &rule.body else { continue };
+        let RuleBody::Moves { state, cell, .. } = &rule.body else { continue };
+        let moved = space.cell_name(*cell);
         let state = &space.states[*state];
         let Type::Enum(of) = state.ty else { continue };
         let variants = &space.enums[of.0].variants;
@@ -32,7 +33,7 @@ pub(crate) fn report(space: &Space) -> Vec<Diagnostic> {
         let stuck: u128 = bits(reached).filter(|from| graph.is_stuck(*from)).map(|value| 1 << value).sum();
         if stuck != 0 && variants.len() > 1 && graph.rows.len() > 1 {
             let names = names(stuck);
-            let message = format!("`{}` can never leave {}", state.name, listed(&names));
+            let message = format!("`{moved}` can never leave {}", listed(&names));
             let warning = Diagnostic::warning(code::STUCK, message)
                 .at(rule.span, "allows no move from there to another value")
                 .help(format!("add `{} -> …` with another value, if an episode should go on", names[0]));
@@ -44,7 +45,7 @@ pub(crate) fn report(space: &Space) -> Vec<Diagnostic> {
         let unreached: u128 = bits(all & !reached).filter(led_to).map(|value| 1 << value).sum();
         if unreached != 0 {
             let begin = names(graph.begin);
-            let message = format!("`{}` never comes to {}", state.name, listed(&names(unreached)));
+            let message = format!("`{moved}` never comes to {}", listed(&names(unreached)));
             let warning = Diagnostic::warning(code::UNREACHABLE, message)
                 .at(rule.span, format!("no actions lead there from {}", listed(&begin)))
                 .beside(state.span, "begins here");
@@ -62,7 +63,7 @@ pub(crate) fn report(space: &Space) -> Vec<Diagnostic> {
             let message = format!("`{}` is never enabled", first.label);
             let warning = Diagnostic::warning(code::NEVER_ENABLED, message)
                 .at(space.actions[first.action].span, numbers(&never))
-                .beside(rule.span, format!("forbids it wherever `{}` can be", state.name));
+                .beside(rule.span, format!("forbids it wherever `{moved}` can be"));
             diagnostics.push(warning.help("allow the move, or remove the rows with `where`"));
         }
     }
@@ -92,18 +93,19 @@ pub(crate) fn forbids(space: &Space, rule: &RuleDef, row: &Row, from: u128) -> b
 }
 
 fn graph<'a>(space: &'a Space, rule: &'a RuleDef) -> Option<Graph<'a>> {
-    let RuleBody::Moves { state, allowed, actions } = &rule.body else { return None };
+    let RuleBody::Moves { state, cell, allowed, .. } = &rule.body else { return None };
+    let index = space.rules.iter().position(|known| known.name == rule.name)?;
     let definition = &space.states[*state];
-    let begin = match &definition.initial {
+    let begin = match &definition.initial[cell - definition.first_cell] {
         Initial::Any => u128::MAX >> (128 - allowed.len()),
         Initial::Value(expr) => match &expr.kind {
             crate::model::expr::ExprKind::Variant(_, value) => 1 << value,
             _ => u128::MAX >> (128 - allowed.len()),
         },
     };
-    let rows = space.rows.iter().filter(|row| actions.contains(&row.action)).map(|row| {
+    let rows = space.rows.iter().filter(|row| row.rules.contains(&index)).map(|row| {
         let after = space.cells_after(row.action, &declared(space, row), &space.cells_unknown());
-        match after[definition.first_cell] {
+        match after[*cell] {
             Values::Variants(set) => (row, set),
             Values::Truth { .. } | Values::Number(_) => (row, 0),
         }

@@ -60,12 +60,12 @@ fn follows(space: &Space, rule: usize, others: &RulesInForce, work: &mut usize) 
         return false;
     }
     match &space.rules[rule].body {
-        RuleBody::Moves { state, allowed, .. } => {
+        RuleBody::Moves { cell, allowed, .. } => {
             let all = allowed.iter().flatten().all(|allowed| *allowed);
             all || others.all().any(|other| match &space.rules[other].body {
-                RuleBody::Moves { state: same, allowed: stricter, .. } => {
+                RuleBody::Moves { cell: same, allowed: stricter, .. } => {
                     let pairs = stricter.iter().flatten().zip(allowed.iter().flatten());
-                    same == state && pairs.into_iter().all(|(stricter, allowed)| *allowed || !*stricter)
+                    same == cell && pairs.into_iter().all(|(stricter, allowed)| *allowed || !*stricter)
                 }
                 RuleBody::Holds(_) => false,
             })

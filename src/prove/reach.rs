@@ -8,8 +8,8 @@ use std::sync::Arc;
 use crate::model::expr::Expr;
 use crate::model::rules::{Bound, Demand, RowRules, allowed};
 use crate::model::{
-    ActionDef, Domain, Facts, Interval, Memory, Parameter, Reach, Road, Row, RulesInForce, Space, Type,
-    Value, code, evaluate, locals,
+    ActionDef, Domain, Facts, Interval, Memory, Parameter, Reach, Road, Row, RuleBody, RulesInForce, Space,
+    Type, Value, code, evaluate, locals,
 };
 use crate::prove::enclose::{Known, Values, enclose};
 use crate::syntax::{Diagnostic, listed};
@@ -31,7 +31,7 @@ pub(crate) fn rows(space: &Space) -> Vec<Row> {
     let in_force = RulesInForce::by_default(space);
     let mut rows = Vec::new();
     for (index, action) in space.actions.iter().enumerate() {
-        let rules: Arc<[usize]> =
+        let bound: Arc<[usize]> =
             (0..space.rules.len()).filter(|rule| space.rules[*rule].body.binds(index)).collect();
         for values in products(space, action) {
             let axes: Vec<(Arc<str>, Value)> = action
@@ -45,8 +45,11 @@ pub(crate) fn rows(space: &Space) -> Vec<Row> {
             let shown: Vec<String> =
                 shown.map(|((name, value), p)| format!("{name}: {}", space.show(*value, p.ty))).collect();
             let label = format!("{}({})", action.name, shown.join(", "));
-            let rules = rules.clone();
-            let row = Row { index: rows.len(), action: index, axes, label, rules, roads: Vec::new() };
+            let rules = bound.clone();
+            let mut row = Row { index: rows.len(), action: index, axes, label, rules, roads: Vec::new() };
+            if let Some(fewer) = without_other_keys(space, &row) {
+                row.rules = fewer;
+            }
             let rules = RowRules { space, row: &row, road: None, in_force: &in_force };
             let reach = |road: &Road| RowRules { road: Some(&road.facts), ..rules }.reach();
             let roads = space.roads.iter().map(reach).collect();
@@ -63,6 +66,18 @@ pub(crate) fn spawn_figures(space: &Space, row: &Row, expr: &Expr) -> Option<Int
     let locals = rules.settle()?;
     let after = space.cells_after(row.action, &locals, &space.cells_unknown());
     Some(enclose(expr, &rules.known(&locals, &after)).interval())
+}
+
+/// The rules that bind the row, without those about a key that the row does not set; `None` if it loses none.
+fn without_other_keys(space: &Space, row: &Row) -> Option<Arc<[usize]>> {
+    let is_other = |rule: &usize| match &space.rules[*rule].body {
+        RuleBody::Moves { state, cell, .. } if space.states[*state].key.is_some() => {
+            !space.may_set(row.action, &declared(space, row), *cell)
+        }
+        RuleBody::Moves { .. } | RuleBody::Holds(_) => false,
+    };
+    let kept: Arc<[usize]> = row.rules.iter().filter(|rule| !is_other(rule)).copied().collect();
+    (kept.len() < row.rules.len()).then_some(kept)
 }
 
 /// The values of all parameters for each row of an action; those that are drawn hold a placeholder.
@@ -148,7 +163,7 @@ impl RowRules<'_> {
         let after = self.space.cells_after(self.row.action, &locals, before);
         let possible = self.demands().all(|(_, demand)| match demand {
             Demand::Holds(condition) => enclose(condition, &self.known(&locals, &after)).may_hold(),
-            Demand::Moves { state, allowed } => match after[self.space.states[state].first_cell] {
+            Demand::Moves { cell, allowed, .. } => match after[cell] {
                 Values::Variants(set) => {
                     (0..allowed.len()).any(|to| set >> to & 1 == 1 && allowed.iter().any(|from| from[to]))
                 }

@@ -188,8 +188,8 @@ impl Search<'_> {
         let space = self.rules.space;
         let mut memories = vec![Memory::default()];
         for state in &space.states {
-            let initial = initial(space, state);
             for cell in 0..state.cells {
+                let initial = initial(space, state, cell);
                 let values = match self.reads(state, cell) {
                     true => all_values(space, state.ty, initial),
                     false => vec![initial],
@@ -219,9 +219,7 @@ impl Search<'_> {
         };
         let by_rule = |demand| match demand {
             Demand::Holds(condition) => named(condition),
-            Demand::Moves { state: moved, .. } => {
-                self.rules.space.states[moved].first_cell == state.first_cell
-            }
+            Demand::Moves { cell: moved, .. } => moved == state.first_cell + cell,
         };
         let by_effect = |effect: &EffectDef| match effect {
             EffectDef::Set(set) => named(&set.value) || set.key.as_ref().is_some_and(named),
@@ -280,9 +278,9 @@ fn halves(narrowed: &[Values], open: &[usize]) -> Vec<Vec<Values>> {
     ]
 }
 
-/// The value that the cells of a state begin with; the first of its type if it is drawn.
-fn initial(space: &Space, state: &StateDef) -> Value {
-    match &state.initial {
+/// The value that a cell of a state begins with; the first of its type if it is drawn.
+fn initial(space: &Space, state: &StateDef, cell: usize) -> Value {
+    match &state.initial[cell] {
         Initial::Value(expr) => evaluate(expr, &space.functions, &Facts::new(&[], &Memory::default())),
         Initial::Any => match state.ty {
             Type::Enum(of) => Value::Variant(of, 0),

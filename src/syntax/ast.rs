@@ -219,6 +219,19 @@ pub enum Initial {
     /// `any`: the value is drawn.
     Any,
     Value(Expr),
+    /// `{ Fog: Moderate, _: None }`: a value for each key of a map.
+    Keys(Vec<InitialKey>),
+}
+
+/// `Fog: Moderate`, `Rain: any`.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct InitialKey {
+    /// `None` for `_`, which stands for every key that is left.
+    pub key: Option<Name>,
+    /// `None` for `any`: the value is drawn.
+    pub value: Option<Expr>,
+    #[serde(skip)]
+    pub span: Span,
 }
 
 /// `Time`, `Length`, or the map `Sky -> Level`.
@@ -332,8 +345,8 @@ pub struct Rule {
 pub enum RuleBody {
     /// `on a, b: condition`. Without `on` it holds for every action: `on` is empty.
     Holds { on: Vec<Name>, condition: Expr },
-    /// `on state { A -> A | B }`.
-    Moves { state: Name, moves: Vec<Move> },
+    /// `on state { A -> A | B }`, `on state[key] { A -> A | B }`.
+    Moves { state: Name, key: Option<Name>, moves: Vec<Move> },
 }
 
 /// `Noon -> Noon | Night`.
@@ -565,7 +578,7 @@ pub enum ExprKind {
 /// `A | B => value`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Arm {
-    /// Empty for `_`, which matches every variant that is left.
+    /// Empty for `_`, which matches all that is left. Else variants, truth values or whole numbers.
     pub patterns: Vec<Name>,
     pub value: Expr,
     #[serde(skip)]

@@ -9,8 +9,9 @@ use pest::iterators::Pair;
 
 use crate::syntax::ast::{
     Action, ActionParam, Block, Case, Clause, ClauseKind, Effect, EffectKind, Enum, Expect, Expr, Field,
-    FileId, Fn, FnParam, Group, Initial, ItemKind, Let, Move, Name, Number, Odds, ParamMode, Place, Policy,
-    PolicyLine, Rule as NamedRule, RuleBody, Scenario, Span, State, Step, Text, Type, TypeKind, Use, Verdict,
+    FileId, Fn, FnParam, Group, Initial, InitialKey, ItemKind, Let, Move, Name, Number, Odds, ParamMode,
+    Place, Policy, PolicyLine, Rule as NamedRule, RuleBody, Scenario, Span, State, Step, Text, Type,
+    TypeKind, Use, Verdict,
 };
 use crate::syntax::grammar::{Rule, is_plain_terminal};
 use crate::syntax::{Diagnostic, code};
@@ -124,9 +125,13 @@ impl Builder {
             Rule::state => {
                 let name = self.name(parts.next());
                 let ty = self.type_name(parts.next());
-                let initial = match parts.take(Rule::drawn_initially) {
-                    Some(_) => Initial::Any,
-                    None => Initial::Value(self.expression(parts.next())?),
+                let initial = match parts.next() {
+                    any if any.as_rule() == Rule::drawn_initially => Initial::Any,
+                    keys if keys.as_rule() == Rule::initial_keys => {
+                        let keys = Parts::of(keys).rest().map(|key| self.initial_key(key));
+                        Initial::Keys(keys.collect::<Built<_>>()?)
+                    }
+                    value => Initial::Value(self.expression(value)?),
                 };
                 ItemKind::State(State { name, ty, initial })
             }
@@ -162,6 +167,18 @@ impl Builder {
 
     fn names(&self, pair: Pair<'_, Rule>) -> Vec<Name> {
         Parts::of(pair).rest().map(|name| self.name(name)).collect()
+    }
+
+    fn initial_key(&self, pair: Pair<'_, Rule>) -> Built<InitialKey> {
+        let span = self.span(&pair);
+        let mut parts = Parts::of(pair);
+        let first = parts.next();
+        let key = (first.as_rule() == Rule::name).then(|| self.name(first));
+        let value = match parts.next() {
+            any if any.as_rule() == Rule::drawn_initially => None,
+            value => Some(self.expression(value)?),
+        };
+        Ok(InitialKey { key, value, span })
     }
 
     fn type_name(&self, pair: Pair<'_, Rule>) -> Type {
@@ -259,8 +276,14 @@ impl Builder {
         let on = parts.take(Rule::targets).map_or_else(Vec::new, |targets| {
             Parts::of(targets).rest().flat_map(|names| self.names(names)).collect()
         });
+        let key = parts.take(Rule::moved_key).map(|key| self.name(Parts::of(key).next()));
         let body = parts.next();
         if body.as_rule() == Rule::holds {
+            if let Some(key) = key {
+                let error =
+                    Diagnostic::error(code::MOVES, "only transitions are about a key").at(key.span, "");
+                return Err(Box::new(error.help("put the key into the condition: `sky[Rain] > None`")));
+            }
             let condition = self.only_expression(body)?;
             return Ok(NamedRule { optional, name, body: RuleBody::Holds { on, condition } });
         }
@@ -279,7 +302,7 @@ impl Builder {
             Move { from, to: names.collect(), span }
         });
         let moves = moves.collect();
-        Ok(NamedRule { optional, name, body: RuleBody::Moves { state, moves } })
+        Ok(NamedRule { optional, name, body: RuleBody::Moves { state, key, moves } })
     }
 
     fn reward_case(&self, pair: Pair<'_, Rule>) -> Built<Case> {

@@ -7,12 +7,12 @@
 
 use crate::syntax::ast::{
     Action, ActionParam, ClauseKind, Doc, Effect, EffectKind, Expect, Expr, ExprKind, Field, File, Initial,
-    Item, ItemKind, Name, ParamMode, Place, Policy, PolicyLine, Rule, RuleBody, Scenario, Span, Step, Type,
-    TypeKind,
+    InitialKey, Item, ItemKind, Name, ParamMode, Place, Policy, PolicyLine, Rule, RuleBody, Scenario, Span,
+    Step, Type, TypeKind,
 };
 use crate::syntax::layout::{INDENT, Layout, WIDTH};
 use crate::syntax::print_expression::{
-    arm, call, expression, expression_on_new_line, field, fields, number, patterns, quoted,
+    arm, braced, call, expression, expression_on_new_line, field, fields, number, patterns, quoted,
 };
 use crate::syntax::scan::Comment;
 
@@ -225,6 +225,7 @@ impl Printer<'_> {
                 match &item.initial {
                     Initial::Any => self.words(" any"),
                     Initial::Value(value) => self.value(value),
+                    Initial::Keys(keys) => self.initial_keys(keys, span),
                 }
             }
             ItemKind::Let(item) => {
@@ -307,6 +308,20 @@ impl Printer<'_> {
             }
         }
         self.level -= 1;
+    }
+
+    /// The values of keys, on one line if they fit and no key has a comment of its own.
+    fn initial_keys(&mut self, keys: &[InitialKey], span: Span) {
+        let layout = Layout::row([Layout::text(" "), braced(keys.iter().map(initial_key))]);
+        if !self.comment_between(span.start, span.end) && self.fits(&layout) {
+            return self.words(&layout.flat());
+        }
+        self.words(" ");
+        self.block(span.end, |printer| {
+            for key in keys {
+                printer.entry(key.span, &initial_key(key));
+            }
+        });
     }
 
     fn words(&mut self, words: &str) {
@@ -416,8 +431,9 @@ impl Printer<'_> {
                 self.words(":");
                 self.value(condition);
             }
-            RuleBody::Moves { state, moves } => {
-                self.words(&format!(" on {} ", state.text));
+            RuleBody::Moves { state, key, moves } => {
+                let key = key.as_ref().map_or(String::new(), |key| format!("[{}]", key.text));
+                self.words(&format!(" on {}{key} ", state.text));
                 self.block(span.end, |printer| {
                     for step in moves {
                         let to = step.to.iter().map(|name| name.text.as_str()).collect::<Vec<_>>();
@@ -511,6 +527,7 @@ fn one_line(kind: &ItemKind) -> bool {
         ItemKind::State(item) => match &item.initial {
             Initial::Any => true,
             Initial::Value(value) => plain(value),
+            Initial::Keys(_) => false,
         },
         ItemKind::Let(item) => plain(&item.value),
         ItemKind::Fn(item) => plain(&item.body),
@@ -553,6 +570,12 @@ fn type_text(ty: &Type) -> String {
         TypeKind::Named(name) => name.text.clone(),
         TypeKind::Map { key, value } => format!("{} -> {}", key.text, value.text),
     }
+}
+
+fn initial_key(key: &InitialKey) -> Layout {
+    let name = key.key.as_ref().map_or("_", |name| name.text.as_str());
+    let value = key.value.as_ref().map_or(Layout::text("any"), expression);
+    Layout::row([Layout::text(format!("{name}: ")), value])
 }
 
 fn param(param: &ActionParam) -> Layout {

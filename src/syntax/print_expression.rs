@@ -123,7 +123,7 @@ pub fn field(field: &Field) -> Layout {
     Layout::row([Layout::text(format!("{}: ", field.name.text)), expression(&field.value)])
 }
 
-fn braced(entries: impl Iterator<Item = Layout>) -> Layout {
+pub fn braced(entries: impl Iterator<Item = Layout>) -> Layout {
     let mut inside = Vec::new();
     for entry in entries {
         if !inside.is_empty() {

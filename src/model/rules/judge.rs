@@ -38,6 +38,7 @@ pub(crate) enum Breach<'a> {
     Move {
         rule: usize,
         state: usize,
+        cell: usize,
         from: Value,
         to: Value,
     },
@@ -75,10 +76,15 @@ impl<'a> RowRules<'a> {
                     Known::Step | Known::Judgement => unreachable!("no rule may read what comes after it"),
                 }
             }
-            Demand::Moves { state, allowed } => {
-                let cell = self.space.states[state].first_cell;
+            Demand::Moves { state, cell, allowed } => {
                 let (from, to) = (candidate.before.cells[cell], candidate.after.cells[cell]);
-                (!allowed[from.variant()][to.variant()]).then_some(Breach::Move { rule, state, from, to })
+                (!allowed[from.variant()][to.variant()]).then_some(Breach::Move {
+                    rule,
+                    state,
+                    cell,
+                    from,
+                    to,
+                })
             }
         }
     }
@@ -99,10 +105,10 @@ impl<'a> RowRules<'a> {
             Breach::Gap { spawn: SpawnFacts { spawn_gap_m, safety_gap_m }, .. } => {
                 format!("the gap would be {spawn_gap_m:.1} m, a fair one is {safety_gap_m:.1} m")
             }
-            Breach::Move { state, from, to, .. } => {
-                let state = &self.space.states[state];
-                let (from, to) = (self.space.show(from, state.ty), self.space.show(to, state.ty));
-                format!("`{}` may not move from {from} to {to}", state.name)
+            Breach::Move { state, cell, from, to, .. } => {
+                let ty = self.space.states[state].ty;
+                let (from, to) = (self.space.show(from, ty), self.space.show(to, ty));
+                format!("`{}` may not move from {from} to {to}", self.space.cell_name(cell))
             }
         }
     }

@@ -46,8 +46,8 @@ pub(crate) struct RowRules<'a> {
 pub(crate) enum Demand<'a> {
     /// The condition holds. State in it is the state after the action.
     Holds(&'a Expr),
-    /// The state of that index moves only as `allowed[from][to]` says.
-    Moves { state: usize, allowed: &'a [Vec<bool>] },
+    /// The cell of that state moves only as `allowed[from][to]` says.
+    Moves { state: usize, cell: usize, allowed: &'a [Vec<bool>] },
 }
 
 impl RuleBody {
@@ -63,8 +63,8 @@ impl RuleBody {
                 let binding = bindings.iter().find(|binding| binding.action == action)?;
                 Some(Demand::Holds(&binding.condition))
             }
-            RuleBody::Moves { state, allowed, actions } => {
-                actions.contains(&action).then_some(Demand::Moves { state: *state, allowed })
+            RuleBody::Moves { state, cell, allowed, actions } => {
+                actions.contains(&action).then_some(Demand::Moves { state: *state, cell: *cell, allowed })
             }
         }
     }
