@@ -214,7 +214,6 @@ pub struct State {
 
 /// The value of a state when an episode begins.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-#[expect(clippy::large_enum_variant, reason = "a file has a handful, and a box would burden every reader")]
 pub enum Initial {
     /// `any`: the value is drawn.
     Any,
