@@ -4,10 +4,11 @@ use std::sync::Arc;
 
 use crate::action::table::{Draw, Refusal, Situation};
 use crate::action::{Effect, SpawnRequest};
+use crate::model::expr::Expr;
 use crate::model::rules::{Candidate, Room, RowRules};
 use crate::model::{
-    ActionDef, Domain, EffectDef, Facts, Memory, Parameter, Space, SpawnDef, StateMeaning, Value, WorldFacts,
-    evaluate, locals, spawn_out_of_bounds,
+    ActionDef, Domain, EffectDef, Facts, Memory, MomentFacts, Parameter, Space, SpawnDef, StateMeaning,
+    Value, WorldFacts, evaluate, locals, spawn_out_of_bounds,
 };
 use crate::rng;
 use crate::rng::{Rng, Stream};
@@ -24,6 +25,8 @@ pub(super) struct Judge<'a> {
     row: RowRules<'a>,
     action: &'a ActionDef,
     situation: &'a Situation<'a>,
+    /// Filled in if a rule or a `where` asks for it.
+    moment: MomentFacts,
 }
 
 impl<'a> Judge<'a> {
@@ -31,7 +34,13 @@ impl<'a> Judge<'a> {
         let row = &space.rows[row];
         let action = &space.actions[row.action];
         let row = RowRules { space, row, road: Some(&situation.road.facts), in_force: situation.rules };
-        Judge { row, action, situation }
+        let wheres = action.parameters.iter().filter_map(|parameter| parameter.condition.as_ref());
+        let mut asked = wheres.chain(row.demands().filter_map(|(_, demand)| demand.condition()));
+        let moment = match asked.any(Expr::asks_the_world) {
+            true => situation.surroundings.moment(),
+            false => MomentFacts::default(),
+        };
+        Judge { row, action, situation, moment }
     }
 
     /// Draws until all rules hold.
@@ -121,7 +130,7 @@ impl<'a> Judge<'a> {
                 Err(reason) => refusals.push(refuse(None, format!("cannot spawn: {reason}"))),
             }
         }
-        let world = WorldFacts { ego_speed_mps: self.situation.surroundings.ego_speed_mps(), spawns };
+        let world = WorldFacts { moment: self.moment, step: self.situation.step, spawns };
         let candidate = Candidate { values, before, after: &after, world: Some(&world) };
         refusals.extend(self.row.breaches(candidate).map(|breach| {
             let rule = breach.rule().map(|rule| self.row.space.rules[rule].name.clone());

@@ -1,7 +1,7 @@
 //! What a row does to the world once its parameters are drawn.
 
-use crate::model::SpawnFacts;
 use crate::model::vocabulary::{Body, Colour, LaneChoice, Level, Phenomenon, Side, Then, TimeOfDay, Verb};
+use crate::model::{MomentFacts, SpawnFacts};
 
 /// One change of the world. A row has one or more, applied in order.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -50,8 +50,8 @@ pub trait Surroundings {
     /// A reason that completes "cannot spawn: …", for example `no lane on the left`.
     fn survey(&self, request: &SpawnRequest) -> Result<SpawnFacts, String>;
 
-    /// Speed of the ego vehicle, m/s, at least 0.
-    fn ego_speed_mps(&self) -> f64;
+    /// What can be asked about the ego vehicle and its surroundings now.
+    fn moment(&self) -> MomentFacts;
 
     /// Why the time of day and the weather cannot change now, in words.
     fn weather_refusal(&self) -> Option<String> {

@@ -7,7 +7,7 @@ use crate::check::names::unknown;
 use crate::check::references::Symbol;
 use crate::check::report::{Report, field};
 use crate::model::expr::{Expr, ExprKind};
-use crate::model::vocabulary::{Body, Colour, LaneChoice, Side, SpawnField, Then, Verb, Word};
+use crate::model::vocabulary::{Body, Colour, LaneChoice, Side, Site, SpawnField, Then, Verb, Word};
 use crate::model::{
     ActionDef, Domain, EffectDef, GroupDef, Parameter, RuleDef, SetDef, SpawnDef, Type, Value, WordExpr, code,
 };
@@ -106,7 +106,10 @@ impl Checker {
     ) -> Option<Parameter> {
         let mut locals = before.to_vec();
         locals.push((declared.name.text.clone(), ty));
-        let place = Place { locals: &locals, owner: Some(owner), ..Place::default() };
+        let axis = declared.mode == ParamMode::Each;
+        // The rows are the same at every moment; what is drawn may depend on it.
+        let site = if axis { Site::Axis } else { Site::Where };
+        let place = Place { locals: &locals, owner: Some(owner), states: !axis, site };
         let Some(domain) = self.values(declared, ty) else {
             declared.condition.iter().for_each(|condition| self.look_at(condition, &place, Some(Type::Bool)));
             return None;
@@ -116,7 +119,6 @@ impl Checker {
             Some(condition) => Some(self.typed(condition, &place, Type::Bool)?),
         };
         let name = declared.name.text.as_str().into();
-        let axis = declared.mode == ParamMode::Each;
         Some(Parameter { name, ty, axis, domain, condition, span: declared.span })
     }
 

@@ -5,7 +5,7 @@ use crate::check::names::unknown;
 use crate::check::references::Symbol;
 use crate::check::report::Report;
 use crate::model::expr::{Expr, ExprKind};
-use crate::model::vocabulary::{Fact, ROAD_LANES, Site, Word, parts_of, things};
+use crate::model::vocabulary::{Fact, Known, ROAD_LANES, Site, Word, WordFact, parts_of, thing_of, things};
 use crate::model::{EnumIndex, Type, code};
 use crate::syntax::ast::{Span, UnaryOp};
 use crate::syntax::{Diagnostic, ast, listed, nearest, one_of};
@@ -28,12 +28,12 @@ impl Place<'_> {
 
     /// The fact of that name, if it is known here.
     fn fact(&self, name: &str) -> Option<Fact> {
-        Fact::from_name(name).filter(|fact| self.site.knows(*fact))
+        Fact::from_name(name).filter(|fact| self.site.knows(fact.known()))
     }
 
     /// Whether something can be asked of a thing (`road`) here.
     pub(super) fn knows(&self, thing: &str) -> bool {
-        self.site.facts().any(|fact| fact.thing() == Some(thing))
+        self.site.knows_thing(thing)
     }
 }
 
@@ -248,8 +248,9 @@ impl Checker {
                 if place.states {
                     candidates.extend(self.states.iter().map(|state| state.name.as_str()));
                 }
-                let facts = place.site.facts().filter(|fact| fact.thing().is_none());
-                candidates.extend(facts.map(|fact| fact.name()));
+                let facts = place.site.facts().map(|fact| fact.name());
+                let words = place.site.word_facts().map(|fact| fact.name());
+                candidates.extend(facts.chain(words).filter(|name| !name.contains('.')));
                 let error = unknown("name", name, span, candidates);
                 let error = match self.lacking(name, place) {
                     Some(note) => error.note(note),
@@ -285,8 +286,10 @@ impl Checker {
     /// Why a name that exists cannot be used here; `None` if there is no such name.
     fn lacking(&self, name: &str, place: &Place<'_>) -> Option<String> {
         if place.knows(name) {
-            let mut asked: Vec<String> =
-                parts_of(name).iter().map(|(part, _)| format!("{name}.{part}")).collect();
+            let facts = place.site.facts().map(|fact| fact.name());
+            let known = facts.chain(place.site.word_facts().map(|fact| fact.name()));
+            let of_thing = known.filter(|known| thing_of(known) == Some(name));
+            let mut asked: Vec<String> = of_thing.map(str::to_owned).collect();
             if name == "road" {
                 asked.extend(["road == corner", "road in [corner, boulevard]"].map(str::to_owned));
             }
@@ -295,12 +298,15 @@ impl Checker {
         if Fact::from_name(name).is_some() && place.fact(name).is_none() {
             return Some(format!("`{name}` is known to the engine, but not in this place"));
         }
-        if !place.states && self.states.iter().any(|state| state.name == name) {
-            return Some(format!(
-                "`{name}` is a state, and functions and constants see none: pass it as a parameter"
-            ));
+        if place.states || !self.states.iter().any(|state| state.name == name) {
+            return None;
         }
-        None
+        Some(match place.site {
+            Site::Axis => format!(
+                "`{name}` is a state, and the rows of the table are the same in every state: write a rule"
+            ),
+            _ => format!("`{name}` is a state, and functions and constants see none: pass it as a parameter"),
+        })
     }
 
     /// `road.limit`: a fact about a thing.
@@ -317,10 +323,16 @@ impl Checker {
             }
         };
         let name = format!("{thing}.{}", part.text);
-        if !place.knows(thing) {
-            self.report(unknown_here(thing, span));
-        } else if let Some(fact) = place.fact(&name) {
+        let is_known = |known: Known| place.site.knows(known);
+        if let Some(fact) = place.fact(&name) {
             return Some(Expr { kind: ExprKind::Fact(fact), ty: fact.ty(), span });
+        } else if !place.knows(thing) || Fact::from_name(&name).is_some_and(|fact| !is_known(fact.known())) {
+            self.report(unknown_here(thing, span, place.site));
+        } else if let Some(fact) = WordFact::from_name(&name) {
+            let words = fact.words();
+            let example = words.first().map_or("", |(word, _)| word);
+            let error = Diagnostic::error(code::TYPE_MISMATCH, format!("`{name}` is a word of the engine"));
+            self.report(error.at(span, "no value").help(format!("compare it: `{name} == {example}`")));
         } else if name == ROAD_LANES.0 {
             let error = Diagnostic::error(code::TYPE_MISMATCH, "`road.lanes` is a set of lanes");
             self.report(error.at(span, "not a value").help("write `lane in road.lanes`"));
@@ -602,11 +614,20 @@ impl Checker {
 }
 
 /// A thing that is asked where no fact about it is known.
-pub(super) fn unknown_here(thing: &str, span: Span) -> Diagnostic {
+pub(super) fn unknown_here(thing: &str, span: Span, site: Site) -> Diagnostic {
     let asked = parts_of(thing).first().map_or("", |(part, _)| part);
-    Diagnostic::error(code::NOT_HERE, format!("`{thing}` is not known here"))
-        .at(span, format!("only rules see the {thing}"))
-        .help(format!("write a rule, or pass a function what it needs: `f({thing}.{asked})`"))
+    let error = Diagnostic::error(code::NOT_HERE, format!("`{thing}` is not known here"));
+    match site {
+        Site::Where if thing == "npc" => error
+            .at(span, "its place is known only once all values are drawn")
+            .help("write a rule on the action"),
+        Site::Axis => error
+            .at(span, "the rows of the table are the same at every moment")
+            .help("write a rule on the action, or draw the parameter with `any`"),
+        _ => error
+            .at(span, format!("only rules see the {thing}"))
+            .help(format!("write a rule, or pass a function what it needs: `f({thing}.{asked})`")),
+    }
 }
 
 /// A word that is no unit.

@@ -7,10 +7,10 @@ use crate::check::names::unknown;
 use crate::check::references::Symbol;
 use crate::check::report::Report;
 use crate::model::expr::{Arithmetic, Comparison, Expr, ExprKind};
-use crate::model::vocabulary::{LaneChoice, PRIORITY, Priority, Site, Word};
+use crate::model::vocabulary::{Known, LaneChoice, Word, WordFact};
 use crate::model::{Type, code};
 use crate::syntax::ast::{BinaryOp, Span};
-use crate::syntax::{Diagnostic, ast};
+use crate::syntax::{Diagnostic, ast, one_of};
 
 impl Checker {
     /// Two sides and what joins them.
@@ -96,13 +96,20 @@ impl Checker {
             }
             return Some(equal_or_not(op, self.on_road(core::slice::from_ref(road), place, span)?));
         }
-        let is_priority = [self.names_priority(left, place), self.names_priority(right, place)];
-        if let Some(word) = beside_word(left, right, is_priority) {
+        let facts = [self.word_fact(left, place), self.word_fact(right, place)];
+        if let Some(fact) = facts[0].or(facts[1]) {
+            let word = if facts[0].is_some() { right } else { left };
             if op.orders() {
-                let help = "write `priority == ego`, or `priority in [other, none]`";
-                return self.unordered("priority has no order", op, span, help);
+                let words = fact.words();
+                let help = format!(
+                    "write `{0} == {1}`, or `{0} in [{1}, {2}]`",
+                    fact.name(),
+                    words[0].0,
+                    words[1].0
+                );
+                return self.unordered(&format!("`{}` has no order", fact.name()), op, span, &help);
             }
-            return Some(equal_or_not(op, self.has_priority(core::slice::from_ref(word), place, span)?));
+            return Some(equal_or_not(op, self.is_word(fact, core::slice::from_ref(word), place, span)?));
         }
         let (left, right) = self.both_sides(left, right, place)?;
         if !fits(left.ty, right.ty) && !fits(right.ty, left.ty) {
@@ -151,8 +158,8 @@ impl Checker {
         if let (true, ast::ExprKind::List(roads)) = (self.names_road(left, place), &right.kind) {
             return self.on_road(roads, place, span);
         }
-        if let (true, ast::ExprKind::List(words)) = (self.names_priority(left, place), &right.kind) {
-            return self.has_priority(words, place, span);
+        if let (ast::ExprKind::List(words), Some(fact)) = (&right.kind, self.word_fact(left, place)) {
+            return self.is_word(fact, words, place, span);
         }
         let Some(value) = self.expr(left, place, None) else {
             self.look_at(right, place, None);
@@ -183,7 +190,7 @@ impl Checker {
             {
                 self.note_part(base, field);
                 if !place.knows("road") {
-                    return self.reject(unknown_here("road", right.span));
+                    return self.reject(unknown_here("road", right.span, place.site));
                 }
                 let lanes = self.words::<LaneChoice>("lane", ty, value.span)?;
                 ExprKind::InLanes(value, lanes)
@@ -208,7 +215,7 @@ impl Checker {
     fn on_road(&mut self, names: &[ast::Expr], place: &Place<'_>, span: Span) -> Option<Expr> {
         self.note_roads(names);
         if !place.knows("road") {
-            return self.reject(unknown_here("road", span));
+            return self.reject(unknown_here("road", span, place.site));
         }
         let road = |name: &ast::Expr| match &name.kind {
             ast::ExprKind::Name(text) if self.road_names.contains(text) => Some(text.clone()),
@@ -227,28 +234,42 @@ impl Checker {
         Some(Expr { kind: ExprKind::OnRoad(roads), ty: Type::Bool, span })
     }
 
-    /// `priority == ego`: whether priority was one of these.
-    fn has_priority(&mut self, words: &[ast::Expr], place: &Place<'_>, span: Span) -> Option<Expr> {
-        if place.site != Site::Verdict {
-            let error = Diagnostic::error(code::NOT_HERE, "`priority` is not known here");
-            return self.reject(error.at(span, "only verdicts see who had to give way"));
+    /// `priority == ego`, `ego.light in [Yellow, Red]`: whether the fact is one of these words.
+    fn is_word(
+        &mut self,
+        fact: WordFact,
+        words: &[ast::Expr],
+        place: &Place<'_>,
+        span: Span,
+    ) -> Option<Expr> {
+        if !place.site.knows(fact.known()) {
+            let error = Diagnostic::error(code::NOT_HERE, format!("`{}` is not known here", fact.name()));
+            let who = match fact.known() {
+                Known::Road | Known::World | Known::Spawn => "only rules ask about the moment",
+                Known::Step => "only rewards and verdicts see what happened in the step",
+                Known::Judgement => "only verdicts see how a collision was judged",
+            };
+            return self.reject(error.at(span, who));
         }
         // Every unknown word is reported, not just the first.
-        let found: Vec<Option<Priority>> = words.iter().map(|word| self.priority_word(word)).collect();
-        let kind = ExprKind::HasPriority(found.into_iter().collect::<Option<_>>()?);
+        let found: Vec<Option<String>> = words.iter().map(|word| self.word_of(fact, word)).collect();
+        let kind = ExprKind::IsWord(fact, found.into_iter().collect::<Option<_>>()?);
         Some(Expr { kind, ty: Type::Bool, span })
     }
 
-    fn priority_word(&mut self, word: &ast::Expr) -> Option<Priority> {
+    fn word_of(&mut self, fact: WordFact, word: &ast::Expr) -> Option<String> {
+        let words = fact.words();
+        let names = || words.iter().map(|(name, _)| *name);
         let ast::ExprKind::Name(name) = &word.kind else {
-            let error = Diagnostic::error(code::TYPE_MISMATCH, "wanted `ego`, `other` or `none`");
-            return self.reject(error.at(word.span, "not a name"));
+            let names: Vec<&str> = names().collect();
+            let message = format!("wanted {}", one_of(&names));
+            return self.reject(Diagnostic::error(code::TYPE_MISMATCH, message).at(word.span, "not a name"));
         };
-        let Some(priority) = Priority::from_name(name) else {
-            return self.reject(unknown("priority", name, word.span, Priority::names()));
+        let Some((known, meaning)) = words.iter().find(|(known, _)| known == name) else {
+            return self.reject(unknown(fact.name(), name, word.span, names()));
         };
-        self.references.word(word.span, priority);
-        Some(priority)
+        self.references.note(word.span, Symbol::Engine(known, meaning), false);
+        Some(name.clone())
     }
 
     /// Notes the names among the expressions as roads.
@@ -265,13 +286,22 @@ impl Checker {
         self.names(expr, "road", place)
     }
 
-    /// Whether the expression is the word `priority`, which is then noted.
-    fn names_priority(&mut self, expr: &ast::Expr, place: &Place<'_>) -> bool {
-        let is_named = self.names(expr, PRIORITY.0, place);
-        if is_named {
-            self.references.note(expr.span, Symbol::Engine(PRIORITY.0, PRIORITY.1), false);
+    /// The fact that is compared with words, if the expression names one, which is then noted.
+    fn word_fact(&mut self, expr: &ast::Expr, place: &Place<'_>) -> Option<WordFact> {
+        match &expr.kind {
+            ast::ExprKind::Name(name) => {
+                let fact = WordFact::from_name(name).filter(|_| self.is_bare_variant(expr, place))?;
+                self.references.note(expr.span, Symbol::Engine(fact.name(), fact.meaning()), false);
+                Some(fact)
+            }
+            ast::ExprKind::Field { base, field } => {
+                let ast::ExprKind::Name(thing) = &base.kind else { return None };
+                let fact = WordFact::from_name(&format!("{thing}.{}", field.text))?;
+                self.note_part(base, field);
+                Some(fact)
+            }
+            _ => None,
         }
-        is_named
     }
 
     /// Whether the expression is a word, and no parameter, constant or state of that name hides it.

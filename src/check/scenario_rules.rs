@@ -43,7 +43,7 @@ pub(super) fn breaches(space: &Space, moment: &Moment<'_>, in_force: &RulesInFor
                 let error = error.at(moment.step.span, rules.words(breach, candidate));
                 Some(forbidden_move(space, rule, (state, cell, from, to), moment, error))
             }
-            Breach::Where(_) | Breach::Gap { .. } => None,
+            Breach::Where(..) | Breach::Spawn { .. } => None,
         }
     };
     rules.breaches(candidate).filter_map(error).collect()
@@ -106,7 +106,7 @@ fn broken_condition(
     let mut error = error.beside(space.rules[rule].span, "does not allow it");
     let mut nearest = None;
     let mut is_placed = false;
-    for (bound, limit) in rules.broken_bounds(rule, candidate) {
+    for (bound, limit) in rules.broken_bounds(rule, candidate, None) {
         let parameter = &space.actions[moment.row.action].parameters[bound.local];
         let field = moment.step.drawn.iter().find(|field| *field.name.text == *parameter.name);
         let Some(field) = field.filter(|_| !parameter.axis) else { continue };

@@ -7,6 +7,7 @@
 use ndarray::Array1;
 
 use crate::ads::Status;
+use crate::model::MomentFacts;
 use crate::model::policy::VARIABLES;
 use crate::sim::World;
 
@@ -15,10 +16,8 @@ use super::state::{STATE_LEN, StateVector, observe};
 /// Number of the variables beyond the paper's; they are the last of [`VARIABLES`].
 pub const BEYOND_LEN: usize = VARIABLES.len() - STATE_LEN;
 
-/// How far ahead a junction is searched for, m; also stands for the distance if there is no obstacle.
+/// A junction farther away is as good as none, m; also stands for the distance if there is no obstacle.
 const LOOK_AHEAD_M: f64 = 100.0;
-/// Step of the search for a junction, m.
-const LOOK_STEP_M: f64 = 5.0;
 
 /// What an agent sees at one moment.
 #[derive(Debug, Clone, PartialEq)]
@@ -32,9 +31,10 @@ pub struct Observation {
 impl Observation {
     /// Reads all variables from the world and the driving system.
     pub fn new(world: &World, status: &Status) -> Observation {
+        let moment = world.moment_facts();
         Observation {
-            state: observe(world, status),
-            beyond: beyond(world).into_iter().map(|value| value as f32).collect(),
+            state: observe(world, &moment, status),
+            beyond: beyond(world, &moment).into_iter().map(|value| value as f32).collect(),
         }
     }
 
@@ -54,7 +54,7 @@ pub fn variable(name: &str) -> Option<usize> {
     VARIABLES.iter().position(|known| known.observed_as == name)
 }
 
-fn beyond(world: &World) -> [f64; BEYOND_LEN] {
+fn beyond(world: &World, moment: &MomentFacts) -> [f64; BEYOND_LEN] {
     let ego = world.ego().rear_axle;
     let [rain, fog, wetness] = world.sky().map(|level| level.intensity());
     let outline = world.ego_outline().pose;
@@ -79,23 +79,11 @@ fn beyond(world: &World) -> [f64; BEYOND_LEN] {
         left_m,
         ahead_mps,
         left_mps,
-        world.scene().route.goal_m - world.ego_station_m(),
-        junction_ahead_m(world),
-        world.ego_offset_m(),
-        world.time_s(),
+        moment.ego_route_left_m,
+        moment.ego_junction_ahead_m.min(LOOK_AHEAD_M),
+        moment.ego_offset_m,
+        moment.elapsed_s,
     ]
-}
-
-/// Distance along the route to the next junction, m, to within a few metres: 0 inside one.
-fn junction_ahead_m(world: &World) -> f64 {
-    let scene = world.scene();
-    let steps = (LOOK_AHEAD_M / LOOK_STEP_M) as u32;
-    let distances = (0..steps).map(|step| f64::from(step) * LOOK_STEP_M);
-    let is_junction = |ahead_m: &f64| {
-        let lane = scene.route.lane_at(world.ego_station_m() + ahead_m).lane;
-        scene.map.lane(lane).junction.is_some()
-    };
-    distances.into_iter().find(is_junction).unwrap_or(LOOK_AHEAD_M)
 }
 
 #[cfg(test)]

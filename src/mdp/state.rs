@@ -12,8 +12,9 @@ use ndarray::Array1;
 
 use crate::ads::{PerceivedObject, Status};
 use crate::geometry::{Vec2, wrap_angle};
-use crate::model::vocabulary::TimeOfDay;
-use crate::sim::{Obstacle, SignalColour, World};
+use crate::model::MomentFacts;
+use crate::model::vocabulary::{Light, RoadKind, TimeOfDay};
+use crate::sim::{Obstacle, World};
 
 /// Number of state variables; they are the first of [`VARIABLES`](crate::model::policy::VARIABLES).
 pub const STATE_LEN: usize = 19;
@@ -21,37 +22,40 @@ pub const STATE_LEN: usize = 19;
 /// One state: shape `(STATE_LEN,)`.
 pub type StateVector = Array1<f32>;
 
-/// Distance that stands for "no obstacle around", m, as in the published package.
-const NO_OBSTACLE_M: f64 = 100.0;
-/// How far ahead a traffic light or a junction is searched for, m.
-const LOOK_AHEAD_M: f64 = 100.0;
-/// The ego vehicle is at a junction that is nearer than this, m, as in the published package.
-const NEAR_JUNCTION_M: f64 = 20.0;
 /// No sensor reaches obstacles that are farther away, m.
 const SENSOR_REACH_M: f64 = 120.0;
 /// A localisation error below this has no direction, m.
 const DEVIATION_M_MIN: f64 = 1e-3;
 
 /// Reads the state vector from the world and the driving system.
-pub fn observe(world: &World, status: &Status) -> StateVector {
-    let surroundings = surroundings(world);
+pub fn observe(world: &World, moment: &MomentFacts, status: &Status) -> StateVector {
+    let surroundings = surroundings(world, moment);
     let driving_system = driving_system(world, status);
     surroundings.into_iter().chain(driving_system).map(|value| value as f32).collect()
 }
 
-fn surroundings(world: &World) -> [f64; 7] {
+fn surroundings(world: &World, moment: &MomentFacts) -> [f64; 7] {
     let [rain, fog, wetness] = world.sky().map(|level| level.intensity());
-    let nearest = nearest_obstacle(world);
     [
         // One number for three phenomena, as the published package packs them.
         100.0 * rain + 10.0 * fog + wetness,
         hour(world.time_of_day()),
-        signal_ahead(world),
-        world.obstacles().len() as f64,
-        nearest.map_or(NO_OBSTACLE_M, |(distance_m, _)| distance_m),
+        match moment.ego_light {
+            Light::Red => -1.0,
+            // Neither says whether the way is free or closed, so both stand between red and green.
+            Light::Yellow | Light::None => 0.0,
+            Light::Green => 1.0,
+        },
+        f64::from(moment.road_users),
+        moment.nearest_gap_m,
         // Ours: the package's 100 would read as an obstacle faster than any other.
-        nearest.map_or(0.0, |(_, speed_mps)| speed_mps),
-        road_condition(world),
+        moment.nearest_speed_mps,
+        match moment.ego_road {
+            RoadKind::OneWay => 0.0,
+            RoadKind::TwoWay => 1.0,
+            RoadKind::NearJunction => 2.0,
+            RoadKind::InJunction => 3.0,
+        },
     ]
 }
 
@@ -84,47 +88,6 @@ fn hour(time: TimeOfDay) -> f64 {
         TimeOfDay::Noon => 14.0,
         TimeOfDay::Night => 20.0,
     }
-}
-
-/// Distance (m, between outlines) and speed (m/s) of the nearest obstacle.
-fn nearest_obstacle(world: &World) -> Option<(f64, f64)> {
-    let gaps = world.obstacles().map(|obstacle| (obstacle.distance_m, obstacle.velocity_mps.norm()));
-    gaps.min_by(|a, b| a.0.total_cmp(&b.0))
-}
-
-/// Colour of the next traffic light on the route: red -1, yellow 0, green 1; 0 if there is none.
-fn signal_ahead(world: &World) -> f64 {
-    let station_m = world.ego_station_m();
-    let ahead = |at_m: f64| at_m >= station_m && at_m <= station_m + LOOK_AHEAD_M;
-    let next = world.scene().route.stop_lines.iter().find(|line| ahead(line.station_m));
-    match next.map(|line| world.signal(line.signal)) {
-        Some(SignalColour::Red) => -1.0,
-        Some(SignalColour::Green) => 1.0,
-        // Neither says whether the way is free or closed, so both stand between red and green.
-        Some(SignalColour::Yellow) | None => 0.0,
-    }
-}
-
-/// Kind of road: 0 one-way, 1 two-way, 2 at a junction, 3 inside one.
-fn road_condition(world: &World) -> f64 {
-    let scene = world.scene();
-    let station_m = world.ego_station_m();
-    let here = scene.map.lane(scene.route.lane_at(station_m).lane);
-    let soon = scene.map.lane(scene.route.lane_at(station_m + NEAR_JUNCTION_M).lane);
-    if here.junction.is_some() {
-        return 3.0;
-    }
-    if soon.junction.is_some() {
-        return 2.0;
-    }
-    let mut beside = here.left;
-    while let Some(neighbour) = beside {
-        if !neighbour.same_direction {
-            return 1.0;
-        }
-        beside = scene.map.lane(neighbour.lane).left;
-    }
-    0.0
 }
 
 /// `angleDeviation`, Eq. 2, by `atan2` (the printed `arctan` loses the quadrant and divides by 0);

@@ -6,7 +6,7 @@
 use crate::model::expr::{Arithmetic, Comparison, Expr, ExprKind};
 use crate::model::space::{COUNTED, FnDef, RoadFacts, Space, WordExpr};
 use crate::model::value::{Memory, Value};
-use crate::model::vocabulary::{Fact, LaneChoice, Priority};
+use crate::model::vocabulary::{Fact, LaneChoice, Light, Priority, RoadKind, Word, WordFact};
 
 /// Numbers that differ by at most this part of the larger one are `==`. This tolerates the digits that an
 /// author rounds away, but no measurable distance.
@@ -29,21 +29,59 @@ pub struct Facts<'a> {
 /// What rules may ask the world at a draw ([`Known::World`] and later).
 ///
 /// [`Known::World`]: crate::model::vocabulary::Known::World
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct WorldFacts {
-    pub ego_speed_mps: f64,
+    pub moment: MomentFacts,
+    /// Number of the step.
+    pub step: u64,
     /// Each spawn of the action for which the world has found a place.
     pub spawns: Vec<SpawnFacts>,
 }
 
+/// What can be asked about the ego vehicle and its surroundings at a moment.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct MomentFacts {
+    pub ego_speed_mps: f64,
+    pub ego_acceleration_mps2: f64,
+    /// Limit of the route's lane at the ego vehicle.
+    pub ego_limit_mps: f64,
+    /// Along the route to the next junction: 0 inside one, at most [`JUNCTION_AHEAD_M_MAX`].
+    pub ego_junction_ahead_m: f64,
+    pub ego_route_left_m: f64,
+    /// Positive to the left of the route.
+    pub ego_offset_m: f64,
+    pub ego_light: Light,
+    pub ego_road: RoadKind,
+    pub road_users: u32,
+    /// Between the outlines.
+    pub nearest_gap_m: f64,
+    pub nearest_speed_mps: f64,
+    pub elapsed_s: f64,
+}
+
+/// Stands for a junction that is farther away, and for none at all, m.
+pub const JUNCTION_AHEAD_M_MAX: f64 = 1000.0;
+
+/// What can be asked about a road user other than the ego vehicle at a moment.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct NpcFacts {
+    pub speed_mps: f64,
+    /// Along its way to the next junction, as in [`MomentFacts`].
+    pub junction_ahead_m: f64,
+    /// Limit of the lane that it is in.
+    pub limit_mps: f64,
+}
+
 /// What a rule may ask about a spawn before it happens.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct SpawnFacts {
     /// Distance between the outlines of the ego vehicle and the newcomer, or the vehicle that is parked with it,
     /// whichever is nearer, m.
     pub spawn_gap_m: f64,
     /// Gap that a careful and competent driver would need there, m; 0 if the two do not approach.
     pub safety_gap_m: f64,
+    /// The road user that would appear.
+    pub npc: NpcFacts,
 }
 
 /// The facts that verdicts and rewards may read.
@@ -107,23 +145,50 @@ pub fn evaluate(expr: &Expr, functions: &[FnDef], facts: &Facts<'_>) -> Value {
         }
         ExprKind::InLanes(inner, lanes) => Value::Bool(has_lane(facts, lanes[value(inner).variant()])),
         ExprKind::OnRoad(names) => Value::Bool(facts.road.is_some_and(|road| names.contains(&road.name))),
-        ExprKind::HasPriority(list) => Value::Bool(list.contains(&facts.outcome.priority)),
+        ExprKind::IsWord(fact, words) => {
+            Value::Bool(word_of(*fact, facts).is_some_and(|word| words.iter().any(|one| one == word)))
+        }
         ExprKind::Match { subject, arm_of, arms } => value(&arms[arm_of[value(subject).variant()]]),
     }
 }
 
 fn fact_value(fact: Fact, facts: &Facts<'_>) -> Value {
+    let moment =
+        |of: fn(&MomentFacts) -> f64| Value::Number(facts.world.map_or(f64::NAN, |world| of(&world.moment)));
+    let spawn = |of: fn(&SpawnFacts) -> f64| Value::Number(facts.spawn.as_ref().map_or(f64::NAN, of));
     match fact {
         Fact::RoadLimit => Value::Number(facts.road.map_or(f64::NAN, |road| road.limit_mps)),
-        Fact::EgoSpeed => Value::Number(facts.world.map_or(f64::NAN, |world| world.ego_speed_mps)),
-        Fact::SpawnGap => Value::Number(facts.spawn.map_or(f64::NAN, |spawn| spawn.spawn_gap_m)),
-        Fact::SafetyGap => Value::Number(facts.spawn.map_or(f64::NAN, |spawn| spawn.safety_gap_m)),
+        Fact::EgoSpeed => moment(|moment| moment.ego_speed_mps),
+        Fact::EgoAcceleration => moment(|moment| moment.ego_acceleration_mps2),
+        Fact::EgoLimit => moment(|moment| moment.ego_limit_mps),
+        Fact::EgoJunctionAhead => moment(|moment| moment.ego_junction_ahead_m),
+        Fact::EgoRouteLeft => moment(|moment| moment.ego_route_left_m),
+        Fact::EgoOffset => moment(|moment| moment.ego_offset_m),
+        Fact::RoadUsers => moment(|moment| f64::from(moment.road_users)),
+        Fact::NearestGap => moment(|moment| moment.nearest_gap_m),
+        Fact::NearestSpeed => moment(|moment| moment.nearest_speed_mps),
+        Fact::Elapsed => moment(|moment| moment.elapsed_s),
+        Fact::StepNumber => Value::Number(facts.world.map_or(f64::NAN, |world| world.step as f64)),
+        Fact::NpcSpeed => spawn(|spawn| spawn.npc.speed_mps),
+        Fact::NpcJunctionAhead => spawn(|spawn| spawn.npc.junction_ahead_m),
+        Fact::NpcLimit => spawn(|spawn| spawn.npc.limit_mps),
+        Fact::SpawnGap => spawn(|spawn| spawn.spawn_gap_m),
+        Fact::SafetyGap => spawn(|spawn| spawn.safety_gap_m),
         Fact::Proc => Value::Number(facts.outcome.proc),
         Fact::Collision => Value::Bool(facts.outcome.collision),
         Fact::Repeated => Value::Bool(facts.outcome.repeated),
         Fact::Sudden => Value::Bool(facts.outcome.sudden),
         Fact::Struck => Value::Bool(facts.outcome.struck),
         Fact::Avoidable => Value::Bool(facts.outcome.avoidable),
+    }
+}
+
+/// The word that a fact is; `None` where it is not known.
+pub(crate) fn word_of(fact: WordFact, facts: &Facts<'_>) -> Option<&'static str> {
+    match fact {
+        WordFact::EgoLight => facts.world.map(|world| world.moment.ego_light.name()),
+        WordFact::EgoRoad => facts.world.map(|world| world.moment.ego_road.name()),
+        WordFact::Priority => Some(facts.outcome.priority.name()),
     }
 }
 

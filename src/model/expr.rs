@@ -1,7 +1,7 @@
 //! Typed expressions: names are resolved, units are gone (all numbers are SI), every type fits.
 
 use crate::model::value::{EnumIndex, Type};
-use crate::model::vocabulary::{Fact, Known, LaneChoice, Priority};
+use crate::model::vocabulary::{Fact, Known, LaneChoice, WordFact};
 use crate::syntax::ast::Span;
 pub use crate::syntax::ast::{Arithmetic, Comparison};
 use crate::units::Rational;
@@ -43,8 +43,8 @@ pub enum ExprKind {
     InLanes(Box<Expr>, Vec<LaneChoice>),
     /// `road == corner`, `road in [corner, boulevard]`: whether the road is one of these.
     OnRoad(Vec<String>),
-    /// `priority == ego`, `priority in [other, none]`: whether priority was one of these.
-    HasPriority(Vec<Priority>),
+    /// `priority == ego`, `ego.light in [Yellow, Red]`: whether the fact is one of these words.
+    IsWord(WordFact, Vec<String>),
     /// The arm for each variant of the subject's enum is `arms[arm_of[variant]]`.
     Match {
         subject: Box<Expr>,
@@ -65,7 +65,7 @@ impl Expr {
             | ExprKind::Local(_)
             | ExprKind::Cell(_)
             | ExprKind::OnRoad(_)
-            | ExprKind::HasPriority(_)
+            | ExprKind::IsWord(..)
             | ExprKind::Fact(_) => {}
             ExprKind::CellAt(_, inner)
             | ExprKind::Not(inner)
@@ -106,12 +106,32 @@ impl Expr {
     /// From when on all facts are known that the expression names; [`Known::Road`] if it names none.
     pub fn known(&self) -> Known {
         let mut latest = Known::Road;
-        self.walk(&mut |expr| {
-            if let ExprKind::Fact(fact) = expr.kind {
-                latest = latest.max(fact.known());
-            }
+        self.walk(&mut |expr| match &expr.kind {
+            ExprKind::Fact(fact) => latest = latest.max(fact.known()),
+            ExprKind::IsWord(fact, _) => latest = latest.max(fact.known()),
+            _ => {}
         });
         latest
+    }
+
+    /// Whether it asks about the moment in the world ([`Known::World`]).
+    pub fn asks_the_world(&self) -> bool {
+        self.any(|kind| match kind {
+            ExprKind::Fact(fact) => fact.known() == Known::World,
+            ExprKind::IsWord(fact, _) => fact.known() == Known::World,
+            _ => false,
+        })
+    }
+
+    /// Whether it asks about the moment, or about more of a spawn than its gaps.
+    pub(crate) fn asks_about_moment(&self) -> bool {
+        let about_npc = |kind: &ExprKind| match kind {
+            ExprKind::Fact(fact) => {
+                fact.known() == Known::Spawn && !matches!(fact, Fact::SpawnGap | Fact::SafetyGap)
+            }
+            _ => false,
+        };
+        self.asks_the_world() || self.any(about_npc)
     }
 
     pub fn reads_memory(&self) -> bool {

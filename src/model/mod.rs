@@ -22,7 +22,9 @@ mod value;
 pub mod vocabulary;
 
 pub use digest::{digest, digest_text};
-pub use eval::{Facts, OutcomeFacts, SpawnFacts, WorldFacts, evaluate};
+pub use eval::{
+    Facts, JUNCTION_AHEAD_M_MAX, MomentFacts, NpcFacts, OutcomeFacts, SpawnFacts, WorldFacts, evaluate,
+};
 pub use interval::{End, Interval};
 pub(crate) use limits::spawn_out_of_bounds;
 pub use limits::{AMBIENT_MAX, SIGNAL_PHASE_S, SPAWN_DISTANCE_M, SPAWN_SPEED_MPS, TICK_MS};

@@ -73,6 +73,29 @@ macro_rules! facts {
     };
 }
 
+/// Declares the facts that are one of a list of words.
+macro_rules! word_facts {
+    ($($fact:ident $spelling:literal $words:ident, $known:ident = $meaning:literal;)+) => {
+        words! {
+            /// The words are no values: they stand only beside the fact, and mean nothing elsewhere.
+            WordFact "What is compared with words of the engine.": $($fact $spelling = $meaning),+
+        }
+
+        impl WordFact {
+            pub fn known(self) -> Known {
+                match self { $(WordFact::$fact => Known::$known),+ }
+            }
+
+            /// The words that it may be, each with its sentence.
+            pub fn words(self) -> Vec<(&'static str, &'static str)> {
+                match self {
+                    $(WordFact::$fact => $words::ALL.iter().map(|word| (word.name(), word.meaning())).collect()),+
+                }
+            }
+        }
+    };
+}
+
 /// From when on a fact is known; later ones come later in an episode.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Known {
@@ -92,19 +115,25 @@ pub enum Known {
 /// Where an expression stands, which decides the facts that it may read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Site {
-    /// In functions, constants, parameters and effects, which see no facts.
+    /// In functions, constants and effects, which see no facts.
     #[default]
     Elsewhere,
+    /// In the `where` of an axis, which is decided before any episode.
+    Axis,
+    /// In the `where` of a drawn parameter.
+    Where,
     Rule,
     Reward,
     Verdict,
 }
 
 impl Site {
-    /// Whether the fact is known here. A verdict knows what a reward knows, and how the collision was judged.
-    pub fn knows(self, fact: Fact) -> bool {
-        match fact.known() {
-            Known::Road | Known::World | Known::Spawn => self == Site::Rule,
+    /// Whether what is known from then on is known here. A verdict knows what a reward knows, and how the
+    /// collision was judged.
+    pub fn knows(self, known: Known) -> bool {
+        match known {
+            Known::Road | Known::World => matches!(self, Site::Where | Site::Rule),
+            Known::Spawn => self == Site::Rule,
             Known::Step => matches!(self, Site::Reward | Site::Verdict),
             Known::Judgement => self == Site::Verdict,
         }
@@ -112,7 +141,18 @@ impl Site {
 
     /// The facts that are known here.
     pub fn facts(self) -> impl Iterator<Item = Fact> {
-        Fact::ALL.iter().copied().filter(move |fact| self.knows(*fact))
+        Fact::ALL.iter().copied().filter(move |fact| self.knows(fact.known()))
+    }
+
+    /// Those that are words.
+    pub fn word_facts(self) -> impl Iterator<Item = WordFact> {
+        WordFact::ALL.iter().copied().filter(move |fact| self.knows(fact.known()))
+    }
+
+    /// Whether anything can be asked of a thing (`road`) here.
+    pub fn knows_thing(self, thing: &str) -> bool {
+        self.facts().any(|fact| thing_of(fact.name()) == Some(thing))
+            || self.word_facts().any(|fact| thing_of(fact.name()) == Some(thing))
     }
 }
 
@@ -128,13 +168,29 @@ pub const TYPES: &[(&str, Type, &str)] = &[
     ("Ratio", RATIO, "A number without a unit, or with `%`."),
 ];
 
+const ACCEL: Type = Type::Quantity(Dimension::ACCEL);
+const DURATION: Type = Type::Quantity(Dimension::DURATION);
 const LENGTH: Type = Type::Quantity(Dimension::LENGTH);
 const RATIO: Type = Type::Quantity(Dimension::RATIO);
 const SPEED: Type = Type::Quantity(Dimension::SPEED);
 
+// The names of policies' variables (`policy::VARIABLES`) are the same wherever the same is meant.
 facts! {
     RoadLimit "road.limit" SPEED, Road = "A `Speed`: the lowest limit along the route.";
-    EgoSpeed "ego.speed" SPEED, World = "A `Speed`: how fast the ego vehicle is when the action is chosen.";
+    EgoSpeed "ego.speed" SPEED, World = "A `Speed`: how fast the ego vehicle is.";
+    EgoAcceleration "ego.acceleration" ACCEL, World = "A `Accel`: of the ego vehicle, negative when it brakes.";
+    EgoLimit "ego.limit" SPEED, World = "A `Speed`: the limit of the lane that the ego vehicle is in.";
+    EgoJunctionAhead "ego.junction_ahead" LENGTH, World = "A `Length`: along the route to the next junction; 0 in one, 1000 m if there is none nearer.";
+    EgoRouteLeft "ego.route_left" LENGTH, World = "A `Length`: along the route to the goal.";
+    EgoOffset "ego.offset" LENGTH, World = "A `Length`: how far the ego vehicle is to the left of its route.";
+    RoadUsers "road_users" Type::Int, World = "A `Int`: how many there are beside the ego vehicle.";
+    NearestGap "nearest.gap" LENGTH, World = "A `Length`: to the nearest road user; 100 m if there is none.";
+    NearestSpeed "nearest.speed" SPEED, World = "A `Speed`: of the nearest road user; 0 if there is none.";
+    Elapsed "elapsed" DURATION, World = "A `Duration`: since the episode began.";
+    StepNumber "step" Type::Int, World = "A `Int`: the number of the step, from 0.";
+    NpcSpeed "npc.speed" SPEED, Spawn = "A `Speed`: of the road user that appears.";
+    NpcJunctionAhead "npc.junction_ahead" LENGTH, Spawn = "A `Length`: along its way to the next junction; 0 in one, 1000 m if there is none nearer.";
+    NpcLimit "npc.limit" SPEED, Spawn = "A `Speed`: the limit of the lane in which it appears.";
     SpawnGap "spawn_gap" LENGTH, Spawn = "A `Length`: the gap from the ego vehicle to the road user that appears.";
     SafetyGap "safety_gap" LENGTH, Spawn = "A `Length`: the gap that a careful driver needs.";
     Proc "proc" RATIO, Step = "A `Ratio`: the collision probability of the step.";
@@ -149,32 +205,39 @@ facts! {
 pub const ROAD_LANES: (&str, &str) =
     ("road.lanes", "The lanes in the ego vehicle's direction: `lane in road.lanes`.");
 
-/// `priority == ego`: spelt like a fact, but only a condition, as `road == corner` is.
-pub const PRIORITY: (&str, &str) = (
-    "priority",
-    "Whether the ego vehicle or the road user had to give way: `priority == ego`, `priority in [other, none]`. Verdicts only.",
-);
+word_facts! {
+    EgoLight "ego.light" Light, World = "The next traffic light within 100 m: `ego.light == Red`, `ego.light in [Yellow, Red]`.";
+    EgoRoad "ego.road" RoadKind, World = "Where the ego vehicle drives: `ego.road == InJunction`.";
+    Priority "priority" Priority, Judgement = "Whether the ego vehicle or the road user had to give way: `priority == ego`, `priority in [other, none]`. Verdicts only.";
+}
 
-impl Fact {
-    /// The thing before the `.`: `road` for `road.limit`.
-    pub fn thing(self) -> Option<&'static str> {
-        self.name().split_once('.').map(|(thing, _)| thing)
-    }
+/// The thing before the `.` of a name: `road` for `road.limit`.
+pub fn thing_of(name: &'static str) -> Option<&'static str> {
+    name.split_once('.').map(|(thing, _)| thing)
+}
+
+/// The names with a `.`, each with its sentence.
+fn dotted() -> impl Iterator<Item = (&'static str, &'static str)> {
+    let facts = Fact::ALL.iter().map(|fact| (fact.name(), fact.meaning()));
+    let words = WordFact::ALL.iter().map(|fact| (fact.name(), fact.meaning()));
+    facts.chain([ROAD_LANES]).chain(words).filter(|(name, _)| name.contains('.'))
 }
 
 /// The things that have facts: the words before a `.`.
 pub fn things() -> Vec<&'static str> {
-    let mut things: Vec<&str> = Fact::ALL.iter().filter_map(|fact| fact.thing()).collect();
-    things.dedup();
+    let mut things: Vec<&str> = Vec::new();
+    for thing in dotted().filter_map(|(name, _)| thing_of(name)) {
+        if !things.contains(&thing) {
+            things.push(thing);
+        }
+    }
     things
 }
 
 /// The facts of a thing (`road`): the words after its `.`, each with its sentence.
 pub fn parts_of(thing: &str) -> Vec<(&'static str, &'static str)> {
-    let facts = Fact::ALL.iter().map(|fact| (fact.name(), fact.meaning()));
-    let dotted =
-        facts.chain([ROAD_LANES]).filter_map(|(name, meaning)| Some((name.split_once('.')?, meaning)));
-    dotted.filter(|((of, _), _)| *of == thing).map(|((_, part), meaning)| (part, meaning)).collect()
+    let parts = dotted().filter_map(|(name, meaning)| Some((name.split_once('.')?, meaning)));
+    parts.filter(|((of, _), _)| *of == thing).map(|((_, part), meaning)| (part, meaning)).collect()
 }
 
 words! {
@@ -303,6 +366,22 @@ words! {
 }
 
 words! {
+    Light "What the next traffic light shows.":
+    Red = "The next traffic light is red.",
+    Yellow = "The next traffic light is yellow.",
+    Green = "The next traffic light is green.",
+    None = "No traffic light within 100 m.",
+}
+
+words! {
+    RoadKind "Where the ego vehicle drives.":
+    OneWay = "On a street without lanes in the other direction.",
+    TwoWay = "On a street with lanes in both directions.",
+    NearJunction = "At most 20 m before a junction.",
+    InJunction = "Inside a junction.",
+}
+
+words! {
     /// As far as the two meet: whoever has priority may count on the other to give way.
     Priority "Which of the ego vehicle and a road user has priority over the other.":
     Ego "ego" = "The ego vehicle: the road user had to give way.",
@@ -313,6 +392,20 @@ words! {
 words! {
     /// The paper's "lane-change" group.
     Then "Whether a vehicle keeps its lane or changes it.": Keep, Change
+}
+
+#[allow(clippy::derivable_impls, reason = "the macro has no place for the mark of a default")]
+impl Default for Light {
+    fn default() -> Light {
+        Light::None
+    }
+}
+
+#[allow(clippy::derivable_impls, reason = "the macro has no place for the mark of a default")]
+impl Default for RoadKind {
+    fn default() -> RoadKind {
+        RoadKind::OneWay
+    }
 }
 
 #[allow(clippy::derivable_impls, reason = "the macro has no place for the mark of a default")]

@@ -146,7 +146,7 @@ pub(crate) fn enclose(expr: &Expr, known: &Known<'_>) -> Values {
             None => Values::UNKNOWN_TRUTH,
             Some(road) => Values::truth(names.contains(&road.name)),
         },
-        ExprKind::HasPriority(_) => Values::UNKNOWN_TRUTH,
+        ExprKind::IsWord(..) => Values::UNKNOWN_TRUTH,
         ExprKind::Match { subject, arm_of, arms } => {
             let chosen = positions(values(subject).variants()).map(|variant| values(&arms[arm_of[variant]]));
             chosen.reduce(Values::union).unwrap_or_else(|| values(&arms[0]))
@@ -160,7 +160,20 @@ fn fact_values(fact: Fact, known: &Known<'_>) -> Values {
             Some(road) => Values::Number(Interval::point(road.limit)),
             None => Values::Number(Interval::NOT_NEGATIVE),
         },
-        Fact::EgoSpeed | Fact::SpawnGap | Fact::SafetyGap => Values::Number(Interval::NOT_NEGATIVE),
+        Fact::EgoAcceleration | Fact::EgoOffset | Fact::EgoRouteLeft => Values::Number(Interval::ALL),
+        Fact::EgoSpeed
+        | Fact::EgoLimit
+        | Fact::EgoJunctionAhead
+        | Fact::RoadUsers
+        | Fact::NearestGap
+        | Fact::NearestSpeed
+        | Fact::Elapsed
+        | Fact::StepNumber
+        | Fact::NpcSpeed
+        | Fact::NpcJunctionAhead
+        | Fact::NpcLimit
+        | Fact::SpawnGap
+        | Fact::SafetyGap => Values::Number(Interval::NOT_NEGATIVE),
         Fact::Proc => Values::Number(Interval::closed(Rational::ZERO, Rational::ONE)),
         Fact::Collision | Fact::Repeated | Fact::Sudden | Fact::Struck | Fact::Avoidable => {
             Values::UNKNOWN_TRUTH

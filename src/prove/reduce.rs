@@ -37,7 +37,7 @@ pub(super) fn reduce(expr: &Expr, functions: &[FnDef], locals: &[Expr]) -> Expr 
         ExprKind::InRange(of, low, high) => ExprKind::InRange(inner(of), inner(low), inner(high)),
         ExprKind::InList(of, list) => ExprKind::InList(inner(of), all(list)),
         ExprKind::OnRoad(names) => ExprKind::OnRoad(names.clone()),
-        ExprKind::HasPriority(list) => ExprKind::HasPriority(list.clone()),
+        ExprKind::IsWord(fact, words) => ExprKind::IsWord(*fact, words.clone()),
         ExprKind::InLanes(of, lanes) => ExprKind::InLanes(inner(of), lanes.clone()),
         ExprKind::Match { subject, arm_of, arms } => {
             let subject = inner(subject);
@@ -66,7 +66,7 @@ fn fold(expr: Expr) -> Expr {
                 | ExprKind::Fact(_)
                 | ExprKind::InLanes(..)
                 | ExprKind::OnRoad(_)
-                | ExprKind::HasPriority(_)
+                | ExprKind::IsWord(..)
         )
     };
     if expr.any(open) {

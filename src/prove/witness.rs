@@ -10,12 +10,12 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 
 use crate::model::expr::{Expr, ExprKind};
-use crate::model::rules::{Candidate, Demand, Room, RowRules};
+use crate::model::rules::{Breach, Candidate, Demand, Room, RowRules};
 use crate::model::{
     ActionDef, Domain, EffectDef, End, Facts, Initial, Interval, Memory, Parameter, Road, Row, RulesInForce,
     Space, SpawnFacts, StateDef, Type, Value, WorldFacts, evaluate, locals, spawn_out_of_bounds,
 };
-use crate::prove::enclose::Values;
+use crate::prove::enclose::{Known, Values, enclose};
 use crate::units::Rational;
 
 /// The most boxes of ranges looked at for one choice of the listed values and one memory.
@@ -169,17 +169,31 @@ impl Search<'_> {
                 return false;
             }
             // The spawn lands where it was asked to, and no gap is unfair.
-            spawns.push(SpawnFacts { spawn_gap_m: distance_m, safety_gap_m: 0.0 });
+            spawns.push(SpawnFacts { spawn_gap_m: distance_m, ..SpawnFacts::default() });
         }
-        let limit_mps = self.rules.road.map_or(0.0, |road| road.limit_mps);
-        let mut world = WorldFacts { ego_speed_mps: limit_mps, spawns };
-        // The ego vehicle drives at the limit, at half of it, or stands.
-        let runs = [1.0, 0.5, 0.0].into_iter().any(|part| {
-            world.ego_speed_mps = part * limit_mps;
-            let candidate = Candidate { values, before, after, world: Some(&world) };
-            self.rules.breaches(candidate).next().is_none()
-        });
+        let world = WorldFacts { spawns, ..WorldFacts::default() };
+        let candidate = Candidate { values, before, after, world: Some(&world) };
+        let runs = self.rules.breaches(candidate).all(|breach| self.is_left_open(breach, candidate));
         runs && wish(values, after)
+    }
+
+    /// Whether what a candidate breaks depends on a moment or a place that an empty world does not have, and might
+    /// hold there.
+    fn is_left_open(&self, breach: Breach<'_>, candidate: Candidate<'_>) -> bool {
+        let condition = match breach {
+            Breach::Where(_, condition)
+            | Breach::Condition { condition, .. }
+            | Breach::Spawn { condition, .. } => condition,
+            Breach::Move { .. } => return false,
+        };
+        let points = |values: &[Value]| values.iter().map(|value| Values::point(*value)).collect::<Vec<_>>();
+        let known = Known {
+            functions: &self.rules.space.functions,
+            locals: &points(candidate.values),
+            cells: &points(candidate.after.cells()),
+            road: self.rules.road,
+        };
+        condition.asks_about_moment() && enclose(condition, &known).may_hold()
     }
 
     /// Memories to try: the initial one first, then every value of the cells that the rules or effects of the

@@ -17,7 +17,7 @@
 //! (`World::apply`). `placement` decides where it appears, along which `way`, or why it cannot;
 //! `traffic` holds the manners that a run can change;
 //! `safety` says how much room a careful driver would need. `junction` knows where lanes cross and which
-//! goes first, `signals` the colour of every light at every tick.
+//! goes first, `signals` the colour of every light at every tick. `moment` says what can be asked about a moment.
 
 mod ambient;
 mod around;
@@ -28,6 +28,7 @@ mod environment;
 mod following;
 mod incident;
 mod junction;
+mod moment;
 mod npc;
 mod pedestrian;
 mod placement;

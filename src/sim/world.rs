@@ -6,8 +6,8 @@ use std::sync::Arc;
 
 use crate::action::{Effect, SpawnFacts, SpawnRequest, Surroundings};
 use crate::geometry::{Frame, OrientedBox, Sweep, Vec2};
-use crate::model::TICK_MS;
 use crate::model::vocabulary::{Level, TimeOfDay};
+use crate::model::{MomentFacts, TICK_MS};
 
 use super::ambient::{Ambient, RENEWAL_TICKS, is_gone};
 use super::around::Around;
@@ -516,8 +516,8 @@ impl Surroundings for World {
         Ok(placement::facts(&around, request, &newcomers))
     }
 
-    fn ego_speed_mps(&self) -> f64 {
-        self.ego.motion.speed_mps
+    fn moment(&self) -> MomentFacts {
+        self.moment_facts()
     }
 
     fn weather_refusal(&self) -> Option<String> {

@@ -5,9 +5,9 @@ use std::path::Path;
 
 use avastra::check::{Loaded, load};
 use avastra::model::vocabulary::{
-    Body, Colour, EpisodeField, Fact, LaneChoice, Level, OriginField, PRIORITY, Phenomenon, Priority,
-    ROAD_LANES, RoadField, ScenarioClaim, Side, SpaceClaim, SpawnField, StartField, StopReason, TYPES, Then,
-    TimeOfDay, Verb, WAIT, Word,
+    Body, Colour, EpisodeField, Fact, LaneChoice, Level, Light, OriginField, Phenomenon, Priority,
+    ROAD_LANES, RoadField, RoadKind, ScenarioClaim, Side, SpaceClaim, SpawnField, StartField, StopReason,
+    TYPES, Then, TimeOfDay, Verb, WAIT, Word, WordFact,
 };
 use avastra::model::{Avoidability, COUNTED, ENDS, MODULES};
 use avastra::syntax::Diagnostic;
@@ -90,14 +90,15 @@ fn every_word_of_the_language_is_on_the_page() {
     let mut on_page: BTreeSet<&str> = page.split(|c: char| !(c.is_alphanumeric() || c == '_')).collect();
     // Units and the like do not consist of letters alone.
     on_page.extend(page.split([' ', '`', ',', '|', '\n', ')', '(', '}']));
-    let all: [Vec<&str>; 22] = [
+    let all: [Vec<&str>; 23] = [
         keywords().map(|(word, _)| *word).collect(),
         UNITS.iter().map(|unit| unit.word).collect(),
         ENDS.to_vec(),
         MODULES.to_vec(),
         Avoidability::ALL.map(Avoidability::name).to_vec(),
-        vec![COUNTED, ROAD_LANES.0, PRIORITY.0, WAIT.0],
-        Fact::names().collect(),
+        vec![COUNTED, ROAD_LANES.0, WAIT.0],
+        Fact::names().chain(WordFact::names()).collect(),
+        Light::names().chain(RoadKind::names()).collect(),
         RoadField::names().collect(),
         StartField::names().collect(),
         OriginField::names().collect(),

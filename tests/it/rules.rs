@@ -17,7 +17,7 @@ use avastra::check::load;
 use avastra::check::state_argument::memory_from;
 use avastra::episode::{Choice, Moment};
 use avastra::model::vocabulary::{Body, TimeOfDay, Verb};
-use avastra::model::{RulesInForce, Type, Value};
+use avastra::model::{MomentFacts, RulesInForce, Type, Value};
 use avastra::rng;
 use avastra::rng::Stream;
 
@@ -367,7 +367,7 @@ impl Surroundings for Full {
         Err("no room".to_owned())
     }
 
-    fn ego_speed_mps(&self) -> f64 {
-        10.0
+    fn moment(&self) -> MomentFacts {
+        MomentFacts { ego_speed_mps: 10.0, ..MomentFacts::default() }
     }
 }

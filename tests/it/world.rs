@@ -7,7 +7,7 @@ use avastra::action::{ActionTable, SpawnFacts, SpawnRequest, Surroundings};
 use avastra::ads::ModularConfig;
 use avastra::check::ReadError;
 use avastra::episode::{EpisodeLog, Script};
-use avastra::model::Space;
+use avastra::model::{MomentFacts, Space};
 use avastra::run::{Profile, Run, RunSettings};
 
 use crate::cases::root;
@@ -26,11 +26,15 @@ pub struct Wide {
 
 impl Surroundings for Wide {
     fn survey(&self, request: &SpawnRequest) -> Result<SpawnFacts, String> {
-        Ok(SpawnFacts { spawn_gap_m: request.distance_m, safety_gap_m: self.safety_gap_m })
+        Ok(SpawnFacts {
+            spawn_gap_m: request.distance_m,
+            safety_gap_m: self.safety_gap_m,
+            ..SpawnFacts::default()
+        })
     }
 
-    fn ego_speed_mps(&self) -> f64 {
-        10.0
+    fn moment(&self) -> MomentFacts {
+        MomentFacts { ego_speed_mps: 10.0, ..MomentFacts::default() }
     }
 }
 

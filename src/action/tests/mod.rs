@@ -10,6 +10,7 @@ use std::sync::Arc;
 
 use crate::action::{ActionTable, SpawnFacts, SpawnRequest, Surroundings};
 use crate::check::{ReadError, load};
+use crate::model::MomentFacts;
 use crate::syntax::{Style, render};
 
 /// The table of a shipped space on Road 2.
@@ -29,11 +30,11 @@ struct Plain;
 
 impl Surroundings for Plain {
     fn survey(&self, request: &SpawnRequest) -> Result<SpawnFacts, String> {
-        Ok(SpawnFacts { spawn_gap_m: request.distance_m, safety_gap_m: 0.0 })
+        Ok(SpawnFacts { spawn_gap_m: request.distance_m, ..SpawnFacts::default() })
     }
 
-    fn ego_speed_mps(&self) -> f64 {
-        10.0
+    fn moment(&self) -> MomentFacts {
+        MomentFacts { ego_speed_mps: 10.0, ..MomentFacts::default() }
     }
 }
 

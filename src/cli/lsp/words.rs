@@ -1,9 +1,7 @@
 //! The words that no file declares, as lists for the editor. The keywords stand in `syntax::keyword`, the
 //! engine's words in `model::vocabulary`.
 
-use crate::model::vocabulary::{
-    Body, Colour, LaneChoice, PRIORITY, Side, Site, SpawnField, TYPES, Then, Verb, Word,
-};
+use crate::model::vocabulary::{Body, Colour, LaneChoice, Side, Site, SpawnField, TYPES, Then, Verb, Word};
 use crate::model::{ENDS, MODULES};
 
 /// A word and what it means.
@@ -21,9 +19,9 @@ pub fn types() -> Vec<Entry> {
 
 /// The facts that are known at a site, without those that have a `.`.
 pub fn facts(site: Site) -> Vec<Entry> {
-    let plain = site.facts().filter(|fact| fact.thing().is_none());
-    let priority = (site == Site::Verdict).then_some(PRIORITY);
-    plain.map(|fact| (fact.name(), fact.meaning())).chain(priority).collect()
+    let facts = site.facts().map(|fact| (fact.name(), fact.meaning()));
+    let words = site.word_facts().map(|fact| (fact.name(), fact.meaning()));
+    facts.chain(words).filter(|(name, _)| !name.contains('.')).collect()
 }
 
 /// The words for a field of a spawn; `body` is what stands before `ahead` or `behind`.

@@ -1,11 +1,11 @@
 //! The judgement: which rules a complete choice of values breaks.
 
-use crate::model::eval::{Facts, SpawnFacts, WorldFacts, compare, evaluate};
+use crate::model::eval::{Facts, SpawnFacts, WorldFacts, compare, evaluate, word_of};
 use crate::model::expr::{Expr, ExprKind};
 use crate::model::rules::{Bound, Demand, RowRules};
 use crate::model::space::Parameter;
 use crate::model::value::{Memory, Value};
-use crate::model::vocabulary::{Known, Word};
+use crate::model::vocabulary::{Fact, Known, Word};
 
 /// A complete choice for a row, and what it would do.
 #[derive(Clone, Copy)]
@@ -24,14 +24,15 @@ pub(crate) struct Candidate<'a> {
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Breach<'a> {
     /// The parameter's `where` does not hold.
-    Where(&'a Parameter),
+    Where(&'a Parameter, &'a Expr),
     Condition {
         rule: usize,
         condition: &'a Expr,
     },
-    /// A rule that asks about the gap of a spawn; m.
-    Gap {
+    /// A rule that asks about a spawn.
+    Spawn {
         rule: usize,
+        condition: &'a Expr,
         spawn: SpawnFacts,
     },
     /// A state makes a move that the rule does not allow.
@@ -51,7 +52,8 @@ impl<'a> RowRules<'a> {
         let parameters = self.space.actions[self.row.action].parameters.iter();
         let wheres = parameters.filter_map(move |parameter| {
             let condition = parameter.condition.as_ref()?;
-            (!self.holds(condition, facts)).then_some(Breach::Where(parameter))
+            let is_open = condition.known() == Known::World && candidate.world.is_none();
+            (!is_open && !self.holds(condition, facts)).then_some(Breach::Where(parameter, condition))
         });
         let rules = self.demands().filter_map(move |(rule, demand)| self.breach(rule, demand, candidate));
         wheres.chain(rules)
@@ -71,7 +73,7 @@ impl<'a> RowRules<'a> {
                         let is_broken = |spawn: &SpawnFacts| {
                             !self.holds(condition, Facts { spawn: Some(*spawn), ..facts })
                         };
-                        Some(Breach::Gap { rule, spawn: spawns.find(is_broken)? })
+                        Some(Breach::Spawn { rule, condition, spawn: spawns.find(is_broken)? })
                     }
                     Known::Step | Known::Judgement => unreachable!("no rule may read what comes after it"),
                 }
@@ -100,10 +102,21 @@ impl<'a> RowRules<'a> {
     /// A breach in words, with its figures.
     pub fn words(self, breach: Breach<'_>, candidate: Candidate<'a>) -> String {
         match breach {
-            Breach::Where(parameter) => format!("the `where` of `{}` does not hold", parameter.name),
-            Breach::Condition { rule, condition } => self.figures(rule, condition, candidate),
-            Breach::Gap { spawn: SpawnFacts { spawn_gap_m, safety_gap_m }, .. } => {
+            Breach::Where(parameter, condition) => {
+                let words = format!("the `where` of `{}` does not hold", parameter.name);
+                match condition.asks_the_world() || condition.reads_memory() {
+                    true => format!("{words}: {}", self.figures(None, condition, candidate, None)),
+                    false => words,
+                }
+            }
+            Breach::Condition { rule, condition } => self.figures(Some(rule), condition, candidate, None),
+            Breach::Spawn { spawn: SpawnFacts { spawn_gap_m, safety_gap_m, .. }, condition, .. }
+                if asks_for_gaps(condition) =>
+            {
                 format!("the gap would be {spawn_gap_m:.1} m, a fair one is {safety_gap_m:.1} m")
+            }
+            Breach::Spawn { rule, condition, spawn } => {
+                self.figures(Some(rule), condition, candidate, Some(spawn))
             }
             Breach::Move { state, cell, from, to, .. } => {
                 let ty = self.space.states[state].ty;
@@ -118,8 +131,9 @@ impl<'a> RowRules<'a> {
         self,
         rule: usize,
         candidate: Candidate<'a>,
+        spawn: Option<SpawnFacts>,
     ) -> impl Iterator<Item = (&'a Bound, Value)> {
-        let facts = self.facts(candidate);
+        let facts = Facts { spawn, ..self.facts(candidate) };
         self.space.bounds[self.row.action].iter().filter_map(move |bound| {
             let applies =
                 bound.rule == Some(rule) && bound.guards.iter().all(|guard| self.holds(guard, facts));
@@ -130,7 +144,13 @@ impl<'a> RowRules<'a> {
 
     /// The parameters and the facts of the world that a broken condition names, with their values, and what was
     /// wanted: the first broken bound, or the right side of a comparison that bounds no single number.
-    fn figures(self, rule: usize, condition: &Expr, candidate: Candidate<'a>) -> String {
+    fn figures(
+        self,
+        rule: Option<usize>,
+        condition: &Expr,
+        candidate: Candidate<'a>,
+        spawn: Option<SpawnFacts>,
+    ) -> String {
         let parameters = &self.space.actions[self.row.action].parameters;
         let mut shown = Vec::new();
         for (index, parameter) in parameters.iter().enumerate() {
@@ -139,19 +159,25 @@ impl<'a> RowRules<'a> {
                 shown.push(format!("{} = {value}", parameter.name));
             }
         }
-        let facts = self.facts(candidate);
+        let facts = Facts { spawn, ..self.facts(candidate) };
         let value = |expr: &Expr| self.space.show(evaluate(expr, &self.space.functions, &facts), expr.ty);
         condition.walk(&mut |part| {
-            if let ExprKind::Fact(fact) = part.kind
-                && fact.known() == Known::World
-            {
-                let figure = format!("{} = {}", fact.name(), value(part));
-                if !shown.contains(&figure) {
-                    shown.push(figure);
+            let figure = match &part.kind {
+                ExprKind::Fact(fact) if matches!(fact.known(), Known::World | Known::Spawn) => {
+                    format!("{} = {}", fact.name(), value(part))
                 }
+                ExprKind::IsWord(fact, _) => {
+                    let Some(word) = word_of(*fact, &facts) else { return };
+                    format!("{} = {word}", fact.name())
+                }
+                _ => return,
+            };
+            if !shown.contains(&figure) {
+                shown.push(figure);
             }
         });
-        match (self.broken_bounds(rule, candidate).next(), &condition.kind) {
+        let bound = rule.and_then(|rule| self.broken_bounds(rule, candidate, spawn).next());
+        match (bound, &condition.kind) {
             (Some((bound, limit)), kind) => {
                 let Parameter { name, ty, .. } = &parameters[bound.local];
                 let (op, limit) = (bound.op.symbol(), self.space.show(limit, *ty));
@@ -174,12 +200,17 @@ impl<'a> RowRules<'a> {
     }
 }
 
+/// Whether a condition asks how far away a spawn is.
+fn asks_for_gaps(condition: &Expr) -> bool {
+    condition.any(|kind| matches!(kind, ExprKind::Fact(Fact::SpawnGap | Fact::SafetyGap)))
+}
+
 impl Breach<'_> {
     /// The rule that is broken; `None` for a `where`.
     pub fn rule(&self) -> Option<usize> {
         match self {
-            Breach::Where(_) => None,
-            Breach::Condition { rule, .. } | Breach::Gap { rule, .. } | Breach::Move { rule, .. } => {
+            Breach::Where(..) => None,
+            Breach::Condition { rule, .. } | Breach::Spawn { rule, .. } | Breach::Move { rule, .. } => {
                 Some(*rule)
             }
         }

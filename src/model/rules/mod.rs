@@ -50,6 +50,16 @@ pub(crate) enum Demand<'a> {
     Moves { state: usize, cell: usize, allowed: &'a [Vec<bool>] },
 }
 
+impl<'a> Demand<'a> {
+    /// The condition, if it is one.
+    pub fn condition(self) -> Option<&'a Expr> {
+        match self {
+            Demand::Holds(condition) => Some(condition),
+            Demand::Moves { .. } => None,
+        }
+    }
+}
+
 impl RuleBody {
     /// Whether the rule binds the action.
     pub fn binds(&self, action: usize) -> bool {

@@ -18,6 +18,7 @@ use crate::model::vocabulary::Verb;
 use crate::sim::around::Around;
 use crate::sim::body::BodyParameters;
 use crate::sim::ego::VehicleParameters;
+use crate::sim::moment::npc_facts;
 use crate::sim::npc::{Cruise, Driver, Manoeuvre};
 use crate::sim::road_user::{Motion, Moved, Mover, RoadUser};
 use crate::sim::sense::{RANGE_M, visible_fraction};
@@ -123,7 +124,8 @@ pub(super) fn facts(around: &Around, request: &SpawnRequest, newcomers: &Newcome
     let noticing_m = safety::noticing_m(ego_mps);
     let is_sudden = !is_behind && noticing_m > braking_gap_m && in_view();
     let safety_gap_m = if is_sudden { noticing_m } else { braking_gap_m };
-    SpawnFacts { spawn_gap_m, safety_gap_m }
+    let npc = npc_facts(around, &newcomer.obstacle, &newcomer.mover);
+    SpawnFacts { spawn_gap_m, safety_gap_m, npc }
 }
 
 /// Whether the way of a driver crosses or joins the rest of the ego vehicle's route.

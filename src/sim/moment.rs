@@ -1,0 +1,154 @@
+//! What can be asked about a moment: the facts of the ego vehicle and its surroundings, and those of another road
+//! user. Rules, policies and the paper's state variables read the same ones.
+
+use crate::model::vocabulary::{Light, RoadKind};
+use crate::model::{JUNCTION_AHEAD_M_MAX, MomentFacts, NpcFacts};
+use crate::road::{LaneIndex, RoadMap, RouteLane};
+
+use super::around::Around;
+use super::road_user::{Motion, Mover, Obstacle};
+use super::scene::Scene;
+use super::sense::SignalColour;
+use super::world::World;
+
+/// How far ahead a traffic light is searched for, m.
+const LIGHT_AHEAD_M: f64 = 100.0;
+/// The ego vehicle is at a junction that is nearer than this, m, as in the published package.
+const NEAR_JUNCTION_M: f64 = 20.0;
+/// Distance that stands for "no road user around", m, as in the published package.
+const NO_ROAD_USER_M: f64 = 100.0;
+
+impl World {
+    /// The facts of this moment.
+    pub fn moment_facts(&self) -> MomentFacts {
+        let scene = self.scene();
+        let station_m = self.ego_station_m();
+        let gaps = self.obstacles().map(|obstacle| (obstacle.distance_m, obstacle.velocity_mps.norm()));
+        let nearest = gaps.min_by(|a, b| a.0.total_cmp(&b.0));
+        MomentFacts {
+            ego_speed_mps: self.ego().speed_mps,
+            ego_acceleration_mps2: self.ego().acceleration_mps2,
+            ego_limit_mps: scene.map.lane(scene.route.lane_at(station_m).lane).speed_limit_mps,
+            ego_junction_ahead_m: scene.route_junction_ahead_m(station_m),
+            ego_route_left_m: scene.route.goal_m - station_m,
+            ego_offset_m: self.ego_offset_m(),
+            ego_light: self.light_ahead(),
+            ego_road: road_kind(scene, station_m),
+            road_users: self.obstacles().len() as u32,
+            nearest_gap_m: nearest.map_or(NO_ROAD_USER_M, |(gap_m, _)| gap_m),
+            nearest_speed_mps: nearest.map_or(0.0, |(_, speed_mps)| speed_mps),
+            elapsed_s: self.time_s(),
+        }
+    }
+
+    /// What the next traffic light on the route shows.
+    fn light_ahead(&self) -> Light {
+        let station_m = self.ego_station_m();
+        let ahead = station_m..=station_m + LIGHT_AHEAD_M;
+        let next = self.scene().route.stop_lines.iter().find(|line| ahead.contains(&line.station_m));
+        match next.map(|line| self.signal(line.signal)) {
+            None => Light::None,
+            Some(SignalColour::Red) => Light::Red,
+            Some(SignalColour::Yellow) => Light::Yellow,
+            Some(SignalColour::Green) => Light::Green,
+        }
+    }
+}
+
+impl Scene {
+    /// Distance along the route from a station to the next junction, m.
+    fn route_junction_ahead_m(&self, station_m: f64) -> f64 {
+        let first = self.route.lanes.partition_point(|lane| lane.enter_m <= station_m).max(1) - 1;
+        let ahead = self.route.lanes[first..].iter().map(|RouteLane { lane, enter_m, .. }| (*lane, *enter_m));
+        junction_ahead_m(&self.map, ahead, station_m)
+    }
+}
+
+/// The facts of a road user. One on foot has those of the ego vehicle's route beside it.
+pub(super) fn npc_facts(around: &Around, obstacle: &Obstacle, mover: &Mover) -> NpcFacts {
+    let scene = around.scene;
+    let (limit_mps, junction_ahead_m) = match &mover.motion {
+        Motion::Drive(driver) => {
+            let station_m = driver.station_m();
+            let ahead = driver
+                .way()
+                .lanes_from(station_m)
+                .map(|(lane, on_lane_m)| (lane, on_lane_m, lane_m(scene, lane)));
+            // Lane by lane: the first begins behind the station, the others follow each other.
+            let mut begin_m = station_m;
+            let ahead = ahead.map(|(lane, on_lane_m, length_m)| {
+                let from_m = begin_m;
+                begin_m += length_m - on_lane_m;
+                (lane, from_m)
+            });
+            (driver.way().limit_mps(scene, station_m), junction_ahead_m(&scene.map, ahead, station_m))
+        }
+        Motion::Walk(_) | Motion::Stand => {
+            let station_m = scene.route.path.project(obstacle.outline.pose.position).station_m;
+            let lane = scene.route.lane_at(station_m).lane;
+            (scene.map.lane(lane).speed_limit_mps, scene.route_junction_ahead_m(station_m))
+        }
+    };
+    NpcFacts { speed_mps: obstacle.velocity_mps.norm(), junction_ahead_m, limit_mps }
+}
+
+fn lane_m(scene: &Scene, lane: LaneIndex) -> f64 {
+    scene.map.lane(lane).centre.length_m()
+}
+
+/// Distance from a station to the first lane inside a junction, m. `ahead` has the lanes from the station on, each
+/// with the station at which it begins.
+fn junction_ahead_m(map: &RoadMap, mut ahead: impl Iterator<Item = (LaneIndex, f64)>, station_m: f64) -> f64 {
+    let junction = ahead.find(|(lane, _)| map.lane(*lane).junction.is_some());
+    junction.map_or(JUNCTION_AHEAD_M_MAX, |(_, from_m)| (from_m - station_m).clamp(0.0, JUNCTION_AHEAD_M_MAX))
+}
+
+fn road_kind(scene: &Scene, station_m: f64) -> RoadKind {
+    let here = scene.map.lane(scene.route.lane_at(station_m).lane);
+    let soon = scene.map.lane(scene.route.lane_at(station_m + NEAR_JUNCTION_M).lane);
+    if here.junction.is_some() {
+        return RoadKind::InJunction;
+    }
+    if soon.junction.is_some() {
+        return RoadKind::NearJunction;
+    }
+    let mut beside = here.left;
+    while let Some(neighbour) = beside {
+        if !neighbour.same_direction {
+            return RoadKind::TwoWay;
+        }
+        beside = scene.map.lane(neighbour.lane).left;
+    }
+    RoadKind::OneWay
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::model::vocabulary::{Light, RoadKind, Verb};
+    use crate::sim::testing;
+
+    #[test]
+    fn a_moment_says_how_far_it_is_to_the_junction() {
+        let world = testing::world(&testing::crossing());
+        let facts = world.moment_facts();
+        let route = &world.scene().route;
+        let inside = route.lanes.iter().find(|lane| world.scene().map.lane(lane.lane).junction.is_some());
+        let begin_m = inside.expect("the route crosses a junction").enter_m;
+        assert_eq!(facts.ego_junction_ahead_m, begin_m);
+        assert_eq!((facts.ego_road, facts.ego_light), (RoadKind::TwoWay, Light::None));
+        assert_eq!((facts.road_users, facts.nearest_gap_m), (0, 100.0));
+        assert_eq!(testing::world(&testing::straight()).moment_facts().ego_junction_ahead_m, 1000.0);
+    }
+
+    #[test]
+    fn a_vehicle_ahead_is_nearer_to_the_junction() {
+        use crate::action::Surroundings;
+        let world = testing::world(&testing::crossing());
+        let ego_m = world.moment_facts().ego_junction_ahead_m;
+        let facts = world.survey(&testing::request(Verb::DriveAhead, 40.0, 8.0)).expect("there is room");
+        // From the rear axle to the bumper, the gap, and half a vehicle.
+        let ahead_m = ego_m - facts.npc.junction_ahead_m;
+        assert!((40.0..50.0).contains(&ahead_m), "{ahead_m}");
+        assert_eq!(facts.npc.speed_mps, 8.0);
+    }
+}
