@@ -196,7 +196,7 @@ impl Drive {
     fn tick(&mut self) {
         self.world.sense(&mut self.sensed);
         self.world.tick(&self.driver.drive(&self.sensed));
-        self.most = self.most.max(collision_probability(&self.world, &self.settings, &|_| false));
+        self.most = self.most.max(collision_probability(&self.world, &self.settings, &|_| false).probability);
     }
 }
 

@@ -163,7 +163,7 @@ impl Checker {
     }
 
     pub(super) fn cases(&mut self, item: &ast::Item, declared: &[ast::Case]) -> Vec<RewardCase> {
-        let place = Place { site: Site::Reward, ..Place::default() };
+        let place = Place { states: true, site: Site::Reward, ..Place::default() };
         let mut cases = Vec::new();
         let mut closed = false;
         for case in declared {
@@ -204,7 +204,7 @@ impl Checker {
     }
 
     pub(super) fn verdict(&mut self, declared: &ast::Verdict) -> Option<Expr> {
-        let place = Place { site: Site::Verdict, ..Place::default() };
+        let place = Place { states: true, site: Site::Verdict, ..Place::default() };
         self.typed(&declared.condition, &place, Type::Bool)
     }
 }

@@ -213,17 +213,21 @@ fn rewards_and_verdicts_are_computed() {
         "{BASE}reward {{\n collision => 7.5\n proc > 20 % => proc\n _ => -1\n}}\nverdict counted: collision and not struck\n"
     );
     let space = load_files(&[("a.ava", &text)]).space.unwrap();
+    let states = Memory::default();
     let quiet = OutcomeFacts { proc: 0.5, ..Default::default() };
     let crash = OutcomeFacts { collision: true, ..quiet };
     let hit = OutcomeFacts { struck: true, ..crash };
-    assert_eq!([crash, quiet, Default::default()].map(|outcome| space.reward(outcome)), [7.5, 0.5, -1.0]);
-    assert_eq!([crash, quiet, hit].map(|outcome| space.counts(outcome)), [true, false, false]);
+    assert_eq!(
+        [crash, quiet, Default::default()].map(|outcome| space.reward(outcome, &states)),
+        [7.5, 0.5, -1.0]
+    );
+    assert_eq!([crash, quiet, hit].map(|outcome| space.counts(outcome, &states)), [true, false, false]);
 
     let loaded = load_files(&[("a.ava", &format!("{BASE}verdict counted: collision and avoidable\n"))]);
     let space = loaded.space.unwrap();
     let careless = OutcomeFacts { avoidable: true, ..crash };
-    assert_eq!([crash, careless].map(|outcome| space.counts(outcome)), [false, true]);
-    assert_eq!(space.verdict("unknown", crash), None);
+    assert_eq!([crash, careless].map(|outcome| space.counts(outcome, &states)), [false, true]);
+    assert_eq!(space.verdict("unknown", crash, &states), None);
 
     for (condition, expected) in [
         ("priority == ego", [true, false, false]),
@@ -233,7 +237,7 @@ fn rewards_and_verdicts_are_computed() {
     ] {
         let loaded = load_files(&[("a.ava", &format!("{BASE}verdict counted: {condition}\n"))]);
         let space = loaded.space.unwrap();
-        let counts = |priority| space.counts(OutcomeFacts { priority, ..crash });
+        let counts = |priority| space.counts(OutcomeFacts { priority, ..crash }, &states);
         assert_eq!(Priority::ALL.iter().copied().map(counts).collect::<Vec<_>>(), expected, "{condition}");
     }
 }
@@ -255,9 +259,10 @@ fn a_space_without_a_verdict_counts_as_the_paper_does() {
     assert!(codes(&loaded).is_empty(), "{}", shown(&loaded));
     let space = loaded.space.unwrap();
     let crash = OutcomeFacts { collision: true, ..Default::default() };
+    let states = Memory::default();
     let again = OutcomeFacts { repeated: true, ..crash };
     let sudden = OutcomeFacts { sudden: true, ..crash };
-    let found = [crash, again, sudden, Default::default()].map(|outcome| space.counts(outcome));
+    let found = [crash, again, sudden, Default::default()].map(|outcome| space.counts(outcome, &states));
     assert_eq!(found, [true, false, false, false]);
 }
 

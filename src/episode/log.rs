@@ -73,6 +73,15 @@ pub struct Collision {
 }
 
 impl EpisodeLog {
+    /// The states of the space after the action of a step.
+    pub fn memory_after(&self, step: usize) -> &Memory {
+        let done = self.steps.iter().take(step + 1).rev().find_map(|step| match &step.outcome {
+            Outcome::Done { draw, .. } => Some(&draw.memory_after),
+            Outcome::Passed | Outcome::Refused { .. } => None,
+        });
+        done.unwrap_or(&self.memory)
+    }
+
     /// SHA-256 over every bit of the world's state after every tick; zeros if there was no step.
     pub fn trace(&self) -> [u8; 32] {
         self.steps.last().map_or([0; 32], |step| step.trace)

@@ -4,11 +4,13 @@
 //!
 //! Does not know which agent or which driving system it runs.
 
+mod facts;
 mod log;
 mod run;
 mod script;
 mod setup;
 
+pub use facts::{at_fault, collision_facts, side, struck};
 pub use log::{Collision, End, EpisodeLog, Outcome, StepLog};
 pub use run::{Choice, Moment, Snapshot, Watch, run, run_from};
 pub use script::{Script, ScriptedAction};

@@ -5,10 +5,12 @@ use sha2::{Digest, Sha256};
 use crate::action::{Draw, Situation};
 use crate::ads::Ads;
 use crate::mdp;
-use crate::mdp::Observation;
+use crate::mdp::{Danger, Observation};
+use crate::model::vocabulary::Body;
 use crate::model::{Memory, OutcomeFacts};
 use crate::sim::{Contact, DT_S, Incident, Sensed, World};
 
+use super::facts::collision_facts;
 use super::log::{Collision, End, EpisodeLog, Outcome, StepLog};
 use super::setup::Setup;
 
@@ -102,6 +104,13 @@ pub fn run_from(
     play.into_log(setup, end)
 }
 
+/// How near the ego vehicle is to a collision, and with what.
+#[derive(Clone, Copy)]
+struct Near {
+    probability: f64,
+    body: Option<Body>,
+}
+
 /// An episode under way.
 #[derive(Clone)]
 struct Play {
@@ -189,19 +198,28 @@ impl Play {
     ) {
         let time_s = self.world.time_s();
         let station_m = self.world.ego_station_m();
-        let (mut proc, mut collided) = (0.0_f64, false);
+        let mut near: Option<Near> = None;
+        let met = self.collisions.len();
         let shift = setup.period_shifts.get(self.steps.len()).copied().unwrap_or(0);
         let ticks = (setup.table.space().episode.step_s / DT_S).round() as i64 + i64::from(shift);
         for _ in 0..ticks {
-            proc = proc.max(self.tick(setup, watch, &mut collided));
+            let now = self.tick(setup, watch);
+            if near.is_none_or(|near| now.probability > near.probability) {
+                near = Some(now);
+            }
             if setup.table.space().episode.stop_arrived && self.world.arrived() {
                 break;
             }
         }
         let progress_m = self.world.ego_station_m() - station_m;
         self.stalled = if progress_m.abs() < PROGRESS_M_MIN { self.stalled + 1 } else { 0 };
-        let reward =
-            setup.table.space().reward(OutcomeFacts { collision: collided, proc, ..OutcomeFacts::default() });
+        let Near { probability: proc, body } = near.unwrap_or(Near { probability: 0.0, body: None });
+        // Of several collisions in a step, the first decides.
+        let facts = match self.collisions.get(met) {
+            Some(first) => collision_facts(first, &self.collisions[..met]),
+            None => OutcomeFacts { proc, near: body, ..OutcomeFacts::default() },
+        };
+        let reward = setup.table.space().reward(facts, &self.memory);
         let trace = self.trace.clone().finalize().into();
         let state = observation.state;
         let perception = mdp::perception_counts(&self.world, self.ads.status());
@@ -210,7 +228,7 @@ impl Play {
 
     /// One physics step; returns the collision probability after it. It is 1 at the tick of a contact. After that
     /// the obstacle is ignored: it stands against the ego vehicle for a while and is no danger any more.
-    fn tick(&mut self, setup: &Setup, watch: &mut Watch, collided: &mut bool) -> f64 {
+    fn tick(&mut self, setup: &Setup, watch: &mut Watch) -> Near {
         self.world.sense(&mut self.sensed);
         let control = self.ads.drive(&self.sensed);
         let contacts = self.world.tick(&control).to_vec();
@@ -221,12 +239,16 @@ impl Play {
         self.distance_m += self.world.ego().speed_mps * DT_S;
         self.world.trace(&mut |bits| self.trace.update(bits.to_le_bytes()));
         watch(&self.world, self.ads.as_ref(), &contacts);
-        *collided |= !contacts.is_empty();
-        if !contacts.is_empty() {
-            return 1.0;
+        if let Some(contact) = contacts.first() {
+            return Near { probability: 1.0, body: self.body(contact.obstacle) };
         }
         let is_hit = |id| self.collisions.iter().any(|collision| collision.contact.obstacle == id);
-        setup.proc.probability(&self.world, &is_hit)
+        let Danger { probability, nearest } = setup.proc.danger(&self.world, &is_hit);
+        Near { probability, body: nearest.and_then(|id| self.body(id)) }
+    }
+
+    fn body(&self, obstacle: u32) -> Option<Body> {
+        self.world.obstacle(obstacle).map(|obstacle| obstacle.body)
     }
 
     fn collision(&self, contact: Contact) -> Collision {

@@ -26,12 +26,51 @@ pub enum ProcKind {
 
 impl ProcKind {
     /// ProC of the ego vehicle at this moment; see [`collision_probability`].
-    pub fn probability(self, world: &World, is_hit: &dyn Fn(u32) -> bool) -> f64 {
+    pub fn danger(self, world: &World, is_hit: &dyn Fn(u32) -> bool) -> Danger {
         match self {
             ProcKind::Avastra => collision_probability(world, &ProcSettings::default(), is_hit),
             ProcKind::Paper => collision_probability(world, &ProcSettings::paper(), is_hit),
             ProcKind::Released => released_probability(world, is_hit),
         }
+    }
+}
+
+/// ProC at a moment, and which road user contributes most to it.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Danger {
+    pub probability: f64,
+    /// Its id; `None` if no road user is a danger.
+    pub nearest: Option<u32>,
+}
+
+/// The greatest probability of each dimension so far.
+#[derive(Default)]
+pub(super) struct Most {
+    longitudinal: f64,
+    lateral: f64,
+    greatest: f64,
+    nearest: Option<u32>,
+}
+
+impl Most {
+    pub fn add_longitudinal(&mut self, id: u32, probability: f64) {
+        self.longitudinal = self.longitudinal.max(probability);
+        self.note(id, probability);
+    }
+
+    pub fn add_lateral(&mut self, id: u32, probability: f64) {
+        self.lateral = self.lateral.max(probability);
+        self.note(id, probability);
+    }
+
+    fn note(&mut self, id: u32, probability: f64) {
+        if probability > self.greatest {
+            (self.greatest, self.nearest) = (probability, Some(id));
+        }
+    }
+
+    pub fn danger(&self) -> Danger {
+        Danger { probability: combined(self.longitudinal, self.lateral), nearest: self.nearest }
     }
 }
 
@@ -129,8 +168,8 @@ pub fn combined(longitudinal: f64, lateral: f64) -> f64 {
 /// vehicle and of the obstacle's lane, or of the pedestrian. The greatest probability of each
 /// dimension counts, and Eq. 16 joins the two. Obstacles that the ego vehicle has hit already (`is_hit`)
 /// are left out.
-pub fn collision_probability(world: &World, settings: &ProcSettings, is_hit: &dyn Fn(u32) -> bool) -> f64 {
-    let (mut longitudinal, mut lateral) = (0.0_f64, 0.0_f64);
+pub fn collision_probability(world: &World, settings: &ProcSettings, is_hit: &dyn Fn(u32) -> bool) -> Danger {
+    let mut most = Most::default();
     for obstacle in world.obstacles() {
         if is_hit(obstacle.id) || beyond_reach(world, obstacle, settings) {
             continue;
@@ -143,7 +182,7 @@ pub fn collision_probability(world: &World, settings: &ProcSettings, is_hit: &dy
         if beside.offset_m.abs() <= route_half_width_m(world, beside.station_m) {
             let ahead = beside.station_m >= world.ego_station_m();
             let safety_m = same_lane_safety_m(world, obstacle, ahead, settings);
-            longitudinal = longitudinal.max(probability(safety_m, current_m));
+            most.add_longitudinal(obstacle.id, probability(safety_m, current_m));
         } else {
             let angle_rad = wrap_angle(obstacle.lane_heading_rad - world.ego().rear_axle.heading_rad);
             let safety_m = lateral_safety_distance_m(
@@ -152,10 +191,10 @@ pub fn collision_probability(world: &World, settings: &ProcSettings, is_hit: &dy
                 settings.vehicle_decel_mps2,
                 settings.lateral_margin_m,
             );
-            lateral = lateral.max(probability(safety_m, current_m));
+            most.add_lateral(obstacle.id, probability(safety_m, current_m));
         }
     }
-    combined(longitudinal, lateral)
+    most.danger()
 }
 
 /// Half the width of the route's lane at a station of the route, m.

@@ -10,7 +10,7 @@ use crate::geometry::Vec2;
 use crate::model::vocabulary::Body;
 use crate::sim::World;
 
-use super::collision_probability::{combined, probability};
+use super::collision_probability::{Danger, Most, probability};
 
 /// Ticks from one computation to the next: 0.5 s.
 const PERIOD_TICKS: u64 = 25;
@@ -26,13 +26,13 @@ const MARGIN_M: f64 = 5.0;
 
 /// ProC at this moment; 0 at the ticks at which the package does not compute it. Obstacles that the ego
 /// vehicle has hit already (`is_hit`) are left out.
-pub fn released_probability(world: &World, is_hit: &dyn Fn(u32) -> bool) -> f64 {
+pub fn released_probability(world: &World, is_hit: &dyn Fn(u32) -> bool) -> Danger {
     if !world.ticks().is_multiple_of(PERIOD_TICKS) {
-        return 0.0;
+        return Danger::default();
     }
     let ego = world.ego_outline().pose;
     let velocity = ego.forward() * world.ego().speed_mps.max(LEAST);
-    let (mut longitudinal, mut lateral) = (0.0_f64, 0.0_f64);
+    let mut most = Most::default();
     for obstacle in world.obstacles().filter(|obstacle| !is_hit(obstacle.id)) {
         let other = if obstacle.velocity_mps.norm() < LEAST {
             obstacle.forward * LEAST
@@ -44,13 +44,13 @@ pub fn released_probability(world: &World, is_hit: &dyn Fn(u32) -> bool) -> f64 
         let slopes = (slope(velocity), slope(other));
         if is_same_lane(slopes, slope(apart)) {
             let safety_m = longitudinal_m(velocity.norm(), other.norm(), decel_mps2);
-            longitudinal = longitudinal.max(probability(safety_m, apart.norm()));
+            most.add_longitudinal(obstacle.id, probability(safety_m, apart.norm()));
         } else {
             let safety_m = lateral_m(velocity.norm(), slopes);
-            lateral = lateral.max(probability(safety_m, apart.norm()));
+            most.add_lateral(obstacle.id, probability(safety_m, apart.norm()));
         }
     }
-    combined(longitudinal, lateral)
+    most.danger()
 }
 
 /// Slope of a direction in the package's frame, whose x points south and whose z points east.

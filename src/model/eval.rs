@@ -6,7 +6,7 @@
 use crate::model::expr::{Arithmetic, Comparison, Expr, ExprKind};
 use crate::model::space::{COUNTED, FnDef, RoadFacts, Space, WordExpr};
 use crate::model::value::{Memory, Value};
-use crate::model::vocabulary::{Fact, LaneChoice, Light, Priority, RoadKind, Word, WordFact};
+use crate::model::vocabulary::{Body, Fact, LaneChoice, Light, Priority, RoadKind, Word, WordFact};
 
 /// Numbers that differ by at most this part of the larger one are `==`. This tolerates the digits that an
 /// author rounds away, but no measurable distance.
@@ -97,6 +97,10 @@ pub struct OutcomeFacts {
     pub struck: bool,
     /// Who had to give way. Known for collisions alone.
     pub priority: Priority,
+    /// What was hit, if anything was.
+    pub hit: Option<Body>,
+    /// What came nearest to a collision in the step, or was hit.
+    pub near: Option<Body>,
     /// A careful reference driver would not have touched the obstacle. Known for judged collisions alone.
     pub avoidable: bool,
     /// Collision probability of the step, in `[0, 1]`.
@@ -189,6 +193,8 @@ pub(crate) fn word_of(fact: WordFact, facts: &Facts<'_>) -> Option<&'static str>
         WordFact::EgoLight => facts.world.map(|world| world.moment.ego_light.name()),
         WordFact::EgoRoad => facts.world.map(|world| world.moment.ego_road.name()),
         WordFact::Priority => Some(facts.outcome.priority.name()),
+        WordFact::Hit => facts.outcome.hit.map(Word::name),
+        WordFact::Near => facts.outcome.near.map(Word::name),
     }
 }
 
@@ -234,10 +240,10 @@ impl<W: Copy> WordExpr<W> {
 }
 
 impl Space {
-    /// Reward of a step: the value of the first case that applies; 0 if none does.
-    pub fn reward(&self, outcome: OutcomeFacts) -> f64 {
-        let memory = Memory::default();
-        let facts = Facts { outcome, ..Facts::new(&[], &memory) };
+    /// Reward of a step: the value of the first case that applies; 0 if none does. `memory` holds the states after
+    /// the action of the step.
+    pub fn reward(&self, outcome: OutcomeFacts, memory: &Memory) -> f64 {
+        let facts = Facts { outcome, ..Facts::new(&[], memory) };
         let applies = |condition: &Option<Expr>| {
             condition.as_ref().is_none_or(|c| evaluate(c, &self.functions, &facts).truth())
         };
@@ -245,16 +251,17 @@ impl Space {
         case.map_or(0.0, |case| evaluate(&case.value, &self.functions, &facts).number())
     }
 
-    /// Whether a collision passes the verdict of that name; `None` if there is no such verdict.
-    pub fn verdict(&self, name: &str, outcome: OutcomeFacts) -> Option<bool> {
-        let memory = Memory::default();
-        let facts = Facts { outcome, ..Facts::new(&[], &memory) };
+    /// Whether a collision passes the verdict of that name; `None` if there is no such verdict. `memory` is as for
+    /// [`Space::reward`].
+    pub fn verdict(&self, name: &str, outcome: OutcomeFacts, memory: &Memory) -> Option<bool> {
+        let facts = Facts { outcome, ..Facts::new(&[], memory) };
         let verdict = self.verdicts.iter().find(|verdict| verdict.name == name)?;
         Some(evaluate(&verdict.condition, &self.functions, &facts).truth())
     }
 
     /// Whether a collision counts: the verdict [`COUNTED`].
-    pub fn counts(&self, outcome: OutcomeFacts) -> bool {
-        self.verdict(COUNTED, outcome).expect("the checker adds the verdict where the author has none")
+    pub fn counts(&self, outcome: OutcomeFacts, memory: &Memory) -> bool {
+        let counts = self.verdict(COUNTED, outcome, memory);
+        counts.expect("the checker adds the verdict where the author has none")
     }
 }

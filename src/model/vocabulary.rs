@@ -208,7 +208,9 @@ pub const ROAD_LANES: (&str, &str) =
 word_facts! {
     EgoLight "ego.light" Light, World = "The next traffic light within 100 m: `ego.light == Red`, `ego.light in [Yellow, Red]`.";
     EgoRoad "ego.road" RoadKind, World = "Where the ego vehicle drives: `ego.road == InJunction`.";
-    Priority "priority" Priority, Judgement = "Whether the ego vehicle or the road user had to give way: `priority == ego`, `priority in [other, none]`. Verdicts only.";
+    Priority "priority" Priority, Step = "Whether the ego vehicle or the road user that was hit had to give way: `priority == ego`, `priority in [other, none]`.";
+    Hit "hit" Body, Step = "What was hit: `hit == Pedestrian`; nothing if there was no collision.";
+    Near "near" Body, Step = "The road user with the greatest collision probability of the step: `near == Pedestrian`.";
 }
 
 /// The thing before the `.` of a name: `road` for `road.limit`.

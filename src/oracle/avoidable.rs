@@ -26,8 +26,8 @@ use crate::model::Avoidability;
 use crate::sim::{Contact, DT_S, EgoMotion, FRAME_TICKS, VehicleParameters, World};
 use crate::syntax::listed;
 
-use super::facts::struck;
 use super::hazard::onset;
+use crate::episode::struck;
 
 const GRAVITY_MPS2: f64 = 9.81;
 

@@ -10,7 +10,7 @@ use crate::ads::{Foresight, Selected};
 use crate::episode;
 use crate::episode::{Choice, Collision, EpisodeLog, Moment, Outcome, Script, Setup};
 
-use super::facts::at_fault;
+use crate::episode::at_fault;
 
 /// What became of a collision in another play.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]

@@ -18,7 +18,7 @@ mod verify;
 pub use avoidable::{AvoidabilityError, AvoidabilitySettings, Judgement, judge, judge_one};
 pub use cause::{Diagnosis, ModuleFinding, NoModules, WeaknessFinding, diagnose, fate};
 pub use crash::{Fate, Regression, regression};
-pub use facts::{counted, facts};
+pub use facts::{counted, counts, facts};
 pub use measured::Measure;
 pub use mechanisms::{MechanismShare, Share, WithoutMechanism, mechanism_shares, mechanisms};
 pub use severity::{Severity, severity};

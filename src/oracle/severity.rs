@@ -10,7 +10,7 @@ use crate::episode::Collision;
 use crate::geometry::Vec2;
 use crate::sim::{VehicleParameters, body_mass_t};
 
-use super::facts::side;
+use crate::episode::side;
 
 /// How hard an impact was.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]

@@ -17,7 +17,7 @@ use crate::model::{Avoidability, Domain, Memory, Value};
 use crate::sim::Start;
 
 use super::avoidable::{AvoidabilitySettings, Judgement, judge};
-use super::facts::facts;
+use super::facts::counts;
 
 /// Most rounds of all passes. Each round makes something smaller or plainer; most crashes need two.
 const ROUNDS_MAX: usize = 8;
@@ -149,7 +149,7 @@ impl<'a> Search<'a> {
             body: collision.body,
             verb: collision.verb,
             class: judgements[index].class,
-            counts: setup.table.space().counts(facts(log, index, &judgements[index])),
+            counts: counts(setup.table.space(), log, index, &judgements[index]),
             plays: 0,
         }
     }
@@ -171,7 +171,7 @@ impl<'a> Search<'a> {
             episode::run(&setup, &mut |moment| script.choose(setup.table, moment), watch);
         });
         let same = |index: &usize| {
-            let counts = self.setup.table.space().counts(facts(&log, *index, &judgements[*index]));
+            let counts = counts(self.setup.table.space(), &log, *index, &judgements[*index]);
             alike(&log.collisions[*index]) && judgements[*index].class == self.class && counts == self.counts
         };
         let index = (0..log.collisions.len()).find(same)?;

@@ -10,14 +10,14 @@ use crate::check::{self, ReadError};
 use crate::episode::Collision;
 use crate::geometry::{OrientedBox, Vec2};
 use crate::model::vocabulary::{Body, Priority, Verb};
-use crate::model::{Avoidability, Space};
+use crate::model::{Avoidability, Memory, OutcomeFacts, Space};
 use crate::road::testing::{lanes, street};
 use crate::sim::testing::Heading;
 use crate::sim::{Contact, Control, DT_S, Sensed, Start, VehicleParameters, World, testing};
 
 use super::avoidable::{AvoidabilitySettings, Judgement, judge_one};
-use super::facts::{facts_of, struck};
 use super::hazard::onset;
+use crate::episode::{collision_facts, struck};
 
 /// A lane along +x for 800 m, 3 m wide: too narrow to pass another vehicle.
 fn world() -> World {
@@ -195,7 +195,9 @@ fn shipped_space() -> Arc<Space> {
 
 fn counts(contact: Contact, judgement: &Judgement) -> bool {
     let collision = Collision { contact, step: 0, body: Body::Sedan, verb: Verb::CrossRoad, spawned_s: 0.0 };
-    shipped_space().counts(facts_of(&collision, judgement))
+    let avoidable = judgement.class == Avoidability::Avoidable;
+    let facts = OutcomeFacts { avoidable, ..collision_facts(&collision, &[]) };
+    shipped_space().counts(facts, &Memory::default())
 }
 
 #[test]

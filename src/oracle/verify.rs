@@ -68,7 +68,7 @@ fn check(
         Claim::Verdict { name, obstacle } => {
             let judge = |index: usize| {
                 let facts = facts(log, index, &judgements[index]);
-                match space.verdict(name, facts) {
+                match space.verdict(name, facts, log.memory_after(log.collisions[index].step)) {
                     Some(true) => Ok(()),
                     _ => Err(format!(
                         "repeated: {}, sudden: {}, struck: {}, priority: {}, {}",

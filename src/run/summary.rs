@@ -75,7 +75,7 @@ impl EpisodeSummary {
     pub fn new(space: &Space, number: usize, log: &EpisodeLog, judgements: Vec<Judgement>) -> EpisodeSummary {
         let find = |(index, judgement)| {
             let facts = oracle::facts(log, index, &judgement);
-            let counted = space.counts(facts);
+            let counted = oracle::counts(space, log, index, &judgement);
             Finding {
                 number: index,
                 collision: log.collisions[index],

@@ -135,7 +135,7 @@ mod tests {
         let inside = route.lanes.iter().find(|lane| world.scene().map.lane(lane.lane).junction.is_some());
         let begin_m = inside.expect("the route crosses a junction").enter_m;
         assert_eq!(facts.ego_junction_ahead_m, begin_m);
-        assert_eq!((facts.ego_road, facts.ego_light), (RoadKind::TwoWay, Light::None));
+        assert_eq!((facts.ego_road, facts.ego_light), (RoadKind::OneWay, Light::None));
         assert_eq!((facts.road_users, facts.nearest_gap_m), (0, 100.0));
         assert_eq!(testing::world(&testing::straight()).moment_facts().ego_junction_ahead_m, 1000.0);
     }

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use avastra::action::{ActionTable, Draw, Effect, Offer, Situation, Surroundings};
+use avastra::action::{ActionTable, Draw, Effect, Offer, Situation};
 use avastra::check::state_argument::memory_from;
 use avastra::episode::{Choice, Moment};
 use avastra::model::vocabulary::{Level, Light, TimeOfDay};
@@ -254,6 +254,37 @@ fn no_vehicle_appears_near_a_junction() {
 }
 
 #[test]
+fn near_misses_of_pedestrians_weigh_double() {
+    let table = wish("pedestrians_weigh_double");
+    let run = run_of(table.space().clone(), 1, 6, &[]);
+    let pedestrians = ["pedestrian(from: Left)", "pedestrian(from: Right)"].map(|label| row(&table, label));
+    let (mut double, mut single) = (0, 0);
+    for number in 0..run.episodes() {
+        // In some episodes nothing but pedestrians appears, in others nothing but vehicles.
+        let mut choose = |moment: &Moment| {
+            let offers = table.offers(moment.situation).into_iter().enumerate();
+            let mut legal = offers.filter_map(|(row, offer)| match offer {
+                Offer::Legal(draw) if pedestrians.contains(&row) == (number % 2 == 0) => Some(draw),
+                _ => None,
+            });
+            let spawns = |draw: &Draw| draw.effects.iter().any(|effect| matches!(effect, Effect::Spawn(_)));
+            legal.find(spawns).map_or(Choice::Pass, Choice::Act)
+        };
+        let log = run.play(number, &mut choose, &mut |_, _, _| {});
+        let is_hit = |index: usize| log.collisions.iter().any(|collision| collision.step == index);
+        for (index, step) in log.steps.iter().enumerate().filter(|(_, step)| step.proc > 0.2) {
+            let weight = if number % 2 == 0 { 2.0 } else { 1.0 };
+            if !is_hit(index) {
+                assert_eq!(step.reward, weight * step.proc, "step {index} of episode {number}");
+                *(if number % 2 == 0 { &mut double } else { &mut single }) += 1;
+            }
+        }
+        assert_replays(&run, number, &log);
+    }
+    assert!(double > 0 && single > 0, "{double} {single}");
+}
+
+#[test]
 fn what_the_world_refuses_is_said_with_its_speed() {
     let space = "tests/cases/wishes/only_while_driving.ava";
     let reason = "rule `only_while_driving` says no: ego.speed = 3 m/s, wanted >= 8 m/s";
@@ -280,7 +311,9 @@ fn the_reward_is_the_authors_own() {
     let rules: Vec<&str> = table.space().rules.iter().map(|rule| rule.name.as_str()).collect();
     assert_eq!(rules, ["chronology", "ped_gap", "walking_pace", "no_teleport", "wet_needs_cause"]);
     let reward = |collision, struck, proc| {
-        table.space().reward(OutcomeFacts { collision, struck, proc, ..OutcomeFacts::default() })
+        table
+            .space()
+            .reward(OutcomeFacts { collision, struck, proc, ..OutcomeFacts::default() }, &Memory::default())
     };
     assert_eq!(reward(true, false, 1.0), 10.0);
     assert_eq!(reward(true, true, 1.0), 2.0);

@@ -1,0 +1,163 @@
+//! What kind of collision a collision was, as far as it is known when it happens.
+//!
+//! Sudden appearance is judged as in the published package; side and rear hits, which its authors sorted out by
+//! hand, are decided here by contact point and motion, unless the ego vehicle had to give way (`sim::right_of_way`):
+//! one that turns across oncoming traffic is hit in the flank, and is not the one that was run into. The package's
+//! "overlapping" cannot occur, because no obstacle appears within another's outline. Its "repeated" does not occur
+//! either, because an obstacle that was touched once touches nothing again; the word stays for worlds in which it
+//! can. Not taken over: that a second pedestrian of an episode never counts.
+
+use crate::geometry::Vec2;
+use crate::model::OutcomeFacts;
+use crate::model::vocabulary::Priority;
+use crate::sim::{Contact, VehicleParameters};
+
+use super::log::Collision;
+
+/// A collision this soon after the obstacle appeared is sudden, s (published package).
+const SUDDEN_S: f64 = 0.75;
+/// An ego vehicle slower than this stands: any contact is an obstacle that ran into it, m/s. The published
+/// package has the figure for pedestrians; ours is to use it for all obstacles.
+const STANDING_MPS: f64 = 1.0;
+/// An obstacle that moves towards the ego vehicle's side faster than this ran into it, m/s: the ego vehicle
+/// itself does not move sideways.
+const SIDEWAYS_MPS: f64 = 0.1;
+
+/// The facts about a collision; `before` are the earlier ones of the episode.
+pub fn collision_facts(collision: &Collision, before: &[Collision]) -> OutcomeFacts {
+    OutcomeFacts {
+        collision: true,
+        repeated: before.iter().any(|other| other.contact.obstacle == collision.contact.obstacle),
+        sudden: collision.contact.time_s - collision.spawned_s <= SUDDEN_S,
+        struck: collision.contact.priority != Priority::Other
+            && struck(&collision.contact, &VehicleParameters::MKZ),
+        priority: collision.contact.priority,
+        // What was hit was nearest, and contact is certainty.
+        hit: Some(collision.body),
+        near: Some(collision.body),
+        proc: 1.0,
+        ..OutcomeFacts::default()
+    }
+}
+
+/// A contact this near to two faces is at the corner between them, m. A first contact is known far more
+/// exactly.
+const CORNER_M: f64 = 1e-3;
+
+/// Whether the obstacle ran into the ego vehicle rather than the other way round, whoever had to give way.
+///
+/// True if the ego vehicle stood; if it was hit at the rear; if it was hit at the side behind its
+/// front axle, or before it by an obstacle moving towards that side; and at a front corner if the
+/// obstacle moved sideways onto it faster than the ego vehicle drove.
+pub fn struck(contact: &Contact, ego: &VehicleParameters) -> bool {
+    if contact.ego_speed_mps < STANDING_MPS {
+        return true;
+    }
+    match face(contact.on_ego, ego) {
+        Face::Front => false,
+        Face::Rear => true,
+        Face::FrontCorner { leftward } => towards_mps(contact, leftward) > contact.ego_speed_mps,
+        Face::Side { leftward } => {
+            let front_axle_m = ego.wheelbase_m + ego.rear_axle_to_back_m - ego.length_m / 2.0;
+            contact.on_ego.x < front_axle_m || towards_mps(contact, leftward) > SIDEWAYS_MPS
+        }
+    }
+}
+
+/// Whether the ego vehicle is at fault in a contact: it had to give way, or where neither had, it ran into the
+/// obstacle.
+pub fn at_fault(contact: &Contact) -> bool {
+    match contact.priority {
+        Priority::Other => true,
+        Priority::Ego => false,
+        Priority::None => !struck(contact, &VehicleParameters::MKZ),
+    }
+}
+
+/// Speed of the obstacle towards a side of the ego vehicle, m/s; `leftward` as in [`Face`].
+fn towards_mps(contact: &Contact, leftward: f64) -> f64 {
+    -leftward * contact.obstacle_velocity_on_ego_mps.y
+}
+
+/// The side of the ego vehicle that a point belongs to, in words.
+pub fn side(on_ego: Vec2, ego: &VehicleParameters) -> &'static str {
+    match face(on_ego, ego) {
+        Face::Front => "front",
+        Face::FrontCorner { leftward } if leftward > 0.0 => "front left",
+        Face::FrontCorner { .. } => "front right",
+        Face::Rear => "rear",
+        Face::Side { leftward } if leftward > 0.0 => "left",
+        Face::Side { .. } => "right",
+    }
+}
+
+/// `leftward` is 1 on the left and -1 on the right.
+enum Face {
+    Front,
+    FrontCorner { leftward: f64 },
+    Rear,
+    Side { leftward: f64 },
+}
+
+/// The face of the ego vehicle's outline that a point lies nearest to. `point` is in the frame of
+/// the outline's centre: x ahead, y left, m.
+fn face(point: Vec2, ego: &VehicleParameters) -> Face {
+    let to_end_m = ego.length_m / 2.0 - point.x.abs();
+    let to_side_m = ego.width_m / 2.0 - point.y.abs();
+    let leftward = if point.y >= 0.0 { 1.0 } else { -1.0 };
+    if point.x >= 0.0 && (to_end_m - to_side_m).abs() < CORNER_M && to_end_m.abs() < CORNER_M {
+        Face::FrontCorner { leftward }
+    } else if to_end_m > to_side_m {
+        Face::Side { leftward }
+    } else if point.x >= 0.0 {
+        Face::Front
+    } else {
+        Face::Rear
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::vocabulary::{Body, Priority, Verb};
+
+    fn collision(x_m: f64, y_m: f64, ego_speed_mps: f64, obstacle_left_mps: f64) -> Collision {
+        let contact = Contact {
+            time_s: 10.0,
+            obstacle: 1,
+            point: Vec2::zeros(),
+            on_ego: Vec2::new(x_m, y_m),
+            ego_speed_mps,
+            obstacle_velocity_mps: Vec2::zeros(),
+            obstacle_velocity_on_ego_mps: Vec2::new(0.0, obstacle_left_mps),
+            closing_speed_mps: 1.0,
+            priority: Priority::None,
+        };
+        Collision { contact, step: 0, body: Body::Sedan, verb: Verb::DriveAhead, spawned_s: 5.0 }
+    }
+
+    #[test]
+    fn the_vehicle_that_struck_the_other_is_found() {
+        let mkz = VehicleParameters::MKZ;
+        let cases = [
+            ("front", collision(2.35, 0.3, 8.0, 0.0), false),
+            ("standing", collision(2.35, 0.3, 0.5, 0.0), true),
+            ("rear", collision(-2.35, 0.0, 8.0, 0.0), true),
+            ("flank", collision(0.0, 1.03, 8.0, 0.0), true),
+            ("front corner, turning into a standing vehicle", collision(2.0, 1.03, 8.0, 0.0), false),
+            ("front corner, hit from the left", collision(2.0, 1.03, 8.0, -1.5), true),
+            ("front corner, hit from the right", collision(2.0, -1.03, 8.0, 1.5), true),
+            ("front corner, a vehicle on the right moving away", collision(2.0, -1.03, 8.0, -1.5), false),
+            ("the corner itself, front by a hair", collision(2.35002, 1.03, 8.0, -1.5), false),
+            ("the corner itself, side by a hair", collision(2.35, 1.03002, 8.0, -1.5), false),
+            (
+                "the corner itself, by a vehicle faster than the ego vehicle",
+                collision(2.35, 1.03, 4.0, -9.0),
+                true,
+            ),
+        ];
+        for (name, collision, expected) in cases {
+            assert_eq!(struck(&collision.contact, &mkz), expected, "{name}");
+        }
+    }
+}
