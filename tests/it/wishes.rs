@@ -256,19 +256,21 @@ fn no_vehicle_appears_near_a_junction() {
 #[test]
 fn near_misses_of_pedestrians_weigh_double() {
     let table = wish("pedestrians_weigh_double");
-    let run = run_of(table.space().clone(), 1, 6, &[]);
+    let run = run_of(table.space().clone(), 1, 8, &[]);
     let pedestrians = ["pedestrian(from: Left)", "pedestrian(from: Right)"].map(|label| row(&table, label));
     let (mut double, mut single) = (0, 0);
     for number in 0..run.episodes() {
         // In some episodes nothing but pedestrians appears, in others nothing but vehicles.
         let mut choose = |moment: &Moment| {
             let offers = table.offers(moment.situation).into_iter().enumerate();
-            let mut legal = offers.filter_map(|(row, offer)| match offer {
+            let legal = offers.filter_map(|(row, offer)| match offer {
                 Offer::Legal(draw) if pedestrians.contains(&row) == (number % 2 == 0) => Some(draw),
                 _ => None,
             });
             let spawns = |draw: &Draw| draw.effects.iter().any(|effect| matches!(effect, Effect::Spawn(_)));
-            legal.find(spawns).map_or(Choice::Pass, Choice::Act)
+            let mut legal: Vec<Draw> = legal.filter(spawns).collect();
+            let chosen = (number + 5 * moment.step) % legal.len().max(1);
+            if legal.is_empty() { Choice::Pass } else { Choice::Act(legal.swap_remove(chosen)) }
         };
         let log = run.play(number, &mut choose, &mut |_, _, _| {});
         let is_hit = |index: usize| log.collisions.iter().any(|collision| collision.step == index);
