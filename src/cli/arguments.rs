@@ -2,10 +2,7 @@
 
 use std::path::PathBuf;
 
-use clap::builder::TypedValueParser;
 use clap::{Args, Parser, Subcommand, ValueEnum};
-
-use crate::sim::TrafficProfile;
 
 use super::help::Named;
 
@@ -136,7 +133,7 @@ pub struct EditorFilesArguments {
 
 #[derive(Debug, Args)]
 pub struct ExplainArguments {
-    /// For example AV0401 [default: list all].
+    /// A code, for example AV0401, or `json`: what `--format json` prints [default: list all].
     pub code: Option<String>,
 }
 
@@ -287,8 +284,8 @@ pub struct RunArguments {
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=i64::from(crate::model::AMBIENT_MAX)))]
     pub ambient: u32,
     /// How other vehicles drive: a name, or a profile like scenarios/traffic/careful.yaml [default: careful].
-    #[arg(long, value_name = "NAME|FILE", value_parser = Named::TRAFFIC.try_map(|name| super::load::traffic(&name)))]
-    pub traffic: Option<TrafficProfile>,
+    #[arg(long, value_name = "NAME|FILE", value_parser = Named::TRAFFIC)]
+    pub traffic: Option<String>,
     /// Say of each counted collision which module of the driving system is at fault; takes some twenty
     /// replays for each.
     #[arg(long)]
@@ -342,8 +339,8 @@ pub struct TrainArguments {
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
     /// How other vehicles drive: a name, or a profile like scenarios/traffic/careful.yaml [default: careful].
-    #[arg(long, value_name = "NAME|FILE", value_parser = Named::TRAFFIC.try_map(|name| super::load::traffic(&name)))]
-    pub traffic: Option<TrafficProfile>,
+    #[arg(long, value_name = "NAME|FILE", value_parser = Named::TRAFFIC)]
+    pub traffic: Option<String>,
     #[command(flatten)]
     pub rules: RuleArguments,
     /// Run directory, new or empty [default: the next free runs/NNNN].
@@ -487,6 +484,7 @@ pub struct ShrinkArguments {
 
 #[derive(Debug, Args)]
 pub struct PackArguments {
+    /// Scenarios and policies.
     #[arg(required = true, value_name = "FILE")]
     pub files: Vec<PathBuf>,
     /// The folder that they are copied to.

@@ -41,12 +41,13 @@ pub fn check(output: &Output, arguments: &CheckArguments) -> Result<(), Failure>
         if let Some(audit) = &audit {
             output.say(&audit.to_string());
         }
-        if wrong == 0 {
+        // With a dump, stdout holds JSON alone.
+        if wrong == 0 && dump.is_none() {
             output.tell(&format!("{}: no mistakes", path.display()));
         }
         files.push(serde_json::json!({ "file": path, "errors": wrong, "dump": dump, "audit": audit }));
     }
-    output.result("check", serde_json::json!({ "errors": errors, "warnings": warnings, "files": files }));
+    output.result(serde_json::json!({ "errors": errors, "warnings": warnings, "files": files }));
     if arguments.strict {
         errors += warnings;
     }

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use crate::action::{ActionTable, TableFile};
 use crate::run::road_named;
+use crate::trial::{Cell, TrialSettings};
 
 use super::arguments::{CompileArguments, TableArguments};
 use super::error::Failure;
@@ -27,7 +28,7 @@ pub fn compile(output: &Output, arguments: &CompileArguments) -> Result<(), Fail
     write(&path, &text)?;
     write(Path::new(LAST), &format!("{}\n", path.display()))?;
     output.tell(&format!("{}: {} -> {}", arguments.file.display(), size(&table), path.display()));
-    output.result("compile", serde_json::json!({ "table": path, "rows": table.rows().len() }));
+    output.result(serde_json::json!({ "table": path, "rows": table.rows().len() }));
     Ok(())
 }
 
@@ -63,8 +64,17 @@ pub fn table(output: &Output, arguments: &TableArguments) -> Result<(), Failure>
         return trials::trials(output, arguments, table);
     }
     output.say(table.text(arguments.road.as_deref()).trim_end());
-    output.result("table", table.file());
+    output.result(TableResult { table: table.file(), trials: None, cells: None });
     Ok(())
+}
+
+/// A table in JSON; with `--try`, what became of each row on each road.
+#[derive(serde::Serialize)]
+pub struct TableResult {
+    #[serde(flatten)]
+    pub table: TableFile,
+    pub trials: Option<TrialSettings>,
+    pub cells: Option<Vec<Cell>>,
 }
 
 /// `45 rows of 10 actions, 8 rules, 1 road`.

@@ -11,7 +11,6 @@ pub fn completions(output: &Output, arguments: &CompletionsArguments) -> Result<
     clap_complete::generate(arguments.shell, &mut help::command(), "avastra", &mut script);
     let script = String::from_utf8(script).expect("scripts are text");
     output.say(script.trim_end());
-    output
-        .result("completions", serde_json::json!({ "shell": arguments.shell.to_string(), "script": script }));
+    output.result(serde_json::json!({ "shell": arguments.shell.to_string(), "script": script }));
     Ok(())
 }

@@ -31,12 +31,40 @@ pub fn diagnose(output: &Output, arguments: &DiagnoseArguments) -> Result<(), Fa
         return mechanisms(output, arguments, profile.as_ref());
     }
     let baseline = arguments.baseline.as_deref().map(load::profile).transpose()?.unwrap_or_default();
-    let inquire = |file: &PathBuf| explain(output, arguments, profile.as_ref(), &baseline, file);
-    let [file] = arguments.many.files.as_slice() else {
-        let found = each_file(&arguments.many, inquire);
-        return many(output, &arguments.many.files, found);
-    };
-    let found = inquire(file)?;
+    let found = each_file(output, &arguments.many, |file| {
+        explain(output, arguments, profile.as_ref(), &baseline, file)
+    });
+    match found.done.as_slice() {
+        [only] if found.is_single() => tell_one(output, only),
+        several => several.iter().for_each(|found| {
+            output.tell(&format!("{}: {}", found.file.display(), sentence(&found.diagnosis)));
+        }),
+    }
+    let causes = causes(&found.done);
+    if !found.is_single() {
+        output.say(&format!("\n{}, at fault:", plural(found.done.len(), "collision")));
+        causes.iter().for_each(|(cause, count)| output.say(&format!("{count:>6}  {cause}")));
+    }
+    let causes = causes.iter().map(|(cause, count)| serde_json::json!({ "cause": cause, "count": count }));
+    output.result(serde_json::json!({
+        "causes": causes.collect::<Vec<_>>(), "mechanisms": null,
+        "scenarios": found.done.iter().map(Explained::in_json).collect::<Vec<_>>(),
+        "failed": found.failed_in_json(),
+    }));
+    found.complete("explained")
+}
+
+/// How often each cause was found; the most frequent first.
+fn causes(found: &[Explained]) -> Vec<(String, usize)> {
+    let mut causes: BTreeMap<String, usize> = BTreeMap::new();
+    found.iter().for_each(|found| *causes.entry(found.cause()).or_default() += 1);
+    let mut causes: Vec<(String, usize)> = causes.into_iter().collect();
+    causes.sort_by_key(|(_, count)| core::cmp::Reverse(*count));
+    causes
+}
+
+/// All about one collision.
+fn tell_one(output: &Output, found: &Explained) {
     output.tell(&heading(&found.collision));
     output.say(&table_text(&found.diagnosis));
     output.say(&weaknesses_text(&found.diagnosis.weaknesses));
@@ -45,8 +73,6 @@ pub fn diagnose(output: &Output, arguments: &DiagnoseArguments) -> Result<(), Fa
     if let Some(likelihood) = &found.likelihood {
         output.say(&likelihood_text(likelihood));
     }
-    output.result("diagnose", found.in_json(file));
-    Ok(())
 }
 
 /// A scenario that was played, with its first counted collision.
@@ -79,6 +105,7 @@ impl Case<'_> {
 
 /// What was found about one file.
 struct Explained {
+    file: PathBuf,
     scenario: String,
     ads: &'static str,
     collision: Collision,
@@ -87,9 +114,9 @@ struct Explained {
 }
 
 impl Explained {
-    fn in_json(&self, file: &Path) -> serde_json::Value {
+    fn in_json(&self) -> serde_json::Value {
         serde_json::json!({
-            "file": file, "scenario": self.scenario, "ads": self.ads,
+            "file": self.file, "scenario": self.scenario, "ads": self.ads,
             "obstacle": self.collision.contact.obstacle, "time_s": self.collision.contact.time_s,
             "priority": self.collision.contact.priority.name(),
             "diagnosis": self.diagnosis, "likelihood": self.likelihood,
@@ -116,35 +143,8 @@ fn explain(
     let diagnosis = oracle::diagnose(&setup, &log, index, baseline).map_err(Failure::usage)?;
     let likelihood = arguments.likelihood.map(|count| oracle::likelihood(&setup, &log, index, count));
     let collision = log.collisions[index];
-    Ok(Explained { scenario: scenario.name.clone(), ads: ads.name(), collision, diagnosis, likelihood })
-}
-
-/// A line for each of several files, and how often each cause was found.
-fn many(output: &Output, files: &[PathBuf], found: Vec<Result<Explained, Failure>>) -> Result<(), Failure> {
-    let mut causes: BTreeMap<String, usize> = BTreeMap::new();
-    let mut results = Vec::new();
-    for (file, found) in files.iter().zip(&found) {
-        match found {
-            Ok(found) => {
-                output.tell(&format!("{}: {}", file.display(), sentence(&found.diagnosis)));
-                results.push(found.in_json(file));
-                *causes.entry(found.cause()).or_default() += 1;
-            }
-            Err(failure) => output.say(&format!("{}: {failure}", file.display())),
-        }
-    }
-    let mut causes: Vec<(String, usize)> = causes.into_iter().collect();
-    causes.sort_by_key(|(_, count)| core::cmp::Reverse(*count));
-    output.say(&format!("\n{}, at fault:", plural(results.len(), "collision")));
-    for (cause, count) in &causes {
-        output.say(&format!("{count:>6}  {cause}"));
-    }
-    let errors = files.len() - results.len();
-    let causes: Vec<serde_json::Value> =
-        causes.iter().map(|(cause, count)| serde_json::json!({ "cause": cause, "count": count })).collect();
-    output
-        .result("diagnose", serde_json::json!({ "causes": causes, "errors": errors, "scenarios": results }));
-    none_left_out(errors)
+    let file = file.to_owned();
+    Ok(Explained { file, scenario: scenario.name.clone(), ads: ads.name(), collision, diagnosis, likelihood })
 }
 
 /// The share of all files' crashes that vanish without each documented weakness.
@@ -153,39 +153,24 @@ fn mechanisms(
     arguments: &DiagnoseArguments,
     profile: Option<&ModularConfig>,
 ) -> Result<(), Failure> {
-    let found = each_file(&arguments.many, |file| {
+    let found = each_file(output, &arguments.many, |file| {
         let (table, scenario) = load::scenario(output, file)?;
         let Case { stage, ads, log, index } = Case::of(&table, &scenario, profile)?;
-        oracle::mechanisms(&stage.setup(&ads), &log, index).map_err(Failure::usage)
+        let without = oracle::mechanisms(&stage.setup(&ads), &log, index).map_err(Failure::usage)?;
+        Ok((file.clone(), scenario.name.clone(), without))
     });
-    let mut crashes: Vec<Vec<WithoutMechanism>> = Vec::new();
-    let mut results = Vec::new();
-    for (file, found) in arguments.many.files.iter().zip(found) {
-        match found {
-            Ok(found) => {
-                results.push(serde_json::json!({ "file": file, "without": found }));
-                crashes.push(found);
-            }
-            Err(failure) => output.say(&format!("{}: {failure}", file.display())),
-        }
-    }
+    let crashes: Vec<Vec<WithoutMechanism>> =
+        found.done.iter().map(|(_, _, without)| without.clone()).collect();
     let shares = oracle::mechanism_shares(&crashes);
     output.say(&shares_text(crashes.len(), &shares));
-    let errors = arguments.many.files.len() - crashes.len();
-    output.result(
-        "diagnose",
-        serde_json::json!({
-            "crashes": crashes.len(), "mechanisms": shares, "errors": errors, "scenarios": results,
-        }),
-    );
-    none_left_out(errors)
-}
-
-fn none_left_out(errors: usize) -> Result<(), Failure> {
-    if errors == 0 {
-        return Ok(());
-    }
-    Err(Failure::usage(format!("{} could not be explained", plural(errors, "scenario"))))
+    let scenarios = found.done.iter().map(|(file, scenario, without)| {
+        serde_json::json!({ "file": file, "scenario": scenario, "without": without })
+    });
+    output.result(serde_json::json!({
+        "causes": null, "mechanisms": shares, "scenarios": scenarios.collect::<Vec<_>>(),
+        "failed": found.failed_in_json(),
+    }));
+    found.complete("explained")
 }
 
 fn shares_text(crashes: usize, shares: &[MechanismShare]) -> String {

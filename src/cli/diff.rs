@@ -22,6 +22,6 @@ pub fn diff(output: &Output, arguments: &DiffArguments) -> Result<(), Failure> {
         let _ = if detail.is_empty() { writeln!(text) } else { writeln!(text, ": {detail}") };
     }
     output.say(if text.is_empty() { "the two spaces mean the same" } else { text.trim_end() });
-    output.result("diff", serde_json::json!({ "differences": found }));
+    output.result(serde_json::json!({ "differences": found }));
     Ok(())
 }

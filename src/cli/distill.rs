@@ -15,6 +15,7 @@ use super::error::Failure;
 use super::files::write;
 use super::load;
 use super::output::{Output, plural};
+use super::progress::Working;
 use super::verify::{acting, same_world};
 
 /// Distils rules anew, with other settings than those of the training, and writes the policy with them.
@@ -41,7 +42,9 @@ pub fn distill(output: &Output, arguments: &DistillArguments) -> Result<(), Fail
         return Err(Failure::usage(message));
     }
     let arena = train::training_arena(&table, &policy, &acting, &policy.origin.roads)?;
+    let working = Working::new(output, "distilling rules from the network");
     let policy = with_rules(&arena, &acting, policy);
+    drop(working);
     let path = arguments.output.clone().unwrap_or_else(|| arguments.file.with_extension("distilled.ava"));
     let folder = path.parent().map_or(PathBuf::new(), PathBuf::from);
     let space_path = load::relative(&folder, &table.space().path)?;
@@ -52,10 +55,7 @@ pub fn distill(output: &Output, arguments: &DistillArguments) -> Result<(), Fail
     }
     output.say(&path.display().to_string());
     let rules = claims.map(|claims| &claims.rules);
-    output.result(
-        "distill",
-        serde_json::json!({ "policy": path, "lines": policy.rules.len(), "rules": rules }),
-    );
+    output.result(serde_json::json!({ "policy": path, "lines": policy.rules.len(), "rules": rules }));
     Ok(())
 }
 

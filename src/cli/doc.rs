@@ -24,7 +24,7 @@ pub fn doc(output: &Output, arguments: &DocArguments) -> Result<(), Failure> {
         }
         None => output.say(text.trim_end()),
     }
-    output.result("doc", serde_json::json!({ "text": text }));
+    output.result(serde_json::json!({ "text": text }));
     Ok(())
 }
 

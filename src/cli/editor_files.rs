@@ -15,6 +15,6 @@ pub fn editor_files(output: &Output, arguments: &EditorFilesArguments) -> Result
         output.tell(&path.display().to_string());
         paths.push(path);
     }
-    output.result("editor-files", serde_json::json!({ "files": paths }));
+    output.result(serde_json::json!({ "files": paths }));
     Ok(())
 }

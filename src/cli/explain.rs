@@ -6,17 +6,24 @@ use crate::syntax::nearest;
 use super::arguments::ExplainArguments;
 use super::error::Failure;
 use super::output::Output;
+use super::schema;
 
-/// Prints the page of a code, or a list of all.
+/// Prints the page of a code, a list of all, or what JSON looks like.
 pub fn explain(output: &Output, arguments: &ExplainArguments) -> Result<(), Failure> {
     let Some(code) = &arguments.code else {
         for page in PAGES {
             output.say(&format!("{}  {}", page.code, page.title()));
         }
+        output.say("json    what `--format json` prints");
         let pages: Vec<serde_json::Value> = PAGES.iter().map(record).collect();
-        output.result("explain", serde_json::json!({ "pages": pages }));
+        output.result(serde_json::json!({ "pages": pages, "always": [], "shapes": [] }));
         return Ok(());
     };
+    if code == "json" {
+        output.say(&schema::in_words());
+        output.result(serde_json::json!({ "pages": [], "always": schema::ALWAYS, "shapes": schema::SHAPES }));
+        return Ok(());
+    }
     let Some(page) = page(code) else {
         let near = nearest(&code.to_uppercase(), PAGES.iter().map(|page| page.code));
         let hint =
@@ -24,7 +31,7 @@ pub fn explain(output: &Output, arguments: &ExplainArguments) -> Result<(), Fail
         return Err(Failure::usage(format!("there is no code `{code}`: {hint}")));
     };
     output.say(page.text.trim_end());
-    output.result("explain", serde_json::json!({ "pages": [record(page)] }));
+    output.result(serde_json::json!({ "pages": [record(page)], "always": [], "shapes": [] }));
     Ok(())
 }
 

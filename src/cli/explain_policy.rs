@@ -9,6 +9,7 @@ use super::error::Failure;
 use super::load;
 use super::output::Output;
 use super::output::plural;
+use super::progress::Working;
 use super::verify::acting;
 
 /// Rows and variables that are listed; JSON has them all.
@@ -22,7 +23,9 @@ pub fn explain_policy(output: &Output, arguments: &ExplainPolicyArguments) -> Re
     let roads = if arguments.road.is_empty() { &policy.origin.roads } else { &arguments.road };
     let test = (u64::from(arguments.episodes), arguments.seed, u64::from(arguments.repeats));
     let arena = training_arena(&table, &policy, &acting, roads)?;
+    let working = Working::new(output, format!("{} drives on {}", policy.name, roads.join(", ")));
     let found = insight(&arena, &acting, &given, test);
+    drop(working);
     output.say(&format!(
         "{} on {}: {} of {}, {:.3} of Q-value at stake in each",
         policy.name,
@@ -34,10 +37,7 @@ pub fn explain_policy(output: &Output, arguments: &ExplainPolicyArguments) -> Re
     output.say(&rows_text(&found));
     output.say(&state_text(&found, !given.is_empty()));
     output.say(&importance_text(&found));
-    output.result(
-        "explain-policy",
-        serde_json::json!({ "policy": policy.name, "roads": roads, "insight": found }),
-    );
+    output.result(serde_json::json!({ "policy": policy.name, "roads": roads, "insight": found }));
     Ok(())
 }
 

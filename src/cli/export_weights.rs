@@ -20,9 +20,6 @@ pub fn export_weights(output: &Output, arguments: &ExportWeightsArguments) -> Re
     let widths: Vec<String> = shape.layers.iter().map(ToString::to_string).collect();
     let head = if shape.dueling { ", and the state's value as the last output" } else { "" };
     output.say(&format!("{}: {count} numbers of {}{head}", path.display(), widths.join("-")));
-    output.result(
-        "export-weights",
-        serde_json::json!({ "file": path, "layers": shape.layers, "dueling": shape.dueling }),
-    );
+    output.result(serde_json::json!({ "file": path, "layers": shape.layers, "dueling": shape.dueling }));
     Ok(())
 }

@@ -33,7 +33,7 @@ pub fn fmt(output: &Output, arguments: &FmtArguments) -> Result<(), Failure> {
             output.tell(&format!("{}: formatted", path.display()));
         }
     }
-    output.result("fmt", serde_json::json!({ "unformatted": unformatted, "texts": texts }));
+    output.result(serde_json::json!({ "unformatted": unformatted, "texts": texts }));
     if unformatted > 0 { Err(Failure::Unformatted { files: unformatted }) } else { Ok(()) }
 }
 

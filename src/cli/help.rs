@@ -24,7 +24,8 @@ Exit status:
   4    a counted collision (`run --fail-on-collision`), or a failing `test`
   130  Ctrl-C; what was done is saved, and `--resume` goes on
 
-`avastra COMMAND --help` has examples. `avastra explain` lists every diagnostic.";
+`avastra COMMAND --help` has examples. `avastra explain` lists every diagnostic,
+`avastra explain json` describes what `--format json` prints.";
 
 /// For every command, lines to type: what stands after `avastra`, and what that does.
 const EXAMPLES: &[(&str, &[(&str, &str)])] = &[

@@ -190,15 +190,13 @@ pub fn profile_or_own(path: Option<&Path>, ads: &str) -> Result<Option<Profile>,
 /// The traffic profile of that name, or in that file.
 ///
 /// # Errors
-/// If there is no such name, or the file cannot be used; in words for the one who wrote the name.
-pub fn traffic(wanted: &str) -> Result<TrafficProfile, String> {
-    let is_file = [".yaml", ".yml", "/"].iter().any(|part| wanted.contains(part));
-    let profile = if is_file {
-        TrafficProfile::from_yaml(&read(Path::new(wanted)).map_err(|error| error.to_string())?)
-    } else {
-        TrafficProfile::shipped(wanted)
-    };
-    profile.map_err(|error| error.to_string())
+/// If there is no such name, or the file cannot be used.
+pub fn traffic(wanted: &str) -> Result<TrafficProfile, Failure> {
+    if [".yaml", ".yml", "/"].iter().any(|part| wanted.contains(part)) {
+        let path = Path::new(wanted);
+        return TrafficProfile::from_yaml(&text(path)?).map_err(|error| Failure::file("use", path, error));
+    }
+    TrafficProfile::shipped(wanted).map_err(Failure::usage)
 }
 
 /// What a file that avastra wrote holds, with the table of its space.

@@ -19,6 +19,7 @@ mod help;
 mod interrupt;
 mod load;
 pub mod lsp;
+mod never;
 mod new;
 mod output;
 mod pack;
@@ -30,6 +31,7 @@ mod road;
 mod run;
 mod run_directory;
 mod sarif;
+mod schema;
 mod shrink;
 mod study;
 mod test;
@@ -42,15 +44,14 @@ use std::process::ExitCode;
 
 use clap::FromArgMatches;
 
-use arguments::{Arguments, Command};
+use arguments::{Arguments, Command, Format};
 use error::Failure;
 use output::Output;
 
 /// Runs the command that the process was started with.
 pub fn main() -> ExitCode {
-    let parsed = help::command().try_get_matches().and_then(|found| Arguments::from_arg_matches(&found));
-    let arguments = match parsed {
-        Ok(arguments) => arguments,
+    let found = match help::command().try_get_matches() {
+        Ok(found) => found,
         Err(error) => {
             // Help and version are not failures; every other message of clap's is a usage error.
             let _ = error.print();
@@ -62,7 +63,13 @@ pub fn main() -> ExitCode {
             return ExitCode::from(failure.status());
         }
     };
-    let output = Output::new(&arguments.output);
+    let arguments = Arguments::from_arg_matches(&found).expect("clap has parsed them");
+    let name = found.subcommand_name().expect("clap asks for a command");
+    // An editor's server speaks its protocol on stdout, whatever is asked for.
+    let output = match arguments.command {
+        Command::Lsp => Output::of(Format::Plain),
+        _ => Output::new(&arguments.output),
+    };
     let result = match &arguments.command {
         Command::Check(arguments) => check::check(&output, arguments),
         Command::Compile(arguments) => compile::compile(&output, arguments),
@@ -91,12 +98,6 @@ pub fn main() -> ExitCode {
         Command::Render(arguments) => render::render(&output, arguments),
         Command::Road(arguments) => road::road(&output, arguments),
     };
-    output.finish();
-    match result {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(failure) => {
-            output.failure(&failure);
-            ExitCode::from(failure.status())
-        }
-    }
+    output.finish(name, result.as_ref().err());
+    result.map_or_else(|failure| ExitCode::from(failure.status()), |()| ExitCode::SUCCESS)
 }

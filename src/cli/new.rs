@@ -25,6 +25,6 @@ pub fn new(output: &Output, arguments: &NewArguments) -> Result<(), Failure> {
     let space = paths[0].0.display().to_string();
     output.tell(&format!("next: avastra check {space}, then avastra run {space} --episodes 20"));
     let files: Vec<String> = paths.iter().map(|(path, _)| path.display().to_string()).collect();
-    output.result("new", serde_json::json!({ "files": files }));
+    output.result(serde_json::json!({ "files": files }));
     Ok(())
 }

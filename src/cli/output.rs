@@ -7,7 +7,7 @@ use crate::syntax::{Diagnostic, DiagnosticRecord, Sources, Style};
 
 use super::arguments::{Format, OutputArguments, When};
 use super::error::Failure;
-use super::sarif;
+use super::{help, sarif};
 
 /// How this command prints.
 pub struct Output {
@@ -17,16 +17,34 @@ pub struct Output {
     pub verbose: bool,
     /// Diagnostics for SARIF, which prints them in one piece at the end.
     collected: Mutex<Vec<DiagnosticRecord>>,
+    /// What the command found, for JSON, which prints it at the end.
+    result: Mutex<Fields>,
 }
 
-/// The result of a command in JSON: its last line on stdout.
+type Fields = serde_json::Map<String, serde_json::Value>;
+
+/// Raised whenever a field of a command's result changes its meaning or goes away.
+const SCHEMA: u32 = 2;
+
+/// The end of a command in JSON: its last line on stdout, whether it failed or not. `avastra explain json` says which
+/// fields a result has (`schema`).
 #[derive(serde::Serialize)]
-struct Line<'a, T> {
-    /// Raised whenever a field changes its meaning or goes away.
+struct Line<'a> {
     schema: u32,
     command: &'a str,
+    status: u8,
+    error: Option<String>,
+    /// None if the command failed before it found anything.
     #[serde(flatten)]
-    result: T,
+    result: Fields,
+}
+
+/// How progress is told.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Telling {
+    Bar,
+    Lines,
+    Nothing,
 }
 
 impl Output {
@@ -36,29 +54,55 @@ impl Output {
             When::Never => false,
             When::Auto => {
                 arguments.format == Format::Human
-                    && std::io::stderr().is_terminal()
+                    && is_on_screen()
                     && std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty())
-                    && !is_dumb()
             }
         };
-        let collected = Mutex::default();
         let (quiet, verbose) = (arguments.quiet, arguments.verbose);
-        Output { format: arguments.format, colour, quiet, verbose, collected }
+        Output { colour, quiet, verbose, ..Output::of(arguments.format) }
+    }
+
+    /// Without colour.
+    pub fn of(format: Format) -> Output {
+        let (collected, result) = (Mutex::default(), Mutex::default());
+        Output { format, colour: false, quiet: false, verbose: false, collected, result }
     }
 
     pub fn is_json(&self) -> bool {
         self.format == Format::Json
     }
 
+    /// How progress is told, in this form and at this place.
+    pub fn telling(&self) -> Telling {
+        match self.format {
+            _ if self.quiet => Telling::Nothing,
+            Format::Human if is_on_screen() => Telling::Bar,
+            Format::Human | Format::Plain => Telling::Lines,
+            Format::Json | Format::Sarif => Telling::Nothing,
+        }
+    }
+
     fn is_sarif(&self) -> bool {
         self.format == Format::Sarif
     }
 
-    /// Ends the command's output.
-    pub fn finish(&self) {
+    /// Ends the command's output: its result, and why it failed if it did.
+    pub fn finish(&self, command: &str, failure: Option<&Failure>) {
+        if self.is_json() {
+            let (status, error) = (failure.map_or(0, Failure::status), failure.map(Failure::to_string));
+            let result = std::mem::take(&mut *self.result.lock().expect("nothing panics while it holds it"));
+            let line = Line { schema: SCHEMA, command, status, error, result };
+            print(&serde_json::to_string(&line).expect("results have string keys only"));
+            return;
+        }
         if self.is_sarif() {
             let log = sarif::log(&self.collected());
             print(&serde_json::to_string_pretty(&log).expect("it is JSON already"));
+        }
+        match failure {
+            Some(failure) if self.colour => remark(&format!("\x1b[1;31merror\x1b[0m: {failure}")),
+            Some(failure) => remark(&format!("error: {failure}")),
+            None => {}
         }
     }
 
@@ -76,12 +120,12 @@ impl Output {
         }
     }
 
-    /// The result in JSON; nothing in the other forms.
-    pub fn result(&self, command: &str, result: impl serde::Serialize) {
+    /// What the command found, an object; told in JSON alone, at the end.
+    pub fn result(&self, result: impl serde::Serialize) {
         if self.is_json() {
-            let line = Line { schema: 1, command, result };
-            let line = serde_json::to_string(&line).expect("results have string keys only");
-            print(&line);
+            let value = serde_json::to_value(result).expect("results have string keys only");
+            let serde_json::Value::Object(fields) = value else { panic!("a result is an object: {value}") };
+            *self.result.lock().expect("nothing panics while it holds it") = fields;
         }
     }
 
@@ -104,34 +148,16 @@ impl Output {
     fn collected(&self) -> std::sync::MutexGuard<'_, Vec<DiagnosticRecord>> {
         self.collected.lock().expect("no thread panics while collecting")
     }
-
-    pub fn failure(&self, failure: &Failure) {
-        if self.is_json() {
-            self.result(
-                "error",
-                serde_json::json!({ "status": failure.status(), "message": failure.to_string() }),
-            );
-        } else if self.colour {
-            remark(&format!("\x1b[1;31merror\x1b[0m: {failure}"));
-        } else {
-            remark(&format!("error: {failure}"));
-        }
-    }
 }
 
-/// Prints the result object of a command line that could not be parsed, if it asks for JSON.
+/// Ends a command line that could not be parsed, if it asks for JSON.
 pub fn usage_in_json(failure: &Failure) {
-    let arguments: Vec<String> = std::env::args().collect();
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
     let asks = |pair: &[String]| pair[0] == "--format" && pair[1] == "json";
     if arguments.windows(2).any(asks) || arguments.iter().any(|argument| argument == "--format=json") {
-        Output {
-            format: Format::Json,
-            colour: false,
-            quiet: false,
-            verbose: false,
-            collected: Mutex::default(),
-        }
-        .failure(failure);
+        let known = help::command();
+        let name = arguments.iter().find(|argument| known.find_subcommand(argument).is_some());
+        Output::of(Format::Json).finish(name.map_or("avastra", String::as_str), Some(failure));
     }
 }
 
@@ -145,9 +171,9 @@ pub fn remark(text: &str) {
     let _ = writeln!(std::io::stderr(), "{text}");
 }
 
-/// Whether the terminal says that it can only print one line after another.
-pub fn is_dumb() -> bool {
-    std::env::var_os("TERM").is_some_and(|name| name == "dumb")
+/// Whether stderr is a terminal that can do more than print one line after another.
+fn is_on_screen() -> bool {
+    std::io::stderr().is_terminal() && std::env::var_os("TERM").is_none_or(|name| name != "dumb")
 }
 
 /// What every terminal shows in a line; longer text is folded.

@@ -34,7 +34,7 @@ pub fn pack(output: &Output, arguments: &PackArguments) -> Result<(), Failure> {
         packed.push(target);
     }
     output.say(&format!("{}: {} with all that they use", folder.display(), plural(packed.len(), "file")));
-    output.result("pack", serde_json::json!({ "directory": folder, "files": packed }));
+    output.result(serde_json::json!({ "directory": folder, "files": packed }));
     Ok(())
 }
 

@@ -7,6 +7,9 @@ use std::sync::atomic::AtomicBool;
 use crate::run::on_threads;
 
 use super::arguments::FilesArguments;
+use super::error::Failure;
+use super::output::{Output, plural};
+use super::progress::{Pieces, Working};
 
 /// Worker threads: as many as asked for, or one for each core.
 pub fn jobs(asked: Option<u32>) -> usize {
@@ -14,31 +17,93 @@ pub fn jobs(asked: Option<u32>) -> usize {
     asked.map_or_else(cores, |jobs| jobs as usize)
 }
 
-/// Does `work` for every file on as many threads as [`jobs`] says.
-pub fn each_file<T: Send>(many: &FilesArguments, work: impl Fn(&PathBuf) -> T + Sync) -> Vec<T> {
+/// What came of each file, in the order of the files.
+pub struct PerFile<T> {
+    pub done: Vec<T>,
+    failed: Vec<(PathBuf, Failure)>,
+    files: usize,
+}
+
+impl<T> PerFile<T> {
+    /// Files that failed, for the result in JSON.
+    pub fn failed_in_json(&self) -> Vec<serde_json::Value> {
+        let entry = |(file, failure): &(PathBuf, Failure)| serde_json::json!({ "file": file, "error": failure.to_string() });
+        self.failed.iter().map(entry).collect()
+    }
+
+    /// Whether the command was about one file only.
+    pub fn is_single(&self) -> bool {
+        self.files == 1
+    }
+
+    /// A broken file does not hide the results of the others, but the command fails.
+    ///
+    /// # Errors
+    /// The failure of the only file, or how many failed and could not be `done`.
+    pub fn complete(mut self, done: &str) -> Result<(), Failure> {
+        match self.failed.len() {
+            0 => Ok(()),
+            _ if self.files == 1 => Err(self.failed.remove(0).1),
+            failed => Err(Failure::usage(format!("{} could not be {done}", plural(failed, "file")))),
+        }
+    }
+}
+
+/// Does `work` for every file on as many threads as [`jobs`] says. Of several files, it says which failed.
+pub fn each_file<T: Send>(
+    output: &Output,
+    many: &FilesArguments,
+    work: impl Fn(&PathBuf) -> Result<T, Failure> + Sync,
+) -> PerFile<T> {
     let numbered: Vec<(usize, &PathBuf)> = many.files.iter().enumerate().collect();
+    let mut results = Vec::new();
+    let (single, several) = match many.files.as_slice() {
+        [file] => (Some(Working::new(output, file.display().to_string())), None),
+        files => (None, Some(Pieces::new(output, "files", files.len()))),
+    };
     let work = |&(number, file): &(usize, &PathBuf), tell: &mut dyn FnMut(_) -> bool| {
         tell((number, work(file)));
     };
-    let mut done = Vec::new();
     let Ok(()) = on_threads(&numbered, jobs(many.jobs), &AtomicBool::new(false), work, &mut |result| {
-        done.push(result);
+        results.push(result);
+        several.iter().for_each(Pieces::one);
         Ok::<_, Infallible>(())
     });
-    done.sort_by_key(|(number, _)| *number);
-    done.into_iter().map(|(_, result)| result).collect()
+    drop((single, several));
+    results.sort_by_key(|(number, _)| *number);
+    let mut all = PerFile { done: Vec::new(), failed: Vec::new(), files: many.files.len() };
+    for ((_, result), file) in results.into_iter().zip(&many.files) {
+        match result {
+            Ok(found) => all.done.push(found),
+            Err(failure) => {
+                if !all.is_single() {
+                    output.say(&format!("{}: {failure}", file.display()));
+                }
+                all.failed.push((file.clone(), failure));
+            }
+        }
+    }
+    all
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::cli::arguments::Format;
 
     #[test]
     fn results_keep_the_order_of_the_files() {
+        let output = Output::of(Format::Json);
         let files = (0..50).map(|number| PathBuf::from(number.to_string())).collect();
         let many = FilesArguments { files, jobs: Some(3) };
-        let names = each_file(&many, |file| file.display().to_string());
-        assert!(names.iter().enumerate().all(|(number, name)| *name == number.to_string()));
-        assert!(each_file(&FilesArguments { files: Vec::new(), jobs: None }, |_| ()).is_empty());
+        let names = each_file(&output, &many, |file| match file.display().to_string() {
+            name if name == "7" => Err(Failure::usage("not this one")),
+            name => Ok(name),
+        });
+        let wanted: Vec<String> =
+            (0..50).filter(|&number| number != 7).map(|number| number.to_string()).collect();
+        assert_eq!(names.done, wanted);
+        assert_eq!(names.failed_in_json(), [serde_json::json!({ "file": "7", "error": "not this one" })]);
+        assert_eq!(names.complete("read").unwrap_err().to_string(), "1 file could not be read");
     }
 }

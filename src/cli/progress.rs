@@ -1,14 +1,17 @@
-//! Progress of long work: a bar on a terminal, plain lines otherwise.
+//! Progress of long work, on stderr: a bar on a terminal, plain lines elsewhere, nothing in JSON or with `--quiet`.
+//!
+//! A bar is as wide as the terminal: its message is cut, never folded. Lines begin after some seconds, so that short
+//! work says nothing.
 
-use super::output::plural;
 use std::collections::VecDeque;
-use std::io::IsTerminal;
+use std::sync::Mutex;
+use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::train::TrainedEpisode;
 
-use super::output::remark;
+use super::output::{Output, Telling, plural, remark};
 
 /// How far a run or a study is. Dropping it clears the bar.
 pub struct Progress {
@@ -17,11 +20,9 @@ pub struct Progress {
 }
 
 impl Progress {
-    /// `quiet` shows nothing at all; `resumed` episodes count as done already.
-    pub fn new(total: u64, resumed: u64, quiet: bool) -> Progress {
-        let template = "{bar:30} {pos}/{len} episodes, {msg}, {per_sec}, {eta} left";
-        let count = Count::new(total, resumed, quiet, template, "no counted collision");
-        Progress { count, found: 0 }
+    /// `resumed` episodes count as done already.
+    pub fn new(output: &Output, total: u64, resumed: u64) -> Progress {
+        Progress { count: Count::new(output, "episodes", total, resumed), found: 0 }
     }
 
     /// One more episode is done, with so many counted collisions.
@@ -43,10 +44,9 @@ pub struct TrainingProgress {
 }
 
 impl TrainingProgress {
-    /// `quiet` shows nothing at all; `resumed` episodes count as done already.
-    pub fn new(total: u64, resumed: u64, quiet: bool) -> TrainingProgress {
-        let template = "{bar:20} {pos}/{len} episodes, {msg}, {eta} left";
-        let count = Count::new(total, resumed, quiet, template, "");
+    /// `resumed` episodes count as done already.
+    pub fn new(output: &Output, total: u64, resumed: u64) -> TrainingProgress {
+        let count = Count::new(output, "episodes", total, resumed);
         TrainingProgress { count, found: 0, recent: VecDeque::new() }
     }
 
@@ -59,32 +59,75 @@ impl TrainingProgress {
         }
         let mean = self.recent.iter().sum::<f64>() / self.recent.len() as f64;
         let loss = trained.lesson.loss.map_or("no loss yet".to_owned(), |loss| format!("loss {loss:.3}"));
-        self.count.up(format!(
-            "return {mean:.1}, {} counted, ε {:.2}, {loss}",
-            plural(self.found, "collision"),
-            trained.exploration_epsilon
-        ));
+        let (found, epsilon) = (self.found, trained.exploration_epsilon);
+        self.count.up(format!("{found} counted, return {mean:.1}, ε {epsilon:.2}, {loss}"));
     }
 }
 
-/// Episodes done of all: a bar on a terminal; elsewhere a line for each tenth of them.
+/// Pieces of work that threads do, each like the others. Dropping it clears the bar.
+pub struct Pieces(Mutex<Count>);
+
+impl Pieces {
+    /// `noun` names the pieces.
+    pub fn new(output: &Output, noun: &'static str, total: usize) -> Pieces {
+        Pieces(Mutex::new(Count::new(output, noun, total as u64, 0)))
+    }
+
+    /// One more piece is done.
+    pub fn one(&self) {
+        self.0.lock().expect("no thread panics while counting").up(String::new());
+    }
+}
+
+/// Work that does not know how far it is: the time spent runs on a terminal. Dropping it clears the line.
+pub struct Working(Option<ProgressBar>);
+
+impl Working {
+    pub fn new(output: &Output, doing: impl Into<String>) -> Working {
+        let bar = (output.telling() == Telling::Bar).then(|| {
+            let style = ProgressStyle::with_template("{spinner} {elapsed}, {wide_msg}");
+            let bar = ProgressBar::new_spinner().with_message(doing.into());
+            bar.set_style(style.expect("a fixed template"));
+            bar.enable_steady_tick(Duration::from_millis(200));
+            bar
+        });
+        Working(bar)
+    }
+}
+
+impl Drop for Working {
+    fn drop(&mut self) {
+        if let Some(bar) = &self.0 {
+            bar.finish_and_clear();
+        }
+    }
+}
+
+/// Work that ends sooner is not worth a line in a log.
+const SILENT: Duration = Duration::from_secs(2);
+
+/// Pieces done of all: a bar on a terminal; elsewhere a line for each tenth of them.
 struct Count {
     bar: Option<ProgressBar>,
     lines: bool,
+    noun: &'static str,
+    begun: Instant,
     total: u64,
     done: u64,
 }
 
 impl Count {
-    fn new(total: u64, done: u64, quiet: bool, template: &str, message: &'static str) -> Count {
-        let terminal = std::io::stderr().is_terminal();
-        let bar = (!quiet && terminal).then(|| {
+    fn new(output: &Output, noun: &'static str, total: u64, done: u64) -> Count {
+        let telling = output.telling();
+        let bar = (telling == Telling::Bar).then(|| {
+            let template = format!("{{bar:20}} {{pos}}/{{len}} {noun}, {{eta}} left  {{wide_msg}}");
             let bar = ProgressBar::new(total).with_position(done);
-            bar.set_style(ProgressStyle::with_template(template).expect("a fixed template"));
-            bar.set_message(message);
+            bar.set_style(ProgressStyle::with_template(&template).expect("a fixed template"));
             bar
         });
-        Count { bar, lines: !quiet && !terminal, total, done }
+        #[allow(clippy::disallowed_methods, reason = "this is cli, and the time only decides what is told")]
+        let begun = Instant::now();
+        Count { bar, lines: telling == Telling::Lines, noun, begun, total, done }
     }
 
     fn up(&mut self, message: String) {
@@ -92,8 +135,12 @@ impl Count {
         if let Some(bar) = &self.bar {
             bar.set_message(message);
             bar.inc(1);
-        } else if self.lines && (self.done * 10 / self.total > (self.done - 1) * 10 / self.total) {
-            remark(&format!("{}/{} episodes, {message}", self.done, self.total));
+        } else if self.lines
+            && self.done * 10 / self.total > (self.done - 1) * 10 / self.total
+            && self.begun.elapsed() >= SILENT
+        {
+            let message = if message.is_empty() { message } else { format!(", {message}") };
+            remark(&format!("{}/{} {}{message}", self.done, self.total, self.noun));
         }
     }
 }

@@ -53,10 +53,7 @@ pub fn render(output: &Output, arguments: &RenderArguments) -> Result<(), Failur
         output.tell(&path.display().to_string());
     }
     let svg = on_stdout.then_some(svg);
-    output.result(
-        "render",
-        serde_json::json!({ "picture": path, "times_s": times_s[..moments.len()], "svg": svg }),
-    );
+    output.result(serde_json::json!({ "picture": path, "times_s": times_s[..moments.len()], "svg": svg }));
     Ok(())
 }
 

@@ -1,8 +1,9 @@
 //! `avastra replay`: plays emitted scenarios again and checks every claim.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-use crate::ads::ModularConfig;
+use crate::action::ActionTable;
+use crate::ads::Selected;
 use crate::episode::Collision;
 use crate::model::vocabulary::{Priority, Word};
 use crate::model::{Avoidability, Scenario};
@@ -20,102 +21,126 @@ use super::parallel::each_file;
 /// Replays the scenario of every file; with `--ads` or another profile only tells what happens.
 pub fn replay(output: &Output, arguments: &ReplayArguments) -> Result<(), Failure> {
     let profile = arguments.ads_config.as_deref().map(load::profile).transpose()?;
-    let played = each_file(&arguments.many, |path| play(output, arguments, profile.as_ref(), path));
-    let (mut refuted, mut confirmed, mut refuted_files) = (0, 0, 0);
-    let (mut results, mut failed) = (Vec::new(), None);
-    for (path, played) in arguments.many.files.iter().zip(played) {
-        let played = match played {
-            Ok(played) => played,
-            // A broken file does not hide the results of the others.
-            Err(failure) => {
-                if arguments.many.files.len() > 1 {
-                    output.tell(&format!("{}: {failure}", path.display()));
-                }
-                failed = failed.or(Some(failure));
-                continue;
-            }
-        };
-        match &played.claims {
-            None => output.say(&format!("{} against {}", path.display(), played.told)),
-            Some(verdicts) => {
-                let wrong = verdicts.iter().filter(|verdict| !verdict.confirmed).count();
-                refuted += wrong;
-                confirmed += verdicts.len() - wrong;
-                refuted_files += usize::from(wrong > 0);
-                report(output, path, &played.scenario, verdicts);
-                if !played.told.is_empty() {
-                    output.tell(&played.told);
-                }
-            }
+    let played = each_file(output, &arguments.many, |path| {
+        let (table, scenario) = load::scenario(output, path)?;
+        let (ads, is_recorded) = run::selected_for(arguments.ads.as_deref(), profile.as_ref(), &scenario)?;
+        if is_recorded {
+            return play_recorded(&table, &scenario, path);
         }
-        results.push(played.result);
+        let name = match &arguments.ads_config {
+            Some(path) => format!("{} with {}", ads.name(), path.display()),
+            None => ads.name().to_owned(),
+        };
+        play(&table, &scenario, path, (&ads, Some(name)))
+    });
+    let tally = tell(output, &played.done);
+    output.result(serde_json::json!({
+        "confirmed": tally.confirmed, "refuted": tally.refuted,
+        "scenarios": played.done.iter().map(|played| &played.result).collect::<Vec<_>>(),
+        "failed": played.failed_in_json(),
+    }));
+    played.complete("replayed")?;
+    refutation(tally.refuted)
+}
+
+/// How many claims hold, and how many do not.
+pub struct Tally {
+    pub confirmed: usize,
+    pub refuted: usize,
+}
+
+/// Says what came of each replay, and the sums of several.
+pub fn tell<'a>(output: &Output, played: impl IntoIterator<Item = &'a Played>) -> Tally {
+    let mut tally = Tally { confirmed: 0, refuted: 0 };
+    let (mut files, mut refuted_files) = (0, 0);
+    for played in played {
+        files += 1;
+        let Some(verdicts) = &played.claims else {
+            output.say(&format!("{} against {}", played.path.display(), played.told));
+            continue;
+        };
+        let wrong = verdicts.iter().filter(|verdict| !verdict.confirmed).count();
+        tally.refuted += wrong;
+        tally.confirmed += verdicts.len() - wrong;
+        refuted_files += usize::from(wrong > 0);
+        report(output, &played.path, &played.name, verdicts);
+        if !played.told.is_empty() {
+            output.tell(&played.told);
+        }
     }
-    if arguments.many.files.len() > 1 && confirmed + refuted > 0 {
-        let files = plural(results.len(), "scenario");
+    if files > 1 && tally.confirmed + tally.refuted > 0 {
         output.say(&format!(
-            "\n{files}: {} confirmed, {refuted} refuted in {refuted_files} of them",
-            plural(confirmed, "claim")
+            "\n{}: {} confirmed, {} refuted in {refuted_files} of them",
+            plural(files, "scenario"),
+            plural(tally.confirmed, "claim"),
+            tally.refuted
         ));
     }
-    output.result(
-        "replay",
-        serde_json::json!({ "confirmed": confirmed, "refuted": refuted, "scenarios": results }),
-    );
-    if let Some(failure) = failed {
-        return Err(failure);
-    }
+    tally
+}
+
+pub fn refutation(refuted: usize) -> Result<(), Failure> {
     if refuted > 0 { Err(Failure::Refuted { claims: refuted }) } else { Ok(()) }
 }
 
 /// What a replay of one file found.
-struct Played {
-    scenario: Scenario,
+pub struct Played {
+    path: PathBuf,
+    /// Of the scenario.
+    name: String,
     /// Its claims, if it was played as it was recorded.
     claims: Option<Vec<oracle::ClaimResult>>,
     /// What happened, in words.
     told: String,
-    result: serde_json::Value,
+    /// All of it, for JSON.
+    pub result: serde_json::Value,
 }
 
+/// Plays a scenario against the driving system that it was found with, and checks its claims.
+///
+/// # Errors
+/// If that driving system, or the scenario, does not exist any more as it was.
+pub fn play_recorded(table: &ActionTable, scenario: &Scenario, path: &Path) -> Result<Played, Failure> {
+    play(table, scenario, path, (&run::recorded(scenario)?, None))
+}
+
+/// Plays a scenario. With a name for the driving system it is another one than the recorded: no claim is checked.
 fn play(
-    output: &Output,
-    arguments: &ReplayArguments,
-    profile: Option<&ModularConfig>,
+    table: &ActionTable,
+    scenario: &Scenario,
     path: &Path,
+    (ads, other): (&Selected, Option<String>),
 ) -> Result<Played, Failure> {
-    let (table, scenario) = load::scenario(output, path)?;
-    let (ads, is_recorded) = run::selected_for(arguments.ads.as_deref(), profile, &scenario)?;
-    let stage = Stage::new(&table, &scenario)?;
+    let stage = Stage::new(table, scenario)?;
     let mut gauges = Gauges::default();
-    let log = stage.play(&ads, &mut |world, _, contacts| gauges.note(world, contacts));
+    let log = stage.play(ads, &mut |world, _, contacts| gauges.note(world, contacts));
     let (criticality, pet_s) = gauges.of_steps(&log);
     let severities: Vec<oracle::Severity> = log.collisions.iter().map(oracle::severity).collect();
     let priorities: Vec<&str> =
         log.collisions.iter().map(|collision| collision.contact.priority.name()).collect();
-    if is_recorded {
-        let claims = stage.verify(&ads, &log);
-        let result = serde_json::json!({ "file": path, "scenario": scenario.name, "claims": claims,
-            "severities": severities, "priorities": priorities, "criticality": criticality, "pet_s": pet_s });
-        let lines = log.collisions.iter().zip(&severities);
-        let told = lines.map(|(collision, severity)| severity_text(collision, severity));
-        let told = told.collect::<Vec<_>>().join("\n");
-        return Ok(Played { claims: Some(claims), told, result, scenario });
-    }
-    let name = match &arguments.ads_config {
-        Some(path) => format!("{} with {}", ads.name(), path.display()),
-        None => ads.name().to_owned(),
+    let claims = other.is_none().then(|| stage.verify(ads, &log));
+    let judgements = other.is_some().then(|| stage.judge(ads, &log));
+    let counted =
+        judgements.as_ref().map(|judgements| oracle::counted(table.space(), &log, judgements).len());
+    let told = match (&other, &judgements) {
+        (Some(name), Some(judgements)) => {
+            let collisions = plural(log.collisions.len(), "collision");
+            let avoidable =
+                judgements.iter().filter(|judged| judged.class == Avoidability::Avoidable).count();
+            format!("{name}: {collisions}, {} counted, {avoidable} avoidable", counted.unwrap_or(0))
+        }
+        _ => {
+            let lines = log.collisions.iter().zip(&severities);
+            let lines = lines.map(|(collision, severity)| severity_text(collision, severity));
+            lines.collect::<Vec<_>>().join("\n")
+        }
     };
-    let judgements = stage.judge(&ads, &log);
-    let counted = oracle::counted(table.space(), &log, &judgements).len();
-    let collisions = plural(log.collisions.len(), "collision");
-    let avoidable = judgements.iter().filter(|j| j.class == Avoidability::Avoidable).count();
-    let told = format!("{name}: {collisions}, {counted} counted, {avoidable} avoidable");
     let result = serde_json::json!({
-        "file": path, "scenario": scenario.name, "ads": name,
-        "collisions": log.collisions.len(), "counted": counted, "judgements": judgements,
+        "file": path, "scenario": scenario.name, "ads": other.as_deref().unwrap_or(ads.name()),
+        "claims": claims, "collisions": log.collisions.len(), "counted": counted, "judgements": judgements,
         "severities": severities, "priorities": priorities, "criticality": criticality, "pet_s": pet_s,
     });
-    Ok(Played { claims: None, told, result, scenario })
+    Ok(Played { path: path.to_owned(), name: scenario.name.clone(), claims, told, result })
 }
 
 /// How hard a collision was, in a line.
@@ -143,18 +168,18 @@ pub fn priority_text(priority: Priority) -> &'static str {
     }
 }
 
-fn report(output: &Output, path: &Path, scenario: &Scenario, verdicts: &[oracle::ClaimResult]) {
+fn report(output: &Output, path: &Path, name: &str, verdicts: &[oracle::ClaimResult]) {
     let wrong: Vec<&oracle::ClaimResult> = verdicts.iter().filter(|verdict| !verdict.confirmed).collect();
     if verdicts.is_empty() {
-        output.say(&format!("{}: {} makes no claim", path.display(), scenario.name));
+        output.say(&format!("{}: {} makes no claim", path.display(), name));
         return;
     }
     if wrong.is_empty() {
         let claims = plural(verdicts.len(), "claim");
-        output.tell(&format!("{}: {} holds, {claims} confirmed", path.display(), scenario.name));
+        output.tell(&format!("{}: {} holds, {claims} confirmed", path.display(), name));
         return;
     }
-    output.say(&format!("{}: {} is refuted", path.display(), scenario.name));
+    output.say(&format!("{}: {} is refuted", path.display(), name));
     for verdict in wrong {
         output.say(&format!("  claimed {}\n  found   {}", verdict.claim, verdict.found));
     }

@@ -24,39 +24,37 @@ const SPACING_M: f64 = 1.0;
 /// Prints a map and, if asked for, a route.
 pub fn road(output: &Output, arguments: &RoadArguments) -> Result<(), Failure> {
     let (map, route) = read(output, arguments)?;
-    if let Some(path) = &arguments.svg {
-        let svg = draw(&map, route.as_ref());
-        if path == Path::new("-") {
-            output.say(svg.trim_end());
-            output.result("road", json!({ "svg": svg }));
-            return Ok(());
+    let picture = arguments.svg.as_ref().map(|path| (path, draw(&map, route.as_ref())));
+    match &picture {
+        Some((path, svg)) if path.as_path() == Path::new("-") => output.say(svg.trim_end()),
+        Some((path, svg)) => {
+            write(path, svg)?;
+            output.say(words(&map, route.as_ref()).trim_end());
         }
-        write(path, &svg)?;
+        None => output.say(words(&map, route.as_ref()).trim_end()),
     }
     if !output.is_json() {
-        output.say(words(&map, route.as_ref()).trim_end());
         return Ok(());
     }
+    let on_stdout = picture.filter(|(path, _)| path.as_path() == Path::new("-"));
     let lanes = (0..map.lanes.len()).map(|index| lane_json(&map, LaneIndex(index)));
     let junctions = (0..map.junctions.len()).map(|index| junction_json(&map, index));
     let signals = (0..map.signals.len()).map(|index| signal_json(&map, index));
-    output.result(
-        "road",
-        json!({
-            "file": arguments.file,
-            "name": map.name,
-            "pose_fields": ["station_m", "s_m", "x_m", "y_m", "heading_rad", "width_m"],
-            "lanes": lanes.collect::<Vec<_>>(),
-            "junctions": junctions.collect::<Vec<_>>(),
-            "signals": signals.collect::<Vec<_>>(),
-            "crosswalks": map.crosswalks.iter().map(|crosswalk| json!({
-                "id": crosswalk.id,
-                "outline_m": crosswalk.outline.iter().map(|corner| [corner.x, corner.y]).collect::<Vec<_>>(),
-            })).collect::<Vec<_>>(),
-            "route": route.as_ref().map(|route| route_json(&map, route)),
-            "warnings": map.warnings,
-        }),
-    );
+    output.result(json!({
+        "file": arguments.file,
+        "name": map.name,
+        "pose_fields": ["station_m", "s_m", "x_m", "y_m", "heading_rad", "width_m"],
+        "lanes": lanes.collect::<Vec<_>>(),
+        "junctions": junctions.collect::<Vec<_>>(),
+        "signals": signals.collect::<Vec<_>>(),
+        "crosswalks": map.crosswalks.iter().map(|crosswalk| json!({
+            "id": crosswalk.id,
+            "outline_m": crosswalk.outline.iter().map(|corner| [corner.x, corner.y]).collect::<Vec<_>>(),
+        })).collect::<Vec<_>>(),
+        "route": route.as_ref().map(|route| route_json(&map, route)),
+        "warnings": map.warnings,
+        "svg": on_stdout.map(|(_, svg)| svg),
+    }));
     Ok(())
 }
 

@@ -16,6 +16,7 @@ use crate::run::{
 use super::arguments::{FaceArgument, RunArguments};
 use super::error::Failure;
 use super::interrupt::stop_on_interrupt;
+use super::never::Never;
 use super::output::Output;
 use super::output::plural;
 use super::pack::pack_space;
@@ -38,13 +39,12 @@ pub fn run(output: &Output, arguments: &RunArguments) -> Result<(), Failure> {
     let unread = |error| Failure::file("read", &path, error);
     let done = directory.database.episodes().map_err(unread)?;
     let todo: Vec<usize> = (0..run.episodes()).filter(|number| !done.contains(number)).collect();
-    output.tell(&heading(&run, &directory.path));
+    output.tell(&heading(&run, arguments, &directory.path));
 
     let stop = stop_on_interrupt()?;
     #[allow(clippy::disallowed_methods, reason = "this is cli, and the time goes nowhere but the summary")]
     let started = Instant::now();
-    let mut progress =
-        Progress::new(run.episodes() as u64, done.len() as u64, output.quiet || output.is_json());
+    let mut progress = Progress::new(output, run.episodes() as u64, done.len() as u64);
     play(&run, &todo, jobs(arguments.jobs), &stop, &mut |summary, log| {
         keep(&run, &mut directory, &summary, &log)?;
         progress.episode(summary.counted());
@@ -62,11 +62,13 @@ pub fn run(output: &Output, arguments: &RunArguments) -> Result<(), Failure> {
     if !groups.is_empty() {
         output.say(&groups_text(&groups));
     }
+    let rows = directory.database.rows().map_err(unread)?;
+    let never = Never::new(run.table(), &rows);
+    output.say(&never.in_words(output.verbose));
     let critical = load::sources_in(&directory.path.join("critical"))?;
     output.say(&critical_text(&directory.path, &critical));
     output.result(
-        "run",
-        serde_json::json!({ "directory": directory.path, "totals": totals, "refusals": refusals, "groups": groups, "critical": critical }),
+        serde_json::json!({ "directory": directory.path, "totals": totals, "refusals": refusals, "groups": groups, "never": never, "critical": critical }),
     );
     if stop.load(Ordering::Relaxed) && (totals.episodes as usize) < run.episodes() {
         return Err(Failure::Interrupted { command: "run", directory: directory.path });
@@ -88,12 +90,13 @@ fn begun(output: &Output, arguments: &RunArguments) -> Result<(Run, RunDirectory
     let space = table.space();
     let agent = policy.as_ref().map_or(&arguments.agent, |(_, policy)| &policy.name);
     let settings = RunSettings::new(space, agent, arguments.episodes, arguments.seed);
+    let traffic = arguments.traffic.as_deref().map(load::traffic).transpose()?;
     let settings = RunSettings {
         roads: roads_or_all(&arguments.road, space),
         ads: arguments.ads.clone(),
         profile: load::profile_or_own(arguments.ads_config.as_deref(), &arguments.ads)?,
         ambient: arguments.ambient,
-        traffic: arguments.traffic.as_ref().and_then(TrafficRecord::new),
+        traffic: traffic.as_ref().and_then(TrafficRecord::new),
         causes: arguments.causes,
         without: arguments.rules.without.clone(),
         with: arguments.rules.with.clone(),
@@ -195,15 +198,20 @@ fn keep(
         .map_err(|error| Failure::file("write", &directory.path.join("run.db"), error))
 }
 
-fn heading(run: &Run, directory: &Path) -> String {
+fn heading(run: &Run, arguments: &RunArguments, directory: &Path) -> String {
     let settings = run.settings();
     let ambient = match settings.ambient {
         0 => String::new(),
         wanted => format!(", {} of ambient traffic", plural(wanted as usize, "vehicle")),
     };
-    let traffic = if settings.traffic.is_some() { ", under a traffic profile" } else { "" };
+    let traffic = settings.traffic.as_ref().map_or(String::new(), |record| {
+        let name = arguments.traffic.as_deref().or(record.settings.shipped_as());
+        format!(", traffic {}", name.unwrap_or("of a profile of its own"))
+    });
+    let profile =
+        arguments.ads_config.as_ref().map_or(String::new(), |path| format!(" with {}", path.display()));
     format!(
-        "{}: {} against {}, {} on {}{ambient}{traffic}, seed {}, into {}",
+        "{}: {} against {}{profile}, {} on {}{ambient}{traffic}, seed {}, into {}",
         run.space().path.display(),
         settings.agent,
         settings.ads,
@@ -216,15 +224,15 @@ fn heading(run: &Run, directory: &Path) -> String {
 
 fn totals_text(totals: &Totals, elapsed_s: f64, played: usize) -> String {
     let mut text = format!(
-        "\n{}: {} arrived, {} stalled, {} blocked by others, {} at the step limit; {:.1} km in {:.1} min of simulated time",
+        "\n{}: {} ended at the goal, {} stalled, {} blocked by others, {} at the step limit",
         plural(totals.episodes as usize, "episode"),
         totals.arrived,
         totals.stalled,
         totals.blocked,
         totals.step_limit,
-        totals.driven_m / 1000.0,
-        totals.simulated_s / 60.0,
     );
+    let (driven_km, simulated_min) = (totals.driven_m / 1000.0, totals.simulated_s / 60.0);
+    text.push_str(&format!("\n{driven_km:.1} km in {simulated_min:.1} min of simulated time"));
     if played == totals.episodes as usize && elapsed_s > 0.0 {
         text.push_str(&format!(" ({elapsed_s:.1} s, {:.0} times real time)", totals.simulated_s / elapsed_s));
     }
@@ -242,6 +250,7 @@ fn totals_text(totals: &Totals, elapsed_s: f64, played: usize) -> String {
         text.push_str(&format!("\n{} passed", plural(totals.red_runs as usize, "red light")));
     }
     if totals.collisions > 0 {
+        text.push_str("\nan episode goes on after a collision, if the ego vehicle can");
         text.push_str(&format!(
             "\nof all: {} sudden, {} where the other ran into the ego vehicle",
             totals.sudden, totals.struck

@@ -16,62 +16,52 @@ use super::load;
 use super::output::Output;
 use super::output::plural;
 use super::parallel::each_file;
+use super::replay::refutation;
 
 /// The folder of what is written, beside the scenarios. What a run found stays apart from what was made of it.
 const FOLDER: &str = "shrunk";
 
 /// Writes each file's scenario as small as possible, and checks every claim of what it wrote.
 pub fn shrink(output: &Output, arguments: &ShrinkArguments) -> Result<(), Failure> {
-    if let [file] = arguments.many.files.as_slice() {
-        let path = arguments.output.clone().unwrap_or_else(|| apart(file));
-        let small = smaller(output, file, &path)?;
-        output.say(&small.in_words());
-        small.actions_left.iter().for_each(|action| output.tell(&format!("  {action}")));
-        output.result("shrink", small.in_json());
-        return refutation(small.refuted);
-    }
-    if let Some(path) = &arguments.output {
+    if let Some(path) = arguments.output.as_ref().filter(|_| arguments.many.files.len() > 1) {
         let path = path.display();
         return Err(Failure::usage(format!(
             "`--output {path}` is for one file: of several, each is written to a folder `{FOLDER}`"
         )));
     }
-    let found = each_file(&arguments.many, |file| smaller(output, file, &apart(file)));
-    let mut done: Vec<Small> = Vec::new();
-    for (file, found) in arguments.many.files.iter().zip(found) {
-        match found {
-            Ok(small) => {
-                output.tell(&small.in_words());
-                done.push(small);
-            }
-            Err(failure) => output.say(&format!("{}: {failure}", file.display())),
+    let shrunk = each_file(output, &arguments.many, |file| {
+        let path = arguments.output.clone().unwrap_or_else(|| apart(file));
+        smaller(output, file, &path)
+    });
+    let done = &shrunk.done;
+    for small in done {
+        output.tell(&small.in_words());
+        if shrunk.is_single() {
+            small.actions_left.iter().for_each(|action| output.tell(&format!("  {action}")));
         }
     }
-    let errors = arguments.many.files.len() - done.len();
     let kept = done.iter().filter(|small| small.refuted == 0).count();
     let before = median(done.iter().map(|small| small.before));
     let after = median(done.iter().map(|small| small.after));
-    output.say(&format!(
-        "\n{}: median {} with {} became {} with {}; {kept} keep their verdict and every claim",
-        plural(done.len(), "scenario"),
-        counted(before.0, "step"),
-        counted(before.1, "action"),
-        counted(after.0, "step"),
-        counted(after.1, "action"),
-    ));
-    output.result(
-        "shrink",
-        serde_json::json!({
-            "median_steps_before": before.0, "median_actions_before": before.1,
-            "median_steps": after.0, "median_actions": after.1,
-            "kept": kept, "errors": errors,
-            "scenarios": done.iter().map(Small::in_json).collect::<Vec<_>>(),
-        }),
-    );
-    if errors > 0 {
-        return Err(Failure::usage(format!("{} could not be shrunk", plural(errors, "scenario"))));
+    if !shrunk.is_single() {
+        output.say(&format!(
+            "\n{}: median {} with {} became {} with {}; {kept} keep their verdict and every claim",
+            plural(done.len(), "scenario"),
+            counted(before.0, "step"),
+            counted(before.1, "action"),
+            counted(after.0, "step"),
+            counted(after.1, "action"),
+        ));
     }
-    refutation(done.iter().map(|small| small.refuted).sum())
+    output.result(serde_json::json!({
+        "median_steps_before": before.0, "median_actions_before": before.1,
+        "median_steps": after.0, "median_actions": after.1, "kept": kept,
+        "scenarios": done.iter().map(Small::in_json).collect::<Vec<_>>(),
+        "failed": shrunk.failed_in_json(),
+    }));
+    let refuted = done.iter().map(|small| small.refuted).sum();
+    shrunk.complete("shrunk")?;
+    refutation(refuted)
 }
 
 /// The result for one file. Sizes are numbers of steps, and of steps with an action.
@@ -193,10 +183,6 @@ fn median(sizes: impl Iterator<Item = (usize, usize)>) -> (f64, f64) {
 /// A median with its noun.
 fn counted(count: f64, noun: &str) -> String {
     if count == 1.0 { format!("1 {noun}") } else { format!("{count} {noun}s") }
-}
-
-fn refutation(refuted: usize) -> Result<(), Failure> {
-    if refuted > 0 { Err(Failure::Refuted { claims: refuted }) } else { Ok(()) }
 }
 
 /// Number of claims of a written file that do not hold.

@@ -43,7 +43,7 @@ pub fn study(output: &Output, arguments: &StudyArguments) -> Result<(), Failure>
 
     let episodes = |jobs: &[_]| jobs.iter().map(|job| study.episodes(job)).sum::<u64>();
     let (all, left) = (episodes(&study.jobs()), episodes(&todo));
-    let mut progress = Progress::new(all, all - left, output.quiet || output.is_json());
+    let mut progress = Progress::new(output, all, all - left);
     play_jobs(&study, &todo, jobs(arguments.jobs), &stop, &spent, &mut |event| match event {
         Event::Episode { counted } => {
             progress.episode(counted);
@@ -60,7 +60,7 @@ pub fn study(output: &Output, arguments: &StudyArguments) -> Result<(), Failure>
     output.say(&report::study(&results));
     let timing = timing(&cells);
     output.say(&timing_text(&path, &timing));
-    output.result("study", serde_json::json!({ "directory": path, "results": results, "timing": timing }));
+    output.result(serde_json::json!({ "directory": path, "results": results, "timing": timing }));
     if stop.load(Ordering::Relaxed) && results.cells < results.cells_wanted {
         return Err(Failure::Interrupted { command: "study", directory: path });
     }
@@ -80,7 +80,8 @@ fn begun(output: &Output, path: &Path, quick: bool) -> Result<Study, Failure> {
         // A name is a name; a file lies beside the study's.
         if wanted.contains('.') { beside(wanted).display().to_string() } else { wanted.clone() }
     });
-    let traffic = traffic.as_deref().map(load::traffic).transpose().map_err(refuse)?;
+    let traffic =
+        traffic.as_deref().map(load::traffic).transpose().map_err(|error| refuse(error.to_string()))?;
     let traffic = traffic.as_ref().and_then(TrafficRecord::new);
     let settings = StudySettings::new(file, &table, profile, traffic, &read);
     let settings = settings.map_err(|error| refuse(error.to_string()))?;

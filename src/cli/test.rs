@@ -82,9 +82,8 @@ pub fn test(output: &Output, arguments: &TestArguments) -> Result<(), Failure> {
         })
         .collect();
     output.result(
-        "test",
-        serde_json::json!({ "still_fails": fails, "fixed": fixed, "changed": changed,
-                            "errors": errors, "accepted": suite.accepted, "scenarios": listed }),
+        serde_json::json!({ "still_fails": fails, "fixed": fixed, "changed": changed, "errors": errors,
+                                      "accepted": suite.accepted, "scenarios": listed }),
     );
     let failing = count(&Outcome::is_failure);
     if errors > 0 {

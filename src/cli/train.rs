@@ -20,7 +20,7 @@ use super::interrupt::stop_on_interrupt;
 use super::output::Output;
 use super::output::plural;
 use super::pack::pack_space;
-use super::progress::TrainingProgress;
+use super::progress::{TrainingProgress, Working};
 use super::run::roads_or_all;
 use super::run_directory::RunDirectory;
 use super::{distill, load, run_directory};
@@ -39,8 +39,7 @@ pub fn train(output: &Output, arguments: &TrainArguments) -> Result<(), Failure>
     let settings = training.settings().clone();
     output.tell(&heading(&training, &directory.path));
     let stop = stop_on_interrupt()?;
-    let quiet = output.quiet || output.is_json();
-    let mut progress = TrainingProgress::new(settings.episodes as u64, training.episodes() as u64, quiet);
+    let mut progress = TrainingProgress::new(output, settings.episodes as u64, training.episodes() as u64);
     while !training.is_done() && !stop.load(Ordering::Relaxed) {
         let trained = training.episode();
         keep(&training, &mut directory, &trained, &stop)?;
@@ -60,11 +59,12 @@ fn begun(output: &Output, arguments: &TrainArguments) -> Result<(Training, RunDi
     let hyperparameters = settings(arguments)?;
     let space = table.space();
     let profile = arguments.ads_config.as_deref().map(load::profile).transpose()?;
+    let traffic = arguments.traffic.as_deref().map(load::traffic).transpose()?;
     let conditions = RunSettings {
         roads: roads_or_all(&arguments.road, space),
         ads: arguments.ads.clone(),
         profile: profile.as_ref().map(Profile::new),
-        traffic: arguments.traffic.as_ref().and_then(TrafficRecord::new),
+        traffic: traffic.as_ref().and_then(TrafficRecord::new),
         without: arguments.rules.without.clone(),
         with: arguments.rules.with.clone(),
         ..RunSettings::new(space, &arguments.agent, arguments.episodes, arguments.seed)
@@ -145,9 +145,12 @@ fn finish(output: &Output, training: &Training, directory: &RunDirectory) -> Res
     let settings = training.settings();
     let roads = &settings.roads;
     let test = (EVALUATION_EPISODES, settings.seed);
+    let working = Working::new(output, "playing what it learned");
     let evaluation = evaluate(training.arena(), &|| training.actor(), test);
+    drop(working);
     let kept = training.policy().map(|acting| {
         output.tell("distilling rules from the network");
+        let _working = Working::new(output, "distilling rules from the network");
         let policy = policy(training, acting, &evaluation);
         let path = write_policy(&policy, training.table().space(), &directory.path)?;
         Ok::<_, Failure>((path, policy))
@@ -182,18 +185,15 @@ fn finish(output: &Output, training: &Training, directory: &RunDirectory) -> Res
             directory.path.join("critical").display()
         )),
     }
-    output.result(
-        "train",
-        serde_json::json!({
-            "directory": directory.path, "totals": totals, "policy": kept.as_ref().map(|(path, _)| path),
-            "rules": rules, "simulated_h": simulated_h,
-            "evaluation": {
-                "episodes": evaluation.episodes * roads.len() as u64, "collisions": evaluation.collisions,
-                "counted": evaluation.counted, "colliding": evaluation.colliding,
-                "simulated_h": evaluation.simulated_s / 3600.0, "return": evaluation.return_mean,
-            },
-        }),
-    );
+    output.result(serde_json::json!({
+        "directory": directory.path, "totals": totals, "policy": kept.as_ref().map(|(path, _)| path),
+        "rules": rules, "simulated_h": simulated_h,
+        "evaluation": {
+            "episodes": evaluation.episodes * roads.len() as u64, "collisions": evaluation.collisions,
+            "counted": evaluation.counted, "colliding": evaluation.colliding,
+            "simulated_h": evaluation.simulated_s / 3600.0, "return": evaluation.return_mean,
+        },
+    }));
     Ok(())
 }
 

@@ -11,10 +11,12 @@ use crate::syntax;
 use crate::trial::{Cell, TrialSettings, Trials};
 
 use super::arguments::TableArguments;
+use super::compile::TableResult;
 use super::error::Failure;
 use super::files::write;
 use super::load;
 use super::output::Output;
+use super::progress::Pieces;
 use super::run::roads_or_all;
 
 /// Tries the rows of a table and prints the results.
@@ -24,14 +26,17 @@ pub fn trials(output: &Output, arguments: &TableArguments, table: ActionTable) -
     let arena = Arena::new(table, &roads, driving_system(&wanted.ads)?, &[], &[])?;
     let settings = TrialSettings { drives: wanted.drives, tries: wanted.tries, seed: wanted.seed };
     let trials = Trials::new(&arena, settings);
-    let cells = trials.cells();
+    let progress = Pieces::new(output, "rows on roads", arena.roads() * arena.table().rows().len());
+    let cells = trials.cells(&|| progress.one());
+    drop(progress);
     if let Some(directory) = &wanted.out {
         for (index, cell) in cells.iter().enumerate() {
             emit_sample(&trials, &arena, index % arena.roads(), cell, arguments, directory)?;
         }
     }
     output.say(report::trials(&cells).trim_end());
-    output.result("table", serde_json::json!({ "trials": settings, "cells": cells }));
+    let table = arena.table().file();
+    output.result(TableResult { table, trials: Some(settings), cells: Some(cells) });
     Ok(())
 }
 

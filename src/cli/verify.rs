@@ -1,6 +1,6 @@
 //! `avastra verify`: checks every claim of emitted scenarios and policies.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use crate::action::ActionTable;
@@ -10,53 +10,53 @@ use crate::model::{Policy, digest_text};
 use crate::sim::ENGINE;
 use crate::train::{evaluate, judge_rules, rounded, training_arena};
 
-use super::arguments::{FilesArguments, ReplayArguments};
+use super::arguments::FilesArguments;
 use super::error::Failure;
 use super::load::Emitted;
 use super::output::Output;
 use super::output::plural;
+use super::parallel::each_file;
+use super::replay::Played;
 use super::{load, replay};
+
+/// What was found about a file.
+enum Verified {
+    Scenario(Played),
+    /// With the claims that do not hold.
+    Policy(PathBuf, Box<Policy>, Vec<String>),
+}
 
 /// Replays scenarios, and plays the evaluations of policies again.
 pub fn verify(output: &Output, arguments: &FilesArguments) -> Result<(), Failure> {
-    let (mut scenarios, mut policies, mut failed) = (Vec::new(), Vec::new(), None);
-    for path in &arguments.files {
-        match load::emitted(output, path) {
-            Ok(Emitted::Scenario(..)) => scenarios.push(path.clone()),
-            Ok(Emitted::Policy(table, policy)) => policies.push((path, table, *policy)),
-            // A broken file does not hide the results of the others.
-            Err(failure) => {
-                if arguments.files.len() > 1 {
-                    output.tell(&format!("{}: {failure}", path.display()));
-                }
-                failed = failed.or(Some(failure));
+    let verified = each_file(output, arguments, |path| match load::emitted(output, path)? {
+        Emitted::Scenario(table, scenario) => {
+            replay::play_recorded(&table, &scenario, path).map(Verified::Scenario)
+        }
+        Emitted::Policy(table, policy) => {
+            let wrong = judge(&table, &policy)?;
+            Ok(Verified::Policy(path.clone(), policy, wrong))
+        }
+    });
+    let (mut scenarios, mut policies, mut refuted) = (Vec::new(), Vec::new(), 0);
+    for found in &verified.done {
+        match found {
+            Verified::Scenario(played) => scenarios.push(played),
+            Verified::Policy(path, policy, wrong) => {
+                refuted += wrong.len();
+                report(output, path, policy, wrong);
+                policies.push(serde_json::json!({ "file": path, "policy": policy.name, "refuted": wrong }));
             }
         }
     }
-    let mut refuted = 0;
-    let mut results = Vec::new();
-    for (path, table, policy) in policies {
-        let wrong = judge(&table, &policy)?;
-        refuted += wrong.len();
-        report(output, path, &policy, &wrong);
-        results.push(serde_json::json!({ "file": path, "policy": policy.name, "refuted": wrong }));
-    }
-    if !scenarios.is_empty() {
-        // Its result comes after the policies': a failure of theirs must not hide it.
-        let many = FilesArguments { files: scenarios, ..arguments.clone() };
-        let recorded = ReplayArguments { many, ads: None, ads_config: None };
-        let outcome = replay::replay(output, &recorded);
-        match outcome {
-            Err(Failure::Refuted { claims }) => refuted += claims,
-            Err(failure) => failed = failed.or(Some(failure)),
-            Ok(()) => {}
-        }
-    }
-    output.result("verify", serde_json::json!({ "refuted": refuted, "policies": results }));
-    if let Some(failure) = failed {
-        return Err(failure);
-    }
-    if refuted > 0 { Err(Failure::Refuted { claims: refuted }) } else { Ok(()) }
+    let tally = replay::tell(output, scenarios.iter().copied());
+    refuted += tally.refuted;
+    output.result(serde_json::json!({
+        "refuted": refuted, "policies": policies,
+        "scenarios": scenarios.iter().map(|played| &played.result).collect::<Vec<_>>(),
+        "failed": verified.failed_in_json(),
+    }));
+    verified.complete("verified")?;
+    replay::refutation(refuted)
 }
 
 /// The claims that do not hold, each with what was found.

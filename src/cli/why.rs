@@ -63,10 +63,7 @@ pub fn why(output: &Output, arguments: &WhyArguments) -> Result<(), Failure> {
         Offer::Legal(_) => (true, None, None),
         Offer::Refused(refusal) => (false, refusal.rule, Some(refusal.reason)),
     };
-    output.result(
-        "why",
-        serde_json::json!({ "row": row.index, "label": row.label, "road": road.name,
-                            "legal": legal, "rule": rule, "reason": reason }),
-    );
+    output.result(serde_json::json!({ "row": row.index, "label": row.label, "road": road.name,
+                            "legal": legal, "rule": rule, "reason": reason }));
     Ok(())
 }

@@ -14,13 +14,15 @@ use crate::model::policy::VARIABLES;
 use crate::model::vocabulary::Word;
 use crate::oracle;
 
+use crate::run::offered::{RowCount, without_figures};
 use crate::run::shape::Shape;
 use crate::run::summary::{EpisodeSummary, Finding};
 
 /// Layout of the tables; raised whenever a column changes.
-const SCHEMA_VERSION: i64 = 5;
+const SCHEMA_VERSION: i64 = 6;
 
-/// `learning` and `checkpoint` belong to a training (`train::record`) and stay empty in a run.
+/// `offer` says for each row in how many steps of an episode it was legal (reason 0) or was refused for a reason; a
+/// training leaves it empty. `learning` and `checkpoint` belong to a training (`train::record`) and stay empty in a run.
 const SCHEMA: &str = "
 CREATE TABLE episode (
   episode INTEGER PRIMARY KEY, road TEXT NOT NULL, seed TEXT NOT NULL, ended TEXT NOT NULL,
@@ -39,6 +41,11 @@ CREATE TABLE collision (
   obstacle_delta_v_mps REAL NOT NULL, cause TEXT, shape TEXT, priority TEXT NOT NULL, r157_letter TEXT NOT NULL,
   PRIMARY KEY (episode, number)
 ) STRICT;
+CREATE TABLE reason (reason INTEGER PRIMARY KEY, text TEXT NOT NULL UNIQUE) STRICT;
+CREATE TABLE offer (
+  episode INTEGER NOT NULL REFERENCES episode, action_row INTEGER NOT NULL, reason INTEGER NOT NULL, steps INTEGER NOT NULL,
+  PRIMARY KEY (episode, action_row, reason)
+) STRICT, WITHOUT ROWID;
 CREATE TABLE learning (
   episode INTEGER PRIMARY KEY REFERENCES episode, return REAL NOT NULL, collisions INTEGER NOT NULL,
   counted INTEGER NOT NULL, epsilon REAL NOT NULL, loss REAL, updates INTEGER NOT NULL,
@@ -122,6 +129,39 @@ impl Database {
         Ok(refusals)
     }
 
+    /// What became of each row of the table, by its number, over all episodes. A row that was never offered is
+    /// absent.
+    ///
+    /// # Errors
+    /// If the file cannot be read.
+    pub fn rows(&self) -> Result<BTreeMap<i64, RowCount>, DatabaseError> {
+        let mut rows: BTreeMap<i64, RowCount> = BTreeMap::new();
+        let mut offers = self.connection.prepare(
+            "SELECT action_row, text, sum(steps) FROM offer LEFT JOIN reason USING (reason)
+             GROUP BY action_row, text ORDER BY sum(steps) DESC, text",
+        )?;
+        let offers =
+            offers.query_map([], |row| Ok((row.get(0)?, row.get::<_, Option<String>>(1)?, row.get(2)?)))?;
+        for offer in offers {
+            let (row, reason, times) = offer?;
+            let count = rows.entry(row).or_default();
+            match reason {
+                None => count.legal = times,
+                Some(reason) => count.refused.push(RefusalCount { reason, times }),
+            }
+        }
+        let mut chosen = self.connection.prepare(
+            "SELECT action_row, count(*), count(action) FROM step WHERE action_row IS NOT NULL GROUP BY action_row",
+        )?;
+        let chosen = chosen.query_map([], |row| Ok((row.get(0)?, row.get(1)?, row.get(2)?)))?;
+        for found in chosen {
+            let (row, chosen, realised) = found?;
+            let count = rows.entry(row).or_default();
+            (count.chosen, count.realised) = (chosen, realised);
+        }
+        Ok(rows)
+    }
+
     /// Totals over all episodes.
     ///
     /// # Errors
@@ -198,16 +238,6 @@ pub(crate) fn connect(path: &Path, version: i64, tables: &str) -> Result<Connect
 pub struct RefusalCount {
     pub reason: String,
     pub times: i64,
-}
-
-/// A reason with `…` for each number.
-fn without_figures(reason: &str) -> String {
-    let is_figure = |word: &str| word.parse::<f64>().is_ok();
-    let shown = reason.split(' ').map(|word| {
-        let bare = word.trim_end_matches([',', ';']);
-        if is_figure(bare) { word.replace(bare, "…") } else { word.to_owned() }
-    });
-    shown.collect::<Vec<_>>().join(" ")
 }
 
 /// What a run has found so far.
@@ -304,6 +334,21 @@ pub(crate) fn add_all(
     }
     for finding in &summary.collisions {
         add_collision(transaction, summary.episode, finding)?;
+    }
+    add_offers(transaction, summary)?;
+    Ok(())
+}
+
+fn add_offers(transaction: &Transaction, summary: &EpisodeSummary) -> Result<(), rusqlite::Error> {
+    let mut known = transaction.prepare_cached("INSERT OR IGNORE INTO reason (text) VALUES (?)")?;
+    let mut insert = transaction.prepare_cached(
+        "INSERT INTO offer VALUES (?, ?, coalesce((SELECT reason FROM reason WHERE text = ?), 0), ?)",
+    )?;
+    for ((row, reason), steps) in &summary.offered.steps {
+        if let Some(reason) = reason {
+            known.execute([reason])?;
+        }
+        insert.execute(params![summary.episode as i64, *row as i64, reason, steps])?;
     }
     Ok(())
 }

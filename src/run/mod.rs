@@ -9,6 +9,7 @@ mod arena;
 mod database;
 mod gauges;
 mod groups;
+mod offered;
 mod play;
 mod profile;
 mod settings;
@@ -24,6 +25,7 @@ pub(crate) use database::{add_all, connect};
 pub use gauges::Gauges;
 pub use groups::Group;
 pub(crate) use groups::kind;
+pub use offered::{Offered, RowCount};
 pub use play::{Run, play};
 pub use profile::{
     DEFAULT_ADS, Profile, TrafficRecord, driving_system, recorded, recorded_traffic, selected_for,

@@ -15,8 +15,9 @@ use crate::oracle;
 use crate::rng;
 use crate::rng::Stream;
 
-use crate::run::arena::{Arena, choose};
+use crate::run::arena::{Arena, carry_out, choose, legal, offers};
 use crate::run::gauges::Gauges;
+use crate::run::offered::Offered;
 use crate::run::profile::{traffic_of, under_test};
 use crate::run::settings::{RunError, RunSettings, agent_named, check_episodes};
 use crate::run::summary::EpisodeSummary;
@@ -99,9 +100,14 @@ impl Run {
     pub fn judged_by(&self, number: usize, agent: &mut dyn Agent) -> (EpisodeSummary, EpisodeLog) {
         agent.begin();
         let mut gauges = Gauges::default();
-        let log = self.play(number, &mut |moment| choose(agent, moment), &mut |world, _, contacts| {
-            gauges.note(world, contacts)
-        });
+        let mut offered = Offered::default();
+        let mut choose = |moment: &Moment| {
+            let offers = offers(agent, moment);
+            offered.note(&offers);
+            let legal = legal(&offers);
+            carry_out(offers, legal.view(), agent, moment)
+        };
+        let log = self.play(number, &mut choose, &mut |world, _, contacts| gauges.note(world, contacts));
         let setup = self.setup(number);
         let mut summary = EpisodeSummary::judged(&setup, number, &log, &self.settings.avoidability);
         (summary.criticality, summary.pet_s) = gauges.of_steps(&log);
@@ -109,6 +115,7 @@ impl Run {
             finding.shape = *shape;
         }
         summary.manners = gauges.manners();
+        summary.offered = offered;
         summary.branched_s = agent.branched_s();
         if self.settings.causes {
             summary.find_causes(&setup, &log).expect("a run with causes is against a system of modules");

@@ -9,6 +9,7 @@ use crate::oracle;
 use crate::oracle::{AvoidabilitySettings, Judgement, NoModules};
 
 use crate::run::gauges::Manners;
+use crate::run::offered::Offered;
 use crate::run::shape::Shape;
 
 /// An episode, judged.
@@ -27,6 +28,8 @@ pub struct EpisodeSummary {
     pub manners: Manners,
     /// Time that an agent with lookahead simulated in branches, outside the episode, s.
     pub branched_s: f64,
+    /// What every row was offered as; empty if the episode is not a run's.
+    pub offered: Offered,
 }
 
 /// A collision, judged.
@@ -96,6 +99,7 @@ impl EpisodeSummary {
             pet_s: None,
             manners: Manners::default(),
             branched_s: 0.0,
+            offered: Offered::default(),
         }
     }
 

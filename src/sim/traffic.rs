@@ -122,6 +122,12 @@ impl TrafficProfile {
         SHIPPED.map(|(name, _)| name).to_vec()
     }
 
+    /// The name under which it is shipped, if it is.
+    pub fn shipped_as(&self) -> Option<&'static str> {
+        let mut names = TrafficProfile::shipped_names().into_iter();
+        names.find(|name| TrafficProfile::shipped(name).as_ref() == Ok(self))
+    }
+
     /// Reads a profile; what it leaves out is as in the default.
     ///
     /// # Errors

@@ -11,6 +11,7 @@ use crate::action::{Draw, Effect, Offer, Refusal};
 use crate::ads::Ads;
 use crate::episode;
 use crate::episode::{Choice, EpisodeLog};
+use crate::model::Row;
 use crate::model::vocabulary::Phenomenon;
 use crate::rng;
 use crate::rng::Stream;
@@ -112,11 +113,11 @@ impl<'a> Trials<'a> {
         Trials { arena, settings }
     }
 
-    /// All cells, by row and then by road; each road is tried on a thread of its own.
-    pub fn cells(&self) -> Vec<Cell> {
+    /// All cells, by row and then by road; each road is tried on a thread of its own. `judged` is called after each.
+    pub fn cells(&self, judged: &(dyn Fn() + Sync)) -> Vec<Cell> {
         let by_road: Vec<Vec<Cell>> = std::thread::scope(|scope| {
             let roads = 0..self.arena.roads();
-            let workers: Vec<_> = roads.map(|road| scope.spawn(move || self.road(road))).collect();
+            let workers: Vec<_> = roads.map(|road| scope.spawn(move || self.road(road, judged))).collect();
             workers.into_iter().map(|worker| worker.join().expect("no trial panics")).collect()
         });
         let rows = 0..self.arena.table().rows().len();
@@ -124,10 +125,15 @@ impl<'a> Trials<'a> {
     }
 
     /// The cells of the nth road of the arena, by row.
-    fn road(&self, road: usize) -> Vec<Cell> {
+    fn road(&self, road: usize, judged: &(dyn Fn() + Sync)) -> Vec<Cell> {
         let moments = self.moments(road);
         let rows = self.arena.table().rows();
-        rows.iter().map(|row| self.cell(road, row.index, &moments)).collect()
+        let judge = |row: &Row| {
+            let cell = self.cell(road, row.index, &moments);
+            judged();
+            cell
+        };
+        rows.iter().map(judge).collect()
     }
 
     /// A try again, as an episode that ends when the judge has seen enough.

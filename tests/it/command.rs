@@ -186,19 +186,26 @@ fn an_interrupted_run_goes_on_where_it_was() {
     let scratch = tempfile::tempdir().expect("a scratch directory");
     let space = root().join("scenarios/avastra45.ava").display().to_string();
     let run = |out: &str| {
-        let arguments = ["run", &space, "--seed", "3", "--episodes", "12", "--out", out, "--quiet"];
+        let arguments = ["run", &space, "--seed", "3", "--episodes", "12", "--out", out, "--format", "json"];
         outcome(avastra(&arguments).current_dir(scratch.path()))
     };
-    assert_eq!(run("whole").0, 0);
+    let (status, whole, stderr) = run("whole");
+    assert_eq!(status, 0, "{stderr}");
     assert_eq!(run("cut").0, 0);
     // The directory is left as by a run that was killed half-way.
     let database = rusqlite::Connection::open(scratch.path().join("cut/run.db")).expect("it is a database");
     let cut = "DELETE FROM step WHERE episode >= 5; DELETE FROM collision WHERE episode >= 5;
-               DELETE FROM episode WHERE episode >= 5;";
+               DELETE FROM offer WHERE episode >= 5; DELETE FROM episode WHERE episode >= 5;";
     database.execute_batch(cut).expect("it can be cut");
     drop(database);
-    let (status, _, stderr) = outcome(avastra(&["run", "--resume", "cut"]).current_dir(scratch.path()));
+    let resume = ["run", "--resume", "cut", "--format", "json"];
+    let (status, resumed, stderr) = outcome(avastra(&resume).current_dir(scratch.path()));
     assert_eq!(status, 0, "{stderr}");
+    // What never happened is told of all episodes, the earlier ones included.
+    let never =
+        |text: &str| serde_json::from_str::<serde_json::Value>(text).expect("a result")["never"].clone();
+    assert_eq!(never(&whole), never(&resumed));
+    assert_eq!(never(&whole)["rows"], 45, "{whole}");
     let traces = |run: &str| -> Vec<String> {
         let path = scratch.path().join(run).join("run.db");
         let database = rusqlite::Connection::open(path).expect("it is a database");
@@ -207,6 +214,35 @@ fn an_interrupted_run_goes_on_where_it_was() {
         rows.map(|trace| trace.expect("a trace is text")).collect()
     };
     assert_eq!(traces("whole"), traces("cut"));
+}
+
+/// A run ends with the rows that never happened, and with what stood in their way.
+#[test]
+fn a_run_says_what_never_happened() {
+    let scratch = tempfile::tempdir().expect("a scratch directory");
+    let space = scratch.path().join("space.ava");
+    let roads = root().join("scenarios/roads.ava").display().to_string();
+    let text = format!(
+        "language 1\nuse \"{roads}\"\nenum Side = Left | Right\n\
+         action walker(each from: Side) {{ spawn Pedestrian ahead 40 m {{ side: from, speed: 1 m/s, does: Walk }} }}\n\
+         action racer() {{ spawn Sedan behind 30 m {{ lane: Left, speed: 60 m/s, does: Overtake }} }}\n\
+         rule in_haste on racer: ego.speed >= 60 m/s\n"
+    );
+    std::fs::write(&space, text).expect("it is writable");
+    let run = |more: &[&str]| {
+        let all = ["run", "space.ava", "--road", "corner", "--episodes", "2", "--format", "plain"];
+        let (status, stdout, stderr) = outcome(avastra(&[&all, more].concat()).current_dir(scratch.path()));
+        assert_eq!(status, 0, "{stderr}");
+        stdout
+    };
+    let short = run(&[]);
+    assert!(short.contains("1 of 3 rows never happened, in "), "{short}");
+    assert!(short.contains("  1 never legal\n    row 2, racer(): in_haste: "), "{short}");
+    assert!(short.lines().all(|line| line.chars().count() <= 80), "{short}");
+    let long = run(&["--verbose"]);
+    assert!(long.contains("    row 2, racer()\n") && long.contains(" × in_haste: "), "{long}");
+    let idle = run(&["--agent", "none"]);
+    assert!(idle.contains("2 legal, but never chosen\n    rows 0, 1 (the agent chose others)"), "{idle}");
 }
 
 #[test]

@@ -14,6 +14,7 @@ mod failures;
 mod faults;
 mod help;
 mod hostile;
+mod json;
 mod language;
 mod layers;
 mod pedestrians;

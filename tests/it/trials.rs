@@ -14,7 +14,7 @@ fn cells(name: &str, settings: TrialSettings) -> Vec<Cell> {
     let roads: Vec<String> = table.space().roads.iter().map(|road| road.name.clone()).collect();
     let arena =
         Arena::new(table, &roads, driving_system("modular").unwrap(), &[], &[]).expect("all of it is there");
-    Trials::new(&arena, settings).cells()
+    Trials::new(&arena, settings).cells(&|| {})
 }
 
 /// Least share of the trials of a verb, over all rows and roads, that do what they say before the ego vehicle

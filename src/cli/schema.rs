@@ -1,0 +1,306 @@
+//! What `--format json` prints: the fields of every command's result, for `avastra explain json`.
+//!
+//! `tests/it/json.rs` holds this table against what the commands print.
+
+use super::output::folded;
+
+/// A field of a result.
+#[derive(Debug, serde::Serialize)]
+pub struct Field {
+    /// Where it stands: `files[].file` is the field `file` of each entry of the list `files`.
+    pub path: &'static str,
+    /// `text`, `number`, `bool`, `list`, or `object` with fields that follow or that the meaning names; with `?` it
+    /// may be null.
+    pub kind: &'static str,
+    pub meaning: &'static str,
+}
+
+/// A command and the fields of its result.
+#[derive(Debug, serde::Serialize)]
+pub struct Shape {
+    pub command: &'static str,
+    pub fields: &'static [Field],
+}
+
+const fn f(path: &'static str, kind: &'static str, meaning: &'static str) -> Field {
+    Field { path, kind, meaning }
+}
+
+const INTRODUCTION: &str = "\
+With `--format json` the last line on stdout is one object with the result of the
+command, whether it failed or not. Diagnostics go to stderr, one object a line.
+Every result has these fields:";
+
+/// Fields of every command's result.
+pub const ALWAYS: &[Field] = &[
+    f("schema", "number", "rises when a field changes its meaning or goes away"),
+    f("command", "text", "the command"),
+    f("status", "number", "the exit status"),
+    f("error", "text?", "why the command failed"),
+];
+
+const AFTER: &str = "\
+Below are the fields of each command. A command that failed early has found nothing:
+its own fields are absent. `?` is for what may be null, `[]` for each entry of a list.";
+
+/// A file that could not be dealt with.
+const FAILED: Field = f("failed[]", "object", "a file for which nothing was found: `file` and `error`");
+
+/// Every command with a result.
+pub const SHAPES: &[Shape] = &[
+    Shape {
+        command: "check",
+        fields: &[
+            f("errors", "number", "mistakes in all files"),
+            f("warnings", "number", "warnings in all files"),
+            f("files[].file", "text", "its path"),
+            f("files[].errors", "number", "its mistakes"),
+            f("files[].dump", "object?", "with `--dump`: the tree, or the table as in `table`"),
+            f("files[].audit", "object?", "with `--audit`: `rules`, each with its rows and what it cuts"),
+        ],
+    },
+    Shape {
+        command: "compile",
+        fields: &[f("table", "text", "path of the written table"), f("rows", "number", "rows of the table")],
+    },
+    Shape {
+        command: "table",
+        fields: &[
+            f("version", "number", "of the table's form"),
+            f("space", "text", "path of the space"),
+            f("digest", "text", "of the space and all that it uses"),
+            f("rules[].name", "text", ""),
+            f("rules[].optional", "bool", "off unless `--with` names it"),
+            f("rules[].rows", "number", "rows that it binds"),
+            f("rows[].row", "number", "from 0"),
+            f("rows[].action", "text", ""),
+            f("rows[].axes[]", "object", "an `each` parameter: `name` and `value`"),
+            f("rows[].rules[]", "text", "names of the rules that bind it"),
+            f("rows[].roads[].road", "text", ""),
+            f("rows[].roads[].masked", "text", "why it cannot run there; absent if it can"),
+            f(
+                "rows[].roads[].draws[]",
+                "object",
+                "what is drawn: `name`, `values` or `low`, `high` and `unit`",
+            ),
+            f("trials", "object?", "with `--try`: its settings"),
+            f("cells[]", "object?", "with `--try`: a row on a road, with its tries and why any failed"),
+        ],
+    },
+    Shape {
+        command: "why",
+        fields: &[
+            f("row", "number", ""),
+            f("label", "text", "the row in words"),
+            f("road", "text", ""),
+            f("legal", "bool", "here and now"),
+            f("rule", "text?", "the rule that refuses it; null if the world does"),
+            f("reason", "text?", "why it is refused"),
+        ],
+    },
+    Shape {
+        command: "fmt",
+        fields: &[
+            f("unformatted", "number", "files that were not formatted"),
+            f("texts[]", "text", "what was read from stdin, formatted"),
+        ],
+    },
+    Shape {
+        command: "explain",
+        fields: &[
+            f("pages[].code", "text", ""),
+            f("pages[].title", "text", ""),
+            f("pages[].text", "text", "Markdown"),
+            f("always[]", "object", "with `json`: a field of every result"),
+            f("shapes[]", "object", "with `json`: `command` and its `fields`"),
+        ],
+    },
+    Shape {
+        command: "diff",
+        fields: &[
+            f("differences[].change", "text", "what happened to it"),
+            f("differences[].subject", "text", "what differs"),
+            f("differences[].detail", "text", "may be empty"),
+        ],
+    },
+    Shape { command: "doc", fields: &[f("text", "text", "Markdown")] },
+    Shape { command: "new", fields: &[f("files[]", "text", "paths of the files written")] },
+    Shape {
+        command: "completions",
+        fields: &[f("shell", "text", ""), f("script", "text", "what the shell reads")],
+    },
+    Shape {
+        command: "run",
+        fields: &[
+            f("directory", "text", "the run directory"),
+            f("totals", "object", "sums over all episodes: how they ended, collisions by kind"),
+            f("refusals[]", "object", "a reason why actions were refused: `reason` and `times`"),
+            f(
+                "groups[]",
+                "object",
+                "a distinct failure: how it came about, `count`, an episode that shows it",
+            ),
+            f("never.rows", "number", "rows of the table"),
+            f("never.steps", "number", "steps of all episodes, in each of which every row is offered"),
+            f("never.legal[]", "object", "a row that no step allowed; what `refused` it, and how often"),
+            f("never.chosen[]", "object", "a row that was legal, but that the agent never chose"),
+            f("never.realised[]", "object", "a row that was chosen, but never carried out"),
+            f("critical[]", "text", "scenarios with a counted collision"),
+        ],
+    },
+    Shape {
+        command: "train",
+        fields: &[
+            f("directory", "text", "the run directory"),
+            f("totals", "object", "as in `run`"),
+            f("simulated_h", "number", "time driven"),
+            f("policy", "text?", "path of the policy; a search has none"),
+            f("rules", "object?", "what its readable rules achieve"),
+            f("evaluation", "object", "what it learned, in episodes of its own"),
+        ],
+    },
+    Shape {
+        command: "distill",
+        fields: &[
+            f("policy", "text", "path of the written policy"),
+            f("lines", "number", "rules"),
+            f("rules", "object?", "what they achieve"),
+        ],
+    },
+    Shape {
+        command: "explain-policy",
+        fields: &[
+            f("policy", "text", "its name"),
+            f("roads[]", "text", ""),
+            f("insight", "object", "rows that it prefers, Q-values in a state, importance of each variable"),
+        ],
+    },
+    Shape {
+        command: "export-weights",
+        fields: &[
+            f("file", "text", "the safetensors file"),
+            f("layers[]", "number", "widths of the network"),
+            f("dueling", "bool", ""),
+        ],
+    },
+    Shape {
+        command: "study",
+        fields: &[
+            f("directory", "text", "where results.json lies"),
+            f("results", "object", "as in results.json"),
+            f("timing[]", "object", "of an agent: `cells`, mean `wall_s` and `cpu_s`"),
+        ],
+    },
+    Shape {
+        command: "replay",
+        fields: &[
+            f("confirmed", "number", "claims that hold"),
+            f("refuted", "number", "claims that do not"),
+            f(
+                "scenarios[]",
+                "object",
+                "`file`, `scenario`, `ads`, `claims`; collisions and how hard they were",
+            ),
+            FAILED,
+        ],
+    },
+    Shape {
+        command: "verify",
+        fields: &[
+            f("refuted", "number", "claims that do not hold"),
+            f("scenarios[]", "object", "as in `replay`"),
+            f("policies[]", "object", "`file`, `policy` and the claims `refuted`, in words"),
+            FAILED,
+        ],
+    },
+    Shape {
+        command: "diagnose",
+        fields: &[
+            f("causes[]", "object?", "`cause` (one or two modules, or none) and `count`"),
+            f("mechanisms[]", "object?", "with `--mechanisms`: a weakness and what vanishes without it"),
+            f(
+                "scenarios[]",
+                "object",
+                "`file`, `scenario`; its `diagnosis`, or with `--mechanisms` `without`",
+            ),
+            FAILED,
+        ],
+    },
+    Shape {
+        command: "shrink",
+        fields: &[
+            f("median_steps_before", "number", ""),
+            f("median_actions_before", "number", ""),
+            f("median_steps", "number", ""),
+            f("median_actions", "number", ""),
+            f("kept", "number", "scenarios that keep their verdict and every claim"),
+            f(
+                "scenarios[]",
+                "object",
+                "`file`, `output`, steps and actions before and after, claims `refuted`",
+            ),
+            FAILED,
+        ],
+    },
+    Shape {
+        command: "test",
+        fields: &[
+            f("still_fails", "number", "scenarios with the same crash"),
+            f("fixed", "number", "scenarios without one"),
+            f("changed", "number", "scenarios with another crash, or that never meet the obstacle"),
+            f("errors", "number", "scenarios that could not be played"),
+            f("accepted", "number", "scenarios that `--accept` changed"),
+            f("scenarios[].file", "text", ""),
+            f("scenarios[].scenario", "text", "its name"),
+            f("scenarios[].outcome", "text", "`still fails`, `fixed`, `changed`, `error`"),
+            f("scenarios[].reason", "text", "may be empty"),
+        ],
+    },
+    Shape {
+        command: "pack",
+        fields: &[f("directory", "text", "the folder"), f("files[]", "text", "paths of the files in it")],
+    },
+    Shape {
+        command: "render",
+        fields: &[
+            f("picture", "text", "its path"),
+            f("times_s[]", "number", "moments drawn"),
+            f("svg", "text?", "the picture, if its path is `-`"),
+        ],
+    },
+    Shape {
+        command: "road",
+        fields: &[
+            f("file", "text", ""),
+            f("name", "text", "of the map"),
+            f("pose_fields[]", "text", "what stands where in a pose"),
+            f("lanes[]", "object", "`key`, length, limit, links, neighbours, a pose each metre"),
+            f("junctions[]", "object", "`id`, `name`, `groups`, `connections`"),
+            f("signals[]", "object", "`id`, place, `junction`, `group`, the lanes that it stops"),
+            f("crosswalks[]", "object", "`id` and `outline_m`"),
+            f("route", "object?", "lanes, lane changes, stop lines and conflicts along the way"),
+            f("warnings[]", "text", "what was wrong with the map"),
+            f("svg", "text?", "the picture, with `--svg -`"),
+        ],
+    },
+];
+
+/// All of it, for people.
+pub fn in_words() -> String {
+    let mut text = INTRODUCTION.to_owned();
+    add(&mut text, ALWAYS);
+    text.push_str(&format!("\n\n{AFTER}"));
+    for Shape { command, fields } in SHAPES {
+        text.push_str(&format!("\n\n{command}"));
+        add(&mut text, fields);
+    }
+    text
+}
+
+fn add(text: &mut String, fields: &[Field]) {
+    for Field { path, kind, meaning } in fields {
+        let meaning = folded(meaning, 80 - 36);
+        text.push_str(format!("\n  {path:<25}{kind:<9}{}", meaning[0]).trim_end());
+        meaning[1..].iter().for_each(|line| text.push_str(&format!("\n{:36}{line}", "")));
+    }
+}

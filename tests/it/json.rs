@@ -1,0 +1,164 @@
+//! `--format json`: the last line is the command's result, and `explain json` describes it.
+
+use std::collections::BTreeSet;
+
+use serde_json::Value;
+
+use crate::cases::root;
+use crate::command::{avastra, outcome};
+use crate::world::FLICKER;
+
+/// The last line that a command prints, after a look at what every result has.
+fn result(arguments: &[&str]) -> Value {
+    let all = [arguments, &["--format", "json"]].concat();
+    let (status, stdout, stderr) = outcome(&mut avastra(&all));
+    let line = stdout.lines().last().unwrap_or_else(|| panic!("{arguments:?} prints nothing: {stderr}"));
+    let value: Value = serde_json::from_str(line).unwrap_or_else(|error| panic!("{line}: {error}"));
+    assert_eq!((&value["command"], &value["schema"]), (&arguments[0].into(), &2.into()), "{line}");
+    assert_eq!((&value["status"], value["error"].is_null()), (&status.into(), status == 0), "{line}");
+    value
+}
+
+/// The fields that `explain json` lists for a command: path and kind.
+fn documented(command: &str) -> Vec<(String, String)> {
+    let schema = result(&["explain", "json"]);
+    let shapes = schema["shapes"].as_array().expect("a list");
+    let shape = shapes.iter().find(|shape| shape["command"] == command);
+    let own = shape.unwrap_or_else(|| panic!("`{command}` is not described"))["fields"].as_array();
+    let all = schema["always"].as_array().into_iter().chain(own).flatten();
+    let text = |value: &Value| value.as_str().expect("text").to_owned();
+    all.map(|field| (text(&field["path"]), text(&field["kind"]))).collect()
+}
+
+/// Compares a value with the fields that are described, and notes which of them were there.
+fn compare(path: &str, value: &Value, fields: &[(String, String)], met: &mut BTreeSet<String>) {
+    if let Some((_, kind)) = fields.iter().find(|(known, _)| known == path) {
+        met.insert(path.to_owned());
+        let (kind, may_be_null) = (kind.trim_end_matches('?'), kind.ends_with('?'));
+        let fits = match value {
+            Value::Null => may_be_null,
+            Value::Bool(_) => kind == "bool",
+            Value::Number(_) => kind == "number",
+            Value::String(_) => kind == "text",
+            Value::Array(_) => kind == "list",
+            Value::Object(_) => kind == "object",
+        };
+        assert!(fits, "`{path}` is described as {kind}: {value}");
+        return;
+    }
+    match value {
+        Value::Object(entries) => {
+            for (name, value) in entries {
+                let path = if path.is_empty() { name.clone() } else { format!("{path}.{name}") };
+                compare(&path, value, fields, met);
+            }
+        }
+        Value::Array(entries) => {
+            let path = format!("{path}[]");
+            let within = |(known, _): &(String, String)| known.starts_with(&path);
+            assert!(fields.iter().any(within), "`{path}` is not described");
+            // An empty list shows nothing wrong.
+            if entries.is_empty() {
+                met.extend(fields.iter().filter(|field| within(field)).map(|(known, _)| known.clone()));
+            }
+            entries.iter().for_each(|value| compare(&path, value, fields, met));
+        }
+        // A list that does not apply is null.
+        Value::Null => {
+            let entry = format!("{path}[]");
+            let field = fields.iter().find(|(known, _)| *known == entry);
+            assert!(field.is_some_and(|(_, kind)| kind.ends_with('?')), "`{path}` is not described");
+            met.insert(entry);
+        }
+        _ => panic!("`{path}` is not described: {value}"),
+    }
+}
+
+/// What the command prints has the fields that are described, and all of them.
+fn is_as_described(arguments: &[&str]) -> Value {
+    let fields = documented(arguments[0]);
+    let (value, mut met) = (result(arguments), BTreeSet::new());
+    compare("", &value, &fields, &mut met);
+    let absent: Vec<&String> =
+        fields.iter().map(|(path, _)| path).filter(|path| !met.contains(*path)).collect();
+    // A row says why it is masked only if it is.
+    let absent: Vec<&&String> = absent.iter().filter(|path| !path.ends_with("masked")).collect();
+    assert!(absent.is_empty(), "{arguments:?}: described but absent: {absent:?}");
+    value
+}
+
+#[test]
+fn results_are_as_explain_describes_them() {
+    let scratch = tempfile::tempdir().expect("a scratch directory");
+    let at = |name: &str| scratch.path().join(name).display().to_string();
+    let space = "scenarios/avastra45.ava";
+    let quick: [&[&str]; 14] = [
+        &["check", "--audit", space],
+        &["check", "--dump", "actions", space],
+        &["compile", space, "-o", &at("table.yaml")],
+        &["table", space],
+        &["why", space, "--row", "3"],
+        &["fmt", "--check", space],
+        &["explain"],
+        &["explain", "json"],
+        &["diff", space, "scenarios/deepcollision52.ava"],
+        &["doc", space],
+        &["new", &at("mine")],
+        &["completions", "bash"],
+        &["export-weights", "policies/corner.ava", "-o", &at("corner.safetensors")],
+        &["road", space, "--road", "corner"],
+    ];
+    quick.iter().for_each(|arguments| drop(is_as_described(arguments)));
+}
+
+#[test]
+fn results_of_drives_are_as_explain_describes_them() {
+    let scratch = tempfile::tempdir().expect("a scratch directory");
+    let at = |name: &str| scratch.path().join(name).display().to_string();
+    let run = at("run");
+    let settings = ["--episodes", "3", "--seed", "7", "--ads-config", FLICKER];
+    let found =
+        is_as_described(&[&["run", "scenarios/avastra45.ava", "--out", &run], &settings[..]].concat());
+    let critical: Vec<&str> =
+        found["critical"].as_array().expect("a list").iter().filter_map(Value::as_str).collect();
+    let [one, .., two] = critical.as_slice() else { panic!("the run finds two crashes: {critical:?}") };
+    is_as_described(&["replay", one]);
+    is_as_described(&["replay", one, two, "--ads", "idm"]);
+    is_as_described(&["verify", one, two]);
+    is_as_described(&["test", &run]);
+    is_as_described(&["render", one, "--at", "1", "-o", &at("moment.svg")]);
+    is_as_described(&["shrink", one]);
+    is_as_described(&["diagnose", one]);
+}
+
+/// A command that fails says so under its own name, and what it found before is there.
+#[test]
+fn a_failure_is_a_result_too() {
+    let broken = "tests/cases/diagnostics/misspelt_name.ava";
+    let mistakes = result(&["check", broken]);
+    assert_eq!((&mistakes["status"], &mistakes["files"][0]["file"]), (&2.into(), &broken.into()));
+    for (arguments, status) in [
+        (&["check", "nowhere.ava"][..], 1),
+        (&["test", "scenarios/studies"], 1),
+        (&["run", "scenarios/avastra45.ava", "--road"], 1),
+        (&["replay", broken], 2),
+        (&["diagnose", broken, broken], 1),
+    ] {
+        let found = result(arguments);
+        assert_eq!(found["status"], status, "{arguments:?}");
+    }
+    let several = result(&["verify", broken, "nowhere.ava"]);
+    assert_eq!(several["failed"][0]["file"], broken, "{several}");
+    assert_eq!(several["failed"][1]["file"], "nowhere.ava", "{several}");
+    assert!(root().join(broken).is_file());
+}
+
+#[test]
+fn a_dump_is_json_alone() {
+    let space = "scenarios/avastra45.ava";
+    for stage in ["ast", "actions"] {
+        let (status, stdout, _) = outcome(&mut avastra(&["check", "--dump", stage, space]));
+        assert_eq!(status, 0);
+        serde_json::from_str::<Value>(&stdout).unwrap_or_else(|error| panic!("{stage}: {error}"));
+    }
+}
