@@ -78,22 +78,7 @@ impl Claim {
         lateral_buffer_m: f64,
     ) -> Option<Claim> {
         let half_way_m = VehicleParameters::MKZ.width_m / 2.0 + lateral_buffer_m;
-        let speed_mps = if forecast.moving { forecast.velocity_mps.norm() } else { 0.0 };
-        let mut claim = Claim {
-            id: forecast.id,
-            probability: forecast.probability,
-            on_wheels: forecast.body.is_vehicle(),
-            moving: forecast.moving,
-            speed_mps,
-            cosine: 0.0,
-            cosine_last: 0.0,
-            sine: 0.0,
-            spans: [EMPTY; STEPS + 1],
-            first: usize::MAX,
-            last: 0,
-            owes_way: false,
-            stance: Stance::Open,
-        };
+        let mut claim = Claim::empty(forecast);
         let mut forward = forecast.forward;
         let reach_m = half_way_m + lateral.offset_m_max() + (forecast.length_m + forecast.width_m) / 2.0;
         let (now, mut tracer) =
@@ -108,40 +93,57 @@ impl Claim {
                 forward = direction(position - forecast.positions[step - 1], forward);
             }
             let on_guide = if step == 0 { Some(now) } else { tracer.next(position) };
-            let beside = on_guide.map(|on_guide| {
+            let taken = on_guide.and_then(|on_guide| {
                 let offset_m = on_guide.offset_m - lateral.aside(on_guide.station_m).offset_m;
-                Beside { offset_m, ..on_guide }
-            });
-            let taken = beside.and_then(|beside| {
+                let beside = Beside { offset_m, ..on_guide };
                 let span = beside.taken(forward, forecast.length_m, forecast.width_m, half_way_m)?;
                 Some((beside, span))
             });
             let near =
                 |(_, span): &(Beside, Span)| span.from_m < ahead.end && span.to_m > ahead.start - BEHIND_M;
-            let Some((beside, span)) = taken.filter(near) else {
+            match taken {
+                Some((beside, span)) if near(&(beside, span)) => claim.take(step, span, forward, &beside),
                 // What is on the way far behind follows: it keeps its distance itself.
-                if step == 0 && taken.is_some_and(|(_, span)| span.to_m <= ahead.start - BEHIND_M) {
-                    return None;
-                }
+                Some((_, span)) if step == 0 && span.to_m <= ahead.start - BEHIND_M => return None,
                 // Only the first stay on the way counts: what lies beyond is seen in a later cycle.
-                if claim.first != usize::MAX {
-                    break;
-                }
-                continue;
-            };
-            claim.spans[step] = span;
-            if claim.first == usize::MAX {
-                claim.first = step;
-                claim.cosine = forward.dot(&beside.forward);
-                claim.sine = beside.forward.perp(&forward);
+                _ if claim.first != usize::MAX => break,
+                _ => {}
             }
-            claim.cosine_last = forward.dot(&beside.forward);
-            claim.last = step;
         }
         if !forecast.moving {
             claim.last = STEPS;
         }
         (claim.first != usize::MAX).then_some(claim)
+    }
+
+    /// A claim that takes nothing yet.
+    fn empty(forecast: &Forecast) -> Claim {
+        Claim {
+            id: forecast.id,
+            probability: forecast.probability,
+            on_wheels: forecast.body.is_vehicle(),
+            moving: forecast.moving,
+            speed_mps: if forecast.moving { forecast.velocity_mps.norm() } else { 0.0 },
+            cosine: 0.0,
+            cosine_last: 0.0,
+            sine: 0.0,
+            spans: [EMPTY; STEPS + 1],
+            first: usize::MAX,
+            last: 0,
+            owes_way: false,
+            stance: Stance::Open,
+        }
+    }
+
+    /// Takes a stretch of the way in a step, with the body along `forward`.
+    fn take(&mut self, step: usize, span: Span, forward: Vec2, beside: &Beside) {
+        self.spans[step] = span;
+        self.last = step;
+        self.cosine_last = forward.dot(&beside.forward);
+        if self.first == usize::MAX {
+            (self.first, self.cosine) = (step, self.cosine_last);
+            self.sine = beside.forward.perp(&forward);
+        }
     }
 
     /// Whether it is on the way already.

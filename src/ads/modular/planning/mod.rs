@@ -13,7 +13,7 @@ mod lights;
 mod nudge;
 mod planner;
 mod rights;
-mod sight;
+mod sight_bound;
 mod speed;
 mod st_graph;
 mod stages;

@@ -175,78 +175,130 @@ impl LateralPlan {
         if self.bump.is_some() || self.way_back.is_some() {
             return;
         }
-        let half_way_m = VehicleParameters::MKZ.width_m / 2.0;
-        let front_m = VehicleParameters::MKZ.front_m(station_m);
-        let edges = || {
-            let standing = forecasts.iter().filter(|forecast| !forecast.moving);
-            standing.filter_map(|forecast| {
-                let beside = guide.project(forecast.positions[0], station_m, station_m + HORIZON_M);
-                let sine = beside.forward.x * forecast.forward.y - beside.forward.y * forecast.forward.x;
-                let cosine = beside.forward.dot(&forecast.forward);
-                let across_m = (sine.abs() * forecast.length_m + cosine.abs() * forecast.width_m) / 2.0;
-                let reach_m = half_way_m + config.lateral_buffer_m;
-                let (length_m, width_m) = (forecast.length_m, forecast.width_m);
-                let span = beside.taken(forecast.forward, length_m, width_m, 2.0 * reach_m)?;
-                let (right_m, left_m) = (beside.offset_m - across_m, beside.offset_m + across_m);
-                (span.to_m > front_m).then_some(Edge { id: forecast.id, span, right_m, left_m })
-            })
-        };
-        let in_the_way = |edge: &Edge| {
-            edge.right_m < half_way_m + config.lateral_buffer_m
-                && edge.left_m > -half_way_m - config.lateral_buffer_m
-        };
-        let nearest = edges()
-            .filter(|edge| in_the_way(edge) && edge.span.from_m > front_m)
-            .min_by(|a, b| a.span.from_m.total_cmp(&b.span.from_m));
-        let Some(mut edge) = nearest else { return };
-        let is_vehicle =
-            |id: u32| forecasts.iter().any(|forecast| forecast.id == id && forecast.body.is_vehicle());
-        let on = scene.route.lane_at(edge.span.from_m);
-        let lane_m = scene.map.lane(on.lane).width_at(edge.span.from_m - on.from_m);
-        let clear_m = half_way_m + config.nudge_buffer_m;
-        let shift_m = |edge: &Edge| {
-            let left = edge.left_m + edge.right_m < 0.0;
-            let offset_m = if left { edge.left_m + clear_m } else { edge.right_m - clear_m };
-            (offset_m.abs() <= lane_m / 2.0 - half_way_m - EDGE_M).then_some(offset_m)
-        };
-        if !is_vehicle(edge.id) || shift_m(&edge).is_none() {
-            return;
+        let standing = Standing { config, guide, forecasts, station_m };
+        if let Some(edge) = standing.nearest().filter(|edge| standing.is_vehicle(edge.id)) {
+            let lane_m = lane_width_m(scene, edge.span.from_m);
+            self.bump = self.row_from(&standing, edge, lane_m).and_then(|(edge, offset_m)| {
+                Bump::past(&edge, offset_m, station_m, speed_mps)
+                    .filter(|bump| standing.leave_room_for(bump, &self.row))
+            });
         }
+    }
+
+    /// All that stands in a row with what is nearest, as one, and the shift that passes it within the lane, m. Its
+    /// ids are noted. `None` if the lane has no room.
+    fn row_from(&mut self, standing: &Standing, nearest: Edge, lane_m: f64) -> Option<(Edge, f64)> {
+        let mut edge = nearest;
+        let mut offset_m = standing.shift_m(&edge, lane_m)?;
         self.row.clear();
         self.row.push(edge.id);
-        while let Some((id, longer)) = edges().find_map(|other| {
-            let next = other.span.from_m < edge.span.to_m + ROW_GAP_M && in_the_way(&other);
+        while let Some((id, longer, shift_m)) = standing.edges().find_map(|other| {
+            let next = other.span.from_m < edge.span.to_m + ROW_GAP_M && standing.is_in_the_way(&other);
+            let fits = next && !self.row.contains(&other.id) && standing.is_vehicle(other.id);
             let longer = edge.with(&other);
-            let fits = next && !self.row.contains(&other.id) && is_vehicle(other.id);
-            (fits && shift_m(&longer).is_some()).then_some((other.id, longer))
+            let shift_m = standing.shift_m(&longer, lane_m).filter(|_| fits)?;
+            Some((other.id, longer, shift_m))
         }) {
             self.row.push(id);
-            edge = longer;
+            (edge, offset_m) = (longer, shift_m);
         }
-        let Some(offset_m) = shift_m(&edge) else { return };
-        let (before_m, behind_m) = (VehicleParameters::MKZ.front_m(0.0), -VehicleParameters::MKZ.rear_m(0.0));
+        Some((edge, offset_m))
+    }
+}
+
+/// Width of the route's lane at a station, m.
+fn lane_width_m(scene: &Scene, station_m: f64) -> f64 {
+    let on = scene.route.lane_at(station_m);
+    scene.map.lane(on.lane).width_at(station_m - on.from_m)
+}
+
+impl Bump {
+    /// The shift past what stands, if there is room for it before.
+    fn past(edge: &Edge, offset_m: f64, station_m: f64, speed_mps: f64) -> Option<Bump> {
+        let vehicle = VehicleParameters::MKZ;
+        let (before_m, behind_m) = (vehicle.front_m(0.0), -vehicle.rear_m(0.0));
         let length_m = (speed_mps * (5.78 * offset_m.abs() / LATERAL_MPS2).sqrt()).max(LENGTH_M_MIN);
-        let (wanted_m, last_m) =
-            (edge.span.from_m - before_m - BEFORE_M, edge.span.from_m - before_m - BEFORE_M_MIN);
+        let wanted_m = edge.span.from_m - before_m - BEFORE_M;
         let up_to_m = wanted_m.max(station_m + length_m);
-        if up_to_m > last_m {
-            return;
-        }
         let down_from_m = edge.span.to_m + behind_m + BEHIND_M;
-        let bump = Bump {
+        (up_to_m <= edge.span.from_m - before_m - BEFORE_M_MIN).then_some(Bump {
             id: edge.id,
             span: edge.span,
             offset_m,
             up_m: (up_to_m - length_m, up_to_m),
             down_m: (down_from_m, down_from_m + length_m),
-        };
-        let free = edges().filter(|other| !self.row.contains(&other.id)).all(|other| {
+        })
+    }
+}
+
+/// What stands ahead, as the vehicle at a station knows it.
+struct Standing<'a> {
+    config: &'a PlanningConfig,
+    guide: &'a Guide,
+    forecasts: &'a [Forecast],
+    station_m: f64,
+}
+
+impl Standing<'_> {
+    /// How far the vehicle reaches to each side of its way, m.
+    const HALF_WAY_M: f64 = VehicleParameters::MKZ.width_m / 2.0;
+
+    fn front_m(&self) -> f64 {
+        VehicleParameters::MKZ.front_m(self.station_m)
+    }
+
+    /// What stands on the way or near it.
+    fn edges(&self) -> impl Iterator<Item = Edge> {
+        self.forecasts.iter().filter(|forecast| !forecast.moving).filter_map(|forecast| {
+            let (station_m, position) = (self.station_m, forecast.positions[0]);
+            let beside = self.guide.project(position, station_m, station_m + HORIZON_M);
+            let sine = beside.forward.x * forecast.forward.y - beside.forward.y * forecast.forward.x;
+            let cosine = beside.forward.dot(&forecast.forward);
+            let across_m = (sine.abs() * forecast.length_m + cosine.abs() * forecast.width_m) / 2.0;
+            let reach_m = Self::HALF_WAY_M + self.config.lateral_buffer_m;
+            let (length_m, width_m) = (forecast.length_m, forecast.width_m);
+            let span = beside.taken(forecast.forward, length_m, width_m, 2.0 * reach_m)?;
+            let (right_m, left_m) = (beside.offset_m - across_m, beside.offset_m + across_m);
+            (span.to_m > self.front_m()).then_some(Edge { id: forecast.id, span, right_m, left_m })
+        })
+    }
+
+    fn is_in_the_way(&self, edge: &Edge) -> bool {
+        let reach_m = Self::HALF_WAY_M + self.config.lateral_buffer_m;
+        edge.right_m < reach_m && edge.left_m > -reach_m
+    }
+
+    /// The nearest that is in the way and wholly ahead.
+    fn nearest(&self) -> Option<Edge> {
+        self.edges()
+            .filter(|edge| self.is_in_the_way(edge) && edge.span.from_m > self.front_m())
+            .min_by(|a, b| a.span.from_m.total_cmp(&b.span.from_m))
+    }
+
+    fn is_vehicle(&self, id: u32) -> bool {
+        self.forecasts.iter().any(|forecast| forecast.id == id && forecast.body.is_vehicle())
+    }
+
+    /// From the way to what stands, at least, m.
+    fn clear_m(&self) -> f64 {
+        Self::HALF_WAY_M + self.config.nudge_buffer_m
+    }
+
+    /// The shift that passes what stands, m; `None` if a lane of that width has no room.
+    fn shift_m(&self, edge: &Edge, lane_m: f64) -> Option<f64> {
+        let left = edge.left_m + edge.right_m < 0.0;
+        let offset_m = if left { edge.left_m + self.clear_m() } else { edge.right_m - self.clear_m() };
+        (offset_m.abs() <= lane_m / 2.0 - Self::HALF_WAY_M - EDGE_M).then_some(offset_m)
+    }
+
+    /// Whether a shift past a row meets nothing else that stands.
+    fn leave_room_for(&self, bump: &Bump, row: &[u32]) -> bool {
+        let before_m = VehicleParameters::MKZ.front_m(0.0);
+        self.edges().filter(|other| !row.contains(&other.id)).all(|other| {
             let abreast = other.span.from_m < bump.down_m.1 + before_m && other.span.to_m > bump.up_m.0;
-            !abreast || other.left_m < offset_m - clear_m || other.right_m > offset_m + clear_m
-        });
-        if free {
-            self.bump = Some(bump);
-        }
+            let (right_m, left_m) = (bump.offset_m - self.clear_m(), bump.offset_m + self.clear_m());
+            !abreast || other.left_m < right_m || other.right_m > left_m
+        })
     }
 }
 

@@ -24,8 +24,8 @@ use super::decisions::{Decisions, Situation};
 use super::lane_change::LaneChanges;
 use super::lights::Lights;
 use super::nudge::LateralPlan;
-use super::rights::Rights;
-use super::sight::Sight;
+use super::rights::RouteRights;
+use super::sight_bound::SightBound;
 use super::speed::Constraint;
 use super::stages::Stages;
 use super::standing::Standing;
@@ -54,9 +54,9 @@ pub struct Planner {
     changes: LaneChanges,
     lights: Lights,
     standing: Standing,
-    rights: Rights,
+    rights: RouteRights,
     stages: Stages,
-    sight: Sight,
+    sight: SightBound,
     manoeuvre: Manoeuvre,
     trajectory: Trajectory,
     claims: Vec<Claim>,
@@ -85,7 +85,7 @@ impl Planner {
         let weaknesses = config.weaknesses;
         let config = without_absent(&config.planning, &weaknesses);
         let changes = LaneChanges::new(scene);
-        let rights = Rights::of(&config, scene);
+        let rights = RouteRights::of(&config, scene);
         Planner {
             guide: Arc::new(changes.guide(&config)),
             lights: Lights::new(&config, scene),
@@ -97,7 +97,7 @@ impl Planner {
             changes,
             standing: Standing::default(),
             stages: Stages::new(&config, scene, junctions, &rights),
-            sight: Sight::new(scene, junctions),
+            sight: SightBound::new(scene, junctions),
             rights,
             manoeuvre: Manoeuvre::LaneFollow,
             trajectory: Trajectory::default(),

@@ -18,7 +18,7 @@ const NEAR_M: f64 = 6.0;
 const SAME_COSINE: f64 = 0.7;
 
 #[derive(Debug, Clone, Default)]
-pub struct Rights {
+pub struct RouteRights {
     meetings: Vec<Meeting>,
 }
 
@@ -32,8 +32,8 @@ struct Meeting {
     ego_first: bool,
 }
 
-impl Rights {
-    pub fn of(config: &PlanningConfig, scene: &Scene) -> Rights {
+impl RouteRights {
+    pub fn of(config: &PlanningConfig, scene: &Scene) -> RouteRights {
         let meetings = scene.route.conflicts.iter().map(|conflict| {
             let own = scene.route.lane_at(conflict.station_m).lane;
             let ego_first =
@@ -45,7 +45,7 @@ impl Rights {
                 ego_first: ego_first != config.priority_misread,
             }
         });
-        Rights { meetings: meetings.collect() }
+        RouteRights { meetings: meetings.collect() }
     }
 
     /// The first crossing between two stations at which another lane goes first, m.

@@ -18,7 +18,7 @@ use crate::sim::{FRAME_S, Scene, VehicleParameters};
 use super::super::config::{PlanningConfig, Weaknesses};
 use super::super::junctions::Junctions;
 use super::claim::Claim;
-use super::rights::Rights;
+use super::rights::RouteRights;
 use super::speed::Constraint;
 use super::trajectory::Point;
 
@@ -60,7 +60,12 @@ enum Stage {
 }
 
 impl Stages {
-    pub fn new(config: &PlanningConfig, scene: &Scene, junctions: &Junctions, rights: &Rights) -> Stages {
+    pub fn new(
+        config: &PlanningConfig,
+        scene: &Scene,
+        junctions: &Junctions,
+        rights: &RouteRights,
+    ) -> Stages {
         let route = &scene.route;
         let passage = |(enter_m, exit_m): (f64, f64)| {
             let before = |at_m: &f64| (enter_m - APPROACH_M..exit_m).contains(at_m);

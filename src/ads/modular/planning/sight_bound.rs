@@ -30,7 +30,7 @@ const BESIDE_M: f64 = 5.0;
 const LOOK_M: f64 = 60.0;
 
 #[derive(Debug, Clone, Default)]
-pub struct Sight {
+pub struct SightBound {
     /// Where the vehicle must expect what it cannot see: crosswalks and junctions without lights, from and
     /// to, m.
     places_m: Vec<(f64, f64)>,
@@ -38,15 +38,15 @@ pub struct Sight {
     known: Option<(Conditions, f64)>,
 }
 
-impl Sight {
-    pub fn new(scene: &Scene, junctions: &Junctions) -> Sight {
+impl SightBound {
+    pub fn new(scene: &Scene, junctions: &Junctions) -> SightBound {
         let lit = |enter_m: f64| {
             let mut lines = scene.route.stop_lines.iter();
             lines.any(|line| (enter_m - 40.0..enter_m + 10.0).contains(&line.station_m))
         };
         let dark = junctions.between(0.0, f64::INFINITY).filter(|(enter_m, _)| !lit(*enter_m));
         let places_m = scene.route.crosswalks_m.iter().copied().chain(dark).collect();
-        Sight { places_m, known: None }
+        SightBound { places_m, known: None }
     }
 
     /// Adds the limits that the view sets here and ahead.
@@ -139,7 +139,7 @@ mod tests {
     fn fog_and_night_slow_it_down_and_the_clear_day_does_not() {
         let config = PlanningConfig::default();
         let scene = straight();
-        let mut sight = Sight::new(&scene, &Junctions::of(&scene));
+        let mut sight = SightBound::new(&scene, &Junctions::of(&scene));
         let clear_mps = sight.allowed_mps(&config, &CLEAR_DAY);
         let fog_mps = sight.allowed_mps(&config, &Conditions { visibility_m: 50.0, ..CLEAR_DAY });
         let night_mps = sight.allowed_mps(&config, &Conditions { light: 0.0, ..CLEAR_DAY });
