@@ -321,17 +321,20 @@ impl World {
     }
 
     /// Whether something stands in the ego vehicle's way that will not go: a wreck, or a driver that waits for
-    /// others that wait for it. Vehicles that stand between them belong to the same queue.
+    /// others that wait for it. Vehicles that stand between them belong to the same queue. After a contact the ego
+    /// vehicle itself is a wreck.
     pub fn is_blocked(&self) -> bool {
         let front_m = self.ego_front_m();
-        self.users.iter().filter(|user| user.mover.is_stuck(&user.obstacle)).any(|user| {
-            let Obstacle { outline, forward, .. } = &user.obstacle;
-            let beside = self.scene.route.path.project_from(outline.pose.position, front_m);
-            let (length_m, width_m) = (2.0 * outline.half_length_m, 2.0 * outline.half_width_m);
-            let taken = beside
-                .and_then(|beside| beside.taken(*forward, length_m, width_m, self.ego.outline.half_width_m));
-            taken.is_some_and(|span| span.to_m > front_m && span.from_m < front_m + QUEUE_M)
-        })
+        !self.ego.motion.touched
+            && self.users.iter().filter(|user| user.mover.is_stuck(&user.obstacle)).any(|user| {
+                let Obstacle { outline, forward, .. } = &user.obstacle;
+                let beside = self.scene.route.path.project_from(outline.pose.position, front_m);
+                let (length_m, width_m) = (2.0 * outline.half_length_m, 2.0 * outline.half_width_m);
+                let taken = beside.and_then(|beside| {
+                    beside.taken(*forward, length_m, width_m, self.ego.outline.half_width_m)
+                });
+                taken.is_some_and(|span| span.to_m > front_m && span.from_m < front_m + QUEUE_M)
+            })
     }
 
     /// Station of the ego vehicle's front bumper on the route, m.
@@ -628,6 +631,9 @@ mod tests {
         assert!(world.is_blocked());
         world.users[0].obstacle.outline.pose.position += Vec2::new(0.0, 3.5);
         assert!(!world.is_blocked(), "it stands in the other lane");
+        world.users[0].obstacle.outline.pose.position -= Vec2::new(0.0, 3.5);
+        world.ego.motion.touched = true;
+        assert!(!world.is_blocked(), "the ego vehicle is a wreck itself");
     }
 
     #[test]

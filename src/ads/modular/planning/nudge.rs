@@ -37,6 +37,9 @@ pub struct LateralPlan {
     bump: Option<Bump>,
     /// All that is passed, the first of them first.
     row: Vec<u32>,
+    /// What of it reaches into the shifted way now, because it has moved or was not where it seemed: the vehicle
+    /// stops for it.
+    met: Vec<u32>,
     way_back: Option<WayBack>,
 }
 
@@ -147,12 +150,12 @@ impl LateralPlan {
 
     /// Whether an object is among those that are being passed.
     pub fn passes(&self, id: u32) -> bool {
-        self.bump.is_some() && self.row.contains(&id)
+        self.bump.is_some() && self.row.contains(&id) && !self.met.contains(&id)
     }
 
     /// What is being passed, and where it stands.
     pub fn passing(&self) -> Option<(u32, Span)> {
-        self.bump.map(|bump| (bump.id, bump.span))
+        self.bump.filter(|bump| !self.met.contains(&bump.id)).map(|bump| (bump.id, bump.span))
     }
 
     /// Once a cycle: ends a shift that is over, begins one that is needed and possible.
@@ -172,10 +175,15 @@ impl LateralPlan {
                 self.bump = None;
             }
         }
+        let standing = Standing { config, guide, forecasts, station_m };
+        self.met.clear();
+        if let Some(bump) = self.bump {
+            let in_row = standing.edges().filter(|edge| self.row.contains(&edge.id));
+            self.met.extend(in_row.filter(|edge| standing.meets(edge, &bump)).map(|edge| edge.id));
+        }
         if self.bump.is_some() || self.way_back.is_some() {
             return;
         }
-        let standing = Standing { config, guide, forecasts, station_m };
         if let Some(edge) = standing.nearest().filter(|edge| standing.is_vehicle(edge.id)) {
             let lane_m = lane_width_m(scene, edge.span.from_m);
             self.bump = self.row_from(&standing, edge, lane_m).and_then(|(edge, offset_m)| {
@@ -291,6 +299,12 @@ impl Standing<'_> {
         (offset_m.abs() <= lane_m / 2.0 - Self::HALF_WAY_M - EDGE_M).then_some(offset_m)
     }
 
+    /// Whether what stands reaches into the way beside, of the room that is wanted half at least.
+    fn meets(&self, edge: &Edge, bump: &Bump) -> bool {
+        let room_m = Self::HALF_WAY_M + self.config.nudge_buffer_m / 2.0;
+        edge.left_m > bump.offset_m - room_m && edge.right_m < bump.offset_m + room_m
+    }
+
     /// Whether a shift past a row meets nothing else that stands.
     fn leave_room_for(&self, bump: &Bump, row: &[u32]) -> bool {
         let before_m = VehicleParameters::MKZ.front_m(0.0);
@@ -312,6 +326,11 @@ mod tests {
     use crate::model::vocabulary::Body;
 
     fn planned(places: &[(Body, f64, f64)]) -> LateralPlan {
+        planned_on(LateralPlan::default(), 10.0, places)
+    }
+
+    /// The plan at a station after one look more.
+    fn planned_on(mut plan: LateralPlan, station_m: f64, places: &[(Body, f64, f64)]) -> LateralPlan {
         let scene = straight();
         let config = PlanningConfig::default();
         let guide = Guide::new(&scene, &config.speed_rules());
@@ -324,8 +343,7 @@ mod tests {
             })
             .collect();
         prediction.update(&tracks, 0.0, 0.0, Vec2::zeros());
-        let mut plan = LateralPlan::default();
-        plan.update(&config, &scene, &guide, 10.0, 8.0, prediction.forecasts());
+        plan.update(&config, &scene, &guide, station_m, 8.0, prediction.forecasts());
         plan
     }
 
@@ -353,6 +371,16 @@ mod tests {
         let (_, span) = row.passing().expect("there is room in the lane");
         assert!(row.passes(1) && row.passes(2) && !row.passes(3));
         assert!(span.to_m > 72.0 && span.to_m < 74.0, "{span:?}");
+    }
+
+    #[test]
+    fn what_comes_into_the_shifted_way_is_no_longer_passed() {
+        let plan = planned(&[(Body::Sedan, 60.0, -3.5)]);
+        assert!(plan.passes(1));
+        let plan = planned_on(plan, 20.0, &[(Body::Sedan, 60.0, -2.2)]);
+        assert!(!plan.passes(1) && plan.passing().is_none(), "it is stopped for");
+        let plan = planned_on(plan, 30.0, &[(Body::Sedan, 60.0, -3.4)]);
+        assert!(plan.passes(1), "there is room again");
     }
 
     #[test]
