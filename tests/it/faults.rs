@@ -41,7 +41,7 @@ const PLANTED: [Planted; 19] = [
     planted("perception_blind_to_pedestrians", SHIPPED, 0),
     planted("perception_dropouts", SHIPPED, 0),
     planted("perception_flicker", SHIPPED, 50),
-    planted("perception_half_range", "tests/cases/faults/step_out.ava", 0),
+    planted("perception_half_range", "tests/cases/faults/leader.ava", 0),
     planted("planning_never_yields", SHIPPED, 50),
     planted("planning_tailgates", "tests/cases/faults/leader.ava", 0),
     planted("prediction_frozen", SHIPPED, 50),
