@@ -1,12 +1,14 @@
 //! The laws that hold for every text, however hostile: it is read to its end, every diagnostic can be shown,
-//! and a text without syntax errors survives the printer and the formatter.
+//! a text without syntax errors survives the printer and the formatter, and what a sound space draws is legal.
 //!
 //! Shared by the fuzz target, which makes up texts, and by `tests/it/hostile.rs`, which runs the texts that
 //! were kept. No file is read: a text may use only the files that stand here.
 
 use std::path::Path;
 
+use avastra::action::{ActionTable, Offer, Situation, SpawnFacts, SpawnRequest, Surroundings};
 use avastra::check::{ReadError, load};
+use avastra::model::{MomentFacts, RulesInForce};
 use avastra::syntax::ast::FileId;
 use avastra::syntax::{Diagnostic, Style, apply_fixes, format, parse, print, record, render, same_meaning};
 
@@ -38,6 +40,9 @@ const STRAIGHT: &str = r#"<OpenDRIVE><header name="straight"/><road id="1" lengt
 <lane id="-3" type="driving"><width sOffset="0" a="3.5" b="0" c="0" d="0"/></lane>
 </right>
 </laneSection></lanes></road></OpenDRIVE>"#;
+
+/// Rows of a table that are drawn.
+const ROWS_MAX: usize = 64;
 
 /// The file name of the text.
 const OWN: &str = "text.ava";
@@ -79,4 +84,35 @@ fn examine_meaning(text: &str) {
     let _ = apply_fixes(FileId(0), text, &found);
     let is_refused = found.iter().any(Diagnostic::is_error);
     assert!(is_refused || loaded.space.is_some(), "without an error there is a space");
+    if let Some(space) = loaded.space {
+        examine_draws(ActionTable::new(space));
+    }
+}
+
+/// What is drawn at the start of an episode is legal when it is judged again.
+fn examine_draws(table: ActionTable) {
+    let space = table.space().clone();
+    let rules = RulesInForce::new(&space, &[], &[]).expect("no rule is named");
+    for road in &space.roads {
+        let memory = space.memory_at_start(road, &rules, 1).expect("what is checked has a start");
+        let situation =
+            Situation { memory: &memory, road, rules: &rules, surroundings: &Empty, seed: 1, step: 0 };
+        for row in 0..table.rows().len().min(ROWS_MAX) {
+            let Offer::Legal(draw) = table.offer(&situation, row) else { continue };
+            assert_eq!(table.check(&situation, row, &draw.values), Ok(draw), "what is drawn is legal");
+        }
+    }
+}
+
+/// A world in which every place is free.
+struct Empty;
+
+impl Surroundings for Empty {
+    fn survey(&self, request: &SpawnRequest) -> Result<SpawnFacts, String> {
+        Ok(SpawnFacts { spawn_gap_m: request.distance_m, ..SpawnFacts::default() })
+    }
+
+    fn moment(&self) -> MomentFacts {
+        MomentFacts { ego_speed_mps: 10.0, ..MomentFacts::default() }
+    }
 }

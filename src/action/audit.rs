@@ -26,6 +26,8 @@ pub struct RuleAudit {
     /// How much of their ranges it takes away by itself, on each road.
     pub removes: Vec<Removal>,
     pub enforced: Enforcement,
+    /// Whether also the states with which an episode begins obey it.
+    pub from_the_start: bool,
 }
 
 /// When a rule is judged. Masks and cuts come earlier, but only to avoid draws that the rule would refuse.
@@ -58,7 +60,7 @@ pub fn audit(table: &ActionTable) -> Audit {
         };
         let mut cuts: Vec<String> = Vec::new();
         for (action, bounds) in space.bounds.iter().enumerate() {
-            for bound in bounds.iter().filter(|bound| bound.rule == Some(index) && bound.is_known_early) {
+            for bound in bounds.iter().filter(|bound| bound.rule == Some(index) && bound.is_drawn_within) {
                 let parameter = &space.actions[action].parameters[bound.local];
                 if !parameter.axis && !cuts.contains(&parameter.name.to_string()) {
                     cuts.push(parameter.name.to_string());
@@ -73,6 +75,7 @@ pub fn audit(table: &ActionTable) -> Audit {
             cuts,
             removes: removals(space, index),
             enforced,
+            from_the_start: rule.start.is_some(),
         }
     });
     Audit { rules: rules.collect() }
@@ -88,6 +91,9 @@ impl fmt::Display for Audit {
                 Enforcement::Transition => "every transition",
             };
             write!(f, "{:width$}  binds {:>3} rows, enforced on {enforced}", rule.name, rule.rows.len())?;
+            if rule.from_the_start {
+                f.write_str(" and at the start")?;
+            }
             if !rule.cuts.is_empty() {
                 write!(f, ", cuts {}", rule.cuts.join(", "))?;
             }

@@ -1,23 +1,22 @@
 //! Drawing the values of a row, and judging given values. Both end in `Judge::judge`.
 
+use std::cell::Cell;
 use std::sync::Arc;
 
 use crate::action::table::{Draw, Refusal, Situation};
 use crate::action::{Effect, SpawnRequest};
 use crate::model::expr::Expr;
-use crate::model::rules::{Candidate, Room, RowRules};
+use crate::model::rules::{Before, Candidate, Choose, Clause, Nearest, Room, RowRules, TRIES_MAX, Unsolved};
 use crate::model::{
-    ActionDef, Domain, EffectDef, Facts, Memory, MomentFacts, Parameter, Space, SpawnDef, StateMeaning,
+    ActionDef, Domain, EffectDef, Facts, Memory, MomentFacts, Parameter, Space, SpawnDef, StateMeaning, Type,
     Value, WorldFacts, evaluate, locals, spawn_out_of_bounds,
 };
 use crate::rng;
 use crate::rng::{Rng, Stream};
 
-/// Draws of one row in a step before the row is refused.
+/// Draws of one row in a step before the row is refused. Every draw obeys what can be known before; a further one
+/// is made only if the world has no place for the spawn, or a rule about its gap refuses that place.
 const DRAWS_MAX: usize = 16;
-
-/// Drawn numbers are multiples of this where the rules allow it, SI: short in text and exact in binary.
-const GRID: f64 = 1.0 / 64.0;
 
 /// One row in one situation.
 pub(super) struct Judge<'a> {
@@ -61,9 +60,13 @@ impl<'a> Judge<'a> {
         // With nothing to draw, every try gives the same result.
         let fixed = self.action.drawn().next().is_none();
         for _ in 0..if fixed { 1 } else { DRAWS_MAX } {
-            match self.draw_values(&mut rng).and_then(|values| self.judge(&values).map_err(first)) {
-                Ok(draw) => return Ok(draw),
-                Err(refusal) => note(refusal),
+            match self.draw_values(&mut rng) {
+                Ok(values) => match self.judge(&values).map_err(first) {
+                    Ok(draw) => return Ok(draw),
+                    Err(refusal) => note(refusal),
+                },
+                // No other draw finds what does not exist.
+                Err(refusal) => return Err(refusal),
             }
         }
         let most = failures.iter().map(|(count, _)| *count).max();
@@ -101,8 +104,10 @@ impl<'a> Judge<'a> {
     /// # Errors
     /// Everything that is wrong with the nearest values, or with the values that are not numbers.
     pub fn nearest(&self, wanted: &[(Arc<str>, Value)]) -> Result<Draw, Vec<Refusal>> {
-        let values = self.values(wanted, |wanted, room| nearest(room, wanted.number()));
-        let values = values.map_err(|refusal| vec![refusal])?;
+        let given = locals(self.action, self.row.row, wanted);
+        let open: Vec<usize> = self.action.drawn_numbers().collect();
+        let mut choose = Nearest { wanted: given.clone() };
+        let values = self.solve(given, &open, &mut choose).map_err(|refusal| vec![refusal])?;
         self.check(&self.action.drawn_of(&values))
     }
 
@@ -130,7 +135,7 @@ impl<'a> Judge<'a> {
                 Err(reason) => refusals.push(refuse(None, format!("cannot spawn: {reason}"))),
             }
         }
-        let world = WorldFacts { moment: self.moment, step: self.situation.step, spawns };
+        let world = WorldFacts { spawns, ..self.world() };
         let candidate = Candidate { values, before, after: &after, world: Some(&world) };
         refusals.extend(self.row.breaches(candidate).map(|breach| {
             let rule = breach.rule().map(|rule| self.row.space.rules[rule].name.clone());
@@ -195,52 +200,62 @@ impl<'a> Judge<'a> {
         }
     }
 
+    /// What the world says before it is asked about spawns.
+    fn world(&self) -> WorldFacts {
+        WorldFacts { moment: self.moment, step: self.situation.step, spawns: Vec::new() }
+    }
+
     fn draw_values(&self, rng: &mut Rng) -> Result<Vec<Value>, Refusal> {
-        let chosen = self.action.drawn().filter_map(|parameter| match &parameter.domain {
-            Domain::Values(choices) => {
-                let choice = choices[rng::below(rng, choices.len() as u32) as usize];
-                Some((parameter.name.clone(), choice))
-            }
-            Domain::Range(..) => None,
-        });
-        let chosen: Vec<(Arc<str>, Value)> = chosen.collect();
-        self.values(&chosen, |_, room| on_grid(room, rng::between(rng, room.low, room.high)))
+        let parameters = self.action.parameters.iter().enumerate();
+        let open: Vec<usize> = parameters.filter(|(_, p)| !p.axis).map(|(local, _)| local).collect();
+        self.solve(locals(self.action, self.row.row, &[]), &open, &mut Chance { rng })
     }
 
-    /// Values of all parameters: those of lists as `given`, numbers as `number` chooses them. `number` gets
-    /// the given value of the parameter, if it has one, and the parameter's room.
-    fn values(
+    fn solve(
         &self,
-        given: &[(Arc<str>, Value)],
-        mut number: impl FnMut(Value, &Room) -> f64,
+        given: Vec<Value>,
+        open: &[usize],
+        choose: &mut dyn Choose,
     ) -> Result<Vec<Value>, Refusal> {
-        let mut values = locals(self.action, self.row.row, given);
-        self.row.solve(&mut values, self.action.drawn_numbers().collect(), |local, given, room| {
-            // A number is drawn even where an equality sets the value: switching a rule off must not
-            // shift later draws.
-            let number = number(given, room);
-            room.settle(number).ok_or_else(|| self.no_room(local, room))
-        })?;
-        Ok(values)
+        let world = self.world();
+        let tries = Cell::new(TRIES_MAX);
+        let before = Before { memory: self.situation.memory, world: Some(&world), tries: &tries };
+        self.row.solve(given, open, before, choose).map_err(|unsolved| self.refused(&unsolved, &world))
     }
 
-    /// Why no number of a parameter's range is possible.
-    fn no_room(&self, local: usize, room: &Room) -> Refusal {
-        let parameter = &self.action.parameters[local];
-        let rule = room.cut_by.map(|rule| self.row.space.rules[rule].name.clone());
-        let shown = |number: f64| self.row.space.show(Value::Number(number), parameter.ty);
-        let wanted = match room.exact {
-            Some(exact) => format!("be {}", shown(exact)),
-            None => format!("lie in {} .. {}", shown(room.low), shown(room.high)),
+    /// Why there are no values, in words.
+    fn refused(&self, unsolved: &Unsolved, world: &WorldFacts) -> Refusal {
+        let space = self.row.space;
+        let values = &unsolved.values;
+        let after = space.memory_after(self.row.row.action, values, self.situation.memory);
+        let candidate =
+            Candidate { values, before: self.situation.memory, after: &after, world: Some(world) };
+        let clause = unsolved.clause.map(|clause| &space.clauses[self.row.row.action][clause]);
+        let rule = clause.and_then(Clause::rule);
+        let named = rule.map(|rule| space.rules[rule].name.clone());
+        let Some(local) = unsolved.local else {
+            let breach = self.row.breaches(candidate).find(|breach| breach.rule() == rule);
+            let words = breach.map(|breach| self.row.words(breach, candidate));
+            return refuse(named, words.unwrap_or_else(|| "its conditions leave no value".to_owned()));
         };
-        let (low, high) = parameter.domain.ends();
-        let range = format!("its range is {} .. {}", shown(low), shown(high));
-        refuse(rule, format!("`{}` would have to {wanted}, {range}", parameter.name))
+        let Parameter { name, ty, domain, .. } = &self.action.parameters[local];
+        let range = match domain {
+            Domain::Values(_) => format!("none of its values {}", self.values_of(domain, *ty)),
+            Domain::Range(..) => format!("no value of its range {}", self.values_of(domain, *ty)),
+        };
+        let bound = rule
+            .and_then(|rule| self.row.broken_bounds(rule, candidate, None).find(|(b, _)| b.local == local));
+        let wanted = match bound {
+            Some((bound, limit)) => format!("it wants {} {}", bound.op.symbol(), space.show(limit, *ty)),
+            None => "with the values of the others".to_owned(),
+        };
+        refuse(named, format!("`{name}`: {range} is possible, {wanted}"))
     }
 
-    fn out_of_range(&self, parameter: &Parameter, value: Value) -> Refusal {
-        let shown = |value: Value| self.row.space.show(value, parameter.ty);
-        let range = match &parameter.domain {
+    /// The values of a list or the ends of a range, in words.
+    fn values_of(&self, domain: &Domain, ty: Type) -> String {
+        let shown = |value: Value| self.row.space.show(value, ty);
+        match domain {
             Domain::Values(values) => {
                 // A value that is likelier stands in the list more than once.
                 let mut words: Vec<String> = Vec::new();
@@ -254,28 +269,30 @@ impl<'a> Judge<'a> {
             Domain::Range(low, high) => {
                 format!("{} .. {}", shown(Value::Number(low.to_f64())), shown(Value::Number(high.to_f64())))
             }
-        };
-        refuse(None, format!("`{}` is {}, its range is {range}", parameter.name, shown(value)))
+        }
+    }
+
+    fn out_of_range(&self, parameter: &Parameter, value: Value) -> Refusal {
+        let shown = self.row.space.show(value, parameter.ty);
+        let range = self.values_of(&parameter.domain, parameter.ty);
+        refuse(None, format!("`{}` is {shown}, its range is {range}", parameter.name))
     }
 }
 
-/// The number of the room nearest to another; the middle of the room for NaN.
-fn nearest(room: &Room, wanted: f64) -> f64 {
-    if room.contains(wanted) {
-        return wanted;
-    }
-    match wanted.is_nan() {
-        true => on_grid(room, room.middle()),
-        false => on_grid(room, wanted.max(room.low).min(room.high)),
-    }
+/// Draws every value with equal chances.
+struct Chance<'a> {
+    rng: &'a mut Rng,
 }
 
-/// A number of the room near `drawn`, on the grid where the room holds a point of it. In a room of one
-/// number, or between two neighbours, it is the middle, and the rules decide.
-fn on_grid(room: &Room, drawn: f64) -> f64 {
-    let down = (drawn / GRID).floor() * GRID;
-    let near = [down, down + GRID, drawn];
-    near.into_iter().find(|number| room.contains(*number)).unwrap_or_else(|| room.middle())
+impl Choose for Chance<'_> {
+    fn value(&mut self, _local: usize, left: &[Value]) -> Value {
+        left[rng::below(self.rng, left.len() as u32) as usize]
+    }
+
+    fn number(&mut self, _local: usize, room: &Room) -> Option<f64> {
+        // Also where a rule sets the value: to switch it off must not shift later draws.
+        room.at(rng::unit(self.rng))
+    }
 }
 
 fn refuse(rule: Option<String>, reason: String) -> Refusal {

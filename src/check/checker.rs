@@ -12,7 +12,7 @@ use crate::check::report::Report;
 use crate::check::road::Maps;
 use crate::check::{style, unused};
 use crate::model::expr::{Expr, ExprKind};
-use crate::model::rules::bounds;
+use crate::model::rules::{bounds, clauses};
 use crate::model::vocabulary::TYPES;
 use crate::model::{ActionDef, EnumDef, FnDef, GroupDef, Meaning, Space, StateDef, Type, Value, code};
 use crate::prove;
@@ -112,6 +112,7 @@ pub(super) fn space(
     }
     let actions: Vec<ActionDef> = core::mem::take(&mut checker.actions).into_iter().flatten().collect();
     let bounds = bounds(&actions, &rules);
+    let clauses = clauses(&actions, &rules, &checker.states);
     let mut space = Space {
         path: root.path,
         meaning: root.meaning,
@@ -128,12 +129,15 @@ pub(super) fn space(
         roads,
         rows: Vec::new(),
         bounds,
+        clauses,
     };
     space.rows = prove::rows(&space);
-    checker.expects(&own, &space);
+    let realisable = prove::realise(&space);
+    space.rows = prove::with_dead(&space, &realisable);
+    checker.expects(&own, &space, &realisable);
     checker.diagnostics.extend(unused::report(&own, items));
     checker.diagnostics.extend(style::report(&own));
-    checker.diagnostics.extend(prove::report(&space));
+    checker.diagnostics.extend(prove::report(&space, &realisable));
     let is_sound = !checker.has_errors();
     checker.finish(is_sound.then_some(space))
 }

@@ -4,15 +4,19 @@ use crate::check::checker::{Checker, each};
 use crate::check::names::unknown;
 use crate::check::report::Report;
 use crate::model::vocabulary::{SpaceClaim, Word};
-use crate::model::{Reach, Row, Space, code};
+use crate::model::{Row, Space, code};
+use crate::prove::{Realisable, Realised};
 use crate::syntax::ast::{BinaryOp, ItemKind, Span};
 use crate::syntax::{Diagnostic, ast};
 
+/// Rows named in one diagnostic, at most.
+const ROWS_SHOWN: usize = 5;
+
 impl Checker {
     /// Judges every claim.
-    pub(super) fn expects(&mut self, items: &[&ast::Item], space: &Space) {
+    pub(super) fn expects(&mut self, items: &[&ast::Item], space: &Space, realisable: &Realisable) {
         for (_, expect) in each(items, ItemKind::as_expect) {
-            self.claim(&expect.claim, expect.span, space);
+            self.claim(&expect.claim, expect.span, space, realisable);
         }
     }
 
@@ -45,23 +49,26 @@ impl Checker {
         }
     }
 
-    fn claim(&mut self, claim: &ast::Expr, span: Span, space: &Space) -> Option<()> {
+    fn claim(&mut self, claim: &ast::Expr, span: Span, space: &Space, realisable: &Realisable) -> Option<()> {
         match &claim.kind {
             ast::ExprKind::Call(call) if call.name.text == SpaceClaim::Every.name() => {
                 let rows = self.rows_of(call.args.first(), call.span, space)?;
                 let is_known = |kind: &ast::ExprKind| matches!(kind, ast::ExprKind::Name(name) if name == SpaceClaim::Realisable.name());
-                let realisable = call.args.get(1).is_some_and(|argument| is_known(&argument.value.kind));
-                if call.args.len() != 2 || !realisable {
+                let is_claimed = call.args.get(1).is_some_and(|argument| is_known(&argument.value.kind));
+                if call.args.len() != 2 || !is_claimed {
                     return self.reject(not_static(call.span));
                 }
-                let dead: Vec<&str> =
-                    rows.iter().filter(|row| is_dead(row)).map(|row| row.label.as_str()).collect();
-                if dead.is_empty() {
+                let idle: Vec<(&str, &str)> = rows
+                    .iter()
+                    .filter_map(|row| Some((row.label.as_str(), obstacle(&realisable[row.index])?)))
+                    .collect();
+                if idle.is_empty() {
                     return Some(());
                 }
-                let message = format!("{} of {} rows can never run", dead.len(), rows.len());
-                let error = Diagnostic::error(code::FALSE_CLAIM, message).at(span, "this is false");
-                self.reject(dead.iter().take(5).fold(error, |error, row| error.note(format!("{row} cannot"))))
+                let message = format!("{} of {} rows were not found to run", idle.len(), rows.len());
+                let error = Diagnostic::error(code::FALSE_CLAIM, message).at(span, "this is not shown");
+                let shown = idle.iter().take(ROWS_SHOWN);
+                self.reject(shown.fold(error, |error, (row, why)| error.note(format!("{row} {why}"))))
             }
             ast::ExprKind::Binary { op, left, right, .. } => {
                 let (left, right) = (self.count(left, space)?, self.count(right, space)?);
@@ -141,6 +148,20 @@ fn not_static(span: Span) -> Diagnostic {
         .help("claims are `count(actions) == 45` and `every(actions, realisable)`; an action or a group may stand for `actions`")
 }
 
-fn is_dead(row: &Row) -> bool {
-    !row.roads.is_empty() && row.roads.iter().all(|reach| matches!(reach, Reach::Dead { .. }))
+/// Why a row is not known to run on any road; `None` if it runs on one.
+fn obstacle(found: &[Realised]) -> Option<&'static str> {
+    // Without roads there is nothing to run on, and the roads of another space are not known here.
+    if found.is_empty() || found.contains(&Realised::Runs) {
+        return None;
+    }
+    let has = |wanted| found.contains(&wanted);
+    Some(match () {
+        () if has(Realised::NotSearched) => "was not looked at: the table is too large",
+        () if has(Realised::Unknown) => "may run or not: its rules could not be solved",
+        () if has(Realised::Elsewhere) => {
+            "runs in states of which it is not known whether an episode comes to them"
+        }
+        () if has(Realised::Unreached) => "runs only in states to which no episode comes",
+        () => "cannot run",
+    })
 }

@@ -18,7 +18,15 @@ impl Checker {
             if let Some(body) = self.rule(declared) {
                 let name = declared.name.text.clone();
                 let span = declared.name.span;
-                rules.push(RuleDef { name, docs: docs(item), optional: declared.optional, body, span });
+                let start = self.start_condition(&declared.body);
+                rules.push(RuleDef {
+                    name,
+                    docs: docs(item),
+                    optional: declared.optional,
+                    body,
+                    start,
+                    span,
+                });
             }
         }
         rules
@@ -74,11 +82,21 @@ impl Checker {
             }
             bindings.push(RuleBinding { action, condition });
         }
-        if bindings.is_empty() {
+        if bindings.is_empty() && self.start_condition(&rule.body).is_none() {
             let help = "a rule without `on` binds the actions that spawn, or that set a state it names";
             self.binds_nothing(rule, help);
         }
         Some(RuleBody::Holds(bindings))
+    }
+
+    /// The condition for the start of an episode, of a rule without `on` that asks only about states and the road.
+    fn start_condition(&mut self, body: &ast::RuleBody) -> Option<Expr> {
+        let ast::RuleBody::Holds { on, condition } = body else { return None };
+        if !on.is_empty() {
+            return None;
+        }
+        let compiled = self.quietly(|checker| checker.typed(condition, &Place::RULE, Type::Bool))?;
+        (compiled.reads_memory() && compiled.known() == Known::Road).then_some(compiled)
     }
 
     /// Reports a rule that binds no action, unless a broken declaration may be why.

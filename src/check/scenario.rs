@@ -1,14 +1,14 @@
 //! Scenarios: checks a timeline against its space, with the start, every step and every claim.
 
-use std::convert::Infallible;
+use std::cell::Cell;
 use std::sync::Arc;
 
 use crate::check::checker::docs;
 use crate::check::names::unknown;
 use crate::check::report::Report;
-use crate::check::scenario_rules::{Moment, breaches};
+use crate::check::scenario_rules::{Moment, breaches, broken_start};
 use crate::check::scenario_value::{figure, number, value};
-use crate::model::rules::RowRules;
+use crate::model::rules::{Before, Nearest, RowRules, TRIES_MAX};
 use crate::model::scenario::{
     Avoidability, Claim, ENDS, Figure, MODULES, Origin, Scenario, ScenarioStart, ScenarioStep,
 };
@@ -42,6 +42,11 @@ pub fn scenario(file: &ast::File, space: &Space) -> Result<Scenario, Vec<Diagnos
     let origin = reader.origin(&declared.origin);
     let road = reader.road(&declared.road);
     let start = reader.start(declared);
+    if let (true, Some(road)) = (reader.diagnostics.is_empty(), road) {
+        let in_force = reader.in_force(&origin);
+        let at = declared.start.first().map_or(declared.name.span, |field| field.name.span);
+        reader.diagnostics.extend(broken_start(space, &start.memory, &space.roads[road], &in_force, at));
+    }
     let steps = reader.steps(&declared.steps, &start.memory, &origin, road);
     let claims = declared.expects.iter().filter_map(|expect| reader.claim(expect)).collect();
     let docs = docs(item);
@@ -73,6 +78,15 @@ impl Report for Reader<'_> {
     fn report(&mut self, diagnostic: Diagnostic) {
         self.diagnostics.push(diagnostic);
     }
+}
+
+/// Where a step stands.
+struct Place<'a> {
+    /// Index in `Space::roads`; `None` if the road is unknown.
+    road: Option<usize>,
+    in_force: &'a RulesInForce,
+    /// The memory before it.
+    before: &'a Memory,
 }
 
 impl<'a> Reader<'a> {
@@ -220,6 +234,11 @@ impl<'a> Reader<'a> {
         }
     }
 
+    fn in_force(&self, origin: &Origin) -> RulesInForce {
+        let in_force = RulesInForce::new(self.space, &origin.with, &origin.without);
+        in_force.expect("the origin was read without the names that are no rules")
+    }
+
     fn steps(
         &mut self,
         declared: &[ast::Step],
@@ -227,8 +246,7 @@ impl<'a> Reader<'a> {
         origin: &Origin,
         road: Option<usize>,
     ) -> Vec<ScenarioStep> {
-        let in_force = RulesInForce::new(self.space, &origin.with, &origin.without);
-        let in_force = in_force.expect("the origin was read without the names that are no rules");
+        let in_force = self.in_force(origin);
         let mut steps: Vec<ScenarioStep> = Vec::new();
         let mut history = vec![(0, start.clone())];
         for step in declared {
@@ -253,9 +271,10 @@ impl<'a> Reader<'a> {
             }
             let Some(row) = self.row(&step.action) else { continue };
             let action = &self.space.actions[row.action];
-            let Some(drawn) = self.drawn(step, row, road, &in_force) else { continue };
-            let locals = locals(action, row, &drawn);
             let memory = &history[history.len() - 1].1;
+            let place = Place { road, in_force: &in_force, before: memory };
+            let Some(drawn) = self.drawn(step, row, &place) else { continue };
+            let locals = locals(action, row, &drawn);
             let after = self.space.memory_after(row.action, &locals, memory);
             let moment = Moment { step, row, locals: &locals, after: &after, history: &history, road };
             self.diagnostics.extend(breaches(self.space, &moment, &in_force));
@@ -338,13 +357,7 @@ impl<'a> Reader<'a> {
         row
     }
 
-    fn drawn(
-        &mut self,
-        step: &ast::Step,
-        row: &Row,
-        road: Option<usize>,
-        in_force: &RulesInForce,
-    ) -> Option<Vec<(Arc<str>, Value)>> {
+    fn drawn(&mut self, step: &ast::Step, row: &Row, place: &Place<'_>) -> Option<Vec<(Arc<str>, Value)>> {
         let action = &self.space.actions[row.action];
         let mut sound = true;
         self.fields_once("drawn value", &step.drawn);
@@ -383,7 +396,7 @@ impl<'a> Reader<'a> {
             values.push((parameter.name.clone(), value));
         }
         if !missing.is_empty() {
-            let error = self.missing(step, row, road, in_force, &missing, values);
+            let error = self.missing(step, row, place, &missing, values);
             return self.reject(error);
         }
         sound.then_some(values)
@@ -395,8 +408,7 @@ impl<'a> Reader<'a> {
         &self,
         step: &ast::Step,
         row: &Row,
-        road: Option<usize>,
-        in_force: &RulesInForce,
+        place: &Place<'_>,
         missing: &[&Parameter],
         mut values: Vec<(Arc<str>, Value)>,
     ) -> Diagnostic {
@@ -419,15 +431,20 @@ impl<'a> Reader<'a> {
         let mut known = locals(action, row, &values);
         let indices = || (0..known.len()).filter(|local| names.contains(&&*action.parameters[*local].name));
         let missing: Vec<usize> = indices().collect();
+        let Place { road, in_force, before } = *place;
         if let Some(road) = road {
-            let rules = RowRules { space, row, road: Some(&space.roads[road].facts), in_force };
+            let road = Some(&space.roads[road].facts);
             let is_number = |local: &usize| matches!(known[*local], Value::Number(_));
-            let open = missing.iter().copied().filter(is_number).collect();
-            let Ok(()) = rules.solve(&mut known, open, |local, example, room| {
-                let example = example.number();
-                let holds = |set: &f64| action.parameters[local].domain.holds(Value::Number(*set));
-                Ok::<f64, Infallible>(room.settle(example).filter(holds).unwrap_or(example))
-            });
+            let open: Vec<usize> = missing.iter().copied().filter(is_number).collect();
+            // A rule that the given values break alone is no reason against an example for the others.
+            let in_force = RowRules { space, row, road, in_force }.deciding(&open);
+            let rules = RowRules { space, row, road, in_force: &in_force };
+            let tries = Cell::new(TRIES_MAX);
+            let before = Before { memory: before, world: None, tries: &tries };
+            let mut example = Nearest { wanted: known.clone() };
+            if let Ok(solved) = rules.solve(known.clone(), &open, before, &mut example) {
+                known = solved;
+            }
         }
         let shown = missing.iter().map(|local| {
             let parameter = &action.parameters[*local];

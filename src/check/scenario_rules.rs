@@ -6,8 +6,9 @@
 use crate::model::expr::{Comparison, ExprKind};
 use crate::model::rules::{Breach, Candidate, RowRules};
 use crate::model::vocabulary::{LaneChoice, Word};
-use crate::model::{Memory, Row, RuleDef, RulesInForce, Space, Value, code};
+use crate::model::{Memory, Road, Row, RuleDef, RulesInForce, Space, Value, code};
 use crate::prove::{next_rows, shortest_way};
+use crate::syntax::ast::Span;
 use crate::syntax::{Diagnostic, ast, listed};
 
 /// Largest number of legal rows that are listed for one step.
@@ -47,6 +48,21 @@ pub(super) fn breaches(space: &Space, moment: &Moment<'_>, in_force: &RulesInFor
         }
     };
     rules.breaches(candidate).filter_map(error).collect()
+}
+
+/// The error for a start that breaks a rule in force; `at` is where it is declared.
+pub(super) fn broken_start(
+    space: &Space,
+    start: &Memory,
+    road: &Road,
+    in_force: &RulesInForce,
+    at: Span,
+) -> Option<Diagnostic> {
+    let rule = &space.rules[space.broken_start(start, &road.facts, in_force)?];
+    let message = format!("the start breaks rule `{}`", rule.name);
+    let error = Diagnostic::error(code::BROKEN_RULE, message).at(at, format!("begins so on `{}`", road.name));
+    let error = error.beside(rule.span, "does not allow it");
+    Some(error.help("begin with other states, or switch the rule off: `origin { without: [RULE] }`"))
 }
 
 /// Adds the history of the state up to the step, and the shortest legal way to the value that the step sets.

@@ -7,18 +7,21 @@ use crate::check::names::unknown;
 use crate::check::policy::value_of;
 use crate::check::report::Report;
 use crate::check::scenario::Reader;
-use crate::model::{Memory, Space};
+use crate::model::{Memory, NoStart, Road, RulesInForce, Space};
 use crate::syntax::ast::Field;
 use crate::syntax::{Diagnostic, parse_fields};
 
+/// How `--state` is written.
+const EXAMPLE: &str = "time: Night, sky: { Rain: High }";
+
 /// The memory that a text describes as the `start` of a scenario does, for example
 /// `time: Night, sky: { Rain: High }`. A state that the text leaves out has its initial value; the seed draws
-/// the states that begin as `any`.
+/// the states that begin as `any`. Rules do not count: see [`legal_memory_from`].
 ///
 /// # Errors
 /// The first mistake, in words.
 pub fn memory_from(space: &Space, text: &str, seed: u64) -> Result<Memory, String> {
-    let fields = fields_of(text, "states", "time: Night, sky: { Rain: High }")?;
+    let fields = fields_of(text, "states", EXAMPLE)?;
     let mut reader = Reader { space, diagnostics: Vec::new() };
     let mut memory = space.initial_memory(seed);
     for field in &fields {
@@ -31,6 +34,32 @@ pub fn memory_from(space: &Space, text: &str, seed: u64) -> Result<Memory, Strin
         }
     }
     reader.diagnostics.into_iter().next().map_or(Ok(memory), |mistake| Err(in_words(mistake)))
+}
+
+/// As [`memory_from`], with states that obey the rules: what the text leaves out is drawn from what they leave.
+///
+/// # Errors
+/// The first mistake, in words; also a state that breaks a rule which holds from the start on.
+pub fn legal_memory_from(
+    space: &Space,
+    text: &str,
+    road: &Road,
+    rules: &RulesInForce,
+    seed: u64,
+) -> Result<Memory, String> {
+    let begun = memory_from(space, text, seed)?;
+    let fields = fields_of(text, "states", EXAMPLE)?;
+    let mut open = space.open_cells();
+    for state in &space.states {
+        if fields.iter().any(|field| field.name.text == state.name) {
+            open.retain(|cell| !(state.first_cell..state.first_cell + state.cells).contains(cell));
+        }
+    }
+    let drawn = space.memory_from_start(begun, &open, road, rules, seed);
+    drawn.map_err(|no_start| {
+        let NoStart { rule, road, .. } = no_start;
+        format!("`{text}` breaks rule `{rule}` on `{road}`, which holds in every moment; switch it off by `--without {rule}`")
+    })
 }
 
 /// The index of each variable that a text names, and the value that an observation holds for it, for example

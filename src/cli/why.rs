@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use crate::action::{Offer, Situation};
-use crate::check::state_argument::memory_from;
+use crate::check::state_argument::legal_memory_from;
 use crate::emit;
 use crate::episode;
 use crate::model::RulesInForce;
@@ -37,8 +37,8 @@ pub fn why(output: &Output, arguments: &WhyArguments) -> Result<(), Failure> {
     let rules =
         RulesInForce::new(space, &arguments.rules.with, &arguments.rules.without).map_err(Failure::usage)?;
     let memory = match &arguments.state {
-        None => space.initial_memory(SEED),
-        Some(text) => memory_from(space, text, SEED).map_err(Failure::usage)?,
+        None => space.memory_at_start(road, &rules, SEED).map_err(Failure::usage)?,
+        Some(text) => legal_memory_from(space, text, road, &rules, SEED).map_err(Failure::usage)?,
     };
     let start = episode::start(space, &memory, SEED);
     let world = World::new(Arc::new(episode::scene(road)), &start);

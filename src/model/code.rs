@@ -97,6 +97,8 @@ pub const NEVER_ACTS: &str = "AV0408";
 pub const UNFAIR: &str = "AV0409";
 /// A rule that follows from others.
 pub const IMPLIED: &str = "AV0410";
+/// A rule under which no episode can begin.
+pub const NO_START: &str = "AV0411";
 /// A value that a transition rule does not lead out of.
 pub const DEADLOCK: &str = "AV0501";
 /// A value that a transition rule does not lead to.

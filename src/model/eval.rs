@@ -202,7 +202,7 @@ fn has_lane(facts: &Facts<'_>, lane: LaneChoice) -> bool {
     facts.road.is_some_and(|road| road.has_lane(lane))
 }
 
-fn arithmetic(op: Arithmetic, left: f64, right: f64) -> f64 {
+pub(crate) fn arithmetic(op: Arithmetic, left: f64, right: f64) -> f64 {
     match op {
         Arithmetic::Add => left + right,
         Arithmetic::Subtract => left - right,

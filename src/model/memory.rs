@@ -1,14 +1,16 @@
 //! How the memory begins and how actions change it.
 
 use crate::model::eval::{Facts, evaluate};
-use crate::model::space::{EffectDef, Initial, SetDef, Space, StateDef, StateMeaning};
+use crate::model::rules::RulesInForce;
+use crate::model::space::{EffectDef, Initial, Road, SetDef, Space, StateDef, StateMeaning};
 use crate::model::value::{Memory, Type, Value};
 use crate::model::vocabulary::{Level, TimeOfDay};
 use crate::rng;
 use crate::rng::{Rng, Stream};
 
 impl Space {
-    /// The memory at the beginning of an episode; `any` states are drawn from [`Stream::Reset`].
+    /// The states as they are declared; those that begin as `any` are drawn from [`Stream::Reset`], whatever the rules
+    /// say. [`Space::memory_at_start`] also asks the rules.
     pub fn initial_memory(&self, seed: u64) -> Memory {
         let mut rng = rng::stream(seed, Stream::Reset, 0);
         let mut memory = Memory::default();
@@ -24,6 +26,30 @@ impl Space {
             }
         }
         memory
+    }
+
+    /// The memories with which an episode may begin on a road, at most so many, and whether these are all.
+    pub(crate) fn initial_memories(
+        &self,
+        road: &Road,
+        rules: &RulesInForce,
+        count_max: usize,
+    ) -> (Vec<Memory>, bool) {
+        let begun = self.initial_memory(0);
+        let (mut memories, mut are_all) = (vec![begun], true);
+        for cell in self.open_cells() {
+            let values = self.drawn_values(self.state_of(cell).ty);
+            let with = |memory: &Memory| values.iter().map(|(_, value)| memory.with(cell, *value)).collect();
+            let mut longer: Vec<Memory> = memories.iter().flat_map::<Vec<Memory>, _>(with).collect();
+            are_all &= longer.len() <= count_max;
+            longer.truncate(count_max);
+            memories = longer;
+        }
+        memories.retain(|memory| self.broken_start(memory, &road.facts, rules).is_none());
+        if memories.is_empty() {
+            memories.extend(self.memory_at_start(road, rules, 0));
+        }
+        (memories, are_all)
     }
 
     /// A state by name.

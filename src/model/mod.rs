@@ -32,7 +32,7 @@ pub use meaning::Meaning;
 pub use policy::Policy;
 pub(crate) use row::locals;
 pub use row::{Reach, Row};
-pub use rules::{RulesInForce, UnknownRule};
+pub use rules::{NoStart, RulesInForce, UnknownRule};
 pub use scenario::{
     Avoidability, Claim, ENDS, Figure, MODULES, Origin, Scenario, ScenarioStart, ScenarioStep,
 };

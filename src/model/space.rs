@@ -7,7 +7,7 @@ use std::sync::Arc;
 use crate::model::expr::Expr;
 use crate::model::meaning::Meaning;
 use crate::model::row::Row;
-use crate::model::rules::Bound;
+use crate::model::rules::{Bound, Clause};
 use crate::model::value::{EnumIndex, Type, Value};
 use crate::model::vocabulary::{Body, Colour, LaneChoice, Level, Phenomenon, Side, Then, TimeOfDay, Verb};
 use crate::road::{LanePlace, RoadMap, Route};
@@ -44,6 +44,8 @@ pub struct Space {
     pub rows: Vec<Row>,
     /// For each action: the bounds that `where`s and rules set for each of its drawn numbers.
     pub(crate) bounds: Vec<Vec<Bound>>,
+    /// For each action: its `where`s and rules, with the parameters that decide each.
+    pub(crate) clauses: Vec<Vec<Clause>>,
 }
 
 #[derive(Debug, Clone, PartialEq)]
@@ -236,6 +238,8 @@ pub struct RuleDef {
     /// Off unless `--with` names it.
     pub optional: bool,
     pub body: RuleBody,
+    /// Its condition for the states with which an episode begins; `None` if it says nothing about them.
+    pub start: Option<Expr>,
     pub span: Span,
 }
 

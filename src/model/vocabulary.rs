@@ -303,7 +303,7 @@ words! {
     Count "count" = "The number of rows of an action, a group, or all `actions`: `count(actions)`.",
     Every "every" = "`every(actions, realisable)`: each row can run on some road.",
     Actions "actions" = "All actions.",
-    Realisable "realisable" = "Not proved dead on every road.",
+    Realisable "realisable" = "Found to run on some road, in states to which an episode comes.",
 }
 
 words! {

@@ -2,10 +2,13 @@
 
 use std::collections::VecDeque;
 
-use crate::model::{Initial, Reach, Row, RuleBody, RuleDef, Space, Type, Value, code};
+use crate::model::{Reach, Row, RuleBody, RuleDef, RulesInForce, Space, Type, Value, code};
 use crate::prove::enclose::Values;
 use crate::prove::reach::{declared, numbers};
 use crate::syntax::{Diagnostic, listed};
+
+/// The most starts of an episode that are looked at.
+const STARTS_MAX: usize = 1_000;
 
 /// The graph of one rule.
 struct Graph<'a> {
@@ -52,13 +55,7 @@ pub(crate) fn report(space: &Space) -> Vec<Diagnostic> {
             diagnostics
                 .push(warning.help("begin elsewhere, allow more moves, or add an action that sets it"));
         }
-        let never: Vec<&Row> = graph
-            .rows
-            .iter()
-            .filter(|(row, _)| row.roads.iter().any(|reach| matches!(reach, Reach::Open(_))))
-            .filter(|(_, sets)| !bits(reached).any(|from| bits(*sets).any(|to| graph.allowed[from][to])))
-            .map(|(row, _)| *row)
-            .collect();
+        let never = graph.never_enabled();
         if let Some(first) = never.first() {
             let message = format!("`{}` is never enabled", first.label);
             let warning = Diagnostic::warning(code::NEVER_ENABLED, message)
@@ -93,16 +90,9 @@ pub(crate) fn forbids(space: &Space, rule: &RuleDef, row: &Row, from: u128) -> b
 }
 
 fn graph<'a>(space: &'a Space, rule: &'a RuleDef) -> Option<Graph<'a>> {
-    let RuleBody::Moves { state, cell, allowed, .. } = &rule.body else { return None };
+    let RuleBody::Moves { cell, allowed, .. } = &rule.body else { return None };
     let index = space.rules.iter().position(|known| known.name == rule.name)?;
-    let definition = &space.states[*state];
-    let begin = match &definition.initial[cell - definition.first_cell] {
-        Initial::Any => u128::MAX >> (128 - allowed.len()),
-        Initial::Value(expr) => match &expr.kind {
-            crate::model::expr::ExprKind::Variant(_, value) => 1 << value,
-            _ => u128::MAX >> (128 - allowed.len()),
-        },
-    };
+    let begin = begin(space, *cell).unwrap_or(u128::MAX >> (128 - allowed.len()));
     let rows = space.rows.iter().filter(|row| row.rules.contains(&index)).map(|row| {
         let after = space.cells_after(row.action, &declared(space, row), &space.cells_unknown());
         match after[*cell] {
@@ -113,7 +103,40 @@ fn graph<'a>(space: &'a Space, rule: &'a RuleDef) -> Option<Graph<'a>> {
     Some(Graph { allowed, rows: rows.collect(), begin })
 }
 
-impl Graph<'_> {
+/// The values with which a cell may begin on some road, as bits; `None` if there are too many starts to look at.
+fn begin(space: &Space, cell: usize) -> Option<u128> {
+    let in_force = RulesInForce::by_default(space);
+    let is_drawn = space.open_cells().contains(&cell);
+    let mut begin = 0;
+    for road in &space.roads {
+        let (memories, are_all) = space.initial_memories(road, &in_force, STARTS_MAX);
+        // A fixed cell has one value, however many the others have.
+        if !are_all && is_drawn {
+            return None;
+        }
+        begin |= memories.iter().fold(0, |all, memory| all | 1 << memory.cells()[cell].variant());
+    }
+    (begin != 0).then_some(begin)
+}
+
+/// The rows, by number, that a transition rule allows in no state which it lets an episode come to.
+pub(super) fn never_enabled(space: &Space) -> Vec<usize> {
+    let graphs = space.rules.iter().filter_map(|rule| graph(space, rule));
+    graphs.flat_map(|graph| graph.never_enabled()).map(|row| row.index).collect()
+}
+
+impl<'a> Graph<'a> {
+    /// The rows that are allowed from no value that an episode can reach.
+    fn never_enabled(&self) -> Vec<&'a Row> {
+        let reached = self.reached();
+        self.rows
+            .iter()
+            .filter(|(row, _)| row.roads.iter().any(|reach| matches!(reach, Reach::Open(_))))
+            .filter(|(_, sets)| !bits(reached).any(|from| bits(*sets).any(|to| self.allowed[from][to])))
+            .map(|(row, _)| *row)
+            .collect()
+    }
+
     /// Every value that an episode can reach.
     fn reached(&self) -> u128 {
         let mut reached = self.begin;

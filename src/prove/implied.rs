@@ -8,6 +8,9 @@ use crate::syntax::{Diagnostic, listed};
 /// Limit on rows times rules for the whole report; rules beyond it are not looked at.
 const WORK_MAX: usize = 1_000_000;
 
+/// The most starts of an episode that are looked at for one rule.
+const STARTS_MAX: usize = 1_000;
+
 /// One warning for each rule that can never refuse anything, on any road and with any memory. If two rules
 /// follow from each other, the later one is named.
 pub(super) fn report(space: &Space) -> Vec<Diagnostic> {
@@ -56,7 +59,7 @@ fn follows(space: &Space, rule: usize, others: &RulesInForce, work: &mut usize) 
     let count = bound().count();
     let Some(left) = work.checked_sub(count * (1 + others.all().count())) else { return false };
     *work = left;
-    if count == 0 {
+    if count == 0 && space.rules[rule].start.is_none() {
         return false;
     }
     match &space.rules[rule].body {
@@ -70,8 +73,22 @@ fn follows(space: &Space, rule: usize, others: &RulesInForce, work: &mut usize) 
                 RuleBody::Holds(_) => false,
             })
         }
-        RuleBody::Holds(_) => bound().all(|row| holds(space, row, rule, others)),
+        RuleBody::Holds(_) => {
+            bound().all(|row| holds(space, row, rule, others)) && start_holds(space, rule, others)
+        }
     }
+}
+
+/// Whether every start that the other rules leave obeys the rule; `false` if there are too many to look at.
+fn start_holds(space: &Space, rule: usize, others: &RulesInForce) -> bool {
+    if space.rules[rule].start.is_none() {
+        return true;
+    }
+    let alone = RulesInForce::only(space, rule);
+    space.roads.iter().all(|road| {
+        let (memories, are_all) = space.initial_memories(road, others, STARTS_MAX);
+        are_all && memories.iter().all(|memory| space.broken_start(memory, &road.facts, &alone).is_none())
+    })
 }
 
 fn holds(space: &Space, row: &Row, rule: usize, others: &RulesInForce) -> bool {

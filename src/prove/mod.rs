@@ -10,8 +10,10 @@ mod cut;
 mod enclose;
 mod implied;
 mod reach;
+mod realise;
 mod reduce;
 mod spawn_bounds;
+mod start;
 mod twins;
 mod undecided;
 mod unfair;
@@ -21,17 +23,19 @@ pub(crate) use clock::{forbids, next_rows, shortest_way};
 pub use cut::{Removal, removals};
 pub(crate) use enclose::{Known, VARIANTS_MAX, Values, enclose};
 pub(crate) use reach::{product_size, rows};
+pub(crate) use realise::{Realisable, Realised, realise, with_dead};
 pub use witness::{Witness, witness};
 
 use crate::model::Space;
 use crate::syntax::Diagnostic;
 
 /// Errors, warnings and remarks about a space whose names and types are right.
-pub(crate) fn report(space: &Space) -> Vec<Diagnostic> {
+pub(crate) fn report(space: &Space, realisable: &Realisable) -> Vec<Diagnostic> {
     let mut diagnostics = reach::report(space);
+    diagnostics.extend(start::report(space));
     diagnostics.extend(spawn_bounds::report(space));
     diagnostics.extend(twins::report(space));
-    diagnostics.extend(undecided::report(space));
+    diagnostics.extend(undecided::report(space, realisable));
     diagnostics.extend(cut::report(space));
     diagnostics.extend(implied::report(space));
     diagnostics.extend(unfair::report(space));

@@ -4,14 +4,12 @@
 //! 0.774 g. The time in which the brake builds up is left out: it only adds to the distance, and this proof
 //! needs a lower bound. The world computes the whole distance (`spawn_gap >= safety_gap`).
 
-use std::cell::Cell;
-
 use crate::model::rules::{Demand, RowRules};
 use crate::model::vocabulary::{Known, Verb, Word};
 use crate::model::{
     EffectDef, Facts, Memory, Reach, Road, Row, RulesInForce, Space, SpawnDef, Value, code, evaluate, locals,
 };
-use crate::prove::witness::{Search, Witness};
+use crate::prove::witness::{Left, Search, Witness};
 use crate::syntax::Diagnostic;
 use crate::units::decimal;
 
@@ -29,14 +27,14 @@ const MARGIN_M: f64 = 0.01;
 pub(super) fn report(space: &Space) -> Vec<Diagnostic> {
     let mut diagnostics = Vec::new();
     for (index, action) in space.actions.iter().enumerate() {
-        let boxes_left = Cell::new(BOXES_MAX / space.actions.len());
+        let left = Left::new(BOXES_MAX / space.actions.len());
         for effect in &action.effects {
             let EffectDef::Spawn(spawn) = effect else { continue };
             let found = space.rows.iter().filter(|row| row.action == index).find_map(|row| {
                 let roads = space.roads.iter().zip(&row.roads);
                 let open = roads.filter(|(_, reach)| matches!(reach, Reach::Open(_)));
                 open.map(|(road, _)| road)
-                    .find_map(|road| Some((row, road, unfair(space, row, road, spawn, &boxes_left)?)))
+                    .find_map(|road| Some((row, road, unfair(space, row, road, spawn, &left)?)))
             });
             if let Some((row, road, found)) = found {
                 diagnostics.push(remark(space, row, road, spawn, &found));
@@ -53,7 +51,7 @@ pub(super) fn unfair(
     row: &Row,
     road: &Road,
     spawn: &SpawnDef,
-    boxes_left: &Cell<usize>,
+    left: &Left,
 ) -> Option<Witness> {
     let in_force = RulesInForce::by_default(space);
     let rules = RowRules { space, row, road: Some(&road.facts), in_force: &in_force };
@@ -61,7 +59,7 @@ pub(super) fn unfair(
     if rules.demands().any(|(_, demand)| asks(demand)) {
         return None;
     }
-    Search { rules, boxes_left }.find(&|values, memory| {
+    Search { rules, left }.find(&|values, memory| {
         let figures = figures(space, road, spawn, values, memory);
         figures.needed_m > figures.distance_m + MARGIN_M
     })

@@ -1,19 +1,22 @@
-//! Witnesses: values with which a row runs on a road, found by search.
+//! Witnesses: values with which a row runs on a road.
 //!
-//! The search narrows the ranges by exact intervals, tries the ends and the middle of what is left, and
-//! halves the box where nothing fits. Each try is solved and judged as a draw is, in f64. The world around is
-//! taken to be empty: a spawn lands where it was asked to, and no gap is too small. Values that the search
-//! does not find may still exist.
+//! Values are solved for as drawing solves for them (`model::rules`), and judged as drawing judges. The world around
+//! is taken to be empty: a spawn lands where it was asked to, and no gap is too small. A rule that asks more of the
+//! world than that holds at some moment, as far as is known here.
+//!
+//! Where a rule asks about a gap, or more is wished for than that the row runs, the search narrows the ranges by
+//! exact intervals, tries the ends and the middle of what is left, and halves the box where nothing fits. Values
+//! that this search does not find may still exist.
 
 use std::cell::Cell;
 use std::collections::VecDeque;
 use std::sync::Arc;
 
 use crate::model::expr::{Expr, ExprKind};
-use crate::model::rules::{Breach, Candidate, Demand, Room, RowRules};
+use crate::model::rules::{Before, Breach, Candidate, Choose, Demand, Nearest, Room, RowRules};
 use crate::model::{
     ActionDef, Domain, EffectDef, End, Facts, Initial, Interval, Memory, Parameter, Road, Row, RulesInForce,
-    Space, SpawnFacts, StateDef, Type, Value, WorldFacts, evaluate, locals, spawn_out_of_bounds,
+    SetDef, Space, SpawnFacts, StateDef, Type, Value, WorldFacts, evaluate, locals, spawn_out_of_bounds,
 };
 use crate::prove::enclose::{Known, Values, enclose};
 use crate::units::Rational;
@@ -22,12 +25,18 @@ use crate::units::Rational;
 const BOXES_MAX: usize = 24;
 /// The most boxes looked at in one search for a single witness.
 const BOXES_IN_ALL_MAX: usize = 20_000;
+/// Judgements of solving for each box, on average; most rows need some fifty for one box.
+const TRIES_A_BOX: usize = 10;
+/// Judgements of solving for one row and one memory.
+const TRIES_A_MEMORY: usize = 5_000;
 /// The most choices of listed values, and the most memories, that are tried.
 const CHOICES_MAX: usize = 256;
 const MEMORIES_MAX: usize = 64;
 /// The first ranges of a row: every combination of their ends is tried. All later ranges take the same end as the
 /// last of these.
 const CORNER_BITS: usize = 3;
+/// The shares of what is left that are tried for each parameter: the middle, and the two ends.
+const SHARES: [f64; 3] = [0.5, 0.0, 1.0 - f64::EPSILON];
 
 /// Values with which a row runs, and the memory before it.
 #[derive(Debug, Clone, PartialEq)]
@@ -39,26 +48,68 @@ pub struct Witness {
 
 /// A witness for a row on a road with the default rules; `None` if the search finds none.
 pub fn witness(space: &Space, row: &Row, road: &Road) -> Option<Witness> {
-    witness_within(space, row, road, &Cell::new(BOXES_IN_ALL_MAX))
-}
-
-/// As [`witness`], with so many boxes left to look at.
-pub(super) fn witness_within(
-    space: &Space,
-    row: &Row,
-    road: &Road,
-    boxes_left: &Cell<usize>,
-) -> Option<Witness> {
     let in_force = RulesInForce::by_default(space);
     let rules = RowRules { space, row, road: Some(&road.facts), in_force: &in_force };
-    Search { rules, boxes_left }.find(&|_, _| true)
+    let search = Search { rules, left: &Left::new(BOXES_IN_ALL_MAX) };
+    search.memories().0.into_iter().find_map(|memory| match search.at(&memory) {
+        Found::Runs(values) => {
+            let values = search.action().drawn_of(&values);
+            Some(Witness { values, memory })
+        }
+        Found::Never | Found::Unknown => None,
+    })
+}
+
+/// What is found of a row with one memory before it.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Found {
+    /// Values of all its parameters with which it runs.
+    Runs(Vec<Value>),
+    /// No values obey the rules.
+    Never,
+    /// No values were found.
+    Unknown,
 }
 
 /// A search for values of a row on a road under the rules in force.
 pub(super) struct Search<'a> {
     pub rules: RowRules<'a>,
-    /// Boxes that may still be looked at; at 0 a search finds nothing more.
-    pub boxes_left: &'a Cell<usize>,
+    pub left: &'a Left,
+}
+
+/// What searches may still do; at 0 they find nothing more.
+pub(super) struct Left {
+    /// Boxes to look at.
+    boxes: Cell<usize>,
+    /// Judgements of solving.
+    tries: Cell<usize>,
+}
+
+impl Left {
+    pub fn new(boxes: usize) -> Left {
+        Left { boxes: Cell::new(boxes), tries: Cell::new(boxes.saturating_mul(TRIES_A_BOX)) }
+    }
+
+    pub fn is_spent(&self) -> bool {
+        self.boxes.get() == 0 || self.tries.get() == 0
+    }
+
+    fn take_box(&self) {
+        self.boxes.set(self.boxes.get().saturating_sub(1));
+    }
+}
+
+/// Takes the same share of everything that is left.
+struct Share(f64);
+
+impl Choose for Share {
+    fn value(&mut self, _local: usize, left: &[Value]) -> Value {
+        left[((left.len() as f64 * self.0) as usize).min(left.len() - 1)]
+    }
+
+    fn number(&mut self, _local: usize, room: &Room) -> Option<f64> {
+        room.at(self.0)
+    }
 }
 
 /// Where in a box a candidate is taken from.
@@ -78,9 +129,9 @@ impl Search<'_> {
     pub fn find(&self, wish: &Wish<'_>) -> Option<Witness> {
         let action = self.action();
         let choices = choices(action, &locals(action, self.rules.row, &[]));
-        for memory in self.memories() {
+        for memory in self.memories().0 {
             for chosen in &choices {
-                if self.boxes_left.get() == 0 {
+                if self.left.is_spent() {
                     return None;
                 }
                 if let Some(values) = self.numbers(chosen, &memory, wish) {
@@ -91,7 +142,46 @@ impl Search<'_> {
         None
     }
 
-    fn action(&self) -> &ActionDef {
+    /// What there is with this memory before the row.
+    pub fn at(&self, memory: &Memory) -> Found {
+        self.left.take_box();
+        let lent = self.left.tries.get().min(TRIES_A_MEMORY);
+        let tries = Cell::new(lent);
+        let found = self.solved(memory, &tries);
+        self.left.tries.set(self.left.tries.get() - (lent - tries.get()));
+        if let Some(found) = found {
+            return found;
+        }
+        if self.left.is_spent() || tries.get() == 0 {
+            return Found::Unknown;
+        }
+        // What is left to try are rules about the gap of the spawn, and its bounds.
+        let action = self.action();
+        let mut chosen = choices(action, &locals(action, self.rules.row, &[])).into_iter();
+        let found = chosen.find_map(|chosen| self.numbers(&chosen, memory, &|_, _| true));
+        found.map_or(Found::Unknown, Found::Runs)
+    }
+
+    /// Values by solving alone; `None` if they exist and the row does not run with them, or if they are not found.
+    fn solved(&self, memory: &Memory, tries: &Cell<usize>) -> Option<Found> {
+        let action = self.action();
+        let parameters = action.parameters.iter().enumerate();
+        let open: Vec<usize> = parameters.filter(|(_, p)| !p.axis).map(|(local, _)| local).collect();
+        let given = locals(action, self.rules.row, &[]);
+        for share in SHARES {
+            // Without a world, rules that ask it hold: they are left to the moment.
+            let before = Before { memory, world: None, tries };
+            match self.rules.solve(given.clone(), &open, before, &mut Share(share)) {
+                Ok(values) if self.runs_in_empty(&values, memory) => return Some(Found::Runs(values)),
+                Ok(_) => {}
+                Err(unsolved) if unsolved.is_proved => return Some(Found::Never),
+                Err(_) => return None,
+            }
+        }
+        None
+    }
+
+    pub fn action(&self) -> &ActionDef {
         &self.rules.space.actions[self.rules.row.action]
     }
 
@@ -108,11 +198,11 @@ impl Search<'_> {
         }
         let corners = 0..1_usize << open.len().min(CORNER_BITS);
         let mut boxes = VecDeque::from([declared]);
-        for _ in 0..BOXES_MAX.min(self.boxes_left.get()) {
-            self.boxes_left.set(self.boxes_left.get() - 1);
+        for _ in 0..BOXES_MAX.min(self.left.boxes.get()) {
+            self.left.take_box();
             let Some(narrowed) = self.rules.narrow(boxes.pop_front()?, &before) else { continue };
             for place in corners.clone().map(Place::Corner).chain([Place::Middle]) {
-                let values = self.candidate(chosen, &open, &narrowed, place);
+                let values = self.candidate(chosen, &open, &narrowed, place, memory);
                 if let Some(found) = values.filter(|values| self.runs(values, memory, wish)) {
                     return Some(found);
                 }
@@ -129,6 +219,7 @@ impl Search<'_> {
         open: &[usize],
         narrowed: &[Values],
         place: Place,
+        memory: &Memory,
     ) -> Option<Vec<Value>> {
         let mut values = chosen.to_vec();
         for (index, local) in open.iter().enumerate() {
@@ -145,13 +236,20 @@ impl Search<'_> {
             };
             values[*local] = Value::Number(number.to_f64());
         }
-        let settle = |_, value: Value, room: &Room| room.settle(value.number()).ok_or(());
-        self.rules.solve(&mut values, open.to_vec(), settle).ok()?;
-        Some(values)
+        let mut nearest = Nearest { wanted: values.clone() };
+        self.rules
+            .solve(values, open, Before { memory, world: None, tries: &self.left.tries }, &mut nearest)
+            .ok()
     }
 
     /// Whether these values run in an empty world, and fulfil the wish.
     fn runs(&self, values: &[Value], before: &Memory, wish: &Wish<'_>) -> bool {
+        let after = || self.rules.space.memory_after(self.rules.row.action, values, before);
+        self.runs_in_empty(values, before) && wish(values, &after())
+    }
+
+    /// Whether these values run in an empty world, as far as that can be told.
+    fn runs_in_empty(&self, values: &[Value], before: &Memory) -> bool {
         let (space, action) = (self.rules.space, self.action());
         let in_domain =
             |(parameter, value): (&Parameter, &Value)| parameter.axis || parameter.domain.holds(*value);
@@ -173,8 +271,47 @@ impl Search<'_> {
         }
         let world = WorldFacts { spawns, ..WorldFacts::default() };
         let candidate = Candidate { values, before, after, world: Some(&world) };
-        let runs = self.rules.breaches(candidate).all(|breach| self.is_left_open(breach, candidate));
-        runs && wish(values, after)
+        self.rules.breaches(candidate).all(|breach| self.is_left_open(breach, candidate))
+    }
+
+    /// The states that one step with this row leads to, and whether there can be no other.
+    pub fn successors(&self, memory: &Memory) -> (Vec<Memory>, bool) {
+        let action = self.action();
+        let sets: Vec<&SetDef> = action
+            .effects
+            .iter()
+            .filter_map(|effect| match effect {
+                EffectDef::Set(set) => Some(&**set),
+                EffectDef::Spawn(_) => None,
+            })
+            .collect();
+        if sets.is_empty() {
+            return (Vec::new(), true);
+        }
+        self.left.take_box();
+        let names = |expr: &Expr, local: usize| expr.any(|kind| *kind == ExprKind::Local(local));
+        let decides = |local: usize| {
+            sets.iter()
+                .any(|set| names(&set.value, local) || set.key.as_ref().is_some_and(|key| names(key, local)))
+        };
+        let open: Vec<usize> = action.drawn_numbers().collect();
+        let mut is_complete = !open.iter().any(|local| decides(*local));
+        let mut after = Vec::new();
+        let chosen = choices(action, &locals(action, self.rules.row, &[]));
+        is_complete &= chosen.len() < CHOICES_MAX;
+        for chosen in chosen {
+            let before = Before { memory, world: None, tries: &self.left.tries };
+            match self.rules.solve(chosen, &open, before, &mut Share(SHARES[0])) {
+                Ok(values) => {
+                    let led_to = self.rules.space.memory_after(self.rules.row.action, &values, memory);
+                    if !after.contains(&led_to) {
+                        after.push(led_to);
+                    }
+                }
+                Err(unsolved) => is_complete &= unsolved.is_proved,
+            }
+        }
+        (after, is_complete)
     }
 
     /// Whether what a candidate breaks depends on a moment or a place that an empty world does not have, and might
@@ -197,9 +334,10 @@ impl Search<'_> {
     }
 
     /// Memories to try: the initial one first, then every value of the cells that the rules or effects of the
-    /// row read.
-    fn memories(&self) -> Vec<Memory> {
+    /// row read. Gives also whether there can be no other.
+    pub fn memories(&self) -> (Vec<Memory>, bool) {
         let space = self.rules.space;
+        let mut is_complete = true;
         let mut memories = vec![Memory::default()];
         for state in &space.states {
             for cell in 0..state.cells {
@@ -209,6 +347,8 @@ impl Search<'_> {
                     false => vec![initial],
                 };
                 let room = MEMORIES_MAX / memories.len();
+                is_complete &= values.len() <= room.max(1);
+                is_complete &= !self.reads(state, cell) || !matches!(state.ty, Type::Int | Type::Quantity(_));
                 let longer = memories.iter().flat_map(|memory| {
                     values.iter().take(room.max(1)).map(|value| {
                         let mut memory = memory.clone();
@@ -219,11 +359,11 @@ impl Search<'_> {
                 memories = longer.collect();
             }
         }
-        memories
+        (memories, is_complete)
     }
 
     /// Whether a rule or an effect of the row depends on what the cell was before.
-    fn reads(&self, state: &StateDef, cell: usize) -> bool {
+    pub fn reads(&self, state: &StateDef, cell: usize) -> bool {
         let named = |expr: &Expr| {
             expr.any(|kind| match kind {
                 ExprKind::Cell(named) => *named == state.first_cell + cell,
@@ -244,7 +384,7 @@ impl Search<'_> {
 }
 
 /// Every choice of the listed values, the first values first; what is a range stays as it is.
-fn choices(action: &ActionDef, values: &[Value]) -> Vec<Vec<Value>> {
+pub(super) fn choices(action: &ActionDef, values: &[Value]) -> Vec<Vec<Value>> {
     let mut chosen = vec![values.to_vec()];
     for (local, parameter) in action.parameters.iter().enumerate().filter(|(_, p)| !p.axis) {
         let Domain::Values(values) = &parameter.domain else { continue };

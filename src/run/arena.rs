@@ -35,7 +35,7 @@ impl Arena {
     /// Looks the names up: of roads, and of the rules that are switched on (`with`) and off (`without`).
     ///
     /// # Errors
-    /// If a road or a rule does not exist, or is named twice.
+    /// If a road or a rule does not exist, or is named twice, or no episode can begin under the rules.
     pub fn new(
         table: ActionTable,
         roads: &[String],
@@ -51,8 +51,11 @@ impl Arena {
             let index = road_named(space, name)?;
             Ok((index, Arc::new(episode::scene(&space.roads[index]))))
         });
-        let roads = roads.collect::<Result<_, RunError>>()?;
+        let roads: Vec<(usize, Arc<Scene>)> = roads.collect::<Result<_, RunError>>()?;
         let rules = RulesInForce::new(space, with, without)?;
+        for (index, _) in &roads {
+            space.memory_at_start(&space.roads[*index], &rules, 0)?;
+        }
         Ok(Arena { table, rules, ads, traffic: TrafficProfile::default(), roads })
     }
 
@@ -84,10 +87,12 @@ impl Arena {
     pub fn setup(&self, road: usize, seed: u64) -> episode::Setup<'_> {
         let (index, scene) = &self.roads[road];
         let space = self.table.space();
-        let memory = space.initial_memory(seed);
+        let road = &space.roads[*index];
+        let memory = space.memory_at_start(road, &self.rules, seed);
+        let memory = memory.expect("the arena was made with a start on each road");
         episode::Setup {
             table: &self.table,
-            road: &space.roads[*index],
+            road,
             scene: scene.clone(),
             rules: &self.rules,
             ads: self.ads.clone(),

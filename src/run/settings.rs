@@ -111,6 +111,8 @@ pub enum RunError {
     Settings(#[from] agent::SettingsError),
     #[error(transparent)]
     Rule(#[from] crate::model::UnknownRule),
+    #[error(transparent)]
+    Start(#[from] crate::model::NoStart),
     #[error("`{name}` is asked for twice, or both on and off")]
     Twice { name: String },
     #[error("{found} episodes a road: from 1 to {EPISODES_MAX} are possible")]

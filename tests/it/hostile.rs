@@ -6,6 +6,9 @@ mod examine;
 
 use std::process::Command;
 
+use avastra::rng;
+use avastra::rng::{Rng, Stream};
+
 use crate::cases::{cases, root};
 
 /// Limits on processor time (s) and memory (MB) for a text of 64 KB. The aim is 1 s, which `fuzz/run.sh` checks
@@ -130,6 +133,169 @@ fn texts_made_to_be_slow_are_not() {
         }
     }
     assert!(dear.is_empty(), "{}", dear.join("\n"));
+}
+
+/// Texts of up to 64 KB, made of the kept texts, the cases and the shipped files: cut, doubled, mixed and with other
+/// words. Fuzzing without `cargo fuzz`, which learns from what its texts reach; this does not, but runs everywhere:
+///
+/// `FUZZ_S=3600 FUZZ_SEED=1 cargo test --test it -- --ignored --nocapture made_up_texts`
+#[test]
+#[ignore = "runs for as long as it is told to"]
+#[expect(clippy::disallowed_methods, reason = "how long and with which seed is said in the environment")]
+fn made_up_texts_break_no_law() {
+    let number = |name: &str, default: u64| {
+        std::env::var(name).ok().and_then(|text| text.parse().ok()).unwrap_or(default)
+    };
+    let (seconds, seed) = (number("FUZZ_S", 60) as f64, number("FUZZ_SEED", 1));
+    let maker = Maker::new();
+    let begin_s = processor_s();
+    let (mut texts, mut bytes, mut dearest) = (0_u64, 0_u64, 0.0_f64);
+    while processor_s() - begin_s < seconds {
+        let text = maker.text(&mut rng::stream(seed, Stream::Exploration, texts));
+        let before_s = processor_s();
+        let result = std::panic::catch_unwind(|| examine::examine(&text));
+        let took_s = processor_s() - before_s;
+        let is_kept = result.is_err() || took_s > 1.0;
+        if is_kept {
+            let path = root().join(format!("target/fuzz_{seed}_{texts}.ava"));
+            std::fs::write(&path, &text).expect("it is writable");
+            panic!("{}: {}", path.display(), if result.is_err() { "panics" } else { "takes over 1 s" });
+        }
+        (texts, bytes, dearest) = (texts + 1, bytes + text.len() as u64, dearest.max(took_s));
+    }
+    let peak_mb = peak_mb();
+    println!(
+        "{texts} texts, {bytes} bytes, {:.0} s, at most {dearest:.2} s and {peak_mb:.0} MB",
+        processor_s() - begin_s
+    );
+    assert!(peak_mb <= PEAK_MB_MAX, "{peak_mb:.0} MB");
+}
+
+/// Makes texts from others.
+struct Maker {
+    texts: Vec<String>,
+    words: Vec<String>,
+}
+
+/// The most bytes of a text.
+const TEXT_MAX: usize = 65_536;
+
+impl Maker {
+    fn new() -> Maker {
+        let mut paths: Vec<std::path::PathBuf> = Vec::new();
+        for folder in ["fuzz/seeds", "scenarios", "scenarios/examples", "policies"] {
+            let Ok(found) = std::fs::read_dir(root().join(folder)) else { continue };
+            paths.extend(found.flatten().map(|entry| entry.path()).filter(|path| path.is_file()));
+        }
+        for area in ["diagnostics", "format", "spaces", "wishes", "faults"] {
+            paths.extend(cases(area).into_iter().map(|(_, path)| path));
+        }
+        paths.sort();
+        let read = |path: &std::path::PathBuf| {
+            Some(String::from_utf8_lossy(&std::fs::read(path).ok()?).into_owned())
+        };
+        // A policy of megabytes of weights would hide everything else.
+        let texts: Vec<String> =
+            paths.iter().filter_map(read).filter(|text: &String| text.len() < TEXT_MAX / 2).collect();
+        assert!(texts.len() > 100, "{} texts", texts.len());
+        let dictionary = std::fs::read_to_string(root().join("fuzz/ava.dict")).expect("it is there");
+        let words =
+            dictionary.lines().filter_map(|line| Some(line.strip_prefix('"')?.strip_suffix('"')?.to_owned()));
+        let words: Vec<String> = words.collect();
+        assert!(words.len() > 20, "{} words", words.len());
+        Maker { texts, words }
+    }
+
+    fn text(&self, rng: &mut Rng) -> String {
+        let one = |rng: &mut Rng, count: usize| rng::below(rng, count.max(1) as u32) as usize;
+        let own = one(rng, self.texts.len());
+        let mut parts = parts(&self.texts[own]);
+        for _ in 0..1 + one(rng, 12) {
+            if parts.is_empty() {
+                break;
+            }
+            let at = one(rng, parts.len());
+            let end = (at + 1 + one(rng, 30)).min(parts.len());
+            match one(rng, 8) {
+                0 => drop(parts.drain(at..end)),
+                1 => {
+                    let again: Vec<String> = parts[at..end].to_vec();
+                    let times = 1 + one(rng, 40);
+                    let all = again.iter().cycle().take(again.len() * times).cloned();
+                    drop(parts.splice(at..at, all.collect::<Vec<_>>()));
+                }
+                2 => {
+                    let other = one(rng, self.texts.len());
+                    let other = self::parts(&self.texts[other]);
+                    let from = one(rng, other.len());
+                    let to = (from + 1 + one(rng, 200)).min(other.len());
+                    let taken = other.get(from..to).unwrap_or_default().to_vec();
+                    drop(parts.splice(at..at, taken));
+                }
+                3 => parts[at] = self.words[one(rng, self.words.len())].clone(),
+                4 => parts.insert(at, self.words[one(rng, self.words.len())].clone()),
+                5 => {
+                    let with = one(rng, parts.len());
+                    parts.swap(at, with);
+                }
+                6 => {
+                    let with = one(rng, parts.len());
+                    parts[at] = parts[with].clone();
+                }
+                _ => {
+                    let numbers = ["0", "1", "-1", "0.000001", "99999999999", "128", "1/3", "360", "65536"];
+                    parts[at] = numbers[one(rng, numbers.len())].to_owned();
+                }
+            }
+        }
+        let mut text = parts.concat();
+        let mut end = text.len().min(TEXT_MAX);
+        while !text.is_char_boundary(end) {
+            end -= 1;
+        }
+        text.truncate(end);
+        text
+    }
+}
+
+/// Words, numbers, spaces and single signs.
+fn parts(text: &str) -> Vec<String> {
+    let kind = |c: char| match c {
+        _ if c.is_alphanumeric() || c == '_' => 0,
+        _ if c.is_whitespace() => 1,
+        _ => 2,
+    };
+    let mut parts: Vec<String> = Vec::new();
+    let mut last = 2;
+    for c in text.chars() {
+        match parts.last_mut() {
+            Some(part) if kind(c) == last && last != 2 => part.push(c),
+            _ => parts.push(c.to_string()),
+        }
+        last = kind(c);
+    }
+    parts
+}
+
+/// Processor time of this process so far, s.
+fn processor_s() -> f64 {
+    let usage = own_usage();
+    let seconds = |time: libc::timeval| time.tv_sec as f64 + time.tv_usec as f64 * 1e-6;
+    seconds(usage.ru_utime) + seconds(usage.ru_stime)
+}
+
+/// The most memory that this process had, MB.
+fn peak_mb() -> f64 {
+    own_usage().ru_maxrss as f64 / 1024.0
+}
+
+fn own_usage() -> libc::rusage {
+    // SAFETY: it is plain data that the kernel fills in.
+    unsafe {
+        let mut usage: libc::rusage = std::mem::zeroed();
+        assert_eq!(libc::getrusage(libc::RUSAGE_SELF, &mut usage), 0);
+        usage
+    }
 }
 
 /// Processor time (s) and peak memory (MB) of a command; it must end by itself.

@@ -1,6 +1,7 @@
 //! The shipped spaces as tables, and draws against what proofs say of them. What each rule refuses is tested in
 //! `tests/it/rules.rs`.
 
+mod promise;
 mod rules;
 mod sound;
 mod table;

@@ -35,7 +35,7 @@ const MAP: &str = r#"<OpenDRIVE><header name="made up"/><road id="1" length="100
 <right><lane id="-1" type="driving"><width sOffset="0" a="4" b="0" c="0" d="0"/></lane></right></laneSection></lanes>
 </road></OpenDRIVE>"#;
 
-fn compiled(text: &str) -> Loaded {
+pub(super) fn compiled(text: &str) -> Loaded {
     let is_map = |path: &Path| path.ends_with("made_up.xodr");
     let read = |path: &Path| -> Result<String, ReadError> {
         Ok(if is_map(path) { MAP.to_owned() } else { text.to_owned() })

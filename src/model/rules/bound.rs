@@ -16,8 +16,8 @@ pub(crate) struct Bound {
     pub op: Comparison,
     pub limit: Expr,
     pub guards: Vec<Expr>,
-    /// Whether it can be computed before the world is asked and before the memory changes.
-    pub is_known_early: bool,
+    /// Whether values are drawn within it: it asks nothing about a spawn.
+    pub is_drawn_within: bool,
     /// The parameters that the limit and the guards name.
     needs: Vec<usize>,
 }
@@ -72,9 +72,9 @@ fn collect(condition: &Expr, rule: Option<usize>, guards: &mut Vec<Expr>, into: 
         {
             let mut parts = guards.iter().chain([limit]);
             let needs = parts.clone().flat_map(locals).collect();
-            let is_known_early = parts.all(|expr| expr.known() == Known::Road && !expr.reads_memory());
+            let is_drawn_within = parts.all(|expr| expr.known() < Known::Spawn);
             let (limit, guards) = (limit.clone(), guards.clone());
-            into.push(Bound { rule, local: *local, op, limit, guards, is_known_early, needs });
+            into.push(Bound { rule, local: *local, op, limit, guards, is_drawn_within, needs });
         }
     };
     match &condition.kind {
@@ -100,7 +100,7 @@ fn collect(condition: &Expr, rule: Option<usize>, guards: &mut Vec<Expr>, into: 
 }
 
 /// The parameters that an expression names.
-fn locals(expr: &Expr) -> Vec<usize> {
+pub(super) fn locals(expr: &Expr) -> Vec<usize> {
     let mut found = Vec::new();
     expr.walk(&mut |part| {
         if let ExprKind::Local(local) = part.kind {

@@ -2,7 +2,7 @@
 
 use crate::model::eval::{Facts, SpawnFacts, WorldFacts, compare, evaluate, word_of};
 use crate::model::expr::{Expr, ExprKind};
-use crate::model::rules::{Bound, Demand, RowRules};
+use crate::model::rules::{Bound, Clause, Demand, RowRules, Source};
 use crate::model::space::Parameter;
 use crate::model::value::{Memory, Value};
 use crate::model::vocabulary::{Fact, Known, Word};
@@ -48,19 +48,33 @@ pub(crate) enum Breach<'a> {
 impl<'a> RowRules<'a> {
     /// Everything that the candidate breaks: `where`s first, then the rules in force that bind the row.
     pub fn breaches(self, candidate: Candidate<'a>) -> impl Iterator<Item = Breach<'a>> {
-        let facts = self.facts(candidate);
-        let parameters = self.space.actions[self.row.action].parameters.iter();
-        let wheres = parameters.filter_map(move |parameter| {
-            let condition = parameter.condition.as_ref()?;
-            let is_open = condition.known() == Known::World && candidate.world.is_none();
-            (!is_open && !self.holds(condition, facts)).then_some(Breach::Where(parameter, condition))
-        });
+        let parameters = 0..self.space.actions[self.row.action].parameters.len();
+        let wheres = parameters.filter_map(move |parameter| self.where_breach(parameter, candidate));
         let rules = self.demands().filter_map(move |(rule, demand)| self.breach(rule, demand, candidate));
         wheres.chain(rules)
     }
 
+    /// Whether this clause forbids the candidate.
+    pub fn breaks(self, clause: &Clause, candidate: Candidate<'_>) -> bool {
+        match clause.source {
+            Source::Where(parameter) => self.where_breach(parameter, candidate).is_some(),
+            Source::Rule(rule) => {
+                let demand = self.space.rules[rule].body.demand(self.row.action);
+                demand.is_some_and(|demand| self.breach(rule, demand, candidate).is_some())
+            }
+        }
+    }
+
+    fn where_breach(self, parameter: usize, candidate: Candidate<'_>) -> Option<Breach<'a>> {
+        let parameter = &self.space.actions[self.row.action].parameters[parameter];
+        let condition = parameter.condition.as_ref()?;
+        let is_open = condition.known() == Known::World && candidate.world.is_none();
+        let facts = self.facts(candidate);
+        (!is_open && !self.holds(condition, facts)).then_some(Breach::Where(parameter, condition))
+    }
+
     /// Why the rule forbids the candidate; `None` if it does not.
-    fn breach(self, rule: usize, demand: Demand<'a>, candidate: Candidate<'a>) -> Option<Breach<'a>> {
+    fn breach(self, rule: usize, demand: Demand<'a>, candidate: Candidate<'_>) -> Option<Breach<'a>> {
         let facts = self.facts(candidate);
         match demand {
             Demand::Holds(condition) => {
@@ -91,7 +105,10 @@ impl<'a> RowRules<'a> {
         }
     }
 
-    fn facts(self, candidate: Candidate<'a>) -> Facts<'a> {
+    fn facts<'c>(self, candidate: Candidate<'c>) -> Facts<'c>
+    where
+        'a: 'c,
+    {
         Facts { road: self.road, world: candidate.world, ..Facts::new(candidate.values, candidate.after) }
     }
 

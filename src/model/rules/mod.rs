@@ -7,25 +7,39 @@
 //!    `--without`.
 //! 2. [`RowRules`] is one row on one road under the rules in force. Each of its rules makes a [`Demand`]
 //!    on the row's action: a condition that must hold, or the moves that a state may make.
-//! 3. `bound` takes from the conditions what they say about single numbers, for example
-//!    `speed <= road.limit`. [`RowRules::solve`] chooses numbers within these bounds, so that few choices
-//!    are in vain. It need not find every bound, because it does not have the last word.
-//! 4. [`RowRules::breaches`] has the last word. It takes a complete [`Candidate`] (values, the memory before
+//! 3. [`RowRules::solve`] chooses values from exactly what the clauses of a row leave: its rules and its `where`s,
+//!    each with the parameters that decide it ([`Clause`]). What it cannot solve it says.
+//! 4. `bound` takes from the conditions what they say about single numbers, for example `speed <= road.limit`:
+//!    for proofs, and for the words of a refusal.
+//! 5. [`RowRules::breaches`] has the last word. It takes a complete [`Candidate`] (values, the memory before
 //!    and after, what the world says) and returns every rule in force that the candidate breaks.
+//!
+//! `start` says which rules the states obey from the first moment on.
 //!
 //! Drawing and replaying (`action`), the search for witnesses (`prove::witness`) and the checker of scenarios
 //! judge by `breaches`; they differ only in what the world says, if it is asked. Proofs (`prove::reach`)
 //! work on sets of values and cannot call it, but they go over the same demands and bounds.
 
 mod bound;
+mod clause;
+mod critical;
 mod in_force;
 mod judge;
+mod polynomial;
+mod room;
 mod solve;
+mod start;
 
 pub(crate) use bound::{Bound, allowed, bounds};
+pub(crate) use clause::{Clause, Source, clauses};
 pub use in_force::{RulesInForce, UnknownRule};
 pub(crate) use judge::{Breach, Candidate};
-pub(crate) use solve::Room;
+pub(crate) use room::Room;
+pub(crate) use solve::{Before, Choose, Nearest, TRIES_MAX, Unsolved};
+
+pub use start::NoStart;
+
+use bound::locals;
 
 use crate::model::expr::Expr;
 use crate::model::row::Row;

@@ -1,115 +1,340 @@
-//! Choosing numbers within the bounds of rules, each after the numbers that its bounds depend on.
+//! Choosing the drawn values of a row from exactly what its rules leave, one parameter after the other.
+//!
+//! The room of a number is found by trying: between two neighbouring places where a clause may change (`critical`)
+//! every clause holds everywhere or nowhere, so one try in between and one at each place decide. A try is judged as
+//! drawing and replaying judge ([`RowRules::breaches`]).
+//!
+//! 1. Forwards: each parameter gets what the clauses leave that no later parameter decides. That is nearly always
+//!    enough, and cheap.
+//! 2. If a later parameter is left without a value by what was chosen before it, all are chosen again. Each then gets
+//!    only the values that leave values to all later ones. The places where that may change come from polynomials
+//!    without the later numbers (`polynomial::project`).
+//!
+//! Both draw from the same values with the same shares: what forwards fails is drawn again by the second way.
 
-use crate::model::eval::{Facts, evaluate};
-use crate::model::expr::{Comparison, Expr};
-use crate::model::rules::{Bound, RowRules};
+use std::borrow::Cow;
+use std::cell::Cell;
+
+use crate::model::eval::{Facts, WorldFacts};
+use crate::model::expr::Comparison;
+use crate::model::rules::critical::{Unknowns, polynomials};
+use crate::model::rules::polynomial::{NUMBERS_MAX, Polynomial, project};
+use crate::model::rules::{Candidate, Clause, Room, RowRules, RulesInForce};
+use crate::model::space::{ActionDef, Domain};
 use crate::model::value::{Memory, Value};
 
-/// The numbers that the bounds leave to a parameter.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Room {
-    pub low: f64,
-    pub high: f64,
-    low_open: bool,
-    high_open: bool,
-    /// The declared range, both ends included.
-    declared: (f64, f64),
-    /// Set by an equality.
-    pub exact: Option<f64>,
-    /// The rule that cut last.
-    pub cut_by: Option<usize>,
+/// The most judgements for one draw. Rows that need more are refused when they are compiled.
+pub(crate) const TRIES_MAX: usize = 50_000;
+
+/// What is known before a row is solved.
+#[derive(Clone, Copy)]
+pub(crate) struct Before<'a> {
+    pub memory: &'a Memory,
+    /// As in [`Candidate`]. The spawns are not known yet, so a rule about them holds.
+    pub world: Option<&'a WorldFacts>,
+    /// Judgements that may still be made; at 0 nothing more is found.
+    pub tries: &'a Cell<usize>,
 }
 
-impl RowRules<'_> {
-    /// Sets each parameter of `open` once everything that bounds it is set. `number` chooses one: it gets
-    /// the parameter, its value so far and its room, and decides with [`Room::settle`].
+/// Chooses one of the values that are left.
+pub(crate) trait Choose {
+    /// One of several values from a list; never asked about none.
+    fn value(&mut self, local: usize, left: &[Value]) -> Value;
+
+    /// A number of a room that is not empty.
+    fn number(&mut self, local: usize, room: &Room) -> Option<f64>;
+}
+
+/// Chooses what is nearest to wanted values, by parameter.
+pub(crate) struct Nearest {
+    pub wanted: Vec<Value>,
+}
+
+impl Choose for Nearest {
+    fn value(&mut self, local: usize, left: &[Value]) -> Value {
+        let wanted = self.wanted[local];
+        if left.contains(&wanted) { wanted } else { left[0] }
+    }
+
+    fn number(&mut self, local: usize, room: &Room) -> Option<f64> {
+        room.nearest(self.wanted[local].number())
+    }
+}
+
+/// No values were found.
+#[derive(Debug, Clone)]
+pub(crate) struct Unsolved {
+    /// The clause that leaves nothing, as an index in `Space::clauses` of the action; that of the last try, if
+    /// several share it.
+    pub clause: Option<usize>,
+    /// The parameter that it leaves without a value; `None` if the clause depends on nothing that is drawn.
+    pub local: Option<usize>,
+    /// The values that were chosen before; the others are the first of their lists or the low ends of their ranges.
+    pub values: Vec<Value>,
+    /// Whether there are no values at all. `false`: the search was too long, or the clauses too complicated.
+    pub is_proved: bool,
+}
+
+impl<'a> RowRules<'a> {
+    /// Values of all parameters that obey every clause: those of `open` as `choose` wants, the others as given.
     ///
     /// # Errors
-    /// The first error of `number`.
-    pub fn solve<E>(
-        &self,
-        values: &mut [Value],
-        mut open: Vec<usize>,
-        mut number: impl FnMut(usize, Value, &Room) -> Result<f64, E>,
-    ) -> Result<(), E> {
-        while !open.is_empty() {
+    /// The clause that is in the way.
+    pub fn solve(
+        self,
+        given: Vec<Value>,
+        open: &[usize],
+        before: Before<'a>,
+        choose: &mut dyn Choose,
+    ) -> Result<Vec<Value>, Unsolved> {
+        let order = self.order(open);
+        let mut search = Search { rules: self, before, order, values: given, is_exact: Cell::new(true) };
+        for local in open {
+            search.values[*local] = first(&search.action().parameters[*local].domain);
+        }
+        let clauses = &self.space.clauses[self.row.action];
+        let fails = |clause: &Clause| !clause.needs_any(open) && search.breaks(clause);
+        if let Some(clause) = self.clauses().find(|index| fails(&clauses[*index])) {
+            let is_proved = before.tries.get() > 0;
+            return Err(Unsolved { clause: Some(clause), local: None, values: search.values, is_proved });
+        }
+        match search.forwards(choose) {
+            Err(unsolved) if !unsolved.is_proved => search.backwards(choose, unsolved),
+            done => done,
+        }
+    }
+
+    /// The rules in force without those that none of these parameters decides.
+    pub fn deciding(self, open: &[usize]) -> RulesInForce {
+        let others = self.space.clauses[self.row.action].iter().filter(|clause| !clause.needs_any(open));
+        others.filter_map(Clause::rule).fold(self.in_force.clone(), |rules, rule| rules.except(rule))
+    }
+
+    /// The clauses of the row under the rules in force, as indices in `Space::clauses` of its action.
+    fn clauses(self) -> impl Iterator<Item = usize> {
+        let all = self.space.clauses[self.row.action].iter().enumerate();
+        let is_in_force = move |rule| self.in_force.contains(rule) && self.row.rules.contains(&rule);
+        let applies = move |clause: &Clause| clause.rule().is_none_or(is_in_force);
+        all.filter(move |(_, clause)| applies(clause)).map(|(index, _)| index)
+    }
+
+    /// The order in which parameters are chosen: lists before numbers, and a number that another one sets after it.
+    fn order(self, open: &[usize]) -> Vec<usize> {
+        let parameters = &self.space.actions[self.row.action].parameters;
+        let is_list = |local: &usize| matches!(parameters[*local].domain, Domain::Values(_));
+        let (mut order, mut numbers): (Vec<usize>, Vec<usize>) = open.iter().copied().partition(is_list);
+        while !numbers.is_empty() {
             let waits = |local: usize| {
-                self.early_bounds(local).any(|bound| {
-                    bound.op == Comparison::Equal
-                        && open.iter().any(|other| *other != local && bound.needs(*other))
+                self.bounds().any(|bound| {
+                    bound.local == local
+                        && bound.op == Comparison::Equal
+                        && bound.is_drawn_within
+                        && numbers.iter().any(|other| *other != local && bound.needs(*other))
                 })
             };
-            // Where two equalities wait for each other, the order of declaration decides; the rules have
-            // the last word.
-            let next = open.iter().position(|local| !waits(*local)).unwrap_or(0);
-            let local = open.remove(next);
-            let room = self.room(local, &open, values);
-            values[local] = Value::Number(number(local, values[local], &room)?);
+            // Where two numbers set each other, the order of declaration decides.
+            let next = numbers.iter().position(|local| !waits(*local)).unwrap_or(0);
+            order.push(numbers.remove(next));
         }
-        Ok(())
-    }
-
-    /// Bounds on a parameter that can be computed beforehand.
-    fn early_bounds(&self, local: usize) -> impl Iterator<Item = &Bound> {
-        self.bounds().filter(move |bound| bound.local == local && bound.is_known_early)
-    }
-
-    /// What the bounds leave that do not depend on a parameter that is still open.
-    fn room(&self, local: usize, open: &[usize], values: &[Value]) -> Room {
-        let (low, high) = self.space.actions[self.row.action].parameters[local].domain.ends();
-        let declared = (low, high);
-        let mut room =
-            Room { low, high, low_open: false, high_open: false, declared, exact: None, cut_by: None };
-        // No early bound reads the memory.
-        let memory = Memory::default();
-        let facts = Facts { road: self.road, ..Facts::new(values, &memory) };
-        let is_known = |bound: &&Bound| !open.iter().any(|other| bound.needs(*other));
-        for bound in self.early_bounds(local).filter(is_known) {
-            let holds = |guard: &Expr| evaluate(guard, &self.space.functions, &facts).truth();
-            if bound.guards.iter().all(holds) {
-                room.cut(bound, evaluate(&bound.limit, &self.space.functions, &facts).number());
-            }
-        }
-        room
+        order
     }
 }
 
-impl Room {
-    /// The number that an equality sets, else the chosen one; `None` if no number of the declared range is
-    /// possible.
-    pub fn settle(&self, chosen: f64) -> Option<f64> {
-        let value = self.exact.unwrap_or(chosen);
-        let is_empty = self.low > self.high || self.low == self.high && (self.low_open || self.high_open);
-        (!is_empty && (self.declared.0..=self.declared.1).contains(&value)).then_some(value)
+/// One solution in the making.
+struct Search<'a> {
+    rules: RowRules<'a>,
+    before: Before<'a>,
+    /// The parameters to choose.
+    order: Vec<usize>,
+    /// Of all parameters. Those that are not chosen yet have some value of their type.
+    values: Vec<Value>,
+    /// Whether every polynomial that was needed was found.
+    is_exact: Cell<bool>,
+}
+
+impl<'a> Search<'a> {
+    fn action(&self) -> &'a ActionDef {
+        &self.rules.space.actions[self.rules.row.action]
     }
 
-    /// Whether a number lies between the ends; equalities do not count.
-    pub fn contains(&self, value: f64) -> bool {
-        (value > self.low || value == self.low && !self.low_open)
-            && (value < self.high || value == self.high && !self.high_open)
+    fn clause(&self, index: usize) -> &'a Clause {
+        &self.rules.space.clauses[self.rules.row.action][index]
     }
 
-    pub fn middle(&self) -> f64 {
-        self.low + (self.high - self.low) / 2.0
-    }
-
-    fn cut(&mut self, bound: &Bound, limit: f64) {
-        let (low, high, exact) = (self.low, self.high, self.exact);
-        match bound.op {
-            Comparison::Equal => self.exact = self.exact.or(Some(limit)),
-            Comparison::Less if limit <= self.high => (self.high, self.high_open) = (limit, true),
-            Comparison::LessEqual if limit < self.high => (self.high, self.high_open) = (limit, false),
-            Comparison::Greater if limit >= self.low => (self.low, self.low_open) = (limit, true),
-            Comparison::GreaterEqual if limit > self.low => (self.low, self.low_open) = (limit, false),
-            // The bound cuts nothing, or leaves out a single number: judging sees to that.
-            Comparison::NotEqual
-            | Comparison::Less
-            | Comparison::LessEqual
-            | Comparison::Greater
-            | Comparison::GreaterEqual => {}
+    /// Whether the values break the clause; also if no try is left.
+    fn breaks(&self, clause: &Clause) -> bool {
+        match self.before.tries.get().checked_sub(1) {
+            Some(left) => self.before.tries.set(left),
+            None => return true,
         }
-        if (low, high, exact) != (self.low, self.high, self.exact) {
-            self.cut_by = bound.rule;
+        let after = match clause.reads_effects {
+            true => Cow::Owned(self.after(&self.values)),
+            false => Cow::Borrowed(self.before.memory),
+        };
+        let Before { memory: before, world, .. } = self.before;
+        let candidate = Candidate { values: &self.values, before, after: &after, world };
+        self.rules.breaks(clause, candidate)
+    }
+
+    fn after(&self, values: &[Value]) -> Memory {
+        self.rules.space.memory_after(self.rules.row.action, values, self.before.memory)
+    }
+
+    /// Chooses each parameter by the clauses that no later one decides.
+    fn forwards(&mut self, choose: &mut dyn Choose) -> Result<Vec<Value>, Unsolved> {
+        for place in 0..self.order.len() {
+            let local = self.order[place];
+            let decided: Vec<usize> = self.decided_by(place).collect();
+            let blamed = Cell::new(None);
+            let holds = |search: &mut Search<'_>, value: Value| {
+                search.values[local] = value;
+                let broken = decided.iter().find(|clause| search.breaks(search.clause(**clause)));
+                blamed.set(broken.copied().or(blamed.get()));
+                broken.is_none()
+            };
+            let chosen = match &self.action().parameters[local].domain {
+                Domain::Values(values) => {
+                    let left: Vec<Value> =
+                        values.iter().copied().filter(|value| holds(self, *value)).collect();
+                    (!left.is_empty()).then(|| choose.value(local, &left))
+                }
+                Domain::Range(low, high) => {
+                    let changes = self.changes_in_one(local, &decided);
+                    let room = Room::where_holds(low.to_f64(), high.to_f64(), changes, |number| {
+                        holds(self, Value::Number(number))
+                    });
+                    choose.number(local, &room).map(Value::Number)
+                }
+            };
+            let Some(value) = chosen else {
+                self.values[local] = first(&self.action().parameters[local].domain);
+                // The choices before matter only if a clause that decides here needs one of them.
+                let before = &self.order[..place];
+                let is_proved = self.is_exact.get()
+                    && self.before.tries.get() > 0
+                    && decided.iter().all(|clause| !self.clause(*clause).needs_any(before));
+                let values = self.values.clone();
+                return Err(Unsolved { clause: blamed.get(), local: Some(local), values, is_proved });
+            };
+            self.values[local] = value;
         }
+        Ok(self.values.clone())
+    }
+
+    /// The clauses that the parameter at this place of the order decides, together with earlier ones alone.
+    fn decided_by(&self, place: usize) -> impl Iterator<Item = usize> {
+        let (local, later) = (self.order[place], &self.order[place + 1..]);
+        let is_decided = move |clause: &Clause| clause.needs(local) && !clause.needs_any(later);
+        self.rules.clauses().filter(move |clause| is_decided(self.clause(*clause)))
+    }
+
+    /// Where these clauses may change along one number, if all others are as they are.
+    fn changes_in_one(&self, local: usize, clauses: &[usize]) -> Vec<f64> {
+        let Domain::Range(low, high) = &self.action().parameters[local].domain else { return Vec::new() };
+        let open = [local];
+        let unknowns = Unknowns { rules: self.rules, open: &open, facts: self.facts() };
+        let Some(found) = polynomials(&unknowns, clauses.iter().map(|clause| self.clause(*clause))) else {
+            self.is_exact.set(false);
+            return Vec::new();
+        };
+        found.iter().flat_map(|polynomial| polynomial.turns(0, low.to_f64(), high.to_f64())).collect()
+    }
+
+    fn facts(&self) -> Facts<'_> {
+        let Before { memory, world, .. } = self.before;
+        Facts { road: self.rules.road, world, ..Facts::new(&self.values, memory) }
+    }
+
+    /// Chooses each parameter from the values that leave values to all later ones.
+    fn backwards(&mut self, choose: &mut dyn Choose, forwards: Unsolved) -> Result<Vec<Value>, Unsolved> {
+        for place in 0..self.order.len() {
+            let local = self.order[place];
+            let chosen = match &self.action().parameters[local].domain {
+                Domain::Values(values) => {
+                    let left: Vec<Value> =
+                        values.iter().copied().filter(|value| self.leads_on(place, *value)).collect();
+                    (!left.is_empty()).then(|| choose.value(local, &left))
+                }
+                Domain::Range(low, high) => {
+                    let changes = self.changes(place);
+                    let room = Room::where_holds(low.to_f64(), high.to_f64(), changes, |number| {
+                        self.leads_on(place, Value::Number(number))
+                    });
+                    choose.number(local, &room).map(Value::Number)
+                }
+            };
+            let Some(value) = chosen else {
+                // Only rounding can leave a later parameter nothing.
+                let is_proved = place == 0 && self.is_exact.get() && self.before.tries.get() > 0;
+                return Err(Unsolved { is_proved, ..forwards });
+            };
+            self.values[local] = value;
+        }
+        Ok(self.values.clone())
+    }
+
+    /// Whether this value of the parameter at the place, after the values before it, can be completed.
+    fn leads_on(&mut self, place: usize, value: Value) -> bool {
+        self.values[self.order[place]] = value;
+        let is_broken = self.decided_by(place).any(|clause| self.breaks(self.clause(clause)));
+        !is_broken && self.can_go_on(place + 1)
+    }
+
+    /// Whether the parameters from this place of the order on have values.
+    fn can_go_on(&mut self, place: usize) -> bool {
+        let Some(local) = self.order.get(place) else { return true };
+        match &self.action().parameters[*local].domain {
+            Domain::Values(values) => values.iter().any(|value| self.leads_on(place, *value)),
+            Domain::Range(low, high) => {
+                let changes = self.changes(place);
+                let mut is_found = false;
+                Room::where_holds(low.to_f64(), high.to_f64(), changes, |number| {
+                    is_found = is_found || self.leads_on(place, Value::Number(number));
+                    is_found
+                });
+                is_found
+            }
+        }
+    }
+
+    /// Where it may change along the number at this place whether all later numbers have values.
+    fn changes(&self, place: usize) -> Vec<f64> {
+        let open = &self.order[place..];
+        let Domain::Range(low, high) = &self.action().parameters[open[0]].domain else { return Vec::new() };
+        let found = self.projected(open);
+        if found.is_none() {
+            self.is_exact.set(false);
+        }
+        let found = found.unwrap_or_default();
+        found.iter().flat_map(|polynomial| polynomial.turns(0, low.to_f64(), high.to_f64())).collect()
+    }
+
+    /// The polynomials in the first of these numbers alone.
+    fn projected(&self, open: &[usize]) -> Option<Vec<Polynomial>> {
+        if open.len() > NUMBERS_MAX {
+            return None;
+        }
+        let unknowns = Unknowns { rules: self.rules, open, facts: self.facts() };
+        let clauses = self.rules.clauses().map(|index| self.clause(index));
+        let mut found = polynomials(&unknowns, clauses.filter(|clause| clause.needs_any(open)))?;
+        for (place, local) in open.iter().enumerate().skip(1) {
+            let (low, high) = self.action().parameters[*local].domain.ends();
+            for end in [low, high] {
+                let number = Polynomial::number(place);
+                found.push(number.minus(&Polynomial::constant(end))?);
+            }
+        }
+        for place in (1..open.len()).rev() {
+            found = project(&found, place)?;
+        }
+        Some(found)
+    }
+}
+
+/// A value of the right type for a parameter that is not chosen yet.
+fn first(domain: &Domain) -> Value {
+    match domain {
+        Domain::Values(values) => values.first().copied().unwrap_or(Value::Bool(false)),
+        Domain::Range(low, _) => Value::Number(low.to_f64()),
     }
 }

@@ -1,0 +1,104 @@
+//! What a row's values must satisfy, piece by piece: each `where`, and each rule that binds the action, with the
+//! parameters that decide it.
+
+use crate::model::expr::{Expr, ExprKind};
+use crate::model::rules::{Demand, locals};
+use crate::model::space::{ActionDef, EffectDef, RuleDef, SetDef, StateDef};
+
+/// One `where` or one rule of an action.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Clause {
+    pub source: Source,
+    /// The parameters that decide it: those that it names, and those that decide the states which it reads,
+    /// because it reads them as they are after the action.
+    needs: Vec<usize>,
+    /// Whether it depends on what the action does to the memory.
+    pub reads_effects: bool,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Source {
+    /// The `where` of the parameter with that index.
+    Where(usize),
+    /// The rule with that index.
+    Rule(usize),
+}
+
+impl Clause {
+    pub fn needs(&self, local: usize) -> bool {
+        self.needs.contains(&local)
+    }
+
+    pub fn needs_any(&self, locals: &[usize]) -> bool {
+        locals.iter().any(|local| self.needs(*local))
+    }
+
+    /// The rule; `None` for a `where`.
+    pub fn rule(&self) -> Option<usize> {
+        match self.source {
+            Source::Where(_) => None,
+            Source::Rule(rule) => Some(rule),
+        }
+    }
+}
+
+/// By action: its `where`s, then the rules that bind it, in the order of their declarations.
+pub(crate) fn clauses(actions: &[ActionDef], rules: &[RuleDef], states: &[StateDef]) -> Vec<Vec<Clause>> {
+    let of_action = |(index, action): (usize, &ActionDef)| {
+        let mut found = Vec::new();
+        for (parameter, definition) in action.parameters.iter().enumerate() {
+            if let Some(condition) = &definition.condition {
+                let (source, mut needs) = (Source::Where(parameter), locals(condition));
+                let read = states_read(condition, states);
+                let reads_effects = add_effects(action, states, read, &mut needs);
+                found.push(Clause { source, needs, reads_effects });
+            }
+        }
+        for (rule, definition) in rules.iter().enumerate() {
+            let (mut needs, read) = match definition.body.demand(index) {
+                Some(Demand::Holds(condition)) => (locals(condition), states_read(condition, states)),
+                Some(Demand::Moves { state, .. }) => (Vec::new(), vec![state]),
+                None => continue,
+            };
+            let reads_effects = add_effects(action, states, read, &mut needs);
+            found.push(Clause { source: Source::Rule(rule), needs, reads_effects });
+        }
+        found
+    };
+    actions.iter().enumerate().map(of_action).collect()
+}
+
+/// Adds the parameters that decide these states after the action; whether the action sets any of them.
+fn add_effects(
+    action: &ActionDef,
+    states: &[StateDef],
+    mut read: Vec<usize>,
+    needs: &mut Vec<usize>,
+) -> bool {
+    let mut sets = false;
+    // Backwards, because an effect reads what the effects before it have set.
+    for effect in action.effects.iter().rev() {
+        let EffectDef::Set(set) = effect else { continue };
+        let SetDef { state, key, value, .. } = &**set;
+        if !read.contains(state) {
+            continue;
+        }
+        sets = true;
+        for part in key.iter().chain([value]) {
+            needs.extend(locals(part));
+            read.extend(states_read(part, states));
+        }
+    }
+    sets
+}
+
+/// The states that an expression names, by index.
+fn states_read(expr: &Expr, states: &[StateDef]) -> Vec<usize> {
+    let mut found = Vec::new();
+    expr.walk(&mut |part| {
+        let (ExprKind::Cell(cell) | ExprKind::CellAt(cell, _)) = part.kind else { return };
+        let holds = |state: &StateDef| (state.first_cell..state.first_cell + state.cells).contains(&cell);
+        found.extend(states.iter().position(holds));
+    });
+    found
+}

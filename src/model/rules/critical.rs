@@ -1,0 +1,326 @@
+//! Where the truth of clauses may change: the polynomials whose signs decide them, in the numbers that are still
+//! to be drawn.
+//!
+//! Everything else is known at this moment: the other parameters, the memory, the road, the world. Expressions are
+//! computed with the open numbers as unknowns. A `match` on something open has every arm, so that too many
+//! polynomials may be found, never too few.
+
+use crate::model::eval::{Facts, arithmetic, compare, evaluate};
+use crate::model::expr::{Arithmetic, Expr, ExprKind};
+use crate::model::rules::polynomial::Polynomial;
+use crate::model::rules::{Clause, Demand, RowRules, Source};
+use crate::model::space::{EffectDef, FnDef, SetDef, StateDef};
+use crate::model::value::Value;
+use crate::model::vocabulary::Known;
+
+/// The most forms that one expression may have, by the arms of its `match`es.
+const FORMS_MAX: usize = 64;
+
+/// What an expression is, as far as the open numbers leave it.
+#[derive(Debug, Clone, PartialEq)]
+enum Form {
+    Known(Value),
+    /// A number: one of these quotients.
+    Numbers(Vec<Quotient>),
+    /// A truth value or a variant that depends on open numbers.
+    Open,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+struct Quotient {
+    above: Polynomial,
+    below: Polynomial,
+}
+
+/// The numbers to be drawn by index, with their places in polynomials; and everything known.
+pub(super) struct Unknowns<'a> {
+    pub rules: RowRules<'a>,
+    /// Locals that are open, in the order of their places.
+    pub open: &'a [usize],
+    /// Values of all parameters and the memory before; the values of open ones do not count.
+    pub facts: Facts<'a>,
+}
+
+/// The polynomials that decide these clauses; `None` if an expression is too complicated.
+pub(super) fn polynomials<'c>(
+    unknowns: &Unknowns<'_>,
+    clauses: impl Iterator<Item = &'c Clause>,
+) -> Option<Vec<Polynomial>> {
+    let space = unknowns.rules.space;
+    let locals: Vec<Form> = unknowns
+        .facts
+        .locals
+        .iter()
+        .enumerate()
+        .map(|(local, value)| match unknowns.open.iter().position(|open| *open == local) {
+            Some(place) => Form::Numbers(vec![Quotient::whole(Polynomial::number(place))]),
+            None => Form::Known(*value),
+        })
+        .collect();
+    let cells = unknowns.facts.memory.cells().iter().map(|value| Form::Known(*value)).collect();
+    let mut reader = Reader {
+        functions: &space.functions,
+        states: &space.states,
+        facts: unknowns.facts,
+        cells,
+        found: Vec::new(),
+    };
+    let action = unknowns.rules.row.action;
+    let mut after_effects = None;
+    for clause in clauses {
+        if clause.reads_effects && after_effects.is_none() {
+            reader.apply(&space.actions[action].effects, &locals)?;
+            after_effects = Some(());
+        }
+        let condition = match clause.source {
+            Source::Where(parameter) => space.actions[action].parameters[parameter].condition.as_ref(),
+            Source::Rule(rule) => match space.rules[rule].body.demand(action) {
+                Some(Demand::Holds(condition)) => Some(condition),
+                // What decides the move was found with the effect that sets the state.
+                Some(Demand::Moves { .. }) | None => None,
+            },
+        };
+        let is_asked = |condition: &&Expr| match condition.known() {
+            Known::Road => true,
+            Known::World => unknowns.facts.world.is_some(),
+            Known::Spawn | Known::Step | Known::Judgement => false,
+        };
+        if let Some(condition) = condition.filter(is_asked) {
+            reader.read(condition, &locals)?;
+        }
+    }
+    Some(reader.found)
+}
+
+struct Reader<'a> {
+    functions: &'a [FnDef],
+    states: &'a [StateDef],
+    facts: Facts<'a>,
+    /// The memory: before the effects, and after them once they are applied.
+    cells: Vec<Form>,
+    found: Vec<Polynomial>,
+}
+
+impl Reader<'_> {
+    fn apply(&mut self, effects: &[EffectDef], locals: &[Form]) -> Option<()> {
+        for effect in effects {
+            let EffectDef::Set(set) = effect else { continue };
+            let SetDef { state, key, value, .. } = &**set;
+            let value = self.read(value, locals)?;
+            let key = match key {
+                Some(key) => Some(self.read(key, locals)?),
+                None => None,
+            };
+            let state = &self.states[*state];
+            let cells = state.first_cell..state.first_cell + state.cells;
+            match key {
+                None => self.cells[cells].fill(value),
+                Some(Form::Known(key)) => self.cells[state.first_cell + key.variant()] = value,
+                Some(_) => {
+                    for cell in cells {
+                        self.cells[cell] = join([self.cells[cell].clone(), value.clone()])?;
+                    }
+                }
+            }
+        }
+        Some(())
+    }
+
+    fn read(&mut self, expr: &Expr, locals: &[Form]) -> Option<Form> {
+        Some(match &expr.kind {
+            ExprKind::Bool(_)
+            | ExprKind::Number(_)
+            | ExprKind::Variant(..)
+            | ExprKind::Fact(_)
+            | ExprKind::OnRoad(_)
+            | ExprKind::IsWord(..) => Form::Known(evaluate(expr, self.functions, &self.facts)),
+            ExprKind::Local(local) => locals[*local].clone(),
+            ExprKind::Cell(cell) => self.cells[*cell].clone(),
+            ExprKind::CellAt(first, key) => match self.read(key, locals)? {
+                Form::Known(key) => self.cells[first + key.variant()].clone(),
+                _ => {
+                    let state = self.states.iter().find(|state| state.first_cell == *first)?;
+                    join(self.cells[*first..][..state.cells].iter().cloned())?
+                }
+            },
+            ExprKind::Call(function, arguments) => {
+                let mut given = Vec::with_capacity(arguments.len());
+                for argument in arguments {
+                    given.push(self.read(argument, locals)?);
+                }
+                self.read(&self.functions[*function].body, &given)?
+            }
+            ExprKind::Not(inner) => match self.read(inner, locals)? {
+                Form::Known(value) => Form::Known(Value::Bool(!value.truth())),
+                other => other,
+            },
+            ExprKind::Negate(inner) => match self.read(inner, locals)? {
+                Form::Known(value) => Form::Known(Value::Number(-value.number())),
+                Form::Numbers(forms) => {
+                    Form::Numbers(forms.into_iter().map(|form| form.scaled(-1.0)).collect())
+                }
+                Form::Open => Form::Open,
+            },
+            ExprKind::Arithmetic(op, left, right) => {
+                let (left, right) = (self.read(left, locals)?, self.read(right, locals)?);
+                combined(*op, left, right)?
+            }
+            ExprKind::Compare(op, left, right) => {
+                let (left, right) = (self.read(left, locals)?, self.read(right, locals)?);
+                match (&left, &right) {
+                    (Form::Known(left), Form::Known(right)) => {
+                        Form::Known(Value::Bool(compare(*op, *left, *right)))
+                    }
+                    _ => self.compared(&left, &right)?,
+                }
+            }
+            ExprKind::And(left, right) => match self.read(left, locals)? {
+                Form::Known(value) if !value.truth() => Form::Known(value),
+                left => {
+                    self.read(right, locals).map(|right| if left == Form::Open { left } else { right })?
+                }
+            },
+            ExprKind::Or(left, right) => match self.read(left, locals)? {
+                Form::Known(value) if value.truth() => Form::Known(value),
+                left => {
+                    self.read(right, locals).map(|right| if left == Form::Open { left } else { right })?
+                }
+            },
+            ExprKind::Implies(left, right) => match self.read(left, locals)? {
+                Form::Known(value) if !value.truth() => Form::Known(Value::Bool(true)),
+                left => {
+                    self.read(right, locals).map(|right| if left == Form::Open { left } else { right })?
+                }
+            },
+            ExprKind::InRange(inner, low, high) => {
+                let inner = self.read(inner, locals)?;
+                for end in [low, high] {
+                    let end = self.read(end, locals)?;
+                    self.compared(&inner, &end)?;
+                }
+                Form::Open
+            }
+            ExprKind::InList(inner, list) => {
+                let inner = self.read(inner, locals)?;
+                for item in list {
+                    let item = self.read(item, locals)?;
+                    self.compared(&inner, &item)?;
+                }
+                Form::Open
+            }
+            ExprKind::InLanes(inner, lanes) => match self.read(inner, locals)? {
+                Form::Known(lane) => {
+                    let has = self.facts.road.is_some_and(|road| road.has_lane(lanes[lane.variant()]));
+                    Form::Known(Value::Bool(has))
+                }
+                _ => Form::Open,
+            },
+            ExprKind::Match { subject, arm_of, arms } => match self.read(subject, locals)? {
+                Form::Known(value) => self.read(&arms[arm_of[value.variant()]], locals)?,
+                _ => {
+                    let mut forms = Vec::with_capacity(arms.len());
+                    for arm in arms {
+                        forms.push(self.read(arm, locals)?);
+                    }
+                    join(forms)?
+                }
+            },
+        })
+    }
+
+    /// Notes where two numbers may be equal.
+    fn compared(&mut self, left: &Form, right: &Form) -> Option<Form> {
+        if let (Some(left), Some(right)) = (left.quotients(), right.quotients()) {
+            for a in &left {
+                for b in &right {
+                    let difference = a.above.times(&b.below)?.minus(&b.above.times(&a.below)?)?;
+                    for polynomial in [&difference, &a.below, &b.below] {
+                        let is_new = !polynomial.is_constant() && !self.found.contains(polynomial);
+                        if is_new && polynomial.is_finite() {
+                            self.found.push(polynomial.clone());
+                        }
+                    }
+                }
+            }
+        }
+        Some(Form::Open)
+    }
+}
+
+impl Quotient {
+    fn whole(above: Polynomial) -> Quotient {
+        Quotient { above, below: Polynomial::constant(1.0) }
+    }
+
+    fn scaled(self, factor: f64) -> Quotient {
+        Quotient { above: self.above.scaled(factor), ..self }
+    }
+}
+
+impl Form {
+    /// The quotients that a number may be; `None` if it is no number.
+    fn quotients(&self) -> Option<Vec<Quotient>> {
+        match self {
+            Form::Known(Value::Number(number)) => Some(vec![Quotient::whole(Polynomial::constant(*number))]),
+            Form::Numbers(forms) => Some(forms.clone()),
+            Form::Known(_) | Form::Open => None,
+        }
+    }
+}
+
+fn combined(op: Arithmetic, left: Form, right: Form) -> Option<Form> {
+    if let (Form::Known(left), Form::Known(right)) = (&left, &right) {
+        return Some(Form::Known(Value::Number(arithmetic(op, left.number(), right.number()))));
+    }
+    let mut forms = Vec::new();
+    for a in &left.quotients()? {
+        for b in &right.quotients()? {
+            let form = quotient(op, a, b)?;
+            if !forms.contains(&form) {
+                forms.push(form);
+            }
+        }
+    }
+    (forms.len() <= FORMS_MAX).then_some(Form::Numbers(forms))
+}
+
+fn quotient(op: Arithmetic, a: &Quotient, b: &Quotient) -> Option<Quotient> {
+    let one = Polynomial::constant(1.0);
+    let plain = a.below == one && b.below == one;
+    Some(match op {
+        // The usual case keeps the digits that evaluation has.
+        Arithmetic::Add if plain => Quotient::whole(a.above.plus(&b.above)?),
+        Arithmetic::Subtract if plain => Quotient::whole(a.above.minus(&b.above)?),
+        Arithmetic::Add | Arithmetic::Subtract => {
+            let (left, right) = (a.above.times(&b.below)?, b.above.times(&a.below)?);
+            let above = if op == Arithmetic::Add { left.plus(&right)? } else { left.minus(&right)? };
+            Quotient { above, below: a.below.times(&b.below)? }
+        }
+        Arithmetic::Multiply => Quotient { above: a.above.times(&b.above)?, below: a.below.times(&b.below)? },
+        Arithmetic::Divide => match b.above.value() {
+            Some(divisor) if divisor != 0.0 => {
+                Quotient { above: a.above.divided(divisor).times(&b.below)?, below: a.below.clone() }
+            }
+            _ => Quotient { above: a.above.times(&b.below)?, below: a.below.times(&b.above)? },
+        },
+    })
+}
+
+/// One of several forms.
+fn join(forms: impl IntoIterator<Item = Form>) -> Option<Form> {
+    let mut different: Vec<Form> = Vec::new();
+    for form in forms {
+        if !different.contains(&form) {
+            different.push(form);
+        }
+    }
+    if different.len() == 1 {
+        return different.pop();
+    }
+    let mut numbers = Vec::new();
+    for form in &different {
+        let Some(quotients) = form.quotients() else { return Some(Form::Open) };
+        numbers.extend(quotients);
+    }
+    (numbers.len() <= FORMS_MAX).then_some(Form::Numbers(numbers))
+}

@@ -1,0 +1,55 @@
+//! Rules under which no episode can begin.
+
+use crate::model::{Initial, NoStart, RulesInForce, Space, code};
+use crate::syntax::ast::Span;
+use crate::syntax::{Diagnostic, listed};
+
+/// One error for each rule that leaves no states to begin with on some roads; a road shows its first one alone.
+pub(super) fn report(space: &Space) -> Vec<Diagnostic> {
+    let in_force = RulesInForce::by_default(space);
+    let mut found: Vec<(NoStart, Vec<&str>)> = Vec::new();
+    for road in &space.roads {
+        let Err(no_start) = space.memory_at_start(road, &in_force, 0) else { continue };
+        match found.iter_mut().find(|(known, _)| known.index == no_start.index) {
+            Some((_, roads)) => roads.push(&road.name),
+            None => found.push((no_start, vec![&road.name])),
+        }
+    }
+    found.iter().map(|(no_start, roads)| error(space, no_start, roads)).collect()
+}
+
+fn error(space: &Space, no_start: &NoStart, roads: &[&str]) -> Diagnostic {
+    let rule = &space.rules[no_start.index];
+    let place = match roads.len() == space.roads.len() {
+        true => String::new(),
+        false => format!(" on {}", listed(roads)),
+    };
+    let error =
+        Diagnostic::error(code::NO_START, format!("no episode can begin under rule `{}`{place}", rule.name));
+    let error = match no_start.is_too_large {
+        true => error.at(rule.span, "it shares states with too many combinations of values"),
+        false => error.at(rule.span, "holds from the start on"),
+    };
+    let initial = |cell: usize| {
+        let state = space.state_of(cell);
+        (state, &state.initial[cell - state.first_cell])
+    };
+    // Cells of a map may share what they begin with.
+    let mut begun: Vec<(Span, &str)> = Vec::new();
+    for cell in &no_start.cells {
+        let at = match initial(*cell) {
+            (_, Initial::Value(expr)) => (expr.span, "begins so"),
+            (state, Initial::Any) => (state.span, "is drawn"),
+        };
+        if !begun.contains(&at) {
+            begun.push(at);
+        }
+    }
+    let error = begun.into_iter().fold(error, |error, (span, how)| error.beside(span, how));
+    let mut names: Vec<String> = no_start.cells.iter().map(|cell| space.cell_name(*cell)).collect();
+    names.dedup();
+    error.help(format!(
+        "let {} begin as the rule allows, for example as `any`; or bind the rule to actions by `on`",
+        listed(&names)
+    ))
+}
