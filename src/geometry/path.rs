@@ -55,6 +55,24 @@ const BLOCK: usize = 16;
 /// Number of cells for each vertex: bends have many vertices close together, and a cell should hold few of them.
 const CELLS_PER_VERTEX: usize = 4;
 
+/// A path turns at once by more than this, rad; less is rounding.
+const TURN_RAD_MIN: f64 = 1e-6;
+
+/// Length of the segment in which a path turns at once, m.
+const TURN_M: f64 = 1e-4;
+
+/// Moves the last vertex back by [`TURN_M`] along its segment. `false` if there is no segment long enough.
+fn step_back(points: &mut [PathPoint]) -> bool {
+    let [.., before, last] = points else { return false };
+    let chord_m = last.station_m - before.station_m;
+    if chord_m < 2.0 * TURN_M {
+        return false;
+    }
+    last.position -= (last.position - before.position) * (TURN_M / chord_m);
+    last.station_m -= TURN_M;
+    true
+}
+
 /// A box with its sides along the axes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Bounds {
@@ -102,7 +120,9 @@ impl Path {
     /// A path through points that already know their heading and curvature.
     ///
     /// Stations are measured anew as chord lengths from 0; points closer than 1 µm to their
-    /// predecessor are dropped. `None` if fewer than two remain.
+    /// predecessor are dropped. If such a point has another heading, the path turns there at once, and the
+    /// predecessor moves back a little: otherwise its heading would reach into the next segment.
+    /// `None` if fewer than two remain.
     pub fn new(samples: impl IntoIterator<Item = (Vec2, f64, f64)>) -> Option<Path> {
         let mut points: Vec<PathPoint> = Vec::new();
         for (position, heading_rad, curvature_per_m) in samples {
@@ -111,9 +131,13 @@ impl Path {
                 Some(last) => {
                     let chord_m = (position - last.position).norm();
                     if chord_m < 1e-6 {
-                        continue;
+                        let turn_rad = wrap_angle(heading_rad - last.heading_rad);
+                        if turn_rad.abs() < TURN_RAD_MIN || !step_back(&mut points) {
+                            continue;
+                        }
                     }
-                    last.station_m + chord_m
+                    let last = points[points.len() - 1];
+                    last.station_m + (position - last.position).norm()
                 }
             };
             points.push(PathPoint { station_m, position, heading_rad, curvature_per_m });
@@ -384,6 +408,17 @@ mod tests {
         assert_eq!(path.pose_at(12.0).position, Vec2::new(12.0, 0.0));
         assert_eq!(path.pose_at(-2.0).position, Vec2::new(-2.0, 0.0));
         assert!(line(0.0).is_none());
+    }
+
+    #[test]
+    fn a_path_that_turns_at_once_keeps_both_headings() {
+        let east = Path::new([0.0, 10.0].map(|x_m| (Vec2::new(x_m, 0.0), 0.0, 0.0))).expect("a line");
+        let up = Path::new([0.0, 10.0].map(|y_m| (Vec2::new(10.0, y_m), 1.5, 0.0))).expect("a line");
+        let both = Path::join([&east, &up]).expect("twenty metres");
+        assert_eq!(both.length_m(), 20.0);
+        assert_eq!(both.pose_at(9.999).heading_rad, 0.0);
+        assert_eq!(both.pose_at(10.001).heading_rad, 1.5);
+        assert_eq!(both.pose_at(10.0).position, Vec2::new(10.0, 0.0));
     }
 
     #[test]

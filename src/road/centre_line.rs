@@ -19,6 +19,14 @@ const CHORD_M_MAX: f64 = 1.0;
 /// interpolation would spread the jump over the whole straight.
 const JUMP_M: f64 = 0.05;
 
+/// The same for a jump in heading, where a taper begins or ends: a vertex on either side of the jump, so that
+/// each side keeps its own heading. Nearer vertices would be dropped as one.
+const TURN_M: f64 = 1e-4;
+
+/// Smaller jumps in heading (rad) and in curvature (1/m) are rounding.
+const TURN_RAD_MIN: f64 = 1e-6;
+const JUMP_PER_M_MIN: f64 = 1e-6;
+
 /// Limit on the vertices of a lane; no lane of a real road needs as many.
 const SAMPLES_MAX: usize = 500_000;
 
@@ -89,10 +97,7 @@ pub fn centre_line(
         // At its end the polynomials of the next piece hold; just before it still those of this piece.
         let mut end_m = limit_m - 1e-7;
         if i + 2 < breaks_m.len() {
-            let jump = curve.at(limit_m).curvature_per_m - curve.at(end_m).curvature_per_m;
-            if jump.abs() > 1e-6 && limit_m - begin_m > 2.0 * JUMP_M {
-                end_m = limit_m - JUMP_M;
-            }
+            end_m -= curve.retreat_m(end_m, limit_m).min((limit_m - begin_m) / 2.0);
         }
         curve.sample(curve.at(begin_m), curve.at(end_m), &mut samples);
     }
@@ -160,6 +165,18 @@ impl Curve<'_> {
             curvature_per_m,
             width_m: width.value,
             folded,
+        }
+    }
+
+    /// How far before a break the last vertex of a piece lies, m; `before_m` is a station just before it.
+    fn retreat_m(&self, before_m: f64, break_m: f64) -> f64 {
+        let (before, after) = (self.at(before_m), self.at(break_m));
+        if wrap_angle(after.heading_rad - before.heading_rad).abs() > TURN_RAD_MIN {
+            TURN_M
+        } else if (after.curvature_per_m - before.curvature_per_m).abs() > JUMP_PER_M_MIN {
+            JUMP_M
+        } else {
+            0.0
         }
     }
 

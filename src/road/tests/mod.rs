@@ -5,4 +5,5 @@ mod abreast;
 mod changes;
 mod footway;
 mod places;
+mod poses;
 mod reading;
