@@ -90,7 +90,14 @@ fn scene(pieces: &[(f64, f64, f64)]) -> Arc<Scene> {
     let mut route = Route::find(&map, start, goal).expect("one lane leads there");
     route.stop_lines.push(RouteStopLine { station_m: 100.0, signal: 0 });
     let position = route.path.pose_at(100.0).offset(10.0, -4.0).position;
-    map.signals.push(Signal { id: "1".into(), position, junction: None, group: 0 });
+    map.signals.push(Signal {
+        id: "1".into(),
+        position,
+        junction: None,
+        group: 0,
+        for_vehicles: true,
+        lanes: Vec::new(),
+    });
     Arc::new(Scene::new(map.into(), route))
 }
 

@@ -80,6 +80,13 @@ impl Checker {
                 return self.reject(error.help("`avastra road MAP` tells which lane leads where"));
             }
         };
+        let unlit = match field(&fields, RoadField::Unlit).map(|unlit| self.truth(unlit)) {
+            None => false,
+            Some(unlit) => unlit?,
+        };
+        if !unlit {
+            self.refuse_idle_lights(block, &map, &route)?;
+        }
         let facts = facts(&block.name.text, &map, &route);
         let name = block.name.text.clone();
         Some(Road { name, docs: docs(item), map_path, map, start, goal, route, facts })
@@ -94,6 +101,28 @@ impl Checker {
                 _ => self.look_at(&field.value, &Place::default(), None),
             }
         }
+    }
+
+    /// A junction whose lights say nothing is driven through without a stop: nothing that an author would expect.
+    fn refuse_idle_lights(&mut self, block: &ast::Block, map: &RoadMap, route: &Route) -> Option<()> {
+        let passed = route.lanes.iter().filter_map(|part| map.lane(part.lane).junction);
+        let Some(idle) = passed.map(|index| &map.junctions[index]).find(|junction| junction.idle_lights > 0)
+        else {
+            return Some(());
+        };
+        let message = format!("no light of junction `{}` holds a lane", idle.id);
+        let reason = format!("the route leads through it; it has {} lights", idle.idle_lights);
+        self.reject(Diagnostic::error(code::NO_ROUTE, message).at(block.name.span, reason).help(
+            "`avastra road MAP` names these lights; `unlit: true` drives through the junction as if it had none",
+        ))
+    }
+
+    fn truth(&mut self, value: &ast::Expr) -> Option<bool> {
+        if let ast::ExprKind::Bool(truth) = value.kind {
+            return Some(truth);
+        }
+        let error = Diagnostic::error(code::TYPE_MISMATCH, "`unlit` is `true` or `false`");
+        self.reject(error.at(value.span, "not a Bool"))
     }
 
     /// A limit for the whole road, m/s.

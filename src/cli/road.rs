@@ -123,13 +123,13 @@ fn words(map: &RoadMap, route: Option<&Route>) -> String {
         let groups = plural(junction.groups, "signal group");
         lines.push(format!("junction `{title}`: {groups}; {}", listed(&ways)));
     }
-    for (index, signal) in map.signals.iter().enumerate() {
+    for signal in &map.signals {
         let (x, y) = (signal.position.x, signal.position.y);
         lines.push(format!(
             "signal `{}` at {x:.1}, {y:.1}: group {}; stops {}",
             signal.id,
             signal.group,
-            listed(&names(map, &stopped(map, index)))
+            listed(&names(map, &signal.lanes))
         ));
     }
     lines.extend(route.map(|route| route_words(map, route)));
@@ -255,7 +255,8 @@ fn signal_json(map: &RoadMap, index: usize) -> Value {
         "y_m": signal.position.y,
         "junction": signal.junction.map(|junction| &map.junctions[junction].id),
         "group": signal.group,
-        "lanes": keys(map, &stopped(map, index)),
+        "for_vehicles": signal.for_vehicles,
+        "lanes": keys(map, &signal.lanes),
     })
 }
 
@@ -289,17 +290,6 @@ fn route_json(map: &RoadMap, route: &Route) -> Value {
 
 fn sign_line_json(station_m: f64, kind: SignKind) -> Value {
     json!({"station_m": station_m, "kind": if kind == SignKind::Stop { "stop" } else { "yield" }})
-}
-
-/// Lanes that a signal stops, once for each of its lines.
-fn stopped(map: &RoadMap, signal: usize) -> Vec<LaneIndex> {
-    let lanes = map.lanes.iter().enumerate();
-    lanes
-        .flat_map(|(index, lane)| {
-            let lines = lane.stop_lines.iter().filter(move |line| line.signal == signal);
-            lines.map(move |_| LaneIndex(index))
-        })
-        .collect()
 }
 
 fn key(map: &RoadMap, lane: LaneIndex) -> &LaneKey {

@@ -212,7 +212,12 @@ impl Play {
             }
         }
         let progress_m = self.world.ego_station_m() - station_m;
-        self.stalled = if progress_m.abs() < PROGRESS_M_MIN { self.stalled + 1 } else { 0 };
+        // Who waits for a light does not stall; neither does that wait end a stall. After a contact nothing waits.
+        if progress_m.abs() >= PROGRESS_M_MIN {
+            self.stalled = 0;
+        } else if !self.collisions.is_empty() || !self.world.waits_for_light() {
+            self.stalled += 1;
+        }
         let Near { probability: proc, body } = near.unwrap_or(Near { probability: 0.0, body: None });
         // Of several collisions in a step, the first decides.
         let facts = match self.collisions.get(met) {

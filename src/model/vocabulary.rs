@@ -262,6 +262,7 @@ words! {
     Start "start" = "Where the ego vehicle starts: `start: lane 1/-1 at 12 m`.",
     Goal "goal" = "Where it is to arrive: `goal: lane 7/-1 at 80 m`.",
     Limit "limit" = "A lower limit for the whole road: `limit: 30 km/h`.",
+    Unlit "unlit" = "Whether to drive through junctions whose lights hold no lane, as if they had none: `unlit: true`.",
 }
 
 words! {

@@ -48,6 +48,7 @@ pub fn draw(map: &RoadMap, route: Option<&Route>) -> String {
         drawing.route(route);
     }
     drawing.signals();
+    drawing.warnings();
     drawing.scale_and_north(south_west, north_east);
     svg.push_str("</svg>\n");
     svg
@@ -69,6 +70,18 @@ struct Drawing<'a> {
 }
 
 impl Drawing<'_> {
+    /// A ring around every place that was repaired or left out; its title says what.
+    fn warnings(&mut self) {
+        for (index, position) in &self.map.warned_at {
+            let (x, y) = self.canvas.at(*position);
+            let title = escape(&self.map.warnings[*index]);
+            let _ = writeln!(
+                self.canvas.svg,
+                r##"<circle cx="{x:.1}" cy="{y:.1}" r="9" fill="none" stroke="#d50000" stroke-width="2"><title>{title}</title></circle>"##
+            );
+        }
+    }
+
     /// The strips between opposing lanes that do not touch.
     fn medians(&mut self) {
         for (index, lane) in self.map.lanes.iter().enumerate() {

@@ -1,7 +1,8 @@
 //! Centre lines of lanes: the exact offset curve of a reference line, sampled.
 
-use crate::geometry::{Path, Vec2, wrap_angle};
+use crate::geometry::{Path, Vec2, unit_vector, wrap_angle};
 
+use super::conflict::segment_crossing;
 use super::opendrive::{RoadElement, SectionElement};
 
 /// Largest distance of a chord from the curve, m; other modules rely on twice as much.
@@ -19,11 +20,12 @@ const CHORD_M_MAX: f64 = 1.0;
 /// interpolation would spread the jump over the whole straight.
 const JUMP_M: f64 = 0.05;
 
-/// The same for a jump in heading, where a taper begins or ends: a vertex on either side of the jump, so that
-/// each side keeps its own heading. Nearer vertices would be dropped as one.
+/// The same for a jump in heading, where a taper begins or ends, or in position, where a width steps: a vertex on
+/// either side of the jump, so that each side keeps its own pose. Nearer vertices would be dropped as one.
 const TURN_M: f64 = 1e-4;
 
-/// Smaller jumps in heading (rad) and in curvature (1/m) are rounding.
+/// Smaller jumps in position (m), heading (rad) and curvature (1/m) are rounding.
+const LEAP_M_MIN: f64 = 1e-5;
 const TURN_RAD_MIN: f64 = 1e-6;
 const JUMP_PER_M_MIN: f64 = 1e-6;
 
@@ -43,9 +45,24 @@ pub struct CentreLine {
     pub widths_m: Vec<f64>,
     /// Station of the road's reference line at each vertex, m.
     pub road_stations_m: Vec<f64>,
-    /// Whether the lane folds up somewhere, because it lies beyond the centre of a bend.
-    pub folded: bool,
+    /// The largest of the loops that were cut off.
+    pub unfolded: Option<Unfolded>,
 }
+
+/// Where a lane ran backwards, because it lies beyond the centre of a bend: the loop is cut off where the lane
+/// crosses itself.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Unfolded {
+    pub position: Vec2,
+    /// How far the part that was cut off reached, m.
+    pub off_m: f64,
+}
+
+/// A smaller loop is rounding, m.
+const UNFOLDED_M_MIN: f64 = 0.01;
+
+/// A loop that reaches farther than this is no mistake of a bend's radius, m: such a lane is left out.
+const UNFOLDED_M_MAX: f64 = 2.0;
 
 #[derive(Clone, Copy)]
 struct Sample {
@@ -61,14 +78,20 @@ struct Sample {
 const WIDTH_M_MIN: f64 = -0.1;
 
 /// Why a lane has no centre line.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 pub enum NoCentreLine {
-    /// The section is too short for a centre line.
+    #[error("it has no length")]
     Short,
     /// Its polynomials or curves have values that no road has.
+    #[error("it is no road: look at its widths, offsets and curves")]
     Wild,
-    /// Its width falls below zero: its edges would cross, and its centre lie in another lane.
+    /// Its edges would cross, and its centre lie in another lane.
+    #[error("it becomes narrower than nothing: look at its widths")]
     Inverted,
+    #[error("it runs backwards in a bend")]
+    Folded,
+    #[error("its road turns too sharply")]
+    Broken,
 }
 
 /// Samples the centre of a lane of a section.
@@ -80,6 +103,10 @@ pub fn centre_line(
     section: &SectionElement,
     lane: i32,
 ) -> Result<CentreLine, NoCentreLine> {
+    let inside = |at_m: &f64| *at_m > section.begin_m - 1e-6 && *at_m < section.end_m + 1e-6;
+    if road.reference.breaks_m().iter().any(inside) {
+        return Err(NoCentreLine::Broken);
+    }
     let mut breaks_m: Vec<f64> = road.reference.beginnings().chain(road.lane_offset.beginnings()).collect();
     for element in section.lanes.iter().filter(|element| element.id.signum() == lane.signum()) {
         let within = element.widths.beginnings().chain(element.borders.beginnings());
@@ -112,6 +139,7 @@ pub fn centre_line(
     if samples.iter().any(|sample| sample.width_m < WIDTH_M_MIN) {
         return Err(NoCentreLine::Inverted);
     }
+    let unfolded = unfold(&mut samples)?;
     // `Path` drops points that coincide; the lists of widths and stations must drop the same ones.
     samples.dedup_by(|b, a| (b.position - a.position).norm() < 1e-5);
     if !road.runs_along(lane) {
@@ -131,8 +159,59 @@ pub fn centre_line(
         path,
         widths_m: samples.iter().map(|sample| sample.width_m.max(0.0)).collect(),
         road_stations_m: samples.iter().map(|sample| sample.s_m).collect(),
-        folded: samples.iter().any(|sample| sample.folded),
+        unfolded,
     })
+}
+
+/// Cuts off the loops in which a lane runs backwards, and tells the largest; `None` if there are none to speak of.
+fn unfold(samples: &mut Vec<Sample>) -> Result<Option<Unfolded>, NoCentreLine> {
+    let mut largest: Option<Unfolded> = None;
+    let mut from = 0;
+    while let Some(back) =
+        (from..samples.len().saturating_sub(1)).find(|i| runs_back(samples[*i], samples[*i + 1]))
+    {
+        let (first, last, crossing) = loop_around(samples, back).ok_or(NoCentreLine::Folded)?;
+        let reach_m = |sample: &Sample| (sample.position - crossing.position).norm();
+        let off_m = samples[first + 1..=last].iter().map(reach_m).fold(0.0, f64::max);
+        if off_m > UNFOLDED_M_MAX {
+            return Err(NoCentreLine::Folded);
+        }
+        samples.splice(first + 1..=last, [crossing]);
+        if off_m > UNFOLDED_M_MIN && largest.is_none_or(|known| known.off_m < off_m) {
+            largest = Some(Unfolded { position: crossing.position, off_m });
+        }
+        from = first + 1;
+    }
+    Ok(largest)
+}
+
+/// Whether the way from one sample to the next leads against the road.
+fn runs_back(a: Sample, b: Sample) -> bool {
+    let heading_rad = a.heading_rad + wrap_angle(b.heading_rad - a.heading_rad) / 2.0;
+    let step = b.position - a.position;
+    step.norm() > LEAP_M_MIN && step.dot(&unit_vector(heading_rad)) < -0.5 * step.norm()
+}
+
+/// How many samples before and after a step that leads backwards its loop may have.
+const LOOP_SAMPLES: usize = 400;
+
+/// The loop around a step that leads backwards: the last sample before it, the last sample of it, and the sample
+/// in its place, where the lane crosses itself. Where it crosses nothing, because it only overlaps, the lane goes
+/// on with the first sample that lies ahead again.
+fn loop_around(samples: &[Sample], back: usize) -> Option<(usize, usize, Sample)> {
+    let behind = back + 1..(back + LOOP_SAMPLES).min(samples.len() - 1);
+    for first in (back.saturating_sub(LOOP_SAMPLES)..back).rev() {
+        for last in behind.clone() {
+            let [a, b, c, d] = [first, first + 1, last, last + 1].map(|i| samples[i]);
+            if let Some((x, _)) = segment_crossing(a.position, b.position, c.position, d.position) {
+                let s_m = (a.s_m + (b.s_m - a.s_m) * x).min(d.s_m);
+                let position = a.position + (b.position - a.position) * x;
+                return Some((first, last, Sample { s_m, position, folded: false, ..a }));
+            }
+        }
+    }
+    let last = behind.into_iter().find(|last| !runs_back(samples[back], samples[last + 1]))?;
+    Some((back.checked_sub(1)?, last, samples[back]))
 }
 
 /// A lane's centre as a function of the road's station.
@@ -171,7 +250,8 @@ impl Curve<'_> {
     /// How far before a break the last vertex of a piece lies, m; `before_m` is a station just before it.
     fn retreat_m(&self, before_m: f64, break_m: f64) -> f64 {
         let (before, after) = (self.at(before_m), self.at(break_m));
-        if wrap_angle(after.heading_rad - before.heading_rad).abs() > TURN_RAD_MIN {
+        let turns = wrap_angle(after.heading_rad - before.heading_rad).abs() > TURN_RAD_MIN;
+        if turns || (after.position - before.position).norm() > LEAP_M_MIN {
             TURN_M
         } else if (after.curvature_per_m - before.curvature_per_m).abs() > JUMP_PER_M_MIN {
             JUMP_M

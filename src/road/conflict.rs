@@ -83,7 +83,7 @@ fn dense(path: &Path) -> Vec<PathPoint> {
 }
 
 /// Where two paths cross: (station on the first, station on the second), m.
-fn crossings(a: &Path, b: &Path) -> Vec<(f64, f64)> {
+pub fn crossings(a: &Path, b: &Path) -> Vec<(f64, f64)> {
     let mut found: Vec<(f64, f64)> = Vec::new();
     // A little larger because of rounding.
     let near = b.bounds().grown(1e-3);
@@ -108,7 +108,7 @@ fn crossings(a: &Path, b: &Path) -> Vec<(f64, f64)> {
 }
 
 /// The fractions along two segments at which they cross; `None` if they do not cross or are parallel.
-fn segment_crossing(a: Vec2, b: Vec2, c: Vec2, d: Vec2) -> Option<(f64, f64)> {
+pub fn segment_crossing(a: Vec2, b: Vec2, c: Vec2, d: Vec2) -> Option<(f64, f64)> {
     let (p, q, delta) = (b - a, d - c, c - a);
     let cross = p.x * q.y - p.y * q.x;
     if cross.abs() < 1e-12 {

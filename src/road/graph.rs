@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::geometry::{Path, wrap_angle};
+use crate::geometry::{Path, Vec2, wrap_angle};
 
 use super::centre_line::{CentreLine, NoCentreLine, centre_line};
 use super::index::LaneGrid;
@@ -11,6 +11,7 @@ use super::map::{
     Junction, Lane, LaneIndex, LaneKey, Neighbour, Precedence, RoadError, RoadMap, Strip, Turn,
 };
 use super::opendrive::{Contact, Document, RoadElement, RoadLink, SectionElement, wrong};
+use super::phases::share_phases;
 use super::signals::{add_objects, add_signals, set_precedence};
 
 /// The limit of a road whose file states none: 50 km/h, usual in towns.
@@ -27,10 +28,10 @@ pub fn build(document: &Document) -> Result<RoadMap, RoadError> {
     let mut builder = Builder::new(document)?;
     builder.add_lanes()?;
     builder.link_sections();
-    builder.link_roads()?;
-    builder.link_junctions()?;
+    builder.link_roads();
+    builder.link_junctions();
     builder.set_neighbours();
-    add_signals(&mut builder)?;
+    add_signals(&mut builder);
     add_objects(&mut builder);
     builder.add_strips();
     let mut map = builder.map;
@@ -45,7 +46,8 @@ pub fn build(document: &Document) -> Result<RoadMap, RoadError> {
             map.junctions[junction].lanes.push(LaneIndex(index));
         }
     }
-    set_precedence(&mut map);
+    share_phases(&mut map);
+    set_precedence(document, &mut map);
     map.grid = LaneGrid::new(&map.lanes);
     Ok(map)
 }
@@ -84,12 +86,14 @@ impl<'a> Builder<'a> {
                     name: junction.name.clone(),
                     lanes: Vec::new(),
                     groups: junction.controllers.len(),
+                    idle_lights: 0,
                 })
                 .collect(),
             crosswalks: Vec::new(),
             strips: Vec::new(),
             solids: Vec::new(),
             warnings: document.warnings.clone(),
+            warned_at: document.warned_at.clone(),
             grid: LaneGrid::default(),
         };
         Ok(Builder { document, map, roads, junctions: junctions.collect(), lanes: BTreeMap::new() })
@@ -97,6 +101,11 @@ impl<'a> Builder<'a> {
 
     pub fn warn(&mut self, line: u32, message: impl AsRef<str>) {
         self.map.warnings.push(format!("line {line}: {}", message.as_ref()));
+    }
+
+    pub fn warn_at(&mut self, line: u32, position: Vec2, message: impl AsRef<str>) {
+        self.map.warned_at.push((self.map.warnings.len(), position));
+        self.warn(line, message);
     }
 
     pub fn lane_index(&self, road: usize, section: usize, lane: i32) -> Option<LaneIndex> {
@@ -107,35 +116,37 @@ impl<'a> Builder<'a> {
         let document = self.document;
         let mut limitless = 0;
         for (road_index, road) in document.roads.iter().enumerate() {
-            let junction = match &road.junction {
-                None => None,
-                Some(id) => Some(*self.junctions.get(id.as_str()).ok_or_else(|| {
-                    wrong(
-                        road.line,
-                        format!("road `{}` lies in junction `{id}`, which does not exist", road.id),
-                    )
-                })?),
-            };
+            let junction = road.junction.as_ref().and_then(|id| self.junctions.get(id.as_str()).copied());
+            if let (Some(id), None) = (&road.junction, junction) {
+                let message = format!(
+                    "road `{}` lies in junction `{id}`, which does not exist: it is taken for one outside junctions",
+                    road.id
+                );
+                self.warn(road.line, message);
+            }
             for (section_index, section) in road.sections.iter().enumerate() {
                 for element in section.lanes.iter().filter(|element| element.driving) {
                     let at = format!("lane {} of road `{}` at s {}", element.id, road.id, section.begin_m);
                     let centre = match centre_line(road, section, element.id) {
                         Ok(centre) => centre,
                         Err(NoCentreLine::Short) => {
-                            self.warn(element.line, format!("ignored {at}: it has no length"));
+                            self.warn(element.line, format!("left out {at}: it has no length"));
                             continue;
                         }
-                        Err(NoCentreLine::Inverted) => {
-                            let message = format!("{at} becomes narrower than nothing: look at its widths");
-                            return Err(wrong(element.line, message));
-                        }
-                        Err(NoCentreLine::Wild) => {
-                            let message = format!("{at} is no road: look at its widths, offsets and curves");
-                            return Err(wrong(element.line, message));
+                        // The corner has its own warning.
+                        Err(NoCentreLine::Broken) => continue,
+                        Err(reason) => {
+                            let begin = road.reference.at(section.begin_m).position;
+                            self.warn_at(element.line, begin, format!("left out {at}: {reason}"));
+                            continue;
                         }
                     };
-                    if centre.folded {
-                        self.warn(element.line, format!("{at} folds up in a bend"));
+                    if let Some(unfolded) = centre.unfolded {
+                        let message = format!(
+                            "{at} runs backwards in a bend: it is cut short there, by up to {:.2} m",
+                            unfolded.off_m
+                        );
+                        self.warn_at(element.line, unfolded.position, message);
                     }
                     let limit_mps = speed_limit_mps(road, section, element.id);
                     limitless += usize::from(limit_mps.is_none());
@@ -148,7 +159,9 @@ impl<'a> Builder<'a> {
             }
         }
         if self.map.lanes.is_empty() {
-            return Err(wrong(1, "the map has no lane of type `driving`"));
+            let left_out = self.map.warnings.iter().find(|warning| warning.contains("left out"));
+            let reason = left_out.map_or(String::new(), |warning| format!(" that can be driven; {warning}"));
+            return Err(wrong(1, format!("the map has no lane of type `driving`{reason}")));
         }
         if limitless > 0 {
             self.map.warnings.push(format!("{limitless} lanes state no speed limit; 50 km/h is taken"));
@@ -192,24 +205,23 @@ impl<'a> Builder<'a> {
         }
     }
 
-    fn link_roads(&mut self) -> Result<(), RoadError> {
+    fn link_roads(&mut self) {
         for (road_index, road) in self.document.roads.iter().enumerate() {
             for (contact, link) in [(Contact::Start, &road.predecessor), (Contact::End, &road.successor)] {
                 let (id, other_contact, line) = match link {
                     None => continue,
-                    Some(RoadLink::Junction { id, .. }) if self.junctions.contains_key(id.as_str()) => {
-                        continue;
-                    }
                     Some(RoadLink::Junction { id, line }) => {
-                        let message =
-                            format!("road `{}` leads to junction `{id}`, which does not exist", road.id);
-                        return Err(wrong(*line, message));
+                        if !self.junctions.contains_key(id.as_str()) {
+                            self.warn_dead_end(road, &format!("junction `{id}`"), *line);
+                        }
+                        continue;
                     }
                     Some(RoadLink::Road { id, contact, line }) => (id, *contact, *line),
                 };
-                let other = *self.roads.get(id.as_str()).ok_or_else(|| {
-                    wrong(line, format!("road `{}` leads to road `{id}`, which does not exist", road.id))
-                })?;
+                let Some(other) = self.roads.get(id.as_str()).copied() else {
+                    self.warn_dead_end(road, &format!("road `{id}`"), line);
+                    continue;
+                };
                 let section = end_section(road, contact);
                 for lane in &road.sections[section].lanes {
                     let linked = match contact {
@@ -223,21 +235,29 @@ impl<'a> Builder<'a> {
                 }
             }
         }
-        Ok(())
     }
 
-    fn link_junctions(&mut self) -> Result<(), RoadError> {
+    fn warn_dead_end(&mut self, road: &RoadElement, missing: &str, line: u32) {
+        let message =
+            format!("road `{}` leads to {missing}, which does not exist: it is a dead end", road.id);
+        self.warn(line, message);
+    }
+
+    fn link_junctions(&mut self) {
         for junction in &self.document.junctions {
             for connection in &junction.connections {
-                let road = |id: &str| {
-                    self.roads.get(id).copied().ok_or_else(|| {
-                        let message =
-                            format!("junction `{}` connects road `{id}`, which does not exist", junction.id);
-                        wrong(connection.line, message)
-                    })
+                let ends = [&connection.incoming_road, &connection.connecting_road];
+                let [Some(incoming), Some(connecting)] = ends.map(|id| self.roads.get(id.as_str()).copied())
+                else {
+                    let missing = ends.into_iter().find(|id| !self.roads.contains_key(id.as_str()));
+                    let message = format!(
+                        "junction `{}` connects road `{}`, which does not exist: ignored the connection",
+                        junction.id,
+                        missing.map_or("", String::as_str)
+                    );
+                    self.warn(connection.line, message);
+                    continue;
                 };
-                let incoming = road(&connection.incoming_road)?;
-                let connecting = road(&connection.connecting_road)?;
                 if connection.lane_links.is_empty() {
                     let message = format!("a connection of junction `{}` links no lanes", junction.id);
                     self.warn(connection.line, message);
@@ -250,7 +270,6 @@ impl<'a> Builder<'a> {
                 }
             }
         }
-        Ok(())
     }
 
     /// The end of a road that touches a junction; if both ends do, the one nearer to the connecting road.

@@ -125,9 +125,12 @@ pub struct Signal {
     pub position: Vec2,
     /// Index in [`RoadMap::junctions`].
     pub junction: Option<usize>,
-    /// Position of its controller in the junction's cycle, from 0. Lights that no controller of a
-    /// junction switches form a group for each arm, after those.
+    /// Its place in the junction's cycle, from 0. Lights whose traffic does not cross share a place.
     pub group: usize,
+    /// Whether it is for vehicles, not for people on foot, cycles or trams.
+    pub for_vehicles: bool,
+    /// The lanes that it holds for. Several heads of a group may share one stop line.
+    pub lanes: Vec<LaneIndex>,
 }
 
 /// A sign that says who gives way. Lights have precedence where both stand.
@@ -156,6 +159,9 @@ pub struct Junction {
     pub lanes: Vec<LaneIndex>,
     /// Number of signal groups in its cycle; 0 if it has no signals.
     pub groups: usize,
+    /// Number of its lights if none of them holds a lane; 0 otherwise. Such a junction is driven as if it had
+    /// no lights.
+    pub idle_lights: usize,
 }
 
 #[derive(Debug, Clone, PartialEq)]
@@ -204,8 +210,10 @@ pub struct RoadMap {
     pub crosswalks: Vec<Crosswalk>,
     pub strips: Vec<Strip>,
     pub solids: Vec<Solid>,
-    /// Messages about parts of the file that were read but not understood.
+    /// What was repaired, left out or not understood.
     pub warnings: Vec<String>,
+    /// The places in the plane that warnings are about: index of the warning, position.
+    pub warned_at: Vec<(usize, Vec2)>,
     pub(super) grid: LaneGrid,
 }
 
@@ -320,6 +328,11 @@ const APPROACH_M: f64 = 40.0;
 const MISFIT_RAD_PER_M: f64 = 0.1;
 
 impl Lane {
+    /// Whether its traffic runs in the direction of the road's reference line.
+    pub(super) fn is_along(&self) -> bool {
+        self.road_stations_m[0] < self.road_stations_m[self.road_stations_m.len() - 1]
+    }
+
     /// The next driving lane to a side, of either direction.
     pub fn neighbour(&self, side: Side) -> Option<Neighbour> {
         match side {
@@ -344,7 +357,7 @@ impl Lane {
     /// The lane's own station beside a station of the road's reference line, clamped to the lane, m.
     pub fn station_of(&self, s_m: f64) -> f64 {
         let stations_m = &self.road_stations_m;
-        let rising = stations_m[0] < stations_m[stations_m.len() - 1];
+        let rising = self.is_along();
         let after = stations_m.partition_point(|at_m| if rising { *at_m <= s_m } else { *at_m >= s_m });
         let after = after.clamp(1, stations_m.len() - 1);
         let (from_m, to_m) = (stations_m[after - 1], stations_m[after]);

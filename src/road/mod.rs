@@ -12,6 +12,7 @@ mod join;
 mod lane_change;
 mod map;
 mod opendrive;
+mod phases;
 mod route;
 mod search;
 mod signals;

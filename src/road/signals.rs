@@ -1,54 +1,129 @@
 //! Traffic lights with their groups and stop lines, signs that say who gives way, crosswalks, and solid things.
 
 use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
 
 use crate::geometry::{Bounds, Pose, Vec2};
 
 use super::graph::Builder;
 use super::map::{
-    Crosswalk, LaneIndex, Precedence, RoadError, RoadMap, Sign, SignKind, SignLine, Signal, Solid, StopLine,
+    Crosswalk, Lane, LaneIndex, Precedence, RoadMap, Sign, SignKind, SignLine, Signal, Solid, StopLine,
 };
 use super::opendrive::{
-    Meaning, ObjectKind, Orientation, Outline, RoadElement, RoadLink, SignalElement, wrong,
+    Document, Meaning, ObjectKind, Orientation, Outline, RoadElement, RoadLink, SignalElement,
 };
 
 /// Signal heads of one group that are nearer to each other than this share a stop line, m.
 const SHARED_LINE_M: f64 = 1.0;
 
+/// A light so near to the beginning of a lane that leaves a junction stops no traffic of that lane, m.
+const AT_THE_MOUTH_M: f64 = 1.0;
+
 /// Adds all lights and signs: lights with a stop line on each lane they hold for.
-pub fn add_signals(builder: &mut Builder) -> Result<(), RoadError> {
+pub fn add_signals(builder: &mut Builder) {
+    let mut placed = place_signals(builder);
+    warn_of_controllers(builder, &placed);
+    for (road_index, road) in builder.document.roads.iter().enumerate() {
+        for (signal_index, signal) in road.signals.iter().enumerate() {
+            if let Some(found) = placed.of(road_index, signal_index, signal) {
+                let held = lanes_of(builder, road_index, signal);
+                match found {
+                    Found::Light(index) => placed.held[index].extend(held),
+                    Found::Sign(index) => builder.map.signs[index].lanes.extend(held),
+                }
+            }
+        }
+    }
+    let lights: Vec<Vec<(LaneIndex, f64)>> = core::mem::take(&mut placed.held);
+    set_groups(builder, &placed, &lights);
+    for (index, held) in lights.iter().enumerate() {
+        builder.map.signals[index].lanes = held.iter().map(|(lane, _)| *lane).collect();
+        add_stop_lines(builder, index, held);
+    }
+    warn_of_idle_lights(builder, &placed, &lights);
+}
+
+/// What a signal of the file became: an index in the map's signals or in its signs.
+#[derive(Clone, Copy)]
+enum Found {
+    Light(usize),
+    Sign(usize),
+}
+
+/// Where the signals of the file went.
+struct Placed<'a> {
+    /// By road and place among its signals.
+    own: BTreeMap<(usize, usize), Found>,
+    /// What a reference or a controller means by an id: the first signal that has it.
+    by_id: BTreeMap<&'a str, Found>,
+    /// For each light, its road and element.
+    lights: Vec<(usize, &'a SignalElement)>,
+    /// For each light, the lanes it holds for, with the station of the light on them, m.
+    held: Vec<Vec<(LaneIndex, f64)>>,
+}
+
+impl Placed<'_> {
+    /// What holds at the place of a signal or of a reference to one. Lights for people on foot hold no lane.
+    fn of(&self, road: usize, place: usize, signal: &SignalElement) -> Option<Found> {
+        if signal.reference {
+            // It may point to a sign that was left out.
+            return self.by_id.get(signal.id.as_str()).copied();
+        }
+        self.own.get(&(road, place)).copied().filter(|_| signal.meaning != Meaning::OtherLight)
+    }
+}
+
+fn place_signals<'a>(builder: &mut Builder<'a>) -> Placed<'a> {
     let document = builder.document;
-    let groups = groups(builder)?;
-    let mut arms = Arms::default();
-    let mut found = BTreeMap::new();
+    let mut placed =
+        Placed { own: BTreeMap::new(), by_id: BTreeMap::new(), lights: Vec::new(), held: Vec::new() };
+    // Ids that several signals have: the line of the second, and how many more there are.
+    let mut doubled: BTreeMap<&str, (u32, usize)> = BTreeMap::new();
     for (road_index, road) in document.roads.iter().enumerate() {
-        for signal in road.signals.iter().filter(|signal| !signal.reference) {
+        for (place, signal) in road.signals.iter().enumerate().filter(|(_, signal)| !signal.reference) {
             let position = position(road, signal.s_m, signal.t_m);
             let id = signal.id.clone();
-            let place = match signal.meaning {
+            let found = match signal.meaning {
                 Meaning::Sign(kind) => {
                     builder.map.signs.push(Sign { id, kind, position, lanes: Vec::new() });
                     Found::Sign(builder.map.signs.len() - 1)
                 }
                 Meaning::Light | Meaning::OtherLight => {
-                    let switched = groups.get(signal.id.as_str()).copied();
-                    let place = switched.or_else(|| arms.group(builder, road_index, signal));
                     builder.map.signals.push(Signal {
                         id,
                         position,
-                        junction: place.map(|(junction, _)| junction),
-                        group: place.map_or(0, |(_, group)| group),
+                        junction: None,
+                        group: 0,
+                        for_vehicles: signal.meaning == Meaning::Light,
+                        lanes: Vec::new(),
                     });
+                    placed.lights.push((road_index, signal));
+                    placed.held.push(Vec::new());
                     Found::Light(builder.map.signals.len() - 1)
                 }
             };
-            if found.insert(signal.id.as_str(), place).is_some() {
-                return Err(wrong(signal.line, format!("a second signal has the id `{}`", signal.id)));
+            placed.own.insert((road_index, place), found);
+            match placed.by_id.entry(signal.id.as_str()) {
+                Entry::Vacant(entry) => {
+                    entry.insert(found);
+                }
+                Entry::Occupied(_) => {
+                    doubled.entry(signal.id.as_str()).or_insert((signal.line, 0)).1 += 1;
+                }
             }
         }
     }
-    for controller in &document.controllers {
-        let is_light = |id: &String| matches!(found.get(id.as_str()), Some(Found::Light(_)));
+    for (id, (line, times)) in doubled {
+        let message =
+            format!("{times} more signals have the id `{id}`: references and controllers mean the first one");
+        builder.warn(line, message);
+    }
+    placed
+}
+
+fn warn_of_controllers(builder: &mut Builder, placed: &Placed) {
+    for controller in &builder.document.controllers {
+        let is_light = |id: &String| matches!(placed.by_id.get(id.as_str()), Some(Found::Light(_)));
         let missing: Vec<_> = controller.signals.iter().filter(|(id, _)| !is_light(id)).collect();
         if let Some((first, line)) = missing.first() {
             let message = format!(
@@ -59,25 +134,186 @@ pub fn add_signals(builder: &mut Builder) -> Result<(), RoadError> {
             builder.warn(*line, message);
         }
     }
-    for (road_index, road) in document.roads.iter().enumerate() {
-        for signal in road.signals.iter().filter(|signal| signal.meaning != Meaning::OtherLight) {
-            // A reference may also point to a sign that was left out.
-            match found.get(signal.id.as_str()) {
-                Some(Found::Light(index)) => add_stop_lines(builder, road_index, signal, *index),
-                Some(Found::Sign(index)) => {
-                    let lanes = lanes_of(builder, road_index, signal);
-                    builder.map.signs[*index].lanes.extend(lanes);
-                }
-                None => {}
+}
+
+/// Gives every light its junction and its group. Lights that no controller of a junction switches form a group
+/// for each arm, so that two crossing streets are never green together.
+fn set_groups(builder: &mut Builder, placed: &Placed, held: &[Vec<(LaneIndex, f64)>]) {
+    let switched = switched(builder);
+    let mut arms: BTreeMap<(usize, Arm), usize> = BTreeMap::new();
+    let (mut of_arms, mut lone) = (0, 0);
+    for (index, (road_index, signal)) in placed.lights.iter().enumerate() {
+        let place = switched.get(signal.id.as_str()).copied().or_else(|| {
+            let (junction, arm) = arm(builder, *road_index, signal, &held[index])?;
+            of_arms += 1;
+            let groups = &mut builder.map.junctions[junction].groups;
+            let group = *arms.entry((junction, arm)).or_insert_with(|| {
+                *groups += 1;
+                *groups - 1
+            });
+            Some((junction, group))
+        });
+        lone += usize::from(place.is_none());
+        builder.map.signals[index].junction = place.map(|(junction, _)| junction);
+        builder.map.signals[index].group = place.map_or(0, |(_, group)| group);
+    }
+    let warnings = &mut builder.map.warnings;
+    if of_arms > 0 {
+        warnings.push(format!(
+            "no junction's controller switches {of_arms} signals: each arm of their junctions is a group of its own"
+        ));
+    }
+    if lone > 0 {
+        warnings.push(format!(
+            "{lone} signals belong to no junction and have no controller in one: each is its own group"
+        ));
+    }
+}
+
+/// An arm of a junction: a road, and whether its traffic drives along the reference line.
+type Arm = (usize, bool);
+
+/// Junction and arm of a light, by the traffic that it stops. A light that holds no lane belongs to the end of
+/// the road near which it stands.
+fn arm(
+    builder: &Builder,
+    road_index: usize,
+    signal: &SignalElement,
+    held: &[(LaneIndex, f64)],
+) -> Option<(usize, Arm)> {
+    let map = &builder.map;
+    for (index, _) in held {
+        let lane = map.lane(*index);
+        let arm_of =
+            |lane: &Lane| Some((builder.roads.get(lane.key.road.as_str()).copied()?, lane.is_along()));
+        if let Some(junction) = lane.junction {
+            let before = lane.predecessors.first().map_or(lane, |before| map.lane(*before));
+            return Some((junction, arm_of(before)?));
+        }
+        if let Some(junction) = lane.successors.iter().find_map(|next| map.lane(*next).junction) {
+            return Some((junction, arm_of(lane)?));
+        }
+    }
+    let road = &builder.document.roads[road_index];
+    let along = match signal.orientation {
+        Orientation::Along => true,
+        Orientation::Against => false,
+        Orientation::Both => signal.s_m > road.length_m / 2.0,
+    };
+    let ahead = if along { &road.successor } else { &road.predecessor };
+    let Some(RoadLink::Junction { id, .. }) = ahead else { return None };
+    Some((builder.junctions.get(id.as_str()).copied()?, (road_index, along)))
+}
+
+/// Junction and group of each signal that a junction's controller switches.
+fn switched<'a>(builder: &mut Builder<'a>) -> BTreeMap<&'a str, (usize, usize)> {
+    let document = builder.document;
+    let mut groups = BTreeMap::new();
+    for (junction_index, junction) in document.junctions.iter().enumerate() {
+        for (group, (id, line)) in junction.controllers.iter().enumerate() {
+            let Some(controller) = document.controllers.iter().find(|controller| controller.id == *id) else {
+                let message =
+                    format!("junction `{}` names controller `{id}`, which does not exist", junction.id);
+                builder.warn(*line, message);
+                continue;
+            };
+            for (signal, _) in &controller.signals {
+                groups.insert(signal.as_str(), (junction_index, group));
             }
         }
     }
-    arms.warn(builder);
-    Ok(())
+    groups
+}
+
+/// Names the lights that stop nobody, and marks junctions of which no light stops anybody.
+fn warn_of_idle_lights(builder: &mut Builder, placed: &Placed, held: &[Vec<(LaneIndex, f64)>]) {
+    let mut lit = vec![(0, 0); builder.map.junctions.len()];
+    for (index, (_, signal)) in placed.lights.iter().enumerate() {
+        if signal.meaning == Meaning::OtherLight {
+            continue;
+        }
+        let idle = held[index].is_empty();
+        if idle {
+            builder.warn(signal.line, format!("light `{}` holds no lane: it stops nobody", signal.id));
+        }
+        if let Some(junction) = builder.map.signals[index].junction {
+            lit[junction].0 += 1;
+            lit[junction].1 += usize::from(!idle);
+        }
+    }
+    for (junction, (lights, working)) in builder.map.junctions.iter_mut().zip(lit) {
+        junction.idle_lights = if working == 0 { lights } else { 0 };
+    }
+}
+
+fn add_stop_lines(builder: &mut Builder, index: usize, held: &[(LaneIndex, f64)]) {
+    for &(lane_index, station_m) in held {
+        let same_light = |other: &StopLine| {
+            let (a, b) = (&builder.map.signals[other.signal], &builder.map.signals[index]);
+            let same_group = a.junction.is_some() && (a.junction, a.group) == (b.junction, b.group);
+            same_group && (other.station_m - station_m).abs() < SHARED_LINE_M
+        };
+        if !builder.map.lane(lane_index).stop_lines.iter().any(same_light) {
+            builder.map.lanes[lane_index.0].stop_lines.push(StopLine { station_m, signal: index });
+        }
+    }
+}
+
+/// The lanes that a signal holds for, with its station on them, m.
+///
+/// Writers of maps disagree about `orientation`; their lights are read by what they can mean:
+/// - `validity` names lanes: it goes before the orientation, which chooses only where both directions are named.
+///   Lane 0 is no driving lane: a light with that validity alone holds through its references.
+/// - A light at the very beginning of lanes that leave a junction would stop traffic that has passed it. It is
+///   meant for the lanes that come to the junction there (LGSVL's maps) or, on a one-way road or with lanes
+///   named, for the ways through the junction that lead to it.
+/// - A light inside a junction stops traffic before the junction.
+fn lanes_of(builder: &Builder, road_index: usize, signal: &SignalElement) -> Vec<(LaneIndex, f64)> {
+    let road = &builder.document.roads[road_index];
+    let section_index = road.section_at(signal.s_m);
+    let named = |id: i32| {
+        signal.validity.is_empty() || signal.validity.iter().any(|(from, to)| (*from..=*to).contains(&id))
+    };
+    let ids: Vec<i32> = road.sections[section_index].lanes.iter().map(|lane| lane.id).collect();
+    let lanes = |wanted: &dyn Fn(i32) -> bool| -> Vec<LaneIndex> {
+        let ids = ids.iter().filter(|id| wanted(**id));
+        ids.filter_map(|id| builder.lane_index(road_index, section_index, *id)).collect()
+    };
+    let fits = |id: i32| match signal.orientation {
+        Orientation::Along => road.runs_along(id),
+        Orientation::Against => !road.runs_along(id),
+        Orientation::Both => true,
+    };
+    let mut held = lanes(&|id| named(id) && fits(id));
+    if held.is_empty() {
+        held = lanes(&named);
+    }
+    let at_light = |lane: &LaneIndex| (*lane, builder.map.lane(*lane).station_of(signal.s_m));
+    let leaves = |lane: &LaneIndex| {
+        let (index, station_m) = at_light(lane);
+        let lane = builder.map.lane(index);
+        let mut before = lane.predecessors.iter().map(|before| builder.map.lane(*before));
+        let from_junction = before.any(|before| before.junction.is_some());
+        lane.junction.is_none() && from_junction && station_m < AT_THE_MOUTH_M
+    };
+    if !held.is_empty() && held.iter().all(leaves) {
+        let coming = lanes(&|id| !fits(id));
+        if signal.validity.is_empty() && !coming.is_empty() {
+            held = coming;
+        } else if !matches!(signal.meaning, Meaning::Sign(_)) {
+            held = held.iter().flat_map(|lane| builder.map.lane(*lane).predecessors.clone()).collect();
+        }
+    }
+    let is_sign = matches!(signal.meaning, Meaning::Sign(_));
+    let line = |lane: LaneIndex| {
+        let inside = builder.map.lane(lane).junction.is_some();
+        if inside && !is_sign { (lane, 0.0) } else { at_light(&lane) }
+    };
+    held.into_iter().map(line).collect()
 }
 
 /// Notes on every lane the signs that hold for it, and on the lanes inside junctions what follows from them.
-pub fn set_precedence(map: &mut RoadMap) {
+pub fn set_precedence(document: &Document, map: &mut RoadMap) {
     for sign in &map.signs {
         for &(index, station_m) in sign.lanes.iter().filter(|_| sign.kind != SignKind::PriorityRoad) {
             let lane = &mut map.lanes[index.0];
@@ -99,7 +335,7 @@ pub fn set_precedence(map: &mut RoadMap) {
         } else if map.approach(lane).any(on_priority_road) {
             Precedence::Priority
         } else {
-            Precedence::Equal
+            recorded(document, map, lane)
         }
     };
     let inside = map.junctions.iter().flat_map(|junction| junction.lanes.iter().copied());
@@ -109,122 +345,22 @@ pub fn set_precedence(map: &mut RoadMap) {
     }
 }
 
-/// What a signal of the file became: an index in the map's signals or in its signs.
-enum Found {
-    Light(usize),
-    Sign(usize),
-}
-
-/// Groups for lights that no controller of a junction switches: one group for each arm, so that two crossing
-/// streets are never green together.
-#[derive(Default)]
-struct Arms {
-    /// Groups by junction, road, and whether the light holds for traffic along the reference line.
-    groups: BTreeMap<(usize, usize, bool), usize>,
-    lights: usize,
-    lone: usize,
-}
-
-impl Arms {
-    /// Junction and group of a light, by the junction to which the traffic that it stops drives.
-    fn group(
-        &mut self,
-        builder: &mut Builder,
-        road_index: usize,
-        signal: &SignalElement,
-    ) -> Option<(usize, usize)> {
-        let road = &builder.document.roads[road_index];
-        let along = match signal.orientation {
-            Orientation::Along => true,
-            Orientation::Against => false,
-            // The light belongs to the nearer end of the road.
-            Orientation::Both => signal.s_m > road.length_m / 2.0,
-        };
-        let ahead = if along { &road.successor } else { &road.predecessor };
-        let junction = match ahead {
-            Some(RoadLink::Junction { id, .. }) => builder.junctions.get(id.as_str()).copied(),
-            _ => None,
-        };
-        let Some(junction) = junction else {
-            self.lone += 1;
-            return None;
-        };
-        self.lights += 1;
-        let groups = &mut builder.map.junctions[junction].groups;
-        let group = *self.groups.entry((junction, road_index, along)).or_insert_with(|| {
-            *groups += 1;
-            *groups - 1
-        });
-        Some((junction, group))
+/// What the `priority` records of its junction say of a lane inside: they name its road or the road before it.
+fn recorded(document: &Document, map: &RoadMap, index: LaneIndex) -> Precedence {
+    let lane = map.lane(index);
+    let Some(junction) = lane.junction else { return Precedence::Equal };
+    let roads: Vec<&str> = core::iter::once(&lane.key.road)
+        .chain(lane.predecessors.iter().map(|before| &map.lane(*before).key.road))
+        .map(String::as_str)
+        .collect();
+    let records = &document.junctions[junction].priorities;
+    if records.iter().any(|(_, low)| roads.contains(&low.as_str())) {
+        Precedence::Yield
+    } else if records.iter().any(|(high, _)| roads.contains(&high.as_str())) {
+        Precedence::Priority
+    } else {
+        Precedence::Equal
     }
-
-    fn warn(&self, builder: &mut Builder) {
-        let warnings = &mut builder.map.warnings;
-        if self.lights > 0 {
-            warnings.push(format!(
-                "no junction's controller switches {} signals: each arm of their junctions is a group of its own",
-                self.lights
-            ));
-        }
-        if self.lone > 0 {
-            warnings.push(format!(
-                "{} signals belong to no junction and have no controller in one: each is its own group",
-                self.lone
-            ));
-        }
-    }
-}
-
-/// Junction and group of each signal that a junction's controller switches.
-fn groups<'a>(builder: &Builder<'a>) -> Result<BTreeMap<&'a str, (usize, usize)>, RoadError> {
-    let document = builder.document;
-    let mut groups = BTreeMap::new();
-    for (junction_index, junction) in document.junctions.iter().enumerate() {
-        for (group, (id, line)) in junction.controllers.iter().enumerate() {
-            let controller =
-                document.controllers.iter().find(|controller| controller.id == *id).ok_or_else(|| {
-                    wrong(
-                        *line,
-                        format!("junction `{}` names controller `{id}`, which does not exist", junction.id),
-                    )
-                })?;
-            for (signal, _) in &controller.signals {
-                groups.insert(signal.as_str(), (junction_index, group));
-            }
-        }
-    }
-    Ok(groups)
-}
-
-fn add_stop_lines(builder: &mut Builder, road_index: usize, signal: &SignalElement, index: usize) {
-    for (lane_index, station_m) in lanes_of(builder, road_index, signal) {
-        let same_light = |other: &StopLine| {
-            let (a, b) = (&builder.map.signals[other.signal], &builder.map.signals[index]);
-            let same_group = a.junction.is_some() && (a.junction, a.group) == (b.junction, b.group);
-            same_group && (other.station_m - station_m).abs() < SHARED_LINE_M
-        };
-        if !builder.map.lane(lane_index).stop_lines.iter().any(same_light) {
-            builder.map.lanes[lane_index.0].stop_lines.push(StopLine { station_m, signal: index });
-        }
-    }
-}
-
-/// The lanes that a signal holds for, with its station on them, m.
-fn lanes_of(builder: &Builder, road_index: usize, signal: &SignalElement) -> Vec<(LaneIndex, f64)> {
-    let road = &builder.document.roads[road_index];
-    let section_index = road.section_at(signal.s_m);
-    let held = road.sections[section_index].lanes.iter().filter(|lane| {
-        let orientation_fits = match signal.orientation {
-            Orientation::Along => road.runs_along(lane.id),
-            Orientation::Against => !road.runs_along(lane.id),
-            Orientation::Both => true,
-        };
-        let valid = signal.validity.is_empty()
-            || signal.validity.iter().any(|(from, to)| (*from..=*to).contains(&lane.id));
-        orientation_fits && valid
-    });
-    let indices = held.filter_map(|lane| builder.lane_index(road_index, section_index, lane.id));
-    indices.map(|index| (index, builder.map.lane(index).station_of(signal.s_m))).collect()
 }
 
 /// Adds all crosswalks and solid things, with their corners in the plane.

@@ -1,8 +1,10 @@
 //! Traffic signals: each junction runs a fixed cycle over its groups.
 //!
 //! A group is green for 12 s and yellow for 3 s, then all are red for 2 s and the next group follows
-//! (yellow 3 to 4 s and all-red 1 to 2 s are usual in towns; the green is ours). Counted in ticks, so
-//! that the colour of any moment is exact. No vehicle detection, no pedestrian lights.
+//! (yellow 3 to 4 s and all-red 1 to 2 s are usual in towns; the green is ours). Where so many groups
+//! follow each other that the cycle would last longer than two minutes, the greens are shorter, down to
+//! 5 s. Counted in ticks, so that the colour of any moment is exact. No vehicle detection, no pedestrian
+//! lights.
 
 use crate::road::RoadMap;
 
@@ -13,11 +15,25 @@ const GREEN_S: f64 = 12.0;
 const YELLOW_S: f64 = 3.0;
 const ALL_RED_S: f64 = 2.0;
 
-const GREEN_TICKS: u64 = (GREEN_S / DT_S + 0.5) as u64;
-const YELLOW_TICKS: u64 = (YELLOW_S / DT_S + 0.5) as u64;
-const SLOT_TICKS: u64 = GREEN_TICKS + YELLOW_TICKS + (ALL_RED_S / DT_S + 0.5) as u64;
+/// A longer cycle than 120 s is bad practice everywhere; the shortest green is a usual minimum.
+const CYCLE_S_MAX: f64 = 120.0;
+const GREEN_S_MIN: f64 = 5.0;
 
-/// Time after which every cycle of up to 16 groups begins anew, s: 720 720 is divisible by 1, 2, … 16.
+const GREEN_TICKS: u64 = ticks(GREEN_S);
+const YELLOW_TICKS: u64 = ticks(YELLOW_S);
+const CHANGE_TICKS: u64 = ticks(YELLOW_S) + ticks(ALL_RED_S);
+
+const fn ticks(time_s: f64) -> u64 {
+    (time_s / DT_S + 0.5) as u64
+}
+
+/// How long each of some groups is green.
+fn green_ticks(groups: u64) -> u64 {
+    (ticks(CYCLE_S_MAX) / groups).saturating_sub(CHANGE_TICKS).clamp(ticks(GREEN_S_MIN), GREEN_TICKS)
+}
+
+/// Time after which every cycle of up to seven groups begins anew, s: 720 720 is divisible by 1, 2, … 7. (Beyond
+/// it a phase is only kept within bounds.)
 const REPEAT_S: f64 = 720_720.0 * (GREEN_S + YELLOW_S + ALL_RED_S);
 
 /// Where in its cycle every signal stands at tick 0.
@@ -38,13 +54,15 @@ impl SignalClock {
         // A light on its own (at a zebra crossing) alternates with an unseen group.
         let groups = signal.junction.map_or(2, |junction| map.junctions[junction].groups);
         let groups = (groups.max(signal.group + 1)) as u64;
-        let now = (tick + self.offset_ticks) % (groups * SLOT_TICKS);
-        if now / SLOT_TICKS != signal.group as u64 {
+        let green_ticks = green_ticks(groups);
+        let slot_ticks = green_ticks + CHANGE_TICKS;
+        let now = (tick + self.offset_ticks) % (groups * slot_ticks);
+        if now / slot_ticks != signal.group as u64 {
             return SignalColour::Red;
         }
-        match now % SLOT_TICKS {
-            t if t < GREEN_TICKS => SignalColour::Green,
-            t if t < GREEN_TICKS + YELLOW_TICKS => SignalColour::Yellow,
+        match now % slot_ticks {
+            t if t < green_ticks => SignalColour::Green,
+            t if t < green_ticks + YELLOW_TICKS => SignalColour::Yellow,
             _ => SignalColour::Red,
         }
     }
@@ -58,6 +76,16 @@ impl SignalClock {
 mod tests {
     use super::*;
     use crate::sim::testing;
+
+    #[test]
+    fn a_cycle_is_bounded() {
+        let cycle_s = |groups: u64| (groups * (green_ticks(groups) + CHANGE_TICKS)) as f64 * DT_S;
+        let cycles_s = [1, 2, 7, 8, 12].map(cycle_s);
+        for (cycle_s, expected_s) in cycles_s.iter().zip([17.0, 34.0, 119.0, 120.0, 120.0]) {
+            assert!((cycle_s - expected_s).abs() < 0.2, "{cycles_s:?}");
+        }
+        assert_eq!(green_ticks(20), ticks(GREEN_S_MIN));
+    }
 
     #[test]
     fn one_group_at_a_time() {

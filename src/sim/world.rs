@@ -93,6 +93,9 @@ pub struct World {
     incidents: Vec<Incident>,
 }
 
+/// A queue before a light is at most this long, m: seven cars.
+const QUEUE_M: f64 = 50.0;
+
 impl World {
     /// The beginning of an episode: the ego vehicle rolls at 3 m/s with its rear axle on the start of
     /// the route; beside ambient traffic, if asked for, nothing else is there.
@@ -212,6 +215,14 @@ impl World {
     /// How far the ego vehicle's rear axle is to the left of the route, m.
     pub fn ego_offset_m(&self) -> f64 {
         self.ego_offset_m
+    }
+
+    /// Whether the ego vehicle comes to a light that is not green, or waits in the queue before one.
+    pub fn waits_for_light(&self) -> bool {
+        let front_m = self.ego_front_m();
+        let mut ahead = self.scene.route.stop_lines.iter().filter(|line| line.station_m > front_m - 1.0);
+        let next = ahead.next().filter(|line| line.station_m < front_m + QUEUE_M);
+        next.is_some_and(|line| self.signal(line.signal) != SignalColour::Green)
     }
 
     /// Stop lines of the route that the ego vehicle's front passed under a red light.

@@ -1,5 +1,6 @@
 //! The elements of an OpenDRIVE file that are read, in OpenDRIVE's own terms.
 
+use crate::geometry::Vec2;
 use crate::road::{SignKind, StripKind};
 
 use super::cubic::{Cubics, Jet};
@@ -13,6 +14,8 @@ pub struct Document {
     pub junctions: Vec<JunctionElement>,
     pub controllers: Vec<ControllerElement>,
     pub warnings: Vec<String>,
+    /// The places in the plane that warnings are about: index of the warning, position.
+    pub warned_at: Vec<(usize, Vec2)>,
 }
 
 #[derive(Debug, Clone)]
@@ -157,6 +160,8 @@ pub struct JunctionElement {
     pub id: String,
     pub name: String,
     pub connections: Vec<ConnectionElement>,
+    /// Pairs of roads, incoming or connecting ones: traffic of the first goes before traffic of the second.
+    pub priorities: Vec<(String, String)>,
     /// Ids of its controllers, in order, with their lines.
     pub controllers: Vec<(String, u32)>,
 }

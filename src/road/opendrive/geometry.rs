@@ -1,12 +1,40 @@
 //! Reference lines: lines, arcs, spirals and parametric cubics, with exact heading and curvature.
 
-use crate::geometry::{Vec2, unit_vector};
+use crate::geometry::{Vec2, unit_vector, wrap_angle};
 
 /// A chain of curves over the road's station.
 #[derive(Debug, Clone)]
 pub struct ReferenceLine {
     pieces: Vec<Piece>,
+    /// Curves that stand for the pieces where these meet at an angle; by rising station, without overlap.
+    roundings: Vec<Piece>,
+    /// Stations at which the line turns so sharply that no vehicle can follow, m.
+    breaks_m: Vec<f64>,
 }
+
+/// A place where two pieces meet at an angle.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Corner {
+    pub at_m: f64,
+    pub position: Vec2,
+    pub turn_rad: f64,
+    /// How far the rounded line is from the corner, m; `None` if it is too sharp to be rounded.
+    pub off_m: Option<f64>,
+}
+
+/// Pieces that meet at a smaller angle are taken as they are, rad. A lane 5 m beside leaps by 4 cm there.
+const CORNER_RAD_MIN: f64 = 0.5 * core::f64::consts::PI / 180.0;
+
+/// A sharper corner than this is no road, rad.
+const CORNER_RAD_MAX: f64 = 60.0 * core::f64::consts::PI / 180.0;
+
+/// Pieces shorter than twice this are rounding of the tool that wrote them: their angles say nothing, m.
+const CORNER_M_MIN: f64 = 5e-4;
+
+/// A corner is rounded with this radius, m, or a smaller one where there is less room: each piece gives at most
+/// half of its length, and the line stays within [`ROUNDED_M_MAX`] of the corner.
+const ROUNDING_RADIUS_M: f64 = 100.0;
+const ROUNDED_M_MAX: f64 = 0.5;
 
 /// A point of a reference line.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -63,15 +91,71 @@ const GAUSS: [(f64, f64); 5] = [
 impl ReferenceLine {
     /// From at least one piece, by rising beginning.
     pub fn new(pieces: Vec<Piece>) -> Option<ReferenceLine> {
-        (!pieces.is_empty()).then_some(ReferenceLine { pieces })
+        (!pieces.is_empty()).then_some(ReferenceLine { pieces, roundings: Vec::new(), breaks_m: Vec::new() })
     }
 
+    /// Stations from which another curve holds, m.
     pub fn beginnings(&self) -> impl Iterator<Item = f64> {
-        self.pieces.iter().map(|piece| piece.begin_m)
+        let rounded = self.roundings.iter().flat_map(|curve| [curve.begin_m, curve.begin_m + curve.length_m]);
+        self.pieces.iter().map(|piece| piece.begin_m).chain(rounded)
+    }
+
+    /// Stations at which the line turns so sharply that no vehicle can follow, m.
+    pub fn breaks_m(&self) -> &[f64] {
+        &self.breaks_m
+    }
+
+    /// Puts a curve in the place of each corner, and tells all corners.
+    ///
+    /// Polylines with short pieces stand for bends. Beside such a corner the inner lanes would run backwards, and
+    /// all lanes would turn at once with no curvature that tells a driver to slow down.
+    pub fn round_corners(&mut self) -> Vec<Corner> {
+        let mut corners = Vec::new();
+        for index in 1..self.pieces.len() {
+            let (before, after) = (&self.pieces[index - 1], &self.pieces[index]);
+            let at_m = after.begin_m;
+            let (end, begin) = (before.at(at_m - before.begin_m), after.at(0.0));
+            let turn_rad = wrap_angle(begin.heading_rad - end.heading_rad);
+            if turn_rad.abs() < CORNER_RAD_MIN {
+                continue;
+            }
+            let next_m = self.pieces.get(index + 1).map_or(at_m + after.length_m, |next| next.begin_m);
+            let room_m = (at_m - before.begin_m).min(next_m - at_m) / 2.0;
+            if room_m < CORNER_M_MIN {
+                continue;
+            }
+            let half_m = room_m
+                .min(ROUNDING_RADIUS_M * libm::tan(turn_rad.abs() / 2.0))
+                .min(ROUNDED_M_MAX / libm::tan(turn_rad.abs() / 4.0));
+            let rounding = (turn_rad.abs() < CORNER_RAD_MAX)
+                .then(|| rounding(before.at(at_m - half_m - before.begin_m), after.at(half_m)))
+                .flatten()
+                .map(|shape| Piece {
+                    begin_m: at_m - half_m,
+                    length_m: 2.0 * half_m,
+                    origin: before.at(at_m - half_m - before.begin_m).position,
+                    heading_rad: before.at(at_m - half_m - before.begin_m).heading_rad,
+                    shape,
+                });
+            let position = begin.position;
+            let off_m = rounding.as_ref().map(|curve| (curve.at(half_m).position - position).norm());
+            corners.push(Corner { at_m, position, turn_rad, off_m });
+            match rounding {
+                Some(curve) => self.roundings.push(curve),
+                None => self.breaks_m.push(at_m),
+            }
+        }
+        corners
     }
 
     /// Beyond its ends the line goes on straight.
     pub fn at(&self, s_m: f64) -> ReferencePoint {
+        let begun = self.roundings.partition_point(|curve| curve.begin_m <= s_m);
+        if let Some(curve) =
+            self.roundings[..begun].last().filter(|curve| s_m < curve.begin_m + curve.length_m)
+        {
+            return curve.at(s_m - curve.begin_m);
+        }
         let after = self.pieces.partition_point(|piece| piece.begin_m <= s_m);
         let piece = &self.pieces[after.max(1) - 1];
         piece.at(s_m - piece.begin_m)
@@ -89,6 +173,26 @@ impl ReferenceLine {
         }
         largest
     }
+}
+
+/// The curve from one point to another that keeps both headings: nearly an arc. `None` if there is no room.
+fn rounding(from: ReferencePoint, to: ReferencePoint) -> Option<Shape> {
+    let (forward, away) = (unit_vector(from.heading_rad), to.position - from.position);
+    let (x, y) = (forward.dot(&away), forward.perp(&away));
+    let turn_rad = wrap_angle(to.heading_rad - from.heading_rad);
+    if away.norm() < 1e-3 {
+        return None;
+    }
+    // With tangents of this length the cubic is within a thousandth of an arc.
+    let tangent = if turn_rad.abs() < 1e-6 {
+        away.norm()
+    } else {
+        2.0 * away.norm() * libm::tan(turn_rad / 4.0) / libm::sin(turn_rad / 2.0)
+    };
+    let last = unit_vector(turn_rad) * tangent;
+    let u = [0.0, tangent, 3.0 * x - 2.0 * tangent - last.x, tangent + last.x - 2.0 * x];
+    let v = [0.0, 0.0, 3.0 * y - last.y, last.y - 2.0 * y];
+    Shape::cubic(u, v, 1.0)
 }
 
 impl Shape {
@@ -249,6 +353,47 @@ mod tests {
         let end = piece(1.0, Shape::Spiral { begin_per_m: 0.0, end_per_m }).at(1.0);
         assert!((end.position - Vec2::new(0.779_893_400_4, 0.438_259_147_4)).norm() < 1e-9, "{end:?}");
         assert!((end.heading_rad - FRAC_PI_2).abs() < 1e-12);
+    }
+
+    /// Straights of 4 m that turn by a twelfth of a circle stand for a circle: the rounded line has its radius.
+    #[test]
+    fn corners_become_the_bend_that_they_stand_for() {
+        let turn_rad = FRAC_PI_2 / 6.0;
+        let mut at = (Vec2::zeros(), 0.0);
+        let pieces = (0..6).map(|i| {
+            let straight = Piece {
+                begin_m: 4.0 * f64::from(i),
+                origin: at.0,
+                heading_rad: at.1,
+                ..piece(4.0, Shape::Line)
+            };
+            at = (at.0 + unit_vector(at.1) * 4.0, at.1 + turn_rad);
+            straight
+        });
+        let mut line = ReferenceLine::new(pieces.collect()).unwrap();
+        let corners = line.round_corners();
+        assert_eq!(corners.len(), 5);
+        assert!(corners.iter().all(|corner| corner.off_m.is_some_and(|off_m| off_m < 0.14)), "{corners:?}");
+        let radius_m = 2.0 / libm::tan(turn_rad / 2.0);
+        let mut before = line.at(2.0);
+        for i in 21..220 {
+            let here = line.at(f64::from(i) * 0.1);
+            assert!((here.curvature_per_m * radius_m - 1.0).abs() < 0.01, "{here:?}");
+            assert!((here.position - before.position).norm() < 0.101, "{here:?}");
+            assert!(wrap_angle(here.heading_rad - before.heading_rad).abs() < 0.11 / radius_m);
+            before = here;
+        }
+        assert_eq!(line.at(1.0).curvature_per_m, 0.0);
+    }
+
+    #[test]
+    fn a_line_that_turns_back_is_not_rounded() {
+        let there = piece(4.0, Shape::Line);
+        let back =
+            Piece { begin_m: 4.0, origin: Vec2::new(4.0, 0.0), heading_rad: 3.0, ..piece(4.0, Shape::Line) };
+        let mut line = ReferenceLine::new(vec![there, back]).unwrap();
+        assert_eq!(line.round_corners()[0].off_m, None);
+        assert_eq!(line.breaks_m(), [4.0]);
     }
 
     #[test]

@@ -311,7 +311,8 @@ fn what_is_wrong_is_said_with_its_line() {
         )
     };
     let link = |link: &str| one_road("", &format!("<link>\n{link}</link>"), LINE_100, TWO_LANES, "");
-    let narrow = |width| one_road("", "", LINE_100, &TWO_LANES.replace(r#"a="3" b="0""#, width), "");
+    let only_left = TWO_LANES.replace(r#"<lane id="-1" type="driving">"#, r#"<lane id="-1" type="none">"#);
+    let narrow = |width| one_road("", "", LINE_100, &only_left.replace(r#"a="3" b="0""#, width), "");
     let nested = "<a>".repeat(50_000);
     let cases = [
         (String::new(), 1, "the file is empty"),
@@ -324,13 +325,6 @@ fn what_is_wrong_is_said_with_its_line() {
         (road(r#"id="1" length="NaN""#), 2, "no number a road can have"),
         (road(r#"id="1" length="long""#), 2, "`length` of `road` is `long`"),
         (road(r#"id="1" length="-3""#), 2, "is -3 m long"),
-        (road(r#"id="1" length="100" junction="7""#), 2, "junction `7`, which does not exist"),
-        (
-            link(r#"<successor elementType="road" elementId="9" contactPoint="start"/>"#),
-            2,
-            "leads to road `9`",
-        ),
-        (link(r#"<successor elementType="junction" elementId="9"/>"#), 2, "leads to junction `9`"),
         (link(r#"<successor elementType="road" elementId="1"/>"#), 2, "lacks its `contactPoint`"),
         (one_road("", "", "", TWO_LANES, ""), 2, "no `geometry`"),
         (
@@ -344,9 +338,9 @@ fn what_is_wrong_is_said_with_its_line() {
             1,
             "no lane of type `driving`",
         ),
-        (narrow(r#"a="3" b="999999""#), 3, "is no road"),
-        (narrow(r#"a="-3" b="0""#), 3, "narrower than nothing"),
-        (narrow(r#"a="3" b="-1""#), 3, "narrower than nothing"),
+        (narrow(r#"a="3" b="999999""#), 1, "is no road"),
+        (narrow(r#"a="-3" b="0""#), 1, "narrower than nothing"),
+        (narrow(r#"a="3" b="-1""#), 1, "narrower than nothing"),
     ];
     for (text, expected_line, part) in cases {
         let start: String = text.chars().take(200).collect();
@@ -355,6 +349,55 @@ fn what_is_wrong_is_said_with_its_line() {
         };
         assert!(message.contains(part), "`{message}` for {start}");
         assert_eq!(line, expected_line, "`{message}` for {start}");
+    }
+}
+
+/// One harmless fault does not cost the whole map: it is said, and the rest can be driven.
+#[test]
+fn a_harmless_fault_is_said_and_the_rest_is_read() {
+    let link = |link: &str| one_road("", &format!("<link>\n{link}</link>"), LINE_100, TWO_LANES, "");
+    let signals =
+        |signals: &str| one_road("", "", LINE_100, TWO_LANES, &format!("<signals>{signals}</signals>"));
+    let with = |element: &str| {
+        one_road("", "", LINE_100, TWO_LANES, "").replace("</OpenDRIVE>", &format!("{element}</OpenDRIVE>"))
+    };
+    let lane = |from: &str, to: &str| one_road("", "", LINE_100, &TWO_LANES.replace(from, to), "");
+    let light = r#"<signal id="-1" s="90" t="-5" orientation="+" type="1000001"/>"#;
+    let cases = [
+        (
+            link(r#"<successor elementType="road" elementId="9" contactPoint="start"/>"#),
+            2,
+            "leads to road `9`",
+        ),
+        (link(r#"<successor elementType="junction" elementId="9"/>"#), 2, "leads to junction `9`"),
+        (
+            one_road("", "", LINE_100, TWO_LANES, "").replace(r#"junction="-1""#, r#"junction="7""#),
+            2,
+            "junction `7`",
+        ),
+        (signals(&light.repeat(3)), 2, "2 more signals have the id `-1`"),
+        (
+            signals(
+                r#"<signal id="-1" s="90" orientation="+" type="1000001"><validity fromLane="-9" toLane="-9"/></signal>"#,
+            ),
+            2,
+            "light `-1` holds no lane",
+        ),
+        (
+            with(
+                r#"<junction id="5" name=""><connection incomingRoad="1" connectingRoad="8" contactPoint="start"><laneLink from="-1" to="-1"/></connection></junction>"#,
+            ),
+            2,
+            "connects road `8`",
+        ),
+        (with(r#"<junction id="5" name=""><controller id="6"/></junction>"#), 2, "names controller `6`"),
+        (lane(r#"a="3" b="0""#, r#"a="3" b="-1""#), 1, "narrower than nothing"),
+        (lane(r#"a="3" b="0""#, r#"a="3" b="999999""#), 1, "is no road"),
+    ];
+    for (text, lanes, part) in cases {
+        let map = RoadMap::from_opendrive("test", &text).unwrap_or_else(|error| panic!("{error} in {text}"));
+        assert_eq!(map.lanes.len(), lanes, "{text}");
+        assert!(map.warnings.iter().any(|warning| warning.contains(part)), "{part}: {:?}", map.warnings);
     }
 }
 

@@ -1,0 +1,168 @@
+//! Reads lane sections and their lanes.
+
+use crate::road::{RoadError, StripKind};
+
+use super::super::elements::{LaneElement, MarkElement, MarkRule, SectionElement};
+use super::super::xml::{Element, wrong};
+use super::{Reader, cubics};
+
+/// Limit on the lanes of one side of a road.
+const LANES_MAX: u32 = 100;
+
+impl Reader {
+    pub(super) fn sections(
+        &mut self,
+        lanes: Element,
+        id: &str,
+        length_m: f64,
+    ) -> Result<Vec<SectionElement>, RoadError> {
+        let mut sections: Vec<SectionElement> = Vec::new();
+        for section in lanes.children("laneSection") {
+            let begin_m = section.number("s")?;
+            if section.attribute("singleSide") == Some("true") {
+                let message =
+                    "lane sections of a single side are not read; give both sides the same sections";
+                return Err(section.wrong(message));
+            }
+            if begin_m < 0.0 || begin_m > length_m {
+                let message = format!("a lane section begins at {begin_m} m, beyond the ends of road `{id}`");
+                return Err(section.wrong(message));
+            }
+            if sections.last().is_some_and(|last| begin_m <= last.begin_m) {
+                return Err(section.wrong(format!("lane sections of road `{id}` must stand by rising `s`")));
+            }
+            let mut all = Vec::new();
+            for side in section.elements().filter(|side| matches!(side.name(), "left" | "right")) {
+                for lane in side.children("lane") {
+                    all.push(self.lane(lane)?);
+                }
+            }
+            all.sort_by_key(|lane| -lane.id);
+            if let Some(pair) = all.windows(2).find(|pair| pair[0].id == pair[1].id) {
+                let message = format!("lane {} stands twice in a section of road `{id}`", pair[1].id);
+                return Err(wrong(pair[1].line, message));
+            }
+            if let Some(last) = sections.last_mut() {
+                last.end_m = begin_m;
+            }
+            sections.push(SectionElement { begin_m, end_m: length_m, lanes: all });
+        }
+        if sections.is_empty() {
+            return Err(lanes.wrong(format!("road `{id}` has no `laneSection`")));
+        }
+        Ok(sections)
+    }
+
+    fn lane(&mut self, lane: Element) -> Result<LaneElement, RoadError> {
+        let id = lane.integer("id")?;
+        if id == 0 || id.unsigned_abs() > LANES_MAX {
+            return Err(lane.wrong(format!("a lane beside the reference line cannot have the id {id}")));
+        }
+        let linked = |name: &str| -> Result<Vec<i32>, RoadError> {
+            let links = lane.child("link").into_iter().flat_map(|link| link.children(name));
+            links.map(|link| link.integer("id")).collect()
+        };
+        let mut speeds = Vec::new();
+        for speed in lane.children("speed") {
+            speeds.push((speed.number_or("sOffset", 0.0)?, self.speed(speed)?));
+        }
+        let kind = lane.attribute("type").unwrap_or("none");
+        let mut driving = is_driving(kind);
+        if !driving && !BESIDE_THE_ROAD.contains(&kind) {
+            self.ignore(format!("lanes of type `{kind}`"));
+        }
+        if let Some(direction @ ("reversed" | "both")) = lane.attribute("direction").filter(|_| driving) {
+            self.ignore(format!("lanes of direction `{direction}`"));
+            driving = false;
+        }
+        let beside = if driving { None } else { strip_kind(kind) };
+        let widths = cubics(lane.children("width"), "sOffset")?;
+        let borders = cubics(lane.children("border"), "sOffset")?;
+        if driving && widths.is_empty() && borders.is_empty() {
+            return Err(lane.wrong(format!("lane {id} has neither `width` nor `border`")));
+        }
+        let marks = lane.children("roadMark");
+        let mut marks: Vec<MarkElement> = marks.map(|mark| road_mark(mark, id)).collect::<Result<_, _>>()?;
+        marks.sort_by(|a, b| a.begin_m.total_cmp(&b.begin_m));
+        Ok(LaneElement {
+            id,
+            line: lane.line(),
+            driving,
+            beside,
+            widths,
+            borders,
+            predecessors: linked("predecessor")?,
+            successors: linked("successor")?,
+            speeds,
+            marks,
+        })
+    }
+}
+
+/// What a lane that cars do not drive on is to people on foot; `None` for verges and medians, where they may
+/// stand but do not walk along.
+fn strip_kind(kind: &str) -> Option<StripKind> {
+    match kind {
+        "sidewalk" | "walking" => Some(StripKind::Walkway),
+        "parking" | "stop" | "biking" | "bus" | "taxi" | "HOV" | "bidirectional" | "tram" | "rail" => {
+            Some(StripKind::Paved)
+        }
+        // A driving lane of another direction attribute.
+        _ => is_driving(kind).then_some(StripKind::Paved),
+    }
+}
+
+/// Whether vehicles of all kinds may use a lane of a type, in one direction.
+fn is_driving(kind: &str) -> bool {
+    matches!(
+        kind,
+        "driving"
+            | "entry"
+            | "exit"
+            | "onRamp"
+            | "offRamp"
+            | "connectingRamp"
+            | "slipLane"
+            | "mwyEntry"
+            | "mwyExit"
+    )
+}
+
+/// Types of lanes that no car drives on; they are left out without a warning.
+const BESIDE_THE_ROAD: [&str; 14] = [
+    "none",
+    "shoulder",
+    "border",
+    "curb",
+    "median",
+    "sidewalk",
+    "walking",
+    "biking",
+    "parking",
+    "stop",
+    "rail",
+    "tram",
+    "roadWorks",
+    "roadMarks",
+];
+
+/// A marking at the outer line of a lane. `laneChange` decides; without it, the paint does: a solid line and
+/// anything raised forbid a change, and a broken line beside a solid one permits a change from the broken side.
+fn road_mark(mark: Element, lane: i32) -> Result<MarkElement, RoadError> {
+    // A double line names the inner line first, the one nearer to the reference line.
+    let (outwards, inwards) = match lane < 0 {
+        true => (MarkRule::Decrease, MarkRule::Increase),
+        false => (MarkRule::Increase, MarkRule::Decrease),
+    };
+    let rule = match (mark.attribute("laneChange"), mark.attribute("type").unwrap_or("none")) {
+        (Some("both"), _) => MarkRule::Both,
+        (Some("none"), _) => MarkRule::Neither,
+        (Some("increase"), _) => MarkRule::Increase,
+        (Some("decrease"), _) => MarkRule::Decrease,
+        (_, "solid" | "solid solid" | "curb" | "edge" | "grass") => MarkRule::Neither,
+        (_, "solid broken") => inwards,
+        (_, "broken solid") => outwards,
+        _ => MarkRule::Both,
+    };
+    Ok(MarkElement { begin_m: mark.number_or("sOffset", 0.0)?, rule })
+}

@@ -1,0 +1,306 @@
+//! Reads XML into elements. Each function reads one kind of element and reports what the element lacks.
+
+use std::collections::BTreeMap;
+
+use crate::geometry::Vec2;
+use crate::road::RoadError;
+
+use super::cubic::{Cubic, Cubics};
+use super::elements::{
+    ConnectionElement, Contact, ControllerElement, Document, JunctionElement, RoadElement, RoadLink,
+};
+use super::xml::{Element, Lines, wrong};
+
+mod lanes;
+mod objects;
+mod plan;
+mod signals;
+
+/// Limit on the length of a road, m; it bounds the work of sampling lanes.
+const ROAD_M_MAX: f64 = 100_000.0;
+
+/// The error for a text that is not XML. If the text ends too early, the error names its last line, because the
+/// XML reader would name the first.
+fn not_xml(text: &str, error: &roxmltree::Error) -> RoadError {
+    let message = error.to_string();
+    if matches!(error, roxmltree::Error::UnexpectedEndOfStream | roxmltree::Error::UnclosedRootNode) {
+        let last = u32::try_from(text.trim_end().lines().count()).unwrap_or(u32::MAX);
+        return wrong(last, format!("this is not well-formed XML, as if cut off in the middle: {message}"));
+    }
+    wrong(error.pos().row, format!("this is not well-formed XML: {message}"))
+}
+
+/// Limit on the attributes of an element; no element of OpenDRIVE has more than thirty. The XML reader compares
+/// every attribute of an element with every other.
+const ATTRIBUTES_MAX: usize = 256;
+
+/// Refuses elements with more attributes than any real file has, in one pass over the text.
+fn refuse_crowded_tags(text: &str) -> Result<(), RoadError> {
+    let mut at = 0;
+    while let Some(begin) = text[at..].find('<').map(|found| at + found) {
+        let rest = &text[begin..];
+        let hidden = [("<!--", "-->"), ("<![CDATA[", "]]>"), ("<?", "?>")];
+        if let Some((_, end)) = hidden.iter().find(|(mark, _)| rest.starts_with(mark)) {
+            let Some(length) = rest.find(end) else { return Ok(()) };
+            at = begin + length;
+            continue;
+        }
+        let (mut quote, mut equals, mut end) = (None, 0, rest.len());
+        for (offset, byte) in rest.bytes().enumerate() {
+            match (quote, byte) {
+                (None, b'>') => {
+                    end = offset;
+                    break;
+                }
+                (None, b'"' | b'\'') => quote = Some(byte),
+                (Some(open), _) if open == byte => quote = None,
+                (None, b'=') => equals += 1,
+                _ => {}
+            }
+        }
+        if equals > ATTRIBUTES_MAX {
+            let line = text[..begin].bytes().filter(|byte| *byte == b'\n').count() + 1;
+            let message =
+                format!("an element has {equals} attributes; no map needs more than {ATTRIBUTES_MAX}");
+            return Err(wrong(u32::try_from(line).unwrap_or(u32::MAX), message));
+        }
+        at = begin + end.max(1);
+    }
+    Ok(())
+}
+
+/// Reads a whole file.
+///
+/// # Errors
+/// The first thing that is wrong, with its line.
+pub fn read(name: &str, text: &str) -> Result<Document, RoadError> {
+    if text.trim().is_empty() {
+        return Err(wrong(1, "the file is empty; an OpenDRIVE map is expected"));
+    }
+    refuse_crowded_tags(text)?;
+    let document = roxmltree::Document::parse(text).map_err(|error| not_xml(text, &error))?;
+    let lines = Lines::new(text);
+    let root = Element::new(document.root_element(), &lines);
+    if root.name() != "OpenDRIVE" {
+        return Err(root.wrong(format!("the root element is `{}`; `OpenDRIVE` is expected", root.name())));
+    }
+    let mut reader = Reader { warnings: Vec::new(), warned_at: Vec::new(), ignored: BTreeMap::new() };
+    let header_name = root.child("header").and_then(|header| header.attribute("name")).unwrap_or("");
+    let roads: Vec<_> = root.children("road").map(|road| reader.road(road)).collect::<Result<_, _>>()?;
+    if roads.is_empty() {
+        return Err(root.wrong("the map holds no `road`"));
+    }
+    let junctions = root.children("junction").map(junction).collect::<Result<_, _>>()?;
+    let controllers = root.children("controller").map(controller).collect::<Result<_, _>>()?;
+    let (mut warnings, warned_at) = (reader.warnings, reader.warned_at);
+    warnings
+        .extend(reader.ignored.into_iter().map(|(what, times)| format!("ignored {what} ({times} times)")));
+    Ok(Document {
+        name: if header_name.is_empty() { name.to_owned() } else { header_name.to_owned() },
+        roads,
+        junctions,
+        controllers,
+        warnings,
+        warned_at,
+    })
+}
+
+/// Reads elements and collects what it does not understand.
+struct Reader {
+    warnings: Vec<String>,
+    /// The places in the plane that warnings are about: index of the warning, position.
+    warned_at: Vec<(usize, Vec2)>,
+    /// Each kind of thing that was left out, with its number.
+    ignored: BTreeMap<String, usize>,
+}
+
+impl Reader {
+    fn warn(&mut self, element: Element, message: impl AsRef<str>) {
+        self.warnings.push(format!("line {}: {}", element.line(), message.as_ref()));
+    }
+
+    fn warn_at(&mut self, element: Element, position: Vec2, message: impl AsRef<str>) {
+        self.warned_at.push((self.warnings.len(), position));
+        self.warn(element, message);
+    }
+
+    /// Notes that the element of an error is left out.
+    fn leave_out(&mut self, error: &RoadError) {
+        self.warnings.push(format!("{error}: left out"));
+    }
+
+    fn ignore(&mut self, what: String) {
+        *self.ignored.entry(what).or_default() += 1;
+    }
+
+    fn road(&mut self, road: Element) -> Result<RoadElement, RoadError> {
+        let id = road.text("id")?.to_owned();
+        let length_m = road.number("length")?;
+        if !(length_m > 0.0 && length_m <= ROAD_M_MAX) {
+            return Err(road.wrong(format!(
+                "road `{id}` is {length_m} m long; more than 0 and at most {ROAD_M_MAX} m is expected"
+            )));
+        }
+        let junction = road.attribute("junction").filter(|id| !id.is_empty() && *id != "-1");
+        let link = |name: &str| match road.child("link").and_then(|link| link.child(name)) {
+            Some(link) => road_link(link).map(Some),
+            None => Ok(None),
+        };
+        let (predecessor, successor) = (link("predecessor")?, link("successor")?);
+        let mut speeds = Vec::new();
+        for kind in road.children("type") {
+            let limit = kind.child("speed").map(|speed| self.speed(speed)).transpose()?;
+            speeds.push((kind.number_or("s", 0.0)?, limit.flatten()));
+        }
+        self.ignore_heights(road)?;
+        if let Some(rule) = road.attribute("rule").filter(|rule| !["LHT", "RHT"].contains(rule)) {
+            self.warn(road, format!("road `{id}` has the rule `{rule}`, taken for RHT"));
+        }
+        let lanes =
+            road.child("lanes").ok_or_else(|| road.wrong(format!("road `{id}` lacks its `lanes`")))?;
+        Ok(RoadElement {
+            line: road.line(),
+            junction: junction.map(str::to_owned),
+            left_hand: road.attribute("rule") == Some("LHT"),
+            predecessor,
+            successor,
+            speeds,
+            reference: self.reference_line(road, &id, length_m)?,
+            lane_offset: cubics(lanes.children("laneOffset"), "s")?,
+            sections: self.sections(lanes, &id, length_m)?,
+            signals: self.signals(road),
+            objects: self.objects(road),
+            id,
+            length_m,
+        })
+    }
+
+    /// Roads are read as flat; a road that is not flat gives a warning.
+    fn ignore_heights(&mut self, road: Element) -> Result<(), RoadError> {
+        let profiles = [
+            ("elevationProfile", "elevation", "slopes: roads are taken as flat"),
+            ("lateralProfile", "superelevation", "banked roads: they are taken as flat"),
+            ("lateralProfile", "crossfall", "crossfalls: roads are taken as flat"),
+            ("lateralProfile", "shape", "lateral shapes: roads are taken as flat"),
+        ];
+        for (profile, record, words) in profiles {
+            for entry in road.child(profile).into_iter().flat_map(|profile| profile.children(record)) {
+                // A constant height is no slope; a constant bank is one.
+                let names = if record == "elevation" { &["b", "c", "d"][..] } else { &["a", "b", "c", "d"] };
+                let mut bends = false;
+                for name in names {
+                    bends |= entry.number_or(name, 0.0)?.abs() > 1e-9;
+                }
+                if bends {
+                    self.ignore(words.to_owned());
+                    break;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// A limit in m/s; `None` for `no limit` and `undefined`.
+    fn speed(&mut self, speed: Element) -> Result<Option<f64>, RoadError> {
+        if matches!(speed.attribute("max"), Some("no limit" | "undefined")) {
+            return Ok(None);
+        }
+        let factor = match speed.attribute("unit").unwrap_or("m/s") {
+            "m/s" => 1.0,
+            "km/h" => 1.0 / 3.6,
+            "mph" => 0.447_04,
+            unit => {
+                let message = format!("unknown unit of speed `{unit}`; write m/s, km/h or mph");
+                return Err(speed.wrong(message));
+            }
+        };
+        let limit_mps = speed.number("max")? * factor;
+        if limit_mps <= 0.0 {
+            // Some tools write 0 or -1 for "none".
+            self.warn(speed, format!("ignored a speed limit of {limit_mps} m/s"));
+            return Ok(None);
+        }
+        Ok(Some(limit_mps))
+    }
+}
+
+fn cubics<'a, 'input: 'a>(
+    records: impl Iterator<Item = Element<'a, 'input>>,
+    begin: &str,
+) -> Result<Cubics, RoadError> {
+    let pieces = records.map(|record| {
+        Ok(Cubic {
+            begin_m: record.number_or(begin, 0.0)?,
+            a: record.number("a")?,
+            b: record.number_or("b", 0.0)?,
+            c: record.number_or("c", 0.0)?,
+            d: record.number_or("d", 0.0)?,
+        })
+    });
+    pieces.collect::<Result<_, _>>().map(Cubics::new)
+}
+
+fn road_link(link: Element) -> Result<RoadLink, RoadError> {
+    let (id, line) = (link.text("elementId")?.to_owned(), link.line());
+    match link.attribute("elementType").unwrap_or("road") {
+        "junction" => Ok(RoadLink::Junction { id, line }),
+        "road" => Ok(RoadLink::Road { id, contact: contact(link)?, line }),
+        other => {
+            Err(link.wrong(format!("unknown `elementType` `{other}`; `road` or `junction` is expected")))
+        }
+    }
+}
+
+fn contact(element: Element) -> Result<Contact, RoadError> {
+    match element.text("contactPoint")? {
+        "start" => Ok(Contact::Start),
+        "end" => Ok(Contact::End),
+        other => {
+            Err(element.wrong(format!("unknown `contactPoint` `{other}`; `start` or `end` is expected")))
+        }
+    }
+}
+
+fn junction(junction: Element) -> Result<JunctionElement, RoadError> {
+    let connections = junction.children("connection").map(|connection| {
+        let links = connection.children("laneLink");
+        Ok(ConnectionElement {
+            line: connection.line(),
+            incoming_road: connection.text("incomingRoad")?.to_owned(),
+            connecting_road: match connection.attribute("connectingRoad") {
+                Some(road) => road.to_owned(),
+                // A direct junction (1.7) links two roads without a connecting road.
+                None => connection.text("linkedRoad")?.to_owned(),
+            },
+            contact: contact(connection)?,
+            lane_links: links
+                .map(|link| Ok((link.integer("from")?, link.integer("to")?)))
+                .collect::<Result<_, _>>()?,
+        })
+    });
+    let controllers = junction.children("controller");
+    Ok(JunctionElement {
+        id: junction.text("id")?.to_owned(),
+        name: junction.attribute("name").unwrap_or("").to_owned(),
+        connections: connections.collect::<Result<_, _>>()?,
+        priorities: junction
+            .children("priority")
+            .filter_map(|entry| {
+                Some((entry.attribute("high")?.to_owned(), entry.attribute("low")?.to_owned()))
+            })
+            .collect(),
+        controllers: controllers
+            .map(|entry| Ok((entry.text("id")?.to_owned(), entry.line())))
+            .collect::<Result<_, _>>()?,
+    })
+}
+
+fn controller(controller: Element) -> Result<ControllerElement, RoadError> {
+    let controls = controller.children("control");
+    Ok(ControllerElement {
+        id: controller.text("id")?.to_owned(),
+        signals: controls
+            .map(|control| Ok((control.text("signalId")?.to_owned(), control.line())))
+            .collect::<Result<_, _>>()?,
+    })
+}

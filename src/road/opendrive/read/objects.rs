@@ -1,0 +1,153 @@
+//! Reads objects: crosswalks, and things that stand beside the road.
+
+use crate::road::RoadError;
+
+use super::super::elements::{ObjectElement, ObjectKind, Outline};
+use super::super::xml::Element;
+use super::{ROAD_M_MAX, Reader};
+
+/// Limit on the copies of one crosswalk.
+const REPEATS_MAX: f64 = 1000.0;
+
+impl Reader {
+    /// The objects of a road. One that cannot be read is left out, with a warning.
+    pub(super) fn objects(&mut self, road: Element) -> Vec<ObjectElement> {
+        let mut all = Vec::new();
+        for object in road.child("objects").into_iter().flat_map(|objects| objects.children("object")) {
+            let word = object.attribute("type").unwrap_or("");
+            let Some(kind) = object_kind(word) else {
+                self.ignore(format!("objects of type `{word}`"));
+                continue;
+            };
+            match self.object(object, word, kind) {
+                Ok(read) => all.extend(read),
+                Err(error) => self.leave_out(&error),
+            }
+        }
+        all
+    }
+
+    /// An object, or its copies.
+    fn object(
+        &mut self,
+        object: Element,
+        word: &str,
+        kind: ObjectKind,
+    ) -> Result<Vec<ObjectElement>, RoadError> {
+        let id = match kind {
+            ObjectKind::Crosswalk => object.text("id")?,
+            ObjectKind::Solid => object.attribute("id").unwrap_or(""),
+        };
+        let (s_m, t_m) = (object.number("s")?, object.number_or("t", 0.0)?);
+        if kind == ObjectKind::Solid
+            && let Some(corners) = stretched(object, s_m, t_m)?
+        {
+            let (outline, heading_rad) = (Outline::Road(corners), 0.0);
+            return Ok(vec![ObjectElement { id: id.to_owned(), kind, s_m, t_m, heading_rad, outline }]);
+        }
+        let Some(outline) = outline(object)? else {
+            match kind {
+                ObjectKind::Crosswalk => {
+                    self.warn(object, "ignored a crosswalk without an outline of three corners");
+                }
+                ObjectKind::Solid => self.ignore(format!("objects of type `{word}` without an outline")),
+            }
+            return Ok(Vec::new());
+        };
+        let heading_rad = object.number_or("hdg", 0.0)?;
+        let copies = repeats(object, s_m, t_m)?.into_iter().map(|(moved_m, t_m)| ObjectElement {
+            id: id.to_owned(),
+            kind,
+            s_m: s_m + moved_m,
+            t_m,
+            heading_rad,
+            outline: match &outline {
+                Outline::Local(corners) => Outline::Local(corners.clone()),
+                Outline::Road(corners) => {
+                    Outline::Road(corners.iter().map(|(s, t)| (s + moved_m, *t)).collect())
+                }
+            },
+        });
+        Ok(copies.collect())
+    }
+}
+
+/// What an object is to people on foot; `None` for one that is nothing to them, like paint.
+fn object_kind(kind: &str) -> Option<ObjectKind> {
+    match kind {
+        "crosswalk" => Some(ObjectKind::Crosswalk),
+        "building" | "barrier" | "railing" | "soundBarrier" | "wall" | "fence" | "guardRail" | "obstacle"
+        | "pole" | "streetLamp" | "gantry" | "tree" | "vegetation" | "car" | "van" | "truck" | "bus"
+        | "trailer" => Some(ObjectKind::Solid),
+        _ => None,
+    }
+}
+
+/// Offsets of an object, m: ahead of its own station, and to the left of the reference line.
+fn repeats(object: Element, s_m: f64, t_m: f64) -> Result<Vec<(f64, f64)>, RoadError> {
+    let mut places = Vec::new();
+    for repeat in object.children("repeat") {
+        let (begin_m, length_m) = (repeat.number("s")?, repeat.number_or("length", 0.0)?);
+        let distance_m = repeat.number_or("distance", 0.0)?;
+        let (from_m, to_m) = (repeat.number_or("tStart", t_m)?, repeat.number_or("tEnd", t_m)?);
+        // Without a distance, `repeat` means one body stretched over the length; a crosswalk is not such a
+        // body.
+        let times = if distance_m > 1e-3 {
+            (length_m / distance_m + 1e-9).floor().clamp(0.0, REPEATS_MAX)
+        } else {
+            0.0
+        };
+        for i in 0..=times as u32 {
+            let ahead_m = distance_m * f64::from(i);
+            let fraction = if length_m > 0.0 { ahead_m / length_m } else { 0.0 };
+            places.push((begin_m + ahead_m - s_m, from_m + (to_m - from_m) * fraction));
+        }
+    }
+    if places.is_empty() {
+        places.push((0.0, t_m));
+    }
+    Ok(places)
+}
+
+/// Corners, along the road, of one body stretched over a length: what `repeat` without a distance means for a
+/// wall or a barrier. Stretched bodies are taken as straight between stations 5 m apart.
+fn stretched(object: Element, s_m: f64, t_m: f64) -> Result<Option<Vec<(f64, f64)>>, RoadError> {
+    const STRETCH_M: f64 = 5.0;
+    let Some(repeat) = object.child("repeat") else { return Ok(None) };
+    let length_m = repeat.number_or("length", 0.0)?;
+    if repeat.number_or("distance", 0.0)? > 1e-3 || !(0.0..=ROAD_M_MAX).contains(&length_m) {
+        return Ok(None);
+    }
+    let begin_m = repeat.number_or("s", s_m)?;
+    let (from_m, to_m) = (repeat.number_or("tStart", t_m)?, repeat.number_or("tEnd", t_m)?);
+    let width_m = repeat.number_or("widthStart", object.number_or("width", 0.0)?)?;
+    let times = (length_m / STRETCH_M).ceil().max(1.0) as u32;
+    let at = |index: u32, left_m: f64| {
+        let fraction = f64::from(index) / f64::from(times);
+        (begin_m + length_m * fraction, from_m + (to_m - from_m) * fraction + left_m)
+    };
+    let there = (0..=times).map(|index| at(index, width_m / 2.0));
+    let back = (0..=times).rev().map(|index| at(index, -width_m / 2.0));
+    Ok(Some(there.chain(back).collect()))
+}
+
+fn outline(object: Element) -> Result<Option<Outline>, RoadError> {
+    // Since 1.5 an object may have several outlines; before, one without the wrapper.
+    let wrapper = object.child("outlines").unwrap_or(object);
+    let Some(outline) = wrapper.child("outline") else {
+        let (length_m, width_m) = (object.number_or("length", 0.0)?, object.number_or("width", 0.0)?);
+        let (u, v) = (length_m / 2.0, width_m / 2.0);
+        let corners = vec![(-u, -v), (u, -v), (u, v), (-u, v)];
+        return Ok((u > 0.0 && v > 0.0).then_some(Outline::Local(corners)));
+    };
+    let corners =
+        |name: &'static str, x: &'static str, y: &'static str| -> Result<Vec<(f64, f64)>, RoadError> {
+            outline.children(name).map(|corner| Ok((corner.number(x)?, corner.number(y)?))).collect()
+        };
+    let local = corners("cornerLocal", "u", "v")?;
+    if local.len() >= 3 {
+        return Ok(Some(Outline::Local(local)));
+    }
+    let along = corners("cornerRoad", "s", "t")?;
+    Ok((along.len() >= 3).then_some(Outline::Road(along)))
+}
