@@ -15,6 +15,7 @@ use super::map::{LaneIndex, RoadMap, StopLine};
 const OPPOSITE_RAD_MIN: f64 = 135.0 * core::f64::consts::PI / 180.0;
 
 /// Gives the groups of every junction their phases: each group the first phase in which it crosses no other.
+/// A junction in which nothing crosses keeps the groups of its file.
 pub fn share_phases(map: &mut RoadMap) {
     for index in 0..map.junctions.len() {
         if map.junctions[index].groups < 2 {
@@ -32,11 +33,15 @@ pub fn share_phases(map: &mut RoadMap) {
             phases[phase].extend(lanes);
             phase_of.insert(*group, phase);
         }
+        if phases.len() < 2 {
+            // Its lights then stop traffic for something that the map does not hold, such as people on foot.
+            continue;
+        }
         for signal in map.signals.iter_mut().filter(|signal| signal.junction == Some(index)) {
             // A group that holds no way stops nobody, whenever it is red.
             signal.group = phase_of.get(&signal.group).copied().unwrap_or(0);
         }
-        map.junctions[index].groups = phases.len().max(1);
+        map.junctions[index].groups = phases.len();
     }
 }
 

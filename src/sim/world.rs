@@ -43,6 +43,9 @@ const OBSTACLES_MAX: usize = 10;
 /// What stands farther ahead than this on the route does not block the ego vehicle, m: a queue of five cars.
 const QUEUE_M: f64 = 40.0;
 
+/// A queue before a light is at most this long, m: seven cars.
+const LIGHT_QUEUE_M: f64 = 50.0;
+
 /// How far along the route the ego vehicle is looked for from where it was, m. More than it drives
 /// in a tick, so that it is found again after a corner cut, and less than any loop of a route.
 const ROUTE_SEARCH_M: f64 = 2.0;
@@ -92,9 +95,6 @@ pub struct World {
     contacts: Vec<Contact>,
     incidents: Vec<Incident>,
 }
-
-/// A queue before a light is at most this long, m: seven cars.
-const QUEUE_M: f64 = 50.0;
 
 impl World {
     /// The beginning of an episode: the ego vehicle rolls at 3 m/s with its rear axle on the start of
@@ -221,7 +221,7 @@ impl World {
     pub fn waits_for_light(&self) -> bool {
         let front_m = self.ego_front_m();
         let mut ahead = self.scene.route.stop_lines.iter().filter(|line| line.station_m > front_m - 1.0);
-        let next = ahead.next().filter(|line| line.station_m < front_m + QUEUE_M);
+        let next = ahead.next().filter(|line| line.station_m < front_m + LIGHT_QUEUE_M);
         next.is_some_and(|line| self.signal(line.signal) != SignalColour::Green)
     }
 
