@@ -67,3 +67,15 @@ pub const REGISTRY: &[Entry] = &[
         build: |scene, _seed| Box::new(Reference::new(scene, MinimalPerformance)),
     },
 ];
+
+#[cfg(test)]
+mod tests {
+    use crate::model::DRIVERS;
+
+    use super::*;
+
+    #[test]
+    fn scenarios_know_every_driver_by_name() {
+        assert_eq!(REGISTRY.iter().map(|entry| entry.name).collect::<Vec<_>>(), DRIVERS);
+    }
+}

@@ -10,7 +10,8 @@ use crate::check::scenario_rules::{Moment, breaches, broken_start};
 use crate::check::scenario_value::{figure, number, value};
 use crate::model::rules::{Before, Nearest, RowRules, TRIES_MAX};
 use crate::model::scenario::{
-    Avoidability, Claim, ENDS, Figure, MODULES, Origin, Scenario, ScenarioStart, ScenarioStep,
+    Avoidability, Claim, DRIVERS, ENDS, Figure, MODULES, Obstacle, ObstacleKind, Origin, Scenario,
+    ScenarioStart, ScenarioStep,
 };
 use crate::model::vocabulary::{Fact, OriginField, Priority, ScenarioClaim, StartField, WAIT, Word};
 use crate::model::{
@@ -473,8 +474,8 @@ impl<'a> Reader<'a> {
         };
         match &expect.claim.kind {
             ast::ExprKind::Name(name) if name == Fact::Collision.name() => {
-                let (obstacle, time_s) = self.clauses(&expect.clauses, true)?;
-                Some(Claim::Collision { obstacle, time_s })
+                let (obstacle, time) = self.clauses(&expect.clauses, true)?;
+                Some(Claim::Collision { obstacle, time })
             }
             ast::ExprKind::Name(name) if self.space.verdicts.iter().any(|verdict| verdict.name == *name) => {
                 let (obstacle, _) = self.clauses(&expect.clauses, false)?;
@@ -552,58 +553,79 @@ impl<'a> Reader<'a> {
             ast::ExprKind::List(items) => items.as_slice(),
             _ => core::slice::from_ref(value),
         };
-        let mut modules = Vec::new();
-        for item in items {
-            let ast::ExprKind::Name(name) = &item.kind else {
-                let error = Diagnostic::error(code::TYPE_MISMATCH, "wanted a module of the driving system");
-                return self.reject(error.at(item.span, "not a name"));
-            };
-            if !MODULES.contains(&name.as_str()) {
-                return self.reject(unknown("module", name, item.span, MODULES));
-            }
-            modules.push(name.clone());
-        }
-        Some(modules)
+        self.words(items, "module", "a module of the driving system", &MODULES)
     }
 
-    /// `avoidable by [cc, fsm] with npc#2`. The oracle judges whether the drivers' names are known.
+    /// Names out of a closed set; `what` is one of them, `wanted` with its article.
+    fn words(
+        &mut self,
+        items: &[ast::Expr],
+        what: &str,
+        wanted: &str,
+        known: &[&'static str],
+    ) -> Option<Vec<String>> {
+        let mut words = Vec::new();
+        for item in items {
+            let ast::ExprKind::Name(name) = &item.kind else {
+                let error = Diagnostic::error(code::TYPE_MISMATCH, format!("wanted {wanted}"));
+                return self.reject(error.at(item.span, "not a name"));
+            };
+            if !known.contains(&name.as_str()) {
+                return self.reject(unknown(what, name, item.span, known.iter().copied()));
+            }
+            words.push(name.clone());
+        }
+        Some(words)
+    }
+
+    /// `avoidable by [cc, fsm] with npc#2`.
     fn avoidability(&mut self, class: Avoidability, expect: &ast::Expect) -> Option<Claim> {
         let (by, others): (Vec<&ast::Clause>, Vec<&ast::Clause>) =
             expect.clauses.iter().partition(|clause| clause.kind == ClauseKind::By);
-        let drivers = by.iter().map(|clause| match &clause.value.kind {
-            ast::ExprKind::List(items) => items.iter().map(driver).collect(),
-            _ => None,
-        });
-        let drivers: Option<Vec<Vec<String>>> = drivers.collect();
-        let Some(drivers) = drivers.filter(|lists| lists.len() <= 1) else {
-            let error = Diagnostic::error(code::UNKNOWN_CLAIM, "wanted one list of reference drivers");
-            return self.reject(error.at(by[0].span, "not one").help("write `avoidable by [cc, fsm]`"));
+        let drivers = match by.as_slice() {
+            [] => None,
+            [clause] if let ast::ExprKind::List(items) = &clause.value.kind => {
+                Some(self.words(items, "reference driver", "a reference driver", &DRIVERS)?)
+            }
+            [clause, ..] => {
+                let error = Diagnostic::error(code::UNKNOWN_CLAIM, "wanted one list of reference drivers");
+                return self.reject(error.at(clause.span, "not one").help("write `avoidable by [cc, fsm]`"));
+            }
         };
         let others: Vec<ast::Clause> = others.into_iter().cloned().collect();
         let (obstacle, _) = self.clauses(&others, false)?;
-        Some(Claim::Avoidability { class, by: drivers.into_iter().next(), obstacle })
+        Some(Claim::Avoidability { class, by: drivers, obstacle })
     }
 
     /// `with npc#2` and, if the claim has a time, `at 14.22 s`.
-    fn clauses(&mut self, clauses: &[ast::Clause], timed: bool) -> Option<(Option<u32>, Option<Figure>)> {
-        let (mut obstacle, mut time_s) = (None, None);
+    fn clauses(
+        &mut self,
+        clauses: &[ast::Clause],
+        timed: bool,
+    ) -> Option<(Option<Obstacle>, Option<Figure>)> {
+        let (mut obstacle, mut time) = (None, None);
         for clause in clauses {
             match (clause.kind, &clause.value.kind) {
-                (ClauseKind::With, ast::ExprKind::Numbered { number, .. })
+                (ClauseKind::With, ast::ExprKind::Numbered { name, number })
                     if number.parse::<u32>().is_ok_and(|number| number > 0) =>
                 {
-                    obstacle = number.parse().ok();
+                    let kind = ObstacleKind::ALL.into_iter().find(|kind| kind.name() == name.text);
+                    let Some(kind) = kind else {
+                        let words = ObstacleKind::ALL.map(ObstacleKind::name);
+                        return self.reject(unknown("road user", &name.text, name.span, words));
+                    };
+                    obstacle = number.parse().ok().map(|number| Obstacle { kind, number });
                 }
                 (ClauseKind::At, _) if timed => {
-                    let time = self.take(figure(&clause.value, Dimension::DURATION))?;
-                    if time.value < 0.0 {
+                    let found = self.take(figure(&clause.value, Dimension::DURATION))?;
+                    if found.value < 0.0 {
                         let error =
                             Diagnostic::error(code::UNKNOWN_CLAIM, "no time of an episode is negative");
                         return self.reject(
                             error.at(clause.value.span, "before its beginning").help("count from 0 s"),
                         );
                     }
-                    time_s = Some(time);
+                    time = Some(found);
                 }
                 _ => {
                     let error = Diagnostic::error(code::UNKNOWN_CLAIM, "unknown clause of this claim");
@@ -615,7 +637,7 @@ impl<'a> Reader<'a> {
                 }
             }
         }
-        Some((obstacle, time_s))
+        Some((obstacle, time))
     }
 
     fn whole(&mut self, value: &ast::Expr) -> Option<u64> {
@@ -638,11 +660,6 @@ impl<'a> Reader<'a> {
             ),
         }
     }
-}
-
-/// The name of a reference driver.
-fn driver(expr: &ast::Expr) -> Option<String> {
-    if let ast::ExprKind::Name(name) = &expr.kind { Some(name.clone()) } else { None }
 }
 
 /// Whether a text has the form in which avastra prints a SHA-256 digest.

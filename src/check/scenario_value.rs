@@ -61,25 +61,28 @@ pub(super) fn number(expr: &ast::Expr, dimension: Dimension) -> Result<f64, Diag
 /// As [`number`].
 pub(super) fn figure(expr: &ast::Expr, dimension: Dimension) -> Result<Figure, Diagnostic> {
     let value = number(expr, dimension)?;
-    let decimals = match &expr.kind {
-        ast::ExprKind::Unary { operand, .. } => decimals(operand),
-        _ => decimals(expr),
+    let literal = match &expr.kind {
+        ast::ExprKind::Unary { operand, .. } => &operand.kind,
+        kind => kind,
     };
-    Ok(Figure { value, decimals })
+    let ast::ExprKind::Number(literal) = literal else {
+        return Ok(Figure { value, decimals: DECIMALS_MAX, unit: "", factor: 1.0 });
+    };
+    let unit = literal.unit.as_ref().and_then(|unit| units::unit(&unit.text));
+    let factor = unit.map_or(1.0, |unit| unit.factor().to_f64());
+    let unit = unit.map_or("", |unit| unit.word);
+    Ok(Figure { value: value / factor, decimals: decimals(&literal.digits), unit, factor })
 }
 
-/// Decimals of a literal without a unit or in seconds; for any other literal, all that an `f64` has.
-fn decimals(expr: &ast::Expr) -> usize {
-    const ALL: usize = 17;
-    match &expr.kind {
-        ast::ExprKind::Number(literal)
-            if literal.unit.as_ref().is_none_or(|unit| unit.text == "s")
-                && !literal.digits.contains(['e', 'E']) =>
-        {
-            literal.digits.split_once('.').map_or(0, |(_, fraction)| fraction.len().min(ALL))
-        }
-        _ => ALL,
-    }
+/// More decimals than these an `f64` does not have.
+const DECIMALS_MAX: usize = 17;
+
+/// Decimals of a literal: 2 of `14.22`, of `1422e-2` and of `0.1422e2`.
+fn decimals(digits: &str) -> usize {
+    let (digits, exponent) = digits.split_once(['e', 'E']).unwrap_or((digits, "0"));
+    let exponent = exponent.parse().unwrap_or(0_i64);
+    let fraction = digits.split_once('.').map_or(0, |(_, fraction)| fraction.len() as i64);
+    fraction.saturating_sub(exponent).clamp(0, DECIMALS_MAX as i64) as usize
 }
 
 /// The number of a literal in a unit of its own, which is given by its factor to SI. `what` begins the complaint

@@ -5,7 +5,9 @@ use std::path::Path;
 use crate::check::state_argument::memory_from;
 use crate::check::{Loaded, ReadError, load, suggest_uses};
 use crate::model::vocabulary::{Priority, Word};
-use crate::model::{Avoidability, Claim, Facts, Memory, OutcomeFacts, Reach, Value, code, evaluate};
+use crate::model::{
+    Avoidability, Claim, Facts, Memory, Obstacle, ObstacleKind, OutcomeFacts, Reach, Value, code, evaluate,
+};
 use crate::syntax::{Style, render};
 
 /// A small sound space; tests put declarations of their own after it.
@@ -105,12 +107,40 @@ fn scenarios_are_read() {
     let rows: Vec<Option<usize>> = scenario.steps.iter().map(|step| step.row).collect();
     assert_eq!(rows, [Some(2), None, Some(3)]);
     assert_eq!(scenario.steps[2].drawn[2].1.number(), 20.1);
-    let Claim::Collision { obstacle: Some(2), time_s: Some(time_s) } = &scenario.claims[0] else { panic!() };
-    assert!(time_s.rounds(14.2249) && !time_s.rounds(14.23));
+    let npc = Obstacle { kind: ObstacleKind::Npc, number: 2 };
+    let Claim::Collision { obstacle: Some(found), time: Some(time) } = &scenario.claims[0] else { panic!() };
+    assert_eq!(*found, npc);
+    assert!(time.rounds(14.2249) && !time.rounds(14.23));
     let by = Some(vec!["cc".to_owned(), "fsm".to_owned()]);
-    let avoidable = Claim::Avoidability { class: Avoidability::Avoidable, by, obstacle: Some(2) };
+    let avoidable = Claim::Avoidability { class: Avoidability::Avoidable, by, obstacle: Some(npc) };
     assert_eq!(scenario.claims[2], avoidable);
     assert_eq!(scenario.claims.len(), 6);
+}
+
+/// A time is compared in the unit and to the decimals in which it is written.
+#[test]
+fn times_may_have_any_unit() {
+    let space = format!("{BASE}{CLOCK}");
+    let figure = |written: &str| {
+        let scenario = SCENARIO.replace("at 14.22 s", &format!("at {written}"));
+        assert_ne!(scenario, SCENARIO);
+        let loaded = load_files(&[("s.ava", &scenario), ("a.ava", &space)]);
+        let scenario = loaded.scenario.clone().unwrap_or_else(|| panic!("{}", shown(&loaded)));
+        let Claim::Collision { time: Some(time), .. } = &scenario.claims[0] else { panic!() };
+        *time
+    };
+    for (written, is, is_not) in [
+        ("0.401 min", 24.06, 24.1),
+        ("24060 ms", 24.0604, 24.061),
+        ("24.06 s", 24.062, 24.07),
+        ("2406e-2 s", 24.062, 24.07),
+        ("0.2406e2 s", 24.062, 24.07),
+        ("24 s", 24.3, 24.6),
+    ] {
+        let figure = figure(written);
+        assert!(figure.rounds(is) && !figure.rounds(is_not), "{written}: {figure:?}");
+        assert!((figure.si() - is).abs() < 0.5, "{written}");
+    }
 }
 
 #[test]

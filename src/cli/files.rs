@@ -1,23 +1,72 @@
 //! Writing files.
 
+use std::fs::File;
+use std::io::Write;
 use std::path::{Path, PathBuf};
+
+use crate::model::digest;
 
 use super::error::Failure;
 
-/// Writes a file completely or not at all: after a kill the old one is still there. A symbolic link is followed;
-/// what is no regular file (a pipe, a terminal, the null device) is written to and not replaced.
+/// Longest name of a file that common file systems take, in bytes.
+const NAME_BYTES_MAX: usize = 255;
+
+/// Writes a file completely or not at all: after a kill or a loss of power the old one or the new one is there. A
+/// symbolic link is followed; what is no regular file (a pipe, a terminal, the null device) is written to and not
+/// replaced.
 pub fn write(path: &Path, text: &(impl AsRef<[u8]> + ?Sized)) -> Result<(), Failure> {
     let followed = std::fs::canonicalize(path);
+    if followed.is_err() && path.is_symlink() {
+        return Err(Failure::file("write", path, "it is a link to a file that does not exist"));
+    }
     let path = followed.as_deref().unwrap_or(path);
+    let failed = |error| Failure::file("write", path, error);
     if path.exists() && !path.is_file() {
-        return std::fs::write(path, text).map_err(|error| Failure::file("write", path, error));
+        return std::fs::write(path, text).map_err(failed);
     }
-    if let Some(parent) = path.parent().filter(|parent| !parent.as_os_str().is_empty()) {
-        std::fs::create_dir_all(parent).map_err(|error| Failure::file("create", parent, error))?;
+    let folder = path.parent().filter(|parent| !parent.as_os_str().is_empty());
+    if let Some(folder) = folder {
+        std::fs::create_dir_all(folder).map_err(|error| Failure::file("create", folder, error))?;
     }
-    let mut partial = path.as_os_str().to_owned();
-    partial.push(".partial");
-    let partial = PathBuf::from(partial);
-    std::fs::write(&partial, text).map_err(|error| Failure::file("write", &partial, error))?;
-    std::fs::rename(&partial, path).map_err(|error| Failure::file("write", path, error))
+    let partial = partial(path);
+    let written = File::create(&partial).and_then(|mut file| {
+        file.write_all(text.as_ref())?;
+        // Without this, a loss of power can leave an empty file under the new name.
+        file.sync_all()
+    });
+    written.map_err(|error| Failure::file("write", &partial, error))?;
+    std::fs::rename(&partial, path).map_err(failed)?;
+    // Where a folder cannot be synchronised, the name may be lost, but no file is torn.
+    let _ = File::open(folder.unwrap_or(Path::new("."))).and_then(|folder| folder.sync_all());
+    Ok(())
+}
+
+/// Where a file is written before it has its name.
+fn partial(path: &Path) -> PathBuf {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let ending = ".partial";
+    if name.len() + ending.len() <= NAME_BYTES_MAX {
+        return path.with_file_name(format!("{name}{ending}"));
+    }
+    // As much of the name as there is room for. The digest keeps names apart that begin alike.
+    let digest = digest(name.as_bytes());
+    let digest = &digest["sha256:".len()..][..16];
+    let kept = name.floor_char_boundary(NAME_BYTES_MAX - ending.len() - digest.len() - 1);
+    path.with_file_name(format!("{}-{digest}{ending}", &name[..kept]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_longest_names_are_written() {
+        let scratch = tempfile::tempdir().unwrap();
+        for name in ["a".repeat(255), "ä".repeat(127), "b".repeat(248)] {
+            let path = scratch.path().join(&name);
+            write(&path, "text").unwrap();
+            assert_eq!(std::fs::read_to_string(&path).unwrap(), "text");
+        }
+        assert_eq!(std::fs::read_dir(scratch.path()).unwrap().count(), 3, "no partial file is left");
+    }
 }

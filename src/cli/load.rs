@@ -1,6 +1,8 @@
 //! Loads files for the commands: each is read, checked and its diagnostics printed; a command gets a table, a
 //! scenario, a policy or a profile, or an error.
 
+use std::fs::File;
+use std::io::Read;
 use std::path::{Component, Path, PathBuf};
 use std::sync::Arc;
 
@@ -18,6 +20,9 @@ use super::output::Output;
 /// In a directory with more files than this, a file that declares a missing name is too weak a hint.
 const NEARBY_MAX: usize = 32;
 
+/// Neighbours are read for a hint as long as they come to no more than this together.
+const NEARBY_BYTES_MAX: u64 = 256 << 10;
+
 /// Files and folders that are looked at in search of source files.
 const ENTRIES_MAX: usize = 20_000;
 
@@ -27,8 +32,11 @@ const PASSED_OVER: [&str; 2] = ["target", "node_modules"];
 /// Why a path cannot be used: it would be written into files, which are text.
 const NOT_UTF8: &str = "the path is not UTF-8; rename it";
 
-/// Larger files are refused: neither people nor our commands write them.
+/// Larger files are refused: neither people nor our commands write them. Maps of whole towns have some 20 MiB.
 const FILE_BYTES_MAX: u64 = 64 << 20;
+
+/// Larger sources are refused: the policy of a network with 500,000 weights has 2.7 MiB.
+const SOURCE_BYTES_MAX: u64 = 4 << 20;
 
 /// Reads and checks a file with everything that it uses. Diagnostics are printed.
 ///
@@ -56,7 +64,8 @@ fn sound(output: &Output, loaded: Loaded) -> Result<Loaded, Failure> {
 /// # Errors
 /// If the file cannot be read.
 pub fn read_and_check(path: &Path) -> Result<Loaded, Failure> {
-    check_read(path, &read)
+    let own = check::normal(path);
+    check_read(path, &|other| if other == own { read(other) } else { read_used(other) })
 }
 
 /// Does the same for a file that has another text than the one on the disk.
@@ -65,7 +74,7 @@ pub fn read_and_check(path: &Path) -> Result<Loaded, Failure> {
 /// If the file has no path.
 pub fn check_text(path: &Path, text: &str) -> Result<Loaded, Failure> {
     let own = check::normal(path);
-    check_read(path, &|other| if other == own { Ok(text.to_owned()) } else { read(other) })
+    check_read(path, &|other| if other == own { Ok(text.to_owned()) } else { read_used(other) })
 }
 
 fn check_read(path: &Path, read: &check::ReadFile<'_>) -> Result<Loaded, Failure> {
@@ -80,6 +89,7 @@ fn check_read(path: &Path, read: &check::ReadFile<'_>) -> Result<Loaded, Failure
 pub fn nearby(path: &Path) -> Vec<(String, String)> {
     let folder = path.parent().unwrap_or(Path::new(""));
     let mut found = Vec::new();
+    let mut bytes_left = NEARBY_BYTES_MAX;
     for prefix in ["", "../"] {
         let directory = Path::new(".").join(folder).join(prefix);
         let Ok(files) = sources_in(&directory) else { continue };
@@ -88,7 +98,10 @@ pub fn nearby(path: &Path) -> Vec<(String, String)> {
         }
         for file in files {
             let name = file.file_name().unwrap_or_default().to_string_lossy().into_owned();
-            found.extend(read(&file).ok().map(|text| (format!("{prefix}{name}"), text)));
+            if let Ok(text) = read_up_to(&file, bytes_left) {
+                bytes_left -= text.len() as u64;
+                found.push((format!("{prefix}{name}"), text));
+            }
         }
     }
     found
@@ -97,11 +110,14 @@ pub fn nearby(path: &Path) -> Vec<(String, String)> {
 /// Source files in a directory, sorted.
 ///
 /// # Errors
-/// If the directory cannot be read.
+/// If the directory cannot be read, or the name of one of them is not UTF-8.
 pub fn sources_in(directory: &Path) -> Result<Vec<PathBuf>, Failure> {
     let entries = std::fs::read_dir(directory).map_err(|error| Failure::file("read", directory, error))?;
     let mut files: Vec<PathBuf> = entries.flatten().map(|entry| entry.path()).collect();
     files.retain(|file| is_source(file));
+    if let Some(file) = files.iter().find(|file| file.to_str().is_none()) {
+        return Err(Failure::file("read", file, NOT_UTF8));
+    }
     files.sort();
     Ok(files)
 }
@@ -254,14 +270,44 @@ pub fn text(path: &Path) -> Result<String, Failure> {
 
 /// Reads a text file; everything that avastra reads comes this way.
 pub fn read(path: &Path) -> Result<String, ReadError> {
-    let length = std::fs::metadata(path).map_err(|error| ReadError(reason(&error)))?.len();
-    if length > FILE_BYTES_MAX {
-        return Err(ReadError(format!("{length} bytes are more than {FILE_BYTES_MAX}")));
+    read_up_to(path, if is_source(path) { SOURCE_BYTES_MAX } else { FILE_BYTES_MAX })
+}
+
+/// Reads a file that another file names. Whatever a file from somebody else names, only sources and maps are read and
+/// shown in a diagnostic: the name must say so, and that of the file at the end of a link.
+pub fn read_used(path: &Path) -> Result<String, ReadError> {
+    let followed = path.canonicalize().map_err(|error| ReadError(reason(&error)))?;
+    if followed.is_file()
+        && followed.extension().is_none_or(|extension| extension != "ava" && extension != "xodr")
+    {
+        return Err(ReadError("it is neither a source (`.ava`) nor a map (`.xodr`)".to_owned()));
     }
-    let bytes = std::fs::read(path).map_err(|error| ReadError(reason(&error)))?;
+    read(path)
+}
+
+/// Reads a text file of a limited size. A pipe would wait, a device has no end: only regular files are read.
+fn read_up_to(path: &Path, bytes_max: u64) -> Result<String, ReadError> {
+    let unread = |error| ReadError(reason(&error));
+    let metadata = std::fs::metadata(path).map_err(unread)?;
+    if metadata.is_dir() {
+        return Err(ReadError("is a directory".to_owned()));
+    }
+    if !metadata.is_file() {
+        return Err(ReadError("it is no regular file".to_owned()));
+    }
+    let mut bytes = Vec::new();
+    // The file may grow while it is read.
+    File::open(path).and_then(|file| file.take(bytes_max + 1).read_to_end(&mut bytes)).map_err(unread)?;
+    if bytes.len() as u64 > bytes_max {
+        return Err(ReadError(format!("it is larger than {}", in_bytes(bytes_max))));
+    }
     String::from_utf8(bytes).map_err(|error| {
         ReadError(format!("not text: byte {} is not UTF-8", error.utf8_error().valid_up_to()))
     })
+}
+
+fn in_bytes(bytes: u64) -> String {
+    if bytes >= 1 << 20 { format!("{} MiB", bytes >> 20) } else { format!("{bytes} bytes") }
 }
 
 /// The system's reason without its error number.

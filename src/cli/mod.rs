@@ -50,13 +50,20 @@ use output::Output;
 
 /// Runs the command that the process was started with.
 pub fn main() -> ExitCode {
+    // File names end up in files and in JSON, which are text. So this is said before anything is played.
+    if let Some(argument) = std::env::args_os().find(|argument| argument.to_str().is_none()) {
+        let failure = Failure::usage(format!("{argument:?} is not UTF-8: rename the file"));
+        output::remark(&format!("error: {failure}"));
+        output::usage_in_json(&failure);
+        return ExitCode::from(failure.status());
+    }
     let found = match help::command().try_get_matches() {
         Ok(found) => found,
         Err(error) => {
             // Help and version are not failures; every other message of clap's is a usage error.
-            let _ = error.print();
+            let is_lost = error.print().or_else(output::unless_closed).is_err();
             if !error.use_stderr() {
-                return ExitCode::SUCCESS;
+                return if is_lost { ExitCode::FAILURE } else { ExitCode::SUCCESS };
             }
             let failure = Failure::usage(error.kind().to_string());
             output::usage_in_json(&failure);
@@ -99,5 +106,9 @@ pub fn main() -> ExitCode {
         Command::Road(arguments) => road::road(&output, arguments),
     };
     output.finish(name, result.as_ref().err());
-    result.map_or_else(|failure| ExitCode::from(failure.status()), |()| ExitCode::SUCCESS)
+    let arrived = output.arrived();
+    if let Err(lost) = &arrived {
+        output::remark(&format!("error: {lost}"));
+    }
+    result.and(arrived).map_or_else(|failure| ExitCode::from(failure.status()), |()| ExitCode::SUCCESS)
 }

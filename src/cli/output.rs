@@ -1,6 +1,7 @@
 //! Printing: results on stdout, everything else on stderr, in the form that was asked for.
 
 use std::io::{IsTerminal, Write};
+use std::path::Path;
 use std::sync::Mutex;
 
 use crate::syntax::{Diagnostic, DiagnosticRecord, Sources, Style};
@@ -19,6 +20,8 @@ pub struct Output {
     collected: Mutex<Vec<DiagnosticRecord>>,
     /// What the command found, for JSON, which prints it at the end.
     result: Mutex<Fields>,
+    /// Why something that was printed is lost.
+    lost: Mutex<Option<String>>,
 }
 
 type Fields = serde_json::Map<String, serde_json::Value>;
@@ -65,7 +68,15 @@ impl Output {
     /// Without colour.
     pub fn of(format: Format) -> Output {
         let (collected, result) = (Mutex::default(), Mutex::default());
-        Output { format, colour: false, quiet: false, verbose: false, collected, result }
+        Output {
+            format,
+            colour: false,
+            quiet: false,
+            verbose: false,
+            collected,
+            result,
+            lost: Mutex::default(),
+        }
     }
 
     pub fn is_json(&self) -> bool {
@@ -92,12 +103,12 @@ impl Output {
             let (status, error) = (failure.map_or(0, Failure::status), failure.map(Failure::to_string));
             let result = std::mem::take(&mut *self.result.lock().expect("nothing panics while it holds it"));
             let line = Line { schema: SCHEMA, command, status, error, result };
-            print(&serde_json::to_string(&line).expect("results have string keys only"));
+            self.print(&serde_json::to_string(&line).expect("results have string keys only"));
             return;
         }
         if self.is_sarif() {
             let log = sarif::log(&self.collected());
-            print(&serde_json::to_string_pretty(&log).expect("it is JSON already"));
+            self.print(&serde_json::to_string_pretty(&log).expect("it is JSON already"));
         }
         match failure {
             Some(failure) if self.colour => remark(&format!("\x1b[1;31merror\x1b[0m: {failure}")),
@@ -106,10 +117,34 @@ impl Output {
         }
     }
 
+    /// Whether all that was printed reached its reader.
+    ///
+    /// # Errors
+    /// If some of it did not, because a disk is full for example.
+    pub fn arrived(&self) -> Result<(), Failure> {
+        self.note(std::io::stdout().flush());
+        let lost = self.lost.lock().expect("no thread panics while printing");
+        lost.as_ref()
+            .map_or(Ok(()), |reason| Err(Failure::file("write", Path::new("standard output"), reason)))
+    }
+
+    /// A line on stdout.
+    fn print(&self, text: &str) {
+        self.note(writeln!(std::io::stdout(), "{text}"));
+    }
+
+    /// Remembers the first failure to print. A reader that has gone away (`| head`) is none.
+    fn note(&self, printed: std::io::Result<()>) {
+        if let Err(error) = printed.or_else(unless_closed) {
+            let mut lost = self.lost.lock().expect("no thread panics while printing");
+            lost.get_or_insert(error.to_string());
+        }
+    }
+
     /// Text for people on stdout; nothing in JSON.
     pub fn say(&self, text: &str) {
         if !self.is_json() && !self.is_sarif() {
-            print(text);
+            self.print(text);
         }
     }
 
@@ -152,7 +187,8 @@ impl Output {
 
 /// Ends a command line that could not be parsed, if it asks for JSON.
 pub fn usage_in_json(failure: &Failure) {
-    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let arguments: Vec<String> =
+        std::env::args_os().skip(1).map(|argument| argument.to_string_lossy().into_owned()).collect();
     let asks = |pair: &[String]| pair[0] == "--format" && pair[1] == "json";
     if arguments.windows(2).any(asks) || arguments.iter().any(|argument| argument == "--format=json") {
         let known = help::command();
@@ -161,12 +197,12 @@ pub fn usage_in_json(failure: &Failure) {
     }
 }
 
-/// A line on stdout. A reader that has gone away (`| head`) is no error, here and on stderr.
-fn print(text: &str) {
-    let _ = writeln!(std::io::stdout(), "{text}");
+/// A pipe that its reader has closed is no error.
+pub fn unless_closed(error: std::io::Error) -> std::io::Result<()> {
+    if error.kind() == std::io::ErrorKind::BrokenPipe { Ok(()) } else { Err(error) }
 }
 
-/// A line on stderr.
+/// A line on stderr. If it is lost, there is no place left to say so; the exit status says what is wrong.
 pub fn remark(text: &str) {
     let _ = writeln!(std::io::stderr(), "{text}");
 }

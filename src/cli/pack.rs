@@ -17,7 +17,7 @@ use super::load;
 use super::output::{Output, plural};
 
 /// The folder of spaces and maps, in the one that can be moved.
-const SPACE: &str = "space";
+pub const SPACE: &str = "space";
 
 /// Copies every file with all that it uses.
 pub fn pack(output: &Output, arguments: &PackArguments) -> Result<(), Failure> {

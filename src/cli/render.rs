@@ -71,7 +71,7 @@ fn times(arguments: &RenderArguments, scenario: &Scenario, step_s: f64) -> Resul
         return Ok(times_s);
     }
     let first_s = scenario.claims.iter().find_map(|claim| match claim {
-        Claim::Collision { time_s, .. } => time_s.map(|time| time.value),
+        Claim::Collision { time, .. } => time.map(|time| time.si()),
         _ => None,
     });
     let Some(first_s) = first_s else {

@@ -22,7 +22,7 @@ use super::output::plural;
 use super::pack::pack_space;
 use super::parallel::jobs;
 use super::progress::Progress;
-use super::run_directory::RunDirectory;
+use super::run_directory::{Resumed, RunDirectory};
 use super::verify::acting;
 use super::{compile, load, run_directory};
 
@@ -107,23 +107,24 @@ fn begun(output: &Output, arguments: &RunArguments) -> Result<(Run, RunDirectory
         FaceArgument::Rules => Face::Rules,
     };
     let run = ready(table, settings, policy.as_ref(), face)?;
-    let path = run_directory::create(arguments.out.as_deref())?;
+    let held = run_directory::create(arguments.out.as_deref())?;
+    let path = &held.path;
     let run = if arguments.self_contained {
         let copy = pack_space(output, &run.space().path, &path.join("critical"))?;
         ready(load::table(output, &copy)?, run.settings().clone(), policy.as_ref(), face)?
     } else {
         run
     };
-    let space = load::relative(&path, &run.space().path)?;
+    let space = load::relative(path, &run.space().path)?;
     let reference = match (&arguments.policy, &policy) {
         (Some(file), Some((_, policy))) => {
-            Some(PolicyReference { file: load::relative(&path, file)?, digest: policy.digest.clone(), face })
+            Some(PolicyReference { file: load::relative(path, file)?, digest: policy.digest.clone(), face })
         }
         _ => None,
     };
     let settings = RunSettings { space, policy: reference, ..run.settings().clone() };
-    run_directory::write_settings(&path, &settings)?;
-    Ok((run, RunDirectory::open(path)?))
+    let text = run_directory::write_settings(path, "run", &settings)?;
+    Ok((run, RunDirectory::open(held, &text)?))
 }
 
 /// The roads that a command line names, or all of the space.
@@ -133,7 +134,8 @@ pub fn roads_or_all(named: &[String], space: &Space) -> Vec<String> {
 
 /// The rest of an interrupted run.
 fn resumed(output: &Output, path: &Path) -> Result<(Run, RunDirectory), Failure> {
-    let (settings, table): (RunSettings, _) = run_directory::resume(output, path, "run", "run")?;
+    let resumed: Resumed<RunSettings> = run_directory::resume(output, path, "run", "run")?;
+    let Resumed { settings, text, table, held } = resumed;
     let policy = match &settings.policy {
         None => None,
         Some(reference) => {
@@ -148,7 +150,7 @@ fn resumed(output: &Output, path: &Path) -> Result<(Run, RunDirectory), Failure>
         }
     };
     let face = settings.policy.as_ref().map_or(Face::Network, |reference| reference.face);
-    Ok((ready(table, settings, policy.as_ref(), face)?, RunDirectory::open(path.to_owned())?))
+    Ok((ready(table, settings, policy.as_ref(), face)?, RunDirectory::open(held, &text)?))
 }
 
 /// A run of the agent that the settings name, or of the given policy, whose table must have the same rows.

@@ -1,5 +1,10 @@
-//! Run directories: `run.yaml`, `run.db` and `critical/*.ava`.
+//! Run directories: `run.yaml`, `run.db` and `critical/*.ava`; those of studies have `study.yaml` and `study.db`.
+//!
+//! A directory is begun when its settings stand in it. What a kill leaves before that counts as empty, so the
+//! directory can be begun again; what it leaves after that can be resumed. One process at a time works in it.
 
+use std::ffi::OsStr;
+use std::fs::{File, TryLockError};
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
@@ -13,36 +18,61 @@ use super::error::Failure;
 use super::files::write;
 use super::load;
 use super::output::Output;
+use super::pack;
+
+/// A directory that no other process works in while this lives.
+pub struct Held {
+    pub path: PathBuf,
+    /// The lock is on the directory itself, and ends with the process however that ends.
+    _lock: Option<File>,
+}
 
 /// A run directory on disk.
 pub struct RunDirectory {
     pub path: PathBuf,
     pub database: Database,
+    _held: Held,
 }
 
 /// Makes a new directory, or the next free `runs/NNNN`.
-pub fn create_empty(out: Option<&Path>) -> Result<PathBuf, Failure> {
+pub fn create_empty(out: Option<&Path>) -> Result<Held, Failure> {
     match out {
-        Some(path) => {
-            make_empty(path)?;
-            Ok(path.to_owned())
-        }
-        None => next_free(Path::new("runs")),
+        Some(path) => make_empty(path),
+        None => hold(&next_free(Path::new("runs"))?),
     }
 }
 
 /// Makes a run directory, with `critical/` for its scenarios.
-pub fn create(out: Option<&Path>) -> Result<PathBuf, Failure> {
-    let path = create_empty(out)?;
-    let critical = path.join("critical");
+pub fn create(out: Option<&Path>) -> Result<Held, Failure> {
+    let held = create_empty(out)?;
+    let critical = held.path.join("critical");
     std::fs::create_dir_all(&critical).map_err(|error| Failure::file("create", &critical, error))?;
-    Ok(path)
+    Ok(held)
 }
 
-/// Writes `run.yaml`. It comes before the database: from then on the run can be resumed.
-pub fn write_settings(directory: &Path, settings: &impl serde::Serialize) -> Result<(), Failure> {
+/// Takes a directory for this process alone.
+fn hold(path: &Path) -> Result<Held, Failure> {
+    // Where folders cannot be opened or locked, as on some network drives, there is no lock.
+    let lock = File::open(path).ok();
+    if let Some(Err(TryLockError::WouldBlock)) = lock.as_ref().map(File::try_lock) {
+        let path = path.display();
+        return Err(Failure::usage(format!(
+            "another avastra is at work in `{path}`: wait for it, or name another directory"
+        )));
+    }
+    Ok(Held { path: path.to_owned(), _lock: lock })
+}
+
+/// Writes the settings, `run.yaml` or `study.yaml`, and returns their text. They come before the database: from then
+/// on the run can be resumed.
+pub fn write_settings(
+    directory: &Path,
+    kind: &str,
+    settings: &impl serde::Serialize,
+) -> Result<String, Failure> {
     let text = serde_yaml::to_string(settings).expect("settings are plain strings and numbers");
-    write(&directory.join("run.yaml"), &text)
+    write(&directory.join(format!("{kind}.yaml")), &text)?;
+    Ok(text)
 }
 
 /// What every kind of settings begins with.
@@ -54,6 +84,15 @@ struct Begun {
     space_digest: String,
 }
 
+/// A directory that is gone on with.
+pub struct Resumed<S> {
+    pub settings: S,
+    /// The settings as they stand in the file.
+    pub text: String,
+    pub table: ActionTable,
+    pub held: Held,
+}
+
 /// The settings of an interrupted run, training or study, and the table of its space, if neither the space nor
 /// avastra has changed since. The settings are in the file `KIND.yaml`; `what` is what was begun, in a word.
 pub fn resume<S: serde::de::DeserializeOwned>(
@@ -61,11 +100,31 @@ pub fn resume<S: serde::de::DeserializeOwned>(
     directory: &Path,
     kind: &str,
     what: &str,
-) -> Result<(S, ActionTable), Failure> {
+) -> Result<Resumed<S>, Failure> {
     let path = directory.join(format!("{kind}.yaml"));
+    let found = what_was_begun(directory);
+    if found.is_some_and(|found| found != what) {
+        let (found, directory) = (found.unwrap_or_default(), directory.display());
+        let command = if found == "training" { "train" } else { found };
+        return Err(Failure::usage(format!(
+            "`{directory}` holds a {found}: go on with `avastra {command} --resume {directory}`"
+        )));
+    }
     if !path.is_file() {
         let directory = directory.display();
-        return Err(Failure::usage(format!("`{directory}` is no {kind} directory: it has no {kind}.yaml")));
+        return Err(Failure::usage(format!(
+            "`{directory}` is no {kind} directory: it has no {kind}.yaml; begin one with `--out {directory}`"
+        )));
+    }
+    let held = hold(directory)?;
+    // The scenarios of a run whose database is lost cannot be told from new ones.
+    let database = directory.join(format!("{kind}.db"));
+    let left = load::sources_in(&directory.join("critical")).unwrap_or_default();
+    if !database.exists() && !left.is_empty() {
+        return Err(Failure::usage(format!(
+            "`{}` is missing, and `critical` has scenarios: begin a new {what}, or delete them to begin this one anew",
+            database.display()
+        )));
     }
     let text = load::text(&path)?;
     let settings = serde_yaml::from_str(&text).map_err(|error| Failure::file("read", &path, error))?;
@@ -86,15 +145,26 @@ pub fn resume<S: serde::de::DeserializeOwned>(
             table.space().path.display()
         )));
     }
-    Ok((settings, table))
+    Ok(Resumed { settings, text, table, held })
+}
+
+/// `run`, `training` or `study`, if the directory holds one.
+fn what_was_begun(directory: &Path) -> Option<&'static str> {
+    if directory.join("study.yaml").is_file() {
+        return Some("study");
+    }
+    let text = load::read(&directory.join("run.yaml")).ok()?;
+    let settings: serde_json::Map<String, serde_json::Value> = serde_yaml::from_str(&text).ok()?;
+    Some(if settings.contains_key("hyperparameters") { "training" } else { "run" })
 }
 
 impl RunDirectory {
-    /// An existing directory, with its database.
-    pub fn open(path: PathBuf) -> Result<RunDirectory, Failure> {
-        let file = path.join("run.db");
-        let database = Database::open(&file).map_err(|error| Failure::file("open", &file, error))?;
-        Ok(RunDirectory { path, database })
+    /// A directory with its database; `settings` is the text of `run.yaml`.
+    pub fn open(held: Held, settings: &str) -> Result<RunDirectory, Failure> {
+        let file = held.path.join("run.db");
+        let database =
+            Database::open(&file, settings).map_err(|error| Failure::file("open", &file, error))?;
+        Ok(RunDirectory { path: held.path.clone(), database, _held: held })
     }
 
     /// Writes the counted collisions of an episode as a scenario, `critical/ROAD_NNNN.ava`. `agent` is the one that
@@ -117,17 +187,36 @@ impl RunDirectory {
     }
 }
 
-fn make_empty(path: &Path) -> Result<(), Failure> {
+fn make_empty(path: &Path) -> Result<Held, Failure> {
     std::fs::create_dir_all(path).map_err(|error| Failure::file("create", path, error))?;
-    let mut entries = std::fs::read_dir(path).map_err(|error| Failure::file("read", path, error))?;
-    if entries.next().is_some() {
+    let held = hold(path)?;
+    if !is_unbegun(path).map_err(|error| Failure::file("read", path, error))? {
         return Err(Failure::usage(format!(
             "`{}` is not empty: name a new directory, or go on with `--resume {}`",
             path.display(),
             path.display()
         )));
     }
-    Ok(())
+    Ok(held)
+}
+
+/// Whether a directory is empty but for what a kill leaves before the settings are written.
+fn is_unbegun(path: &Path) -> std::io::Result<bool> {
+    for entry in std::fs::read_dir(path)? {
+        let name = entry?.file_name();
+        let is_left = match name.to_str() {
+            Some("run.yaml.partial" | "study.yaml.partial") => true,
+            Some("critical") => {
+                let inside: Vec<_> = std::fs::read_dir(path.join(name))?.collect::<Result<_, _>>()?;
+                inside.iter().all(|entry| entry.file_name() == OsStr::new(pack::SPACE))
+            }
+            _ => false,
+        };
+        if !is_left {
+            return Ok(false);
+        }
+    }
+    Ok(true)
 }
 
 /// Makes the first directory `NNNN` that does not exist yet.

@@ -18,26 +18,28 @@ use super::output::Output;
 use super::output::plural;
 use super::parallel::jobs;
 use super::progress::Progress;
+use super::run_directory::{Held, Resumed};
 use super::{load, run_directory};
 
 /// Plays what a study still lacks and prints its result.
 pub fn study(output: &Output, arguments: &StudyArguments) -> Result<(), Failure> {
-    let (study, path) = match &arguments.resume {
-        Some(path) => (resumed(output, path)?, path.clone()),
+    let (study, held, settings) = match &arguments.resume {
+        Some(path) => resumed(output, path)?,
         None => {
             let file = arguments.file.as_ref().expect("clap asks for it where there is no `--resume`");
             let study = begun(output, file, arguments.quick)?;
-            let path = run_directory::create_empty(arguments.out.as_deref())?;
-            let space = load::relative(&path, &study.table().space().path)?;
+            let held = run_directory::create_empty(arguments.out.as_deref())?;
+            let space = load::relative(&held.path, &study.table().space().path)?;
             let settings = StudySettings { space, ..study.settings().clone() };
-            let text = serde_yaml::to_string(&settings).expect("settings are plain strings and numbers");
-            write(&path.join("study.yaml"), &text)?;
-            (study, path)
+            let text = run_directory::write_settings(&held.path, "study", &settings)?;
+            (study, held, text)
         }
     };
+    let path = held.path.clone();
     let stop = stop_on_interrupt()?;
     let file = path.join("study.db");
-    let mut database = StudyDatabase::open(&file).map_err(|error| Failure::file("open", &file, error))?;
+    let mut database =
+        StudyDatabase::open(&file, &settings).map_err(|error| Failure::file("open", &file, error))?;
     let todo = database.missing(&study).map_err(|error| Failure::file("read", &file, error))?;
     output.tell(&heading(&study, &path));
 
@@ -89,10 +91,10 @@ fn begun(output: &Output, path: &Path, quick: bool) -> Result<Study, Failure> {
     Study::new(table, settings).map_err(|error| refuse(error.to_string()))
 }
 
-/// The rest of an interrupted study.
-fn resumed(output: &Output, path: &Path) -> Result<Study, Failure> {
-    let (settings, table) = run_directory::resume(output, path, "study", "study")?;
-    Study::new(table, settings).map_err(Failure::usage)
+/// The rest of an interrupted study, with the text of its settings.
+fn resumed(output: &Output, path: &Path) -> Result<(Study, Held, String), Failure> {
+    let Resumed { settings, text, table, held } = run_directory::resume(output, path, "study", "study")?;
+    Ok((Study::new(table, settings).map_err(Failure::usage)?, held, text))
 }
 
 fn heading(study: &Study, directory: &Path) -> String {

@@ -22,7 +22,7 @@ use super::output::plural;
 use super::pack::pack_space;
 use super::progress::{TrainingProgress, Working};
 use super::run::roads_or_all;
-use super::run_directory::RunDirectory;
+use super::run_directory::{Resumed, RunDirectory};
 use super::{distill, load, run_directory};
 
 /// Episodes between two checkpoints: at most so many are played again after a kill.
@@ -71,14 +71,16 @@ fn begun(output: &Output, arguments: &TrainArguments) -> Result<(Training, RunDi
     };
     let settings = TrainSettings::new(conditions, hyperparameters);
     let mut training = Training::new(table, settings)?;
-    let path = run_directory::create(arguments.out.as_deref())?;
+    let held = run_directory::create(arguments.out.as_deref())?;
+    let path = &held.path;
     if arguments.self_contained {
         let copy = pack_space(output, &training.table().space().path, &path.join("critical"))?;
         training = Training::new(load::table(output, &copy)?, training.settings().clone())?;
     }
-    let space = load::relative(&path, &training.table().space().path)?;
-    run_directory::write_settings(&path, &TrainSettings { space, ..training.settings().clone() })?;
-    Ok((training, RunDirectory::open(path)?))
+    let space = load::relative(path, &training.table().space().path)?;
+    let settings = TrainSettings { space, ..training.settings().clone() };
+    let text = run_directory::write_settings(path, "run", &settings)?;
+    Ok((training, RunDirectory::open(held, &text)?))
 }
 
 /// The agent's settings: the preset that is asked for, as the configuration file changes it.
@@ -102,8 +104,9 @@ fn settings(arguments: &TrainArguments) -> Result<Settings, Failure> {
 
 /// The rest of an interrupted training.
 fn resumed(output: &Output, path: &Path) -> Result<(Training, RunDirectory), Failure> {
-    let (settings, table): (TrainSettings, _) = run_directory::resume(output, path, "run", "training")?;
-    let mut directory = RunDirectory::open(path.to_owned())?;
+    let resumed: Resumed<TrainSettings> = run_directory::resume(output, path, "run", "training")?;
+    let Resumed { settings, text, table, held } = resumed;
+    let mut directory = RunDirectory::open(held, &text)?;
     let checkpoint =
         directory.database.return_to_checkpoint().map_err(|error| Failure::file("resume", path, error))?;
     let training = match checkpoint {

@@ -34,7 +34,8 @@ pub(crate) use row::locals;
 pub use row::{Reach, Row};
 pub use rules::{NoStart, RulesInForce, UnknownRule};
 pub use scenario::{
-    Avoidability, Claim, ENDS, Figure, MODULES, Origin, Scenario, ScenarioStart, ScenarioStep,
+    Avoidability, Claim, DRIVERS, ENDS, Figure, MODULES, Obstacle, ObstacleKind, Origin, Scenario,
+    ScenarioStart, ScenarioStep,
 };
 pub use space::{
     ActionDef, COUNTED, Domain, EffectDef, EnumDef, EpisodeDef, FnDef, GroupDef, Initial, Parameter,

@@ -69,24 +69,24 @@ pub struct ScenarioStep {
 #[derive(Debug, Clone, PartialEq)]
 pub enum Claim {
     /// `expect collision with npc#2 at 14.22 s`.
-    Collision { obstacle: Option<u32>, time_s: Option<Figure> },
+    Collision { obstacle: Option<Obstacle>, time: Option<Figure> },
     /// `expect proc == [0.0, 0.12]`: ProC of each step.
     Proc(Vec<Figure>),
     /// `expect trace == "sha256:…"`.
     Trace(String),
     /// `expect counted with npc#2`: the named verdict holds of the collision.
-    Verdict { name: String, obstacle: Option<u32> },
+    Verdict { name: String, obstacle: Option<Obstacle> },
     /// `expect avoidable by [cc, fsm] with npc#2`: the class of the collision, and the reference drivers
     /// that avoid it.
-    Avoidability { class: Avoidability, by: Option<Vec<String>>, obstacle: Option<u32> },
+    Avoidability { class: Avoidability, by: Option<Vec<String>>, obstacle: Option<Obstacle> },
     /// `expect cause == perception with npc#2`, `expect cause == [tracking, planning]`: the module at
     /// fault, or the two that are at fault together; in words of [`MODULES`].
-    Cause { modules: Vec<String>, obstacle: Option<u32> },
+    Cause { modules: Vec<String>, obstacle: Option<Obstacle> },
     /// `expect priority == other with npc#2`: who had priority in the collision.
-    Priority { priority: Priority, obstacle: Option<u32> },
+    Priority { priority: Priority, obstacle: Option<Obstacle> },
     /// `expect minimal with npc#2`: if any one step is left out, with its time or without, there is no such
     /// collision.
-    Minimal { obstacle: Option<u32> },
+    Minimal { obstacle: Option<Obstacle> },
     /// `expect end == arrived`: one of [`ENDS`].
     End(String),
 }
@@ -121,27 +121,85 @@ impl Avoidability {
 pub const MODULES: [&str; 8] =
     ["localization", "perception", "tracking", "prediction", "planning", "latency", "control", "emergency"];
 
+/// The drivers that can tell whether a collision was avoidable, in the words of `expect avoidable by […]`.
+pub const DRIVERS: [&str; 8] = ["modular", "frenet", "reactive", "idm", "cc", "fsm", "rss", "r157"];
+
 /// How an episode may end, in the words of `expect end == …`.
 pub const ENDS: [&str; 5] = ["arrived", "stalled", "blocked", "limit", "script"];
 
-/// A number with the precision to which it was written, SI.
+/// A number with the unit and the precision in which it was written.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Figure {
+    /// In its own unit.
     pub value: f64,
     pub decimals: usize,
+    /// The word of its unit; empty if it has none.
+    pub unit: &'static str,
+    /// Its unit in SI units.
+    pub factor: f64,
 }
 
 impl Figure {
-    /// Whether a number, rounded to the same precision, is this figure.
+    /// The number in SI units.
+    pub fn si(&self) -> f64 {
+        self.value * self.factor
+    }
+
+    /// Whether a number in SI, rounded to the same precision, is this figure.
     pub fn rounds(&self, found: f64) -> bool {
         let as_written = |value: f64| format!("{value:.*}", self.decimals);
         // Minus zero is zero.
-        as_written(found + 0.0) == as_written(self.value + 0.0)
+        as_written(found / self.factor + 0.0) == as_written(self.value + 0.0)
     }
 }
 
 impl fmt::Display for Figure {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{:.*}", self.decimals, self.value)
+        write!(f, "{:.*}", self.decimals, self.value)?;
+        if self.unit.is_empty() { Ok(()) } else { write!(f, " {}", self.unit) }
+    }
+}
+
+/// A road user as a claim names it: `npc#2`, `pedestrian#3`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Obstacle {
+    pub kind: ObstacleKind,
+    /// Its place in the order of appearance, from 1.
+    pub number: u32,
+}
+
+/// What a claim says of the body of a road user.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ObstacleKind {
+    /// Nothing.
+    Npc,
+    Pedestrian,
+    Vehicle,
+}
+
+impl ObstacleKind {
+    pub const ALL: [ObstacleKind; 3] = [ObstacleKind::Npc, ObstacleKind::Pedestrian, ObstacleKind::Vehicle];
+
+    pub fn name(self) -> &'static str {
+        match self {
+            ObstacleKind::Npc => "npc",
+            ObstacleKind::Pedestrian => "pedestrian",
+            ObstacleKind::Vehicle => "vehicle",
+        }
+    }
+
+    /// Whether the word fits a road user.
+    pub fn fits(self, is_vehicle: bool) -> bool {
+        match self {
+            ObstacleKind::Npc => true,
+            ObstacleKind::Pedestrian => !is_vehicle,
+            ObstacleKind::Vehicle => is_vehicle,
+        }
+    }
+}
+
+impl fmt::Display for Obstacle {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}#{}", self.kind.name(), self.number)
     }
 }

@@ -62,11 +62,16 @@ impl Default for AvoidabilitySettings {
     }
 }
 
+/// Longest time in the settings of the verdict, s: the worlds of so many ticks are kept.
+const SECONDS_MAX: f64 = 60.0;
+
 /// Why settings of the verdict cannot be used.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum AvoidabilityError {
     #[error("cannot read how avoidability is told: {reason}")]
     Yaml { reason: String },
+    #[error("`{name}` is {found} s where avoidability is told: from 0 to {SECONDS_MAX} s are possible")]
+    Seconds { name: &'static str, found: f64 },
     #[error("no reference driver `{name}` to tell avoidability by: there are {known}")]
     Driver { name: String, known: String },
 }
@@ -89,8 +94,12 @@ impl AvoidabilitySettings {
     }
 
     /// # Errors
-    /// If they name a driver that does not exist.
+    /// If they name a driver that does not exist, or more time than a replay should take.
     pub fn check(&self) -> Result<(), AvoidabilityError> {
+        let times = [("rewind_s", self.rewind_s), ("watch_s", self.watch_s), ("after_s", self.after_s)];
+        if let Some((name, found)) = times.into_iter().find(|(_, time)| !(0.0..=SECONDS_MAX).contains(time)) {
+            return Err(AvoidabilityError::Seconds { name, found });
+        }
         match self.careful.iter().chain(&self.reported).find(|name| ads::by_name(name).is_none()) {
             None => Ok(()),
             Some(name) => {

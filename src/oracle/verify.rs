@@ -3,7 +3,7 @@
 use crate::ads::Module;
 use crate::episode::{Collision, EpisodeLog, Outcome};
 use crate::model::vocabulary::Word;
-use crate::model::{Claim, Scenario, Space, digest_text};
+use crate::model::{Claim, Obstacle, Scenario, Space, digest_text};
 
 use super::avoidable::Judgement;
 use super::cause::NoModules;
@@ -55,9 +55,9 @@ fn check(
     replays: &Replays,
 ) -> ClaimResult {
     match claim {
-        Claim::Collision { obstacle, time_s } => {
-            let at = time_s.as_ref().map_or(String::new(), |time| format!(" at {time} s"));
-            let outcome = collision(log, *obstacle).and_then(|index| match time_s {
+        Claim::Collision { obstacle, time } => {
+            let at = time.as_ref().map_or(String::new(), |time| format!(" at {time}"));
+            let outcome = collision(log, *obstacle).and_then(|index| match time {
                 Some(claimed) if !claimed.rounds(log.collisions[index].contact.time_s) => {
                     Err(format!("at {:.2} s", log.collisions[index].contact.time_s))
                 }
@@ -141,13 +141,21 @@ fn check(
 }
 
 /// The first collision with an obstacle, or with any obstacle.
-fn collision(log: &EpisodeLog, obstacle: Option<u32>) -> Result<usize, String> {
-    let meant = |collision: &Collision| obstacle.is_none_or(|id| collision.contact.obstacle == id);
-    log.collisions.iter().position(meant).ok_or_else(|| "no such collision".to_owned())
+fn collision(log: &EpisodeLog, obstacle: Option<Obstacle>) -> Result<usize, String> {
+    let meant =
+        |collision: &Collision| obstacle.is_none_or(|wanted| collision.contact.obstacle == wanted.number);
+    let index = log.collisions.iter().position(meant).ok_or_else(|| "no such collision".to_owned())?;
+    let body = log.collisions[index].body;
+    match obstacle {
+        Some(wanted) if !wanted.kind.fits(body.is_vehicle()) => {
+            Err(format!("npc#{} is a {}", wanted.number, body.name()))
+        }
+        _ => Ok(index),
+    }
 }
 
-fn with(obstacle: Option<u32>) -> String {
-    obstacle.map_or(String::new(), |id| format!(" with npc#{id}"))
+fn with(obstacle: Option<Obstacle>) -> String {
+    obstacle.map_or(String::new(), |obstacle| format!(" with {obstacle}"))
 }
 
 /// The class of a collision and the reference drivers that avoid it.

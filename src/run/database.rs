@@ -15,11 +15,12 @@ use crate::model::vocabulary::Word;
 use crate::oracle;
 
 use crate::run::offered::{RowCount, without_figures};
+use crate::run::sealed::{DatabaseError, Layout};
 use crate::run::shape::Shape;
 use crate::run::summary::{EpisodeSummary, Finding};
 
-/// Layout of the tables; raised whenever a column changes.
-const SCHEMA_VERSION: i64 = 6;
+pub(crate) const LAYOUT: Layout =
+    Layout { version: 7, unit: "episode", tables: &["episode", "step", "offer", "collision", "learning"] };
 
 /// `offer` says for each row in how many steps of an episode it was legal (reason 0) or was refused for a reason; a
 /// training leaves it empty. `learning` and `checkpoint` belong to a training (`train::record`) and stay empty in a run.
@@ -57,31 +58,18 @@ CREATE TABLE checkpoint (
 ) STRICT;
 ";
 
-/// Why a run database cannot be used.
-#[derive(Debug, thiserror::Error)]
-pub enum DatabaseError {
-    #[error("it has layout {found}, this version of avastra reads {wanted}")]
-    Layout { found: i64, wanted: i64 },
-    #[error("it names an episode {found}")]
-    Episode { found: i64 },
-    #[error("its checkpoint is damaged: begin a new training")]
-    Checkpoint,
-    #[error(transparent)]
-    Sqlite(#[from] rusqlite::Error),
-}
-
 /// An open run database.
 pub struct Database {
     pub(crate) connection: Connection,
 }
 
 impl Database {
-    /// Opens the file, making the tables if it is new.
+    /// Opens the file, making the tables if it is new. `settings` is the text of `run.yaml`.
     ///
     /// # Errors
-    /// If the file cannot be opened or is a database of another layout.
-    pub fn open(path: &Path) -> Result<Database, DatabaseError> {
-        let connection = connect(path, SCHEMA_VERSION, &format!("{SCHEMA}{}", step_table()))?;
+    /// If the file cannot be opened, has another layout or other settings, or was damaged or changed.
+    pub fn open(path: &Path, settings: &str) -> Result<Database, DatabaseError> {
+        let connection = LAYOUT.open(path, &format!("{SCHEMA}{}", step_table()), settings)?;
         Ok(Database { connection })
     }
 
@@ -97,6 +85,7 @@ impl Database {
     ) -> Result<(), DatabaseError> {
         let transaction = self.connection.transaction()?;
         add_all(&transaction, summary, log, in_words)?;
+        LAYOUT.seal(&transaction, summary.episode as i64)?;
         transaction.commit()?;
         Ok(())
     }
@@ -213,24 +202,6 @@ impl Database {
             },
         )?)
     }
-}
-
-/// Opens a database, making its tables if the file is new.
-///
-/// # Errors
-/// If the file cannot be opened, or has another layout than `version`.
-pub(crate) fn connect(path: &Path, version: i64, tables: &str) -> Result<Connection, DatabaseError> {
-    let mut connection = Connection::open(path)?;
-    let found: i64 = connection.pragma_query_value(None, "user_version", |row| row.get(0))?;
-    if found == 0 {
-        let transaction = connection.transaction()?;
-        transaction.execute_batch(tables)?;
-        transaction.pragma_update(None, "user_version", version)?;
-        transaction.commit()?;
-    } else if found != version {
-        return Err(DatabaseError::Layout { found, wanted: version });
-    }
-    Ok(connection)
 }
 
 /// How often a reason kept an action from being carried out.

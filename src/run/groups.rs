@@ -8,7 +8,8 @@ use std::collections::BTreeMap;
 
 use crate::model::vocabulary::{Body, Word};
 
-use crate::run::database::{Database, DatabaseError};
+use crate::run::database::Database;
+use crate::run::sealed::DatabaseError;
 
 /// Counted collisions that are alike.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]

@@ -12,6 +12,7 @@ mod groups;
 mod offered;
 mod play;
 mod profile;
+mod sealed;
 mod settings;
 mod shape;
 mod stage;
@@ -20,8 +21,8 @@ mod threads;
 
 pub use arena::{Arena, road_named};
 pub(crate) use arena::{carry_out, choose, legal, offers};
-pub use database::{Database, DatabaseError, RefusalCount, Totals};
-pub(crate) use database::{add_all, connect};
+pub use database::{Database, RefusalCount, Totals};
+pub(crate) use database::{LAYOUT, add_all};
 pub use gauges::Gauges;
 pub use groups::Group;
 pub(crate) use groups::kind;
@@ -32,6 +33,8 @@ pub use profile::{
     trained_against,
 };
 pub(crate) use profile::{traffic_of, under_test};
+pub use sealed::DatabaseError;
+pub(crate) use sealed::Layout;
 pub use settings::{EPISODES_MAX, PolicyReference, RunError, RunSettings, VERSION};
 pub(crate) use settings::{agent_named, check_episodes};
 pub use shape::Shape;

@@ -6,15 +6,15 @@ use std::path::Path;
 use rusqlite::types::Type as Kind;
 use rusqlite::{Connection, Row, params};
 
-use crate::run::{DatabaseError, connect};
+use crate::run::{DatabaseError, Layout};
 
 use crate::study::job::Job;
 use crate::study::ready::Study;
 use crate::study::record::{CellRecord, CollisionRecord, EpisodeRecord, FailureClass, Spent, TrainedRecord};
 
-/// Layout of the tables; raised whenever a column changes. Begins at 1001, so that a `run.db` is never taken for a
-/// `study.db`.
-const SCHEMA_VERSION: i64 = 1002;
+/// Versions begin at 1001, so that a `run.db` is never taken for a `study.db`.
+const LAYOUT: Layout =
+    Layout { version: 1003, unit: "cell", tables: &["cell", "trained", "evaluated", "collision"] };
 
 /// Seeds are text: SQLite's integers have a sign.
 const SCHEMA: &str = "
@@ -46,12 +46,12 @@ pub struct StudyDatabase {
 }
 
 impl StudyDatabase {
-    /// Opens the file, making the tables if it is new.
+    /// Opens the file, making the tables if it is new. `settings` is the text of `study.yaml`.
     ///
     /// # Errors
-    /// If the file cannot be opened or is a database of another layout.
-    pub fn open(path: &Path) -> Result<StudyDatabase, DatabaseError> {
-        Ok(StudyDatabase { connection: connect(path, SCHEMA_VERSION, SCHEMA)? })
+    /// If the file cannot be opened, has another layout or other settings, or was damaged or changed.
+    pub fn open(path: &Path, settings: &str) -> Result<StudyDatabase, DatabaseError> {
+        Ok(StudyDatabase { connection: LAYOUT.open(path, SCHEMA, settings)? })
     }
 
     /// Adds all cells of a job, or nothing.
@@ -90,6 +90,7 @@ impl StudyDatabase {
             for (index, episode) in record.episodes.iter().enumerate() {
                 add_episode(&transaction, cell, index as i64, episode)?;
             }
+            LAYOUT.seal(&transaction, cell)?;
         }
         transaction.commit()?;
         Ok(())

@@ -7,7 +7,7 @@ use rusqlite::{OptionalExtension, params};
 
 use crate::action::Draw;
 use crate::model::digest;
-use crate::run::{Database, DatabaseError, add_all};
+use crate::run::{Database, DatabaseError, LAYOUT, add_all};
 
 use crate::train::training::TrainedEpisode;
 
@@ -47,9 +47,10 @@ impl Database {
         if let Some(learner) = checkpoint {
             transaction.execute(
                 "INSERT OR REPLACE INTO checkpoint VALUES (1, ?, ?, ?)",
-                params![episode as i64 + 1, digest(learner), learner],
+                params![episode as i64 + 1, seal(episode as i64 + 1, learner), learner],
             )?;
         }
+        LAYOUT.seal(&transaction, episode as i64)?;
         transaction.commit()?;
         Ok(())
     }
@@ -80,17 +81,20 @@ impl Database {
             Some((episodes, claimed, learner)) => {
                 let episodes =
                     usize::try_from(episodes).map_err(|_| DatabaseError::Episode { found: episodes })?;
-                if digest(&learner) != claimed {
+                if seal(episodes as i64, &learner) != claimed {
                     return Err(DatabaseError::Checkpoint);
                 }
                 Some(Checkpoint { episodes, learner })
             }
         };
         let first = checkpoint.as_ref().map_or(0, |checkpoint| checkpoint.episodes) as i64;
-        for table in ["step", "collision", "learning", "episode"] {
-            transaction.execute(&format!("DELETE FROM {table} WHERE episode >= ?"), [first])?;
-        }
+        LAYOUT.delete_from(&transaction, first)?;
         transaction.commit()?;
         Ok(checkpoint)
     }
+}
+
+/// The digest of a checkpoint: of its bytes, and of the number of episodes that it comes after.
+fn seal(episodes: i64, learner: &[u8]) -> String {
+    digest(&[&episodes.to_le_bytes(), learner].concat())
 }

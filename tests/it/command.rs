@@ -195,7 +195,8 @@ fn an_interrupted_run_goes_on_where_it_was() {
     // The directory is left as by a run that was killed half-way.
     let database = rusqlite::Connection::open(scratch.path().join("cut/run.db")).expect("it is a database");
     let cut = "DELETE FROM step WHERE episode >= 5; DELETE FROM collision WHERE episode >= 5;
-               DELETE FROM offer WHERE episode >= 5; DELETE FROM episode WHERE episode >= 5;";
+               DELETE FROM offer WHERE episode >= 5; DELETE FROM episode WHERE episode >= 5;
+               DELETE FROM seal WHERE unit >= 5;";
     database.execute_batch(cut).expect("it can be cut");
     drop(database);
     let resume = ["run", "--resume", "cut", "--format", "json"];

@@ -7,6 +7,7 @@ mod cases;
 mod command;
 mod corpus;
 mod contacts;
+mod disks;
 mod drives;
 mod editor;
 mod emitted;

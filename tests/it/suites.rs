@@ -152,7 +152,8 @@ fn packed_scenarios_are_a_folder_that_moves() {
     let first = format!("{far}/{}", stem(&names[0]));
     let (status, stdout, stderr) = outcome(&mut avastra(&["shrink", &first, "--format", "json"]));
     assert_eq!(status, 0, "{stderr}");
-    let shrunk: serde_json::Value = serde_json::from_str(stdout.trim_end()).expect("it is JSON");
+    let told: serde_json::Value = serde_json::from_str(stdout.trim_end()).expect("it is JSON");
+    let shrunk = &told["scenarios"][0];
     assert!(shrunk["scenario"].as_str().is_some_and(|name| name.ends_with("_shrunk")), "{shrunk}");
     assert!(shrunk["output"].as_str().is_some_and(|path| path.contains("far/shrunk/")), "{shrunk}");
     let copy = found.path("far/copy.ava");

@@ -128,7 +128,8 @@ fn kept(out: &Path) -> Vec<(String, Vec<u8>)> {
         *name = name.rsplit('/').next().expect("it has a name").to_owned();
     }
     files.sort();
-    let mut database = Database::open(&out.join("run.db")).expect("it is a run database");
+    let settings = std::fs::read_to_string(out.join("run.yaml")).expect("it is written");
+    let mut database = Database::open(&out.join("run.db"), &settings).expect("it is a run database");
     let checkpoint = database.return_to_checkpoint().expect("it is sound").expect("it has ended");
     files.push(("checkpoint".to_owned(), checkpoint.learner));
     files

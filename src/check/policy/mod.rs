@@ -15,6 +15,12 @@ use crate::model::{Space, code};
 use crate::syntax::ast::{Field, Span};
 use crate::syntax::{Diagnostic, ast};
 
+/// Most episodes on each road that a policy may claim; `avastra train` claims 15.
+const EPISODES_MAX: u64 = 10_000;
+
+/// Largest weight, in absolute value. Trained ones stay below 100; larger ones than this overflow in a few layers.
+const WEIGHT_MAX: f32 = 10_000.0;
+
 /// The policy of a file, checked against the space that it uses. `text` is what the tree was read from.
 ///
 /// # Errors
@@ -40,6 +46,12 @@ pub fn policy(text: &str, file: &ast::File, space: &Space) -> Result<Policy, Vec
     let origin: PolicyOrigin = block(&declared.origin, "origin", whole)?;
     let claims: Option<PolicyClaims> =
         if declared.claims.is_empty() { None } else { Some(block(&declared.claims, "claims", whole)?) };
+    if claims.as_ref().is_some_and(|claims| claims.episodes > EPISODES_MAX) {
+        let message = "the policy claims more episodes than can be played again";
+        let error = Diagnostic::error(code::POLICY_FORM, message);
+        let span = field_span(&declared.claims, "episodes", whole);
+        return Err(vec![error.at(span, format!("at most {EPISODES_MAX} on each road"))]);
+    }
     let parameters = parameters(&net, declared, whole, space)?;
     let rules = rules(&declared.rules, space, &origin)?;
     if claims.as_ref().is_some_and(|claims| claims.rules.is_some() == rules.is_empty()) {
@@ -88,9 +100,11 @@ fn parameters(
         let note = format!("the table has {rows} rows, which must be the width of the last layer");
         return Err(vec![error.note(note)]);
     }
-    let found = weights_from_lines(&net.weights).filter(|all| all.iter().all(|one| one.is_finite()));
+    let found = weights_from_lines(&net.weights);
+    // NaN is not below the limit either.
+    let found = found.filter(|all| all.iter().all(|weight| weight.abs() <= WEIGHT_MAX));
     let Some(found) = found else {
-        let message = "the weights are no Base64 of finite numbers";
+        let message = format!("the weights are no Base64 of numbers up to {WEIGHT_MAX}");
         let weights = field_span(&declared.net, "weights", whole);
         return Err(vec![Diagnostic::error(code::POLICY_FORM, message).at(weights, "here")]);
     };

@@ -147,7 +147,7 @@ impl Workspace {
 fn read(documents: &BTreeMap<PathBuf, Document>, path: &Path) -> Result<String, ReadError> {
     match documents.get(path) {
         Some(document) => Ok(document.text.clone()),
-        None => load::read(path),
+        None => load::read_used(path),
     }
 }
 

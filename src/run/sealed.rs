@@ -1,0 +1,260 @@
+//! What `run.db` and `study.db` have in common: layout, settings, and seals, by which a resumed run sees that nothing
+//! was changed behind its back.
+//!
+//! The settings stand in the database as they were when it was begun. Every episode (or cell) has a seal: a digest of
+//! all its rows, written in the same transaction. SQLite's own check finds torn pages, a seal finds values that were
+//! changed. Neither is a protection against somebody who writes seals of their own.
+
+use std::path::Path;
+
+use rusqlite::types::ValueRef;
+use rusqlite::{Connection, OptionalExtension, Row, params};
+use serde_json::{Map, Value};
+use sha2::{Digest, Sha256};
+
+use crate::model::digest_text;
+
+/// Tables that every layout has.
+const TABLES: &str = "
+CREATE TABLE begun (only INTEGER PRIMARY KEY CHECK (only = 1), settings TEXT NOT NULL) STRICT;
+CREATE TABLE seal (unit INTEGER PRIMARY KEY, digest TEXT NOT NULL) STRICT;
+";
+
+/// Why a run database cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum DatabaseError {
+    #[error("it has layout {found}, this version of avastra reads {wanted}")]
+    Layout { found: i64, wanted: i64 },
+    #[error("it names an episode {found}")]
+    Episode { found: i64 },
+    #[error("its checkpoint is damaged: begin a new training")]
+    Checkpoint,
+    #[error("the settings were edited since it was begun: {what}; undo that, or begin a new one")]
+    Settings { what: String },
+    #[error("its rows of {unit} {number} were changed since they were written: begin a new one")]
+    Rows { unit: &'static str, number: i64 },
+    #[error("it is damaged ({what}): begin a new one")]
+    Damaged { what: String },
+    #[error(transparent)]
+    Sqlite(rusqlite::Error),
+}
+
+impl From<rusqlite::Error> for DatabaseError {
+    fn from(error: rusqlite::Error) -> DatabaseError {
+        use rusqlite::ErrorCode::{DatabaseCorrupt, NotADatabase};
+        match error.sqlite_error_code() {
+            Some(DatabaseCorrupt | NotADatabase) => DatabaseError::Damaged { what: error.to_string() },
+            _ => DatabaseError::Sqlite(error),
+        }
+    }
+}
+
+/// The layout of a database.
+pub(crate) struct Layout {
+    /// Raised whenever a column changes.
+    pub version: i64,
+    /// What is added as a whole, in a word, which is also its key: `episode`, `cell`. The first of the tables has
+    /// one row for each.
+    pub unit: &'static str,
+    /// The tables with its rows.
+    pub tables: &'static [&'static str],
+}
+
+impl Layout {
+    /// Opens a database, making its tables if the file is new. `settings` are the ones that it is begun with, as
+    /// YAML; an older file must have been begun with the same, and be whole.
+    ///
+    /// # Errors
+    /// If the file cannot be opened, has another layout or other settings, or was damaged or changed.
+    pub fn open(&self, path: &Path, tables: &str, settings: &str) -> Result<Connection, DatabaseError> {
+        let mut connection = Connection::open(path)?;
+        let found: i64 = connection.pragma_query_value(None, "user_version", |row| row.get(0))?;
+        if found == 0 {
+            let transaction = connection.transaction()?;
+            transaction.execute_batch(TABLES)?;
+            transaction.execute_batch(tables)?;
+            transaction.execute("INSERT INTO begun VALUES (1, ?)", [settings])?;
+            transaction.pragma_update(None, "user_version", self.version)?;
+            transaction.commit()?;
+        } else if found != self.version {
+            return Err(DatabaseError::Layout { found, wanted: self.version });
+        } else {
+            self.check(&connection, settings)?;
+        }
+        Ok(connection)
+    }
+
+    /// Whether all is as it was written.
+    fn check(&self, connection: &Connection, settings: &str) -> Result<(), DatabaseError> {
+        let state: String = connection.pragma_query_value(None, "quick_check", |row| row.get(0))?;
+        if state != "ok" {
+            return Err(DatabaseError::Damaged { what: state });
+        }
+        let begun: String = connection.query_row("SELECT settings FROM begun", [], |row| row.get(0))?;
+        if let Some(what) = differences(&begun, settings) {
+            return Err(DatabaseError::Settings { what });
+        }
+        let (unit, main) = (self.unit, self.tables[0]);
+        let query = format!("SELECT {unit} FROM {main} UNION SELECT unit FROM seal ORDER BY 1");
+        let mut numbers = connection.prepare(&query)?;
+        for number in numbers.query_map([], |row| row.get::<_, i64>(0))? {
+            let number = number?;
+            let mut seal = connection.prepare_cached("SELECT digest FROM seal WHERE unit = ?")?;
+            let seal: Option<String> = seal.query_row([number], |row| row.get(0)).optional()?;
+            if seal != Some(self.rows_digest(connection, number)?) {
+                return Err(DatabaseError::Rows { unit, number });
+            }
+        }
+        Ok(())
+    }
+
+    /// Seals the rows of a unit; called in the transaction that adds them.
+    pub fn seal(&self, connection: &Connection, number: i64) -> Result<(), rusqlite::Error> {
+        let digest = self.rows_digest(connection, number)?;
+        connection.prepare_cached("INSERT INTO seal VALUES (?, ?)")?.execute(params![number, digest])?;
+        Ok(())
+    }
+
+    /// Deletes the rows of all units from a number on.
+    pub fn delete_from(&self, connection: &Connection, first: i64) -> Result<(), rusqlite::Error> {
+        for table in self.tables.iter().rev() {
+            connection.execute(&format!("DELETE FROM {table} WHERE {} >= ?", self.unit), [first])?;
+        }
+        connection.execute("DELETE FROM seal WHERE unit >= ?", [first])?;
+        Ok(())
+    }
+
+    /// The digest of all rows of a unit. SQLite need not give them in one order, so each has a digest, and these are
+    /// sorted.
+    fn rows_digest(&self, connection: &Connection, number: i64) -> Result<String, rusqlite::Error> {
+        let mut whole = Sha256::new();
+        for table in self.tables {
+            let query = format!("SELECT * FROM {table} WHERE {} = ?", self.unit);
+            let mut statement = connection.prepare_cached(&query)?;
+            let columns = statement.column_count();
+            let mut digests: Vec<[u8; 32]> = Vec::new();
+            let mut rows = statement.query([number])?;
+            while let Some(row) = rows.next()? {
+                digests.push(row_digest(row, columns)?);
+            }
+            digests.sort_unstable();
+            whole.update(table.as_bytes());
+            whole.update((digests.len() as u64).to_le_bytes());
+            digests.iter().for_each(|digest| whole.update(digest));
+        }
+        Ok(digest_text(&whole.finalize().into()))
+    }
+}
+
+/// The digest of a row: a tag for each value and, where the length is not fixed, the length.
+fn row_digest(row: &Row, columns: usize) -> Result<[u8; 32], rusqlite::Error> {
+    let mut hash = Sha256::new();
+    for column in 0..columns {
+        match row.get_ref(column)? {
+            ValueRef::Null => hash.update([0]),
+            ValueRef::Integer(value) => {
+                hash.update([1]);
+                hash.update(value.to_le_bytes());
+            }
+            ValueRef::Real(value) => {
+                hash.update([2]);
+                hash.update(value.to_le_bytes());
+            }
+            ValueRef::Text(bytes) | ValueRef::Blob(bytes) => {
+                hash.update([3]);
+                hash.update((bytes.len() as u64).to_le_bytes());
+                hash.update(bytes);
+            }
+        }
+    }
+    Ok(hash.finalize().into())
+}
+
+/// The settings that differ, each with what it was; `None` if there is none.
+fn differences(begun: &str, now: &str) -> Option<String> {
+    let read = |text: &str| serde_yaml::from_str::<Map<String, Value>>(text).unwrap_or_default();
+    let (begun, now) = (read(begun), read(now));
+    let mut keys: Vec<&String> = begun.keys().chain(now.keys()).collect();
+    keys.sort();
+    keys.dedup();
+    let was = |key: &String| match begun.get(key) {
+        Some(value) => format!("`{key}` was {value}"),
+        None => format!("`{key}` was not there"),
+    };
+    let differ: Vec<String> =
+        keys.into_iter().filter(|key| begun.get(*key) != now.get(*key)).map(was).collect();
+    (!differ.is_empty()).then(|| differ.join(", "))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SETTINGS: &str = "seed: 1\nroads: [corner]\n";
+    const LAYOUT: Layout = Layout { version: 3, unit: "episode", tables: &["episode", "step"] };
+    const OWN: &str = "CREATE TABLE episode (episode INTEGER PRIMARY KEY, name TEXT) STRICT;
+                       CREATE TABLE step (episode INTEGER, step INTEGER, x REAL) STRICT;";
+
+    fn begun(path: &Path) -> Connection {
+        let mut connection = LAYOUT.open(path, OWN, SETTINGS).unwrap();
+        for number in 0..3_i64 {
+            let transaction = connection.transaction().unwrap();
+            transaction.execute("INSERT INTO episode VALUES (?, 'a')", [number]).unwrap();
+            transaction.execute("INSERT INTO step VALUES (?, 0, 0.5)", [number]).unwrap();
+            LAYOUT.seal(&transaction, number).unwrap();
+            transaction.commit().unwrap();
+        }
+        connection
+    }
+
+    #[test]
+    fn what_was_changed_is_said() {
+        let changes = [
+            ("UPDATE step SET x = 0.25 WHERE episode = 1", "episode 1"),
+            ("UPDATE episode SET name = 'b' WHERE episode = 2", "episode 2"),
+            ("DELETE FROM step WHERE episode = 0", "episode 0"),
+            ("DELETE FROM episode WHERE episode = 1", "episode 1"),
+            ("INSERT INTO episode VALUES (7, 'a')", "episode 7"),
+            ("DELETE FROM seal WHERE unit = 2", "episode 2"),
+        ];
+        for (change, what) in changes {
+            let scratch = tempfile::tempdir().unwrap();
+            let path = scratch.path().join("run.db");
+            let connection = begun(&path);
+            LAYOUT.open(&path, OWN, SETTINGS).expect("nothing was changed");
+            connection.execute_batch(change).unwrap();
+            drop(connection);
+            let refused = LAYOUT.open(&path, OWN, SETTINGS).unwrap_err().to_string();
+            assert!(refused.contains(what), "{change}: {refused}");
+        }
+    }
+
+    #[test]
+    fn other_settings_are_said() {
+        let scratch = tempfile::tempdir().unwrap();
+        let path = scratch.path().join("run.db");
+        let connection = begun(&path);
+        LAYOUT.delete_from(&connection, 1).unwrap();
+        drop(connection);
+        LAYOUT.open(&path, OWN, "# a comment\nroads:\n  - corner\nseed: 1").expect("the same settings");
+        let refused = LAYOUT.open(&path, OWN, "seed: 2\nroads: [corner]\nx: 1").unwrap_err().to_string();
+        assert!(refused.contains("`seed` was 1, `x` was not there"), "{refused}");
+    }
+
+    #[test]
+    fn torn_pages_are_said() {
+        let scratch = tempfile::tempdir().unwrap();
+        let path = scratch.path().join("run.db");
+        drop(begun(&path));
+        let whole = std::fs::read(&path).unwrap();
+        let mut refused = 0;
+        for at in (100..whole.len()).step_by(97) {
+            let mut torn = whole.clone();
+            torn[at] ^= 0x55;
+            std::fs::write(&path, &torn).unwrap();
+            // A byte that no row and no page needs may differ.
+            refused += usize::from(LAYOUT.open(&path, OWN, SETTINGS).is_err());
+        }
+        assert!(refused > 10, "{refused}");
+    }
+}

@@ -1,0 +1,262 @@
+//! Files, names and disks that fail: each is an error that says what to do, found before anything is lost.
+#![cfg(unix)]
+
+use std::ffi::OsStr;
+use std::os::unix::ffi::OsStrExt;
+use std::path::{Path, PathBuf};
+use std::process::Stdio;
+use std::time::Duration;
+
+use crate::cases::root;
+use crate::command::{avastra, outcome};
+
+/// A command that takes longer hangs, also on a busy machine.
+const TIME_MAX: Duration = Duration::from_secs(30);
+
+const SPACE: &str = "scenarios/avastra45.ava";
+
+/// A directory for a test, and paths in it as text.
+struct Scratch(tempfile::TempDir);
+
+impl Scratch {
+    fn new() -> Scratch {
+        Scratch(tempfile::tempdir().expect("a scratch directory"))
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.0.path().join(name)
+    }
+
+    fn text(&self, name: &str) -> String {
+        self.path(name).display().to_string()
+    }
+}
+
+/// A short run into a directory.
+fn run_into(out: &str) -> (i32, String, String) {
+    let settings = ["--ads", "idm", "--road", "corner", "--episodes", "3", "--out", out];
+    outcome(&mut avastra(&[&["run", SPACE], &settings[..]].concat()))
+}
+
+fn resume(command: &str, directory: &str) -> (i32, String) {
+    let (status, _, stderr) = outcome(&mut avastra(&[command, "--resume", directory]));
+    (status, stderr)
+}
+
+/// Replaces a part of a file.
+fn edit(path: &Path, from: &str, to: &str) {
+    let text = std::fs::read_to_string(path).expect("it is readable");
+    assert!(text.contains(from), "`{from}` is in {text}");
+    std::fs::write(path, text.replacen(from, to, 1)).expect("it is writable");
+}
+
+#[test]
+fn names_that_are_no_text_are_refused_before_anything_is_played() {
+    let scratch = Scratch::new();
+    let odd = scratch.0.path().join(OsStr::from_bytes(b"odd\xff.ava"));
+    std::fs::copy(root().join("scenarios/roads.ava"), &odd).expect("it is writable");
+    for command in
+        ["check", "compile", "run", "replay", "shrink", "diagnose", "test", "train", "road", "verify"]
+    {
+        let (status, stdout, stderr) = outcome(avastra(&[command, "--format", "json"]).arg(&odd));
+        assert_eq!(status, 1, "{command}: {stderr}");
+        assert!(stderr.contains("is not UTF-8: rename the file"), "{command}: {stderr}");
+        assert!(stdout.lines().all(|line| serde_json::from_str::<serde_json::Value>(line).is_ok()));
+    }
+    // One that is found in a folder is named; nothing of the folder is played.
+    let (status, _, stderr) = outcome(&mut avastra(&["test", &scratch.0.path().display().to_string()]));
+    assert!(status == 1 && stderr.contains("the path is not UTF-8"), "{stderr}");
+    let inside = scratch.0.path().join(OsStr::from_bytes(b"run\xfe"));
+    std::fs::create_dir(&inside).expect("it is writable");
+    let space = root().join(SPACE);
+    let mut command = avastra(&["run", &space.display().to_string(), "--out", "here", "--episodes", "1"]);
+    let (status, _, stderr) =
+        outcome(command.args(["--ads", "idm", "--road", "corner"]).current_dir(&inside));
+    assert_eq!(status, 0, "the folder that one works in may have any name: {stderr}");
+}
+
+#[test]
+fn output_that_is_lost_is_an_error() {
+    let scratch = Scratch::new();
+    let out = scratch.text("run");
+    let commands: [&[&str]; 6] = [
+        &["check", SPACE],
+        &["table", SPACE],
+        &["explain", "AV0101", "--format", "json"],
+        &["completions", "bash"],
+        &["--help"],
+        &["run", SPACE, "--ads", "idm", "--road", "corner", "--episodes", "1", "--out", &out],
+    ];
+    for arguments in commands {
+        let command = |stdout: Stdio| {
+            let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_avastra"));
+            command.args(arguments).current_dir(root()).stdout(stdout).stderr(Stdio::piped());
+            command.output().expect("it starts")
+        };
+        let full = std::fs::OpenOptions::new().write(true).open("/dev/full").expect("Linux has it");
+        let lost = command(Stdio::from(full));
+        let stderr = String::from_utf8_lossy(&lost.stderr);
+        assert_eq!(lost.status.code(), Some(1), "{arguments:?}: {stderr}");
+        assert!(arguments == ["--help"] || stderr.contains("cannot write `standard output`"), "{stderr}");
+        if !arguments.contains(&"run") {
+            let (reader, writer) = std::io::pipe().expect("a pipe");
+            drop(reader);
+            assert_eq!(command(Stdio::from(writer)).status.code(), Some(0), "{arguments:?}: a closed pipe");
+        }
+    }
+    assert!(scratch.path("run/run.db").is_file(), "what was played is kept");
+}
+
+#[test]
+fn what_a_kill_left_before_the_beginning_can_be_begun() {
+    let scratch = Scratch::new();
+    let out = scratch.text("run");
+    std::fs::create_dir_all(scratch.path("run/critical/space")).expect("it is writable");
+    std::fs::write(scratch.path("run/run.yaml.partial"), "avastra: 0").expect("it is writable");
+    let (status, stderr) = resume("run", &out);
+    assert!(status == 1 && stderr.contains("it has no run.yaml; begin one with `--out"), "{stderr}");
+    assert_eq!(run_into(&out).0, 0);
+    let (status, _, stderr) = run_into(&out);
+    assert!(status == 1 && stderr.contains("is not empty"), "{stderr}");
+    // The database may be missing as long as nothing was found.
+    std::fs::remove_file(scratch.path("run/run.db")).expect("it is there");
+    assert_eq!(resume("run", &out).0, 0);
+    std::fs::write(scratch.path("run/critical/corner_0000.ava"), "language 1\n").expect("it is writable");
+    std::fs::remove_file(scratch.path("run/run.db")).expect("it is there");
+    let (status, stderr) = resume("run", &out);
+    assert!(status == 1 && stderr.contains("is missing, and `critical` has scenarios"), "{stderr}");
+}
+
+#[test]
+fn a_run_that_was_edited_is_not_gone_on_with() {
+    let scratch = Scratch::new();
+    let out = scratch.text("run");
+    assert_eq!(run_into(&out).0, 0);
+    let settings = scratch.path("run/run.yaml");
+    let whole = std::fs::read_to_string(&settings).expect("it is written");
+    for (from, to, what) in [
+        ("episodes: 3", "episodes: 4", "`episodes` was 3"),
+        ("seed: 1", "seed: 2", "`seed` was 1"),
+        ("ambient: 0", "ambient: 5", "`ambient` was 0"),
+    ] {
+        edit(&settings, from, to);
+        let (status, stderr) = resume("run", &out);
+        assert!(status == 1 && stderr.contains(what), "{stderr}");
+        std::fs::write(&settings, &whole).expect("it is writable");
+    }
+    assert_eq!(resume("run", &out).0, 0);
+    let (status, stderr) = resume("train", &out);
+    assert!(status == 1 && stderr.contains("holds a run: go on with `avastra run --resume"), "{stderr}");
+    let (status, stderr) = resume("study", &out);
+    assert!(status == 1 && stderr.contains("holds a run"), "{stderr}");
+
+    let database = rusqlite::Connection::open(scratch.path("run/run.db")).expect("it is a database");
+    database
+        .execute_batch("UPDATE step SET proc = 0.5 WHERE episode = 1 AND step = 0")
+        .expect("it can be changed");
+    drop(database);
+    let (status, stderr) = resume("run", &out);
+    assert!(status == 1 && stderr.contains("its rows of episode 1 were changed"), "{stderr}");
+    let bytes = std::fs::read(scratch.path("run/run.db")).expect("it is readable");
+    let torn: Vec<u8> =
+        bytes.iter().enumerate().map(|(at, byte)| if at % 991 == 990 { !byte } else { *byte }).collect();
+    std::fs::write(scratch.path("run/run.db"), torn).expect("it is writable");
+    let (status, stderr) = resume("run", &out);
+    assert!(status == 1 && stderr.contains("begin a new one"), "{stderr}");
+}
+
+#[test]
+fn one_process_at_a_time_works_in_a_directory() {
+    let scratch = Scratch::new();
+    let out = scratch.text("run");
+    assert_eq!(run_into(&out).0, 0);
+    let other = std::fs::File::open(scratch.path("run")).expect("it is there");
+    other.lock().expect("no process holds it");
+    let (status, stderr) = resume("run", &out);
+    assert!(status == 1 && stderr.contains("another avastra is at work"), "{stderr}");
+    other.unlock().expect("it was locked");
+    assert_eq!(resume("run", &out).0, 0);
+}
+
+#[test]
+fn every_file_is_verified() {
+    let scratch = Scratch::new();
+    let good = root().join("policies/corner.ava");
+    let text = std::fs::read_to_string(&good).expect("it is shipped");
+    // Its own digest is made right again, as somebody who means harm would.
+    let sealed = |text: &str, name: &str| {
+        let path = scratch.path(name);
+        let text = text.replace("../scenarios/avastra45.ava", &root().join(SPACE).display().to_string());
+        std::fs::write(&path, &text).expect("it is writable");
+        let (_, _, stderr) = outcome(&mut avastra(&["check", &path.display().to_string()]));
+        if let Some((_, found)) = stderr.split_once("the file has ") {
+            let found = found.split_whitespace().next().expect("a digest");
+            let before = "\n    digest: \"";
+            let at = text.find(before).expect("it is sealed") + before.len();
+            let was = &text[at..at + found.len()];
+            std::fs::write(&path, text.replace(was, found)).expect("it is writable");
+        }
+        path.display().to_string()
+    };
+    let engine = text.lines().find(|line| line.contains("engine: ")).expect("it has one");
+    let foreign = sealed(&text.replace(engine, "    engine: \"plane/0\""), "foreign.ava");
+    let liar = sealed(&text.replacen("episodes: 15", "episodes: 4000000000", 1), "liar.ava");
+    let (status, stdout, stderr) = outcome(&mut avastra(&["verify", &liar, &foreign, &foreign]));
+    assert_eq!(status, 1, "{stdout}{stderr}");
+    assert!(stderr.contains("claims more episodes than can be played again"), "{stderr}");
+    assert_eq!(stdout.matches("was trained in world `plane/0`").count(), 2, "each file is judged: {stdout}");
+}
+
+#[test]
+fn only_regular_files_of_a_sensible_size_are_read() {
+    let scratch = Scratch::new();
+    let fifo = scratch.text("pipe.ava");
+    let made = std::process::Command::new("mkfifo").arg(&fifo).status().expect("it starts");
+    assert!(made.success());
+    let file = |name: &str, text: &str| {
+        std::fs::write(scratch.path(name), text).expect("it is writable");
+        scratch.text(name)
+    };
+    // A missing name makes `check` look at the neighbours, of which one is a pipe and one is huge.
+    std::os::unix::fs::symlink("/etc/passwd", scratch.path("link.ava")).expect("links can be made");
+    let hint = file("hint.ava", "language 1\nlet there = 3 m\n");
+    let huge = file("huge.ava", &format!("language 1\nlet a = {}1\n", "1 + ".repeat(2_600_000)));
+    let cases = [
+        (file("unknown.ava", "language 1\nlet far = there + 1 m\n"), 2, "`there` is declared in `hint.ava`"),
+        (file("device.ava", "language 1\nuse \"/dev/zero\"\n"), 2, "it is no regular file"),
+        (file("waits.ava", "language 1\nuse \"pipe.ava\"\n"), 2, "it is no regular file"),
+        (
+            file(
+                "map.ava",
+                "language 1\nroad r { map: \"/dev/zero\" start: lane 1/-1 at 0 m goal: lane 1/-1 at 1 m }\n",
+            ),
+            2,
+            "it is no regular file",
+        ),
+        (
+            file("climbs.ava", "language 1\nuse \"../../../../../../etc/passwd\"\n"),
+            2,
+            "neither a source (`.ava`)",
+        ),
+        (file("follows.ava", "language 1\nuse \"link.ava\"\n"), 2, "neither a source (`.ava`)"),
+        (huge, 1, "it is larger than 4 MiB"),
+        (fifo.clone(), 1, "it is no regular file"),
+        ("/dev/zero".to_owned(), 1, "it is no regular file"),
+        (hint, 0, ""),
+    ];
+    for (path, wanted, message) in cases {
+        let (status, _, stderr) = outcome(avastra(&["check", &path]).timeout(TIME_MAX));
+        assert!(status == wanted && stderr.contains(message), "{path}: {stderr}");
+        assert!(!stderr.contains("root:"), "the file at the end of the path is not shown: {stderr}");
+    }
+}
+
+#[test]
+fn a_link_to_nothing_is_not_replaced() {
+    let scratch = Scratch::new();
+    let link = scratch.path("link.yaml");
+    std::os::unix::fs::symlink(scratch.path("nothing"), &link).expect("links can be made");
+    let (status, _, stderr) = outcome(&mut avastra(&["compile", SPACE, "-o", &link.display().to_string()]));
+    assert!(status == 1 && stderr.contains("a link to a file that does not exist"), "{stderr}");
+    assert!(link.is_symlink());
+}
