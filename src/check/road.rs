@@ -111,7 +111,7 @@ impl Checker {
             return Some(());
         };
         let message = format!("no light of junction `{}` holds a lane", idle.id);
-        let reason = format!("the route leads through it; it has {} lights", idle.idle_lights);
+        let reason = format!("the route leads through it; lights without a lane: {}", idle.idle_lights);
         self.reject(Diagnostic::error(code::NO_ROUTE, message).at(block.name.span, reason).help(
             "`avastra road MAP` names these lights; `unlit: true` drives through the junction as if it had none",
         ))

@@ -1,4 +1,4 @@
-//! Hostile texts: those that the fuzz target kept, and some made to be slow or large. `fuzz/` makes more of
+//! Hostile texts and maps: those that the fuzz target kept, and some made to be slow or large. `fuzz/` makes more of
 //! them.
 
 #[path = "../../fuzz/examine.rs"]
@@ -8,6 +8,7 @@ use std::process::Command;
 
 use avastra::rng;
 use avastra::rng::{Rng, Stream};
+use avastra::road::RoadMap;
 
 use crate::cases::{cases, root};
 
@@ -169,6 +170,101 @@ fn made_up_texts_break_no_law() {
         processor_s() - begin_s
     );
     assert!(peak_mb <= PEAK_MB_MAX, "{peak_mb:.0} MB");
+}
+
+/// Maps with other values, without some lines and with others twice: none panics, and none takes a second.
+#[test]
+fn mutated_maps_do_no_harm() {
+    examine_mutated_maps(40);
+}
+
+/// The same at length: `cargo test --test it -- --ignored --nocapture a_thousand_mutated_maps`
+#[test]
+#[ignore = "takes minutes"]
+fn a_thousand_mutated_maps_do_no_harm() {
+    examine_mutated_maps(1000);
+}
+
+fn examine_mutated_maps(count: u64) {
+    let folders = ["scenarios/roads", "tests/cases/faults", "tests/cases/diagnostics"];
+    let found =
+        folders.iter().flat_map(|folder| std::fs::read_dir(root().join(folder)).expect("it is there"));
+    let mut paths: Vec<_> = found.flatten().map(|entry| entry.path()).collect();
+    paths.retain(|path| path.extension().is_some_and(|extension| extension == "xodr"));
+    paths.sort();
+    let texts: Vec<String> =
+        paths.iter().map(|path| std::fs::read_to_string(path).expect("a map is readable")).collect();
+    let (mut read, mut dearest_s) = (0, 0.0_f64);
+    for index in 0..count {
+        let mut random = rng::stream(1, Stream::Exploration, index);
+        let text = mutated(&texts[index as usize % texts.len()], &mut random);
+        let before_s = processor_s();
+        let result = std::panic::catch_unwind(|| RoadMap::from_opendrive("mutated", &text));
+        let took_s = processor_s() - before_s;
+        // The limit allows for an unoptimised build on a busy machine.
+        if result.is_err() || took_s > CPU_S_MAX {
+            let path = root().join(format!("target/mutated_{index}.xodr"));
+            std::fs::write(&path, &text).expect("it is writable");
+            panic!("{}: {took_s:.1} s, panics: {}", path.display(), result.is_err());
+        }
+        read += u64::from(matches!(result, Ok(Ok(_))));
+        dearest_s = dearest_s.max(took_s);
+    }
+    println!("{count} mutated maps, {read} of them are still maps, at most {dearest_s:.2} s");
+    assert!(read > count / 10, "only {read} are maps");
+}
+
+/// A map with up to eight changes: values, lines left out and lines twice.
+fn mutated(text: &str, random: &mut Rng) -> String {
+    const VALUES: [&str; 14] = [
+        "",
+        "NaN",
+        "inf",
+        "1e308",
+        "-1e9",
+        "1e9",
+        "0",
+        "-1",
+        "1e-300",
+        "-2147483648",
+        "7",
+        "x",
+        "+",
+        "driving",
+    ];
+    let mut text = text.to_owned();
+    for _ in 0..=rng::below(random, 8) {
+        let from = rng::below(random, text.len() as u32) as usize;
+        let Some(from) = (from..text.len()).find(|at| text.is_char_boundary(*at)) else { continue };
+        if rng::below(random, 4) > 0 {
+            let Some(begin) = text[from..].find("=\"").map(|at| from + at + 2) else { continue };
+            let Some(length) = text[begin..].find('"') else { continue };
+            let value = VALUES[rng::below(random, VALUES.len() as u32) as usize];
+            text.replace_range(begin..begin + length, value);
+        } else {
+            let Some(begin) = text[from..].find('\n').map(|at| from + at + 1) else { continue };
+            let Some(length) = text[begin..].find('\n').map(|at| at + 1) else { continue };
+            let line = text[begin..begin + length].to_owned();
+            let new = if rng::below(random, 2) == 0 { String::new() } else { line.repeat(2) };
+            text.replace_range(begin..begin + length, &new);
+        }
+    }
+    text
+}
+
+/// Elements, attributes and lines so many or so long that they find a cost that grows faster than the text.
+#[test]
+fn crowded_maps_are_refused_soon() {
+    let attributes: String = (0..40_000).map(|n| format!(" a{n}=\"1\"")).collect();
+    let many = format!("<OpenDRIVE><road{attributes}/></OpenDRIVE>");
+    let long = format!("<OpenDRIVE><header name=\"{}\"/></OpenDRIVE>", "x".repeat(10_000_000));
+    let roads = format!("<OpenDRIVE>{}</OpenDRIVE>", "<road id=\"1\"/>".repeat(200_000));
+    for (what, text) in [("attributes", many), ("line", long), ("roads", roads)] {
+        let before_s = processor_s();
+        assert!(RoadMap::from_opendrive("crowded", &text).is_err(), "{what}");
+        let took_s = processor_s() - before_s;
+        assert!(took_s < CPU_S_MAX / 2.0, "{what}: {took_s:.1} s");
+    }
 }
 
 /// Makes texts from others.

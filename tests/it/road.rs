@@ -63,3 +63,46 @@ fn what_cannot_be_shown_is_said() {
         assert!(stderr.contains(part), "{arguments:?}: {stderr}");
     }
 }
+
+/// A lane offset of slope 0.3 over 10 m, then 290 m straight, and the same shift as a smooth cubic: the corners of a
+/// taper must not cost collisions on the straight.
+/// `cargo test --test it -- --ignored --nocapture a_taper_costs_no_collisions`
+#[test]
+#[ignore = "plays 360 episodes"]
+fn a_taper_costs_no_collisions() {
+    let shifts = [
+        ("taper", r#"<laneOffset s="40" a="0" b="0.3" c="0" d="0"/>"#),
+        ("cubic", r#"<laneOffset s="40" a="0" b="0" c="0.09" d="-0.006"/>"#),
+    ];
+    let scratch = tempfile::tempdir().expect("a scratch directory");
+    let collisions = shifts.map(|(name, shift)| {
+        let lanes = [2, 1, -1, -2, -3].map(|id| {
+            format!(r#"<lane id="{id}" type="driving"><width a="3.5"/><roadMark sOffset="0" type="broken"/></lane>"#)
+        });
+        let map = format!(
+            r#"<OpenDRIVE><road id="1" length="340" junction="-1"><type s="0" type="town"><speed max="50" unit="km/h"/></type>
+            <planView><geometry s="0" x="0" y="0" hdg="0" length="340"><line/></geometry></planView>
+            <lanes><laneOffset s="0" a="0"/>{shift}<laneOffset s="50" a="3"/><laneSection s="0">
+            <left>{}{}</left><right>{}{}{}</right></laneSection></lanes></road></OpenDRIVE>"#,
+            lanes[0], lanes[1], lanes[2], lanes[3], lanes[4]
+        );
+        std::fs::write(scratch.path().join(format!("{name}.xodr")), map).expect("it is writable");
+        let shipped = crate::cases::root().join("scenarios/avastra45.ava");
+        let space = format!(
+            "language 1\nuse \"{}\"\nroad {name} {{ map: \"{name}.xodr\", start: lane 1/-2 at 5 m, goal: lane 1/-2 at 330 m }}\noverride episode {{ roads: [{name}], stop: arrived or stalled >= 4 }}\n",
+            shipped.display()
+        );
+        let file = scratch.path().join(format!("{name}.ava"));
+        std::fs::write(&file, space).expect("it is writable");
+        let out = scratch.path().join(name);
+        let (file, out) = (file.display().to_string(), out.display().to_string());
+        let (status, stdout, stderr) = outcome(&mut avastra(&[
+            "run", &file, "--episodes", "180", "--seed", "1", "--out", &out, "--format", "json",
+        ]));
+        assert_eq!(status, 0, "{stderr}{stdout}");
+        let result: Value = serde_json::from_str(stdout.lines().last().expect("one line")).expect("it is JSON");
+        println!("{name}: {}", result["totals"]);
+        result["totals"]["collisions"].as_u64().expect("a number")
+    });
+    assert!(collisions[0] <= collisions[1], "taper and cubic: {collisions:?}");
+}
