@@ -94,18 +94,27 @@ impl fmt::Display for Audit {
             if rule.from_the_start {
                 f.write_str(" and at the start")?;
             }
-            if !rule.cuts.is_empty() {
-                write!(f, ", cuts {}", rule.cuts.join(", "))?;
-            }
-            for removal in rule.removes.iter().filter(|removal| removal.percent_max > 0.0) {
-                let (least, most) = (removal.percent_min.round(), removal.percent_max.round());
-                let share = if least == most { format!("{most}") } else { format!("{least} to {most}") };
-                write!(f, ", removes {share} % of {} on {}", removal.parameter, removal.road)?;
-            }
             if !rule.masks.is_empty() {
                 write!(f, ", masks {} rows", rule.masks.len())?;
             }
             writeln!(f, "{}", if rule.optional { " (optional)" } else { "" })?;
+            if !rule.cuts.is_empty() {
+                writeln!(f, "{:width$}  cuts {}", "", rule.cuts.join(", "))?;
+            }
+            // Roads of which as much is removed share a line.
+            let mut removed: Vec<(String, Vec<&str>)> = Vec::new();
+            for removal in rule.removes.iter().filter(|removal| removal.percent_max > 0.0) {
+                let (least, most) = (removal.percent_min.round(), removal.percent_max.round());
+                let share = if least == most { format!("{most}") } else { format!("{least} to {most}") };
+                let what = format!("removes {share} % of {}", removal.parameter);
+                match removed.iter_mut().find(|(known, _)| *known == what) {
+                    Some((_, roads)) => roads.push(&removal.road),
+                    None => removed.push((what, vec![&removal.road])),
+                }
+            }
+            for (what, roads) in removed {
+                writeln!(f, "{:width$}  {what} on {}", "", roads.join(", "))?;
+            }
         }
         Ok(())
     }

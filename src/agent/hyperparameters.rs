@@ -9,7 +9,7 @@ use core::ops::RangeInclusive;
 use serde_json::Value;
 
 use crate::mdp::{ProcKind, RewardSettings};
-use crate::syntax::{listed, nearest};
+use crate::syntax::{listed, nearest, yaml_mistake};
 
 use super::network::Initialization;
 use super::presets;
@@ -222,7 +222,7 @@ impl Hyperparameters {
         text: &str,
     ) -> Result<Hyperparameters, SettingsError> {
         let changes: Option<Value> =
-            serde_yaml::from_str(text).map_err(|error| SettingsError::Text(error.to_string()))?;
+            serde_yaml::from_str(text).map_err(|error| SettingsError::Text(yaml_mistake(&error, text)))?;
         let changes = match changes {
             None | Some(Value::Null) => serde_json::Map::new(),
             Some(Value::Object(changes)) => changes,

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use serde::de::DeserializeOwned;
 
 use crate::mdp::{ProcKind, RewardSettings};
+use crate::syntax::yaml_mistake;
 
 use super::hyperparameters::{Hyperparameters, RewardSource, SettingsError};
 use super::learner::Learner;
@@ -56,7 +57,7 @@ impl Settings {
         settings: fn(T) -> Settings,
     ) -> Result<Settings, SettingsError> {
         let read: Option<T> =
-            serde_yaml::from_str(text).map_err(|error| SettingsError::Text(error.to_string()))?;
+            serde_yaml::from_str(text).map_err(|error| SettingsError::Text(yaml_mistake(&error, text)))?;
         let read = read.unwrap_or_default();
         check(&read)?;
         Ok(settings(read))

@@ -15,7 +15,7 @@ use crate::check::{checker, overriding, policy, scenario, scenario_names};
 use crate::model::policy::Policy;
 use crate::model::scenario::Scenario;
 use crate::model::{Meaning, Space, code, digest};
-use crate::road::RoadMap;
+use crate::road::{LanePlace, RoadError, RoadMap, Route};
 use crate::syntax::ast::{FileId, ItemKind, Span};
 use crate::syntax::{Diagnostic, Severity, Sources, ast, parse};
 
@@ -87,12 +87,16 @@ impl Loaded {
     }
 }
 
-/// Maps that were read before, by name and content. A caller that loads often, such as the editor's server,
-/// then reads each map once.
+/// Maps that were read before, by name and content, and the routes found on them. A caller that loads often, such as the
+/// editor's server, then reads each map once.
 #[derive(Debug, Clone, Default)]
 pub struct MapCache {
     known: BTreeMap<(String, String), Result<Arc<RoadMap>, String>>,
+    routes: Vec<(Arc<RoadMap>, [LanePlace; 2], Route)>,
 }
+
+/// Routes that are kept: while an author types a place, each keystroke makes another route.
+const ROUTES_MAX: usize = 64;
 
 /// Reads a root file, all it uses, and checks the whole.
 ///
@@ -139,8 +143,30 @@ pub fn load_with(root: &Path, read: &ReadFile<'_>, cache: &mut MapCache) -> Resu
     if has_scenario || has_policy || diagnostics.iter().any(Diagnostic::is_error) {
         remarks.clear();
     }
+    let (diagnostics, remarks) = (merged(diagnostics), merged(remarks));
     let space = space.map(Arc::new);
     Ok(Loaded { sources, diagnostics, remarks, files, references, space, scenario, policy, order })
+}
+
+/// Diagnostics that say the same of the same place become one, which shows the other places of all.
+fn merged(diagnostics: Vec<Diagnostic>) -> Vec<Diagnostic> {
+    let mut merged: Vec<Diagnostic> = Vec::new();
+    let mut known: BTreeMap<(Option<Span>, String), usize> = BTreeMap::new();
+    for found in diagnostics {
+        let says = |one: &Diagnostic| (one.code, one.notes.clone(), one.help.clone(), one.fixes.clone());
+        match known.get(&(found.place(), found.message.clone())) {
+            Some(&index) if says(&merged[index]) == says(&found) => {
+                let labels = &mut merged[index].labels;
+                let new: Vec<_> = found.labels.into_iter().filter(|label| !labels.contains(label)).collect();
+                labels.extend(new);
+            }
+            _ => {
+                known.insert((found.place(), found.message.clone()), merged.len());
+                merged.push(found);
+            }
+        }
+    }
+    merged
 }
 
 /// The files that a file uses, itself included, however far away. Nothing is checked.
@@ -326,6 +352,23 @@ impl Maps for MapReader<'_> {
         let key = (stem.clone(), digest(text.as_bytes()));
         let map = self.cache.known.entry(key).or_insert_with(parse).clone()?;
         Ok((path, map))
+    }
+
+    fn route(&mut self, map: &Arc<RoadMap>, start: LanePlace, goal: LanePlace) -> Result<Route, RoadError> {
+        let MapCache { known, routes } = &mut *self.cache;
+        let found = routes.iter().find(|(of, ends, _)| Arc::ptr_eq(of, map) && *ends == [start, goal]);
+        if let Some((_, _, route)) = found {
+            return Ok(route.clone());
+        }
+        let route = Route::find(map, start, goal)?;
+        // A map with a limit of its own is made anew at each load, so its routes are not found again.
+        if known.values().flatten().any(|of| Arc::ptr_eq(of, map)) {
+            if routes.len() >= ROUTES_MAX {
+                routes.clear();
+            }
+            routes.push((Arc::clone(map), [start, goal], route.clone()));
+        }
+        Ok(route)
     }
 }
 

@@ -9,7 +9,7 @@ use crate::check::names::unknown;
 use crate::check::report::{Report, field};
 use crate::model::vocabulary::{RoadField, Word};
 use crate::model::{Road, RoadFacts, SPAWN_SPEED_MPS, Type, code};
-use crate::road::{LanePlace, RoadMap, Route};
+use crate::road::{LanePlace, RoadError, RoadMap, Route};
 use crate::syntax::ast::ItemKind;
 use crate::syntax::{Diagnostic, ast, print_expr};
 use crate::units::{Dimension, Rational};
@@ -18,6 +18,9 @@ use crate::units::{Dimension, Rational};
 pub(crate) trait Maps {
     /// The map and its path, or in words why it cannot be used.
     fn map(&mut self, name: &ast::Text) -> Result<(PathBuf, Arc<RoadMap>), String>;
+
+    /// The route between two places of a map.
+    fn route(&mut self, map: &Arc<RoadMap>, start: LanePlace, goal: LanePlace) -> Result<Route, RoadError>;
 }
 
 impl Checker {
@@ -72,7 +75,7 @@ impl Checker {
         let start = self.lane_point(start, &map);
         let goal = self.lane_point(goal, &map);
         let (start, goal) = (start?, goal?);
-        let route = match Route::find(&map, start, goal) {
+        let route = match maps.route(&map, start, goal) {
             Ok(route) => route,
             Err(error) => {
                 let message = format!("road `{}` has no route", block.name.text);

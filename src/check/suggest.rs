@@ -21,6 +21,10 @@ pub fn suggest_uses(loaded: &mut Loaded, nearby: &[(String, String)]) {
         }
         let Some(span) = diagnostic.place().filter(|span| span.file == FileId(0)) else { continue };
         let name = loaded.sources.text(span.file).get(span.start..span.end).unwrap_or_default().to_owned();
+        // A name that is declared in what the file uses needs no other `use`: it may not stand here.
+        if loaded.files.iter().any(|file| declares(&file.tree, &name)) {
+            continue;
+        }
         let is_root = |path: &str| root.path.file_name() == Path::new(path).file_name();
         let declaring = trees.iter().find(|(path, tree)| !is_root(path) && declares(tree, &name));
         if let Some((path, _)) = declaring {

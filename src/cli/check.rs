@@ -4,6 +4,7 @@ use std::path::Path;
 
 use crate::action::{ActionTable, audit};
 use crate::check::Loaded;
+use crate::sim::ENGINE;
 use crate::syntax::ast::FileId;
 use crate::syntax::{Diagnostic, apply_fixes};
 
@@ -42,8 +43,13 @@ pub fn check(output: &Output, arguments: &CheckArguments) -> Result<(), Failure>
             output.say(&audit.to_string());
         }
         // With a dump, stdout holds JSON alone.
-        if wrong == 0 && dump.is_none() {
-            output.tell(&format!("{}: no mistakes", path.display()));
+        match older(&loaded) {
+            _ if dump.is_some() || wrong > 0 => {}
+            Some(engine) => output.say(&format!(
+                "{}: made in world `{engine}`, this is `{ENGINE}`: it cannot be replayed here",
+                path.display()
+            )),
+            None => output.tell(&format!("{}: no mistakes", path.display())),
         }
         files.push(serde_json::json!({ "file": path, "errors": wrong, "dump": dump, "audit": audit }));
     }
@@ -52,6 +58,13 @@ pub fn check(output: &Output, arguments: &CheckArguments) -> Result<(), Failure>
         errors += warnings;
     }
     if errors > 0 { Err(Failure::Source { errors }) } else { Ok(()) }
+}
+
+/// The world in which a scenario or policy was made, if it is another than this one.
+fn older(loaded: &Loaded) -> Option<&str> {
+    let scenario = loaded.scenario.as_ref().and_then(|scenario| scenario.origin.engine.as_deref());
+    let made = scenario.or(loaded.policy.as_ref().map(|policy| policy.origin.engine.as_str()));
+    made.filter(|engine| *engine != ENGINE)
 }
 
 /// Remarks about the file itself; what is remarked about a file that it uses is told where that file is checked, and

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use crate::action::{ActionTable, TableFile};
 use crate::run::road_named;
+use crate::syntax::yaml_mistake;
 use crate::trial::{Cell, TrialSettings};
 
 use super::arguments::{CompileArguments, TableArguments};
@@ -42,7 +43,8 @@ pub fn last(output: &Output) -> Result<ActionTable, Failure> {
     let path = load::read(Path::new(LAST)).map_err(|_| no_table())?;
     let path = PathBuf::from(path.trim_end());
     let text = load::text(&path)?;
-    let file: TableFile = serde_yaml::from_str(&text).map_err(|error| Failure::file("read", &path, error))?;
+    let file: TableFile = serde_yaml::from_str(&text)
+        .map_err(|error| Failure::file("read", &path, yaml_mistake(&error, &text)))?;
     let table = load::table(output, Path::new(&file.space))?;
     if table.file() != file {
         return Err(Failure::usage(format!(

@@ -112,7 +112,7 @@ fn action_section(text: &mut String, space: &Space, index: usize, action: &Actio
             text,
             "| `{}` | {how} | {} | {} |",
             parameter.name,
-            values(space, &parameter.domain, parameter.ty),
+            values(space, &occurring(space, index, parameter), parameter.ty),
             ranges(space, index, parameter)
         );
     }
@@ -161,6 +161,21 @@ pub fn range_on(space: &Space, action: usize, parameter: &Parameter, road: usize
         Reach::Dead { .. } => None,
     });
     kept.reduce(|all, interval| all.hull(&interval))
+}
+
+/// The values of a parameter; of an `each` parameter those that have rows, because a `where` may leave others out.
+fn occurring(space: &Space, action: usize, parameter: &Parameter) -> Domain {
+    match &parameter.domain {
+        Domain::Values(values) if parameter.axis => {
+            let rows = || space.rows.iter().filter(|row| row.action == action);
+            let has_row = |value: &&Value| {
+                let mut axes = rows().flat_map(|row| &row.axes);
+                axes.any(|(name, found)| *name == parameter.name && found == *value)
+            };
+            Domain::Values(values.iter().filter(has_row).copied().collect())
+        }
+        domain => domain.clone(),
+    }
 }
 
 fn values(space: &Space, domain: &Domain, ty: Type) -> String {

@@ -225,14 +225,18 @@ fn heading(run: &Run, arguments: &RunArguments, directory: &Path) -> String {
 }
 
 fn totals_text(totals: &Totals, elapsed_s: f64, played: usize) -> String {
-    let mut text = format!(
-        "\n{}: {} ended at the goal, {} stalled, {} blocked by others, {} at the step limit",
-        plural(totals.episodes as usize, "episode"),
-        totals.arrived,
-        totals.stalled,
-        totals.blocked,
-        totals.step_limit,
-    );
+    let ends = [
+        (totals.arrived, "at the goal"),
+        (totals.stalled, "stalled"),
+        (totals.blocked, "blocked by others"),
+        (totals.step_limit, "at the step limit"),
+    ];
+    let ends = ends.iter().filter(|(count, _)| *count > 0).map(|(count, how)| format!("{count} {how}"));
+    let ends: Vec<String> = ends.collect();
+    let mut text = format!("\n{} ended", plural(totals.episodes as usize, "episode"));
+    if !ends.is_empty() {
+        text.push_str(&format!(": {}", ends.join(", ")));
+    }
     let (driven_km, simulated_min) = (totals.driven_m / 1000.0, totals.simulated_s / 60.0);
     text.push_str(&format!("\n{driven_km:.1} km in {simulated_min:.1} min of simulated time"));
     if played == totals.episodes as usize && elapsed_s > 0.0 {

@@ -13,6 +13,7 @@ use crate::emit;
 use crate::episode::EpisodeLog;
 use crate::run::{Database, EpisodeSummary, VERSION};
 use crate::sim::ENGINE;
+use crate::syntax::yaml_mistake;
 
 use super::error::Failure;
 use super::files::write;
@@ -127,8 +128,9 @@ pub fn resume<S: serde::de::DeserializeOwned>(
         )));
     }
     let text = load::text(&path)?;
-    let settings = serde_yaml::from_str(&text).map_err(|error| Failure::file("read", &path, error))?;
-    let begun: Begun = serde_yaml::from_str(&text).map_err(|error| Failure::file("read", &path, error))?;
+    let refuse = |error| Failure::file("read", &path, yaml_mistake(&error, &text));
+    let settings = serde_yaml::from_str(&text).map_err(refuse)?;
+    let begun: Begun = serde_yaml::from_str(&text).map_err(refuse)?;
     if (begun.engine.as_str(), begun.avastra.as_str()) != (ENGINE, VERSION) {
         return Err(Failure::usage(format!(
             "the {what} was begun by avastra {} in world `{}`, this is avastra {VERSION} in `{ENGINE}`: begin a new one",

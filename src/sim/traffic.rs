@@ -8,7 +8,7 @@ use std::fmt::Write as _;
 
 use sha2::{Digest, Sha256};
 
-use crate::syntax::listed;
+use crate::syntax::{listed, yaml_mistake};
 
 /// The struct, its `Default`, and the range of each number.
 macro_rules! profile {
@@ -92,7 +92,7 @@ const SHIPPED: [(&str, &str); 2] = [
 pub enum TrafficError {
     #[error("no traffic profile `{name}`: there are {known}; a file needs its ending, `.yaml`")]
     Name { name: String, known: String },
-    #[error("no YAML of a traffic profile: {reason}")]
+    #[error("{reason}")]
     Yaml { reason: String },
     #[error("the profile is empty; write what differs from `scenarios/traffic/careful.yaml`, or `{{}}`")]
     Empty,
@@ -133,8 +133,7 @@ impl TrafficProfile {
     /// # Errors
     /// Text that is no YAML or says nothing, an unknown key, a value of the wrong type or out of its range.
     pub fn from_yaml(text: &str) -> Result<TrafficProfile, TrafficError> {
-        let refuse =
-            |error: serde_yaml::Error| TrafficError::Yaml { reason: error.to_string().trim().to_owned() };
+        let refuse = |error: serde_yaml::Error| TrafficError::Yaml { reason: yaml_mistake(&error, text) };
         let file: serde_json::Value = serde_yaml::from_str(text).map_err(refuse)?;
         if file.is_null() {
             return Err(TrafficError::Empty);

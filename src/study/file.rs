@@ -3,6 +3,7 @@
 use serde_json::Value;
 
 use crate::run::DEFAULT_ADS;
+use crate::syntax::yaml_mistake;
 
 /// A study file. Paths are relative to it.
 #[derive(Debug, Clone, PartialEq, serde::Deserialize)]
@@ -106,6 +107,6 @@ impl StudyFile {
     /// # Errors
     /// If the text has another form: the reason, with its place.
     pub fn from_yaml(text: &str) -> Result<StudyFile, String> {
-        serde_yaml::from_str(text).map_err(|error| error.to_string())
+        serde_yaml::from_str(text).map_err(|error| yaml_mistake(&error, text))
     }
 }

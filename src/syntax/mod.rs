@@ -16,6 +16,7 @@ mod print;
 mod print_expression;
 mod record;
 mod scan;
+mod yaml;
 
 pub(crate) use diagnostic::one_of;
 pub use diagnostic::{Diagnostic, Edit, Fix, Label, Severity, Sources, Style, listed, nearest, render};
@@ -25,6 +26,8 @@ pub use print::{print, print_expr, print_item};
 pub use record::{
     DiagnosticRecord, EditRecord, FixRecord, LabelRecord, PlaceRecord, SCHEMA, apply_fixes, record,
 };
+
+pub use yaml::yaml_mistake;
 
 #[cfg(test)]
 mod tests;

@@ -226,7 +226,7 @@ fn a_run_says_what_never_happened() {
     let text = format!(
         "language 1\nuse \"{roads}\"\nenum Side = Left | Right\n\
          action walker(each from: Side) {{ spawn Pedestrian ahead 40 m {{ side: from, speed: 1 m/s, does: Walk }} }}\n\
-         action racer() {{ spawn Sedan behind 30 m {{ lane: Left, speed: 60 m/s, does: Overtake }} }}\n\
+         action racer() {{ spawn Sedan ahead 60 m {{ lane: Current, speed: 8 m/s, does: DriveAhead }} }}\n\
          rule in_haste on racer: ego.speed >= 60 m/s\n"
     );
     std::fs::write(&space, text).expect("it is writable");

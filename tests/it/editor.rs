@@ -804,3 +804,83 @@ fn the_extension_is_that_of_the_language() {
         assert!(shipped.join(text(path)).is_file(), "{path}");
     }
 }
+
+/// Folds, links, symbols of the workspace, signatures, and the fields of blocks.
+#[test]
+fn a_document_has_a_structure() {
+    let scratch = tempfile::tempdir().expect("a scratch directory");
+    let base = scratch.path().join("base.ava");
+    std::fs::write(
+        &base,
+        "language 1\nfn lead(v: Speed, room: Length) -> Length = v * 1 s + room\nlet far = 9 m\n",
+    )
+    .expect("it is writable");
+    let user = scratch.path().join("user.ava");
+    std::fs::write(&user, "language 1\nuse \"base.ava\"\nlet twice = far * 2\n").expect("it is writable");
+    let mut editor = Editor::start();
+    let folder = json!([{ "uri": uri(scratch.path()), "name": "all" }]);
+    editor.ask("initialize", json!({ "workspaceFolders": folder })).expect("it can be initialized");
+    let here = uri(&scratch.path().join("here.ava"));
+    let head = "// One\n// remark.\nlanguage 1\nuse \"base.ava\"\nenum Side =\n  Left\n  || Right\n";
+    editor.write(&here, &head.replace("||", "|"));
+    let document = json!({ "textDocument": { "uri": here } });
+    let folds = editor.ask("textDocument/foldingRange", document.clone()).expect("it folds");
+    let lines = |fold: &Value| (fold["startLine"].as_u64(), fold["endLine"].as_u64());
+    let folds: Vec<_> = folds.as_array().expect("a list").iter().map(lines).collect();
+    assert_eq!(folds, [(Some(4), Some(6)), (Some(0), Some(1))]);
+    let links = editor.ask("textDocument/documentLink", document).expect("it has links");
+    assert_eq!(links[0]["target"], uri(&base), "{links}");
+    let found = editor.ask("workspace/symbol", json!({ "query": "LEA" })).expect("it searches");
+    assert_eq!((&found[0]["name"], &found[0]["location"]["uri"]), (&"lead".into(), &uri(&base).into()));
+
+    let help = editor.ask_at(
+        "textDocument/signatureHelp",
+        &here,
+        &format!("{head}let a = lead(2 m/s, |"),
+        json!({}),
+    );
+    let help = help.expect("it knows the call");
+    assert_eq!(help["signatures"][0]["label"], "lead(v: Speed, room: Length) -> Length", "{help}");
+    assert_eq!(help["activeParameter"], 1, "{help}");
+    let none = editor.ask_at("textDocument/signatureHelp", &here, &format!("{head}let a = |"), json!({}));
+    assert_eq!(none.expect("it can be asked"), Value::Null);
+
+    let labels = |list: Value| -> Vec<String> {
+        list["items"].as_array().expect("a list").iter().map(|item| text(&item["label"])).collect()
+    };
+    for (written, wanted) in [("override fn |", "lead"), ("override let |", "far")] {
+        let list = editor.ask_at("textDocument/completion", &here, &format!("{head}{written}"), json!({}));
+        assert_eq!(labels(list.expect("it proposes")), [wanted], "{written}");
+    }
+    let list = editor.ask_at("textDocument/completion", &here, &format!("{head}reward {{ |"), json!({}));
+    let list = labels(list.expect("it proposes"));
+    assert!(
+        list.iter().any(|word| word == "proc") && !list.iter().any(|word| word == "avoidable"),
+        "{list:?}"
+    );
+
+    let walker = "action a() { spawn Pedestrian ahead 9 m { d|oes: Walk, side: Left, speed: 1 m/s } }\n";
+    let hover = editor.ask_at("textDocument/hover", &here, &format!("{head}{walker}"), json!({}));
+    assert!(text(&hover.expect("it knows it")["contents"]["value"]).starts_with("**does**"));
+
+    // Names in files that are not open, and a name that is taken.
+    let place = format!("{head}let mine = f|ar\n");
+    let found = editor.ask_at("textDocument/references", &here, &place, json!({ "context": {} }));
+    let found = found.expect("it has references");
+    let files: Vec<String> =
+        found.as_array().expect("a list").iter().map(|place| text(&place["uri"])).collect();
+    assert!(files.contains(&uri(&user)) && files.contains(&uri(&base)), "{files:?}");
+    let taken = editor.ask_at("textDocument/rename", &here, &place, json!({ "newName": "mine" }));
+    let taken = text(&taken.expect_err("the name is taken")["message"]);
+    assert_eq!(taken, "`far` cannot be called `mine`: that name is taken");
+
+    // A second declaration of a name may be meant to replace the first.
+    let again = format!("{head}let far = 3 m\n").replace("||", "|");
+    let mistakes = editor.write(&here, &again);
+    assert_eq!(mistakes[0]["code"], "AV0102", "{mistakes:?}");
+    let params = json!({ "textDocument": { "uri": here }, "range": mistakes[0]["range"], "context": { "diagnostics": [] } });
+    let actions = editor.ask("textDocument/codeAction", params).expect("it can be asked");
+    assert_eq!(actions[0]["title"], "write `override` before `let`", "{actions}");
+    let mended = edited(&again, &actions[0]["edit"]["changes"][&here]);
+    assert!(mended.ends_with("override let far = 3 m\n"), "{mended}");
+}

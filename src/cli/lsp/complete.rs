@@ -77,6 +77,8 @@ impl List<'_> {
             Kind::Roads => self.symbols(MODULE, |symbol| matches!(symbol, Symbol::Road(_))),
             Kind::Rules => self.symbols(OPERATOR, |symbol| matches!(symbol, Symbol::Rule(_))),
             Kind::Verdicts => self.symbols(OPERATOR, |symbol| matches!(symbol, Symbol::Verdict(_))),
+            Kind::Functions => self.symbols(FUNCTION, |symbol| matches!(symbol, Symbol::Function(_))),
+            Kind::Constants => self.symbols(CONSTANT, |symbol| matches!(symbol, Symbol::Constant(_))),
             Kind::Value(ty) => self.value(*ty),
             Kind::Operators => self.words(keyword::OPERATORS, OPERATOR, POSSIBLE),
             Kind::Variants(of) => self.variants(of, WANTED),

@@ -29,6 +29,8 @@ pub enum Kind {
     Roads,
     Rules,
     Verdicts,
+    Functions,
+    Constants,
     /// The parts of an expression; the variants of this type come first.
     Value(Option<Type>),
     Operators,
@@ -65,7 +67,7 @@ pub fn wanted(references: &References, text: &str, byte: usize) -> (Vec<Kind>, u
 }
 
 /// Where the declaration around a byte begins: at the last line before it that starts with a keyword.
-fn item_start(text: &str, byte: usize) -> usize {
+pub fn item_start(text: &str, byte: usize) -> usize {
     let mut at = byte;
     loop {
         let start = text[..at].rfind('\n').map_or(0, |newline| newline + 1);
@@ -91,6 +93,22 @@ fn path(text: &str, from: usize, item: usize) -> (Vec<Kind>, usize) {
     (kinds, item + from)
 }
 
+/// What the declaration after `override` and a keyword may replace.
+fn replaceable(keyword: &str) -> Vec<Kind> {
+    match keyword {
+        "enum" | "odds" => vec![Kind::Enums],
+        "state" => vec![Kind::States],
+        "let" => vec![Kind::Constants],
+        "fn" => vec![Kind::Functions],
+        "action" => vec![Kind::Actions],
+        "group" => vec![Kind::Groups],
+        "rule" => vec![Kind::Rules],
+        "road" => vec![Kind::Roads],
+        "verdict" => vec![Kind::Verdicts],
+        _ => Vec::new(),
+    }
+}
+
 /// The tokens of a declaration up to the place.
 struct Place<'a> {
     references: &'a References,
@@ -99,12 +117,15 @@ struct Place<'a> {
     open: Vec<usize>,
     /// Whether the place is the first on its line.
     fresh_line: bool,
+    /// Whether the declaration replaces another.
+    overrides: bool,
     locals: Vec<(String, Option<Type>)>,
 }
 
 impl<'a> Place<'a> {
     fn new(references: &'a References, mut tokens: Vec<Token<'a>>, fresh_line: bool) -> Place<'a> {
-        if tokens.len() > 1 && tokens[0].text == "override" {
+        let overrides = tokens.len() > 1 && tokens[0].text == "override";
+        if overrides {
             tokens.remove(0);
         }
         let mut open = Vec::new();
@@ -117,7 +138,7 @@ impl<'a> Place<'a> {
                 _ => {}
             }
         }
-        let mut place = Place { references, tokens, open, fresh_line, locals: Vec::new() };
+        let mut place = Place { references, tokens, open, fresh_line, overrides, locals: Vec::new() };
         place.locals = place.find_locals();
         place
     }
@@ -168,6 +189,9 @@ impl<'a> Place<'a> {
                 let declarations = keyword::DECLARATIONS.iter().copied();
                 let open = declarations.filter(|(word, _)| !fixed.contains(word));
                 return vec![Kind::Words(open.collect())];
+            }
+            (keyword, _) if self.overrides && self.tokens.len() == 1 && keyword != "optional" => {
+                return replaceable(keyword);
             }
             ("optional", _) => return vec![Kind::Keyword("rule")],
             (".", thing) if things().contains(&thing) => return vec![Kind::Words(parts_of(thing))],
@@ -345,7 +369,8 @@ impl<'a> Place<'a> {
         if !self.wants_operand() && !self.begins_entry() {
             return vec![Kind::Operators];
         }
-        let mut kinds = vec![Kind::Words(words::facts(Site::Verdict))];
+        let site = if self.keyword() == "reward" { Site::Reward } else { Site::Verdict };
+        let mut kinds = vec![Kind::Words(words::facts(site))];
         kinds.extend(self.value(None));
         kinds
     }

@@ -9,6 +9,7 @@ use crate::model;
 use crate::syntax::ast::{FileId, Span};
 use crate::syntax::{Diagnostic, Severity};
 
+use super::structure;
 use super::workspace::{Analysis, Workspace};
 
 /// The mistakes of all open documents and of what they use, by file. Every open document has an
@@ -111,8 +112,32 @@ pub fn fixes(analysis: &Analysis, workspace: &Workspace, from: usize, to: usize)
                 "edit": { "changes": changes },
             }));
         }
+        actions.extend(replacement(diagnostic, analysis, workspace, &shown));
     }
     actions
+}
+
+/// For a name that a used file declares already, `override`. It is offered here and not by `check --fix`, because only
+/// the author knows whether the other declaration is to be replaced.
+fn replacement(
+    diagnostic: &Diagnostic,
+    analysis: &Analysis,
+    workspace: &Workspace,
+    shown: &Value,
+) -> Option<Value> {
+    let again = diagnostic.place().filter(|place| place.file == Analysis::ROOT)?;
+    let is_elsewhere = diagnostic.labels.iter().any(|label| label.span.file != Analysis::ROOT);
+    if diagnostic.code != model::code::DUPLICATE || !is_elsewhere {
+        return None;
+    }
+    let (title, edit) = structure::override_before(analysis, again)?;
+    let uri = workspace.uri(analysis.path(Analysis::ROOT)?);
+    Some(json!({
+        "title": title,
+        "kind": "quickfix",
+        "diagnostics": [shown],
+        "edit": { "changes": { uri: [edit] } },
+    }))
 }
 
 /// The file of an analysis with that path.

@@ -39,7 +39,8 @@ pub fn hover(analysis: &Analysis, byte: usize) -> Option<(Span, String)> {
     }
     let text = analysis.text(Analysis::ROOT);
     let (start, word) = tokens::word_at(text, byte)?;
-    let meaning = keyword::meaning(word)?;
+    let field = || text[start + word.len()..].trim_start().starts_with(':').then(|| words::field(word))?;
+    let meaning = keyword::meaning(word).or_else(field)?;
     let span = Span::new(Analysis::ROOT, start, start + word.len());
     Some((span, format!("**{word}**\n\n{meaning}")))
 }

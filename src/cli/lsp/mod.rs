@@ -18,6 +18,8 @@ mod position;
 mod rename;
 mod serve;
 mod server;
+mod signature;
+mod structure;
 mod tokens;
 mod transport;
 mod uri;

@@ -24,29 +24,41 @@ pub fn symbols(analysis: &Analysis) -> Vec<Value> {
     analysis.loaded.files[0].tree.items.iter().filter_map(|item| symbol(item, analysis)).collect()
 }
 
-fn symbol(item: &Item, analysis: &Analysis) -> Option<Value> {
-    let inner = item.kind.plain();
-    let leaf = |name: &Name, kind: u32| entry(analysis, &name.text, kind, name.span, name.span, Vec::new());
-    let (kind, children): (u32, Vec<Value>) = match inner {
+/// The name of a declaration, if it has one, and its kind.
+pub fn named(item: &Item) -> Option<(&Name, u32)> {
+    Some((item.kind.plain().name()?, kind(item)?))
+}
+
+/// `None` for what is no symbol.
+fn kind(item: &Item) -> Option<u32> {
+    Some(match item.kind.plain() {
         ItemKind::Language(_) | ItemKind::Use(_) | ItemKind::Expect(_) | ItemKind::Override(_) => {
             return None;
         }
-        ItemKind::Enum(of) => (ENUM, of.variants.iter().map(|name| leaf(name, ENUM_MEMBER)).collect()),
-        ItemKind::Odds(_) => (ARRAY, Vec::new()),
-        ItemKind::State(_) => (VARIABLE, Vec::new()),
-        ItemKind::Let(_) => (CONSTANT, Vec::new()),
-        ItemKind::Fn(_) => (FUNCTION, Vec::new()),
+        ItemKind::Enum(_) => ENUM,
+        ItemKind::Odds(_) | ItemKind::Group(_) => ARRAY,
+        ItemKind::State(_) => VARIABLE,
+        ItemKind::Let(_) => CONSTANT,
+        ItemKind::Fn(_) => FUNCTION,
+        ItemKind::Action(_) => EVENT,
+        ItemKind::Rule(_) | ItemKind::Verdict(_) => OPERATOR,
+        ItemKind::Road(_) | ItemKind::Episode(_) | ItemKind::Reward(_) => OBJECT,
+        ItemKind::Scenario(_) | ItemKind::Policy(_) => MODULE,
+    })
+}
+
+fn symbol(item: &Item, analysis: &Analysis) -> Option<Value> {
+    let (inner, kind) = (item.kind.plain(), kind(item)?);
+    let leaf = |name: &Name, kind: u32| entry(analysis, &name.text, kind, name.span, name.span, Vec::new());
+    let children: Vec<Value> = match inner {
+        ItemKind::Enum(of) => of.variants.iter().map(|name| leaf(name, ENUM_MEMBER)).collect(),
         ItemKind::Action(of) => {
             let parameter = |p: &crate::syntax::ast::ActionParam| {
                 entry(analysis, &p.name.text, FIELD, p.span, p.name.span, Vec::new())
             };
-            (EVENT, of.params.iter().map(parameter).collect())
+            of.params.iter().map(parameter).collect()
         }
-        ItemKind::Group(_) => (ARRAY, Vec::new()),
-        ItemKind::Rule(_) => (OPERATOR, Vec::new()),
-        ItemKind::Road(_) | ItemKind::Episode(_) | ItemKind::Reward(_) => (OBJECT, Vec::new()),
-        ItemKind::Verdict(_) => (OPERATOR, Vec::new()),
-        ItemKind::Scenario(_) | ItemKind::Policy(_) => (MODULE, Vec::new()),
+        _ => Vec::new(),
     };
     let keyword = inner.keyword();
     let (name, place) = match inner.name() {

@@ -83,6 +83,9 @@ pub fn rename(workspace: &mut Workspace, path: &Path, byte: usize, name: &str) -
     for known in &touched {
         symbols = known.references().tied(&symbols);
     }
+    if touched.iter().any(|known| is_taken(known, &symbols, name)) {
+        return Err(format!("`{old}` cannot be called `{name}`: that name is taken"));
+    }
     let (texts, changes) = renamed(workspace, &touched, &symbols, name);
     let touched: Vec<PathBuf> =
         touched.iter().filter_map(|known| known.path(Analysis::ROOT)).map(Path::to_owned).collect();
@@ -101,6 +104,17 @@ pub fn rename(workspace: &mut Workspace, path: &Path, byte: usize, name: &str) -
         }
     }
     Ok(json!({ "changes": changes }))
+}
+
+/// Whether something of the kind of one of the symbols has that name already, at the same place.
+fn is_taken(known: &Analysis, symbols: &BTreeSet<Symbol>, name: &str) -> bool {
+    let of = |symbol: &Symbol| match symbol {
+        Symbol::Variant(of, _) | Symbol::Argument(of, _) | Symbol::Parameter(of, _) => Some(of.clone()),
+        _ => None,
+    };
+    let kind = |symbol: &Symbol| (std::mem::discriminant(symbol), of(symbol));
+    let mut declared = known.references().symbols().filter(|symbol| symbol.word() == Some(name));
+    declared.any(|other| symbols.iter().any(|symbol| kind(symbol) == kind(other) && symbol != other))
 }
 
 /// Why nothing can be renamed in a document: the syntax of one of its files is broken.

@@ -10,7 +10,7 @@ use crate::check::Symbol;
 use crate::syntax;
 
 use super::workspace::{Analysis, Document, Workspace};
-use super::{complete, diagnostics, highlight, hints, hover, outline, rename, uri};
+use super::{complete, diagnostics, highlight, hints, hover, outline, rename, signature, structure, uri};
 
 // Codes of JSON-RPC and of the protocol.
 const PARSE_ERROR: i64 = -32700;
@@ -166,6 +166,24 @@ impl Server {
                 let path = self.document(params)?;
                 Ok(outline::symbols(self.analysis(&path)?).into())
             }
+            "textDocument/foldingRange" => {
+                let path = self.document(params)?;
+                Ok(structure::folds(self.analysis(&path)?).into())
+            }
+            "textDocument/documentLink" => {
+                let path = self.document(params)?;
+                self.analysis(&path)?;
+                let analysis = self.workspace.known(&path).ok_or(Refusal::Params("textDocument"))?;
+                Ok(structure::links(analysis, &self.workspace).into())
+            }
+            "textDocument/signatureHelp" => {
+                let (path, byte) = self.place(params)?;
+                Ok(signature::help(self.analysis(&path)?, byte).unwrap_or(Value::Null))
+            }
+            "workspace/symbol" => {
+                let query = params["query"].as_str().ok_or(Refusal::Params("query"))?;
+                Ok(structure::search(&self.workspace, query).into())
+            }
             "textDocument/semanticTokens/full" => {
                 let path = self.document(params)?;
                 Ok(json!({ "data": highlight::tokens(self.analysis(&path)?) }))
@@ -214,13 +232,14 @@ impl Server {
         let Some(occurrence) = analysis.references().at(Analysis::ROOT, byte) else { return Ok(json!([])) };
         let symbols: BTreeSet<Symbol> = occurrence.symbols.iter().cloned().collect();
         let home = rename::home(analysis, &symbols);
+        let closed = self.workspace.closed_users(&home);
         let mut found: Vec<Value> = Vec::new();
-        // The document itself comes first, then others that use the same declaration.
+        // The document itself comes first, then others that use the same declaration, open or not.
         let others = self.workspace.paths().into_iter().filter(|other| *other != path);
-        for other in std::iter::once(path.clone()).chain(others) {
-            let Some(known) = self.workspace.known(&other) else { continue };
-            let is_same =
-                other == path || rename::home(known, &symbols).iter().any(|file| home.contains(file));
+        let open = std::iter::once(path.clone()).chain(others);
+        for known in open.filter_map(|path| self.workspace.known(&path)).chain(&closed) {
+            let is_same = known.path(Analysis::ROOT) == Some(&path)
+                || rename::home(known, &symbols).iter().any(|file| home.contains(file));
             if !is_same {
                 continue;
             }
@@ -421,6 +440,10 @@ fn capabilities() -> Value {
             "renameProvider": { "prepareProvider": true },
             "documentFormattingProvider": true,
             "documentSymbolProvider": true,
+            "workspaceSymbolProvider": true,
+            "foldingRangeProvider": true,
+            "documentLinkProvider": {},
+            "signatureHelpProvider": { "triggerCharacters": ["(", ","] },
             "inlayHintProvider": true,
             "semanticTokensProvider": {
                 "legend": { "tokenTypes": highlight::TYPES, "tokenModifiers": highlight::MODIFIERS },

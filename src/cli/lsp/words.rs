@@ -1,7 +1,10 @@
 //! The words that no file declares, as lists for the editor. The keywords stand in `syntax::keyword`, the
 //! engine's words in `model::vocabulary`.
 
-use crate::model::vocabulary::{Body, Colour, LaneChoice, Side, Site, SpawnField, TYPES, Then, Verb, Word};
+use crate::model::vocabulary::{
+    Body, Colour, EpisodeField, LaneChoice, RoadField, Side, Site, SpawnField, StartField, TYPES, Then, Verb,
+    Word,
+};
 use crate::model::{ENDS, MODULES};
 
 /// A word and what it means.
@@ -44,6 +47,12 @@ pub fn claim_words(claim: &str) -> &'static [&'static str] {
         "cause" => &MODULES,
         _ => &[],
     }
+}
+
+/// What a field of a block means: of a spawn, a road, an episode or a start.
+pub fn field(word: &str) -> Option<&'static str> {
+    let blocks = [of::<SpawnField>(), of::<RoadField>(), of::<EpisodeField>(), of::<StartField>()];
+    blocks.iter().find_map(|fields| meaning(fields, word))
 }
 
 /// What a word of a list means.

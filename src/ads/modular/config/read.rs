@@ -6,7 +6,7 @@ use serde_json::{Map, Value};
 use sha2::{Digest, Sha256};
 
 use crate::ads::steering::SteeringConfig;
-use crate::syntax::nearest;
+use crate::syntax::{nearest, yaml_mistake};
 
 use super::ModularConfig;
 use super::driving::{ActuatorsConfig, PedalsConfig, PlanningConfig, PredictionConfig};
@@ -58,7 +58,7 @@ impl ModularConfig {
     /// or out of its range.
     pub fn from_yaml(text: &str) -> Result<ModularConfig, ConfigError> {
         let file: Value = serde_yaml::from_str(text)
-            .map_err(|error| ConfigError::Yaml { reason: error.to_string().trim().to_owned() })?;
+            .map_err(|error| ConfigError::Yaml { reason: yaml_mistake(&error, text) })?;
         let mut whole =
             serde_json::to_value(ModularConfig::default()).expect("a configuration is plain data");
         // An empty file is more likely a slip, or was cut off, than a wish for the default.
