@@ -82,12 +82,13 @@ def routes(town, draw, wanted):
     lanes = {key(lane["key"]): lane for lane in town["lanes"]}
     starts = [lane for lane in town["lanes"] if lane["junction"] is None and lane["length_m"] > 25]
     for lane in draw.sample(starts, min(len(starts), 4 * wanted)):
-        start, length_m = place(lane, 4.0), lane["length_m"] - 4.0
-        while length_m < 250 and lane["successors"]:
+        start, before_m = place(lane, 4.0), -4.0
+        while before_m + lane["length_m"] < 250 and lane["successors"]:
+            before_m += lane["length_m"]
             lane = lanes[key(draw.choice(lane["successors"]))]
-            length_m += lane["length_m"]
-        if lane["junction"] is None and length_m > 40 and lane["length_m"] > 12:
-            yield start, place(lane, lane["length_m"] - 8.0)
+        goal_m = min(lane["length_m"] - 8.0, 250.0 - before_m)
+        if lane["junction"] is None and goal_m > 4.0 and before_m + goal_m > 40:
+            yield start, place(lane, goal_m)
 
 
 def drive(avastra, path, town, title, directory):
