@@ -8,7 +8,7 @@ use crate::action::{Effect, SpawnRequest};
 use crate::model::expr::Expr;
 use crate::model::rules::{Before, Candidate, Choose, Clause, Nearest, Room, RowRules, TRIES_MAX, Unsolved};
 use crate::model::{
-    ActionDef, Domain, EffectDef, Facts, Memory, MomentFacts, Parameter, Space, SpawnDef, StateMeaning, Type,
+    ActionDef, BodyWord, Domain, EffectDef, Facts, Memory, MomentFacts, Parameter, Space, SpawnDef, Type,
     Value, WorldFacts, evaluate, locals, spawn_out_of_bounds,
 };
 use crate::rng;
@@ -115,7 +115,7 @@ impl<'a> Judge<'a> {
     fn judge(&self, values: &[Value]) -> Result<Draw, Vec<Refusal>> {
         let before = self.situation.memory;
         let after = self.row.space.memory_after(self.row.row.action, values, before);
-        let effects = self.effects(values, &after);
+        let mut effects = self.effects(values, &after);
         let mut refusals = Vec::new();
         let mut spawns = Vec::new();
         for effect in &effects {
@@ -144,6 +144,12 @@ impl<'a> Judge<'a> {
         if !refusals.is_empty() {
             return Err(refusals);
         }
+        // What every step changes comes without a question: it is no action, and not the world's to refuse.
+        for effect in Effect::of_change(self.row.space, before, &after) {
+            if !effects.contains(&effect) {
+                effects.push(effect);
+            }
+        }
         let values = self.action.drawn_of(values);
         Ok(Draw { row: self.row.row.index, values, effects, memory_after: after })
     }
@@ -164,15 +170,7 @@ impl<'a> Judge<'a> {
                         evaluate(key, &self.row.space.functions, &self.facts(locals, after)).variant()
                     });
                     let touched = key.map_or(0..state.cells, |key| key..key + 1);
-                    for cell in touched {
-                        let value = after.cells()[state.first_cell + cell].variant();
-                        let effect = match &state.meaning {
-                            StateMeaning::Private => continue,
-                            StateMeaning::Time(words) => Effect::Time(words[value]),
-                            StateMeaning::Sky(phenomena, levels) => {
-                                Effect::Sky(phenomena[cell], levels[value])
-                            }
-                        };
+                    for effect in touched.filter_map(|cell| Effect::of_cell(state, cell, after)) {
                         if !effects.contains(&effect) {
                             effects.push(effect);
                         }
@@ -187,8 +185,13 @@ impl<'a> Judge<'a> {
     fn request(&self, spawn: &SpawnDef, locals: &[Value], after: &Memory) -> SpawnRequest {
         let functions = &self.row.space.functions;
         let facts = self.facts(locals, after);
+        let shape = |body: BodyWord| body.own.map(|own| self.row.space.bodies[own].shape);
+        let body = spawn.body.word(functions, &facts);
+        let cover = spawn.cover.as_ref().map(|cover| cover.word(functions, &facts));
         SpawnRequest {
-            body: spawn.body.word(functions, &facts),
+            body: body.like,
+            shape: shape(body),
+            cover_shape: cover.and_then(shape),
             colour: spawn.colour.word(functions, &facts),
             verb: spawn.verb.word(functions, &facts),
             lane: spawn.lane.word(functions, &facts),
@@ -196,7 +199,7 @@ impl<'a> Judge<'a> {
             then: spawn.then.word(functions, &facts),
             speed_mps: evaluate(&spawn.speed, functions, &facts).number(),
             distance_m: evaluate(&spawn.distance, functions, &facts).number(),
-            cover: spawn.cover.as_ref().map(|cover| cover.word(functions, &facts)),
+            cover: cover.map(|cover| cover.like),
         }
     }
 

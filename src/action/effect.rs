@@ -1,7 +1,8 @@
 //! What a row does to the world once its parameters are drawn.
 
+use crate::model::body::BodyParameters;
 use crate::model::vocabulary::{Body, Colour, LaneChoice, Level, Phenomenon, Side, Then, TimeOfDay, Verb};
-use crate::model::{MomentFacts, SpawnFacts};
+use crate::model::{Memory, MomentFacts, Space, SpawnFacts, StateDef, StateMeaning};
 
 /// One change of the world. A row has one or more, applied in order.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -28,11 +29,34 @@ pub struct SpawnRequest {
     /// Gap to the ego vehicle along its route, m; behind the ego vehicle for `Overtake`. `sim::placement`
     /// says for each verb what exactly lies at that distance.
     pub distance_m: f64,
+    /// What a body of the author's own is, in place of `body` and of `cover`.
+    pub shape: Option<BodyParameters>,
+    pub cover_shape: Option<BodyParameters>,
     /// A vehicle that is parked with it, so that it steps out from behind; for `Walk` alone.
     pub cover: Option<Body>,
 }
 
 impl Effect {
+    /// What the world sees of a cell of a state: nothing, if the state is the author's own record.
+    pub(super) fn of_cell(state: &StateDef, cell: usize, memory: &Memory) -> Option<Effect> {
+        let value = memory.cells()[state.first_cell + cell].variant();
+        match &state.meaning {
+            StateMeaning::Private => None,
+            StateMeaning::Time(words) => Some(Effect::Time(words[value])),
+            StateMeaning::Sky(phenomena, levels) => Some(Effect::Sky(phenomena[cell], levels[value])),
+        }
+    }
+
+    /// What the world sees of a change of the memory.
+    pub(super) fn of_change(space: &Space, before: &Memory, after: &Memory) -> Vec<Effect> {
+        let cells = space.states.iter().flat_map(|state| (0..state.cells).map(move |cell| (state, cell)));
+        let changed = cells.filter(|(state, cell)| {
+            let cell = state.first_cell + cell;
+            before.cells()[cell] != after.cells()[cell]
+        });
+        changed.filter_map(|(state, cell)| Effect::of_cell(state, cell, after)).collect()
+    }
+
     /// How many road users it makes appear. Their ids follow each other; the one that was asked for is the first.
     pub fn newcomers(&self) -> u32 {
         match self {

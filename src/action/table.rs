@@ -80,6 +80,12 @@ impl ActionTable {
         }
     }
 
+    /// What a step without an action does: to the world, and the memory after it.
+    pub fn wait(&self, memory: &Memory, road: &Road, rules: &RulesInForce) -> (Vec<Effect>, Memory) {
+        let after = self.space.memory_after_wait(memory, Some(&road.facts), rules);
+        (Effect::of_change(&self.space, memory, &after), after)
+    }
+
     /// The draw with the legal values nearest to given ones. A number that a rule sets is computed from the
     /// others; a number out of bounds moves to the bound.
     ///

@@ -108,6 +108,7 @@ pub fn object(id: u32, body: Body, pose: Pose, speed_mps: f64) -> SensedObject {
         Body::SchoolBus => (11.0, 2.44, 3.1),
         Body::BoxTruck => (7.5, 2.4, 3.2),
         Body::Jeep | Body::Sedan | Body::SUV | Body::Hatchback => (4.8, 1.85, 1.45),
+        Body::Motorcycle | Body::Bicycle => (2.0, 0.7, 1.6),
     };
     SensedObject {
         id,

@@ -6,10 +6,12 @@ use crate::check::expression::{Place, is_number};
 use crate::check::names::unknown;
 use crate::check::references::Symbol;
 use crate::check::report::{Report, field};
+use crate::check::rule::locals;
 use crate::model::expr::{Expr, ExprKind};
-use crate::model::vocabulary::{Body, Colour, LaneChoice, Side, Site, SpawnField, Then, Verb, Word};
+use crate::model::vocabulary::{Colour, LaneChoice, Side, Site, SpawnField, Then, Verb, Word};
 use crate::model::{
-    ActionDef, Domain, EffectDef, GroupDef, Parameter, RuleDef, SetDef, SpawnDef, Type, Value, WordExpr, code,
+    ActionDef, BodyWord, Domain, EffectDef, GroupDef, Parameter, RuleDef, SetDef, SpawnDef, Type, Value,
+    WordExpr, code,
 };
 use crate::prove::product_size;
 use crate::syntax::ast::{ItemKind, ParamMode, Span};
@@ -262,7 +264,7 @@ impl Checker {
             }
             ast::EffectKind::Spawn { body, place: side, distance, cover, fields } => {
                 let behind = *side == ast::Place::Behind;
-                let cover = cover.as_ref().map(|cover| self.word::<Body>("body", cover, place));
+                let cover = cover.as_ref().map(|cover| self.body_word(cover, place));
                 let spawn = self.spawn(body, behind, distance, fields, place, effect.span)?;
                 let cover = match cover {
                     Some(cover) => Some(cover?),
@@ -287,7 +289,7 @@ impl Checker {
         let fields = self.fields_known(fields);
         let find = |wanted: SpawnField| field(&fields, wanted);
         let lacks = |what: &str| format!("the spawn does not say {what}");
-        let body_word = self.word::<Body>("body", body, place);
+        let body_word = self.body_word(body, place);
         let distance = self.typed(distance, place, Type::Quantity(Dimension::LENGTH));
         let verb = match find(SpawnField::Does) {
             Some(value) => self.word::<Verb>("verb", value, place),
@@ -343,10 +345,10 @@ impl Checker {
     }
 
     /// Reports a cover that is no vehicle, and one for a road user that does not walk.
-    fn check_cover(&mut self, cover: Option<&WordExpr<Body>>, verb: &WordExpr<Verb>, span: Span) {
+    fn check_cover(&mut self, cover: Option<&WordExpr<BodyWord>>, verb: &WordExpr<Verb>, span: Span) {
         let Some(cover) = cover else { return };
-        if let Some(body) = possible(cover).into_iter().find(|body| !body.is_vehicle()) {
-            let message = format!("a `{}` hides nobody", body.name());
+        if let Some(body) = possible(cover).into_iter().find(|body| !body.like.is_vehicle()) {
+            let message = format!("a `{}` hides nobody", self.body_name(body));
             let error = Diagnostic::error(code::IMPOSSIBLE_SPAWN, message).at(span, "spawned here");
             self.report(error.help("write a vehicle after `from behind`"));
         }
@@ -359,14 +361,14 @@ impl Checker {
 
     /// Reports a vehicle that walks, a pedestrian that drives, and a wrong `ahead` or `behind`: only a vehicle that
     /// overtakes spawns behind the ego vehicle.
-    fn check_verb(&mut self, body: &WordExpr<Body>, verb: &WordExpr<Verb>, behind: bool, span: Span) {
+    fn check_verb(&mut self, body: &WordExpr<BodyWord>, verb: &WordExpr<Verb>, behind: bool, span: Span) {
         let on_foot = |verb: &Verb| matches!(verb, Verb::Walk | Verb::Stand);
         let verbs = possible(verb);
         let clash = possible(body).into_iter().find_map(|body| {
-            verbs.iter().find(|verb| on_foot(verb) == body.is_vehicle()).map(|verb| (body, *verb))
+            verbs.iter().find(|verb| on_foot(verb) == body.like.is_vehicle()).map(|verb| (body, *verb))
         });
         if let Some((body, verb)) = clash {
-            let message = format!("a `{}` cannot `{}`", body.name(), verb.name());
+            let message = format!("a `{}` cannot `{}`", self.body_name(body), verb.name());
             let error = Diagnostic::error(code::IMPOSSIBLE_SPAWN, message).at(span, "spawned here");
             self.report(
                 error.help("`Walk` and `Stand` are for a `Pedestrian`, all other verbs for vehicles"),
@@ -420,6 +422,56 @@ impl Checker {
             let name = declared.name.text.clone();
             self.groups.push(GroupDef { name, docs: docs(item), actions });
         }
+    }
+
+    /// `on … also` adds its effects to each of its actions, after those that the action has.
+    pub(super) fn declare_also(&mut self, items: &[&ast::Item]) {
+        for (_, declared) in each(items, ItemKind::as_also) {
+            for (action, effect) in self.also(declared) {
+                self.actions[action].iter_mut().for_each(|known| known.effects.push(effect.clone()));
+            }
+        }
+    }
+
+    /// The effects that are added, each with its action.
+    pub(super) fn also(&mut self, declared: &ast::Also) -> Vec<(usize, EffectDef)> {
+        let mut actions: Vec<usize> = declared.on.iter().flat_map(|name| self.targets(name)).collect();
+        actions.sort_unstable();
+        actions.dedup();
+        let mut added = Vec::new();
+        for action in actions {
+            // A broken action was reported where it is declared.
+            let Some(definition) = self.actions[action].clone() else { continue };
+            let locals = locals(&definition);
+            let owner = Symbol::Action(definition.name);
+            let place = Place { locals: &locals, owner: Some(&owner), states: true, ..Place::default() };
+            added.extend(
+                declared
+                    .effects
+                    .iter()
+                    .filter_map(|effect| self.effect(effect, &place))
+                    .map(|effect| (action, effect)),
+            );
+        }
+        added
+    }
+
+    pub(super) fn declare_each_step(&mut self, items: &[&ast::Item]) {
+        for (_, effects) in each(items, ItemKind::as_each_step) {
+            let sets = self.sets(effects);
+            self.each_step.extend(sets);
+        }
+    }
+
+    /// The effects of every step.
+    pub(super) fn sets(&mut self, effects: &[ast::Effect]) -> Vec<SetDef> {
+        let place = Place { states: true, ..Place::default() };
+        let found = effects.iter().filter_map(|effect| self.effect(effect, &place));
+        let sets = found.filter_map(|effect| match effect {
+            EffectDef::Set(set) => Some(*set),
+            EffectDef::Spawn(_) => None,
+        });
+        sets.collect()
     }
 
     /// The indices of the actions that a name means: one action, or the members of a group.

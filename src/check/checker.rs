@@ -14,7 +14,9 @@ use crate::check::{style, unused};
 use crate::model::expr::{Expr, ExprKind};
 use crate::model::rules::{bounds, clauses};
 use crate::model::vocabulary::TYPES;
-use crate::model::{ActionDef, EnumDef, FnDef, GroupDef, Meaning, Space, StateDef, Type, Value, code};
+use crate::model::{
+    ActionDef, BodyDef, EnumDef, FnDef, GroupDef, Meaning, SetDef, Space, StateDef, Type, Value, code,
+};
 use crate::prove;
 use crate::prove::{Known, Values, enclose};
 use crate::syntax::ast::{FileId, ItemKind, Span};
@@ -31,6 +33,7 @@ pub(super) struct Checker {
     pub(super) enum_names: Names,
     pub(super) enums: Vec<EnumDef>,
     pub(super) states: Vec<StateDef>,
+    pub(super) bodies: Vec<BodyDef>,
     /// Each constant is folded to a literal; `None` stands for a broken one.
     pub(super) constants: Vec<(String, Option<Expr>)>,
     pub(super) function_names: Names,
@@ -46,6 +49,8 @@ pub(super) struct Checker {
     /// Indices of actions with a broken effect: no rule reports that such an action lacks an effect.
     pub(super) half_broken: Vec<usize>,
     pub(super) groups: Vec<GroupDef>,
+    /// The effects of every step.
+    pub(super) each_step: Vec<SetDef>,
     /// Number of rows of each action; `None` if an axis is broken.
     pub(super) row_counts: Vec<Option<u64>>,
     /// What each name stands for.
@@ -90,10 +95,13 @@ pub(super) fn space(
     checker.road_names = roads.map(|(_, road)| road.name.text.clone()).collect();
     checker.declare_constants(items);
     checker.declare_odds(items);
+    checker.declare_bodies(items);
     checker.declare_functions(items);
     checker.declare_states(items);
     checker.declare_actions(items);
     checker.declare_groups(items);
+    checker.declare_also(items);
+    checker.declare_each_step(items);
     let rules = checker.rules(items);
     let reward = checker.reward(items);
     let verdicts = checker.verdicts(items);
@@ -119,9 +127,11 @@ pub(super) fn space(
         docs: root.docs,
         enums: core::mem::take(&mut checker.enums),
         states: core::mem::take(&mut checker.states),
+        bodies: core::mem::take(&mut checker.bodies),
         functions: core::mem::take(&mut checker.functions),
         actions,
         groups: core::mem::take(&mut checker.groups),
+        each_step: core::mem::take(&mut checker.each_step),
         rules,
         episode,
         reward,
@@ -195,6 +205,7 @@ impl Checker {
         match item.kind.plain() {
             ItemKind::Odds(declared) => drop(self.odds(declared)),
             ItemKind::State(declared) => drop(self.state(item, declared)),
+            ItemKind::Body(declared) => drop(self.body(item, declared)),
             ItemKind::Let(declared) => drop(self.constant(declared)),
             ItemKind::Fn(declared) => {
                 let signature = self.signature(declared);
@@ -202,6 +213,8 @@ impl Checker {
             }
             ItemKind::Action(declared) => drop(self.action(item, declared)),
             ItemKind::Group(declared) => declared.members.iter().for_each(|name| drop(self.targets(name))),
+            ItemKind::Also(declared) => drop(self.also(declared)),
+            ItemKind::EachStep(effects) => drop(self.sets(effects)),
             ItemKind::Rule(declared) => drop(self.rule(declared)),
             ItemKind::Episode(fields) => drop(self.settings(fields)),
             ItemKind::Reward(cases) => drop(self.cases(item, cases)),

@@ -11,7 +11,7 @@ use crate::model::rules::RowRules;
 use crate::model::{Interval, Reach, Road, Row, RuleBody, RulesInForce, Space, Type};
 use crate::prove::Values;
 use crate::syntax::ast::ItemKind;
-use crate::syntax::print_item;
+use crate::syntax::{listed, print_item};
 
 /// One difference; its parts together make a sentence.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
@@ -80,12 +80,21 @@ fn texts(loaded: &Loaded) -> Texts {
                 | ItemKind::Policy(_)
         )
     });
-    named
-        .map(|item| {
-            let name = item.kind.name().map_or(String::new(), |name| format!(" `{}`", name.text));
-            ((item.kind.keyword().to_owned(), name), print_item(&item.kind))
-        })
-        .collect()
+    let mut texts = Texts::new();
+    for item in named {
+        let name = match &item.kind {
+            ItemKind::Also(also) => {
+                let on: Vec<&str> = also.on.iter().map(|name| name.text.as_str()).collect();
+                format!(" {}", listed(&on))
+            }
+            kind => kind.name().map_or(String::new(), |name| format!(" `{}`", name.text)),
+        };
+        let text = texts.entry((item.kind.keyword().to_owned(), name)).or_default();
+        // Effects of every step, and more effects of an action, may stand in several places.
+        text.push_str(&print_item(&item.kind));
+        text.push('\n');
+    }
+    texts
 }
 
 /// Differences between declarations other than rules and actions, which are compared by their meaning.

@@ -7,7 +7,7 @@
 //!
 //! Rows are numbered in the order of the actions, states are drawn in theirs, roads are driven in theirs, and the
 //! first rule that refuses an action gives the reason. So their order is covered. That of enums, odds, constants,
-//! functions and groups has no effect; they are sorted by name.
+//! functions, bodies and groups has no effect; they are sorted by name.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -61,7 +61,12 @@ pub(super) fn meaning(
 fn has_free_order(kind: &ItemKind) -> bool {
     matches!(
         kind,
-        ItemKind::Enum(_) | ItemKind::Odds(_) | ItemKind::Let(_) | ItemKind::Fn(_) | ItemKind::Group(_)
+        ItemKind::Enum(_)
+            | ItemKind::Odds(_)
+            | ItemKind::Let(_)
+            | ItemKind::Fn(_)
+            | ItemKind::Body(_)
+            | ItemKind::Group(_)
     )
 }
 

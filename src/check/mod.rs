@@ -7,6 +7,7 @@
 //! `explain` has a page for each diagnostic code.
 
 mod action;
+mod body;
 mod checker;
 mod declaration;
 mod difference;

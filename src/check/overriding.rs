@@ -106,7 +106,10 @@ fn leave_out(
 /// Whether a `use` can leave this declaration out.
 fn is_offered(standing: &Standing<'_>, offered: &[bool]) -> bool {
     offered[standing.file]
-        && matches!(standing.item.kind, ItemKind::Action(_) | ItemKind::Group(_) | ItemKind::Rule(_))
+        && matches!(
+            standing.item.kind,
+            ItemKind::Action(_) | ItemKind::Group(_) | ItemKind::Also(_) | ItemKind::Rule(_)
+        )
 }
 
 /// The names that a `use` leaves out; for a group also its members.
@@ -164,6 +167,13 @@ fn keeps_something(
             item.to_mut().kind = ItemKind::Group(kept);
             is_kept
         }
+        ItemKind::Also(also) if also.on.iter().any(gone) => {
+            let mut kept = also.clone();
+            kept.on.retain(|target| !gone(target));
+            let is_kept = !kept.on.is_empty();
+            item.to_mut().kind = ItemKind::Also(kept);
+            is_kept
+        }
         ItemKind::Rule(rule) => match &rule.body {
             RuleBody::Holds { on, condition } if on.is_empty() => {
                 let mut named = BTreeSet::new();
@@ -185,11 +195,14 @@ fn keeps_something(
     }
 }
 
-/// What decides which actions a rule without `on` binds: the states that the actions set, and the gaps if one
-/// of them spawns.
+/// What decides which actions a rule without `on` binds: the states that steps set, and the gaps if an action spawns.
 fn touched<'a>(items: impl Iterator<Item = &'a Item>) -> BTreeSet<String> {
-    let actions = items.filter_map(|item| item.kind.plain().as_action());
-    let effects = actions.flat_map(|action| &action.effects);
+    let effects = items.flat_map(|item| match item.kind.plain() {
+        ItemKind::Action(action) => action.effects.as_slice(),
+        ItemKind::Also(also) => &also.effects,
+        ItemKind::EachStep(effects) => effects,
+        _ => &[],
+    });
     let gaps = Fact::ALL.iter().filter(|fact| fact.known() == Known::Spawn);
     let gaps: Vec<String> = gaps.map(|fact| fact.name().to_owned()).collect();
     effects

@@ -33,6 +33,7 @@ pub enum Symbol {
     Parameter(String, String),
     Group(String),
     Rule(String),
+    Body(String),
     Road(String),
     Verdict(String),
     Scenario(String),
@@ -224,6 +225,7 @@ impl Symbol {
             | Symbol::Parameter(_, name)
             | Symbol::Group(name)
             | Symbol::Rule(name)
+            | Symbol::Body(name)
             | Symbol::Road(name)
             | Symbol::Verdict(name)
             | Symbol::Scenario(name)
@@ -371,6 +373,7 @@ impl References {
                 self.declare(item, Symbol::Group, parts.collect());
             }
             ItemKind::Rule(_) => self.declare(item, Symbol::Rule, Vec::new()),
+            ItemKind::Body(_) => self.declare(item, Symbol::Body, Vec::new()),
             ItemKind::Road(_) => self.declare(item, Symbol::Road, Vec::new()),
             ItemKind::Verdict(_) => self.declare(item, Symbol::Verdict, Vec::new()),
             ItemKind::Scenario(_) => self.declare(item, Symbol::Scenario, Vec::new()),
@@ -378,6 +381,8 @@ impl References {
             ItemKind::Language(_)
             | ItemKind::Use(_)
             | ItemKind::Odds(_)
+            | ItemKind::Also(_)
+            | ItemKind::EachStep(_)
             | ItemKind::Episode(_)
             | ItemKind::Reward(_)
             | ItemKind::Expect(_)

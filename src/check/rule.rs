@@ -82,7 +82,7 @@ impl Checker {
             }
             bindings.push(RuleBinding { action, condition });
         }
-        if bindings.is_empty() && self.start_condition(&rule.body).is_none() {
+        if bindings.is_empty() {
             let help = "a rule without `on` binds the actions that spawn, or that set a state it names";
             self.binds_nothing(rule, help);
         }
@@ -141,7 +141,8 @@ impl Checker {
                 EffectDef::Set(set) => reads_state(&compiled, &self.states[set.state]),
             })
         };
-        let open = compiled.known() != Known::Spawn && !compiled.reads_memory();
+        let each_step = self.each_step.iter().any(|set| reads_state(&compiled, &self.states[set.state]));
+        let open = each_step || compiled.known() != Known::Spawn && !compiled.reads_memory();
         let all = self.actions.iter().enumerate();
         let bound = all.filter(|(index, a)| {
             a.as_ref().is_some_and(|a| open || binds(a) || self.half_broken.contains(index))
@@ -151,7 +152,7 @@ impl Checker {
 
     /// Reports a name that is a parameter of some actions but not of every bound action. Gives the bound actions
     /// that lack it.
-    fn lacking_parameters(
+    pub(super) fn lacking_parameters(
         &mut self,
         rule: &ast::Name,
         targets: &[usize],
@@ -255,6 +256,7 @@ impl Checker {
         };
         let sets = |action: &ActionDef| {
             action.effects.iter().any(|effect| matches!(effect, EffectDef::Set(set) if may_set(set)))
+                || self.each_step.iter().any(may_set)
         };
         let all = self.actions.iter().enumerate();
         let actions: Vec<usize> =

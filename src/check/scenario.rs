@@ -3,6 +3,8 @@
 use std::cell::Cell;
 use std::sync::Arc;
 
+use core::ops::Range;
+
 use crate::check::checker::docs;
 use crate::check::names::unknown;
 use crate::check::report::Report;
@@ -15,8 +17,8 @@ use crate::model::scenario::{
 };
 use crate::model::vocabulary::{Fact, OriginField, Priority, ScenarioClaim, StartField, WAIT, Word};
 use crate::model::{
-    AMBIENT_MAX, Domain, Initial, Memory, Parameter, Row, RulesInForce, SIGNAL_PHASE_S, Space, StateDef,
-    Value, code, locals,
+    AMBIENT_MAX, Domain, Initial, Memory, Parameter, RoadFacts, Row, RulesInForce, SIGNAL_PHASE_S, Space,
+    StateDef, Value, code, locals,
 };
 use crate::syntax::ast::{BinaryOp, ClauseKind, Comparison};
 use crate::syntax::{Diagnostic, ast, listed};
@@ -250,6 +252,8 @@ impl<'a> Reader<'a> {
         let in_force = self.in_force(origin);
         let mut steps: Vec<ScenarioStep> = Vec::new();
         let mut history = vec![(0, start.clone())];
+        // The number of steps that are over.
+        let mut over = 0;
         for step in declared {
             let Ok(number) = step.number.digits.parse::<u64>() else {
                 let error = Diagnostic::error(code::STEP_ORDER, "the number of the step is too large");
@@ -266,7 +270,11 @@ impl<'a> Reader<'a> {
                 self.report(error.at(step.number.span, format!("less than {STEPS_MAX} is possible")));
                 continue;
             }
-            if self.is_wait(step) {
+            let rules = (road.map(|road| &self.space.roads[road].facts), &in_force);
+            let waits = self.is_wait(step);
+            self.wait(over..number + u64::from(waits), rules, &mut history);
+            over = over.max(number + 1);
+            if waits {
                 steps.push(ScenarioStep { number, row: None, drawn: Vec::new() });
                 continue;
             }
@@ -283,6 +291,24 @@ impl<'a> Reader<'a> {
             steps.push(ScenarioStep { number, row: Some(row.index), drawn });
         }
         steps
+    }
+
+    /// Steps without an action change the states too, whether they are written or left out.
+    fn wait(
+        &self,
+        steps: Range<u64>,
+        (road, in_force): (Option<&RoadFacts>, &RulesInForce),
+        history: &mut Vec<(u64, Memory)>,
+    ) {
+        for number in steps {
+            let before = &history[history.len() - 1].1;
+            let after = self.space.memory_after_wait(before, road, in_force);
+            if after == *before {
+                // So it goes on until the next action.
+                return;
+            }
+            history.push((number, after));
+        }
     }
 
     /// `wait()` is a step without an action, unless the space has an action of that name.

@@ -31,6 +31,12 @@ fn names(kind: &ItemKind, into: &mut Vec<Diagnostic>) {
                 }
             }
         }
+        ItemKind::Body(declared) => {
+            let name = &declared.name;
+            if name.text.starts_with(|first: char| first.is_ascii_lowercase()) {
+                into.push(named(name, "bodies begin with a capital letter", capital(&name.text)));
+            }
+        }
         // It bears the name of an enum.
         ItemKind::Odds(_) => {}
         _ => {

@@ -102,6 +102,11 @@ fn names_of_item<'a>(kind: &'a ItemKind, used: &mut BTreeSet<&'a str>) {
             declared.effects.iter().for_each(|effect| names_of_effect(effect, used));
         }
         ItemKind::Group(declared) => used.extend(declared.members.iter().map(|name| name.text.as_str())),
+        ItemKind::Also(declared) => {
+            used.extend(declared.on.iter().map(|name| name.text.as_str()));
+            declared.effects.iter().for_each(|effect| names_of_effect(effect, used));
+        }
+        ItemKind::EachStep(effects) => effects.iter().for_each(|effect| names_of_effect(effect, used)),
         ItemKind::Rule(declared) => match &declared.body {
             ast::RuleBody::Holds { on, condition } => {
                 used.extend(on.iter().map(|name| name.text.as_str()));
@@ -115,7 +120,7 @@ fn names_of_item<'a>(kind: &'a ItemKind, used: &mut BTreeSet<&'a str>) {
                 }
             }
         },
-        ItemKind::Road(block) => names_of_fields(&block.fields, used),
+        ItemKind::Body(block) | ItemKind::Road(block) => names_of_fields(&block.fields, used),
         ItemKind::Episode(fields) => names_of_fields(fields, used),
         ItemKind::Reward(cases) => {
             for case in cases {

@@ -156,6 +156,9 @@ pub struct DocArguments {
 
 #[derive(Debug, Args)]
 pub struct NewArguments {
+    /// Write an example instead, with the files that it uses.
+    #[arg(long, value_name = "NAME", value_parser = super::new::template_names())]
+    pub template: Option<String>,
     /// Made if need be; no file in it is replaced.
     pub directory: PathBuf,
 }

@@ -53,6 +53,12 @@ fn page(space: &Space) -> String {
         }
         text.push('\n');
     }
+    if !space.each_step.is_empty() {
+        let mut set: Vec<String> =
+            space.each_step.iter().map(|set| format!("`{}`", space.states[set.state].name)).collect();
+        set.dedup();
+        let _ = writeln!(text, "Every step ends with a change of {}.\n", set.join(", "));
+    }
     if !space.enums.is_empty() {
         text.push_str("## Enums\n\n| enum | variants | meaning |\n|---|---|---|\n");
         for declared in &space.enums {

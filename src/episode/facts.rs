@@ -133,7 +133,14 @@ mod tests {
             closing_speed_mps: 1.0,
             priority: Priority::None,
         };
-        Collision { contact, step: 0, body: Body::Sedan, verb: Verb::DriveAhead, spawned_s: 5.0 }
+        Collision {
+            contact,
+            step: 0,
+            body: Body::Sedan,
+            mass_t: 1.55,
+            verb: Verb::DriveAhead,
+            spawned_s: 5.0,
+        }
     }
 
     #[test]

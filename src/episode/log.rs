@@ -40,6 +40,8 @@ pub struct StepLog {
     /// The state vector before the action, shape `(STATE_LEN,)`.
     pub state: StateVector,
     pub outcome: Outcome,
+    /// The states of the space after the action, or after a step without one.
+    pub memory: Memory,
     /// Largest collision probability of the observation period, in `[0, 1]`.
     pub proc: f64,
     pub reward: f64,
@@ -67,19 +69,17 @@ pub struct Collision {
     /// Index of the step in which it happened.
     pub step: usize,
     pub body: Body,
+    /// Mass of the obstacle, t.
+    pub mass_t: f64,
     pub verb: Verb,
     /// When the obstacle appeared, s.
     pub spawned_s: f64,
 }
 
 impl EpisodeLog {
-    /// The states of the space after the action of a step.
+    /// The states of the space after the action of a step; those at the start if there is no such step.
     pub fn memory_after(&self, step: usize) -> &Memory {
-        let done = self.steps.iter().take(step + 1).rev().find_map(|step| match &step.outcome {
-            Outcome::Done { draw, .. } => Some(&draw.memory_after),
-            Outcome::Passed | Outcome::Refused { .. } => None,
-        });
-        done.unwrap_or(&self.memory)
+        self.steps.get(step).map_or(&self.memory, |step| &step.memory)
     }
 
     /// SHA-256 over every bit of the world's state after every tick; zeros if there was no step.

@@ -188,6 +188,15 @@ impl Play {
         Outcome::Done { draw, spawned }
     }
 
+    /// What every step does, in a step without an action.
+    fn wait(&mut self, setup: &Setup) {
+        let (effects, memory) = setup.table.wait(&self.memory, setup.road, setup.rules);
+        for effect in effects {
+            self.world.apply(&effect).expect("weather and time of day need no place");
+        }
+        self.memory = memory;
+    }
+
     /// Drives for one observation period (OTP), or until the goal.
     fn observation_period(
         &mut self,
@@ -196,6 +205,9 @@ impl Play {
         outcome: Outcome,
         watch: &mut Watch,
     ) {
+        if !matches!(outcome, Outcome::Done { .. }) {
+            self.wait(setup);
+        }
         let time_s = self.world.time_s();
         let station_m = self.world.ego_station_m();
         let mut near: Option<Near> = None;
@@ -228,7 +240,8 @@ impl Play {
         let trace = self.trace.clone().finalize().into();
         let state = observation.state;
         let perception = mdp::perception_counts(&self.world, self.ads.status());
-        self.steps.push(StepLog { time_s, state, outcome, proc, reward, perception, trace });
+        let memory = self.memory.clone();
+        self.steps.push(StepLog { time_s, state, outcome, memory, proc, reward, perception, trace });
     }
 
     /// One physics step; returns the collision probability after it. It is 1 at the tick of a contact. After that
@@ -263,6 +276,7 @@ impl Play {
             contact,
             step: self.steps.len(),
             body: obstacle.body,
+            mass_t: self.world.mass_t(contact.obstacle).unwrap_or(0.0),
             verb: obstacle.verb,
             spawned_s: obstacle.spawned_tick as f64 * DT_S,
         }

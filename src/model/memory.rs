@@ -1,8 +1,11 @@
 //! How the memory begins and how actions change it.
 
 use crate::model::eval::{Facts, evaluate};
+use crate::model::expr::ExprKind;
 use crate::model::rules::RulesInForce;
-use crate::model::space::{EffectDef, Initial, Road, SetDef, Space, StateDef, StateMeaning};
+use crate::model::space::{
+    EffectDef, Initial, Road, RoadFacts, RuleBody, SetDef, Space, StateDef, StateMeaning,
+};
 use crate::model::value::{Memory, Type, Value};
 use crate::model::vocabulary::{Level, TimeOfDay};
 use crate::rng;
@@ -94,22 +97,68 @@ impl Space {
         plain
     }
 
-    /// The memory after an action with these parameter values.
+    /// The memory after a step with this action and these parameter values.
     pub(crate) fn memory_after(&self, action: usize, locals: &[Value], before: &Memory) -> Memory {
         let mut after = before.clone();
         for effect in &self.actions[action].effects {
-            let EffectDef::Set(set) = effect else { continue };
-            let SetDef { state, key, value, .. } = &**set;
-            let facts = Facts::new(locals, &after);
-            let value = evaluate(value, &self.functions, &facts);
-            let key = key.as_ref().map(|key| evaluate(key, &self.functions, &facts).variant());
-            let state = &self.states[*state];
-            match key {
-                Some(key) => after.cells[state.first_cell + key] = value,
-                None => after.cells[state.first_cell..][..state.cells].fill(value),
+            if let EffectDef::Set(set) = effect {
+                self.change(&mut after, set, locals);
             }
         }
+        self.each_step.iter().for_each(|set| self.change(&mut after, set, &[]));
         after
+    }
+
+    /// The memory after a step without an action. If the effects of every step would break a rule in force that
+    /// stands for all states or orders their changes, they do not happen.
+    pub fn memory_after_wait(
+        &self,
+        before: &Memory,
+        road: Option<&RoadFacts>,
+        rules: &RulesInForce,
+    ) -> Memory {
+        let mut after = before.clone();
+        self.each_step.iter().for_each(|set| self.change(&mut after, set, &[]));
+        let is_broken = |rule: usize| {
+            let rule = &self.rules[rule];
+            let facts = Facts { road, ..Facts::new(&[], &after) };
+            let start = rule.start.as_ref();
+            let stands = start.is_none_or(|start| evaluate(start, &self.functions, &facts).truth());
+            !stands
+                || match &rule.body {
+                    RuleBody::Holds(_) => false,
+                    RuleBody::Moves { cell, allowed, .. } => {
+                        let [from, to] = [before, &after].map(|memory| memory.cells[*cell].variant());
+                        self.may_set_each_step(*cell) && !allowed[from][to]
+                    }
+                }
+        };
+        if self.each_step.is_empty() || rules.all().any(is_broken) { before.clone() } else { after }
+    }
+
+    /// Whether the effects of every step may set a cell.
+    pub(crate) fn may_set_each_step(&self, cell: usize) -> bool {
+        self.each_step.iter().any(|set| self.sets_cell(set, cell))
+    }
+
+    /// Whether an effect sets a cell, as far as its key is written out.
+    pub(crate) fn sets_cell(&self, set: &SetDef, cell: usize) -> bool {
+        let position = self.states[set.state].position_of(cell);
+        position.is_some_and(|position| match set.key.as_ref().map(|key| &key.kind) {
+            Some(ExprKind::Variant(_, key)) => *key == position,
+            _ => true,
+        })
+    }
+
+    fn change(&self, memory: &mut Memory, set: &SetDef, locals: &[Value]) {
+        let facts = Facts::new(locals, memory);
+        let value = evaluate(&set.value, &self.functions, &facts);
+        let key = set.key.as_ref().map(|key| evaluate(key, &self.functions, &facts).variant());
+        let state = &self.states[set.state];
+        match key {
+            Some(key) => memory.cells[state.first_cell + key] = value,
+            None => memory.cells[state.first_cell..][..state.cells].fill(value),
+        }
     }
 
     /// Draws a value of a type. The checker allows `any` states only for finite types.

@@ -5,6 +5,7 @@
 //! Its expressions are [`expr::Expr`], and [`evaluate`] is their one evaluator. A [`Row`] is one entry of the
 //! action table; [`Memory`] holds the values of the states during an episode.
 
+pub mod body;
 pub mod code;
 mod digest;
 mod eval;
@@ -38,8 +39,8 @@ pub use scenario::{
     ScenarioStart, ScenarioStep,
 };
 pub use space::{
-    ActionDef, COUNTED, Domain, EffectDef, EnumDef, EpisodeDef, FnDef, GroupDef, Initial, Parameter,
-    RewardCase, Road, RoadFacts, RuleBinding, RuleBody, RuleDef, SetDef, Space, SpawnDef, StateDef,
-    StateMeaning, VerdictDef, WordExpr,
+    ActionDef, BodyDef, BodyWord, COUNTED, Domain, EffectDef, EnumDef, EpisodeDef, FnDef, GroupDef, Initial,
+    Parameter, RewardCase, Road, RoadFacts, RuleBinding, RuleBody, RuleDef, SetDef, Space, SpawnDef,
+    StateDef, StateMeaning, VerdictDef, WordExpr,
 };
 pub use value::{EnumIndex, Memory, Type, Value};

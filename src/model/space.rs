@@ -4,6 +4,7 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use crate::model::body::BodyParameters;
 use crate::model::expr::Expr;
 use crate::model::meaning::Meaning;
 use crate::model::row::Row;
@@ -29,9 +30,12 @@ pub struct Space {
     pub docs: Vec<String>,
     pub enums: Vec<EnumDef>,
     pub states: Vec<StateDef>,
+    pub bodies: Vec<BodyDef>,
     pub functions: Vec<FnDef>,
     pub actions: Vec<ActionDef>,
     pub groups: Vec<GroupDef>,
+    /// What happens at the end of every step, after the effects of its action.
+    pub each_step: Vec<SetDef>,
     pub rules: Vec<RuleDef>,
     pub episode: EpisodeDef,
     /// The first case that applies gives the reward.
@@ -99,6 +103,24 @@ pub enum StateMeaning {
     Sky(Vec<Phenomenon>, Vec<Level>),
 }
 
+/// A body of the author's own.
+#[derive(Debug, Clone, PartialEq)]
+pub struct BodyDef {
+    pub name: String,
+    pub docs: Vec<String>,
+    pub like: Body,
+    pub shape: BodyParameters,
+    pub span: Span,
+}
+
+/// What a spawn calls a body: one of the engine, or one of the author's own that is like it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct BodyWord {
+    pub like: Body,
+    /// Index in [`Space::bodies`].
+    pub own: Option<usize>,
+}
+
 /// A pure function; its parameters are the locals of its body.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FnDef {
@@ -115,6 +137,7 @@ pub struct ActionDef {
     pub docs: Vec<String>,
     /// `each` and `any` parameters, in the order of declaration: the locals of the action's expressions.
     pub parameters: Vec<Parameter>,
+    /// Its own, then those that `on … also` adds.
     pub effects: Vec<EffectDef>,
     pub span: Span,
 }
@@ -198,7 +221,7 @@ pub struct SetDef {
 /// How a spawn request is made from an action's parameters.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SpawnDef {
-    pub body: WordExpr<Body>,
+    pub body: WordExpr<BodyWord>,
     pub colour: WordExpr<Colour>,
     pub verb: WordExpr<Verb>,
     pub lane: WordExpr<LaneChoice>,
@@ -211,7 +234,7 @@ pub struct SpawnDef {
     /// Whether the file says `behind`; the verb decides which place that is.
     pub behind: bool,
     /// The parked vehicle from behind which a pedestrian steps.
-    pub cover: Option<WordExpr<Body>>,
+    pub cover: Option<WordExpr<BodyWord>>,
     pub span: Span,
 }
 

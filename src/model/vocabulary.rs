@@ -165,6 +165,7 @@ pub const TYPES: &[(&str, Type, &str)] = &[
     ("Speed", SPEED, "In `m/s`, `km/h` or `mph`."),
     ("Accel", Type::Quantity(Dimension::ACCEL), "In `m/s^2`."),
     ("Angle", Type::Quantity(Dimension::ANGLE), "In `deg` or `rad`."),
+    ("Mass", Type::Quantity(Dimension::MASS), "In `kg`."),
     ("Ratio", RATIO, "A number without a unit, or with `%`."),
 ];
 
@@ -266,6 +267,18 @@ words! {
 }
 
 words! {
+    BodyField "A field of `body`.":
+    Like "like" = "The body of the engine that it is like: what it does not say itself, it has from there.",
+    Length "length" = "How long it is.",
+    Width "width" = "How wide it is.",
+    Height "height" = "How high it is.",
+    Wheelbase "wheelbase" = "From the rear axle to the front axle.",
+    Mass "mass" = "How heavy it is.",
+    Acceleration "acceleration" = "How fast it can gain speed.",
+    Deceleration "deceleration" = "How hard it can brake on a dry road.",
+}
+
+words! {
     SpawnField "A field of `spawn`.":
     Does "does" = "What the road user does: a verb of the engine.",
     Lane "lane" = "Its lane, seen from the ego vehicle: `Left`, `Current` or `Right`.",
@@ -341,7 +354,8 @@ words! {
 }
 
 words! {
-    Body "The body of a road user.": Jeep, Sedan, SUV, Hatchback, BoxTruck, SchoolBus, Pedestrian
+    Body "The body of a road user.": Jeep, Sedan, SUV, Hatchback, BoxTruck, SchoolBus, Pedestrian, Motorcycle,
+    Bicycle = "It rides on the road, as a vehicle does.",
 }
 
 words! {
@@ -434,6 +448,10 @@ impl Body {
     /// Everything on wheels.
     pub fn is_vehicle(self) -> bool {
         self != Body::Pedestrian
+    }
+
+    pub fn has_two_wheels(self) -> bool {
+        matches!(self, Body::Motorcycle | Body::Bicycle)
     }
 }
 

@@ -8,7 +8,7 @@
 
 use crate::episode::Collision;
 use crate::geometry::Vec2;
-use crate::sim::{VehicleParameters, body_mass_t};
+use crate::sim::VehicleParameters;
 
 use crate::episode::side;
 
@@ -40,7 +40,7 @@ pub fn severity(collision: &Collision) -> Severity {
     let obstacle_mps = contact.obstacle_velocity_on_ego_mps;
     let (ahead_mps, left_mps) = (contact.ego_speed_mps - obstacle_mps.x, obstacle_mps.y);
     let relative_speed_mps = (ahead_mps * ahead_mps + left_mps * left_mps).sqrt();
-    let (ego_t, other_t) = (VehicleParameters::MKZ.mass_t, body_mass_t(collision.body));
+    let (ego_t, other_t) = (VehicleParameters::MKZ.mass_t, collision.mass_t);
     let part = |mass_t: f64| mass_t / (ego_t + other_t) * contact.closing_speed_mps;
     Severity {
         closing_speed_mps: contact.closing_speed_mps,
@@ -66,6 +66,7 @@ fn approach(velocity_mps: Vec2) -> &'static str {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::model::body::parameters;
     use crate::model::vocabulary::{Body, Priority, Verb};
     use crate::sim::Contact;
 
@@ -83,12 +84,14 @@ mod tests {
             priority: Priority::None,
         };
         for body in [Body::SchoolBus, Body::Hatchback, Body::Pedestrian] {
-            let collision = Collision { contact, step: 0, body, verb: Verb::DriveAhead, spawned_s: 5.0 };
+            let mass_t = parameters(body).mass_t;
+            let collision =
+                Collision { contact, step: 0, body, mass_t, verb: Verb::DriveAhead, spawned_s: 5.0 };
             let found = severity(&collision);
             assert_eq!((found.relative_speed_mps, found.side, found.approach), (5.0, "front", "along"));
             // It closes at 4 m/s; 3 m/s along the bumper do nothing.
             assert!((found.delta_v_mps + found.obstacle_delta_v_mps - 4.0).abs() < 1e-12);
-            let (ego_t, other_t) = (VehicleParameters::MKZ.mass_t, body_mass_t(body));
+            let (ego_t, other_t) = (VehicleParameters::MKZ.mass_t, parameters(body).mass_t);
             assert!((ego_t * found.delta_v_mps - other_t * found.obstacle_delta_v_mps).abs() < 1e-9);
         }
     }

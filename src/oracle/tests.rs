@@ -194,7 +194,14 @@ fn shipped_space() -> Arc<Space> {
 }
 
 fn counts(contact: Contact, judgement: &Judgement) -> bool {
-    let collision = Collision { contact, step: 0, body: Body::Sedan, verb: Verb::CrossRoad, spawned_s: 0.0 };
+    let collision = Collision {
+        contact,
+        step: 0,
+        body: Body::Sedan,
+        mass_t: 1.55,
+        verb: Verb::CrossRoad,
+        spawned_s: 0.0,
+    };
     let avoidable = judgement.class == Avoidability::Avoidable;
     let facts = OutcomeFacts { avoidable, ..collision_facts(&collision, &[]) };
     shipped_space().counts(facts, &Memory::default())

@@ -8,29 +8,41 @@ impl Space {
     pub(crate) fn cells_after(&self, action: usize, locals: &[Values], before: &[Values]) -> Vec<Values> {
         let mut after = before.to_vec();
         for effect in &self.actions[action].effects {
-            let EffectDef::Set(set) = effect else { continue };
-            let SetDef { state, key, value, .. } = &**set;
-            let known = Known { functions: &self.functions, locals, cells: &after, road: None };
-            let value = enclose(value, &known);
-            let key = key.as_ref().map(|key| enclose(key, &known));
-            let state = &self.states[*state];
-            let cells = &mut after[state.first_cell..][..state.cells];
-            match key {
-                None => cells.fill(value),
-                Some(Values::Variants(set)) if set.is_power_of_two() => {
-                    cells[set.trailing_zeros() as usize] = value;
-                }
-                Some(Values::Variants(set)) => {
-                    let hit = cells.iter_mut().enumerate().filter(|(key, _)| set >> key & 1 == 1);
-                    hit.for_each(|(_, cell)| *cell = cell.union(value));
-                }
-                Some(Values::Truth { .. } | Values::Number(_)) => {}
+            if let EffectDef::Set(set) = effect {
+                self.change_cells(&mut after, set, locals);
             }
         }
+        self.each_step.iter().for_each(|set| self.change_cells(&mut after, set, &[]));
         after
     }
 
-    /// Whether an action may set a cell.
+    /// [`Space::memory_after_wait`] for sets of values, where no rule is in the way.
+    pub(crate) fn cells_after_wait(&self, before: &[Values]) -> Vec<Values> {
+        let mut after = before.to_vec();
+        self.each_step.iter().for_each(|set| self.change_cells(&mut after, set, &[]));
+        after
+    }
+
+    fn change_cells(&self, memory: &mut [Values], set: &SetDef, locals: &[Values]) {
+        let known = Known { functions: &self.functions, locals, cells: memory, road: None };
+        let value = enclose(&set.value, &known);
+        let key = set.key.as_ref().map(|key| enclose(key, &known));
+        let state = &self.states[set.state];
+        let cells = &mut memory[state.first_cell..][..state.cells];
+        match key {
+            None => cells.fill(value),
+            Some(Values::Variants(set)) if set.is_power_of_two() => {
+                cells[set.trailing_zeros() as usize] = value;
+            }
+            Some(Values::Variants(set)) => {
+                let hit = cells.iter_mut().enumerate().filter(|(key, _)| set >> key & 1 == 1);
+                hit.for_each(|(_, cell)| *cell = cell.union(value));
+            }
+            Some(Values::Truth { .. } | Values::Number(_)) => {}
+        }
+    }
+
+    /// Whether a step with an action may set a cell.
     pub(crate) fn may_set(&self, action: usize, locals: &[Values], cell: usize) -> bool {
         let unknown = self.cells_unknown();
         let known = Known { functions: &self.functions, locals, cells: &unknown, road: None };
@@ -41,7 +53,9 @@ impl Space {
                 Some(Values::Truth { .. } | Values::Number(_)) | None => true,
             })
         };
-        self.actions[action].effects.iter().any(|effect| matches!(effect, EffectDef::Set(set) if may(set)))
+        let effects = &self.actions[action].effects;
+        effects.iter().any(|effect| matches!(effect, EffectDef::Set(set) if may(set)))
+            || self.each_step.iter().any(may)
     }
 
     /// Every value of every cell.

@@ -15,6 +15,8 @@ struct Graph<'a> {
     allowed: &'a [Vec<bool>],
     /// Rows that set the state, and the values that each may set, as bits.
     rows: Vec<(&'a Row, u128)>,
+    /// Values that a step without an action may set, as bits.
+    waits: u128,
     /// Values that an episode may begin with, as bits.
     begin: u128,
 }
@@ -100,7 +102,11 @@ fn graph<'a>(space: &'a Space, rule: &'a RuleDef) -> Option<Graph<'a>> {
             Values::Truth { .. } | Values::Number(_) => (row, 0),
         }
     });
-    Some(Graph { allowed, rows: rows.collect(), begin })
+    let waits = match space.cells_after_wait(&space.cells_unknown())[*cell] {
+        Values::Variants(set) if space.may_set_each_step(*cell) => set,
+        Values::Variants(_) | Values::Truth { .. } | Values::Number(_) => 0,
+    };
+    Some(Graph { allowed, rows: rows.collect(), waits, begin })
 }
 
 /// The values with which a cell may begin on some road, as bits; `None` if there are too many starts to look at.
@@ -141,7 +147,7 @@ impl<'a> Graph<'a> {
     fn reached(&self) -> u128 {
         let mut reached = self.begin;
         loop {
-            let sets = self.rows.iter().fold(0, |all, (_, sets)| all | sets);
+            let sets = self.rows.iter().fold(self.waits, |all, (_, sets)| all | sets);
             let next = bits(reached)
                 .flat_map(|from| bits(sets).filter(move |to| self.allowed[from][*to]))
                 .fold(reached, |all, to| all | 1 << to);

@@ -126,6 +126,12 @@ impl<'a> OnRoad<'a> {
             if !pending.iter().any(|row| self.depends_on_states(row)) {
                 break;
             }
+            let waited = self.space.memory_after_wait(&state, Some(&self.road.facts), self.in_force);
+            match states.len() < STATES_MAX {
+                _ if states.contains(&waited) => {}
+                true => states.push(waited),
+                false => is_complete = false,
+            }
             for row in rows.iter().filter(|row| !matches!(row.roads[index], Reach::Dead { .. })) {
                 let (led_to, are_all) = self.search(row).successors(&state);
                 is_complete &= are_all;

@@ -379,7 +379,10 @@ impl Search<'_> {
             EffectDef::Set(set) => named(&set.value) || set.key.as_ref().is_some_and(named),
             EffectDef::Spawn(spawn) => named(&spawn.speed) || named(&spawn.distance),
         };
-        self.rules.demands().any(|(_, demand)| by_rule(demand)) || self.action().effects.iter().any(by_effect)
+        let by_step = |set: &SetDef| named(&set.value) || set.key.as_ref().is_some_and(named);
+        self.rules.demands().any(|(_, demand)| by_rule(demand))
+            || self.action().effects.iter().any(by_effect)
+            || self.rules.space.each_step.iter().any(by_step)
     }
 }
 

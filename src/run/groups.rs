@@ -90,6 +90,7 @@ impl Database {
 pub(crate) fn kind(body: &str) -> &'static str {
     match Body::from_name(body) {
         Some(Body::Pedestrian) => "pedestrian",
+        Some(Body::Motorcycle | Body::Bicycle) => "two-wheeler",
         Some(Body::BoxTruck | Body::SchoolBus) => "large vehicle",
         Some(Body::Jeep | Body::Sedan | Body::SUV | Body::Hatchback) | None => "car",
     }

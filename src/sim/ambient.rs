@@ -91,8 +91,8 @@ pub(super) fn is_gone(obstacle: &Obstacle, ego: &OrientedBox) -> bool {
 /// A vehicle somewhere on a street, if it may appear there.
 fn draw(around: &Around, nearest_m: f64, id: u32, rng: &mut Rng) -> Option<RoadUser> {
     let (lane, station_m) = around.scene.street_at(rng::unit(rng))?;
-    let bodies = Body::ALL.iter().filter(|body| body.is_vehicle()).count() as u32;
-    let body = *Body::ALL.iter().filter(|body| body.is_vehicle()).nth(rng::below(rng, bodies) as usize)?;
+    let bodies = || Body::ALL.iter().filter(|body| body.is_vehicle() && !body.has_two_wheels());
+    let body = *bodies().nth(rng::below(rng, bodies().count() as u32) as usize)?;
     let colour = Colour::ALL[rng::below(rng, Colour::ALL.len() as u32) as usize];
     let cruise =
         Cruise::Limit(rng::between(rng, around.traffic.limit_part_min, around.traffic.limit_part_max));

@@ -21,7 +21,6 @@
 
 mod ambient;
 mod around;
-mod body;
 mod contact;
 mod ego;
 mod environment;
@@ -46,7 +45,8 @@ mod traffic;
 mod way;
 mod world;
 
-pub use body::body_mass_t;
+use crate::model::body;
+
 pub use contact::Contact;
 pub use ego::{Control, VehicleParameters, pedal_acceleration_mps2, pedals_for};
 pub use following::Following;

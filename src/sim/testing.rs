@@ -73,6 +73,8 @@ pub fn request(verb: Verb, distance_m: f64, speed_mps: f64) -> SpawnRequest {
         then: Then::Keep,
         speed_mps,
         distance_m,
+        shape: None,
+        cover_shape: None,
         cover: None,
     }
 }

@@ -191,6 +191,11 @@ impl World {
         Ok(None)
     }
 
+    /// Mass of a road user, t; `None` if there is none with that id.
+    pub fn mass_t(&self, id: u32) -> Option<f64> {
+        self.users.iter().find(|user| user.obstacle.id == id).map(|user| user.mover.size.mass_t)
+    }
+
     pub fn ticks(&self) -> u64 {
         self.ticks
     }

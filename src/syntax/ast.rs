@@ -155,7 +155,10 @@ kinds! {
     Fn(Fn) "fn" as_fn name;
     Action(Action) "action" as_action name;
     Group(Group) "group" as_group name;
+    Also(Also) "on" as_also;
+    EachStep(Vec<Effect>) "each step" as_each_step;
     Rule(Rule) "rule" as_rule name;
+    Body(Block) "body" as_body name;
     Road(Block) "road" as_road name;
     Episode(Vec<Field>) "episode" as_episode;
     Reward(Vec<Case>) "reward" as_reward;
@@ -329,6 +332,15 @@ pub enum Place {
 pub struct Group {
     pub name: Name,
     pub members: Vec<Name>,
+}
+
+/// `on vehicles also { set spawned = spawned + 1 }`.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Also {
+    /// Actions and groups.
+    pub on: Vec<Name>,
+    /// Each is a `set`.
+    pub effects: Vec<Effect>,
 }
 
 /// A named constraint.

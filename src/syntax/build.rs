@@ -8,10 +8,10 @@ use std::cell::Cell;
 use pest::iterators::Pair;
 
 use crate::syntax::ast::{
-    Action, ActionParam, Block, Case, Clause, ClauseKind, Effect, EffectKind, Enum, Expect, Expr, Field,
-    FileId, Fn, FnParam, Group, Initial, InitialKey, ItemKind, Let, Move, Name, Number, Odds, ParamMode,
-    Place, Policy, PolicyLine, Rule as NamedRule, RuleBody, Scenario, Span, State, Step, Text, Type,
-    TypeKind, Use, Verdict,
+    Action, ActionParam, Also, Block, Case, Clause, ClauseKind, Effect, EffectKind, Enum, Expect, Expr,
+    Field, FileId, Fn, FnParam, Group, Initial, InitialKey, ItemKind, Let, Move, Name, Number, Odds,
+    ParamMode, Place, Policy, PolicyLine, Rule as NamedRule, RuleBody, Scenario, Span, State, Step, Text,
+    Type, TypeKind, Use, Verdict,
 };
 use crate::syntax::grammar::{Rule, is_plain_terminal};
 use crate::syntax::{Diagnostic, code};
@@ -145,7 +145,19 @@ impl Builder {
                 let name = self.name(parts.next());
                 ItemKind::Group(Group { name, members: self.names(parts.next()) })
             }
+            Rule::also => {
+                let on = self.names(parts.next());
+                ItemKind::Also(Also { on, effects: self.effects(parts)? })
+            }
+            Rule::each_step => {
+                parts.take(Rule::kw_each);
+                ItemKind::EachStep(self.effects(parts)?)
+            }
             Rule::named_rule => ItemKind::Rule(self.rule(parts, span)?),
+            Rule::body => {
+                let name = self.name(parts.next());
+                ItemKind::Body(Block { name, fields: self.fields(parts.next())? })
+            }
             Rule::road => {
                 let name = self.name(parts.next());
                 ItemKind::Road(Block { name, fields: self.fields(parts.next())? })
@@ -220,8 +232,12 @@ impl Builder {
         while let Some(param) = parts.take(Rule::action_param) {
             params.push(self.action_param(param)?);
         }
-        let effects = parts.rest().map(|effect| self.effect(effect)).collect::<Built<_>>()?;
-        Ok(Action { name, params, effects })
+        Ok(Action { name, params, effects: self.effects(parts)? })
+    }
+
+    /// All effects that are left.
+    fn effects(&self, parts: Parts<'_>) -> Built<Vec<Effect>> {
+        parts.rest().map(|effect| self.effect(effect)).collect()
     }
 
     fn action_param(&self, pair: Pair<'_, Rule>) -> Built<ActionParam> {

@@ -147,7 +147,8 @@ impl Reader<'_> {
         if start >= end {
             return None;
         }
-        if declarations().any(|word| word == found) {
+        // More effects and those of every step begin with a word of another clause.
+        if declarations().chain(["on", "each"]).any(|word| word == found) {
             let (at, expected) = self.failure(start, end);
             return Some(self.expected(at, expected, (start, end)));
         }

@@ -248,7 +248,19 @@ impl Printer<'_> {
                 let head = format!("group {} =", item.name.text);
                 self.list(&head, ",", &item.members, span);
             }
+            ItemKind::Also(item) => {
+                self.sets(&format!("on {} also ", names(&item.on)), &item.effects, span);
+            }
+            ItemKind::EachStep(effects) => self.sets("each step ", effects, span),
             ItemKind::Rule(item) => self.rule(item, span),
+            ItemKind::Body(item) => {
+                self.words(&format!("body {} ", item.name.text));
+                let layout = fields(&item.fields);
+                match self.comment_between(span.start, span.end) || !self.fits(&layout) {
+                    true => self.field_lines(&item.fields, span.end),
+                    false => self.words(&layout.flat()),
+                }
+            }
             ItemKind::Road(item) => {
                 self.words(&format!("road {} ", item.name.text));
                 self.field_lines(&item.fields, span.end);
@@ -378,8 +390,26 @@ impl Printer<'_> {
         } else {
             self.params(&item.params, body_start);
         }
+        self.effects(&item.effects, span);
+    }
+
+    /// `head { set … }`: on one line if it is one effect that fits and has no comment.
+    fn sets(&mut self, head: &str, effects: &[Effect], span: Span) {
+        if let ([only], false) = (effects, self.comment_between(span.start, span.end)) {
+            let layout =
+                Layout::row([Layout::text(head), Layout::text("{ "), effect(only), Layout::text(" }")]);
+            if self.fits(&layout) {
+                return self.words(&layout.flat());
+            }
+        }
+        self.words(head);
+        self.effects(effects, span);
+    }
+
+    /// Effects in braces, one a line.
+    fn effects(&mut self, effects: &[Effect], span: Span) {
         self.block(span.end, |printer| {
-            for step in &item.effects {
+            for step in effects {
                 match &step.kind {
                     EffectKind::Set { state, key, value } if matches!(value.kind, ExprKind::Match { .. }) => {
                         printer.entry_of_entries(step.span, |printer| {
@@ -537,7 +567,10 @@ fn one_line(kind: &ItemKind) -> bool {
         ItemKind::Verdict(item) => plain(&item.condition),
         ItemKind::Expect(_) => true,
         ItemKind::Action(_)
+        | ItemKind::Also(_)
+        | ItemKind::EachStep(_)
         | ItemKind::Odds(_)
+        | ItemKind::Body(_)
         | ItemKind::Road(_)
         | ItemKind::Episode(_)
         | ItemKind::Reward(_)

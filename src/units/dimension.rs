@@ -1,13 +1,14 @@
-//! Dimensions: what a quantity measures, as exponents of metre, second and radian.
+//! Dimensions: what a quantity measures, as exponents of metre, second, radian and kilogram.
 
 use core::fmt;
 
-/// `m^metres · s^seconds · rad^radians`.
+/// `m^metres · s^seconds · rad^radians · kg^kilograms`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
 pub struct Dimension {
     pub metres: i8,
     pub seconds: i8,
     pub radians: i8,
+    pub kilograms: i8,
 }
 
 impl Dimension {
@@ -17,6 +18,7 @@ impl Dimension {
     pub const SPEED: Dimension = Dimension::of(1, -1, 0);
     pub const ACCEL: Dimension = Dimension::of(1, -2, 0);
     pub const ANGLE: Dimension = Dimension::of(0, 0, 1);
+    pub const MASS: Dimension = Dimension { kilograms: 1, ..Dimension::RATIO };
 
     /// The dimensions that have a type name in the language, with it and their SI unit.
     pub const NAMED: &'static [(Dimension, &'static str, &'static str)] = &[
@@ -26,10 +28,11 @@ impl Dimension {
         (Dimension::SPEED, "Speed", "m/s"),
         (Dimension::ACCEL, "Accel", "m/s^2"),
         (Dimension::ANGLE, "Angle", "rad"),
+        (Dimension::MASS, "Mass", "kg"),
     ];
 
     const fn of(metres: i8, seconds: i8, radians: i8) -> Dimension {
-        Dimension { metres, seconds, radians }
+        Dimension { metres, seconds, radians, kilograms: 0 }
     }
 
     /// The dimension of a product; `None` beyond exponents of ±127.
@@ -38,6 +41,7 @@ impl Dimension {
             metres: self.metres.checked_add(other.metres)?,
             seconds: self.seconds.checked_add(other.seconds)?,
             radians: self.radians.checked_add(other.radians)?,
+            kilograms: self.kilograms.checked_add(other.kilograms)?,
         })
     }
 
@@ -47,6 +51,7 @@ impl Dimension {
             metres: self.metres.checked_sub(other.metres)?,
             seconds: self.seconds.checked_sub(other.seconds)?,
             radians: self.radians.checked_sub(other.radians)?,
+            kilograms: self.kilograms.checked_sub(other.kilograms)?,
         })
     }
 
@@ -55,7 +60,7 @@ impl Dimension {
         if let Some((_, _, unit)) = Dimension::NAMED.iter().find(|(dimension, _, _)| *dimension == self) {
             return (*unit).to_owned();
         }
-        let powers = [(self.metres, "m"), (self.seconds, "s"), (self.radians, "rad")];
+        let powers = [(self.metres, "m"), (self.seconds, "s"), (self.radians, "rad"), (self.kilograms, "kg")];
         let factor = |(power, base): (i8, &str)| match power {
             1 => base.to_owned(),
             _ => format!("{base}^{power}"),

@@ -43,6 +43,7 @@ pub const UNITS: &[Unit] = &[
     // so that `deg` becomes the same f64 as with the true value.
     Unit::exact("deg", Dimension::ANGLE, 1_068_966_896, 340_262_731 * 180),
     Unit::exact("rad", Dimension::ANGLE, 1, 1),
+    Unit::exact("kg", Dimension::MASS, 1, 1),
     Unit::exact("%", Dimension::RATIO, 1, 100),
 ];
 

@@ -11,6 +11,7 @@ mod disks;
 mod drives;
 mod editor;
 mod emitted;
+mod examples;
 mod failures;
 mod faults;
 mod help;

@@ -12,19 +12,20 @@ use avastra::syntax::{Diagnostic, format};
 
 use crate::cases::{cases, root};
 use crate::command::{avastra, outcome};
+use crate::examples::example;
 use crate::world::{Wide, assert_replays, read, run_of, space_at};
 
 fn wish(name: &str) -> ActionTable {
     ActionTable::new(space_at(&format!("tests/cases/wishes/{name}.ava")))
 }
 
-fn row(table: &ActionTable, label: &str) -> usize {
+pub fn row(table: &ActionTable, label: &str) -> usize {
     let mut rows = table.rows().iter();
     rows.position(|row| row.label == label).unwrap_or_else(|| panic!("no row `{label}`"))
 }
 
 /// The legal draws of a row on a road, one for each of this many seeds at most.
-fn draws(table: &ActionTable, row: usize, road: usize, memory: &Memory, seeds: u64) -> Vec<Draw> {
+pub fn draws(table: &ActionTable, row: usize, road: usize, memory: &Memory, seeds: u64) -> Vec<Draw> {
     let rules = RulesInForce::new(table.space(), &[], &[]).expect("no rule is named");
     let road = &table.space().roads[road];
     let offer = |seed| {
@@ -218,7 +219,7 @@ fn pedestrians_come_only_while_the_ego_vehicle_drives() {
 
 #[test]
 fn no_vehicle_appears_near_a_junction() {
-    let table = wish("no_spawn_near_junctions");
+    let table = example("away_from_junctions");
     let run = run_of(table.space().clone(), 1, 4, &[]);
     let (mut refused, mut appeared) = (BTreeSet::new(), 0);
     for number in 0..run.episodes() {
@@ -255,7 +256,7 @@ fn no_vehicle_appears_near_a_junction() {
 
 #[test]
 fn near_misses_of_pedestrians_weigh_double() {
-    let table = wish("pedestrians_weigh_double");
+    let table = example("pedestrians_weigh_double");
     let run = run_of(table.space().clone(), 1, 8, &[]);
     let pedestrians = ["pedestrian(from: Left)", "pedestrian(from: Right)"].map(|label| row(&table, label));
     let (mut double, mut single) = (0, 0);

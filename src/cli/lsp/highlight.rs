@@ -38,7 +38,7 @@ pub fn tokens(analysis: &Analysis) -> Vec<usize> {
 
 fn kind(symbol: &Symbol) -> Option<(usize, u32)> {
     let (name, modifiers) = match symbol {
-        Symbol::Enum(_) => ("enum", 0),
+        Symbol::Enum(_) | Symbol::Body(_) => ("enum", 0),
         Symbol::Variant(..) => ("enumMember", 0),
         Symbol::State(_) => ("variable", 0),
         Symbol::Constant(_) => ("variable", READONLY),

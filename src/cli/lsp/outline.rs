@@ -40,9 +40,9 @@ fn kind(item: &Item) -> Option<u32> {
         ItemKind::State(_) => VARIABLE,
         ItemKind::Let(_) => CONSTANT,
         ItemKind::Fn(_) => FUNCTION,
-        ItemKind::Action(_) => EVENT,
+        ItemKind::Action(_) | ItemKind::Also(_) | ItemKind::EachStep(_) => EVENT,
         ItemKind::Rule(_) | ItemKind::Verdict(_) => OPERATOR,
-        ItemKind::Road(_) | ItemKind::Episode(_) | ItemKind::Reward(_) => OBJECT,
+        ItemKind::Body(_) | ItemKind::Road(_) | ItemKind::Episode(_) | ItemKind::Reward(_) => OBJECT,
         ItemKind::Scenario(_) | ItemKind::Policy(_) => MODULE,
     })
 }
