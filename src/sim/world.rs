@@ -28,7 +28,7 @@ use super::traffic::TrafficProfile;
 
 /// Name of this simulated world. Raised whenever the same seed no longer gives the same episode, so
 /// that an old scenario is told apart from a refuted one.
-pub const ENGINE: &str = "plane/4";
+pub const ENGINE: &str = "plane/5";
 
 /// One physics step, s: 50 Hz.
 pub const DT_S: f64 = TICK_MS as f64 / 1000.0;

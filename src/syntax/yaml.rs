@@ -29,7 +29,9 @@ pub fn yaml_mistake(error: &serde_yaml::Error, text: &str) -> String {
                 None => format!("there is no `{name}`; there are {}", listed(&known)),
             }
         }
-        None if what.starts_with("invalid floating point") => format!("{}write a number", of(field)),
+        None if what.starts_with("invalid floating point") || what.starts_with("non-finite float") => {
+            format!("{}write a number", of(field))
+        }
         None if what.starts_with("invalid u") || what.starts_with("invalid i") => {
             format!("{}write a whole number", of(field))
         }
@@ -61,7 +63,9 @@ mod tests {
         assert_eq!(said("seed: 3\npace_mp: 4\n"), "line 2: there is no `pace_mp`; did you mean `pace_mps`?");
         assert_eq!(said("x: 3\n"), "line 1: there is no `x`; there are `seed`, `pace_mps` and `yields`");
         assert_eq!(said("seed: abc\n"), "line 1: `seed`: write a whole number");
-        assert_eq!(said("pace_mps: fast\n"), "line 1: `pace_mps`: write a number");
+        for number in ["fast", ".nan", "-.inf"] {
+            assert_eq!(said(&format!("pace_mps: {number}\n")), "line 1: `pace_mps`: write a number");
+        }
         assert_eq!(said("seed: 1\nyields: maybe\n"), "line 2: `yields`: write `true` or `false`");
         assert_eq!(said("a: [\n").lines().count(), 1);
     }

@@ -184,7 +184,7 @@ fn codes_and_shells_are_explained() {
     assert_eq!(status, 0);
     assert!(stdout.starts_with("# AV0401: ") && stdout.contains("## Right"), "{stdout}");
     let (_, stdout, _) = outcome(&mut avastra(&["explain"]));
-    assert_eq!(stdout.lines().count(), PAGES.len());
+    assert_eq!(stdout.lines().count(), PAGES.len() + 1, "a line for each code, and one for `json`");
     let (status, _, stderr) = outcome(&mut avastra(&["explain", "AV9999"]));
     assert_eq!(status, 1, "{stderr}");
     for shell in ["bash", "zsh", "fish"] {

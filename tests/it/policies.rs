@@ -238,6 +238,11 @@ fn observation(numbers: &[f64]) -> Observation {
     observation
 }
 
+/// A number of any bits, brought into the range that weights may have.
+fn small(number: f32) -> f32 {
+    if number.is_finite() { number % 10_000.0 } else { 0.0 }
+}
+
 fn visit() -> impl Strategy<Value = Visit> {
     let numbers = proptest::collection::vec(0.0..1.0_f64, VARIABLES.len());
     let rows = proptest::collection::vec((any::<bool>(), -2.0..9.0_f32), 45);
@@ -258,7 +263,7 @@ proptest! {
     fn emitted_rules_are_sound_and_read_back(
         visits in proptest::collection::vec(visit(), 12..60),
         leaves in 1..20_usize,
-        weights in proptest::collection::vec(any::<f32>().prop_filter("finite", |one| one.is_finite()), 90),
+        weights in proptest::collection::vec(any::<f32>().prop_map(small), 90),
         share in 0.0..1.0_f64,
     ) {
         let variables: Vec<usize> = (0..VARIABLES.len()).collect();

@@ -142,8 +142,8 @@ fn what_no_study_can_be_is_said_so() {
     let file = scratch.path().join("study.yaml");
     let space = root().join("scenarios/avastra45.ava").display().to_string();
     let cases = [
-        ("agents: [{ name: random, repats: 3 }]", "unknown field `repats`"),
-        ("agents: [{ name: random }]\nseed: 3", "unknown field `seed`"),
+        ("agents: [{ name: random, repats: 3 }]", "line 2: there is no `repats`; did you mean `repeats`?"),
+        ("agents: [{ name: random }]\nseed: 3", "line 3: there is no `seed`"),
         ("agents: []", "no agent is named"),
         ("agents: [{ name: rnadom }]", "agent `rnadom`: no agent `rnadom`"),
         ("agents: [{ name: random }, { name: random }]", "two agents are called `random`"),
