@@ -82,7 +82,7 @@ impl Checker {
             }
             bindings.push(RuleBinding { action, condition });
         }
-        if bindings.is_empty() {
+        if bindings.is_empty() && self.start_condition(&rule.body).is_none() {
             let help = "a rule without `on` binds the actions that spawn, or that set a state it names";
             self.binds_nothing(rule, help);
         }

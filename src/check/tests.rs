@@ -6,7 +6,8 @@ use crate::check::state_argument::memory_from;
 use crate::check::{Loaded, ReadError, load, suggest_uses};
 use crate::model::vocabulary::{Priority, Word};
 use crate::model::{
-    Avoidability, Claim, Facts, Memory, Obstacle, ObstacleKind, OutcomeFacts, Reach, Value, code, evaluate,
+    Avoidability, Claim, Facts, Memory, Obstacle, ObstacleKind, OutcomeFacts, Reach, RulesInForce, Value,
+    code, evaluate,
 };
 use crate::syntax::{Style, render};
 
@@ -191,6 +192,37 @@ rule slow_rain on sky[Rain] {{
     let shower = ["None", "Light", "Moderate", "High"].map(|how| format!("shower(how: {how})"));
     let expected: Vec<&str> = shower.iter().map(String::as_str).chain(["weather(what: Rain)"]).collect();
     assert_eq!(rows, expected);
+}
+
+#[test]
+fn what_every_step_does_comes_last_and_keeps_to_the_rules() {
+    let text = format!(
+        "{BASE}state count: Int = 0
+state rest: Int = 0
+on ahead also {{ set count = count + 1, set rest = rest + 2 }}
+on ahead also {{ set count = count * 10 }}
+each step {{
+  set rest = match rest {{ 0 => 0  _ => rest - 1 }}
+  set sky[Wetness] = match sky[Wetness] {{ None => Light  Light => Moderate  _ => High }}
+}}
+rule never_soaked: sky[Wetness] <= Moderate
+"
+    );
+    let loaded = load_files(&[("space.ava", &text)]);
+    let space = loaded.space.clone().unwrap_or_else(|| panic!("{}", shown(&loaded)));
+    let cell = |name: &str| space.state(name).expect("it is declared").first_cell;
+    let action = space.actions.iter().position(|action| action.name == "ahead").expect("it is declared");
+    let locals = vec![Value::Bool(false); space.actions[action].parameters.len()];
+    let after = space.memory_after(action, &locals, &space.initial_memory(0));
+    assert_eq!(after.cells()[cell("count")], Value::Number(10.0));
+    assert_eq!(after.cells()[cell("rest")], Value::Number(1.0));
+    let (road, rules) = (&space.roads[0].facts, RulesInForce::by_default(&space));
+    let wait = |memory: &Memory| space.memory_after_wait(memory, Some(road), &rules);
+    let waited = wait(&after);
+    assert_eq!(waited.cells()[cell("rest")], Value::Number(0.0));
+    assert_eq!(waited.cells()[cell("sky") + 2].variant(), 2);
+    // Another level would break the rule, so nothing of it happens.
+    assert_eq!(wait(&waited), waited);
 }
 
 #[test]
