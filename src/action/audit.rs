@@ -40,6 +40,8 @@ pub enum Enforcement {
     Survey,
     /// On the step from one state to the next.
     Transition,
+    /// On every lane change that an action commanded, when it would begin.
+    Change,
 }
 
 /// Audits every rule of the table's space.
@@ -51,6 +53,7 @@ pub fn audit(table: &ActionTable) -> Audit {
         let masks = table.rows().iter().filter(|row| row.roads.iter().any(helps));
         let enforced = match &rule.body {
             RuleBody::Moves { .. } => Enforcement::Transition,
+            RuleBody::During(_) => Enforcement::Change,
             RuleBody::Holds(bindings)
                 if bindings.iter().any(|binding| binding.condition.known() > Known::Road) =>
             {
@@ -89,6 +92,7 @@ impl fmt::Display for Audit {
                 Enforcement::Draw => "every draw",
                 Enforcement::Survey => "every draw, in the world",
                 Enforcement::Transition => "every transition",
+                Enforcement::Change => "every lane change, as it begins",
             };
             write!(f, "{:width$}  binds {:>3} rows, enforced on {enforced}", rule.name, rule.rows.len())?;
             if rule.from_the_start {

@@ -4,7 +4,7 @@ use std::cell::Cell;
 use std::sync::Arc;
 
 use crate::action::table::{Draw, Refusal, Situation};
-use crate::action::{Effect, SpawnRequest};
+use crate::action::{Effect, LaneChangeRules, SpawnRequest};
 use crate::model::expr::Expr;
 use crate::model::rules::{Before, Candidate, Choose, Clause, Nearest, Room, RowRules, TRIES_MAX, Unsolved};
 use crate::model::{
@@ -150,8 +150,23 @@ impl<'a> Judge<'a> {
                 effects.push(effect);
             }
         }
+        let lane_changes = self.lane_changes(values);
         let values = self.action.drawn_of(values);
-        Ok(Draw { row: self.row.row.index, values, effects, memory_after: after })
+        Ok(Draw { row: self.row.row.index, values, effects, memory_after: after, lane_changes })
+    }
+
+    /// The rules on the lane changes of what the action spawns.
+    fn lane_changes(&self, values: &[Value]) -> Option<Arc<LaneChangeRules>> {
+        let conditions: Vec<Expr> = self.row.during().cloned().collect();
+        (!conditions.is_empty()).then(|| {
+            Arc::new(LaneChangeRules {
+                conditions,
+                functions: self.row.space.functions.clone(),
+                locals: values.to_vec(),
+                road: self.row.road.cloned(),
+                step: self.situation.step,
+            })
+        })
     }
 
     fn facts<'f>(&'f self, values: &'f [Value], memory: &'f Memory) -> Facts<'f> {
@@ -205,7 +220,7 @@ impl<'a> Judge<'a> {
 
     /// What the world says before it is asked about spawns.
     fn world(&self) -> WorldFacts {
-        WorldFacts { moment: self.moment, step: self.situation.step, spawns: Vec::new() }
+        WorldFacts { moment: self.moment, step: self.situation.step, ..WorldFacts::default() }
     }
 
     fn draw_values(&self, rng: &mut Rng) -> Result<Vec<Value>, Refusal> {

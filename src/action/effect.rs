@@ -1,8 +1,12 @@
 //! What a row does to the world once its parameters are drawn.
 
 use crate::model::body::BodyParameters;
+use crate::model::expr::Expr;
 use crate::model::vocabulary::{Body, Colour, LaneChoice, Level, Phenomenon, Side, Then, TimeOfDay, Verb};
-use crate::model::{Memory, MomentFacts, Space, SpawnFacts, StateDef, StateMeaning};
+use crate::model::{
+    Facts, FnDef, Memory, MomentFacts, NpcFacts, RoadFacts, Space, SpawnFacts, StateDef, StateMeaning, Value,
+    WorldFacts, evaluate,
+};
 
 /// One change of the world. A row has one or more, applied in order.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -63,6 +67,34 @@ impl Effect {
             Effect::Spawn(request) => 1 + u32::from(request.cover.is_some()),
             Effect::Time(_) | Effect::Sky(..) => 0,
         }
+    }
+}
+
+/// The rules in force on the lane changes of a commanded road user (`during change`), with the values of its action.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LaneChangeRules {
+    pub(super) conditions: Vec<Expr>,
+    pub(super) functions: Vec<FnDef>,
+    pub(super) locals: Vec<Value>,
+    pub(super) road: Option<RoadFacts>,
+    /// Number of the step in which it appeared.
+    pub(super) step: u64,
+}
+
+impl LaneChangeRules {
+    /// Whether a lane change may begin at a moment.
+    pub fn allow(&self, moment: MomentFacts, npc: NpcFacts) -> bool {
+        let world = WorldFacts { moment, step: self.step, ..WorldFacts::default() };
+        let spawn = SpawnFacts { spawn_gap_m: npc.gap_m, npc, ..SpawnFacts::default() };
+        // No such condition names a state.
+        let memory = Memory::default();
+        let facts = Facts {
+            road: self.road.as_ref(),
+            world: Some(&world),
+            spawn: Some(spawn),
+            ..Facts::new(&self.locals, &memory)
+        };
+        self.conditions.iter().all(|condition| evaluate(condition, &self.functions, &facts).truth())
     }
 }
 

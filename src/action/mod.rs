@@ -11,7 +11,7 @@ mod table;
 
 pub use crate::model::SpawnFacts;
 pub use audit::{Audit, Enforcement, RuleAudit, audit};
-pub use effect::{Effect, SpawnRequest, Surroundings};
+pub use effect::{Effect, LaneChangeRules, SpawnRequest, Surroundings};
 pub use file::{AxisRecord, DrawRecord, RoadRecord, RowRecord, RuleRecord, TableFile};
 pub use table::{ActionTable, Draw, Offer, Refusal, Situation};
 

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use crate::action::draw::Judge;
-use crate::action::{Effect, Surroundings};
+use crate::action::{Effect, LaneChangeRules, Surroundings};
 use crate::model::{Memory, Road, Row, RulesInForce, Space, Value};
 
 /// The rows that an agent chooses from.
@@ -41,6 +41,8 @@ pub struct Draw {
     /// What it does to the world, in order.
     pub effects: Vec<Effect>,
     pub memory_after: Memory,
+    /// Rules on the lane changes of what it makes appear; `None` without any.
+    pub lane_changes: Option<Arc<LaneChangeRules>>,
 }
 
 /// Why a row cannot be chosen.

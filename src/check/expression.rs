@@ -305,12 +305,16 @@ impl Checker {
             Site::Axis => format!(
                 "`{name}` is a state, and the rows of the table are the same in every state: write a rule"
             ),
+            Site::Change => format!("`{name}` is a state, and none is looked up when a lane change begins"),
             _ => format!("`{name}` is a state, and functions and constants see none: pass it as a parameter"),
         })
     }
 
     /// `road.limit`: a fact about a thing.
     fn part(&mut self, base: &ast::Expr, part: &ast::Name, place: &Place<'_>, span: Span) -> Option<Expr> {
+        if let ast::ExprKind::Numbered { name, number } = &base.kind {
+            return self.part_of_road_user((name, number, base.span), part, place, span);
+        }
         self.note_part(base, part);
         let things = things();
         let thing = match &base.kind {
@@ -341,6 +345,32 @@ impl Checker {
             self.report(unknown(&format!("{thing} fact"), &part.text, part.span, parts));
         }
         None
+    }
+
+    /// `npc#2.gap`: a fact about a road user by its number.
+    fn part_of_road_user(
+        &mut self,
+        (name, number, at): (&ast::Name, &str, Span),
+        part: &ast::Name,
+        place: &Place<'_>,
+        span: Span,
+    ) -> Option<Expr> {
+        if place.site != Site::Trigger {
+            let error = Diagnostic::error(code::NOT_HERE, "road users have no numbers here");
+            return self.reject(error.at(at, "only a scenario's `once` asks for one by its number"));
+        }
+        let parts = || parts_of("npc").into_iter().map(|(part, _)| part);
+        let fact = Fact::from_name(&format!("npc.{}", part.text));
+        let id = number.parse::<u32>().ok().filter(|id| *id > 0 && name.text == "npc");
+        let Some(id) = id else {
+            let error = Diagnostic::error(code::UNKNOWN, "no such road user").at(at, "none has this number");
+            return self.reject(error.help("road users are `npc#1`, `npc#2` and so on, as they appear"));
+        };
+        let Some(fact) = fact else {
+            return self.reject(unknown("npc fact", &part.text, part.span, parts()));
+        };
+        self.references.note(part.span, Symbol::Engine(fact.name(), fact.meaning()), false);
+        Some(Expr { kind: ExprKind::OfRoadUser(id, fact), ty: fact.ty(), span })
     }
 
     /// Notes the `limit` of `road.limit`.
@@ -621,6 +651,9 @@ pub(super) fn unknown_here(thing: &str, span: Span, site: Site) -> Diagnostic {
         Site::Where if thing == "npc" => error
             .at(span, "its place is known only once all values are drawn")
             .help("write a rule on the action"),
+        Site::Trigger if thing == "npc" => {
+            error.at(span, "which road user?").help("name it by its number, as it appeared: `npc#1.gap`")
+        }
         Site::Axis => error
             .at(span, "the rows of the table are the same at every moment")
             .help("write a rule on the action, or draw the parameter with `any`"),

@@ -175,9 +175,13 @@ fn keeps_something(
             is_kept
         }
         ItemKind::Rule(rule) => match &rule.body {
-            RuleBody::Holds { on, condition } if on.is_empty() => {
+            RuleBody::Holds { on, during, condition } if on.is_empty() => {
                 let mut named = BTreeSet::new();
-                names_of_expr(condition, &mut named);
+                match during {
+                    None => names_of_expr(condition, &mut named),
+                    // It binds what spawns, as a rule about the gap does.
+                    Some(_) => drop(named.insert(Fact::SpawnGap.name())),
+                }
                 !has_lost(&named)
             }
             RuleBody::Holds { on, .. } if on.iter().any(gone) => {

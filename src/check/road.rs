@@ -190,8 +190,13 @@ fn facts(name: &str, map: &RoadMap, route: &Route) -> RoadFacts {
             neighbour.is_some_and(|neighbour| neighbour.same_direction)
         })
     };
-    let name = name.to_owned();
-    RoadFacts { name, limit, limit_mps: limit.to_f64(), lanes: [beside(true), true, beside(false)] }
+    let limited_at = route.slowest(map).map(|part| {
+        let key = &map.lane(part.lane).key;
+        let (from_m, to_m) = (part.enter_m.max(0.0), part.to_m);
+        format!("lane {}/{} from {from_m:.0} to {to_m:.0} m along the route", key.road, key.lane)
+    });
+    let lanes = [beside(true), true, beside(false)];
+    RoadFacts { name: name.to_owned(), limit, limit_mps: limit.to_f64(), limited_at, lanes }
 }
 
 /// The exact limit: a whole number of km/h or mph if the map's `f64` is close to one, as on road signs.

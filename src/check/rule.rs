@@ -6,8 +6,8 @@ use crate::check::names::unknown;
 use crate::check::references::Symbol;
 use crate::check::report::Report;
 use crate::model::expr::{Expr, ExprKind};
-use crate::model::vocabulary::Known;
-use crate::model::{ActionDef, EffectDef, RuleBinding, RuleBody, RuleDef, SetDef, Type, code};
+use crate::model::vocabulary::{CHANGE, Known, Site, Then, Verb};
+use crate::model::{ActionDef, EffectDef, RuleBinding, RuleBody, RuleDef, SetDef, Type, WordExpr, code};
 use crate::syntax::ast::ItemKind;
 use crate::syntax::{Diagnostic, ast, listed};
 
@@ -34,12 +34,32 @@ impl Checker {
 
     pub(super) fn rule(&mut self, declared: &ast::Rule) -> Option<RuleBody> {
         match &declared.body {
-            ast::RuleBody::Holds { on, condition } => self.holds(declared, on, condition),
+            ast::RuleBody::Holds { on, during, condition } => {
+                self.holds(declared, on, during.as_ref(), condition)
+            }
             ast::RuleBody::Moves { state, key, moves } => self.moves(declared, state, key.as_ref(), moves),
         }
     }
 
-    fn holds(&mut self, rule: &ast::Rule, on: &[ast::Name], condition: &ast::Expr) -> Option<RuleBody> {
+    fn holds(
+        &mut self,
+        rule: &ast::Rule,
+        on: &[ast::Name],
+        during: Option<&ast::Name>,
+        condition: &ast::Expr,
+    ) -> Option<RuleBody> {
+        let change = during.filter(|during| during.text == CHANGE.0);
+        if let Some(during) = during {
+            match change {
+                Some(_) => self.references.note(during.span, Symbol::Engine(CHANGE.0, CHANGE.1), false),
+                None => self.report(unknown("behaviour", &during.text, during.span, [CHANGE.0])),
+            }
+        }
+        let site = Place {
+            states: during.is_none(),
+            site: during.map_or(Site::Rule, |_| Site::Change),
+            ..Place::RULE
+        };
         let mut targets: Vec<usize> = Vec::new();
         for name in on {
             let found = self.targets(name);
@@ -53,7 +73,11 @@ impl Checker {
             }
         }
         if on.is_empty() {
-            targets = self.targets_of_global(rule, condition)?;
+            targets = match during {
+                None => self.targets_of_global(rule, condition)?,
+                // Every action whose road users might change lanes.
+                Some(_) => self.changers(),
+            };
         }
         targets.sort_unstable();
         let lacking = self.lacking_parameters(&rule.name, &targets, condition);
@@ -69,8 +93,16 @@ impl Checker {
             let locals = locals(&definition);
             let owner = Symbol::Action(definition.name.clone());
             let spawns = definition.effects.iter().any(|effect| matches!(effect, EffectDef::Spawn(_)));
-            let place = Place { locals: &locals, owner: Some(&owner), ..Place::RULE };
+            let place = Place { locals: &locals, owner: Some(&owner), ..site };
             let Some(condition) = self.typed(condition, &place, Type::Bool) else { continue };
+            if during.is_some() && !self.changers().contains(&action) && !self.half_broken.contains(&action) {
+                let message = format!("no road user of `{}` changes lanes", definition.name);
+                let error = Diagnostic::error(code::NO_SPAWN, message).at(rule.name.span, "never asked");
+                let help = "bind actions whose spawn has `then` or overtakes in its own lane";
+                self.report(error.beside(definition.span, "changes no lanes").help(help));
+                continue;
+            }
+            self.warn_of_later(rule, &definition, &condition, during);
             if condition.known() == Known::Spawn && !spawns && !self.half_broken.contains(&action) {
                 let message =
                     format!("`{}` asks about a spawn, and `{}` has none", rule.name.text, definition.name);
@@ -86,13 +118,64 @@ impl Checker {
             let help = "a rule without `on` binds the actions that spawn, or that set a state it names";
             self.binds_nothing(rule, help);
         }
-        Some(RuleBody::Holds(bindings))
+        Some(if during.is_some() { RuleBody::During(bindings) } else { RuleBody::Holds(bindings) })
+    }
+
+    /// The actions whose road users may be told to change lanes.
+    fn changers(&self) -> Vec<usize> {
+        let may_be = |then: &WordExpr<Then>| match then {
+            WordExpr::Fixed(word) => *word == Then::Change,
+            WordExpr::Of(_, words) => words.contains(&Then::Change),
+        };
+        let overtakes = |verb: &WordExpr<Verb>| match verb {
+            WordExpr::Fixed(word) => *word == Verb::Overtake,
+            WordExpr::Of(_, words) => words.contains(&Verb::Overtake),
+        };
+        let changes = |action: &ActionDef| {
+            action.effects.iter().any(|effect| match effect {
+                EffectDef::Spawn(spawn) => may_be(&spawn.then) || overtakes(&spawn.verb),
+                EffectDef::Set(_) => false,
+            })
+        };
+        let all = self.actions.iter().enumerate();
+        all.filter(|(_, action)| action.as_ref().is_some_and(changes)).map(|(index, _)| index).collect()
+    }
+
+    /// Warns of a rule that ties a later lane change to the moment of the draw.
+    fn warn_of_later(
+        &mut self,
+        rule: &ast::Rule,
+        action: &ActionDef,
+        condition: &Expr,
+        during: Option<&ast::Name>,
+    ) {
+        if during.is_some() || !condition.asks_about_moment() {
+            return;
+        }
+        let names = |expr: &Expr, local: usize| {
+            expr.any(|kind| matches!(kind, ExprKind::Local(named) if *named == local))
+        };
+        let decides = |local: usize| {
+            action.effects.iter().any(|effect| match effect {
+                EffectDef::Spawn(spawn) => {
+                    matches!(&spawn.then, WordExpr::Of(then, _) if names(then, local))
+                }
+                EffectDef::Set(_) => false,
+            })
+        };
+        let mut locals = 0..action.parameters.len();
+        let Some(local) = locals.find(|local| decides(*local) && names(condition, *local)) else { return };
+        let parameter = &action.parameters[local].name;
+        let message = format!("`{}` judges the draw, and the lane change comes later", rule.name.text);
+        let warning = Diagnostic::warning(code::LATER, message)
+            .at(condition.span, format!("`{parameter}` is carried out some time after this moment"));
+        self.report(warning.help(format!("write `rule {} on … during change: …`", rule.name.text)));
     }
 
     /// The condition for the start of an episode, of a rule without `on` that asks only about states and the road.
     fn start_condition(&mut self, body: &ast::RuleBody) -> Option<Expr> {
-        let ast::RuleBody::Holds { on, condition } = body else { return None };
-        if !on.is_empty() {
+        let ast::RuleBody::Holds { on, during, condition } = body else { return None };
+        if !on.is_empty() || during.is_some() {
             return None;
         }
         let compiled = self.quietly(|checker| checker.typed(condition, &Place::RULE, Type::Bool))?;

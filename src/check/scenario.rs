@@ -8,20 +8,21 @@ use core::ops::Range;
 use crate::check::checker::docs;
 use crate::check::names::unknown;
 use crate::check::report::Report;
+use crate::check::scenario_condition::condition;
 use crate::check::scenario_rules::{Moment, breaches, broken_start};
 use crate::check::scenario_value::{figure, number, value};
 use crate::model::rules::{Before, Nearest, RowRules, TRIES_MAX};
 use crate::model::scenario::{
-    Avoidability, Claim, DRIVERS, ENDS, Figure, MODULES, Obstacle, ObstacleKind, Origin, Scenario,
-    ScenarioStart, ScenarioStep,
+    Avoidability, Claim, Condition, DRIVERS, ENDS, Figure, MODULES, Obstacle, ObstacleKind, Origin, Scenario,
+    ScenarioStart, ScenarioStep, Trigger, ticks_s,
 };
 use crate::model::vocabulary::{Fact, OriginField, Priority, ScenarioClaim, StartField, WAIT, Word};
 use crate::model::{
     AMBIENT_MAX, Domain, Initial, Memory, Parameter, RoadFacts, Row, RulesInForce, SIGNAL_PHASE_S, Space,
-    StateDef, Value, code, locals,
+    StateDef, TICK_MS, Value, code, locals,
 };
 use crate::syntax::ast::{BinaryOp, ClauseKind, Comparison};
-use crate::syntax::{Diagnostic, ast, listed};
+use crate::syntax::{Diagnostic, ast, listed, print_expr};
 use crate::units::{Dimension, Rational};
 
 /// Step numbers must be below this.
@@ -274,8 +275,16 @@ impl<'a> Reader<'a> {
             let waits = self.is_wait(step);
             self.wait(over..number + u64::from(waits), rules, &mut history);
             over = over.max(number + 1);
+            let trigger = self.trigger(step);
             if waits {
-                steps.push(ScenarioStep { number, row: None, drawn: Vec::new() });
+                if let Some(clause) = step.once.as_ref().or(step.after.as_ref()) {
+                    let error =
+                        Diagnostic::error(code::TRIGGER, "`wait()` does nothing, so it waits for nothing");
+                    self.report(
+                        error.at(clause.span, "no action to be carried out then").help("remove the clause"),
+                    );
+                }
+                steps.push(ScenarioStep { number, row: None, drawn: Vec::new(), trigger: None });
                 continue;
             }
             let Some(row) = self.row(&step.action) else { continue };
@@ -288,7 +297,7 @@ impl<'a> Reader<'a> {
             let moment = Moment { step, row, locals: &locals, after: &after, history: &history, road };
             self.diagnostics.extend(breaches(self.space, &moment, &in_force));
             history.push((number, after));
-            steps.push(ScenarioStep { number, row: Some(row.index), drawn });
+            steps.push(ScenarioStep { number, row: Some(row.index), drawn, trigger });
         }
         steps
     }
@@ -309,6 +318,53 @@ impl<'a> Reader<'a> {
             }
             history.push((number, after));
         }
+    }
+
+    /// `once ego.junction_ahead <= 40 m after 1 s`.
+    fn trigger(&mut self, step: &ast::Step) -> Option<Arc<Trigger>> {
+        let once = step.once.as_ref().and_then(|once| {
+            let expr = self.take_all(condition(self.space, once))?;
+            Some(Condition { expr, text: print_expr(once) })
+        });
+        let after_ticks = step.after.as_ref().map_or(Some(0), |after| self.after_ticks(after))?;
+        let clause = step.once.as_ref().or(step.after.as_ref());
+        if let Some(clause) = clause.filter(|_| !self.space.each_step.is_empty()) {
+            let error =
+                Diagnostic::error(code::TRIGGER, "in this space, actions happen when their step begins");
+            let error = error.at(clause.span, "what `each step` does would come before it");
+            return self.reject(error.help("write the action in a later step"));
+        }
+        let trigger = Trigger { once, after_ticks };
+        (trigger.once.is_some() || trigger.after_ticks > 0).then(|| Arc::new(trigger))
+    }
+
+    fn take_all<T>(&mut self, value: Result<T, Vec<Diagnostic>>) -> Option<T> {
+        value.map_err(|errors| self.diagnostics.extend(errors)).ok()
+    }
+
+    fn after_ticks(&mut self, after: &ast::Expr) -> Option<u32> {
+        let after_s = self.take(number(after, Dimension::DURATION))?;
+        let step_s = self.space.episode.step_s;
+        let ticks = (after_s * 1000.0 / TICK_MS as f64).round();
+        if !(0.0..step_s).contains(&after_s) {
+            let error =
+                Diagnostic::error(code::TRIGGER, format!("`after {after_s} s` is not within the step"));
+            return self.reject(
+                error
+                    .at(after.span, format!("a step lasts {step_s} s"))
+                    .help("write the action in a later step, and the rest of the time here"),
+            );
+        }
+        if (ticks * TICK_MS as f64 / 1000.0 - after_s).abs() > 1e-9 {
+            let error = Diagnostic::error(code::TRIGGER, format!("nothing happens after {after_s} s"));
+            let near = ticks_s(ticks as u32);
+            return self.reject(
+                error
+                    .at(after.span, format!("time passes in ticks of {TICK_MS} ms"))
+                    .help(format!("the nearest is {near} s")),
+            );
+        }
+        Some(ticks as u32)
     }
 
     /// `wait()` is a step without an action, unless the space has an action of that name.

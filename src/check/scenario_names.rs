@@ -35,6 +35,7 @@ impl Notes<'_> {
             for field in &step.drawn {
                 self.argument(&step.action.name.text, &field.name, &field.value);
             }
+            step.once.iter().chain(&step.after).for_each(|clause| self.value(clause, None));
         }
         for expect in &scenario.expects {
             self.claim(&expect.claim);

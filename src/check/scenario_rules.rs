@@ -3,9 +3,9 @@
 //!
 //! Rules that ask the world can be judged only by the replay.
 
-use crate::model::expr::{Comparison, ExprKind};
+use crate::model::expr::{Comparison, Expr, ExprKind};
 use crate::model::rules::{Breach, Candidate, RowRules};
-use crate::model::vocabulary::{LaneChoice, Word};
+use crate::model::vocabulary::{Fact, LaneChoice, Word};
 use crate::model::{Memory, Road, Row, RuleDef, RulesInForce, Space, Value, code};
 use crate::prove::{next_rows, shortest_way};
 use crate::syntax::ast::Span;
@@ -142,6 +142,10 @@ fn broken_condition(
         let label = format!("{} on `{}`", rules.words(breach, candidate), road.name);
         error = error.at(moment.step.span, label);
     }
+    if let Some(place) = road.limited_at.as_ref().filter(|_| is_placed && asks_for_limit(condition)) {
+        error = error
+            .note(format!("`road.limit` is that of {place}; `npc.limit` is that of the newcomer's lane"));
+    }
     if condition.any(|kind| matches!(kind, ExprKind::InLanes(..))) {
         let there: Vec<&str> =
             LaneChoice::ALL.iter().filter(|lane| road.has_lane(**lane)).map(|lane| lane.name()).collect();
@@ -155,4 +159,8 @@ fn broken_condition(
         ),
         None => error,
     })
+}
+
+fn asks_for_limit(condition: &Expr) -> bool {
+    condition.any(|kind| matches!(kind, ExprKind::Fact(Fact::RoadLimit)))
 }

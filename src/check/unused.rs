@@ -108,7 +108,7 @@ fn names_of_item<'a>(kind: &'a ItemKind, used: &mut BTreeSet<&'a str>) {
         }
         ItemKind::EachStep(effects) => effects.iter().for_each(|effect| names_of_effect(effect, used)),
         ItemKind::Rule(declared) => match &declared.body {
-            ast::RuleBody::Holds { on, condition } => {
+            ast::RuleBody::Holds { on, condition, .. } => {
                 used.extend(on.iter().map(|name| name.text.as_str()));
                 names_of_expr(condition, used);
             }

@@ -128,7 +128,8 @@ fn action_section(text: &mut String, space: &Space, index: usize, action: &Actio
 fn rule_section(text: &mut String, space: &Space, index: usize, rule: &RuleDef) {
     let rows = space.rows.iter().filter(|row| row.rules.contains(&index)).count();
     let optional = if rule.optional { ", optional" } else { "" };
-    let _ = write!(text, "### `{}` (binds {}{optional})\n\n", rule.name, plural(rows, "row"));
+    let during = if matches!(rule.body, RuleBody::During(_)) { " during lane changes" } else { "" };
+    let _ = write!(text, "### `{}` (binds {}{during}{optional})\n\n", rule.name, plural(rows, "row"));
     text.push_str(&paragraph(&rule.docs));
     if let RuleBody::Moves { state, cell, allowed, .. } = &rule.body {
         let state = &space.states[*state];

@@ -176,6 +176,13 @@ fn route_words(map: &RoadMap, route: &Route) -> String {
         format!("  stop lines at {}; crosswalks from {}", listed(&stops), listed(&crosswalks)),
         format!("  {}", plural(route.conflicts.len(), "conflict")),
     ];
+    lines.extend(route.slowest(map).map(|part| {
+        let limit_kmh = map.lane(part.lane).speed_limit_mps * 3.6;
+        let (lane, from_m, to_m) = (name(map, part.lane), part.enter_m.max(0.0), part.to_m);
+        format!(
+            "  road.limit is {limit_kmh:.0} km/h: lane {lane} from {from_m:.1} to {to_m:.1} m; more elsewhere"
+        )
+    }));
     lines.extend(route.sign_lines.iter().map(|line| {
         let does = if line.kind == SignKind::Stop { "stops" } else { "gives way" };
         format!("  {does} at a sign at {:.1} m", line.station_m)

@@ -6,7 +6,7 @@ use crate::action::{Offer, Situation};
 use crate::check::state_argument::legal_memory_from;
 use crate::emit;
 use crate::episode;
-use crate::model::RulesInForce;
+use crate::model::{RuleBody, RulesInForce};
 use crate::run::road_named;
 use crate::sim::World;
 
@@ -48,7 +48,11 @@ pub fn why(output: &Output, arguments: &WhyArguments) -> Result<(), Failure> {
 
     output.say(&format!("row {}: {} on {}", row.index, row.label, road.name));
     for &rule in row.rules.iter() {
-        let state = if rules.contains(rule) { "" } else { " (off)" };
+        let state = match (rules.contains(rule), &space.rules[rule].body) {
+            (false, _) => " (off)",
+            (true, RuleBody::During(_)) => " (during lane changes)",
+            (true, _) => "",
+        };
         output.say(&format!("  bound by {}{state}", space.rules[rule].name));
     }
     let verdict = match &offer {

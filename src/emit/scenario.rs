@@ -6,7 +6,7 @@ use std::sync::Arc;
 use crate::action::{ActionTable, Draw};
 use crate::episode::{Collision, EpisodeLog, Outcome};
 use crate::model::vocabulary::Word;
-use crate::model::{ActionDef, Space, StateDef, Value, digest_text};
+use crate::model::{ActionDef, Space, StateDef, Value, digest_text, ticks_s};
 use crate::oracle::AvoidabilitySettings;
 use crate::run::{EpisodeSummary, Finding};
 use crate::sim::{ENGINE, TrafficProfile};
@@ -149,18 +149,21 @@ fn state_value(space: &Space, log: &EpisodeLog, state: &StateDef) -> Expr {
 }
 
 fn step(table: &ActionTable, log: &EpisodeLog, number: usize) -> Step {
-    let (action, drawn) = match &log.steps[number].outcome {
-        Outcome::Passed | Outcome::Refused { .. } => (tree::call("wait", Vec::new()), Vec::new()),
-        Outcome::Done { draw, .. } => {
+    let (action, drawn, after) = match &log.steps[number].outcome {
+        Outcome::Passed | Outcome::Refused { .. } => (tree::call("wait", Vec::new()), Vec::new(), None),
+        Outcome::Done { draw, delay_ticks, .. } => {
             let space = table.space();
             let row = &table.rows()[draw.row];
             let action = &space.actions[row.action];
             let axes =
                 row.axes.iter().map(|(name, value)| (name.to_string(), literal(space, action, name, *value)));
-            (tree::call(&action.name, axes.collect()), self::drawn(table, draw))
+            // The tick at which it happened, whatever it waited for: so it replays to the bit.
+            let after = tree::quantity(ticks_s(*delay_ticks), Dimension::DURATION);
+            let after = (*delay_ticks > 0).then_some(after);
+            (tree::call(&action.name, axes.collect()), self::drawn(table, draw), after)
         }
     };
-    Step { number: tree::digits(number.to_string()), action, drawn, span: Span::NONE }
+    Step { number: tree::digits(number.to_string()), action, drawn, once: None, after, span: Span::NONE }
 }
 
 /// The drawn parameters of a step, as fields of its `with` block.

@@ -35,7 +35,7 @@ pub struct EpisodeLog {
 /// One action of the agent and the observation period after it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StepLog {
-    /// When the action was carried out, s.
+    /// When the step began, s.
     pub time_s: f64,
     /// The state vector before the action, shape `(STATE_LEN,)`.
     pub state: StateVector,
@@ -54,8 +54,8 @@ pub struct StepLog {
 /// What became of the agent's choice.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Outcome {
-    /// Carried out as drawn; the ids of the road users it made appear.
-    Done { draw: Draw, spawned: Vec<u32> },
+    /// Carried out as drawn, so many ticks after the step began; the ids of the road users it made appear.
+    Done { draw: Draw, spawned: Vec<u32>, delay_ticks: u32 },
     /// No action was chosen: no row was legal, or the script has none here.
     Passed,
     /// The chosen row could not be carried out: nothing changed, and the step passed without an action.

@@ -6,12 +6,14 @@ use crate::action::{Draw, Situation};
 use crate::ads::Ads;
 use crate::mdp;
 use crate::mdp::{Danger, Observation};
+use crate::model::expr::Expr;
 use crate::model::vocabulary::Body;
-use crate::model::{Memory, OutcomeFacts};
+use crate::model::{Facts, Memory, OutcomeFacts, Trigger, WorldFacts, evaluate};
 use crate::sim::{Contact, DT_S, Incident, Sensed, World};
 
 use super::facts::collision_facts;
 use super::log::{Collision, End, EpisodeLog, Outcome, StepLog};
+use super::script::ScriptedAction;
 use super::setup::Setup;
 
 /// A step with less progress than this counts as stalled, m. The published package: 3 m in five steps.
@@ -39,8 +41,8 @@ impl<'a> Moment<'a> {
     /// change.
     pub fn look_ahead(&self, draw: Draw) -> EpisodeLog {
         let mut copy = self.play.clone();
-        let outcome = copy.carry_out(draw);
-        copy.observation_period(self.setup, self.observation.clone(), outcome, &mut |_, _, _| {});
+        let begun = Begun::With(copy.carry_out(draw, 0));
+        copy.observation_period(self.setup, self.observation.clone(), begun, &mut |_, _, _| {});
         copy.into_log(self.setup, End::Script)
     }
 
@@ -57,6 +59,8 @@ pub struct Snapshot(Play);
 /// What is to happen in a step.
 pub enum Choice {
     Act(Draw),
+    /// The action is judged and carried out when its trigger says so, if that comes within the step.
+    Await(ScriptedAction),
     /// Nothing happens.
     Pass,
     /// A row was chosen that is not legal now: nothing happens.
@@ -88,13 +92,14 @@ pub fn run_from(
     let end = loop {
         let observation = Observation::new(&play.world, play.ads.status());
         let choice = choose(&play.moment(setup, &observation, &play.situation(setup)));
-        let outcome = match choice {
-            Choice::Act(draw) => play.carry_out(draw),
-            Choice::Pass => Outcome::Passed,
-            Choice::Refused { row, rule, reason } => Outcome::Refused { row, rule, reason },
+        let begun = match choice {
+            Choice::Act(draw) => Begun::With(play.carry_out(draw, 0)),
+            Choice::Await(action) => Begun::Waiting(Waiting { action, held_tick: None }),
+            Choice::Pass => Begun::With(Outcome::Passed),
+            Choice::Refused { row, rule, reason } => Begun::With(Outcome::Refused { row, rule, reason }),
             Choice::Stop => break End::Script,
         };
-        play.observation_period(setup, observation, outcome, watch);
+        play.observation_period(setup, observation, begun, watch);
         if let Some(end) = play.end(setup) {
             break end;
         }
@@ -102,6 +107,39 @@ pub fn run_from(
     let observation = Observation::new(&play.world, play.ads.status());
     last(&play.moment(setup, &observation, &play.situation(setup)));
     play.into_log(setup, end)
+}
+
+/// What became of the choice of a step when the step began.
+enum Begun {
+    With(Outcome),
+    Waiting(Waiting),
+}
+
+/// An action whose moment has not come.
+struct Waiting {
+    action: ScriptedAction,
+    /// Tick of the step at which the condition first held.
+    held_tick: Option<i64>,
+}
+
+impl Waiting {
+    /// Whether the action happens before this tick of the step.
+    fn is_due(&mut self, tick: i64, play: &Play, setup: &Setup) -> bool {
+        let Some(trigger) = self.action.trigger.as_deref() else { return true };
+        if self.held_tick.is_none()
+            && trigger.once.as_ref().is_none_or(|once| play.holds(&once.expr, trigger, setup))
+        {
+            self.held_tick = Some(tick);
+        }
+        self.held_tick.is_some_and(|held| tick - held >= i64::from(trigger.after_ticks))
+    }
+
+    /// The moment did not come.
+    fn in_vain(self) -> Outcome {
+        let text = self.action.trigger.as_deref().map(Trigger::text).unwrap_or_default();
+        let reason = format!("`{text}` did not come within the step");
+        Outcome::Refused { row: self.action.row, rule: None, reason }
+    }
 }
 
 /// How near the ego vehicle is to a collision, and with what.
@@ -170,7 +208,7 @@ impl Play {
     }
 
     /// Carries out a whole action or nothing of it: its second spawn may find its first in the way.
-    fn carry_out(&mut self, draw: Draw) -> Outcome {
+    fn carry_out(&mut self, draw: Draw, delay_ticks: u32) -> Outcome {
         let before = self.world.clone();
         let mut spawned = Vec::new();
         for effect in &draw.effects {
@@ -184,8 +222,11 @@ impl Play {
                 }
             }
         }
+        if let Some(rules) = &draw.lane_changes {
+            spawned.iter().for_each(|id| self.world.bind_lane_changes(*id, rules));
+        }
         self.memory = draw.memory_after.clone();
-        Outcome::Done { draw, spawned }
+        Outcome::Done { draw, spawned, delay_ticks }
     }
 
     /// What every step does, in a step without an action.
@@ -202,10 +243,11 @@ impl Play {
         &mut self,
         setup: &Setup,
         observation: Observation,
-        outcome: Outcome,
+        mut begun: Begun,
         watch: &mut Watch,
     ) {
-        if !matches!(outcome, Outcome::Done { .. }) {
+        // No space in which every step does something has actions that wait (AV0609).
+        if matches!(&begun, Begun::With(Outcome::Passed | Outcome::Refused { .. })) {
             self.wait(setup);
         }
         let time_s = self.world.time_s();
@@ -214,7 +256,12 @@ impl Play {
         let met = self.collisions.len();
         let shift = setup.period_shifts.get(self.steps.len()).copied().unwrap_or(0);
         let ticks = (setup.table.space().episode.step_s / DT_S).round() as i64 + i64::from(shift);
-        for _ in 0..ticks {
+        for tick in 0..ticks {
+            if let Begun::Waiting(waiting) = &mut begun
+                && waiting.is_due(tick, self, setup)
+            {
+                begun = Begun::With(self.carry_out_awaited(waiting, tick, setup));
+            }
             let now = self.tick(setup, watch);
             if near.is_none_or(|near| now.probability > near.probability) {
                 near = Some(now);
@@ -230,6 +277,10 @@ impl Play {
         } else if !self.collisions.is_empty() || !self.world.waits_for_light() {
             self.stalled += 1;
         }
+        let outcome = match begun {
+            Begun::With(outcome) => outcome,
+            Begun::Waiting(waiting) => waiting.in_vain(),
+        };
         let Near { probability: proc, body } = near.unwrap_or(Near { probability: 0.0, body: None });
         // Of several collisions in a step, the first decides.
         let facts = match self.collisions.get(met) {
@@ -242,6 +293,16 @@ impl Play {
         let perception = mdp::perception_counts(&self.world, self.ads.status());
         let memory = self.memory.clone();
         self.steps.push(StepLog { time_s, state, outcome, memory, proc, reward, perception, trace });
+    }
+
+    /// Judges and carries out an action whose moment has come.
+    fn carry_out_awaited(&mut self, waiting: &Waiting, tick: i64, setup: &Setup) -> Outcome {
+        let judged = waiting.action.judged(setup.table, &self.situation(setup));
+        match judged {
+            Choice::Act(draw) => self.carry_out(draw, tick as u32),
+            Choice::Refused { row, rule, reason } => Outcome::Refused { row, rule, reason },
+            Choice::Await(_) | Choice::Pass | Choice::Stop => unreachable!("a judgement allows or refuses"),
+        }
     }
 
     /// One physics step; returns the collision probability after it. It is 1 at the tick of a contact. After that
@@ -263,6 +324,20 @@ impl Play {
         let is_hit = |id| self.collisions.iter().any(|collision| collision.contact.obstacle == id);
         let Danger { probability, nearest } = setup.proc.danger(&self.world, &is_hit);
         Near { probability, body: nearest.and_then(|id| self.body(id)) }
+    }
+
+    /// Whether the condition of a trigger holds now.
+    fn holds(&self, condition: &Expr, trigger: &Trigger, setup: &Setup) -> bool {
+        let users = trigger.road_users().into_iter();
+        let world = WorldFacts {
+            moment: self.world.moment_facts(),
+            step: self.steps.len() as u64,
+            road_users: users.filter_map(|id| Some((id, self.world.npc_facts(id)?))).collect(),
+            ..WorldFacts::default()
+        };
+        let facts =
+            Facts { road: Some(&setup.road.facts), world: Some(&world), ..Facts::new(&[], &self.memory) };
+        evaluate(condition, &setup.table.space().functions, &facts).truth()
     }
 
     fn body(&self, obstacle: u32) -> Option<Body> {

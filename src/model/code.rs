@@ -99,6 +99,8 @@ pub const UNFAIR: &str = "AV0409";
 pub const IMPLIED: &str = "AV0410";
 /// A rule under which no episode can begin.
 pub const NO_START: &str = "AV0411";
+/// A rule about the moment of the draw that names what happens later.
+pub const LATER: &str = "AV0412";
 /// A value that a transition rule does not lead out of.
 pub const DEADLOCK: &str = "AV0501";
 /// A value that a transition rule does not lead to.
@@ -124,6 +126,8 @@ pub const BROKEN_RULE: &str = "AV0605";
 pub const OPEN_START: &str = "AV0606";
 /// A claim of an unknown form.
 pub const UNKNOWN_CLAIM: &str = "AV0607";
+/// A moment that cannot come within its step.
+pub const TRIGGER: &str = "AV0609";
 /// A file with no scenario, or with two.
 pub const ONE_SCENARIO: &str = "AV0608";
 

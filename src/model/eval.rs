@@ -36,6 +36,8 @@ pub struct WorldFacts {
     pub step: u64,
     /// Each spawn of the action for which the world has found a place.
     pub spawns: Vec<SpawnFacts>,
+    /// Those that are asked for by number and are there.
+    pub road_users: Vec<(u32, NpcFacts)>,
 }
 
 /// What can be asked about the ego vehicle and its surroundings at a moment.
@@ -66,6 +68,8 @@ pub const JUNCTION_AHEAD_M_MAX: f64 = 1000.0;
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct NpcFacts {
     pub speed_mps: f64,
+    /// To the ego vehicle, between the outlines.
+    pub gap_m: f64,
     /// Along its way to the next junction, as in [`MomentFacts`].
     pub junction_ahead_m: f64,
     /// Limit of the lane that it is in.
@@ -125,6 +129,12 @@ pub fn evaluate(expr: &Expr, functions: &[FnDef], facts: &Facts<'_>) -> Value {
         ExprKind::Cell(cell) => facts.memory.cells[*cell],
         ExprKind::CellAt(first, key) => facts.memory.cells[first + value(key).variant()],
         ExprKind::Fact(fact) => fact_value(*fact, facts),
+        ExprKind::OfRoadUser(id, fact) => {
+            let mut users = facts.world.into_iter().flat_map(|world| &world.road_users);
+            let npc = users.find(|(known, _)| known == id).map(|(_, npc)| *npc);
+            let spawn = npc.map(|npc| SpawnFacts { npc, ..SpawnFacts::default() });
+            fact_value(*fact, &Facts { spawn, ..*facts })
+        }
         ExprKind::Call(function, arguments) => {
             let locals: Vec<Value> = arguments.iter().map(value).collect();
             evaluate(&functions[*function].body, functions, &Facts { locals: &locals, ..*facts })
@@ -174,6 +184,7 @@ fn fact_value(fact: Fact, facts: &Facts<'_>) -> Value {
         Fact::Elapsed => moment(|moment| moment.elapsed_s),
         Fact::StepNumber => Value::Number(facts.world.map_or(f64::NAN, |world| world.step as f64)),
         Fact::NpcSpeed => spawn(|spawn| spawn.npc.speed_mps),
+        Fact::NpcGap => spawn(|spawn| spawn.npc.gap_m),
         Fact::NpcJunctionAhead => spawn(|spawn| spawn.npc.junction_ahead_m),
         Fact::NpcLimit => spawn(|spawn| spawn.npc.limit_mps),
         Fact::SpawnGap => spawn(|spawn| spawn.spawn_gap_m),

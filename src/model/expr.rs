@@ -26,6 +26,8 @@ pub enum ExprKind {
     /// A map in the memory: its first cell and the key.
     CellAt(usize, Box<Expr>),
     Fact(Fact),
+    /// `npc#2.speed`: a fact about the road user with that number. NaN while it is not there.
+    OfRoadUser(u32, Fact),
     /// A function by its index in `Space::functions`.
     Call(usize, Vec<Expr>),
     Not(Box<Expr>),
@@ -66,6 +68,7 @@ impl Expr {
             | ExprKind::Cell(_)
             | ExprKind::OnRoad(_)
             | ExprKind::IsWord(..)
+            | ExprKind::OfRoadUser(..)
             | ExprKind::Fact(_) => {}
             ExprKind::CellAt(_, inner)
             | ExprKind::Not(inner)

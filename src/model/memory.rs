@@ -126,7 +126,7 @@ impl Space {
             let stands = start.is_none_or(|start| evaluate(start, &self.functions, &facts).truth());
             !stands
                 || match &rule.body {
-                    RuleBody::Holds(_) => false,
+                    RuleBody::Holds(_) | RuleBody::During(_) => false,
                     RuleBody::Moves { cell, allowed, .. } => {
                         let [from, to] = [before, &after].map(|memory| memory.cells[*cell].variant());
                         self.may_set_each_step(*cell) && !allowed[from][to]

@@ -36,7 +36,7 @@ pub use row::{Reach, Row};
 pub use rules::{NoStart, RulesInForce, UnknownRule};
 pub use scenario::{
     Avoidability, Claim, DRIVERS, ENDS, Figure, MODULES, Obstacle, ObstacleKind, Origin, Scenario,
-    ScenarioStart, ScenarioStep,
+    ScenarioStart, ScenarioStep, Trigger, ticks_s,
 };
 pub use space::{
     ActionDef, BodyDef, BodyWord, COUNTED, Domain, EffectDef, EnumDef, EpisodeDef, FnDef, GroupDef, Initial,

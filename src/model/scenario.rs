@@ -3,6 +3,8 @@
 use core::fmt;
 use std::sync::Arc;
 
+use crate::model::expr::{Expr, ExprKind};
+use crate::model::limits::TICK_MS;
 use crate::model::value::{Memory, Value};
 use crate::model::vocabulary::Priority;
 
@@ -63,6 +65,51 @@ pub struct ScenarioStep {
     pub row: Option<usize>,
     /// Values of the action's drawn (`any`) parameters, as declared.
     pub drawn: Vec<(Arc<str>, Value)>,
+    /// When within the step it happens; `None`: at the beginning.
+    pub trigger: Option<Arc<Trigger>>,
+}
+
+/// The moment within a step at which an action happens: some ticks after the first at which a condition holds.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Trigger {
+    /// `None` holds from the beginning of the step.
+    pub once: Option<Condition>,
+    pub after_ticks: u32,
+}
+
+/// A condition and how it was written.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Condition {
+    pub expr: Expr,
+    pub text: String,
+}
+
+impl Trigger {
+    /// The numbers of the road users that the condition asks about.
+    pub fn road_users(&self) -> Vec<u32> {
+        let mut found = Vec::new();
+        if let Some(condition) = &self.once {
+            condition.expr.walk(&mut |part| {
+                if let ExprKind::OfRoadUser(id, _) = part.kind {
+                    found.push(id);
+                }
+            });
+        }
+        found
+    }
+
+    /// The trigger as a file spells it.
+    pub fn text(&self) -> String {
+        let once = self.once.as_ref().map(|once| format!("once {}", once.text));
+        let after_s = ticks_s(self.after_ticks);
+        let after = (self.after_ticks > 0).then(|| format!("after {after_s} s"));
+        once.into_iter().chain(after).collect::<Vec<_>>().join(" ")
+    }
+}
+
+/// A number of ticks in seconds, as the decimal that a file spells.
+pub fn ticks_s(ticks: u32) -> f64 {
+    f64::from(ticks) * TICK_MS as f64 / 1000.0
 }
 
 /// A claim of a scenario about what happens.

@@ -271,6 +271,8 @@ pub enum RuleBody {
     /// A condition, compiled once for every action that it binds. States in it have their values
     /// after the action.
     Holds(Vec<RuleBinding>),
+    /// A condition under which a commanded lane change may begin; states are not known then.
+    During(Vec<RuleBinding>),
     /// `allowed[from][to]` for a plain state, or for one key of a map; `cell` is its position in the memory. The rule
     /// binds the actions that may set it.
     Moves { state: usize, cell: usize, allowed: Vec<Vec<bool>>, actions: Vec<usize> },
@@ -332,6 +334,8 @@ pub struct RoadFacts {
     pub limit: Rational,
     /// `limit` as a float, m/s.
     pub limit_mps: f64,
+    /// Where on the route that is, in words, unless it is everywhere.
+    pub limited_at: Option<String>,
     /// Which lanes in the ego vehicle's direction exist somewhere along the route, by
     /// [`LaneChoice`] in its order: left, current, right.
     pub lanes: [bool; 3],

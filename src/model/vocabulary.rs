@@ -123,6 +123,10 @@ pub enum Site {
     /// In the `where` of a drawn parameter.
     Where,
     Rule,
+    /// In a rule `during change`.
+    Change,
+    /// In `once` of a scenario's step.
+    Trigger,
     Reward,
     Verdict,
 }
@@ -132,8 +136,10 @@ impl Site {
     /// collision was judged.
     pub fn knows(self, known: Known) -> bool {
         match known {
-            Known::Road | Known::World => matches!(self, Site::Where | Site::Rule),
-            Known::Spawn => self == Site::Rule,
+            Known::Road | Known::World => {
+                matches!(self, Site::Where | Site::Rule | Site::Change | Site::Trigger)
+            }
+            Known::Spawn => matches!(self, Site::Rule | Site::Change),
             Known::Step => matches!(self, Site::Reward | Site::Verdict),
             Known::Judgement => self == Site::Verdict,
         }
@@ -175,7 +181,7 @@ const LENGTH: Type = Type::Quantity(Dimension::LENGTH);
 const RATIO: Type = Type::Quantity(Dimension::RATIO);
 const SPEED: Type = Type::Quantity(Dimension::SPEED);
 
-// The names of policies' variables (`policy::VARIABLES`) are the same wherever the same is meant.
+// Policies have variables of their own (`policy::VARIABLES`): what an agent observes is rounded and cut off.
 facts! {
     RoadLimit "road.limit" SPEED, Road = "A `Speed`: the lowest limit along the route.";
     EgoSpeed "ego.speed" SPEED, World = "A `Speed`: how fast the ego vehicle is.";
@@ -190,6 +196,7 @@ facts! {
     Elapsed "elapsed" DURATION, World = "A `Duration`: since the episode began.";
     StepNumber "step" Type::Int, World = "A `Int`: the number of the step, from 0.";
     NpcSpeed "npc.speed" SPEED, Spawn = "A `Speed`: of the road user that appears.";
+    NpcGap "npc.gap" LENGTH, Spawn = "A `Length`: from the road user that appears to the ego vehicle.";
     NpcJunctionAhead "npc.junction_ahead" LENGTH, Spawn = "A `Length`: along its way to the next junction; 0 in one, 1000 m if there is none nearer.";
     NpcLimit "npc.limit" SPEED, Spawn = "A `Speed`: the limit of the lane in which it appears.";
     SpawnGap "spawn_gap" LENGTH, Spawn = "A `Length`: the gap from the ego vehicle to the road user that appears.";
@@ -201,6 +208,12 @@ facts! {
     Struck "struck" Type::Bool, Step = "A `Bool`: the obstacle ran into the side or the rear of an ego vehicle that did not have to give way.";
     Avoidable "avoidable" Type::Bool, Judgement = "A `Bool`: a careful reference driver avoids it. Verdicts only.";
 }
+
+/// What a rule may restrict instead of the draw.
+pub const CHANGE: (&str, &str) = (
+    "change",
+    "`during change`: a lane change that the action commands begins only while the condition holds.",
+);
 
 /// `lane in road.lanes`: spelt like a fact, but a set, which may only stand after `in`.
 pub const ROAD_LANES: (&str, &str) =

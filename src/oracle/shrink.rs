@@ -53,6 +53,7 @@ pub fn shrink(
         search.fewest_actions(&mut best);
         search.fewest_steps(&mut best);
         search.fewest_ambient(&mut best);
+        search.fewest_delays(&mut best);
         search.fewest_effects(&mut best);
         search.plainest_start(&mut best);
         search.plainest_values(&mut best);
@@ -251,6 +252,19 @@ impl<'a> Search<'a> {
         }
     }
 
+    /// Actions at the beginning of their step.
+    fn fewest_delays(&mut self, best: &mut Candidate) {
+        for step in 0..best.script.steps.len() {
+            let mut candidate = best.clone();
+            let Some(action) = candidate.script.steps.get_mut(step).and_then(Option::as_mut) else {
+                continue;
+            };
+            if action.trigger.take().is_some() {
+                self.take(best, candidate, None);
+            }
+        }
+    }
+
     /// Rows that do less, with the same values for parameters of the same name.
     fn fewest_effects(&mut self, best: &mut Candidate) {
         let log = self.play(best, None);
@@ -264,7 +278,8 @@ impl<'a> Search<'a> {
                     continue;
                 }
                 let mut candidate = best.clone();
-                candidate.script.steps[step] = Some(ScriptedAction { row, values: draw.values.clone() });
+                candidate.script.steps[step] =
+                    Some(ScriptedAction { row, values: draw.values.clone(), trigger: None });
                 if self.take(best, candidate, None) {
                     break;
                 }

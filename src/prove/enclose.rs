@@ -101,7 +101,7 @@ pub(crate) fn enclose(expr: &Expr, known: &Known<'_>) -> Values {
             let chosen = positions(values(key).variants()).map(|key| known.cells[first + key]);
             chosen.reduce(Values::union).unwrap_or(Values::Variants(0))
         }
-        ExprKind::Fact(fact) => fact_values(*fact, known),
+        ExprKind::Fact(fact) | ExprKind::OfRoadUser(_, fact) => fact_values(*fact, known),
         ExprKind::Call(function, arguments) => {
             let locals: Vec<Values> = arguments.iter().map(values).collect();
             enclose(&known.functions[*function].body, &Known { locals: &locals, ..*known })
@@ -170,6 +170,7 @@ fn fact_values(fact: Fact, known: &Known<'_>) -> Values {
         | Fact::Elapsed
         | Fact::StepNumber
         | Fact::NpcSpeed
+        | Fact::NpcGap
         | Fact::NpcJunctionAhead
         | Fact::NpcLimit
         | Fact::SpawnGap

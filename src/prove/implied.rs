@@ -70,9 +70,10 @@ fn follows(space: &Space, rule: usize, others: &RulesInForce, work: &mut usize) 
                     let pairs = stricter.iter().flatten().zip(allowed.iter().flatten());
                     same == cell && pairs.into_iter().all(|(stricter, allowed)| *allowed || !*stricter)
                 }
-                RuleBody::Holds(_) => false,
+                RuleBody::Holds(_) | RuleBody::During(_) => false,
             })
         }
+        RuleBody::During(_) => false,
         RuleBody::Holds(_) => {
             bound().all(|row| holds(space, row, rule, others)) && start_holds(space, rule, others)
         }

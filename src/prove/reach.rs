@@ -74,7 +74,7 @@ fn without_other_keys(space: &Space, row: &Row) -> Option<Arc<[usize]>> {
         RuleBody::Moves { state, cell, .. } if space.states[*state].key.is_some() => {
             !space.may_set(row.action, &declared(space, row), *cell)
         }
-        RuleBody::Moves { .. } | RuleBody::Holds(_) => false,
+        RuleBody::Moves { .. } | RuleBody::Holds(_) | RuleBody::During(_) => false,
     };
     let kept: Arc<[usize]> = row.rules.iter().filter(|rule| !is_other(rule)).copied().collect();
     (kept.len() < row.rules.len()).then_some(kept)

@@ -19,7 +19,8 @@ pub(super) fn reduce(expr: &Expr, functions: &[FnDef], locals: &[Expr]) -> Expr 
         | ExprKind::Number(_)
         | ExprKind::Variant(..)
         | ExprKind::Cell(_)
-        | ExprKind::Fact(_) => expr.kind.clone(),
+        | ExprKind::Fact(_)
+        | ExprKind::OfRoadUser(..) => expr.kind.clone(),
         ExprKind::CellAt(first, key) => {
             let key = inner(key);
             match key.kind {
@@ -64,6 +65,7 @@ fn fold(expr: Expr) -> Expr {
                 | ExprKind::Cell(_)
                 | ExprKind::CellAt(..)
                 | ExprKind::Fact(_)
+                | ExprKind::OfRoadUser(..)
                 | ExprKind::InLanes(..)
                 | ExprKind::OnRoad(_)
                 | ExprKind::IsWord(..)

@@ -105,7 +105,7 @@ fn form(space: &Space, row: &Row) -> String {
     for rule in row.rules.iter() {
         match &space.rules[*rule].body {
             RuleBody::Moves { .. } => parts.push(format!("rule {rule}")),
-            RuleBody::Holds(bindings) => {
+            RuleBody::Holds(bindings) | RuleBody::During(bindings) => {
                 for binding in bindings.iter().filter(|binding| binding.action == row.action) {
                     let condition = reduced(&binding.condition);
                     if condition.kind != ExprKind::Bool(true) {

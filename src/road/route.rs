@@ -164,6 +164,13 @@ impl Route {
         })
     }
 
+    /// The lane with the lowest limit, the first of several; `None` if all allow the same.
+    pub fn slowest(&self, map: &RoadMap) -> Option<RouteLane> {
+        let limit_mps = |lane: &RouteLane| map.lane(lane.lane).speed_limit_mps;
+        let slowest = self.lanes.iter().min_by(|a, b| limit_mps(a).total_cmp(&limit_mps(b)))?;
+        self.lanes.iter().any(|lane| limit_mps(lane) > limit_mps(slowest)).then_some(*slowest)
+    }
+
     /// The lane of the route at a station, clamped to its ends.
     pub fn lane_at(&self, station_m: f64) -> RouteLane {
         let after = self.lanes.partition_point(|lane| lane.enter_m <= station_m);

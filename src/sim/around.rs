@@ -22,6 +22,7 @@ pub(super) struct Around<'a> {
     pub ego_forward: Vec2,
     pub ego_velocity_mps: Vec2,
     pub ego_station_m: f64,
+    pub ego_offset_m: f64,
     /// All other road users: those before it in the world's order, and those after it.
     pub users: [&'a [RoadUser]; 2],
     pub signals: &'a SignalClock,

@@ -6,10 +6,11 @@ use crate::model::{JUNCTION_AHEAD_M_MAX, MomentFacts, NpcFacts};
 use crate::road::{LaneIndex, RoadMap, RouteLane};
 
 use super::around::Around;
-use super::road_user::{Motion, Mover, Obstacle};
+use super::npc::Driver;
+use super::road_user::{Motion, Obstacle};
 use super::scene::Scene;
 use super::sense::SignalColour;
-use super::world::World;
+use super::world::{DT_S, World};
 
 /// How far ahead a traffic light is searched for, m.
 const LIGHT_AHEAD_M: f64 = 100.0;
@@ -21,32 +22,37 @@ const NO_ROAD_USER_M: f64 = 100.0;
 impl World {
     /// The facts of this moment.
     pub fn moment_facts(&self) -> MomentFacts {
-        let scene = self.scene();
-        let station_m = self.ego_station_m();
+        self.alone().moment_facts()
+    }
+}
+
+impl Around<'_> {
+    /// The facts of this moment. Where one road user looks around, the nearest is another.
+    pub fn moment_facts(&self) -> MomentFacts {
+        let (scene, station_m) = (self.scene, self.ego_station_m);
         let gaps = self.obstacles().map(|obstacle| (obstacle.distance_m, obstacle.velocity_mps.norm()));
         let nearest = gaps.min_by(|a, b| a.0.total_cmp(&b.0));
         MomentFacts {
-            ego_speed_mps: self.ego().speed_mps,
-            ego_acceleration_mps2: self.ego().acceleration_mps2,
+            ego_speed_mps: self.ego.speed_mps,
+            ego_acceleration_mps2: self.ego.acceleration_mps2,
             ego_limit_mps: scene.map.lane(scene.route.lane_at(station_m).lane).speed_limit_mps,
             ego_junction_ahead_m: scene.route_junction_ahead_m(station_m),
             ego_route_left_m: scene.route.goal_m - station_m,
-            ego_offset_m: self.ego_offset_m(),
+            ego_offset_m: self.ego_offset_m,
             ego_light: self.light_ahead(),
             ego_road: road_kind(scene, station_m),
-            road_users: self.obstacles().len() as u32,
+            road_users: self.obstacles().count() as u32,
             nearest_gap_m: nearest.map_or(NO_ROAD_USER_M, |(gap_m, _)| gap_m),
             nearest_speed_mps: nearest.map_or(0.0, |(_, speed_mps)| speed_mps),
-            elapsed_s: self.time_s(),
+            elapsed_s: self.tick as f64 * DT_S,
         }
     }
 
     /// What the next traffic light on the route shows.
     fn light_ahead(&self) -> Light {
-        let station_m = self.ego_station_m();
-        let ahead = station_m..=station_m + LIGHT_AHEAD_M;
-        let next = self.scene().route.stop_lines.iter().find(|line| ahead.contains(&line.station_m));
-        match next.map(|line| self.signal(line.signal)) {
+        let ahead = self.ego_station_m..=self.ego_station_m + LIGHT_AHEAD_M;
+        let next = self.scene.route.stop_lines.iter().find(|line| ahead.contains(&line.station_m));
+        match next.map(|line| self.signals.colour(&self.scene.map, line.signal, self.tick)) {
             None => Light::None,
             Some(SignalColour::Red) => Light::Red,
             Some(SignalColour::Yellow) => Light::Yellow,
@@ -65,35 +71,35 @@ impl Scene {
 }
 
 /// The facts of a road user. One on foot has those of the ego vehicle's route beside it.
-pub(super) fn npc_facts(around: &Around, obstacle: &Obstacle, mover: &Mover) -> NpcFacts {
+pub(super) fn npc_facts(around: &Around, obstacle: &Obstacle, motion: &Motion) -> NpcFacts {
     let scene = around.scene;
-    let (limit_mps, junction_ahead_m) = match &mover.motion {
-        Motion::Drive(driver) => {
-            let station_m = driver.station_m();
-            let ahead = driver
-                .way()
-                .lanes_from(station_m)
-                .map(|(lane, on_lane_m)| (lane, on_lane_m, lane_m(scene, lane)));
-            // Lane by lane: the first begins behind the station, the others follow each other.
-            let mut begin_m = station_m;
-            let ahead = ahead.map(|(lane, on_lane_m, length_m)| {
-                let from_m = begin_m;
-                begin_m += length_m - on_lane_m;
-                (lane, from_m)
-            });
-            (driver.way().limit_mps(scene, station_m), junction_ahead_m(&scene.map, ahead, station_m))
-        }
+    match motion {
+        Motion::Drive(driver) => driver_facts(around, obstacle, driver),
         Motion::Walk(_) | Motion::Stand => {
             let station_m = scene.route.path.project(obstacle.outline.pose.position).station_m;
-            let lane = scene.route.lane_at(station_m).lane;
-            (scene.map.lane(lane).speed_limit_mps, scene.route_junction_ahead_m(station_m))
+            let limit_mps = scene.map.lane(scene.route.lane_at(station_m).lane).speed_limit_mps;
+            facts(obstacle, limit_mps, scene.route_junction_ahead_m(station_m))
         }
-    };
-    NpcFacts { speed_mps: obstacle.velocity_mps.norm(), junction_ahead_m, limit_mps }
+    }
 }
 
-fn lane_m(scene: &Scene, lane: LaneIndex) -> f64 {
-    scene.map.lane(lane).centre.length_m()
+/// The facts of a road user that drives.
+pub(super) fn driver_facts(around: &Around, obstacle: &Obstacle, driver: &Driver) -> NpcFacts {
+    let (scene, way, station_m) = (around.scene, driver.way(), driver.station_m());
+    // Lane by lane: the first begins behind the station, the others follow each other.
+    let mut begin_m = station_m;
+    let ahead = way.lanes_from(station_m).map(|(lane, on_lane_m)| {
+        let from_m = begin_m;
+        begin_m += scene.map.lane(lane).centre.length_m() - on_lane_m;
+        (lane, from_m)
+    });
+    let ahead_m = junction_ahead_m(&scene.map, ahead, station_m);
+    facts(obstacle, way.limit_mps(scene, station_m), ahead_m)
+}
+
+fn facts(obstacle: &Obstacle, limit_mps: f64, junction_ahead_m: f64) -> NpcFacts {
+    let (speed_mps, gap_m) = (obstacle.velocity_mps.norm(), obstacle.distance_m);
+    NpcFacts { speed_mps, gap_m, junction_ahead_m, limit_mps }
 }
 
 /// Distance from a station to the first lane inside a junction, m. `ahead` has the lanes from the station on, each
@@ -124,8 +130,14 @@ fn road_kind(scene: &Scene, station_m: f64) -> RoadKind {
 
 #[cfg(test)]
 mod tests {
+    use std::path::Path;
+    use std::sync::Arc;
+
+    use crate::action::{ActionTable, Offer, Situation};
+    use crate::check::{ReadError, load};
     use crate::model::vocabulary::{Light, RoadKind, Verb};
-    use crate::sim::testing;
+    use crate::model::{NpcFacts, Row, RulesInForce};
+    use crate::sim::{Control, Scene, World, testing};
 
     #[test]
     fn a_moment_says_how_far_it_is_to_the_junction() {
@@ -150,5 +162,59 @@ mod tests {
         let ahead_m = ego_m - facts.npc.junction_ahead_m;
         assert!((40.0..50.0).contains(&ahead_m), "{ahead_m}");
         assert_eq!(facts.npc.speed_mps, 8.0);
+    }
+
+    /// A lane change that an action commands begins only while the rules `during change` hold; without them others
+    /// begin too.
+    #[test]
+    fn lane_changes_begin_only_while_their_rules_hold() {
+        let path =
+            Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/cases/wishes/no_cut_ins_near_junctions.ava");
+        let read = |path: &Path| std::fs::read_to_string(path).map_err(|error| ReadError(error.to_string()));
+        let space = load(&path, &read).expect("it can be read").space.expect("it is sound");
+        let table = ActionTable::new(Arc::clone(&space));
+        let rules = RulesInForce::by_default(&space);
+        let is_changer =
+            |row: &&Row| row.label.contains("then: Change") && !row.label.starts_with("cross_road");
+        let (mut bound, mut wrong, mut free) = (0, 0, 0);
+        for road in &space.roads {
+            let scene = Arc::new(Scene::new(road.map.clone(), road.route.clone()));
+            let world = World::new(scene, &testing::start());
+            let memory = space.initial_memory(1);
+            let situation =
+                Situation { memory: &memory, road, rules: &rules, surroundings: &world, seed: 1, step: 0 };
+            for row in space.rows.iter().filter(is_changer) {
+                let Offer::Legal(draw) = table.offer(&situation, row.index) else { continue };
+                let rules = draw.lane_changes.as_ref().expect("the rule binds it");
+                for binds in [true, false] {
+                    let mut world = world.clone();
+                    let id = world.apply(&draw.effects[0]).expect("it is legal").expect("it spawns");
+                    if binds {
+                        world.bind_lane_changes(id, rules);
+                    }
+                    let Some(begin) = first_change(&mut world, id) else { continue };
+                    let holds = begin.junction_ahead_m >= 40.0 && begin.gap_m >= 12.0;
+                    assert!(!binds || holds, "{}: {begin:?}", row.label);
+                    bound += usize::from(binds);
+                    free += usize::from(!binds);
+                    wrong += usize::from(!binds && !holds);
+                }
+            }
+        }
+        assert!(bound > 0 && free > bound && wrong > 0, "{bound} of {free}, {wrong}");
+    }
+
+    /// What was known of a driver when its first lane change began, within 20 s.
+    fn first_change(world: &mut World, id: u32) -> Option<NpcFacts> {
+        for _ in 0..1000 {
+            let before = world.npc_facts(id)?;
+            world.tick(&Control { throttle_pct: 20.0, ..Control::default() });
+            let around = world.alone();
+            let (.., driver) = around.drivers().find(|(obstacle, ..)| obstacle.id == id)?;
+            if driver.is_changing_lanes() {
+                return Some(before);
+            }
+        }
+        None
     }
 }

@@ -4,10 +4,10 @@ mod playback;
 
 use std::sync::Arc;
 
-use crate::action::{Effect, SpawnFacts, SpawnRequest, Surroundings};
+use crate::action::{Effect, LaneChangeRules, SpawnFacts, SpawnRequest, Surroundings};
 use crate::geometry::{Frame, OrientedBox, Sweep, Vec2};
 use crate::model::vocabulary::{Level, TimeOfDay};
-use crate::model::{MomentFacts, TICK_MS};
+use crate::model::{MomentFacts, NpcFacts, TICK_MS};
 
 use super::ambient::{Ambient, RENEWAL_TICKS, is_gone};
 use super::around::Around;
@@ -15,9 +15,10 @@ use super::contact::{Contact, Party, common_speed_mps, meet};
 use super::ego::{Control, Ego, VehicleParameters};
 use super::environment::Environment;
 use super::incident::{Bump, Incident, bump, impact};
+use super::moment::npc_facts;
 use super::placement;
 use super::right_of_way::PassedLight;
-use super::road_user::{Moved, Obstacle, RoadUser};
+use super::road_user::{Motion, Moved, Obstacle, RoadUser};
 use super::scene::Scene;
 use super::sense::{
     Conditions, EgoMotion, FRAME_S, FRAME_TICKS, RANGE_M, Sensed, SensedObject, SignalColour,
@@ -245,6 +246,20 @@ impl World {
         self.obstacles().find(|obstacle| obstacle.id == id)
     }
 
+    /// Binds the lane changes of a road user that just appeared by rules.
+    pub fn bind_lane_changes(&mut self, id: u32, rules: &Arc<LaneChangeRules>) {
+        let user = self.users.iter_mut().find(|user| user.obstacle.id == id);
+        if let Some(Motion::Drive(driver)) = user.map(|user| &mut user.mover.motion) {
+            driver.lane_changes = Some(Arc::clone(rules));
+        }
+    }
+
+    /// What can be asked about the road user with an id, if it is there.
+    pub fn npc_facts(&self, id: u32) -> Option<NpcFacts> {
+        let user = self.users.iter().find(|user| user.obstacle.id == id)?;
+        Some(npc_facts(&self.alone(), &user.obstacle, &user.mover.motion))
+    }
+
     /// Contacts among obstacles that began in the tick before.
     pub fn incidents(&self) -> &[Incident] {
         &self.incidents
@@ -358,6 +373,11 @@ impl World {
         VehicleParameters::MKZ.front_m(self.ego_station_m)
     }
 
+    /// The world as nobody in it looks around.
+    pub(super) fn alone(&self) -> Around<'_> {
+        self.around([&self.users, &[]])
+    }
+
     fn around<'a>(&'a self, users: [&'a [RoadUser]; 2]) -> Around<'a> {
         Around {
             scene: &self.scene,
@@ -366,6 +386,7 @@ impl World {
             ego_forward: self.ego.frame.forward(),
             ego_velocity_mps: self.ego.velocity_mps(),
             ego_station_m: self.ego_station_m,
+            ego_offset_m: self.ego_offset_m,
             users,
             signals: &self.signals,
             tick: self.ticks,

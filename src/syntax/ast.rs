@@ -354,8 +354,9 @@ pub struct Rule {
 
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub enum RuleBody {
-    /// `on a, b: condition`. Without `on` it holds for every action: `on` is empty.
-    Holds { on: Vec<Name>, condition: Expr },
+    /// `on a, b: condition`. Without `on` it holds for every action: `on` is empty. With `during change` it is about
+    /// what road users do later.
+    Holds { on: Vec<Name>, during: Option<Name>, condition: Expr },
     /// `on state { A -> A | B }`, `on state[key] { A -> A | B }`.
     Moves { state: Name, key: Option<Name>, moves: Vec<Move> },
 }
@@ -447,6 +448,9 @@ pub struct Step {
     pub action: Call,
     /// The drawn parameters.
     pub drawn: Vec<Field>,
+    /// The condition that the action waits for, and how long it waits from then on.
+    pub once: Option<Expr>,
+    pub after: Option<Expr>,
     #[serde(skip)]
     pub span: Span,
 }

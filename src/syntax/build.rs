@@ -293,6 +293,7 @@ impl Builder {
             Parts::of(targets).rest().flat_map(|names| self.names(names)).collect()
         });
         let key = parts.take(Rule::moved_key).map(|key| self.name(Parts::of(key).next()));
+        let during = parts.take(Rule::during).map(|during| self.name(Parts::of(during).next()));
         let body = parts.next();
         if body.as_rule() == Rule::holds {
             if let Some(key) = key {
@@ -301,7 +302,11 @@ impl Builder {
                 return Err(Box::new(error.help("put the key into the condition: `sky[Rain] > None`")));
             }
             let condition = self.only_expression(body)?;
-            return Ok(NamedRule { optional, name, body: RuleBody::Holds { on, condition } });
+            return Ok(NamedRule { optional, name, body: RuleBody::Holds { on, during, condition } });
+        }
+        if let Some(during) = during {
+            let error = Diagnostic::error(code::MOVES, "transitions are not about what road users do");
+            return Err(Box::new(error.at(during.span, "").help("write a condition: `during change: …`")));
         }
         let [state] = <[Name; 1]>::try_from(on).map_err(|on| {
             let place = on.get(1).map_or(Span { end: name.span.end, ..span }, |second| second.span);
@@ -388,7 +393,9 @@ impl Builder {
             let fields = drawn.into_inner().find(|part| part.as_rule() == Rule::fields);
             self.fields(fields.expect("`with` has fields"))
         })?;
-        Ok(Step { number, action, drawn, span })
+        let once = parts.take(Rule::once).map(|once| self.only_expression(once)).transpose()?;
+        let after = parts.take(Rule::after).map(|after| self.only_expression(after)).transpose()?;
+        Ok(Step { number, action, drawn, once, after, span })
     }
 
     fn policy(&self, mut parts: Parts<'_>) -> Built<Policy> {

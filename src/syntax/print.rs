@@ -454,9 +454,12 @@ impl Printer<'_> {
         }
         self.words(&format!("rule {}", item.name.text));
         match &item.body {
-            RuleBody::Holds { on, condition } => {
+            RuleBody::Holds { on, during, condition } => {
                 if !on.is_empty() {
                     self.words(&format!(" on {}", names(on)));
+                }
+                if let Some(during) = during {
+                    self.words(&format!(" during {}", during.text));
                 }
                 self.words(":");
                 self.value(condition);
@@ -671,6 +674,9 @@ fn step(step: &Step) -> Layout {
     let mut parts = vec![Layout::text(format!("{}: ", number(&step.number))), call(&step.action)];
     if !step.drawn.is_empty() {
         parts.extend([Layout::text(" with "), fields(&step.drawn)]);
+    }
+    for (keyword, clause) in [(" once ", &step.once), (" after ", &step.after)] {
+        parts.extend(clause.iter().flat_map(|clause| [Layout::text(keyword), expression(clause)]));
     }
     Layout::Row(parts)
 }

@@ -28,7 +28,7 @@ fn binding(expr: &Expr) -> u8 {
         ExprKind::Unary { op: UnaryOp::Not, .. } => NOT_PRECEDENCE,
         ExprKind::Unary { op: UnaryOp::Negate, .. } => NEGATE_PRECEDENCE,
         // `12 m.x` and `lane 1/1 at 2 m[0]` would read as something else.
-        ExprKind::Number(_) | ExprKind::LanePoint { .. } | ExprKind::Numbered { .. } => OPERAND,
+        ExprKind::Number(_) | ExprKind::LanePoint { .. } => OPERAND,
         _ => BASE,
     }
 }

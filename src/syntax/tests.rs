@@ -249,14 +249,16 @@ fn item() -> impl Strategy<Value = ItemKind> {
     let entry = || (name(), expr()).prop_map(|(name, value)| Field { name, value, span: Span::NONE });
     let entries = || prop::collection::vec(entry(), 0..3);
     let scenario =
-        (name(), name(), entries(), entries(), entries()).prop_map(|(name, road, origin, start, drawn)| {
-            let args =
-                start.iter().map(|entry| Arg { name: Some(entry.name.clone()), value: entry.value.clone() });
-            let action = Call { name: name.clone(), args: args.collect(), span: Span::NONE };
-            let number = Number { digits: "0".to_owned(), unit: None, span: Span::NONE };
-            let steps = vec![Step { number, action, drawn, span: Span::NONE }];
-            ItemKind::Scenario(Scenario { name, origin, road, start, steps, expects: Vec::new() })
-        });
+        (name(), name(), entries(), entries(), entries(), prop::option::of(expr()), prop::option::of(expr()))
+            .prop_map(|(name, road, origin, start, drawn, once, after)| {
+                let args = start
+                    .iter()
+                    .map(|entry| Arg { name: Some(entry.name.clone()), value: entry.value.clone() });
+                let action = Call { name: name.clone(), args: args.collect(), span: Span::NONE };
+                let number = Number { digits: "0".to_owned(), unit: None, span: Span::NONE };
+                let steps = vec![Step { number, action, drawn, once, after, span: Span::NONE }];
+                ItemKind::Scenario(Scenario { name, origin, road, start, steps, expects: Vec::new() })
+            });
     prop_oneof![
         (name(), expr()).prop_map(|(name, value)| ItemKind::Let(Let { name, value })),
         (name(), expr())

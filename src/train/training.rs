@@ -269,6 +269,7 @@ fn play(
         let choice = carry_out(offers, legal.view(), agent, moment);
         let row = match &choice {
             Choice::Act(draw) => Some(draw.row),
+            Choice::Await(action) => Some(action.row),
             Choice::Refused { row, .. } => Some(*row),
             Choice::Pass | Choice::Stop => None,
         };

@@ -4,11 +4,12 @@ use std::collections::BTreeSet;
 
 use avastra::action::{ActionTable, Draw, Effect, Offer, Situation};
 use avastra::check::state_argument::memory_from;
-use avastra::episode::{Choice, Moment};
+use avastra::emit::{Provenance, unclaimed};
+use avastra::episode::{Choice, Moment, Outcome, Script};
 use avastra::model::vocabulary::{Level, Light, TimeOfDay};
 use avastra::model::{End, Memory, OutcomeFacts, Reach, RulesInForce, Value};
 use avastra::syntax::ast::FileId;
-use avastra::syntax::{Diagnostic, format};
+use avastra::syntax::{Diagnostic, format, print};
 
 use crate::cases::{cases, root};
 use crate::command::{avastra, outcome};
@@ -288,6 +289,55 @@ fn near_misses_of_pedestrians_weigh_double() {
 }
 
 #[test]
+fn a_pedestrian_comes_when_the_ego_vehicle_is_30_m_from_the_junction() {
+    let path = root().join("tests/cases/wishes/crosses_at_30_m.ava");
+    let loaded = avastra::check::load(&path, &read).expect("it is there");
+    let (space, scenario) = (loaded.space.expect("it is sound"), loaded.scenario.expect("it holds one"));
+    let number = space.roads.iter().position(|road| road.name == "corner").expect("it is there");
+    let run = run_of(space, 1, 4, &[]);
+    let script = Script::of_scenario(&scenario);
+    let mut seen = Vec::new();
+    let log = run.play(number, &mut |moment| script.choose(run.table(), moment), &mut |world, _, _| {
+        let appeared = world.obstacles().next().map(|obstacle| obstacle.spawned_tick);
+        seen.push((world.moment_facts().ego_junction_ahead_m, appeared));
+    });
+    let Outcome::Done { delay_ticks, .. } = log.steps[0].outcome else { panic!("{:?}", log.steps[0]) };
+    assert!(delay_ticks > 0 && delay_ticks < 300, "{delay_ticks}");
+    // What is seen first was before the first tick.
+    let spawned = seen.iter().find_map(|(_, spawned)| *spawned).expect("it appeared") as usize;
+    assert_eq!(spawned, delay_ticks as usize);
+    assert!(seen[spawned].0 <= 30.0 && seen[spawned - 1].0 > 30.0, "{:?}", &seen[spawned - 1..=spawned]);
+    // The log has the tick alone, and plays to the same bits; so does the file that is written of it.
+    assert_replays(&run, number, &log);
+    let source = Provenance {
+        command: "test",
+        name: "again",
+        space_path: "avastra45.ava",
+        episode: 0,
+        agent: "none",
+        without: &[],
+        with: &[],
+    };
+    let text = print(&unclaimed(run.table(), &log, "Again.", &source));
+    assert!(text.contains(&format!("}} after {} s", f64::from(delay_ticks) * 20.0 / 1000.0)), "{text}");
+}
+
+#[test]
+fn a_moment_that_does_not_come_is_said() {
+    let path = "tests/cases/wishes/crosses_at_30_m.ava";
+    let text =
+        read(&root().join(path)).expect("it is there").replace("<= 30 m", "<= 30 m and npc#7.gap < 5 m");
+    let folder = tempfile::tempdir().expect("a folder");
+    let space = root().join("scenarios/avastra45.ava");
+    let text = text.replace("../../../scenarios/avastra45.ava", &space.display().to_string());
+    let file = folder.path().join("late.ava");
+    std::fs::write(&file, text).expect("it can be written");
+    let (status, stdout, _) = outcome(&mut avastra(&["verify", &file.display().to_string()]));
+    let reason = "`once ego.junction_ahead <= 30 m and npc#7.gap < 5 m` did not come within the step";
+    assert!(status != 0 && stdout.contains(reason), "{stdout}");
+}
+
+#[test]
 fn what_the_world_refuses_is_said_with_its_speed() {
     let space = "tests/cases/wishes/only_while_driving.ava";
     let reason = "rule `only_while_driving` says no: ego.speed = 3 m/s, wanted >= 8 m/s";
@@ -321,4 +371,33 @@ fn the_reward_is_the_authors_own() {
     assert_eq!(reward(true, false, 1.0), 10.0);
     assert_eq!(reward(true, true, 1.0), 2.0);
     assert_eq!((reward(false, false, 0.75), reward(false, false, 0.5)), (1.5, 0.0));
+}
+
+#[test]
+fn the_limit_of_the_newcomers_own_lane_may_bind() {
+    let map = std::fs::read_to_string(root().join("scenarios/roads/corner.xodr")).expect("it is shipped");
+    let turn = map.find("id=\"803\"").expect("the route turns there");
+    let (before, turn) = map.split_at(turn);
+    let map = before.to_owned() + &turn.replacen("max=\"11.176\"", "max=\"9.26\"", 1);
+    let space = "language 1
+road turn {
+  map: \"turn.xodr\"
+  start: lane 1/-1 at 105.88 m
+  goal: lane 5/-3 at 75.27 m
+}
+action ahead(any speed: Speed in 10 m/s .. 11 m/s) {
+  spawn Sedan ahead 40 m { lane: Current, speed: speed, does: DriveAhead }
+}
+optional rule whole_way on ahead: speed <= road.limit
+rule own_lane on ahead: speed <= npc.limit
+";
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("turn.ava").display().to_string();
+    std::fs::write(folder.path().join("turn.xodr"), map).expect("it can be written");
+    std::fs::write(&file, space).expect("it can be written");
+    let (status, stdout, stderr) = outcome(&mut avastra(&["road", &file]));
+    assert_eq!(status, 0, "{stderr}");
+    assert!(stdout.contains("road.limit is 33 km/h: lane 803/-1 from"), "{stdout}");
+    let (_, stdout, _) = outcome(&mut avastra(&["why", &file, "--row", "0"]));
+    assert!(stdout.contains("legal, for example ahead() with { speed: 10"), "{stdout}");
 }

@@ -4,8 +4,8 @@
 use crate::check::{Declaration, References, Symbol};
 use crate::model::Type;
 use crate::model::vocabulary::{
-    EpisodeField, RoadField, ScenarioClaim, Site, SpaceClaim, SpawnField, StartField, StopReason, WAIT,
-    parts_of, things,
+    CHANGE, EpisodeField, RoadField, ScenarioClaim, Site, SpaceClaim, SpawnField, StartField, StopReason,
+    WAIT, parts_of, things,
 };
 use crate::syntax::keyword;
 
@@ -333,8 +333,11 @@ impl<'a> Place<'a> {
                 }
                 kinds
             }
+            ("during", ..) => vec![Kind::Words(vec![CHANGE])],
             ("on" | ",", None, Some(_)) => vec![Kind::Actions, Kind::Groups, Kind::States],
-            (_, None, None) if self.tokens.len() > 1 && self.last(0) != "rule" => vec![Kind::Keyword("on")],
+            (_, None, None) if self.tokens.len() > 1 && self.last(0) != "rule" => {
+                ["on", "during"].map(Kind::Keyword).to_vec()
+            }
             _ => Vec::new(),
         }
     }
@@ -440,7 +443,7 @@ impl<'a> Place<'a> {
             (":", "{") if before == "with" => self.value(self.parameter_type(&self.called())),
             ("(" | ",", "(") => vec![Kind::Parameters(before.to_owned(), true)],
             (_, "{") if before == "with" => vec![Kind::Parameters(self.called(), false)],
-            (")", _) => vec![Kind::Keyword("with")],
+            (")", _) => ["with", "once", "after"].map(Kind::Keyword).to_vec(),
             _ => Vec::new(),
         }
     }

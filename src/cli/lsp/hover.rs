@@ -199,6 +199,7 @@ fn bound_by(space: &Space, name: &str) -> Option<String> {
         .collect();
     let kind = match &rule.body {
         RuleBody::Holds(_) => "Binds",
+        RuleBody::During(_) => "Binds, when they change lanes, the road users of",
         RuleBody::Moves { .. } => "Orders the changes made by",
     };
     let optional = if rule.optional { "\n\nOff unless asked for: `--with`." } else { "" };
@@ -216,9 +217,10 @@ fn facts_of(space: &Space, name: &str) -> Option<String> {
         .map(|(name, _)| name)
         .collect();
     Some(format!(
-        "\n\n- limit: {} m/s ({} km/h)\n- lanes beside the route: {}",
+        "\n\n- limit: {} m/s ({} km/h){}\n- lanes beside the route: {}",
         rounded(limit),
         rounded(limit * 3.6),
+        road.facts.limited_at.as_ref().map_or(String::new(), |place| format!(", in {place}")),
         lanes.join(", ")
     ))
 }

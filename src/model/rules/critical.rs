@@ -132,6 +132,7 @@ impl Reader<'_> {
             | ExprKind::Number(_)
             | ExprKind::Variant(..)
             | ExprKind::Fact(_)
+            | ExprKind::OfRoadUser(..)
             | ExprKind::OnRoad(_)
             | ExprKind::IsWord(..) => Form::Known(evaluate(expr, self.functions, &self.facts)),
             ExprKind::Local(local) => locals[*local].clone(),

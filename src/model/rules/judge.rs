@@ -210,6 +210,11 @@ impl<'a> RowRules<'a> {
             }
             (None, _) => {}
         }
+        let asks_for_limit = condition.any(|kind| matches!(kind, ExprKind::Fact(Fact::RoadLimit)));
+        let limited_at = self.road.and_then(|road| road.limited_at.as_ref());
+        if let Some(place) = limited_at.filter(|_| asks_for_limit) {
+            shown.push(format!("road.limit is that of {place}"));
+        }
         match shown.is_empty() {
             true => "its condition does not hold".to_owned(),
             false => shown.join(", "),

@@ -77,16 +77,23 @@ impl<'a> Demand<'a> {
 impl RuleBody {
     /// Whether the rule binds the action.
     pub fn binds(&self, action: usize) -> bool {
-        self.demand(action).is_some()
+        self.demand(action).is_some() || self.during(action).is_some()
     }
 
-    /// What the rule demands of an action; `None` if it does not bind the action.
+    /// What must hold when a road user of the action changes lanes.
+    pub(crate) fn during(&self, action: usize) -> Option<&Expr> {
+        let RuleBody::During(bindings) = self else { return None };
+        bindings.iter().find(|binding| binding.action == action).map(|binding| &binding.condition)
+    }
+
+    /// What the rule demands of an action when it is chosen; `None` if it demands nothing then.
     pub(crate) fn demand(&self, action: usize) -> Option<Demand<'_>> {
         match self {
             RuleBody::Holds(bindings) => {
                 let binding = bindings.iter().find(|binding| binding.action == action)?;
                 Some(Demand::Holds(&binding.condition))
             }
+            RuleBody::During(_) => None,
             RuleBody::Moves { state, cell, allowed, actions } => {
                 actions.contains(&action).then_some(Demand::Moves { state: *state, cell: *cell, allowed })
             }
@@ -99,6 +106,12 @@ impl<'a> RowRules<'a> {
     pub fn demands(self) -> impl Iterator<Item = (usize, Demand<'a>)> {
         let rules = self.in_force.on_row(self.row);
         rules.filter_map(move |rule| Some((rule, self.space.rules[rule].body.demand(self.row.action)?)))
+    }
+
+    /// The conditions in force under which road users of the row may change lanes.
+    pub fn during(self) -> impl Iterator<Item = &'a Expr> {
+        let rules = self.in_force.on_row(self.row);
+        rules.filter_map(move |rule| self.space.rules[rule].body.during(self.row.action))
     }
 
     /// The bounds on the numbers of the row: those of `where`s, and those of rules in force.

@@ -6,6 +6,7 @@
 
 use std::sync::Arc;
 
+use crate::action::LaneChangeRules;
 use crate::geometry::{
     OrientedBox, Path, Pose, SMOOTH_STEP_SLOPE_MAX, SmoothStep, Vec2, distance_m, smooth_step, wrap_angle,
 };
@@ -15,6 +16,7 @@ use crate::road::{LaneIndex, Neighbour};
 
 use crate::sim::around::Around;
 use crate::sim::body::BodyParameters;
+use crate::sim::moment::driver_facts;
 use crate::sim::road_user::{Moved, Obstacle};
 use crate::sim::traffic::TrafficProfile;
 use crate::sim::way::Way;
@@ -85,7 +87,10 @@ impl Driver {
                 ahead_m - size.length_m / 2.0 - around.ego_outline.half_length_m >= gap_m
             }
         };
-        if !due {
+        let allowed = |rules: &Arc<LaneChangeRules>| {
+            rules.allow(around.moment_facts(), driver_facts(around, this, self))
+        };
+        if !due || !self.lane_changes.as_ref().is_none_or(allowed) {
             return;
         }
         let begun = match next.towards.clone() {

@@ -9,6 +9,7 @@
 
 use std::sync::Arc;
 
+use crate::action::LaneChangeRules;
 use crate::model::vocabulary::Side;
 use crate::rng;
 use crate::rng::{Rng, Stream};
@@ -70,6 +71,8 @@ pub(in crate::sim) struct Driver {
     pub(super) last_change: Option<Side>,
     /// In reverse order: the next manoeuvre is last.
     pub(super) plan: Vec<Manoeuvre>,
+    /// Rules of the space on the lane changes of `plan`.
+    pub lane_changes: Option<Arc<LaneChangeRules>>,
     /// How often it drew where to go, so that each draw has its own stream.
     draws: u32,
 }
@@ -108,6 +111,7 @@ impl Driver {
             change: None,
             last_change: None,
             plan,
+            lane_changes: None,
             draws,
         }
     }

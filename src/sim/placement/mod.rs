@@ -124,7 +124,7 @@ pub(super) fn facts(around: &Around, request: &SpawnRequest, newcomers: &Newcome
     let noticing_m = safety::noticing_m(ego_mps);
     let is_sudden = !is_behind && noticing_m > braking_gap_m && in_view();
     let safety_gap_m = if is_sudden { noticing_m } else { braking_gap_m };
-    let npc = npc_facts(around, &newcomer.obstacle, &newcomer.mover);
+    let npc = npc_facts(around, &newcomer.obstacle, &newcomer.mover.motion);
     SpawnFacts { spawn_gap_m, safety_gap_m, npc }
 }
 
