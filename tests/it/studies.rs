@@ -126,7 +126,7 @@ fn a_quick_study_says_that_it_is_none() {
     let (status, stdout, stderr) = outcome(&mut avastra(&study));
     assert_eq!(status, 0, "{stderr}");
     let line = stdout.lines().last().expect("a result");
-    assert!(line.starts_with("{\"schema\":1,\"command\":\"study\""), "{line}");
+    assert!(line.starts_with("{\"schema\":2,\"command\":\"study\""), "{line}");
     let result: Value = serde_json::from_str(line).expect("JSON");
     let results = &result["results"];
     assert_eq!((&results["quick"], &results["cells"]), (&true.into(), &8.into()));
