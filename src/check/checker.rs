@@ -120,7 +120,7 @@ pub(super) fn space(
     }
     let actions: Vec<ActionDef> = core::mem::take(&mut checker.actions).into_iter().flatten().collect();
     let bounds = bounds(&actions, &rules);
-    let clauses = clauses(&actions, &rules, &checker.states);
+    let clauses = clauses(&actions, &checker.each_step, &rules, &checker.states);
     let mut space = Space {
         path: root.path,
         meaning: root.meaning,

@@ -48,6 +48,7 @@ examples! {
     "pedestrians_weigh_double",
     "slow_rain",
     "two_vehicles",
+    "wet_trucks",
 }
 
 /// What `--template` takes.

@@ -1,6 +1,7 @@
 //! The shipped examples: each is short, works when copied, and draws what it says.
 
 use avastra::action::{ActionTable, Draw, Effect, Offer, SpawnRequest};
+use avastra::check::state_argument::memory_from;
 use avastra::episode::{Choice, EpisodeLog, Moment, Outcome, StepLog};
 use avastra::model::vocabulary::{Body, Level, Side, TimeOfDay};
 use avastra::syntax::ast::FileId;
@@ -175,6 +176,26 @@ fn two_vehicles_at_most_and_never_in_a_row() {
         counts[steps.iter().filter(|is_vehicle| **is_vehicle).count()] += 1;
     }
     assert!(counts[2] > 0, "{counts:?}");
+}
+
+#[test]
+fn wet_trucks_keep_twice_the_distance() {
+    let table = example("wet_trucks");
+    let row = row(&table, "drive_ahead(lane: Current, mode: Near, then: Keep)");
+    for (sky, times) in [("None", 1.0), ("{ Wetness: Light, Rain: None, Fog: None }", 2.0)] {
+        let memory =
+            memory_from(table.space(), &format!("time: Noon, sky: {sky}"), 1).expect("it is a state");
+        let drawn = draws(&table, row, 0, &memory, 40);
+        let mut trucks = 0;
+        for request in drawn.iter().flat_map(spawns) {
+            let large = matches!(request.body, Body::BoxTruck | Body::SchoolBus);
+            trucks += usize::from(large);
+            let (base_m, times) = if large { (15.0, times) } else { (12.0, 1.0) };
+            let wanted_m = times * (base_m + request.speed_mps * 0.5);
+            assert!((request.distance_m - wanted_m).abs() < 1e-6, "{request:?}, not {wanted_m} m");
+        }
+        assert!(trucks > 0 && trucks < drawn.len(), "{trucks} of {}", drawn.len());
+    }
 }
 
 #[test]

@@ -80,6 +80,21 @@ fn wishes_compile_as_they_are_written() {
     }
 }
 
+/// What every step does to a state comes before the judgement of a draw, though the row itself sets nothing.
+#[test]
+fn every_second_step_is_slow() {
+    let table = wish("slow_every_second_step");
+    let space = table.space();
+    let (cold, rules) = (space.initial_memory(0), RulesInForce::by_default(space));
+    let hot = space.memory_after_wait(&cold, Some(&space.roads[0].facts), &rules);
+    let speeds = |memory: &Memory| -> Vec<f64> {
+        draws(&table, 0, 0, memory, 40).iter().map(|draw| number(draw, "speed")).collect()
+    };
+    let (slow, free) = (speeds(&cold), speeds(&hot));
+    assert!(slow.len() == 40 && slow.iter().all(|speed| *speed <= 4.0), "{slow:?}");
+    assert!(free.len() == 40 && free.iter().any(|speed| *speed > 8.0), "{free:?}");
+}
+
 #[test]
 fn it_is_always_night() {
     let table = wish("night_only");

@@ -12,7 +12,7 @@ pub(crate) struct Clause {
     /// The parameters that decide it: those that it names, and those that decide the states which it reads,
     /// because it reads them as they are after the action.
     needs: Vec<usize>,
-    /// Whether it depends on what the action does to the memory.
+    /// Whether it depends on what the step does to the memory.
     pub reads_effects: bool,
 }
 
@@ -43,14 +43,25 @@ impl Clause {
 }
 
 /// By action: its `where`s, then the rules that bind it, in the order of their declarations.
-pub(crate) fn clauses(actions: &[ActionDef], rules: &[RuleDef], states: &[StateDef]) -> Vec<Vec<Clause>> {
+pub(crate) fn clauses(
+    actions: &[ActionDef],
+    each_step: &[SetDef],
+    rules: &[RuleDef],
+    states: &[StateDef],
+) -> Vec<Vec<Clause>> {
     let of_action = |(index, action): (usize, &ActionDef)| {
+        let own = action.effects.iter().filter_map(|effect| match effect {
+            EffectDef::Set(set) => Some(&**set),
+            EffectDef::Spawn(_) => None,
+        });
+        // What every step does comes after the action's own effects.
+        let sets: Vec<&SetDef> = own.chain(each_step).collect();
         let mut found = Vec::new();
         for (parameter, definition) in action.parameters.iter().enumerate() {
             if let Some(condition) = &definition.condition {
                 let (source, mut needs) = (Source::Where(parameter), locals(condition));
                 let read = states_read(condition, states);
-                let reads_effects = add_effects(action, states, read, &mut needs);
+                let reads_effects = add_effects(&sets, states, read, &mut needs);
                 found.push(Clause { source, needs, reads_effects });
             }
         }
@@ -60,7 +71,7 @@ pub(crate) fn clauses(actions: &[ActionDef], rules: &[RuleDef], states: &[StateD
                 Some(Demand::Moves { state, .. }) => (Vec::new(), vec![state]),
                 None => continue,
             };
-            let reads_effects = add_effects(action, states, read, &mut needs);
+            let reads_effects = add_effects(&sets, states, read, &mut needs);
             found.push(Clause { source: Source::Rule(rule), needs, reads_effects });
         }
         found
@@ -68,28 +79,21 @@ pub(crate) fn clauses(actions: &[ActionDef], rules: &[RuleDef], states: &[StateD
     actions.iter().enumerate().map(of_action).collect()
 }
 
-/// Adds the parameters that decide these states after the action; whether the action sets any of them.
-fn add_effects(
-    action: &ActionDef,
-    states: &[StateDef],
-    mut read: Vec<usize>,
-    needs: &mut Vec<usize>,
-) -> bool {
-    let mut sets = false;
+/// Adds the parameters that decide these states after the step; whether the step sets any of them.
+fn add_effects(sets: &[&SetDef], states: &[StateDef], mut read: Vec<usize>, needs: &mut Vec<usize>) -> bool {
+    let mut is_set = false;
     // Backwards, because an effect reads what the effects before it have set.
-    for effect in action.effects.iter().rev() {
-        let EffectDef::Set(set) = effect else { continue };
-        let SetDef { state, key, value, .. } = &**set;
+    for SetDef { state, key, value, .. } in sets.iter().rev() {
         if !read.contains(state) {
             continue;
         }
-        sets = true;
+        is_set = true;
         for part in key.iter().chain([value]) {
             needs.extend(locals(part));
             read.extend(states_read(part, states));
         }
     }
-    sets
+    is_set
 }
 
 /// The states that an expression names, by index.

@@ -69,7 +69,13 @@ pub(super) fn polynomials<'c>(
     let mut after_effects = None;
     for clause in clauses {
         if clause.reads_effects && after_effects.is_none() {
-            reader.apply(&space.actions[action].effects, &locals)?;
+            for effect in &space.actions[action].effects {
+                let EffectDef::Set(set) = effect else { continue };
+                reader.apply(set, &locals)?;
+            }
+            for set in &space.each_step {
+                reader.apply(set, &[])?;
+            }
             after_effects = Some(());
         }
         let condition = match clause.source {
@@ -102,24 +108,21 @@ struct Reader<'a> {
 }
 
 impl Reader<'_> {
-    fn apply(&mut self, effects: &[EffectDef], locals: &[Form]) -> Option<()> {
-        for effect in effects {
-            let EffectDef::Set(set) = effect else { continue };
-            let SetDef { state, key, value, .. } = &**set;
-            let value = self.read(value, locals)?;
-            let key = match key {
-                Some(key) => Some(self.read(key, locals)?),
-                None => None,
-            };
-            let state = &self.states[*state];
-            let cells = state.first_cell..state.first_cell + state.cells;
-            match key {
-                None => self.cells[cells].fill(value),
-                Some(Form::Known(key)) => self.cells[state.first_cell + key.variant()] = value,
-                Some(_) => {
-                    for cell in cells {
-                        self.cells[cell] = join([self.cells[cell].clone(), value.clone()])?;
-                    }
+    fn apply(&mut self, set: &SetDef, locals: &[Form]) -> Option<()> {
+        let SetDef { state, key, value, .. } = set;
+        let value = self.read(value, locals)?;
+        let key = match key {
+            Some(key) => Some(self.read(key, locals)?),
+            None => None,
+        };
+        let state = &self.states[*state];
+        let cells = state.first_cell..state.first_cell + state.cells;
+        match key {
+            None => self.cells[cells].fill(value),
+            Some(Form::Known(key)) => self.cells[state.first_cell + key.variant()] = value,
+            Some(_) => {
+                for cell in cells {
+                    self.cells[cell] = join([self.cells[cell].clone(), value.clone()])?;
                 }
             }
         }
