@@ -7,15 +7,7 @@
 # with venv, and PyPI for the first run. Everything it makes stays under target/interop.
 set -eu
 
-root=$(cd "$(dirname "$0")/../.." && pwd)
-work=$root/target/interop
-venv=$work/venv
-mkdir -p "$work"
-if [ ! -e "$venv/installed" ]; then
-    python3 -m venv "$venv"
-    "$venv/bin/pip" install --quiet carla==0.9.16 eclipse-sumo==1.28.0
-    touch "$venv/installed"
-fi
+. "$(dirname "$0")/map_tools.sh"
 binary=${AVASTRA:-$root/target/release/avastra}
 [ -n "${AVASTRA:-}" ] || (cd "$root" && cargo build --release --quiet)
 exec "$venv/bin/python" "$root/tests/interop/gallery.py" "$binary" "$work/gallery" "$@"

@@ -6,14 +6,6 @@
 # it makes stays under target/interop.
 set -eu
 
-root=$(cd "$(dirname "$0")/../.." && pwd)
-work=$root/target/interop
-venv=$work/venv
-mkdir -p "$work"
-if [ ! -e "$venv/installed" ]; then
-    python3 -m venv "$venv"
-    "$venv/bin/pip" install --quiet carla==0.9.16 eclipse-sumo==1.28.0
-    touch "$venv/installed"
-fi
+. "$(dirname "$0")/map_tools.sh"
 (cd "$root" && cargo build --quiet)
 exec "$venv/bin/python" "$root/tests/interop/maps.py" "$root/target/debug/avastra" "$work/maps"
