@@ -1,0 +1,43 @@
+#!/bin/sh
+# Runs a driving system that others wrote: `sh python/adapters/run.sh sumo:EIDM scenarios/avastra45.ava --episodes 20`.
+#
+# NAME is a folder beside this file; what follows a colon is an option of the adapter. The rest are the arguments of `avastra run`; without
+# them only the profile is written, for other commands: `avastra replay FILES --ads-config target/adapters/sumo.yaml`.
+# The packages are installed once, under target/adapters/NAME. The driver gets the truth instead of what `modular`
+# perceives, so that its mistakes are its own; OBSERVATION=perceived changes that. PYTHON is a Python 3.11, AVASTRA the command.
+set -eu
+
+here=$(cd "$(dirname "$0")" && pwd)
+root=$(cd "$here/../.." && pwd)
+choice=${1:?"name an adapter: $(cd "$here" && echo */ | tr -d /)"}
+shift
+name=${choice%%:*}
+option=${choice#"$name"}
+option=${option#:}
+[ -f "$here/$name/driver.py" ] || { echo "run.sh: there is no adapter \`$name\`; there are: $(cd "$here" && echo */ | tr -d /)" >&2; exit 1; }
+
+venv=$root/target/adapters/$name
+if [ ! -e "$venv/installed" ]; then
+    "${PYTHON:-python3.11}" -m venv "$venv"
+    "$venv/bin/python" -m pip install --quiet --disable-pip-version-check -r "$here/$name/requirements.txt"
+    packages=$("$venv/bin/python" -c 'import sysconfig; print(sysconfig.get_path("purelib"))')
+    echo "$root/python" >"$packages/avastra.pth"
+    touch "$venv/installed"
+fi
+
+profile=$venv${option:+.$option}.yaml
+cat >"$profile" <<YAML
+ads:
+  command: ["$venv/bin/python", "$here/$name/driver.py"${option:+, \"$option\"}]
+  observation: ${OBSERVATION:-truth}
+  timeouts: { init: 120, step: 30 }
+YAML
+if [ $# -eq 0 ]; then
+    echo "$profile"
+    exit 0
+fi
+if [ -z "${AVASTRA:-}" ]; then
+    AVASTRA=$root/target/release/avastra
+    (cd "$root" && cargo build --release --quiet)
+fi
+exec "$AVASTRA" run "$@" --ads-config "$profile"

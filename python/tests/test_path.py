@@ -1,0 +1,87 @@
+"""Paths and ways."""
+
+import math
+import unittest
+
+import avastra
+from avastra import messages
+from stand_in import INIT, World, line
+
+
+class Paths(unittest.TestCase):
+    def test_a_pose_is_projected_to_where_it_comes_from(self):
+        path = line(bend=True)
+        for index in range(0, 1950):
+            station, offset = index * 0.1 + 0.05, (index % 7 - 3) * 0.8
+            pose = path.at(station, offset)
+            beside = path.project(pose.x, pose.y)
+            self.assertAlmostEqual(beside.station, station, delta=0.35 if 79 < station < 100 else 1e-6)
+            self.assertAlmostEqual(beside.offset, offset, delta=0.05 if 79 < station < 100 else 1e-6)
+
+    def test_beyond_its_ends_a_path_goes_on_straight(self):
+        path = avastra.Path([(0.0, 0.0), (10.0, 0.0), (10.0, 10.0)])
+        self.assertEqual(path.project(-3.0, 1.0), avastra.Beside(-3.0, 1.0, 0.0))
+        self.assertAlmostEqual(path.at(25.0).y, 15.0)
+        self.assertAlmostEqual(path.project(9.0, 14.0).station, 24.0)
+        self.assertAlmostEqual(path.project(9.0, 14.0).offset, 1.0)
+
+    def test_the_outside_of_a_corner_belongs_to_the_corner(self):
+        beside = avastra.Path([(0.0, 0.0), (10.0, 0.0), (10.0, 10.0)]).project(13.0, -4.0)
+        self.assertAlmostEqual(beside.station, 10.0)
+        self.assertAlmostEqual(beside.offset, -5.0)
+
+    def test_a_path_needs_two_points(self):
+        with self.assertRaisesRegex(ValueError, "two different points, and has 1"):
+            avastra.Path([(1.0, 1.0), (1.0, 1.0)])
+
+    def test_angles_are_wrapped(self):
+        for turns in range(-3, 4):
+            self.assertAlmostEqual(avastra.wrap(1.0 + turns * 2.0 * math.pi), 1.0)
+        self.assertEqual(avastra.wrap(-math.pi), math.pi)
+
+
+def way(road):
+    world = World(road)
+    vehicle = messages.read(messages.Init, INIT, "init").vehicle
+    reset = messages.read(messages.Reset, world.reset(), "reset")
+    return world, avastra.Way(vehicle, messages.read(messages.Map, world.map, "map"), reset)
+
+
+def step(world):
+    return messages.read(messages.Step, world.step(0), "step")
+
+
+class Ways(unittest.TestCase):
+    def test_a_bend_is_slow_and_braked_for_in_time(self):
+        _, on = way("bend")
+        self.assertAlmostEqual(on.speed(85.0), math.sqrt(2.0 * 12.0), delta=0.3)
+        self.assertEqual(on.speed(5.0), 13.9)
+        for station in (40.0, 56.0, 70.0):
+            braked = math.sqrt(on.speed(74.0) ** 2 + 2.0 * 1.5 * (74.0 - station))
+            self.assertAlmostEqual(on.speed(station), min(braked, 13.9), delta=0.01)
+
+    def test_the_room_reaches_over_lanes_of_the_own_direction(self):
+        self.assertEqual([round(side, 3) for side in way("straight")[1].room(20.0)], [1.75, 1.75])
+        self.assertEqual([round(side, 3) for side in way("beside")[1].room(20.0)], [5.25, 1.75])
+
+    def test_a_light_holds_while_it_can_be_stopped_for(self):
+        world, on = way("light")
+        self.assertEqual(on.stop(step(world)), 95.0)
+        world.x, world.speed = 90.0, 13.0
+        self.assertIsNone(on.stop(step(world)), "too late")
+        world.speed = 5.0
+        self.assertEqual(on.stop(step(world)), 95.0)
+        world.time_us = 26_000_000
+        self.assertIsNone(on.stop(step(world)), "green")
+
+    def test_at_a_stop_sign_one_stops_once(self):
+        world = World("straight")
+        message = world.reset()
+        message["route"]["signs"] = [{"route_s": 10.0, "kind": "yield"}, {"route_s": 40.0, "kind": "stop"}]
+        vehicle = messages.read(messages.Init, INIT, "init").vehicle
+        on = avastra.Way(vehicle, messages.read(messages.Map, world.map, "map"), messages.read(messages.Reset, message, "reset"))
+        self.assertEqual(on.stop(step(world)), 40.0)
+        world.x, world.speed = 40.0, 0.0
+        self.assertIsNone(on.stop(step(world)), "it stands there")
+        world.speed = 3.0
+        self.assertIsNone(on.stop(step(world)), "it has stood there")
