@@ -35,7 +35,7 @@ STOP_GAP = 1.0
 #: Standard deviation of a predicted position now, and what it gains in a second, m.
 SPREAD_NOW, SPREAD = 0.1, 0.2
 #: Kept free around a predicted box, m.
-MARGIN = 0.2
+MARGIN = 0.4
 #: A plan is begun anew at the real vehicle when it is farther than this from the last one, m and m/s.
 ASTRAY = 0.5
 
