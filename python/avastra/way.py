@@ -5,7 +5,7 @@ Objects are not looked at here: whom to follow and whom to give way to is what a
 
 from typing import List, Optional, Tuple
 
-from .messages import Map, Reset, Step, Vehicle
+from .messages import Map, Reset, Step, TrajectoryPoint, Vehicle
 from .path import Path
 
 #: A yellow light that needs harder braking than this is passed, m/s².
@@ -42,11 +42,31 @@ class Way:
     def stop(self, step: Step) -> Optional[float]:
         """The station that the front must not pass now, for a light or a stop sign; None if there is none.
 
-        To be asked once in every step: it remembers at which signs the vehicle has stopped.
+        To be asked in every step: it remembers at which signs the vehicle has stopped.
         """
         front = step.ego.route_s + self.vehicle.rear_axle_to_front
         lines = [line for line in (self._light(step, front), self._sign(step, front)) if line is not None]
         return min(lines, default=None)
+
+    def wanted_speed(self, step: Step, decel: float = 1.5, gap: float = 1.0) -> float:
+        """What limits, bends and a line that holds ask for, m/s: braking at `decel` (m/s²) to stop `gap` m before the line."""
+        ego = step.ego
+        wanted = min(self.speed(ego.route_s), self.speed(ego.route_s + 1.5 * ego.speed))
+        line = self.stop(step)
+        if line is None:
+            return wanted
+        left = line - gap - ego.route_s - self.vehicle.rear_axle_to_front - 0.5 * ego.speed
+        return min(wanted, (2.0 * decel * max(left, 0.0)) ** 0.5)
+
+    def braking(self, step: Step, seconds: float = 3.0) -> List[TrajectoryPoint]:
+        """A way out for a planner without a plan: braking as hard as the vehicle can, at its distance beside the route."""
+        points, station, speed, period = [], step.ego.route_s, step.ego.speed, 0.1
+        for index in range(round(seconds / period) + 1):
+            pose = self.path.at(station, step.ego.route_d)
+            accel = -min(self.vehicle.max_decel, speed / period)
+            points.append(TrajectoryPoint(step.t_us + round(index * 1e6 * period), *pose, v=speed, a=accel))
+            station, speed = station + period * (speed + accel * period / 2.0), max(speed + accel * period, 0.0)
+        return points
 
     def room(self, station: float) -> Tuple[float, float]:
         """How far lanes of the own direction reach to the left and to the right of the path, m; both positive."""

@@ -74,6 +74,21 @@ class Ways(unittest.TestCase):
         world.time_us = 26_000_000
         self.assertIsNone(on.stop(step(world)), "green")
 
+    def test_a_line_that_holds_is_braked_for_evenly(self):
+        world, on = way("light")
+        world.x, world.speed = 70.0, 5.0
+        left = 95.0 - 1.0 - 65.0 - 3.705 - 2.5
+        self.assertAlmostEqual(on.wanted_speed(step(world)), math.sqrt(2.0 * 1.5 * left), places=6)
+        world.time_us = 26_000_000
+        self.assertEqual(on.wanted_speed(step(world)), 13.9)
+
+    def test_braking_ends_where_the_brakes_end_it(self):
+        world, on = way("straight")
+        world.speed = 12.0
+        points = on.braking(step(world))
+        self.assertEqual((points[0].t_us, points[-1].t_us, points[-1].v), (0, 3_000_000, 0.0))
+        self.assertAlmostEqual(points[-1].x - points[0].x, 12.0**2 / (2.0 * 6.0), places=6)
+
     def test_at_a_stop_sign_one_stops_once(self):
         world = World("straight")
         message = world.reset()

@@ -28,10 +28,6 @@ LOW_SPEED = 2.0
 DURATIONS = np.arange(1.1, HORIZON + 1e-9, 0.38)
 SPEEDS = 11
 OFFSETS = 9
-#: Braking before lights and signs, m/s².
-STOP_DECEL = 1.5
-#: The front stops this far before a line, m.
-STOP_GAP = 1.0
 #: Standard deviation of a predicted position now, and what it gains in a second, m.
 SPREAD_NOW, SPREAD = 0.1, 0.2
 #: Kept free around a predicted box, m.
@@ -63,19 +59,15 @@ class Frenetix(avastra.Driver):
         self.room = np.array([self.way.room(station) for station in stations]) - self.vehicle.width / 2.0
 
     def step(self, step):
-        now = self.stitched(step)
-        line = self.way.stop(step)
-        wanted = self.wanted_speed(step, line)
         boxes = [self.predicted(other) for other in step.objects]
+        line = self.way.stop(step)
         if line is not None:
             boxes.append(self.barrier(line))
-        plan, braking = self.best(now, wanted, step.ego.route_s, boxes, step.objects), False
-        if plan is None:
-            plan, braking = self.brake(step.ego), True
-        self.plan = None if braking else plan
-        points = [avastra.TrajectoryPoint(step.t_us + round(index * 1e6 * DT), *point[:4], a=point[4])
-                  for index, point in enumerate(plan)]
-        return avastra.Trajectory(points, avastra.Internal(reason="no plan: brakes" if braking else None))
+        self.plan = self.best(self.stitched(step), self.way.wanted_speed(step), step.ego.route_s, boxes, step.objects)
+        if self.plan is None:
+            return avastra.Trajectory(self.way.braking(step), avastra.Internal(reason="no plan: brakes"))
+        return avastra.Trajectory([avastra.TrajectoryPoint(step.t_us + round(index * 1e6 * DT), *row[:4], a=row[4])
+                                   for index, row in enumerate(self.plan)])
 
     def stitched(self, step):
         """Where the plan goes on from: x, y, heading, speed, acceleration, angle of the wheels."""
@@ -85,14 +77,6 @@ class Frenetix(avastra.Driver):
             if math.dist((x, y), (ego.x, ego.y)) < ASTRAY and abs(speed - ego.speed) < ASTRAY:
                 return x, y, heading, speed, accel, math.atan(self.vehicle.wheelbase * curvature)
         return ego.x, ego.y, ego.heading, ego.speed, ego.accel, ego.steer
-
-    def wanted_speed(self, step, line):
-        ego = step.ego
-        wanted = min(self.way.speed(ego.route_s), self.way.speed(ego.route_s + 1.5 * ego.speed))
-        if line is not None:
-            left = line - STOP_GAP - ego.route_s - self.vehicle.rear_axle_to_front
-            wanted = min(wanted, math.sqrt(2.0 * STOP_DECEL * max(left - 0.5 * ego.speed, 0.0)))
-        return wanted
 
     def predicted(self, other):
         """The boxes of an object at each time of the horizon: rows of x, y, heading; and half its length and width."""
@@ -181,16 +165,6 @@ class Frenetix(avastra.Driver):
         apart |= np.abs(dx * other_cos + dy * other_sin) > half_length + (car.length * turned_cos + car.width * turned_sin) / 2.0
         apart |= np.abs(dy * other_cos - dx * other_sin) > half_width + (car.length * turned_sin + car.width * turned_cos) / 2.0
         return not apart.all()
-
-    def brake(self, ego):
-        """As hard as the vehicle can, at the same distance beside the route."""
-        rows, station, speed = [], ego.route_s, ego.speed
-        for _ in range(round(HORIZON / DT) + 1):
-            pose = self.way.path.at(station, ego.route_d)
-            accel = -min(self.vehicle.max_decel, speed / DT)
-            rows.append((*pose, speed, accel, self.way.curvature(station)))
-            station, speed = station + DT * (speed + accel * DT / 2.0), speed + accel * DT
-        return np.array(rows)
 
 
 def spread(other):

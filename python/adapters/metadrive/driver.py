@@ -26,7 +26,7 @@ OTHERS = 4
 WHEELBASE = 1.05234 + 1.4166
 STEER_MAX = math.radians(40.0)
 SPEED_MAX_KMH = 80.0
-MASS, ENGINE, BRAKE, DRAG = 1100.0, 800.0, 150.0, 2.0
+MASS, ENGINE, BRAKE = 1100.0, 800.0, 150.0
 PHYSICS_STEP = 0.02
 FRICTION_DECEL = 0.9 * 9.81
 LANES_WIDTH_MAX = 4 * 4.5
@@ -80,12 +80,11 @@ class Expert(avastra.Driver):
         """What MetaDrive's car makes of a pedal, m/s²: its brakes lock almost at a touch."""
         if pedal < 0.0:
             return -min(4.0 * BRAKE * -pedal / MASS / PHYSICS_STEP, FRICTION_DECEL)
-        drag = 4.0 * DRAG / MASS / PHYSICS_STEP
         limit = self.way.speed(ego.route_s)
         if ego.speed > limit:
-            # Its car only rolls beyond its highest speed; ours has bends to be slow for.
-            return -max(drag, 2.0 * (ego.speed - limit))
-        return 4.0 * ENGINE * pedal / MASS - drag
+            # Beyond its highest speed its car only rolls; ours has bends to be slow for.
+            return -2.0 * (ego.speed - limit)
+        return 4.0 * ENGINE * pedal / MASS
 
     def observed(self, step):
         """MetaDrive's frame has y to the right: what is `right` below is positive there."""

@@ -32,10 +32,6 @@ DT = 0.1
 ASTRAY = 0.5
 #: Kept free beyond the lanes' edges, m: the reference leaves the lane's middle in lane changes.
 VERGE = 0.3
-#: Braking before lights and signs, m/s².
-STOP_DECEL = 1.5
-#: The front stops this far before a line, m.
-STOP_GAP = 1.0
 #: A desired speed of 0 makes the planner look for a goal, m/s.
 SLOWEST = 0.01
 
@@ -88,11 +84,12 @@ class Reactive(avastra.Driver):
     def step(self, step):
         if not self.holds(step):
             self.plan, self.age = self.planned(step), 0
-        braking = self.plan is None
-        rows = self.brake(step.ego) if braking else self.plan[self.age:]
+        if self.plan is None:
+            return avastra.Trajectory(self.way.braking(step), avastra.Internal(reason="no plan: brakes"))
+        rows = self.plan[self.age:]
         self.age += 1
-        points = [avastra.TrajectoryPoint(step.t_us + round(index * 1e6 * DT), *row[:4], a=row[4]) for index, row in enumerate(rows)]
-        return avastra.Trajectory(points, avastra.Internal(reason="no plan: brakes" if braking else None))
+        return avastra.Trajectory([avastra.TrajectoryPoint(step.t_us + round(index * 1e6 * DT), *row[:4], a=row[4])
+                                   for index, row in enumerate(rows)])
 
     def holds(self, step):
         """Whether the plan is young enough and the vehicle on it."""
@@ -116,7 +113,7 @@ class Reactive(avastra.Driver):
         try:
             self.planner.reset(initial_state_cart=state, collision_checker=self.checker(step, line),
                                coordinate_system=self.planner.coordinate_system)
-            self.planner.set_desired_velocity(max(self.wanted_speed(ego, line), SLOWEST), max(speed, SLOWEST))
+            self.planner.set_desired_velocity(max(self.way.wanted_speed(step), SLOWEST), max(speed, SLOWEST))
             result = self.planner.plan()
         # The planner raises a bare Exception where its frame does not fit, and trips over its own log line where it stands.
         except Exception as error:
@@ -126,13 +123,6 @@ class Reactive(avastra.Driver):
             return None
         return [(*state.position, state.orientation, max(state.velocity, 0.0), state.acceleration, state.steering_angle,
                  state.yaw_rate) for state in result[0].state_list]
-
-    def wanted_speed(self, ego, line):
-        wanted = min(self.way.speed(ego.route_s), self.way.speed(ego.route_s + 1.5 * ego.speed))
-        if line is not None:
-            left = line - STOP_GAP - ego.route_s - self.vehicle.rear_axle_to_front
-            wanted = min(wanted, math.sqrt(2.0 * STOP_DECEL * max(left - 0.5 * ego.speed, 0.0)))
-        return wanted
 
     def checker(self, step, line):
         """What the planner must not touch: the edges, predicted road users, and a line that holds."""
@@ -148,16 +138,6 @@ class Reactive(avastra.Driver):
             pose = self.way.path.at(line + 1.0)
             checker.add_collision_object(pycrcc.RectOBB(1.0, 5.0, pose.heading, pose.x, pose.y))
         return checker
-
-    def brake(self, ego):
-        """As hard as the vehicle can, at the same distance beside the route."""
-        rows, station, speed = [], ego.route_s, ego.speed
-        for _ in range(31):
-            pose = self.way.path.at(station, ego.route_d)
-            accel = -min(self.vehicle.max_decel, speed / DT)
-            rows.append((*pose, speed, accel))
-            station, speed = station + DT * (speed + accel * DT / 2.0), speed + accel * DT
-        return rows
 
 
 if __name__ == "__main__":
