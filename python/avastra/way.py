@@ -3,6 +3,7 @@
 Objects are not looked at here: whom to follow and whom to give way to is what a driver under test decides.
 """
 
+import math
 from typing import List, Optional, Tuple
 
 from .messages import Map, Reset, Step, TrajectoryPoint, Vehicle
@@ -56,7 +57,7 @@ class Way:
         if line is None:
             return wanted
         left = line - gap - ego.route_s - self.vehicle.rear_axle_to_front - 0.5 * ego.speed
-        return min(wanted, (2.0 * decel * max(left, 0.0)) ** 0.5)
+        return min(wanted, math.sqrt(2.0 * decel * max(left, 0.0)))
 
     def braking(self, step: Step, seconds: float = 3.0) -> List[TrajectoryPoint]:
         """A way out for a planner without a plan: braking as hard as the vehicle can, at its distance beside the route."""
