@@ -47,7 +47,7 @@ pub struct StepLog {
     pub reward: f64,
     /// Obstacles that the driving system misses, and ghosts that it sees, at the end of the period.
     pub perception: PerceptionCounts,
-    /// SHA-256 over every bit of the world's state after every tick so far.
+    /// Digest of every bit of the world's state after every tick so far.
     pub trace: [u8; 32],
 }
 
@@ -82,7 +82,9 @@ impl EpisodeLog {
         self.steps.get(step).map_or(&self.memory, |step| &step.memory)
     }
 
-    /// SHA-256 over every bit of the world's state after every tick; zeros if there was no step.
+    /// Digest of every bit of the world's state after every tick ([`Trace`]); zeros if there was no step.
+    ///
+    /// [`Trace`]: crate::sim::Trace
     pub fn trace(&self) -> [u8; 32] {
         self.steps.last().map_or([0; 32], |step| step.trace)
     }

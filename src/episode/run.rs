@@ -1,7 +1,5 @@
 //! The loop: act, drive for one observation period, record what happened.
 
-use sha2::{Digest, Sha256};
-
 use crate::action::{Draw, Situation};
 use crate::ads::Ads;
 use crate::mdp;
@@ -9,7 +7,7 @@ use crate::mdp::{Danger, Observation};
 use crate::model::expr::Expr;
 use crate::model::vocabulary::Body;
 use crate::model::{Facts, Memory, OutcomeFacts, Trigger, WorldFacts, evaluate};
-use crate::sim::{Contact, DT_S, Incident, Sensed, World};
+use crate::sim::{Contact, DT_S, Incident, Sensed, Trace, World};
 
 use super::facts::collision_facts;
 use super::log::{Collision, End, EpisodeLog, Outcome, StepLog};
@@ -159,7 +157,7 @@ struct Play {
     steps: Vec<StepLog>,
     collisions: Vec<Collision>,
     incidents: Vec<Incident>,
-    trace: Sha256,
+    trace: Trace,
     distance_m: f64,
     /// Steps without progress up to now.
     stalled: u32,
@@ -181,7 +179,7 @@ impl Play {
             steps: Vec::new(),
             collisions: Vec::new(),
             incidents: Vec::new(),
-            trace: Sha256::new(),
+            trace: Trace::default(),
             distance_m: 0.0,
             stalled: 0,
         }
@@ -288,7 +286,7 @@ impl Play {
             None => OutcomeFacts { proc, near: body, ..OutcomeFacts::default() },
         };
         let reward = setup.table.space().reward(facts, &self.memory);
-        let trace = self.trace.clone().finalize().into();
+        let trace = self.trace.digest();
         let state = observation.state;
         let perception = mdp::perception_counts(&self.world, self.ads.status());
         let memory = self.memory.clone();
@@ -316,7 +314,7 @@ impl Play {
         }
         self.incidents.extend_from_slice(self.world.incidents());
         self.distance_m += self.world.ego().speed_mps * DT_S;
-        self.world.trace(&mut |bits| self.trace.update(bits.to_le_bytes()));
+        self.world.trace(&mut self.trace);
         watch(&self.world, self.ads.as_ref(), &contacts);
         if let Some(contact) = contacts.first() {
             return Near { probability: 1.0, body: self.body(contact.obstacle) };

@@ -20,6 +20,7 @@ use super::body;
 use super::npc::{Cruise, Driver};
 use super::road_user::{Motion, Mover, Obstacle, RoadUser};
 use super::sense::RANGE_M;
+use super::trace::Trace;
 use super::way::Way;
 
 /// Ids up to this are of obstacles that an action made appear.
@@ -74,10 +75,10 @@ impl Ambient {
         Some(placed)
     }
 
-    pub fn trace(&self, sink: &mut dyn FnMut(u64)) {
-        sink(u64::from(self.wanted));
-        sink(self.attempts);
-        sink(u64::from(self.next_id));
+    pub fn trace(&self, trace: &mut Trace) {
+        trace.word(u64::from(self.wanted));
+        trace.word(self.attempts);
+        trace.word(u64::from(self.next_id));
     }
 }
 

@@ -9,6 +9,7 @@ use crate::geometry::{Frame, OrientedBox, Pose, Vec2, unit_vector, wrap_angle};
 
 use super::environment::GRAVITY_MPS2;
 use super::sense::EgoMotion;
+use super::trace::Trace;
 
 /// Pedals and wheel, as a driving system commands them.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -195,7 +196,7 @@ impl Ego {
     }
 
     /// Every bit that later ticks depend on.
-    pub fn trace(&self, sink: &mut dyn FnMut(u64)) {
+    pub fn trace(&self, trace: &mut Trace) {
         let motion = &self.motion;
         for value in [
             motion.rear_axle.position.x,
@@ -208,9 +209,9 @@ impl Ego {
             self.throttle_pct,
             self.brake_pct,
         ] {
-            sink(value.to_bits());
+            trace.number(value);
         }
-        sink(u64::from(motion.touched));
+        trace.word(u64::from(motion.touched));
     }
 }
 

@@ -25,6 +25,7 @@
 use crate::model::vocabulary::{Level, Phenomenon, TimeOfDay};
 
 use super::sense::Conditions;
+use super::trace::Trace;
 
 /// Standard gravity, m/s².
 pub(super) const GRAVITY_MPS2: f64 = 9.80665;
@@ -121,11 +122,11 @@ impl Environment {
         }
     }
 
-    pub fn trace(&self, sink: &mut dyn FnMut(u64)) {
+    pub fn trace(&self, trace: &mut Trace) {
         for word in [self.time as u64, self.rain as u64, self.fog as u64, self.wetness as u64] {
-            sink(word);
+            trace.word(word);
         }
-        sink(self.water_mm.to_bits());
+        trace.number(self.water_mm);
     }
 }
 

@@ -17,7 +17,8 @@
 //! (`World::apply`). `placement` decides where it appears, along which `way`, or why it cannot;
 //! `traffic` holds the manners that a run can change;
 //! `safety` says how much room a careful driver would need. `junction` knows where lanes cross and which
-//! goes first, `signals` the colour of every light at every tick. `moment` says what can be asked about a moment.
+//! goes first, `signals` the colour of every light at every tick. `moment` says what can be asked about a moment,
+//! `trace` digests the states of all ticks.
 
 mod ambient;
 mod around;
@@ -41,6 +42,7 @@ mod signals;
 pub(crate) mod testing;
 #[cfg(test)]
 mod tests;
+mod trace;
 mod traffic;
 mod way;
 mod world;
@@ -55,5 +57,6 @@ pub use right_of_way::right_of_way;
 pub use road_user::Obstacle;
 pub use scene::Scene;
 pub use sense::{Conditions, EgoMotion, FRAME_S, FRAME_TICKS, Sensed, SensedObject, SignalColour};
+pub use trace::Trace;
 pub use traffic::{TrafficError, TrafficProfile};
 pub use world::{DT_S, ENGINE, Start, World};

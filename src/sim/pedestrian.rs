@@ -25,6 +25,7 @@ use crate::rng::Rng;
 use super::around::Around;
 use super::road_user::{Moved, Obstacle};
 use super::sense::FRAME_TICKS;
+use super::trace::Trace;
 use super::world::DT_S;
 
 /// Least time at the kerb before setting out, s (published package).
@@ -184,7 +185,7 @@ impl Walker {
         Some(self.moved(this))
     }
 
-    pub fn trace(&self, sink: &mut dyn FnMut(u64)) {
+    pub fn trace(&self, trace: &mut Trace) {
         for value in [
             self.from.position.x,
             self.from.position.y,
@@ -197,14 +198,14 @@ impl Walker {
             self.pace_mps,
             self.wants_aside_m,
         ] {
-            sink(value.to_bits());
+            trace.number(value);
         }
         for count in [self.startle_ticks, self.stuck_ticks, u32::from(self.returns)] {
-            sink(u64::from(count));
+            trace.word(u64::from(count));
         }
-        sink(self.begins_tick);
-        sink(self.begins_tick_max);
-        sink(self.manner as u64);
+        trace.word(self.begins_tick);
+        trace.word(self.begins_tick_max);
+        trace.word(self.manner as u64);
     }
 
     /// Whether it has come to the end of its walk, or back to the beginning.

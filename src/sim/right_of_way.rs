@@ -37,6 +37,7 @@ use super::junction::{Area, ConflictAreas, goes_first};
 use super::npc::Driver;
 use super::road_user::{Motion, Obstacle};
 use super::sense::SignalColour;
+use super::trace::Trace;
 use super::way::Way;
 use super::world::DT_S;
 
@@ -151,8 +152,8 @@ impl PassedLight {
         Some(PassedLight { signal: line.signal, was_red: colour(line.signal) == SignalColour::Red })
     }
 
-    pub fn trace(passed: Option<&PassedLight>, sink: &mut dyn FnMut(u64)) {
-        sink(passed.map_or(0, |passed| 2 + 2 * passed.signal as u64 + u64::from(passed.was_red)));
+    pub fn trace(passed: Option<&PassedLight>, trace: &mut Trace) {
+        trace.word(passed.map_or(0, |passed| 2 + 2 * passed.signal as u64 + u64::from(passed.was_red)));
     }
 }
 
@@ -240,17 +241,17 @@ impl Rights {
         }
     }
 
-    pub fn trace(&self, sink: &mut dyn FnMut(u64)) {
-        PassedLight::trace(self.passed.as_ref(), sink);
-        sink(self.shares.map_or(2, u64::from));
-        sink(self.wreck.map_or(u64::MAX, |priority| priority as u64));
+    pub fn trace(&self, trace: &mut Trace) {
+        PassedLight::trace(self.passed.as_ref(), trace);
+        trace.word(self.shares.map_or(2, u64::from));
+        trace.word(self.wreck.map_or(u64::MAX, |priority| priority as u64));
         if let Some(Meeting { place, priority, tick }) = self.meeting {
             let (ego, other) = match place {
                 Place::Area(ego, other) => (ego.0 as u64, other.0 as u64),
                 Place::Lane => (u64::MAX, u64::MAX),
             };
             for word in [ego, other, priority as u64, tick] {
-                sink(word);
+                trace.word(word);
             }
         }
     }

@@ -13,6 +13,7 @@ use super::environment::GRAVITY_MPS2;
 use super::npc::Driver;
 use super::pedestrian::Walker;
 use super::right_of_way::Rights;
+use super::trace::Trace;
 use super::world::DT_S;
 
 /// How long a wreck stays where it came to rest, s; longer while the ego vehicle sees it.
@@ -122,21 +123,21 @@ impl RoadUser {
     }
 
     /// Every bit that later ticks depend on.
-    pub fn trace(&self, sink: &mut dyn FnMut(u64)) {
+    pub fn trace(&self, trace: &mut Trace) {
         let Obstacle { id, body, colour, verb, outline, velocity_mps, spawned_tick, .. } = &self.obstacle;
-        sink(u64::from(*id));
-        sink(*spawned_tick);
+        trace.word(u64::from(*id));
+        trace.word(*spawned_tick);
         for word in [*body as u64, *colour as u64, *verb as u64] {
-            sink(word);
+            trace.word(word);
         }
         let pose = &outline.pose;
         for value in [pose.position.x, pose.position.y, pose.heading_rad] {
-            sink(value.to_bits());
+            trace.number(value);
         }
         for value in velocity_mps.iter() {
-            sink(value.to_bits());
+            trace.number(*value);
         }
-        self.mover.trace(sink);
+        self.mover.trace(trace);
     }
 }
 
@@ -216,15 +217,15 @@ impl Mover {
         self.crashed_with.replace(other)
     }
 
-    fn trace(&self, sink: &mut dyn FnMut(u64)) {
-        sink(u64::from(self.touched));
-        sink(u64::from(self.crashed_with.unwrap_or(0)));
-        sink(u64::from(self.rest_ticks));
-        sink(self.visible_fraction.to_bits());
-        self.rights.trace(sink);
+    fn trace(&self, trace: &mut Trace) {
+        trace.word(u64::from(self.touched));
+        trace.word(u64::from(self.crashed_with.unwrap_or(0)));
+        trace.word(u64::from(self.rest_ticks));
+        trace.number(self.visible_fraction);
+        self.rights.trace(trace);
         match &self.motion {
-            Motion::Drive(driver) => driver.trace(sink),
-            Motion::Walk(walker) => walker.trace(sink),
+            Motion::Drive(driver) => driver.trace(trace),
+            Motion::Walk(walker) => walker.trace(trace),
             Motion::Stand => {}
         }
     }

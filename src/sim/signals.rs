@@ -9,6 +9,7 @@
 use crate::road::RoadMap;
 
 use super::sense::SignalColour;
+use super::trace::Trace;
 use super::world::DT_S;
 
 const GREEN_S: f64 = 12.0;
@@ -67,8 +68,8 @@ impl SignalClock {
         }
     }
 
-    pub fn trace(&self, sink: &mut dyn FnMut(u64)) {
-        sink(self.offset_ticks);
+    pub fn trace(&self, trace: &mut Trace) {
+        trace.word(self.offset_ticks);
     }
 }
 

@@ -9,6 +9,7 @@ use crate::road::testing::{lanes, road, street};
 use crate::road::{RoadMap, Route};
 
 use super::scene::Scene;
+use super::trace::Trace;
 use super::traffic::TrafficProfile;
 use super::world::{Start, World};
 
@@ -54,11 +55,11 @@ pub fn start() -> Start {
     }
 }
 
-/// Every bit that later ticks depend on.
-pub fn bits(world: &World) -> Vec<u64> {
-    let mut bits = Vec::new();
-    world.trace(&mut |word| bits.push(word));
-    bits
+/// The digest of every bit that later ticks depend on.
+pub fn digest(world: &World) -> [u8; 32] {
+    let mut trace = Trace::default();
+    world.trace(&mut trace);
+    trace.digest()
 }
 
 /// A road user that appears in the ego vehicle's lane, or from the right: on foot if the verb is.

@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use proptest::prelude::*;
 
-use super::testing::{bits, request};
+use super::testing::{digest, request};
 use super::{
     Contact, Control, DT_S, Incident, Obstacle, Scene, Start, VehicleParameters, World, pedals_for, testing,
 };
@@ -394,7 +394,7 @@ proptest! {
                 let control = hold(world, 7.0);
                 met.extend_from_slice(world.tick(&control));
             }
-            (met, bits(world), world.sensed())
+            (met, digest(world), world.sensed())
         };
         prop_assert_eq!(go_on(&mut world), go_on(&mut branch));
     }

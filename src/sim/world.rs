@@ -25,11 +25,12 @@ use super::sense::{
     visible_fraction,
 };
 use super::signals::SignalClock;
+use super::trace::Trace;
 use super::traffic::TrafficProfile;
 
 /// Name of this simulated world. Raised whenever the same seed no longer gives the same episode, so
 /// that an old scenario is told apart from a refuted one.
-pub const ENGINE: &str = "plane/5";
+pub const ENGINE: &str = "plane/6";
 
 /// One physics step, s: 50 Hz.
 pub const DT_S: f64 = TICK_MS as f64 / 1000.0;
@@ -326,23 +327,23 @@ impl World {
         }
     }
 
-    /// Feeds every bit of the state that later ticks depend on to `sink`, in a fixed order.
-    pub fn trace(&self, sink: &mut dyn FnMut(u64)) {
-        sink(self.ticks);
-        self.ego.trace(sink);
-        sink(self.ego_station_m.to_bits());
-        sink(self.ego_offset_m.to_bits());
-        sink(u64::from(self.red_runs));
-        PassedLight::trace(self.ego_passed.as_ref(), sink);
-        self.environment.trace(sink);
-        sink(self.conditions.friction.to_bits());
-        self.signals.trace(sink);
-        sink(u64::from(self.next_id));
-        self.ambient.trace(sink);
-        sink(self.weather_tick);
-        sink(self.seed);
+    /// Feeds every bit of the state that later ticks depend on to `trace`, in a fixed order.
+    pub fn trace(&self, trace: &mut Trace) {
+        trace.word(self.ticks);
+        self.ego.trace(trace);
+        trace.number(self.ego_station_m);
+        trace.number(self.ego_offset_m);
+        trace.word(u64::from(self.red_runs));
+        PassedLight::trace(self.ego_passed.as_ref(), trace);
+        self.environment.trace(trace);
+        trace.number(self.conditions.friction);
+        self.signals.trace(trace);
+        trace.word(u64::from(self.next_id));
+        self.ambient.trace(trace);
+        trace.word(self.weather_tick);
+        trace.word(self.seed);
         for user in &self.users {
-            user.trace(sink);
+            user.trace(trace);
         }
     }
 

@@ -19,6 +19,7 @@ use crate::sim::body::BodyParameters;
 use crate::sim::road_user::{Moved, Obstacle};
 use crate::sim::scene::Scene;
 use crate::sim::sense::FRAME_TICKS;
+use crate::sim::trace::Trace;
 use crate::sim::way::Way;
 use crate::sim::world::DT_S;
 
@@ -286,28 +287,28 @@ impl Driver {
         choices(around.seed, id, self.draws - 1)
     }
 
-    /// Feeds every bit that later ticks depend on to `sink`; ways follow from the draws.
-    pub fn trace(&self, sink: &mut dyn FnMut(u64)) {
+    /// Feeds every bit that later ticks depend on to `trace`; ways follow from the draws.
+    pub fn trace(&self, trace: &mut Trace) {
         for value in [self.station_m, self.speed_mps, self.cruise_mps] {
-            sink(value.to_bits());
+            trace.number(value);
         }
         let leader = self.leader.unwrap_or(Leader::line(-1.0));
-        sink(leader.gap_m.to_bits());
-        sink(leader.speed_mps.to_bits());
-        sink(u64::from(leader.crosswise));
-        sink(self.hold_m.unwrap_or(f64::INFINITY).to_bits());
-        sink(self.insists_to_m.to_bits());
-        sink(self.stopped_to_m.to_bits());
-        sink(u64::from(self.waited_ticks));
-        sink(u64::from(self.aggression));
+        trace.number(leader.gap_m);
+        trace.number(leader.speed_mps);
+        trace.word(u64::from(leader.crosswise));
+        trace.number(self.hold_m.unwrap_or(f64::INFINITY));
+        trace.number(self.insists_to_m);
+        trace.number(self.stopped_to_m);
+        trace.word(u64::from(self.waited_ticks));
+        trace.word(u64::from(self.aggression));
         if let Some(change) = &self.change {
             for value in [change.to_station_m, change.progress, change.duration_s] {
-                sink(value.to_bits());
+                trace.number(value);
             }
         }
-        sink(self.last_change.map_or(0, |side| side as u64 + 1));
-        sink(self.plan.len() as u64);
-        sink(u64::from(self.draws));
+        trace.word(self.last_change.map_or(0, |side| side as u64 + 1));
+        trace.word(self.plan.len() as u64);
+        trace.word(u64::from(self.draws));
     }
 }
 

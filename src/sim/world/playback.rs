@@ -87,7 +87,7 @@ mod tests {
             assert!(world.tick(&throttle).is_empty());
             assert!(same.tick_recorded(&throttle, &world).is_empty());
             braked.tick_recorded(&Control { brake_pct: 100.0, ..Control::default() }, &world);
-            assert_eq!(testing::bits(&same), testing::bits(&world));
+            assert_eq!(testing::digest(&same), testing::digest(&world));
         }
         assert_eq!(braked.ego().speed_mps, 0.0);
         let first = |world: &World| *world.obstacles().next().expect("it drives on");
