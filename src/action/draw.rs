@@ -57,16 +57,22 @@ impl<'a> Judge<'a> {
             Some((count, _)) => *count += 1,
             None => failures.push((1, refusal)),
         };
+        let parameters = self.action.parameters.iter().enumerate();
+        let open: Vec<usize> = parameters.filter(|(_, p)| !p.axis).map(|(local, _)| local).collect();
+        let (world, tries) = (self.world(), Cell::new(TRIES_MAX));
+        let before = Before { memory: self.situation.memory, world: Some(&world), tries: &tries };
+        // No other draw finds what does not exist.
+        let refused = |unsolved: Unsolved| self.refused(&unsolved, &world);
+        let given = locals(self.action, self.row.row, &[]);
+        let mut solver = self.row.solver(given, &open, before).map_err(refused)?;
         // With nothing to draw, every try gives the same result.
         let fixed = self.action.drawn().next().is_none();
         for _ in 0..if fixed { 1 } else { DRAWS_MAX } {
-            match self.draw_values(&mut rng) {
-                Ok(values) => match self.judge(&values).map_err(first) {
-                    Ok(draw) => return Ok(draw),
-                    Err(refusal) => note(refusal),
-                },
-                // No other draw finds what does not exist.
-                Err(refusal) => return Err(refusal),
+            tries.set(TRIES_MAX);
+            let values = solver.solve(&mut Chance { rng: &mut rng }).map_err(refused)?;
+            match self.judge(&values, 1).map_err(first) {
+                Ok(draw) => return Ok(draw),
+                Err(refusal) => note(refusal),
             }
         }
         let most = failures.iter().map(|(count, _)| *count).max();
@@ -96,7 +102,7 @@ impl<'a> Judge<'a> {
         if !refusals.is_empty() {
             return Err(refusals);
         }
-        self.judge(&locals(self.action, self.row.row, values))
+        self.judge(&locals(self.action, self.row.row, values), usize::MAX)
     }
 
     /// The draw with the legal values nearest to these.
@@ -107,18 +113,27 @@ impl<'a> Judge<'a> {
         let given = locals(self.action, self.row.row, wanted);
         let open: Vec<usize> = self.action.drawn_numbers().collect();
         let mut choose = Nearest { wanted: given.clone() };
-        let values = self.solve(given, &open, &mut choose).map_err(|refusal| vec![refusal])?;
+        let (world, tries) = (self.world(), Cell::new(TRIES_MAX));
+        let before = Before { memory: self.situation.memory, world: Some(&world), tries: &tries };
+        let values = self.row.solve(given, &open, before, &mut choose);
+        let values = values.map_err(|unsolved| vec![self.refused(&unsolved, &world)])?;
         self.check(&self.action.drawn_of(&values))
     }
 
     /// Asks the world about every spawn, then applies every rule in force to a complete set of values.
-    fn judge(&self, values: &[Value]) -> Result<Draw, Vec<Refusal>> {
+    ///
+    /// # Errors
+    /// The first refusals, at most so many.
+    fn judge(&self, values: &[Value], refusals_max: usize) -> Result<Draw, Vec<Refusal>> {
         let before = self.situation.memory;
         let after = self.row.space.memory_after(self.row.row.action, values, before);
         let mut effects = self.effects(values, &after);
         let mut refusals = Vec::new();
         let mut spawns = Vec::new();
         for effect in &effects {
+            if refusals.len() >= refusals_max {
+                return Err(refusals);
+            }
             let Effect::Spawn(request) = effect else {
                 let refusal =
                     self.situation.surroundings.weather_refusal().map(|reason| refuse(None, reason));
@@ -137,7 +152,8 @@ impl<'a> Judge<'a> {
         }
         let world = WorldFacts { spawns, ..self.world() };
         let candidate = Candidate { values, before, after: &after, world: Some(&world) };
-        refusals.extend(self.row.breaches(candidate).map(|breach| {
+        let breaches = self.row.breaches(candidate).take(refusals_max.saturating_sub(refusals.len()));
+        refusals.extend(breaches.map(|breach| {
             let rule = breach.rule().map(|rule| self.row.space.rules[rule].name.clone());
             refuse(rule, self.row.words(breach, candidate))
         }));
@@ -221,24 +237,6 @@ impl<'a> Judge<'a> {
     /// What the world says before it is asked about spawns.
     fn world(&self) -> WorldFacts {
         WorldFacts { moment: self.moment, step: self.situation.step, ..WorldFacts::default() }
-    }
-
-    fn draw_values(&self, rng: &mut Rng) -> Result<Vec<Value>, Refusal> {
-        let parameters = self.action.parameters.iter().enumerate();
-        let open: Vec<usize> = parameters.filter(|(_, p)| !p.axis).map(|(local, _)| local).collect();
-        self.solve(locals(self.action, self.row.row, &[]), &open, &mut Chance { rng })
-    }
-
-    fn solve(
-        &self,
-        given: Vec<Value>,
-        open: &[usize],
-        choose: &mut dyn Choose,
-    ) -> Result<Vec<Value>, Refusal> {
-        let world = self.world();
-        let tries = Cell::new(TRIES_MAX);
-        let before = Before { memory: self.situation.memory, world: Some(&world), tries: &tries };
-        self.row.solve(given, open, before, choose).map_err(|unsolved| self.refused(&unsolved, &world))
     }
 
     /// Why there are no values, in words.

@@ -12,6 +12,9 @@ use crate::model::vocabulary::{Body, Fact, LaneChoice, Light, Priority, RoadKind
 /// author rounds away, but no measurable distance.
 const EQUAL_PART: f64 = 1e-9;
 
+/// A call of a function with at most so many parameters allocates nothing.
+const FEW: usize = 4;
+
 /// The facts that an expression may read. Facts that are not known at its place in the file keep their
 /// defaults.
 #[derive(Debug, Clone, Copy)]
@@ -136,8 +139,18 @@ pub fn evaluate(expr: &Expr, functions: &[FnDef], facts: &Facts<'_>) -> Value {
             fact_value(*fact, &Facts { spawn, ..*facts })
         }
         ExprKind::Call(function, arguments) => {
-            let locals: Vec<Value> = arguments.iter().map(value).collect();
-            evaluate(&functions[*function].body, functions, &Facts { locals: &locals, ..*facts })
+            let body = &functions[*function].body;
+            let mut few = [Value::Bool(false); FEW];
+            match few.get_mut(..arguments.len()) {
+                Some(locals) => {
+                    locals.iter_mut().zip(arguments).for_each(|(local, argument)| *local = value(argument));
+                    evaluate(body, functions, &Facts { locals, ..*facts })
+                }
+                None => {
+                    let locals: Vec<Value> = arguments.iter().map(value).collect();
+                    evaluate(body, functions, &Facts { locals: &locals, ..*facts })
+                }
+            }
         }
         ExprKind::Not(inner) => Value::Bool(!value(inner).truth()),
         ExprKind::Negate(inner) => Value::Number(-value(inner).number()),

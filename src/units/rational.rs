@@ -98,8 +98,8 @@ impl Rational {
         const EXACT: u128 = 1 << 53;
         let (top, bottom) = (self.numerator.unsigned_abs(), self.denominator.unsigned_abs());
         let magnitude = if top <= EXACT && bottom <= EXACT {
-            // Both are exact, so the division rounds once.
-            top as f64 / bottom as f64
+            // Both are exact, so the division rounds once. They also fit 64 bits, which machines convert themselves.
+            top as u64 as f64 / bottom as u64 as f64
         } else {
             divide_rounding_once(top, bottom)
         };

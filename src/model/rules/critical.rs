@@ -152,7 +152,18 @@ impl Reader<'_> {
                 for argument in arguments {
                     given.push(self.read(argument, locals)?);
                 }
-                self.read(&self.functions[*function].body, &given)?
+                let body = &self.functions[*function].body;
+                // A function knows nothing but its arguments.
+                let known = given.iter().map(|form| match form {
+                    Form::Known(value) => Some(*value),
+                    Form::Numbers(_) | Form::Open => None,
+                });
+                match known.collect::<Option<Vec<Value>>>() {
+                    Some(locals) => {
+                        Form::Known(evaluate(body, self.functions, &Facts { locals: &locals, ..self.facts }))
+                    }
+                    None => self.read(body, &given)?,
+                }
             }
             ExprKind::Not(inner) => match self.read(inner, locals)? {
                 Form::Known(value) => Form::Known(Value::Bool(!value.truth())),

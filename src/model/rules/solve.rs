@@ -87,21 +87,38 @@ impl<'a> RowRules<'a> {
         before: Before<'a>,
         choose: &mut dyn Choose,
     ) -> Result<Vec<Value>, Unsolved> {
-        let order = self.order(open);
-        let mut search = Search { rules: self, before, order, values: given, is_exact: Cell::new(true) };
+        self.solver(given, open, before)?.solve(choose)
+    }
+
+    /// What [`RowRules::solve`] needs, to be used for several solutions.
+    ///
+    /// # Errors
+    /// The clause that is in the way of all of them: nothing that is open decides it.
+    pub fn solver(
+        self,
+        mut given: Vec<Value>,
+        open: &[usize],
+        before: Before<'a>,
+    ) -> Result<Solver<'a>, Unsolved> {
         for local in open {
-            search.values[*local] = first(&search.action().parameters[*local].domain);
+            given[*local] = first(&self.space.actions[self.row.action].parameters[*local].domain);
         }
-        let clauses = &self.space.clauses[self.row.action];
-        let fails = |clause: &Clause| !clause.needs_any(open) && search.breaks(clause);
-        if let Some(clause) = self.clauses().find(|index| fails(&clauses[*index])) {
+        let mut solver = Solver {
+            rules: self,
+            before,
+            values: given.clone(),
+            given,
+            places: Vec::new(),
+            order: self.order(open),
+            is_exact: Cell::new(true),
+        };
+        let fails = |clause: &Clause| !clause.needs_any(open) && solver.breaks(clause);
+        if let Some(clause) = self.clauses().find(|index| fails(solver.clause(*index))) {
             let is_proved = before.tries.get() > 0;
-            return Err(Unsolved { clause: Some(clause), local: None, values: search.values, is_proved });
+            return Err(Unsolved { clause: Some(clause), local: None, values: solver.given, is_proved });
         }
-        match search.forwards(choose) {
-            Err(unsolved) if !unsolved.is_proved => search.backwards(choose, unsolved),
-            done => done,
-        }
+        solver.places = (0..solver.order.len()).map(|place| solver.place(place)).collect();
+        Ok(solver)
     }
 
     /// The rules in force without those that none of these parameters decides.
@@ -140,19 +157,75 @@ impl<'a> RowRules<'a> {
     }
 }
 
-/// One solution in the making.
-struct Search<'a> {
+/// A row in a situation, and one solution in the making.
+pub(crate) struct Solver<'a> {
     rules: RowRules<'a>,
     before: Before<'a>,
     /// The parameters to choose.
     order: Vec<usize>,
+    /// By place of the order.
+    places: Vec<Place>,
+    /// Of all parameters; some value of their type for those to choose.
+    given: Vec<Value>,
     /// Of all parameters. Those that are not chosen yet have some value of their type.
     values: Vec<Value>,
     /// Whether every polynomial that was needed was found.
     is_exact: Cell<bool>,
 }
 
-impl<'a> Search<'a> {
+/// How one parameter is chosen forwards.
+struct Place {
+    /// The clauses that it decides, together with earlier parameters alone.
+    decided: Vec<usize>,
+    /// Whether one of them needs an earlier choice.
+    depends: bool,
+    /// What is left to it, once that is known, if it does not depend on other choices: the same in every solution.
+    kept: Option<Left>,
+}
+
+/// What the clauses leave to a parameter.
+struct Left {
+    choices: Choices,
+    /// The clause that the last broken try broke.
+    blamed: Option<usize>,
+    is_exact: bool,
+}
+
+enum Choices {
+    Values(Vec<Value>),
+    Numbers(Room),
+}
+
+impl Choices {
+    fn choose(&self, local: usize, choose: &mut dyn Choose) -> Option<Value> {
+        match self {
+            Choices::Values(left) => (!left.is_empty()).then(|| choose.value(local, left)),
+            Choices::Numbers(room) => choose.number(local, room).map(Value::Number),
+        }
+    }
+}
+
+impl<'a> Solver<'a> {
+    /// Values of all parameters that obey every clause.
+    ///
+    /// # Errors
+    /// As [`RowRules::solve`].
+    pub fn solve(&mut self, choose: &mut dyn Choose) -> Result<Vec<Value>, Unsolved> {
+        self.values.clone_from(&self.given);
+        self.is_exact.set(true);
+        match self.forwards(choose) {
+            Err(unsolved) if !unsolved.is_proved => self.backwards(choose, unsolved),
+            done => done,
+        }
+    }
+
+    fn place(&self, place: usize) -> Place {
+        let decided: Vec<usize> = self.decided_by(place).collect();
+        let earlier = &self.order[..place];
+        let depends = decided.iter().any(|clause| self.clause(*clause).needs_any(earlier));
+        Place { decided, depends, kept: None }
+    }
+
     fn action(&self) -> &'a ActionDef {
         &self.rules.space.actions[self.rules.row.action]
     }
@@ -184,41 +257,51 @@ impl<'a> Search<'a> {
     fn forwards(&mut self, choose: &mut dyn Choose) -> Result<Vec<Value>, Unsolved> {
         for place in 0..self.order.len() {
             let local = self.order[place];
-            let decided: Vec<usize> = self.decided_by(place).collect();
-            let blamed = Cell::new(None);
-            let holds = |search: &mut Search<'_>, value: Value| {
-                search.values[local] = value;
-                let broken = decided.iter().find(|clause| search.breaks(search.clause(**clause)));
-                blamed.set(broken.copied().or(blamed.get()));
-                broken.is_none()
-            };
-            let chosen = match &self.action().parameters[local].domain {
-                Domain::Values(values) => {
-                    let left: Vec<Value> =
-                        values.iter().copied().filter(|value| holds(self, *value)).collect();
-                    (!left.is_empty()).then(|| choose.value(local, &left))
-                }
-                Domain::Range(low, high) => {
-                    let changes = self.changes_in_one(local, &decided);
-                    let room = Room::where_holds(low.to_f64(), high.to_f64(), changes, |number| {
-                        holds(self, Value::Number(number))
-                    });
-                    choose.number(local, &room).map(Value::Number)
-                }
-            };
-            let Some(value) = chosen else {
+            let left = self.places[place].kept.take().unwrap_or_else(|| self.left(place));
+            self.is_exact.set(self.is_exact.get() && left.is_exact);
+            let Some(value) = left.choices.choose(local, choose) else {
                 self.values[local] = first(&self.action().parameters[local].domain);
                 // The choices before matter only if a clause that decides here needs one of them.
-                let before = &self.order[..place];
-                let is_proved = self.is_exact.get()
-                    && self.before.tries.get() > 0
-                    && decided.iter().all(|clause| !self.clause(*clause).needs_any(before));
+                let is_proved =
+                    self.is_exact.get() && self.before.tries.get() > 0 && !self.places[place].depends;
                 let values = self.values.clone();
-                return Err(Unsolved { clause: blamed.get(), local: Some(local), values, is_proved });
+                return Err(Unsolved { clause: left.blamed, local: Some(local), values, is_proved });
             };
             self.values[local] = value;
+            let Place { depends, kept, .. } = &mut self.places[place];
+            *kept = (!*depends).then_some(left);
         }
         Ok(self.values.clone())
+    }
+
+    /// What is left to the parameter at this place of the order after the choices before it.
+    fn left(&mut self, place: usize) -> Left {
+        let local = self.order[place];
+        // Taken out while the values change.
+        let decided = core::mem::take(&mut self.places[place].decided);
+        let mut blamed = None;
+        let mut holds = |solver: &mut Solver<'_>, value: Value| {
+            solver.values[local] = value;
+            let broken = decided.iter().find(|clause| solver.breaks(solver.clause(**clause)));
+            blamed = broken.copied().or(blamed);
+            broken.is_none()
+        };
+        let mut is_exact = true;
+        let choices = match &self.action().parameters[local].domain {
+            Domain::Values(values) => {
+                Choices::Values(values.iter().copied().filter(|value| holds(self, *value)).collect())
+            }
+            Domain::Range(low, high) => {
+                let changes = self.changes_in_one(local, &decided);
+                is_exact = changes.is_some();
+                let changes = changes.unwrap_or_default();
+                Choices::Numbers(Room::where_holds(low.to_f64(), high.to_f64(), changes, |number| {
+                    holds(self, Value::Number(number))
+                }))
+            }
+        };
+        self.places[place].decided = decided;
+        Left { choices, blamed, is_exact }
     }
 
     /// The clauses that the parameter at this place of the order decides, together with earlier ones alone.
@@ -228,16 +311,14 @@ impl<'a> Search<'a> {
         self.rules.clauses().filter(move |clause| is_decided(self.clause(*clause)))
     }
 
-    /// Where these clauses may change along one number, if all others are as they are.
-    fn changes_in_one(&self, local: usize, clauses: &[usize]) -> Vec<f64> {
-        let Domain::Range(low, high) = &self.action().parameters[local].domain else { return Vec::new() };
+    /// Where these clauses may change along one number, if all others are as they are; `None` if a polynomial was
+    /// not found.
+    fn changes_in_one(&self, local: usize, clauses: &[usize]) -> Option<Vec<f64>> {
+        let (low, high) = self.action().parameters[local].domain.ends();
         let open = [local];
         let unknowns = Unknowns { rules: self.rules, open: &open, facts: self.facts() };
-        let Some(found) = polynomials(&unknowns, clauses.iter().map(|clause| self.clause(*clause))) else {
-            self.is_exact.set(false);
-            return Vec::new();
-        };
-        found.iter().flat_map(|polynomial| polynomial.turns(0, low.to_f64(), high.to_f64())).collect()
+        let found = polynomials(&unknowns, clauses.iter().map(|clause| self.clause(*clause)))?;
+        Some(found.iter().flat_map(|polynomial| polynomial.turns(0, low, high)).collect())
     }
 
     fn facts(&self) -> Facts<'_> {
