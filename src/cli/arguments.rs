@@ -468,8 +468,8 @@ pub struct DiagnoseArguments {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000), conflicts_with = "mechanisms")]
     pub likelihood: Option<u32>,
     /// Instead of modules, the documented weaknesses: the share of the collisions of all files
-    /// that vanish when one alone is switched off, when the obstacle appears (as modules are) or from the
-    /// start.
+    /// that vanish when one alone is switched off as the obstacle appears, beside the share that other sensor noise
+    /// alone makes vanish.
     #[arg(long)]
     pub mechanisms: bool,
     #[command(flatten)]

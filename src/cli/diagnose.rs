@@ -9,11 +9,10 @@ use crate::episode::{Collision, EpisodeLog};
 use crate::model::Scenario;
 use crate::model::vocabulary::Word;
 use crate::oracle;
-use crate::oracle::{
-    Diagnosis, Likelihood, Measure, MechanismShare, Share, WeaknessFinding, WithoutMechanism,
-};
+use crate::oracle::{Diagnosis, Likelihood, Measure, MechanismShare, Mechanisms, WeaknessFinding};
 use crate::run;
 use crate::run::Stage;
+use crate::statistics::Estimate;
 
 use super::arguments::DiagnoseArguments;
 use super::error::Failure;
@@ -47,7 +46,7 @@ pub fn diagnose(output: &Output, arguments: &DiagnoseArguments) -> Result<(), Fa
     }
     let causes = causes.iter().map(|(cause, count)| serde_json::json!({ "cause": cause, "count": count }));
     output.result(serde_json::json!({
-        "causes": causes.collect::<Vec<_>>(), "mechanisms": null,
+        "causes": causes.collect::<Vec<_>>(), "mechanisms": null, "placebo": null,
         "scenarios": found.done.iter().map(Explained::in_json).collect::<Vec<_>>(),
         "failed": found.failed_in_json(),
     }));
@@ -147,7 +146,7 @@ fn explain(
     Ok(Explained { file, scenario: scenario.name.clone(), ads: ads.name(), collision, diagnosis, likelihood })
 }
 
-/// The share of all files' crashes that vanish without each documented weakness.
+/// The share of all files' crashes that vanish without each documented weakness, and by chance.
 fn mechanisms(
     output: &Output,
     arguments: &DiagnoseArguments,
@@ -156,41 +155,55 @@ fn mechanisms(
     let found = each_file(output, &arguments.many, |file| {
         let (table, scenario) = load::scenario(output, file)?;
         let Case { stage, ads, log, index } = Case::of(&table, &scenario, profile)?;
-        let without = oracle::mechanisms(&stage.setup(&ads), &log, index).map_err(Failure::usage)?;
-        Ok((file.clone(), scenario.name.clone(), without))
+        let found = oracle::mechanisms(&stage.setup(&ads), &log, index).map_err(Failure::usage)?;
+        Ok((file.clone(), scenario.name.clone(), found))
     });
-    let crashes: Vec<Vec<WithoutMechanism>> =
-        found.done.iter().map(|(_, _, without)| without.clone()).collect();
-    let shares = oracle::mechanism_shares(&crashes);
-    output.say(&shares_text(crashes.len(), &shares));
-    let scenarios = found.done.iter().map(|(file, scenario, without)| {
-        serde_json::json!({ "file": file, "scenario": scenario, "without": without })
+    let crashes: Vec<Mechanisms> = found.done.iter().map(|(_, _, crash)| crash.clone()).collect();
+    let (shares, placebo) = (oracle::mechanism_shares(&crashes), oracle::placebo(&crashes));
+    output.say(&shares_text(crashes.len(), &shares, placebo.as_ref()));
+    let scenarios = found.done.iter().map(|(file, scenario, crash)| {
+        serde_json::json!({
+            "file": file, "scenario": scenario, "without": crash.without, "placebo": crash.placebo,
+        })
     });
     output.result(serde_json::json!({
-        "causes": null, "mechanisms": shares, "scenarios": scenarios.collect::<Vec<_>>(),
+        "causes": null, "mechanisms": shares, "placebo": placebo, "scenarios": scenarios.collect::<Vec<_>>(),
         "failed": found.failed_in_json(),
     }));
     found.complete("explained")
 }
 
-fn shares_text(crashes: usize, shares: &[MechanismShare]) -> String {
+fn shares_text(crashes: usize, shares: &[MechanismShare], placebo: Option<&Estimate>) -> String {
     let mut text = format!(
-        "{}; each weakness switched off alone, what vanishes (95 %):\n{:<34}{:<26}{}",
+        "{}; each weakness switched off alone when the obstacle appears, what vanishes (95 %):",
         plural(crashes, "collision"),
-        "weakness",
-        "when the obstacle appears",
-        "from the start"
     );
-    let cell = |share: &Share| {
-        let [found, low, high] = [share.share, share.low, share.high].map(|share| share * 100.0);
-        format!("{:>4} {found:>4.0} % ({low:.0} to {high:.0})", share.vanished)
+    let mut line = |weakness: &str, as_it_was: &str, noise: Option<&Estimate>, beyond: Option<&Estimate>| {
+        let [noise, beyond] = [noise, beyond].map(|found| found.map_or(String::new(), percent_text));
+        let line = format!("{weakness:<34}{as_it_was:<24}{noise:<24}{beyond}");
+        text.push_str(&format!("\n{}", line.trim_end()));
     };
     for found in shares {
-        let line =
-            format!("{:<34}{:<26}{}", found.mechanism, cell(&found.from_onset), cell(&found.from_start));
-        text.push_str(&format!("\n{line}"));
+        let share = &found.as_it_was;
+        let [part, low, high] = [share.share, share.low, share.high].map(|share| share * 100.0);
+        let as_it_was = format!("{:>4} {part:>4.0} % ({low:.0} to {high:.0})", share.vanished);
+        line(found.mechanism, &as_it_was, found.other_noise.as_ref(), found.beyond_chance.as_ref());
     }
-    text
+    line("none, by chance", "", placebo, None);
+    let heads = format!(
+        "{:<34}{:<24}{:<24}{}",
+        "weakness", "with the crash's noise", "with other noise", "beyond chance"
+    );
+    text.replacen('\n', &format!("\n{heads}\n"), 1)
+}
+
+/// A mean share with its interval, in percent.
+fn percent_text(share: &Estimate) -> String {
+    let percent = |share: f64| share * 100.0;
+    let interval = share.interval.and_then(|interval| Some((interval.low, interval.high?)));
+    let interval = interval
+        .map_or(String::new(), |(low, high)| format!(" ({:.0} to {:.0})", percent(low), percent(high)));
+    format!("{:>4.0} %{interval}", percent(share.mean))
 }
 
 fn heading(collision: &Collision) -> String {

@@ -218,10 +218,11 @@ pub const SHAPES: &[Shape] = &[
         fields: &[
             f("causes[]", "object?", "`cause` (one or two modules, or none) and `count`"),
             f("mechanisms[]", "object?", "with `--mechanisms`: a weakness and what vanishes without it"),
+            f("placebo", "object?", "with `--mechanisms`: what vanishes by other sensor noise alone"),
             f(
                 "scenarios[]",
                 "object",
-                "`file`, `scenario`; its `diagnosis`, or with `--mechanisms` `without`",
+                "`file`, `scenario`; its `diagnosis`, or with `--mechanisms` `without` and `placebo`",
             ),
             FAILED,
         ],

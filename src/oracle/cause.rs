@@ -334,7 +334,7 @@ impl<'a> Inquiry<'a> {
 
     /// The share of replays with other sensor noise in which the collision vanishes, with a profile that takes
     /// over when the obstacle appears.
-    fn vanished(&self, profile: &ModularConfig) -> f64 {
+    pub fn vanished(&self, profile: &ModularConfig) -> f64 {
         let vanished = (1..=VARIATIONS).filter(|&number| {
             let ads = taken_over(&self.crash.setup.ads, profile, &self.foresight, self.from_s, Some(number));
             self.crash.fate(&self.crash.play(&ads)) == Fate::Vanished

@@ -20,7 +20,9 @@ pub use cause::{Diagnosis, ModuleFinding, NoModules, WeaknessFinding, diagnose, 
 pub use crash::{Fate, Regression, regression};
 pub use facts::{counted, counts, facts};
 pub use measured::Measure;
-pub use mechanisms::{MechanismShare, Share, WithoutMechanism, mechanism_shares, mechanisms};
+pub use mechanisms::{
+    MechanismShare, Mechanisms, Share, WithoutMechanism, mechanism_shares, mechanisms, placebo,
+};
 pub use severity::{Severity, severity};
 pub use shrink::{Shrunk, shrink, spare_steps};
 pub use variation::{Likelihood, likelihood};

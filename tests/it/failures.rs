@@ -80,9 +80,13 @@ fn found_scenarios_are_explained_shrunk_and_tested_again() {
     let shares = found["mechanisms"].as_array().expect("a list");
     let crashes = found["scenarios"].as_array().expect("a list").len();
     assert_eq!((status, shares.len(), crashes), (0, Weaknesses::NAMES.len(), 2));
-    for share in shares.iter().flat_map(|found| [&found["from_onset"], &found["from_start"]]) {
-        let [low, at, high] = ["low", "share", "high"].map(|name| share[name].as_f64().expect("a number"));
+    let chance = found["placebo"]["mean"].as_f64().expect("a number");
+    for share in shares {
+        let [low, at, high] =
+            ["low", "share", "high"].map(|name| share["as_it_was"][name].as_f64().expect("a number"));
         assert!(0.0 <= low && low <= at && at <= high && high <= 1.0, "{share}");
+        let mean = |name: &str| share[name]["mean"].as_f64().expect("a number");
+        assert!((mean("other_noise") - chance - mean("beyond_chance")).abs() < 1e-9, "{share}");
     }
 
     let small = path("small.ava");
