@@ -11,10 +11,10 @@
 //!
 //! To give way means not to make the other change its speed or direction *abruptly* (article 1), so what counts
 //! is the moment when the first of the two comes into the other's way. A vehicle that then leaves the other
-//! room to brake gently has given way, and has from now on priority over it: nobody may drive into a junction
-//! or a lane that is taken (18.5, 13.5). What is abrupt, UN R79 says for lane changes: more than 3 m/s² after
-//! 0.4 s, to stay the way of a second behind. So a vehicle that cuts in and stops before the one behind it has its
-//! distance back has not given way.
+//! room to brake gently has given way, and has from now on priority over it: a vehicle that is in a junction may clear
+//! it (18.6), and one that follows keeps its distance (13.5); that both make a priority is ours. What is abrupt,
+//! UN R79 says for lane changes: more than 3 m/s² after 0.4 s, to stay the way of a second behind. So a vehicle that
+//! cuts in and stops before the one behind it has its distance back has not given way.
 //!
 //! A vehicle that has crashed is an obstacle: whoever drives must be able to stop for what can be foreseen (13.1).
 //! It has priority, unless it came to lie in the ego vehicle's way too late to brake gently for it; then neither has.

@@ -64,7 +64,7 @@ profile! {
         change_mps_max: f64 = 1.8, 0.2..=5.0;
         /// A lane change takes at least this long, s, in `[0.5, 20]`. Ours.
         change_s_min: f64 = 2.0, 0.5..=20.0;
-        /// Whether instead of all this a driver changes lanes at once if a sphere of 1 m, 2 m beside the corner of its front, is empty. LGSVL up to 2021.2.
+        /// Whether instead of all this a driver changes lanes at once if a sphere half its width beside the corner of its front is empty. LGSVL.
         change_by_sphere: bool = false;
         /// Whether ambient vehicles change lanes for their own gain, by MOBIL. Otherwise they keep their lane.
         mobil: bool = true;

@@ -65,7 +65,7 @@ localization: { position_sigma_m: 0.06 }
 perception: { range_factor: 0.95, latency_frames: 2 }
 tracking: { velocity_factor: 0.98 }
 prediction: { lateral_speed_mps: 0.5 }
-planning: { acceleration_mps2_max: 1.8, nudge_buffer_m: 0.35 }
+planning: { acceleration_mps2_max: 1.8, lateral_buffer_m: 0.45 }
 control: { actuators: { brake_mps2_max: 8.0 } }
 ";
 

@@ -19,7 +19,7 @@ use super::tracking::Track;
 /// Contacts farther ahead in time are of no interest, s.
 const HORIZON_S: f64 = 3.0;
 /// Part of the vehicle's half width that a contact must reach into, m: what is only grazed is left to the
-/// planner, which passes standing vehicles at 0.3 m. Ours; tests begin at an overlap of a quarter.
+/// planner, which passes standing vehicles at 0.4 m. Ours; tests begin at an overlap of a quarter.
 const OVERLAP_M: f64 = 0.25;
 /// Of what enters the path from the side only that is braked for which would be hit by the front, m behind it.
 const FLANK_M: f64 = 1.5;

@@ -25,10 +25,10 @@ use crate::sim::world::DT_S;
 use super::driver::{Driver, SIDE_ROOM_M};
 use super::leader::extent_m;
 
-/// The sphere of LGSVL's check up to 2021.2: its radius, and how far its centre is beside the corner of the
-/// front, m.
-const SPHERE_M: f64 = 1.0;
-const SPHERE_ASIDE_M: f64 = 2.0;
+/// The sphere of LGSVL's check: its radius in half widths of the vehicle, and at most, m. Its centre is half a width
+/// beside the corner of the front.
+const SPHERE_PART: f64 = 0.75;
+const SPHERE_M_MAX: f64 = 1.2;
 /// Below this speed a lane change slows down with the vehicle, which cannot slide sideways, m/s.
 const CHANGE_FULL_MPS: f64 = 5.0;
 /// Neighbouring lanes whose centres are farther apart than this have parted, m.
@@ -166,11 +166,11 @@ impl Driver {
             return self.is_free(path, station_m, size, around);
         }
         let left = Vec2::new(-this.forward.y, this.forward.x);
-        let aside_m = size.width_m / 2.0 + SPHERE_ASIDE_M;
-        let aside = if side == Side::Left { left * aside_m } else { left * -aside_m };
+        let sphere_m = (SPHERE_PART * size.width_m / 2.0).min(SPHERE_M_MAX);
+        let aside = if side == Side::Left { left * size.width_m } else { left * -size.width_m };
         let centre = this.outline.pose.position + this.forward * (size.length_m / 2.0) + aside;
         let point = OrientedBox::new(Pose { position: centre, ..this.outline.pose }, 0.0, 0.0);
-        around.others().all(|(outline, _)| distance_m(&point, outline) > SPHERE_M)
+        around.others().all(|(outline, _)| distance_m(&point, outline) > sphere_m)
     }
 
     /// Whether no vehicle is beside it in another lane or would be soon, and none has to brake hard for it.

@@ -3,8 +3,7 @@
 //! Three rays run straight ahead from the front, from its middle and its corners, whatever the way does. What
 //! they meet within a stop distance makes the driver stop. The stop distance grows with the speed and falls
 //! with a driver's aggression, 1 to 3. The speed tends to its target at a fixed rate.
-//! Figures from `NPCLaneFollowBehaviour` of LGSVL's simulator 2021.3; they stand in `sim::traffic`. There the stop
-//! distance at the limit is cut to whole metres (20, 10 and 6 m straight through junctions).
+//! Figures from `NPCLaneFollowBehaviour` of LGSVL's simulator 2021.3; they stand in `sim::traffic`.
 //!
 //! That rate is a wish of 23 to 57 m/s², which LGSVL's vehicles got because they have no tyres. Here brakes and
 //! tyres bound it (`Driver::step`), and so that its drivers are no worse for it, they stop from as far away as the
@@ -90,7 +89,9 @@ impl Driver {
             ahead.junction.is_some() && ahead.turn == Turn::Straight
         };
         let most_m = if goes_straight { profile.stop_junction_m } else { profile.stop_m };
-        let at_limit_m = most_m / f64::from(self.aggression.max(1)) * lane.speed_limit_mps / LIMIT_MPS;
+        // Cut to whole metres, as there: 20, 10 and 6 m straight through junctions.
+        let at_25_mph_m = (most_m / f64::from(self.aggression.max(1))).floor();
+        let at_limit_m = at_25_mph_m * lane.speed_limit_mps / LIMIT_MPS;
         let part = (self.speed_mps / lane.speed_limit_mps).clamp(0.0, 1.0);
         let published_m = profile.stop_m_min + (at_limit_m - profile.stop_m_min) * part;
         let braking_mps2 = around.braking_mps2(size, self.speed_mps);

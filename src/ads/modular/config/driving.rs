@@ -51,16 +51,14 @@ section! {
         jerk_mps3_down: f64 = 4.0, 0.5..=50.0;
         /// Rate at which a plan may raise its acceleration, m/s³, in `[0.5, 50]`. Apollo `longitudinal_jerk_upper_bound`: 2.0.
         jerk_mps3_up: f64 = 2.0, 0.5..=50.0;
-        /// Room kept free on each side, m, in `[0, 2]`. Apollo `obstacle_lat_buffer`: 0.4.
+        /// Room kept free on each side, also of what stands at the edge of the lane and is passed within it, m, in `[0, 2]`. Apollo's path bounds, `obstacle_lat_buffer`: 0.4.
         lateral_buffer_m: f64 = 0.4, 0.0..=2.0;
-        /// Room left to what stands at the edge of the lane and is passed within it, m, in `[0, 2]`. Apollo `static_obstacle_nudge_l_buffer`: 0.3, which there tells what blocks the lane; its path bounds keep `obstacle_lat_buffer`.
-        nudge_buffer_m: f64 = 0.3, 0.0..=2.0;
         /// Gap to what stands in the way, m, in `[0.5, 20]`. Apollo `min_stop_distance_obstacle`: 6.0.
         stop_gap_m: f64 = 6.0, 0.5..=20.0;
         /// Gap to a leader at rest, m, in `[0.5, 20]`. Ours: between Apollo's `follow_min_distance` 3.0 and the stop gap.
         follow_gap_m: f64 = 5.0, 0.5..=20.0;
-        /// Time gap to a leader, s, in `[0.1, 5]`. Ours; Apollo's gap has 2.5 (`follow_time_buffer`).
-        follow_time_s: f64 = 2.0, 0.1..=5.0;
+        /// Time gap to a leader, s, in `[0.1, 5]`. Apollo `follow_time_buffer`: 2.5.
+        follow_time_s: f64 = 2.5, 0.1..=5.0;
         /// Gap to the way of something that crosses, m, in `[0.5, 20]`. Apollo `yield_distance`: 5.0.
         yield_gap_m: f64 = 5.0, 0.5..=20.0;
         /// Two road users at one place closer in time than this are in conflict, s, in `[0, 5]`. Ours.
@@ -107,8 +105,8 @@ section! {
         lost_offset_m: f64 = 3.0, 1.0..=20.0;
         /// Speed at which an unprotected turn is approached and crept into, m/s, in `[0.5, 10]`. Apollo's unprotected left turn, `approach_cruise_speed`: 2.78; that it also holds while creeping is ours.
         approach_mps: f64 = 2.78, 0.5..=10.0;
-        /// Under `creep_skipped_at_speed` the approach begins this far before the line, m, in `[0, 100]`; without it, in time. Ours: Apollo's unprotected left turn begins 30 m before (`start_traffic_light_scenario_distance`), only its other lights 5 m.
-        approach_m: f64 = 5.0, 0.0..=100.0;
+        /// The approach begins this far before the line, or as far as slowing down takes, m, in `[0, 100]`. Apollo's unprotected left turn, `start_traffic_light_scenario_distance`: 30.0; that it holds for signs as well is ours.
+        approach_m: f64 = 30.0, 0.0..=100.0;
         /// Speed at which a junction without lights and signs is approached if others go first, m/s, in `[0.5, 20]`. Apollo's bare intersection, `approach_cruise_speed`: 6.7056 (15 mph).
         bare_approach_mps: f64 = 6.7, 0.5..=20.0;
         /// Creeping ends this far behind the line, m, in `[0, 20]`. Apollo's creep decider, `FindCreepDistance`: 2.0.
@@ -117,8 +115,6 @@ section! {
         creep_clear_s: f64 = 6.0, 0.0..=20.0;
         /// Under `creep_skipped_at_speed`, a faster vehicle does not creep, m/s, in `[0, 20]`. Apollo `max_adc_speed_before_creep`: 5.56.
         creep_skip_mps: f64 = 5.56, 0.0..=20.0;
-        /// Under `creep_times_out`, creeping ends after so long, s, in `[0, 60]`. Apollo `creep_timeout_sec`: 10.0, after which the way must be clear there as well.
-        creep_timeout_s: f64 = 10.0, 0.0..=60.0;
         /// Time at rest before a stop sign, s, in `[0, 20]`. Apollo's stop sign scenario, `stop_duration_sec`: 1.0.
         stop_sign_s: f64 = 1.0, 0.0..=20.0;
         /// Reaction time of the sight distance, s, in `[0, 5]`: publication of a track, and half the time in which braking builds up. Ours; AASHTO's Green Book has 2.5 for people.

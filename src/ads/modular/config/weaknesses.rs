@@ -52,12 +52,10 @@ weaknesses! {
     late_red_passed,
     /// What will come onto the way at the front bumper or behind it does not count until it is there. Apollo issue 14633: `STObstaclesProcessor` drops what begins below 0.01 m and after 0.1 s. Off: it counts.
     blind_to_side_and_rear,
-    /// When not even the hardest braking of a plan keeps clear, the fallback brakes at 4 m/s² and no harder. Apollo `slowdown_profile_deceleration`; that it builds up at a bounded rate is ours. Off: as hard as the vehicle can.
+    /// When not even the hardest braking of a plan keeps clear, the fallback brakes at 4 m/s² and no harder. Apollo `slowdown_profile_deceleration`, `GenerateStopProfile`. Off: as hard as the vehicle can.
     gentle_fallback,
     /// Decisions about road users are taken anew in every cycle, so that a small change flips them. Apollo issue 14870: yields only briefly; that its cause lies here is ours. Off: a decision is kept until the other is much cheaper.
     decides_anew,
-    /// An unprotected turn is approached late, and a vehicle that is still fast at the line goes without creeping. Apollo `max_adc_speed_before_creep`; that it begins so late is ours. Off: it slows down in time, and always creeps.
+    /// A vehicle that is still fast at the line of a junction where others may go first goes on without creeping. Apollo `max_adc_speed_before_creep`; that it also holds at junctions without lights is ours. Off: it always creeps.
     creep_skipped_at_speed,
-    /// Creeping into an unprotected turn ends after some time, whatever comes. Apollo `creep_timeout_sec`; there the way must be clear as well: that it need not be is ours. Off: it goes on until nothing enters.
-    creep_times_out,
 }

@@ -18,7 +18,8 @@ use super::trajectory::Point;
 const CROSSWALK_MARGIN_M: f64 = 2.0;
 /// Slower than this across the way, a pedestrian neither comes nor goes, m/s.
 const ACROSS_MPS: f64 = 0.2;
-/// Apollo's `stop_timeout`, s: it belongs to this rule and holds whether `creeps_to_standing_pedestrian` is on or not.
+/// Apollo's `stop_timeout`, s: a pedestrian beside the lane who does not go lets the vehicle go first. It belongs to
+/// this rule and holds whether `creeps_to_standing_pedestrian` is on or not.
 const CROSSWALK_PATIENCE_S: f64 = 4.0;
 
 /// A stop before each crosswalk ahead that a pedestrian is on, or comes onto.
@@ -47,9 +48,9 @@ pub fn crosswalks(
             let velocity_mps = walker.velocity_mps;
             let left_mps = beside.forward.x * velocity_mps.y - beside.forward.y * velocity_mps.x;
             let away_mps = left_mps * beside.offset_m.signum();
-            // Apollo's `stop_timeout`: a pedestrian who does not go lets the vehicle go first. There it is only for
-            // those beside the lane; here for all.
-            if standing.time_s(walker.id) > CROSSWALK_PATIENCE_S {
+            let on = scene.route.lane_at(from_m);
+            let beside_lane = off_m > scene.map.lane(on.lane).width_at(from_m - on.from_m) / 2.0;
+            if beside_lane && standing.time_s(walker.id) > CROSSWALK_PATIENCE_S {
                 return false;
             }
             let comes = away_mps < -ACROSS_MPS;
@@ -57,7 +58,7 @@ pub fn crosswalks(
                 || off_m <= config.crosswalk_strict_m && away_mps <= ACROSS_MPS
         });
         let stop_m = from_m - config.crosswalk_gap_m;
-        if waited_for && can_stop(config, config.crosswalk_mps2_max, stop_m - front_m, start.speed_mps) {
+        if waited_for && can_stop(config, config.crosswalk_mps2_max, stop_m - front_m, start, 0.0) {
             constraints.push(Constraint::line(Reason::Crosswalk, stop_m));
         }
     }
@@ -81,20 +82,29 @@ pub fn keep_clear(
             stands && stop_m > enter_m && stop_m - vehicle.length_m < exit_m
         });
         let stop_m = enter_m - config.stop_line_gap_m;
-        if blocked && can_stop(config, config.deceleration_mps2_max, stop_m - front_m, start.speed_mps) {
+        if blocked && can_stop(config, config.deceleration_mps2_max, stop_m - front_m, start, 0.0) {
             constraints.push(Constraint::line(Reason::KeepClear, stop_m));
         }
     }
 }
 
-/// Whether a braking that builds up at the plan's rate ends within a distance.
-pub fn can_stop(config: &PlanningConfig, decel_mps2: f64, distance_m: f64, speed_mps: f64) -> bool {
+/// Whether a braking that begins in `response_s` and builds up at the plan's rate ends within a distance.
+pub fn can_stop(
+    config: &PlanningConfig,
+    decel_mps2: f64,
+    distance_m: f64,
+    start: &Point,
+    response_s: f64,
+) -> bool {
     if decel_mps2.is_infinite() {
         return true;
     }
-    // Until the braking has built up, the vehicle goes on as if for half that time.
-    let build_up_s = decel_mps2 / config.jerk_mps3_down / 2.0;
-    speed_mps * build_up_s + speed_mps * speed_mps / (2.0 * decel_mps2) <= distance_m.max(0.2)
+    // Until the braking has built up, the vehicle goes on as if for half that time; less if it brakes already.
+    let speed_mps = start.speed_mps;
+    let lacking = (1.0 + start.acceleration_mps2.min(0.0) / decel_mps2).max(0.0);
+    let build_up_s = decel_mps2 / config.jerk_mps3_down / 2.0 * lacking * lacking;
+    let late_s = response_s * lacking + build_up_s;
+    speed_mps * late_s + speed_mps * speed_mps / (2.0 * decel_mps2) <= distance_m.max(0.2)
 }
 
 #[cfg(test)]
@@ -140,6 +150,7 @@ mod tests {
         assert!(!stops_for(-9.0, 1.2, 0.0), "is too far");
         assert!(stops_for(-3.0, 0.0, 2.0), "waits");
         assert!(!stops_for(-3.0, 0.0, 6.0), "has waited for long");
+        assert!(stops_for(-1.0, 0.0, 6.0), "stands in the lane");
         assert!(!stops_for(3.0, 1.2, 0.0), "has crossed");
     }
 

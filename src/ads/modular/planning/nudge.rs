@@ -1,7 +1,7 @@
 //! The path beside the guide: a shift within the lane past vehicles that stand at its edge, and the way back
 //! from a lane change that was broken off.
 //!
-//! Apollo's path bounds keep 0.4 m from static obstacles, 3 m before and 2 m behind them (here `nudge_buffer_m`); its
+//! Apollo's path bounds keep 0.4 m from static obstacles, 3 m before and 2 m behind them (here `lateral_buffer_m`); its
 //! piecewise-jerk optimiser is replaced by a quintic shift of bounded lateral acceleration. Vehicles that stand
 //! in a row are passed as one. Pedestrians and moving road users are not passed in this way. Left out is lane
 //! borrowing, a shift into the next lane: behind what stands, the stop gap leaves no room to turn out of the lane.
@@ -289,7 +289,7 @@ impl Standing<'_> {
 
     /// From the way to what stands, at least, m.
     fn clear_m(&self) -> f64 {
-        Self::HALF_WAY_M + self.config.nudge_buffer_m
+        Self::HALF_WAY_M + self.config.lateral_buffer_m
     }
 
     /// The shift that passes what stands, m; `None` if a lane of that width has no room.
@@ -301,7 +301,7 @@ impl Standing<'_> {
 
     /// Whether what stands reaches into the way beside, of the room that is wanted half at least.
     fn meets(&self, edge: &Edge, bump: &Bump) -> bool {
-        let room_m = Self::HALF_WAY_M + self.config.nudge_buffer_m / 2.0;
+        let room_m = Self::HALF_WAY_M + self.config.lateral_buffer_m / 2.0;
         edge.left_m > bump.offset_m - room_m && edge.right_m < bump.offset_m + room_m
     }
 

@@ -97,7 +97,7 @@ impl Planner {
             changes,
             standing: Standing::default(),
             stages: Stages::new(&config, scene, junctions, &rights),
-            sight: SightBound::new(scene, junctions),
+            sight: SightBound::new(scene, &rights),
             rights,
             manoeuvre: Manoeuvre::LaneFollow,
             trajectory: Trajectory::default(),
@@ -172,10 +172,10 @@ impl Planner {
 
     /// Collects the constraints of rules, and what road users claim of the way.
     fn collect(&mut self, outlook: &Outlook, start: &Point) {
-        let &Outlook { station_m, speed_mps, forecasts, .. } = outlook;
+        let &Outlook { station_m, forecasts, .. } = outlook;
         let constraints = &mut self.constraints;
         constraints.clear();
-        self.lights.constrain(station_m, speed_mps, outlook.lights, constraints);
+        self.lights.constrain(start, outlook.lights, constraints);
         self.changes.constrain(constraints);
         let (config, scene, guide) = (&self.config, &self.scene, &self.guide);
         kept_clear::crosswalks(config, scene, guide, start, forecasts, &self.standing, constraints);
@@ -264,7 +264,7 @@ impl Planner {
                 let room_m = claim.near_m() - CHECK_ROOM_M - front_m;
                 claim.stance == Stance::Overtake
                     && self.trajectory.meets(claim, config.conflict_buffer_s).is_some()
-                    && kept_clear::can_stop(config, config.emergency_mps2, room_m, start.speed_mps)
+                    && kept_clear::can_stop(config, config.emergency_mps2, room_m, &start, 0.0)
             });
             let Some(index) = late else { return };
             self.claims[index].stance = Stance::Yield;
@@ -299,9 +299,7 @@ impl Planner {
         }
         self.trajectory = braking;
         if self.weaknesses.gentle_fallback {
-            let config = PlanningConfig { emergency_mps2: self.config.fallback_mps2, ..self.config };
-            let trajectory = &mut self.trajectory;
-            speed::roll(&config, &self.guide, start, &self.constraints, &self.claims, trajectory);
+            self.trajectory = Trajectory::braking(start, self.config.fallback_mps2, self.reason());
         }
     }
 

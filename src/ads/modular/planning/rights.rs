@@ -24,8 +24,11 @@ pub struct RouteRights {
 
 /// A place where another lane crosses or joins the route.
 #[derive(Debug, Clone, Copy)]
-struct Meeting {
-    station_m: f64,
+pub struct Meeting {
+    pub station_m: f64,
+    /// The other lane, and the station there, m.
+    pub lane: LaneIndex,
+    pub lane_station_m: f64,
     /// Cosine and sine of the angle between the other lane and the route.
     cosine: f64,
     sine: f64,
@@ -40,6 +43,8 @@ impl RouteRights {
                 never_green_together(scene, own, conflict.lane) || goes_first(scene, own, conflict.lane);
             Meeting {
                 station_m: conflict.station_m,
+                lane: conflict.lane,
+                lane_station_m: conflict.lane_station_m,
                 cosine: libm::cos(conflict.angle_rad),
                 sine: libm::sin(conflict.angle_rad),
                 ego_first: ego_first != config.priority_misread,
@@ -48,10 +53,15 @@ impl RouteRights {
         RouteRights { meetings: meetings.collect() }
     }
 
-    /// The first crossing between two stations at which another lane goes first, m.
+    /// The places at which another lane goes first.
+    pub fn to_wait_for(&self) -> impl Iterator<Item = &Meeting> {
+        self.meetings.iter().filter(|meeting| !meeting.ego_first)
+    }
+
+    /// The first of them between two stations, m.
     pub fn first_to_wait_for_m(&self, from_m: f64, to_m: f64) -> Option<f64> {
-        let stations = self.meetings.iter().filter(|meeting| !meeting.ego_first);
-        stations.map(|meeting| meeting.station_m).find(|at_m| (from_m..=to_m).contains(at_m))
+        let mut stations = self.to_wait_for().map(|meeting| meeting.station_m);
+        stations.find(|at_m| (from_m..=to_m).contains(at_m))
     }
 
     /// Whether what a road user would do on the way takes the ego vehicle's right of way.

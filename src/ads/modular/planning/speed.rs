@@ -217,6 +217,10 @@ fn free_mps2(config: &PlanningConfig, guide: &Guide, point: &Point) -> f64 {
 /// the comfortable deceleration; where that has been missed, whatever still stops in time.
 fn fence_mps2(config: &PlanningConfig, speed_mps: f64, room_m: f64) -> f64 {
     let comfortable_mps2 = config.comfortable_mps2;
+    // Beyond its place the vehicle must not roll on, however slowly.
+    if room_m <= 0.0 && speed_mps > 0.0 {
+        return -comfortable_mps2.max(braking_mps2(speed_mps, room_m));
+    }
     // Until the braking has built up, the vehicle goes on as if for half that time.
     let build_up_m = speed_mps * comfortable_mps2 / config.jerk_mps3_down / 2.0;
     let needed_mps2 = braking_mps2(speed_mps, room_m - build_up_m);
@@ -300,6 +304,14 @@ mod tests {
         let hardest_mps2 =
             trajectory.points.iter().fold(0.0_f64, |worst, point| worst.min(point.acceleration_mps2));
         assert!(hardest_mps2 > -3.0, "{hardest_mps2}");
+    }
+
+    #[test]
+    fn a_vehicle_beyond_its_place_does_not_roll_on() {
+        let start = Point { station_m: 0.0, speed_mps: 0.6, acceleration_mps2: 0.0 };
+        let line_m = VehicleParameters::MKZ.front_m(-0.5);
+        let last = rolled(start, &[Constraint::line(Reason::RedLight, line_m)]).points[POINTS - 1];
+        assert!(last.speed_mps < 1e-9 && last.station_m < 0.35, "{last:?}");
     }
 
     #[test]

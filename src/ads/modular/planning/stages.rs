@@ -6,8 +6,8 @@
 //! station-time graph hold alone. A junction is protected, and has no stages, if a light lets the vehicle
 //! through and nothing that may go at the same time goes first.
 //!
-//! Two weaknesses: `creep_skipped_at_speed` (a vehicle that comes faster goes without creeping) is the original's,
-//! but for its late approach; `creep_times_out` is ours, since the original's timeout asks for a clear way, too.
+//! Weakness `creep_skipped_at_speed`, as in the original: a vehicle that is still fast at the line goes without
+//! creeping. The original's timeout of creeping is no weakness, since after it the way must still be clear.
 //! Left out: right turns at a red light (the vehicle waits for green), and the order of arrival at all-way stops.
 //! Ours: creeping ends as soon as nothing enters, not at its end only.
 
@@ -31,7 +31,7 @@ const AT_LINE_M: f64 = 0.5;
 const STOPPED_M: f64 = 2.5;
 const STOPPED_MPS: f64 = 0.2;
 /// Room kept to the middle of the first lane that crosses, m: half a lane and a metre.
-const CROSSING_ROOM_M: f64 = 4.0;
+pub(super) const CROSSING_ROOM_M: f64 = 4.0;
 
 #[derive(Debug, Clone)]
 pub struct Stages {
@@ -55,7 +55,7 @@ struct Passage {
 enum Stage {
     Approach,
     Stop { stood_s: f64 },
-    Creep { since_s: f64 },
+    Creep,
     Go,
 }
 
@@ -107,7 +107,7 @@ impl Stages {
         if let Some(passage) = self.passages.iter_mut().find(|passage| passage.exit_m > rear_m) {
             let enters = claims.iter().any(|claim| passage.is_entered_by(config, claim));
             passage.advance(config, weaknesses, start, enters);
-            passage.constrain(config, weaknesses, start, constraints);
+            passage.constrain(config, start, constraints);
         }
     }
 }
@@ -134,43 +134,30 @@ impl Passage {
             }
             Stage::Approach if is_at_line => {
                 let skipped = weaknesses.creep_skipped_at_speed && start.speed_mps > config.creep_skip_mps;
-                if self.creeps && !skipped { Stage::Creep { since_s: 0.0 } } else { Stage::Go }
+                if self.creeps && !skipped { Stage::Creep } else { Stage::Go }
             }
-            Stage::Stop { stood_s } if stood_s >= config.stop_sign_s => Stage::Creep { since_s: 0.0 },
+            Stage::Stop { stood_s } if stood_s >= config.stop_sign_s => Stage::Creep,
             Stage::Stop { stood_s } => Stage::Stop { stood_s: stood_s + FRAME_S },
-            Stage::Creep { .. } if !enters => Stage::Go,
-            Stage::Creep { since_s } if weaknesses.creep_times_out && since_s >= config.creep_timeout_s => {
-                Stage::Go
-            }
-            Stage::Creep { since_s } => Stage::Creep { since_s: since_s + FRAME_S },
+            Stage::Creep if !enters => Stage::Go,
             stage => stage,
         };
     }
 
-    fn constrain(
-        &self,
-        config: &PlanningConfig,
-        weaknesses: &Weaknesses,
-        start: &Point,
-        constraints: &mut Vec<Constraint>,
-    ) {
+    fn constrain(&self, config: &PlanningConfig, start: &Point, constraints: &mut Vec<Constraint>) {
         let hold = |reason| Constraint::line(reason, self.hold_m);
         let stop = Constraint::line(Reason::StopSign, self.line_m - config.stop_line_gap_m);
         match self.stage {
             Stage::Approach => {
-                // So late that a fast vehicle is still fast at the line. Ours: Apollo begins 30 m before.
                 let excess_m2ps2 = start.speed_mps * start.speed_mps - self.approach_mps * self.approach_mps;
                 let needed_m = excess_m2ps2.max(0.0) / (2.0 * config.comfortable_mps2);
-                let is_late = weaknesses.creep_skipped_at_speed;
-                let begin_m = if is_late { config.approach_m } else { needed_m.max(config.approach_m) };
-                let from_m = self.line_m - begin_m;
+                let from_m = self.line_m - needed_m.max(config.approach_m);
                 constraints.push(Constraint::limit(Reason::Approach, from_m, self.hold_m, self.approach_mps));
                 if self.sign == Some(SignKind::Stop) {
                     constraints.push(stop);
                 }
             }
             Stage::Stop { .. } => constraints.push(stop),
-            Stage::Creep { .. } => {
+            Stage::Creep => {
                 let from_m = f64::NEG_INFINITY;
                 constraints.push(Constraint::limit(Reason::Creep, from_m, self.hold_m, config.approach_mps));
                 constraints.push(hold(Reason::Creep));
@@ -209,8 +196,7 @@ mod tests {
         enters: bool,
         for_s: f64,
     ) -> Stage {
-        let mut weaknesses = Weaknesses::NONE;
-        (weaknesses.creep_skipped_at_speed, weaknesses.creep_times_out) = (weak, weak);
+        let weaknesses = Weaknesses { creep_skipped_at_speed: weak, ..Weaknesses::NONE };
         let station_m = LINE_M + ahead_m - VehicleParameters::MKZ.front_m(0.0);
         let start = Point { station_m, speed_mps, acceleration_mps2: 0.0 };
         for _ in 0..=(for_s / FRAME_S) as u32 {
@@ -223,21 +209,14 @@ mod tests {
     fn it_creeps_until_nothing_enters() {
         let mut turn = passage(None);
         assert_eq!(stage(&mut turn, true, -20.0, 8.0, true, 1.0), Stage::Approach);
-        assert!(matches!(stage(&mut turn, true, 0.0, 2.5, true, 2.0), Stage::Creep { .. }));
+        assert_eq!(stage(&mut turn, true, 0.0, 2.5, true, 60.0), Stage::Creep);
         assert_eq!(stage(&mut turn, true, 2.0, 0.0, false, 0.0), Stage::Go);
     }
 
     #[test]
     fn creep_skipped_at_speed_goes_without_creeping() {
         assert_eq!(stage(&mut passage(None), true, 0.0, 6.0, true, 0.0), Stage::Go);
-        assert!(matches!(stage(&mut passage(None), false, 0.0, 6.0, true, 0.0), Stage::Creep { .. }));
-    }
-
-    #[test]
-    fn creep_times_out_after_ten_seconds() {
-        assert!(matches!(stage(&mut passage(None), true, 0.0, 2.0, true, 9.0), Stage::Creep { .. }));
-        assert_eq!(stage(&mut passage(None), true, 0.0, 2.0, true, 11.0), Stage::Go);
-        assert!(matches!(stage(&mut passage(None), false, 0.0, 2.0, true, 60.0), Stage::Creep { .. }));
+        assert_eq!(stage(&mut passage(None), false, 0.0, 6.0, true, 0.0), Stage::Creep);
     }
 
     #[test]
