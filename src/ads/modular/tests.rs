@@ -269,7 +269,7 @@ fn gap_behind_a_parked_car(config: &ModularConfig) -> f64 {
     let mut rig = rig_of(&scene, config, 1);
     rig.run(8.0);
     let parked_m = rig.station_m() + 60.0;
-    rig.sensed.objects.push(object(1, Body::Sedan, Pose::new(parked_m, -3.55, 0.0), 0.0));
+    rig.sensed.objects.push(object(1, Body::Sedan, Pose::new(parked_m, -3.65, 0.0), 0.0));
     rig.sensed.objects.push(object(2, Body::Sedan, Pose::new(parked_m + 28.0, -1.75, 0.0), 0.0));
     let mut nudged = false;
     for _ in 0..1000 {
@@ -293,7 +293,7 @@ fn closest_static_only_sees_only_the_closest_of_what_stands() {
 fn it_passes_a_parked_car_within_its_lane() {
     let scene = straight();
     let mut rig = rig_of(&scene, &ModularConfig::default(), 2);
-    rig.sensed.objects.push(object(1, Body::Sedan, Pose::new(200.0, -3.55, 0.0), 0.0));
+    rig.sensed.objects.push(object(1, Body::Sedan, Pose::new(200.0, -3.65, 0.0), 0.0));
     let mut slowest_mps = f64::INFINITY;
     while rig.station_m() < 260.0 {
         rig.tick();

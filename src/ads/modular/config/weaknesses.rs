@@ -52,7 +52,7 @@ weaknesses! {
     late_red_passed,
     /// What will come onto the way at the front bumper or behind it does not count until it is there. Apollo issue 14633: `STObstaclesProcessor` drops what begins below 0.01 m and after 0.1 s. Off: it counts.
     blind_to_side_and_rear,
-    /// When not even the hardest braking of a plan keeps clear, the fallback brakes at 4 m/s² and no harder. Apollo `slowdown_profile_deceleration`, `GenerateStopProfile`. Off: as hard as the vehicle can.
+    /// When not even the hardest braking of a plan keeps clear, the fallback brakes at 4 m/s² at once, and no harder. Apollo `slowdown_profile_deceleration`, `GenerateStopProfile`. Off: as hard as the vehicle can.
     gentle_fallback,
     /// Decisions about road users are taken anew in every cycle, so that a small change flips them. Apollo issue 14870: yields only briefly; that its cause lies here is ours. Off: a decision is kept until the other is much cheaper.
     decides_anew,

@@ -349,10 +349,10 @@ mod tests {
 
     #[test]
     fn it_shifts_as_far_as_needed_and_back_smoothly() {
-        // The lane's middle is at -1.75; the car's left side at -2.55 leaves 0.8 m to it.
-        let plan = planned(&[(Body::Sedan, 60.0, -3.5)]);
+        // The lane's middle is at -1.75; the car's left side at -2.65 leaves 0.9 m to it.
+        let plan = planned(&[(Body::Sedan, 60.0, -3.6)]);
         let at_car = plan.aside(60.0);
-        assert!((at_car.offset_m - (1.03 + 0.3 - 0.8)).abs() < 1e-6, "{at_car:?}");
+        assert!((at_car.offset_m - (1.03 + 0.4 - 0.9)).abs() < 1e-6, "{at_car:?}");
         assert_eq!((plan.aside(10.0), plan.aside(120.0)), (Aside::default(), Aside::default()));
         let h = 1e-3;
         for decimetre in 100..1200 {
@@ -367,7 +367,7 @@ mod tests {
     #[test]
     fn vehicles_in_a_row_are_passed_as_one() {
         let row =
-            planned(&[(Body::Sedan, 60.0, -3.5), (Body::Sedan, 70.0, -3.45), (Body::Sedan, 110.0, -3.5)]);
+            planned(&[(Body::Sedan, 60.0, -3.6), (Body::Sedan, 70.0, -3.55), (Body::Sedan, 110.0, -3.6)]);
         let (_, span) = row.passing().expect("there is room in the lane");
         assert!(row.passes(1) && row.passes(2) && !row.passes(3));
         assert!(span.to_m > 72.0 && span.to_m < 74.0, "{span:?}");
@@ -375,11 +375,11 @@ mod tests {
 
     #[test]
     fn what_comes_into_the_shifted_way_is_no_longer_passed() {
-        let plan = planned(&[(Body::Sedan, 60.0, -3.5)]);
+        let plan = planned(&[(Body::Sedan, 60.0, -3.6)]);
         assert!(plan.passes(1));
         let plan = planned_on(plan, 20.0, &[(Body::Sedan, 60.0, -2.2)]);
         assert!(!plan.passes(1) && plan.passing().is_none(), "it is stopped for");
-        let plan = planned_on(plan, 30.0, &[(Body::Sedan, 60.0, -3.4)]);
+        let plan = planned_on(plan, 30.0, &[(Body::Sedan, 60.0, -3.5)]);
         assert!(plan.passes(1), "there is room again");
     }
 
@@ -404,9 +404,9 @@ mod tests {
     #[test]
     fn obstacles_that_cannot_be_passed_are_not_passed() {
         assert!(planned(&[(Body::Sedan, 60.0, -1.75)]).passing().is_none(), "in the middle");
-        assert!(planned(&[(Body::Pedestrian, 60.0, -3.5)]).passing().is_none(), "a pedestrian");
-        assert!(planned(&[(Body::Sedan, 16.0, -3.5)]).passing().is_none(), "too near");
-        let gate = [(Body::Sedan, 60.0, -3.5), (Body::Sedan, 62.0, 0.4)];
+        assert!(planned(&[(Body::Pedestrian, 60.0, -3.6)]).passing().is_none(), "a pedestrian");
+        assert!(planned(&[(Body::Sedan, 16.0, -3.6)]).passing().is_none(), "too near");
+        let gate = [(Body::Sedan, 60.0, -3.6), (Body::Sedan, 62.0, 0.4)];
         assert!(planned(&gate).passing().is_none(), "one on each side");
         assert!(planned(&[(Body::Sedan, 60.0, -4.6)]).passing().is_none(), "beside the lane");
     }

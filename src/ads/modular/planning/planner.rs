@@ -287,7 +287,7 @@ impl Planner {
             self.roll(start);
         }
         let Some((_, braking_for_s, _)) = self.first_contact(&start) else { return };
-        let braking = self.trajectory.clone();
+        let braking_reason = self.reason();
         let all = core::mem::take(&mut self.constraints);
         let others = all[..planned].iter().filter(|constraint| !constraint.is_yielding());
         self.constraints.extend(others);
@@ -297,10 +297,10 @@ impl Planner {
         if goes_on_for_s > braking_for_s {
             return;
         }
-        self.trajectory = braking;
-        if self.weaknesses.gentle_fallback {
-            self.trajectory = Trajectory::braking(start, self.config.fallback_mps2, self.reason());
-        }
+        // As in the original, the fallback knows no bound on the jerk.
+        let gentle = self.weaknesses.gentle_fallback;
+        let decel_mps2 = if gentle { self.config.fallback_mps2 } else { self.config.emergency_mps2 };
+        self.trajectory = Trajectory::braking(start, decel_mps2, braking_reason);
     }
 
     /// The first contact with what binds: index of the claim, time (s) and station (m). What the vehicle touches
