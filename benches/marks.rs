@@ -124,8 +124,8 @@ fn crowded(scene: &Arc<Scene>) -> World {
                     speed_mps: if verb == Verb::Walk { 1.2 } else { 9.0 },
                     distance_m,
                     cover: None,
-                    shape: None,
-                    cover_shape: None,
+                    own: None,
+                    cover_own: None,
                 };
                 // A place that is taken does not matter: there are more places than needed.
                 let _ = world.apply(&Effect::Spawn(request));

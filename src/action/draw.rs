@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use crate::action::table::{Draw, Refusal, Situation};
 use crate::action::{Effect, LaneChangeRules, SpawnRequest};
+use crate::model::body::OwnBody;
 use crate::model::expr::Expr;
 use crate::model::rules::{Before, Candidate, Choose, Clause, Nearest, Room, RowRules, TRIES_MAX, Unsolved};
 use crate::model::{
@@ -216,13 +217,16 @@ impl<'a> Judge<'a> {
     fn request(&self, spawn: &SpawnDef, locals: &[Value], after: &Memory) -> SpawnRequest {
         let functions = &self.row.space.functions;
         let facts = self.facts(locals, after);
-        let shape = |body: BodyWord| body.own.map(|own| self.row.space.bodies[own].shape);
+        let own = |body: BodyWord| {
+            let shape = |index: usize| self.row.space.bodies[index].shape;
+            body.own.map(|index| OwnBody { index, shape: shape(index) })
+        };
         let body = spawn.body.word(functions, &facts);
         let cover = spawn.cover.as_ref().map(|cover| cover.word(functions, &facts));
         SpawnRequest {
             body: body.like,
-            shape: shape(body),
-            cover_shape: cover.and_then(shape),
+            own: own(body),
+            cover_own: cover.and_then(own),
             colour: spawn.colour.word(functions, &facts),
             verb: spawn.verb.word(functions, &facts),
             lane: spawn.lane.word(functions, &facts),

@@ -1,6 +1,6 @@
 //! What a row does to the world once its parameters are drawn.
 
-use crate::model::body::BodyParameters;
+use crate::model::body::OwnBody;
 use crate::model::expr::Expr;
 use crate::model::vocabulary::{Body, Colour, LaneChoice, Level, Phenomenon, Side, Then, TimeOfDay, Verb};
 use crate::model::{
@@ -33,9 +33,9 @@ pub struct SpawnRequest {
     /// Gap to the ego vehicle along its route, m; behind the ego vehicle for `Overtake`. `sim::placement`
     /// says for each verb what exactly lies at that distance.
     pub distance_m: f64,
-    /// What a body of the author's own is, in place of `body` and of `cover`.
-    pub shape: Option<BodyParameters>,
-    pub cover_shape: Option<BodyParameters>,
+    /// The author's own body that is meant, in place of `body` and of `cover`.
+    pub own: Option<OwnBody>,
+    pub cover_own: Option<OwnBody>,
     /// A vehicle that is parked with it, so that it steps out from behind; for `Walk` alone.
     pub cover: Option<Body>,
 }
@@ -59,6 +59,15 @@ impl Effect {
             before.cells()[cell] != after.cells()[cell]
         });
         changed.filter_map(|(state, cell)| Effect::of_cell(state, cell, after)).collect()
+    }
+
+    /// The author's own bodies among them, as indices in the space, where the first has this id.
+    pub fn own_bodies(&self, first: u32) -> impl Iterator<Item = (u32, usize)> {
+        let own = match self {
+            Effect::Spawn(request) => [request.own, request.cover_own],
+            Effect::Time(_) | Effect::Sky(..) => [None, None],
+        };
+        (first..).zip(own).filter_map(|(id, own)| Some((id, own?.index)))
     }
 
     /// How many road users it makes appear. Their ids follow each other; the one that was asked for is the first.

@@ -83,8 +83,14 @@ impl ActionTable {
     }
 
     /// What a step without an action does: to the world, and the memory after it.
-    pub fn wait(&self, memory: &Memory, road: &Road, rules: &RulesInForce) -> (Vec<Effect>, Memory) {
-        let after = self.space.memory_after_wait(memory, Some(&road.facts), rules);
+    pub fn wait(
+        &self,
+        memory: &Memory,
+        step: u64,
+        road: &Road,
+        rules: &RulesInForce,
+    ) -> (Vec<Effect>, Memory) {
+        let after = self.space.memory_after_wait(memory, Some(step), Some(&road.facts), rules);
         (Effect::of_change(&self.space, memory, &after), after)
     }
 

@@ -8,7 +8,7 @@ use crate::check::references::Symbol;
 use crate::check::report::{Report, field};
 use crate::check::rule::locals;
 use crate::model::expr::{Expr, ExprKind};
-use crate::model::vocabulary::{Colour, LaneChoice, Side, Site, SpawnField, Then, Verb, Word};
+use crate::model::vocabulary::{Colour, LaneChoice, Side, Site, SpaceClaim, SpawnField, Then, Verb, Word};
 use crate::model::{
     ActionDef, BodyWord, Domain, EffectDef, GroupDef, Parameter, RuleDef, SetDef, SpawnDef, Type, Value,
     WordExpr, code,
@@ -483,8 +483,17 @@ impl Checker {
         if let Some(group) = self.groups.iter().find(|group| group.name == name.text) {
             return group.actions.clone();
         }
+        if name.text == SpaceClaim::Actions.name() {
+            self.references.word(name.span, SpaceClaim::Actions);
+            return (0..self.actions.len()).collect();
+        }
         let groups = self.groups.iter().map(|group| group.name.as_str());
-        let error = unknown("action", &name.text, name.span, self.action_names.all().chain(groups));
+        let error = unknown(
+            "action",
+            &name.text,
+            name.span,
+            self.action_names.all().chain(groups).chain([SpaceClaim::Actions.name()]),
+        );
         self.report(error);
         Vec::new()
     }

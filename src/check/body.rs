@@ -151,13 +151,13 @@ impl Checker {
         Some(WordExpr::Of(expr, words.into_iter().collect::<Option<_>>()?))
     }
 
-    fn body_named(&self, name: &str) -> Option<BodyWord> {
+    pub(super) fn body_named(&self, name: &str) -> Option<BodyWord> {
         let own = self.bodies.iter().position(|body| body.name == name);
         let like = own.map(|own| self.bodies[own].like).or_else(|| Body::from_name(name))?;
         Some(BodyWord { like, own })
     }
 
-    fn note_body(&mut self, span: Span, name: &str) {
+    pub(super) fn note_body(&mut self, span: Span, name: &str) {
         self.references.uses(span, Symbol::Body(name.to_owned()));
         self.references.word_named::<Body>(span, name);
     }

@@ -3,7 +3,7 @@
 //! It goes on after a mistake, so that one run shows all mistakes: a broken declaration becomes `None`, and
 //! no diagnostic is reported for what depends on it.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 
 use crate::check::names::{Names, unknown};
@@ -22,6 +22,9 @@ use crate::prove::{Known, Values, enclose};
 use crate::syntax::ast::{FileId, ItemKind, Span};
 use crate::syntax::{Diagnostic, ast};
 use crate::units::Rational;
+
+/// The most diagnostics of a file: more are of no use, and each is found in the text by its place.
+const DIAGNOSTICS_MAX: usize = 1_000;
 
 /// A function's parameters, its result type, and the span of its header.
 pub(super) type Signature = (Vec<(String, Type)>, Type, Span);
@@ -120,7 +123,6 @@ pub(super) fn space(
     }
     let actions: Vec<ActionDef> = core::mem::take(&mut checker.actions).into_iter().flatten().collect();
     let bounds = bounds(&actions, &rules);
-    let clauses = clauses(&actions, &checker.each_step, &rules, &checker.states);
     let mut space = Space {
         path: root.path,
         meaning: root.meaning,
@@ -139,8 +141,9 @@ pub(super) fn space(
         roads,
         rows: Vec::new(),
         bounds,
-        clauses,
+        clauses: Vec::new(),
     };
+    space.clauses = clauses(&space);
     space.rows = prove::rows(&space);
     let realisable = prove::realise(&space);
     space.rows = prove::with_dead(&space, &realisable);
@@ -167,12 +170,22 @@ impl Checker {
     /// are kept once.
     fn finish(self, space: Option<Space>) -> Checked {
         let mut kept: Vec<Diagnostic> = Vec::new();
+        // What is equal says the same of the same place.
+        let mut known: BTreeMap<(Option<Span>, String), Vec<usize>> = BTreeMap::new();
         for diagnostic in self.diagnostics {
-            if !kept.contains(&diagnostic) {
+            let alike = known.entry((diagnostic.place(), diagnostic.message.clone())).or_default();
+            if !alike.iter().any(|index| kept[*index] == diagnostic) {
+                alike.push(kept.len());
                 kept.push(diagnostic);
             }
         }
         kept.sort_by_key(Diagnostic::place);
+        if kept.len() > DIAGNOSTICS_MAX {
+            let left: Vec<Diagnostic> = kept.split_off(DIAGNOSTICS_MAX);
+            let message = format!("{} further mistakes are not listed", left.len());
+            let worst = left.iter().find(|one| one.is_error()).unwrap_or(&left[0]);
+            kept.push(Diagnostic { severity: worst.severity, ..Diagnostic::error(worst.code, message) });
+        }
         Checked { space, diagnostics: kept, references: self.references }
     }
 
@@ -279,7 +292,7 @@ impl Checker {
             // The broken function was reported where it is declared.
             return None;
         }
-        let known = Known { functions: &self.functions, locals: &[], cells: &[], road: None };
+        let known = Known { functions: &self.functions, locals: &[], cells: &[], road: None, case: None };
         let folded = match enclose(expr, &known) {
             Values::Number(interval) => interval.single().map(ExprKind::Number),
             Values::Variants(set) => match expr.ty {

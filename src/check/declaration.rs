@@ -19,12 +19,17 @@ const OPERATIONS_MAX: u64 = 10_000;
 /// Limit on the depth of nested calls.
 const CALLS_MAX: u32 = 64;
 
+/// Limit on how deep operators and calls stand in one another, with every call inlined: evaluation recurses so deep.
+const HEIGHT_MAX: u32 = 4_096;
+
 /// Size of a function with every call inlined.
 #[derive(Debug, Clone, Copy)]
 struct Cost {
     operations: u64,
     /// Depth of nested calls.
     depth: u32,
+    /// Depth of operators and calls.
+    height: u32,
 }
 
 /// Largest value that `odds` may give to a variant.
@@ -209,7 +214,9 @@ impl Checker {
                 self.functions.clear();
                 return;
             }
-            let too_large = |cost: Cost| cost.operations > OPERATIONS_MAX || cost.depth > CALLS_MAX;
+            let too_large = |cost: Cost| {
+                cost.operations > OPERATIONS_MAX || cost.depth > CALLS_MAX || cost.height > HEIGHT_MAX
+            };
             if costs[start].flatten().is_some_and(too_large) {
                 let function = &self.functions[start];
                 let message = format!("`{}` calls too much", function.name);
@@ -243,19 +250,22 @@ impl Checker {
             }
             // The limit on the depth is passed already, and the exact depth does not matter.
             None if path.len() > CALLS_MAX as usize => {
-                return Ok(Cost { operations: 0, depth: CALLS_MAX + 1 });
+                return Ok(Cost { operations: 0, depth: CALLS_MAX + 1, height: 0 });
             }
             None => {}
         }
         costs[function] = Some(None);
         path.push(function);
-        let mut cost = Cost { operations: 0, depth: 1 };
+        let mut cost = Cost { operations: 0, depth: 1, height: 0 };
         self.functions[function].body.walk(&mut |_| cost.operations += 1);
+        let mut called = 0;
         for callee in &calls[function] {
             let inner = self.cost(*callee, calls, costs, path)?;
             cost.operations = cost.operations.saturating_add(inner.operations);
             cost.depth = cost.depth.max(inner.depth.saturating_add(1));
+            called = called.max(inner.height);
         }
+        cost.height = self.functions[function].body.height().saturating_add(called);
         path.pop();
         costs[function] = Some(Some(cost));
         Ok(cost)

@@ -251,10 +251,12 @@ impl Checker {
                 let facts = place.site.facts().map(|fact| fact.name());
                 let words = place.site.word_facts().map(|fact| fact.name());
                 candidates.extend(facts.chain(words).filter(|name| !name.contains('.')));
-                let error = unknown("name", name, span, candidates);
                 let error = match self.lacking(name, place) {
-                    Some(note) => error.note(note),
-                    None => error,
+                    Some(note) => {
+                        let message = format!("`{name}` cannot be used here");
+                        Diagnostic::error(code::NOT_HERE, message).at(span, "not in this place").note(note)
+                    }
+                    None => unknown("name", name, span, candidates),
                 };
                 return self.reject(error);
             }
@@ -294,6 +296,10 @@ impl Checker {
                 asked.extend(["road == corner", "road in [corner, boulevard]"].map(str::to_owned));
             }
             return Some(format!("`{name}` is no value: ask for {}", one_of(&asked)));
+        }
+        if let Some(fact) = WordFact::from_name(name).filter(|fact| place.site.knows(fact.known())) {
+            let example = fact.words().first().map_or("", |(word, _)| word);
+            return Some(format!("`{name}` is no value: compare it, as in `{name} == {example}`"));
         }
         if Fact::from_name(name).is_some() && place.fact(name).is_none() {
             return Some(format!("`{name}` is known to the engine, but not in this place"));
@@ -396,7 +402,15 @@ impl Checker {
             let maps =
                 || self.states.iter().filter(|state| state.key.is_some()).map(|state| state.name.as_str());
             let error = match &base.kind {
-                ast::ExprKind::Name(name) => unknown("map", name, base.span, maps()),
+                ast::ExprKind::Name(name) => match self.lacking(name, place) {
+                    Some(note) => {
+                        let message = format!("`{name}` cannot be used here");
+                        Diagnostic::error(code::NOT_HERE, message)
+                            .at(base.span, "not in this place")
+                            .note(note)
+                    }
+                    None => unknown("map", name, base.span, maps()),
+                },
                 _ => Diagnostic::error(code::TYPE_MISMATCH, "only a state can have a key")
                     .at(base.span, "not a state"),
             };
@@ -643,6 +657,9 @@ impl Checker {
     }
 }
 
+/// Where facts of the world are known, in words that a thing follows.
+pub(super) const SEEN_BY: &str = "only rules, the `where` of a drawn parameter and `once` see";
+
 /// A thing that is asked where no fact about it is known.
 pub(super) fn unknown_here(thing: &str, span: Span, site: Site) -> Diagnostic {
     let asked = parts_of(thing).first().map_or("", |(part, _)| part);
@@ -658,7 +675,7 @@ pub(super) fn unknown_here(thing: &str, span: Span, site: Site) -> Diagnostic {
             .at(span, "the rows of the table are the same at every moment")
             .help("write a rule on the action, or draw the parameter with `any`"),
         _ => error
-            .at(span, format!("only rules see the {thing}"))
+            .at(span, format!("{} {}", SEEN_BY, if thing == "npc" { "a newcomer" } else { thing }))
             .help(format!("write a rule, or pass a function what it needs: `f({thing}.{asked})`")),
     }
 }

@@ -95,6 +95,9 @@ pub struct MapCache {
     routes: Vec<(Arc<RoadMap>, [LanePlace; 2], Route)>,
 }
 
+/// Maps that are parsed at the same time.
+const MAPS_AT_ONCE: usize = 4;
+
 /// Routes that are kept: while an author types a place, each keystroke makes another route.
 const ROUTES_MAX: usize = 64;
 
@@ -118,6 +121,7 @@ pub fn load_with(root: &Path, read: &ReadFile<'_>, cache: &mut MapCache) -> Resu
     let folders = files.iter().map(|file| folder(&file.path)).collect();
     let mut maps = MapReader { read, folders, texts: BTreeMap::new(), cache };
     if is_whole {
+        maps.parse(&files);
         diagnostics.extend(check_digests(&files, &mut maps));
     }
     let checked = check_space(&files, &order, &mut maps, is_whole);
@@ -322,20 +326,65 @@ struct MapReader<'a> {
     read: &'a ReadFile<'a>,
     /// Folder of each file, by [`FileId`].
     folders: Vec<PathBuf>,
-    texts: BTreeMap<PathBuf, Result<String, ReadError>>,
+    texts: BTreeMap<PathBuf, Result<MapText, ReadError>>,
     cache: &'a mut MapCache,
+}
+
+/// The text of a map, and its digest.
+struct MapText {
+    text: String,
+    digest: String,
+}
+
+impl MapText {
+    fn read(path: &Path, read: &ReadFile<'_>) -> Result<MapText, ReadError> {
+        read(path).map(|text| MapText { digest: digest(text.as_bytes()), text })
+    }
 }
 
 impl MapReader<'_> {
     /// The text of a map, read once.
-    fn text(&mut self, path: &Path) -> &Result<String, ReadError> {
+    fn text(&mut self, path: &Path) -> &Result<MapText, ReadError> {
         let read = self.read;
-        self.texts.entry(path.to_owned()).or_insert_with(|| read(path))
+        self.texts.entry(path.to_owned()).or_insert_with(|| MapText::read(path, read))
+    }
+
+    /// Parses the maps that the files name and that are not known yet, some at a time: they take longer than all the rest.
+    fn parse(&mut self, files: &[LoadedFile]) {
+        let mut paths: Vec<PathBuf> = files
+            .iter()
+            .flat_map(|file| maps_named(file).map(|(written, _)| path_from(file, written)))
+            .collect();
+        paths.sort_unstable();
+        paths.dedup();
+        for path in &paths {
+            let _ = self.text(path);
+        }
+        let MapReader { texts, cache, .. } = self;
+        let mut open: BTreeMap<(String, String), &str> = BTreeMap::new();
+        for (path, map) in paths.iter().filter_map(|path| Some((path, texts.get(path)?.as_ref().ok()?))) {
+            let key = map_key(path, map);
+            if !cache.known.contains_key(&key) {
+                open.insert(key, &map.text);
+            }
+        }
+        let open: Vec<((String, String), &str)> = open.into_iter().collect();
+        for some in open.chunks(MAPS_AT_ONCE) {
+            let parsed: Vec<_> = std::thread::scope(|scope| {
+                let workers: Vec<_> =
+                    some.iter().map(|((stem, _), text)| scope.spawn(move || map_of(stem, text))).collect();
+                workers
+                    .into_iter()
+                    .map(|worker| worker.join().expect("no map makes its reader panic"))
+                    .collect()
+            });
+            cache.known.extend(some.iter().map(|(key, _)| key.clone()).zip(parsed));
+        }
     }
 
     /// What a file means with all that it uses, as far as all could be read.
     fn meaning(&mut self, files: &[LoadedFile], path: &Path) -> Option<Meaning> {
-        meaning(files, path, &mut |map| self.text(map).as_ref().ok().map(|text| digest(text.as_bytes())))
+        meaning(files, path, &mut |map| self.text(map).as_ref().ok().map(|map| map.digest.clone()))
     }
 }
 
@@ -344,12 +393,11 @@ impl Maps for MapReader<'_> {
         let FileId(file) = name.span.file;
         let folder = self.folders.get(file as usize).cloned().unwrap_or_default();
         let path = normal(&folder.join(&name.value));
-        let stem = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
         let read = self.read;
-        let text = self.texts.entry(path.clone()).or_insert_with(|| read(&path));
-        let text = text.as_ref().map_err(ToString::to_string)?;
-        let parse = || RoadMap::from_opendrive(&stem, text).map(Arc::new).map_err(|error| error.to_string());
-        let key = (stem.clone(), digest(text.as_bytes()));
+        let found = self.texts.entry(path.clone()).or_insert_with(|| MapText::read(&path, read));
+        let map = found.as_ref().map_err(ToString::to_string)?;
+        let key = map_key(&path, map);
+        let parse = || map_of(&map_key(&path, map).0, &map.text);
         let map = self.cache.known.entry(key).or_insert_with(parse).clone()?;
         Ok((path, map))
     }
@@ -370,6 +418,16 @@ impl Maps for MapReader<'_> {
         }
         Ok(route)
     }
+}
+
+/// By what a map is known: its name and the digest of its text.
+fn map_key(path: &Path, map: &MapText) -> (String, String) {
+    let stem = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
+    (stem, map.digest.clone())
+}
+
+fn map_of(name: &str, text: &str) -> Result<Arc<RoadMap>, String> {
+    RoadMap::from_opendrive(name, text).map(Arc::new).map_err(|error| error.to_string())
 }
 
 fn folder(path: &Path) -> PathBuf {

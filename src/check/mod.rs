@@ -25,6 +25,7 @@ mod references;
 mod road;
 mod rule;
 mod scenario;
+mod scenario_claim;
 mod scenario_condition;
 mod scenario_names;
 mod scenario_rules;

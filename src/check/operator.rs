@@ -2,13 +2,13 @@
 //! values: `road == corner` and `road in [corner, boulevard]` are read here as one condition.
 
 use crate::check::checker::Checker;
-use crate::check::expression::{Place, article, dimension, fits, is_number, unknown_here};
+use crate::check::expression::{Place, SEEN_BY, article, dimension, fits, is_number, unknown_here};
 use crate::check::names::unknown;
 use crate::check::references::Symbol;
 use crate::check::report::Report;
 use crate::model::expr::{Arithmetic, Comparison, Expr, ExprKind};
-use crate::model::vocabulary::{Known, LaneChoice, Word, WordFact};
-use crate::model::{Type, code};
+use crate::model::vocabulary::{Body, Known, LaneChoice, Word, WordFact};
+use crate::model::{BodyWord, Type, code};
 use crate::syntax::ast::{BinaryOp, Span};
 use crate::syntax::{Diagnostic, ast, one_of};
 
@@ -155,6 +155,13 @@ impl Checker {
         place: &Place<'_>,
         span: Span,
     ) -> Option<Expr> {
+        if let ast::ExprKind::List(items) = &right.kind
+            && items.is_empty()
+        {
+            self.look_at(left, place, None);
+            let error = Diagnostic::error(code::EMPTY, "nothing is in an empty list").at(right.span, "empty");
+            return self.reject(error.help("list what is meant, or leave the condition out"));
+        }
         if let (true, ast::ExprKind::List(roads)) = (self.names_road(left, place), &right.kind) {
             return self.on_road(roads, place, span);
         }
@@ -245,16 +252,44 @@ impl Checker {
         if !place.site.knows(fact.known()) {
             let error = Diagnostic::error(code::NOT_HERE, format!("`{}` is not known here", fact.name()));
             let who = match fact.known() {
-                Known::Road | Known::World | Known::Spawn => "only rules ask about the moment",
-                Known::Step => "only rewards and verdicts see what happened in the step",
-                Known::Judgement => "only verdicts see how a collision was judged",
+                Known::Road | Known::World | Known::Spawn => format!("{SEEN_BY} the moment"),
+                Known::Step => "only rewards and verdicts see what happened in the step".to_owned(),
+                Known::Judgement => "only verdicts see how a collision was judged".to_owned(),
             };
             return self.reject(error.at(span, who));
+        }
+        if matches!(fact, WordFact::Hit | WordFact::Near) {
+            let found: Vec<Option<BodyWord>> = words.iter().map(|word| self.body_of(fact, word)).collect();
+            let kind = ExprKind::IsBody(fact, found.into_iter().collect::<Option<_>>()?);
+            return Some(Expr { kind, ty: Type::Bool, span });
         }
         // Every unknown word is reported, not just the first.
         let found: Vec<Option<String>> = words.iter().map(|word| self.word_of(fact, word)).collect();
         let kind = ExprKind::IsWord(fact, found.into_iter().collect::<Option<_>>()?);
         Some(Expr { kind, ty: Type::Bool, span })
+    }
+
+    /// A body beside `hit` or `near`: of the engine, or of the author's own.
+    fn body_of(&mut self, fact: WordFact, word: &ast::Expr) -> Option<BodyWord> {
+        let known = match &word.kind {
+            ast::ExprKind::Name(name) => self.body_named(name).map(|body| (name, body)),
+            _ => None,
+        };
+        let Some((name, body)) = known else {
+            let own = self.bodies.iter().map(|body| body.name.clone()).collect::<Vec<_>>();
+            return match &word.kind {
+                ast::ExprKind::Name(name) => {
+                    let names = Body::names().chain(own.iter().map(String::as_str));
+                    self.reject(unknown(fact.name(), name, word.span, names))
+                }
+                _ => {
+                    let error = Diagnostic::error(code::TYPE_MISMATCH, "wanted the name of a body");
+                    self.reject(error.at(word.span, "not a name"))
+                }
+            };
+        };
+        self.note_body(word.span, name);
+        Some(body)
     }
 
     fn word_of(&mut self, fact: WordFact, word: &ast::Expr) -> Option<String> {

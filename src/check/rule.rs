@@ -179,7 +179,7 @@ impl Checker {
             return None;
         }
         let compiled = self.quietly(|checker| checker.typed(condition, &Place::RULE, Type::Bool))?;
-        (compiled.reads_memory() && compiled.known() == Known::Road).then_some(compiled)
+        (compiled.reads_memory() && compiled.is_known_at_start()).then_some(compiled)
     }
 
     /// Reports a rule that binds no action, unless a broken declaration may be why.
@@ -221,10 +221,14 @@ impl Checker {
         let binds = |action: &ActionDef| {
             action.effects.iter().any(|effect| match effect {
                 EffectDef::Spawn(_) => compiled.known() == Known::Spawn,
-                EffectDef::Set(set) => reads_state(&compiled, &self.states[set.state]),
+                // Where nothing spawns, nothing asks about a spawn.
+                EffectDef::Set(set) => {
+                    compiled.known() != Known::Spawn && reads_state(&compiled, &self.states[set.state])
+                }
             })
         };
-        let each_step = self.each_step.iter().any(|set| reads_state(&compiled, &self.states[set.state]));
+        let each_step = compiled.known() != Known::Spawn
+            && self.each_step.iter().any(|set| reads_state(&compiled, &self.states[set.state]));
         let open = each_step || compiled.known() != Known::Spawn && !compiled.reads_memory();
         let all = self.actions.iter().enumerate();
         let bound = all.filter(|(index, a)| {
@@ -337,10 +341,7 @@ impl Checker {
             Some(ExprKind::Variant(_, other)) => set.state == index && *other == position,
             _ => set.state == index,
         };
-        let sets = |action: &ActionDef| {
-            action.effects.iter().any(|effect| matches!(effect, EffectDef::Set(set) if may_set(set)))
-                || self.each_step.iter().any(may_set)
-        };
+        let sets = |action: &ActionDef| action.sets().any(may_set) || self.each_step.iter().any(may_set);
         let all = self.actions.iter().enumerate();
         let actions: Vec<usize> =
             all.filter(|(_, a)| a.as_ref().is_some_and(sets)).map(|(index, _)| index).collect();

@@ -24,11 +24,14 @@ pub(super) fn value(space: &Space, expr: &ast::Expr, ty: Type) -> Result<Value, 
         }
         (Type::Bool, ast::ExprKind::Bool(truth)) => Ok(Value::Bool(*truth)),
         (Type::Int, _) => {
-            let found = number(expr, Dimension::RATIO)?;
-            if found.floor() == found {
-                return Ok(Value::Number(found));
-            }
-            Err(Diagnostic::error(code::TYPE_MISMATCH, "wanted a whole number").at(expr.span, "not one"))
+            let is_plain = |literal: &ast::Number| literal.unit.is_none();
+            let found = match &expr.kind {
+                ast::ExprKind::Number(literal) if !is_plain(literal) => None,
+                _ => Some(number(expr, Dimension::RATIO)?).filter(|found| found.floor() == *found),
+            };
+            found.map(Value::Number).ok_or_else(|| {
+                Diagnostic::error(code::TYPE_MISMATCH, "wanted a whole number").at(expr.span, "not one")
+            })
         }
         (Type::Quantity(dimension), _) => number(expr, dimension).map(Value::Number),
         (Type::Enum(of), _) => {

@@ -4,10 +4,10 @@ use std::path::Path;
 
 use crate::check::state_argument::memory_from;
 use crate::check::{Loaded, ReadError, load, suggest_uses};
-use crate::model::vocabulary::{Priority, Word};
+use crate::model::vocabulary::{Body, Priority, Word};
 use crate::model::{
-    Avoidability, Claim, Facts, Memory, Obstacle, ObstacleKind, OutcomeFacts, Reach, RulesInForce, Value,
-    code, evaluate,
+    Avoidability, BodyWord, Claim, Facts, Memory, Obstacle, ObstacleKind, OutcomeFacts, Reach, RulesInForce,
+    Value, code, evaluate,
 };
 use crate::syntax::{Style, render};
 
@@ -217,7 +217,7 @@ rule never_soaked: sky[Wetness] <= Moderate
     assert_eq!(after.cells()[cell("count")], Value::Number(10.0));
     assert_eq!(after.cells()[cell("rest")], Value::Number(1.0));
     let (road, rules) = (&space.roads[0].facts, RulesInForce::by_default(&space));
-    let wait = |memory: &Memory| space.memory_after_wait(memory, Some(road), &rules);
+    let wait = |memory: &Memory| space.memory_after_wait(memory, Some(1), Some(road), &rules);
     let waited = wait(&after);
     assert_eq!(waited.cells()[cell("rest")], Value::Number(0.0));
     assert_eq!(waited.cells()[cell("sky") + 2].variant(), 2);
@@ -521,4 +521,69 @@ mod hostile {
             shown(&loaded);
         }
     }
+}
+
+#[test]
+fn rules_of_the_first_step_bind_the_start() {
+    let text = format!(
+        "{BASE}state dark: Bool = any
+action switch(each to: Bool) {{ set dark = to }}
+rule begins: step == 0 implies dark
+rule later: elapsed < 12 s or not dark
+"
+    );
+    let loaded = load_files(&[("space.ava", &text)]);
+    let space = loaded.space.clone().unwrap_or_else(|| panic!("{}", shown(&loaded)));
+    let dark = space.state("dark").expect("it is declared").first_cell;
+    let rules = RulesInForce::by_default(&space);
+    for seed in 0..20 {
+        let memory = space.memory_at_start(&space.roads[0], &rules, seed).expect("it may be dark");
+        assert_eq!(memory.cells()[dark], Value::Bool(true), "seed {seed}");
+    }
+}
+
+#[test]
+fn hit_and_near_name_bodies_of_ones_own() {
+    let text = format!(
+        "{BASE}body Scooter {{ like: Motorcycle, length: 1.8 m }}
+reward {{
+  near == Scooter => 3
+  hit in [Motorcycle, Sedan] => 2
+  _ => 0
+}}
+"
+    );
+    let loaded = load_files(&[("space.ava", &text)]);
+    let space = loaded.space.clone().unwrap_or_else(|| panic!("{}", shown(&loaded)));
+    let scooter = BodyWord { like: Body::Motorcycle, own: Some(0) };
+    let reward = |hit: Option<BodyWord>, near: Option<BodyWord>| {
+        space.reward(OutcomeFacts { hit, near, ..OutcomeFacts::default() }, &space.initial_memory(0))
+    };
+    let motorcycle = BodyWord::engine(Body::Motorcycle);
+    assert_eq!(reward(None, Some(scooter)), 3.0);
+    assert_eq!(reward(None, Some(motorcycle)), 0.0);
+    // What is like a motorcycle is one.
+    assert_eq!(reward(Some(scooter), None), 2.0);
+    assert_eq!(reward(Some(motorcycle), None), 2.0);
+    assert_eq!(reward(Some(BodyWord::engine(Body::SUV)), None), 0.0);
+    assert_eq!(space.body_name(scooter), "Scooter");
+}
+
+/// Long sums are read, checked and evaluated within the stack of a thread.
+#[test]
+fn the_longest_sums_are_checked() {
+    let sum = format!("1 m{}", " + 1 m".repeat(128));
+    let text = format!(
+        "{BASE}fn long(x: Length) -> Length = {}
+rule far on ahead: long(distance) >= distance + {}
+",
+        sum.replace("1 m", "x"),
+        sum.replacen(" + 1 m", "", 4)
+    );
+    let loaded = load_files(&[("space.ava", &text)]);
+    let space = loaded.space.clone().unwrap_or_else(|| panic!("{}", shown(&loaded)));
+    let long = space.functions.iter().find(|function| function.name == "long").expect("it is declared");
+    let value =
+        evaluate(&long.body, &space.functions, &Facts::new(&[Value::Number(0.5)], &Memory::default()));
+    assert_eq!(value, Value::Number(64.5));
 }

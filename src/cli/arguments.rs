@@ -192,7 +192,7 @@ pub struct TableArguments {
     /// Only what this road allows, with the reason where it does not.
     #[arg(long)]
     pub road: Option<String>,
-    /// Carry every row out on the road, or on all of them, and judge whether it does what it says.
+    /// Carry every row out on the road, or on all of them, without other traffic, and judge whether it does what it says.
     #[arg(long)]
     pub r#try: bool,
     #[command(flatten)]

@@ -19,8 +19,16 @@ use super::output::plural;
 pub fn check(output: &Output, arguments: &CheckArguments) -> Result<(), Failure> {
     let (mut errors, mut warnings) = (0, 0);
     let mut files = Vec::new();
+    let (mut unread, mut failed) = (Vec::new(), Vec::new());
     for path in &arguments.files {
-        let mut loaded = load::read_and_check(path)?;
+        let mut loaded = match load::read_and_check(path) {
+            Ok(loaded) => loaded,
+            Err(failure) => {
+                failed.push(serde_json::json!({ "file": path, "error": failure.to_string() }));
+                unread.push(failure);
+                continue;
+            }
+        };
         if arguments.fix && fix(output, path, &loaded)? {
             loaded = load::read_and_check(path)?;
         }
@@ -53,11 +61,19 @@ pub fn check(output: &Output, arguments: &CheckArguments) -> Result<(), Failure>
         }
         files.push(serde_json::json!({ "file": path, "errors": wrong, "dump": dump, "audit": audit }));
     }
-    output.result(serde_json::json!({ "errors": errors, "warnings": warnings, "files": files }));
+    output.result(
+        serde_json::json!({ "errors": errors, "warnings": warnings, "files": files, "failed": failed }),
+    );
     if arguments.strict {
         errors += warnings;
     }
-    if errors > 0 { Err(Failure::Source { errors }) } else { Ok(()) }
+    // The last one is told as the reason of the command's failure.
+    let last = match errors {
+        0 => unread.pop(),
+        errors => Some(Failure::Source { errors }),
+    };
+    unread.iter().for_each(|failure| output.fault(failure));
+    last.map_or(Ok(()), Err)
 }
 
 /// The world in which a scenario or policy was made, if it is another than this one.

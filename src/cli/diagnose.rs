@@ -64,7 +64,7 @@ fn causes(found: &[Explained]) -> Vec<(String, usize)> {
 
 /// All about one collision.
 fn tell_one(output: &Output, found: &Explained) {
-    output.tell(&heading(&found.collision));
+    output.tell(&heading(&found.body, &found.collision));
     output.say(&table_text(&found.diagnosis));
     output.say(&weaknesses_text(&found.diagnosis.weaknesses));
     output.say(&measured_text(&found.diagnosis.measured));
@@ -108,6 +108,8 @@ struct Explained {
     scenario: String,
     ads: &'static str,
     collision: Collision,
+    /// What the author calls the obstacle.
+    body: String,
     diagnosis: Diagnosis,
     likelihood: Option<Likelihood>,
 }
@@ -142,8 +144,9 @@ fn explain(
     let diagnosis = oracle::diagnose(&setup, &log, index, baseline).map_err(Failure::usage)?;
     let likelihood = arguments.likelihood.map(|count| oracle::likelihood(&setup, &log, index, count));
     let collision = log.collisions[index];
-    let file = file.to_owned();
-    Ok(Explained { file, scenario: scenario.name.clone(), ads: ads.name(), collision, diagnosis, likelihood })
+    let body = table.space().body_name(collision.body).to_owned();
+    let (file, scenario) = (file.to_owned(), scenario.name.clone());
+    Ok(Explained { file, scenario, ads: ads.name(), collision, body, diagnosis, likelihood })
 }
 
 /// The share of all files' crashes that vanish without each documented weakness, and by chance.
@@ -206,10 +209,9 @@ fn percent_text(share: &Estimate) -> String {
     format!("{:>4.0} %{interval}", percent(share.mean))
 }
 
-fn heading(collision: &Collision) -> String {
+fn heading(body: &str, collision: &Collision) -> String {
     format!(
-        "{} npc#{} ({}) is hit at {:.2} s; {}",
-        collision.body.name(),
+        "{body} npc#{} ({}) is hit at {:.2} s; {}",
         collision.contact.obstacle,
         collision.verb.name(),
         collision.contact.time_s,

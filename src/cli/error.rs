@@ -20,6 +20,11 @@ pub enum Failure {
     Refuted { claims: usize },
     #[error("{count} found", count = super::output::plural(*collisions, "counted collision"))]
     Collision { collisions: usize },
+    /// A scenario whose space means something else now. The diagnostic is on stderr already.
+    #[error("what it uses does not mean what it meant")]
+    Outdated,
+    #[error("{count} could not be played", count = super::output::plural(*scenarios, "scenario"))]
+    NotPlayed { scenarios: usize, in_source: bool },
     #[error("{count} failing", count = super::output::plural(*scenarios, "scenario"))]
     Failing { scenarios: usize },
     /// Ctrl-C: what was done is saved.
@@ -39,8 +44,11 @@ impl Failure {
     /// Exit status, as documented in `--help`.
     pub fn status(&self) -> u8 {
         match self {
-            Failure::Usage { .. } | Failure::File { .. } => 1,
-            Failure::Source { .. } | Failure::Unformatted { .. } => 2,
+            Failure::Usage { .. } | Failure::File { .. } | Failure::NotPlayed { in_source: false, .. } => 1,
+            Failure::Source { .. }
+            | Failure::Unformatted { .. }
+            | Failure::Outdated
+            | Failure::NotPlayed { in_source: true, .. } => 2,
             Failure::Refuted { .. } => 3,
             Failure::Collision { .. } | Failure::Failing { .. } => 4,
             // What a shell reports for a process that SIGINT ended.

@@ -22,6 +22,7 @@ pub fn write(path: &Path, text: &(impl AsRef<[u8]> + ?Sized)) -> Result<(), Fail
     let path = followed.as_deref().unwrap_or(path);
     let failed = |error| Failure::file("write", path, error);
     if path.exists() && !path.is_file() {
+        let _reader = is_read(path).map_err(failed)?;
         return std::fs::write(path, text).map_err(failed);
     }
     let folder = path.parent().filter(|parent| !parent.as_os_str().is_empty());
@@ -39,6 +40,28 @@ pub fn write(path: &Path, text: &(impl AsRef<[u8]> + ?Sized)) -> Result<(), Fail
     // Where a folder cannot be synchronised, the name may be lost, but no file is torn.
     let _ = File::open(folder.unwrap_or(Path::new("."))).and_then(|folder| folder.sync_all());
     Ok(())
+}
+
+/// Asks whether somebody reads from a named pipe: to open one that nobody reads would wait without end. As long as the
+/// result lives, the pipe has a writer.
+#[cfg(any(target_os = "linux", target_os = "macos"))]
+fn is_read(path: &Path) -> std::io::Result<Option<File>> {
+    use std::os::unix::fs::{FileTypeExt, OpenOptionsExt};
+    const O_NONBLOCK: i32 = if cfg!(target_os = "macos") { 0x4 } else { 0o4000 };
+    const ENXIO: i32 = 6;
+    if !std::fs::metadata(path)?.file_type().is_fifo() {
+        return Ok(None);
+    }
+    let opened = File::options().write(true).custom_flags(O_NONBLOCK).open(path);
+    opened.map(Some).map_err(|error| match error.raw_os_error() {
+        Some(ENXIO) => std::io::Error::other("it is a pipe, and nothing reads from it"),
+        _ => error,
+    })
+}
+
+#[cfg(not(any(target_os = "linux", target_os = "macos")))]
+fn is_read(_: &Path) -> std::io::Result<Option<File>> {
+    Ok(None)
 }
 
 /// Where a file is written before it has its name.
@@ -68,5 +91,26 @@ mod tests {
             assert_eq!(std::fs::read_to_string(&path).unwrap(), "text");
         }
         assert_eq!(std::fs::read_dir(scratch.path()).unwrap().count(), 3, "no partial file is left");
+    }
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn a_pipe_that_nobody_reads_is_refused() {
+        let scratch = tempfile::tempdir().unwrap();
+        let path = scratch.path().join("pipe");
+        let name = std::ffi::CString::new(path.to_str().unwrap()).unwrap();
+        // SAFETY: the name is a string with an end.
+        assert_eq!(unsafe { libc::mkfifo(name.as_ptr(), 0o600) }, 0);
+        let refused = write(&path, "text").unwrap_err().to_string();
+        assert!(refused.contains("nothing reads from it"), "{refused}");
+        let reader = std::thread::spawn({
+            let path = path.clone();
+            move || std::fs::read_to_string(path).unwrap()
+        });
+        let long = "x".repeat(1 << 20);
+        while write(&path, &long).is_err() {
+            std::thread::yield_now();
+        }
+        assert_eq!(reader.join().unwrap(), long);
     }
 }

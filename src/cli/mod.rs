@@ -53,20 +53,26 @@ pub fn main() -> ExitCode {
     // File names end up in files and in JSON, which are text. So this is said before anything is played.
     if let Some(argument) = std::env::args_os().find(|argument| argument.to_str().is_none()) {
         let failure = Failure::usage(format!("{argument:?} is not UTF-8: rename the file"));
-        output::remark(&format!("error: {failure}"));
-        output::usage_in_json(&failure);
+        match output::asks_for_json() {
+            true => output::usage_in_json(&failure),
+            false => output::remark(&format!("error: {failure}")),
+        }
         return ExitCode::from(failure.status());
     }
     let found = match help::command().try_get_matches() {
         Ok(found) => found,
         Err(error) => {
             // Help and version are not failures; every other message of clap's is a usage error.
+            if error.use_stderr() && output::asks_for_json() {
+                let failure = Failure::usage(error.to_string().trim_end().trim_start_matches("error: "));
+                output::usage_in_json(&failure);
+                return ExitCode::from(failure.status());
+            }
             let is_lost = error.print().or_else(output::unless_closed).is_err();
             if !error.use_stderr() {
                 return if is_lost { ExitCode::FAILURE } else { ExitCode::SUCCESS };
             }
             let failure = Failure::usage(error.kind().to_string());
-            output::usage_in_json(&failure);
             return ExitCode::from(failure.status());
         }
     };
@@ -110,5 +116,6 @@ pub fn main() -> ExitCode {
     if let Err(lost) = &arrived {
         output::remark(&format!("error: {lost}"));
     }
-    result.and(arrived).map_or_else(|failure| ExitCode::from(failure.status()), |()| ExitCode::SUCCESS)
+    // What was found and not told is not found.
+    arrived.and(result).map_or_else(|failure| ExitCode::from(failure.status()), |()| ExitCode::SUCCESS)
 }

@@ -110,10 +110,15 @@ impl Output {
             let log = sarif::log(&self.collected());
             self.print(&serde_json::to_string_pretty(&log).expect("it is JSON already"));
         }
-        match failure {
-            Some(failure) if self.colour => remark(&format!("\x1b[1;31merror\x1b[0m: {failure}")),
-            Some(failure) => remark(&format!("error: {failure}")),
-            None => {}
+        failure.iter().for_each(|failure| self.fault(failure));
+    }
+
+    /// One of several failures of a command, on stderr; JSON has it in the result.
+    pub fn fault(&self, failure: &Failure) {
+        match (self.is_json(), self.colour) {
+            (true, _) => {}
+            (false, true) => remark(&format!("\x1b[1;31merror\x1b[0m: {failure}")),
+            (false, false) => remark(&format!("error: {failure}")),
         }
     }
 
@@ -185,16 +190,23 @@ impl Output {
     }
 }
 
-/// Ends a command line that could not be parsed, if it asks for JSON.
-pub fn usage_in_json(failure: &Failure) {
-    let arguments: Vec<String> =
-        std::env::args_os().skip(1).map(|argument| argument.to_string_lossy().into_owned()).collect();
+/// The words of the command line.
+fn command_line() -> Vec<String> {
+    std::env::args_os().skip(1).map(|argument| argument.to_string_lossy().into_owned()).collect()
+}
+
+/// Whether a command line asks for JSON, also one that cannot be parsed.
+pub fn asks_for_json() -> bool {
+    let arguments = command_line();
     let asks = |pair: &[String]| pair[0] == "--format" && pair[1] == "json";
-    if arguments.windows(2).any(asks) || arguments.iter().any(|argument| argument == "--format=json") {
-        let known = help::command();
-        let name = arguments.iter().find(|argument| known.find_subcommand(argument).is_some());
-        Output::of(Format::Json).finish(name.map_or("avastra", String::as_str), Some(failure));
-    }
+    arguments.windows(2).any(asks) || arguments.iter().any(|argument| argument == "--format=json")
+}
+
+/// Ends a command line that could not be parsed, and asks for JSON.
+pub fn usage_in_json(failure: &Failure) {
+    let (known, arguments) = (help::command(), command_line());
+    let name = arguments.iter().find(|argument| known.find_subcommand(argument).is_some());
+    Output::of(Format::Json).finish(name.map_or("avastra", String::as_str), Some(failure));
 }
 
 /// A pipe that its reader has closed is no error.

@@ -6,7 +6,7 @@
 use std::collections::BTreeMap;
 use std::path::{Component, Path, PathBuf};
 
-use crate::check::{Loaded, WrittenPath, normal};
+use crate::check::{Loaded, LoadedFile, WrittenPath, normal};
 use crate::syntax::ast::{Expr, ExprKind, FileId};
 use crate::syntax::print_expr;
 
@@ -22,17 +22,21 @@ pub const SPACE: &str = "space";
 /// Copies every file with all that it uses.
 pub fn pack(output: &Output, arguments: &PackArguments) -> Result<(), Failure> {
     let folder = &arguments.out;
-    let mut packed = Vec::new();
+    let mut plan = Plan::default();
+    let mut packed: Vec<PathBuf> = Vec::new();
     for path in &arguments.files {
         let loaded = load::load(output, path)?;
         let name = path.file_name().ok_or_else(|| Failure::usage("a file has a name"))?;
         let target = folder.join(name);
         let mut moves = moves(&loaded, folder)?;
         moves.insert(absolute(path)?, target.clone());
-        copy(&loaded, &moves)?;
-        load::load(output, &target)?;
-        packed.push(target);
+        plan.copy(&loaded, &moves)?;
+        // A file that is named twice is one file.
+        if !packed.contains(&target) {
+            packed.push(target);
+        }
     }
+    plan.carry_out(&|| packed.iter().try_for_each(|target| load::load(output, target).map(drop)))?;
     output.say(&format!("{}: {} with all that they use", folder.display(), plural(packed.len(), "file")));
     output.result(serde_json::json!({ "directory": folder, "files": packed }));
     Ok(())
@@ -43,7 +47,9 @@ pub fn pack_space(output: &Output, space: &Path, folder: &Path) -> Result<PathBu
     let loaded = load::load(output, space)?;
     let space = absolute(space)?;
     let moves = moves(&loaded, folder)?;
-    copy(&loaded, &moves)?;
+    let mut plan = Plan::default();
+    plan.copy(&loaded, &moves)?;
+    plan.carry_out(&|| Ok(()))?;
     Ok(moves[&space].clone())
 }
 
@@ -65,32 +71,62 @@ fn moves(loaded: &Loaded, folder: &Path) -> Result<BTreeMap<PathBuf, PathBuf>, F
     Ok(needed.iter().map(|path| (path.clone(), place(path))).collect())
 }
 
-/// Writes the files of `moves` at their new places, and in them the new paths of what they use. A file that is there
-/// already must have the same content.
-fn copy(loaded: &Loaded, moves: &BTreeMap<PathBuf, PathBuf>) -> Result<(), Failure> {
-    let paths = loaded.written_paths();
-    for (from, to) in moves {
-        let index = loaded.files.iter().position(|file| absolute(&file.path).is_ok_and(|path| path == *from));
-        let text = match index {
-            Some(index) => {
-                let file = FileId(u32::try_from(index).expect("a file's id is its position"));
-                let own = paths.iter().filter(|path| path.span.file == file);
-                moved(loaded.sources.text(file), own, to, moves)?
-            }
-            None => load::text(from)?,
-        };
-        match std::fs::read(to) {
-            Ok(known) if known == text.as_bytes() => {}
-            Ok(_) => {
+/// The files that are to be written: nothing is, before all are known.
+#[derive(Default)]
+struct Plan {
+    texts: BTreeMap<PathBuf, String>,
+}
+
+impl Plan {
+    /// Adds the files of `moves` at their new places, and in them the new paths of what they use. A file that is there
+    /// already must have the same content.
+    fn copy(&mut self, loaded: &Loaded, moves: &BTreeMap<PathBuf, PathBuf>) -> Result<(), Failure> {
+        let paths = loaded.written_paths();
+        for (from, to) in moves {
+            let is_meant = |file: &LoadedFile| absolute(&file.path).is_ok_and(|path| path == *from);
+            let text = match loaded.files.iter().position(is_meant) {
+                Some(index) => {
+                    let file = FileId(u32::try_from(index).expect("a file's id is its position"));
+                    let own = paths.iter().filter(|path| path.span.file == file);
+                    moved(loaded.sources.text(file), own, to, moves)?
+                }
+                None => load::text(from)?,
+            };
+            let is_equal = match (self.texts.get(to), std::fs::read(to)) {
+                (Some(known), _) => *known == text,
+                (None, Ok(known)) => known == text.as_bytes(),
+                (None, Err(_)) => true,
+            };
+            if !is_equal {
                 return Err(Failure::usage(format!(
                     "`{}` is already there, with another content: name another folder",
                     to.display()
                 )));
             }
-            Err(_) => write(to, &text)?,
+            self.texts.insert(to.clone(), text);
         }
+        Ok(())
     }
-    Ok(())
+
+    /// Writes what is not there yet. If that fails, or the check of it afterwards, what was written is removed.
+    fn carry_out(&self, check: &dyn Fn() -> Result<(), Failure>) -> Result<(), Failure> {
+        let (mut files, mut folders) = (Vec::new(), Vec::new());
+        let written = self.texts.iter().filter(|(path, _)| !path.exists()).try_for_each(|(path, text)| {
+            let missing = path
+                .ancestors()
+                .skip(1)
+                .take_while(|folder| !folder.as_os_str().is_empty() && !folder.exists());
+            folders.extend(missing.map(Path::to_owned));
+            files.push(path);
+            write(path, text)
+        });
+        written.and_then(|()| check()).inspect_err(|_| {
+            // What cannot be removed either is left: the failure is told.
+            files.iter().for_each(|file| drop(std::fs::remove_file(file)));
+            folders.sort_by_key(|folder| core::cmp::Reverse(folder.components().count()));
+            folders.iter().for_each(|folder| drop(std::fs::remove_dir(folder)));
+        })
+    }
 }
 
 /// A file's text with the paths that lead to the new places.

@@ -1,5 +1,6 @@
 //! `avastra render`: moments of an emitted scenario as a picture.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use crate::action::ActionTable;
@@ -31,7 +32,7 @@ pub fn render(output: &Output, arguments: &RenderArguments) -> Result<(), Failur
     let times_s = times(arguments, scenario, table.space().episode.step_s)?;
     let profile = arguments.ads_config.as_deref().map(load::profile).transpose()?;
     let (ads, _) = run::selected_for(arguments.ads.as_deref(), profile.as_ref(), scenario)?;
-    let moments = moments(&table, scenario, &ads, &times_s)?;
+    let (moments, names) = moments(&table, scenario, &ads, &times_s)?;
     // A strip ends with its scenario.
     if moments.is_empty() || (!arguments.strip && moments.len() < times_s.len()) {
         return Err(Failure::usage(format!(
@@ -40,7 +41,7 @@ pub fn render(output: &Output, arguments: &RenderArguments) -> Result<(), Failur
             times_s[moments.len()]
         )));
     }
-    let svg = picture(&moments);
+    let svg = picture(&moments, &names);
     let path = arguments.output.clone().unwrap_or_else(|| {
         let stem = arguments.file.file_stem().unwrap_or_default().to_string_lossy();
         PathBuf::from(format!("{stem}.svg"))
@@ -87,17 +88,18 @@ fn times(arguments: &RenderArguments, scenario: &Scenario, step_s: f64) -> Resul
     Ok((0..STRIP_LEN).map(back).collect())
 }
 
-/// The world at the first tick at or after each time, as far as the episode lasts.
+/// The world at the first tick at or after each time, as far as the episode lasts; and what the author calls road users,
+/// by number, where the engine has no name for them.
 fn moments(
     table: &ActionTable,
     scenario: &Scenario,
     ads: &Selected,
     times_s: &[f64],
-) -> Result<Vec<Snapshot>, Failure> {
+) -> Result<(Vec<Snapshot>, BTreeMap<u32, String>), Failure> {
     let mut moments: Vec<Snapshot> = Vec::new();
     let mut last_contact: Option<(f64, Vec2)> = None;
     let stage = Stage::new(table, scenario)?;
-    stage.play(ads, &mut |world, ads, contacts| {
+    let log = stage.play(ads, &mut |world, ads, contacts| {
         if let Some(contact) = contacts.last() {
             last_contact = Some((contact.time_s, contact.point));
         }
@@ -111,5 +113,6 @@ fn moments(
             });
         }
     });
-    Ok(moments)
+    let name = |(id, own): (u32, usize)| (id, table.space().bodies[own].name.clone());
+    Ok((moments, log.own_bodies().into_iter().map(name).collect()))
 }

@@ -6,7 +6,7 @@ use crate::action::ActionTable;
 use crate::ads::Selected;
 use crate::episode::Collision;
 use crate::model::vocabulary::{Priority, Word};
-use crate::model::{Avoidability, Scenario};
+use crate::model::{Avoidability, Scenario, Space};
 use crate::oracle;
 use crate::run;
 use crate::run::{Gauges, Stage};
@@ -131,7 +131,7 @@ fn play(
         }
         _ => {
             let lines = log.collisions.iter().zip(&severities);
-            let lines = lines.map(|(collision, severity)| severity_text(collision, severity));
+            let lines = lines.map(|(collision, severity)| severity_text(table.space(), collision, severity));
             lines.collect::<Vec<_>>().join("\n")
         }
     };
@@ -144,10 +144,10 @@ fn play(
 }
 
 /// How hard a collision was, in a line.
-fn severity_text(collision: &Collision, severity: &oracle::Severity) -> String {
+fn severity_text(space: &Space, collision: &Collision, severity: &oracle::Severity) -> String {
     format!(
         "  {} npc#{} ({}) hit at {:.2} s by the ego vehicle's {}: closing at {:.1} m/s, delta-v {:.1} m/s, the other's {:.1} m/s; {}",
-        collision.body.name(),
+        space.body_name(collision.body),
         collision.contact.obstacle,
         severity.approach,
         collision.contact.time_s,

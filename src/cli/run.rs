@@ -8,7 +8,7 @@ use crate::action::ActionTable;
 use crate::agent::Face;
 use crate::emit;
 use crate::episode::EpisodeLog;
-use crate::model::{Policy, Space};
+use crate::model::{Policy, Space, digest};
 use crate::run::{
     EpisodeSummary, Group, PolicyReference, RefusalCount, Run, RunSettings, Totals, TrafficRecord, play,
 };
@@ -35,6 +35,9 @@ pub fn run(output: &Output, arguments: &RunArguments) -> Result<(), Failure> {
         Some(path) => resumed(output, path)?,
         None => begun(output, arguments)?,
     };
+    if arguments.resume.is_some() {
+        restore(output, &run, &directory)?;
+    }
     let path = directory.path.clone();
     let unread = |error| Failure::file("read", &path, error);
     let done = directory.database.episodes().map_err(unread)?;
@@ -189,15 +192,53 @@ fn keep(
     summary: &EpisodeSummary,
     log: &EpisodeLog,
 ) -> Result<(), Failure> {
-    if summary.counted() > 0 {
-        let settings = run.settings();
-        let rules = [&settings.without[..], &settings.with];
-        directory.write_critical("run", run.table(), (log, summary), &settings.agent, rules)?;
-    }
+    let scenario = match summary.counted() {
+        0 => None,
+        _ => Some(write_scenario(run, directory, summary, log)?),
+    };
     directory
         .database
-        .add(summary, log, |draw| emit::action_text(run.table(), draw))
+        .add(summary, log, |draw| emit::action_text(run.table(), draw), scenario.as_deref())
         .map_err(|error| Failure::file("write", &directory.path.join("run.db"), error))
+}
+
+/// Writes the scenario of an episode, and gives the digest of the file.
+fn write_scenario(
+    run: &Run,
+    directory: &RunDirectory,
+    summary: &EpisodeSummary,
+    log: &EpisodeLog,
+) -> Result<String, Failure> {
+    let settings = run.settings();
+    let rules = [&settings.without[..], &settings.with];
+    directory.write_critical("run", run.table(), (log, summary), &settings.agent, rules)
+}
+
+/// Plays again the episodes whose scenarios are gone, and writes these; names those that were edited.
+fn restore(output: &Output, run: &Run, directory: &RunDirectory) -> Result<(), Failure> {
+    let unread = |error| Failure::file("read", &directory.path, error);
+    let mut edited = Vec::new();
+    for (episode, road, written) in directory.database.scenarios().map_err(unread)? {
+        let path = directory.critical(&road, episode);
+        match load::read(&path) {
+            Ok(text) if digest(text.as_bytes()) == written => {}
+            Ok(_) => edited.push(path.display().to_string()),
+            Err(_) if path.exists() => edited.push(path.display().to_string()),
+            Err(_) => {
+                let (summary, log) = run.judged(episode);
+                write_scenario(run, directory, &summary, &log)?;
+                output.tell(&format!("{}: was missing, is written again", path.display()));
+            }
+        }
+    }
+    if !edited.is_empty() {
+        let files = if edited.len() == 1 { "it" } else { "them" };
+        output.tell(&format!(
+            "edited since the run wrote {files}: {}; delete {files} and resume again to get {files} back",
+            edited.join(", ")
+        ));
+    }
+    Ok(())
 }
 
 fn heading(run: &Run, arguments: &RunArguments, directory: &Path) -> String {

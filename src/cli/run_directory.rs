@@ -11,6 +11,7 @@ use std::path::{Path, PathBuf};
 use crate::action::ActionTable;
 use crate::emit;
 use crate::episode::EpisodeLog;
+use crate::model::digest;
 use crate::run::{Database, EpisodeSummary, VERSION};
 use crate::sim::ENGINE;
 use crate::syntax::yaml_mistake;
@@ -121,11 +122,20 @@ pub fn resume<S: serde::de::DeserializeOwned>(
     // The scenarios of a run whose database is lost cannot be told from new ones.
     let database = directory.join(format!("{kind}.db"));
     let left = load::sources_in(&directory.join("critical")).unwrap_or_default();
-    if !database.exists() && !left.is_empty() {
-        return Err(Failure::usage(format!(
-            "`{}` is missing, and `critical` has scenarios: begin a new {what}, or delete them to begin this one anew",
-            database.display()
-        )));
+    // A kill may leave an empty file before anything is in it.
+    let lost = match std::fs::metadata(&database) {
+        Err(_) => Some("missing"),
+        Ok(found) => (found.len() == 0).then_some("empty"),
+    };
+    match lost {
+        Some(how) if !left.is_empty() => {
+            return Err(Failure::usage(format!(
+                "`{}` is {how}, and `critical` has scenarios: begin a new {what}, or delete them to begin this one anew",
+                database.display()
+            )));
+        }
+        Some(how) => output.tell(&format!("`{}` is {how}: the {what} begins anew", database.display())),
+        None => {}
     }
     let text = load::text(&path)?;
     let refuse = |error| Failure::file("read", &path, yaml_mistake(&error, &text));
@@ -169,8 +179,13 @@ impl RunDirectory {
         Ok(RunDirectory { path: held.path.clone(), database, _held: held })
     }
 
-    /// Writes the counted collisions of an episode as a scenario, `critical/ROAD_NNNN.ava`. `agent` is the one that
-    /// played it, `rules` are those switched off and those switched on.
+    /// The file with the scenario of an episode.
+    pub fn critical(&self, road: &str, episode: usize) -> PathBuf {
+        self.path.join("critical").join(format!("{}.ava", scenario_name(road, episode)))
+    }
+
+    /// Writes the counted collisions of an episode as a scenario, `critical/ROAD_NNNN.ava`, and gives the digest of the
+    /// file. `agent` is the one that played it, `rules` are those switched off and those switched on.
     pub fn write_critical(
         &self,
         command: &str,
@@ -178,15 +193,21 @@ impl RunDirectory {
         (log, summary): (&EpisodeLog, &EpisodeSummary),
         agent: &str,
         [without, with]: [&[String]; 2],
-    ) -> Result<(), Failure> {
-        let name = format!("{}_{:04}", log.road, summary.episode);
+    ) -> Result<String, Failure> {
+        let name = scenario_name(&log.road, summary.episode);
         let critical = self.path.join("critical");
         let space_path = load::relative(&critical, &table.space().path)?;
         let (name, space_path, episode) = (name.as_str(), space_path.as_str(), summary.episode);
         let source = emit::Provenance { command, name, space_path, episode, agent, without, with };
         let file = emit::scenario(table, log, summary, &source);
-        write(&critical.join(format!("{name}.ava")), &crate::syntax::print(&file))
+        let text = crate::syntax::print(&file);
+        write(&self.critical(&log.road, episode), &text)?;
+        Ok(digest(text.as_bytes()))
     }
+}
+
+fn scenario_name(road: &str, episode: usize) -> String {
+    format!("{road}_{episode:04}")
 }
 
 fn make_empty(path: &Path) -> Result<Held, Failure> {

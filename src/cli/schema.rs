@@ -57,6 +57,7 @@ pub const SHAPES: &[Shape] = &[
             f("files[].errors", "number", "its mistakes"),
             f("files[].dump", "object?", "with `--dump`: the tree, or the table as in `table`"),
             f("files[].audit", "object?", "with `--audit`: `rules`, each with its rows and what it cuts"),
+            FAILED,
         ],
     },
     Shape {
@@ -93,6 +94,7 @@ pub const SHAPES: &[Shape] = &[
             f("row", "number", ""),
             f("label", "text", "the row in words"),
             f("road", "text", ""),
+            f("states", "object", "the value of each state, as given or as an episode may begin"),
             f("legal", "bool", "here and now"),
             f("rule", "text?", "the rule that refuses it; null if the world does"),
             f("reason", "text?", "why it is refused"),

@@ -36,8 +36,11 @@ enum Outcome {
     Played(Regression),
     /// Another crash than the scenario's, which `--allow-changed` lets pass.
     Allowed(Regression),
-    /// Why the scenario could not be played.
-    NotPlayed(String),
+    /// Why the scenario could not be played, and whether that is a mistake in a source.
+    NotPlayed {
+        reason: String,
+        in_source: bool,
+    },
 }
 
 /// Plays every scenario of a suite against a driving system.
@@ -68,7 +71,8 @@ pub fn test(output: &Output, arguments: &TestArguments) -> Result<(), Failure> {
     let fails = count(&|outcome| matches!(outcome, Outcome::Played(Regression::StillFails { .. })));
     let fixed = count(&|outcome| matches!(outcome, Outcome::Played(Regression::Fixed)));
     let changed = count(&Outcome::is_changed);
-    let errors = count(&|outcome| matches!(outcome, Outcome::NotPlayed(_)));
+    let errors = count(&|outcome| matches!(outcome, Outcome::NotPlayed { .. }));
+    let in_source = count(&|outcome| matches!(outcome, Outcome::NotPlayed { in_source: true, .. }));
     output.say(&format!(
         "{}: {fails} still fail, {fixed} fixed, {changed} changed, {errors} not played",
         plural(cases.len(), "scenario")
@@ -87,7 +91,7 @@ pub fn test(output: &Output, arguments: &TestArguments) -> Result<(), Failure> {
     );
     let failing = count(&Outcome::is_failure);
     if errors > 0 {
-        return Err(Failure::usage(format!("{} could not be played", plural(errors, "scenario"))));
+        return Err(Failure::NotPlayed { scenarios: errors, in_source: in_source > 0 });
     }
     if failing > 0 { Err(Failure::Failing { scenarios: failing }) } else { Ok(()) }
 }
@@ -132,9 +136,14 @@ impl Suite<'_> {
             Ok(Emitted::Scenario(table, scenario)) => {
                 let road = table.space().roads[scenario.road].name.clone();
                 let outcome = self.compare(&table, &scenario);
-                (scenario.name, road, outcome.unwrap_or_else(|error| Outcome::NotPlayed(error.to_string())))
+                let not_played =
+                    |error: RunError| Outcome::NotPlayed { reason: error.to_string(), in_source: false };
+                (scenario.name, road, outcome.unwrap_or_else(not_played))
             }
-            Err(failure) => (name, String::new(), Outcome::NotPlayed(failure.to_string())),
+            Err(failure) => {
+                let in_source = matches!(failure, Failure::Source { .. } | Failure::Outdated);
+                (name, String::new(), Outcome::NotPlayed { reason: failure.to_string(), in_source })
+            }
         };
         let elapsed_s = started.elapsed().as_secs_f64();
         Ok(Some(Case { file: file.to_owned(), scenario, road, outcome, elapsed_s }))
@@ -150,7 +159,7 @@ impl Suite<'_> {
             return self.accept(file, &loaded);
         }
         self.outdated.push(loaded);
-        Err(Failure::usage("what it uses does not mean what it meant"))
+        Err(Failure::Outdated)
     }
 
     /// Takes the change of its space over into a scenario, if it still plays as it claims.
@@ -203,7 +212,7 @@ impl Suite<'_> {
         let (log, _, first) = stage.first_counted(&recorded);
         let Some(index) = first else {
             let reason = "it has no counted collision with the driving system that it was found with";
-            return Ok(Outcome::NotPlayed(reason.to_owned()));
+            return Ok(Outcome::NotPlayed { reason: reason.to_owned(), in_source: false });
         };
         let found = oracle::regression(&stage.setup(&recorded), &log, index, &ads);
         let is_allowed = self.arguments.allow_changed && found.is_other_crash();
@@ -223,7 +232,7 @@ impl Outcome {
         match self {
             Outcome::Played(Regression::StillFails { .. }) => true,
             Outcome::Played(found) => found.is_other_crash(),
-            Outcome::Allowed(_) | Outcome::NotPlayed(_) => false,
+            Outcome::Allowed(_) | Outcome::NotPlayed { .. } => false,
         }
     }
 
@@ -241,7 +250,7 @@ impl Outcome {
         let (found, more) = match self {
             Outcome::Played(found) => (found, ""),
             Outcome::Allowed(found) => (found, ", which is allowed"),
-            Outcome::NotPlayed(reason) => return ("error", reason.clone()),
+            Outcome::NotPlayed { reason, .. } => return ("error", reason.clone()),
         };
         match found {
             Regression::StillFails { time_s } => {
@@ -263,7 +272,7 @@ fn junit(suite: &str, cases: &[Case]) -> String {
         "tests=\"{}\" failures=\"{}\" errors=\"{}\" skipped=\"{}\" time=\"{:.3}\"",
         cases.len(),
         count(Outcome::is_failure),
-        count(|outcome| matches!(outcome, Outcome::NotPlayed(_))),
+        count(|outcome| matches!(outcome, Outcome::NotPlayed { .. })),
         count(Outcome::is_skipped),
         cases.iter().map(|case| case.elapsed_s).sum::<f64>()
     );
@@ -276,7 +285,7 @@ fn junit(suite: &str, cases: &[Case]) -> String {
         let (word, reason) = case.outcome.in_words();
         let reason = escaped(&reason);
         let element = match &case.outcome {
-            Outcome::NotPlayed(_) => Some("error"),
+            Outcome::NotPlayed { .. } => Some("error"),
             outcome if outcome.is_failure() => Some("failure"),
             outcome if outcome.is_skipped() => Some("skipped"),
             Outcome::Played(_) | Outcome::Allowed(_) => None,
@@ -342,7 +351,10 @@ mod tests {
             case("d", Outcome::Played(Regression::NeverMet)),
             case("f", Outcome::Played(Regression::Struck)),
             Case { file: PathBuf::from("other/f.ava"), ..case("f", Outcome::Allowed(Regression::Struck)) },
-            case("e <&> \"\u{1}\"", Outcome::NotPlayed("cannot read `x` & \"y\"\nat all".to_owned())),
+            case(
+                "e <&> \"\u{1}\"",
+                Outcome::NotPlayed { reason: "cannot read `x` & \"y\"\nat all".to_owned(), in_source: false },
+            ),
         ];
         let text = junit("runs/<1>", &cases);
         let document = roxmltree::Document::parse(&text).expect(&text);

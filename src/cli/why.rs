@@ -1,12 +1,13 @@
 //! `avastra why`: whether a row is legal here, and which rule refuses it.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use crate::action::{Offer, Situation};
 use crate::check::state_argument::legal_memory_from;
 use crate::emit;
 use crate::episode;
-use crate::model::{RuleBody, RulesInForce};
+use crate::model::{Memory, RuleBody, RulesInForce, Space, StateDef};
 use crate::run::road_named;
 use crate::sim::World;
 
@@ -47,6 +48,12 @@ pub fn why(output: &Output, arguments: &WhyArguments) -> Result<(), Failure> {
     let offer = table.offer(&situation, arguments.row);
 
     output.say(&format!("row {}: {} on {}", row.index, row.label, road.name));
+    let states: Vec<(&str, String)> =
+        space.states.iter().map(|state| (state.name.as_str(), shown(space, state, &memory))).collect();
+    if !states.is_empty() {
+        let states: Vec<String> = states.iter().map(|(name, value)| format!("{name}: {value}")).collect();
+        output.say(&format!("  with {}", states.join(", ")));
+    }
     for &rule in row.rules.iter() {
         let state = match (rules.contains(rule), &space.rules[rule].body) {
             (false, _) => " (off)",
@@ -68,6 +75,21 @@ pub fn why(output: &Output, arguments: &WhyArguments) -> Result<(), Failure> {
         Offer::Refused(refusal) => (false, refusal.rule, Some(refusal.reason)),
     };
     output.result(serde_json::json!({ "row": row.index, "label": row.label, "road": road.name,
+                            "states": states.into_iter().collect::<BTreeMap<_, _>>(),
                             "legal": legal, "rule": rule, "reason": reason }));
     Ok(())
+}
+
+/// The value of a state as `--state` takes it: `Night`, `{ Rain: High, Fog: None }`.
+fn shown(space: &Space, state: &StateDef, memory: &Memory) -> String {
+    let cells = &memory.cells()[state.first_cell..][..state.cells];
+    let values: Vec<String> = cells.iter().map(|value| space.show(*value, state.ty)).collect();
+    match state.key {
+        Some(of) if values.iter().any(|value| *value != values[0]) => {
+            let keys = space.enums[of.0].variants.iter().zip(&values);
+            let entries: Vec<String> = keys.map(|(key, value)| format!("{key}: {value}")).collect();
+            format!("{{ {} }}", entries.join(", "))
+        }
+        _ => values.first().cloned().unwrap_or_default(),
+    }
 }

@@ -43,7 +43,7 @@ pub fn scenario(
     let last = counted.last().expect("an episode without a counted collision is not emitted");
     let steps = last.collision.step + 1;
     let emitted = format!("Emitted by `avastra {}`; replay with `avastra replay FILE`.", source.command);
-    let headline = headline(log, &counted[0].collision);
+    let headline = headline(table.space(), log, &counted[0].collision);
     let origin = origin(log, source, &summary.avoidability);
     file(table, log, source, origin, [&emitted, &headline], steps, expects(log, summary, steps))
 }
@@ -220,11 +220,11 @@ fn expects(log: &EpisodeLog, summary: &EpisodeSummary, steps: usize) -> Vec<Expe
 }
 
 /// What happens, in a sentence for the reader.
-fn headline(log: &EpisodeLog, collision: &Collision) -> String {
+fn headline(space: &Space, log: &EpisodeLog, collision: &Collision) -> String {
     let contact = &collision.contact;
     format!(
         "{} npc#{} ({}) is hit at {:.1} s by an ego vehicle at {:.1} km/h on {}.",
-        collision.body.name(),
+        space.body_name(collision.body),
         contact.obstacle,
         collision.verb.name(),
         contact.time_s,

@@ -119,6 +119,7 @@ fn face(point: Vec2, ego: &VehicleParameters) -> Face {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::model::BodyWord;
     use crate::model::vocabulary::{Body, Priority, Verb};
 
     fn collision(x_m: f64, y_m: f64, ego_speed_mps: f64, obstacle_left_mps: f64) -> Collision {
@@ -136,7 +137,7 @@ mod tests {
         Collision {
             contact,
             step: 0,
-            body: Body::Sedan,
+            body: BodyWord::engine(Body::Sedan),
             mass_t: 1.55,
             verb: Verb::DriveAhead,
             spawned_s: 5.0,

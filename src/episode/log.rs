@@ -1,10 +1,12 @@
 //! The record of an episode: enough to judge it, to count it and to replay it.
 
+use std::collections::BTreeMap;
+
 use crate::action::Draw;
 use crate::ads::ModularConfig;
 use crate::mdp::{PerceptionCounts, StateVector};
-use crate::model::Memory;
-use crate::model::vocabulary::{Body, Verb};
+use crate::model::vocabulary::Verb;
+use crate::model::{BodyWord, Memory};
 use crate::sim::{Contact, Incident, Start};
 
 /// One episode, from start to end.
@@ -68,7 +70,7 @@ pub struct Collision {
     pub contact: Contact,
     /// Index of the step in which it happened.
     pub step: usize,
-    pub body: Body,
+    pub body: BodyWord,
     /// Mass of the obstacle, t.
     pub mass_t: f64,
     pub verb: Verb,
@@ -80,6 +82,20 @@ impl EpisodeLog {
     /// The states of the space after the action of a step; those at the start if there is no such step.
     pub fn memory_after(&self, step: usize) -> &Memory {
         self.steps.get(step).map_or(&self.memory, |step| &step.memory)
+    }
+
+    /// The author's own bodies among the road users: number of the road user, index in the space.
+    pub fn own_bodies(&self) -> BTreeMap<u32, usize> {
+        let mut own = BTreeMap::new();
+        for step in &self.steps {
+            let Outcome::Done { draw, spawned, .. } = &step.outcome else { continue };
+            let mut ids = spawned.iter();
+            for effect in &draw.effects {
+                let first = ids.by_ref().take(effect.newcomers() as usize).min();
+                own.extend(first.into_iter().flat_map(|first| effect.own_bodies(*first)));
+            }
+        }
+        own
     }
 
     /// Digest of every bit of the world's state after every tick ([`Trace`]); zeros if there was no step.

@@ -1,12 +1,13 @@
 //! The loop: act, drive for one observation period, record what happened.
 
+use std::collections::BTreeMap;
+
 use crate::action::{Draw, Situation};
 use crate::ads::Ads;
 use crate::mdp;
 use crate::mdp::{Danger, Observation};
 use crate::model::expr::Expr;
-use crate::model::vocabulary::Body;
-use crate::model::{Facts, Memory, OutcomeFacts, Trigger, WorldFacts, evaluate};
+use crate::model::{BodyWord, Facts, Memory, OutcomeFacts, Trigger, WorldFacts, evaluate};
 use crate::sim::{Contact, DT_S, Incident, Sensed, Trace, World};
 
 use super::facts::collision_facts;
@@ -144,7 +145,7 @@ impl Waiting {
 #[derive(Clone, Copy)]
 struct Near {
     probability: f64,
-    body: Option<Body>,
+    body: Option<BodyWord>,
 }
 
 /// An episode under way.
@@ -155,6 +156,8 @@ struct Play {
     sensed: Sensed,
     memory: Memory,
     steps: Vec<StepLog>,
+    /// The author's own bodies among the road users, by number.
+    own_bodies: BTreeMap<u32, usize>,
     collisions: Vec<Collision>,
     incidents: Vec<Incident>,
     trace: Trace,
@@ -177,6 +180,7 @@ impl Play {
             sensed,
             memory: setup.memory.clone(),
             steps: Vec::new(),
+            own_bodies: BTreeMap::new(),
             collisions: Vec::new(),
             incidents: Vec::new(),
             trace: Trace::default(),
@@ -208,11 +212,12 @@ impl Play {
     /// Carries out a whole action or nothing of it: its second spawn may find its first in the way.
     fn carry_out(&mut self, draw: Draw, delay_ticks: u32) -> Outcome {
         let before = self.world.clone();
-        let mut spawned = Vec::new();
+        let (mut spawned, mut own_bodies) = (Vec::new(), Vec::new());
         for effect in &draw.effects {
             match self.world.apply(effect) {
                 Ok(newcomer) => {
-                    spawned.extend(newcomer.into_iter().flat_map(|id| id..id + effect.newcomers()))
+                    spawned.extend(newcomer.into_iter().flat_map(|id| id..id + effect.newcomers()));
+                    own_bodies.extend(newcomer.into_iter().flat_map(|id| effect.own_bodies(id)));
                 }
                 Err(reason) => {
                     self.world = before;
@@ -223,13 +228,15 @@ impl Play {
         if let Some(rules) = &draw.lane_changes {
             spawned.iter().for_each(|id| self.world.bind_lane_changes(*id, rules));
         }
+        self.own_bodies.extend(own_bodies);
         self.memory = draw.memory_after.clone();
         Outcome::Done { draw, spawned, delay_ticks }
     }
 
     /// What every step does, in a step without an action.
     fn wait(&mut self, setup: &Setup) {
-        let (effects, memory) = setup.table.wait(&self.memory, setup.road, setup.rules);
+        let (effects, memory) =
+            setup.table.wait(&self.memory, self.steps.len() as u64, setup.road, setup.rules);
         for effect in effects {
             self.world.apply(&effect).expect("weather and time of day need no place");
         }
@@ -338,8 +345,9 @@ impl Play {
         evaluate(condition, &setup.table.space().functions, &facts).truth()
     }
 
-    fn body(&self, obstacle: u32) -> Option<Body> {
-        self.world.obstacle(obstacle).map(|obstacle| obstacle.body)
+    fn body(&self, obstacle: u32) -> Option<BodyWord> {
+        let own = self.own_bodies.get(&obstacle).copied();
+        self.world.obstacle(obstacle).map(|obstacle| BodyWord { like: obstacle.body, own })
     }
 
     fn collision(&self, contact: Contact) -> Collision {
@@ -348,7 +356,7 @@ impl Play {
         Collision {
             contact,
             step: self.steps.len(),
-            body: obstacle.body,
+            body: BodyWord { like: obstacle.body, own: self.own_bodies.get(&contact.obstacle).copied() },
             mass_t: self.world.mass_t(contact.obstacle).unwrap_or(0.0),
             verb: obstacle.verb,
             spawned_s: obstacle.spawned_tick as f64 * DT_S,

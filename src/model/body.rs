@@ -8,6 +8,14 @@
 
 use crate::model::vocabulary::Body;
 
+/// A body of the author's own, as a spawn asks for it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct OwnBody {
+    /// Index in [`Space::bodies`](super::Space::bodies).
+    pub index: usize,
+    pub shape: BodyParameters,
+}
+
 /// What a body is and can do on a dry road.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BodyParameters {

@@ -101,6 +101,8 @@ pub const IMPLIED: &str = "AV0410";
 pub const NO_START: &str = "AV0411";
 /// A rule about the moment of the draw that names what happens later.
 pub const LATER: &str = "AV0412";
+/// A rule under which no lane change begins.
+pub const NO_CHANGE: &str = "AV0413";
 /// A value that a transition rule does not lead out of.
 pub const DEADLOCK: &str = "AV0501";
 /// A value that a transition rule does not lead to.

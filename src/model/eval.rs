@@ -4,9 +4,9 @@
 //! division by 0 gives infinity or NaN. NaN satisfies no comparison but `!=`.
 
 use crate::model::expr::{Arithmetic, Comparison, Expr, ExprKind};
-use crate::model::space::{COUNTED, FnDef, RoadFacts, Space, WordExpr};
+use crate::model::space::{BodyWord, COUNTED, FnDef, RoadFacts, Space, WordExpr};
 use crate::model::value::{Memory, Value};
-use crate::model::vocabulary::{Body, Fact, LaneChoice, Light, Priority, RoadKind, Word, WordFact};
+use crate::model::vocabulary::{Fact, LaneChoice, Light, Priority, RoadKind, Word, WordFact};
 
 /// Numbers that differ by at most this part of the larger one are `==`. This tolerates the digits that an
 /// author rounds away, but no measurable distance.
@@ -105,9 +105,9 @@ pub struct OutcomeFacts {
     /// Who had to give way. Known for collisions alone.
     pub priority: Priority,
     /// What was hit, if anything was.
-    pub hit: Option<Body>,
+    pub hit: Option<BodyWord>,
     /// What came nearest to a collision in the step, or was hit.
-    pub near: Option<Body>,
+    pub near: Option<BodyWord>,
     /// A careful reference driver would not have touched the obstacle. Known for judged collisions alone.
     pub avoidable: bool,
     /// Collision probability of the step, in `[0, 1]`.
@@ -175,6 +175,10 @@ pub fn evaluate(expr: &Expr, functions: &[FnDef], facts: &Facts<'_>) -> Value {
         ExprKind::IsWord(fact, words) => {
             Value::Bool(word_of(*fact, facts).is_some_and(|word| words.iter().any(|one| one == word)))
         }
+        ExprKind::IsBody(fact, bodies) => {
+            let found = if *fact == WordFact::Hit { facts.outcome.hit } else { facts.outcome.near };
+            Value::Bool(found.is_some_and(|found| bodies.iter().any(|named| found.is(*named))))
+        }
         ExprKind::Match { subject, arm_of, arms } => value(&arms[arm_of[value(subject).variant()]]),
     }
 }
@@ -217,8 +221,8 @@ pub(crate) fn word_of(fact: WordFact, facts: &Facts<'_>) -> Option<&'static str>
         WordFact::EgoLight => facts.world.map(|world| world.moment.ego_light.name()),
         WordFact::EgoRoad => facts.world.map(|world| world.moment.ego_road.name()),
         WordFact::Priority => Some(facts.outcome.priority.name()),
-        WordFact::Hit => facts.outcome.hit.map(Word::name),
-        WordFact::Near => facts.outcome.near.map(Word::name),
+        WordFact::Hit => facts.outcome.hit.map(|body| body.like.name()),
+        WordFact::Near => facts.outcome.near.map(|body| body.like.name()),
     }
 }
 

@@ -1,5 +1,6 @@
 //! Typed expressions: names are resolved, units are gone (all numbers are SI), every type fits.
 
+use crate::model::space::BodyWord;
 use crate::model::value::{EnumIndex, Type};
 use crate::model::vocabulary::{Fact, Known, LaneChoice, WordFact};
 use crate::syntax::ast::Span;
@@ -47,6 +48,8 @@ pub enum ExprKind {
     OnRoad(Vec<String>),
     /// `priority == ego`, `ego.light in [Yellow, Red]`: whether the fact is one of these words.
     IsWord(WordFact, Vec<String>),
+    /// `hit == Scooter`, `near in [Sedan, SUV]`: whether the fact is one of these bodies.
+    IsBody(WordFact, Vec<BodyWord>),
     /// The arm for each variant of the subject's enum is `arms[arm_of[variant]]`.
     Match {
         subject: Box<Expr>,
@@ -60,6 +63,11 @@ impl Expr {
     /// not entered, because they know only their arguments.
     pub fn walk(&self, visit: &mut dyn FnMut(&Expr)) {
         visit(self);
+        self.each_part(&mut |part| part.walk(visit));
+    }
+
+    /// Calls `visit` for the expressions of which this one is made.
+    fn each_part(&self, visit: &mut dyn FnMut(&Expr)) {
         match &self.kind {
             ExprKind::Bool(_)
             | ExprKind::Number(_)
@@ -68,35 +76,43 @@ impl Expr {
             | ExprKind::Cell(_)
             | ExprKind::OnRoad(_)
             | ExprKind::IsWord(..)
+            | ExprKind::IsBody(..)
             | ExprKind::OfRoadUser(..)
             | ExprKind::Fact(_) => {}
             ExprKind::CellAt(_, inner)
             | ExprKind::Not(inner)
             | ExprKind::Negate(inner)
-            | ExprKind::InLanes(inner, _) => inner.walk(visit),
-            ExprKind::Call(_, arguments) => arguments.iter().for_each(|argument| argument.walk(visit)),
+            | ExprKind::InLanes(inner, _) => visit(inner),
+            ExprKind::Call(_, arguments) => arguments.iter().for_each(visit),
             ExprKind::Arithmetic(_, left, right)
             | ExprKind::Compare(_, left, right)
             | ExprKind::And(left, right)
             | ExprKind::Or(left, right)
             | ExprKind::Implies(left, right) => {
-                left.walk(visit);
-                right.walk(visit);
+                visit(left);
+                visit(right);
             }
             ExprKind::InRange(value, low, high) => {
-                value.walk(visit);
-                low.walk(visit);
-                high.walk(visit);
+                visit(value);
+                visit(low);
+                visit(high);
             }
             ExprKind::InList(value, list) => {
-                value.walk(visit);
-                list.iter().for_each(|item| item.walk(visit));
+                visit(value);
+                list.iter().for_each(visit);
             }
             ExprKind::Match { subject, arms, .. } => {
-                subject.walk(visit);
-                arms.iter().for_each(|arm| arm.walk(visit));
+                visit(subject);
+                arms.iter().for_each(visit);
             }
         }
+    }
+
+    /// How deep its parts stand in one another.
+    pub fn height(&self) -> u32 {
+        let mut deepest = 0;
+        self.each_part(&mut |part| deepest = deepest.max(part.height()));
+        deepest + 1
     }
 
     /// Whether the expression or a part of it passes the test.
@@ -111,7 +127,7 @@ impl Expr {
         let mut latest = Known::Road;
         self.walk(&mut |expr| match &expr.kind {
             ExprKind::Fact(fact) => latest = latest.max(fact.known()),
-            ExprKind::IsWord(fact, _) => latest = latest.max(fact.known()),
+            ExprKind::IsWord(fact, _) | ExprKind::IsBody(fact, _) => latest = latest.max(fact.known()),
             _ => {}
         });
         latest
@@ -122,6 +138,16 @@ impl Expr {
         self.any(|kind| match kind {
             ExprKind::Fact(fact) => fact.known() == Known::World,
             ExprKind::IsWord(fact, _) => fact.known() == Known::World,
+            _ => false,
+        })
+    }
+
+    /// Whether the start of an episode answers all that it asks: when `step` and `elapsed` are 0.
+    pub(crate) fn is_known_at_start(&self) -> bool {
+        !self.any(|kind| match kind {
+            ExprKind::Fact(Fact::StepNumber | Fact::Elapsed) => false,
+            ExprKind::Fact(fact) => fact.known() > Known::Road,
+            ExprKind::IsWord(fact, _) | ExprKind::IsBody(fact, _) => fact.known() > Known::Road,
             _ => false,
         })
     }

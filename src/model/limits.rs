@@ -7,8 +7,14 @@ use core::ops::RangeInclusive;
 /// The tick of physics, ms: an observation period is a whole number of ticks.
 pub const TICK_MS: u32 = 20;
 
+/// Nothing on the road is faster, m/s.
+pub const SPEED_MPS_MAX: f64 = 70.0;
+
 /// Speeds at which anything may be spawned, m/s.
-pub const SPAWN_SPEED_MPS: RangeInclusive<f64> = 0.0..=70.0;
+pub const SPAWN_SPEED_MPS: RangeInclusive<f64> = 0.0..=SPEED_MPS_MAX;
+
+/// More than tyres give the ego vehicle, forwards or backwards, m/s².
+pub const EGO_ACCELERATION_MPS2_MAX: f64 = 10.0;
 
 /// Distances from the ego vehicle at which anything may be spawned, m.
 pub const SPAWN_DISTANCE_M: RangeInclusive<f64> = 0.0..=1000.0;

@@ -2,12 +2,15 @@
 //!
 //! `check::meaning` says what a digest covers. Here are the digests, and the text that a `use` keeps of them.
 
-use std::collections::BTreeSet;
+use std::collections::BTreeMap;
 
 use crate::model::digest;
 
-/// Hexadecimal digits of a declaration's mark: enough to tell what changed, never used to tell whether.
-const MARK_DIGITS: usize = 4;
+/// Letters of a declaration's mark, of six bits each: enough to tell what changed, never used to tell whether.
+const MARK_LETTERS: usize = 2;
+
+/// The letters of marks.
+const LETTERS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789-_";
 
 /// Largest number of declarations that are named as different.
 const NAMED_MAX: usize = 6;
@@ -31,7 +34,6 @@ impl Meaning {
     /// The meaning of declarations, each with its title and its canonical text. Their order counts.
     pub fn new(declarations: &[(String, String)]) -> Meaning {
         let whole: Vec<&str> = declarations.iter().map(|(_, text)| text.as_str()).collect();
-        let mark = |text: &str| digest(text.as_bytes())["sha256:".len()..][..MARK_DIGITS].to_owned();
         Meaning {
             digest: digest(whole.join("\n").as_bytes()),
             declarations: declarations
@@ -60,19 +62,20 @@ impl Meaning {
     /// Which declarations differ from those of a seal, in words; `None` if the seal has no marks.
     pub fn differences(&self, seal: &str) -> Option<String> {
         let (_, marks) = seal.split_once(' ').filter(|(_, marks)| marks.is_ascii() && !marks.is_empty())?;
-        let marks: Vec<&str> =
-            (0..marks.len() / MARK_DIGITS).map(|at| &marks[at * MARK_DIGITS..][..MARK_DIGITS]).collect();
-        let before: BTreeSet<&str> = marks.iter().copied().collect();
-        let now: BTreeSet<&str> =
-            self.declarations.iter().map(|declaration| declaration.mark.as_str()).collect();
-        let differ: Vec<&str> = self
-            .declarations
-            .iter()
-            .filter(|declaration| !before.contains(declaration.mark.as_str()))
-            .map(|declaration| declaration.title.as_str())
-            .collect();
+        // How many declarations had a mark.
+        let mut before: BTreeMap<&str, usize> = BTreeMap::new();
+        for at in 0..marks.len() / MARK_LETTERS {
+            *before.entry(&marks[at * MARK_LETTERS..][..MARK_LETTERS]).or_default() += 1;
+        }
+        let mut differ: Vec<&str> = Vec::new();
+        for Declaration { title, mark } in &self.declarations {
+            match before.get_mut(mark.as_str()).filter(|left| **left > 0) {
+                Some(left) => *left -= 1,
+                None => differ.push(title),
+            }
+        }
         // A declaration that changed is missing under its old mark, too.
-        let missing = marks.iter().filter(|mark| !now.contains(**mark)).count().saturating_sub(differ.len());
+        let missing = before.values().sum::<usize>().saturating_sub(differ.len());
         let mut parts = Vec::new();
         if !differ.is_empty() {
             let more = differ.len().saturating_sub(NAMED_MAX);
@@ -89,6 +92,14 @@ impl Meaning {
         }
         Some(parts.join("; "))
     }
+}
+
+/// The mark of a declaration: the first bits of its digest.
+fn mark(text: &str) -> String {
+    let digest = digest(text.as_bytes());
+    let bits = u64::from_str_radix(&digest["sha256:".len()..][..16], 16).expect("a digest is hexadecimal");
+    let letter = |at: usize| char::from(LETTERS[(bits >> (58 - 6 * at) & 63) as usize]);
+    (0..MARK_LETTERS).map(letter).collect()
 }
 
 #[cfg(test)]

@@ -3,9 +3,7 @@
 use crate::model::eval::{Facts, evaluate};
 use crate::model::expr::ExprKind;
 use crate::model::rules::RulesInForce;
-use crate::model::space::{
-    EffectDef, Initial, Road, RoadFacts, RuleBody, SetDef, Space, StateDef, StateMeaning,
-};
+use crate::model::space::{Initial, Road, RoadFacts, RuleBody, SetDef, Space, StateDef, StateMeaning};
 use crate::model::value::{Memory, Type, Value};
 use crate::model::vocabulary::{Level, TimeOfDay};
 use crate::rng;
@@ -100,45 +98,37 @@ impl Space {
     /// The memory after a step with this action and these parameter values.
     pub(crate) fn memory_after(&self, action: usize, locals: &[Value], before: &Memory) -> Memory {
         let mut after = before.clone();
-        for effect in &self.actions[action].effects {
-            if let EffectDef::Set(set) = effect {
-                self.change(&mut after, set, locals);
-            }
-        }
-        self.each_step.iter().for_each(|set| self.change(&mut after, set, &[]));
+        self.sets(Some(action)).for_each(|set| self.change(&mut after, set, locals));
         after
     }
 
     /// The memory after a step without an action. If the effects of every step would break a rule in force that
-    /// stands for all states or orders their changes, they do not happen.
+    /// stands for all states or orders their changes, they do not happen. `step` is its number, if it is known.
     pub fn memory_after_wait(
         &self,
         before: &Memory,
+        step: Option<u64>,
         road: Option<&RoadFacts>,
         rules: &RulesInForce,
     ) -> Memory {
+        if self.each_step.is_empty() {
+            return before.clone();
+        }
         let mut after = before.clone();
-        self.each_step.iter().for_each(|set| self.change(&mut after, set, &[]));
+        self.sets(None).for_each(|set| self.change(&mut after, set, &[]));
         let is_broken = |rule: usize| {
-            let rule = &self.rules[rule];
-            let facts = Facts { road, ..Facts::new(&[], &after) };
-            let start = rule.start.as_ref();
-            let stands = start.is_none_or(|start| evaluate(start, &self.functions, &facts).truth());
-            !stands
-                || match &rule.body {
-                    RuleBody::Holds(_) | RuleBody::During(_) => false,
-                    RuleBody::Moves { cell, allowed, .. } => {
-                        let [from, to] = [before, &after].map(|memory| memory.cells[*cell].variant());
-                        self.may_set_each_step(*cell) && !allowed[from][to]
-                    }
-                }
+            let RuleBody::Moves { cell, allowed, .. } = &self.rules[rule].body else {
+                return !self.stands(rule, &after, road, step);
+            };
+            let [from, to] = [before, &after].map(|memory| memory.cells[*cell].variant());
+            self.may_set_each_step(*cell) && !allowed[from][to]
         };
-        if self.each_step.is_empty() || rules.all().any(is_broken) { before.clone() } else { after }
+        if rules.all().any(is_broken) { before.clone() } else { after }
     }
 
     /// Whether the effects of every step may set a cell.
     pub(crate) fn may_set_each_step(&self, cell: usize) -> bool {
-        self.each_step.iter().any(|set| self.sets_cell(set, cell))
+        self.sets(None).any(|set| self.sets_cell(set, cell))
     }
 
     /// Whether an effect sets a cell, as far as its key is written out.

@@ -28,7 +28,10 @@ pub use eval::{
 };
 pub use interval::{End, Interval};
 pub(crate) use limits::spawn_out_of_bounds;
-pub use limits::{AMBIENT_MAX, SIGNAL_PHASE_S, SPAWN_DISTANCE_M, SPAWN_SPEED_MPS, TICK_MS};
+pub use limits::{
+    AMBIENT_MAX, EGO_ACCELERATION_MPS2_MAX, SIGNAL_PHASE_S, SPAWN_DISTANCE_M, SPAWN_SPEED_MPS, SPEED_MPS_MAX,
+    TICK_MS,
+};
 pub use meaning::Meaning;
 pub use policy::Policy;
 pub(crate) use row::locals;

@@ -10,7 +10,9 @@ use crate::model::meaning::Meaning;
 use crate::model::row::Row;
 use crate::model::rules::{Bound, Clause};
 use crate::model::value::{EnumIndex, Type, Value};
-use crate::model::vocabulary::{Body, Colour, LaneChoice, Level, Phenomenon, Side, Then, TimeOfDay, Verb};
+use crate::model::vocabulary::{
+    Body, Colour, LaneChoice, Level, Phenomenon, Side, Then, TimeOfDay, Verb, Word,
+};
 use crate::road::{LanePlace, RoadMap, Route};
 use crate::syntax::ast::Span;
 use crate::units::Rational;
@@ -121,6 +123,19 @@ pub struct BodyWord {
     pub own: Option<usize>,
 }
 
+impl BodyWord {
+    /// A body of the engine.
+    pub const fn engine(like: Body) -> BodyWord {
+        BodyWord { like, own: None }
+    }
+
+    /// Whether this is what a body of that name means: one of the engine's names stands for the author's own that are
+    /// like it, too.
+    pub(crate) fn is(self, named: BodyWord) -> bool {
+        self.like == named.like && (named.own.is_none() || self.own == named.own)
+    }
+}
+
 /// A pure function; its parameters are the locals of its body.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FnDef {
@@ -158,6 +173,15 @@ impl ActionDef {
     /// The parameters that are drawn.
     pub(crate) fn drawn(&self) -> impl Iterator<Item = &Parameter> {
         self.parameters.iter().filter(|parameter| !parameter.axis)
+    }
+
+    /// Its own `set`s and those that `on … also` adds, in the order in which they happen; those of every step come after
+    /// them: [`Space::sets`].
+    pub(crate) fn sets(&self) -> impl Iterator<Item = &SetDef> {
+        self.effects.iter().filter_map(|effect| match effect {
+            EffectDef::Set(set) => Some(&**set),
+            EffectDef::Spawn(_) => None,
+        })
     }
 
     /// The values of the parameters that are drawn, given those of all, as declared.
@@ -355,6 +379,13 @@ impl StateDef {
 }
 
 impl Space {
+    /// All that a step sets, in the order in which it happens: by its action, by `on … also`, and by every step. Without
+    /// an action only the last is left.
+    pub(crate) fn sets(&self, action: Option<usize>) -> impl Iterator<Item = &SetDef> {
+        let of_action = action.into_iter().flat_map(|action| self.actions[action].sets());
+        of_action.chain(&self.each_step)
+    }
+
     /// A cell of the memory as the language spells it: `time`, `sky[Rain]`.
     pub fn cell_name(&self, cell: usize) -> String {
         let found = self.states.iter().find_map(|state| Some((state, state.position_of(cell)?)));
@@ -363,6 +394,11 @@ impl Space {
             None => state.name.clone(),
             Some(of) => format!("{}[{}]", state.name, self.enums[of.0].variants[position]),
         }
+    }
+
+    /// A body as its author calls it.
+    pub fn body_name(&self, body: BodyWord) -> &str {
+        body.own.map_or_else(|| body.like.name(), |own| &self.bodies[own].name)
     }
 
     /// A value as the language spells it.

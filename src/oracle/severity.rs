@@ -66,6 +66,7 @@ fn approach(velocity_mps: Vec2) -> &'static str {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::model::BodyWord;
     use crate::model::body::parameters;
     use crate::model::vocabulary::{Body, Priority, Verb};
     use crate::sim::Contact;
@@ -85,8 +86,14 @@ mod tests {
         };
         for body in [Body::SchoolBus, Body::Hatchback, Body::Pedestrian] {
             let mass_t = parameters(body).mass_t;
-            let collision =
-                Collision { contact, step: 0, body, mass_t, verb: Verb::DriveAhead, spawned_s: 5.0 };
+            let collision = Collision {
+                contact,
+                step: 0,
+                body: BodyWord::engine(body),
+                mass_t,
+                verb: Verb::DriveAhead,
+                spawned_s: 5.0,
+            };
             let found = severity(&collision);
             assert_eq!((found.relative_speed_mps, found.side, found.approach), (5.0, "front", "along"));
             // It closes at 4 m/s; 3 m/s along the bumper do nothing.

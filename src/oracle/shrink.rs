@@ -12,8 +12,8 @@ use std::sync::Arc;
 use crate::action::{ActionTable, Draw};
 use crate::episode;
 use crate::episode::{Choice, Collision, EpisodeLog, Moment, Outcome, Script, ScriptedAction, Setup};
-use crate::model::vocabulary::{Body, Verb};
-use crate::model::{Avoidability, Domain, Memory, Value};
+use crate::model::vocabulary::Verb;
+use crate::model::{Avoidability, BodyWord, Domain, Memory, Value};
 use crate::sim::Start;
 
 use super::avoidable::{AvoidabilitySettings, Judgement, judge};
@@ -125,7 +125,7 @@ struct Kept {
 struct Search<'a> {
     setup: &'a Setup<'a>,
     settings: &'a AvoidabilitySettings,
-    body: Body,
+    body: BodyWord,
     verb: Verb,
     class: Avoidability,
     counts: bool,

@@ -10,7 +10,7 @@ use crate::check::{self, ReadError};
 use crate::episode::Collision;
 use crate::geometry::{OrientedBox, Vec2};
 use crate::model::vocabulary::{Body, Priority, Verb};
-use crate::model::{Avoidability, Memory, OutcomeFacts, Space};
+use crate::model::{Avoidability, BodyWord, Memory, OutcomeFacts, Space};
 use crate::road::testing::{lanes, street};
 use crate::sim::testing::Heading;
 use crate::sim::{Contact, Control, DT_S, Sensed, Start, VehicleParameters, World, testing};
@@ -197,7 +197,7 @@ fn counts(contact: Contact, judgement: &Judgement) -> bool {
     let collision = Collision {
         contact,
         step: 0,
-        body: Body::Sedan,
+        body: BodyWord::engine(Body::Sedan),
         mass_t: 1.55,
         verb: Verb::CrossRoad,
         spawned_s: 0.0,

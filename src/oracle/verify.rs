@@ -145,7 +145,7 @@ fn collision(log: &EpisodeLog, obstacle: Option<Obstacle>) -> Result<usize, Stri
     let meant =
         |collision: &Collision| obstacle.is_none_or(|wanted| collision.contact.obstacle == wanted.number);
     let index = log.collisions.iter().position(meant).ok_or_else(|| "no such collision".to_owned())?;
-    let body = log.collisions[index].body;
+    let body = log.collisions[index].body.like;
     match obstacle {
         Some(wanted) if !wanted.kind.fits(body.is_vehicle()) => {
             Err(format!("npc#{} is a {}", wanted.number, body.name()))

@@ -1,30 +1,25 @@
 //! The memory as sets of values: what each cell may hold, and how an action changes that.
 
-use crate::model::{EffectDef, Interval, SetDef, Space, StateDef, Type};
+use crate::model::{Interval, SetDef, Space, StateDef, Type};
 use crate::prove::enclose::{Known, Values, enclose};
 
 impl Space {
     /// [`Space::memory_after`] for sets of values.
     pub(crate) fn cells_after(&self, action: usize, locals: &[Values], before: &[Values]) -> Vec<Values> {
         let mut after = before.to_vec();
-        for effect in &self.actions[action].effects {
-            if let EffectDef::Set(set) = effect {
-                self.change_cells(&mut after, set, locals);
-            }
-        }
-        self.each_step.iter().for_each(|set| self.change_cells(&mut after, set, &[]));
+        self.sets(Some(action)).for_each(|set| self.change_cells(&mut after, set, locals));
         after
     }
 
     /// [`Space::memory_after_wait`] for sets of values, where no rule is in the way.
     pub(crate) fn cells_after_wait(&self, before: &[Values]) -> Vec<Values> {
         let mut after = before.to_vec();
-        self.each_step.iter().for_each(|set| self.change_cells(&mut after, set, &[]));
+        self.sets(None).for_each(|set| self.change_cells(&mut after, set, &[]));
         after
     }
 
     fn change_cells(&self, memory: &mut [Values], set: &SetDef, locals: &[Values]) {
-        let known = Known { functions: &self.functions, locals, cells: memory, road: None };
+        let known = Known { functions: &self.functions, locals, cells: memory, road: None, case: None };
         let value = enclose(&set.value, &known);
         let key = set.key.as_ref().map(|key| enclose(key, &known));
         let state = &self.states[set.state];
@@ -45,7 +40,7 @@ impl Space {
     /// Whether a step with an action may set a cell.
     pub(crate) fn may_set(&self, action: usize, locals: &[Values], cell: usize) -> bool {
         let unknown = self.cells_unknown();
-        let known = Known { functions: &self.functions, locals, cells: &unknown, road: None };
+        let known = Known { functions: &self.functions, locals, cells: &unknown, road: None, case: None };
         let may = |set: &SetDef| {
             let position = self.states[set.state].position_of(cell);
             position.is_some_and(|position| match set.key.as_ref().map(|key| enclose(key, &known)) {
@@ -53,9 +48,7 @@ impl Space {
                 Some(Values::Truth { .. } | Values::Number(_)) | None => true,
             })
         };
-        let effects = &self.actions[action].effects;
-        effects.iter().any(|effect| matches!(effect, EffectDef::Set(set) if may(set)))
-            || self.each_step.iter().any(may)
+        self.sets(Some(action)).any(may)
     }
 
     /// Every value of every cell.

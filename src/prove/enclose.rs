@@ -5,7 +5,10 @@
 
 use crate::model::expr::{Arithmetic, Comparison, Expr, ExprKind};
 use crate::model::vocabulary::Fact;
-use crate::model::{FnDef, Interval, RoadFacts, Value};
+use crate::model::{
+    EGO_ACCELERATION_MPS2_MAX, FnDef, Interval, JUNCTION_AHEAD_M_MAX, RoadFacts, SPEED_MPS_MAX, Value,
+};
+use crate::prove::moment::Case;
 use crate::units::Rational;
 
 /// The most variants of an enum: a set of them fits one integer.
@@ -31,6 +34,8 @@ pub(crate) struct Known<'a> {
     pub cells: &'a [Values],
     /// `None`: any road.
     pub road: Option<&'a RoadFacts>,
+    /// `None`: any moment.
+    pub case: Option<&'a Case>,
 }
 
 impl Values {
@@ -101,7 +106,11 @@ pub(crate) fn enclose(expr: &Expr, known: &Known<'_>) -> Values {
             let chosen = positions(values(key).variants()).map(|key| known.cells[first + key]);
             chosen.reduce(Values::union).unwrap_or(Values::Variants(0))
         }
-        ExprKind::Fact(fact) | ExprKind::OfRoadUser(_, fact) => fact_values(*fact, known),
+        ExprKind::Fact(fact) => match known.case.and_then(|case| case.number(*fact)) {
+            Some(piece) => Values::Number(piece),
+            None => fact_values(*fact, known),
+        },
+        ExprKind::OfRoadUser(_, fact) => fact_values(*fact, known),
         ExprKind::Call(function, arguments) => {
             let locals: Vec<Values> = arguments.iter().map(values).collect();
             enclose(&known.functions[*function].body, &Known { locals: &locals, ..*known })
@@ -146,7 +155,11 @@ pub(crate) fn enclose(expr: &Expr, known: &Known<'_>) -> Values {
             None => Values::UNKNOWN_TRUTH,
             Some(road) => Values::truth(names.contains(&road.name)),
         },
-        ExprKind::IsWord(..) => Values::UNKNOWN_TRUTH,
+        ExprKind::IsWord(fact, words) => match known.case.and_then(|case| case.word(*fact)) {
+            Some(word) => Values::truth(words.iter().any(|one| one == word)),
+            None => Values::UNKNOWN_TRUTH,
+        },
+        ExprKind::IsBody(..) => Values::UNKNOWN_TRUTH,
         ExprKind::Match { subject, arm_of, arms } => {
             let chosen = positions(values(subject).variants()).map(|variant| values(&arms[arm_of[variant]]));
             chosen.reduce(Values::union).unwrap_or_else(|| values(&arms[0]))
@@ -155,15 +168,25 @@ pub(crate) fn enclose(expr: &Expr, known: &Known<'_>) -> Values {
 }
 
 fn fact_values(fact: Fact, known: &Known<'_>) -> Values {
-    match fact {
-        Fact::RoadLimit => match known.road {
-            Some(road) => Values::Number(Interval::point(road.limit)),
-            None => Values::Number(Interval::NOT_NEGATIVE),
-        },
-        Fact::EgoAcceleration | Fact::EgoOffset | Fact::EgoRouteLeft => Values::Number(Interval::ALL),
-        Fact::EgoSpeed
+    match (fact, known.road) {
+        (Fact::RoadLimit, Some(road)) => Values::Number(Interval::point(road.limit)),
+        _ => fact_range(fact).map_or(Values::UNKNOWN_TRUTH, Values::Number),
+    }
+}
+
+/// What a fact that is a number may be, on any road and at any moment.
+pub(super) fn fact_range(fact: Fact) -> Option<Interval> {
+    let between = |low: f64, high: f64| match (Rational::from_f64(low), Rational::from_f64(high)) {
+        (Some(low), Some(high)) => Interval::closed(low, high),
+        _ => Interval::ALL,
+    };
+    Some(match fact {
+        Fact::EgoSpeed => between(0.0, SPEED_MPS_MAX),
+        Fact::EgoAcceleration => between(-EGO_ACCELERATION_MPS2_MAX, EGO_ACCELERATION_MPS2_MAX),
+        Fact::EgoJunctionAhead | Fact::NpcJunctionAhead => between(0.0, JUNCTION_AHEAD_M_MAX),
+        Fact::EgoOffset | Fact::EgoRouteLeft => Interval::ALL,
+        Fact::RoadLimit
         | Fact::EgoLimit
-        | Fact::EgoJunctionAhead
         | Fact::RoadUsers
         | Fact::NearestGap
         | Fact::NearestSpeed
@@ -171,15 +194,12 @@ fn fact_values(fact: Fact, known: &Known<'_>) -> Values {
         | Fact::StepNumber
         | Fact::NpcSpeed
         | Fact::NpcGap
-        | Fact::NpcJunctionAhead
         | Fact::NpcLimit
         | Fact::SpawnGap
-        | Fact::SafetyGap => Values::Number(Interval::NOT_NEGATIVE),
-        Fact::Proc => Values::Number(Interval::closed(Rational::ZERO, Rational::ONE)),
-        Fact::Collision | Fact::Repeated | Fact::Sudden | Fact::Struck | Fact::Avoidable => {
-            Values::UNKNOWN_TRUTH
-        }
-    }
+        | Fact::SafetyGap => Interval::NOT_NEGATIVE,
+        Fact::Proc => between(0.0, 1.0),
+        Fact::Collision | Fact::Repeated | Fact::Sudden | Fact::Struck | Fact::Avoidable => return None,
+    })
 }
 
 fn positions(set: u128) -> impl Iterator<Item = usize> {

@@ -2,7 +2,7 @@
 
 use crate::model::rules::{Demand, RowRules};
 use crate::model::{Row, RuleBody, RulesInForce, Space, code};
-use crate::prove::enclose::enclose;
+use crate::prove::moment::always_holds;
 use crate::syntax::{Diagnostic, listed};
 
 /// Limit on rows times rules for the whole report; rules beyond it are not looked at.
@@ -73,8 +73,7 @@ fn follows(space: &Space, rule: usize, others: &RulesInForce, work: &mut usize) 
                 RuleBody::Holds(_) | RuleBody::During(_) => false,
             })
         }
-        RuleBody::During(_) => false,
-        RuleBody::Holds(_) => {
+        RuleBody::During(_) | RuleBody::Holds(_) => {
             bound().all(|row| holds(space, row, rule, others)) && start_holds(space, rule, others)
         }
     }
@@ -93,10 +92,12 @@ fn start_holds(space: &Space, rule: usize, others: &RulesInForce) -> bool {
 }
 
 fn holds(space: &Space, row: &Row, rule: usize, others: &RulesInForce) -> bool {
-    let Some(Demand::Holds(condition)) = space.rules[rule].body.demand(row.action) else { return false };
+    let body = &space.rules[rule].body;
+    let demanded = body.demand(row.action).and_then(Demand::condition);
+    let Some(condition) = demanded.or_else(|| body.during(row.action)) else { return false };
     let rules = RowRules { space, row, road: None, in_force: others };
     // If the other rules leave the row no value, the row says nothing about this rule.
     let Some(locals) = rules.settle() else { return false };
     let after = space.cells_after(row.action, &locals, &space.cells_unknown());
-    !enclose(condition, &rules.known(&locals, &after)).may_fail()
+    always_holds(condition, &rules.known(&locals, &after), &space.episode)
 }

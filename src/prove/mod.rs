@@ -9,6 +9,7 @@ mod clock;
 mod cut;
 mod enclose;
 mod implied;
+mod moment;
 mod reach;
 mod realise;
 mod reduce;
@@ -39,6 +40,7 @@ pub(crate) fn report(space: &Space, realisable: &Realisable) -> Vec<Diagnostic> 
     diagnostics.extend(cut::report(space));
     diagnostics.extend(implied::report(space));
     diagnostics.extend(unfair::report(space));
+    diagnostics.extend(moment::report(space));
     diagnostics.extend(clock::report(space));
     diagnostics
 }

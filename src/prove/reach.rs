@@ -7,11 +7,13 @@ use std::sync::Arc;
 
 use crate::model::expr::Expr;
 use crate::model::rules::{Bound, Demand, RowRules, allowed};
+use crate::model::vocabulary::Word;
 use crate::model::{
     ActionDef, Domain, Facts, Interval, Memory, Parameter, Reach, Road, Row, RuleBody, RulesInForce, Space,
     Type, Value, code, evaluate, locals,
 };
 use crate::prove::enclose::{Known, Values, enclose};
+use crate::prove::moment::{may_hold_together, ranges_named};
 use crate::syntax::{Diagnostic, listed};
 
 /// Rounds of narrowing: a bound may depend on another one, rarely on two.
@@ -110,7 +112,7 @@ fn products(space: &Space, action: &ActionDef) -> Vec<Vec<Value>> {
     rows
 }
 
-impl RowRules<'_> {
+impl<'a> RowRules<'a> {
     fn reach(self) -> Reach {
         let parameters = &self.space.actions[self.row.action].parameters;
         if let Some(locals) = self.settle() {
@@ -161,8 +163,8 @@ impl RowRules<'_> {
             }
         }
         let after = self.space.cells_after(self.row.action, &locals, before);
-        let possible = self.demands().all(|(_, demand)| match demand {
-            Demand::Holds(condition) => enclose(condition, &self.known(&locals, &after)).may_hold(),
+        let may_move = self.demands().all(|(_, demand)| match demand {
+            Demand::Holds(_) => true,
             Demand::Moves { cell, allowed, .. } => match after[cell] {
                 Values::Variants(set) => {
                     (0..allowed.len()).any(|to| set >> to & 1 == 1 && allowed.iter().any(|from| from[to]))
@@ -170,11 +172,22 @@ impl RowRules<'_> {
                 Values::Truth { .. } | Values::Number(_) => true,
             },
         });
+        let known = self.known(&locals, &after);
+        let possible = may_move && may_hold_together(&self.conditions(), &known, &self.space.episode);
         possible.then_some(locals)
     }
 
+    /// The conditions of a draw: those of rules, and the `where`s that ask about the moment. The others are bounds, or
+    /// are left to solving.
+    pub fn conditions(self) -> Vec<&'a Expr> {
+        let parameters = &self.space.actions[self.row.action].parameters;
+        let wheres = parameters.iter().filter_map(|parameter| parameter.condition.as_ref());
+        let of_rules = self.demands().filter_map(|(_, demand)| demand.condition());
+        of_rules.chain(wheres.filter(|condition| condition.asks_the_world())).collect()
+    }
+
     pub fn known<'k>(&'k self, locals: &'k [Values], cells: &'k [Values]) -> Known<'k> {
-        Known { functions: &self.space.functions, locals, cells, road: self.road }
+        Known { functions: &self.space.functions, locals, cells, road: self.road, case: None }
     }
 
     /// What each rule of a conflict wants, in words.
@@ -185,6 +198,7 @@ impl RowRules<'_> {
         let after = self.space.cells_after(self.row.action, &locals, &before);
         let known = self.known(&locals, &after);
         let mut parts = Vec::new();
+        let mut without_figures = Vec::new();
         for rule in rules {
             let name = &self.space.rules[*rule].name;
             let mut figures = Vec::new();
@@ -202,9 +216,29 @@ impl RowRules<'_> {
                 ));
             }
             match figures.as_slice() {
-                [] => parts.push(self.without_figures(name)),
+                [] => without_figures.push(name.as_str()),
                 figures => parts.push(format!("rule `{name}`: {}", figures.join("; "))),
             }
+        }
+        match (parts.as_slice(), without_figures.as_slice()) {
+            (_, []) => {}
+            ([], [only]) => parts.push(self.without_figures(only)),
+            _ => {
+                let names: Vec<&str> =
+                    rules.iter().map(|rule| self.space.rules[*rule].name.as_str()).collect();
+                parts.push(format!("{} cannot hold together", listed(&names)));
+            }
+        }
+        let conditions: Vec<&Expr> = rules
+            .iter()
+            .filter_map(|rule| self.space.rules[*rule].body.demand(self.row.action)?.condition())
+            .collect();
+        for (fact, range) in ranges_named(&conditions, &self.space.episode) {
+            let unit = match fact.ty() {
+                Type::Quantity(dimension) => format!(" {}", dimension.si_unit()),
+                Type::Int | Type::Bool | Type::Enum(_) => String::new(),
+            };
+            parts.push(format!("`{}` is within {range}{unit}", fact.name()));
         }
         match parts.as_slice() {
             [] => "its own ranges and conditions leave no value".to_owned(),
@@ -242,6 +276,8 @@ pub(crate) fn declared(space: &Space, row: &Row) -> Vec<Values> {
 /// Diagnostics about rows: actions that have none, dead rows, masked rows.
 pub(crate) fn report(space: &Space) -> Vec<Diagnostic> {
     let mut diagnostics = Vec::new();
+    let mut gone: Vec<Gone<'_>> = Vec::new();
+    let mut masked = Vec::new();
     for (index, action) in space.actions.iter().enumerate() {
         let rows: Vec<&Row> = space.rows.iter().filter(|row| row.action == index).collect();
         if rows.is_empty() {
@@ -250,49 +286,128 @@ pub(crate) fn report(space: &Space) -> Vec<Diagnostic> {
                 .at(action.span, "its conditions leave no value");
             diagnostics.push(conditions.fold(error, |error, p| error.beside(p.span, "by this `where`")));
         }
-        diagnostics.extend(report_dead(space, action, &rows));
+        let (dead, left): (Vec<&Row>, Vec<&Row>) = rows.iter().copied().partition(|row| is_gone(row));
+        gone.extend(Gone::of(action, dead, left.is_empty()));
+        masked.extend(report_masked(space, action, &left));
     }
+    // Actions that the same rules leave no row share an error.
+    let mut together: Vec<Vec<Gone<'_>>> = Vec::new();
+    for one in gone {
+        match together.iter_mut().find(|many| !one.rules.is_empty() && many[0].rules == one.rules) {
+            Some(many) => many.push(one),
+            None => together.push(vec![one]),
+        }
+    }
+    diagnostics.extend(together.iter().map(|gone| match gone.as_slice() {
+        [one] => one.error(space),
+        many => error_of_many(space, many),
+    }));
+    diagnostics.extend(masked);
     diagnostics
 }
 
-/// One error for the rows of an action that are dead everywhere, and one warning for each road on
-/// which others are masked.
-fn report_dead(space: &Space, action: &ActionDef, rows: &[&Row]) -> Vec<Diagnostic> {
-    let mut diagnostics = Vec::new();
-    let dead_on = |row: &Row, road: usize| matches!(row.roads[road], Reach::Dead { .. });
-    let everywhere = |row: &Row| !row.roads.is_empty() && (0..row.roads.len()).all(|road| dead_on(row, road));
-    let (gone, left): (Vec<&Row>, Vec<&Row>) = rows.iter().copied().partition(|row| everywhere(row));
-    if let Some(Reach::Dead { rules, reason }) = gone.first().and_then(|row| row.roads.first()) {
-        let what = match gone.len() == rows.len() {
-            true => format!("`{}`", action.name),
-            false => format!("{} of `{}`", numbers(&gone), action.name),
-        };
-        let message = match space.roads.as_slice() {
-            [road] => format!("{what} can never run on `{}`", road.name),
-            _ => format!("{what} can never run on any road"),
-        };
+/// Whether a row can run on no road.
+fn is_gone(row: &Row) -> bool {
+    !row.roads.is_empty() && row.roads.iter().all(|reach| matches!(reach, Reach::Dead { .. }))
+}
+
+/// The rows of an action that can run on no road.
+struct Gone<'a> {
+    action: &'a ActionDef,
+    rows: Vec<&'a Row>,
+    /// Whether the action has no others.
+    are_all: bool,
+    /// The rules that leave the first of them no value, and why.
+    rules: &'a [usize],
+    reason: &'a str,
+}
+
+impl<'a> Gone<'a> {
+    fn of(action: &'a ActionDef, rows: Vec<&'a Row>, are_all: bool) -> Option<Gone<'a>> {
+        let Some(Reach::Dead { rules, reason }) = rows.first()?.roads.first() else { return None };
+        Some(Gone { action, rows, are_all, rules, reason })
+    }
+
+    fn what(&self) -> String {
+        match self.are_all {
+            true => format!("`{}`", self.action.name),
+            false => format!("{} of `{}`", numbers(&self.rows), self.action.name),
+        }
+    }
+
+    fn error(&self, space: &Space) -> Diagnostic {
+        let Gone { action, rows, rules, reason, .. } = self;
+        let message = format!("{} can never run on {}", self.what(), any_road(space));
         let error =
-            Diagnostic::error(code::DEAD, message).at(action.span, numbers(&gone)).note(reason.clone());
-        let error = error.help("widen a range, change a rule, or remove the rows with `where`");
+            Diagnostic::error(code::DEAD, message).at(action.span, numbers(rows)).note(*reason).help(HELP);
         let error =
             rules.iter().fold(error, |error, rule| error.beside(space.rules[*rule].span, "by this rule"));
-        let bounded = &space.bounds[gone[0].action];
+        let bounded = &space.bounds[rows[0].action];
         let is_bounded = |local: usize| {
             let of_conflict = |bound: &Bound| bound.rule.is_some_and(|rule| rules.contains(&rule));
             bounded.iter().any(|bound| bound.local == local && of_conflict(bound))
         };
         let ranges = action.parameters.iter().enumerate().filter(|(local, _)| is_bounded(*local));
-        diagnostics.push(ranges.fold(error, |error, (_, parameter)| match &parameter.domain {
+        ranges.fold(error, |error, (_, parameter)| match &parameter.domain {
             Domain::Range(low, high) => {
                 let [low, high] =
                     [low, high].map(|end| space.show(Value::Number(end.to_f64()), parameter.ty));
                 error.beside(parameter.span, format!("`{}` is {low} .. {high}", parameter.name))
             }
             Domain::Values(_) => error,
-        }));
+        })
     }
+}
+
+const HELP: &str = "widen a range, change a rule, or remove the rows with `where`";
+
+/// The most actions that an error about many names, and the most reasons that it gives.
+const ACTIONS_MAX: usize = 4;
+const REASONS_MAX: usize = 3;
+
+/// One error for several actions that the same rules leave no row.
+fn error_of_many(space: &Space, gone: &[Gone<'_>]) -> Diagnostic {
+    let rules = gone[0].rules;
+    let names: Vec<&str> = rules.iter().map(|rule| space.rules[*rule].name.as_str()).collect();
+    let leave = if names.len() == 1 { "leaves" } else { "leave" };
+    let mut named: Vec<String> = gone.iter().take(ACTIONS_MAX).map(Gone::what).collect();
+    if gone.len() > ACTIONS_MAX {
+        named.push(format!("{} other actions", gone.len() - ACTIONS_MAX));
+    }
+    let (last, others) = named.split_last().expect("many are more than none");
+    let what = format!("{} and {last}", others.join(", "));
+    let message = format!("{what} can never run on {}", any_road(space));
+    let error = Diagnostic::error(code::DEAD, message).at(
+        space.rules[rules[0]].span,
+        format!("{} {leave} {} actions no value", listed(&names), gone.len()),
+    );
+    let error =
+        rules[1..].iter().fold(error, |error, rule| error.beside(space.rules[*rule].span, "and this rule"));
+    let shown = gone.iter().take(ACTIONS_MAX);
+    let error = shown.fold(error, |error, one| error.beside(one.action.span, numbers(&one.rows)));
+    let mut reasons: Vec<&str> = Vec::new();
+    for one in gone {
+        if !reasons.contains(&one.reason) {
+            reasons.push(one.reason);
+        }
+    }
+    let error = reasons.iter().take(REASONS_MAX).fold(error, |error, reason| error.note(*reason));
+    error.help(HELP)
+}
+
+fn any_road(space: &Space) -> String {
+    match space.roads.as_slice() {
+        [road] => format!("`{}`", road.name),
+        _ => "any road".to_owned(),
+    }
+}
+
+/// One remark for each road on which some rows of an action are masked, which run on others.
+fn report_masked(space: &Space, action: &ActionDef, left: &[&Row]) -> Vec<Diagnostic> {
+    let mut diagnostics = Vec::new();
     for (index, road) in space.roads.iter().enumerate() {
-        let masked: Vec<&Row> = left.iter().copied().filter(|row| dead_on(row, index)).collect();
+        let is_masked = |row: &&Row| matches!(row.roads[index], Reach::Dead { .. });
+        let masked: Vec<&Row> = left.iter().copied().filter(is_masked).collect();
         let Some(Reach::Dead { rules, reason }) = masked.first().map(|row| &row.roads[index]) else {
             continue;
         };

@@ -126,7 +126,7 @@ impl<'a> OnRoad<'a> {
             if !pending.iter().any(|row| self.depends_on_states(row)) {
                 break;
             }
-            let waited = self.space.memory_after_wait(&state, Some(&self.road.facts), self.in_force);
+            let waited = self.space.memory_after_wait(&state, None, Some(&self.road.facts), self.in_force);
             match states.len() < STATES_MAX {
                 _ if states.contains(&waited) => {}
                 true => states.push(waited),

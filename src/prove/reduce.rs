@@ -39,6 +39,7 @@ pub(super) fn reduce(expr: &Expr, functions: &[FnDef], locals: &[Expr]) -> Expr 
         ExprKind::InList(of, list) => ExprKind::InList(inner(of), all(list)),
         ExprKind::OnRoad(names) => ExprKind::OnRoad(names.clone()),
         ExprKind::IsWord(fact, words) => ExprKind::IsWord(*fact, words.clone()),
+        ExprKind::IsBody(fact, bodies) => ExprKind::IsBody(*fact, bodies.clone()),
         ExprKind::InLanes(of, lanes) => ExprKind::InLanes(inner(of), lanes.clone()),
         ExprKind::Match { subject, arm_of, arms } => {
             let subject = inner(subject);
@@ -69,12 +70,13 @@ fn fold(expr: Expr) -> Expr {
                 | ExprKind::InLanes(..)
                 | ExprKind::OnRoad(_)
                 | ExprKind::IsWord(..)
+                | ExprKind::IsBody(..)
         )
     };
     if expr.any(open) {
         return expr;
     }
-    let known = Known { functions: &[], locals: &[], cells: &[], road: None };
+    let known = Known { functions: &[], locals: &[], cells: &[], road: None, case: None };
     let kind = match (enclose(&expr, &known), expr.ty) {
         (Values::Number(interval), _) => interval.single().map(ExprKind::Number),
         (Values::Variants(set), Type::Enum(of)) if set.is_power_of_two() => {

@@ -1,49 +1,29 @@
 //! Rows that were not found to run: those of which nothing is known, and those that would run only in states to
 //! which no episode comes.
 
-use crate::model::{Row, RulesInForce, Space, code};
+use crate::model::rules::RowRules;
+use crate::model::{ActionDef, Road, Row, RulesInForce, Space, code};
 use crate::prove::clock::never_enabled;
 use crate::prove::reach::numbers;
 use crate::prove::realise::{Realisable, Realised};
+use crate::prove::witness::{Found, Left, Search};
 use crate::syntax::{Diagnostic, listed};
 
-/// One error for each action with rows of which nothing is known, and one warning for each action with rows
-/// that no episode enables.
+/// The most boxes of ranges that are looked at to find the rules which leave a row undecided.
+const BOXES_MAX: usize = 2_000;
+
+/// One error for the rules that leave rows undecided, and one warning for each action with rows that no episode
+/// enables.
 pub(super) fn report(space: &Space, realisable: &Realisable) -> Vec<Diagnostic> {
-    let mut diagnostics = Vec::new();
+    let mut diagnostics = report_unknown(space, realisable);
     let told = never_enabled(space);
     let in_force = RulesInForce::by_default(space);
-    let has_start = space.roads.iter().all(|road| space.memory_at_start(road, &in_force, 0).is_ok());
+    // Where no episode begins, no state is reached.
+    if space.roads.iter().any(|road| space.memory_at_start(road, &in_force, 0).is_err()) {
+        return diagnostics;
+    }
     for (action, definition) in space.actions.iter().enumerate() {
         let rows = || space.rows.iter().filter(move |row| row.action == action);
-        // Roads on which the same rows are open share an error.
-        let mut open: Vec<(Vec<&Row>, Vec<&str>)> = Vec::new();
-        for (index, road) in space.roads.iter().enumerate() {
-            let unknown: Vec<&Row> =
-                rows().filter(|row| realisable[row.index][index] == Realised::Unknown).collect();
-            match open.iter_mut().find(|(known, _)| *known == unknown) {
-                _ if unknown.is_empty() => {}
-                Some((_, roads)) => roads.push(&road.name),
-                None => open.push((unknown, vec![&road.name])),
-            }
-        }
-        for (unknown, roads) in &open {
-            let message = format!("whether `{}` can run on {} is not known", definition.name, listed(roads));
-            let obeyed = match names(space, unknown[0]).as_str() {
-                "" => String::new(),
-                names => format!(" that obey {names}"),
-            };
-            let error = Diagnostic::error(code::UNDECIDED, message)
-                .at(definition.span, numbers(unknown))
-                .note(format!("no values were found{obeyed}, and no proof that there are none"));
-            diagnostics.push(error.help(
-                "say it by sums, products and `match`, of at most six drawn numbers and with low powers",
-            ));
-        }
-        // Where no episode begins, no state is reached.
-        if !has_start {
-            continue;
-        }
         let is_unreached = |row: &&Row| {
             let found = &realisable[row.index];
             found.contains(&Realised::Unreached)
@@ -62,8 +42,84 @@ pub(super) fn report(space: &Space, realisable: &Realisable) -> Vec<Diagnostic> 
     diagnostics
 }
 
+/// The rows of an action of which it is not known whether they run, with the roads on which that is so.
+struct Unknown<'a> {
+    action: &'a ActionDef,
+    rows: Vec<&'a Row>,
+    roads: Vec<&'a str>,
+    /// The rules without which they would run, or be known not to.
+    rules: Vec<usize>,
+}
+
+/// One error for each set of rules that leaves rows undecided, whichever actions they belong to.
+fn report_unknown(space: &Space, realisable: &Realisable) -> Vec<Diagnostic> {
+    let mut together: Vec<Vec<Unknown<'_>>> = Vec::new();
+    for (index, action) in space.actions.iter().enumerate() {
+        let mut of_action: Vec<Unknown<'_>> = Vec::new();
+        for (number, road) in space.roads.iter().enumerate() {
+            let is_unknown =
+                |row: &&Row| row.action == index && realisable[row.index][number] == Realised::Unknown;
+            let rows: Vec<&Row> = space.rows.iter().filter(is_unknown).collect();
+            match of_action.iter_mut().find(|known| known.rows == rows) {
+                _ if rows.is_empty() => {}
+                Some(known) => known.roads.push(&road.name),
+                None => {
+                    let rules = to_blame(space, rows[0], road);
+                    of_action.push(Unknown { action, rows, roads: vec![&road.name], rules });
+                }
+            }
+        }
+        for one in of_action {
+            let alike = |many: &&mut Vec<Unknown<'_>>| {
+                !one.rules.is_empty() && many[0].rules == one.rules && many[0].roads == one.roads
+            };
+            match together.iter_mut().find(alike) {
+                Some(many) => many.push(one),
+                None => together.push(vec![one]),
+            }
+        }
+    }
+    together.iter().map(|many| error(space, many)).collect()
+}
+
+fn error(space: &Space, many: &[Unknown<'_>]) -> Diagnostic {
+    let first = &many[0];
+    let actions: Vec<&str> = many.iter().map(|one| one.action.name.as_str()).collect();
+    let message = format!("whether {} can run on {} is not known", listed(&actions), listed(&first.roads));
+    let error = Diagnostic::error(code::UNDECIDED, message).at(first.action.span, numbers(&first.rows));
+    let others = many[1..].iter();
+    let error = others.fold(error, |error, one| error.beside(one.action.span, numbers(&one.rows)));
+    let rules = first.rules.iter().map(|rule| &space.rules[*rule]);
+    let error = rules.fold(error, |error, rule| error.beside(rule.span, "too complicated to be solved"));
+    let obeyed = match rule_names(space, &first.rules).as_str() {
+        "" => String::new(),
+        names => format!(" that obey {names}"),
+    };
+    let error = error.note(format!("no values were found{obeyed}, and no proof that there are none"));
+    error.help("say it by sums, products and `match`, of at most six drawn numbers and with low powers")
+}
+
+/// The rules that leave a row undecided: without any one of the others it is undecided still.
+fn to_blame(space: &Space, row: &Row, road: &Road) -> Vec<usize> {
+    let left = Left::new(BOXES_MAX);
+    let mut in_force = RulesInForce::by_default(space);
+    for rule in in_force.clone().on_row(row) {
+        let fewer = in_force.except(rule);
+        let rules = RowRules { space, row, road: Some(&road.facts), in_force: &fewer };
+        let search = Search { rules, left: &left };
+        if search.memories().0.iter().all(|memory| search.at(memory) == Found::Unknown) {
+            in_force = fewer;
+        }
+    }
+    in_force.on_row(row).collect()
+}
+
 /// The rules on a row that are in force by default, in words.
 fn names(space: &Space, row: &Row) -> String {
-    let rules = row.rules.iter().map(|rule| &space.rules[*rule]).filter(|rule| !rule.optional);
-    listed(&rules.map(|rule| rule.name.as_str()).collect::<Vec<_>>())
+    let rules: Vec<usize> = RulesInForce::by_default(space).on_row(row).collect();
+    rule_names(space, &rules)
+}
+
+fn rule_names(space: &Space, rules: &[usize]) -> String {
+    listed(&rules.iter().map(|rule| space.rules[*rule].name.as_str()).collect::<Vec<_>>())
 }

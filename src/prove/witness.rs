@@ -13,12 +13,13 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 
 use crate::model::expr::{Expr, ExprKind};
-use crate::model::rules::{Before, Breach, Candidate, Choose, Demand, Nearest, Room, RowRules};
+use crate::model::rules::{Before, Candidate, Choose, Demand, Nearest, Room, RowRules};
 use crate::model::{
     ActionDef, Domain, EffectDef, End, Facts, Initial, Interval, Memory, Parameter, Road, Row, RulesInForce,
     SetDef, Space, SpawnFacts, StateDef, Type, Value, WorldFacts, evaluate, locals, spawn_out_of_bounds,
 };
-use crate::prove::enclose::{Known, Values, enclose};
+use crate::prove::enclose::Values;
+use crate::prove::moment::may_hold_together;
 use crate::units::Rational;
 
 /// The most boxes of ranges looked at for one choice of the listed values and one memory.
@@ -271,20 +272,16 @@ impl Search<'_> {
         }
         let world = WorldFacts { spawns, ..WorldFacts::default() };
         let candidate = Candidate { values, before, after, world: Some(&world) };
-        self.rules.breaches(candidate).all(|breach| self.is_left_open(breach, candidate))
+        let mut breaches = self.rules.breaches(candidate).peekable();
+        breaches.peek().is_none()
+            || breaches.all(|breach| breach.asks_about_moment()) && self.is_left_open(candidate)
     }
 
     /// The states that one step with this row leads to, and whether there can be no other.
     pub fn successors(&self, memory: &Memory) -> (Vec<Memory>, bool) {
         let action = self.action();
-        let sets: Vec<&SetDef> = action
-            .effects
-            .iter()
-            .filter_map(|effect| match effect {
-                EffectDef::Set(set) => Some(&**set),
-                EffectDef::Spawn(_) => None,
-            })
-            .collect();
+        // What every step sets is left out: a step without this row leads there too.
+        let sets: Vec<&SetDef> = action.sets().collect();
         if sets.is_empty() {
             return (Vec::new(), true);
         }
@@ -314,23 +311,12 @@ impl Search<'_> {
         (after, is_complete)
     }
 
-    /// Whether what a candidate breaks depends on a moment or a place that an empty world does not have, and might
-    /// hold there.
-    fn is_left_open(&self, breach: Breach<'_>, candidate: Candidate<'_>) -> bool {
-        let condition = match breach {
-            Breach::Where(_, condition)
-            | Breach::Condition { condition, .. }
-            | Breach::Spawn { condition, .. } => condition,
-            Breach::Move { .. } => return false,
-        };
+    /// Whether some moment or place, which an empty world does not have, might meet all conditions with these values.
+    fn is_left_open(&self, candidate: Candidate<'_>) -> bool {
         let points = |values: &[Value]| values.iter().map(|value| Values::point(*value)).collect::<Vec<_>>();
-        let known = Known {
-            functions: &self.rules.space.functions,
-            locals: &points(candidate.values),
-            cells: &points(candidate.after.cells()),
-            road: self.rules.road,
-        };
-        condition.asks_about_moment() && enclose(condition, &known).may_hold()
+        let (locals, cells) = (points(candidate.values), points(candidate.after.cells()));
+        let known = self.rules.known(&locals, &cells);
+        may_hold_together(&self.rules.conditions(), &known, &self.rules.space.episode)
     }
 
     /// Memories to try: the initial one first, then every value of the cells that the rules or effects of the
@@ -375,14 +361,14 @@ impl Search<'_> {
             Demand::Holds(condition) => named(condition),
             Demand::Moves { cell: moved, .. } => moved == state.first_cell + cell,
         };
-        let by_effect = |effect: &EffectDef| match effect {
-            EffectDef::Set(set) => named(&set.value) || set.key.as_ref().is_some_and(named),
+        let by_set = |set: &SetDef| named(&set.value) || set.key.as_ref().is_some_and(named);
+        let by_spawn = |effect: &EffectDef| match effect {
+            EffectDef::Set(_) => false,
             EffectDef::Spawn(spawn) => named(&spawn.speed) || named(&spawn.distance),
         };
-        let by_step = |set: &SetDef| named(&set.value) || set.key.as_ref().is_some_and(named);
         self.rules.demands().any(|(_, demand)| by_rule(demand))
-            || self.action().effects.iter().any(by_effect)
-            || self.rules.space.each_step.iter().any(by_step)
+            || self.rules.space.sets(Some(self.rules.row.action)).any(by_set)
+            || self.action().effects.iter().any(by_spawn)
     }
 }
 

@@ -5,6 +5,7 @@
 //! driving system believes is dashed, so that a missed or misplaced object is seen at a glance. Chevrons show the
 //! direction of a lane; a yellow line separates opposing traffic.
 
+use std::collections::BTreeMap;
 use std::fmt::Write;
 
 use crate::ads::{PerceivedObject, Status};
@@ -39,8 +40,9 @@ pub struct Snapshot {
     pub contact: Option<Vec2>,
 }
 
-/// The moments in rows of four, as one SVG document.
-pub fn picture(moments: &[Snapshot]) -> String {
+/// The moments in rows of four, as one SVG document. `names` are what the author calls road users, by number, where the
+/// engine has no name for them.
+pub fn picture(moments: &[Snapshot], names: &BTreeMap<u32, String>) -> String {
     let columns = moments.len().clamp(1, COLUMNS);
     let rows = moments.len().max(1).div_ceil(columns);
     let width_px = PANEL_PX * columns as f64;
@@ -59,7 +61,7 @@ pub fn picture(moments: &[Snapshot]) -> String {
             svg,
             r##"<svg x="{left_px}" y="{top_px}" width="{PANEL_PX}" height="{PANEL_PX}"><rect width="100%" height="100%" fill="#e9eee4" stroke="#888888"/>"##
         );
-        Panel::new(&mut svg, &moment.world, radius_m).draw(moment, &moments[..index]);
+        Panel::new(&mut svg, &moment.world, radius_m, names).draw(moment, &moments[..index]);
         svg.push_str("</svg>\n");
         caption(&mut svg, (left_px, top_px), moment);
     }
@@ -86,14 +88,20 @@ struct Panel<'a> {
     canvas: Canvas<'a>,
     centre: Vec2,
     radius_m: f64,
+    names: &'a BTreeMap<u32, String>,
 }
 
 impl Panel<'_> {
-    fn new<'a>(svg: &'a mut String, world: &World, radius_m: f64) -> Panel<'a> {
+    fn new<'a>(
+        svg: &'a mut String,
+        world: &World,
+        radius_m: f64,
+        names: &'a BTreeMap<u32, String>,
+    ) -> Panel<'a> {
         let centre = world.ego_outline().pose.position;
         let north_west = centre + Vec2::new(-radius_m, radius_m);
         let canvas = Canvas { svg, north_west, px_per_m: PANEL_PX / (2.0 * radius_m) };
-        Panel { canvas, centre, radius_m }
+        Panel { canvas, centre, radius_m, names }
     }
 
     /// `earlier` are the moments of the panels before.
@@ -190,7 +198,8 @@ impl Panel<'_> {
         let centre = obstacle.outline.pose.position;
         let arrow = [centre, centre + obstacle.velocity_mps * VELOCITY_S];
         self.canvas.polyline(&arrow, r##"stroke="#202020" stroke-width="1.2""##);
-        let name = format!("{} {}", obstacle.id, obstacle.body.name());
+        let body = self.names.get(&obstacle.id).map_or(obstacle.body.name(), String::as_str);
+        let name = format!("{} {body}", obstacle.id);
         let style = r##"font-size="11" fill="#202020""##;
         self.canvas.text(centre + Vec2::new(1.5, 1.5), &name, style);
     }

@@ -3,6 +3,9 @@
 use crate::statistics::{Estimate, Interval};
 use crate::study::{AgentResults, BaselineComparison, Rate, RoadResults, StudyResults};
 
+/// What every terminal shows in a line.
+const WIDTH_MAX: usize = 80;
+
 /// Measures by which comparisons are printed.
 const PRINTED_COMPARISONS: [&str; 2] = ["counted", "distinct"];
 
@@ -152,7 +155,8 @@ fn with_interval(value: f64, interval: Option<Interval>) -> String {
     }
 }
 
-/// Columns side by side; all but the first are aligned right.
+/// Columns side by side; all but the first are aligned right. What does not fit in a line goes on below, beside the first
+/// column again.
 fn table<'a>(head: impl IntoIterator<Item = &'a str>, rows: impl IntoIterator<Item = Vec<String>>) -> String {
     let mut lines = vec![head.into_iter().map(str::to_owned).collect::<Vec<_>>()];
     lines.extend(rows);
@@ -160,13 +164,23 @@ fn table<'a>(head: impl IntoIterator<Item = &'a str>, rows: impl IntoIterator<It
     let width = |column: usize| lines.iter().map(|line| line[column].chars().count()).max().unwrap_or(0);
     let widths: Vec<usize> = (0..columns).map(width).collect();
     let mut text = String::new();
-    for line in &lines {
-        let mut row = format!("  {:width$}", line[0], width = widths[0]);
-        for (cell, width) in line.iter().zip(&widths).skip(1) {
-            row.push_str(&format!("  {cell:>width$}"));
+    let mut from = 1;
+    while from < columns {
+        let mut taken = 2 + widths[0];
+        let fitting = widths[from..].iter().take_while(|width| {
+            taken += 2 + **width;
+            taken <= WIDTH_MAX
+        });
+        let to = from + fitting.count().max(1);
+        for line in &lines {
+            let mut row = format!("  {:width$}", line[0], width = widths[0]);
+            for (cell, width) in line[from..to].iter().zip(&widths[from..to]) {
+                row.push_str(&format!("  {cell:>width$}"));
+            }
+            text.push_str(row.trim_end());
+            text.push('\n');
         }
-        text.push_str(row.trim_end());
-        text.push('\n');
+        from = to;
     }
     text
 }

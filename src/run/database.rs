@@ -19,11 +19,15 @@ use crate::run::sealed::{DatabaseError, Layout};
 use crate::run::shape::Shape;
 use crate::run::summary::{EpisodeSummary, Finding};
 
-pub(crate) const LAYOUT: Layout =
-    Layout { version: 7, unit: "episode", tables: &["episode", "step", "offer", "collision", "learning"] };
+pub(crate) const LAYOUT: Layout = Layout {
+    version: 8,
+    unit: "episode",
+    tables: &["episode", "step", "offer", "collision", "learning", "scenario"],
+    naming: Some(("offer", "reason")),
+};
 
 /// `offer` says for each row in how many steps of an episode it was legal (reason 0) or was refused for a reason; a
-/// training leaves it empty. `learning` and `checkpoint` belong to a training (`train::record`) and stay empty in a run.
+/// training leaves it empty. `scenario` has the digest of the file that a run wrote of an episode. `learning` and `checkpoint` belong to a training (`train::record`) and stay empty in a run.
 const SCHEMA: &str = "
 CREATE TABLE episode (
   episode INTEGER PRIMARY KEY, road TEXT NOT NULL, seed TEXT NOT NULL, ended TEXT NOT NULL,
@@ -33,7 +37,7 @@ CREATE TABLE episode (
 ) STRICT;
 CREATE TABLE collision (
   episode INTEGER NOT NULL REFERENCES episode, number INTEGER NOT NULL, time_s REAL NOT NULL,
-  step INTEGER NOT NULL, obstacle INTEGER NOT NULL, body TEXT NOT NULL, verb TEXT NOT NULL,
+  step INTEGER NOT NULL, obstacle INTEGER NOT NULL, body TEXT NOT NULL, own_body TEXT, verb TEXT NOT NULL,
   ego_speed_mps REAL NOT NULL, closing_speed_mps REAL NOT NULL,
   on_ego_ahead_m REAL NOT NULL, on_ego_left_m REAL NOT NULL,
   repeated INTEGER NOT NULL, sudden INTEGER NOT NULL, struck INTEGER NOT NULL, counted INTEGER NOT NULL,
@@ -42,6 +46,7 @@ CREATE TABLE collision (
   obstacle_delta_v_mps REAL NOT NULL, cause TEXT, shape TEXT, priority TEXT NOT NULL, r157_letter TEXT NOT NULL,
   PRIMARY KEY (episode, number)
 ) STRICT;
+CREATE TABLE scenario (episode INTEGER PRIMARY KEY REFERENCES episode, digest TEXT NOT NULL) STRICT;
 CREATE TABLE reason (reason INTEGER PRIMARY KEY, text TEXT NOT NULL UNIQUE) STRICT;
 CREATE TABLE offer (
   episode INTEGER NOT NULL REFERENCES episode, action_row INTEGER NOT NULL, reason INTEGER NOT NULL, steps INTEGER NOT NULL,
@@ -73,7 +78,8 @@ impl Database {
         Ok(Database { connection })
     }
 
-    /// Adds a whole episode, or nothing. `in_words` says what a draw does in the space's own words.
+    /// Adds a whole episode, or nothing. `in_words` says what a draw does in the space's own words; `scenario` is the
+    /// digest of the file that was written of it.
     ///
     /// # Errors
     /// If the file cannot be written.
@@ -82,9 +88,14 @@ impl Database {
         summary: &EpisodeSummary,
         log: &EpisodeLog,
         in_words: impl Fn(&Draw) -> String,
+        scenario: Option<&str>,
     ) -> Result<(), DatabaseError> {
         let transaction = self.connection.transaction()?;
         add_all(&transaction, summary, log, in_words)?;
+        if let Some(digest) = scenario {
+            let mut insert = transaction.prepare_cached("INSERT INTO scenario VALUES (?, ?)")?;
+            insert.execute(params![summary.episode as i64, digest])?;
+        }
         LAYOUT.seal(&transaction, summary.episode as i64)?;
         transaction.commit()?;
         Ok(())
@@ -99,6 +110,23 @@ impl Database {
         let numbers = statement.query_map([], |row| row.get::<_, i64>(0))?;
         let number = |found: i64| usize::try_from(found).map_err(|_| DatabaseError::Episode { found });
         numbers.map(|found| number(found?)).collect()
+    }
+
+    /// The episodes of which a scenario was written: number, road, and the digest of the file.
+    ///
+    /// # Errors
+    /// If the file cannot be read.
+    pub fn scenarios(&self) -> Result<Vec<(usize, String, String)>, DatabaseError> {
+        let query =
+            "SELECT episode, road, digest FROM scenario JOIN episode USING (episode) ORDER BY episode";
+        let mut statement = self.connection.prepare(query)?;
+        let rows = statement.query_map([], |row| Ok((row.get::<_, i64>(0)?, row.get(1)?, row.get(2)?)))?;
+        rows.map(|row| {
+            let (found, road, digest) = row?;
+            let episode = usize::try_from(found).map_err(|_| DatabaseError::Episode { found })?;
+            Ok((episode, road, digest))
+        })
+        .collect()
     }
 
     /// Why chosen actions were refused, and how often; the most frequent reason first. Figures in a reason are
@@ -315,7 +343,7 @@ fn add_offers(transaction: &Transaction, summary: &EpisodeSummary) -> Result<(),
     let mut insert = transaction.prepare_cached(
         "INSERT INTO offer VALUES (?, ?, coalesce((SELECT reason FROM reason WHERE text = ?), 0), ?)",
     )?;
-    for ((row, reason), steps) in &summary.offered.steps {
+    for ((row, reason), steps) in &summary.offered.steps() {
         if let Some(reason) = reason {
             known.execute([reason])?;
         }
@@ -360,7 +388,7 @@ fn add_collision(
     let severity = oracle::severity(collision);
     transaction
         .prepare_cached(
-            "INSERT INTO collision VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+            "INSERT INTO collision VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
         )?
         .execute(params![
             episode as i64,
@@ -368,7 +396,8 @@ fn add_collision(
             contact.time_s,
             collision.step as i64,
             contact.obstacle,
-            collision.body.name(),
+            collision.body.like.name(),
+            finding.own_body,
             collision.verb.name(),
             contact.ego_speed_mps,
             contact.closing_speed_mps,

@@ -9,23 +9,43 @@ use crate::action::{Offer, Refusal};
 
 use crate::run::database::RefusalCount;
 
-/// The offers of an episode, added up over its steps.
+/// The offers of an episode, step by step.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Offered {
-    /// Steps by row and reason; without a reason the row was legal.
-    pub(super) steps: BTreeMap<(usize, Option<String>), u32>,
+    rows: Vec<RowOffers>,
+}
+
+/// The offers of a row.
+#[derive(Debug, Clone, Default, PartialEq)]
+struct RowOffers {
+    legal: u32,
+    refused: Vec<Refusal>,
 }
 
 impl Offered {
-    /// One step's offers, by row.
+    /// One step's offers, by row. Refusals are put in words once, at the end: most steps refuse most rows.
     pub(super) fn note(&mut self, offers: &[Offer]) {
-        for (row, offer) in offers.iter().enumerate() {
-            let reason = match offer {
-                Offer::Legal(_) => None,
-                Offer::Refused(Refusal { rule, reason, .. }) => Some(in_words(rule.as_deref(), reason)),
-            };
-            *self.steps.entry((row, reason)).or_default() += 1;
+        self.rows.resize_with(offers.len(), RowOffers::default);
+        for (row, offer) in self.rows.iter_mut().zip(offers) {
+            match offer {
+                Offer::Legal(_) => row.legal += 1,
+                Offer::Refused(refusal) => row.refused.push(refusal.clone()),
+            }
         }
+    }
+
+    /// Steps by row and reason; without a reason the row was legal.
+    pub(super) fn steps(&self) -> BTreeMap<(usize, Option<String>), u32> {
+        let mut steps = BTreeMap::new();
+        for (index, row) in self.rows.iter().enumerate() {
+            if row.legal > 0 {
+                steps.insert((index, None), row.legal);
+            }
+            for Refusal { rule, reason } in &row.refused {
+                *steps.entry((index, Some(in_words(rule.as_deref(), reason)))).or_default() += 1;
+            }
+        }
+        steps
     }
 }
 

@@ -58,6 +58,8 @@ pub(crate) struct Layout {
     pub unit: &'static str,
     /// The tables with its rows.
     pub tables: &'static [&'static str],
+    /// A table whose rows name rows of another by a column with that one's name. What they name is sealed with them.
+    pub naming: Option<(&'static str, &'static str)>,
 }
 
 impl Layout {
@@ -129,7 +131,10 @@ impl Layout {
     fn rows_digest(&self, connection: &Connection, number: i64) -> Result<String, rusqlite::Error> {
         let mut whole = Sha256::new();
         for table in self.tables {
-            let query = format!("SELECT * FROM {table} WHERE {} = ?", self.unit);
+            let named = self.naming.filter(|(by, _)| by == table);
+            let join =
+                named.map_or(String::new(), |(_, named)| format!(" LEFT JOIN {named} USING ({named})"));
+            let query = format!("SELECT * FROM {table}{join} WHERE {} = ?", self.unit);
             let mut statement = connection.prepare_cached(&query)?;
             let columns = statement.column_count();
             let mut digests: Vec<[u8; 32]> = Vec::new();
@@ -191,16 +196,23 @@ mod tests {
     use super::*;
 
     const SETTINGS: &str = "seed: 1\nroads: [corner]\n";
-    const LAYOUT: Layout = Layout { version: 3, unit: "episode", tables: &["episode", "step"] };
+    const LAYOUT: Layout = Layout {
+        version: 3,
+        unit: "episode",
+        tables: &["episode", "step"],
+        naming: Some(("step", "reason")),
+    };
     const OWN: &str = "CREATE TABLE episode (episode INTEGER PRIMARY KEY, name TEXT) STRICT;
-                       CREATE TABLE step (episode INTEGER, step INTEGER, x REAL) STRICT;";
+                       CREATE TABLE reason (reason INTEGER PRIMARY KEY, text TEXT) STRICT;
+                       CREATE TABLE step (episode INTEGER, step INTEGER, x REAL, reason INTEGER) STRICT;";
 
     fn begun(path: &Path) -> Connection {
         let mut connection = LAYOUT.open(path, OWN, SETTINGS).unwrap();
+        connection.execute("INSERT INTO reason VALUES (1, 'no room')", []).unwrap();
         for number in 0..3_i64 {
             let transaction = connection.transaction().unwrap();
             transaction.execute("INSERT INTO episode VALUES (?, 'a')", [number]).unwrap();
-            transaction.execute("INSERT INTO step VALUES (?, 0, 0.5)", [number]).unwrap();
+            transaction.execute("INSERT INTO step VALUES (?, 0, 0.5, ?1 % 2)", [number]).unwrap();
             LAYOUT.seal(&transaction, number).unwrap();
             transaction.commit().unwrap();
         }
@@ -216,6 +228,8 @@ mod tests {
             ("DELETE FROM episode WHERE episode = 1", "episode 1"),
             ("INSERT INTO episode VALUES (7, 'a')", "episode 7"),
             ("DELETE FROM seal WHERE unit = 2", "episode 2"),
+            ("UPDATE reason SET text = 'no lane'", "episode 1"),
+            ("INSERT INTO reason VALUES (0, 'a red light')", "episode 0"),
         ];
         for (change, what) in changes {
             let scratch = tempfile::tempdir().unwrap();

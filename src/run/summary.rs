@@ -45,6 +45,8 @@ pub struct Finding {
     pub counted: bool,
     /// Whether it is proved that no step before it can be left out.
     pub minimal: bool,
+    /// What the author calls the obstacle, if it is a body of the author's own.
+    pub own_body: Option<String>,
     /// The shape of the ego vehicle's way to it, if the episode was measured.
     pub shape: Option<Shape>,
 }
@@ -79,9 +81,11 @@ impl EpisodeSummary {
         let find = |(index, judgement)| {
             let facts = oracle::facts(log, index, &judgement);
             let counted = oracle::counts(space, log, index, &judgement);
+            let collision = log.collisions[index];
             Finding {
                 number: index,
-                collision: log.collisions[index],
+                collision,
+                own_body: collision.body.own.map(|own| space.bodies[own].name.clone()),
                 facts,
                 judgement,
                 cause: None,

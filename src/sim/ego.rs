@@ -6,6 +6,7 @@
 //! angles: what the tyres cannot give is cut off instead.
 
 use crate::geometry::{Frame, OrientedBox, Pose, Vec2, unit_vector, wrap_angle};
+use crate::model::SPEED_MPS_MAX;
 
 use super::environment::GRAVITY_MPS2;
 use super::sense::EgoMotion;
@@ -163,7 +164,7 @@ impl Ego {
         let (forward_mps2, curvature_per_m) =
             within_friction(wanted_mps2, wheel_curvature_per_m(steer_rad), speed_mps, friction);
 
-        let faster_mps = speed_mps + forward_mps2 * dt_s;
+        let faster_mps = (speed_mps + forward_mps2 * dt_s).min(SPEED_MPS_MAX);
         // A car that stops within the tick stays where it stopped.
         let (next_mps, way_m) = if faster_mps > 0.0 {
             (faster_mps, (speed_mps + faster_mps) / 2.0 * dt_s)

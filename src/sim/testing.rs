@@ -74,8 +74,8 @@ pub fn request(verb: Verb, distance_m: f64, speed_mps: f64) -> SpawnRequest {
         then: Then::Keep,
         speed_mps,
         distance_m,
-        shape: None,
-        cover_shape: None,
+        own: None,
+        cover_own: None,
         cover: None,
     }
 }

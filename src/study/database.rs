@@ -13,8 +13,12 @@ use crate::study::ready::Study;
 use crate::study::record::{CellRecord, CollisionRecord, EpisodeRecord, FailureClass, Spent, TrainedRecord};
 
 /// Versions begin at 1001, so that a `run.db` is never taken for a `study.db`.
-const LAYOUT: Layout =
-    Layout { version: 1003, unit: "cell", tables: &["cell", "trained", "evaluated", "collision"] };
+const LAYOUT: Layout = Layout {
+    version: 1003,
+    unit: "cell",
+    tables: &["cell", "trained", "evaluated", "collision"],
+    naming: None,
+};
 
 /// Seeds are text: SQLite's integers have a sign.
 const SCHEMA: &str = "

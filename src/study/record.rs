@@ -150,7 +150,7 @@ impl CollisionRecord {
             avoidability: finding.judgement.class.name().to_owned(),
             priority: finding.facts.priority.name().to_owned(),
             failure: FailureClass {
-                kind: kind(finding.collision.body.name()).to_owned(),
+                kind: kind(finding.collision.body.like.name()).to_owned(),
                 manoeuvre: finding.collision.verb.name().to_owned(),
                 approach: severity.approach.to_owned(),
                 side: severity.side.to_owned(),

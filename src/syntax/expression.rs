@@ -5,7 +5,7 @@ use pest::iterators::Pair;
 use crate::syntax::ast::{Arg, Arm, BinaryOp, Call, Expr, ExprKind, Span, Text, UnaryOp};
 use crate::syntax::build::{Builder, Built, Parts};
 use crate::syntax::grammar::Rule;
-use crate::syntax::{DEPTH_MAX, Diagnostic, code};
+use crate::syntax::{Diagnostic, OPERATORS_MAX, code};
 
 /// Binding strength of `not`, on the scale of [`strength`].
 pub const NOT_PRECEDENCE: u8 = 8;
@@ -50,13 +50,11 @@ impl Builder {
     /// is long, and later stages walk trees by recursion: so chains are bounded like brackets.
     fn below<T>(&self, operators: usize, span: Span, build: impl FnOnce() -> Built<T>) -> Built<T> {
         let above = self.operators_above.get();
-        if above + operators > DEPTH_MAX {
-            let message = format!("an expression with more than {DEPTH_MAX} operators in one another");
-            return Err(Box::new(
-                Diagnostic::error(code::DEPTH, message)
-                    .at(span, "")
-                    .help("give a part of it a name, with `let` or `fn`"),
-            ));
+        if above + operators > OPERATORS_MAX {
+            let message = format!("an expression with more than {OPERATORS_MAX} operators in one another");
+            return Err(Box::new(Diagnostic::error(code::DEPTH, message).at(span, "").help(
+                "give a part of it a name, with `let` or `fn`; where it is long, join parts in brackets",
+            )));
         }
         self.operators_above.set(above + operators);
         let built = build();

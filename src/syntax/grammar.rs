@@ -19,6 +19,7 @@ pub fn words(rule: Rule) -> Option<&'static str> {
         Rule::expression | Rule::operand | Rule::prefix => "an expression",
         Rule::name | Rule::names => NAME,
         Rule::argument | Rule::argument_name => "an argument",
+        Rule::moved => "a variant",
         Rule::pattern | Rule::arm => "a variant or `_`",
         Rule::initial_key => "a key like `Rain: High`",
         Rule::integer => "a whole number",

@@ -21,7 +21,7 @@ mod yaml;
 pub(crate) use diagnostic::one_of;
 pub use diagnostic::{Diagnostic, Edit, Fix, Label, Severity, Sources, Style, listed, nearest, render};
 pub use format::{FormatError, format, same_meaning};
-pub use parse::{DEPTH_MAX, LANGUAGE, parse, parse_fields};
+pub use parse::{DEPTH_MAX, LANGUAGE, OPERATORS_MAX, parse, parse_fields};
 pub use print::{print, print_expr, print_item};
 pub use record::{
     DiagnosticRecord, EditRecord, FixRecord, LabelRecord, PlaceRecord, SCHEMA, apply_fixes, record,

@@ -19,6 +19,9 @@ use crate::syntax::{Diagnostic, code, nearest};
 /// Most brackets within one another, and most operators within one another.
 pub const DEPTH_MAX: usize = 64;
 
+/// Most operators in one another, those around brackets included. Trees are walked by recursion.
+pub const OPERATORS_MAX: usize = 128;
+
 /// The version of the language that this compiler reads.
 pub const LANGUAGE: u64 = 1;
 

@@ -7,7 +7,9 @@ use crate::syntax::ast::{
     Arg, Arm, BinaryOp, Call, Case, Expr, ExprKind, Field, File, FileId, Item, ItemKind, Let, Name, Number,
     Odds, Scenario, Span, Step, Text, UnaryOp, Use, Verdict,
 };
-use crate::syntax::{DEPTH_MAX, FormatError, Sources, Style, format, parse, print, render, same_meaning};
+use crate::syntax::{
+    DEPTH_MAX, FormatError, OPERATORS_MAX, Sources, Style, format, parse, print, render, same_meaning,
+};
 
 const AVASTRA: &str = include_str!("../../scenarios/avastra45.ava");
 const DEEP_COLLISION: &str = include_str!("../../scenarios/deepcollision52.ava");
@@ -108,6 +110,9 @@ fn depth_is_bounded_alike_everywhere() {
     ] {
         assert_eq!(codes(&text), ["AV0003:2"]);
     }
+    let sum = |terms: usize| format!("language 1\nlet x = 1{}\n", " + 1".repeat(terms));
+    assert!(codes(&sum(OPERATORS_MAX)).is_empty());
+    assert_eq!(codes(&sum(OPERATORS_MAX + 1)), ["AV0003:2"]);
     let opened = format!("language 1\nlet x = {}", "f([{a: ".repeat(100_000));
     assert_eq!(codes(&opened), ["AV0003:2"]);
     let unfinished = format!("language 1\nlet x = {}", "f({a: -(".repeat(21));

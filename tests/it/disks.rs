@@ -9,6 +9,7 @@ use std::time::Duration;
 
 use crate::cases::root;
 use crate::command::{avastra, outcome};
+use crate::world::FLICKER;
 
 /// A command that takes longer hangs, also on a busy machine.
 const TIME_MAX: Duration = Duration::from_secs(30);
@@ -60,7 +61,7 @@ fn names_that_are_no_text_are_refused_before_anything_is_played() {
     {
         let (status, stdout, stderr) = outcome(avastra(&[command, "--format", "json"]).arg(&odd));
         assert_eq!(status, 1, "{command}: {stderr}");
-        assert!(stderr.contains("is not UTF-8: rename the file"), "{command}: {stderr}");
+        assert!(stdout.contains("is not UTF-8: rename the file"), "{command}: {stdout}");
         assert!(stdout.lines().all(|line| serde_json::from_str::<serde_json::Value>(line).is_ok()));
     }
     // One that is found in a folder is named; nothing of the folder is played.
@@ -259,4 +260,53 @@ fn a_link_to_nothing_is_not_replaced() {
     let (status, _, stderr) = outcome(&mut avastra(&["compile", SPACE, "-o", &link.display().to_string()]));
     assert!(status == 1 && stderr.contains("a link to a file that does not exist"), "{stderr}");
     assert!(link.is_symlink());
+}
+
+#[test]
+fn scenarios_that_are_gone_or_edited_are_noticed() {
+    let scratch = Scratch::new();
+    let out = scratch.text("run");
+    let settings =
+        ["--ads-config", FLICKER, "--road", "corner", "--episodes", "6", "--seed", "5", "--out", &out];
+    let (status, _, stderr) = outcome(&mut avastra(&[&["run", SPACE], &settings[..]].concat()));
+    assert_eq!(status, 0, "{stderr}");
+    let critical = std::fs::read_dir(scratch.path("run/critical")).expect("it is there").flatten();
+    let mut files: Vec<PathBuf> = critical.map(|entry| entry.path()).collect();
+    files.sort();
+    let [gone, edited, ..] = files.as_slice() else { panic!("the run finds two crashes: {files:?}") };
+    let written = std::fs::read(gone).expect("it is readable");
+    std::fs::remove_file(gone).expect("it is there");
+    edit(edited, "language 1", "// mine\nlanguage 1");
+    let (status, stdout, stderr) = outcome(&mut avastra(&["run", "--resume", &out]));
+    assert_eq!(status, 0, "{stderr}");
+    assert!(stdout.contains("was missing, is written again"), "{stdout}");
+    assert!(stdout.contains("edited since the run wrote it"), "{stdout}");
+    assert_eq!(std::fs::read(gone).expect("it is back"), written);
+
+    // A database without anything in it is no reason to play all again over what was found.
+    std::fs::write(scratch.path("run/run.db"), "").expect("it is writable");
+    let (status, stderr) = resume("run", &out);
+    assert!(status == 1 && stderr.contains("is empty, and `critical` has scenarios"), "{stderr}");
+}
+
+#[test]
+fn one_file_that_cannot_be_read_costs_no_other() {
+    let (status, stdout, stderr) = outcome(&mut avastra(&["check", "nowhere.ava", SPACE, "neither.ava"]));
+    assert!(status == 1 && stdout.contains("no mistakes"), "{stdout}{stderr}");
+    assert!(stderr.contains("nowhere.ava") && stderr.contains("neither.ava"), "{stderr}");
+    // Mistakes of usage are objects, too.
+    let (status, stdout, stderr) = outcome(&mut avastra(&["why", "--format", "json"]));
+    let told: serde_json::Value = serde_json::from_str(stdout.trim_end()).expect("it is JSON");
+    assert!(
+        status == 1 && stderr.is_empty() && told["error"].as_str().is_some_and(|why| why.contains("--row"))
+    );
+}
+
+#[test]
+fn many_mistakes_are_told_in_time() {
+    let scratch = Scratch::new();
+    let text = format!("language 1\n{}", "let x = 1\n".repeat(100_000));
+    std::fs::write(scratch.path("twice.ava"), text).expect("it is writable");
+    let (status, _, stderr) = outcome(&mut avastra(&["check", &scratch.text("twice.ava")]));
+    assert!(status == 2 && stderr.contains("98999 further mistakes are not listed"), "{}", stderr.len());
 }

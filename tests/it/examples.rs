@@ -105,7 +105,7 @@ fn motorcycles_and_scooters_ride_among_the_cars() {
         drawn.iter().flat_map(spawns).filter(|spawn| spawn.body == Body::Motorcycle).collect();
     // Six kinds of vehicle have odds of one, two have odds of three.
     assert!((160..240).contains(&two_wheeled.len()), "{} of {}", two_wheeled.len(), drawn.len());
-    let scooters: Vec<_> = two_wheeled.iter().filter_map(|spawn| spawn.shape).collect();
+    let scooters: Vec<_> = two_wheeled.iter().filter_map(|spawn| spawn.own.map(|own| own.shape)).collect();
     assert!((70..130).contains(&scooters.len()), "{}", scooters.len());
     for scooter in scooters {
         let figures = [scooter.length_m, scooter.width_m, scooter.height_m, scooter.mass_t];

@@ -26,8 +26,8 @@ fn walks_ahead(side: Side, distance_m: f64, speed_mps: f64, cover: Option<Body>)
         then: Then::Keep,
         speed_mps,
         distance_m,
-        shape: None,
-        cover_shape: None,
+        own: None,
+        cover_own: None,
         cover,
     }
 }

@@ -78,7 +78,7 @@ fn a_suite_outlives_changes_of_its_space() {
     // A change of meaning that none of the scenarios meets: each must be accepted by name.
     found.edit(space, "let weight_mode = 1.0", "let weight_mode = 1.0\nodds Side { Left => 3 }");
     let (status, tested, stderr) = found.test(&[&run]);
-    assert_eq!((status, tested["errors"].as_u64()), (1, Some(all)));
+    assert_eq!((status, tested["errors"].as_u64()), (2, Some(all)));
     let diagnostics: Vec<&str> = stderr.lines().filter(|line| line.contains("AV0110")).collect();
     assert_eq!(diagnostics.len(), 1, "one for the whole suite: {stderr}");
     let others = format!("the same holds for {} other scenario", all - 1);
@@ -193,6 +193,14 @@ fn what_is_packed_keeps_away_from_what_is_there() {
     assert_eq!(text, "language 1\nuse \"space/space.ava\"\n");
     let (status, _, stderr) = pack("two");
     assert!(status == 1 && stderr.contains("with another content"), "{stderr}");
+
+    // What fails leaves nothing behind, and a file that is named twice is one.
+    let [one, two] = ["one/one.ava", "two/two.ava"].map(|name| path(name).display().to_string());
+    let out = path("both/deep").display().to_string();
+    let (status, _, stderr) = outcome(&mut avastra(&["pack", &one, &two, "--out", &out]));
+    assert!(status == 1 && !path("both").exists(), "{stderr}");
+    let (status, stdout, stderr) = outcome(&mut avastra(&["pack", &one, &one, "--out", &out]));
+    assert!(status == 0 && stdout.contains("1 file with all that they use"), "{stdout}{stderr}");
 }
 
 fn stem(path: &str) -> String {

@@ -82,9 +82,34 @@ enum Rule {
     Fog([[bool; 3]; 3]),
 }
 
+/// What every step does at its end.
+#[derive(Clone, Copy, PartialEq)]
+enum EachStep {
+    Nothing,
+    FogLifts,
+    CountFalls,
+    FlagTurns,
+    FogSoaks,
+}
+
+impl EachStep {
+    fn text(self) -> &'static str {
+        match self {
+            EachStep::Nothing => "",
+            EachStep::FogLifts => {
+                "each step { set fog = match fog { None | Light => None\n  High => Light } }\n"
+            }
+            EachStep::CountFalls => "each step { set count = match count { 0 => 0\n  _ => count - 1 } }\n",
+            EachStep::FlagTurns => "each step { set flag = match flag { true => false\n  false => true } }\n",
+            EachStep::FogSoaks => "each step { set wet[Back] = fog }\n",
+        }
+    }
+}
+
 /// A space: its text without rules, and its rules.
 struct Made {
     text: String,
+    each_step: EachStep,
     rules: Vec<Rule>,
 }
 
@@ -393,7 +418,14 @@ group cars = ahead, pair
             let with = self.below(at as u32 + 1);
             rules.swap(at, with);
         }
-        Made { text, rules }
+        let each_step = match self.below(8) {
+            0 => EachStep::FogLifts,
+            1 => EachStep::CountFalls,
+            2 => EachStep::FlagTurns,
+            3 => EachStep::FogSoaks,
+            _ => EachStep::Nothing,
+        };
+        Made { text: format!("{text}{}", each_step.text()), each_step, rules }
     }
 }
 
@@ -441,8 +473,31 @@ impl Twin {
         (self.fog, self.wet, self.was, self.flag, self.count)
     }
 
+    /// What every step does after its action.
+    fn end_step(&mut self, each_step: EachStep) {
+        match each_step {
+            EachStep::Nothing => {}
+            EachStep::FogLifts => self.fog = self.fog.saturating_sub(1),
+            EachStep::CountFalls => self.count = (self.count - 1.0).max(0.0),
+            EachStep::FlagTurns => self.flag = !self.flag,
+            EachStep::FogSoaks => self.wet[1] = self.fog,
+        }
+    }
+
+    /// After a step without an action: what every step does, unless it would break a rule.
+    fn waited(&self, made: &Made) -> Twin {
+        let mut after = self.clone();
+        after.end_step(made.each_step);
+        let breaks = |rule: &Rule| match rule {
+            Rule::Holds(Binds::Always, condition) => !condition.holds(&after),
+            Rule::Holds(Binds::On(_), _) => false,
+            Rule::Fog(moves) => made.each_step == EachStep::FogLifts && !moves[self.fog][after.fog],
+        };
+        if made.rules.iter().any(breaks) { self.clone() } else { after }
+    }
+
     /// What a draw does, by what the action of that name says.
-    fn after(&self, space: &Space, row: &Row, draw: &Draw) -> Twin {
+    fn after(&self, space: &Space, row: &Row, draw: &Draw, each_step: EachStep) -> Twin {
         let axis = |name: &str| row.axes.iter().find(|(known, _)| &**known == name).map(|(_, value)| *value);
         let drawn =
             |name: &str| draw.values.iter().find(|(known, _)| &**known == name).map(|(_, value)| *value);
@@ -464,18 +519,22 @@ impl Twin {
                 after.numbers.insert(name.to_string(), *number);
             }
         }
+        after.end_step(each_step);
         after
     }
 
     /// The rule that a step from `self` to `after` breaks, by its number.
-    fn broken(&self, after: &Twin, action: &str, rules: &[Rule]) -> Option<usize> {
-        rules.iter().position(|rule| match rule {
+    fn broken(&self, after: &Twin, action: &str, made: &Made) -> Option<usize> {
+        made.rules.iter().position(|rule| match rule {
             Rule::Holds(Binds::Always, condition) => !condition.holds(after),
             Rule::Holds(Binds::On(name), condition) => {
                 let binds = *name == action || (*name == "cars" && matches!(action, "ahead" | "pair"));
                 binds && !condition.holds(after)
             }
-            Rule::Fog(moves) => action == "thicken" && !moves[self.fog][after.fog],
+            Rule::Fog(moves) => {
+                let sets = action == "thicken" || made.each_step == EachStep::FogLifts;
+                sets && !moves[self.fog][after.fog]
+            }
         })
     }
 }
@@ -487,6 +546,8 @@ struct Seen {
     /// Spaces that the checker refused before a rule was dropped, by the first code.
     refused: BTreeMap<&'static str, u32>,
     draws: u64,
+    /// Steps without an action, where every step does something.
+    waits: u64,
     rows_realised: u32,
     /// The most draws before a realisable row was drawn.
     longest_wait: u64,
@@ -553,9 +614,9 @@ fn played(space: &std::sync::Arc<Space>, made: &Made, draws: u32, seen: &mut See
                     let Offer::Legal(draw) = offer else { continue };
                     count += 1;
                     let row = &space.rows[draw.row];
-                    let after = before.after(space, row, &draw);
+                    let after = before.after(space, row, &draw, made.each_step);
                     let name = &space.actions[row.action].name;
-                    let broken = before.broken(&after, name, &made.rules);
+                    let broken = before.broken(&after, name, made);
                     assert_eq!(broken, None, "{} {:?}\n{}", row.label, draw.values, made.text());
                     assert_eq!(Twin::of(space, &draw.memory_after, road_number).states(), after.states());
                     let found = realised[draw.row][road_index];
@@ -567,6 +628,15 @@ fn played(space: &std::sync::Arc<Space>, made: &Made, draws: u32, seen: &mut See
                         seen.longest_wait = seen.longest_wait.max(u64::from(count));
                     }
                     legal.push(draw);
+                }
+                let waits = made.each_step != EachStep::Nothing && rng::below(&mut choices, 4) == 0;
+                if waits {
+                    let (_, waited) = table.wait(&memory, step, road, &rules);
+                    let found = Twin::of(space, &waited, road_number).states();
+                    assert_eq!(found, before.waited(made).states(), "{}", made.text());
+                    memory = waited;
+                    seen.waits += 1;
+                    continue;
                 }
                 if legal.is_empty() {
                     break;
@@ -599,7 +669,7 @@ fn played(space: &std::sync::Arc<Space>, made: &Made, draws: u32, seen: &mut See
 #[test]
 fn random_spaces_keep_the_promise() {
     let seen = audit(24, 400);
-    assert!(seen.rows_realised >= 24 * 8, "{seen:?}");
+    assert!(seen.rows_realised >= 24 * 8 && seen.waits > 100, "{seen:?}");
 }
 
 /// `cargo test --lib -- --ignored --nocapture random_spaces_keep_the_promise_at_length`

@@ -3,7 +3,7 @@
 
 use crate::model::expr::{Expr, ExprKind};
 use crate::model::rules::{Demand, locals};
-use crate::model::space::{ActionDef, EffectDef, RuleDef, SetDef, StateDef};
+use crate::model::space::{ActionDef, SetDef, Space, StateDef};
 
 /// One `where` or one rule of an action.
 #[derive(Debug, Clone, PartialEq)]
@@ -43,19 +43,10 @@ impl Clause {
 }
 
 /// By action: its `where`s, then the rules that bind it, in the order of their declarations.
-pub(crate) fn clauses(
-    actions: &[ActionDef],
-    each_step: &[SetDef],
-    rules: &[RuleDef],
-    states: &[StateDef],
-) -> Vec<Vec<Clause>> {
+pub(crate) fn clauses(space: &Space) -> Vec<Vec<Clause>> {
+    let Space { actions, rules, states, .. } = space;
     let of_action = |(index, action): (usize, &ActionDef)| {
-        let own = action.effects.iter().filter_map(|effect| match effect {
-            EffectDef::Set(set) => Some(&**set),
-            EffectDef::Spawn(_) => None,
-        });
-        // What every step does comes after the action's own effects.
-        let sets: Vec<&SetDef> = own.chain(each_step).collect();
+        let sets: Vec<&SetDef> = space.sets(Some(index)).collect();
         let mut found = Vec::new();
         for (parameter, definition) in action.parameters.iter().enumerate() {
             if let Some(condition) = &definition.condition {

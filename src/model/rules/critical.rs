@@ -9,7 +9,7 @@ use crate::model::eval::{Facts, arithmetic, compare, evaluate};
 use crate::model::expr::{Arithmetic, Expr, ExprKind};
 use crate::model::rules::polynomial::Polynomial;
 use crate::model::rules::{Clause, Demand, RowRules, Source};
-use crate::model::space::{EffectDef, FnDef, SetDef, StateDef};
+use crate::model::space::{FnDef, SetDef, StateDef};
 use crate::model::value::Value;
 use crate::model::vocabulary::Known;
 
@@ -69,12 +69,8 @@ pub(super) fn polynomials<'c>(
     let mut after_effects = None;
     for clause in clauses {
         if clause.reads_effects && after_effects.is_none() {
-            for effect in &space.actions[action].effects {
-                let EffectDef::Set(set) = effect else { continue };
+            for set in space.sets(Some(action)) {
                 reader.apply(set, &locals)?;
-            }
-            for set in &space.each_step {
-                reader.apply(set, &[])?;
             }
             after_effects = Some(());
         }
@@ -137,7 +133,8 @@ impl Reader<'_> {
             | ExprKind::Fact(_)
             | ExprKind::OfRoadUser(..)
             | ExprKind::OnRoad(_)
-            | ExprKind::IsWord(..) => Form::Known(evaluate(expr, self.functions, &self.facts)),
+            | ExprKind::IsWord(..)
+            | ExprKind::IsBody(..) => Form::Known(evaluate(expr, self.functions, &self.facts)),
             ExprKind::Local(local) => locals[*local].clone(),
             ExprKind::Cell(cell) => self.cells[*cell].clone(),
             ExprKind::CellAt(first, key) => match self.read(key, locals)? {

@@ -127,13 +127,11 @@ impl<'a> RowRules<'a> {
                 }
             }
             Breach::Condition { rule, condition } => self.figures(Some(rule), condition, candidate, None),
-            Breach::Spawn { spawn: SpawnFacts { spawn_gap_m, safety_gap_m, .. }, condition, .. }
-                if asks_for_gaps(condition) =>
-            {
-                format!("the gap would be {spawn_gap_m:.1} m, a fair one is {safety_gap_m:.1} m")
-            }
             Breach::Spawn { rule, condition, spawn } => {
-                self.figures(Some(rule), condition, candidate, Some(spawn))
+                let facts = Facts { spawn: Some(spawn), ..self.facts(candidate) };
+                let decisive = self.decisive(condition, facts);
+                self.gap_words(decisive, spawn, facts)
+                    .unwrap_or_else(|| self.figures(Some(rule), decisive, candidate, Some(spawn)))
             }
             Breach::Move { state, cell, from, to, .. } => {
                 let ty = self.space.states[state].ty;
@@ -141,6 +139,37 @@ impl<'a> RowRules<'a> {
                 format!("`{}` may not move from {from} to {to}", self.space.cell_name(cell))
             }
         }
+    }
+
+    /// The part of a broken condition that decides: the side of an `and` that fails, what an `implies` leads to.
+    fn decisive<'e>(self, condition: &'e Expr, facts: Facts<'_>) -> &'e Expr {
+        match &condition.kind {
+            ExprKind::And(left, right) => {
+                let failing = if self.holds(left, facts) { right } else { left };
+                self.decisive(failing, facts)
+            }
+            ExprKind::Implies(_, right) => self.decisive(right, facts),
+            _ => condition,
+        }
+    }
+
+    /// A comparison of the spawn's gap in words; `None` for any other condition.
+    fn gap_words(self, condition: &Expr, spawn: SpawnFacts, facts: Facts<'_>) -> Option<String> {
+        let ExprKind::Compare(op, left, right) = &condition.kind else { return None };
+        if left.kind != ExprKind::Fact(Fact::SpawnGap) {
+            return None;
+        }
+        let SpawnFacts { spawn_gap_m, safety_gap_m, .. } = spawn;
+        if right.kind == ExprKind::Fact(Fact::SafetyGap) {
+            return Some(format!("the gap would be {spawn_gap_m:.1} m, a fair one is {safety_gap_m:.1} m"));
+        }
+        let wanted_m = evaluate(right, &self.space.functions, &facts).number();
+        let mut words =
+            format!("the gap would be {spawn_gap_m:.1} m, wanted {} {wanted_m:.1} m", op.symbol());
+        if right.any(|kind| *kind == ExprKind::Fact(Fact::SafetyGap)) {
+            words.push_str(&format!(", where {safety_gap_m:.1} m are fair"));
+        }
+        Some(words)
     }
 
     /// The bounds of a rule on single numbers that the candidate breaks, each with its limit.
@@ -222,12 +251,17 @@ impl<'a> RowRules<'a> {
     }
 }
 
-/// Whether a condition asks how far away a spawn is.
-fn asks_for_gaps(condition: &Expr) -> bool {
-    condition.any(|kind| matches!(kind, ExprKind::Fact(Fact::SpawnGap | Fact::SafetyGap)))
-}
-
 impl Breach<'_> {
+    /// Whether it depends on a moment, or on a place in the world.
+    pub fn asks_about_moment(&self) -> bool {
+        match self {
+            Breach::Where(_, condition)
+            | Breach::Condition { condition, .. }
+            | Breach::Spawn { condition, .. } => condition.asks_about_moment(),
+            Breach::Move { .. } => false,
+        }
+    }
+
     /// The rule that is broken; `None` for a `where`.
     pub fn rule(&self) -> Option<usize> {
         match self {

@@ -1,10 +1,10 @@
 //! The states with which an episode may begin.
 //!
-//! A rule without `on` that asks about states, and perhaps the road, holds from the start on ([`RuleDef::start`]):
+//! A rule without `on` that asks about states, and perhaps the road, `step` and `elapsed`, holds from the start on ([`RuleDef::start`]):
 //! the actions that set such a state keep it, and no other action can break it. A rule with `on` is about the actions
 //! that it names, and says nothing about the start.
 
-use crate::model::eval::{Facts, evaluate};
+use crate::model::eval::{Facts, MomentFacts, WorldFacts, evaluate};
 use crate::model::expr::{Expr, ExprKind};
 use crate::model::rules::RulesInForce;
 use crate::model::space::{Initial, Road, RoadFacts, RuleDef, Space, StateDef};
@@ -68,13 +68,28 @@ impl Space {
         road: &RoadFacts,
         rules: &RulesInForce,
     ) -> Option<usize> {
-        rules.all().find(|rule| !self.start_holds(*rule, memory, road))
+        rules.all().find(|rule| !self.stands(*rule, memory, Some(road), Some(0)))
     }
 
-    fn start_holds(&self, rule: usize, memory: &Memory, road: &RoadFacts) -> bool {
-        let facts = Facts { road: Some(road), ..Facts::new(&[], memory) };
-        let condition = self.rules[rule].start.as_ref();
-        condition.is_none_or(|condition| evaluate(condition, &self.functions, &facts).truth())
+    /// Whether the states obey what a rule says about them where no action is judged: at the start, and after a step
+    /// without an action. Where the step is not known, a rule that asks for it is taken to be obeyed.
+    pub(crate) fn stands(
+        &self,
+        rule: usize,
+        memory: &Memory,
+        road: Option<&RoadFacts>,
+        step: Option<u64>,
+    ) -> bool {
+        let Some(condition) = &self.rules[rule].start else { return true };
+        let step = match step {
+            None if condition.asks_the_world() => return true,
+            step => step.unwrap_or(0),
+        };
+        let elapsed_s = step as f64 * self.episode.step_s;
+        let moment = MomentFacts { elapsed_s, ..MomentFacts::default() };
+        let world = WorldFacts { moment, step, ..WorldFacts::default() };
+        let facts = Facts { road, world: Some(&world), ..Facts::new(&[], memory) };
+        evaluate(condition, &self.functions, &facts).truth()
     }
 
     /// The cells that are drawn when an episode begins.
@@ -168,7 +183,9 @@ impl<'a> Starts<'a> {
         };
         for rule in &group.rules {
             let mut legal = core::mem::take(&mut starts.legal);
-            legal.retain(|number| space.start_holds(*rule, &starts.combination(*number).1, &road.facts));
+            legal.retain(|number| {
+                space.stands(*rule, &starts.combination(*number).1, Some(&road.facts), Some(0))
+            });
             if legal.is_empty() {
                 return Err(no_start(*rule, false));
             }

@@ -49,7 +49,7 @@ pub(super) struct Newcomers {
 /// Why it cannot, in words that complete "cannot spawn: …".
 pub(super) fn place(around: &Around, request: &SpawnRequest, id: u32) -> Result<Newcomers, String> {
     check(request)?;
-    let size = request.shape.unwrap_or_else(|| body::parameters(request.body));
+    let size = request.own.map_or_else(|| body::parameters(request.body), |own| own.shape);
     let driver = match request.verb {
         Verb::DriveAhead => drive_ahead(around, request, &size, id)?,
         Verb::Overtake => overtake(around, request, &size, id)?,

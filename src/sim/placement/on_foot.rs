@@ -141,7 +141,7 @@ fn park(
     id: u32,
     way: &mut Crossing,
 ) -> Result<RoadUser, String> {
-    let size = request.cover_shape.unwrap_or_else(|| body::parameters(body));
+    let size = request.cover_own.map_or_else(|| body::parameters(body), |own| own.shape);
     let (map, path) = (&around.scene.map, &around.scene.route.path);
     let outward = |station_m: f64| {
         let left = path.pose_at(station_m).left();
