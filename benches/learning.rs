@@ -1,19 +1,25 @@
-//! Marks of learning: updates a second on one core, one line `mark NAME VALUE UNIT` each.
+//! Marks of learning: updates a CPU second on one core, one line `mark NAME VALUE UNIT` each, and the rate of the
+//! multiplications and additions that the products of the passes alone need.
 //!
 //! An update draws a batch of 64 by priority, makes Double DQN's three forward passes and the backward pass,
 //! takes a step of Adam, and sets the new priorities. There are 19 inputs and 45 rows, as in the paper.
 
+mod clock;
+
 use std::hint::black_box;
 use std::sync::Arc;
-use std::time::Instant;
 
 use avastra::agent::{Agent, Experience, Hyperparameters, Kind, Learner, Rows, Trainable, Trajectory};
-use avastra::mdp::{Closeness, Observation};
+use avastra::mdp::{Closeness, Observation, STATE_LEN};
 use avastra::rng::Stream;
 use avastra::{agent, rng};
 use ndarray::Array1;
 
+use clock::cpu_s;
+
 const ROWS: usize = 45;
+/// Transitions of an update: the paper's.
+const BATCH: usize = 64;
 /// Repeats of each mark; the median counts.
 const REPEATS: usize = 7;
 /// Steps of an episode, which is the number of updates measured at once.
@@ -24,12 +30,17 @@ fn main() {
         let [first, second] = hidden;
         let (updates, choices) = measured(&format!("hidden_units: [{first}, {second}]\n"));
         println!("mark updates_per_s_{first}_{second} {updates:.0} updates/s");
+        // Three passes forward and one back, which is two products: ten operations for each weight and transition.
+        let weights = STATE_LEN * first + first * second + second * ROWS;
+        println!(
+            "mark products_{first}_{second} {:.1} Gflop/s",
+            updates * (10 * BATCH * weights) as f64 * 1e-9
+        );
         println!("mark choice_{first}_{second} {choices:.1} us");
     }
 }
 
 /// Updates a second, and the time of a greedy choice, us.
-#[allow(clippy::disallowed_methods, reason = "a benchmark is about the clock")]
 fn measured(text: &str) -> (f64, f64) {
     let Kind::Learning(presets) = agent::by_name("ddqn").expect("it is registered").kind else {
         panic!("it learns")
@@ -46,20 +57,20 @@ fn measured(text: &str) -> (f64, f64) {
     let seconds: Vec<f64> = (0..REPEATS)
         .map(|_| {
             let episode = episode(&mut rng, STEPS);
-            let begin = Instant::now();
+            let begin = cpu_s();
             black_box(learner.learn(&episode, &mut rng));
-            begin.elapsed().as_secs_f64()
+            cpu_s() - begin
         })
         .collect();
     let look = observation(&mut rng);
     let legal = Array1::from_elem(ROWS, true);
     let choices: Vec<f64> = (0..REPEATS)
         .map(|_| {
-            let begin = Instant::now();
+            let begin = cpu_s();
             for _ in 0..200 {
                 black_box(learner.choose(&look, legal.view(), &mut rng));
             }
-            begin.elapsed().as_secs_f64() / 200.0
+            (cpu_s() - begin) / 200.0
         })
         .collect();
     (STEPS as f64 / median(seconds), median(choices) * 1e6)

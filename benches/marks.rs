@@ -19,6 +19,8 @@
 //! | GPUDrive | agents x steps, on one GPU | 1,000,000 | arXiv 2408.01584 |
 //! | this machine's floor | 10 bicycles and 45 pairs of boxes, nothing else, f64 with libm | 4,000,000 | measured |
 
+mod clock;
+
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::hint::black_box;
 use std::path::Path;
@@ -35,6 +37,8 @@ use avastra::model::vocabulary::{Body, Colour, LaneChoice, Level, Side, Then, Ti
 use avastra::run::{Run, RunSettings};
 use avastra::sim::{Scene, Sensed, Start, TrafficProfile, World};
 use avastra::{ads, episode};
+
+use clock::cpu_s;
 
 const REPEATS: usize = 7;
 /// Ticks of one repeat: six seconds of traffic.
@@ -302,24 +306,6 @@ fn seconds(calls: u64, mut call: impl FnMut()) -> f64 {
         call();
     }
     (cpu_s() - started_s) / calls as f64
-}
-
-/// CPU time of this process so far, s.
-#[cfg(unix)]
-fn cpu_s() -> f64 {
-    let mut time = libc::timespec { tv_sec: 0, tv_nsec: 0 };
-    // SAFETY: the call writes to the struct that it is given, and to nothing else.
-    let status = unsafe { libc::clock_gettime(libc::CLOCK_PROCESS_CPUTIME_ID, &mut time) };
-    assert_eq!(status, 0, "every Unix has this clock");
-    time.tv_sec as f64 + time.tv_nsec as f64 * 1e-9
-}
-
-/// The wall clock, where there is no clock of CPU time, s.
-#[cfg(not(unix))]
-fn cpu_s() -> f64 {
-    #[allow(clippy::disallowed_methods, reason = "a benchmark is about the clock")]
-    static STARTED: std::sync::LazyLock<Instant> = std::sync::LazyLock::new(Instant::now);
-    STARTED.elapsed().as_secs_f64()
 }
 
 fn median(mut repeat: impl FnMut() -> f64) -> f64 {
