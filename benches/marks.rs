@@ -29,12 +29,13 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::Instant;
 
 use avastra::action::{ActionTable, Effect, SpawnRequest};
+use avastra::ads::external::{ExternalSettings, Observation, Program, Target};
 use avastra::check::ReadError;
 use avastra::cli::lsp::Server;
 use avastra::mdp::{ProcSettings, collision_probability};
 use avastra::model::Space;
 use avastra::model::vocabulary::{Body, Colour, LaneChoice, Level, Side, Then, TimeOfDay, Verb};
-use avastra::run::{Run, RunSettings};
+use avastra::run::{Arena, Run, RunSettings};
 use avastra::sim::{Scene, Sensed, Start, TrafficProfile, World};
 use avastra::{ads, episode};
 
@@ -74,6 +75,9 @@ fn main() {
         let mut editing = Editing::new();
         median(|| seconds(5, || editing.keystroke())) * 1e3
     });
+    let attached = Attached::new(&space);
+    mark("external_round_trips_per_s", "/s", || median(|| attached.round_trips_per_s()));
+    mark("external_share_of_episode", "", || median(|| attached.share()));
     let run = run(space);
     mark("episodes_per_s", "episodes/s", || median(|| episodes_per_s(&run)));
     mark("episodes_two_cores_over_one", "x", || {
@@ -249,6 +253,54 @@ unsafe impl GlobalAlloc for Counting {
     }
 }
 
+/// A driving system in another process: the toy, with accelerations, which sees the truth.
+struct Attached {
+    program: Arc<Program>,
+    arena: Arena,
+}
+
+impl Attached {
+    fn new(space: &Arc<Space>) -> Attached {
+        let words = [env!("CARGO_BIN_EXE_avastra"), "ads", "toy"].map(str::to_owned);
+        let settings = ExternalSettings {
+            observation: Observation::Truth,
+            ..ExternalSettings::of(Target::Program(words.to_vec()))
+        };
+        let program = Program::new(settings);
+        let roads = [space.roads[0].name.clone()];
+        let ads = ads::Selected::external(Arc::clone(&program));
+        let table = ActionTable::new(Arc::clone(space));
+        let arena = Arena::new(table, &roads, ads, &[], &[]).expect("the road is there");
+        Attached { program, arena }
+    }
+
+    /// An episode without actions: how many questions, and wall time with the process and with known answers, s.
+    fn episode(&self) -> (f64, f64, f64) {
+        let drive = || {
+            #[allow(clippy::disallowed_methods, reason = "a benchmark is about the clock")]
+            let start = Instant::now();
+            let setup = self.arena.setup(0, 1);
+            let log = episode::run(&setup, &mut |_| episode::Choice::Pass, &mut |_, _, _| {});
+            assert!(log.failure.is_none(), "{:?}", log.failure);
+            let questions = log.conversation.map_or(0, |conversation| conversation.exchanges.len());
+            (questions as f64, start.elapsed().as_secs_f64())
+        };
+        self.program.forget();
+        let (questions, asked_s) = drive();
+        (questions, asked_s, drive().1)
+    }
+
+    fn round_trips_per_s(&self) -> f64 {
+        let (questions, asked_s, known_s) = self.episode();
+        questions / (asked_s - known_s).max(1e-9)
+    }
+
+    fn share(&self) -> f64 {
+        let (_, asked_s, known_s) = self.episode();
+        1.0 - known_s / asked_s
+    }
+}
+
 fn run(space: Arc<Space>) -> Run {
     let settings = RunSettings {
         avastra: String::new(),
@@ -258,6 +310,7 @@ fn run(space: Arc<Space>) -> Run {
         roads: vec![space.roads[0].name.clone()],
         ads: "modular".to_owned(),
         profile: None,
+        external: None,
         agent: "random".to_owned(),
         policy: None,
         episodes: EPISODES,

@@ -2,6 +2,7 @@
 
 use crate::sim::{Control, Sensed};
 
+use super::external::{Conversation, Failure};
 use super::status::Status;
 
 /// A driving system under test, or a reference driver.
@@ -11,6 +12,16 @@ pub trait Ads: CloneAds + Send {
 
     /// What it believes, wants and commands at the moment.
     fn status(&self) -> &Status;
+
+    /// Why it cannot drive any more. Only an external one fails; the episode ends there.
+    fn failure(&self) -> Option<&Failure> {
+        None
+    }
+
+    /// What it was asked in this episode and answered, if it is an external one.
+    fn conversation(&self) -> Option<Conversation> {
+        None
+    }
 }
 
 /// A copy that goes on exactly as the original would: part of a snapshot. Whatever is `Clone` has it.

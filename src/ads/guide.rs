@@ -111,6 +111,45 @@ impl Guide {
         Guide { samples }
     }
 
+    /// Through poses, one after another, of which two may be at the same place; and the station of each, m. There is
+    /// no speed limit on it.
+    pub fn through(poses: &[Pose]) -> (Guide, Vec<f64>) {
+        let mut stations_m = vec![0.0];
+        for pair in poses.windows(2) {
+            let way_m = (pair[1].position - pair[0].position).norm();
+            stations_m.push(stations_m[stations_m.len() - 1] + way_m);
+        }
+        let last = poses.len() - 1;
+        let count = ((stations_m[last] / SPACING_M).ceil() as usize + 1).max(2);
+        let at = |station_m: f64| -> Pose {
+            let after = stations_m.partition_point(|known_m| *known_m <= station_m);
+            if after > last {
+                return poses[last].offset(station_m - stations_m[last], 0.0);
+            }
+            let (a, b) = (&poses[after - 1], &poses[after]);
+            let fraction = (station_m - stations_m[after - 1]) / (stations_m[after] - stations_m[after - 1]);
+            let turn_rad = wrap_angle(b.heading_rad - a.heading_rad) * fraction;
+            Pose {
+                position: a.position + (b.position - a.position) * fraction,
+                heading_rad: wrap_angle(a.heading_rad + turn_rad),
+            }
+        };
+        let sample = |index: usize| {
+            let station_m = index as f64 * SPACING_M;
+            let (pose, before, after) =
+                (at(station_m), at((station_m - SPACING_M).max(0.0)), at(station_m + SPACING_M));
+            let way_m = station_m.min(SPACING_M) + SPACING_M;
+            Sample {
+                position: pose.position,
+                forward: unit_vector(pose.heading_rad),
+                heading_rad: pose.heading_rad,
+                curvature_per_m: wrap_angle(after.heading_rad - before.heading_rad) / way_m,
+                speed_mps_max: f64::INFINITY,
+            }
+        };
+        (Guide { samples: (0..count).map(sample).collect() }, stations_m)
+    }
+
     /// The pose at a station; beyond the ends the route goes on straight.
     pub fn pose_at(&self, station_m: f64) -> Pose {
         let (index, fraction) = self.segment(station_m);

@@ -6,6 +6,7 @@
 use crate::sim::{Control, Sensed};
 
 use super::driver::Ads;
+use super::external::{Conversation, Failure};
 use super::status::Status;
 
 /// The first driver until a moment, the second from then on. Until then the second drives, too, but its
@@ -35,5 +36,13 @@ impl Ads for Handover {
 
     fn status(&self) -> &Status {
         if self.is_over { self.second.status() } else { self.first.status() }
+    }
+
+    fn failure(&self) -> Option<&Failure> {
+        if self.is_over { self.second.failure() } else { self.first.failure() }
+    }
+
+    fn conversation(&self) -> Option<Conversation> {
+        if self.is_over { self.second.conversation() } else { self.first.conversation() }
     }
 }

@@ -1,9 +1,10 @@
 //! Driving systems: what drives the ego vehicle. They see `Sensed` and the HD map, never the `World`.
 //!
-//! `modular` is the system under test; `frenet` and `reactive` are two more of other kinds, `reference` holds
-//! drivers to judge by. `guide` and `steering` serve all, `sight` and `stops` the two others.
+//! `modular` is the system under test; `frenet` and `reactive` are two more of other kinds, `external` is any program
+//! outside, `reference` holds drivers to judge by. `guide` and `steering` serve all, `sight` and `stops` the two others.
 
 mod driver;
+pub mod external;
 mod frenet;
 mod guide;
 mod handover;
@@ -30,5 +31,5 @@ pub use reference::{
     Careful, CarefulHuman, Evasion, FuzzySafety, Idm, MinimalPerformance, Reference, Rss, careful, in_sight,
 };
 pub use registry::{Entry, REGISTRY, by_name};
-pub use selected::{NoSettings, Selected};
+pub use selected::{EXTERNAL, NoSettings, Selected};
 pub use status::{GHOST_ID_MIN, Manoeuvre, PerceivedObject, Reason, Status};

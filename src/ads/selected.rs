@@ -7,20 +7,30 @@ use crate::rng::Stream;
 use crate::sim::Scene;
 
 use super::driver::Ads;
+use super::external::{External, Program};
 use super::handover::Handover;
 use super::modular::{Foresight, Modular, ModularConfig};
 use super::registry::Entry;
 
+/// Name of every driving system outside this program.
+pub const EXTERNAL: &str = "external";
+
 /// A driving system and, if it is `modular`, its profile.
 #[derive(Debug, Clone)]
 pub struct Selected {
-    entry: &'static Entry,
+    kind: Kind,
     profile: Option<ModularConfig>,
     foresight: Option<Arc<Foresight>>,
     /// The number of other errors than those of the episode's seed.
     noise: Option<u32>,
     /// The driving system that takes over, and when, s.
     successor: Option<(Box<Selected>, f64)>,
+}
+
+#[derive(Debug, Clone)]
+enum Kind {
+    Ours(&'static Entry),
+    External(Arc<Program>),
 }
 
 /// A profile for a driving system that has no settings.
@@ -34,7 +44,13 @@ impl Selected {
     /// The driving system with its default settings.
     pub fn new(entry: &'static Entry) -> Selected {
         let profile = (entry.name == MODULAR).then(ModularConfig::default);
-        Selected { entry, profile, foresight: None, noise: None, successor: None }
+        Selected { kind: Kind::Ours(entry), profile, foresight: None, noise: None, successor: None }
+    }
+
+    /// A driving system outside this program.
+    pub fn external(program: Arc<Program>) -> Selected {
+        let kind = Kind::External(program);
+        Selected { kind, profile: None, foresight: None, noise: None, successor: None }
     }
 
     /// With a profile.
@@ -43,7 +59,7 @@ impl Selected {
     /// If it is not `modular`.
     pub fn with_profile(self, profile: ModularConfig) -> Result<Selected, NoSettings> {
         if self.profile.is_none() {
-            return Err(NoSettings { ads: self.entry.name.to_owned() });
+            return Err(NoSettings { ads: self.name().to_owned() });
         }
         Ok(Selected { profile: Some(profile), ..self })
     }
@@ -64,7 +80,18 @@ impl Selected {
     }
 
     pub fn name(&self) -> &'static str {
-        self.entry.name
+        match &self.kind {
+            Kind::Ours(entry) => entry.name,
+            Kind::External(_) => EXTERNAL,
+        }
+    }
+
+    /// The driving system outside this program, if it is one.
+    pub fn program(&self) -> Option<&Arc<Program>> {
+        match &self.kind {
+            Kind::Ours(_) => None,
+            Kind::External(program) => Some(program),
+        }
     }
 
     /// Its settings, if it has any.
@@ -76,11 +103,12 @@ impl Selected {
     pub fn build(&self, scene: &Arc<Scene>, seed: u64) -> Box<dyn Ads> {
         let own_seed =
             self.noise.map_or(seed, |number| rng::child_seed(seed, Stream::Noise, u64::from(number)));
-        let first: Box<dyn Ads> = match &self.profile {
-            Some(profile) => {
+        let first: Box<dyn Ads> = match (&self.kind, &self.profile) {
+            (_, Some(profile)) => {
                 Box::new(Modular::with_foresight(scene, profile, own_seed, self.foresight.clone()))
             }
-            None => (self.entry.build)(scene, own_seed),
+            (Kind::Ours(entry), None) => (entry.build)(scene, own_seed),
+            (Kind::External(program), None) => Box::new(External::new(program, scene, own_seed)),
         };
         match &self.successor {
             Some((second, at_s)) => Box::new(Handover::new(first, second.build(scene, seed), *at_s)),

@@ -68,6 +68,7 @@ impl Sight {
             predicted.clear();
             let seen = PerceivedObject {
                 id: Some(object.id),
+                track: object.id,
                 body: object.body,
                 pose: object.pose,
                 velocity_mps: object.velocity_mps,

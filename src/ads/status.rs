@@ -1,6 +1,7 @@
 //! The inside of a driving system, as far as the paper's internal state and the pictures need it.
 
 use core::fmt;
+use std::sync::Arc;
 
 use crate::geometry::{Pose, Vec2};
 use crate::model::vocabulary::Body;
@@ -23,6 +24,8 @@ pub struct Status {
     pub manoeuvre: Manoeuvre,
     /// Why it drives as it does now: the constraint that holds it back most.
     pub reason: Reason,
+    /// The same in the words of an external driving system, if it says so.
+    pub reported: Option<Arc<str>>,
 }
 
 /// Ids from here on belong to ghosts: objects that a driving system sees and that are not there.
@@ -72,6 +75,8 @@ fn named(id: u32) -> String {
 pub struct PerceivedObject {
     /// Id of the true object; `None` is a ghost.
     pub id: Option<u32>,
+    /// The number under which the driving system follows it.
+    pub track: u32,
     pub body: Body,
     /// Centre of the outline.
     pub pose: Pose,
@@ -122,6 +127,15 @@ pub enum Reason {
     Emergency(u32),
     /// It has touched something: it brakes to rest and stays.
     Contact,
+    /// An external driving system drives: see [`Status::reported`].
+    Reported,
+}
+
+impl Status {
+    /// Why it drives as it does now, in words.
+    pub fn reason_text(&self) -> String {
+        self.reported.as_deref().map_or_else(|| self.reason.to_string(), str::to_owned)
+    }
 }
 
 impl Reason {
@@ -144,6 +158,7 @@ impl Reason {
             | Reason::KeepClear
             | Reason::Degraded
             | Reason::Contact
+            | Reason::Reported
             | Reason::Fallback => self,
         }
     }
@@ -169,6 +184,7 @@ impl fmt::Display for Reason {
             Reason::Degraded => write!(f, "degraded mode"),
             Reason::Emergency(id) => write!(f, "emergency {}", named(*id)),
             Reason::Contact => write!(f, "stop after a contact"),
+            Reason::Reported => write!(f, "external"),
         }
     }
 }

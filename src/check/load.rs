@@ -361,18 +361,18 @@ impl MapReader<'_> {
             let _ = self.text(path);
         }
         let MapReader { texts, cache, .. } = self;
-        let mut open: BTreeMap<(String, String), &str> = BTreeMap::new();
+        let mut open: BTreeMap<(String, String), (&Path, &str)> = BTreeMap::new();
         for (path, map) in paths.iter().filter_map(|path| Some((path, texts.get(path)?.as_ref().ok()?))) {
             let key = map_key(path, map);
             if !cache.known.contains_key(&key) {
-                open.insert(key, &map.text);
+                open.insert(key, (path, &map.text));
             }
         }
-        let open: Vec<((String, String), &str)> = open.into_iter().collect();
+        let open: Vec<_> = open.into_iter().collect();
         for some in open.chunks(MAPS_AT_ONCE) {
             let parsed: Vec<_> = std::thread::scope(|scope| {
                 let workers: Vec<_> =
-                    some.iter().map(|((stem, _), text)| scope.spawn(move || map_of(stem, text))).collect();
+                    some.iter().map(|(_, (path, text))| scope.spawn(move || map_of(path, text))).collect();
                 workers
                     .into_iter()
                     .map(|worker| worker.join().expect("no map makes its reader panic"))
@@ -397,7 +397,7 @@ impl Maps for MapReader<'_> {
         let found = self.texts.entry(path.clone()).or_insert_with(|| MapText::read(&path, read));
         let map = found.as_ref().map_err(ToString::to_string)?;
         let key = map_key(&path, map);
-        let parse = || map_of(&map_key(&path, map).0, &map.text);
+        let parse = || map_of(&path, &map.text);
         let map = self.cache.known.entry(key).or_insert_with(parse).clone()?;
         Ok((path, map))
     }
@@ -422,12 +422,17 @@ impl Maps for MapReader<'_> {
 
 /// By what a map is known: its name and the digest of its text.
 fn map_key(path: &Path, map: &MapText) -> (String, String) {
-    let stem = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
-    (stem, map.digest.clone())
+    (stem(path), map.digest.clone())
 }
 
-fn map_of(name: &str, text: &str) -> Result<Arc<RoadMap>, String> {
-    RoadMap::from_opendrive(name, text).map(Arc::new).map_err(|error| error.to_string())
+fn map_of(path: &Path, text: &str) -> Result<Arc<RoadMap>, String> {
+    let mut map = RoadMap::from_opendrive(&stem(path), text).map_err(|error| error.to_string())?;
+    map.file = Some(path.to_owned());
+    Ok(Arc::new(map))
+}
+
+fn stem(path: &Path) -> String {
+    path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default()
 }
 
 fn folder(path: &Path) -> PathBuf {

@@ -101,6 +101,7 @@ impl<'a> Reader<'a> {
                 OriginField::Ads => origin.ads = self.text(value),
                 OriginField::Profile => origin.profile = self.text(value),
                 OriginField::ProfileDigest => origin.profile_digest = self.text(value),
+                OriginField::Answers => origin.answers = self.text(value),
                 OriginField::Engine => origin.engine = self.text(value),
                 OriginField::Traffic => origin.traffic = self.text(value),
                 OriginField::TrafficDigest => origin.traffic_digest = self.text(value),

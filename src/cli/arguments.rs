@@ -91,7 +91,7 @@ pub enum Command {
     /// Run emitted scenarios again and check every claim they make.
     Replay(ReplayArguments),
     /// Check every claim of emitted scenarios and policies.
-    Verify(FilesArguments),
+    Verify(VerifyArguments),
     /// Say which module of the driving system an emitted scenario's crash is the fault of.
     Diagnose(DiagnoseArguments),
     /// Find the smallest scenario that still makes the same crash.
@@ -104,6 +104,85 @@ pub enum Command {
     Render(RenderArguments),
     /// Print or draw a map, and a route through it.
     Road(RoadArguments),
+    /// Attach a driving system of your own: check it, print the schema of the messages, play with a toy.
+    Ads(AdsArguments),
+}
+
+#[derive(Debug, Args)]
+pub struct AdsArguments {
+    #[command(subcommand)]
+    pub command: AdsCommand,
+}
+
+#[derive(Debug, Subcommand)]
+pub enum AdsCommand {
+    /// Check that a driving system follows PROTOCOL.md, answers alike to the like, and how fast.
+    Check(AdsCheckArguments),
+    /// Print the JSON Schema of every message.
+    Schema,
+    /// Be a small driving system that speaks the protocol over stdin and stdout, well or not.
+    Toy(ToyArguments),
+}
+
+#[derive(Debug, Args)]
+pub struct AdsCheckArguments {
+    /// The program and its arguments, after `--`; or `tcp:HOST:PORT` or `unix:PATH`.
+    #[arg(last = true, required_unless_present = "ads_config", value_name = "COMMAND")]
+    pub program: Vec<String>,
+    /// Its profile, with an `ads` block.
+    #[arg(long, value_name = "FILE")]
+    pub ads_config: Option<PathBuf>,
+    /// The space whose first road it drives [default: a space of avastra's own].
+    #[arg(long, value_name = "FILE")]
+    pub space: Option<PathBuf>,
+    /// Road to drive [default: the first of the space].
+    #[arg(long)]
+    pub road: Option<String>,
+    /// Seed of the episodes.
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+    /// Length of each of the four episodes, in steps of an agent (6 s), at most.
+    #[arg(long, default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    pub steps: u32,
+}
+
+#[derive(Debug, Args)]
+pub struct ToyArguments {
+    /// The kind of its answers.
+    #[arg(long, value_enum, default_value_t = ToyAnswer::Acceleration)]
+    pub answer: ToyAnswer,
+    /// What it does wrong, from the twentieth step on.
+    #[arg(long, value_enum)]
+    pub misbehave: Option<Misbehaviour>,
+    /// How late it is, s, if it is late.
+    #[arg(long, default_value_t = 3.0)]
+    pub late: f64,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum ToyAnswer {
+    Control,
+    Pedals,
+    Trajectory,
+    Acceleration,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Misbehaviour {
+    CrashAtStart,
+    CrashInEpisode,
+    CrashAtReset,
+    Hang,
+    Garbage,
+    Nan,
+    Late,
+    Twice,
+    WrongSeq,
+    HugeLine,
+    CloseStdout,
+    FloodStderr,
+    Error,
+    Forgetful,
 }
 
 #[derive(Debug, Args)]
@@ -265,9 +344,13 @@ pub struct RunArguments {
     /// Driving system under test.
     #[arg(long, default_value = crate::run::DEFAULT_ADS, value_parser = Named::ADS)]
     pub ads: String,
-    /// Profile of the `modular` driving system, for example scenarios/ads/cautious.yaml [default: as it comes].
+    /// Profile of the `modular` driving system, for example scenarios/ads/cautious.yaml, or of one of your own, with an
+    /// `ads` block [default: as it comes].
     #[arg(long, value_name = "FILE")]
     pub ads_config: Option<PathBuf>,
+    /// Driving system of your own: a command (PROTOCOL.md), `tcp:HOST:PORT` or `unix:PATH`.
+    #[arg(long, value_name = "COMMAND", conflicts_with = "ads")]
+    pub ads_cmd: Option<String>,
     /// Who chooses the actions.
     #[arg(long, default_value = "random", value_parser = Named::AGENT)]
     pub agent: String,
@@ -305,7 +388,7 @@ pub struct RunArguments {
     #[arg(long)]
     pub self_contained: bool,
     /// Go on with an interrupted run directory; its own settings hold.
-    #[arg(long, value_name = "DIR", conflicts_with_all = ["file", "road", "ads", "ads_config", "agent", "policy", "face", "episodes", "seed", "ambient", "traffic", "causes", "out", "self_contained", "without", "with"])]
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["file", "road", "ads", "ads_config", "ads_cmd", "agent", "policy", "face", "episodes", "seed", "ambient", "traffic", "causes", "out", "self_contained", "without", "with"])]
     pub resume: Option<PathBuf>,
     /// Exit with status 4 if a counted collision was found.
     #[arg(long)]
@@ -323,9 +406,12 @@ pub struct TrainArguments {
     /// Driving system under test.
     #[arg(long, default_value = crate::run::DEFAULT_ADS, value_parser = Named::ADS)]
     pub ads: String,
-    /// Profile of the `modular` driving system [default: as it comes].
+    /// Profile of the `modular` driving system, or of one of your own [default: as it comes].
     #[arg(long, value_name = "FILE")]
     pub ads_config: Option<PathBuf>,
+    /// Driving system of your own: a command (PROTOCOL.md), `tcp:HOST:PORT` or `unix:PATH`.
+    #[arg(long, value_name = "COMMAND", conflicts_with = "ads")]
+    pub ads_cmd: Option<String>,
     /// Who learns.
     #[arg(long, default_value = "ddqn", value_parser = Named::TRAINED)]
     pub agent: String,
@@ -353,7 +439,7 @@ pub struct TrainArguments {
     #[arg(long)]
     pub self_contained: bool,
     /// Go on with an interrupted run directory; its own settings hold.
-    #[arg(long, value_name = "DIR", conflicts_with_all = ["file", "road", "ads", "ads_config", "agent", "preset", "config", "episodes", "seed", "traffic", "out", "self_contained", "without", "with"])]
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["file", "road", "ads", "ads_config", "ads_cmd", "agent", "preset", "config", "episodes", "seed", "traffic", "out", "self_contained", "without", "with"])]
     pub resume: Option<PathBuf>,
 }
 
@@ -444,14 +530,30 @@ pub struct FilesArguments {
 }
 
 #[derive(Debug, Args)]
+pub struct VerifyArguments {
+    /// Driving system of your own that the scenarios were made against: a command (PROTOCOL.md), `tcp:HOST:PORT` or
+    /// `unix:PATH` [default: its recorded answers].
+    #[arg(long, value_name = "COMMAND")]
+    pub ads_cmd: Option<String>,
+    /// Its profile, with an `ads` block.
+    #[arg(long, value_name = "FILE")]
+    pub ads_config: Option<PathBuf>,
+    #[command(flatten)]
+    pub many: FilesArguments,
+}
+
+#[derive(Debug, Args)]
 pub struct ReplayArguments {
     /// Replay against another driving system: shows what happens, checks no claim.
     #[arg(long, value_parser = Named::ADS)]
     pub ads: Option<String>,
-    /// Replay against another profile of `modular`: claims are checked only if it means the same as the
-    /// recorded one.
+    /// Replay against another profile of `modular`, or of a driving system of your own: claims are checked only if it
+    /// means the same as the recorded one.
     #[arg(long, value_name = "FILE")]
     pub ads_config: Option<PathBuf>,
+    /// Driving system of your own: a command (PROTOCOL.md), `tcp:HOST:PORT` or `unix:PATH`.
+    #[arg(long, value_name = "COMMAND", conflicts_with = "ads")]
+    pub ads_cmd: Option<String>,
     #[command(flatten)]
     pub many: FilesArguments,
 }
@@ -461,6 +563,9 @@ pub struct DiagnoseArguments {
     /// Another profile of `modular` than the recorded one.
     #[arg(long, value_name = "FILE")]
     pub ads_config: Option<PathBuf>,
+    /// Driving system of your own: a command (PROTOCOL.md), `tcp:HOST:PORT` or `unix:PATH`.
+    #[arg(long, value_name = "COMMAND")]
+    pub ads_cmd: Option<String>,
     /// Profile that says how good each module should be [default: `modular` as it comes].
     #[arg(long, value_name = "FILE", conflicts_with = "mechanisms")]
     pub baseline: Option<PathBuf>,
@@ -481,6 +586,13 @@ pub struct ShrinkArguments {
     /// Where to write, if there is one file [default: a folder `shrunk` beside the scenarios].
     #[arg(long, short)]
     pub output: Option<PathBuf>,
+    /// Driving system of your own that the scenarios were made against: a command (PROTOCOL.md), `tcp:HOST:PORT` or
+    /// `unix:PATH`.
+    #[arg(long, value_name = "COMMAND")]
+    pub ads_cmd: Option<String>,
+    /// Its profile, with an `ads` block.
+    #[arg(long, value_name = "FILE")]
+    pub ads_config: Option<PathBuf>,
     #[command(flatten)]
     pub many: FilesArguments,
 }
@@ -509,9 +621,12 @@ pub struct TestArguments {
     /// Driving system under test [default: the one that each scenario was found with].
     #[arg(long, value_parser = Named::ADS)]
     pub ads: Option<String>,
-    /// Profile of the `modular` driving system.
+    /// Profile of the `modular` driving system, or of one of your own.
     #[arg(long, value_name = "FILE")]
     pub ads_config: Option<PathBuf>,
+    /// Driving system of your own: a command (PROTOCOL.md), `tcp:HOST:PORT` or `unix:PATH`.
+    #[arg(long, value_name = "COMMAND", conflicts_with = "ads")]
+    pub ads_cmd: Option<String>,
     /// Write the results as JUnit XML, too.
     #[arg(long, value_name = "FILE")]
     pub junit: Option<PathBuf>,
@@ -533,9 +648,12 @@ pub struct RenderArguments {
     /// Draw the drive of another driving system.
     #[arg(long, value_parser = Named::ADS)]
     pub ads: Option<String>,
-    /// Draw the drive of another profile of `modular`.
+    /// Draw the drive of another profile of `modular`, or of a driving system of your own.
     #[arg(long, value_name = "FILE")]
     pub ads_config: Option<PathBuf>,
+    /// Driving system of your own: a command (PROTOCOL.md), `tcp:HOST:PORT` or `unix:PATH`.
+    #[arg(long, value_name = "COMMAND", conflicts_with = "ads")]
+    pub ads_cmd: Option<String>,
 }
 
 #[derive(Debug, Args)]

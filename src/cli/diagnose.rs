@@ -10,8 +10,7 @@ use crate::model::Scenario;
 use crate::model::vocabulary::Word;
 use crate::oracle;
 use crate::oracle::{Diagnosis, Likelihood, Measure, MechanismShare, Mechanisms, WeaknessFinding};
-use crate::run;
-use crate::run::Stage;
+use crate::run::{Asked, Stage};
 use crate::statistics::Estimate;
 
 use super::arguments::DiagnoseArguments;
@@ -25,14 +24,13 @@ use super::replay::priority_text;
 /// Says which module is at fault for every file's first counted collision or, with `--mechanisms`, which share of
 /// all collisions each documented weakness causes.
 pub fn diagnose(output: &Output, arguments: &DiagnoseArguments) -> Result<(), Failure> {
-    let profile = arguments.ads_config.as_deref().map(load::profile).transpose()?;
+    let asked = load::asked(None, arguments.ads_config.as_deref(), arguments.ads_cmd.as_deref())?;
     if arguments.mechanisms {
-        return mechanisms(output, arguments, profile.as_ref());
+        return mechanisms(output, arguments, &asked);
     }
     let baseline = arguments.baseline.as_deref().map(load::profile).transpose()?.unwrap_or_default();
-    let found = each_file(output, &arguments.many, |file| {
-        explain(output, arguments, profile.as_ref(), &baseline, file)
-    });
+    let found =
+        each_file(output, &arguments.many, |file| explain(output, arguments, &asked, &baseline, file));
     match found.done.as_slice() {
         [only] if found.is_single() => tell_one(output, only),
         several => several.iter().for_each(|found| {
@@ -83,12 +81,8 @@ struct Case<'a> {
 }
 
 impl Case<'_> {
-    fn of<'a>(
-        table: &'a ActionTable,
-        scenario: &'a Scenario,
-        profile: Option<&ModularConfig>,
-    ) -> Result<Case<'a>, Failure> {
-        let (ads, _) = run::selected_for(None, profile, scenario)?;
+    fn of<'a>(table: &'a ActionTable, scenario: &'a Scenario, asked: &Asked) -> Result<Case<'a>, Failure> {
+        let (ads, _) = asked.selected_for(scenario)?;
         let stage = Stage::new(table, scenario)?;
         let (log, _, first) = stage.first_counted(&ads);
         let Some(index) = first else {
@@ -134,12 +128,12 @@ impl Explained {
 fn explain(
     output: &Output,
     arguments: &DiagnoseArguments,
-    profile: Option<&ModularConfig>,
+    asked: &Asked,
     baseline: &ModularConfig,
     file: &Path,
 ) -> Result<Explained, Failure> {
     let (table, scenario) = load::scenario(output, file)?;
-    let Case { stage, ads, log, index } = Case::of(&table, &scenario, profile)?;
+    let Case { stage, ads, log, index } = Case::of(&table, &scenario, asked)?;
     let setup = stage.setup(&ads);
     let diagnosis = oracle::diagnose(&setup, &log, index, baseline).map_err(Failure::usage)?;
     let likelihood = arguments.likelihood.map(|count| oracle::likelihood(&setup, &log, index, count));
@@ -150,14 +144,10 @@ fn explain(
 }
 
 /// The share of all files' crashes that vanish without each documented weakness, and by chance.
-fn mechanisms(
-    output: &Output,
-    arguments: &DiagnoseArguments,
-    profile: Option<&ModularConfig>,
-) -> Result<(), Failure> {
+fn mechanisms(output: &Output, arguments: &DiagnoseArguments, asked: &Asked) -> Result<(), Failure> {
     let found = each_file(output, &arguments.many, |file| {
         let (table, scenario) = load::scenario(output, file)?;
-        let Case { stage, ads, log, index } = Case::of(&table, &scenario, profile)?;
+        let Case { stage, ads, log, index } = Case::of(&table, &scenario, asked)?;
         let found = oracle::mechanisms(&stage.setup(&ads), &log, index).map_err(Failure::usage)?;
         Ok((file.clone(), scenario.name.clone(), found))
     });

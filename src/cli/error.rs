@@ -25,6 +25,9 @@ pub enum Failure {
     Outdated,
     #[error("{count} could not be played", count = super::output::plural(*scenarios, "scenario"))]
     NotPlayed { scenarios: usize, in_source: bool },
+    /// An external driving system failed.
+    #[error("the driving system failed {count}", count = super::output::plural(*findings, "time"))]
+    Ads { findings: usize },
     #[error("{count} failing", count = super::output::plural(*scenarios, "scenario"))]
     Failing { scenarios: usize },
     /// Ctrl-C: what was done is saved.
@@ -51,6 +54,7 @@ impl Failure {
             | Failure::NotPlayed { in_source: true, .. } => 2,
             Failure::Refuted { .. } => 3,
             Failure::Collision { .. } | Failure::Failing { .. } => 4,
+            Failure::Ads { .. } => 5,
             // What a shell reports for a process that SIGINT ended.
             Failure::Interrupted { .. } => 130,
         }

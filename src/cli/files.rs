@@ -4,9 +4,12 @@ use std::fs::File;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
+use crate::ads::external;
+use crate::episode::EpisodeLog;
 use crate::model::digest;
 
 use super::error::Failure;
+use super::load::answers_path;
 
 /// Longest name of a file that common file systems take, in bytes.
 const NAME_BYTES_MAX: usize = 255;
@@ -62,6 +65,14 @@ fn is_read(path: &Path) -> std::io::Result<Option<File>> {
 #[cfg(not(any(target_os = "linux", target_os = "macos")))]
 fn is_read(_: &Path) -> std::io::Result<Option<File>> {
     Ok(None)
+}
+
+/// Writes the answers of an external driving system beside the scenario of its episode; nothing for others.
+pub fn write_answers(scenario: &Path, log: &EpisodeLog) -> Result<(), Failure> {
+    match log.conversation.as_deref() {
+        Some(conversation) => write(&answers_path(scenario), &external::to_text(&conversation.exchanges)),
+        None => Ok(()),
+    }
 }
 
 /// Where a file is written before it has its name.

@@ -22,6 +22,7 @@ Exit status:
   2    mistakes in a source file; for `fmt --check`, a file is not formatted
   3    a claim is refuted
   4    a counted collision (`run --fail-on-collision`), or a failing `test`
+  5    a driving system of your own failed (`ads check`, `run --fail-on-collision`)
   130  Ctrl-C; what was done is saved, and `--resume` goes on
 
 `avastra COMMAND --help` has examples. `avastra explain` lists every diagnostic,
@@ -94,6 +95,7 @@ const EXAMPLES: &[(&str, &[(&str, &str)])] = &[
             ("run scenarios/avastra45.ava --ads reactive --traffic released", ""),
             ("run scenarios/avastra45.ava --road corner --without npc_gap", "with one rule switched off"),
             ("run --policy policies/corner.ava", "let a learned policy choose"),
+            ("run scenarios/avastra45.ava --ads-cmd './my_planner --fast'", "a driving system of your own"),
             ("run --resume runs/0001", "go on after Ctrl-C"),
         ],
     ),
@@ -158,6 +160,15 @@ const EXAMPLES: &[(&str, &[(&str, &str)])] = &[
         &[
             ("render runs/0001/critical/corner_0004.ava --strip", "the seconds up to the crash"),
             ("render runs/0001/critical/corner_0004.ava --at 12.5 -o moment.svg", ""),
+        ],
+    ),
+    (
+        "ads",
+        &[
+            ("ads check -- ./my_planner --fast", "does it follow PROTOCOL.md?"),
+            ("ads check -- tcp:127.0.0.1:5555", "one that listens on a socket"),
+            ("ads schema", "JSON Schema of every message"),
+            ("ads check -- avastra ads toy --misbehave nan", "what a finding looks like"),
         ],
     ),
     (

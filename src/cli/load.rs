@@ -7,11 +7,13 @@ use std::path::{Component, Path, PathBuf};
 use std::sync::Arc;
 
 use crate::action::ActionTable;
-use crate::ads::ModularConfig;
+use crate::ads::external::{ExternalSettings, Target};
+use crate::ads::{EXTERNAL, ModularConfig};
 use crate::check;
 use crate::check::{Loaded, ReadError};
 use crate::model::{Policy, Scenario, Space};
-use crate::run::{Profile, driving_system};
+use crate::run;
+use crate::run::{Asked, Profile, driving_system};
 use crate::sim::TrafficProfile;
 
 use super::error::Failure;
@@ -160,7 +162,15 @@ pub fn below(folder: &Path) -> Vec<PathBuf> {
 /// # Errors
 /// As [`load`], and if the file declares no action, or is a scenario.
 pub fn table(output: &Output, path: &Path) -> Result<ActionTable, Failure> {
-    let loaded = load(output, path)?;
+    table_of(output, read_and_check(path)?, path)
+}
+
+/// The action table of a space that was read.
+///
+/// # Errors
+/// As [`table`].
+pub fn table_of(output: &Output, loaded: Loaded, path: &Path) -> Result<ActionTable, Failure> {
+    let loaded = sound(output, loaded)?;
     if loaded.scenario.is_some() {
         let path = path.display();
         return Err(Failure::usage(format!("`{path}` is a scenario: `avastra replay {path}` plays it")));
@@ -180,6 +190,7 @@ pub fn scenario(output: &Output, path: &Path) -> Result<(ActionTable, Scenario),
     let mut loaded = load(output, path)?;
     let scenario = loaded.scenario.take();
     let scenario = scenario.ok_or_else(|| Failure::usage(format!("`{}` has no scenario", path.display())))?;
+    let scenario = with_answers(scenario, path)?;
     Ok((ActionTable::new(space(loaded, path)?), scenario))
 }
 
@@ -191,16 +202,74 @@ pub fn profile(path: &Path) -> Result<ModularConfig, Failure> {
     ModularConfig::from_yaml(&text(path)?).map_err(|error| Failure::file("use", path, error))
 }
 
-/// The profile in a file; without a file, the one that the driving system comes with, if there is one.
+/// The driving system that a run, a training or a study is to be played against.
+pub struct UnderTest {
+    pub ads: String,
+    pub profile: Option<Profile>,
+    pub external: Option<ExternalSettings>,
+}
+
+/// The driving system of a name, with the profile in a file; without a file, the one that it comes with, if there is
+/// one. A command, or a profile with an `ads` block, makes it an external one.
 ///
 /// # Errors
-/// As [`profile`].
-pub fn profile_or_own(path: Option<&Path>, ads: &str) -> Result<Option<Profile>, Failure> {
-    let settings = match path {
+/// If the file cannot be read or is no profile, or the command is none.
+pub fn under_test(ads: &str, config: Option<&Path>, command: Option<&str>) -> Result<UnderTest, Failure> {
+    if let Some(settings) = external(config, command)? {
+        return Ok(UnderTest { ads: EXTERNAL.to_owned(), profile: None, external: Some(settings) });
+    }
+    let settings = match config {
         Some(path) => Some(profile(path)?),
         None => driving_system(ads).ok().and_then(|ads| ads.profile().copied()),
     };
-    Ok(settings.as_ref().map(Profile::new))
+    Ok(UnderTest { ads: ads.to_owned(), profile: settings.as_ref().map(Profile::new), external: None })
+}
+
+/// The driving system that scenarios are to be played with, if a command line names one. An external one is started.
+///
+/// # Errors
+/// As [`under_test`], and if an external one does not start.
+pub fn asked(ads: Option<&str>, config: Option<&Path>, command: Option<&str>) -> Result<Asked, Failure> {
+    if let Some(settings) = external(config, command)? {
+        return Ok(Asked { external: Some(run::started(&settings)?), ..Asked::default() });
+    }
+    let profile = config.map(profile).transpose()?;
+    Ok(Asked { ads: ads.map(str::to_owned), profile, external: None })
+}
+
+/// An external driving system, by a command or by the `ads` block of a profile; with both, the command goes before the
+/// one of the profile.
+pub fn external(config: Option<&Path>, command: Option<&str>) -> Result<Option<ExternalSettings>, Failure> {
+    let target = command.map(|text| {
+        Target::from_text(text).map_err(|reason| Failure::usage(format!("`--ads-cmd`: {reason}")))
+    });
+    let target = target.transpose()?;
+    let Some(path) = config else { return Ok(target.map(ExternalSettings::of)) };
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let settings = ExternalSettings::from_yaml(&text(path)?, folder).transpose();
+    let settings = settings.map_err(|error| Failure::file("use", path, error))?;
+    match (settings, target) {
+        (Some(settings), Some(command)) => Ok(Some(ExternalSettings { command, ..settings })),
+        (None, Some(_)) => Err(Failure::usage(format!(
+            "`{}` is a profile of `modular`: with `--ads-cmd` it must have an `ads` block",
+            path.display()
+        ))),
+        (settings, None) => Ok(settings),
+    }
+}
+
+/// The file of the recorded answers of a scenario.
+pub fn answers_path(scenario: &Path) -> PathBuf {
+    scenario.with_extension("answers.jsonl")
+}
+
+/// A scenario with the recorded answers of its driving system, if that is an external one and they lie beside it.
+fn with_answers(mut scenario: Scenario, path: &Path) -> Result<Scenario, Failure> {
+    let answers = answers_path(path);
+    if scenario.origin.ads.as_deref() == Some(EXTERNAL) && answers.is_file() {
+        scenario.origin.recorded_answers = Some(text(&answers)?.into());
+    }
+    Ok(scenario)
 }
 
 /// The traffic profile of that name, or in that file.
@@ -239,6 +308,7 @@ pub fn emitted_in(output: &Output, path: &Path, loaded: Loaded) -> Result<Emitte
         return Ok(Emitted::Policy(ActionTable::new(space(loaded, path)?), Box::new(policy)));
     }
     if let Some(scenario) = loaded.scenario.take() {
+        let scenario = with_answers(scenario, path)?;
         return Ok(Emitted::Scenario(ActionTable::new(space(loaded, path)?), Box::new(scenario)));
     }
     Err(Failure::usage(format!("`{}` has neither a scenario nor a policy", path.display())))

@@ -1,5 +1,6 @@
 //! The command line: the one place that reads files, the clock and the environment, and exits.
 
+mod ads;
 mod arguments;
 mod check;
 mod compile;
@@ -110,6 +111,7 @@ pub fn main() -> ExitCode {
         Command::Test(arguments) => test::test(&output, arguments),
         Command::Render(arguments) => render::render(&output, arguments),
         Command::Road(arguments) => road::road(&output, arguments),
+        Command::Ads(arguments) => ads::ads(&output, arguments),
     };
     output.finish(name, result.as_ref().err());
     let arrived = output.arrived();

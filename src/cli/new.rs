@@ -17,6 +17,11 @@ const STARTER: [(&str, &str); 3] = [
     ("roads/corner.xodr", include_str!("../../scenarios/roads/corner.xodr")),
 ];
 
+/// The text of a file of the paper's space, which is in the program.
+pub fn shipped(name: &str) -> Option<&'static str> {
+    USED.iter().find(|(known, _)| *known == name).map(|(_, text)| *text)
+}
+
 /// What the examples use.
 const USED: [(&str, &str); 6] = [
     ("avastra45.ava", include_str!("../../scenarios/avastra45.ava")),

@@ -30,6 +30,11 @@ pub fn pack(output: &Output, arguments: &PackArguments) -> Result<(), Failure> {
         let target = folder.join(name);
         let mut moves = moves(&loaded, folder)?;
         moves.insert(absolute(path)?, target.clone());
+        // The recorded answers of an external driving system lie beside their scenario.
+        let answers = load::answers_path(path);
+        if answers.is_file() {
+            moves.insert(absolute(&answers)?, load::answers_path(&target));
+        }
         plan.copy(&loaded, &moves)?;
         // A file that is named twice is one file.
         if !packed.contains(&target) {

@@ -8,7 +8,6 @@ use crate::ads::Selected;
 use crate::geometry::Vec2;
 use crate::model::{Claim, Scenario};
 use crate::report::{Snapshot, picture};
-use crate::run;
 use crate::run::Stage;
 use crate::sim::DT_S;
 
@@ -30,8 +29,9 @@ pub fn render(output: &Output, arguments: &RenderArguments) -> Result<(), Failur
     let (table, scenario) = load::scenario(output, &arguments.file)?;
     let scenario = &scenario;
     let times_s = times(arguments, scenario, table.space().episode.step_s)?;
-    let profile = arguments.ads_config.as_deref().map(load::profile).transpose()?;
-    let (ads, _) = run::selected_for(arguments.ads.as_deref(), profile.as_ref(), scenario)?;
+    let asked =
+        load::asked(arguments.ads.as_deref(), arguments.ads_config.as_deref(), arguments.ads_cmd.as_deref())?;
+    let (ads, _) = asked.selected_for(scenario)?;
     let (moments, names) = moments(&table, scenario, &ads, &times_s)?;
     // A strip ends with its scenario.
     if moments.is_empty() || (!arguments.strip && moments.len() < times_s.len()) {

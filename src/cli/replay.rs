@@ -9,7 +9,7 @@ use crate::model::vocabulary::{Priority, Word};
 use crate::model::{Avoidability, Scenario, Space};
 use crate::oracle;
 use crate::run;
-use crate::run::{Gauges, Stage};
+use crate::run::{Asked, Gauges, Stage};
 
 use super::arguments::ReplayArguments;
 use super::error::Failure;
@@ -20,16 +20,18 @@ use super::parallel::each_file;
 
 /// Replays the scenario of every file; with `--ads` or another profile only tells what happens.
 pub fn replay(output: &Output, arguments: &ReplayArguments) -> Result<(), Failure> {
-    let profile = arguments.ads_config.as_deref().map(load::profile).transpose()?;
+    let asked =
+        load::asked(arguments.ads.as_deref(), arguments.ads_config.as_deref(), arguments.ads_cmd.as_deref())?;
     let played = each_file(output, &arguments.many, |path| {
         let (table, scenario) = load::scenario(output, path)?;
-        let (ads, is_recorded) = run::selected_for(arguments.ads.as_deref(), profile.as_ref(), &scenario)?;
+        let (ads, is_recorded) = asked.selected_for(&scenario)?;
         if is_recorded {
-            return play_recorded(&table, &scenario, path);
+            return play(&table, &scenario, path, (&ads, None));
         }
-        let name = match &arguments.ads_config {
-            Some(path) => format!("{} with {}", ads.name(), path.display()),
-            None => ads.name().to_owned(),
+        let name = match (&arguments.ads_config, ads.program()) {
+            (_, Some(program)) => program.attached().name(),
+            (Some(path), None) => format!("{} with {}", ads.name(), path.display()),
+            (None, None) => ads.name().to_owned(),
         };
         play(&table, &scenario, path, (&ads, Some(name)))
     });
@@ -96,12 +98,22 @@ pub struct Played {
     pub result: serde_json::Value,
 }
 
-/// Plays a scenario against the driving system that it was found with, and checks its claims.
+/// Plays a scenario against the driving system that it was found with, and checks its claims. An external one is the one
+/// that is asked for, or else known by its recorded answers.
 ///
 /// # Errors
 /// If that driving system, or the scenario, does not exist any more as it was.
-pub fn play_recorded(table: &ActionTable, scenario: &Scenario, path: &Path) -> Result<Played, Failure> {
-    play(table, scenario, path, (&run::recorded(scenario)?, None))
+pub fn play_recorded(
+    table: &ActionTable,
+    scenario: &Scenario,
+    path: &Path,
+    asked: &Asked,
+) -> Result<Played, Failure> {
+    let ads = match asked.selected_for(scenario)? {
+        (ads, true) => ads,
+        (_, false) => run::recorded(scenario)?,
+    };
+    play(table, scenario, path, (&ads, None))
 }
 
 /// Plays a scenario. With a name for the driving system it is another one than the recorded: no claim is checked.

@@ -10,12 +10,14 @@ use crate::emit;
 use crate::episode::EpisodeLog;
 use crate::model::{Policy, Space, digest};
 use crate::run::{
-    EpisodeSummary, Group, PolicyReference, RefusalCount, Run, RunSettings, Totals, TrafficRecord, play,
+    EpisodeSummary, FailureCount, Group, PolicyReference, RefusalCount, Run, RunSettings, Totals,
+    TrafficRecord, play,
 };
 
 use super::arguments::{FaceArgument, RunArguments};
 use super::error::Failure;
 use super::interrupt::stop_on_interrupt;
+use super::load::UnderTest;
 use super::never::Never;
 use super::output::Output;
 use super::output::plural;
@@ -70,14 +72,21 @@ pub fn run(output: &Output, arguments: &RunArguments) -> Result<(), Failure> {
     output.say(&never.in_words(output.verbose));
     let critical = load::sources_in(&directory.path.join("critical"))?;
     output.say(&critical_text(&directory.path, &critical));
+    let failures = directory.database.failures().map_err(unread)?;
+    if !failures.is_empty() {
+        output.say(&failures_text(&directory.path, &failures));
+    }
     output.result(
-        serde_json::json!({ "directory": directory.path, "totals": totals, "refusals": refusals, "groups": groups, "never": never, "critical": critical }),
+        serde_json::json!({ "directory": directory.path, "totals": totals, "refusals": refusals, "groups": groups, "never": never, "critical": critical, "failures": failures }),
     );
     if stop.load(Ordering::Relaxed) && (totals.episodes as usize) < run.episodes() {
         return Err(Failure::Interrupted { command: "run", directory: directory.path });
     }
     if arguments.fail_on_collision && totals.counted > 0 {
         return Err(Failure::Collision { collisions: totals.counted as usize });
+    }
+    if arguments.fail_on_collision && totals.failed > 0 {
+        return Err(Failure::Ads { findings: totals.failed as usize });
     }
     Ok(())
 }
@@ -94,10 +103,13 @@ fn begun(output: &Output, arguments: &RunArguments) -> Result<(Run, RunDirectory
     let agent = policy.as_ref().map_or(&arguments.agent, |(_, policy)| &policy.name);
     let settings = RunSettings::new(space, agent, arguments.episodes, arguments.seed);
     let traffic = arguments.traffic.as_deref().map(load::traffic).transpose()?;
+    let UnderTest { ads, profile, external } =
+        load::under_test(&arguments.ads, arguments.ads_config.as_deref(), arguments.ads_cmd.as_deref())?;
     let settings = RunSettings {
         roads: roads_or_all(&arguments.road, space),
-        ads: arguments.ads.clone(),
-        profile: load::profile_or_own(arguments.ads_config.as_deref(), &arguments.ads)?,
+        ads,
+        profile,
+        external,
         ambient: arguments.ambient,
         traffic: traffic.as_ref().and_then(TrafficRecord::new),
         causes: arguments.causes,
@@ -196,6 +208,11 @@ fn keep(
         0 => None,
         _ => Some(write_scenario(run, directory, summary, log)?),
     };
+    if log.failure.is_some() {
+        let settings = run.settings();
+        let rules = [&settings.without[..], &settings.with];
+        directory.write_failure("run", run.table(), (log, summary), &settings.agent, rules)?;
+    }
     directory
         .database
         .add(summary, log, |draw| emit::action_text(run.table(), draw), scenario.as_deref())
@@ -251,13 +268,14 @@ fn heading(run: &Run, arguments: &RunArguments, directory: &Path) -> String {
         let name = arguments.traffic.as_deref().or(record.settings.shipped_as());
         format!(", traffic {}", name.unwrap_or("of a profile of its own"))
     });
+    let ads = run.ads_name();
     let profile =
         arguments.ads_config.as_ref().map_or(String::new(), |path| format!(" with {}", path.display()));
     format!(
         "{}: {} against {}{profile}, {} on {}{ambient}{traffic}, seed {}, into {}",
         run.space().path.display(),
         settings.agent,
-        settings.ads,
+        ads,
         plural(settings.episodes as usize, "episode"),
         settings.roads.join(", "),
         settings.seed,
@@ -271,6 +289,7 @@ fn totals_text(totals: &Totals, elapsed_s: f64, played: usize) -> String {
         (totals.stalled, "stalled"),
         (totals.blocked, "blocked by others"),
         (totals.step_limit, "at the step limit"),
+        (totals.failed, "because the driving system failed"),
     ];
     let ends = ends.iter().filter(|(count, _)| *count > 0).map(|(count, how)| format!("{count} {how}"));
     let ends: Vec<String> = ends.collect();
@@ -320,6 +339,21 @@ fn refusals_text(refusals: &[RefusalCount]) -> String {
     let line = |refusal: &RefusalCount| format!("{} × {}", refusal.times, refusal.reason);
     let head = format!("refused: {}", plural(all as usize, "action"));
     cut_short(head, refusals, line, |more| format!("and for {more} other reasons"))
+}
+
+/// Findings about an external driving system, by what is wrong and when.
+fn failures_text(directory: &Path, failures: &[FailureCount]) -> String {
+    let line = |failure: &FailureCount| {
+        let FailureCount { kind, problem, times, detail, scenario, .. } = failure;
+        format!("{times} × {kind} ({problem}): {detail}; for example {scenario}")
+    };
+    let all: i64 = failures.iter().map(|failure| failure.times).sum();
+    let head = format!(
+        "\nthe driving system failed {}; each is in {}/failures:",
+        plural(all as usize, "time"),
+        directory.display()
+    );
+    cut_short(head, failures, line, |more| format!("and {more} others"))
 }
 
 /// Distinct failures, each with how often it was found and a scenario that shows it.

@@ -17,7 +17,7 @@ use crate::sim::ENGINE;
 use crate::syntax::yaml_mistake;
 
 use super::error::Failure;
-use super::files::write;
+use super::files::{write, write_answers};
 use super::load;
 use super::output::Output;
 use super::pack;
@@ -179,6 +179,38 @@ impl RunDirectory {
         Ok(RunDirectory { path: held.path.clone(), database, _held: held })
     }
 
+    /// Writes an episode that an external driving system failed in: `failures/ROAD_NNNN.txt` says how, and a scenario of
+    /// that name ends so.
+    pub fn write_failure(
+        &self,
+        command: &str,
+        table: &ActionTable,
+        (log, summary): (&EpisodeLog, &EpisodeSummary),
+        agent: &str,
+        [without, with]: [&[String]; 2],
+    ) -> Result<(), Failure> {
+        let Some(failure) = &log.failure else { return Ok(()) };
+        let folder = self.path.join("failures");
+        std::fs::create_dir_all(&folder).map_err(|error| Failure::file("create", &folder, error))?;
+        let name = format!("{}_{:04}", log.road, summary.episode);
+        let space_path = load::relative(&folder, &table.space().path)?;
+        let (name, space_path, episode) = (name.as_str(), space_path.as_str(), summary.episode);
+        let source = emit::Provenance { command, name, space_path, episode, agent, without, with };
+        let path = folder.join(format!("{name}.ava"));
+        let mut text = format!("{}\n{}\n", failure.in_words(), failure.problem.advice());
+        if !failure.stderr.is_empty() {
+            text.push_str(&format!("\nthe end of its standard error:\n{}", failure.stderr));
+        }
+        write(&path.with_extension("txt"), &text)?;
+        // Without a step there is nothing to replay.
+        if log.steps.is_empty() {
+            return Ok(());
+        }
+        write_answers(&path, log)?;
+        let file = emit::failure(table, log, &failure.in_words(), &source);
+        write(&path, &crate::syntax::print(&file))
+    }
+
     /// The file with the scenario of an episode.
     pub fn critical(&self, road: &str, episode: usize) -> PathBuf {
         self.path.join("critical").join(format!("{}.ava", scenario_name(road, episode)))
@@ -201,6 +233,7 @@ impl RunDirectory {
         let source = emit::Provenance { command, name, space_path, episode, agent, without, with };
         let file = emit::scenario(table, log, summary, &source);
         let text = crate::syntax::print(&file);
+        write_answers(&self.critical(&log.road, episode), log)?;
         write(&self.critical(&log.road, episode), &text)?;
         Ok(digest(text.as_bytes()))
     }

@@ -148,6 +148,27 @@ pub const SHAPES: &[Shape] = &[
             f("never.chosen[]", "object", "a row that was legal, but that the agent never chose"),
             f("never.realised[]", "object", "a row that was chosen, but never carried out"),
             f("critical[]", "text", "scenarios with a counted collision"),
+            f(
+                "failures[]",
+                "object",
+                "what went wrong with a driving system of your own: `kind`, `problem`, `times`, `detail`, `scenario`",
+            ),
+        ],
+    },
+    Shape {
+        command: "ads",
+        fields: &[
+            f(
+                "checks[]",
+                "object",
+                "`ads check`: `stage`, `passed`, what was `found`, the `failure` if it is one of PROTOCOL.md",
+            ),
+            f(
+                "speed",
+                "object?",
+                "`ads check`: `questions`, `round_trips_per_s` and `share` of the episode's time",
+            ),
+            f("protocol", "object?", "`ads schema`: the JSON Schema of every message"),
         ],
     },
     Shape {

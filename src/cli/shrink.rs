@@ -7,11 +7,11 @@ use crate::episode::{Outcome, Script, Setup};
 use crate::model::Claim;
 use crate::oracle;
 use crate::run;
-use crate::run::{EpisodeSummary, Stage};
+use crate::run::{Asked, EpisodeSummary, Stage};
 
 use super::arguments::ShrinkArguments;
 use super::error::Failure;
-use super::files::write;
+use super::files::{write, write_answers};
 use super::load;
 use super::output::Output;
 use super::output::plural;
@@ -29,9 +29,10 @@ pub fn shrink(output: &Output, arguments: &ShrinkArguments) -> Result<(), Failur
             "`--output {path}` is for one file: of several, each is written to a folder `{FOLDER}`"
         )));
     }
+    let asked = load::asked(None, arguments.ads_config.as_deref(), arguments.ads_cmd.as_deref())?;
     let shrunk = each_file(output, &arguments.many, |file| {
         let path = arguments.output.clone().unwrap_or_else(|| apart(file));
-        smaller(output, file, &path)
+        smaller(output, file, &path, &asked)
     });
     let done = &shrunk.done;
     for small in done {
@@ -110,9 +111,16 @@ fn apart(file: &Path) -> PathBuf {
 }
 
 /// Shrinks the scenario of a file into another.
-fn smaller(output: &Output, file: &Path, path: &Path) -> Result<Small, Failure> {
+fn smaller(output: &Output, file: &Path, path: &Path, asked: &Asked) -> Result<Small, Failure> {
     let (table, scenario) = load::scenario(output, file)?;
-    let ads = run::recorded(&scenario)?;
+    let (ads, _) = asked.selected_for(&scenario)?;
+    if ads.program().is_some_and(|program| !program.can_start()) {
+        return Err(Failure::usage(format!(
+            "`{}` was made against an external driving system, which must drive each try: give it with `--ads-cmd` or \
+             `--ads-config`",
+            scenario.name
+        )));
+    }
     let stage = Stage::new(&table, &scenario)?;
     let (log, judgements, first) = stage.first_counted(&ads);
     let Some(index) = first else {
@@ -149,6 +157,7 @@ fn smaller(output: &Output, file: &Path, path: &Path) -> Result<Small, Failure> 
         summary.find_causes(&setup, &shrunk.log).map_err(Failure::usage)?;
     }
     write(path, &crate::syntax::print(&emit::scenario(&table, &shrunk.log, &summary, &source)))?;
+    write_answers(path, &shrunk.log)?;
     let actions = shrunk.log.steps.iter().filter_map(|step| match &step.outcome {
         Outcome::Done { draw, .. } => Some(emit::action_text(&table, draw)),
         Outcome::Passed | Outcome::Refused { .. } => None,

@@ -76,7 +76,8 @@ fn begun(output: &Output, path: &Path, quick: bool) -> Result<Study, Failure> {
     let file = StudyFile::from_yaml(&text).map_err(refuse)?;
     let beside = |name: &str| path.parent().unwrap_or(Path::new("")).join(name);
     let table = load::table(output, &beside(&file.space))?;
-    let profile = load::profile_or_own(file.ads_config.as_deref().map(beside).as_deref(), &file.ads)?;
+    let config = file.ads_config.as_deref().map(beside);
+    let under_test = load::under_test(&file.ads, config.as_deref(), None)?;
     let read = |name: &str| load::read(&beside(name)).map_err(|error| error.to_string());
     let traffic = file.traffic.as_ref().map(|wanted| {
         // A name is a name; a file lies beside the study's.
@@ -85,7 +86,8 @@ fn begun(output: &Output, path: &Path, quick: bool) -> Result<Study, Failure> {
     let traffic =
         traffic.as_deref().map(load::traffic).transpose().map_err(|error| refuse(error.to_string()))?;
     let traffic = traffic.as_ref().and_then(TrafficRecord::new);
-    let settings = StudySettings::new(file, &table, profile, traffic, &read);
+    let settings =
+        StudySettings::new(file, &table, (under_test.profile, under_test.external), traffic, &read);
     let settings = settings.map_err(|error| refuse(error.to_string()))?;
     let settings = if quick { settings.quick() } else { settings };
     Study::new(table, settings).map_err(|error| refuse(error.to_string()))

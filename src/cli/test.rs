@@ -5,13 +5,12 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use crate::action::ActionTable;
-use crate::ads::ModularConfig;
 use crate::check::{Loaded, normal};
 use crate::model::{Scenario, code};
 use crate::oracle;
 use crate::oracle::Regression;
 use crate::run;
-use crate::run::{RunError, Stage};
+use crate::run::{Asked, RunError, Stage};
 use crate::syntax::ast::FileId;
 use crate::syntax::{Diagnostic, apply_fixes};
 
@@ -45,11 +44,12 @@ enum Outcome {
 
 /// Plays every scenario of a suite against a driving system.
 pub fn test(output: &Output, arguments: &TestArguments) -> Result<(), Failure> {
-    let profile = arguments.ads_config.as_deref().map(load::profile).transpose()?;
+    let asked =
+        load::asked(arguments.ads.as_deref(), arguments.ads_config.as_deref(), arguments.ads_cmd.as_deref())?;
     if let Some(name) = &arguments.ads {
         run::driving_system(name)?;
     }
-    let mut suite = Suite { output, arguments, profile, outdated: Vec::new(), accepted: 0 };
+    let mut suite = Suite { output, arguments, asked, outdated: Vec::new(), accepted: 0 };
     let mut cases = Vec::new();
     for file in suite_files(&arguments.paths)? {
         let Some(case) = suite.play(&file)? else { continue };
@@ -118,7 +118,7 @@ fn suite_files(paths: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
 struct Suite<'a> {
     output: &'a Output,
     arguments: &'a TestArguments,
-    profile: Option<ModularConfig>,
+    asked: Asked,
     /// Scenarios that use a space which means something else now.
     outdated: Vec<Loaded>,
     /// Number of scenarios that `--accept` took the change over into.
@@ -207,7 +207,7 @@ impl Suite<'_> {
     /// The crash of a scenario with the driving system that it was found with, and with the one under test.
     fn compare(&self, table: &ActionTable, scenario: &Scenario) -> Result<Outcome, RunError> {
         let recorded = run::recorded(scenario)?;
-        let (ads, _) = run::selected_for(self.arguments.ads.as_deref(), self.profile.as_ref(), scenario)?;
+        let (ads, _) = self.asked.selected_for(scenario)?;
         let stage = Stage::new(table, scenario)?;
         let (log, _, first) = stage.first_counted(&recorded);
         let Some(index) = first else {

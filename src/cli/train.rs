@@ -3,12 +3,13 @@
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use crate::ads::external::Attached;
 use crate::agent;
 use crate::agent::{Kind, QPolicy, Settings};
 use crate::emit;
 use crate::model::policy::{PolicyClaims, PolicyOrigin};
 use crate::model::{Policy, Space, digest_text};
-use crate::run::{Profile, RunSettings, TrafficRecord};
+use crate::run::{RunSettings, TrafficRecord};
 use crate::syntax::listed;
 use crate::train::{Evaluation, TrainSettings, TrainedEpisode, Training, evaluate, rounded};
 
@@ -17,6 +18,7 @@ use super::distill::rules_text;
 use super::error::Failure;
 use super::files::write;
 use super::interrupt::stop_on_interrupt;
+use super::load::UnderTest;
 use super::output::Output;
 use super::output::plural;
 use super::pack::pack_space;
@@ -58,12 +60,15 @@ fn begun(output: &Output, arguments: &TrainArguments) -> Result<(Training, RunDi
     let table = load::table(output, file)?;
     let hyperparameters = settings(arguments)?;
     let space = table.space();
-    let profile = arguments.ads_config.as_deref().map(load::profile).transpose()?;
+    let UnderTest { ads, profile, external } =
+        load::under_test(&arguments.ads, arguments.ads_config.as_deref(), arguments.ads_cmd.as_deref())?;
     let traffic = arguments.traffic.as_deref().map(load::traffic).transpose()?;
     let conditions = RunSettings {
         roads: roads_or_all(&arguments.road, space),
-        ads: arguments.ads.clone(),
-        profile: profile.as_ref().map(Profile::new),
+        ads,
+        // Without a file nothing is recorded.
+        profile: profile.filter(|_| arguments.ads_config.is_some()),
+        external,
         traffic: traffic.as_ref().and_then(TrafficRecord::new),
         without: arguments.rules.without.clone(),
         with: arguments.rules.with.clone(),
@@ -208,6 +213,8 @@ fn policy(training: &Training, acting: &QPolicy, evaluation: &Evaluation) -> Pol
         _ => format!("{}_{}", settings.agent, settings.seed),
     };
     let network = acting.network();
+    let attached = training.arena().attached();
+    let attached = attached.as_ref();
     let policy = Policy {
         name,
         docs: vec![headline(settings, evaluation)],
@@ -221,8 +228,13 @@ fn policy(training: &Training, acting: &QPolicy, evaluation: &Evaluation) -> Pol
                 .profile
                 .as_ref()
                 .map(|profile| profile.settings.to_line())
-                .filter(|line| !line.is_empty()),
-            profile_digest: settings.profile.as_ref().map(|profile| profile.digest.clone()),
+                .filter(|line| !line.is_empty())
+                .or_else(|| attached.map(Attached::to_line)),
+            profile_digest: settings
+                .profile
+                .as_ref()
+                .map(|profile| profile.digest.clone())
+                .or_else(|| attached.map(Attached::digest)),
             engine: settings.engine.clone(),
             avastra: settings.avastra.clone(),
             with: settings.with.clone(),

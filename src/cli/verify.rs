@@ -10,7 +10,7 @@ use crate::model::{Policy, digest_text};
 use crate::sim::ENGINE;
 use crate::train::{evaluate, judge_rules, rounded, training_arena};
 
-use super::arguments::FilesArguments;
+use super::arguments::VerifyArguments;
 use super::error::Failure;
 use super::load::Emitted;
 use super::output::Output;
@@ -27,10 +27,11 @@ enum Verified {
 }
 
 /// Replays scenarios, and plays the evaluations of policies again.
-pub fn verify(output: &Output, arguments: &FilesArguments) -> Result<(), Failure> {
-    let verified = each_file(output, arguments, |path| match load::emitted(output, path)? {
+pub fn verify(output: &Output, arguments: &VerifyArguments) -> Result<(), Failure> {
+    let asked = load::asked(None, arguments.ads_config.as_deref(), arguments.ads_cmd.as_deref())?;
+    let verified = each_file(output, &arguments.many, |path| match load::emitted(output, path)? {
         Emitted::Scenario(table, scenario) => {
-            replay::play_recorded(&table, &scenario, path).map(Verified::Scenario)
+            replay::play_recorded(&table, &scenario, path, &asked).map(Verified::Scenario)
         }
         Emitted::Policy(table, policy) => {
             let wrong = judge(&table, &policy)?;

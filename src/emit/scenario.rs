@@ -4,6 +4,8 @@
 use std::sync::Arc;
 
 use crate::action::{ActionTable, Draw};
+use crate::ads::external;
+use crate::ads::external::Conversation;
 use crate::episode::{Collision, EpisodeLog, Outcome};
 use crate::model::vocabulary::Word;
 use crate::model::{ActionDef, Space, StateDef, Value, digest_text, ticks_s};
@@ -46,6 +48,16 @@ pub fn scenario(
     let headline = headline(table.space(), log, &counted[0].collision);
     let origin = origin(log, source, &summary.avoidability);
     file(table, log, source, origin, [&emitted, &headline], steps, expects(log, summary, steps))
+}
+
+/// An episode that an external driving system failed in, as a scenario that ends so; it must have a step.
+pub fn failure(table: &ActionTable, log: &EpisodeLog, headline: &str, source: &Provenance) -> File {
+    let emitted = format!("Emitted by `avastra {}`; replay with `avastra replay FILE`.", source.command);
+    let origin = origin(log, source, &AvoidabilitySettings::default());
+    let end = tree::expect(tree::equal(tree::name("end"), tree::name(log.end.name())), Vec::new());
+    let trace = tree::text(digest_text(&log.trace()));
+    let trace = tree::expect(tree::equal(tree::name("trace"), trace), Vec::new());
+    file(table, log, source, origin, [&emitted, headline], log.steps.len(), vec![end, trace])
 }
 
 /// All steps of an episode as a scenario without claims, to look at.
@@ -105,6 +117,11 @@ fn origin(log: &EpisodeLog, source: &Provenance, avoidability: &AvoidabilitySett
             fields.push(tree::field("profile", tree::text(line)));
         }
         fields.push(tree::field("profile_digest", tree::text(profile.digest())));
+    }
+    if let Some(Conversation { attached, exchanges }) = log.conversation.as_deref() {
+        fields.push(tree::field("profile", tree::text(attached.to_line())));
+        fields.push(tree::field("profile_digest", tree::text(attached.digest())));
+        fields.push(tree::field("answers", tree::text(external::digest_of(exchanges))));
     }
     fields.push(tree::field("engine", tree::text(ENGINE)));
     let traffic = &log.start.traffic;

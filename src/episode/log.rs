@@ -1,9 +1,11 @@
 //! The record of an episode: enough to judge it, to count it and to replay it.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use crate::action::Draw;
 use crate::ads::ModularConfig;
+use crate::ads::external::{Conversation, Failure, FailureKind};
 use crate::mdp::{PerceptionCounts, StateVector};
 use crate::model::vocabulary::Verb;
 use crate::model::{BodyWord, Memory};
@@ -16,6 +18,10 @@ pub struct EpisodeLog {
     pub ads: String,
     /// Settings of the driving system, if it has any.
     pub profile: Option<ModularConfig>,
+    /// What an external driving system was asked and answered.
+    pub conversation: Option<Arc<Conversation>>,
+    /// Why an external driving system could not drive on.
+    pub failure: Option<Failure>,
     pub seed: u64,
     pub start: Start,
     /// States of the space at the start.
@@ -120,6 +126,8 @@ pub enum End {
     StepLimit,
     /// The script of a replay has no more steps.
     Script,
+    /// An external driving system failed: a finding of its own, and no collision.
+    Failed(FailureKind),
 }
 
 impl End {
@@ -130,6 +138,7 @@ impl End {
             End::Blocked => "blocked",
             End::StepLimit => "limit",
             End::Script => "script",
+            End::Failed(kind) => kind.name(),
         }
     }
 }
@@ -140,7 +149,8 @@ mod tests {
 
     #[test]
     fn every_end_can_be_claimed() {
-        let ends = [End::Arrived, End::Stalled, End::Blocked, End::StepLimit, End::Script];
-        assert_eq!(ends.map(End::name), crate::model::ENDS);
+        let driven = [End::Arrived, End::Stalled, End::Blocked, End::StepLimit, End::Script];
+        let ends = driven.into_iter().chain(FailureKind::ALL.map(End::Failed));
+        assert_eq!(ends.map(End::name).collect::<Vec<_>>(), crate::model::ENDS);
     }
 }

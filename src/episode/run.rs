@@ -1,6 +1,7 @@
 //! The loop: act, drive for one observation period, record what happened.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use crate::action::{Draw, Situation};
 use crate::ads::Ads;
@@ -89,6 +90,9 @@ pub fn run_from(
     let mut play = from.map_or_else(|| Play::new(setup), |Snapshot(play)| play);
     watch(&play.world, play.ads.as_ref(), &[]);
     let end = loop {
+        if let Some(end) = play.failed() {
+            break end;
+        }
         let observation = Observation::new(&play.world, play.ads.status());
         let choice = choose(&play.moment(setup, &observation, &play.situation(setup)));
         let begun = match choice {
@@ -267,7 +271,7 @@ impl Play {
             {
                 begun = Begun::With(self.carry_out_awaited(waiting, tick, setup));
             }
-            let now = self.tick(setup, watch);
+            let Some(now) = self.tick(setup, watch) else { break };
             if near.is_none_or(|near| now.probability > near.probability) {
                 near = Some(now);
             }
@@ -310,11 +314,15 @@ impl Play {
         }
     }
 
-    /// One physics step; returns the collision probability after it. It is 1 at the tick of a contact. After that
+    /// One physics step; returns the collision probability after it, or `None` where the driving system failed and
+    /// nothing moved. It is 1 at the tick of a contact. After that
     /// the obstacle is ignored: it stands against the ego vehicle for a while and is no danger any more.
-    fn tick(&mut self, setup: &Setup, watch: &mut Watch) -> Near {
+    fn tick(&mut self, setup: &Setup, watch: &mut Watch) -> Option<Near> {
         self.world.sense(&mut self.sensed);
         let control = self.ads.drive(&self.sensed);
+        if self.ads.failure().is_some() {
+            return None;
+        }
         let contacts = self.world.tick(&control).to_vec();
         for &contact in &contacts {
             self.collisions.push(self.collision(contact));
@@ -324,11 +332,11 @@ impl Play {
         self.world.trace(&mut self.trace);
         watch(&self.world, self.ads.as_ref(), &contacts);
         if let Some(contact) = contacts.first() {
-            return Near { probability: 1.0, body: self.body(contact.obstacle) };
+            return Some(Near { probability: 1.0, body: self.body(contact.obstacle) });
         }
         let is_hit = |id| self.collisions.iter().any(|collision| collision.contact.obstacle == id);
         let Danger { probability, nearest } = setup.proc.danger(&self.world, &is_hit);
-        Near { probability, body: nearest.and_then(|id| self.body(id)) }
+        Some(Near { probability, body: nearest.and_then(|id| self.body(id)) })
     }
 
     /// Whether the condition of a trigger holds now.
@@ -363,9 +371,16 @@ impl Play {
         }
     }
 
+    /// The end of an episode whose driving system cannot drive any more.
+    fn failed(&self) -> Option<End> {
+        self.ads.failure().map(|failure| End::Failed(failure.kind()))
+    }
+
     fn end(&self, setup: &Setup) -> Option<End> {
         let episode = &setup.table.space().episode;
-        if episode.stop_arrived && self.world.arrived() {
+        if let Some(end) = self.failed() {
+            Some(end)
+        } else if episode.stop_arrived && self.world.arrived() {
             Some(End::Arrived)
         } else if episode.stalled_steps.is_some_and(|limit| self.stalled >= limit) {
             Some(if self.world.is_blocked() { End::Blocked } else { End::Stalled })
@@ -381,6 +396,8 @@ impl Play {
             road: setup.road.name.clone(),
             ads: setup.ads.name().to_owned(),
             profile: setup.ads.profile().copied(),
+            conversation: self.ads.conversation().map(Arc::new),
+            failure: self.ads.failure().cloned(),
             seed: setup.seed,
             start: setup.start,
             memory: setup.memory.clone(),

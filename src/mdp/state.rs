@@ -183,8 +183,9 @@ mod tests {
             distance_m: 5.0,
             spawned_tick: 0,
         };
-        let object = |id, x_m, heading_rad| PerceivedObject {
+        let object = |id: Option<u32>, x_m, heading_rad| PerceivedObject {
             id,
+            track: id.unwrap_or(0),
             body: Body::Sedan,
             pose: Pose::new(x_m, 0.0, heading_rad),
             velocity_mps: Vec2::new(-8.0, 3.0),

@@ -32,6 +32,10 @@ pub struct Origin {
     pub profile: Option<String>,
     /// Digest of all its settings.
     pub profile_digest: Option<String>,
+    /// Digest of the answers of an external driving system.
+    pub answers: Option<String>,
+    /// The text of the file of these answers, if whoever read the scenario found it beside.
+    pub recorded_answers: Option<Arc<str>>,
     pub engine: Option<String>,
     /// The traffic profile as one line of YAML, and its digest; the default if not given.
     pub traffic: Option<String>,
@@ -172,7 +176,20 @@ pub const MODULES: [&str; 8] =
 pub const DRIVERS: [&str; 8] = ["modular", "frenet", "reactive", "idm", "cc", "fsm", "rss", "r157"];
 
 /// How an episode may end, in the words of `expect end == …`.
-pub const ENDS: [&str; 5] = ["arrived", "stalled", "blocked", "limit", "script"];
+pub const ENDS: [&str; 12] = [
+    "arrived",
+    "stalled",
+    "blocked",
+    "limit",
+    "script",
+    "ads_crash",
+    "ads_timeout",
+    "ads_protocol",
+    "ads_flood",
+    "ads_error",
+    "ads_nondeterministic",
+    "ads_absent",
+];
 
 /// A number with the unit and the precision in which it was written.
 #[derive(Debug, Clone, Copy, PartialEq)]

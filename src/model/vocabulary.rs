@@ -317,6 +317,7 @@ words! {
     Ads "ads" = "The driving system.",
     Profile "profile" = "The settings of the driving system that differ from the default.",
     ProfileDigest "profile_digest" = "The digest of all settings of the driving system.",
+    Answers "answers" = "The digest of the recorded answers of an external driving system.",
     Engine "engine" = "The version of the world's physics.",
     Traffic "traffic" = "How other vehicles drove, if not as they usually do.",
     TrafficDigest "traffic_digest" = "The digest of all settings of the traffic.",

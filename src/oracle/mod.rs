@@ -26,4 +26,4 @@ pub use mechanisms::{
 pub use severity::{Severity, severity};
 pub use shrink::{Shrunk, shrink, spare_steps};
 pub use variation::{Likelihood, likelihood};
-pub use verify::{ClaimResult, Replays, verify};
+pub use verify::{ClaimResult, NoTries, Replays, verify};

@@ -19,12 +19,17 @@ pub struct ClaimResult {
     pub found: String,
 }
 
+/// An external driving system that is known by its recorded answers alone cannot drive anything else.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("no way to try: give the driving system with `--ads-cmd` or `--ads-config`")]
+pub struct NoTries;
+
 /// Findings that take many replays, each about the nth collision of the log; asked for only by some claims.
 pub struct Replays<'a> {
     /// The modules at fault.
     pub cause: &'a dyn Fn(usize) -> Result<Vec<Module>, NoModules>,
-    /// Steps that could be left out with the same crash.
-    pub spare_steps: &'a dyn Fn(usize) -> Vec<usize>,
+    /// Steps that could be left out with the same crash; an external driving system must be there to try.
+    pub spare_steps: &'a dyn Fn(usize) -> Result<Vec<usize>, NoTries>,
 }
 
 /// Checks every claim of a scenario, and that each of its steps was legal. `judgements` has one for
@@ -110,12 +115,13 @@ fn check(
             judged(claim, collision(log, *obstacle).and_then(judge))
         }
         Claim::Minimal { obstacle } => {
-            let judge = |index: usize| match (replays.spare_steps)(index).as_slice() {
-                [] => Ok(()),
-                spare => {
-                    let spare: Vec<String> = spare.iter().map(usize::to_string).collect();
-                    Err(format!("the same crash without step {}", spare.join(", or without step ")))
+            let judge = |index: usize| {
+                let spare = (replays.spare_steps)(index).map_err(|error| error.to_string())?;
+                if spare.is_empty() {
+                    return Ok(());
                 }
+                let spare: Vec<String> = spare.iter().map(usize::to_string).collect();
+                Err(format!("the same crash without step {}", spare.join(", or without step ")))
             };
             judged(format!("minimal{}", with(*obstacle)), collision(log, *obstacle).and_then(judge))
         }

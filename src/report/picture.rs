@@ -250,7 +250,9 @@ fn caption(svg: &mut String, (left_px, top_px): (f64, f64), moment: &Snapshot) {
         ),
         format!(
             "{}   throttle {:.0} %, brake {:.0} %",
-            moment.status.reason, moment.status.control.throttle_pct, moment.status.control.brake_pct
+            moment.status.reason_text(),
+            moment.status.control.throttle_pct,
+            moment.status.control.brake_pct
         ),
         "filled: true   dashed: perceived   green: planned   dotted: came from there".to_owned(),
     ];

@@ -75,6 +75,7 @@ impl<'a> Builder<'a> {
         let junctions = document.junctions.iter().enumerate().map(|(i, junction)| (junction.id.as_str(), i));
         let map = RoadMap {
             name: document.name.clone(),
+            file: None,
             lanes: Vec::new(),
             signals: Vec::new(),
             signs: Vec::new(),

@@ -1,6 +1,7 @@
 //! The lane graph, and how places on it are named and found.
 
 use std::collections::BTreeSet;
+use std::path::PathBuf;
 
 use crate::geometry::{Bounds, Path, Vec2, wrap_angle};
 
@@ -203,6 +204,8 @@ pub enum StripKind {
 #[derive(Debug, Clone)]
 pub struct RoadMap {
     pub name: String,
+    /// The OpenDRIVE file that it was read from, if it was a file.
+    pub file: Option<PathBuf>,
     pub lanes: Vec<Lane>,
     pub signals: Vec<Signal>,
     pub signs: Vec<Sign>,

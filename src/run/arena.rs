@@ -7,6 +7,7 @@ use ndarray::Array1;
 
 use crate::action::{ActionTable, Offer, Situation};
 use crate::ads::Selected;
+use crate::ads::external::Attached;
 use crate::agent::{Agent, Branch, Trial};
 use crate::episode;
 use crate::episode::{Choice, Moment};
@@ -71,6 +72,16 @@ impl Arena {
     /// Whether the driving system is made of modules that could be at fault.
     pub(crate) fn has_modules(&self) -> bool {
         self.ads.profile().is_some()
+    }
+
+    /// The driving system: its name here, or what an external one calls itself.
+    pub fn ads_name(&self) -> String {
+        self.ads.program().map_or_else(|| self.ads.name().to_owned(), |program| program.attached().name())
+    }
+
+    /// What identifies an external driving system.
+    pub fn attached(&self) -> Option<Attached> {
+        Some(self.ads.program()?.attached())
     }
 
     /// Number of roads.

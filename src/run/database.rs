@@ -8,6 +8,7 @@ use std::path::Path;
 use rusqlite::{Connection, Transaction, params};
 
 use crate::action::Draw;
+use crate::ads::external::Failure;
 use crate::episode::{EpisodeLog, Outcome};
 use crate::mdp::STATE_LEN;
 use crate::model::policy::VARIABLES;
@@ -22,7 +23,7 @@ use crate::run::summary::{EpisodeSummary, Finding};
 pub(crate) const LAYOUT: Layout = Layout {
     version: 8,
     unit: "episode",
-    tables: &["episode", "step", "offer", "collision", "learning", "scenario"],
+    tables: &["episode", "step", "offer", "collision", "failure", "learning", "scenario"],
     naming: Some(("offer", "reason")),
 };
 
@@ -47,6 +48,10 @@ CREATE TABLE collision (
   PRIMARY KEY (episode, number)
 ) STRICT;
 CREATE TABLE scenario (episode INTEGER PRIMARY KEY REFERENCES episode, digest TEXT NOT NULL) STRICT;
+CREATE TABLE failure (
+  episode INTEGER PRIMARY KEY REFERENCES episode, kind TEXT NOT NULL, problem TEXT NOT NULL, stage TEXT NOT NULL,
+  detail TEXT NOT NULL, exit TEXT, stderr TEXT NOT NULL
+) STRICT;
 CREATE TABLE reason (reason INTEGER PRIMARY KEY, text TEXT NOT NULL UNIQUE) STRICT;
 CREATE TABLE offer (
   episode INTEGER NOT NULL REFERENCES episode, action_row INTEGER NOT NULL, reason INTEGER NOT NULL, steps INTEGER NOT NULL,
@@ -179,6 +184,30 @@ impl Database {
         Ok(rows)
     }
 
+    /// What went wrong with an external driving system, by what it was; the most frequent first.
+    ///
+    /// # Errors
+    /// If the file cannot be read.
+    pub fn failures(&self) -> Result<Vec<FailureCount>, DatabaseError> {
+        // The bare columns of an aggregate query with `min` are those of the row that has the minimum.
+        let mut statement = self.connection.prepare(
+            "SELECT kind, problem, count(*), min(failure.episode), stage, detail, road FROM failure
+             JOIN episode USING (episode) GROUP BY kind, problem ORDER BY count(*) DESC, kind, problem",
+        )?;
+        let counts = statement.query_map([], |row| {
+            let (episode, stage, detail, road): (i64, String, String, String) =
+                (row.get(3)?, row.get(4)?, row.get(5)?, row.get(6)?);
+            Ok(FailureCount {
+                kind: row.get(0)?,
+                problem: row.get(1)?,
+                times: row.get(2)?,
+                detail: format!("at {stage}, {detail}"),
+                scenario: format!("{road}_{episode:04}"),
+            })
+        })?;
+        Ok(counts.collect::<Result<_, _>>()?)
+    }
+
     /// Totals over all episodes.
     ///
     /// # Errors
@@ -199,7 +228,7 @@ impl Database {
                         coalesce(sum(branched_s), 0.0),
                         (SELECT coalesce(sum(priority = 'ego'), 0) FROM collision),
                         (SELECT coalesce(sum(priority = 'other'), 0) FROM collision),
-                        coalesce(sum(ended = 'blocked'), 0)
+                        coalesce(sum(ended = 'blocked'), 0), (SELECT count(*) FROM failure)
                  FROM episode",
             [],
             |row| {
@@ -226,6 +255,7 @@ impl Database {
                     wronged: row.get(19)?,
                     wrong: row.get(20)?,
                     blocked: row.get(21)?,
+                    failed: row.get(22)?,
                 })
             },
         )?)
@@ -237,6 +267,18 @@ impl Database {
 pub struct RefusalCount {
     pub reason: String,
     pub times: i64,
+}
+
+/// What went wrong with an external driving system, how often, and the first time.
+#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
+pub struct FailureCount {
+    pub kind: String,
+    pub problem: String,
+    pub times: i64,
+    /// When and how, the first time.
+    pub detail: String,
+    /// Name of the first episode's files.
+    pub scenario: String,
 }
 
 /// What a run has found so far.
@@ -252,6 +294,8 @@ pub struct Totals {
     /// Ended without progress: for a reason of the driving system's own, and because others blocked its way.
     pub stalled: i64,
     pub blocked: i64,
+    /// Ended because an external driving system failed.
+    pub failed: i64,
     pub step_limit: i64,
     pub simulated_s: f64,
     pub driven_m: f64,
@@ -333,6 +377,18 @@ pub(crate) fn add_all(
     }
     for finding in &summary.collisions {
         add_collision(transaction, summary.episode, finding)?;
+    }
+    if let Some(failure) = &log.failure {
+        let Failure { problem, stage, detail, exit, stderr } = failure;
+        transaction.prepare_cached("INSERT INTO failure VALUES (?, ?, ?, ?, ?, ?, ?)")?.execute(params![
+            summary.episode as i64,
+            problem.kind().name(),
+            problem.name(),
+            stage,
+            detail,
+            exit,
+            stderr,
+        ])?;
     }
     add_offers(transaction, summary)?;
     Ok(())

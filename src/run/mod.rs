@@ -21,7 +21,7 @@ mod threads;
 
 pub use arena::{Arena, road_named};
 pub(crate) use arena::{carry_out, choose, legal, offers};
-pub use database::{Database, RefusalCount, Totals};
+pub use database::{Database, FailureCount, RefusalCount, Totals};
 pub(crate) use database::{LAYOUT, add_all};
 pub use gauges::Gauges;
 pub use groups::Group;
@@ -29,7 +29,7 @@ pub(crate) use groups::kind;
 pub use offered::{Offered, RowCount};
 pub use play::{Run, play};
 pub use profile::{
-    DEFAULT_ADS, Profile, TrafficRecord, driving_system, recorded, recorded_traffic, selected_for,
+    Asked, DEFAULT_ADS, Profile, TrafficRecord, driving_system, recorded, recorded_traffic, started,
     trained_against,
 };
 pub(crate) use profile::{traffic_of, under_test};

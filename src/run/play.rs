@@ -57,7 +57,7 @@ impl Run {
     fn with_agent(table: ActionTable, settings: RunSettings, agent: Box<MakeAgent>) -> Result<Run, RunError> {
         check_episodes(settings.episodes)?;
         settings.avoidability.check()?;
-        let ads = under_test(&settings.ads, settings.profile.as_ref())?;
+        let ads = under_test(&settings.ads, settings.profile.as_ref(), settings.external.as_ref())?;
         let traffic = traffic_of(settings.traffic.as_ref())?;
         let arena =
             Arena::new(table, &settings.roads, ads, &settings.with, &settings.without)?.with_traffic(traffic);
@@ -77,6 +77,11 @@ impl Run {
 
     pub fn settings(&self) -> &RunSettings {
         &self.settings
+    }
+
+    /// The driving system under test: its name here, or what an external one calls itself.
+    pub fn ads_name(&self) -> String {
+        self.arena.ads_name()
     }
 
     /// Number of episodes on all roads together.

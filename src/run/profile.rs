@@ -1,7 +1,11 @@
 //! Driving systems by name, with the profiles that runs, scenarios and policies record.
 
+use std::sync::Arc;
+
 use crate::ads;
-use crate::ads::{ModularConfig, Selected};
+use crate::ads::external;
+use crate::ads::external::{Attached, ExternalSettings, Program};
+use crate::ads::{EXTERNAL, ModularConfig, Selected};
 use crate::model::{Policy, Scenario};
 use crate::sim::TrafficProfile;
 use crate::syntax::listed;
@@ -16,6 +20,9 @@ pub const DEFAULT_ADS: &str = "modular";
 /// # Errors
 /// If there is none.
 pub fn driving_system(name: &str) -> Result<Selected, RunError> {
+    if name == EXTERNAL {
+        return Err(RunError::ExternalUnnamed);
+    }
     ads::by_name(name).map(Selected::new).ok_or_else(|| {
         let known = listed(&ads::REGISTRY.iter().map(|entry| entry.name).collect::<Vec<_>>());
         RunError::Ads { name: name.to_owned(), known }
@@ -85,11 +92,20 @@ pub fn recorded_traffic(scenario: &Scenario) -> Result<TrafficProfile, RunError>
     }
 }
 
-/// The driving system that the settings of a run or a training name, with their profile if they have one.
+/// The driving system that the settings of a run or a training name, with their profile if they have one. An external
+/// one is started once, to see that it can be.
 ///
 /// # Errors
-/// If there is none of that name, it has no settings, or they mean something else in this version.
-pub(crate) fn under_test(ads: &str, profile: Option<&Profile>) -> Result<Selected, RunError> {
+/// If there is none of that name, it has no settings, or they mean something else in this version; if an external one
+/// cannot be started.
+pub(crate) fn under_test(
+    ads: &str,
+    profile: Option<&Profile>,
+    external: Option<&ExternalSettings>,
+) -> Result<Selected, RunError> {
+    if let Some(settings) = external {
+        return started(settings).map(Selected::external);
+    }
     let selected = driving_system(ads)?;
     match profile {
         None => Ok(selected),
@@ -100,34 +116,74 @@ pub(crate) fn under_test(ads: &str, profile: Option<&Profile>) -> Result<Selecte
     }
 }
 
-/// The driving system that a scenario was made with, and its settings.
+/// An external driving system that was seen to start.
+///
+/// # Errors
+/// Why it does not.
+pub fn started(settings: &ExternalSettings) -> Result<Arc<Program>, RunError> {
+    let program = Program::new(settings.clone());
+    program.start().map_err(|failure| RunError::External(Box::new(failure)))?;
+    Ok(program)
+}
+
+/// The driving system that a scenario was made with, and its settings. An external one is known by its recorded answers
+/// alone: no program that a file names is started.
 ///
 /// # Errors
 /// If there is none of that name, or its settings do not exist any more or mean something else.
 pub fn recorded(scenario: &Scenario) -> Result<Selected, RunError> {
     let origin = &scenario.origin;
     let ads = origin.ads.as_deref().unwrap_or(DEFAULT_ADS);
+    if ads == EXTERNAL {
+        let attached = attached(scenario)?;
+        let broken = |error| RunError::Answers { name: scenario.name.clone(), error };
+        let Some(text) = origin.recorded_answers.as_deref() else {
+            return Err(RunError::NoAnswers { name: scenario.name.clone(), ads: attached.name() });
+        };
+        let answers = external::from_text(text, origin.answers.as_deref()).map_err(broken)?;
+        return Ok(Selected::external(Program::recorded(attached, answers)));
+    }
     selected(&scenario.name, ads, origin.profile.as_deref(), origin.profile_digest.as_deref())
 }
 
-/// The driving system to play with, and whether it is the one that the scenario records.
-/// Without a name and a profile it is that one; without a name, its driving system with another profile.
-///
-/// # Errors
-/// If there is no driving system of that name, or it has no profile.
-pub fn selected_for(
-    ads: Option<&str>,
-    profile: Option<&ModularConfig>,
-    scenario: &Scenario,
-) -> Result<(Selected, bool), RunError> {
-    if ads.is_none() && profile.is_none() {
-        return Ok((recorded(scenario)?, true));
+/// The external driving system that a scenario names.
+fn attached(scenario: &Scenario) -> Result<Attached, RunError> {
+    let line = scenario.origin.profile.as_deref().unwrap_or_default();
+    Attached::from_line(line).map_err(|reason| RunError::Attached { name: scenario.name.clone(), reason })
+}
+
+/// What a command line says of the driving system to play scenarios with.
+#[derive(Debug, Default, Clone)]
+pub struct Asked {
+    pub ads: Option<String>,
+    pub profile: Option<ModularConfig>,
+    /// An external one, which was started.
+    pub external: Option<Arc<Program>>,
+}
+
+impl Asked {
+    /// The driving system to play a scenario with, and whether it is the one that the scenario records. If nothing is
+    /// asked, it is that one; without a name, its driving system with another profile.
+    ///
+    /// # Errors
+    /// If there is no driving system of that name, or it has no profile.
+    pub fn selected_for(&self, scenario: &Scenario) -> Result<(Selected, bool), RunError> {
+        let Asked { ads, profile, external } = self;
+        if let Some(program) = external {
+            let recorded = scenario.origin.profile_digest.as_deref();
+            let same = scenario.origin.ads.as_deref() == Some(EXTERNAL)
+                && recorded == Some(program.attached().digest().as_str());
+            return Ok((Selected::external(Arc::clone(program)), same));
+        }
+        if ads.is_none() && profile.is_none() {
+            return Ok((recorded(scenario)?, true));
+        }
+        let recorded = scenario.origin.ads.as_deref().unwrap_or(DEFAULT_ADS);
+        let selected = driving_system(ads.as_deref().unwrap_or(recorded))?;
+        let Some(profile) = profile else { return Ok((selected, false)) };
+        let same = ads.is_none() && scenario.origin.profile_digest == Some(profile.digest());
+        Ok((selected.with_profile(*profile)?, same))
     }
-    let recorded = scenario.origin.ads.as_deref().unwrap_or(DEFAULT_ADS);
-    let selected = driving_system(ads.unwrap_or(recorded))?;
-    let Some(profile) = profile else { return Ok((selected, false)) };
-    let same = ads.is_none() && scenario.origin.profile_digest == Some(profile.digest());
-    Ok((selected.with_profile(*profile)?, same))
 }
 
 /// The driving system that a policy was trained against, and its settings.
@@ -136,6 +192,9 @@ pub fn selected_for(
 /// As [`recorded`].
 pub fn trained_against(policy: &Policy) -> Result<Selected, RunError> {
     let origin = &policy.origin;
+    if origin.ads == EXTERNAL {
+        return Err(RunError::TrainedExternal { name: policy.name.clone() });
+    }
     selected(&policy.name, &origin.ads, origin.profile.as_deref(), origin.profile_digest.as_deref())
 }
 

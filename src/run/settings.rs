@@ -1,6 +1,7 @@
 //! What a run is asked to do, as `run.yaml` keeps it, and why it cannot begin.
 
 use crate::ads;
+use crate::ads::external::{ExternalSettings, Failure, RecordError};
 use crate::agent;
 use crate::model::Space;
 use crate::oracle;
@@ -30,6 +31,9 @@ pub struct RunSettings {
     /// Settings of the driving system; without them it has its defaults.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub profile: Option<Profile>,
+    /// How an external driving system is reached and asked.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub external: Option<ExternalSettings>,
     pub agent: String,
     /// The policy that the agent follows, from the run directory, and its digest.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -67,6 +71,7 @@ impl RunSettings {
             roads: space.roads.iter().map(|road| road.name.clone()).collect(),
             ads: DEFAULT_ADS.to_owned(),
             profile: None,
+            external: None,
             agent: agent.to_owned(),
             policy: None,
             episodes,
@@ -136,9 +141,42 @@ pub enum RunError {
         "{what} was made with a traffic profile that means something else in this version: nothing need happen alike"
     )]
     TrafficDigest { what: String },
+    #[error("{}", external_text(.0))]
+    External(Box<Failure>),
+    #[error(
+        "an external driving system has no name here: give it with `--ads-cmd 'COMMAND'` or `--ads-config FILE`"
+    )]
+    ExternalUnnamed,
+    #[error(
+        "`{name}` was made against {ads}, and its recorded answers are not beside it: give the driving system with \
+         `--ads-cmd` or `--ads-config`"
+    )]
+    NoAnswers { name: String, ads: String },
+    #[error(
+        "`{name}` was trained against an external driving system, which a policy does not name: `avastra run --policy` \
+         plays it against any; its training cannot be looked at again"
+    )]
+    TrainedExternal { name: String },
+    #[error("the recorded answers of `{name}`: {error}")]
+    Answers { name: String, error: RecordError },
+    #[error("`{name}` does not say which external driving system it was made against: {reason}")]
+    Attached { name: String, reason: String },
     #[error("`{scenario}` was made in world `{engine}`; this is `{ENGINE}`, where nothing need happen alike")]
     Engine { scenario: String, engine: String },
 }
+
+/// Why an external driving system is of no use, what to do, and the end of its standard error.
+fn external_text(failure: &Failure) -> String {
+    let mut text =
+        format!("the driving system cannot be used: {}\n  {}", failure.in_words(), failure.problem.advice());
+    for line in failure.stderr_lines(STDERR_LINES) {
+        text.push_str(&format!("\n  | {line}"));
+    }
+    text
+}
+
+/// Lines of standard error that an error shows.
+const STDERR_LINES: usize = 12;
 
 /// Most episodes that a run may have on each road.
 pub const EPISODES_MAX: u32 = 1_000_000;

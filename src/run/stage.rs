@@ -9,7 +9,7 @@ use crate::episode::{EpisodeLog, Script, Watch};
 use crate::mdp::ProcKind;
 use crate::model::{RulesInForce, Scenario};
 use crate::oracle;
-use crate::oracle::{AvoidabilitySettings, ClaimResult, Judgement, Replays};
+use crate::oracle::{AvoidabilitySettings, ClaimResult, Judgement, NoTries, Replays};
 use crate::sim::{ENGINE, Scene, Start, TrafficProfile};
 
 use crate::run::profile::recorded_traffic;
@@ -93,7 +93,12 @@ impl<'a> Stage<'a> {
         let judgements = self.judge(ads, log);
         let replays = Replays {
             cause: &|index| Ok(oracle::diagnose(&setup, log, index, &ModularConfig::default())?.cause),
-            spare_steps: &|index| oracle::spare_steps(&setup, log, index, &judgements, &self.avoidability),
+            spare_steps: &|index| {
+                if ads.program().is_some_and(|program| !program.can_start()) {
+                    return Err(NoTries);
+                }
+                Ok(oracle::spare_steps(&setup, log, index, &judgements, &self.avoidability))
+            },
         };
         oracle::verify(self.table.space(), self.scenario, log, &judgements, &replays)
     }

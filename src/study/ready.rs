@@ -125,6 +125,7 @@ impl Study {
             roads,
             ads: study.ads.clone(),
             profile: agent.profile.as_ref().or(study.profile.as_ref()).cloned(),
+            external: study.external.clone(),
             ambient: study.ambient,
             traffic: study.traffic.clone(),
             causes: study.causes,

@@ -3,7 +3,8 @@
 use std::collections::BTreeSet;
 
 use crate::action::ActionTable;
-use crate::ads::ModularConfig;
+use crate::ads::external::ExternalSettings;
+use crate::ads::{EXTERNAL, ModularConfig};
 use crate::agent::{Kind, Settings};
 use crate::oracle::AvoidabilitySettings;
 use crate::run::{EPISODES_MAX, Profile, RunError, TrafficRecord, VERSION, agent_named};
@@ -31,6 +32,9 @@ pub struct StudySettings {
     /// Settings of the driving system, if it has any.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub profile: Option<Profile>,
+    /// How an external driving system is reached and asked.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub external: Option<ExternalSettings>,
     pub ambient: u32,
     /// How other vehicles drive, if not as in the default.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -110,7 +114,7 @@ impl StudySettings {
     pub fn new(
         file: StudyFile,
         table: &ActionTable,
-        profile: Option<Profile>,
+        (profile, external): (Option<Profile>, Option<ExternalSettings>),
         traffic: Option<TrafficRecord>,
         read: &dyn Fn(&str) -> Result<String, String>,
     ) -> Result<StudySettings, StudyError> {
@@ -127,8 +131,9 @@ impl StudySettings {
             space: space.path.display().to_string(),
             space_digest: space.meaning.seal(),
             roads,
-            ads: file.ads,
+            ads: if external.is_some() { EXTERNAL.to_owned() } else { file.ads },
             profile,
+            external,
             ambient: file.ambient,
             traffic,
             first_seed: file.first_seed,

@@ -9,6 +9,7 @@ use ndarray::Array1;
 
 use crate::action::ActionTable;
 use crate::ads::Ads;
+use crate::ads::external::ExternalSettings;
 use crate::agent::{
     Agent, Beginning, Experience, Kind, Lesson, QPolicy, Rows, Settings, Trainable, Trajectory,
 };
@@ -44,6 +45,9 @@ pub struct TrainSettings {
     /// Settings of the driving system; without them it has its defaults.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub profile: Option<Profile>,
+    /// How an external driving system is reached and asked.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub external: Option<ExternalSettings>,
     pub agent: String,
     /// Episodes on all roads together.
     pub episodes: u32,
@@ -73,6 +77,7 @@ impl TrainSettings {
             roads: run.roads,
             ads: run.ads,
             profile: run.profile,
+            external: run.external,
             agent: run.agent,
             episodes: run.episodes,
             seed: run.seed,
@@ -337,7 +342,7 @@ fn prepared(table: ActionTable, settings: &TrainSettings) -> Result<(Arena, Arc<
     }
     let table = with_period(table, settings.hyperparameters.observation_period_s());
     let rows = Arc::new(Rows::new(&table, settings.hyperparameters.actions())?);
-    let ads = under_test(&settings.ads, settings.profile.as_ref())?;
+    let ads = under_test(&settings.ads, settings.profile.as_ref(), settings.external.as_ref())?;
     let arena = Arena::new(table, &settings.roads, ads, &settings.with, &settings.without)?;
     Ok((arena.with_traffic(traffic_of(settings.traffic.as_ref())?), rows))
 }

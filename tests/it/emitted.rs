@@ -83,7 +83,7 @@ fn emitted_scenarios_keep_every_claim() {
         let judgements = oracle::judge(&again, &run.settings().avoidability, &mut |watch| {
             play(watch);
         });
-        let replays = Replays { cause: &|_| Ok(Vec::new()), spare_steps: &|_| Vec::new() };
+        let replays = Replays { cause: &|_| Ok(Vec::new()), spare_steps: &|_| Ok(Vec::new()) };
         for verdict in oracle::verify(run.space(), scenario, &again, &judgements, &replays) {
             assert!(verdict.confirmed, "{verdict:?}\n{text}");
         }

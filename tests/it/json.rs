@@ -122,6 +122,7 @@ fn results_of_drives_are_as_explain_describes_them() {
     let critical: Vec<&str> =
         found["critical"].as_array().expect("a list").iter().filter_map(Value::as_str).collect();
     let [one, .., two] = critical.as_slice() else { panic!("the run finds two crashes: {critical:?}") };
+    is_as_described(&["ads", "schema"]);
     is_as_described(&["replay", one]);
     is_as_described(&["replay", one, two, "--ads", "idm"]);
     is_as_described(&["verify", one, two]);

@@ -78,7 +78,10 @@ fn cli_alone_touches_files_and_the_environment() {
         // Tests at the end of a file may read what the repository ships.
         let text = text.split("#[cfg(test)]").next().unwrap_or(&text);
         let is_test = path.components().any(|part| part.as_os_str().to_string_lossy().contains("test"));
+        // Time limits of an external driving system are by the wall clock; in one place.
+        let may_wait = path.ends_with("ads/external/link.rs") && text.matches("Instant::now").count() == 1;
         for word in ["std::fs", "std::env::var", "Instant::now", "SystemTime"] {
+            let is_test = is_test || (may_wait && word == "Instant::now");
             assert!(is_test || !text.contains(word), "{} names {word}", path.display());
         }
     }

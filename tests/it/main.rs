@@ -12,6 +12,7 @@ mod drives;
 mod editor;
 mod emitted;
 mod examples;
+mod external;
 mod failures;
 mod faults;
 mod help;

@@ -219,7 +219,8 @@ fn loaded(text: &str) -> avastra::study::Study {
         std::fs::read_to_string(root().join("scenarios/studies").join(name))
             .map_err(|error| error.to_string())
     };
-    let settings = avastra::study::StudySettings::new(file, &table, None, None, &read).expect("it is sound");
+    let settings =
+        avastra::study::StudySettings::new(file, &table, (None, None), None, &read).expect("it is sound");
     avastra::study::Study::new(table, settings).expect("all that it names is there")
 }
 

@@ -21,5 +21,6 @@ mod tracking;
 mod watchdog;
 
 pub use config::{ConfigError, ModularConfig, Module, Weaknesses};
+pub use control::{Pedals, Target};
 pub use foresight::Foresight;
 pub use stack::Modular;

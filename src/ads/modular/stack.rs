@@ -136,6 +136,7 @@ impl Modular {
             predicted.extend_from_slice(&forecast.positions[1..]);
             let object = PerceivedObject {
                 id: (forecast.truth < GHOST_ID_MIN).then_some(forecast.truth),
+                track: forecast.id,
                 body: forecast.body,
                 pose,
                 velocity_mps: forecast.velocity_mps,

@@ -288,6 +288,7 @@ impl Idm {
         perceived.extend(sensed.objects.iter().filter(|object| object.distance_m < SIGHT_M).map(|object| {
             PerceivedObject {
                 id: Some(object.id),
+                track: object.id,
                 body: object.body,
                 pose: object.pose,
                 velocity_mps: object.velocity_mps,

@@ -22,4 +22,3 @@ mod trajectory;
 
 pub use nudge::LateralPlan;
 pub use planner::{Outlook, Planner};
-pub use trajectory::Trajectory;

@@ -1,0 +1,175 @@
+//! From an answer to pedals and wheel: controls as they are, a trajectory by `modular`'s controllers, an acceleration
+//! with steering along the route.
+
+use std::sync::Arc;
+
+use crate::ads::guide::{Guide, SpeedRules};
+use crate::ads::modular::{ModularConfig, Pedals, Target};
+use crate::ads::steering::{Steering, SteeringConfig};
+use crate::geometry::{Pose, Vec2, wrap_angle};
+use crate::sim::{Control, EgoMotion, Scene, pedals_for};
+
+use super::message::{Answer, ControlMessage, TrajectoryMessage};
+
+/// Braking after the last point of a trajectory, magnitude, m/s².
+const AFTER_MPS2: f64 = 3.0;
+/// The brake while no answer comes, %: Apollo's, where the planner is late.
+const LOST_BRAKE_PCT: f64 = 50.0;
+/// The route is only steered along here, so nothing bounds the speed.
+const RULES: SpeedRules = SpeedRules {
+    cruise_mps: f64::INFINITY,
+    lateral_acceleration_mps2_max: f64::INFINITY,
+    slowdown_mps2: f64::INFINITY,
+};
+
+/// Obeys answers.
+#[derive(Debug, Clone)]
+pub struct Follower {
+    route: Arc<Guide>,
+    steering: Arc<Steering>,
+    pedals: Pedals,
+    /// Place on the route, m; `None` before the first tick.
+    station_m: Option<f64>,
+    course: Option<Course>,
+}
+
+/// A trajectory, ready to be followed.
+#[derive(Debug, Clone)]
+struct Course {
+    guide: Guide,
+    points: Vec<CoursePoint>,
+    /// Place of the vehicle on the guide, m.
+    station_m: Option<f64>,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct CoursePoint {
+    time_s: f64,
+    station_m: f64,
+    speed_mps: f64,
+    acceleration_mps2: f64,
+}
+
+impl Follower {
+    pub fn new(scene: &Scene) -> Follower {
+        Follower {
+            route: Arc::new(Guide::new(scene, &RULES)),
+            steering: Steering::shared(&SteeringConfig::default()),
+            pedals: Pedals::new(&ModularConfig::default().control.pedals),
+            station_m: None,
+            course: None,
+        }
+    }
+
+    /// Place on the route and offset from it, m, of a vehicle at a pose; to be called every tick.
+    pub fn locate(&mut self, pose: &Pose) -> (f64, f64) {
+        let beside = self.route.locate(pose.position, self.station_m);
+        self.station_m = Some(beside.station_m);
+        (beside.station_m, beside.offset_m)
+    }
+
+    /// Takes a new answer.
+    pub fn begin(&mut self, answer: &Answer) {
+        self.course = match answer {
+            Answer::Trajectory(trajectory) => Some(Course::new(trajectory)),
+            _ => None,
+        };
+    }
+
+    /// Pedals and wheel for this tick; `pose` is where the driving system was told to be.
+    pub fn obey(&mut self, answer: &Answer, time_s: f64, pose: &Pose, motion: &EgoMotion) -> Control {
+        match answer {
+            Answer::Control(control) => controls(control),
+            Answer::Acceleration(wanted) => {
+                let (throttle_pct, brake_pct) = pedals_for(wanted.accel);
+                Control { throttle_pct, brake_pct, steer_rad: self.along_route_rad(pose, motion) }
+            }
+            Answer::Trajectory(_) => {
+                let course = self.course.as_mut().expect("a trajectory was begun");
+                let near_m = course.guide.locate(pose.position, course.station_m).station_m;
+                course.station_m = Some(near_m);
+                let steer_rad = self.steering.steer_rad(&course.guide, pose, near_m, motion);
+                let (now, soon) = (course.at(time_s), course.at(time_s + self.pedals.preview_s()));
+                let target = Target {
+                    station_m: now.station_m,
+                    speed_mps: now.speed_mps,
+                    soon_mps2: soon.acceleration_mps2,
+                };
+                let wanted_mps2 = self.pedals.acceleration_mps2(&target, near_m, motion.speed_mps);
+                let (throttle_pct, brake_pct) = pedals_for(wanted_mps2);
+                Control { throttle_pct, brake_pct, steer_rad }
+            }
+            Answer::Ready(_) | Answer::Error(_) => unreachable!("no step is answered by these"),
+        }
+    }
+
+    /// Pedals and wheel while no answer comes: it brakes along the route.
+    pub fn lost(&self, pose: &Pose, motion: &EgoMotion) -> Control {
+        let steer_rad = self.along_route_rad(pose, motion);
+        Control { throttle_pct: 0.0, brake_pct: LOST_BRAKE_PCT, steer_rad }
+    }
+
+    fn along_route_rad(&self, pose: &Pose, motion: &EgoMotion) -> f64 {
+        self.steering.steer_rad(&self.route, pose, self.station_m.unwrap_or(0.0), motion)
+    }
+}
+
+fn controls(control: &ControlMessage) -> Control {
+    let (throttle_pct, brake_pct) = match control.accel {
+        Some(accel_mps2) => pedals_for(accel_mps2),
+        None => (100.0 * control.throttle.unwrap_or(0.0), 100.0 * control.brake.unwrap_or(0.0)),
+    };
+    Control { throttle_pct, brake_pct, steer_rad: control.steer }
+}
+
+impl Course {
+    fn new(trajectory: &TrajectoryMessage) -> Course {
+        let given = &trajectory.points;
+        let poses: Vec<Pose> = given
+            .iter()
+            .map(|point| Pose {
+                position: Vec2::new(point.x, point.y),
+                heading_rad: wrap_angle(point.heading),
+            })
+            .collect();
+        let (guide, stations_m) = Guide::through(&poses);
+        let acceleration_mps2 = |index: usize| {
+            given[index].a.unwrap_or_else(|| {
+                let from = index.min(given.len() - 2);
+                let duration_s = (given[from + 1].t_us - given[from].t_us) as f64 * 1e-6;
+                (given[from + 1].v - given[from].v) / duration_s
+            })
+        };
+        let points = (0..given.len()).map(|index| CoursePoint {
+            time_s: given[index].t_us as f64 * 1e-6,
+            station_m: stations_m[index],
+            speed_mps: given[index].v,
+            acceleration_mps2: acceleration_mps2(index),
+        });
+        Course { guide, points: points.collect(), station_m: None }
+    }
+
+    /// The point at a time; after the last it brakes to rest.
+    fn at(&self, time_s: f64) -> CoursePoint {
+        let last = self.points[self.points.len() - 1];
+        let beyond_s = time_s - last.time_s;
+        if beyond_s >= 0.0 {
+            let stop_s = (last.speed_mps / AFTER_MPS2).min(beyond_s);
+            let way_m = last.speed_mps * stop_s - AFTER_MPS2 * stop_s * stop_s / 2.0;
+            let speed_mps = last.speed_mps - AFTER_MPS2 * stop_s;
+            let acceleration_mps2 = if speed_mps > 0.0 { -AFTER_MPS2 } else { 0.0 };
+            return CoursePoint { time_s, station_m: last.station_m + way_m, speed_mps, acceleration_mps2 };
+        }
+        let after =
+            self.points.partition_point(|point| point.time_s <= time_s).clamp(1, self.points.len() - 1);
+        let (a, b) = (self.points[after - 1], self.points[after]);
+        let fraction = ((time_s - a.time_s) / (b.time_s - a.time_s)).clamp(0.0, 1.0);
+        let mix = |a: f64, b: f64| a + (b - a) * fraction;
+        CoursePoint {
+            time_s,
+            station_m: mix(a.station_m, b.station_m),
+            speed_mps: mix(a.speed_mps, b.speed_mps),
+            acceleration_mps2: mix(a.acceleration_mps2, b.acceleration_mps2),
+        }
+    }
+}

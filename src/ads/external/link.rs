@@ -1,0 +1,404 @@
+//! One connection to a driving system: a process of its own group with three pipes, or a socket.
+//!
+//! All reading and writing is non-blocking, in one place and on the caller's thread, so a question costs two
+//! switches between processes and no thread can be left behind. Lines and standard error are bounded, whatever comes.
+//! This is the one file of the layer that asks the clock: for time limits, which decide nothing but that an answer is
+//! missing; what follows from a missing answer is in the log.
+
+use std::io::{ErrorKind, Read, Write};
+use std::net::{TcpStream, ToSocketAddrs};
+use std::os::fd::{AsFd, BorrowedFd};
+use std::os::unix::net::UnixStream;
+use std::os::unix::process::{CommandExt, ExitStatusExt};
+use std::process::{Child, ChildStderr, ChildStdin, ChildStdout, Command, ExitStatus, Stdio};
+use std::time::{Duration, Instant};
+
+use nix::fcntl::{FcntlArg, OFlag, fcntl};
+use nix::poll::{PollFd, PollFlags, PollTimeout, poll};
+use nix::sys::signal::{Signal, killpg};
+use nix::unistd::Pid;
+
+use super::finding::Problem;
+use super::settings::{ExternalSettings, Target};
+
+/// A line from a driving system is at most this long, bytes.
+pub const LINE_BYTES_MAX: usize = 1 << 20;
+/// This much of standard error is kept, bytes.
+const STDERR_BYTES_KEPT: usize = 64 << 10;
+/// More than this on standard error in one episode is a flood, bytes.
+const STDERR_BYTES_MAX: u64 = 64 << 20;
+/// Bytes read at once.
+const CHUNK_BYTES: usize = 64 << 10;
+/// A process that closed its output has this long to end, so that its exit status can be told.
+const ENDING_S: f64 = 0.5;
+/// Between SIGTERM and SIGKILL.
+const TERM_S: f64 = 2.0;
+
+/// Why no line came: what is wrong, and details in words.
+#[derive(Debug)]
+pub struct Broken {
+    pub problem: Problem,
+    pub detail: String,
+}
+
+/// A moment on the wall clock.
+#[derive(Debug, Clone, Copy)]
+pub struct Deadline(Instant);
+
+impl Deadline {
+    pub fn after(limit_s: f64) -> Deadline {
+        Deadline(now() + Duration::from_secs_f64(limit_s))
+    }
+
+    fn left(self) -> Duration {
+        self.0.saturating_duration_since(now())
+    }
+}
+
+#[allow(clippy::disallowed_methods, reason = "a time limit of an answer is one by the wall clock")]
+fn now() -> Instant {
+    Instant::now()
+}
+
+/// Where questions go and answers come from.
+enum Ends {
+    Process { child: Child, stdin: Option<ChildStdin>, stdout: ChildStdout, stderr: Option<ChildStderr> },
+    Tcp(TcpStream),
+    Unix(UnixStream),
+}
+
+/// A connection to a driving system.
+pub struct Link {
+    ends: Ends,
+    /// What is still to be written.
+    to_write: Vec<u8>,
+    written: usize,
+    /// What was read and not yet taken.
+    read: Vec<u8>,
+    /// Up to here `read` has no end of a line.
+    searched: usize,
+    is_closed: bool,
+    stderr: Vec<u8>,
+    /// Bytes of standard error since the episode began.
+    flood_bytes: u64,
+    /// The process was reaped and its group ended: its number may belong to another.
+    is_ended: bool,
+}
+
+impl Link {
+    /// Starts the program, or connects to it.
+    ///
+    /// # Errors
+    /// Why that is not possible, in words.
+    pub fn open(settings: &ExternalSettings) -> Result<Link, String> {
+        let ends = match &settings.command {
+            Target::Program(words) => start(words, settings)?,
+            Target::Tcp(address) => {
+                let limit = Duration::from_secs_f64(settings.timeouts.init_s);
+                let mut places = address
+                    .to_socket_addrs()
+                    .map_err(|error| format!("`{address}` is no place to connect to: {error}"))?;
+                let place = places.next().ok_or_else(|| format!("`{address}` names no host"))?;
+                let socket = TcpStream::connect_timeout(&place, limit)
+                    .map_err(|error| format!("nothing answers at `{address}`: {error}"))?;
+                let ready = socket.set_nodelay(true).and_then(|()| socket.set_nonblocking(true));
+                ready.map_err(|error| format!("the connection to `{address}` cannot be used: {error}"))?;
+                Ends::Tcp(socket)
+            }
+            Target::Unix(path) => {
+                let path = match &settings.working_directory {
+                    Some(directory) => directory.join(path),
+                    None => path.clone(),
+                };
+                let socket = UnixStream::connect(&path)
+                    .map_err(|error| format!("nothing answers at `{}`: {error}", path.display()))?;
+                socket.set_nonblocking(true).map_err(|error| error.to_string())?;
+                Ends::Unix(socket)
+            }
+        };
+        Ok(Link {
+            ends,
+            to_write: Vec::new(),
+            written: 0,
+            read: Vec::new(),
+            searched: 0,
+            is_closed: false,
+            stderr: Vec::new(),
+            flood_bytes: 0,
+            is_ended: false,
+        })
+    }
+
+    /// Notes that an episode begins.
+    pub fn begin_episode(&mut self) {
+        self.flood_bytes = 0;
+    }
+
+    /// Writes as much as fits now; the rest goes with the next line that is waited for.
+    pub fn send(&mut self, line: &str) {
+        self.to_write.extend_from_slice(line.as_bytes());
+        // What cannot be written is noticed when an answer is waited for.
+        let _ = self.write();
+    }
+
+    /// The next line that is not empty, without its end.
+    ///
+    /// # Errors
+    /// If it does not come before the deadline, is too long, or cannot come any more.
+    pub fn line(&mut self, deadline: Deadline) -> Result<Vec<u8>, Broken> {
+        loop {
+            while let Some(line) = self.take_line()? {
+                if !line.iter().all(u8::is_ascii_whitespace) {
+                    return Ok(line);
+                }
+            }
+            if self.is_closed {
+                return Err(self.ended());
+            }
+            if self.flood_bytes > STDERR_BYTES_MAX {
+                let detail = format!("more than {} MiB on standard error", STDERR_BYTES_MAX >> 20);
+                return Err(Broken { problem: Problem::Stderr, detail });
+            }
+            let left = deadline.left();
+            if left.is_zero() {
+                return Err(Broken { problem: Problem::NoAnswer, detail: "no answer in time".to_owned() });
+            }
+            self.wait(left);
+        }
+    }
+
+    /// Waits until something can be read or written, and does so.
+    fn wait(&mut self, at_most: Duration) {
+        let wants_write = self.written < self.to_write.len();
+        let millis = u16::try_from(at_most.as_micros().div_ceil(1000)).unwrap_or(u16::MAX);
+        let mut fds: Vec<PollFd> = Vec::with_capacity(3);
+        let out = if wants_write { PollFlags::POLLOUT } else { PollFlags::empty() };
+        match &self.ends {
+            Ends::Process { stdin, stdout, stderr, .. } => {
+                fds.push(PollFd::new(stdout.as_fd(), PollFlags::POLLIN));
+                fds.extend(stderr.as_ref().map(|pipe| PollFd::new(pipe.as_fd(), PollFlags::POLLIN)));
+                let stdin = stdin.as_ref().filter(|_| wants_write);
+                fds.extend(stdin.map(|pipe| PollFd::new(pipe.as_fd(), out)));
+            }
+            Ends::Tcp(socket) => fds.push(PollFd::new(socket.as_fd(), PollFlags::POLLIN | out)),
+            Ends::Unix(socket) => fds.push(PollFd::new(socket.as_fd(), PollFlags::POLLIN | out)),
+        }
+        // An interrupted wait is a short wait.
+        let _ = poll(&mut fds, PollTimeout::from(millis));
+        drop(fds);
+        if wants_write && self.write().is_err() {
+            self.to_write.clear();
+            self.written = 0;
+        }
+        self.read_all();
+    }
+
+    fn write(&mut self) -> std::io::Result<()> {
+        while self.written < self.to_write.len() {
+            let rest = &self.to_write[self.written..];
+            let result = match &mut self.ends {
+                Ends::Process { stdin: Some(stdin), .. } => stdin.write(rest),
+                Ends::Process { stdin: None, .. } => return Ok(()),
+                Ends::Tcp(socket) => socket.write(rest),
+                Ends::Unix(socket) => socket.write(rest),
+            };
+            match result {
+                Ok(count) => self.written += count,
+                Err(error) if error.kind() == ErrorKind::WouldBlock => return Ok(()),
+                Err(error) if error.kind() == ErrorKind::Interrupted => {}
+                Err(error) => return Err(error),
+            }
+        }
+        self.to_write.clear();
+        self.written = 0;
+        Ok(())
+    }
+
+    /// Reads what is there: of the answers no more than a line and a half, of standard error all.
+    fn read_all(&mut self) {
+        let mut chunk = [0; CHUNK_BYTES];
+        if let Ends::Process { stderr, .. } = &mut self.ends
+            && let Some(pipe) = stderr
+        {
+            loop {
+                match pipe.read(&mut chunk) {
+                    Ok(0) => {
+                        *stderr = None;
+                        break;
+                    }
+                    Ok(count) => {
+                        self.flood_bytes += count as u64;
+                        self.stderr.extend_from_slice(&chunk[..count]);
+                        if self.stderr.len() > 2 * STDERR_BYTES_KEPT {
+                            self.stderr.drain(..self.stderr.len() - STDERR_BYTES_KEPT);
+                        }
+                        // A program that writes faster than this reads must not keep it here.
+                        if self.flood_bytes > STDERR_BYTES_MAX {
+                            break;
+                        }
+                    }
+                    Err(error) if error.kind() == ErrorKind::Interrupted => {}
+                    Err(_) => break,
+                }
+            }
+        }
+        while self.read.len() <= LINE_BYTES_MAX && !self.is_closed {
+            let result = match &mut self.ends {
+                Ends::Process { stdout, .. } => stdout.read(&mut chunk),
+                Ends::Tcp(socket) => socket.read(&mut chunk),
+                Ends::Unix(socket) => socket.read(&mut chunk),
+            };
+            match result {
+                Ok(0) => self.is_closed = true,
+                Ok(count) => {
+                    self.read.extend_from_slice(&chunk[..count]);
+                    if self.read[self.searched..].contains(&b'\n') {
+                        break;
+                    }
+                }
+                Err(error) if error.kind() == ErrorKind::WouldBlock => break,
+                Err(error) if error.kind() == ErrorKind::Interrupted => {}
+                Err(_) => self.is_closed = true,
+            }
+        }
+    }
+
+    /// The first whole line of what was read.
+    fn take_line(&mut self) -> Result<Option<Vec<u8>>, Broken> {
+        let end = self.read[self.searched..].iter().position(|byte| *byte == b'\n');
+        let length = end.map_or(self.read.len(), |end| self.searched + end);
+        if length > LINE_BYTES_MAX {
+            let detail = "a line of more than 1 MiB".to_owned();
+            return Err(Broken { problem: Problem::TooLong, detail });
+        }
+        let Some(end) = end else {
+            self.searched = self.read.len();
+            return Ok(None);
+        };
+        let mut line: Vec<u8> = self.read.drain(..=self.searched + end).collect();
+        self.searched = 0;
+        line.pop();
+        Ok(Some(line))
+    }
+
+    /// Why nothing more comes.
+    fn ended(&mut self) -> Broken {
+        match self.exit_within(ENDING_S) {
+            Some(_) => Broken { problem: Problem::Exited, detail: "the process ended".to_owned() },
+            None if matches!(self.ends, Ends::Process { .. }) => {
+                Broken { problem: Problem::Closed, detail: "it closed its standard output".to_owned() }
+            }
+            None => Broken { problem: Problem::Closed, detail: "it closed the connection".to_owned() },
+        }
+    }
+
+    /// The exit status, in words, of a process that ends by itself within a time.
+    pub fn exit_within(&mut self, limit_s: f64) -> Option<String> {
+        let deadline = Deadline::after(limit_s);
+        loop {
+            let Ends::Process { child, .. } = &mut self.ends else { return None };
+            if let Ok(Some(status)) = child.try_wait() {
+                self.read_all();
+                return Some(status_text(status));
+            }
+            let left = deadline.left();
+            if left.is_zero() {
+                return None;
+            }
+            // Standard error is read on, so that a process that writes there can end.
+            self.read_all();
+            std::thread::sleep(left.min(Duration::from_millis(2)));
+        }
+    }
+
+    /// The end of standard error as text.
+    pub fn stderr(&mut self) -> String {
+        self.read_all();
+        let kept = &self.stderr[self.stderr.len().saturating_sub(STDERR_BYTES_KEPT)..];
+        String::from_utf8_lossy(kept).into_owned()
+    }
+
+    /// Says that no more comes, and waits for the process to end; then ends it. `true` if it ended by itself with
+    /// status 0; a socket always does.
+    pub fn close(&mut self, line: &str, limit_s: f64) -> bool {
+        self.send(line);
+        // What the pipe does not hold is lost; the end of the input says the same.
+        match &mut self.ends {
+            Ends::Process { stdin, .. } => *stdin = None,
+            Ends::Tcp(socket) => drop(socket.shutdown(std::net::Shutdown::Both)),
+            Ends::Unix(socket) => drop(socket.shutdown(std::net::Shutdown::Both)),
+        }
+        if !matches!(self.ends, Ends::Process { .. }) {
+            return true;
+        }
+        let ended = self.exit_within(limit_s);
+        if ended.is_none() {
+            self.signal(Signal::SIGTERM);
+            self.exit_within(TERM_S);
+        }
+        self.kill();
+        ended.is_some_and(|status| status == status_text(ExitStatus::from_raw(0)))
+    }
+
+    /// Ends the process group at once and reaps the process.
+    pub fn kill(&mut self) {
+        if self.is_ended {
+            return;
+        }
+        self.is_ended = true;
+        self.signal(Signal::SIGKILL);
+        if let Ends::Process { child, .. } = &mut self.ends {
+            let _ = child.wait();
+        }
+    }
+
+    /// To the whole group, which the process leads: also to what it started.
+    fn signal(&self, signal: Signal) {
+        if let Ends::Process { child, .. } = &self.ends
+            && let Ok(id) = i32::try_from(child.id())
+        {
+            // It fails only if no process of the group is left.
+            let _ = killpg(Pid::from_raw(id), signal);
+        }
+    }
+}
+
+impl Drop for Link {
+    fn drop(&mut self) {
+        self.kill();
+    }
+}
+
+fn start(words: &[String], settings: &ExternalSettings) -> Result<Ends, String> {
+    let mut command = Command::new(&words[0]);
+    command.args(&words[1..]).stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
+    // Number libraries that use every core, and hashes with a new seed each time, make two runs differ.
+    command.env("OMP_NUM_THREADS", "1").env("PYTHONHASHSEED", "0");
+    command.envs(&settings.env).process_group(0);
+    if let Some(directory) = &settings.working_directory {
+        if !directory.is_dir() {
+            return Err(format!("its working directory `{}` is no folder", directory.display()));
+        }
+        command.current_dir(directory);
+    }
+    let mut child = command.spawn().map_err(|error| format!("`{}` cannot be started: {error}", words[0]))?;
+    let (stdin, stdout, stderr) = (child.stdin.take(), child.stdout.take(), child.stderr.take());
+    let stdout = stdout.expect("it was asked for");
+    let fds: [Option<BorrowedFd>; 3] =
+        [stdin.as_ref().map(AsFd::as_fd), Some(stdout.as_fd()), stderr.as_ref().map(AsFd::as_fd)];
+    for fd in fds.into_iter().flatten() {
+        fcntl(fd, FcntlArg::F_SETFL(OFlag::O_NONBLOCK)).map_err(|error| format!("its pipes: {error}"))?;
+    }
+    Ok(Ends::Process { child, stdin, stdout, stderr })
+}
+
+fn status_text(status: ExitStatus) -> String {
+    match (status.code(), status.signal()) {
+        (Some(code), _) => format!("exit status {code}"),
+        (None, Some(number)) => match Signal::try_from(number) {
+            Ok(signal) => format!("signal {signal}"),
+            Err(_) => format!("signal {number}"),
+        },
+        (None, None) => "no status".to_owned(),
+    }
+}

@@ -1,0 +1,25 @@
+//! Driving systems outside this program: any program that speaks avastra-ads/1 (PROTOCOL.md) over pipes or a socket.
+//!
+//! `message` has the messages and `question` fills those that are asked; `link` moves lines, `session` speaks with one
+//! process, `program` keeps the processes and the known answers, and `driver` is one episode. What goes wrong is a
+//! `finding`, never a collision and never an error of the run.
+
+mod driver;
+mod finding;
+mod follow;
+mod link;
+mod message;
+mod program;
+mod question;
+mod record;
+mod schema;
+mod session;
+mod settings;
+
+pub use driver::External;
+pub use finding::{Failure, FailureKind, Problem};
+pub use message::{AnswerKind, Observation, PROTOCOL, schemas};
+pub use program::Program;
+pub use record::{Attached, Conversation, Key, Outcome, RecordError, digest_of, from_text, to_text};
+pub use session::Identity;
+pub use settings::{ExternalError, ExternalSettings, OnTimeout, Target, Timeouts};

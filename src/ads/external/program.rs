@@ -1,0 +1,189 @@
+//! A driving system outside this program, for many episodes at once: its processes, and what it is known to answer.
+
+use std::collections::{BTreeMap, VecDeque};
+use std::path::PathBuf;
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
+
+use crate::road::RoadMap;
+
+use super::finding::Failure;
+use super::message::{Init, Question};
+use super::question;
+use super::record::{Attached, Key, Outcome};
+use super::session::{Identity, Session};
+use super::settings::ExternalSettings;
+
+/// Most answers that are kept: those of some hundred episodes.
+const KNOWN_MAX: usize = 400_000;
+/// Most maps whose message is kept.
+const MAPS_MAX: usize = 16;
+
+/// An external driving system.
+pub struct Program {
+    settings: ExternalSettings,
+    init: Init,
+    /// Whether processes may be started: recorded answers alone need none, and what a file names is never run.
+    may_start: bool,
+    identity: OnceLock<Identity>,
+    idle: Mutex<Vec<Session>>,
+    known: Mutex<Known>,
+    maps: Mutex<Vec<Arc<MapLine>>>,
+}
+
+/// Answers by what was asked, so that an episode that is played again needs no process; the oldest go first.
+#[derive(Default)]
+struct Known {
+    answers: BTreeMap<Key, Outcome>,
+    order: VecDeque<Key>,
+}
+
+/// The message about a map.
+pub(super) struct MapLine {
+    map: Arc<RoadMap>,
+    pub line: String,
+    /// What every conversation on the map begins with.
+    pub key: Key,
+}
+
+impl core::fmt::Debug for Program {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.debug_struct("Program").field("settings", &self.settings).finish_non_exhaustive()
+    }
+}
+
+impl Program {
+    /// A driving system that is started when it is needed.
+    pub fn new(settings: ExternalSettings) -> Arc<Program> {
+        Program::with(settings, None, true)
+    }
+
+    /// A driving system that is known by recorded answers only, and never started.
+    pub fn recorded(attached: Attached, answers: Vec<(Key, Outcome)>) -> Arc<Program> {
+        let program = Program::with(attached.settings, attached.identity, false);
+        for (key, outcome) in answers {
+            program.learn(key, outcome);
+        }
+        program
+    }
+
+    fn with(settings: ExternalSettings, identity: Option<Identity>, may_start: bool) -> Arc<Program> {
+        let known = OnceLock::new();
+        if let Some(identity) = identity {
+            known.get_or_init(|| identity);
+        }
+        Arc::new(Program {
+            init: question::init(&settings),
+            settings,
+            may_start,
+            identity: known,
+            idle: Mutex::default(),
+            known: Mutex::default(),
+            maps: Mutex::default(),
+        })
+    }
+
+    /// Starts it once, to see that it can be.
+    ///
+    /// # Errors
+    /// Why it is of no use.
+    pub fn start(&self) -> Result<Identity, Failure> {
+        let session = self.session(None)?;
+        let identity = session.identity.clone();
+        self.give_back(session);
+        Ok(identity)
+    }
+
+    pub fn settings(&self) -> &ExternalSettings {
+        &self.settings
+    }
+
+    /// Whether other episodes can be driven than those that were recorded.
+    pub fn can_start(&self) -> bool {
+        self.may_start
+    }
+
+    /// Who it is, as far as it was asked, and how.
+    pub fn attached(&self) -> Attached {
+        Attached { identity: self.identity.get().cloned(), settings: self.settings.clone() }
+    }
+
+    /// A process that no episode uses; one that has the map, if there is any.
+    pub(super) fn session(&self, map: Option<Key>) -> Result<Session, Failure> {
+        let mut idle = locked(&self.idle);
+        let fits = idle.iter().position(|session| session.map == map.map(|key| key.0));
+        if let Some(index) = fits.or_else(|| idle.len().checked_sub(1)) {
+            return Ok(idle.swap_remove(index));
+        }
+        drop(idle);
+        let session = Session::open(&self.settings, &self.init)?;
+        self.identity.get_or_init(|| session.identity.clone());
+        Ok(session)
+    }
+
+    pub(super) fn give_back(&self, session: Session) {
+        locked(&self.idle).push(session);
+    }
+
+    /// Ends all processes that no episode uses. `false` if one did not end by itself, with status 0.
+    pub fn close(&self) -> bool {
+        let idle: Vec<Session> = core::mem::take(&mut *locked(&self.idle));
+        let limit_s = self.settings.timeouts.close_s;
+        // Each is closed, whatever became of the ones before.
+        let stubborn = idle.into_iter().map(|session| session.close(limit_s)).filter(|ended| !ended).count();
+        stubborn == 0
+    }
+
+    /// Forgets all answers, so that the next episodes are asked anew.
+    pub fn forget(&self) {
+        *locked(&self.known) = Known::default();
+    }
+
+    pub(super) fn known(&self, key: Key) -> Option<Outcome> {
+        locked(&self.known).answers.get(&key).cloned()
+    }
+
+    pub(super) fn learn(&self, key: Key, outcome: Outcome) {
+        let mut known = locked(&self.known);
+        if known.answers.insert(key, outcome).is_none() {
+            known.order.push_back(key);
+        }
+        if known.order.len() > KNOWN_MAX
+            && let Some(oldest) = known.order.pop_front()
+        {
+            known.answers.remove(&oldest);
+        }
+    }
+
+    /// The message about a map. Conversations do not depend on where its file lies.
+    pub(super) fn map_line(&self, map: &Arc<RoadMap>) -> Arc<MapLine> {
+        let mut maps = locked(&self.maps);
+        if let Some(found) = maps.iter().find(|known| Arc::ptr_eq(&known.map, map)) {
+            return Arc::clone(found);
+        }
+        let file =
+            map.file.as_ref().map(|file| std::path::absolute(file).unwrap_or_else(|_| PathBuf::from(file)));
+        let essence = Question::Map(question::map(map, None)).line();
+        let asked = Question::Init(Init { simulator: String::new(), ..self.init.clone() }).line();
+        let made = Arc::new(MapLine {
+            line: Question::Map(question::map(map, file.as_deref())).line(),
+            key: Key::new(&[asked.as_bytes(), essence.as_bytes()]),
+            map: Arc::clone(map),
+        });
+        if maps.len() >= MAPS_MAX {
+            maps.remove(0);
+        }
+        maps.push(Arc::clone(&made));
+        made
+    }
+}
+
+impl Drop for Program {
+    fn drop(&mut self) {
+        self.close();
+    }
+}
+
+/// What is behind the lock is whole, even if a thread panicked while it held it.
+fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}

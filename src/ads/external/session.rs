@@ -1,0 +1,381 @@
+//! One driving system that was started, spoken with in whole messages: asks, waits, reads and judges the answer.
+
+use serde_json::Value;
+
+use super::finding::{Failure, Problem};
+use super::link::{Broken, Deadline, Link};
+use super::message::{Answer, AnswerKind, Close, Init, PROTOCOL, Question, Ready};
+use super::schema::InRange;
+use super::settings::ExternalSettings;
+
+/// Names and versions are at most this long, characters.
+const NAME_CHARS_MAX: usize = 100;
+const REASON_CHARS_MAX: usize = 200;
+const ERROR_CHARS_MAX: usize = 2000;
+/// Most points of a trajectory and of a plan.
+const POINTS_MAX: usize = 1000;
+/// A trajectory reaches at least this far beyond its step, µs.
+const REACH_US_MIN: u64 = 1_000_000;
+
+/// What a driving system says of itself.
+#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+pub struct Identity {
+    pub name: String,
+    pub version: String,
+    pub answer: AnswerKind,
+    pub deterministic: bool,
+}
+
+/// A driving system that is ready.
+pub struct Session {
+    link: Link,
+    pub identity: Identity,
+    /// The map that it has, by the digest of its message.
+    pub map: Option<[u8; 16]>,
+    /// The step that was answered last, and whether one was missed in this episode.
+    answered: Option<u64>,
+    missed: bool,
+}
+
+impl Session {
+    /// Starts a driving system, or connects to one, and asks it who it is.
+    ///
+    /// # Errors
+    /// What went wrong, and its standard error.
+    pub fn open(settings: &ExternalSettings, init: &Init) -> Result<Session, Failure> {
+        let deadline = Deadline::after(settings.timeouts.init_s);
+        let mut link =
+            Link::open(settings).map_err(|detail| Failure::new(Problem::NotStarted, "start", detail))?;
+        link.send(&Question::Init(init.clone()).line());
+        let line = link.line(deadline);
+        let found = line.map_err(|broken| told(broken, settings.timeouts.init_s)).and_then(|line| {
+            let Answer::Ready(ready) = read(&line, "ready")? else { return Err(wrong_type(&line, "ready")) };
+            identity(ready, init)
+        });
+        match found {
+            Ok(identity) => Ok(Session { link, identity, map: None, answered: None, missed: false }),
+            Err(broken) => Err(failed(&mut link, broken, "init")),
+        }
+    }
+
+    /// Sends a message that wants no answer.
+    pub fn tell(&mut self, line: &str) {
+        self.link.send(line);
+    }
+
+    /// Sends a step whose answer is not waited for.
+    pub fn pass(&mut self, line: &str) {
+        self.missed = true;
+        self.link.send(line);
+    }
+
+    /// Asks by a line that `ready` answers.
+    ///
+    /// # Errors
+    /// What went wrong; the driving system is of no use then.
+    pub fn ready(&mut self, line: &str, stage: &'static str, limit_s: f64) -> Result<(), Failure> {
+        if stage == "reset" {
+            self.link.begin_episode();
+        }
+        self.link.send(line);
+        let deadline = Deadline::after(limit_s);
+        let result = loop {
+            let line = match self.link.line(deadline) {
+                Ok(line) => line,
+                Err(broken) => break Err(told(broken, limit_s)),
+            };
+            match read(&line, "ready") {
+                Ok(Answer::Ready(_)) => break Ok(()),
+                // The answer to a step that was missed.
+                Ok(answer) if self.missed && answer.seq().is_some() => {}
+                Ok(answer) if answer.seq().is_some() && answer.seq() == self.answered => {
+                    break Err(twice(self.answered));
+                }
+                Ok(_) => break Err(wrong_type(&line, "ready")),
+                Err(broken) => break Err(broken),
+            }
+        };
+        if stage == "reset" {
+            (self.answered, self.missed) = (None, false);
+        }
+        result.map_err(|broken| failed(&mut self.link, broken, stage))
+    }
+
+    /// Asks a step. `None` is an answer that did not come in time.
+    ///
+    /// # Errors
+    /// What else went wrong; the driving system is of no use then.
+    pub fn step(
+        &mut self,
+        line: &str,
+        (seq, t_us): (u64, u64),
+        limit_s: f64,
+    ) -> Result<Option<Answer>, Failure> {
+        self.link.send(line);
+        let deadline = Deadline::after(limit_s);
+        let wanted = self.identity.answer.name();
+        let result = loop {
+            let line = match self.link.line(deadline) {
+                Ok(line) => line,
+                Err(Broken { problem: Problem::NoAnswer, .. }) => {
+                    self.missed = true;
+                    break Ok(None);
+                }
+                Err(broken) => break Err(broken),
+            };
+            let answer = match read(&line, wanted) {
+                Ok(answer) => answer,
+                Err(broken) => break Err(broken),
+            };
+            match answer.seq() {
+                Some(found) if found == seq => {
+                    self.answered = Some(seq);
+                    break judged(answer, t_us).map(Some);
+                }
+                Some(found) if Some(found) == self.answered => break Err(twice(self.answered)),
+                Some(found) if found < seq && self.missed => {}
+                Some(found) => {
+                    let detail = format!("`seq` is {found}, asked was {seq}");
+                    break Err(Broken { problem: Problem::WrongSeq, detail });
+                }
+                None => break Err(wrong_type(&line, wanted)),
+            }
+        };
+        result.map_err(|broken| failed(&mut self.link, broken, format!("step {seq}")))
+    }
+
+    /// The finding that a step was not answered in time; the driving system is killed.
+    pub fn too_late(&mut self, seq: u64, limit_s: f64) -> Failure {
+        let broken = Broken { problem: Problem::NoAnswer, detail: in_time(limit_s) };
+        failed(&mut self.link, broken, format!("step {seq}"))
+    }
+
+    /// The finding that an answer differs from the one to the same question; the driving system is killed.
+    pub fn otherwise(&mut self, stage: String, detail: String) -> Failure {
+        failed(&mut self.link, Broken { problem: Problem::OtherAnswer, detail }, stage)
+    }
+
+    /// Says `close` and waits. `true` if it ended by itself, with status 0.
+    pub fn close(mut self, limit_s: f64) -> bool {
+        self.link.close(&Question::Close(Close {}).line(), limit_s)
+    }
+}
+
+/// A finding with all that can be known; the process is killed.
+fn failed(link: &mut Link, broken: Broken, stage: impl Into<String>) -> Failure {
+    let exit = match broken.problem {
+        Problem::Exited => link.exit_within(0.0),
+        _ => None,
+    };
+    link.kill();
+    let stderr = link.stderr();
+    Failure { exit, stderr, ..Failure::new(broken.problem, stage, broken.detail) }
+}
+
+fn told(broken: Broken, limit_s: f64) -> Broken {
+    match broken.problem {
+        Problem::NoAnswer => Broken { detail: in_time(limit_s), ..broken },
+        _ => broken,
+    }
+}
+
+fn in_time(limit_s: f64) -> String {
+    format!("no answer within {limit_s} s")
+}
+
+fn twice(seq: Option<u64>) -> Broken {
+    let detail = format!("a second answer to step {}", seq.unwrap_or_default());
+    Broken { problem: Problem::Twice, detail }
+}
+
+fn wrong_type(line: &[u8], wanted: &str) -> Broken {
+    Broken { problem: Problem::WrongType, detail: format!("expected `{wanted}`, got {}", shown(line)) }
+}
+
+/// The beginning of a line, for a message.
+fn shown(line: &[u8]) -> String {
+    let text = String::from_utf8_lossy(line);
+    let short: String = text.chars().take(120).map(|c| if c.is_control() { ' ' } else { c }).collect();
+    if short.len() < text.len() { format!("`{short}…`") } else { format!("`{short}`") }
+}
+
+/// A line as a message; `error` is a finding, and so is whatever is no message.
+pub(super) fn read(line: &[u8], wanted: &str) -> Result<Answer, Broken> {
+    let value: Value = serde_json::from_slice(line).map_err(|error| {
+        let text = String::from_utf8_lossy(line);
+        let is_number = error.to_string().contains("number out of range")
+            || (text.trim_start().starts_with('{')
+                && ["NaN", "Infinity", "nan", "inf"].iter().any(|word| outside_strings(&text, word)));
+        let problem = if is_number { Problem::NotFinite } else { Problem::NotJson };
+        Broken { problem, detail: shown(line) }
+    })?;
+    let Value::Object(fields) = &value else {
+        return Err(Broken { problem: Problem::NotJson, detail: format!("no object: {}", shown(line)) });
+    };
+    let Some(word) = fields.get("type").and_then(Value::as_str) else {
+        let detail = format!("no `type`: {}", shown(line));
+        return Err(Broken { problem: Problem::WrongShape, detail });
+    };
+    if !["ready", "control", "trajectory", "acceleration", "error"].contains(&word) {
+        return Err(wrong_type(line, wanted));
+    }
+    let word = word.to_owned();
+    let answer: Answer = serde_json::from_value(value).map_err(|error| {
+        let detail = format!("in `{word}`: {error}: {}", shown(line));
+        Broken { problem: Problem::WrongShape, detail }
+    })?;
+    match answer {
+        Answer::Error(error) => {
+            let message = error.message.chars().take(ERROR_CHARS_MAX).collect();
+            Err(Broken { problem: Problem::Reported, detail: message })
+        }
+        // What comes in place of `ready` may be a second answer to a step, or a late one: the caller tells by `seq`.
+        _ if wanted != "ready" && word != wanted => Err(wrong_type(line, wanted)),
+        answer => Ok(answer),
+    }
+}
+
+/// Whether a word stands in a line of JSON outside its strings.
+fn outside_strings(text: &str, word: &str) -> bool {
+    let mut is_string = false;
+    let mut previous = ' ';
+    for (at, c) in text.char_indices() {
+        if c == '"' && previous != '\\' {
+            is_string = !is_string;
+        } else if !is_string && text[at..].starts_with(word) {
+            return true;
+        }
+        previous = c;
+    }
+    false
+}
+
+/// Who a driving system is, by its first `ready`.
+fn identity(ready: Ready, init: &Init) -> Result<Identity, Broken> {
+    let missing = |name: &str| Broken {
+        problem: Problem::WrongShape,
+        detail: format!("the first `ready` has no `{name}`"),
+    };
+    let protocol = ready.protocol.ok_or_else(|| missing("protocol"))?;
+    if protocol != PROTOCOL {
+        let detail = format!("it speaks `{protocol}`");
+        return Err(Broken { problem: Problem::WrongProtocol, detail });
+    }
+    let (name, version) =
+        (ready.name.ok_or_else(|| missing("name"))?, ready.version.ok_or_else(|| missing("version"))?);
+    for text in [&name, &version] {
+        let count = text.chars().count();
+        if !(1..=NAME_CHARS_MAX).contains(&count) || text.chars().any(char::is_control) {
+            let detail =
+                "`name` and `version` have 1 to 100 characters, and no control characters".to_owned();
+            return Err(Broken { problem: Problem::WrongShape, detail });
+        }
+    }
+    let answer = ready.answer.ok_or_else(|| missing("answer"))?;
+    if let Some(wanted) = init.answer.filter(|wanted| *wanted != answer) {
+        let detail = format!("asked for answers of kind `{}`, it gives `{}`", wanted.name(), answer.name());
+        return Err(Broken { problem: Problem::WrongType, detail });
+    }
+    let deterministic = ready.deterministic.ok_or_else(|| missing("deterministic"))?;
+    Ok(Identity { name, version, answer, deterministic })
+}
+
+/// An answer to a step at `t_us`, if its values are possible.
+fn judged(answer: Answer, t_us: u64) -> Result<Answer, Broken> {
+    let wrong = |problem, detail: String| Err(Broken { problem, detail });
+    let out_of_range = match &answer {
+        Answer::Control(control) => control.out_of_range(""),
+        Answer::Trajectory(trajectory) => trajectory.out_of_range(""),
+        Answer::Acceleration(acceleration) => acceleration.out_of_range(""),
+        Answer::Ready(_) | Answer::Error(_) => None,
+    };
+    if let Some(detail) = out_of_range {
+        return wrong(Problem::OutOfRange, detail);
+    }
+    if let Answer::Control(control) = &answer {
+        let pedals = (control.accel.is_some(), control.throttle.is_some(), control.brake.is_some());
+        if !matches!(pedals, (true, false, false) | (false, true, true)) {
+            let detail = "`control` has either `accel`, or `throttle` and `brake`".to_owned();
+            return wrong(Problem::WrongShape, detail);
+        }
+    }
+    if let Answer::Trajectory(trajectory) = &answer {
+        let points = &trajectory.points;
+        if !(2..=POINTS_MAX).contains(&points.len()) {
+            let detail = format!("{} points; a trajectory has 2 to {POINTS_MAX}", points.len());
+            return wrong(Problem::WrongShape, detail);
+        }
+        if points.windows(2).any(|pair| pair[1].t_us <= pair[0].t_us) {
+            return wrong(Problem::OutOfRange, "`t_us` of the points does not rise".to_owned());
+        }
+        if points[0].t_us > t_us || points[points.len() - 1].t_us < t_us + REACH_US_MIN {
+            let (first, last) = (points[0].t_us, points[points.len() - 1].t_us);
+            let detail = format!(
+                "the points reach from {first} to {last} µs; the step is at {t_us} µs, and they must reach 1 s beyond it"
+            );
+            return wrong(Problem::OutOfRange, detail);
+        }
+    }
+    if let Some(internal) = answer.internal() {
+        if internal.reason.as_ref().is_some_and(|reason| reason.chars().count() > REASON_CHARS_MAX) {
+            let detail = format!("`internal.reason` has more than {REASON_CHARS_MAX} characters");
+            return wrong(Problem::WrongShape, detail);
+        }
+        if internal.planned.as_ref().is_some_and(|planned| planned.len() > POINTS_MAX) {
+            let detail = format!("`internal.planned` has more than {POINTS_MAX} points");
+            return wrong(Problem::WrongShape, detail);
+        }
+    }
+    Ok(answer)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn problem(line: &str, wanted: &str) -> Problem {
+        match read(line.as_bytes(), wanted).and_then(|answer| judged(answer, 1_000_000)) {
+            Ok(answer) => panic!("{line}: {answer:?}"),
+            Err(broken) => broken.problem,
+        }
+    }
+
+    #[test]
+    fn every_wrong_line_has_its_problem() {
+        for (line, wanted) in [
+            ("hello", Problem::NotJson),
+            ("[1, 2]", Problem::NotJson),
+            (r#"{"type":"control","seq":1,"accel":NaN,"steer":0}"#, Problem::NotFinite),
+            (r#"{"type":"control","seq":1,"accel":-Infinity,"steer":0}"#, Problem::NotFinite),
+            (r#"{"type":"control","seq":1,"accel":1e999,"steer":0}"#, Problem::NotFinite),
+            (r#"{"type":"control","seq":1,"name":"NaN","#, Problem::NotJson),
+            (r#"{"seq":1}"#, Problem::WrongShape),
+            (r#"{"type":"hello"}"#, Problem::WrongType),
+            (r#"{"type":"acceleration","seq":1,"accel":0}"#, Problem::WrongType),
+            (r#"{"type":"control","seq":-1,"accel":0,"steer":0}"#, Problem::WrongShape),
+            (r#"{"type":"control","seq":1,"accel":"fast","steer":0}"#, Problem::WrongShape),
+            (r#"{"type":"control","seq":1,"steer":0}"#, Problem::WrongShape),
+            (r#"{"type":"control","seq":1,"steer":0,"accel":1,"brake":0}"#, Problem::WrongShape),
+            (r#"{"type":"control","seq":1,"steer":0,"throttle":2,"brake":0}"#, Problem::OutOfRange),
+            (r#"{"type":"control","seq":1,"steer":30,"accel":1}"#, Problem::OutOfRange),
+            (r#"{"type":"error","message":"lost"}"#, Problem::Reported),
+        ] {
+            assert_eq!(problem(line, "control"), wanted, "{line}");
+        }
+        let trajectory = |points: &str| {
+            problem(&format!(r#"{{"type":"trajectory","seq":1,"points":[{points}]}}"#), "trajectory")
+        };
+        let point = |t_us: u64| format!(r#"{{"t_us":{t_us},"x":0,"y":0,"heading":0,"v":1}}"#);
+        assert_eq!(trajectory(""), Problem::WrongShape);
+        assert_eq!(trajectory(&format!("{},{}", point(1_000_000), point(1_000_000))), Problem::OutOfRange);
+        assert_eq!(trajectory(&format!("{},{}", point(1_000_000), point(1_900_000))), Problem::OutOfRange);
+        assert_eq!(trajectory(&format!("{},{}", point(1_100_000), point(2_900_000))), Problem::OutOfRange);
+        let fine = format!(
+            r#"{{"type":"trajectory","seq":1,"more":[],"points":[{},{}]}}"#,
+            point(900_000),
+            point(2_000_000)
+        );
+        assert!(read(fine.as_bytes(), "trajectory").and_then(|answer| judged(answer, 1_000_000)).is_ok());
+        assert!(read(br#"{"type":"control","seq":1,"steer":0,"accel":1}"#, "control").is_ok());
+    }
+}

@@ -1,0 +1,265 @@
+//! `avastra ads check`: whether a driving system follows the protocol, answers alike to the like, and how fast it is.
+//!
+//! It drives whole episodes with what may happen around the ego vehicle, because a driving system that answers one step
+//! well may fail at the hundredth. Whatever fails is named with its stage and what to do about it.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::Instant;
+
+use serde::Serialize;
+
+use crate::action::ActionTable;
+use crate::ads::Selected;
+use crate::ads::external::{ExternalSettings, Failure as Finding, Outcome, Program, Target};
+use crate::agent;
+use crate::agent::Kind;
+use crate::cli::arguments::AdsCheckArguments;
+use crate::cli::error::Failure;
+use crate::cli::load;
+use crate::cli::new::shipped;
+use crate::cli::output::Output;
+use crate::episode;
+use crate::episode::{Choice, EpisodeLog};
+use crate::run::{Arena, choose};
+
+/// The space that is driven if none is named, and its name.
+const SPACE: &str = "avastra45.ava";
+/// Steps of the episode that is broken off for a reset.
+const BROKEN_OFF_STEPS: usize = 2;
+/// Lines of standard error that are shown.
+const STDERR_LINES: usize = 12;
+
+/// What was checked.
+#[derive(Debug, Serialize)]
+struct Part {
+    /// In a word: `start`, `episode`, `reset`, `process`, `close`.
+    stage: &'static str,
+    passed: bool,
+    /// What was found, in words.
+    found: String,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    failure: Option<Finding>,
+}
+
+/// Figures of the first episode.
+#[derive(Debug, Clone, Copy, Serialize)]
+struct Speed {
+    questions: usize,
+    round_trips_per_s: f64,
+    /// Part of the episode's time that the driving system took, in `[0, 1]`.
+    share: f64,
+}
+
+/// Runs all checks; the first that fails ends them.
+pub fn check(output: &Output, arguments: &AdsCheckArguments) -> Result<(), Failure> {
+    let command = match arguments.program.as_slice() {
+        [] => None,
+        [one] if one.starts_with("tcp:") || one.starts_with("unix:") => {
+            Some(Target::from_text(one).map_err(Failure::usage)?)
+        }
+        words => Some(Target::Program(words.to_vec())),
+    };
+    let of_profile = load::external(arguments.ads_config.as_deref(), None)?;
+    let settings = match (of_profile, command) {
+        (Some(settings), Some(command)) => ExternalSettings { command, ..settings },
+        (Some(settings), None) => settings,
+        (None, Some(command)) => ExternalSettings::of(command),
+        (None, None) => {
+            return Err(Failure::usage("the profile has no `ads` block, and there is no command after `--`"));
+        }
+    };
+    let table = match &arguments.space {
+        Some(path) => load::table(output, path)?,
+        None => own_space(output)?,
+    };
+    let road = match &arguments.road {
+        Some(road) => road.clone(),
+        None => table.space().roads[0].name.clone(),
+    };
+    let steps = arguments.steps as usize;
+    let mut checks = Checks { output, seed: arguments.seed, steps, parts: Vec::new(), speed: None };
+    checks.all(table, &road, settings)?;
+    let Checks { parts, speed, .. } = checks;
+    let failed = parts.iter().filter(|part| !part.passed).count();
+    output.say(match failed {
+        0 => "\nit can be put under test",
+        _ => "\nit cannot be put under test as it is",
+    });
+    output.result(serde_json::json!({ "checks": parts, "speed": speed, "protocol": null }));
+    if failed > 0 { Err(Failure::Ads { findings: failed }) } else { Ok(()) }
+}
+
+/// The paper's space, from the program itself.
+fn own_space(output: &Output) -> Result<ActionTable, Failure> {
+    let folder = Path::new("avastra-ads-check");
+    let read = |path: &Path| -> Result<String, crate::check::ReadError> {
+        let name = path.strip_prefix(folder).unwrap_or(path).to_string_lossy().into_owned();
+        shipped(&name).map(str::to_owned).ok_or_else(|| crate::check::ReadError("no such file".to_owned()))
+    };
+    let path: PathBuf = folder.join(SPACE);
+    let loaded = crate::check::load(&path, &read).map_err(|error| Failure::file("read", &path, error))?;
+    load::table_of(output, loaded, &path)
+}
+
+struct Checks<'a> {
+    output: &'a Output,
+    seed: u64,
+    /// Length of an episode.
+    steps: usize,
+    parts: Vec<Part>,
+    speed: Option<Speed>,
+}
+
+impl Checks<'_> {
+    fn all(&mut self, table: ActionTable, road: &str, settings: ExternalSettings) -> Result<(), Failure> {
+        let program = Program::new(settings);
+        #[allow(clippy::disallowed_methods, reason = "this is cli, and the time is what is asked for")]
+        let began = Instant::now();
+        let identity = match program.start() {
+            Ok(identity) => identity,
+            Err(failure) => {
+                self.fail("start", "it does not come up", failure);
+                return Ok(());
+            }
+        };
+        let kind = identity.answer.name();
+        self.pass(
+            "start",
+            format!(
+                "{} {}, answers with `{kind}`, ready after {:.2} s",
+                identity.name,
+                identity.version,
+                began.elapsed().as_secs_f64()
+            ),
+        );
+
+        let arena =
+            Arena::new(table, &[road.to_owned()], Selected::external(Arc::clone(&program)), &[], &[])?;
+        #[allow(clippy::disallowed_methods, reason = "this is cli, and the time is what is asked for")]
+        let began = Instant::now();
+        let first = self.drive(&arena, 0, self.steps);
+        let asked_s = began.elapsed().as_secs_f64();
+        if let Some(failure) = &first.failure {
+            self.fail("episode", "it fails in an episode", failure.clone());
+            return Ok(());
+        }
+        // Now all answers are known: the same again is what avastra itself takes.
+        #[allow(clippy::disallowed_methods, reason = "this is cli, and the time is what is asked for")]
+        let began = Instant::now();
+        self.drive(&arena, 0, self.steps);
+        let own_s = began.elapsed().as_secs_f64();
+        let questions = exchanges(&first).len();
+        let taken_s = (asked_s - own_s).max(1e-9);
+        let share = taken_s / asked_s.max(1e-9);
+        let round_trips_per_s = questions as f64 / taken_s;
+        self.speed = Some(Speed { questions, round_trips_per_s, share });
+        self.pass(
+            "episode",
+            format!(
+                "{questions} questions on `{road}`, {:.0} m driven, end `{}`, {}; {round_trips_per_s:.0} round trips/s, {:.0} % of the episode's time",
+                first.distance_m,
+                first.end.name(),
+                crate::cli::output::plural(first.collisions.len(), "collision"),
+                100.0 * share
+            ),
+        );
+
+        // Another episode is broken off, and then the first one comes again, in the same process.
+        program.forget();
+        let between = self.drive(&arena, 1, BROKEN_OFF_STEPS);
+        let again = self.drive(&arena, 0, self.steps);
+        let failure = between.failure.as_ref().or(again.failure.as_ref());
+        if !self.same("reset", "after a reset, the same episode", &first, &again, failure) {
+            return Ok(());
+        }
+        program.forget();
+        let ended_well = program.close();
+        let fresh = self.drive(&arena, 0, self.steps);
+        if !self.same(
+            "process",
+            "in a fresh process, the same episode",
+            &first,
+            &fresh,
+            fresh.failure.as_ref(),
+        ) {
+            return Ok(());
+        }
+        let ended_well = program.close() && ended_well;
+        let limit_s = program.settings().timeouts.close_s;
+        if ended_well {
+            self.pass("close", "it ends by itself".to_owned());
+        } else {
+            let found = format!(
+                "after `close` it did not end with status 0 within {limit_s} s: leave the loop at `close`, or at the end of the input"
+            );
+            self.note("close", false, found, None);
+        }
+        Ok(())
+    }
+
+    /// An episode with random actions, broken off after so many steps.
+    fn drive(&self, arena: &Arena, number: u64, steps: usize) -> EpisodeLog {
+        let setup = arena.setup(0, self.seed.wrapping_add(number));
+        let Kind::Ready(build) = agent::by_name("random").expect("it is in the registry").kind else {
+            unreachable!("it learns nothing")
+        };
+        let mut agent = build();
+        let mut choose = |moment: &episode::Moment| {
+            if moment.step >= steps { Choice::Stop } else { choose(agent.as_mut(), moment) }
+        };
+        episode::run(&setup, &mut choose, &mut |_, _, _| {})
+    }
+
+    /// Whether an episode went as before.
+    fn same(
+        &mut self,
+        stage: &'static str,
+        what: &str,
+        first: &EpisodeLog,
+        again: &EpisodeLog,
+        failure: Option<&Finding>,
+    ) -> bool {
+        if let Some(failure) = failure {
+            self.fail(stage, "it fails", failure.clone());
+            return false;
+        }
+        let pairs = exchanges(first).iter().zip(exchanges(again));
+        let differs = pairs.clone().position(|((_, a), (_, b))| !a.means(b));
+        let Some(index) = differs else {
+            self.pass(stage, format!("{what} gets the same answers"));
+            return true;
+        };
+        let text = |outcome: &Outcome| serde_json::to_string(&outcome.essence()).unwrap_or_default();
+        let found = format!(
+            "{what} gets other answers from step {} on: {} instead of {}; forget everything at `reset`, seed all that is random from it, and use no clock",
+            index.saturating_sub(1),
+            text(&exchanges(again)[index].1),
+            text(&exchanges(first)[index].1)
+        );
+        self.note(stage, false, found, None);
+        false
+    }
+
+    fn pass(&mut self, stage: &'static str, found: String) {
+        self.note(stage, true, found, None);
+    }
+
+    fn fail(&mut self, stage: &'static str, what: &str, failure: Finding) {
+        let mut found = format!("{what}: {}\n  {}", failure.in_words(), failure.problem.advice());
+        for line in failure.stderr_lines(STDERR_LINES) {
+            found.push_str(&format!("\n  | {line}"));
+        }
+        self.note(stage, false, found, Some(failure));
+    }
+
+    fn note(&mut self, stage: &'static str, passed: bool, found: String, failure: Option<Finding>) {
+        let word = if passed { "ok" } else { "FAILS" };
+        self.output.say(&format!("{word:<6}{stage:<9}{found}"));
+        self.parts.push(Part { stage, passed, found, failure });
+    }
+}
+
+fn exchanges(log: &EpisodeLog) -> &[(crate::ads::external::Key, Outcome)] {
+    log.conversation.as_ref().map_or(&[], |conversation| &conversation.exchanges)
+}
