@@ -17,7 +17,8 @@ def measured(avastra, episodes, folder):
     """Largest resident memory, kB, and the size of the database."""
     out = Path(folder, str(episodes))
     command = [avastra, "run", "scenarios/avastra45.ava", "--traffic", "released", "--jobs", "1", "--quiet"]
-    run = subprocess.Popen([*command, "--episodes", str(episodes // ROADS), "--out", str(out)], cwd=ROOT)
+    command += ["--episodes", str(episodes // ROADS), "--out", str(out)]
+    run = subprocess.Popen(command, cwd=ROOT, stdout=subprocess.DEVNULL)
     _, status, used = os.wait4(run.pid, 0)
     if status != 0:
         sys.exit(f"a run of {episodes} episodes failed")
