@@ -675,7 +675,7 @@ pub(super) fn unknown_here(thing: &str, span: Span, site: Site) -> Diagnostic {
             .at(span, "the rows of the table are the same at every moment")
             .help("write a rule on the action, or draw the parameter with `any`"),
         _ => error
-            .at(span, format!("{} {}", SEEN_BY, if thing == "npc" { "a newcomer" } else { thing }))
+            .at(span, format!("{SEEN_BY} the {}", if thing == "npc" { "newcomer" } else { thing }))
             .help(format!("write a rule, or pass a function what it needs: `f({thing}.{asked})`")),
     }
 }

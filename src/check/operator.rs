@@ -259,7 +259,7 @@ impl Checker {
             return self.reject(error.at(span, who));
         }
         if matches!(fact, WordFact::Hit | WordFact::Near) {
-            let found: Vec<Option<BodyWord>> = words.iter().map(|word| self.body_of(fact, word)).collect();
+            let found: Vec<Option<BodyWord>> = words.iter().map(|word| self.body_of(word)).collect();
             let kind = ExprKind::IsBody(fact, found.into_iter().collect::<Option<_>>()?);
             return Some(Expr { kind, ty: Type::Bool, span });
         }
@@ -270,7 +270,7 @@ impl Checker {
     }
 
     /// A body beside `hit` or `near`: of the engine, or of the author's own.
-    fn body_of(&mut self, fact: WordFact, word: &ast::Expr) -> Option<BodyWord> {
+    fn body_of(&mut self, word: &ast::Expr) -> Option<BodyWord> {
         let known = match &word.kind {
             ast::ExprKind::Name(name) => self.body_named(name).map(|body| (name, body)),
             _ => None,
@@ -280,7 +280,7 @@ impl Checker {
             return match &word.kind {
                 ast::ExprKind::Name(name) => {
                     let names = Body::names().chain(own.iter().map(String::as_str));
-                    self.reject(unknown(fact.name(), name, word.span, names))
+                    self.reject(unknown("body", name, word.span, names))
                 }
                 _ => {
                     let error = Diagnostic::error(code::TYPE_MISMATCH, "wanted the name of a body");
