@@ -53,6 +53,22 @@ class Path:
         """m"""
         return self.stations[-1]
 
+    def smoothed(self, reach: int = 1) -> "Path":
+        """The path with its points averaged twice over `reach` neighbours to both sides; its ends stay.
+
+        Roads go from straight to bend at once, and a planner that bounds how fast the wheel turns finds no way along
+        that. With points 1 m apart and a `reach` of 1 the change takes some 5 m, and a bend of 6 m is cut by 0.1 m.
+        """
+        points = self.xy
+        for _ in range(2):
+            averaged = []
+            for index in range(len(points)):
+                span = min(reach, index, len(points) - 1 - index)
+                near = points[index - span: index + span + 1]
+                averaged.append((sum(x for x, _ in near) / len(near), sum(y for _, y in near) / len(near)))
+            points = averaged
+        return Path(points)
+
     def at(self, station: float, offset: float = 0.0) -> Pose:
         """The pose at a station and `offset` m to the left of it; beyond its ends the path goes on straight."""
         index = self._segment(station)

@@ -122,6 +122,9 @@ class Conversation:
             times = [point["t_us"] for point in answer["points"]]
             if any(after <= before for before, after in zip(times, times[1:])):
                 raise ProtocolError("the times `t_us` of `trajectory.points` must rise from point to point")
+            slowest = min(point["v"] for point in answer["points"])
+            if slowest < 0.0:
+                raise ProtocolError(f"a speed `v` of the trajectory is {slowest}; the vehicle does not drive backwards")
             if times[0] > step.t_us or times[-1] < step.t_us + 1_000_000:
                 raise ProtocolError(f"the trajectory goes from {times[0]} to {times[-1]} µs; it must begin at the time of the "
                                     f"step, {step.t_us}, or before, and reach at least 1 s beyond it")

@@ -49,24 +49,29 @@ class Way:
         lines = [line for line in (self._light(step, front), self._sign(step, front)) if line is not None]
         return min(lines, default=None)
 
-    def wanted_speed(self, step: Step, decel: float = 1.5, gap: float = 1.0) -> float:
-        """What limits, bends and a line that holds ask for, m/s: braking at `decel` (m/s²) to stop `gap` m before the line."""
+    def wanted_speed(self, step: Step, decel: float = 1.5, gap: float = 1.5) -> float:
+        """What limits, bends and a line that holds ask for, m/s: braking at `decel` (m/s²) to stop `gap` m before the line.
+
+        It is the speed for 1 s from now, because a planner comes to it with some delay.
+        """
         ego = step.ego
         wanted = min(self.speed(ego.route_s), self.speed(ego.route_s + 1.5 * ego.speed))
         line = self.stop(step)
         if line is None:
             return wanted
-        left = line - gap - ego.route_s - self.vehicle.rear_axle_to_front - 0.5 * ego.speed
+        left = line - gap - ego.route_s - self.vehicle.rear_axle_to_front - ego.speed
         return min(wanted, math.sqrt(2.0 * decel * max(left, 0.0)))
 
     def braking(self, step: Step, seconds: float = 3.0) -> List[TrajectoryPoint]:
         """A way out for a planner without a plan: braking as hard as the vehicle can, at its distance beside the route."""
         points, station, speed, period = [], step.ego.route_s, step.ego.speed, 0.1
+        decel = self.vehicle.max_decel
         for index in range(round(seconds / period) + 1):
             pose = self.path.at(station, step.ego.route_d)
-            accel = -min(self.vehicle.max_decel, speed / period)
-            points.append(TrajectoryPoint(step.t_us + round(index * 1e6 * period), *pose, v=speed, a=accel))
-            station, speed = station + period * (speed + accel * period / 2.0), max(speed + accel * period, 0.0)
+            # Also at rest: a controller that looks ahead must find the brake pressed there.
+            points.append(TrajectoryPoint(step.t_us + round(index * 1e6 * period), *pose, v=speed, a=-decel))
+            braked = min(period, speed / decel)
+            station, speed = station + speed * braked - decel * braked**2 / 2.0, speed - decel * braked
         return points
 
     def room(self, station: float) -> Tuple[float, float]:

@@ -30,6 +30,16 @@ class Paths(unittest.TestCase):
         self.assertAlmostEqual(beside.station, 10.0)
         self.assertAlmostEqual(beside.offset, -5.0)
 
+    def test_a_smoothed_path_turns_less_abruptly_and_stays_near(self):
+        path = line(bend=True)
+        smooth = path.smoothed(2)
+        def steepest(on):
+            turns = [on.curvature(station, 0.5) for station in range(2, 180)]
+            return max(abs(after - before) for before, after in zip(turns, turns[1:]))
+        self.assertLess(steepest(smooth), 0.45 * steepest(path))
+        self.assertLess(max(abs(path.project(*point).offset) for point in smooth.xy), 0.2)
+        self.assertEqual((smooth.xy[0], smooth.xy[-1]), (path.xy[0], path.xy[-1]))
+
     def test_a_path_needs_two_points(self):
         with self.assertRaisesRegex(ValueError, "two different points, and has 1"):
             avastra.Path([(1.0, 1.0), (1.0, 1.0)])
@@ -77,7 +87,7 @@ class Ways(unittest.TestCase):
     def test_a_line_that_holds_is_braked_for_evenly(self):
         world, on = way("light")
         world.x, world.speed = 70.0, 5.0
-        left = 95.0 - 1.0 - 65.0 - 3.705 - 2.5
+        left = 95.0 - 1.5 - 65.0 - 3.705 - 5.0
         self.assertAlmostEqual(on.wanted_speed(step(world)), math.sqrt(2.0 * 1.5 * left), places=6)
         world.time_us = 26_000_000
         self.assertEqual(on.wanted_speed(step(world)), 13.9)

@@ -86,6 +86,16 @@ class Failing(unittest.TestCase):
         """
         self.fails(source, opening(), "reach at least 1 s beyond it", 1)
 
+    def test_a_negative_speed_is_refused(self):
+        source = """
+        class Back(avastra.Driver):
+            answer = "trajectory"
+            def step(self, step):
+                return avastra.Trajectory([avastra.TrajectoryPoint(time, 0.0, 0.0, 0.0, -1e-9) for time in (0, 1_000_000)])
+        avastra.serve(Back)
+        """
+        self.fails(source, opening(), "the vehicle does not drive backwards", 1)
+
     def test_a_kind_that_the_driver_cannot_give_is_refused(self):
         self.fails(CRUISE.format("pass", "0.0"), [dict(INIT, answer="control")], "gives only `acceleration`", 1)
 

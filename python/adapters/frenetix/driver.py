@@ -28,6 +28,9 @@ LOW_SPEED = 2.0
 DURATIONS = np.arange(1.1, HORIZON + 1e-9, 0.38)
 SPEEDS = 11
 OFFSETS = 9
+#: Where the route bends more than this within `BEND_AHEAD` m, offsets are sampled only up to `BEND_OFFSET` m to the outside: on the inside a tight
+#: bend is tighter than the wheels turn.
+BEND, BEND_AHEAD, BEND_OFFSET = 1.0 / 25.0, 15.0, 0.5
 #: Standard deviation of a predicted position now, and what it gains in a second, m.
 SPREAD_NOW, SPREAD = 0.1, 0.2
 #: Kept free around a predicted box, m.
@@ -49,13 +52,9 @@ class Frenetix(avastra.Driver):
 
     def reset(self, reset):
         self.way = avastra.Way(self.vehicle, self.roads, reset)
-        path = self.way.path
-        # The core's frame ends where its line does; a noisy place at the start lies before it.
-        before = [path.at(-float(back))[:2] for back in range(20, 0, -1)]
-        after = [path.at(path.length + float(on))[:2] for on in range(1, 80)]
-        self.frame = frenetix.CoordinateSystemWrapper(np.array([*before, *path.xy, *after]))
+        self.frame = frenetix.CoordinateSystemWrapper(np.array(reference(self.way.path).xy))
         self.plan = None
-        stations = np.arange(0.0, path.length, 2.0)
+        stations = np.arange(0.0, self.way.path.length, 2.0)
         self.room = np.array([self.way.room(station) for station in stations]) - self.vehicle.width / 2.0
 
     def step(self, step):
@@ -87,7 +86,7 @@ class Frenetix(avastra.Driver):
 
     def barrier(self, line):
         """A line that must not be passed, as a predicted box."""
-        pose = self.way.path.at(line + 1.0)
+        pose = self.way.path.at(line + 0.5)
         return np.tile(np.array(pose), (round(HORIZON / DT) + 1, 1)), 1.0, 5.0
 
     def best(self, now, wanted, station, boxes, objects):
@@ -117,8 +116,8 @@ class Frenetix(avastra.Driver):
         """The core's evaluation of one set of samples."""
         car = self.vehicle
         handler = frenetix.TrajectoryHandler(dt=DT)
-        handler.add_feasability_function(limits.CheckYawRateConstraint(
-            deltaMax=car.max_steer, wheelbase=car.wheelbase, wholeTrajectory=False))
+        # Not its check of the rate of turn: it says the same as that of the curvature, and refuses every way on which the heading
+        # passes from pi to -pi.
         handler.add_feasability_function(limits.CheckAccelerationConstraint(
             switchingVelocity=8.0, maxAcceleration=car.max_decel, wholeTrajectory=False))
         handler.add_feasability_function(limits.CheckCurvatureConstraint(
@@ -142,6 +141,9 @@ class Frenetix(avastra.Driver):
         slowest = max(0.0, speed - self.vehicle.max_decel * 1.5)
         fastest = max(min(speed + self.vehicle.max_accel * HORIZON, wanted + 1.0), slowest + 1.0)
         left, right = self.room[min(max(int(station / 2.0), 0), len(self.room) - 1)]
+        tightest = max((self.way.curvature(station + on) for on in np.arange(0.0, BEND_AHEAD)), key=abs)
+        if abs(tightest) > BEND:
+            left, right = (0.0, BEND_OFFSET) if tightest > 0.0 else (BEND_OFFSET, 0.0)
         ends = np.append(np.linspace(slowest, fastest, SPEEDS), [max(wanted, 0.0), 0.0])
         across = np.append(np.linspace(-max(right, 0.0), max(left, 0.0), OFFSETS), 0.0)
         grid = np.stack([axis.ravel() for axis in np.meshgrid(DURATIONS, np.unique(ends), np.unique(across), indexing="ij")])
@@ -165,6 +167,13 @@ class Frenetix(avastra.Driver):
         apart |= np.abs(dx * other_cos + dy * other_sin) > half_length + (car.length * turned_cos + car.width * turned_sin) / 2.0
         apart |= np.abs(dy * other_cos - dx * other_sin) > half_width + (car.length * turned_sin + car.width * turned_cos) / 2.0
         return not apart.all()
+
+
+def reference(path):
+    """The route for the core: longer at both ends, because its frame ends where its line does, and smooth."""
+    before = [path.at(-float(back))[:2] for back in range(20, 0, -1)]
+    after = [path.at(path.length + float(on))[:2] for on in range(1, 80)]
+    return avastra.Path([*before, *path.xy, *after]).smoothed()
 
 
 def spread(other):

@@ -9,7 +9,7 @@ The driver is its `IDMVehicle` as it comes: every parameter is the package's. Ou
 - speed limits and bends as its target speed, because IDM slows down for neither.
 
 Its steering law presumes a wheel that turns at once. So the answer is no wheel angle but a trajectory: the model's own vehicle, driven on
-for 1.2 s by the acceleration of now and its steering law, and in the next step from where it was to be by then, unless the real
+for 1 s by the acceleration of now and its steering law, and in the next step from where it was to be by then, unless the real
 vehicle is farther than `ASTRAY` from there.
 
 It knows no right of way: it brakes for what is on its lane or within 1 m beside it, and for nothing else.
@@ -35,8 +35,10 @@ ROOM_TO_CHANGE = 60.0
 HAS_TO_LEAVE = 120.0
 #: The model's vehicle is put back to the real one when they are this far apart, m and m/s.
 ASTRAY = 1.0
-#: Points of the answer, 0.1 s apart.
-POINTS = 13
+#: Points of the answer, a period apart.
+POINTS = 11
+#: Parts of a period in which the model's vehicle moves: its steering law swings in long steps, the more so the slower it drives.
+PARTS, PARTS_SLOW, SLOW = 2, 5, 5.0
 #: Names of the only two nodes of the network.
 EDGE = ("start", "goal")
 
@@ -68,6 +70,30 @@ class Strand(AbstractLane):
 
     def width_at(self, longitudinal):
         return self.width
+
+
+class Network(RoadNetwork):
+    """The strands as lanes of one road. They need not lie side by side in the order of their numbers: some begin where others have ended."""
+
+    def __init__(self, strands):
+        super().__init__()
+        self.strands = strands
+        for strand in strands:
+            self.add_lane(*EDGE, strand)
+
+    def side_lanes_at(self, index, position):
+        """The nearest strand on either side of a place."""
+        middle = self.strands[index[2]].path.project(*position)
+        here = self.strands[index[2]].path.at(middle.station)
+        sides = {}
+        for number, strand in enumerate(self.strands):
+            station, offset = strand.local_coordinates(here[:2])
+            if number == index[2] or not 0.0 <= station < strand.length:
+                continue
+            side = offset < 0.0
+            if side not in sides or abs(offset) < abs(sides[side][0]):
+                sides[side] = (offset, (*EDGE, number))
+        return [lane for _, lane in sides.values()]
 
 
 def strands(map, route):
@@ -123,10 +149,8 @@ class HighwayEnv(avastra.Driver):
 
     def reset(self, reset):
         self.way = avastra.Way(self.vehicle, self.roads, reset)
-        network = RoadNetwork()
         self.strands = strands(self.roads, reset.route)
-        for strand in self.strands:
-            network.add_lane(*EDGE, strand)
+        network = Network(self.strands)
         self.goal_lane = reset.route.lanes[-1].id
         self.road = Road(network, np_random=np.random.RandomState(reset.seed % 2**32))
         self.ego = None
@@ -140,6 +164,8 @@ class HighwayEnv(avastra.Driver):
         ego.route = self.must_change(ego, station)
         self.road.vehicles = [ego] + [self.other(ego, other) for other in step.objects]
         self.road.objects = self.obstacles(step)
+        # The model asks for the lanes beside the ego vehicle's own, and for no other's.
+        self.road.network.side_lanes = lambda index: self.road.network.side_lanes_at(index, ego.position)
         ego.act()
         ego.timer += self.period
         return self.driven_on(step.t_us)
@@ -161,10 +187,12 @@ class HighwayEnv(avastra.Driver):
         ego, points, after = self.ego, [], None
         for index in range(POINTS):
             x, y = ego.position - self.vehicle.rear_axle_to_centre * ego.direction
-            points.append(avastra.TrajectoryPoint(now_us + round(index * 1e6 * self.period), x, y, ego.heading, ego.speed))
-            ego.action["steering"] = ego.steering_control(ego.target_lane_index)
+            points.append(avastra.TrajectoryPoint(now_us + round(index * 1e6 * self.period), x, y, ego.heading, max(ego.speed, 0.0)))
             ego.action["acceleration"] = max(ego.action["acceleration"], -ego.speed / self.period)
-            Vehicle.step(ego, self.period)
+            parts = PARTS if ego.speed > SLOW else PARTS_SLOW
+            for _ in range(parts):
+                ego.action["steering"] = ego.steering_control(ego.target_lane_index)
+                Vehicle.step(ego, self.period / parts)
             after = after or (ego.position.copy(), ego.heading, ego.speed)
         ego.position, ego.heading, ego.speed = after
         ego.on_state_update()

@@ -67,7 +67,8 @@ class Reactive(avastra.Driver):
         path = self.way.path
         # Beyond both ends straight on, so that no place near them lies outside of the planner's frame.
         stations = np.arange(-20.0, path.length + 80.0, 1.0)
-        reference = np.array([path.at(station)[:2] for station in stations])
+        # Smooth, because the planner bounds how fast the wheel turns.
+        reference = np.array(avastra.Path([path.at(station)[:2] for station in stations]).smoothed().xy)
         room = [self.way.room(min(max(station, 0.0), path.length)) for station in stations]
         left = np.array([path.at(station, sides[0] + VERGE)[:2] for station, sides in zip(stations, room)])
         right = np.array([path.at(station, -sides[1] - VERGE)[:2] for station, sides in zip(stations, room)])
@@ -135,7 +136,7 @@ class Reactive(avastra.Driver):
                 moving.append_obstacle(pycrcc.RectOBB(other.length / 2.0, other.width / 2.0, other.heading, x, y))
             checker.add_collision_object(moving)
         if line is not None:
-            pose = self.way.path.at(line + 1.0)
+            pose = self.way.path.at(line + 0.5)
             checker.add_collision_object(pycrcc.RectOBB(1.0, 5.0, pose.heading, pose.x, pose.y))
         return checker
 
