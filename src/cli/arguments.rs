@@ -151,6 +151,9 @@ pub struct ToyArguments {
     /// The kind of its answers.
     #[arg(long, value_enum, default_value_t = ToyAnswer::Acceleration)]
     pub answer: ToyAnswer,
+    /// Drive on whatever is in the way.
+    #[arg(long)]
+    pub blind: bool,
     /// What it does wrong, from the twentieth step on.
     #[arg(long, value_enum)]
     pub misbehave: Option<Misbehaviour>,
