@@ -23,6 +23,9 @@ const STRIDES: [usize; 3] = [16, 4, 1];
 /// within a tick, less than to another branch of the route.
 const NEAR_M: f64 = 5.0;
 
+/// Error that the position of a vehicle may have, m: places of the route that are nearer by less are equally near.
+const POSITION_ERROR_M: f64 = 2.0;
+
 /// Most steps along tangents until a place has settled; in a bend each step leaves a fraction of the error.
 const SLIDES_MAX: usize = 8;
 
@@ -184,7 +187,7 @@ impl Guide {
 
     /// The place of a vehicle that was lately at station `near_m`; with `None` the whole route is searched.
     pub fn locate(&self, point: Vec2, near_m: Option<f64>) -> Beside {
-        let Some(near_m) = near_m else { return self.project(point, 0.0, f64::INFINITY) };
+        let Some(near_m) = near_m else { return self.beside_sample(point, self.first_near(point)) };
         let within = Stretch { first: self.index(near_m - NEAR_M), last: self.index(near_m + NEAR_M) };
         let found = self.slide(point, self.index(near_m), within);
         self.beside_sample(point, found.unwrap_or_else(|| self.nearest(point, within)))
@@ -219,6 +222,17 @@ impl Guide {
 
     fn squared_m2(&self, point: Vec2, index: usize) -> f64 {
         (point - self.samples[index].position).norm_squared()
+    }
+
+    /// The nearest sample of the whole route. Where the route passes a place twice, the first passage is meant,
+    /// within the error of a position.
+    fn first_near(&self, point: Vec2) -> usize {
+        let whole = Stretch { first: 0, last: self.samples.len() - 1 };
+        let nearest = self.nearest(point, whole);
+        let reach_m = self.squared_m2(point, nearest).sqrt() + POSITION_ERROR_M;
+        let is_near = |index: &usize| self.squared_m2(point, *index) <= reach_m * reach_m;
+        let first = (0..nearest).find(is_near).unwrap_or(nearest);
+        self.descend(point, first, whole)
     }
 
     /// The sample of a stretch that is nearest to a point, coarse to fine.
@@ -334,7 +348,7 @@ impl Tracer<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ads::testing::winding;
+    use crate::ads::testing::{ring, winding};
 
     const RULES: SpeedRules =
         SpeedRules { cruise_mps: 11.0, lateral_acceleration_mps2_max: 2.0, slowdown_mps2: 1.5 };
@@ -351,6 +365,18 @@ mod tests {
             assert!((beside.station_m - station_m).abs() < 0.06, "{beside:?} at {station_m}");
             assert!((beside.offset_m - 1.0).abs() < 0.01, "{beside:?}");
         }
+    }
+
+    #[test]
+    fn a_drive_begins_where_the_route_begins_even_if_it_comes_there_again() {
+        let guide = Guide::new(&ring(), &RULES);
+        let start = guide.pose_at(0.0);
+        for (ahead_m, left_m) in [(0.0, 0.0), (0.3, 0.2), (0.2, -0.4), (1.0, 0.1)] {
+            let place = guide.locate(start.offset(ahead_m, left_m).position, None);
+            assert!((place.station_m - ahead_m).abs() < 0.1, "{place:?}");
+        }
+        let place = guide.locate(guide.pose_at(80.0).offset(0.0, 0.3).position, None);
+        assert!((place.station_m - 80.0).abs() < 0.1, "{place:?}");
     }
 
     #[test]

@@ -53,6 +53,27 @@ pub fn winding() -> Arc<Scene> {
     ])
 }
 
+/// A ring of 125.7 m in two halves, with one lane. The route leads from 10 m into the first half to 55 m into the
+/// second, and on through its start.
+pub fn ring() -> Arc<Scene> {
+    let link = r#"<link><predecessor id="-1"/><successor id="-1"/></link>"#;
+    let lane = lanes(&[(-1, "driving", 3.5, link)]);
+    let half_m = 20.0 * core::f64::consts::PI;
+    let half = |id: &str, other: &str, x_m: f64, heading_rad: f64| {
+        let plan = format!(
+            r#"<geometry s="0" x="{x_m}" y="0" hdg="{heading_rad}" length="{half_m}"><arc curvature="0.05"/></geometry>"#
+        );
+        let links = format!(
+            r#"<predecessor elementType="road" elementId="{other}" contactPoint="end"/>
+            <successor elementType="road" elementId="{other}" contactPoint="start"/>"#
+        );
+        road(id, half_m, "-1", &links, &plan, &lane, "")
+    };
+    let quarter_rad = core::f64::consts::FRAC_PI_2;
+    let halves = [half("1", "2", 20.0, quarter_rad), half("2", "1", -20.0, -quarter_rad)];
+    sim::testing::scene(&halves.concat(), ("1", -1, 10.0), ("2", -1, 55.0))
+}
+
 /// A lane each way, 3.5 m wide, from pieces of length (m) and curvature at both ends (1/m). Limit
 /// 13.9 m/s; the route keeps to the right-hand lane, and a signal has its line at 100 m.
 fn scene(pieces: &[(f64, f64, f64)]) -> Arc<Scene> {

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use crate::geometry::Pose;
 use crate::model::vocabulary::{Body, Level, TimeOfDay, Word};
 use crate::road::testing::{lanes as lanes_of, street};
+use crate::sim::testing::overpass;
 use crate::sim::{DT_S, Scene, SignalColour, Start, TrafficProfile, VehicleParameters, World};
 
 use super::driver::Ads;
@@ -53,6 +54,32 @@ fn all_drive_the_corner_in_any_weather() {
             assert!(over_limit_max < 1.05, "{drive}, {over_limit_max} of the limit");
             assert!(offset_m_max < 0.6, "{drive}");
         }
+    }
+}
+
+#[test]
+fn nothing_slows_down_for_traffic_on_a_bridge() {
+    // The speeds of a drive under (or, on the flat, across) a road on which a queue drives or not.
+    let speeds_mps = |entry: &super::registry::Entry, height_m: f64, queue: bool| {
+        let scene = overpass(height_m);
+        let mut world = World::new(Arc::clone(&scene), &crate::sim::testing::start());
+        if queue {
+            (0..16).for_each(|i| world.put("2", -1, "", 100.0 + 12.0 * f64::from(i), 5.0));
+        }
+        let mut ads = (entry.build)(&scene, 1);
+        let (mut sensed, mut speeds_mps, mut contacts) = (world.sensed(), Vec::new(), 0);
+        while !world.arrived() && world.time_s() < 60.0 {
+            world.sense(&mut sensed);
+            contacts += world.tick(&ads.drive(&sensed)).len();
+            speeds_mps.push(world.ego().speed_mps);
+        }
+        assert!(height_m == 0.0 || world.arrived() && contacts == 0, "{}", entry.name);
+        speeds_mps
+    };
+    for entry in REGISTRY {
+        let alone = speeds_mps(entry, 6.0, false);
+        assert!(speeds_mps(entry, 6.0, true) == alone, "{} yields to traffic above it", entry.name);
+        assert!(speeds_mps(entry, 0.0, true) != alone, "{} does not meet traffic on the flat", entry.name);
     }
 }
 

@@ -122,6 +122,8 @@ pub enum End {
     /// The same, because something stood in the way that would not go: wrecks, or vehicles that wait for each
     /// other. It says nothing about the driving system.
     Blocked,
+    /// The same, because the ego vehicle has left its lane and does not find back.
+    Astray,
     /// The space's limit of steps was reached: truncated.
     StepLimit,
     /// The script of a replay has no more steps.
@@ -136,6 +138,7 @@ impl End {
             End::Arrived => "arrived",
             End::Stalled => "stalled",
             End::Blocked => "blocked",
+            End::Astray => "astray",
             End::StepLimit => "limit",
             End::Script => "script",
             End::Failed(kind) => kind.name(),
@@ -149,7 +152,7 @@ mod tests {
 
     #[test]
     fn every_end_can_be_claimed() {
-        let driven = [End::Arrived, End::Stalled, End::Blocked, End::StepLimit, End::Script];
+        let driven = [End::Arrived, End::Stalled, End::Blocked, End::Astray, End::StepLimit, End::Script];
         let ends = driven.into_iter().chain(FailureKind::ALL.map(End::Failed));
         assert_eq!(ends.map(End::name).collect::<Vec<_>>(), crate::model::ENDS);
     }

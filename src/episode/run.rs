@@ -383,7 +383,11 @@ impl Play {
         } else if episode.stop_arrived && self.world.arrived() {
             Some(End::Arrived)
         } else if episode.stalled_steps.is_some_and(|limit| self.stalled >= limit) {
-            Some(if self.world.is_blocked() { End::Blocked } else { End::Stalled })
+            Some(match () {
+                () if self.world.is_blocked() => End::Blocked,
+                () if self.world.is_astray() => End::Astray,
+                () => End::Stalled,
+            })
         } else if self.steps.len() >= episode.step_limit as usize {
             Some(End::StepLimit)
         } else {

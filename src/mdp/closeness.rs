@@ -36,7 +36,7 @@ impl Closeness {
     /// Updates the values from the world of this moment.
     pub fn note(&mut self, world: &World) {
         let ego = world.ego_outline().pose;
-        for obstacle in world.obstacles() {
+        for obstacle in world.obstacles_on_level() {
             let other = obstacle.outline.pose;
             let distance_m = (other.position - ego.position).norm();
             self.distance_m = self.distance_m.min(distance_m);

@@ -170,7 +170,7 @@ pub fn combined(longitudinal: f64, lateral: f64) -> f64 {
 /// are left out.
 pub fn collision_probability(world: &World, settings: &ProcSettings, is_hit: &dyn Fn(u32) -> bool) -> Danger {
     let mut most = Most::default();
-    for obstacle in world.obstacles() {
+    for obstacle in world.obstacles_on_level() {
         if is_hit(obstacle.id) || beyond_reach(world, obstacle, settings) {
             continue;
         }

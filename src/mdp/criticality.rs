@@ -58,7 +58,7 @@ impl Criticality {
         }
         let speed_mps = world.ego().speed_mps;
         let mut is_unsafe = false;
-        for obstacle in world.obstacles().filter(|obstacle| !is_hit(obstacle.id)) {
+        for obstacle in world.obstacles_on_level().filter(|obstacle| !is_hit(obstacle.id)) {
             let seen = Seen::of(world, obstacle);
             if let Some(ttc_s) = time_to_collision_s(world, obstacle) {
                 self.ttc_s = Some(self.ttc_s.map_or(ttc_s, |least| least.min(ttc_s)));
@@ -185,7 +185,7 @@ impl Encroachment {
         }
         let frame = self.ego.len();
         self.ego.push(world.ego_outline());
-        for obstacle in world.obstacles() {
+        for obstacle in world.obstacles_on_level() {
             match self.others.iter_mut().find(|trail| trail.id == obstacle.id) {
                 Some(trail) => trail.outlines.push(obstacle.outline),
                 None => {

@@ -58,7 +58,7 @@ fn beyond(world: &World, moment: &MomentFacts) -> [f64; BEYOND_LEN] {
     let ego = world.ego().rear_axle;
     let [rain, fog, wetness] = world.sky().map(|level| level.intensity());
     let outline = world.ego_outline().pose;
-    let nearest = world.obstacles().min_by(|a, b| a.distance_m.total_cmp(&b.distance_m));
+    let nearest = world.obstacles_on_level().min_by(|a, b| a.distance_m.total_cmp(&b.distance_m));
     let [ahead_m, left_m, ahead_mps, left_mps] = nearest.map_or([LOOK_AHEAD_M, 0.0, 0.0, 0.0], |obstacle| {
         let place = outline.to_local(obstacle.outline.pose.position);
         let velocity = obstacle.velocity_mps;

@@ -33,7 +33,7 @@ pub fn released_probability(world: &World, is_hit: &dyn Fn(u32) -> bool) -> Dang
     let ego = world.ego_outline().pose;
     let velocity = ego.forward() * world.ego().speed_mps.max(LEAST);
     let mut most = Most::default();
-    for obstacle in world.obstacles().filter(|obstacle| !is_hit(obstacle.id)) {
+    for obstacle in world.obstacles_on_level().filter(|obstacle| !is_hit(obstacle.id)) {
         let other = if obstacle.velocity_mps.norm() < LEAST {
             obstacle.forward * LEAST
         } else {

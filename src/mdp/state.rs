@@ -63,7 +63,7 @@ fn driving_system(world: &World, status: &Status) -> [f64; 12] {
     let ego = world.ego();
     let localized = status.localized.unwrap_or(ego.rear_axle);
     let deviation = localized.position - ego.rear_axle.position;
-    let differences = perception_differences(world.obstacles(), &status.perceived);
+    let differences = perception_differences(world.obstacles_on_level(), &status.perceived);
     let steer_rad_max = crate::sim::VehicleParameters::MKZ.steer_rad_max;
     [
         deviation.norm(),
@@ -110,7 +110,7 @@ pub struct PerceptionCounts {
 
 /// Counts missed objects and ghosts. Obstacles beyond the sensors' reach (120 m) are not missed.
 pub fn perception_counts(world: &World, status: &Status) -> PerceptionCounts {
-    counts(world.obstacles(), &status.perceived)
+    counts(world.obstacles_on_level(), &status.perceived)
 }
 
 fn counts<'a>(
@@ -180,6 +180,8 @@ mod tests {
             forward: Vec2::new(-1.0, 0.0),
             lane_heading_rad: core::f64::consts::PI,
             velocity_mps: Vec2::new(-8.0, 0.0),
+            elevation_m: 0.0,
+            is_apart: false,
             distance_m: 5.0,
             spawned_tick: 0,
         };

@@ -49,8 +49,8 @@ pub struct Opposing {
 
 impl RoadMap {
     /// All lanes parallel to a lane at one of its stations, with an edge within `reach_m` of its centre, from
-    /// left to right. The lane itself is left out. For a lane outside junctions, so are the lanes inside
-    /// junctions.
+    /// left to right. The lane itself is left out, and so are lanes of another level. For a lane outside
+    /// junctions, so are the lanes inside junctions.
     pub fn abreast(&self, lane: LaneIndex, station_m: f64, reach_m: f64) -> Vec<Abreast> {
         let own = self.lane(lane);
         let pose = own.centre.pose_at(station_m);
@@ -59,7 +59,8 @@ impl RoadMap {
         let centre_m = reach_m + self.grid.half_width_m();
         for (index, projection) in self.grid.beside(&self.lanes, &pose, ABREAST_M, centre_m) {
             let other = self.lane(index);
-            if index == lane || other.junction.is_some() && own.junction.is_none() {
+            let is_inside = other.junction.is_some() && own.junction.is_none();
+            if index == lane || is_inside || own.is_apart_at(station_m, other, projection.station_m) {
                 continue;
             }
             let there = other.centre.pose_at(projection.station_m);

@@ -30,7 +30,12 @@ pub fn conflicts(map: &RoadMap, lanes: &[RouteLane], path: &Path) -> Vec<Conflic
             } else {
                 crossings(&inside, &map.lane(other).centre)
             };
-            all.extend(found.into_iter().map(|(station_m, lane_station_m)| Conflict {
+            let passes_over = |(station_m, lane_station_m): &(f64, f64)| {
+                let on_lane_m = station_m + begin_m - here.from_m;
+                map.lane(here.lane).is_apart_at(on_lane_m, map.lane(other), *lane_station_m)
+            };
+            let meet = found.into_iter().filter(|stations_m| !passes_over(stations_m));
+            all.extend(meet.map(|(station_m, lane_station_m)| Conflict {
                 station_m: station_m + begin_m,
                 lane: other,
                 lane_station_m,

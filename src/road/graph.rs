@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use crate::geometry::{Path, Vec2, wrap_angle};
 
 use super::centre_line::{CentreLine, NoCentreLine, centre_line};
+use super::heights::Heights;
 use super::index::LaneGrid;
 use super::lane_change::permitted;
 use super::map::{
@@ -23,6 +24,15 @@ const STRAIGHT_RAD_MAX: f64 = 30.0 * core::f64::consts::PI / 180.0;
 /// Above this change of heading a connection is a U-turn (survey conventions).
 const U_TURN_RAD_MIN: f64 = 150.0 * core::f64::consts::PI / 180.0;
 
+/// A turn by more than this, with a smaller mean radius (m), is left out: it leads back into the next lane beside,
+/// which no car can drive in one go (between kerbs they need 10 to 12 m).
+const TIGHT_RAD_MIN: f64 = 100.0 * core::f64::consts::PI / 180.0;
+const TIGHT_M_MIN: f64 = 3.0;
+
+/// Lanes that meet at a larger angle than this are not linked: so sharp a corner within a reference line is left out
+/// as well.
+const LINK_RAD_MAX: f64 = 60.0 * core::f64::consts::PI / 180.0;
+
 /// Builds the map of a file.
 pub fn build(document: &Document) -> Result<RoadMap, RoadError> {
     let mut builder = Builder::new(document)?;
@@ -30,6 +40,7 @@ pub fn build(document: &Document) -> Result<RoadMap, RoadError> {
     builder.link_sections();
     builder.link_roads();
     builder.link_junctions();
+    builder.unlink_corners();
     builder.set_neighbours();
     add_signals(&mut builder);
     add_objects(&mut builder);
@@ -46,6 +57,7 @@ pub fn build(document: &Document) -> Result<RoadMap, RoadError> {
             map.junctions[junction].lanes.push(LaneIndex(index));
         }
     }
+    map.has_levels = map.find_levels();
     share_phases(&mut map);
     set_precedence(document, &mut map);
     map.grid = LaneGrid::new(&map.lanes);
@@ -93,6 +105,7 @@ impl<'a> Builder<'a> {
             crosswalks: Vec::new(),
             strips: Vec::new(),
             solids: Vec::new(),
+            has_levels: false,
             warnings: document.warnings.clone(),
             warned_at: document.warned_at.clone(),
             grid: LaneGrid::default(),
@@ -116,6 +129,7 @@ impl<'a> Builder<'a> {
     fn add_lanes(&mut self) -> Result<(), RoadError> {
         let document = self.document;
         let mut limitless = 0;
+        let mut tight: Vec<String> = Vec::new();
         for (road_index, road) in document.roads.iter().enumerate() {
             let junction = road.junction.as_ref().and_then(|id| self.junctions.get(id.as_str()).copied());
             if let (Some(id), None) = (&road.junction, junction) {
@@ -142,6 +156,10 @@ impl<'a> Builder<'a> {
                             continue;
                         }
                     };
+                    if junction.is_some() && is_tight(&centre.path) {
+                        tight.push(at);
+                        continue;
+                    }
                     if let Some(unfolded) = centre.unfolded {
                         let message = format!(
                             "{at} runs backwards in a bend: it is cut short there, by up to {:.2} m",
@@ -155,7 +173,11 @@ impl<'a> Builder<'a> {
                     let index = LaneIndex(self.map.lanes.len());
                     self.lanes.insert((road_index, section_index, element.id), index);
                     let limit_mps = limit_mps.unwrap_or(LIMIT_MPS_DEFAULT);
-                    self.map.lanes.push(new_lane(key, centre, limit_mps, road.left_hand, junction));
+                    let mut lane = new_lane(key, centre, limit_mps, road.left_hand, junction);
+                    lane.heights = Heights::sampled(lane.centre.length_m(), |station_m| {
+                        road.elevation.at(lane.road_station_m(station_m)).value
+                    });
+                    self.map.lanes.push(lane);
                 }
             }
         }
@@ -163,6 +185,12 @@ impl<'a> Builder<'a> {
             let left_out = self.map.warnings.iter().find(|warning| warning.contains("left out"));
             let reason = left_out.map_or(String::new(), |warning| format!(" that can be driven; {warning}"));
             return Err(wrong(1, format!("the map has no lane of type `driving`{reason}")));
+        }
+        if let Some(first) = tight.first() {
+            let (number, message) = (tight.len(), "so tight that no car can drive it in one go");
+            self.map
+                .warnings
+                .push(format!("left out {number} lanes that turn round {message}; the first is {first}"));
         }
         if limitless > 0 {
             self.map.warnings.push(format!("{limitless} lanes state no speed limit; 50 km/h is taken"));
@@ -334,6 +362,34 @@ impl<'a> Builder<'a> {
         }
     }
 
+    /// Removes the links between lanes that meet at a corner which nothing on wheels can follow.
+    fn unlink_corners(&mut self) {
+        for index in 0..self.map.lanes.len() {
+            let lane = &self.map.lanes[index];
+            let end = lane.centre.pose_at(lane.centre.length_m());
+            let turn_rad = |next: &LaneIndex| {
+                wrap_angle(self.map.lane(*next).centre.pose_at(0.0).heading_rad - end.heading_rad).abs()
+            };
+            let sharp = lane.successors.iter().map(|next| (*next, turn_rad(next)));
+            let sharp: Vec<_> = sharp.filter(|(_, turn_rad)| *turn_rad > LINK_RAD_MAX).collect();
+            for (next, turn_rad) in sharp {
+                let (from, to) = (&self.map.lanes[index].key, &self.map.lane(next).key);
+                let message = format!(
+                    "lane {} of road `{}` meets lane {} of road `{}` at an angle of {:.0} degrees: the link is left out",
+                    from.lane,
+                    from.road,
+                    to.lane,
+                    to.road,
+                    turn_rad.to_degrees()
+                );
+                self.map.warned_at.push((self.map.warnings.len(), end.position));
+                self.map.warnings.push(message);
+                self.map.lanes[index].successors.retain(|other| *other != next);
+                self.map.lanes[next.0].predecessors.retain(|other| other.0 != index);
+            }
+        }
+    }
+
     fn set_neighbours(&mut self) {
         for (road_index, road) in self.document.roads.iter().enumerate() {
             for (section_index, section) in road.sections.iter().enumerate() {
@@ -450,14 +506,23 @@ fn new_lane(
         stop_lines: Vec::new(),
         sign_lines: Vec::new(),
         precedence: Precedence::Equal,
+        heights: Heights::default(),
         road_stations_m: centre.road_stations_m,
     }
 }
 
-/// The turn of a whole path, from the sum of its heading changes.
+fn is_tight(path: &Path) -> bool {
+    let change_rad = change_rad(path).abs();
+    change_rad > TIGHT_RAD_MIN && path.length_m() < change_rad * TIGHT_M_MIN
+}
+
+/// The sum of a path's changes of heading, rad.
+fn change_rad(path: &Path) -> f64 {
+    path.points().windows(2).map(|pair| wrap_angle(pair[1].heading_rad - pair[0].heading_rad)).sum()
+}
+
 fn turn(path: &Path) -> Turn {
-    let pairs = path.points().windows(2);
-    let change_rad: f64 = pairs.map(|pair| wrap_angle(pair[1].heading_rad - pair[0].heading_rad)).sum();
+    let change_rad = change_rad(path);
     match change_rad {
         _ if change_rad.abs() < STRAIGHT_RAD_MAX => Turn::Straight,
         _ if change_rad.abs() > U_TURN_RAD_MIN => Turn::UTurn,

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use crate::geometry::{Bounds, Path, Vec2, wrap_angle};
 
+use super::heights::Heights;
 use super::index::LaneGrid;
 use super::{graph, opendrive};
 
@@ -63,6 +64,7 @@ pub struct Lane {
     pub sign_lines: Vec<SignLine>,
     /// What signs say of a lane inside a junction; `Equal` for other lanes, and where lights stand.
     pub precedence: Precedence,
+    pub(super) heights: Heights,
     /// Station of the road's reference line at each vertex of `centre`, m: rising or falling.
     pub(super) road_stations_m: Vec<f64>,
 }
@@ -170,6 +172,8 @@ pub struct Crosswalk {
     pub id: String,
     /// Corners, in order.
     pub outline: Vec<Vec2>,
+    /// Height of its road there, m.
+    pub height_m: f64,
 }
 
 /// A lane that is no driving lane, as far as it matters to people on foot.
@@ -213,6 +217,8 @@ pub struct RoadMap {
     pub crosswalks: Vec<Crosswalk>,
     pub strips: Vec<Strip>,
     pub solids: Vec<Solid>,
+    /// Whether roads may pass over each other. If not, no heights need to be compared.
+    pub has_levels: bool,
     /// What was repaired, left out or not understood.
     pub warnings: Vec<String>,
     /// The places in the plane that warnings are about: index of the warning, position.

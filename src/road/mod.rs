@@ -7,6 +7,7 @@ mod centre_line;
 mod conflict;
 mod footway;
 mod graph;
+mod heights;
 mod index;
 mod join;
 mod lane_change;
@@ -23,6 +24,7 @@ mod tests;
 
 pub use abreast::{Connection, Opposing};
 pub use footway::{FootWay, Kerb};
+pub use heights::{Heights, is_apart};
 pub use lane_change::STRIP_M_MAX;
 pub use map::{
     Crosswalk, Junction, Lane, LaneIndex, LaneKey, LanePlace, Neighbour, Precedence, RoadError, RoadMap,

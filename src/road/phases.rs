@@ -79,5 +79,6 @@ fn conflict(map: &RoadMap, a: LaneIndex, b: LaneIndex) -> bool {
     if share(&a.predecessors, &b.predecessors) {
         return false;
     }
-    share(&a.successors, &b.successors) || !crossings(&a.centre, &b.centre).is_empty()
+    let meet = |(a_m, b_m): &(f64, f64)| !a.is_apart_at(*a_m, b, *b_m);
+    share(&a.successors, &b.successors) || crossings(&a.centre, &b.centre).iter().any(meet)
 }

@@ -5,6 +5,7 @@ use std::collections::BTreeSet;
 use crate::geometry::{Path, smooth_step, wrap_angle};
 
 use super::conflict::{conflicts, spans_inside};
+use super::heights::is_apart;
 use super::join::Joined;
 use super::lane_change::LENGTH_M_MIN;
 use super::map::{LaneIndex, LanePlace, RoadError, RoadMap, SignKind};
@@ -149,19 +150,25 @@ impl Route {
                 .map(|line| RouteSignLine { station_m: lane.from_m + line.station_m, kind: line.kind });
             on_route.filter(|line| is_on(lane, line.station_m))
         });
-        let mut crosswalks_m: Vec<_> =
-            map.crosswalks.iter().flat_map(|crosswalk| spans_inside(&path, &crosswalk.outline)).collect();
-        crosswalks_m.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
-        Ok(Route {
-            stop_lines: stop_lines.collect(),
-            sign_lines: sign_lines.collect(),
-            crosswalks_m,
-            conflicts: conflicts(map, &lanes, &path),
-            lanes,
-            changes,
-            path,
-            goal_m,
-        })
+        let (stop_lines, sign_lines) = (stop_lines.collect(), sign_lines.collect());
+        let conflicts = conflicts(map, &lanes, &path);
+        let crosswalks_m = Vec::new();
+        let mut route =
+            Route { lanes, changes, path, goal_m, stop_lines, sign_lines, crosswalks_m, conflicts };
+        for crosswalk in &map.crosswalks {
+            let spans_m = spans_inside(&route.path, &crosswalk.outline);
+            let meets = |span_m: &(f64, f64)| !is_apart(crosswalk.height_m, route.height_at(map, span_m.0));
+            let spans_m: Vec<_> = spans_m.into_iter().filter(meets).collect();
+            route.crosswalks_m.extend(spans_m);
+        }
+        route.crosswalks_m.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
+        Ok(route)
+    }
+
+    /// Height of the road at a station, m.
+    pub fn height_at(&self, map: &RoadMap, station_m: f64) -> f64 {
+        let part = self.lane_at(station_m);
+        map.lane(part.lane).height_at(station_m - part.from_m)
     }
 
     /// The lane with the lowest limit, the first of several; `None` if all allow the same.

@@ -225,14 +225,21 @@ fn switched<'a>(builder: &mut Builder<'a>) -> BTreeMap<&'a str, (usize, usize)> 
     groups
 }
 
-/// Names the lights that stop nobody, and marks junctions of which no light stops anybody.
+/// Names the lights that stop nobody, and marks junctions of which no light stops anybody. A light whose lanes are
+/// all for cycles or trams is none for vehicles.
 fn warn_of_idle_lights(builder: &mut Builder, placed: &Placed, held: &[Vec<(LaneIndex, f64)>]) {
     let mut lit = vec![(0, 0); builder.map.junctions.len()];
-    for (index, (_, signal)) in placed.lights.iter().enumerate() {
-        if signal.meaning == Meaning::OtherLight {
+    for (index, (road_index, signal)) in placed.lights.iter().enumerate() {
+        let idle = held[index].is_empty();
+        let road = &builder.document.roads[*road_index];
+        let lanes = &road.sections[road.section_at(signal.s_m)].lanes;
+        let is_named = |id: i32| signal.validity.iter().any(|(from, to)| (*from..=*to).contains(&id));
+        let mut named = lanes.iter().filter(|lane| is_named(lane.id)).peekable();
+        let others_only = idle && named.peek().is_some() && named.all(|lane| !lane.driving);
+        if signal.meaning == Meaning::OtherLight || others_only {
+            builder.map.signals[index].for_vehicles = false;
             continue;
         }
-        let idle = held[index].is_empty();
         if idle {
             builder.warn(signal.line, format!("light `{}` holds no lane: it stops nobody", signal.id));
         }
@@ -377,7 +384,8 @@ pub fn add_objects(builder: &mut Builder) {
             };
             match object.kind {
                 ObjectKind::Crosswalk => {
-                    builder.map.crosswalks.push(Crosswalk { id: object.id.clone(), outline });
+                    let (id, height_m) = (object.id.clone(), road.elevation.at(object.s_m).value);
+                    builder.map.crosswalks.push(Crosswalk { id, outline, height_m });
                 }
                 ObjectKind::Solid => {
                     let bounds = Bounds::around(&outline);

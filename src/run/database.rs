@@ -6,6 +6,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use rusqlite::{Connection, Transaction, params};
+use sha2::{Digest, Sha256};
 
 use crate::action::Draw;
 use crate::ads::external::Failure;
@@ -228,7 +229,8 @@ impl Database {
                         coalesce(sum(branched_s), 0.0),
                         (SELECT coalesce(sum(priority = 'ego'), 0) FROM collision),
                         (SELECT coalesce(sum(priority = 'other'), 0) FROM collision),
-                        coalesce(sum(ended = 'blocked'), 0), (SELECT count(*) FROM failure)
+                        coalesce(sum(ended = 'blocked'), 0), (SELECT count(*) FROM failure),
+                        coalesce(sum(ended = 'astray'), 0)
                  FROM episode",
             [],
             |row| {
@@ -256,6 +258,7 @@ impl Database {
                     wrong: row.get(20)?,
                     blocked: row.get(21)?,
                     failed: row.get(22)?,
+                    astray: row.get(23)?,
                 })
             },
         )?)
@@ -291,9 +294,11 @@ pub struct Totals {
     pub episodes_with_collision: i64,
     pub episodes_with_counted: i64,
     pub arrived: i64,
-    /// Ended without progress: for a reason of the driving system's own, and because others blocked its way.
+    /// Ended without progress: for a reason of the driving system's own, because others blocked its way, and
+    /// because it had left its lane.
     pub stalled: i64,
     pub blocked: i64,
+    pub astray: i64,
     /// Ended because an external driving system failed.
     pub failed: i64,
     pub step_limit: i64,
@@ -395,17 +400,26 @@ pub(crate) fn add_all(
 }
 
 fn add_offers(transaction: &Transaction, summary: &EpisodeSummary) -> Result<(), rusqlite::Error> {
-    let mut known = transaction.prepare_cached("INSERT OR IGNORE INTO reason (text) VALUES (?)")?;
+    let mut known =
+        transaction.prepare_cached("INSERT OR IGNORE INTO reason (reason, text) VALUES (?, ?)")?;
     let mut insert = transaction.prepare_cached(
         "INSERT INTO offer VALUES (?, ?, coalesce((SELECT reason FROM reason WHERE text = ?), 0), ?)",
     )?;
     for ((row, reason), steps) in &summary.offered.steps() {
         if let Some(reason) = reason {
-            known.execute([reason])?;
+            known.execute(params![reason_number(reason), reason])?;
         }
         insert.execute(params![summary.episode as i64, *row as i64, reason, steps])?;
     }
     Ok(())
+}
+
+/// The number of a reason: the beginning of its digest, so that it does not depend on which thread's episode is
+/// written first. Never 0.
+fn reason_number(text: &str) -> i64 {
+    let digest: [u8; 32] = Sha256::digest(text.as_bytes()).into();
+    let [a, b, c, d, e, f, g, h, ..] = digest;
+    (i64::from_le_bytes([a, b, c, d, e, f, g, h]) & i64::MAX) | 1
 }
 
 fn add_episode(

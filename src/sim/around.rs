@@ -1,6 +1,7 @@
 //! What a road user may look at while it decides how to move.
 
 use crate::geometry::{OrientedBox, Vec2};
+use crate::road::is_apart;
 
 use super::body::BodyParameters;
 use super::environment::{GRAVITY_MPS2, Grip};
@@ -12,6 +13,16 @@ use super::sense::{EgoMotion, RANGE_M};
 use super::signals::SignalClock;
 use super::traffic::TrafficProfile;
 
+/// A way within this distance of the route meets it or passes over it, m: three lanes, so that what drives beside
+/// the ego vehicle is on its level even if it passes over the route later.
+const LEVEL_ASIDE_M: f64 = 10.0;
+/// How far a way is followed until it comes near the route, in steps, m: as far as it matters to the ego vehicle,
+/// and less than any ramp needs to come around to a road that it passed over.
+const LEVEL_STEP_M: f64 = 5.0;
+const LEVEL_STEPS: u32 = 25;
+/// Stretch of the route before and behind the ego vehicle on which others meet it, m.
+const LEVEL_REACH_M: f64 = 200.0;
+
 /// The world around one road user during one tick, or around a newcomer that is not in it yet.
 #[derive(Clone, Copy)]
 pub(super) struct Around<'a> {
@@ -21,6 +32,8 @@ pub(super) struct Around<'a> {
     /// Unit vector along the ego vehicle's heading.
     pub ego_forward: Vec2,
     pub ego_velocity_mps: Vec2,
+    /// Height of the road under the ego vehicle, m.
+    pub ego_elevation_m: f64,
     pub ego_station_m: f64,
     pub ego_offset_m: f64,
     /// All other road users: those before it in the world's order, and those after it.
@@ -36,30 +49,65 @@ pub(super) struct Around<'a> {
     pub seed: u64,
 }
 
+/// Another road user or the ego vehicle, as far as one must not run into it.
+#[derive(Clone, Copy)]
+pub(super) struct Other<'a> {
+    pub outline: &'a OrientedBox,
+    /// Unit vector along its heading.
+    pub forward: Vec2,
+    pub velocity_mps: Vec2,
+    /// Height of the road under it, m.
+    pub elevation_m: f64,
+}
+
+impl<'a> From<&'a Obstacle> for Other<'a> {
+    fn from(obstacle: &'a Obstacle) -> Other<'a> {
+        let Obstacle { outline, forward, velocity_mps, elevation_m, .. } = obstacle;
+        Other { outline, forward: *forward, velocity_mps: *velocity_mps, elevation_m: *elevation_m }
+    }
+}
+
 impl Around<'_> {
     /// All other road users but the ego vehicle, as seen.
     pub fn obstacles(&self) -> impl Iterator<Item = &Obstacle> + Clone {
         self.users().map(|user| &user.obstacle)
     }
 
-    /// Outlines and velocities of the ego vehicle and of every obstacle.
-    pub fn others(&self) -> impl Iterator<Item = (&OrientedBox, Vec2)> {
-        core::iter::once((self.ego_outline, self.ego_velocity_mps))
-            .chain(self.obstacles().map(|obstacle| (&obstacle.outline, obstacle.velocity_mps)))
+    /// As [`Around::obstacles`], without those of roads that pass over or under that of the ego vehicle.
+    pub fn obstacles_on_level(&self) -> impl Iterator<Item = &Obstacle> + Clone {
+        self.obstacles().filter(|obstacle| !obstacle.is_apart)
     }
 
-    /// As [`Around::others`], with the unit vector of each heading: outline, heading, velocity.
-    pub fn others_along(&self) -> impl Iterator<Item = (&OrientedBox, Vec2, Vec2)> {
-        core::iter::once((self.ego_outline, self.ego_forward, self.ego_velocity_mps)).chain(
-            self.obstacles().map(|obstacle| (&obstacle.outline, obstacle.forward, obstacle.velocity_mps)),
-        )
+    /// Whether the road of a user passes over or under that of the ego vehicle. The place where its way first
+    /// comes near the route decides; if it comes near nowhere, the place beside it.
+    pub fn is_apart_from_ego(&self, user: &RoadUser) -> bool {
+        let (map, route) = (&self.scene.map, &self.scene.route);
+        if !map.has_levels {
+            return false;
+        }
+        let beside = |point: Vec2| route.path.project_near(point, self.ego_station_m, LEVEL_REACH_M);
+        let is_apart_at = |station_m, height_m| is_apart(route.height_at(map, station_m), height_m);
+        if let Motion::Drive(driver) = &user.mover.motion {
+            let ahead = (0..LEVEL_STEPS).map(|step| driver.station_m() + f64::from(step) * LEVEL_STEP_M);
+            for station_m in ahead {
+                let found = beside(driver.way().path.position_at(station_m));
+                if found.distance_m < LEVEL_ASIDE_M {
+                    return is_apart_at(found.station_m, driver.way().height_at(station_m));
+                }
+            }
+        }
+        is_apart_at(beside(user.obstacle.outline.pose.position).station_m, user.obstacle.elevation_m)
     }
 
-    /// Outlines and velocities of all vehicles, the ego vehicle first.
-    pub fn vehicles(&self) -> impl Iterator<Item = (&OrientedBox, Vec2)> {
+    /// The ego vehicle and every obstacle.
+    pub fn others(&self) -> impl Iterator<Item = Other<'_>> {
+        core::iter::once(self.ego()).chain(self.obstacles().map(Other::from))
+    }
+
+    /// All vehicles, the ego vehicle first.
+    pub fn vehicles(&self) -> impl Iterator<Item = Other<'_>> {
         let vehicles = self.obstacles().filter(|obstacle| obstacle.body.is_vehicle());
-        core::iter::once((self.ego_outline, self.ego_velocity_mps))
-            .chain(vehicles.map(|obstacle| (&obstacle.outline, obstacle.velocity_mps)))
+        core::iter::once(self.ego()).chain(vehicles.map(Other::from))
     }
 
     /// Every other driver with its obstacle and its body; wrecks are left out.
@@ -88,6 +136,15 @@ impl Around<'_> {
     /// The hardest braking of a body at a speed on this road, m/s².
     pub fn braking_mps2(&self, size: &BodyParameters, speed_mps: f64) -> f64 {
         size.deceleration_mps2_max.min(self.grip.friction(speed_mps) * GRAVITY_MPS2)
+    }
+
+    fn ego(&self) -> Other<'_> {
+        Other {
+            outline: self.ego_outline,
+            forward: self.ego_forward,
+            velocity_mps: self.ego_velocity_mps,
+            elevation_m: self.ego_elevation_m,
+        }
     }
 
     fn users(&self) -> impl Iterator<Item = &RoadUser> + Clone {

@@ -8,6 +8,8 @@
 
 use crate::geometry::{FirstContact, Frame, Pose, Sweep, Vec2, first_contact, wrap_angle};
 
+use crate::road::is_apart;
+
 use super::road_user::RoadUser;
 use super::world::DT_S;
 
@@ -57,7 +59,8 @@ pub(super) fn bump(users: &[RoadUser], index: usize, end: &Pose, tick: u64) -> O
     for (other, RoadUser { obstacle, .. }) in users.iter().enumerate() {
         let near_m = reach_m + obstacle.outline.half_length_m + obstacle.outline.half_width_m;
         let away = obstacle.outline.pose.position - outline.pose.position;
-        if other == index || away.x.abs() > near_m || away.y.abs() > near_m {
+        let is_far = away.x.abs() > near_m || away.y.abs() > near_m;
+        if other == index || is_far || is_apart(this.elevation_m, obstacle.elevation_m) {
             continue;
         }
         if own.is_apart(&Frame::along(&obstacle.outline, obstacle.forward), most_m + CLOSE_M) {

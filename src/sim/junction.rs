@@ -6,8 +6,8 @@
 //! conflict: a vehicle on one of them follows the vehicle ahead. Where lights differ, they decide before any
 //! of this (see `right_of_way`).
 
-use crate::geometry::{Path, wrap_angle};
-use crate::road::{LaneIndex, RoadMap, Turn};
+use crate::geometry::wrap_angle;
+use crate::road::{Lane, LaneIndex, RoadMap, Turn};
 
 /// Centre lines nearer than this are in conflict, m: two of the widest bodies (2.44 m) and 0.36 m of
 /// air.
@@ -81,18 +81,20 @@ fn conflict(map: &RoadMap, a: LaneIndex, b: LaneIndex) -> Option<((f64, f64), (f
     if !lane_a.centre.bounds().grown(CORRIDOR_M).meets(&lane_b.centre.bounds()) {
         return None;
     }
-    let on_a = stretch_near(&lane_a.centre, &lane_b.centre)?;
-    let on_b = stretch_near(&lane_b.centre, &lane_a.centre)?;
+    let on_a = stretch_near(lane_a, lane_b)?;
+    let on_b = stretch_near(lane_b, lane_a)?;
     Some((on_a, on_b))
 }
 
-/// From the first to the last station of `path` at which it is within the corridor of `other`, m.
-fn stretch_near(path: &Path, other: &Path) -> Option<(f64, f64)> {
+/// From the first to the last station of `lane` at which it is within the corridor of `other`, on one level, m.
+fn stretch_near(lane: &Lane, other: &Lane) -> Option<(f64, f64)> {
+    let path = &lane.centre;
     let mut stretch: Option<(f64, f64)> = None;
     let steps = (path.length_m() / STEP_M).ceil().max(1.0);
     for step in 0..=steps as u32 {
         let station_m = path.length_m() * f64::from(step) / steps;
-        if other.project(path.pose_at(station_m).position).distance_m < CORRIDOR_M {
+        let beside = other.centre.project(path.pose_at(station_m).position);
+        if beside.distance_m < CORRIDOR_M && !lane.is_apart_at(station_m, other, beside.station_m) {
             stretch = Some((stretch.map_or(station_m, |(from_m, _)| from_m), station_m));
         }
     }
@@ -102,7 +104,8 @@ fn stretch_near(path: &Path, other: &Path) -> Option<(f64, f64)> {
 /// Whether `a` goes before `b`.
 ///
 /// Signs decide first: a priority road before a lane without signs, and that before a stop or yield sign.
-/// Where they say the same, a vehicle that turns left or round yields to oncoming traffic; otherwise the vehicle from the right
+/// Where they say the same, a vehicle that turns left (right, where traffic keeps left) or round yields to oncoming
+/// traffic; otherwise the vehicle from the right
 /// goes first (Vienna Convention, article 18; so in Estonia and California). Of two from the same side,
 /// the one that turns less goes first; if they turn alike, the lane that the file names first.
 pub(super) fn goes_first(map: &RoadMap, a: LaneIndex, b: LaneIndex) -> bool {
@@ -112,11 +115,15 @@ pub(super) fn goes_first(map: &RoadMap, a: LaneIndex, b: LaneIndex) -> bool {
     }
     let approach_rad = |lane: LaneIndex| map.lane(lane).centre.points()[0].heading_rad;
     let angle_rad = wrap_angle(approach_rad(b) - approach_rad(a));
-    let rank = |lane: LaneIndex| match map.lane(lane).turn {
-        Turn::Straight => 0,
-        Turn::Right => 1,
-        Turn::Left => 2,
-        Turn::UTurn => 3,
+    let rank = |index: LaneIndex| {
+        let lane = map.lane(index);
+        let across = if lane.keeps_left { Turn::Right } else { Turn::Left };
+        match lane.turn {
+            Turn::Straight => 0,
+            turn if turn == across => 2,
+            Turn::Left | Turn::Right => 1,
+            Turn::UTurn => 3,
+        }
     };
     if angle_rad.abs() > OPPOSING_RAD_MIN || angle_rad.abs() < ALONGSIDE_RAD_MAX {
         return (rank(a), a) < (rank(b), b);

@@ -30,7 +30,8 @@ impl Around<'_> {
     /// The facts of this moment. Where one road user looks around, the nearest is another.
     pub fn moment_facts(&self) -> MomentFacts {
         let (scene, station_m) = (self.scene, self.ego_station_m);
-        let gaps = self.obstacles().map(|obstacle| (obstacle.distance_m, obstacle.velocity_mps.norm()));
+        let gaps =
+            self.obstacles_on_level().map(|obstacle| (obstacle.distance_m, obstacle.velocity_mps.norm()));
         let nearest = gaps.min_by(|a, b| a.0.total_cmp(&b.0));
         MomentFacts {
             ego_speed_mps: self.ego.speed_mps,
@@ -41,7 +42,7 @@ impl Around<'_> {
             ego_offset_m: self.ego_offset_m,
             ego_light: self.light_ahead(),
             ego_road: road_kind(scene, station_m),
-            road_users: self.obstacles().count() as u32,
+            road_users: self.obstacles_on_level().count() as u32,
             nearest_gap_m: nearest.map_or(NO_ROAD_USER_M, |(gap_m, _)| gap_m),
             nearest_speed_mps: nearest.map_or(0.0, |(_, speed_mps)| speed_mps),
             elapsed_s: self.tick as f64 * DT_S,

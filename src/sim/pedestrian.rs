@@ -21,8 +21,9 @@
 use crate::geometry::{OrientedBox, Pose, Vec2, distance_m, wrap_angle};
 use crate::rng;
 use crate::rng::Rng;
+use crate::road::is_apart;
 
-use super::around::Around;
+use super::around::{Around, Other};
 use super::road_user::{Moved, Obstacle};
 use super::sense::FRAME_TICKS;
 use super::trace::Trace;
@@ -229,7 +230,7 @@ impl Walker {
         let comes_close = || {
             [0.0, LOOK_M / 2.0, LOOK_M].into_iter().any(|ahead_m| {
                 let there = OrientedBox { pose: this.outline.pose.offset(ahead_m, 0.0), ..this.outline };
-                soonest_s(&there, around) < CLOSE_S
+                soonest_s(&there, this.elevation_m, around) < CLOSE_S
             })
         };
         if waits {
@@ -245,7 +246,9 @@ impl Walker {
         let startled = self.manner == Manner::Startled && self.startle_ticks > 0;
         if self.is_blocked(this, around) {
             self.pace_mps = 0.0;
-        } else if startled && (self.pace_mps == 0.0 || soonest_s(&this.outline, around) < STARTLE_S) {
+        } else if startled
+            && (self.pace_mps == 0.0 || soonest_s(&this.outline, this.elevation_m, around) < STARTLE_S)
+        {
             self.startle_ticks = self.startle_ticks.saturating_sub(FRAME_TICKS as u32);
             self.pace_mps = 0.0;
         } else if self.manner == Manner::Hurried && comes_close() {
@@ -258,10 +261,12 @@ impl Walker {
     /// Whether something stands or passes right before its feet.
     fn is_blocked(&self, this: &Obstacle, around: &Around) -> bool {
         let next = OrientedBox { pose: this.outline.pose.offset(STEP_M, 0.0), ..this.outline };
-        around.others().any(|(outline, _)| {
+        around.others().any(|Other { outline, elevation_m, .. }| {
             let reach_m = outline.half_length_m + outline.half_width_m + 2.0;
             let away = outline.pose.position - next.pose.position;
-            away.norm_squared() < reach_m * reach_m && distance_m(&next, outline) < ROOM_M
+            away.norm_squared() < reach_m * reach_m
+                && distance_m(&next, outline) < ROOM_M
+                && !is_apart(this.elevation_m, elevation_m)
         })
     }
 
@@ -275,10 +280,11 @@ impl Walker {
     }
 }
 
-/// Time until the first vehicle would reach an outline if all vehicles keep their velocity, s.
-fn soonest_s(outline: &OrientedBox, around: &Around) -> f64 {
-    around.vehicles().fold(f64::INFINITY, |soonest_s, (vehicle, velocity_mps)| {
-        soonest_s.min(arrival_s(outline, vehicle, velocity_mps))
+/// Time until the first vehicle would reach an outline at a height (m) if all vehicles keep their velocity, s.
+fn soonest_s(outline: &OrientedBox, elevation_m: f64, around: &Around) -> f64 {
+    let level = around.vehicles().filter(|vehicle| !is_apart(elevation_m, vehicle.elevation_m));
+    level.fold(f64::INFINITY, |soonest_s, vehicle| {
+        soonest_s.min(arrival_s(outline, vehicle.outline, vehicle.velocity_mps))
     })
 }
 

@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use crate::geometry::{OrientedBox, Pose, Vec2, distance_m};
 use crate::model::vocabulary::{Body, Colour, Verb};
+use crate::road::is_apart;
 
 use super::ambient::COMMANDED_MAX;
 use super::around::Around;
@@ -18,6 +19,9 @@ use super::world::DT_S;
 
 /// How long a wreck stays where it came to rest, s; longer while the ego vehicle sees it.
 const WRECK_S: f64 = 2.0;
+
+/// What walks or stands does so beside this stretch of the ego vehicle's route, before and behind it, m.
+const ON_FOOT_M: f64 = 200.0;
 
 /// A road user other than the ego vehicle, as others may see it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -34,6 +38,11 @@ pub struct Obstacle {
     /// Heading of the lane that it drives in; a pedestrian's own heading.
     pub lane_heading_rad: f64,
     pub velocity_mps: Vec2,
+    /// Height of the road under it, m.
+    pub elevation_m: f64,
+    /// Whether its road passes over or under that of the ego vehicle, which then neither sees nor meets it; at
+    /// most 0.1 s old.
+    pub is_apart: bool,
     /// Gap between its outline and the ego vehicle's, m; 0 if they touch.
     pub distance_m: f64,
     pub spawned_tick: u64,
@@ -111,15 +120,27 @@ impl RoadUser {
             height_m: mover.size.height_m,
             lane_heading_rad: moved.lane_heading_rad,
             velocity_mps: moved.velocity_mps,
+            elevation_m: mover.elevation_m().unwrap_or_else(|| {
+                let route = &around.scene.route;
+                let beside = route.path.project_near(moved.pose.position, around.ego_station_m, ON_FOOT_M);
+                route.height_at(&around.scene.map, beside.station_m)
+            }),
+            is_apart: false,
             distance_m: distance_m(around.ego_outline, &outline),
             spawned_tick: around.tick,
         };
-        RoadUser { obstacle, mover }
+        let mut newcomer = RoadUser { obstacle, mover };
+        newcomer.obstacle.is_apart = around.is_apart_from_ego(&newcomer);
+        newcomer
     }
 
     /// Whether every other road user, the ego vehicle included, is at least `room_m` away.
     pub fn has_room(&self, around: &Around, room_m: f64) -> bool {
-        !around.others().any(|(other, _)| distance_m(&self.obstacle.outline, other) < room_m)
+        let this = &self.obstacle;
+        !around.others().any(|other| {
+            distance_m(&this.outline, other.outline) < room_m
+                && !is_apart(this.elevation_m, other.elevation_m)
+        })
     }
 
     /// Every bit that later ticks depend on.
@@ -151,6 +172,14 @@ impl Mover {
             rest_ticks: 0,
             visible_fraction: 1.0,
             rights: Rights::default(),
+        }
+    }
+
+    /// Height of the road on its way, m; `None` for what has no way.
+    pub fn elevation_m(&self) -> Option<f64> {
+        match &self.motion {
+            Motion::Drive(driver) => Some(driver.way().height_at(driver.station_m())),
+            Motion::Walk(_) | Motion::Stand => None,
         }
     }
 

@@ -196,6 +196,8 @@ mod tests {
             forward: Vec2::new(1.0, 0.0),
             lane_heading_rad: 0.0,
             velocity_mps: Vec2::zeros(),
+            elevation_m: 0.0,
+            is_apart: false,
             distance_m: 0.0,
             spawned_tick: 0,
         }

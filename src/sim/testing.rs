@@ -134,6 +134,33 @@ pub enum Heading {
     Left,
 }
 
+/// The way of the ego vehicle (from x = 100 to x = 500, with a lane each way) leads along +x at height 0. At x = 300
+/// road 2, with one lane to the north, crosses it without a junction. Its ramps climb at 4 % to `height_m`.
+pub fn overpass(height_m: f64) -> Arc<Scene> {
+    let (both, one) = (lanes(&[plain(1), plain(-1)]), lanes(&[plain(-1)]));
+    let ramp_m = height_m / 0.04;
+    let (up_m, down_m) = (280.0 - ramp_m, 320.0);
+    let heights = format!(
+        r#"<elevationProfile><elevation s="0" a="0"/><elevation s="{up_m}" a="0" b="0.04"/>
+        <elevation s="280" a="{height_m}"/><elevation s="{down_m}" a="{height_m}" b="-0.04"/>
+        <elevation s="{}" a="0"/></elevationProfile>"#,
+        down_m + ramp_m
+    );
+    let north = core::f64::consts::FRAC_PI_2;
+    let roads = [
+        street("1", [0.0, 0.0, 0.0, 600.0], "-1", "", &both, ""),
+        street("2", [300.0, -300.0, north, 600.0], "-1", "", &one, &heights),
+    ];
+    scene(&roads.concat(), ("1", -1, 100.0), ("1", -1, 500.0))
+}
+
+/// A street of 600 m along +x with a lane each way that climbs at 10 %; the route leads from x = 100 to x = 500.
+pub fn hill() -> Arc<Scene> {
+    let both = lanes(&[plain(1), plain(-1)]);
+    let climbs = r#"<elevationProfile><elevation s="0" a="20" b="0.1"/></elevationProfile>"#;
+    scene(&street("1", [0.0, 0.0, 0.0, 600.0], "-1", "", &both, climbs), ("1", -1, 100.0), ("1", -1, 500.0))
+}
+
 /// A street from west (road 1) to east (road 3) through a junction at the origin, with a lane each way, 200 m
 /// to each side. The ego vehicle comes from the west, 100 m before the junction, and goes straight on (through
 /// road 2) or turns left to the north (road 5). A vehicle from the east goes straight on or turns left to the

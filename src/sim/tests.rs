@@ -1,5 +1,6 @@
 //! What road users do: every verb on a hand-made road, and what must hold of all of them.
 
+mod levels;
 mod vehicles;
 
 use std::sync::Arc;

@@ -7,7 +7,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use crate::geometry::{Bounds, Path, Pose, Vec2};
 use crate::rng;
 use crate::rng::Rng;
-use crate::road::{Lane, LaneIndex, RoadMap, RouteStopLine, SignKind};
+use crate::road::{Heights, Lane, LaneIndex, RoadMap, RouteStopLine, SignKind};
 
 use super::body::BodyParameters;
 use super::junction::Area;
@@ -40,6 +40,7 @@ const WAYS_MAX: usize = 256;
 pub(super) struct Way {
     pub path: Path,
     lanes: Vec<WayLane>,
+    heights: Heights,
     /// One bit for each lane of the way, its index modulo 64: tells quickly of most lanes that they are not on the way.
     lane_bits: u64,
     /// By rising station.
@@ -121,7 +122,19 @@ impl Way {
         let end_m = if open { None } else { free_end_m(map, &path) };
         let lane_bits = lanes.iter().fold(0, |bits, part| bits | lane_bit(part.lane));
         areas.sort_by(|a, b| a.from_m.total_cmp(&b.from_m).then(a.other.cmp(&b.other)));
-        Some(Way { path, lanes, lane_bits, stop_lines, stop_signs_m, areas, speeds_mps_max, open, end_m })
+        let heights = Heights::chained(lanes.iter().map(|part| (part.from_m, map.lane(part.lane))));
+        Some(Way {
+            path,
+            lanes,
+            heights,
+            lane_bits,
+            stop_lines,
+            stop_signs_m,
+            areas,
+            speeds_mps_max,
+            open,
+            end_m,
+        })
     }
 
     /// Where the outline's centre of a body is that has driven to a station: both axles are on the way.
@@ -150,6 +163,7 @@ impl Way {
         Way {
             path,
             lanes,
+            heights: Heights::default(),
             lane_bits: 0,
             stop_lines,
             stop_signs_m,
@@ -158,6 +172,11 @@ impl Way {
             open: false,
             end_m: None,
         }
+    }
+
+    /// Height of the road at a station, m.
+    pub fn height_at(&self, station_m: f64) -> f64 {
+        self.heights.at(station_m)
     }
 
     /// The lane at a station, clamped to the ends, and the station on it.

@@ -8,6 +8,7 @@ use crate::action::{Effect, LaneChangeRules, SpawnFacts, SpawnRequest, Surroundi
 use crate::geometry::{Frame, OrientedBox, Sweep, Vec2};
 use crate::model::vocabulary::{Level, TimeOfDay};
 use crate::model::{MomentFacts, NpcFacts, TICK_MS};
+use crate::road::{RouteLaneChange, is_apart};
 
 use super::ambient::{Ambient, RENEWAL_TICKS, is_gone};
 use super::around::Around;
@@ -79,6 +80,8 @@ pub struct World {
     /// Place of the ego vehicle's rear axle beside the route.
     ego_station_m: f64,
     ego_offset_m: f64,
+    /// Height of the road under it, m. It follows from the station.
+    ego_elevation_m: f64,
     red_runs: u32,
     ego_passed: Option<PassedLight>,
     environment: Environment,
@@ -108,6 +111,7 @@ impl World {
             ego: Ego::new(scene.route.path.pose_at(0.0), START_MPS),
             ego_station_m: 0.0,
             ego_offset_m: 0.0,
+            ego_elevation_m: scene.route.height_at(&scene.map, 0.0),
             red_runs: 0,
             ego_passed: None,
             conditions: environment.conditions(START_MPS),
@@ -242,6 +246,11 @@ impl World {
         self.users.iter().map(|user| &user.obstacle)
     }
 
+    /// The obstacles whose roads neither pass over nor under that of the ego vehicle.
+    pub fn obstacles_on_level(&self) -> impl Iterator<Item = &Obstacle> + Clone {
+        self.obstacles().filter(|obstacle| !obstacle.is_apart)
+    }
+
     /// The road user with an id, if it is there.
     pub fn obstacle(&self, id: u32) -> Option<&Obstacle> {
         self.obstacles().find(|obstacle| obstacle.id == id)
@@ -308,7 +317,7 @@ impl World {
         into.signals.clear();
         into.signals.extend((0..self.scene.map.signals.len()).map(|signal| self.signal(signal)));
         into.objects.clear();
-        for RoadUser { obstacle, mover } in &self.users {
+        for RoadUser { obstacle, mover } in self.users.iter().filter(|user| !user.obstacle.is_apart) {
             let away = obstacle.outline.pose.position - self.ego.outline.pose.position;
             if away.norm_squared() > RANGE_M * RANGE_M {
                 continue;
@@ -357,8 +366,9 @@ impl World {
     /// vehicle itself is a wreck.
     pub fn is_blocked(&self) -> bool {
         let front_m = self.ego_front_m();
+        let stands_in_way = |user: &RoadUser| user.mover.is_stuck(&user.obstacle) && !user.obstacle.is_apart;
         !self.ego.motion.touched
-            && self.users.iter().filter(|user| user.mover.is_stuck(&user.obstacle)).any(|user| {
+            && self.users.iter().filter(|user| stands_in_way(user)).any(|user| {
                 let Obstacle { outline, forward, .. } = &user.obstacle;
                 let beside = self.scene.route.path.project_from(outline.pose.position, front_m);
                 let (length_m, width_m) = (2.0 * outline.half_length_m, 2.0 * outline.half_width_m);
@@ -367,6 +377,16 @@ impl World {
                 });
                 taken.is_some_and(|span| span.to_m > front_m && span.from_m < front_m + QUEUE_M)
             })
+    }
+
+    /// Whether the ego vehicle has left its lane without a contact: the middle of its rear axle is beside it. During a
+    /// lane change it is in one of two lanes.
+    pub fn is_astray(&self) -> bool {
+        let (route, station_m) = (&self.scene.route, self.ego_station_m);
+        let here = route.lane_at(station_m);
+        let half_m = self.scene.map.lane(here.lane).width_at(station_m - here.from_m) / 2.0;
+        let changes = |change: &RouteLaneChange| (change.begin_m..change.latest_m).contains(&station_m);
+        !self.ego.motion.touched && self.ego_offset_m.abs() > half_m && !route.changes.iter().any(changes)
     }
 
     /// Station of the ego vehicle's front bumper on the route, m.
@@ -386,6 +406,7 @@ impl World {
             ego_outline: &self.ego.outline,
             ego_forward: self.ego.frame.forward(),
             ego_velocity_mps: self.ego.velocity_mps(),
+            ego_elevation_m: self.ego_elevation_m,
             ego_station_m: self.ego_station_m,
             ego_offset_m: self.ego_offset_m,
             users,
@@ -447,7 +468,7 @@ impl World {
     fn watch_rights(&mut self) {
         let mut users = core::mem::take(&mut self.users);
         let around = self.around([&[], &[]]);
-        for RoadUser { obstacle, mover } in &mut users {
+        for RoadUser { obstacle, mover } in users.iter_mut().filter(|user| !user.obstacle.is_apart) {
             if mover.has_crashed() {
                 mover.rights.watch_wreck(obstacle, &around);
             } else {
@@ -484,7 +505,8 @@ impl World {
         let RoadUser { obstacle, mover } = &mut users[index];
         (obstacle.outline.pose, obstacle.velocity_mps) = (moved.pose, moved.velocity_mps);
         (obstacle.forward, obstacle.lane_heading_rad) = (moved.forward, moved.lane_heading_rad);
-        if mover.touched {
+        obstacle.elevation_m = mover.elevation_m().unwrap_or(obstacle.elevation_m);
+        if mover.touched || is_apart(self.ego_elevation_m, obstacle.elevation_m) {
             return true;
         }
         let other = Party {
@@ -523,8 +545,12 @@ impl World {
     fn look(&mut self) {
         let eye = self.ego.outline.pose.position;
         for index in 0..self.users.len() {
+            self.users[index].obstacle.is_apart = self.alone().is_apart_from_ego(&self.users[index]);
+        }
+        for index in 0..self.users.len() {
             let target = &self.users[index].obstacle;
-            let visible_fraction = visible_fraction(eye, target, self.obstacles());
+            let visible_fraction =
+                if target.is_apart { 0.0 } else { visible_fraction(eye, target, self.obstacles_on_level()) };
             self.users[index].mover.visible_fraction = visible_fraction;
         }
     }
@@ -537,6 +563,7 @@ impl World {
             route.path.project_near(self.ego.motion.rear_axle.position, self.ego_station_m, ROUTE_SEARCH_M);
         self.ego_station_m = found.station_m;
         self.ego_offset_m = found.offset_m;
+        self.ego_elevation_m = route.height_at(&self.scene.map, found.station_m);
         let passed = front_before_m..self.ego_front_m();
         let colour = |signal| self.signal(signal);
         let light = PassedLight::between(&route.stop_lines, passed.start, passed.end, colour);
@@ -672,6 +699,22 @@ mod tests {
         world.users[0].obstacle.outline.pose.position -= Vec2::new(0.0, 3.5);
         world.ego.motion.touched = true;
         assert!(!world.is_blocked(), "the ego vehicle is a wreck itself");
+    }
+
+    #[test]
+    fn a_vehicle_that_left_its_lane_is_astray() {
+        let mut world = testing::world(&testing::straight());
+        let steers = |steer_rad| Control { throttle_pct: 20.0, steer_rad, ..Control::default() };
+        while world.ego_offset_m() < 1.6 {
+            world.tick(&steers(0.1));
+            assert!(!world.is_astray() && world.time_s() < 20.0);
+        }
+        while world.ego_offset_m() < 1.8 {
+            world.tick(&steers(0.1));
+        }
+        assert!(world.is_astray());
+        world.ego.motion.touched = true;
+        assert!(!world.is_astray(), "it was pushed");
     }
 
     #[test]

@@ -18,8 +18,9 @@ const SLACK_M: f64 = 0.1;
 /// What is unfair about the road user with this id, in words.
 pub(super) fn complaint(world: &World, request: &SpawnRequest, id: u32) -> Option<String> {
     let newcomer = world.obstacle(id)?;
-    let overlaps =
-        world.obstacles().any(|other| other.id != id && distance_m(&other.outline, &newcomer.outline) <= 0.0);
+    let overlaps = world
+        .obstacles_on_level()
+        .any(|other| other.id != id && distance_m(&other.outline, &newcomer.outline) <= 0.0);
     if overlaps || newcomer.distance_m <= 0.0 {
         return Some("it appears inside another road user".to_owned());
     }

@@ -1,4 +1,4 @@
-"""Ends runs and trainings at each system call by which they change files, and goes on with them.
+"""Ends runs, trainings and studies at each system call by which they change files, and goes on with them.
 
 However a command ends, what is gone on with must end in the same bytes as the uninterrupted one, or be refused with
 a message that says the way out, which is then taken. `kill.c` strikes; see there for the modes.
@@ -15,6 +15,14 @@ from pathlib import Path
 
 AVASTRA, SHIM, STRIDE = sys.argv[1], sys.argv[2], int(sys.argv[3])
 FAULT = "scenarios/ads/faults/perception_flicker.yaml"
+# Two agents, so that cells are written in two jobs.
+STUDY = """space: {space}
+roads: [corner]
+evaluation: {{ episodes: 1, seeds: 1 }}
+agents:
+  - {{ name: random, repeats: 2 }}
+  - {{ name: random, label: again, repeats: 1 }}
+"""
 SMALL = "learning_starts: 4\nupdates_per_step: 1\nhidden_units: [8]\nbatch_len: 4\nrules_leaves: 0\n"
 AGAIN = "begin one with `--out"
 
@@ -28,10 +36,18 @@ def call(arguments, **fault):
 
 
 def rows(path):
-    """All rows of a run database but those of SQLite's own."""
+    """All rows of a database but those of SQLite's own; without the times that a study took, and their seals."""
     database = sqlite3.connect(path)
-    names = [name for (name,) in database.execute("SELECT name FROM sqlite_master WHERE type = 'table' ORDER BY 1")]
-    return {name: sorted(map(repr, database.execute(f"SELECT * FROM {name}"))) for name in names}
+    tables = [name for (name,) in database.execute("SELECT name FROM sqlite_master WHERE type = 'table' ORDER BY 1")]
+    found = {}
+    for table in tables:
+        columns = [row[1] for row in database.execute(f"PRAGMA table_info({table})")]
+        columns = [name for name in columns if name not in ("wall_s", "cpu_s")]
+        if path.name == "study.db" and table == "seal":
+            columns = ["unit"]
+        named = ", ".join(f'"{name}"' for name in columns)
+        found[table] = sorted(map(repr, database.execute(f"SELECT {named} FROM {table}")))
+    return found
 
 
 def kept(out):
@@ -68,7 +84,7 @@ def strike(folder, name, command, begin, modes):
             status, told = call(begin(out), FAULT_AT=moment, FAULT_MODE=mode)
             if mode == "full" and status != 1:
                 wrong.append(f"{moment}: status {status} on a full disk: {told}")
-            begun_again += not (out / "run.yaml").exists()
+            begun_again += not any((out / begun).exists() for begun in ("run.yaml", "study.yaml"))
             # Every third time the second attempt is struck as well.
             if moment % 3 == 0:
                 gone_on(command, begin, out, FAULT_AT=rng.randrange(1, calls + 1), FAULT_MODE=mode)
@@ -97,3 +113,6 @@ with tempfile.TemporaryDirectory() as scratch:
     strike(folder, "run", "run", lambda out: [*run, "--out", str(out)], every)
     strike(folder, "self-contained run", "run", lambda out: [*run, "--self-contained", "--out", str(out)], ["kill"])
     strike(folder, "training", "train", lambda out: [*train, "--out", str(out)], every)
+    study = folder / "study.yaml"
+    study.write_text(STUDY.format(space=Path(space).resolve()))
+    strike(folder, "study", "study", lambda out: ["study", str(study), "--jobs", "1", "--out", str(out)], every)

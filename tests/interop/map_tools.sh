@@ -4,8 +4,8 @@ root=$(cd "$(dirname "$0")/../.." && pwd)
 work=$root/target/interop
 venv=$work/venv
 mkdir -p "$work"
-if [ ! -e "$venv/installed" ]; then
+if [ ! -e "$venv/installed-2" ]; then
     python3 -m venv "$venv"
-    "$venv/bin/pip" install --quiet carla==0.9.16 eclipse-sumo==1.28.0
-    touch "$venv/installed"
+    "$venv/bin/pip" install --quiet carla==0.9.16 eclipse-sumo==1.28.0 opendrive2lanelet==1.2.1
+    touch "$venv/installed-2"
 fi

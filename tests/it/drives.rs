@@ -70,7 +70,7 @@ fn a_healthy_driving_system_mostly_survives_ambient_traffic() {
 }
 
 /// Every level of every phenomenon occurs at every time of day; signals begin at any phase.
-fn start(seed: u64) -> Start {
+pub fn start(seed: u64) -> Start {
     let pick = |n: u64| Level::ALL[(seed / n % 4) as usize];
     let time = TimeOfDay::ALL[(seed % 3) as usize];
     let signal_phase_s = (seed * 7 % 60) as f64;

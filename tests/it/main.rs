@@ -20,6 +20,7 @@ mod hostile;
 mod json;
 mod language;
 mod layers;
+mod maps;
 mod pedestrians;
 mod policies;
 mod profiles;

@@ -32,6 +32,8 @@ pub struct RoadElement {
     /// Station from which a speed limit holds, m, and the limit, m/s; `None` where it ends.
     pub speeds: Vec<(f64, Option<f64>)>,
     pub reference: ReferenceLine,
+    /// Height of the reference line, m. Banks and crossfalls are not read.
+    pub elevation: Cubics,
     pub lane_offset: Cubics,
     pub sections: Vec<SectionElement>,
     pub signals: Vec<SignalElement>,

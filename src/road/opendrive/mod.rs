@@ -1,6 +1,6 @@
 //! Reading OpenDRIVE (ASAM, 1.4 to 1.8): an XML text becomes typed elements that know their line.
 //!
-//! Left out on purpose: heights (with a warning where a road is not flat), surfaces, railroads
+//! Left out on purpose: banks and crossfalls (with a warning where a road is not level), surfaces, railroads
 //! and everything that does not say where a vehicle may drive or must stop, or where people may walk.
 
 mod cubic;

@@ -4,6 +4,7 @@
 mod abreast;
 mod changes;
 mod footway;
+mod heights;
 mod places;
 mod poses;
 mod reading;

@@ -3,7 +3,7 @@
 use proptest::prelude::*;
 
 use crate::geometry::{Vec2, unit_vector, wrap_angle};
-use crate::road::testing::street;
+use crate::road::testing::{road, street};
 use crate::road::{Lane, RoadError, RoadMap, Route, SignKind};
 
 const CORNER: &str = include_str!("../../../scenarios/roads/corner.xodr");
@@ -121,6 +121,78 @@ fn lights_stop_the_lanes_they_are_meant_for() {
     assert_eq!((map.signs.len(), map.signs[0].kind), (1, SignKind::Stop));
     assert_eq!(map.lane(map.signs[0].lanes[0].0).key.lane, 1);
     assert!((map.signs[0].lanes[0].1 - 90.0).abs() < 1e-6);
+}
+
+#[test]
+fn a_light_for_the_cycle_lane_alone_is_none_for_vehicles() {
+    let lanes = r#"<laneSection s="0"><right><lane id="-1" type="driving"><width a="3"/></lane>
+        <lane id="-2" type="biking"><width a="2"/></lane></right></laneSection>"#;
+    let light = |id: &str, lane: i32| {
+        format!(
+            r#"<signal id="{id}" s="90" orientation="+" type="1000001"><validity fromLane="{lane}" toLane="{lane}"/></signal>"#
+        )
+    };
+    let tail = format!("<signals>{}{}</signals>", light("cars", -1), light("cycles", -2));
+    let map = read(&one_road("", "", LINE_100, lanes, &tail));
+    assert_eq!(map.signals.iter().map(|signal| signal.for_vehicles).collect::<Vec<_>>(), [true, false]);
+    assert!(!map.warnings.iter().any(|warning| warning.contains("holds no lane")), "{:?}", map.warnings);
+}
+
+/// A junction of a road that turns round on the spot, of one that meets the next at a right angle, and of one that
+/// goes on.
+#[test]
+fn what_no_car_can_follow_is_left_out() {
+    let pi = core::f64::consts::PI;
+    let one = r#"<laneSection s="0"><right><lane id="-1" type="driving"><link><predecessor id="-1"/>
+        <successor id="-1"/></link><width a="3"/></lane></right></laneSection>"#;
+    let both = TWO_LANES;
+    let inside = |id: &str, hdg: f64, shape: &str, length_m: f64| {
+        road(
+            id,
+            length_m,
+            "9",
+            r#"<predecessor elementType="road" elementId="1" contactPoint="end"/>
+            <successor elementType="road" elementId="2" contactPoint="start"/>"#,
+            &format!(r#"<geometry s="0" x="100" y="0" hdg="{hdg}" length="{length_m}">{shape}</geometry>"#),
+            one,
+            "",
+        )
+    };
+    let arc = |radius_m: f64| format!(r#"<arc curvature="{}"/>"#, 1.0 / radius_m);
+    let connection = |to: &str| {
+        format!(
+            r#"<connection id="{to}" incomingRoad="1" connectingRoad="{to}" contactPoint="start"><laneLink from="-1" to="-1"/></connection>"#
+        )
+    };
+    let text = format!(
+        r#"<OpenDRIVE>{}{}{}{}{}<junction id="9" name="">{}{}{}{}</junction></OpenDRIVE>"#,
+        street(
+            "1",
+            [0.0, 0.0, 0.0, 100.0],
+            "-1",
+            r#"<successor elementType="junction" elementId="9"/>"#,
+            both,
+            ""
+        ),
+        inside("tight", 0.0, &arc(1.0), pi),
+        inside("wide", 0.0, &arc(6.0), 6.0 * pi),
+        inside("across", pi / 2.0, "<line/>", 10.0),
+        inside("on", 0.0, "<line/>", 10.0),
+        connection("tight"),
+        connection("wide"),
+        connection("across"),
+        connection("on"),
+    );
+    let map = read(&text);
+    let next: Vec<&str> =
+        lane(&map, 0, -1).successors.iter().map(|next| map.lane(*next).key.road.as_str()).collect();
+    assert_eq!(next, ["wide", "on"]);
+    assert!(!map.lanes.iter().any(|lane| lane.key.road == "tight"));
+    for part in
+        ["left out 1 lanes that turn round", "meets lane -1 of road `across` at an angle of 90 degrees"]
+    {
+        assert!(map.warnings.iter().any(|warning| warning.contains(part)), "{part}: {:?}", map.warnings);
+    }
 }
 
 #[test]

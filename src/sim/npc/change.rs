@@ -8,13 +8,13 @@ use std::sync::Arc;
 
 use crate::action::LaneChangeRules;
 use crate::geometry::{
-    OrientedBox, Path, Pose, SMOOTH_STEP_SLOPE_MAX, SmoothStep, Vec2, distance_m, smooth_step, wrap_angle,
+    OrientedBox, Pose, SMOOTH_STEP_SLOPE_MAX, SmoothStep, Vec2, distance_m, smooth_step, wrap_angle,
 };
 use crate::model::vocabulary::Side;
 use crate::road;
-use crate::road::{LaneIndex, Neighbour};
+use crate::road::{Lane, LaneIndex, Neighbour, is_apart};
 
-use crate::sim::around::Around;
+use crate::sim::around::{Around, Other};
 use crate::sim::body::BodyParameters;
 use crate::sim::moment::driver_facts;
 use crate::sim::road_user::{Moved, Obstacle};
@@ -143,7 +143,7 @@ impl Driver {
         let room_m = map.change_room_m(here, on_road(side), here_m);
         if there.distance_m > CHANGE_M_MAX
             || room_m < change_length_m(self.speed_mps, there.distance_m, around.traffic)
-            || !self.may_enter(side, centre, there.station_m, this, size, around)
+            || !self.may_enter(side, map.lane(target), there.station_m, this, size, around)
         {
             return None;
         }
@@ -156,28 +156,31 @@ impl Driver {
     fn may_enter(
         &self,
         side: Side,
-        path: &Path,
+        lane: &Lane,
         station_m: f64,
         this: &Obstacle,
         size: &BodyParameters,
         around: &Around,
     ) -> bool {
         if !around.traffic.change_by_sphere {
-            return self.is_free(path, station_m, size, around);
+            return self.is_free(lane, station_m, size, around);
         }
         let left = Vec2::new(-this.forward.y, this.forward.x);
         let sphere_m = (SPHERE_PART * size.width_m / 2.0).min(SPHERE_M_MAX);
         let aside = if side == Side::Left { left * size.width_m } else { left * -size.width_m };
         let centre = this.outline.pose.position + this.forward * (size.length_m / 2.0) + aside;
         let point = OrientedBox::new(Pose { position: centre, ..this.outline.pose }, 0.0, 0.0);
-        around.others().all(|(outline, _)| distance_m(&point, outline) > sphere_m)
+        around.others().all(|other| {
+            distance_m(&point, other.outline) > sphere_m || is_apart(this.elevation_m, other.elevation_m)
+        })
     }
 
     /// Whether no vehicle is beside it in another lane or would be soon, and none has to brake hard for it.
-    fn is_free(&self, path: &Path, station_m: f64, size: &BodyParameters, around: &Around) -> bool {
+    fn is_free(&self, lane: &Lane, station_m: f64, size: &BodyParameters, around: &Around) -> bool {
+        let path = &lane.centre;
         let here = path.pose_at(station_m);
         let forward = here.forward();
-        around.others_along().all(|(outline, heading, velocity_mps)| {
+        around.others().all(|Other { outline, forward: heading, velocity_mps, elevation_m }| {
             let ahead_m = forward.dot(&(outline.pose.position - here.position));
             let Some(other) = path.project_from(outline.pose.position, station_m + ahead_m) else {
                 return true;
@@ -187,7 +190,9 @@ impl Driver {
             let apart_m = (other.station_m - station_m).abs() - half_length_m - size.length_m / 2.0;
             let closing_mps = (velocity_mps.dot(&forward) - self.speed_mps)
                 * if other.station_m < station_m { 1.0 } else { -1.0 };
-            aside_m > SIDE_ROOM_M || apart_m > change_gap_m(closing_mps.max(0.0), around.traffic)
+            aside_m > SIDE_ROOM_M
+                || apart_m > change_gap_m(closing_mps.max(0.0), around.traffic)
+                || is_apart(lane.height_at(other.station_m), elevation_m)
         })
     }
 

@@ -9,6 +9,7 @@
 use core::cell::LazyCell;
 
 use crate::geometry::{OrientedBox, Pose, distance_m};
+use crate::road::is_apart;
 use crate::sim::around::Around;
 use crate::sim::body::BodyParameters;
 use crate::sim::road_user::Obstacle;
@@ -36,9 +37,10 @@ impl Driver {
             return None;
         }
         let here = &this.outline.pose;
-        let matters = |outline: &OrientedBox, speed_mps: f64| {
+        let matters = |outline: &OrientedBox, elevation_m: f64, speed_mps: f64| {
             let away = outline.pose.position - here.position;
             away.norm_squared() < NEAR_M * NEAR_M
+                && !is_apart(this.elevation_m, elevation_m)
                 && (this.forward.dot(&away) > 0.0 || speed_mps < self.speed_mps)
         };
         // The own poses at those moments, worked out only if there is a vehicle to meet.
@@ -47,7 +49,7 @@ impl Driver {
             MOMENTS_S.map(|time_s| self.way.body_at(self.station_m + speed_mps * time_s, size))
         });
         let mut free_m = f64::INFINITY;
-        if self.yields_to_ego && matters(around.ego_outline, around.ego.speed_mps) {
+        if self.yields_to_ego && matters(around.ego_outline, around.ego_elevation_m, around.ego.speed_mps) {
             let ego = |time_s| Pose {
                 position: around.ego_outline.pose.position + around.ego_velocity_mps * time_s,
                 ..around.ego_outline.pose
@@ -55,7 +57,8 @@ impl Driver {
             free_m = free_m.min(free_way_m(this, &own, speed_mps, around.ego_outline, ego));
         }
         for (obstacle, body, driver) in around.drivers() {
-            if driver.change.is_some() || !matters(&obstacle.outline, driver.speed_mps) {
+            if driver.change.is_some() || !matters(&obstacle.outline, obstacle.elevation_m, driver.speed_mps)
+            {
                 continue;
             }
             let other = |time_s| driver.way.body_at(driver.station_m + driver.speed_mps * time_s, body);

@@ -3,12 +3,14 @@
 //! A leader is ahead on the own way and within a corridor as wide as the vehicle. What would come into
 //! the way beside that corridor is found in `foresight`.
 
-use crate::geometry::{OrientedBox, Path, Pose, Vec2};
+use crate::geometry::{OrientedBox, Pose, Vec2};
+use crate::road::is_apart;
 
-use crate::sim::around::Around;
+use crate::sim::around::{Around, Other};
 use crate::sim::body::BodyParameters;
 use crate::sim::following::Following;
 use crate::sim::road_user::Obstacle;
+use crate::sim::way::Way;
 
 use super::driver::{COMFORT_MPS2, Driver, GAP_M_MIN, LOOK_AHEAD_M, SIDE_ROOM_M};
 
@@ -35,17 +37,11 @@ impl Leader {
 }
 
 impl Driver {
-    /// Gap to another outline on its way, m, and the other's speed along the way. `None` if the other is
+    /// Gap to another road user on its way, m, and the other's speed along the way. `None` if the other is
     /// not ahead in its corridor.
-    pub fn gap_to(
-        &self,
-        size: &BodyParameters,
-        other: &OrientedBox,
-        velocity_mps: Vec2,
-    ) -> Option<(f64, f64)> {
+    pub fn gap_to(&self, size: &BodyParameters, other: Other) -> Option<(f64, f64)> {
         let here = self.way.path.pose_at(self.station_m);
-        let other = (other, other.pose.forward(), velocity_mps);
-        in_corridor(&self.way.path, self.station_m, &here, size, other)
+        in_corridor(&self.way, self.station_m, &here, size, other)
             .map(|leader| (leader.gap_m, leader.speed_mps))
     }
 
@@ -62,18 +58,18 @@ impl Driver {
             + self.speed_mps * (TIME_GAP_S + self.speed_mps / (2.0 * COMFORT_MPS2))
             + size.length_m / 2.0;
         let mut nearest: Option<Leader> = None;
-        for other in around.others_along() {
-            let outline = other.0;
+        for other in around.others() {
+            let outline = other.outline;
             let delta = outline.pose.position - here.position;
             let reach_m = reach_m + outline.half_length_m;
             if delta.norm_squared() > reach_m * reach_m || forward.dot(&delta) < 0.0 {
                 continue;
             }
-            let on_own_way = in_corridor(&self.way.path, self.station_m, here, size, other);
+            let on_own_way = in_corridor(&self.way, self.station_m, here, size, other);
             let on_next_way = self
                 .change
                 .as_ref()
-                .and_then(|change| in_corridor(&change.to.path, change.to_station_m, here, size, other));
+                .and_then(|change| in_corridor(&change.to, change.to_station_m, here, size, other));
             for leader in on_own_way.into_iter().chain(on_next_way) {
                 if nearest.is_none_or(|found| leader.gap_m < found.gap_m) {
                     nearest = Some(leader);
@@ -102,26 +98,27 @@ impl Driver {
     }
 }
 
-/// Another outline (with its heading as a unit vector, and its velocity) as the leader of a driver at
-/// `station_m` of a path, if it is ahead and in the driver's corridor.
+/// Another road user as the leader of a driver at `station_m` of a way, if it is ahead and in the driver's
+/// corridor.
 fn in_corridor(
-    path: &Path,
+    way: &Way,
     station_m: f64,
     here: &Pose,
     size: &BodyParameters,
-    (outline, heading, velocity_mps): (&OrientedBox, Vec2, Vec2),
+    Other { outline, forward, velocity_mps, elevation_m }: Other,
 ) -> Option<Leader> {
     let straight_m = (outline.pose.position - here.position).norm();
-    let other = path.project_from(outline.pose.position, station_m + straight_m)?;
-    let (half_length_m, half_width_m) = extent_m(outline, heading, other.forward);
+    let other = way.path.project_from(outline.pose.position, station_m + straight_m)?;
+    let (half_length_m, half_width_m) = extent_m(outline, forward, other.forward);
     let aside_m = other.offset_m.abs() - half_width_m - size.width_m / 2.0;
-    if other.station_m < station_m || aside_m > SIDE_ROOM_M {
+    let is_aside = other.station_m < station_m || aside_m > SIDE_ROOM_M;
+    if is_aside || is_apart(way.height_at(other.station_m), elevation_m) {
         return None;
     }
     Some(Leader {
         gap_m: other.station_m - station_m - half_length_m - size.length_m / 2.0,
         speed_mps: velocity_mps.dot(&other.forward),
-        crosswise: heading.dot(&other.forward) < CROSSWISE_COS_MAX,
+        crosswise: forward.dot(&other.forward) < CROSSWISE_COS_MAX,
     })
 }
 

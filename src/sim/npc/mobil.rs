@@ -10,7 +10,9 @@
 
 use crate::geometry::Path;
 use crate::model::vocabulary::Side;
+use crate::road::is_apart;
 
+use crate::sim::around;
 use crate::sim::around::Around;
 use crate::sim::body::BodyParameters;
 use crate::sim::following::Following;
@@ -51,14 +53,16 @@ impl Driver {
             return None;
         }
         let (here, _) = self.way.lane_at(self.station_m);
-        let own = self.lane_of(&self.way.path, self.station_m, this, size, around);
+        let own =
+            self.lane_of(&self.way.path, |at_m| self.way.height_at(at_m), self.station_m, this, size, around);
         let driver = Idm { acceleration_mps2: size.acceleration_mps2_max, wish_mps: self.cruise_mps };
         let mut best: Option<(f64, Side)> = None;
         for side in [Side::Right, Side::Left] {
             let Some(target) = lane_beside(around, here, side) else { continue };
-            let centre = &around.scene.map.lane(target).centre;
-            let station_m = centre.project(this.outline.pose.position).station_m;
-            let beside = self.lane_of(centre, station_m, this, size, around);
+            let target = around.scene.map.lane(target);
+            let station_m = target.centre.project(this.outline.pose.position).station_m;
+            let height_m = |at_m| target.height_at(at_m);
+            let beside = self.lane_of(&target.centre, height_m, station_m, this, size, around);
             let gain_mps2 =
                 gain_mps2(&driver, self.speed_mps, size.length_m, own, beside, profile.politeness);
             let excess_mps2 = gain_mps2 - threshold_mps2(profile, side);
@@ -69,17 +73,19 @@ impl Driver {
         best.map(|(_, side)| side)
     }
 
-    /// The nearest others in a lane in which the own centre would be at a station.
+    /// The nearest others in a lane, of which `height_m` gives the heights, in which the own centre would be at a
+    /// station.
     fn lane_of(
         &self,
         path: &Path,
+        height_m: impl Fn(f64) -> f64,
         station_m: f64,
         this: &Obstacle,
         size: &BodyParameters,
         around: &Around,
     ) -> Lane {
         let mut lane = Lane::default();
-        for (outline, heading, velocity_mps) in around.others_along() {
+        for around::Other { outline, forward: heading, velocity_mps, elevation_m } in around.others() {
             let away = outline.pose.position - this.outline.pose.position;
             if away.norm_squared() > REACH_M * REACH_M {
                 continue;
@@ -89,7 +95,8 @@ impl Driver {
                 continue;
             };
             let (half_length_m, half_width_m) = extent_m(outline, heading, other.forward);
-            if other.offset_m.abs() - half_width_m - size.width_m / 2.0 > SIDE_ROOM_M {
+            let aside_m = other.offset_m.abs() - half_width_m - size.width_m / 2.0;
+            if aside_m > SIDE_ROOM_M || is_apart(height_m(other.station_m), elevation_m) {
                 continue;
             }
             let ahead_m = other.station_m - station_m;

@@ -11,9 +11,9 @@
 
 use crate::geometry::{Frame, Vec2};
 use crate::rng;
-use crate::road::Turn;
+use crate::road::{Turn, is_apart};
 
-use crate::sim::around::Around;
+use crate::sim::around::{Around, Other};
 use crate::sim::body::BodyParameters;
 use crate::sim::road_user::Obstacle;
 use crate::sim::world::DT_S;
@@ -60,12 +60,13 @@ impl Driver {
             (front - corner, profile.ray_m.min(stop_m) / 2.0),
         ];
         let mut nearest: Option<Leader> = None;
-        for (outline, heading, velocity_mps) in around.others_along() {
+        for Other { outline, forward, velocity_mps, elevation_m } in around.others() {
             let reach_m = stop_m + this.outline.radius_m() + outline.radius_m();
-            if (outline.pose.position - this.outline.pose.position).norm_squared() > reach_m * reach_m {
+            let away = outline.pose.position - this.outline.pose.position;
+            if away.norm_squared() > reach_m * reach_m || is_apart(this.elevation_m, elevation_m) {
                 continue;
             }
-            let frame = Frame::along(outline, heading);
+            let frame = Frame::along(outline, forward);
             for (origin, reach_m) in rays {
                 let Some(gap_m) = frame.ray_hit_m(origin, this.forward, reach_m) else { continue };
                 if nearest.is_none_or(|found| gap_m < found.gap_m) {

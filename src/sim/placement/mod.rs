@@ -119,7 +119,7 @@ pub(super) fn facts(around: &Around, request: &SpawnRequest, newcomers: &Newcome
     let sight_m = RANGE_M.min(around.visibility_m);
     let in_view = || {
         let eye = around.ego_outline.pose.position;
-        spawn_gap_m < sight_m && visible_fraction(eye, &newcomer.obstacle, around.obstacles()) > 0.0
+        spawn_gap_m < sight_m && visible_fraction(eye, &newcomer.obstacle, around.obstacles_on_level()) > 0.0
     };
     let noticing_m = safety::noticing_m(ego_mps);
     let is_sudden = !is_behind && noticing_m > braking_gap_m && in_view();
@@ -166,7 +166,7 @@ fn finish(
 fn check_way(around: &Around, driver: &Driver, size: &BodyParameters) -> Result<(), String> {
     let braking_mps2 = around.braking_mps2(size, driver.speed_mps);
     let blocked = around.obstacles().any(|other| {
-        driver.gap_to(size, &other.outline, other.velocity_mps).is_some_and(|(gap_m, speed_mps)| {
+        driver.gap_to(size, other.into()).is_some_and(|(gap_m, speed_mps)| {
             let closing_mps = (driver.speed_mps - speed_mps).max(0.0);
             gap_m < 1.0 + closing_mps * closing_mps / (2.0 * braking_mps2) + 0.1 * closing_mps
         })

@@ -5,6 +5,7 @@
 //! whether there is a contact, not what comes of it.
 
 use crate::geometry::{OrientedBox, Sweep};
+use crate::road::is_apart;
 use crate::sim::contact::{Contact, Party, meet};
 use crate::sim::ego::{Control, Ego};
 use crate::sim::road_user::RoadUser;
@@ -36,6 +37,7 @@ impl World {
             ego: self.ego.clone(),
             ego_station_m: self.ego_station_m,
             ego_offset_m: self.ego_offset_m,
+            ego_elevation_m: self.ego_elevation_m,
             red_runs: self.red_runs,
             ego_passed: self.ego_passed,
             contacts: Vec::new(),
@@ -48,7 +50,7 @@ impl World {
             velocity_mps: self.ego.velocity_mps(),
         };
         for RoadUser { obstacle, mover } in &self.users {
-            if mover.touched {
+            if mover.touched || is_apart(self.ego_elevation_m, obstacle.elevation_m) {
                 continue;
             }
             // An obstacle that was not there a tick ago has not come from anywhere.

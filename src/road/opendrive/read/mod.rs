@@ -152,7 +152,8 @@ impl Reader {
             let limit = kind.child("speed").map(|speed| self.speed(speed)).transpose()?;
             speeds.push((kind.number_or("s", 0.0)?, limit.flatten()));
         }
-        self.ignore_heights(road)?;
+        let elevation = self.elevation(road);
+        self.ignore_slopes(road)?;
         if let Some(rule) = road.attribute("rule").filter(|rule| !["LHT", "RHT"].contains(rule)) {
             self.warn(road, format!("road `{id}` has the rule `{rule}`, taken for RHT"));
         }
@@ -166,6 +167,7 @@ impl Reader {
             successor,
             speeds,
             reference: self.reference_line(road, &id, length_m)?,
+            elevation,
             lane_offset: cubics(lanes.children("laneOffset"), "s")?,
             sections: self.sections(lanes, &id, length_m)?,
             signals: self.signals(road),
@@ -175,10 +177,20 @@ impl Reader {
         })
     }
 
-    /// Roads are read as flat; a road that is not flat gives a warning.
-    fn ignore_heights(&mut self, road: Element) -> Result<(), RoadError> {
+    /// Heights of the reference line. A road whose heights cannot be read lies at height 0.
+    fn elevation(&mut self, road: Element) -> Cubics {
+        let records =
+            road.child("elevationProfile").into_iter().flat_map(|profile| profile.children("elevation"));
+        cubics(records, "s").unwrap_or_else(|error| {
+            self.leave_out(&error);
+            Cubics::default()
+        })
+    }
+
+    /// Everything drives as on the flat; a road that is not flat gives a warning.
+    fn ignore_slopes(&mut self, road: Element) -> Result<(), RoadError> {
         let profiles = [
-            ("elevationProfile", "elevation", "slopes: roads are taken as flat"),
+            ("elevationProfile", "elevation", "slopes: heights only tell which roads pass over each other"),
             ("lateralProfile", "superelevation", "banked roads: they are taken as flat"),
             ("lateralProfile", "crossfall", "crossfalls: roads are taken as flat"),
             ("lateralProfile", "shape", "lateral shapes: roads are taken as flat"),

@@ -1,0 +1,148 @@
+//! Maps for a kind of place each (`tests/cases/maps`): how they are read, and that every driving system arrives there.
+
+use std::sync::Arc;
+
+use avastra::action::ActionTable;
+use avastra::episode::{End, StepLog};
+use avastra::road::{LaneIndex, Precedence, RoadMap, Route};
+use avastra::run::{Run, RunSettings};
+use avastra::sim::{Scene, SensedObject, Start, World};
+use avastra::{ads, episode};
+
+use crate::cases::{expect_snapshot, root};
+use crate::command::{avastra, outcome};
+use crate::drives::start;
+use crate::world::space_at;
+
+const PLACES: [&str; 7] =
+    ["dead_end", "left_hand", "motorway", "overpass", "parking", "priority", "roundabout"];
+
+fn path(file: &str) -> String {
+    format!("tests/cases/maps/{file}")
+}
+
+fn map(place: &str) -> RoadMap {
+    let text = std::fs::read_to_string(root().join(path(&format!("{place}.xodr")))).expect("it is there");
+    RoadMap::from_opendrive(place, &text).expect("it is sound")
+}
+
+/// The lane of a road with one section.
+fn lane(map: &RoadMap, road: &str, id: i32) -> LaneIndex {
+    let found = map.lanes.iter().position(|lane| lane.key.road == road && lane.key.lane == id);
+    LaneIndex(found.unwrap_or_else(|| panic!("no lane {id} of road {road}")))
+}
+
+#[test]
+fn every_place_is_read_as_it_was_meant() {
+    for place in PLACES {
+        let (status, stdout, stderr) = outcome(&mut avastra(&["road", &path(&format!("{place}.xodr"))]));
+        assert_eq!((status, stderr.as_str()), (0, ""), "{place}");
+        expect_snapshot("maps", place, &stdout);
+    }
+}
+
+/// Contacts of a drive with ambient traffic, and whether it arrives within 4 min.
+fn drive(scene: &Arc<Scene>, entry: &ads::Entry, seed: u64, ambient: u32) -> (usize, bool) {
+    let mut world = World::new(scene.clone(), &Start { ambient, ..start(seed) });
+    let mut driver = (entry.build)(scene, seed);
+    let mut sensed = world.sensed();
+    let mut contacts = 0;
+    while !world.arrived() && contacts == 0 && world.time_s() < 240.0 {
+        world.sense(&mut sensed);
+        contacts += world.tick(&driver.drive(&sensed)).len();
+    }
+    (contacts, world.arrived())
+}
+
+#[test]
+fn every_driving_system_arrives_at_every_place() {
+    for place in PLACES {
+        for road in &space_at(&path(&format!("{place}.ava"))).roads {
+            let scene = Arc::new(episode::scene(road));
+            for entry in ads::REGISTRY {
+                for seed in 0..3 {
+                    let case = format!("{} on {place}, {}, seed {seed}", entry.name, road.name);
+                    assert_eq!(drive(&scene, entry, seed, 0), (0, true), "{case}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn traffic_on_a_bridge_is_seen_only_if_the_bridge_is_flat() {
+    let text = std::fs::read_to_string(root().join(path("overpass.xodr"))).expect("it is there");
+    let flat =
+        text.lines().filter(|line| !line.contains("<elevationProfile>")).collect::<Vec<_>>().join("\n");
+    // How often something is sensed that comes along the other road, and how many of some drives arrive.
+    let seen = |text: &str| {
+        let map = Arc::new(RoadMap::from_opendrive("overpass", text).expect("it is sound"));
+        let place = |s_m| map.place("street", -1, s_m).expect("it is on the map");
+        let route = Route::find(&map, place(100.0), place(500.0)).expect("there is a way");
+        let scene = Arc::new(Scene::new(map, route));
+        let (mut seen, mut arrived) = (0, 0);
+        for seed in 0..6 {
+            let mut world = World::new(scene.clone(), &Start { ambient: 30, seed, ..start(0) });
+            let mut driver =
+                ads::by_name("idm").map(|entry| (entry.build)(&scene, seed)).expect("it is known");
+            let mut sensed = world.sensed();
+            while !world.arrived() && world.time_s() < 120.0 {
+                world.sense(&mut sensed);
+                // What has passed and comes down the ramp is seen again.
+                let comes = |object: &&SensedObject| {
+                    let y_m = object.pose.position.y;
+                    y_m.abs() > 10.0 && y_m * object.velocity_mps.y < 0.0
+                };
+                seen += sensed.objects.iter().filter(comes).count();
+                world.tick(&driver.drive(&sensed));
+            }
+            arrived += usize::from(world.arrived());
+        }
+        (seen, arrived)
+    };
+    assert_eq!(seen(&text), (0, 6));
+    assert!(seen(&flat).0 > 0, "the other road has no traffic");
+}
+
+#[test]
+fn priority_records_say_who_goes_first() {
+    let map = map("priority");
+    let of = |road: &str| map.lane(lane(&map, road, -1)).precedence;
+    for (road, expected) in [
+        ("0-to-2", Precedence::Priority),
+        ("2-to-1", Precedence::Priority),
+        ("1-to-3", Precedence::Yield),
+        ("3-to-0", Precedence::Yield),
+    ] {
+        assert_eq!(of(road), expected, "{road}");
+    }
+}
+
+#[test]
+fn where_a_street_ends_there_is_no_way_on() {
+    let file = path("dead_end.xodr");
+    let (status, _, stderr) =
+        outcome(&mut avastra(&["road", &file, "--from", "street/-1@10", "--to", "street/1@10"]));
+    assert_eq!(status, 1);
+    assert!(
+        stderr.contains("there is no way from lane -1 of road `street` to lane 1 of road `street`"),
+        "{stderr}"
+    );
+}
+
+#[test]
+fn a_wait_at_a_red_light_is_no_stall() {
+    // Two steps without progress would end these episodes, unless they are a wait for a light.
+    let space = space_at(&path("red_light.ava"));
+    let settings = RunSettings { ads: "idm".to_owned(), ..RunSettings::new(&space, "none", 12, 1) };
+    let run = Run::new(ActionTable::new(space), settings).expect("the settings are sound");
+    let mut waits = 0;
+    for number in 0..run.episodes() {
+        let log = run.episode(number);
+        assert_eq!(log.end, End::Arrived, "episode {number}");
+        // Standing at the beginning of four steps, one after the other: for at least three steps.
+        let stands = |step: &StepLog| step.state.last().is_some_and(|speed_mps| *speed_mps < 0.01);
+        waits += log.steps.windows(4).filter(|pair| pair.iter().all(stands)).count();
+    }
+    assert!(waits > 0, "no episode met a light that was red for long");
+}
