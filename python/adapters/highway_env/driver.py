@@ -4,7 +4,7 @@ The driver is its `IDMVehicle` as it comes: every parameter is the package's. Ou
 
 - one lane for the route and one for each lane of the own direction beside it, as long as it goes along (a "strand");
 - every object as a vehicle that keeps its speed. The model measures from centre to centre and takes all vehicles to be 5 m long, so an object
-  is moved along the lane until the end that is nearer to the ego vehicle is where that of such a car would be;
+  is moved along the lane until its end that is nearer to the ego vehicle is where that of such a car would be;
 - a light or stop sign that holds, and the end of a strand before the goal, as an obstacle;
 - speed limits and bends as its target speed, because IDM slows down for neither.
 
@@ -218,8 +218,10 @@ class HighwayEnv(avastra.Driver):
         turned = other.heading - lane_heading
         half = (abs(math.cos(turned)) * other.length + abs(math.sin(turned)) * other.width) / 2.0
         along = np.array([math.cos(lane_heading), math.sin(lane_heading)])
-        ahead = np.dot(np.array([other.x, other.y]) - ego.position, along) > 0.0
-        position = np.array([other.x, other.y]) + along * (HALF_LENGTH - half) * (1.0 if ahead else -1.0)
+        away = np.dot(np.array([other.x, other.y]) - ego.position, along)
+        # A car of the model within a longer body, as near to the ego vehicle as it gets: beside it while the two are abreast.
+        shift = min(max(-away, HALF_LENGTH - half), half - HALF_LENGTH) if half > HALF_LENGTH else math.copysign(HALF_LENGTH - half, away)
+        position = np.array([other.x, other.y]) + along * shift
         heading = math.atan2(other.vy, other.vx) if other.speed > 0.5 else other.heading
         return ControlledVehicle(self.road, position, heading, other.speed)
 
