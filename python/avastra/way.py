@@ -71,7 +71,9 @@ class Way:
             # Also at rest: a controller that looks ahead must find the brake pressed there.
             points.append(TrajectoryPoint(step.t_us + round(index * 1e6 * period), *pose, v=speed, a=-decel))
             braked = min(period, speed / decel)
-            station, speed = station + speed * braked - decel * braked**2 / 2.0, speed - decel * braked
+            station += speed * braked - decel * braked**2 / 2.0
+            # Rounding must not make it roll backwards.
+            speed = max(speed - decel * braked, 0.0)
         return points
 
     def room(self, station: float) -> Tuple[float, float]:

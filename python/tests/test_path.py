@@ -98,6 +98,9 @@ class Ways(unittest.TestCase):
         points = on.braking(step(world))
         self.assertEqual((points[0].t_us, points[-1].t_us, points[-1].v), (0, 3_000_000, 0.0))
         self.assertAlmostEqual(points[-1].x - points[0].x, 12.0**2 / (2.0 * 6.0), places=6)
+        for tenth in range(1, 200):
+            world.speed = tenth * 0.07
+            self.assertGreaterEqual(min(point.v for point in on.braking(step(world))), 0.0)
 
     def test_at_a_stop_sign_one_stops_once(self):
         world = World("straight")
