@@ -19,9 +19,6 @@ const ABREAST_M: f64 = 1.0;
 /// The widest median, m: an opposing lane farther away belongs to another street.
 const MEDIAN_M_MAX: f64 = 40.0;
 
-/// How far aside an opposing lane is looked for first, m: three lanes. Any value gives the same answer.
-const BESIDE_M: f64 = 10.0;
-
 /// A lane beside a place on another.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Abreast {
@@ -94,25 +91,20 @@ impl RoadMap {
     pub fn opposing(&self, lane: LaneIndex, station_m: f64) -> Option<Opposing> {
         let own = self.lane(lane);
         let side = if own.keeps_left { -1.0 } else { 1.0 };
+        // Twice the width of a median, because lanes of our own direction may lie between.
+        let abreast = self.abreast(lane, station_m, 2.0 * MEDIAN_M_MAX);
         let aside_m = |beside: &Abreast| side * beside.lateral_m;
-        let nearest = |abreast: &[Abreast]| {
-            let opposing = abreast.iter().filter(|beside| !beside.same_direction && aside_m(beside) > 0.0);
-            opposing.min_by(|a, b| aside_m(a).total_cmp(&aside_m(b))).copied()
-        };
-        // Most lanes have theirs close by, and all that lies before it is then within the same reach. Twice the width
-        // of a median, because lanes of our own direction may lie between.
-        let mut abreast = self.abreast(lane, station_m, BESIDE_M);
-        if nearest(&abreast).is_none_or(|nearest| aside_m(&nearest) > BESIDE_M - 1.0) {
-            abreast = self.abreast(lane, station_m, 2.0 * MEDIAN_M_MAX);
-        }
-        let nearest = nearest(&abreast)?;
+        let nearest = abreast
+            .iter()
+            .filter(|beside| !beside.same_direction && aside_m(beside) > 0.0)
+            .min_by(|a, b| aside_m(a).total_cmp(&aside_m(b)))?;
         let ours = abreast.iter().filter(|beside| {
-            beside.same_direction && aside_m(beside) > 0.0 && aside_m(beside) < aside_m(&nearest)
+            beside.same_direction && aside_m(beside) > 0.0 && aside_m(beside) < aside_m(nearest)
         });
         let edge_m = ours
             .map(|beside| aside_m(beside) + beside.width_m / 2.0)
             .fold(own.width_at(station_m) / 2.0, f64::max);
-        let gap_m = aside_m(&nearest) - nearest.width_m / 2.0 - edge_m;
+        let gap_m = aside_m(nearest) - nearest.width_m / 2.0 - edge_m;
         let (lane, station_m, lateral_m) = (nearest.lane, nearest.station_m, nearest.lateral_m);
         // Rounding leaves tiny gaps between lanes that share a line.
         let median_m = if gap_m > 1e-3 { gap_m } else { 0.0 };
