@@ -140,9 +140,9 @@ fn a_wait_at_a_red_light_is_no_stall() {
     for number in 0..run.episodes() {
         let log = run.episode(number);
         assert_eq!(log.end, End::Arrived, "episode {number}");
-        // Standing at the beginning of four steps, one after the other: for at least three steps.
+        // Standing at the beginning of three steps, one after the other: two whole steps without progress.
         let stands = |step: &StepLog| step.state.last().is_some_and(|speed_mps| *speed_mps < 0.01);
-        waits += log.steps.windows(4).filter(|pair| pair.iter().all(stands)).count();
+        waits += log.steps.windows(3).filter(|pair| pair.iter().all(stands)).count();
     }
     assert!(waits > 0, "no episode met a light that was red for long");
 }
