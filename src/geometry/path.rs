@@ -100,8 +100,12 @@ impl Bounds {
 
     /// Squared distance to the box, m²; rounded down, so that no point of a segment in it is nearer.
     pub fn distance_m2_min(&self, point: Vec2) -> f64 {
-        let outside = (self.least - point).sup(&(point - self.most)).sup(&Vec2::zeros());
-        outside.norm_squared() * (1.0 - 1e-9)
+        // Not `f64::max`: it also looks for NaN, and this is asked for every box of every lane near a spawn.
+        let larger = |a: f64, b: f64| if a > b { a } else { b };
+        let outside_m =
+            |axis: usize| larger(larger(self.least[axis] - point[axis], point[axis] - self.most[axis]), 0.0);
+        let (x_m, y_m) = (outside_m(0), outside_m(1));
+        (x_m * x_m + y_m * y_m) * (1.0 - 1e-9)
     }
 
     /// The box that reaches farther by `room_m` on each side.

@@ -54,7 +54,7 @@ impl RoadMap {
         let mut found: Vec<Abreast> = Vec::new();
         // The edge of a lane is at most half the width of the widest lane away from the lane's centre.
         let centre_m = reach_m + self.grid.half_width_m();
-        for (index, projection) in self.grid.beside(&self.lanes, &pose, ABREAST_M, centre_m) {
+        for (index, projection) in self.grid.beside(&self.lanes, &pose, PARALLEL_RAD, ABREAST_M, centre_m) {
             let other = self.lane(index);
             let is_inside = other.junction.is_some() && own.junction.is_none();
             if index == lane || is_inside || own.is_apart_at(station_m, other, projection.station_m) {

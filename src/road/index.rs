@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::geometry::{Bounds, Path, Pose, Projection, Vec2};
+use crate::geometry::{Bounds, Path, Pose, Projection, Vec2, wrap_angle};
 
 use super::map::{Lane, LaneIndex};
 
@@ -14,6 +14,9 @@ const STRETCH_M: f64 = 4.0;
 
 /// Added to distances because of rounding, m.
 const SLACK_M: f64 = 1e-3;
+
+/// Added to angles because of rounding, rad.
+const SLACK_RAD: f64 = 1e-6;
 
 /// Above this number of cells, every lane is tried instead: with a reach that wide nearly all lanes are in it,
 /// and each stands in many cells.
@@ -27,6 +30,31 @@ pub struct LaneGrid {
     half_width_m: f64,
     /// The box around each lane's centre line.
     boxes: Vec<Bounds>,
+    /// By lane.
+    headings: Vec<Headings>,
+}
+
+/// All headings of a centre line: one of them, and how far the others are from it at most, rad.
+#[derive(Debug, Clone, Copy)]
+struct Headings {
+    first_rad: f64,
+    turn_rad_max: f64,
+}
+
+impl Headings {
+    fn of(path: &Path) -> Headings {
+        let first_rad = path.points()[0].heading_rad;
+        let turn_rad = |heading_rad: f64| wrap_angle(heading_rad - first_rad).abs();
+        let turns_rad = path.points().iter().map(|point| turn_rad(point.heading_rad));
+        Headings { first_rad, turn_rad_max: turns_rad.fold(0.0, f64::max) }
+    }
+
+    /// Whether a place of the line may have a heading within an angle of this one, or of its reverse.
+    fn may_be_parallel(&self, heading_rad: f64, within_rad: f64) -> bool {
+        let turn_rad = wrap_angle(self.first_rad - heading_rad).abs();
+        let off_rad = turn_rad.min(core::f64::consts::PI - turn_rad);
+        off_rad <= within_rad + self.turn_rad_max + SLACK_RAD
+    }
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -41,7 +69,8 @@ impl LaneGrid {
         let widths_m = lanes.iter().flat_map(|lane| &lane.widths_m);
         let widest_m = widths_m.copied().fold(0.0, f64::max);
         let boxes = lanes.iter().map(|lane| lane.centre.bounds()).collect();
-        let mut grid = LaneGrid { cells: BTreeMap::new(), half_width_m: widest_m / 2.0, boxes };
+        let headings = lanes.iter().map(|lane| Headings::of(&lane.centre)).collect();
+        let mut grid = LaneGrid { cells: BTreeMap::new(), half_width_m: widest_m / 2.0, boxes, headings };
         for (index, lane) in lanes.iter().enumerate() {
             let stretches = (lane.centre.length_m() / STRETCH_M).ceil().max(1.0);
             let step_m = lane.centre.length_m() / stretches;
@@ -77,11 +106,13 @@ impl LaneGrid {
     }
 
     /// The nearest point of each lane that may have a point within `ahead_m` before or behind a pose and
-    /// `reach_m` beside it, by rising index. A few lanes farther away may be among them.
+    /// `reach_m` beside it, and be parallel there within an angle, by rising index. A few lanes farther away, or not
+    /// parallel, may be among them.
     pub fn beside(
         &self,
         lanes: &[Lane],
         pose: &Pose,
+        within_rad: f64,
         ahead_m: f64,
         reach_m: f64,
     ) -> Vec<(LaneIndex, Projection)> {
@@ -93,8 +124,10 @@ impl LaneGrid {
                 |axis: &Vec2, reach_m: f64| axis.dot(&middle).abs() <= reach_m + axis.abs().dot(&half);
             within(&forward, ahead_m + SLACK_M) && within(&left, reach_m + SLACK_M)
         };
-        let candidates = lanes.iter().zip(&self.boxes).enumerate().filter(|(_, (_, bounds))| may_be(bounds));
-        candidates.map(|(index, (lane, _))| (LaneIndex(index), lane.centre.project(pose.position))).collect()
+        let candidates = (0..lanes.len()).filter(|index| {
+            may_be(&self.boxes[*index]) && self.headings[*index].may_be_parallel(pose.heading_rad, within_rad)
+        });
+        candidates.map(|index| (LaneIndex(index), lanes[index].centre.project(pose.position))).collect()
     }
 
     /// The nearest point of each lane whose centre comes within `reach_m` and half a lane width of a

@@ -19,6 +19,11 @@ struct Part {
 }
 
 impl Room {
+    /// Nothing but this number.
+    pub fn of(number: f64) -> Room {
+        Room { parts: vec![Part { low: number, high: number, low_in: true, high_in: true }] }
+    }
+
     /// The parts of a range for which `holds`, given the numbers in it where that may change. `holds` is asked at
     /// each of these numbers, and once between each two.
     pub fn where_holds(

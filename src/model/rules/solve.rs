@@ -15,8 +15,8 @@
 use std::borrow::Cow;
 use std::cell::Cell;
 
-use crate::model::eval::{Facts, WorldFacts};
-use crate::model::expr::Comparison;
+use crate::model::eval::{Facts, WorldFacts, evaluate};
+use crate::model::expr::{Comparison, ExprKind};
 use crate::model::rules::critical::{Unknowns, polynomials};
 use crate::model::rules::polynomial::{NUMBERS_MAX, Polynomial, project};
 use crate::model::rules::{Candidate, Clause, Room, RowRules, RulesInForce};
@@ -25,6 +25,10 @@ use crate::model::value::{Memory, Value};
 
 /// The most judgements for one draw. Rows that need more are refused when they are compiled.
 pub(crate) const TRIES_MAX: usize = 50_000;
+
+/// A number this far from both ends of its range, SI, equals neither end, nor what is tried between: equality tolerates a
+/// part of 1e-9.
+const WELL_WITHIN: f64 = 1.0;
 
 /// What is known before a row is solved.
 #[derive(Clone, Copy)]
@@ -291,6 +295,12 @@ impl<'a> Solver<'a> {
             Domain::Values(values) => {
                 Choices::Values(values.iter().copied().filter(|value| holds(self, *value)).collect())
             }
+            Domain::Range(..)
+                if let Some(number) = self.set_to(local, &decided)
+                    && holds(self, Value::Number(number)) =>
+            {
+                Choices::Numbers(Room::of(number))
+            }
             Domain::Range(low, high) => {
                 let changes = self.changes_in_one(local, &decided);
                 is_exact = changes.is_some();
@@ -309,6 +319,24 @@ impl<'a> Solver<'a> {
         let (local, later) = (self.order[place], &self.order[place + 1..]);
         let is_decided = move |clause: &Clause| clause.needs(local) && !clause.needs_any(later);
         self.rules.clauses().filter(move |clause| is_decided(self.clause(*clause)))
+    }
+
+    /// The number that the only clause sets the parameter to, as `distance == gap(…)` does, if it lies well within the
+    /// range: no other place that would be tried is then equal to it. Nearly all draws of a distance end here.
+    fn set_to(&self, local: usize, clauses: &[usize]) -> Option<f64> {
+        let [clause] = clauses else { return None };
+        let (clause, action) = (self.clause(*clause), self.rules.row.action);
+        let demand = self.rules.space.rules[clause.rule()?].body.demand(action)?;
+        let is_equation = matches!(demand.condition()?.kind, ExprKind::Compare(Comparison::Equal, ..));
+        if clause.reads_effects || !is_equation {
+            return None;
+        }
+        let mut bounds = self.rules.space.bounds[action].iter();
+        let bound = bounds.find(|bound| bound.rule == clause.rule() && bound.local == local)?;
+        let number = evaluate(&bound.limit, &self.rules.space.functions, &self.facts()).number();
+        let (low, high) = self.action().parameters[local].domain.ends();
+        let room = WELL_WITHIN.max(1e-6 * number.abs());
+        (bound.is_drawn_within && number - low > room && high - number > room).then_some(number)
     }
 
     /// Where these clauses may change along one number, if all others are as they are; `None` if a polynomial was
