@@ -31,6 +31,7 @@ class Way:
         self.path = Path([(point.x, point.y) for point in reset.route.path])
         self._speeds = _speeds(reset, lateral_accel, decel)
         self._signs_done = 0
+        self._held = set()
 
     def speed(self, station: float) -> float:
         """What limits and bends, here and ahead, allow, m/s."""
@@ -43,7 +44,7 @@ class Way:
     def stop(self, step: Step) -> Optional[float]:
         """The station that the front must not pass now, for a light or a stop sign; None if there is none.
 
-        To be asked in every step: it remembers at which signs the vehicle has stopped.
+        To be asked in every step: it remembers at which signs the vehicle has stopped, and for which lights it has begun to stop.
         """
         front = step.ego.route_s + self.vehicle.rear_axle_to_front
         lines = [line for line in (self._light(step, front), self._sign(step, front)) if line is not None]
@@ -96,13 +97,16 @@ class Way:
 
     def _light(self, step: Step, front: float) -> Optional[float]:
         states = {signal.id: signal.state for signal in step.signals}
-        for line in self.route.stop_lines:
+        for index, line in enumerate(self.route.stop_lines):
             distance = line.route_s - front
             state = states.get(line.signal)
             hardest = {"red": self.vehicle.max_decel, "yellow": _YELLOW_DECEL}.get(state or "")
             if hardest is None or distance < -_OVER:
+                self._held.discard(index)
                 continue
-            if step.ego.speed**2 <= 2.0 * hardest * max(distance, 0.1):
+            # Once begun, braking goes on: a driver that brakes late would otherwise be let through in the middle of it.
+            if index in self._held or step.ego.speed**2 <= 2.0 * hardest * max(distance, 0.1):
+                self._held.add(index)
                 return line.route_s
         return None
 

@@ -76,11 +76,12 @@ class Ways(unittest.TestCase):
 
     def test_a_light_holds_while_it_can_be_stopped_for(self):
         world, on = way("light")
-        self.assertEqual(on.stop(step(world)), 95.0)
         world.x, world.speed = 90.0, 13.0
         self.assertIsNone(on.stop(step(world)), "too late")
         world.speed = 5.0
         self.assertEqual(on.stop(step(world)), 95.0)
+        world.speed = 13.0
+        self.assertEqual(on.stop(step(world)), 95.0, "who brakes late goes on braking")
         world.time_us = 26_000_000
         self.assertIsNone(on.stop(step(world)), "green")
 

@@ -84,6 +84,7 @@ pub fn main() -> ExitCode {
         Command::Lsp => Output::of(Format::Plain),
         _ => Output::new(&arguments.output),
     };
+    interrupt::listen();
     let result = match &arguments.command {
         Command::Check(arguments) => check::check(&output, arguments),
         Command::Compile(arguments) => compile::compile(&output, arguments),

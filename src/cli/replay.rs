@@ -41,8 +41,10 @@ pub fn replay(output: &Output, arguments: &ReplayArguments) -> Result<(), Failur
         "scenarios": played.done.iter().map(|played| &played.result).collect::<Vec<_>>(),
         "failed": played.failed_in_json(),
     }));
+    let findings = played.done.iter().filter(|played| played.has_ads_failed).count();
     played.complete("replayed")?;
-    refutation(tally.refuted)
+    refutation(tally.refuted)?;
+    if findings > 0 { Err(Failure::Ads { findings }) } else { Ok(()) }
 }
 
 /// How many claims hold, and how many do not.
@@ -94,6 +96,8 @@ pub struct Played {
     claims: Option<Vec<oracle::ClaimResult>>,
     /// What happened, in words.
     told: String,
+    /// Another driving system than the recorded one failed.
+    has_ads_failed: bool,
     /// All of it, for JSON.
     pub result: serde_json::Value,
 }
@@ -139,7 +143,10 @@ fn play(
             let collisions = plural(log.collisions.len(), "collision");
             let avoidable =
                 judgements.iter().filter(|judged| judged.class == Avoidability::Avoidable).count();
-            format!("{name}: {collisions}, {} counted, {avoidable} avoidable", counted.unwrap_or(0))
+            let failed = log.failure.as_ref().map_or_else(String::new, |failure| {
+                format!("; it failed at {}, {}: {}", failure.stage, failure.kind().name(), failure.detail)
+            });
+            format!("{name}: {collisions}, {} counted, {avoidable} avoidable{failed}", counted.unwrap_or(0))
         }
         _ => {
             let lines = log.collisions.iter().zip(&severities);
@@ -149,10 +156,11 @@ fn play(
     };
     let result = serde_json::json!({
         "file": path, "scenario": scenario.name, "ads": other.as_deref().unwrap_or(ads.name()),
-        "claims": claims, "collisions": log.collisions.len(), "counted": counted, "judgements": judgements,
+        "claims": claims, "end": log.end.name(), "collisions": log.collisions.len(), "counted": counted, "judgements": judgements,
         "severities": severities, "priorities": priorities, "criticality": criticality, "pet_s": pet_s,
     });
-    Ok(Played { path: path.to_owned(), name: scenario.name.clone(), claims, told, result })
+    let has_ads_failed = other.is_some() && log.failure.is_some();
+    Ok(Played { path: path.to_owned(), name: scenario.name.clone(), claims, told, has_ads_failed, result })
 }
 
 /// How hard a collision was, in a line.

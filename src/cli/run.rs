@@ -46,7 +46,7 @@ pub fn run(output: &Output, arguments: &RunArguments) -> Result<(), Failure> {
     let todo: Vec<usize> = (0..run.episodes()).filter(|number| !done.contains(number)).collect();
     output.tell(&heading(&run, arguments, &directory.path));
 
-    let stop = stop_on_interrupt()?;
+    let stop = stop_on_interrupt();
     #[allow(clippy::disallowed_methods, reason = "this is cli, and the time goes nowhere but the summary")]
     let started = Instant::now();
     let mut progress = Progress::new(output, run.episodes() as u64, done.len() as u64);

@@ -36,7 +36,7 @@ pub fn study(output: &Output, arguments: &StudyArguments) -> Result<(), Failure>
         }
     };
     let path = held.path.clone();
-    let stop = stop_on_interrupt()?;
+    let stop = stop_on_interrupt();
     let file = path.join("study.db");
     let mut database =
         StudyDatabase::open(&file, &settings).map_err(|error| Failure::file("open", &file, error))?;

@@ -71,12 +71,16 @@ pub fn test(output: &Output, arguments: &TestArguments) -> Result<(), Failure> {
     let fails = count(&|outcome| matches!(outcome, Outcome::Played(Regression::StillFails { .. })));
     let fixed = count(&|outcome| matches!(outcome, Outcome::Played(Regression::Fixed)));
     let changed = count(&Outcome::is_changed);
+    let ads_failed = count(&|outcome| matches!(outcome, Outcome::Played(Regression::AdsFailed(_))));
     let errors = count(&|outcome| matches!(outcome, Outcome::NotPlayed { .. }));
     let in_source = count(&|outcome| matches!(outcome, Outcome::NotPlayed { in_source: true, .. }));
     output.say(&format!(
         "{}: {fails} still fail, {fixed} fixed, {changed} changed, {errors} not played",
         plural(cases.len(), "scenario")
     ));
+    if ads_failed > 0 {
+        output.say(&format!("in {ads_failed} more the driving system itself failed"));
+    }
     let listed: Vec<serde_json::Value> = cases
         .iter()
         .map(|case| {
@@ -86,7 +90,7 @@ pub fn test(output: &Output, arguments: &TestArguments) -> Result<(), Failure> {
         })
         .collect();
     output.result(
-        serde_json::json!({ "still_fails": fails, "fixed": fixed, "changed": changed, "errors": errors,
+        serde_json::json!({ "still_fails": fails, "fixed": fixed, "changed": changed, "errors": errors, "ads_failed": ads_failed,
                                       "accepted": suite.accepted, "scenarios": listed }),
     );
     let failing = count(&Outcome::is_failure);
@@ -227,10 +231,10 @@ fn is_outdated(loaded: &Loaded) -> bool {
 }
 
 impl Outcome {
-    /// Whether the driving system still crashes.
+    /// Whether the driving system still crashes, or is itself what fails.
     fn is_failure(&self) -> bool {
         match self {
-            Outcome::Played(Regression::StillFails { .. }) => true,
+            Outcome::Played(Regression::StillFails { .. } | Regression::AdsFailed(_)) => true,
             Outcome::Played(found) => found.is_other_crash(),
             Outcome::Allowed(_) | Outcome::NotPlayed { .. } => false,
         }
@@ -245,7 +249,7 @@ impl Outcome {
         self.is_skipped() || matches!(self, Outcome::Played(found) if found.is_other_crash())
     }
 
-    /// One of four words, and why.
+    /// One of five words, and why.
     fn in_words(&self) -> (&'static str, String) {
         let (found, more) = match self {
             Outcome::Played(found) => (found, ""),
@@ -260,6 +264,9 @@ impl Outcome {
             Regression::OtherCrash => ("changed", format!("another obstacle is hit{more}")),
             Regression::Struck => ("changed", format!("the same obstacle runs into the ego vehicle{more}")),
             Regression::NeverMet => ("changed", "the obstacle never appears".to_owned()),
+            Regression::AdsFailed(kind) => {
+                ("ads failed", format!("{}: `avastra ads check` says more", kind.name()))
+            }
         }
     }
 }

@@ -40,7 +40,7 @@ pub fn train(output: &Output, arguments: &TrainArguments) -> Result<(), Failure>
     };
     let settings = training.settings().clone();
     output.tell(&heading(&training, &directory.path));
-    let stop = stop_on_interrupt()?;
+    let stop = stop_on_interrupt();
     let mut progress = TrainingProgress::new(output, settings.episodes as u64, training.episodes() as u64);
     while !training.is_done() && !stop.load(Ordering::Relaxed) {
         let trained = training.episode();

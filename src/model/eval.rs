@@ -268,15 +268,16 @@ impl<W: Copy> WordExpr<W> {
 }
 
 impl Space {
-    /// Reward of a step: the value of the first case that applies; 0 if none does. `memory` holds the states after
-    /// the action of the step.
+    /// Reward of a step: the value of the first case that applies; 0 if none does, or if it has no value (a division
+    /// by 0), so that neither a database nor a network meets it. `memory` holds the states after the action of the step.
     pub fn reward(&self, outcome: OutcomeFacts, memory: &Memory) -> f64 {
         let facts = Facts { outcome, ..Facts::new(&[], memory) };
         let applies = |condition: &Option<Expr>| {
             condition.as_ref().is_none_or(|c| evaluate(c, &self.functions, &facts).truth())
         };
         let case = self.reward.iter().find(|case| applies(&case.condition));
-        case.map_or(0.0, |case| evaluate(&case.value, &self.functions, &facts).number())
+        let value = case.map(|case| evaluate(&case.value, &self.functions, &facts).number());
+        value.filter(|value| value.is_finite()).unwrap_or(0.0)
     }
 
     /// Whether a collision passes the verdict of that name; `None` if there is no such verdict. `memory` is as for

@@ -6,9 +6,10 @@
 
 use std::sync::Arc;
 
+use crate::ads::external::FailureKind;
 use crate::ads::{Foresight, Selected};
 use crate::episode;
-use crate::episode::{Choice, Collision, EpisodeLog, Moment, Outcome, Script, Setup};
+use crate::episode::{Choice, Collision, End, EpisodeLog, Moment, Outcome, Script, Setup};
 
 use crate::episode::at_fault;
 
@@ -51,6 +52,8 @@ pub enum Regression {
     Struck,
     /// The obstacle never appears, because another drive left no legal place for it.
     NeverMet,
+    /// An external driving system failed before it hit anything.
+    AdsFailed(FailureKind),
 }
 
 impl Regression {
@@ -65,12 +68,13 @@ impl Regression {
 pub fn regression(setup: &Setup, log: &EpisodeLog, index: usize, ads: &Selected) -> Regression {
     let crash = Crash::new(setup, log, index);
     let again = crash.play(ads);
-    match (crash.fate(&again), crash.again(&again)) {
-        (_, Some(collision)) => Regression::StillFails { time_s: collision.contact.time_s },
-        (Fate::Crash, None) => Regression::Struck,
-        (Fate::Other, None) => Regression::OtherCrash,
-        (Fate::Vanished, None) => Regression::Fixed,
-        (Fate::Absent, None) => Regression::NeverMet,
+    match (crash.fate(&again), crash.again(&again), again.end) {
+        (_, Some(collision), _) => Regression::StillFails { time_s: collision.contact.time_s },
+        (Fate::Crash, None, _) => Regression::Struck,
+        (Fate::Other, None, _) => Regression::OtherCrash,
+        (Fate::Vanished | Fate::Absent, None, End::Failed(kind)) => Regression::AdsFailed(kind),
+        (Fate::Vanished, None, _) => Regression::Fixed,
+        (Fate::Absent, None, _) => Regression::NeverMet,
     }
 }
 

@@ -161,6 +161,13 @@ fn threads_and_processes_change_nothing_and_crashes_replay_with_and_without_the_
         assert_eq!(status, 0, "{more:?}: {stdout}{stderr}");
         assert!(stdout.contains("confirmed"), "{more:?}: {stdout}");
     }
+    // Who dies on the way has not been cured of the crash.
+    let dies = tempfile::tempdir().expect("a scratch directory");
+    let dies = profile(dies.path(), &["--misbehave", "crash-in-episode"], "1", "");
+    let (status, stdout, stderr) = outcome(&mut avastra(&["test", &path, "--ads-config", &dies]));
+    assert!(status == 4 && stdout.contains("ads failed"), "{status}: {stdout}{stderr}");
+    let (status, stdout, stderr) = outcome(&mut avastra(&["replay", &path, "--ads-config", &dies]));
+    assert!(status == 5 && stdout.contains("it failed at step"), "{status}: {stdout}{stderr}");
     // Changed answers are noticed, and missing ones are asked for.
     let answers = Path::new(&path).with_extension("answers.jsonl");
     let text = std::fs::read_to_string(&answers).unwrap();

@@ -14,6 +14,7 @@ import pathlib
 import subprocess
 import sys
 import tempfile
+import typing
 
 import avastra
 import libsumo
@@ -26,6 +27,15 @@ BEGIN = 100.0
 LANE_LENGTH = 100_000.0
 #: Farther ahead than this nothing is put before the vehicle, m.
 REACH = 150.0
+
+
+class Leader(typing.NamedTuple):
+    """What is in the way: its gap to the vehicle's front (m), its speed along the way (m/s) and its length (m)."""
+
+    name: str
+    gap: float
+    speed: float
+    length: float
 
 
 class Sumo(avastra.Driver):
@@ -52,30 +62,35 @@ class Sumo(avastra.Driver):
         self.running = True
         libsumo.vehicle.add("ego", "way", typeID="ego", departPos=str(BEGIN), departSpeed=str(reset.start.speed), departLane="0")
         libsumo.simulationStep()
-        self.ahead = set()
+        self.ahead = []
 
     def step(self, step):
         ego, front = step.ego, step.ego.route_s + self.vehicle.rear_axle_to_front
         sumo_front = libsumo.vehicle.getLanePosition("ego")
         libsumo.vehicle.setPreviousSpeed("ego", ego.speed)
         libsumo.lane.setMaxSpeed("way_0", max(self.way.speed(ego.route_s), 0.1))
-        seen, nearest = set(), (math.inf, "free")
-        for name, gap, speed, length in self.in_the_way(step, front):
-            self.put(name, sumo_front + gap + length, speed, length)
-            seen.add(name)
-            nearest = min(nearest, (gap, f"follow {name}"))
-        for name in self.ahead - seen:
-            libsumo.vehicle.remove(name)
-        self.ahead = seen
+        leaders = in_order(self.in_the_way(step, front))
+        # SUMO follows in the order in which vehicles came to the lane: where two have passed each other, as a car passes a
+        # line that holds, all are put there anew.
+        stay = [leader.name for leader in leaders if leader.name in self.ahead]
+        if stay != [name for name in self.ahead if name in stay]:
+            stay = []
+        for name in self.ahead:
+            if name not in stay:
+                libsumo.vehicle.remove(name)
+        for leader in leaders:
+            self.put(leader, sumo_front, is_new=leader.name not in stay)
+        self.ahead = [leader.name for leader in leaders]
         libsumo.simulationStep()
         accel = (libsumo.vehicle.getSpeed("ego") - ego.speed) / self.period
-        return avastra.Acceleration(accel, avastra.Internal(reason=nearest[1]))
+        reason = f"follow {self.ahead[0]}" if self.ahead else "free"
+        return avastra.Acceleration(accel, avastra.Internal(reason=reason))
 
     def in_the_way(self, step, front):
-        """Name, gap, speed along the way and length of everything on the strip ahead."""
+        """Everything on the strip ahead."""
         line = self.way.stop(step)
         if line is not None and line > front - 1.0:
-            yield "line", max(line - front, 0.0), 0.0, 1.0
+            yield Leader("line", max(line - front, 0.0), 0.0, 1.0)
         for other in step.objects:
             beside = self.way.path.project(other.x, other.y)
             turned = other.heading - beside.heading
@@ -86,22 +101,33 @@ class Sumo(avastra.Driver):
             # What reaches beside the vehicle's front is nothing that it could follow.
             if overlaps and beside.station > front and gap < REACH:
                 speed = other.vx * math.cos(beside.heading) + other.vy * math.sin(beside.heading)
-                yield f"object {other.id}", max(gap, 0.0), max(speed, 0.0), along
+                yield Leader(f"object {other.id}", max(gap, 0.0), max(speed, 0.0), along)
 
-    def put(self, name, position, speed, length):
-        vehicle = libsumo.vehicle
-        if name not in self.ahead:
-            vehicle.add(name, "way", typeID="other", departPos=str(position), departSpeed=str(speed), departLane="0")
+    def put(self, leader, sumo_front, is_new):
+        vehicle, name = libsumo.vehicle, leader.name
+        position = sumo_front + leader.gap + leader.length
+        if is_new:
+            vehicle.add(name, "way", typeID="other", departPos=str(position), departSpeed=str(leader.speed), departLane="0")
             vehicle.setSpeedMode(name, 0)
-        vehicle.setLength(name, length)
+        vehicle.setLength(name, leader.length)
         vehicle.moveTo(name, "way_0", position)
-        vehicle.setSpeed(name, speed)
-        vehicle.setPreviousSpeed(name, speed)
+        vehicle.setSpeed(name, leader.speed)
+        vehicle.setPreviousSpeed(name, leader.speed)
 
     def close(self):
         if self.running:
             libsumo.close()
         self.folder.cleanup()
+
+
+def in_order(found):
+    """From the nearest on, up to the first that stands; none reaches beyond the next, as a car may beyond a line."""
+    leaders = sorted(found, key=lambda leader: leader.gap)
+    stands = next((index for index, leader in enumerate(leaders) if leader.speed == 0.0), len(leaders))
+    leaders = leaders[: stands + 1]
+    for index, (leader, after) in enumerate(zip(leaders, leaders[1:])):
+        leaders[index] = leader._replace(length=max(min(leader.length, after.gap - leader.gap - 0.1), 0.1))
+    return leaders
 
 
 def write_network(folder, model, init):

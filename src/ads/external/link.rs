@@ -5,12 +5,14 @@
 //! This is the one file of the layer that asks the clock: for time limits, which decide nothing but that an answer is
 //! missing; what follows from a missing answer is in the log.
 
+use std::collections::BTreeSet;
 use std::io::{ErrorKind, Read, Write};
 use std::net::{TcpStream, ToSocketAddrs};
 use std::os::fd::{AsFd, BorrowedFd};
 use std::os::unix::net::UnixStream;
 use std::os::unix::process::{CommandExt, ExitStatusExt};
 use std::process::{Child, ChildStderr, ChildStdin, ChildStdout, Command, ExitStatus, Stdio};
+use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use nix::fcntl::{FcntlArg, OFlag, fcntl};
@@ -33,6 +35,21 @@ const CHUNK_BYTES: usize = 64 << 10;
 const ENDING_S: f64 = 0.5;
 /// Between SIGTERM and SIGKILL.
 const TERM_S: f64 = 2.0;
+
+/// The process groups that were started and not ended.
+static GROUPS: Mutex<BTreeSet<i32>> = Mutex::new(BTreeSet::new());
+
+/// Ends all processes of driving systems at once, before this one ends.
+pub fn end_all() {
+    for group in core::mem::take(&mut *groups()) {
+        // It fails only if no process of the group is left.
+        let _ = killpg(Pid::from_raw(group), Signal::SIGKILL);
+    }
+}
+
+fn groups() -> std::sync::MutexGuard<'static, BTreeSet<i32>> {
+    GROUPS.lock().unwrap_or_else(PoisonError::into_inner)
+}
 
 /// Why no line came: what is wrong, and details in words.
 #[derive(Debug)]
@@ -348,6 +365,10 @@ impl Link {
         self.is_ended = true;
         self.signal(Signal::SIGKILL);
         if let Ends::Process { child, .. } = &mut self.ends {
+            // Forgotten before it is reaped: afterwards its number may belong to another.
+            if let Ok(id) = i32::try_from(child.id()) {
+                groups().remove(&id);
+            }
             let _ = child.wait();
         }
     }
@@ -382,6 +403,7 @@ fn start(words: &[String], settings: &ExternalSettings) -> Result<Ends, String> 
         command.current_dir(directory);
     }
     let mut child = command.spawn().map_err(|error| format!("`{}` cannot be started: {error}", words[0]))?;
+    groups().extend(i32::try_from(child.id()));
     let (stdin, stdout, stderr) = (child.stdin.take(), child.stdout.take(), child.stderr.take());
     let stdout = stdout.expect("it was asked for");
     let fds: [Option<BorrowedFd>; 3] =

@@ -18,6 +18,7 @@ mod settings;
 
 pub use driver::External;
 pub use finding::{Failure, FailureKind, Problem};
+pub use link::end_all;
 pub use message::{AnswerKind, Observation, PROTOCOL, schemas};
 pub use program::Program;
 pub use record::{Attached, Conversation, Key, Outcome, RecordError, digest_of, from_text, to_text};
