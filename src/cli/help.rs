@@ -22,7 +22,8 @@ Exit status:
   2    mistakes in a source file; for `fmt --check`, a file is not formatted
   3    a claim is refuted
   4    a counted collision (`run --fail-on-collision`), or a failing `test`
-  5    a driving system of your own failed (`ads check`, `run --fail-on-collision`)
+  5    a driving system of your own failed (`ads check`, `study`,
+       `run --fail-on-collision`)
   130  Ctrl-C; what was done is saved, and `--resume` goes on
 
 `avastra COMMAND --help` has examples. `avastra explain` lists every diagnostic,

@@ -122,6 +122,15 @@ impl Output {
         }
     }
 
+    /// What the user should know though the command does not fail, on stderr; JSON has it in the result.
+    pub fn warn(&self, text: &str) {
+        match (self.is_json(), self.colour) {
+            (true, _) => {}
+            (false, true) => remark(&format!("\x1b[1;33mwarning\x1b[0m: {text}")),
+            (false, false) => remark(&format!("warning: {text}")),
+        }
+    }
+
     /// Whether all that was printed reached its reader.
     ///
     /// # Errors

@@ -74,7 +74,8 @@ pub fn run(output: &Output, arguments: &RunArguments) -> Result<(), Failure> {
     output.say(&critical_text(&directory.path, &critical));
     let failures = directory.database.failures().map_err(unread)?;
     if !failures.is_empty() {
-        output.say(&failures_text(&directory.path, &failures));
+        let place = format!("; each is in {}/failures", directory.path.display());
+        output.say(&failures_text(&failures, &place));
     }
     output.result(
         serde_json::json!({ "directory": directory.path, "totals": totals, "refusals": refusals, "groups": groups, "never": never, "critical": critical, "failures": failures }),
@@ -342,18 +343,14 @@ fn refusals_text(refusals: &[RefusalCount]) -> String {
     cut_short(head, refusals, line, |more| format!("and for {more} other reasons"))
 }
 
-/// Findings about an external driving system, by what is wrong and when.
-fn failures_text(directory: &Path, failures: &[FailureCount]) -> String {
+/// Findings about an external driving system, by what is wrong and when; `place` says where they happened or stand.
+pub fn failures_text(failures: &[FailureCount], place: &str) -> String {
     let line = |failure: &FailureCount| {
         let FailureCount { kind, problem, times, detail, scenario, .. } = failure;
         format!("{times} × {kind} ({problem}): {detail}; for example {scenario}")
     };
     let all: i64 = failures.iter().map(|failure| failure.times).sum();
-    let head = format!(
-        "\nthe driving system failed {}; each is in {}/failures:",
-        plural(all as usize, "time"),
-        directory.display()
-    );
+    let head = format!("\nthe driving system failed {}{place}:", plural(all as usize, "time"));
     cut_short(head, failures, line, |more| format!("and {more} others"))
 }
 

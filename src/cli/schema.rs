@@ -179,7 +179,8 @@ pub const SHAPES: &[Shape] = &[
             f("simulated_h", "number", "time driven"),
             f("policy", "text?", "path of the policy; a search has none"),
             f("rules", "object?", "what its readable rules achieve"),
-            f("evaluation", "object", "what it learned, in episodes of its own"),
+            f("evaluation", "object", "what it learned, in episodes of its own; its `failures` by kind"),
+            f("failures[]", "object", "of the training, as in `run`"),
         ],
     },
     Shape {
@@ -210,7 +211,13 @@ pub const SHAPES: &[Shape] = &[
         command: "study",
         fields: &[
             f("directory", "text", "where results.json lies"),
-            f("results", "object", "as in results.json"),
+            f("results", "object?", "as in results.json; absent if the driving system failed"),
+            f(
+                "failures[]",
+                "object",
+                "a cell that a driving system of your own failed in: `agent`, `road`, `number`, and how often by kind, \
+                 `trained` and `evaluated`",
+            ),
             f("timing[]", "object", "of an agent: `cells`, mean `wall_s` and `cpu_s`"),
         ],
     },

@@ -7,7 +7,8 @@ use std::time::Instant;
 use crate::report;
 use crate::run::TrafficRecord;
 use crate::study::{
-    CellRecord, Event, Spent, Study, StudyDatabase, StudyFile, StudyResults, StudySettings, play_jobs,
+    CellRecord, Event, FailedCell, Spent, Study, StudyDatabase, StudyFile, StudyResults, StudySettings,
+    play_jobs,
 };
 
 use super::arguments::StudyArguments;
@@ -56,17 +57,58 @@ pub fn study(output: &Output, arguments: &StudyArguments) -> Result<(), Failure>
     drop(progress);
 
     let cells = database.cells().map_err(|error| Failure::file("read", &file, error))?;
+    let failed = FailedCell::among(&cells);
+    if !failed.is_empty() {
+        // An interruption may have left some of the cells before.
+        remove(&path.join("results.json"))?;
+        let findings = FailedCell::findings(&failed);
+        output.say(&failed_text(&path, &failed));
+        output.result(serde_json::json!({ "directory": path, "failures": failed, "timing": timing(&cells) }));
+        return Err(Failure::Ads { findings });
+    }
     let results = StudyResults::new(study.settings(), &cells);
     let text = serde_json::to_string_pretty(&results).expect("results have string keys only");
     write(&path.join("results.json"), &format!("{text}\n"))?;
     output.say(&report::study(&results));
     let timing = timing(&cells);
     output.say(&timing_text(&path, &timing));
-    output.result(serde_json::json!({ "directory": path, "results": results, "timing": timing }));
+    output.result(
+        serde_json::json!({ "directory": path, "results": results, "failures": failed, "timing": timing }),
+    );
     if stop.load(Ordering::Relaxed) && results.cells < results.cells_wanted {
         return Err(Failure::Interrupted { command: "study", directory: path });
     }
     Ok(())
+}
+
+/// Removes a file, if it is there.
+fn remove(file: &Path) -> Result<(), Failure> {
+    match std::fs::remove_file(file) {
+        Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
+            Err(Failure::file("remove", file, error))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// The cells that the driving system failed in, and what to do.
+fn failed_text(directory: &Path, cells: &[FailedCell]) -> String {
+    let mut text =
+        "\nno statistics, because the driving system did not drive every episode to its end:".to_owned();
+    for cell in cells {
+        let FailedCell { agent, road, number, trained, evaluated } = cell;
+        text.push_str(&format!("\n  {agent} on {road}, number {number}:"));
+        let named = [(trained, "in training"), (evaluated, "when played")];
+        let kinds = named.iter().flat_map(|(kinds, place)| kinds.iter().map(move |kind| (kind, place)));
+        let kinds = kinds.map(|((kind, times), place)| format!(" {times} × {} {place}", kind.name()));
+        text.push_str(&kinds.collect::<Vec<_>>().join(","));
+    }
+    text.push_str(&format!(
+        "\nwhat was played stands in {}; when the driving system is repaired (`avastra ads check`), begin the study \
+         again in a new folder",
+        directory.join("study.db").display()
+    ));
+    text
 }
 
 /// A new study, from its file.

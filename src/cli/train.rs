@@ -23,7 +23,7 @@ use super::output::Output;
 use super::output::plural;
 use super::pack::pack_space;
 use super::progress::{TrainingProgress, Working};
-use super::run::roads_or_all;
+use super::run::{failures_text, roads_or_all};
 use super::run_directory::{Resumed, RunDirectory};
 use super::{distill, load, run_directory};
 
@@ -151,7 +151,6 @@ fn keep(
 /// Evaluates the policy, writes it, and prints the result of the training.
 fn finish(output: &Output, training: &Training, directory: &RunDirectory) -> Result<(), Failure> {
     let settings = training.settings();
-    let roads = &settings.roads;
     let test = (EVALUATION_EPISODES, settings.seed);
     let working = Working::new(output, "playing what it learned");
     let evaluation = evaluate(training.arena(), &|| training.actor(), test);
@@ -176,7 +175,7 @@ fn finish(output: &Output, training: &Training, directory: &RunDirectory) -> Res
     ));
     output.say(&format!(
         "what it learned, on {} of its own: {} counted in {}",
-        plural(evaluation.episodes as usize * roads.len(), "episode"),
+        plural(played(settings, &evaluation), "episode"),
         plural(evaluation.counted as usize, "collision"),
         plural(evaluation.colliding as usize, "episode"),
     ));
@@ -193,16 +192,47 @@ fn finish(output: &Output, training: &Training, directory: &RunDirectory) -> Res
             directory.path.join("critical").display()
         )),
     }
+    let failures = directory.database.failures().map_err(read)?;
+    if !failures.is_empty() {
+        output.say(&failures_text(&failures, " in the training"));
+    }
+    if !evaluation.failures.is_empty() {
+        output.say("\nthe driving system failed in the episodes of what it learned:");
+        evaluation
+            .failures
+            .iter()
+            .for_each(|(kind, times)| output.say(&format!("  {times} × {}", kind.name())));
+    }
+    let failed = totals.failed as usize + failed(&evaluation);
+    if failed > 0 {
+        output.warn(&format!(
+            "the driving system failed in {} of {}, which ended there: few collisions say nothing about it, and what \
+             was learned is of little worth; `avastra ads check` looks at it alone",
+            failed,
+            plural(totals.episodes as usize + played(settings, &evaluation), "episode"),
+        ));
+    }
     output.result(serde_json::json!({
         "directory": directory.path, "totals": totals, "policy": kept.as_ref().map(|(path, _)| path),
-        "rules": rules, "simulated_h": simulated_h,
+        "rules": rules, "simulated_h": simulated_h, "failures": failures,
         "evaluation": {
-            "episodes": evaluation.episodes * roads.len() as u64, "collisions": evaluation.collisions,
+            "episodes": played(settings, &evaluation), "collisions": evaluation.collisions,
             "counted": evaluation.counted, "colliding": evaluation.colliding,
             "simulated_h": evaluation.simulated_s / 3600.0, "return": evaluation.return_mean,
+            "failures": evaluation.failures,
         },
     }));
     Ok(())
+}
+
+/// Episodes of an evaluation, on all roads together.
+fn played(settings: &TrainSettings, evaluation: &Evaluation) -> usize {
+    evaluation.episodes as usize * settings.roads.len()
+}
+
+/// Those of them that ended because the driving system failed.
+fn failed(evaluation: &Evaluation) -> usize {
+    evaluation.failures.values().sum::<u64>() as usize
 }
 
 /// The policy to be written, with the rules distilled from it and the claims of both.
@@ -272,14 +302,18 @@ fn write_policy(policy: &Policy, space: &Space, directory: &Path) -> Result<Path
 
 /// The policy's headline: what it is, in a sentence.
 fn headline(settings: &TrainSettings, evaluation: &Evaluation) -> String {
+    let failed = match failed(evaluation) {
+        0 => String::new(),
+        failed => format!(" The driving system failed in {failed} of them."),
+    };
     format!(
-        "{} ({}) after {} on {}: {} in {} of its own.",
+        "{} ({}) after {} on {}: {} in {} of its own.{failed}",
         settings.agent,
         settings.hyperparameters.preset(),
         plural(settings.episodes as usize, "episode"),
         settings.roads.join(", "),
         plural(evaluation.counted as usize, "counted collision"),
-        plural(evaluation.episodes as usize * settings.roads.len(), "episode"),
+        plural(played(settings, evaluation), "episode"),
     )
 }
 

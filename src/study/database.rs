@@ -14,7 +14,7 @@ use crate::study::record::{CellRecord, CollisionRecord, EpisodeRecord, FailureCl
 
 /// Versions begin at 1001, so that a `run.db` is never taken for a `study.db`.
 const LAYOUT: Layout = Layout {
-    version: 1003,
+    version: 1004,
     unit: "cell",
     tables: &["cell", "trained", "evaluated", "collision"],
     naming: None,
@@ -27,7 +27,7 @@ CREATE TABLE cell (
   training_seed TEXT, wall_s REAL NOT NULL, cpu_s REAL, UNIQUE (agent, road, number)
 ) STRICT;
 CREATE TABLE trained (
-  cell INTEGER NOT NULL REFERENCES cell, episode INTEGER NOT NULL, return REAL NOT NULL,
+  cell INTEGER NOT NULL REFERENCES cell, episode INTEGER NOT NULL, ended TEXT NOT NULL, return REAL NOT NULL,
   collisions INTEGER NOT NULL, counted INTEGER NOT NULL, epsilon REAL NOT NULL, loss REAL,
   simulated_s REAL NOT NULL, PRIMARY KEY (cell, episode)
 ) STRICT;
@@ -78,11 +78,12 @@ impl StudyDatabase {
             )?;
             let cell = transaction.last_insert_rowid();
             let mut insert =
-                transaction.prepare_cached("INSERT INTO trained VALUES (?, ?, ?, ?, ?, ?, ?, ?)")?;
+                transaction.prepare_cached("INSERT INTO trained VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)")?;
             for (index, episode) in record.trained.iter().enumerate() {
                 insert.execute(params![
                     cell,
                     index as i64,
+                    episode.ended,
                     episode.sum,
                     episode.collisions,
                     episode.counted,
@@ -142,7 +143,7 @@ impl StudyDatabase {
             .into_iter()
             .collect();
         let trained = self.by_cell(
-            "SELECT cell, return, collisions, counted, epsilon, loss, simulated_s FROM trained ORDER BY cell, episode",
+            "SELECT cell, ended, return, collisions, counted, epsilon, loss, simulated_s FROM trained ORDER BY cell, episode",
             trained_episode,
         )?;
         for (cell, episode) in trained {
@@ -233,12 +234,13 @@ fn add_episode(
 
 fn trained_episode(row: &Row) -> Result<TrainedRecord, rusqlite::Error> {
     Ok(TrainedRecord {
-        sum: row.get(1)?,
-        collisions: row.get(2)?,
-        counted: row.get(3)?,
-        exploration_epsilon: row.get(4)?,
-        loss: row.get(5)?,
-        simulated_s: row.get(6)?,
+        ended: row.get(1)?,
+        sum: row.get(2)?,
+        collisions: row.get(3)?,
+        counted: row.get(4)?,
+        exploration_epsilon: row.get(5)?,
+        loss: row.get(6)?,
+        simulated_s: row.get(7)?,
     })
 }
 

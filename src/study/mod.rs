@@ -9,6 +9,7 @@
 //! [`statistics`]: crate::statistics
 
 mod database;
+mod failed;
 mod file;
 mod job;
 mod measures;
@@ -18,6 +19,7 @@ mod results;
 mod settings;
 
 pub use database::StudyDatabase;
+pub use failed::FailedCell;
 pub use file::StudyFile;
 pub use job::{Event, play_jobs};
 pub use ready::Study;

@@ -34,6 +34,7 @@ pub struct Spent {
 /// An episode of a training.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TrainedRecord {
+    pub ended: String,
     /// Sum of its rewards, not discounted.
     pub sum: f64,
     pub collisions: u32,
@@ -100,6 +101,7 @@ pub struct FailureClass {
 impl TrainedRecord {
     pub fn new(episode: &TrainedEpisode) -> TrainedRecord {
         TrainedRecord {
+            ended: episode.log.end.name().to_owned(),
             sum: episode.sum,
             collisions: episode.log.collisions.len() as u32,
             counted: episode.summary.counted() as u32,

@@ -1,9 +1,13 @@
 //! What an agent achieves when it does not learn, in figures that can be checked by playing again.
 
+use std::collections::BTreeMap;
+
 use sha2::{Digest, Sha256};
 
+use crate::ads::external::FailureKind;
 use crate::agent::Agent;
 use crate::episode;
+use crate::episode::End;
 use crate::oracle::AvoidabilitySettings;
 use crate::rng;
 use crate::rng::Stream;
@@ -26,6 +30,8 @@ pub struct Evaluation {
     pub trace: [u8; 32],
     /// Time simulated, branches included, s.
     pub simulated_s: f64,
+    /// Episodes that ended because an external driving system failed, by how it failed.
+    pub failures: BTreeMap<FailureKind, u64>,
 }
 
 /// Plays so many episodes on each road; `make` gives a fresh agent for each.
@@ -51,6 +57,9 @@ pub fn evaluate(
         found.counted += counted;
         found.colliding += u64::from(counted > 0);
         found.simulated_s += log.duration_s + agent.branched_s();
+        if let End::Failed(kind) = log.end {
+            *found.failures.entry(kind).or_default() += 1;
+        }
         traces.update(log.trace());
     }
     let return_mean = sum / (episodes * arena.roads() as u64).max(1) as f64;
