@@ -37,7 +37,7 @@ pub fn replay(output: &Output, arguments: &ReplayArguments) -> Result<(), Failur
     });
     let tally = tell(output, &played.done);
     output.result(serde_json::json!({
-        "confirmed": tally.confirmed, "refuted": tally.refuted,
+        "confirmed": tally.confirmed, "refuted": tally.refuted, "untried": tally.untried,
         "scenarios": played.done.iter().map(|played| &played.result).collect::<Vec<_>>(),
         "failed": played.failed_in_json(),
     }));
@@ -47,15 +47,17 @@ pub fn replay(output: &Output, arguments: &ReplayArguments) -> Result<(), Failur
     if findings > 0 { Err(Failure::Ads { findings }) } else { Ok(()) }
 }
 
-/// How many claims hold, and how many do not.
+/// How many claims hold, how many do not, and how many could not be tried.
+#[derive(Default)]
 pub struct Tally {
     pub confirmed: usize,
     pub refuted: usize,
+    pub untried: usize,
 }
 
 /// Says what came of each replay, and the sums of several.
 pub fn tell<'a>(output: &Output, played: impl IntoIterator<Item = &'a Played>) -> Tally {
-    let mut tally = Tally { confirmed: 0, refuted: 0 };
+    let mut tally = Tally::default();
     let (mut files, mut refuted_files) = (0, 0);
     for played in played {
         files += 1;
@@ -63,9 +65,11 @@ pub fn tell<'a>(output: &Output, played: impl IntoIterator<Item = &'a Played>) -
             output.say(&format!("{} against {}", played.path.display(), played.told));
             continue;
         };
-        let wrong = verdicts.iter().filter(|verdict| !verdict.confirmed).count();
+        let wrong = verdicts.iter().filter(|verdict| verdict.is_refuted()).count();
+        let untried = verdicts.iter().filter(|verdict| verdict.confirmed.is_none()).count();
         tally.refuted += wrong;
-        tally.confirmed += verdicts.len() - wrong;
+        tally.untried += untried;
+        tally.confirmed += verdicts.len() - wrong - untried;
         refuted_files += usize::from(wrong > 0);
         report(output, &played.path, &played.name, verdicts);
         if !played.told.is_empty() {
@@ -73,8 +77,12 @@ pub fn tell<'a>(output: &Output, played: impl IntoIterator<Item = &'a Played>) -
         }
     }
     if files > 1 && tally.confirmed + tally.refuted > 0 {
+        let untried = match tally.untried {
+            0 => String::new(),
+            untried => format!(", {untried} not tried"),
+        };
         output.say(&format!(
-            "\n{}: {} confirmed, {} refuted in {refuted_files} of them",
+            "\n{}: {} confirmed, {} refuted in {refuted_files} of them{untried}",
             plural(files, "scenario"),
             plural(tally.confirmed, "claim"),
             tally.refuted
@@ -189,18 +197,23 @@ pub fn priority_text(priority: Priority) -> &'static str {
 }
 
 fn report(output: &Output, path: &Path, name: &str, verdicts: &[oracle::ClaimResult]) {
-    let wrong: Vec<&oracle::ClaimResult> = verdicts.iter().filter(|verdict| !verdict.confirmed).collect();
+    let wrong: Vec<&oracle::ClaimResult> = verdicts.iter().filter(|verdict| verdict.is_refuted()).collect();
+    let untried: Vec<&oracle::ClaimResult> =
+        verdicts.iter().filter(|verdict| verdict.confirmed.is_none()).collect();
     if verdicts.is_empty() {
         output.say(&format!("{}: {} makes no claim", path.display(), name));
         return;
     }
     if wrong.is_empty() {
-        let claims = plural(verdicts.len(), "claim");
+        let claims = plural(verdicts.len() - untried.len(), "claim");
         output.tell(&format!("{}: {} holds, {claims} confirmed", path.display(), name));
-        return;
+    } else {
+        output.say(&format!("{}: {} is refuted", path.display(), name));
     }
-    output.say(&format!("{}: {} is refuted", path.display(), name));
     for verdict in wrong {
         output.say(&format!("  claimed {}\n  found   {}", verdict.claim, verdict.found));
+    }
+    for verdict in untried {
+        output.tell(&format!("  {}: {}", verdict.claim, verdict.found));
     }
 }

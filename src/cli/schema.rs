@@ -226,6 +226,7 @@ pub const SHAPES: &[Shape] = &[
         fields: &[
             f("confirmed", "number", "claims that hold"),
             f("refuted", "number", "claims that do not"),
+            f("untried", "number", "claims that only the driving system itself can show"),
             f(
                 "scenarios[]",
                 "object",
@@ -238,6 +239,7 @@ pub const SHAPES: &[Shape] = &[
         command: "verify",
         fields: &[
             f("refuted", "number", "claims that do not hold"),
+            f("untried", "number", "as in `replay`"),
             f("scenarios[]", "object", "as in `replay`"),
             f("policies[]", "object", "`file`, `policy` and the claims `refuted`, in words"),
             FAILED,

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::ads::Selected;
 use crate::emit;
 use crate::episode::{Outcome, Script, Setup};
 use crate::model::Claim;
@@ -170,7 +171,7 @@ fn smaller(output: &Output, file: &Path, path: &Path, asked: &Asked) -> Result<S
         after: size(&shrunk.script),
         actions_left: actions.collect(),
         plays: shrunk.plays,
-        refuted: refuted(output, path)?,
+        refuted: refuted(output, path, &ads)?,
     })
 }
 
@@ -194,14 +195,16 @@ fn counted(count: f64, noun: &str) -> String {
     if count == 1.0 { format!("1 {noun}") } else { format!("{count} {noun}s") }
 }
 
-/// Number of claims of a written file that do not hold.
-fn refuted(output: &Output, path: &Path) -> Result<usize, Failure> {
+/// Number of claims of a written file that do not hold. An external driving system plays the file by its recorded answers,
+/// as for everybody who replays it; what they do not cover is tried with the one that was given, `given`.
+fn refuted(output: &Output, path: &Path, given: &Selected) -> Result<usize, Failure> {
     let (table, scenario) = load::scenario(output, path)?;
-    let ads = run::recorded(&scenario)?;
+    let recorded = run::recorded(&scenario)?;
     let stage = Stage::new(&table, &scenario)?;
-    let log = stage.play(&ads, &mut |_, _, _| {});
-    let claims = stage.verify(&ads, &log);
-    Ok(claims.iter().filter(|claim| !claim.confirmed).count())
+    let log = stage.play(&recorded, &mut |_, _, _| {});
+    let to_try = if given.program().is_some() { given } else { &recorded };
+    let claims = stage.verify(to_try, &log);
+    Ok(claims.iter().filter(|claim| claim.is_refuted()).count())
 }
 
 /// Steps, and how many of them do something.

@@ -175,7 +175,7 @@ impl Suite<'_> {
         let ads = run::recorded(scenario)?;
         let stage = Stage::new(table, scenario)?;
         let log = stage.play(&ads, &mut |_, _, _| {});
-        if let Some(wrong) = stage.verify(&ads, &log).iter().find(|claim| !claim.confirmed) {
+        if let Some(wrong) = stage.verify(&ads, &log).iter().find(|claim| claim.is_refuted()) {
             return Err(Failure::usage(format!(
                 "not accepted, because it does not play as it claims: claimed {}, found {}",
                 wrong.claim, wrong.found

@@ -52,7 +52,7 @@ pub fn verify(output: &Output, arguments: &VerifyArguments) -> Result<(), Failur
     let tally = replay::tell(output, scenarios.iter().copied());
     refuted += tally.refuted;
     output.result(serde_json::json!({
-        "refuted": refuted, "policies": policies,
+        "refuted": refuted, "untried": tally.untried, "policies": policies,
         "scenarios": scenarios.iter().map(|played| &played.result).collect::<Vec<_>>(),
         "failed": verified.failed_in_json(),
     }));

@@ -14,14 +14,21 @@ use super::facts;
 pub struct ClaimResult {
     /// The claim in words.
     pub claim: String,
-    pub confirmed: bool,
-    /// What the replay found instead, or `as claimed`.
+    /// None if it could not be tried.
+    pub confirmed: Option<bool>,
+    /// What the replay found instead, or `as claimed`; why it was not tried.
     pub found: String,
+}
+
+impl ClaimResult {
+    pub fn is_refuted(&self) -> bool {
+        self.confirmed == Some(false)
+    }
 }
 
 /// An external driving system that is known by its recorded answers alone cannot drive anything else.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("no way to try: give the driving system with `--ads-cmd` or `--ads-config`")]
+#[error("not tried (needs the driving system: `--ads-cmd` or `--ads-config`)")]
 pub struct NoTries;
 
 /// Findings that take many replays, each about the nth collision of the log; asked for only by some claims.
@@ -115,15 +122,20 @@ fn check(
             judged(claim, collision(log, *obstacle).and_then(judge))
         }
         Claim::Minimal { obstacle } => {
-            let judge = |index: usize| {
-                let spare = (replays.spare_steps)(index).map_err(|error| error.to_string())?;
-                if spare.is_empty() {
-                    return Ok(());
-                }
-                let spare: Vec<String> = spare.iter().map(usize::to_string).collect();
-                Err(format!("the same crash without step {}", spare.join(", or without step ")))
+            let claim = format!("minimal{}", with(*obstacle));
+            let spare = match collision(log, *obstacle) {
+                Ok(index) => (replays.spare_steps)(index),
+                Err(found) => return judged(claim, Err(found)),
             };
-            judged(format!("minimal{}", with(*obstacle)), collision(log, *obstacle).and_then(judge))
+            match spare {
+                Ok(spare) if spare.is_empty() => judged(claim, Ok(())),
+                Ok(spare) => {
+                    let spare: Vec<String> = spare.iter().map(usize::to_string).collect();
+                    let found = format!("the same crash without step {}", spare.join(", or without step "));
+                    judged(claim, Err(found))
+                }
+                Err(no_tries) => ClaimResult { claim, confirmed: None, found: no_tries.to_string() },
+            }
         }
         Claim::Proc(claimed) => {
             let found: Vec<f64> = log.steps.iter().map(|step| step.proc).collect();
@@ -175,7 +187,7 @@ fn by_whom(drivers: Option<&[String]>) -> String {
 
 fn judged(claim: String, found: Result<(), String>) -> ClaimResult {
     match found {
-        Ok(()) => ClaimResult { claim, confirmed: true, found: "as claimed".to_owned() },
-        Err(found) => ClaimResult { claim, confirmed: false, found },
+        Ok(()) => ClaimResult { claim, confirmed: Some(true), found: "as claimed".to_owned() },
+        Err(found) => ClaimResult { claim, confirmed: Some(false), found },
     }
 }

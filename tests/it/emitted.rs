@@ -85,7 +85,7 @@ fn emitted_scenarios_keep_every_claim() {
         });
         let replays = Replays { cause: &|_| Ok(Vec::new()), spare_steps: &|_| Ok(Vec::new()) };
         for verdict in oracle::verify(run.space(), scenario, &again, &judgements, &replays) {
-            assert!(verdict.confirmed, "{verdict:?}\n{text}");
+            assert_eq!(verdict.confirmed, Some(true), "{verdict:?}\n{text}");
         }
     }
     assert!(emitted >= 2, "sixty episodes of random search find crashes; these found {emitted}");
