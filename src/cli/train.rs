@@ -206,8 +206,8 @@ fn finish(output: &Output, training: &Training, directory: &RunDirectory) -> Res
     let failed = totals.failed as usize + failed(&evaluation);
     if failed > 0 {
         output.warn(&format!(
-            "the driving system failed in {} of {}, which ended there: few collisions say nothing about it, and what \
-             was learned is of little worth; `avastra ads check` looks at it alone",
+            "the driving system failed in {} of {}, which ended there: that these have few collisions says nothing; \
+             `avastra ads check` looks at the driving system alone",
             failed,
             plural(totals.episodes as usize + played(settings, &evaluation), "episode"),
         ));

@@ -10,6 +10,7 @@ use std::path::Path;
 use assert_cmd::cargo::cargo_bin;
 use serde_json::Value;
 
+use crate::cases::root;
 use crate::command::{avastra, outcome};
 
 const SPACE: &str = "scenarios/avastra45.ava";
@@ -99,6 +100,51 @@ fn every_misbehaviour_is_a_finding_and_leaves_nothing_behind() {
 }
 
 #[test]
+fn a_training_and_a_study_say_that_the_driving_system_failed() {
+    let scratch = tempfile::tempdir().expect("a scratch directory");
+    let config = profile(scratch.path(), &["--misbehave", "crash-in-episode"], "1", "");
+    let out = scratch.path().join("train").display().to_string();
+    let train = [
+        "train",
+        SPACE,
+        "--agent",
+        "av-fuzzer",
+        "--road",
+        "corner",
+        "--episodes",
+        "2",
+        "--ads-config",
+        &config,
+        "--out",
+        &out,
+    ];
+    let (status, stdout, stderr) = outcome(&mut avastra(&train));
+    assert_eq!(status, 0, "{stdout}{stderr}");
+    assert!(stderr.contains("warning: the driving system failed in 17 of 17 episodes"), "{stdout}{stderr}");
+    assert!(stdout.contains("2 × ads_crash (exited)") && stdout.contains("15 × ads_crash\n"), "{stdout}");
+
+    let space = root().join(SPACE).display().to_string();
+    let study = serde_json::json!({
+        "space": space, "roads": ["corner"], "ads_config": config, "evaluation": { "episodes": 2, "seeds": 1 },
+        "agents": [{ "name": "random", "repeats": 2 }],
+    });
+    let file = scratch.path().join("study.yaml");
+    std::fs::write(&file, study.to_string()).unwrap();
+    let out = scratch.path().join("study");
+    let arguments =
+        ["study", &file.display().to_string(), "--out", &out.display().to_string(), "--format", "json"];
+    let (status, stdout, stderr) = outcome(&mut avastra(&arguments));
+    let result = last_line(&stdout);
+    assert_eq!((status, result.get("results")), (5, None), "{stderr}{result}");
+    let cells = result["failures"].as_array().expect("the cells");
+    assert_eq!(cells.len(), 2, "{result}");
+    for cell in cells {
+        assert_eq!(cell["evaluated"], serde_json::json!({ "ads_crash": 2 }), "{result}");
+    }
+    assert!(!out.join("results.json").exists(), "it would be read as if all had been driven");
+}
+
+#[test]
 fn what_cannot_be_started_is_an_error_with_its_reason() {
     let scratch = tempfile::tempdir().expect("a scratch directory");
     let config = profile(scratch.path(), &["--misbehave", "crash-at-start"], "1", "");
@@ -168,6 +214,17 @@ fn threads_and_processes_change_nothing_and_crashes_replay_with_and_without_the_
     assert!(status == 4 && stdout.contains("ads failed"), "{status}: {stdout}{stderr}");
     let (status, stdout, stderr) = outcome(&mut avastra(&["replay", &path, "--ads-config", &dies]));
     assert!(status == 5 && stdout.contains("it failed at step"), "{status}: {stdout}{stderr}");
+    // It is made small with the program; what only the program can show is not tried without it.
+    let small = scratch.path().join("small.ava").display().to_string();
+    let (status, stdout, stderr) =
+        outcome(&mut avastra(&["shrink", &path, "--ads-config", &config, "--output", &small]));
+    assert_eq!(status, 0, "{stdout}{stderr}");
+    let claims_minimal = std::fs::read_to_string(&small).unwrap().contains("expect minimal");
+    for (more, is_tried) in [(&[][..], false), (&["--ads-config", &config], true)] {
+        let (status, stdout, stderr) = outcome(&mut avastra(&[&["verify", &small][..], more].concat()));
+        assert_eq!(status, 0, "{more:?}: {stdout}{stderr}");
+        assert_eq!(stdout.contains("not tried"), claims_minimal && !is_tried, "{more:?}: {stdout}");
+    }
     // Changed answers are noticed, and missing ones are asked for.
     let answers = Path::new(&path).with_extension("answers.jsonl");
     let text = std::fs::read_to_string(&answers).unwrap();
