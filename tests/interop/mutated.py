@@ -112,7 +112,7 @@ if POLICIES and not (FOLDER / "trained").exists():
     small = FOLDER / "small.yaml"
     small.write_text("learning_starts: 4\nupdates_per_step: 1\nhidden_units: [8]\nbatch_len: 4\n")
     run("train", SPACE, "--road", "corner", "--episodes", "6", "--config", small, "--out", FOLDER / "trained")
-policies = sorted((FOLDER / "trained").glob("*.ava"))
+policies = sorted((FOLDER / "trained/policy").glob("*.ava"))
 failures = examine("scenario", scenarios, SCENARIOS) if SCENARIOS else 0
 failures += examine("policy", policies, POLICIES) if POLICIES else 0
 sys.exit(1 if failures else 0)
