@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use crate::geometry::{Pose, Vec2};
 use crate::model::vocabulary::Body;
-use crate::sim::Control;
+use crate::sim::{Control, SensedObject};
 
 /// What a driving system believes, wants and commands.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -86,6 +86,23 @@ pub struct PerceivedObject {
     pub height_m: f64,
     /// Predicted positions of the centre, every 0.5 s from the moment of planning.
     pub predicted: Vec<Vec2>,
+}
+
+impl PerceivedObject {
+    /// The truth, as one perceives it who drives by the truth.
+    pub fn as_it_is(object: &SensedObject) -> PerceivedObject {
+        PerceivedObject {
+            id: Some(object.id),
+            track: object.id,
+            body: object.body,
+            pose: object.pose,
+            velocity_mps: object.velocity_mps,
+            length_m: object.length_m,
+            width_m: object.width_m,
+            height_m: object.height_m,
+            predicted: Vec::new(),
+        }
+    }
 }
 
 /// The most restrictive constraint of a plan. `Display` gives a few words, for example `follow 3`;

@@ -282,17 +282,7 @@ impl External {
             }
             None => {
                 self.status.perceived.clear();
-                self.status.perceived.extend(sensed.objects.iter().map(|object| PerceivedObject {
-                    id: Some(object.id),
-                    track: object.id,
-                    body: object.body,
-                    pose: object.pose,
-                    velocity_mps: object.velocity_mps,
-                    length_m: object.length_m,
-                    width_m: object.width_m,
-                    height_m: object.height_m,
-                    predicted: Vec::new(),
-                }));
+                self.status.perceived.extend(sensed.objects.iter().map(PerceivedObject::as_it_is));
             }
         }
     }

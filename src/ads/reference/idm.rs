@@ -285,19 +285,8 @@ impl Idm {
     fn report(&mut self, sensed: &Sensed) {
         let perceived = &mut self.status.perceived;
         perceived.clear();
-        perceived.extend(sensed.objects.iter().filter(|object| object.distance_m < SIGHT_M).map(|object| {
-            PerceivedObject {
-                id: Some(object.id),
-                track: object.id,
-                body: object.body,
-                pose: object.pose,
-                velocity_mps: object.velocity_mps,
-                length_m: object.length_m,
-                width_m: object.width_m,
-                height_m: object.height_m,
-                predicted: Vec::new(),
-            }
-        }));
+        let in_sight = sensed.objects.iter().filter(|object| object.distance_m < SIGHT_M);
+        perceived.extend(in_sight.map(PerceivedObject::as_it_is));
     }
 
     /// Drives the route, but with the acceleration (m/s²) and reason that `decide` makes of the model's.
