@@ -118,6 +118,12 @@ pub trait Surroundings {
     /// What can be asked about the ego vehicle and its surroundings now.
     fn moment(&self) -> MomentFacts;
 
+    /// The same surroundings for many questions about this moment: what those have in common is found once. `None`
+    /// where nothing is gained.
+    fn for_many(&self) -> Option<Box<dyn Surroundings + '_>> {
+        None
+    }
+
     /// Why the time of day and the weather cannot change now, in words.
     fn weather_refusal(&self) -> Option<String> {
         None

@@ -71,7 +71,10 @@ impl ActionTable {
     /// One offer for each row. Every row draws from a stream of its own, so that one row's draws do not
     /// change another's.
     pub fn offers(&self, situation: &Situation<'_>) -> Vec<Offer> {
-        (0..self.rows().len()).map(|row| self.offer(situation, row)).collect()
+        let kept = situation.surroundings.for_many();
+        let surroundings = kept.as_deref().unwrap_or(situation.surroundings);
+        let situation = Situation { surroundings, ..*situation };
+        (0..self.rows().len()).map(|row| self.offer(&situation, row)).collect()
     }
 
     /// The offer of one row: the same as in [`ActionTable::offers`].

@@ -88,6 +88,10 @@ impl Agent for Learner {
         self.policy.chosen(row);
         Some(row)
     }
+
+    fn looks_at_mask(&self) -> bool {
+        self.policy.looks_at_mask() || self.policy.settings().masks_target
+    }
 }
 
 impl Trainable for Learner {

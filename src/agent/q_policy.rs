@@ -147,7 +147,7 @@ impl QPolicy {
 
     /// Rows to choose from, shape `(rows,)`. Rules choose among legal rows whatever the settings say.
     pub(super) fn open(&self, legal: ArrayView1<bool>) -> Vec<bool> {
-        let masks = self.settings.masks_choice || self.rules.is_some();
+        let masks = self.looks_at_mask();
         self.allowed_now(legal.iter().map(|&legal| legal || !masks))
     }
 
@@ -193,6 +193,10 @@ impl Agent for QPolicy {
         let row = if explores { any(&open, rng) } else { self.decide(observation, &open) }?;
         self.chosen(row);
         Some(row)
+    }
+
+    fn looks_at_mask(&self) -> bool {
+        self.settings.masks_choice || self.rules.is_some()
     }
 }
 

@@ -24,6 +24,10 @@ impl Agent for RawRandom {
     fn choose(&mut self, _: &Observation, legal: ArrayView1<bool>, rng: &mut Rng) -> Option<usize> {
         Some(rng::below(rng, legal.len() as u32) as usize)
     }
+
+    fn looks_at_mask(&self) -> bool {
+        false
+    }
 }
 
 /// Any of the open rows, each as likely; none if no row is open.

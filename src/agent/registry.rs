@@ -33,6 +33,12 @@ pub trait Agent: Send {
         self.choose(observation, legal, rng)
     }
 
+    /// Whether the choice, or what is learned of it, depends on which rows are legal. If not, only the chosen row is
+    /// drawn, and all others pass for legal.
+    fn looks_at_mask(&self) -> bool {
+        true
+    }
+
     /// A step begins: the seed for its draws, or `None` if they come from the episode's own.
     fn draw_seed(&mut self, step: usize) -> Option<u64> {
         let _ = step;
@@ -115,6 +121,10 @@ struct Idle;
 impl Agent for Idle {
     fn choose(&mut self, _: &Observation, _: ArrayView1<bool>, _: &mut Rng) -> Option<usize> {
         None
+    }
+
+    fn looks_at_mask(&self) -> bool {
+        false
     }
 }
 

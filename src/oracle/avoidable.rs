@@ -20,7 +20,8 @@ use std::collections::VecDeque;
 
 use crate::ads;
 use crate::ads::{Ads, Careful, Evasion};
-use crate::episode::{EpisodeLog, Watch};
+use crate::episode;
+use crate::episode::{Choice, EpisodeLog, Moment, Script, Setup};
 use crate::geometry::{OrientedBox, Pose, wrap_angle};
 use crate::model::Avoidability;
 use crate::sim::{Contact, DT_S, EgoMotion, FRAME_TICKS, VehicleParameters, World};
@@ -124,27 +125,36 @@ pub struct Judgement {
     pub evasion: Option<String>,
 }
 
-/// Judges every collision of a log, in order. `rerun` plays the logged episode again under a watch.
+/// Judges every collision of a log, in order, by playing its episode again up to the last of them. `setup` and `script`
+/// are what the log was played from.
 pub fn judge(
+    setup: &Setup,
+    script: &Script,
     log: &EpisodeLog,
     settings: &AvoidabilitySettings,
-    rerun: &mut dyn FnMut(&mut Watch),
 ) -> Vec<Judgement> {
     let mut judgements = Vec::new();
-    if log.collisions.is_empty() {
-        return judgements;
-    }
+    let Some(last) = log.collisions.last() else { return judgements };
+    let mut choose = |moment: &Moment<'_>| match moment.step > last.step {
+        true => Choice::Stop,
+        false => script.choose(setup.table, moment),
+    };
     let kept = ticks(settings.rewind_s) + ticks(settings.watch_s);
     let mut recording: VecDeque<World> = VecDeque::with_capacity(kept);
-    rerun(&mut |world, _, contacts| {
+    episode::run(setup, &mut choose, &mut |world, _, contacts| {
         for contact in contacts {
             judgements.push(judge_one(recording.make_contiguous(), contact, world.ego_outline(), settings));
         }
-        if judgements.len() < log.collisions.len() {
+        // Only the worlds before a contact are asked for.
+        let next = log.collisions.get(judgements.len());
+        let is_soon = |time_s: f64| world.ticks() as usize + kept >= ticks(time_s);
+        if next.is_some_and(|next| is_soon(next.contact.time_s - DT_S)) {
             if recording.len() == kept {
                 recording.pop_front();
             }
             recording.push_back(world.clone());
+        } else {
+            recording.clear();
         }
     });
     assert_eq!(judgements.len(), log.collisions.len(), "an episode played again is the same episode");

@@ -167,10 +167,7 @@ impl<'a> Search<'a> {
             return None;
         }
         let mut script = Script::of_log(&log);
-        let judgements = judge(&log, self.settings, &mut |watch| {
-            let setup = self.begin(candidate);
-            episode::run(&setup, &mut |moment| script.choose(setup.table, moment), watch);
-        });
+        let judgements = judge(&self.begin(candidate), &script, &log, self.settings);
         let same = |index: &usize| {
             let counts = counts(self.setup.table.space(), &log, *index, &judgements[*index]);
             alike(&log.collisions[*index]) && judgements[*index].class == self.class && counts == self.counts

@@ -16,6 +16,9 @@ const PARALLEL_RAD: f64 = 0.35;
 /// A parallel lane counts as abreast only if its nearest point is within this distance along the road, m.
 const ABREAST_M: f64 = 1.0;
 
+/// Lanes of one direction whose centres are nearer to each other than this are parts of one lane, m.
+const FOLLOWS_M: f64 = 0.1;
+
 /// The widest median, m: an opposing lane farther away belongs to another street.
 const MEDIAN_M_MAX: f64 = 40.0;
 
@@ -49,21 +52,38 @@ impl RoadMap {
     /// left to right. The lane itself is left out, and so are lanes of another level. For a lane outside
     /// junctions, so are the lanes inside junctions.
     pub fn abreast(&self, lane: LaneIndex, station_m: f64, reach_m: f64) -> Vec<Abreast> {
+        let directions = [true, false].map(|same| self.abreast_towards(lane, station_m, reach_m, same));
+        let mut found = directions.concat();
+        found.sort_by(|a, b| b.lateral_m.total_cmp(&a.lateral_m).then(a.lane.cmp(&b.lane)));
+        found
+    }
+
+    /// Those of [`RoadMap::abreast`] that lead in our direction, or those that lead the other way, by rising index.
+    fn abreast_towards(&self, lane: LaneIndex, station_m: f64, reach_m: f64, same: bool) -> Vec<Abreast> {
         let own = self.lane(lane);
         let pose = own.centre.pose_at(station_m);
         let mut found: Vec<Abreast> = Vec::new();
         // The edge of a lane is at most half the width of the widest lane away from the lane's centre.
         let centre_m = reach_m + self.grid.half_width_m();
-        for (index, projection) in self.grid.beside(&self.lanes, &pose, PARALLEL_RAD, ABREAST_M, centre_m) {
+        let heading_rad = pose.heading_rad + if same { 0.0 } else { core::f64::consts::PI };
+        let toward = (heading_rad, PARALLEL_RAD);
+        for index in self.grid.beside(&pose, toward, ABREAST_M, centre_m) {
             let other = self.lane(index);
             let is_inside = other.junction.is_some() && own.junction.is_none();
-            if index == lane || is_inside || own.is_apart_at(station_m, other, projection.station_m) {
+            if index == lane || is_inside {
+                continue;
+            }
+            let projection = other.centre.project(pose.position);
+            if own.is_apart_at(station_m, other, projection.station_m) {
                 continue;
             }
             let there = other.centre.pose_at(projection.station_m);
             let turn_rad = wrap_angle(there.heading_rad - pose.heading_rad).abs();
-            let same_direction = turn_rad < PARALLEL_RAD;
-            if !same_direction && turn_rad < core::f64::consts::PI - PARALLEL_RAD {
+            let is_wanted = match same {
+                true => turn_rad < PARALLEL_RAD,
+                false => turn_rad >= core::f64::consts::PI - PARALLEL_RAD,
+            };
+            if !is_wanted {
                 continue;
             }
             let offset = pose.to_local(there.position);
@@ -72,16 +92,12 @@ impl RoadMap {
                 continue;
             }
             let (station_m, lateral_m) = (projection.station_m, offset.y);
-            let abreast = Abreast { lane: index, station_m, lateral_m, width_m, same_direction };
+            let abreast = Abreast { lane: index, station_m, lateral_m, width_m, same_direction: same };
             // Where two lane sections meet, a lane and its successor are both abreast: one of them is enough.
-            let follows = |known: &Abreast| {
-                (known.lateral_m - lateral_m).abs() < 0.1 && known.same_direction == same_direction
-            };
-            if !found.iter().any(follows) {
+            if !found.iter().any(|known| (known.lateral_m - lateral_m).abs() < FOLLOWS_M) {
                 found.push(abreast);
             }
         }
-        found.sort_by(|a, b| b.lateral_m.total_cmp(&a.lateral_m).then(a.lane.cmp(&b.lane)));
         found
     }
 
@@ -91,16 +107,16 @@ impl RoadMap {
     pub fn opposing(&self, lane: LaneIndex, station_m: f64) -> Option<Opposing> {
         let own = self.lane(lane);
         let side = if own.keeps_left { -1.0 } else { 1.0 };
-        // Twice the width of a median, because lanes of our own direction may lie between.
-        let abreast = self.abreast(lane, station_m, 2.0 * MEDIAN_M_MAX);
         let aside_m = |beside: &Abreast| side * beside.lateral_m;
-        let nearest = abreast
+        // Twice the width of a median, because lanes of our own direction may lie between.
+        let opposite = self.abreast_towards(lane, station_m, 2.0 * MEDIAN_M_MAX, false);
+        let nearest = opposite
             .iter()
-            .filter(|beside| !beside.same_direction && aside_m(beside) > 0.0)
+            .filter(|beside| aside_m(beside) > 0.0)
             .min_by(|a, b| aside_m(a).total_cmp(&aside_m(b)))?;
-        let ours = abreast.iter().filter(|beside| {
-            beside.same_direction && aside_m(beside) > 0.0 && aside_m(beside) < aside_m(nearest)
-        });
+        // No farther than the opposing lane; a little more, because one lane may stand for another beside it.
+        let same = self.abreast_towards(lane, station_m, aside_m(nearest) + FOLLOWS_M, true);
+        let ours = same.iter().filter(|beside| aside_m(beside) > 0.0 && aside_m(beside) < aside_m(nearest));
         let edge_m = ours
             .map(|beside| aside_m(beside) + beside.width_m / 2.0)
             .fold(own.width_at(station_m) / 2.0, f64::max);

@@ -49,11 +49,10 @@ impl Headings {
         Headings { first_rad, turn_rad_max: turns_rad.fold(0.0, f64::max) }
     }
 
-    /// Whether a place of the line may have a heading within an angle of this one, or of its reverse.
+    /// Whether a place of the line may have a heading within an angle of this one.
     fn may_be_parallel(&self, heading_rad: f64, within_rad: f64) -> bool {
         let turn_rad = wrap_angle(self.first_rad - heading_rad).abs();
-        let off_rad = turn_rad.min(core::f64::consts::PI - turn_rad);
-        off_rad <= within_rad + self.turn_rad_max + SLACK_RAD
+        turn_rad <= within_rad + self.turn_rad_max + SLACK_RAD
     }
 }
 
@@ -105,29 +104,29 @@ impl LaneGrid {
         }
     }
 
-    /// The nearest point of each lane that may have a point within `ahead_m` before or behind a pose and
-    /// `reach_m` beside it, and be parallel there within an angle, by rising index. A few lanes farther away, or not
-    /// parallel, may be among them.
+    /// The lanes that may have a point within `ahead_m` before or behind a pose and `reach_m` beside it, with a heading
+    /// there within an angle of the given one, by rising index. A few lanes farther away, or with other headings, may be
+    /// among them.
     pub fn beside(
         &self,
-        lanes: &[Lane],
         pose: &Pose,
-        within_rad: f64,
+        (heading_rad, within_rad): (f64, f64),
         ahead_m: f64,
         reach_m: f64,
-    ) -> Vec<(LaneIndex, Projection)> {
+    ) -> impl Iterator<Item = LaneIndex> {
         let forward = pose.forward();
         let left = Vec2::new(-forward.y, forward.x);
-        let may_be = |&Bounds { least, most }: &Bounds| {
-            let (middle, half) = ((least + most) / 2.0 - pose.position, (most - least) / 2.0);
+        let position = pose.position;
+        let may_be = move |&Bounds { least, most }: &Bounds| {
+            let (middle, half) = ((least + most) / 2.0 - position, (most - least) / 2.0);
             let within =
                 |axis: &Vec2, reach_m: f64| axis.dot(&middle).abs() <= reach_m + axis.abs().dot(&half);
             within(&forward, ahead_m + SLACK_M) && within(&left, reach_m + SLACK_M)
         };
-        let candidates = (0..lanes.len()).filter(|index| {
-            may_be(&self.boxes[*index]) && self.headings[*index].may_be_parallel(pose.heading_rad, within_rad)
+        let candidates = (0..self.boxes.len()).filter(move |index| {
+            may_be(&self.boxes[*index]) && self.headings[*index].may_be_parallel(heading_rad, within_rad)
         });
-        candidates.map(|index| (LaneIndex(index), lanes[index].centre.project(pose.position))).collect()
+        candidates.map(LaneIndex)
     }
 
     /// The nearest point of each lane whose centre comes within `reach_m` and half a lane width of a

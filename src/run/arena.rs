@@ -15,7 +15,7 @@ use crate::mdp::ProcKind;
 use crate::model::{Road, RulesInForce, Space};
 use crate::oracle::AvoidabilitySettings;
 use crate::rng;
-use crate::rng::Stream;
+use crate::rng::{Rng, Stream};
 use crate::sim::{Scene, Start, TrafficProfile};
 use crate::syntax::listed;
 
@@ -127,17 +127,48 @@ pub fn road_named(space: &Space, name: &str) -> Result<usize, RunError> {
     })
 }
 
-/// Lets an agent choose among the offers of the moment. With nothing legal, the step passes.
-pub(crate) fn choose(agent: &mut dyn Agent, moment: &Moment) -> Choice {
-    let offers = offers(agent, moment);
-    let legal = legal(&offers);
-    carry_out(offers, legal.view(), agent, moment)
+/// Lets an agent choose among the offers of the moment. With nothing legal, the step passes. Beside the choice come the
+/// legal rows, shape `(rows,)`: all of them for an agent that does not look at them.
+pub(crate) fn choose(agent: &mut dyn Agent, moment: &Moment) -> (Choice, Array1<bool>) {
+    if agent.looks_at_mask() {
+        let offers = offers(agent, moment);
+        let legal = legal(&offers);
+        return (carry_out(offers, legal.view(), agent, moment), legal);
+    }
+    let situation = situation(agent, moment);
+    let table = moment.setup().table;
+    let offer = |row| table.offer(&situation, row);
+    let all = Array1::from_elem(table.rows().len(), true);
+    if !(0..all.len()).any(|row| matches!(offer(row), Offer::Legal(_))) {
+        return (Choice::Pass, all);
+    }
+    let mut rng = exploration(moment);
+    let chosen = agent.choose(moment.observation, all.view(), &mut rng);
+    (chosen.map_or(Choice::Pass, |row| taken(row, offer(row))), all)
 }
 
-/// What each row would do now, with values drawn from the agent's seed if it gives one.
+/// What each row would do now.
 pub(crate) fn offers(agent: &mut dyn Agent, moment: &Moment) -> Vec<Offer> {
+    moment.setup().table.offers(&situation(agent, moment))
+}
+
+/// The situation of the moment, with values drawn from the agent's seed if it gives one.
+fn situation<'a>(agent: &mut dyn Agent, moment: &Moment<'a>) -> Situation<'a> {
     let seed = agent.draw_seed(moment.step).unwrap_or(moment.situation.seed);
-    moment.setup().table.offers(&Situation { seed, ..*moment.situation })
+    Situation { seed, ..*moment.situation }
+}
+
+/// The agent's own randomness in this step.
+fn exploration(moment: &Moment) -> Rng {
+    rng::stream(moment.situation.seed, Stream::Exploration, moment.step as u64)
+}
+
+/// The choice of an offered row.
+fn taken(row: usize, offer: Offer) -> Choice {
+    match offer {
+        Offer::Legal(draw) => Choice::Act(draw),
+        Offer::Refused(refusal) => Choice::Refused { row, rule: refusal.rule, reason: refusal.reason },
+    }
 }
 
 /// Which of the offers are legal, shape `(rows,)`.
@@ -155,15 +186,9 @@ pub(crate) fn carry_out(
     if !legal.iter().any(|&is_legal| is_legal) {
         return Choice::Pass;
     }
-    let mut rng = rng::stream(moment.situation.seed, Stream::Exploration, moment.step as u64);
     let branch = Lookahead { offers: &offers, moment };
-    let Some(row) = agent.choose_ahead(moment.observation, legal, &branch, &mut rng) else {
-        return Choice::Pass;
-    };
-    match offers.swap_remove(row) {
-        Offer::Legal(draw) => Choice::Act(draw),
-        Offer::Refused(refusal) => Choice::Refused { row, rule: refusal.rule, reason: refusal.reason },
-    }
+    let row = agent.choose_ahead(moment.observation, legal, &branch, &mut exploration(moment));
+    row.map_or(Choice::Pass, |row| taken(row, offers.swap_remove(row)))
 }
 
 /// Carries offers out in copies of the moment's world, and judges the collisions as in an episode.

@@ -71,7 +71,9 @@ pub(super) fn in_words(rule: Option<&str>, reason: &str) -> String {
 
 /// A reason with `…` for each number.
 pub(super) fn without_figures(reason: &str) -> String {
-    let is_figure = |word: &str| word.parse::<f64>().is_ok();
+    // Nearly all words are none, and telling so by their first letter is cheaper than reading them as numbers.
+    let may_be = |letter: char| letter.is_ascii_digit() || "+-.iInN".contains(letter);
+    let is_figure = |word: &str| word.starts_with(may_be) && word.parse::<f64>().is_ok();
     let shown = reason.split(' ').map(|word| {
         let bare = word.trim_end_matches([',', ';']);
         if is_figure(bare) { word.replace(bare, "…") } else { word.to_owned() }

@@ -93,7 +93,7 @@ impl Run {
     pub fn episode(&self, number: usize) -> EpisodeLog {
         let mut agent = (self.agent)();
         agent.begin();
-        self.play(number, &mut |moment| choose(agent.as_mut(), moment), &mut |_, _, _| {})
+        self.play(number, &mut |moment| choose(agent.as_mut(), moment).0, &mut |_, _, _| {})
     }
 
     /// Plays one episode and judges its collisions.

@@ -105,8 +105,6 @@ impl<'a> Stage<'a> {
 
     /// Judges the collisions of its log, by playing it again.
     pub fn judge(&self, ads: &Selected, log: &EpisodeLog) -> Vec<Judgement> {
-        oracle::judge(log, &self.avoidability, &mut |watch| {
-            self.play(ads, watch);
-        })
+        oracle::judge(&self.setup(ads), &Script::of_scenario(self.scenario), log, &self.avoidability)
     }
 }

@@ -1,7 +1,6 @@
 //! An episode's result: its collisions, each with its verdict and the facts behind it.
 
 use crate::ads::{ModularConfig, Module};
-use crate::episode;
 use crate::episode::{Collision, EpisodeLog, Script, Setup};
 use crate::mdp::Criticality;
 use crate::model::{OutcomeFacts, Space};
@@ -67,10 +66,7 @@ impl EpisodeSummary {
         log: &EpisodeLog,
         settings: &AvoidabilitySettings,
     ) -> EpisodeSummary {
-        let script = Script::of_log(log);
-        let judgements = oracle::judge(log, settings, &mut |watch| {
-            episode::run(setup, &mut |moment| script.choose(setup.table, moment), watch);
-        });
+        let judgements = oracle::judge(setup, &Script::of_log(log), log, settings);
         let summary = EpisodeSummary::new(setup.table.space(), number, log, judgements);
         EpisodeSummary { avoidability: settings.clone(), ..summary }
     }

@@ -1,13 +1,15 @@
-//! The world of one episode, and what a tick does to it. `world/playback` moves it by a recording.
+//! The world of one episode, and what a tick does to it. `world/playback` moves it by a recording, `world/survey`
+//! answers what drawing asks.
 
 mod playback;
+mod survey;
 
 use std::sync::Arc;
 
-use crate::action::{Effect, LaneChangeRules, SpawnFacts, SpawnRequest, Surroundings};
+use crate::action::{Effect, LaneChangeRules, SpawnRequest};
 use crate::geometry::{Frame, OrientedBox, Sweep, Vec2};
 use crate::model::vocabulary::{Level, TimeOfDay};
-use crate::model::{MomentFacts, NpcFacts, TICK_MS};
+use crate::model::{NpcFacts, TICK_MS};
 use crate::road::{RouteLaneChange, is_apart};
 
 use super::ambient::{Ambient, RENEWAL_TICKS, is_gone};
@@ -18,6 +20,7 @@ use super::environment::Environment;
 use super::incident::{Bump, Incident, bump, impact};
 use super::moment::npc_facts;
 use super::placement;
+use super::placement::Arrivals;
 use super::right_of_way::PassedLight;
 use super::road_user::{Motion, Moved, Obstacle, RoadUser};
 use super::scene::Scene;
@@ -422,7 +425,7 @@ impl World {
 
     fn spawn(&mut self, request: &SpawnRequest) -> Result<u32, String> {
         let leave = self.make_room(request)?;
-        let placed = placement::place(&self.around([&self.users, &[]]), request, self.next_id)?;
+        let placed = placement::place(&self.alone(), &Arrivals::default(), request, self.next_id)?;
         for index in leave.into_iter().rev() {
             self.users.remove(index);
         }
@@ -573,24 +576,6 @@ impl World {
             .iter()
             .filter(|line| passed.contains(&line.station_m) && self.signal(line.signal) == SignalColour::Red)
             .count() as u32;
-    }
-}
-
-impl Surroundings for World {
-    fn survey(&self, request: &SpawnRequest) -> Result<SpawnFacts, String> {
-        let _leave = self.make_room(request)?;
-        let around = self.around([&self.users, &[]]);
-        let newcomers = placement::place(&around, request, self.next_id)?;
-        Ok(placement::facts(&around, request, &newcomers))
-    }
-
-    fn moment(&self) -> MomentFacts {
-        self.moment_facts()
-    }
-
-    fn weather_refusal(&self) -> Option<String> {
-        let left_s = self.weather_tick.saturating_sub(self.ticks) as f64 * DT_S;
-        (left_s > 0.0).then(|| format!("this traffic profile keeps the weather for {left_s} s more"))
     }
 }
 

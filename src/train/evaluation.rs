@@ -48,7 +48,7 @@ pub fn evaluate(
         let setup = arena.setup((number % arena.roads() as u64) as usize, seed);
         let mut agent = make();
         agent.begin();
-        let mut choose = |moment: &episode::Moment| choose(agent.as_mut(), moment);
+        let mut choose = |moment: &episode::Moment| choose(agent.as_mut(), moment).0;
         let log = episode::run(&setup, &mut choose, &mut |_, _, _| {});
         let settings = AvoidabilitySettings::default();
         let counted = EpisodeSummary::judged(&setup, number as usize, &log, &settings).counted() as u64;

@@ -22,8 +22,8 @@ use crate::oracle::AvoidabilitySettings;
 use crate::rng;
 use crate::rng::Stream;
 use crate::run::{
-    Arena, EpisodeSummary, Finding, Profile, RunError, RunSettings, TrafficRecord, agent_named, carry_out,
-    check_episodes, legal, offers, traffic_of, under_test,
+    Arena, EpisodeSummary, Finding, Profile, RunError, RunSettings, TrafficRecord, agent_named,
+    check_episodes, choose, legal, traffic_of, under_test,
 };
 use crate::sim::{Contact, World};
 
@@ -265,13 +265,12 @@ fn play(
     let mut snapshots = BTreeMap::new();
     let mut last = None;
     let mut closeness = Closeness::default();
-    let mut choose = |moment: &Moment| {
+    let looks_at_mask = agent.looks_at_mask();
+    let mut make_choice = |moment: &Moment| {
         if searches {
             snapshots.insert(moment.step, moment.snapshot());
         }
-        let offers = offers(agent, moment);
-        let legal = legal(&offers);
-        let choice = carry_out(offers, legal.view(), agent, moment);
+        let (choice, legal) = choose(agent, moment);
         let row = match &choice {
             Choice::Act(draw) => Some(draw.row),
             Choice::Await(action) => Some(action.row),
@@ -289,10 +288,14 @@ fn play(
         }
     };
     let mut at_last = |moment: &Moment| {
-        let legal = legal(&moment.setup().table.offers(moment.situation));
+        let table = moment.setup().table;
+        let legal = match looks_at_mask {
+            true => legal(&table.offers(moment.situation)),
+            false => Array1::from_elem(table.rows().len(), true),
+        };
         last = Some((moment.observation.clone(), legal));
     };
-    let log = episode::run_from(setup, from.cloned(), &mut choose, &mut watch, &mut at_last);
+    let log = episode::run_from(setup, from.cloned(), &mut make_choice, &mut watch, &mut at_last);
     Played { log, choices, last, snapshots, closeness }
 }
 

@@ -83,7 +83,7 @@ pub(super) fn visits(
         let setup = arena.setup((number % arena.roads() as u64) as usize, seed);
         let mut agent = record.of(policy);
         agent.begin();
-        episode::run(&setup, &mut |moment: &Moment| choose(&mut agent, moment), &mut |_, _, _| {});
+        episode::run(&setup, &mut |moment: &Moment| choose(&mut agent, moment).0, &mut |_, _, _| {});
     }
     record.visits()
 }

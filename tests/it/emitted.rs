@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
-use avastra::episode::{EpisodeLog, Outcome, Script, Watch};
+use avastra::episode::{EpisodeLog, Outcome, Script};
 use avastra::oracle::Replays;
 use avastra::run::{EpisodeSummary, Run, RunSettings, play};
 use avastra::{emit, oracle};
@@ -77,12 +77,8 @@ fn emitted_scenarios_keep_every_claim() {
         assert!(loaded.diagnostics.is_empty(), "{text}\n{:?}", loaded.diagnostics);
         let scenario = loaded.scenario.as_ref().expect("it has a scenario");
         let script = Script::of_scenario(scenario);
-        let play =
-            |watch: &mut Watch| run.play(number, &mut |moment| script.choose(run.table(), moment), watch);
-        let again = play(&mut |_, _, _| {});
-        let judgements = oracle::judge(&again, &run.settings().avoidability, &mut |watch| {
-            play(watch);
-        });
+        let again = run.play(number, &mut |moment| script.choose(run.table(), moment), &mut |_, _, _| {});
+        let judgements = oracle::judge(&run.setup(number), &script, &again, &run.settings().avoidability);
         let replays = Replays { cause: &|_| Ok(Vec::new()), spare_steps: &|_| Ok(Vec::new()) };
         for verdict in oracle::verify(run.space(), scenario, &again, &judgements, &replays) {
             assert_eq!(verdict.confirmed, Some(true), "{verdict:?}\n{text}");

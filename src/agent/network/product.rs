@@ -152,6 +152,9 @@ mod tests {
         })
     }
 
+    #[cfg(target_arch = "x86_64")]
+    type Kernel = unsafe fn(ArrayView2<f32>, ArrayView2<f32>, ArrayViewMut2<f32>);
+
     proptest! {
         #[test]
         fn every_way_gives_the_bits_of_the_naive_sum(
@@ -170,6 +173,18 @@ mod tests {
             prop_assert_eq!(&by_choice, &expected);
             prop_assert_eq!(&portable, &expected);
             prop_assert_eq!(&plain, &expected);
+            #[cfg(target_arch = "x86_64")]
+            for (has, kernel) in [
+                (std::arch::is_x86_feature_detected!("avx2"), product_avx2 as Kernel),
+                (std::arch::is_x86_feature_detected!("avx512f"), product_avx512 as Kernel),
+            ] {
+                let mut wide = Array2::zeros((m, n));
+                if has {
+                    // SAFETY: the processor has just said that it knows the instructions.
+                    unsafe { kernel(left.view(), right.t(), wide.view_mut()) };
+                    prop_assert_eq!(&wide, &expected);
+                }
+            }
         }
     }
 }

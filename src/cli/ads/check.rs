@@ -206,7 +206,7 @@ impl Checks<'_> {
         };
         let mut agent = build();
         let mut choose = |moment: &episode::Moment| {
-            if moment.step >= steps { Choice::Stop } else { choose(agent.as_mut(), moment) }
+            if moment.step >= steps { Choice::Stop } else { choose(agent.as_mut(), moment).0 }
         };
         episode::run(&setup, &mut choose, &mut |_, _, _| {})
     }

@@ -295,10 +295,8 @@ impl<'a> Solver<'a> {
             Domain::Values(values) => {
                 Choices::Values(values.iter().copied().filter(|value| holds(self, *value)).collect())
             }
-            Domain::Range(..)
-                if let Some(number) = self.set_to(local, &decided)
-                    && holds(self, Value::Number(number)) =>
-            {
+            // A number that is set to what it must equal needs no try.
+            Domain::Range(..) if let Some(number) = self.set_to(local, &decided) => {
                 Choices::Numbers(Room::of(number))
             }
             Domain::Range(low, high) => {

@@ -13,35 +13,26 @@ use crate::sim::sense::SignalColour;
 use crate::sim::way::Way;
 use crate::sim::world::DT_S;
 
-use super::commanded;
+use super::arrival::TIMING_M;
+use super::{Arrivals, commanded};
 
 /// How far beyond the asked distance a crossing may lie, m.
 const CROSSING_M: f64 = 60.0;
-/// How the ego vehicle is expected to gain speed on its way to a rendezvous, m/s²: ours, the comfort of most
-/// planners.
-const EGO_GAINS_MPS2: f64 = 1.5;
-/// Lateral acceleration with which it is expected to take bends, m/s²: ours, as above.
-const EGO_LATERAL_MPS2: f64 = 2.0;
 /// A stop line within this distance behind a newcomer counts as passed when it appears, m.
 const BEYOND_LINE_M: f64 = 30.0;
 /// How long a vehicle stands at a stop sign, s, and its braking before it, m/s². Ours, and that of the drivers' model.
 const STANDS_S: f64 = 1.0;
 const STOPS_MPS2: f64 = 2.0;
-/// Step in which a drive towards a rendezvous is timed, m.
-const TIMING_M: f64 = 1.0;
 
 pub(super) fn cross_road(
     around: &Around,
+    arrivals: &Arrivals,
     request: &SpawnRequest,
     size: &BodyParameters,
     id: u32,
 ) -> Result<Driver, String> {
     let front_m = VehicleParameters::MKZ.front_m(around.ego_station_m);
-    let side = match request.side {
-        Side::Left => "left",
-        Side::Right => "right",
-    };
-    let mut reason = format!("no crossing leg from the {side} within {CROSSING_M} m");
+    let mut reason = None;
     for conflict in &around.scene.route.conflicts {
         let distance_m = conflict.station_m - front_m;
         let from_right = conflict.angle_rad > 0.0;
@@ -50,44 +41,30 @@ pub(super) fn cross_road(
         {
             continue;
         }
-        match rendezvous(around, request, size, id, conflict, distance_m) {
+        match rendezvous(around, request, size, id, conflict, arrivals.after_s(around, distance_m)) {
             Ok(driver) => return Ok(driver),
-            Err(why) => reason = why,
+            Err(why) => reason = Some(why),
         }
     }
-    Err(reason)
+    Err(reason.unwrap_or_else(|| {
+        let side = match request.side {
+            Side::Left => "left",
+            Side::Right => "right",
+        };
+        format!("no crossing leg from the {side} within {CROSSING_M} m")
+    }))
 }
 
-/// Time until the ego vehicle's front is `distance_m` farther on, if nothing is in its way, s.
-pub(super) fn arrival_s(around: &Around, distance_m: f64) -> f64 {
-    let (map, route) = (&around.scene.map, &around.scene.route);
-    let mut station_m = VehicleParameters::MKZ.front_m(around.ego_station_m);
-    let end_m = station_m + distance_m;
-    let (mut speed_mps, mut time_s) = (around.ego.speed_mps, 0.0);
-    while station_m < end_m {
-        let step_m = TIMING_M.min(end_m - station_m);
-        let gained_mps = (speed_mps * speed_mps + 2.0 * EGO_GAINS_MPS2 * step_m).sqrt();
-        let limit_mps = map.lane(route.lane_at(station_m).lane).speed_limit_mps;
-        let curvature_per_m = route.path.curvature_at(station_m).abs().max(1e-4);
-        let next_mps = gained_mps.min(limit_mps).min((EGO_LATERAL_MPS2 / curvature_per_m).sqrt());
-        time_s += 2.0 * step_m / (speed_mps + next_mps);
-        speed_mps = next_mps;
-        station_m += step_m;
-    }
-    time_s
-}
-
-/// A driver that reaches a conflict when the ego vehicle does, if nothing is in its way.
+/// A driver that reaches a conflict after `arrival_s`, when the ego vehicle does, if nothing is in its way.
 fn rendezvous(
     around: &Around,
     request: &SpawnRequest,
     size: &BodyParameters,
     id: u32,
     conflict: &Conflict,
-    distance_m: f64,
+    arrival_s: f64,
 ) -> Result<Driver, String> {
     let map = &around.scene.map;
-    let arrival_s = arrival_s(around, distance_m);
     let needed_m = request.speed_mps * arrival_s + size.length_m;
     let mut lanes = vec![conflict.lane];
     let mut upstream_m = conflict.lane_station_m;
@@ -151,9 +128,11 @@ fn approach_m(
         let step_m = TIMING_M.min(speed_mps * left_s);
         front_m -= step_m;
         left_s -= step_m / speed_mps;
-        let lines =
-            way.stop_lines.iter().filter(|line| (front_m..front_m + step_m).contains(&line.station_m));
-        passed_lines.extend(lines.map(|line| (line.signal, left_s.max(0.0))));
+        for line in &way.stop_lines {
+            if (front_m..front_m + step_m).contains(&line.station_m) {
+                passed_lines.push((line.signal, left_s.max(0.0)));
+            }
+        }
         if way.stop_signs_m.iter().any(|line_m| (front_m..front_m + step_m).contains(line_m)) {
             left_s -= STANDS_S + speed_mps / 2.0 * (1.0 / STOPS_MPS2 + 1.0 / size.acceleration_mps2_max);
             if left_s < 0.0 {

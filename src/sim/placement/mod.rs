@@ -5,6 +5,7 @@
 //! offsets are not: they ignore the lanes). A pedestrian who walks begins at a kerb, at most 10 m from the asked
 //! place (`on_foot`). Traffic drives on the right.
 
+mod arrival;
 mod crossing;
 mod driving;
 mod lanes;
@@ -25,6 +26,8 @@ use crate::sim::sense::{RANGE_M, visible_fraction};
 use crate::sim::way::Way;
 use crate::sim::{body, safety};
 
+pub(super) use arrival::Arrivals;
+
 use crossing::cross_road;
 use driving::{drive_ahead, drive_opposite, overtake};
 use on_foot::on_foot;
@@ -43,19 +46,24 @@ pub(super) struct Newcomers {
     pub cover: Option<RoadUser>,
 }
 
-/// The road user that a request would make appear, with a new id, and its cover.
+/// The road user that a request would make appear, with a new id, and its cover. `arrivals` are those of this moment.
 ///
 /// # Errors
 /// Why it cannot, in words that complete "cannot spawn: …".
-pub(super) fn place(around: &Around, request: &SpawnRequest, id: u32) -> Result<Newcomers, String> {
+pub(super) fn place(
+    around: &Around,
+    arrivals: &Arrivals,
+    request: &SpawnRequest,
+    id: u32,
+) -> Result<Newcomers, String> {
     check(request)?;
     let size = request.own.map_or_else(|| body::parameters(request.body), |own| own.shape);
     let driver = match request.verb {
         Verb::DriveAhead => drive_ahead(around, request, &size, id)?,
         Verb::Overtake => overtake(around, request, &size, id)?,
         Verb::DriveOpposite => drive_opposite(around, request, &size, id)?,
-        Verb::CrossRoad => cross_road(around, request, &size, id)?,
-        Verb::Walk | Verb::Stand => return on_foot(around, request, size, id),
+        Verb::CrossRoad => cross_road(around, arrivals, request, &size, id)?,
+        Verb::Walk | Verb::Stand => return on_foot(around, arrivals, request, size, id),
     };
     check_way(around, &driver, &size)?;
     let moved = driver.moved(&size);

@@ -17,8 +17,7 @@ use crate::sim::pedestrian::{Walk, Walker};
 use crate::sim::road_user::{Motion, Moved, Mover, Obstacle, RoadUser};
 use crate::sim::sense::visible_fraction;
 
-use super::crossing::arrival_s;
-use super::{Newcomers, ROOM_M, ahead_m, finish};
+use super::{Arrivals, Newcomers, ROOM_M, ahead_m, finish};
 
 /// A crosswalk within this distance of the asked place is used, m. Ours.
 const CROSSWALK_M: f64 = 5.0;
@@ -44,6 +43,7 @@ struct Crossing {
 /// A pedestrian who crosses the whole road, or who stands on the route.
 pub(super) fn on_foot(
     around: &Around,
+    arrivals: &Arrivals,
     request: &SpawnRequest,
     size: BodyParameters,
     id: u32,
@@ -61,7 +61,7 @@ pub(super) fn on_foot(
         let found = crossing(around, request.side, station_m).and_then(|mut way| {
             let cover =
                 request.cover.map(|body| park(around, request, body, id + 1, &mut way)).transpose()?;
-            let asked = walk(around, request, size, id, &way)?;
+            let asked = walk(around, arrivals, request, size, id, &way)?;
             if let Some(cover) = &cover {
                 check_cover(around, &asked, cover)?;
             }
@@ -107,6 +107,7 @@ fn crossing(around: &Around, side: Side, station_m: f64) -> Result<Crossing, Str
 /// A pedestrian at the beginning of a way, if there is room.
 fn walk(
     around: &Around,
+    arrivals: &Arrivals,
     request: &SpawnRequest,
     size: BodyParameters,
     id: u32,
@@ -126,7 +127,7 @@ fn walk(
         speed_mps: request.speed_mps,
         // As in Euro NCAP's tests with an impact at half the width: it is in the middle of the ego vehicle's way when
         // that vehicle's front arrives.
-        meets_s: arrival_s(around, way.station_m - front_m) - way.from.way_m / request.speed_mps,
+        meets_s: arrivals.after_s(around, way.station_m - front_m) - way.from.way_m / request.speed_mps,
     };
     let walker = Walker::new(walk, around.tick, &mut choices(around.seed, id, 0));
     finish(around, request, Mover::new(size, Motion::Walk(walker)), id, at(from))
