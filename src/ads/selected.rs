@@ -86,6 +86,11 @@ impl Selected {
         }
     }
 
+    /// Its name for people: what one outside this program calls itself.
+    pub fn title(&self) -> String {
+        self.program().map_or_else(|| self.name().to_owned(), |program| program.attached().name())
+    }
+
     /// The driving system outside this program, if it is one.
     pub fn program(&self) -> Option<&Arc<Program>> {
         match &self.kind {

@@ -151,11 +151,16 @@ pub enum Reason {
 impl Status {
     /// Why it drives as it does now, in words.
     pub fn reason_text(&self) -> String {
-        self.reported.as_deref().map_or_else(|| self.reason.to_string(), str::to_owned)
+        self.reason.in_words(self.reported.as_deref())
     }
 }
 
 impl Reason {
+    /// The reason in the words of an external driving system, if it has any of its own.
+    pub fn in_words(self, reported: Option<&str>) -> String {
+        reported.map_or_else(|| self.to_string(), str::to_owned)
+    }
+
     /// The reason with the number of its object replaced.
     pub(super) fn renumbered(self, number: impl Fn(u32) -> u32) -> Reason {
         match self {

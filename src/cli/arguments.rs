@@ -160,6 +160,12 @@ pub struct ToyArguments {
     /// How late it is, s, if it is late.
     #[arg(long, default_value_t = 3.0)]
     pub late: f64,
+    /// The version that it says to be.
+    #[arg(long, value_name = "VERSION", default_value = "1")]
+    pub as_version: String,
+    /// Say that it may answer otherwise when asked the same again.
+    #[arg(long)]
+    pub not_deterministic: bool,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -508,6 +514,9 @@ pub struct StudyArguments {
     /// The study, for example scenarios/studies/rq1.yaml.
     #[arg(required_unless_present = "resume")]
     pub file: Option<PathBuf>,
+    /// Driving system of your own in place of the study's: a command (PROTOCOL.md), `tcp:HOST:PORT` or `unix:PATH`.
+    #[arg(long, value_name = "COMMAND")]
+    pub ads_cmd: Option<String>,
     /// Directory of the study, new or empty [default: the next free runs/NNNN].
     #[arg(long)]
     pub out: Option<PathBuf>,
@@ -515,7 +524,7 @@ pub struct StudyArguments {
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=1024))]
     pub jobs: Option<u32>,
     /// Go on with an interrupted study; its own settings hold.
-    #[arg(long, value_name = "DIR", conflicts_with_all = ["file", "out", "quick"])]
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["file", "ads_cmd", "out", "quick"])]
     pub resume: Option<PathBuf>,
     /// Cut it down to see that it works: two short trainings, few episodes. No result.
     #[arg(long)]
@@ -534,8 +543,8 @@ pub struct FilesArguments {
 
 #[derive(Debug, Args)]
 pub struct VerifyArguments {
-    /// Driving system of your own that the scenarios were made against: a command (PROTOCOL.md), `tcp:HOST:PORT` or
-    /// `unix:PATH` [default: its recorded answers].
+    /// Driving system of your own that the scenarios were made against, to be asked anew: a command (PROTOCOL.md),
+    /// `tcp:HOST:PORT` or `unix:PATH` [default: its recorded answers].
     #[arg(long, value_name = "COMMAND")]
     pub ads_cmd: Option<String>,
     /// Its profile, with an `ads` block.
@@ -563,12 +572,9 @@ pub struct ReplayArguments {
 
 #[derive(Debug, Args)]
 pub struct DiagnoseArguments {
-    /// Another profile of `modular` than the recorded one.
+    /// Another profile of `modular` than the recorded one. Only `modular` is made of modules that can be told apart.
     #[arg(long, value_name = "FILE")]
     pub ads_config: Option<PathBuf>,
-    /// Driving system of your own: a command (PROTOCOL.md), `tcp:HOST:PORT` or `unix:PATH`.
-    #[arg(long, value_name = "COMMAND")]
-    pub ads_cmd: Option<String>,
     /// Profile that says how good each module should be [default: `modular` as it comes].
     #[arg(long, value_name = "FILE", conflicts_with = "mechanisms")]
     pub baseline: Option<PathBuf>,

@@ -24,13 +24,13 @@ use super::replay::priority_text;
 /// Says which module is at fault for every file's first counted collision or, with `--mechanisms`, which share of
 /// all collisions each documented weakness causes.
 pub fn diagnose(output: &Output, arguments: &DiagnoseArguments) -> Result<(), Failure> {
-    let asked = load::asked(None, arguments.ads_config.as_deref(), arguments.ads_cmd.as_deref())?;
+    let asked = load::asked(None, arguments.ads_config.as_deref(), None)?;
     if arguments.mechanisms {
         return mechanisms(output, arguments, &asked);
     }
     let baseline = arguments.baseline.as_deref().map(load::profile).transpose()?.unwrap_or_default();
     let found =
-        each_file(output, &arguments.many, |file| explain(output, arguments, &asked, &baseline, file));
+        each_file(output, &arguments.many, None, |file| explain(output, arguments, &asked, &baseline, file))?;
     match found.done.as_slice() {
         [only] if found.is_single() => tell_one(output, only),
         several => several.iter().for_each(|found| {
@@ -145,12 +145,12 @@ fn explain(
 
 /// The share of all files' crashes that vanish without each documented weakness, and by chance.
 fn mechanisms(output: &Output, arguments: &DiagnoseArguments, asked: &Asked) -> Result<(), Failure> {
-    let found = each_file(output, &arguments.many, |file| {
+    let found = each_file(output, &arguments.many, None, |file| {
         let (table, scenario) = load::scenario(output, file)?;
         let Case { stage, ads, log, index } = Case::of(&table, &scenario, asked)?;
         let found = oracle::mechanisms(&stage.setup(&ads), &log, index).map_err(Failure::usage)?;
         Ok((file.clone(), scenario.name.clone(), found))
-    });
+    })?;
     let crashes: Vec<Mechanisms> = found.done.iter().map(|(_, _, crash)| crash.clone()).collect();
     let (shares, placebo) = (oracle::mechanism_shares(&crashes), oracle::placebo(&crashes));
     output.say(&shares_text(crashes.len(), &shares, placebo.as_ref()));

@@ -20,6 +20,9 @@ pub enum Failure {
     Refuted { claims: usize },
     #[error("{count} found", count = super::output::plural(*collisions, "counted collision"))]
     Collision { collisions: usize },
+    /// A driving system of one's own is not the one that was begun with.
+    #[error("{message}")]
+    OtherProgram { message: String },
     /// A scenario whose space means something else now. The diagnostic is on stderr already.
     #[error("what it uses does not mean what it meant")]
     Outdated,
@@ -51,6 +54,7 @@ impl Failure {
             Failure::Source { .. }
             | Failure::Unformatted { .. }
             | Failure::Outdated
+            | Failure::OtherProgram { .. }
             | Failure::NotPlayed { in_source: true, .. } => 2,
             Failure::Refuted { .. } => 3,
             Failure::Collision { .. } | Failure::Failing { .. } => 4,
@@ -63,6 +67,9 @@ impl Failure {
 
 impl From<RunError> for Failure {
     fn from(error: RunError) -> Failure {
-        Failure::usage(error)
+        match error {
+            RunError::OtherProgram { .. } => Failure::OtherProgram { message: error.to_string() },
+            _ => Failure::usage(error),
+        }
     }
 }

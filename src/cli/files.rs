@@ -2,7 +2,11 @@
 
 use std::fs::File;
 use std::io::Write;
+use std::os::unix::fs::{FileTypeExt, OpenOptionsExt};
 use std::path::{Path, PathBuf};
+
+use nix::errno::Errno;
+use nix::fcntl::OFlag;
 
 use crate::ads::external;
 use crate::episode::EpisodeLog;
@@ -47,24 +51,17 @@ pub fn write(path: &Path, text: &(impl AsRef<[u8]> + ?Sized)) -> Result<(), Fail
 
 /// Asks whether somebody reads from a named pipe: to open one that nobody reads would wait without end. As long as the
 /// result lives, the pipe has a writer.
-#[cfg(any(target_os = "linux", target_os = "macos"))]
 fn is_read(path: &Path) -> std::io::Result<Option<File>> {
-    use std::os::unix::fs::{FileTypeExt, OpenOptionsExt};
-    const O_NONBLOCK: i32 = if cfg!(target_os = "macos") { 0x4 } else { 0o4000 };
-    const ENXIO: i32 = 6;
     if !std::fs::metadata(path)?.file_type().is_fifo() {
         return Ok(None);
     }
-    let opened = File::options().write(true).custom_flags(O_NONBLOCK).open(path);
+    let opened = File::options().write(true).custom_flags(OFlag::O_NONBLOCK.bits()).open(path);
     opened.map(Some).map_err(|error| match error.raw_os_error() {
-        Some(ENXIO) => std::io::Error::other("it is a pipe, and nothing reads from it"),
+        Some(number) if number == Errno::ENXIO as i32 => {
+            std::io::Error::other("it is a pipe, and nothing reads from it")
+        }
         _ => error,
     })
-}
-
-#[cfg(not(any(target_os = "linux", target_os = "macos")))]
-fn is_read(_: &Path) -> std::io::Result<Option<File>> {
-    Ok(None)
 }
 
 /// Writes the answers of an external driving system beside the scenario of its episode; nothing for others.
@@ -104,7 +101,6 @@ mod tests {
         assert_eq!(std::fs::read_dir(scratch.path()).unwrap().count(), 3, "no partial file is left");
     }
 
-    #[cfg(target_os = "linux")]
     #[test]
     fn a_pipe_that_nobody_reads_is_refused() {
         let scratch = tempfile::tempdir().unwrap();

@@ -19,11 +19,13 @@ const STATUS: &str = "\
 Exit status:
   0    all is well
   1    wrong usage, or a file that cannot be read, used or written
-  2    mistakes in a source file; for `fmt --check`, a file is not formatted
+  2    mistakes in a source file; for `fmt --check`, a file is not formatted;
+       for `--resume`, another driving system than the one begun with
   3    a claim is refuted
   4    a counted collision (`run --fail-on-collision`), or a failing `test`
-  5    a driving system of your own failed (`ads check`, `study`,
+  5    a driving system of your own failed (`ads check`, `study`, `replay`,
        `run --fail-on-collision`)
+       Of several, the first in this order holds: 1 and 2 before 3, 4, 5.
   130  Ctrl-C; what was done is saved, and `--resume` goes on
 
 `avastra COMMAND --help` has examples. `avastra explain` lists every diagnostic,

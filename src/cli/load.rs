@@ -7,7 +7,7 @@ use std::path::{Component, Path, PathBuf};
 use std::sync::Arc;
 
 use crate::action::ActionTable;
-use crate::ads::external::{ExternalSettings, Target};
+use crate::ads::external::{Attached, ExternalSettings, Target};
 use crate::ads::{EXTERNAL, ModularConfig};
 use crate::check;
 use crate::check::{Loaded, ReadError};
@@ -206,7 +206,7 @@ pub fn profile(path: &Path) -> Result<ModularConfig, Failure> {
 pub struct UnderTest {
     pub ads: String,
     pub profile: Option<Profile>,
-    pub external: Option<ExternalSettings>,
+    pub external: Option<Attached>,
 }
 
 /// The driving system of a name, with the profile in a file; without a file, the one that it comes with, if there is
@@ -216,7 +216,8 @@ pub struct UnderTest {
 /// If the file cannot be read or is no profile, or the command is none.
 pub fn under_test(ads: &str, config: Option<&Path>, command: Option<&str>) -> Result<UnderTest, Failure> {
     if let Some(settings) = external(config, command)? {
-        return Ok(UnderTest { ads: EXTERNAL.to_owned(), profile: None, external: Some(settings) });
+        let external = Some(Attached { identity: None, settings });
+        return Ok(UnderTest { ads: EXTERNAL.to_owned(), profile: None, external });
     }
     let settings = match config {
         Some(path) => Some(profile(path)?),

@@ -15,6 +15,7 @@ mod explain;
 mod explain_policy;
 mod export_weights;
 mod files;
+mod findings;
 mod fmt;
 mod help;
 mod interrupt;

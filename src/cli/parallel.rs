@@ -2,19 +2,32 @@
 
 use std::convert::Infallible;
 use std::path::PathBuf;
+use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-use crate::run::on_threads;
+use crate::ads::external::Program;
+use crate::run::{RunError, on_threads};
 
 use super::arguments::FilesArguments;
 use super::error::Failure;
 use super::output::{Output, plural};
 use super::progress::{Pieces, Working};
 
-/// Worker threads: as many as asked for, or one for each core.
-pub fn jobs(asked: Option<u32>) -> usize {
-    let cores = || std::thread::available_parallelism().map_or(1, usize::from);
-    asked.map_or_else(cores, |jobs| jobs as usize)
+/// Worker threads: as many as asked for, or one for each core. A driving system behind a socket may serve one connection
+/// at a time, so it gets one, and otherwise must show that it serves as many.
+///
+/// # Errors
+/// If it does not.
+pub fn jobs(asked: Option<u32>, program: Option<&Arc<Program>>) -> Result<usize, Failure> {
+    let cores = || match program {
+        Some(program) if program.settings().command.is_socket() => 1,
+        _ => std::thread::available_parallelism().map_or(1, usize::from),
+    };
+    let jobs = asked.map_or_else(cores, |jobs| jobs as usize);
+    if let Some(program) = program {
+        program.reserve(jobs).map_err(|failure| RunError::External(Box::new(failure)))?;
+    }
+    Ok(jobs)
 }
 
 /// What came of each file, in the order of the files.
@@ -49,12 +62,18 @@ impl<T> PerFile<T> {
     }
 }
 
-/// Does `work` for every file on as many threads as [`jobs`] says. Of several files, it says which failed.
+/// Does `work` for every file on as many threads as [`jobs`] says, for `program` if one is to drive. Of several files, it
+/// says which failed.
+///
+/// # Errors
+/// As [`jobs`].
 pub fn each_file<T: Send>(
     output: &Output,
     many: &FilesArguments,
+    program: Option<&Arc<Program>>,
     work: impl Fn(&PathBuf) -> Result<T, Failure> + Sync,
-) -> PerFile<T> {
+) -> Result<PerFile<T>, Failure> {
+    let jobs = jobs(many.jobs, program)?;
     let numbered: Vec<(usize, &PathBuf)> = many.files.iter().enumerate().collect();
     let mut results = Vec::new();
     let (single, several) = match many.files.as_slice() {
@@ -64,7 +83,7 @@ pub fn each_file<T: Send>(
     let work = |&(number, file): &(usize, &PathBuf), tell: &mut dyn FnMut(_) -> bool| {
         tell((number, work(file)));
     };
-    let Ok(()) = on_threads(&numbered, jobs(many.jobs), &AtomicBool::new(false), work, &mut |result| {
+    let Ok(()) = on_threads(&numbered, jobs, &AtomicBool::new(false), work, &mut |result| {
         results.push(result);
         several.iter().for_each(Pieces::one);
         Ok::<_, Infallible>(())
@@ -83,7 +102,7 @@ pub fn each_file<T: Send>(
             }
         }
     }
-    all
+    Ok(all)
 }
 
 #[cfg(test)]
@@ -96,10 +115,11 @@ mod tests {
         let output = Output::of(Format::Json);
         let files = (0..50).map(|number| PathBuf::from(number.to_string())).collect();
         let many = FilesArguments { files, jobs: Some(3) };
-        let names = each_file(&output, &many, |file| match file.display().to_string() {
+        let names = each_file(&output, &many, None, |file| match file.display().to_string() {
             name if name == "7" => Err(Failure::usage("not this one")),
             name => Ok(name),
-        });
+        })
+        .unwrap();
         let wanted: Vec<String> =
             (0..50).filter(|&number| number != 7).map(|number| number.to_string()).collect();
         assert_eq!(names.done, wanted);

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use crate::action::ActionTable;
 use crate::ads::Selected;
-use crate::episode::Collision;
+use crate::episode::{Collision, EpisodeLog};
 use crate::model::vocabulary::{Priority, Word};
 use crate::model::{Avoidability, Scenario, Space};
 use crate::oracle;
@@ -22,7 +22,7 @@ use super::parallel::each_file;
 pub fn replay(output: &Output, arguments: &ReplayArguments) -> Result<(), Failure> {
     let asked =
         load::asked(arguments.ads.as_deref(), arguments.ads_config.as_deref(), arguments.ads_cmd.as_deref())?;
-    let played = each_file(output, &arguments.many, |path| {
+    let played = each_file(output, &arguments.many, asked.external.as_ref(), |path| {
         let (table, scenario) = load::scenario(output, path)?;
         let (ads, is_recorded) = asked.selected_for(&scenario)?;
         if is_recorded {
@@ -34,7 +34,7 @@ pub fn replay(output: &Output, arguments: &ReplayArguments) -> Result<(), Failur
             (None, None) => ads.name().to_owned(),
         };
         play(&table, &scenario, path, (&ads, Some(name)))
-    });
+    })?;
     let tally = tell(output, &played.done);
     output.result(serde_json::json!({
         "confirmed": tally.confirmed, "refuted": tally.refuted, "untried": tally.untried,
@@ -114,17 +114,22 @@ pub struct Played {
 /// that is asked for, or else known by its recorded answers.
 ///
 /// # Errors
-/// If that driving system, or the scenario, does not exist any more as it was.
+/// If that driving system, or the scenario, does not exist any more as it was, or another one is asked for.
 pub fn play_recorded(
     table: &ActionTable,
     scenario: &Scenario,
     path: &Path,
     asked: &Asked,
 ) -> Result<Played, Failure> {
-    let ads = match asked.selected_for(scenario)? {
-        (ads, true) => ads,
-        (_, false) => run::recorded(scenario)?,
-    };
+    let (ads, is_recorded) = asked.selected_for(scenario)?;
+    if !is_recorded {
+        return Err(Failure::usage(format!(
+            "`{}` claims what happens with {}, and that is not what was given: `avastra replay` plays it with another one; \
+             without `--ads-cmd` and `--ads-config` recorded answers are verified",
+            scenario.name,
+            run::recorded_name(scenario)
+        )));
+    }
     play(table, scenario, path, (&ads, None))
 }
 
@@ -142,7 +147,21 @@ fn play(
     let severities: Vec<oracle::Severity> = log.collisions.iter().map(oracle::severity).collect();
     let priorities: Vec<&str> =
         log.collisions.iter().map(|collision| collision.contact.priority.name()).collect();
-    let claims = other.is_none().then(|| stage.verify(ads, &log));
+    let doubts = ads.program().filter(|program| program.can_start()).map_or_else(Vec::new, |program| {
+        if program.attached().is_deterministic() { Vec::new() } else { vec![program.attached().name()] }
+    });
+    let claims = other.is_none().then(|| {
+        let mut claims = stage.verify(ads, &log);
+        for claim in claims.iter_mut().filter(|claim| claim.is_refuted()) {
+            // What says that it may answer otherwise cannot refute a claim by doing so.
+            for name in &doubts {
+                claim.confirmed = None;
+                claim.found =
+                    format!("{} this time, but {name} says that it is not deterministic", claim.found);
+            }
+        }
+        claims
+    });
     let judgements = other.is_some().then(|| stage.judge(ads, &log));
     let counted =
         judgements.as_ref().map(|judgements| oracle::counted(table.space(), &log, judgements).len());
@@ -158,13 +177,18 @@ fn play(
         }
         _ => {
             let lines = log.collisions.iter().zip(&severities);
-            let lines = lines.map(|(collision, severity)| severity_text(table.space(), collision, severity));
-            lines.collect::<Vec<_>>().join("\n")
+            let lines =
+                lines.map(|(collision, severity)| severity_text(table.space(), &log, collision, severity));
+            let failure =
+                log.failure.as_ref().map(|failure| format!("  it ends with {}", failure.in_words()));
+            lines.chain(failure).collect::<Vec<_>>().join("\n")
         }
     };
     let result = serde_json::json!({
         "file": path, "scenario": scenario.name, "ads": other.as_deref().unwrap_or(ads.name()),
         "claims": claims, "end": log.end.name(), "collisions": log.collisions.len(), "counted": counted, "judgements": judgements,
+        "reproducible": doubts.is_empty(), "failure": log.failure.as_ref().map(|failure| failure.in_words()),
+        "held": log.held.iter().map(|held| serde_json::json!({ "from_s": held.from_s, "by": held.text() })).collect::<Vec<_>>(),
         "severities": severities, "priorities": priorities, "criticality": criticality, "pet_s": pet_s,
     });
     let has_ads_failed = other.is_some() && log.failure.is_some();
@@ -172,9 +196,16 @@ fn play(
 }
 
 /// How hard a collision was, in a line.
-fn severity_text(space: &Space, collision: &Collision, severity: &oracle::Severity) -> String {
+fn severity_text(
+    space: &Space,
+    log: &EpisodeLog,
+    collision: &Collision,
+    severity: &oracle::Severity,
+) -> String {
+    let held = log.held_at(collision.contact.time_s);
+    let held = held.map_or_else(String::new, |held| format!("; its speed was held by: {}", held.text()));
     format!(
-        "  {} npc#{} ({}) hit at {:.2} s by the ego vehicle's {}: closing at {:.1} m/s, delta-v {:.1} m/s, the other's {:.1} m/s; {}",
+        "  {} npc#{} ({}) hit at {:.2} s by the ego vehicle's {}: closing at {:.1} m/s, delta-v {:.1} m/s, the other's {:.1} m/s; {}{held}",
         space.body_name(collision.body),
         collision.contact.obstacle,
         severity.approach,

@@ -10,12 +10,12 @@ use crate::emit;
 use crate::episode::EpisodeLog;
 use crate::model::{Policy, Space, digest};
 use crate::run::{
-    EpisodeSummary, FailureCount, Group, PolicyReference, RefusalCount, Run, RunSettings, Totals,
-    TrafficRecord, play,
+    EpisodeSummary, Group, PolicyReference, RefusalCount, Run, RunSettings, Totals, TrafficRecord, play,
 };
 
 use super::arguments::{FaceArgument, RunArguments};
 use super::error::Failure;
+use super::findings::{doubts, failures_text};
 use super::interrupt::stop_on_interrupt;
 use super::load::UnderTest;
 use super::never::Never;
@@ -49,8 +49,9 @@ pub fn run(output: &Output, arguments: &RunArguments) -> Result<(), Failure> {
     let stop = stop_on_interrupt();
     #[allow(clippy::disallowed_methods, reason = "this is cli, and the time goes nowhere but the summary")]
     let started = Instant::now();
+    let jobs = jobs(arguments.jobs, run.program())?;
     let mut progress = Progress::new(output, run.episodes() as u64, done.len() as u64);
-    play(&run, &todo, jobs(arguments.jobs), &stop, &mut |summary, log| {
+    play(&run, &todo, jobs, &stop, &mut |summary, log| {
         keep(&run, &mut directory, &summary, &log)?;
         progress.episode(summary.counted());
         Ok::<_, Failure>(())
@@ -77,9 +78,12 @@ pub fn run(output: &Output, arguments: &RunArguments) -> Result<(), Failure> {
         let place = format!("; each is in {}/failures", directory.path.display());
         output.say(&failures_text(&failures, &place));
     }
-    output.result(
-        serde_json::json!({ "directory": directory.path, "totals": totals, "refusals": refusals, "groups": groups, "never": never, "critical": critical, "failures": failures }),
-    );
+    let doubts = doubts(run.program());
+    doubts.iter().for_each(|doubt| output.warn(doubt));
+    output.result(serde_json::json!({
+        "directory": directory.path, "totals": totals, "refusals": refusals, "groups": groups, "never": never,
+        "critical": critical, "failures": failures, "reproducible": doubts.is_empty(),
+    }));
     if stop.load(Ordering::Relaxed) && (totals.episodes as usize) < run.episodes() {
         return Err(Failure::Interrupted { command: "run", directory: directory.path });
     }
@@ -138,7 +142,8 @@ fn begun(output: &Output, arguments: &RunArguments) -> Result<(Run, RunDirectory
         }
         _ => None,
     };
-    let settings = RunSettings { space, policy: reference, ..run.settings().clone() };
+    let external = run.attached().map(|attached| run_directory::to_record(path, attached)).transpose()?;
+    let settings = RunSettings { space, policy: reference, external, ..run.settings().clone() };
     let text = run_directory::write_settings(path, "run", &settings)?;
     Ok((run, RunDirectory::open(held, &text)?))
 }
@@ -152,6 +157,8 @@ pub fn roads_or_all(named: &[String], space: &Space) -> Vec<String> {
 fn resumed(output: &Output, path: &Path) -> Result<(Run, RunDirectory), Failure> {
     let resumed: Resumed<RunSettings> = run_directory::resume(output, path, "run", "run")?;
     let Resumed { settings, text, table, held } = resumed;
+    let external = settings.external.map(|attached| run_directory::from_record(path, attached));
+    let settings = RunSettings { external, ..settings };
     let policy = match &settings.policy {
         None => None,
         Some(reference) => {
@@ -343,17 +350,6 @@ fn refusals_text(refusals: &[RefusalCount]) -> String {
     cut_short(head, refusals, line, |more| format!("and for {more} other reasons"))
 }
 
-/// Findings about an external driving system, by what is wrong and when; `place` says where they happened or stand.
-pub fn failures_text(failures: &[FailureCount], place: &str) -> String {
-    let line = |failure: &FailureCount| {
-        let FailureCount { kind, problem, times, detail, scenario, .. } = failure;
-        format!("{times} × {kind} ({problem}): {detail}; for example {scenario}")
-    };
-    let all: i64 = failures.iter().map(|failure| failure.times).sum();
-    let head = format!("\nthe driving system failed {}{place}:", plural(all as usize, "time"));
-    cut_short(head, failures, line, |more| format!("and {more} others"))
-}
-
 /// Distinct failures, each with how often it was found and a scenario that shows it.
 fn groups_text(groups: &[Group]) -> String {
     let line = |group: &Group| {
@@ -392,7 +388,7 @@ fn critical_text(directory: &Path, files: &[PathBuf]) -> String {
 }
 
 /// The head and a line for each of the first items; `rest` says how many more there are.
-fn cut_short<T>(
+pub fn cut_short<T>(
     head: String,
     items: &[T],
     line: impl Fn(&T) -> String,

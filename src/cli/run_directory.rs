@@ -9,6 +9,7 @@ use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 use crate::action::ActionTable;
+use crate::ads::external::{Attached, ExternalSettings};
 use crate::emit;
 use crate::episode::EpisodeLog;
 use crate::model::digest;
@@ -75,6 +76,23 @@ pub fn write_settings(
     let text = serde_yaml::to_string(settings).expect("settings are plain strings and numbers");
     write(&directory.join(format!("{kind}.yaml")), &text)?;
     Ok(text)
+}
+
+/// An external driving system as settings in `directory` record it: its working directory is one from there, so that the
+/// same program is started wherever the run is resumed from.
+///
+/// # Errors
+/// If one of the two folders does not exist.
+pub fn to_record(directory: &Path, attached: Attached) -> Result<Attached, Failure> {
+    let folder = attached.settings.working_directory.as_deref().unwrap_or(Path::new("."));
+    let working_directory = Some(PathBuf::from(load::relative(directory, folder)?));
+    Ok(Attached { settings: ExternalSettings { working_directory, ..attached.settings }, ..attached })
+}
+
+/// The same as it is to be started.
+pub fn from_record(directory: &Path, attached: Attached) -> Attached {
+    let working_directory = attached.settings.working_directory.map(|folder| directory.join(folder));
+    Attached { settings: ExternalSettings { working_directory, ..attached.settings }, ..attached }
 }
 
 /// What every kind of settings begins with.

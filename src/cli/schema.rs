@@ -46,6 +46,13 @@ its own fields are absent. `?` is for what may be null, `[]` for each entry of a
 /// A file that could not be dealt with.
 const FAILED: Field = f("failed[]", "object", "a file for which nothing was found: `file` and `error`");
 
+/// Whether the same command leads to the same result again.
+const REPRODUCIBLE: Field = f(
+    "reproducible",
+    "bool",
+    "false if a driving system of your own says that it is not deterministic, or missed steps",
+);
+
 /// Every command with a result.
 pub const SHAPES: &[Shape] = &[
     Shape {
@@ -153,6 +160,7 @@ pub const SHAPES: &[Shape] = &[
                 "object",
                 "what went wrong with a driving system of your own: `kind`, `problem`, `times`, `detail`, `scenario`",
             ),
+            REPRODUCIBLE,
         ],
     },
     Shape {
@@ -181,6 +189,7 @@ pub const SHAPES: &[Shape] = &[
             f("rules", "object?", "what its readable rules achieve"),
             f("evaluation", "object", "what it learned, in episodes of its own; its `failures` by kind"),
             f("failures[]", "object", "of the training, as in `run`"),
+            REPRODUCIBLE,
         ],
     },
     Shape {
@@ -230,7 +239,8 @@ pub const SHAPES: &[Shape] = &[
             f(
                 "scenarios[]",
                 "object",
-                "`file`, `scenario`, `ads`, `claims`, `end`; collisions and how hard they were",
+                "`file`, `scenario`, `ads`, `claims`, `end`, the `failure` of a driving system of your own, whether it is \
+                 `reproducible`; what its speed was `held` by, from when on; collisions and how hard they were",
             ),
             FAILED,
         ],
@@ -284,6 +294,7 @@ pub const SHAPES: &[Shape] = &[
             f("errors", "number", "scenarios that could not be played"),
             f("ads_failed", "number", "scenarios in which an external driving system failed"),
             f("accepted", "number", "scenarios that `--accept` changed"),
+            REPRODUCIBLE,
             f("scenarios[].file", "text", ""),
             f("scenarios[].scenario", "text", "its name"),
             f("scenarios[].outcome", "text", "`still fails`, `fixed`, `changed`, `ads failed`, `error`"),

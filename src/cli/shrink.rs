@@ -31,10 +31,10 @@ pub fn shrink(output: &Output, arguments: &ShrinkArguments) -> Result<(), Failur
         )));
     }
     let asked = load::asked(None, arguments.ads_config.as_deref(), arguments.ads_cmd.as_deref())?;
-    let shrunk = each_file(output, &arguments.many, |file| {
+    let shrunk = each_file(output, &arguments.many, asked.external.as_ref(), |file| {
         let path = arguments.output.clone().unwrap_or_else(|| apart(file));
         smaller(output, file, &path, &asked)
-    });
+    })?;
     let done = &shrunk.done;
     for small in done {
         output.tell(&small.in_words());

@@ -4,16 +4,18 @@ use std::path::Path;
 use std::sync::atomic::Ordering;
 use std::time::Instant;
 
+use crate::ads::external::Program;
 use crate::report;
-use crate::run::TrafficRecord;
+use crate::run::{RunError, TrafficRecord};
 use crate::study::{
-    CellRecord, Event, FailedCell, Spent, Study, StudyDatabase, StudyFile, StudyResults, StudySettings,
-    play_jobs,
+    CellRecord, Event, FailedCell, Spent, Study, StudyDatabase, StudyError, StudyFile, StudyResults,
+    StudySettings, play_jobs,
 };
 
 use super::arguments::StudyArguments;
 use super::error::Failure;
 use super::files::write;
+use super::findings::kinds_text;
 use super::interrupt::stop_on_interrupt;
 use super::output::Output;
 use super::output::plural;
@@ -28,10 +30,13 @@ pub fn study(output: &Output, arguments: &StudyArguments) -> Result<(), Failure>
         Some(path) => resumed(output, path)?,
         None => {
             let file = arguments.file.as_ref().expect("clap asks for it where there is no `--resume`");
-            let study = begun(output, file, arguments.quick)?;
+            let study = begun(output, file, arguments)?;
             let held = run_directory::create_empty(arguments.out.as_deref())?;
             let space = load::relative(&held.path, &study.table().space().path)?;
-            let settings = StudySettings { space, ..study.settings().clone() };
+            let external = study.settings().external.clone();
+            let external =
+                external.map(|attached| run_directory::to_record(&held.path, attached)).transpose()?;
+            let settings = StudySettings { space, external, ..study.settings().clone() };
             let text = run_directory::write_settings(&held.path, "study", &settings)?;
             (study, held, text)
         }
@@ -46,8 +51,12 @@ pub fn study(output: &Output, arguments: &StudyArguments) -> Result<(), Failure>
 
     let episodes = |jobs: &[_]| jobs.iter().map(|job| study.episodes(job)).sum::<u64>();
     let (all, left) = (episodes(&study.jobs()), episodes(&todo));
+    // Each job has a process, or a connection, of its own: these are only to see that they can be had.
+    let probe = study.settings().external.as_ref().map(|attached| Program::new(attached.settings.clone()));
+    let jobs = jobs(arguments.jobs, probe.as_ref())?;
+    drop(probe);
     let mut progress = Progress::new(output, all, all - left);
-    play_jobs(&study, &todo, jobs(arguments.jobs), &stop, &spent, &mut |event| match event {
+    play_jobs(&study, &todo, jobs, &stop, &spent, &mut |event| match event {
         Event::Episode { counted } => {
             progress.episode(counted);
             Ok(())
@@ -98,10 +107,10 @@ fn failed_text(directory: &Path, cells: &[FailedCell]) -> String {
     for cell in cells {
         let FailedCell { agent, road, number, trained, evaluated } = cell;
         text.push_str(&format!("\n  {agent} on {road}, number {number}:"));
-        let named = [(trained, "in training"), (evaluated, "when played")];
-        let kinds = named.iter().flat_map(|(kinds, place)| kinds.iter().map(move |kind| (kind, place)));
-        let kinds = kinds.map(|((kind, times), place)| format!(" {times} × {} {place}", kind.name()));
-        text.push_str(&kinds.collect::<Vec<_>>().join(","));
+        let places = [(trained, "in training"), (evaluated, "when played")];
+        let places = places.iter().filter(|(kinds, _)| !kinds.is_empty());
+        let places = places.map(|(kinds, place)| format!(" {} {place}", kinds_text(kinds)));
+        text.push_str(&places.collect::<Vec<_>>().join(","));
     }
     text.push_str(&format!(
         "\nwhat was played stands in {}; when the driving system is repaired (`avastra ads check`), begin the study \
@@ -112,14 +121,14 @@ fn failed_text(directory: &Path, cells: &[FailedCell]) -> String {
 }
 
 /// A new study, from its file.
-fn begun(output: &Output, path: &Path, quick: bool) -> Result<Study, Failure> {
+fn begun(output: &Output, path: &Path, arguments: &StudyArguments) -> Result<Study, Failure> {
     let refuse = |reason: String| Failure::file("use", path, reason);
     let text = load::text(path)?;
     let file = StudyFile::from_yaml(&text).map_err(refuse)?;
     let beside = |name: &str| path.parent().unwrap_or(Path::new("")).join(name);
     let table = load::table(output, &beside(&file.space))?;
     let config = file.ads_config.as_deref().map(beside);
-    let under_test = load::under_test(&file.ads, config.as_deref(), None)?;
+    let under_test = load::under_test(&file.ads, config.as_deref(), arguments.ads_cmd.as_deref())?;
     let read = |name: &str| load::read(&beside(name)).map_err(|error| error.to_string());
     let traffic = file.traffic.as_ref().map(|wanted| {
         // A name is a name; a file lies beside the study's.
@@ -131,14 +140,21 @@ fn begun(output: &Output, path: &Path, quick: bool) -> Result<Study, Failure> {
     let settings =
         StudySettings::new(file, &table, (under_test.profile, under_test.external), traffic, &read);
     let settings = settings.map_err(|error| refuse(error.to_string()))?;
-    let settings = if quick { settings.quick() } else { settings };
+    let settings = if arguments.quick { settings.quick() } else { settings };
     Study::new(table, settings).map_err(|error| refuse(error.to_string()))
 }
 
 /// The rest of an interrupted study, with the text of its settings.
 fn resumed(output: &Output, path: &Path) -> Result<(Study, Held, String), Failure> {
-    let Resumed { settings, text, table, held } = run_directory::resume(output, path, "study", "study")?;
-    Ok((Study::new(table, settings).map_err(Failure::usage)?, held, text))
+    let resumed: Resumed<StudySettings> = run_directory::resume(output, path, "study", "study")?;
+    let Resumed { settings, text, table, held } = resumed;
+    let external = settings.external.map(|attached| run_directory::from_record(path, attached));
+    let settings = StudySettings { external, ..settings };
+    let study = Study::new(table, settings).map_err(|error| match error {
+        StudyError::Agent { error: error @ RunError::OtherProgram { .. }, .. } => error.into(),
+        error => Failure::usage(error),
+    })?;
+    Ok((study, held, text))
 }
 
 fn heading(study: &Study, directory: &Path) -> String {
@@ -148,7 +164,7 @@ fn heading(study: &Study, directory: &Path) -> String {
         "{}: {} against {} on {}, {} a seed, {}, first seed {}, into {}",
         study.table().space().path.display(),
         labels.join(", "),
-        settings.ads,
+        study.ads_name(),
         settings.roads.join(", "),
         plural(settings.evaluation.episodes as usize, "episode"),
         plural(settings.evaluation.seeds as usize, "seed"),

@@ -5,8 +5,9 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use crate::action::ActionTable;
+use crate::ads::external::{Failure as AdsFailure, FailureKind};
 use crate::check::{Loaded, normal};
-use crate::model::{Scenario, code};
+use crate::model::{Claim, Scenario, code};
 use crate::oracle;
 use crate::oracle::Regression;
 use crate::run;
@@ -17,6 +18,7 @@ use crate::syntax::{Diagnostic, apply_fixes};
 use super::arguments::TestArguments;
 use super::error::Failure;
 use super::files::write;
+use super::findings::doubts;
 use super::load;
 use super::load::Emitted;
 use super::output::Output;
@@ -68,7 +70,9 @@ pub fn test(output: &Output, arguments: &TestArguments) -> Result<(), Failure> {
         write(path, &junit(&named, &cases))?;
     }
     let count = |is: &dyn Fn(&Outcome) -> bool| cases.iter().filter(|case| is(&case.outcome)).count();
-    let fails = count(&|outcome| matches!(outcome, Outcome::Played(Regression::StillFails { .. })));
+    let fails = count(&|outcome| {
+        matches!(outcome, Outcome::Played(Regression::StillFails { .. } | Regression::FailsAgain(_)))
+    });
     let fixed = count(&|outcome| matches!(outcome, Outcome::Played(Regression::Fixed)));
     let changed = count(&Outcome::is_changed);
     let ads_failed = count(&|outcome| matches!(outcome, Outcome::Played(Regression::AdsFailed(_))));
@@ -78,6 +82,8 @@ pub fn test(output: &Output, arguments: &TestArguments) -> Result<(), Failure> {
         "{}: {fails} still fail, {fixed} fixed, {changed} changed, {errors} not played",
         plural(cases.len(), "scenario")
     ));
+    let doubts = doubts(suite.asked.external.as_ref());
+    doubts.iter().for_each(|doubt| output.warn(doubt));
     if ads_failed > 0 {
         output.say(&format!("in {ads_failed} more the driving system itself failed"));
     }
@@ -90,7 +96,7 @@ pub fn test(output: &Output, arguments: &TestArguments) -> Result<(), Failure> {
         })
         .collect();
     output.result(
-        serde_json::json!({ "still_fails": fails, "fixed": fixed, "changed": changed, "errors": errors, "ads_failed": ads_failed,
+        serde_json::json!({ "still_fails": fails, "fixed": fixed, "changed": changed, "errors": errors, "ads_failed": ads_failed, "reproducible": doubts.is_empty(),
                                       "accepted": suite.accepted, "scenarios": listed }),
     );
     let failing = count(&Outcome::is_failure);
@@ -104,9 +110,12 @@ pub fn test(output: &Output, arguments: &TestArguments) -> Result<(), Failure> {
 fn suite_files(paths: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
     let mut files: Vec<PathBuf> = Vec::new();
     for path in paths {
-        let critical = path.join("critical");
+        let of_run = ["critical", "failures"].map(|folder| path.join(folder));
         let found = match path {
-            _ if critical.is_dir() => load::sources_in(&critical)?,
+            _ if of_run[0].is_dir() => {
+                let folders = of_run.iter().filter(|folder| folder.is_dir());
+                folders.map(|folder| load::sources_in(folder)).collect::<Result<Vec<_>, _>>()?.concat()
+            }
             path if path.is_dir() => load::sources_in(path)?,
             path => vec![path.clone()],
         };
@@ -213,6 +222,14 @@ impl Suite<'_> {
         let recorded = run::recorded(scenario)?;
         let (ads, _) = self.asked.selected_for(scenario)?;
         let stage = Stage::new(table, scenario)?;
+        if let Some(kind) = claimed_failure(scenario) {
+            let log = stage.play(&ads, &mut |_, _, _| {});
+            return Ok(Outcome::Played(match log.failure.as_ref().map(AdsFailure::kind) {
+                None => Regression::Fixed,
+                Some(found) if found == kind => Regression::FailsAgain(kind),
+                Some(found) => Regression::AdsFailed(found),
+            }));
+        }
         let (log, _, first) = stage.first_counted(&recorded);
         let Some(index) = first else {
             let reason = "it has no counted collision with the driving system that it was found with";
@@ -222,6 +239,15 @@ impl Suite<'_> {
         let is_allowed = self.arguments.allow_changed && found.is_other_crash();
         Ok(if is_allowed { Outcome::Allowed(found) } else { Outcome::Played(found) })
     }
+}
+
+/// How an external driving system fails at the end of a scenario, if the scenario claims so.
+fn claimed_failure(scenario: &Scenario) -> Option<FailureKind> {
+    let end = scenario.claims.iter().find_map(|claim| match claim {
+        Claim::End(end) => Some(end),
+        _ => None,
+    })?;
+    FailureKind::ALL.into_iter().find(|kind| kind.name() == end)
 }
 
 /// Whether the only mistakes of a scenario are digests, which it may accept.
@@ -234,7 +260,9 @@ impl Outcome {
     /// Whether the driving system still crashes, or is itself what fails.
     fn is_failure(&self) -> bool {
         match self {
-            Outcome::Played(Regression::StillFails { .. } | Regression::AdsFailed(_)) => true,
+            Outcome::Played(
+                Regression::StillFails { .. } | Regression::AdsFailed(_) | Regression::FailsAgain(_),
+            ) => true,
             Outcome::Played(found) => found.is_other_crash(),
             Outcome::Allowed(_) | Outcome::NotPlayed { .. } => false,
         }
@@ -260,6 +288,7 @@ impl Outcome {
             Regression::StillFails { time_s } => {
                 ("still fails", format!("the same obstacle is hit at {time_s:.2} s"))
             }
+            Regression::FailsAgain(kind) => ("still fails", format!("{} again", kind.name())),
             Regression::Fixed => ("fixed", String::new()),
             Regression::OtherCrash => ("changed", format!("another obstacle is hit{more}")),
             Regression::Struck => ("changed", format!("the same obstacle runs into the ego vehicle{more}")),

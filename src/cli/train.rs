@@ -17,13 +17,14 @@ use super::arguments::TrainArguments;
 use super::distill::rules_text;
 use super::error::Failure;
 use super::files::write;
+use super::findings::{doubts, failures_text, kinds_text};
 use super::interrupt::stop_on_interrupt;
 use super::load::UnderTest;
 use super::output::Output;
 use super::output::plural;
 use super::pack::pack_space;
 use super::progress::{TrainingProgress, Working};
-use super::run::{failures_text, roads_or_all};
+use super::run::roads_or_all;
 use super::run_directory::{Resumed, RunDirectory};
 use super::{distill, load, run_directory};
 
@@ -83,7 +84,9 @@ fn begun(output: &Output, arguments: &TrainArguments) -> Result<(Training, RunDi
         training = Training::new(load::table(output, &copy)?, training.settings().clone())?;
     }
     let space = load::relative(path, &training.table().space().path)?;
-    let settings = TrainSettings { space, ..training.settings().clone() };
+    let attached = training.arena().attached();
+    let external = attached.map(|attached| run_directory::to_record(path, attached)).transpose()?;
+    let settings = TrainSettings { space, external, ..training.settings().clone() };
     let text = run_directory::write_settings(path, "run", &settings)?;
     Ok((training, RunDirectory::open(held, &text)?))
 }
@@ -111,6 +114,8 @@ fn settings(arguments: &TrainArguments) -> Result<Settings, Failure> {
 fn resumed(output: &Output, path: &Path) -> Result<(Training, RunDirectory), Failure> {
     let resumed: Resumed<TrainSettings> = run_directory::resume(output, path, "run", "training")?;
     let Resumed { settings, text, table, held } = resumed;
+    let external = settings.external.map(|attached| run_directory::from_record(path, attached));
+    let settings = TrainSettings { external, ..settings };
     let mut directory = RunDirectory::open(held, &text)?;
     let checkpoint =
         directory.database.return_to_checkpoint().map_err(|error| Failure::file("resume", path, error))?;
@@ -130,11 +135,15 @@ fn keep(
     stop: &AtomicBool,
 ) -> Result<(), Failure> {
     let settings = training.settings();
+    let rules = [&settings.without[..], &settings.with];
+    if trained.log.failure.is_some() {
+        let episode = (&trained.log, &trained.summary);
+        directory.write_failure("train", training.table(), episode, &settings.agent, rules)?;
+    }
     // A training with an observation period of its own writes no scenario, because a replay would use the period
     // of the space.
     if trained.summary.counted() > 0 && settings.hyperparameters.observation_period_s().is_none() {
         let log = training.log_of_space(&trained.log);
-        let rules = [&settings.without[..], &settings.with];
         let episode = (&log, &trained.summary);
         directory.write_critical("train", training.table(), episode, &settings.agent, rules)?;
     }
@@ -194,14 +203,12 @@ fn finish(output: &Output, training: &Training, directory: &RunDirectory) -> Res
     }
     let failures = directory.database.failures().map_err(read)?;
     if !failures.is_empty() {
-        output.say(&failures_text(&failures, " in the training"));
+        let place = format!(" in the training; each is in {}/failures", directory.path.display());
+        output.say(&failures_text(&failures, &place));
     }
     if !evaluation.failures.is_empty() {
-        output.say("\nthe driving system failed in the episodes of what it learned:");
-        evaluation
-            .failures
-            .iter()
-            .for_each(|(kind, times)| output.say(&format!("  {times} × {}", kind.name())));
+        let kinds = kinds_text(&evaluation.failures);
+        output.say(&format!("\nthe driving system failed in the episodes of what it learned: {kinds}"));
     }
     let failed = totals.failed as usize + failed(&evaluation);
     if failed > 0 {
@@ -212,7 +219,10 @@ fn finish(output: &Output, training: &Training, directory: &RunDirectory) -> Res
             plural(totals.episodes as usize + played(settings, &evaluation), "episode"),
         ));
     }
+    let doubts = doubts(training.arena().program());
+    doubts.iter().for_each(|doubt| output.warn(doubt));
     output.result(serde_json::json!({
+        "reproducible": doubts.is_empty(),
         "directory": directory.path, "totals": totals, "policy": kept.as_ref().map(|(path, _)| path),
         "rules": rules, "simulated_h": simulated_h, "failures": failures,
         "evaluation": {
@@ -329,7 +339,7 @@ fn heading(training: &Training, directory: &Path) -> String {
         training.table().space().path.display(),
         settings.agent,
         settings.hyperparameters.preset(),
-        settings.ads,
+        training.arena().ads_name(),
         plural(settings.episodes as usize, "episode"),
         settings.roads.join(", "),
         settings.seed,

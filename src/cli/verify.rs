@@ -29,15 +29,18 @@ enum Verified {
 /// Replays scenarios, and plays the evaluations of policies again.
 pub fn verify(output: &Output, arguments: &VerifyArguments) -> Result<(), Failure> {
     let asked = load::asked(None, arguments.ads_config.as_deref(), arguments.ads_cmd.as_deref())?;
-    let verified = each_file(output, &arguments.many, |path| match load::emitted(output, path)? {
-        Emitted::Scenario(table, scenario) => {
-            replay::play_recorded(&table, &scenario, path, &asked).map(Verified::Scenario)
-        }
-        Emitted::Policy(table, policy) => {
-            let wrong = judge(&table, &policy)?;
-            Ok(Verified::Policy(path.clone(), policy, wrong))
-        }
-    });
+    let verified =
+        each_file(output, &arguments.many, asked.external.as_ref(), |path| {
+            match load::emitted(output, path)? {
+                Emitted::Scenario(table, scenario) => {
+                    replay::play_recorded(&table, &scenario, path, &asked).map(Verified::Scenario)
+                }
+                Emitted::Policy(table, policy) => {
+                    let wrong = judge(&table, &policy)?;
+                    Ok(Verified::Policy(path.clone(), policy, wrong))
+                }
+            }
+        })?;
     let (mut scenarios, mut policies, mut refuted) = (Vec::new(), Vec::new(), 0);
     for found in &verified.done {
         match found {

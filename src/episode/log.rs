@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use crate::action::Draw;
-use crate::ads::ModularConfig;
 use crate::ads::external::{Conversation, Failure, FailureKind};
+use crate::ads::{ModularConfig, Reason, Status};
 use crate::mdp::{PerceptionCounts, StateVector};
 use crate::model::vocabulary::Verb;
 use crate::model::{BodyWord, Memory};
@@ -27,6 +27,8 @@ pub struct EpisodeLog {
     /// States of the space at the start.
     pub memory: Memory,
     pub steps: Vec<StepLog>,
+    /// What held the speed of the ego vehicle back, by rising time; each holds until the next one.
+    pub held: Vec<Held>,
     pub collisions: Vec<Collision>,
     /// Contacts of obstacles with each other.
     pub incidents: Vec<Incident>,
@@ -38,6 +40,33 @@ pub struct EpisodeLog {
     pub red_runs: u32,
     /// Physics steps done.
     pub ticks: u64,
+}
+
+/// What held the speed of the ego vehicle back, by what the driving system says of itself.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Held {
+    /// From this time on, s.
+    pub from_s: f64,
+    reason: Reason,
+    /// In the words of an external driving system.
+    reported: Option<Arc<str>>,
+}
+
+impl Held {
+    /// What a driving system says at a time.
+    pub(super) fn new(from_s: f64, status: &Status) -> Held {
+        Held { from_s, reason: status.reason, reported: status.reported.clone() }
+    }
+
+    /// Whether a driving system still says so.
+    pub(super) fn still(&self, status: &Status) -> bool {
+        self.reason == status.reason && self.reported == status.reported
+    }
+
+    /// In a few words, for example `follow 3`.
+    pub fn text(&self) -> String {
+        self.reason.in_words(self.reported.as_deref())
+    }
 }
 
 /// One action of the agent and the observation period after it.
@@ -88,6 +117,12 @@ impl EpisodeLog {
     /// The states of the space after the action of a step; those at the start if there is no such step.
     pub fn memory_after(&self, step: usize) -> &Memory {
         self.steps.get(step).map_or(&self.memory, |step| &step.memory)
+    }
+
+    /// What held the speed back at a time, s; `None` before anything did.
+    pub fn held_at(&self, time_s: f64) -> Option<&Held> {
+        // Times of contacts lie within a tick, which is driven by what is said at its beginning.
+        self.held[..self.held.partition_point(|held| held.from_s <= time_s)].last()
     }
 
     /// The author's own bodies among the road users: number of the road user, index in the space.

@@ -11,7 +11,7 @@ mod script;
 mod setup;
 
 pub use facts::{at_fault, collision_facts, side, struck};
-pub use log::{Collision, End, EpisodeLog, Outcome, StepLog};
+pub use log::{Collision, End, EpisodeLog, Held, Outcome, StepLog};
 pub use run::{Choice, Moment, Snapshot, Watch, run, run_from};
 pub use script::{Script, ScriptedAction};
 pub use setup::{Setup, scene, start};

@@ -12,7 +12,7 @@ use crate::model::{BodyWord, Facts, Memory, OutcomeFacts, Trigger, WorldFacts, e
 use crate::sim::{Contact, DT_S, Incident, Sensed, Trace, World};
 
 use super::facts::collision_facts;
-use super::log::{Collision, End, EpisodeLog, Outcome, StepLog};
+use super::log::{Collision, End, EpisodeLog, Held, Outcome, StepLog};
 use super::script::ScriptedAction;
 use super::setup::Setup;
 
@@ -160,6 +160,7 @@ struct Play {
     sensed: Sensed,
     memory: Memory,
     steps: Vec<StepLog>,
+    held: Vec<Held>,
     /// The author's own bodies among the road users, by number.
     own_bodies: BTreeMap<u32, usize>,
     collisions: Vec<Collision>,
@@ -184,6 +185,7 @@ impl Play {
             sensed,
             memory: setup.memory.clone(),
             steps: Vec::new(),
+            held: Vec::new(),
             own_bodies: BTreeMap::new(),
             collisions: Vec::new(),
             incidents: Vec::new(),
@@ -323,6 +325,10 @@ impl Play {
         if self.ads.failure().is_some() {
             return None;
         }
+        let status = self.ads.status();
+        if self.held.last().is_none_or(|held| !held.still(status)) {
+            self.held.push(Held::new(self.world.time_s(), status));
+        }
         let contacts = self.world.tick(&control).to_vec();
         for &contact in &contacts {
             self.collisions.push(self.collision(contact));
@@ -413,6 +419,7 @@ impl Play {
             red_runs: self.world.red_runs(),
             ticks: self.world.ticks(),
             steps: self.steps,
+            held: self.held,
         }
     }
 }

@@ -48,7 +48,9 @@ const LOOK_BACK_S: f64 = 15.0;
 
 /// Why no cause can be found.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("`{ads}` is not made of modules that could be at fault: only `modular` is")]
+#[error(
+    "`{ads}` is not made of modules that could be at fault: only `modular` is, so `--causes` and `diagnose` are for it alone"
+)]
 pub struct NoModules {
     pub ads: String,
 }
@@ -280,7 +282,7 @@ pub(super) struct Inquiry<'a> {
 impl<'a> Inquiry<'a> {
     pub fn new(crash: &'a Crash<'a>) -> Result<Inquiry<'a>, NoModules> {
         let ads = &crash.setup.ads;
-        let profile = *ads.profile().ok_or_else(|| NoModules { ads: ads.name().to_owned() })?;
+        let profile = *ads.profile().ok_or_else(|| NoModules { ads: ads.title() })?;
         let (_, foresight) = play(crash.setup, |moment| crash.script.choose(crash.setup.table, moment));
         let collision = &crash.collision;
         let from_s = collision.spawned_s.max(collision.contact.time_s - LOOK_BACK_S);

@@ -54,6 +54,8 @@ pub enum Regression {
     NeverMet,
     /// An external driving system failed before it hit anything.
     AdsFailed(FailureKind),
+    /// The scenario ends with a failure of an external driving system, which fails in the same way.
+    FailsAgain(FailureKind),
 }
 
 impl Regression {

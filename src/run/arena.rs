@@ -7,7 +7,7 @@ use ndarray::Array1;
 
 use crate::action::{ActionTable, Offer, Situation};
 use crate::ads::Selected;
-use crate::ads::external::Attached;
+use crate::ads::external::{Attached, Program};
 use crate::agent::{Agent, Branch, Trial};
 use crate::episode;
 use crate::episode::{Choice, Moment};
@@ -76,7 +76,12 @@ impl Arena {
 
     /// The driving system: its name here, or what an external one calls itself.
     pub fn ads_name(&self) -> String {
-        self.ads.program().map_or_else(|| self.ads.name().to_owned(), |program| program.attached().name())
+        self.ads.title()
+    }
+
+    /// The external driving system, if it is one.
+    pub fn program(&self) -> Option<&Arc<Program>> {
+        self.ads.program()
     }
 
     /// What identifies an external driving system.

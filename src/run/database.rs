@@ -22,13 +22,13 @@ use crate::run::shape::Shape;
 use crate::run::summary::{EpisodeSummary, Finding};
 
 pub(crate) const LAYOUT: Layout = Layout {
-    version: 8,
+    version: 9,
     unit: "episode",
-    tables: &["episode", "step", "offer", "collision", "failure", "learning", "scenario"],
+    tables: &["episode", "step", "held", "offer", "collision", "failure", "learning", "scenario"],
     naming: Some(("offer", "reason")),
 };
 
-/// `offer` says for each row in how many steps of an episode it was legal (reason 0) or was refused for a reason; a
+/// `held` says what held the speed of the ego vehicle back, from a time until that of the next row. `offer` says for each row in how many steps of an episode it was legal (reason 0) or was refused for a reason; a
 /// training leaves it empty. `scenario` has the digest of the file that a run wrote of an episode. `learning` and `checkpoint` belong to a training (`train::record`) and stay empty in a run.
 const SCHEMA: &str = "
 CREATE TABLE episode (
@@ -53,6 +53,10 @@ CREATE TABLE failure (
   episode INTEGER PRIMARY KEY REFERENCES episode, kind TEXT NOT NULL, problem TEXT NOT NULL, stage TEXT NOT NULL,
   detail TEXT NOT NULL, exit TEXT, stderr TEXT NOT NULL
 ) STRICT;
+CREATE TABLE held (
+  episode INTEGER NOT NULL REFERENCES episode, number INTEGER NOT NULL, from_s REAL NOT NULL, text TEXT NOT NULL,
+  PRIMARY KEY (episode, number)
+) STRICT, WITHOUT ROWID;
 CREATE TABLE reason (reason INTEGER PRIMARY KEY, text TEXT NOT NULL UNIQUE) STRICT;
 CREATE TABLE offer (
   episode INTEGER NOT NULL REFERENCES episode, action_row INTEGER NOT NULL, reason INTEGER NOT NULL, steps INTEGER NOT NULL,
@@ -192,17 +196,18 @@ impl Database {
     pub fn failures(&self) -> Result<Vec<FailureCount>, DatabaseError> {
         // The bare columns of an aggregate query with `min` are those of the row that has the minimum.
         let mut statement = self.connection.prepare(
-            "SELECT kind, problem, count(*), min(failure.episode), stage, detail, road FROM failure
+            "SELECT kind, problem, count(*), min(failure.episode), stage, detail, exit, road FROM failure
              JOIN episode USING (episode) GROUP BY kind, problem ORDER BY count(*) DESC, kind, problem",
         )?;
         let counts = statement.query_map([], |row| {
-            let (episode, stage, detail, road): (i64, String, String, String) =
-                (row.get(3)?, row.get(4)?, row.get(5)?, row.get(6)?);
+            let (episode, stage, detail): (i64, String, String) = (row.get(3)?, row.get(4)?, row.get(5)?);
+            let (exit, road): (Option<String>, String) = (row.get(6)?, row.get(7)?);
+            let exit = exit.map_or_else(String::new, |exit| format!(" ({exit})"));
             Ok(FailureCount {
                 kind: row.get(0)?,
                 problem: row.get(1)?,
                 times: row.get(2)?,
-                detail: format!("at {stage}, {detail}"),
+                detail: format!("at {stage}, {detail}{exit}"),
                 scenario: format!("{road}_{episode:04}"),
             })
         })?;
@@ -379,6 +384,14 @@ pub(crate) fn add_all(
         transaction
             .prepare_cached(&format!("INSERT INTO step VALUES ({places})"))?
             .execute(rusqlite::params_from_iter(values))?;
+    }
+    for (number, held) in log.held.iter().enumerate() {
+        transaction.prepare_cached("INSERT INTO held VALUES (?, ?, ?, ?)")?.execute(params![
+            summary.episode as i64,
+            number as i64,
+            held.from_s,
+            held.text(),
+        ])?;
     }
     for finding in &summary.collisions {
         add_collision(transaction, summary.episode, finding)?;

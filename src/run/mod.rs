@@ -29,8 +29,8 @@ pub(crate) use groups::kind;
 pub use offered::{Offered, RowCount};
 pub use play::{Run, play};
 pub use profile::{
-    Asked, DEFAULT_ADS, Profile, TrafficRecord, driving_system, recorded, recorded_traffic, started,
-    trained_against,
+    Asked, DEFAULT_ADS, Profile, TrafficRecord, driving_system, recorded, recorded_name, recorded_traffic,
+    started, trained_against,
 };
 pub(crate) use profile::{traffic_of, under_test};
 pub use sealed::DatabaseError;

@@ -7,6 +7,7 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use crate::action::ActionTable;
+use crate::ads::external::{Attached, Program};
 use crate::agent::{Agent, Kind, QPolicy};
 use crate::episode;
 use crate::episode::{Choice, EpisodeLog, Moment, Watch};
@@ -62,7 +63,7 @@ impl Run {
         let arena =
             Arena::new(table, &settings.roads, ads, &settings.with, &settings.without)?.with_traffic(traffic);
         if settings.causes && !arena.has_modules() {
-            return Err(RunError::NoModules(oracle::NoModules { ads: settings.ads }));
+            return Err(RunError::NoModules(oracle::NoModules { ads: arena.ads_name() }));
         }
         Ok(Run { arena, settings, agent })
     }
@@ -82,6 +83,16 @@ impl Run {
     /// The driving system under test: its name here, or what an external one calls itself.
     pub fn ads_name(&self) -> String {
         self.arena.ads_name()
+    }
+
+    /// The external driving system under test, if it is one.
+    pub fn program(&self) -> Option<&Arc<Program>> {
+        self.arena.program()
+    }
+
+    /// What identifies an external driving system.
+    pub fn attached(&self) -> Option<Attached> {
+        self.arena.attached()
     }
 
     /// Number of episodes on all roads together.

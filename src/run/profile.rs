@@ -93,18 +93,24 @@ pub fn recorded_traffic(scenario: &Scenario) -> Result<TrafficProfile, RunError>
 }
 
 /// The driving system that the settings of a run or a training name, with their profile if they have one. An external
-/// one is started once, to see that it can be.
+/// one is started once, to see that it can be and is still the same.
 ///
 /// # Errors
 /// If there is none of that name, it has no settings, or they mean something else in this version; if an external one
-/// cannot be started.
+/// cannot be started, or has another name, version or kind of answer.
 pub(crate) fn under_test(
     ads: &str,
     profile: Option<&Profile>,
-    external: Option<&ExternalSettings>,
+    external: Option<&Attached>,
 ) -> Result<Selected, RunError> {
-    if let Some(settings) = external {
-        return started(settings).map(Selected::external);
+    if let Some(Attached { identity, settings }) = external {
+        let program = started(settings)?;
+        let found = program.attached();
+        if identity.is_some() && *identity != found.identity {
+            let begun = Attached { identity: identity.clone(), settings: settings.clone() };
+            return Err(RunError::OtherProgram { begun: begun.name(), found: found.name() });
+        }
+        return Ok(Selected::external(program));
     }
     let selected = driving_system(ads)?;
     match profile {
@@ -144,6 +150,15 @@ pub fn recorded(scenario: &Scenario) -> Result<Selected, RunError> {
         return Ok(Selected::external(Program::recorded(attached, answers)));
     }
     selected(&scenario.name, ads, origin.profile.as_deref(), origin.profile_digest.as_deref())
+}
+
+/// The name of the driving system that a scenario was made with.
+pub fn recorded_name(scenario: &Scenario) -> String {
+    let ads = scenario.origin.ads.as_deref().unwrap_or(DEFAULT_ADS);
+    attached(scenario)
+        .ok()
+        .filter(|_| ads == EXTERNAL)
+        .map_or_else(|| ads.to_owned(), |attached| attached.name())
 }
 
 /// The external driving system that a scenario names.

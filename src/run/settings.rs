@@ -1,7 +1,7 @@
 //! What a run is asked to do, as `run.yaml` keeps it, and why it cannot begin.
 
 use crate::ads;
-use crate::ads::external::{ExternalSettings, Failure, RecordError};
+use crate::ads::external::{Attached, Failure, RecordError};
 use crate::agent;
 use crate::model::Space;
 use crate::oracle;
@@ -31,9 +31,10 @@ pub struct RunSettings {
     /// Settings of the driving system; without them it has its defaults.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub profile: Option<Profile>,
-    /// How an external driving system is reached and asked.
+    /// Who an external driving system said to be, and how it is reached and asked. Its working directory is one from
+    /// the run directory.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub external: Option<ExternalSettings>,
+    pub external: Option<Attached>,
     pub agent: String,
     /// The policy that the agent follows, from the run directory, and its digest.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -143,6 +144,8 @@ pub enum RunError {
     TrafficDigest { what: String },
     #[error("{}", external_text(.0))]
     External(Box<Failure>),
+    #[error("it was begun against {begun}, and the same command now starts {found}: begin a new one")]
+    OtherProgram { begun: String, found: String },
     #[error(
         "an external driving system has no name here: give it with `--ads-cmd 'COMMAND'` or `--ads-config FILE`"
     )]

@@ -25,4 +25,4 @@ pub use job::{Event, play_jobs};
 pub use ready::Study;
 pub use record::{CellRecord, Spent};
 pub use results::{AgentResults, BaselineComparison, Rate, RoadResults, StudyResults};
-pub use settings::StudySettings;
+pub use settings::{StudyError, StudySettings};

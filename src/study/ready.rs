@@ -1,6 +1,7 @@
 //! A study that is ready to play: its jobs, their seeds, and the training and evaluations of each.
 
 use crate::action::ActionTable;
+use crate::ads::external::Attached;
 use crate::rng;
 use crate::rng::Stream;
 use crate::run::{Run, RunError, RunSettings};
@@ -23,7 +24,8 @@ impl Study {
     /// If something does not exist, is named twice, or is out of range.
     pub fn new(table: ActionTable, settings: StudySettings) -> Result<Study, StudyError> {
         check(&settings)?;
-        let study = Study { table, settings };
+        let mut study = Study { table, settings };
+        let mut attached = None;
         for job in study.jobs().iter().filter(|job| job.number == 0) {
             let agent = study.agent(job);
             let refuse = |error| StudyError::Agent { label: agent.label.clone(), error };
@@ -31,9 +33,12 @@ impl Study {
                 study.training(job).map_err(refuse)?;
             }
             for &road in &job.roads {
-                study.evaluation(job, 0, &study.settings.roads[road]).map_err(refuse)?;
+                let run = study.evaluation(job, 0, &study.settings.roads[road]).map_err(refuse)?;
+                attached = run.attached();
             }
         }
+        // The jobs, and whoever goes on with the study, must meet the same one.
+        study.settings.external = attached;
         Ok(study)
     }
 
@@ -43,6 +48,11 @@ impl Study {
 
     pub fn settings(&self) -> &StudySettings {
         &self.settings
+    }
+
+    /// The driving system under test: its name here, or what an external one calls itself.
+    pub fn ads_name(&self) -> String {
+        self.settings.external.as_ref().map_or_else(|| self.settings.ads.clone(), Attached::name)
     }
 
     /// All jobs. The first training or repetition of every agent comes before the second of any, so that an

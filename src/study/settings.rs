@@ -1,9 +1,10 @@
 //! The settings of a study in full, as `study.yaml` keeps them, and how they follow from a study file.
 
 use std::collections::BTreeSet;
+use std::path::Path;
 
 use crate::action::ActionTable;
-use crate::ads::external::ExternalSettings;
+use crate::ads::external::{Attached, ExternalSettings};
 use crate::ads::{EXTERNAL, ModularConfig};
 use crate::agent::{Kind, Settings};
 use crate::oracle::AvoidabilitySettings;
@@ -32,9 +33,9 @@ pub struct StudySettings {
     /// Settings of the driving system, if it has any.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub profile: Option<Profile>,
-    /// How an external driving system is reached and asked.
+    /// An external driving system, as in `RunSettings`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub external: Option<ExternalSettings>,
+    pub external: Option<Attached>,
     pub ambient: u32,
     /// How other vehicles drive, if not as in the default.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -91,6 +92,11 @@ pub enum StudyError {
     NotLearning { label: String, name: String, field: &'static str },
     #[error("agent `{label}`: `repeats` is for agents that do not learn, `{name}` does; say `trainings`")]
     Learning { label: String, name: String },
+    #[error(
+        "agent `{label}`: its `ads_config` names a driving system of its own (`ads`), but agents are compared against one: \
+         write it as the `ads_config` of the study, or make a study for each"
+    )]
+    AgentsOwnAds { label: String },
     #[error("agent `{label}`: {error}")]
     Agent { label: String, error: RunError },
     #[error("agent `{label}`: {reason}")]
@@ -114,7 +120,7 @@ impl StudySettings {
     pub fn new(
         file: StudyFile,
         table: &ActionTable,
-        (profile, external): (Option<Profile>, Option<ExternalSettings>),
+        (profile, external): (Option<Profile>, Option<Attached>),
         traffic: Option<TrafficRecord>,
         read: &dyn Fn(&str) -> Result<String, String>,
     ) -> Result<StudySettings, StudyError> {
@@ -200,6 +206,9 @@ fn agent_settings(
         None => None,
         given => {
             let text = settings_text(given.as_ref(), read).map_err(refuse)?;
+            if ExternalSettings::from_yaml(&text, Path::new("")).is_some_and(|block| block.is_ok()) {
+                return Err(StudyError::AgentsOwnAds { label });
+            }
             let settings = ModularConfig::from_yaml(&text).map_err(|error| refuse(error.to_string()))?;
             Some(Profile::new(&settings))
         }

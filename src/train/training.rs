@@ -9,7 +9,7 @@ use ndarray::Array1;
 
 use crate::action::ActionTable;
 use crate::ads::Ads;
-use crate::ads::external::ExternalSettings;
+use crate::ads::external::Attached;
 use crate::agent::{
     Agent, Beginning, Experience, Kind, Lesson, QPolicy, Rows, Settings, Trainable, Trajectory,
 };
@@ -45,9 +45,9 @@ pub struct TrainSettings {
     /// Settings of the driving system; without them it has its defaults.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub profile: Option<Profile>,
-    /// How an external driving system is reached and asked.
+    /// An external driving system, as in [`RunSettings`].
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub external: Option<ExternalSettings>,
+    pub external: Option<Attached>,
     pub agent: String,
     /// Episodes on all roads together.
     pub episodes: u32,

@@ -162,7 +162,6 @@ fn compile_and_run_write_the_same_files_twice() {
     }
 }
 
-#[cfg(unix)]
 #[test]
 fn what_is_no_plain_file_is_written_to_and_never_replaced() {
     let scratch = tempfile::tempdir().expect("a scratch directory");

@@ -1,5 +1,4 @@
 //! Files, names and disks that fail: each is an error that says what to do, found before anything is lost.
-#![cfg(unix)]
 
 use std::ffi::OsStr;
 use std::os::unix::ffi::OsStrExt;

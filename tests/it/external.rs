@@ -4,6 +4,7 @@
 
 use std::collections::BTreeMap;
 use std::io::{BufRead, BufReader, Write};
+use std::os::unix::fs::PermissionsExt;
 use std::os::unix::net::UnixListener;
 use std::path::Path;
 
@@ -121,7 +122,12 @@ fn a_training_and_a_study_say_that_the_driving_system_failed() {
     let (status, stdout, stderr) = outcome(&mut avastra(&train));
     assert_eq!(status, 0, "{stdout}{stderr}");
     assert!(stderr.contains("warning: the driving system failed in 17 of 17 episodes"), "{stdout}{stderr}");
-    assert!(stdout.contains("2 × ads_crash (exited)") && stdout.contains("15 × ads_crash\n"), "{stdout}");
+    assert!(
+        stdout.contains("2 × ads_crash (exited)") && stdout.contains("learned: 15 × ads_crash"),
+        "{stdout}"
+    );
+    let found = std::fs::read_dir(scratch.path().join("train/failures")).expect("they are written").count();
+    assert_eq!(found, 6, "two scenarios, their answers, and what happened");
 
     let space = root().join(SPACE).display().to_string();
     let study = serde_json::json!({
@@ -156,8 +162,8 @@ fn what_cannot_be_started_is_an_error_with_its_reason() {
     assert!(error.contains("as it was asked to"), "its standard error is shown: {error}");
     for (command, word) in [
         ("/no/such/program", "not_started"),
-        ("tcp:127.0.0.1:1", "not_started"),
-        ("unix:/no/such/socket", "not_started"),
+        ("tcp:127.0.0.1:1", "not_reached"),
+        ("unix:/no/such/socket", "not_reached"),
         ("'unclosed", "not closed"),
     ] {
         let all = ["run", SPACE, "--ads-cmd", command, "--episodes", "1"];
@@ -271,6 +277,8 @@ fn a_missed_step_is_held_on_demand() {
     let out = scratch.path().join("run");
     let (status, result, stderr) = run(&config, &out, &["--episodes", "1", "--jobs", "1"]);
     assert_eq!((status, &result["totals"]["failed"]), (0, &0.into()), "{stderr}\n{result}");
+    assert!(stderr.contains("were not answered in time"), "{stderr}");
+    assert_eq!(result["reproducible"], false, "{result}");
 }
 
 #[test]
@@ -344,4 +352,189 @@ fn the_schema_of_every_message_is_printed() {
     ];
     assert_eq!(defined, words);
     assert_eq!(schema["$defs"]["control"]["properties"]["throttle"]["maximum"], 1.0);
+}
+
+/// A program that is a shell script around a toy: what a user changes while the command stays the same.
+fn script(folder: &Path, before: &str, toy: &str) -> String {
+    let path = folder.join("planner");
+    let text = format!("#!/bin/sh\n{before}\nexec {} ads toy {toy}\n", cargo_bin("avastra").display());
+    std::fs::write(&path, text).expect("a script is written");
+    std::fs::set_permissions(&path, std::fs::Permissions::from_mode(0o755)).expect("it can be run");
+    path.display().to_string()
+}
+
+#[test]
+fn what_was_begun_against_one_program_is_not_gone_on_with_against_another() {
+    let scratch = tempfile::tempdir().expect("a scratch directory");
+    script(scratch.path(), "", "--as-version 1");
+    let config = scratch.path().join("profile.yaml");
+    // A relative command is one of the working directory, here the folder of the profile.
+    std::fs::write(&config, "ads:\n  command: ./planner\n  working_directory: .\n").unwrap();
+    let config = config.display().to_string();
+    let space = root().join(SPACE).display().to_string();
+    let out = |name: &str| scratch.path().join(name).display().to_string();
+    let study = serde_json::json!({
+        "space": space, "roads": ["corner"], "evaluation": { "episodes": 1, "seeds": 1 },
+        "agents": [{ "name": "none", "repeats": 1 }],
+    });
+    let file = out("study.yaml");
+    std::fs::write(&file, study.to_string()).unwrap();
+    let (runs, train, cell) = (out("run"), out("train"), out("study"));
+    let planner = scratch.path().join("planner").display().to_string();
+    let begun = [
+        vec!["run", SPACE, "--road", "corner", "--episodes", "1", "--ads-config", &config, "--out", &runs],
+        vec![
+            "train",
+            SPACE,
+            "--agent",
+            "av-fuzzer",
+            "--road",
+            "corner",
+            "--episodes",
+            "1",
+            "--ads-config",
+            &config,
+            "--out",
+            &train,
+        ],
+        vec!["study", &file, "--ads-cmd", &planner, "--out", &cell],
+    ];
+    for arguments in &begun {
+        let (status, stdout, stderr) = outcome(&mut avastra(arguments));
+        assert_eq!(status, 0, "{arguments:?}: {stdout}{stderr}");
+        assert!(stderr.contains("against toy 1") || stdout.contains("against toy 1"), "{stdout}{stderr}");
+    }
+    let resumed = [["run", &runs], ["train", &train], ["study", &cell]];
+    for [command, directory] in resumed {
+        // From another folder, too, the same program is started.
+        let mut again = avastra(&[command, "--resume", directory]);
+        let (status, stdout, stderr) = outcome(again.current_dir(scratch.path().join("run")));
+        assert_eq!(status, 0, "{command}: {stdout}{stderr}");
+    }
+    script(scratch.path(), "", "--as-version 2");
+    for [command, directory] in resumed {
+        let (status, stdout, stderr) = outcome(&mut avastra(&[command, "--resume", directory]));
+        assert_eq!(status, 2, "{command}: {stdout}{stderr}");
+        assert!(stderr.contains("toy 1") && stderr.contains("toy 2"), "{command}: {stderr}");
+    }
+}
+
+#[test]
+fn a_failure_is_a_regression_test_until_it_is_gone() {
+    let scratch = tempfile::tempdir().expect("a scratch directory");
+    let dies = profile(scratch.path(), &["--misbehave", "crash-in-episode"], "1", "");
+    let out = scratch.path().join("run");
+    let (_, result, stderr) = run(&dies, &out, &["--episodes", "1"]);
+    let detail = result["failures"][0]["detail"].as_str().expect("in words");
+    assert!(detail.contains("exit status 1"), "how it ended is told: {detail}{stderr}");
+    let name = result["failures"][0]["scenario"].as_str().expect("a name");
+    let file = out.join(format!("failures/{name}.ava")).display().to_string();
+    let (status, stdout, stderr) = outcome(&mut avastra(&["replay", &file]));
+    assert_eq!(status, 0, "{stdout}{stderr}");
+    assert!(stdout.contains("it ends with ads_crash (exited) at step 20"), "{stdout}");
+    let well = tempfile::tempdir().expect("a scratch directory");
+    let well = profile(well.path(), &[], "1", "");
+    let whole = out.display().to_string();
+    for (what, more, wanted, word) in [
+        (&file, &[][..], 4, "still fails"),
+        (&file, &["--ads-config", &dies], 4, "ads_crash again"),
+        (&file, &["--ads-config", &well], 0, "1 fixed"),
+        (&file, &["--ads", "idm"], 0, "1 fixed"),
+        (&whole, &["--ads-config", &well], 0, "1 fixed"),
+    ] {
+        let (status, stdout, stderr) = outcome(&mut avastra(&[&["test", what][..], more].concat()));
+        assert!(status == wanted && stdout.contains(word), "{more:?}: {status}: {stdout}{stderr}");
+    }
+    // `verify` asks what it is given, and does not fall back to recorded answers.
+    let (status, stdout, _) = outcome(&mut avastra(&["verify", &file]));
+    assert_eq!(status, 0, "{stdout}");
+    let other = tempfile::tempdir().expect("a scratch directory");
+    let other = profile(other.path(), &["--as-version", "2"], "1", "");
+    let (status, _, stderr) = outcome(&mut avastra(&["verify", &file, "--ads-config", &other]));
+    assert!(status == 1 && stderr.contains("what happens with toy 1"), "{status}: {stderr}");
+}
+
+#[test]
+fn what_is_not_deterministic_is_said_to_be_so_and_is_no_fault() {
+    let scratch = tempfile::tempdir().expect("a scratch directory");
+    let toy = ["--not-deterministic", "--misbehave", "forgetful", "--blind"];
+    let config = profile(scratch.path(), &toy, "1", "");
+    let out = scratch.path().join("run");
+    let (status, result, stderr) =
+        run(&config, &out, &["--episodes", "2", "--seed", "3", "--agent", "greedy"]);
+    assert_eq!((status, &result["totals"]["failed"]), (0, &0.into()), "{stderr}\n{result}");
+    assert_eq!(result["reproducible"], false, "{result}");
+    assert!(stderr.contains("toy 1 says that it is not deterministic"), "{stderr}");
+    let program = cargo_bin("avastra").display().to_string();
+    let check = [&["ads", "check", "--road", "corner", "--", &program, "ads", "toy"], &toy[..]].concat();
+    let (status, stdout, stderr) = outcome(&mut avastra(&check));
+    assert!(status == 0 && stdout.contains("as it says it may"), "{stdout}{stderr}");
+}
+
+#[test]
+fn a_dead_program_whose_child_holds_its_output_has_crashed() {
+    let scratch = tempfile::tempdir().expect("a scratch directory");
+    let planner = script(scratch.path(), "sleep 97 &", "--misbehave crash-in-episode");
+    let out = scratch.path().join("run").display().to_string();
+    let all = ["run", SPACE, "--road", "corner", "--episodes", "1", "--ads-cmd", &planner, "--out", &out];
+    let (status, stdout, stderr) = outcome(&mut avastra(&all));
+    assert_eq!(status, 0, "{stdout}{stderr}");
+    assert!(stdout.contains("ads_crash (exited)") && stdout.contains("exit status 1"), "{stdout}{stderr}");
+}
+
+#[test]
+fn a_socket_that_serves_one_connection_is_told_from_a_hang() {
+    let scratch = tempfile::tempdir().expect("a scratch directory");
+    let socket = scratch.path().join("ads");
+    let listener = UnixListener::bind(&socket).expect("it listens");
+    let serving = std::thread::spawn(move || {
+        let (stream, _) = listener.accept().expect("avastra connects");
+        let mut out = stream.try_clone().expect("a stream has two ends");
+        for _ in BufReader::new(stream).lines() {
+            let ready = serde_json::json!({
+                "type": "ready", "protocol": "avastra-ads/1", "name": "single", "version": "1",
+                "answer": "acceleration", "deterministic": true,
+            });
+            writeln!(out, "{ready}").ok();
+        }
+    });
+    let config = scratch.path().join("profile.yaml");
+    let text = format!("ads: {{ command: \"unix:{}\", timeouts: {{ init: 0.5 }} }}", socket.display());
+    std::fs::write(&config, text).unwrap();
+    let out = scratch.path().join("run");
+    let (status, result, stderr) = run(&config.display().to_string(), &out, &["--jobs", "2"]);
+    let error = result["error"].as_str().expect("an error");
+    assert!(status == 1 && error.contains("`--jobs 1`"), "{status}: {error}{stderr}");
+    serving.join().expect("the server is sound");
+}
+
+#[test]
+fn mistakes_in_a_profile_are_told_where_they_are() {
+    let scratch = tempfile::tempdir().expect("a scratch directory");
+    let file = scratch.path().join("profile.yaml");
+    let config = file.display().to_string();
+    for (text, word) in [
+        ("ads:\n  command: [python3\n", "line"),
+        ("ads:\n  command: { a: 1 }\n", "write one string"),
+        ("ads: planner\n", "`ads` is a block"),
+        ("ads:\n  command: a\n  speed: 1\n", "speed"),
+    ] {
+        std::fs::write(&file, text).unwrap();
+        for arguments in
+            [&["ads", "check", "--ads-config", &config][..], &["run", SPACE, "--ads-config", &config]]
+        {
+            let (status, _, stderr) = outcome(&mut avastra(arguments));
+            assert!(status == 1 && stderr.contains(word), "{text}: {status}: {stderr}");
+        }
+    }
+    let config = profile(scratch.path(), &[], "1", "");
+    let space = root().join(SPACE).display().to_string();
+    let study = serde_json::json!({ "space": space, "agents": [{ "name": "none", "ads_config": config }] });
+    let file = scratch.path().join("study.yaml");
+    std::fs::write(&file, study.to_string()).unwrap();
+    let (status, _, stderr) = outcome(&mut avastra(&["study", &file.display().to_string()]));
+    assert!(status == 1 && stderr.contains("`ads_config` of the study"), "{status}: {stderr}");
+    let causes = ["run", SPACE, "--causes", "--ads-config", &config];
+    let (status, _, stderr) = outcome(&mut avastra(&causes));
+    assert!(status == 1 && stderr.contains("`toy 1` is not made of modules"), "{status}: {stderr}");
 }

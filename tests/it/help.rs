@@ -32,7 +32,6 @@ fn examples(command: &str) -> Vec<String> {
     lines
 }
 
-#[cfg(unix)]
 #[test]
 fn the_examples_of_quick_commands_work() {
     let scratch = tempfile::tempdir().expect("a scratch directory");

@@ -193,7 +193,8 @@ impl External {
                 continue;
             }
             let again = self.answer(&mut session, &exchange.question, step)?;
-            if !again.means(&exchange.outcome) {
+            // What says that it may answer otherwise is not at fault when it does.
+            if session.identity.deterministic && !again.means(&exchange.outcome) {
                 let stage = step.map_or("reset".to_owned(), |(seq, _)| format!("step {seq}"));
                 let text = |outcome: &Outcome| serde_json::to_string(&outcome.essence()).unwrap_or_default();
                 let detail = format!(
@@ -220,7 +221,10 @@ impl External {
         };
         match session.step(question, (seq, t_us), settings.timeouts.step_s)? {
             Some(answer) => Ok(Outcome::answered(answer)),
-            None if settings.on_timeout == OnTimeout::Hold => Ok(Outcome::Missed),
+            None if settings.on_timeout == OnTimeout::Hold => {
+                self.program.miss();
+                Ok(Outcome::Missed)
+            }
             None => Err(session.too_late(seq, settings.timeouts.step_s)),
         }
     }

@@ -53,6 +53,7 @@ pub enum Problem {
     Exited,
     Closed,
     NotStarted,
+    NotReached,
     NoAnswer,
     NotJson,
     TooLong,
@@ -70,10 +71,11 @@ pub enum Problem {
 }
 
 impl Problem {
-    pub const ALL: [Problem; 17] = [
+    pub const ALL: [Problem; 18] = [
         Problem::Exited,
         Problem::Closed,
         Problem::NotStarted,
+        Problem::NotReached,
         Problem::NoAnswer,
         Problem::NotJson,
         Problem::TooLong,
@@ -92,7 +94,9 @@ impl Problem {
 
     pub fn kind(self) -> FailureKind {
         match self {
-            Problem::Exited | Problem::Closed | Problem::NotStarted => FailureKind::Crash,
+            Problem::Exited | Problem::Closed | Problem::NotStarted | Problem::NotReached => {
+                FailureKind::Crash
+            }
             Problem::NoAnswer => FailureKind::Timeout,
             Problem::NotJson
             | Problem::TooLong
@@ -115,6 +119,7 @@ impl Problem {
             Problem::Exited => "exited",
             Problem::Closed => "closed",
             Problem::NotStarted => "not_started",
+            Problem::NotReached => "not_reached",
             Problem::NoAnswer => "no_answer",
             Problem::NotJson => "not_json",
             Problem::TooLong => "too_long",
@@ -140,6 +145,9 @@ impl Problem {
             }
             Problem::NotStarted => {
                 "try the command by hand in the same folder; there is no shell, so no `~`, `*`, `|` or variables"
+            }
+            Problem::NotReached => {
+                "avastra connects and starts nothing: start the program that listens there first"
             }
             Problem::NoAnswer => {
                 "flush standard output after each line; if the program needs longer, raise `timeouts` in its profile"
@@ -169,6 +177,9 @@ impl Problem {
     }
 }
 
+/// Characters of a line of standard error that a message shows.
+const STDERR_CHARS_SHOWN: usize = 300;
+
 /// One finding about an external driving system.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Failure {
@@ -196,14 +207,23 @@ impl Failure {
 
     /// In one line, for example `ads_crash (exited) at step 37: it ended with exit status 1`.
     pub fn in_words(&self) -> String {
-        let exit = self.exit.as_ref().map_or(String::new(), |exit| format!("; it ended with {exit}"));
-        format!("{} ({}) at {}: {}{exit}", self.kind().name(), self.problem.name(), self.stage, self.detail)
+        format!("{} ({}) at {}: {}", self.kind().name(), self.problem.name(), self.stage, self.what())
     }
 
-    /// The last lines of its standard error, at most so many.
-    pub fn stderr_lines(&self, at_most: usize) -> Vec<&str> {
+    /// What happened, and how the process ended.
+    pub fn what(&self) -> String {
+        let exit = self.exit.as_ref().map_or(String::new(), |exit| format!("; it ended with {exit}"));
+        format!("{}{exit}", self.detail)
+    }
+
+    /// The last lines of its standard error, at most so many, each cut to a length that can be read.
+    pub fn stderr_lines(&self, at_most: usize) -> Vec<String> {
         let lines: Vec<&str> = self.stderr.lines().collect();
-        lines[lines.len().saturating_sub(at_most)..].to_vec()
+        let short = |line: &&str| match line.char_indices().nth(STDERR_CHARS_SHOWN) {
+            Some((end, _)) => format!("{}…", &line[..end]),
+            None => (*line).to_owned(),
+        };
+        lines[lines.len().saturating_sub(at_most)..].iter().map(short).collect()
     }
 }
 

@@ -149,7 +149,8 @@ impl Course {
         Course { guide, points: points.collect(), station_m: None }
     }
 
-    /// The point at a time; after the last it brakes to rest.
+    /// The point at a time; after the last it brakes to rest, and stands. What stands is held by the brake (see
+    /// `Pedals::acceleration_mps2`).
     fn at(&self, time_s: f64) -> CoursePoint {
         let last = self.points[self.points.len() - 1];
         let beyond_s = time_s - last.time_s;
@@ -170,6 +171,34 @@ impl Course {
             station_m: mix(a.station_m, b.station_m),
             speed_mps: mix(a.speed_mps, b.speed_mps),
             acceleration_mps2: mix(a.acceleration_mps2, b.acceleration_mps2),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ads::external::message::TrajectoryPoint;
+
+    #[test]
+    fn a_trajectory_that_ends_at_rest_is_held_there() {
+        let point = |t_us: u64, x: f64, v: f64| TrajectoryPoint { t_us, x, y: 0.0, heading: 0.0, v, a: None };
+        for points in [
+            vec![point(0, 0.0, 0.0), point(1_000_000, 0.0, 0.0)],
+            vec![point(0, 0.0, 2.0), point(1_000_000, 1.0, 0.0)],
+            vec![point(0, 0.0, 2.0), point(1_000_000, 2.0, 2.0)],
+        ] {
+            let course = Course::new(&TrajectoryMessage { seq: 0, points, internal: None });
+            let mut pedals = Pedals::new(&ModularConfig::default().control.pedals);
+            let (now, soon) = (course.at(5.0), course.at(5.0 + pedals.preview_s()));
+            let target = Target {
+                station_m: now.station_m,
+                speed_mps: now.speed_mps,
+                soon_mps2: soon.acceleration_mps2,
+            };
+            // It has stopped half a metre short: there is no creeping on.
+            let wanted_mps2 = pedals.acceleration_mps2(&target, now.station_m - 0.5, 0.0);
+            assert!(pedals_for(wanted_mps2).1 > 0.0, "the brake is on: {wanted_mps2}");
         }
     }
 }

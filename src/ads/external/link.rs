@@ -35,6 +35,8 @@ const CHUNK_BYTES: usize = 64 << 10;
 const ENDING_S: f64 = 0.5;
 /// Between SIGTERM and SIGKILL.
 const TERM_S: f64 = 2.0;
+/// So often it is looked whether a silent process still lives, ms.
+const ALIVE_MS: u16 = 100;
 
 /// The process groups that were started and not ended.
 static GROUPS: Mutex<BTreeSet<i32>> = Mutex::new(BTreeSet::new());
@@ -95,6 +97,8 @@ pub struct Link {
     /// Up to here `read` has no end of a line.
     searched: usize,
     is_closed: bool,
+    /// The process has ended, though its output is open.
+    is_orphaned: bool,
     stderr: Vec<u8>,
     /// Bytes of standard error since the episode began.
     flood_bytes: u64,
@@ -106,8 +110,13 @@ impl Link {
     /// Starts the program, or connects to it.
     ///
     /// # Errors
-    /// Why that is not possible, in words.
-    pub fn open(settings: &ExternalSettings) -> Result<Link, String> {
+    /// Why that is not possible.
+    pub fn open(settings: &ExternalSettings) -> Result<Link, Broken> {
+        let problem = if settings.command.is_socket() { Problem::NotReached } else { Problem::NotStarted };
+        Link::opened(settings).map_err(|detail| Broken { problem, detail })
+    }
+
+    fn opened(settings: &ExternalSettings) -> Result<Link, String> {
         let ends = match &settings.command {
             Target::Program(words) => start(words, settings)?,
             Target::Tcp(address) => {
@@ -140,6 +149,7 @@ impl Link {
             read: Vec::new(),
             searched: 0,
             is_closed: false,
+            is_orphaned: false,
             stderr: Vec::new(),
             flood_bytes: 0,
             is_ended: false,
@@ -169,7 +179,7 @@ impl Link {
                     return Ok(line);
                 }
             }
-            if self.is_closed {
+            if self.is_closed || self.is_orphaned {
                 return Err(self.ended());
             }
             if self.flood_bytes > STDERR_BYTES_MAX {
@@ -180,14 +190,17 @@ impl Link {
             if left.is_zero() {
                 return Err(Broken { problem: Problem::NoAnswer, detail: "no answer in time".to_owned() });
             }
-            self.wait(left);
+            if !self.wait(left) && self.exit_within(0.0).is_some() {
+                // Something that it started may hold its output open. What it wrote before it ended is read by now.
+                self.is_orphaned = true;
+            }
         }
     }
 
-    /// Waits until something can be read or written, and does so.
-    fn wait(&mut self, at_most: Duration) {
+    /// Waits for a moment until something can be read or written, and does so. `false` if nothing could.
+    fn wait(&mut self, at_most: Duration) -> bool {
         let wants_write = self.written < self.to_write.len();
-        let millis = u16::try_from(at_most.as_micros().div_ceil(1000)).unwrap_or(u16::MAX);
+        let millis = at_most.as_micros().div_ceil(1000).min(u128::from(ALIVE_MS)) as u16;
         let mut fds: Vec<PollFd> = Vec::with_capacity(3);
         let out = if wants_write { PollFlags::POLLOUT } else { PollFlags::empty() };
         match &self.ends {
@@ -201,13 +214,14 @@ impl Link {
             Ends::Unix(socket) => fds.push(PollFd::new(socket.as_fd(), PollFlags::POLLIN | out)),
         }
         // An interrupted wait is a short wait.
-        let _ = poll(&mut fds, PollTimeout::from(millis));
+        let is_ready = poll(&mut fds, PollTimeout::from(millis)).is_ok_and(|ready| ready > 0);
         drop(fds);
         if wants_write && self.write().is_err() {
             self.to_write.clear();
             self.written = 0;
         }
         self.read_all();
+        is_ready
     }
 
     fn write(&mut self) -> std::io::Result<()> {
@@ -335,9 +349,11 @@ impl Link {
         String::from_utf8_lossy(kept).into_owned()
     }
 
-    /// Says that no more comes, and waits for the process to end; then ends it. `true` if it ended by itself with
-    /// status 0; a socket always does.
-    pub fn close(&mut self, line: &str, limit_s: f64) -> bool {
+    /// Says that no more comes, and waits for the process to end; then ends it.
+    ///
+    /// # Errors
+    /// How it ended, if not by itself with status 0. A socket always ends well.
+    pub fn close(&mut self, line: &str, limit_s: f64) -> Result<(), String> {
         self.send(line);
         // What the pipe does not hold is lost; the end of the input says the same.
         match &mut self.ends {
@@ -346,7 +362,7 @@ impl Link {
             Ends::Unix(socket) => drop(socket.shutdown(std::net::Shutdown::Both)),
         }
         if !matches!(self.ends, Ends::Process { .. }) {
-            return true;
+            return Ok(());
         }
         let ended = self.exit_within(limit_s);
         if ended.is_none() {
@@ -354,7 +370,11 @@ impl Link {
             self.exit_within(TERM_S);
         }
         self.kill();
-        ended.is_some_and(|status| status == status_text(ExitStatus::from_raw(0)))
+        match ended {
+            Some(status) if status == status_text(ExitStatus::from_raw(0)) => Ok(()),
+            Some(status) => Err(format!("it ended with {status}")),
+            None => Err(format!("it did not end within {limit_s} s")),
+        }
     }
 
     /// Ends the process group at once and reaps the process.

@@ -8,7 +8,7 @@ mod driver;
 mod finding;
 mod follow;
 mod link;
-mod message;
+pub mod message;
 mod program;
 mod question;
 mod record;

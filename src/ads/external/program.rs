@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, VecDeque};
 use std::path::PathBuf;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 
 use crate::road::RoadMap;
@@ -28,6 +29,7 @@ pub struct Program {
     idle: Mutex<Vec<Session>>,
     known: Mutex<Known>,
     maps: Mutex<Vec<Arc<MapLine>>>,
+    missed: AtomicU64,
 }
 
 /// Answers by what was asked, so that an episode that is played again needs no process; the oldest go first.
@@ -79,6 +81,7 @@ impl Program {
             idle: Mutex::default(),
             known: Mutex::default(),
             maps: Mutex::default(),
+            missed: AtomicU64::new(0),
         })
     }
 
@@ -91,6 +94,29 @@ impl Program {
         let identity = session.identity.clone();
         self.give_back(session);
         Ok(identity)
+    }
+
+    /// Sees whether a socket serves as many connections at once as there are jobs; processes are started as needed.
+    ///
+    /// # Errors
+    /// Why it does not.
+    pub fn reserve(&self, jobs: usize) -> Result<(), Failure> {
+        if self.settings.command.is_socket() {
+            let missing = jobs.saturating_sub(locked(&self.idle).len());
+            let opened = (0..missing).map(|_| self.opened()).collect::<Result<Vec<_>, _>>()?;
+            locked(&self.idle).extend(opened);
+        }
+        Ok(())
+    }
+
+    /// Notes that a step was not answered in time, in mode `hold`.
+    pub(super) fn miss(&self) {
+        self.missed.fetch_add(1, Ordering::Relaxed);
+    }
+
+    /// Steps that were not answered in time, in mode `hold`, since avastra was started.
+    pub fn missed(&self) -> u64 {
+        self.missed.load(Ordering::Relaxed)
     }
 
     pub fn settings(&self) -> &ExternalSettings {
@@ -115,8 +141,18 @@ impl Program {
             return Ok(idle.swap_remove(index));
         }
         drop(idle);
-        let session = Session::open(&self.settings, &self.init)?;
-        self.identity.get_or_init(|| session.identity.clone());
+        self.opened()
+    }
+
+    /// A new process, or a new connection.
+    fn opened(&self) -> Result<Session, Failure> {
+        let mut session = Session::open(&self.settings, &self.init)?;
+        let first = self.identity.get_or_init(|| session.identity.clone());
+        if *first != session.identity {
+            let detail =
+                format!("it was {}, and now says that it is {}", first.text(), session.identity.text());
+            return Err(session.otherwise("init".to_owned(), detail));
+        }
         Ok(session)
     }
 
@@ -124,13 +160,15 @@ impl Program {
         locked(&self.idle).push(session);
     }
 
-    /// Ends all processes that no episode uses. `false` if one did not end by itself, with status 0.
-    pub fn close(&self) -> bool {
+    /// Ends all processes that no episode uses.
+    ///
+    /// # Errors
+    /// How the first that did not end by itself with status 0 ended.
+    pub fn close(&self) -> Result<(), String> {
         let idle: Vec<Session> = core::mem::take(&mut *locked(&self.idle));
         let limit_s = self.settings.timeouts.close_s;
         // Each is closed, whatever became of the ones before.
-        let stubborn = idle.into_iter().map(|session| session.close(limit_s)).filter(|ended| !ended).count();
-        stubborn == 0
+        idle.into_iter().map(|session| session.close(limit_s)).fold(Ok(()), Result::and)
     }
 
     /// Forgets all answers, so that the next episodes are asked anew.
@@ -179,7 +217,8 @@ impl Program {
 
 impl Drop for Program {
     fn drop(&mut self) {
-        self.close();
+        // How it ends is of no interest any more.
+        let _ = self.close();
     }
 }
 

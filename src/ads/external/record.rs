@@ -116,9 +116,16 @@ pub struct Attached {
 }
 
 impl Attached {
-    /// As one line, for [`Attached::from_line`].
+    /// As one line, for [`Attached::from_line`]. Where the program lay on a disk is left out: nothing is started from there.
     pub fn to_line(&self) -> String {
-        serde_json::to_string(self).expect("settings are plain data")
+        let settings = ExternalSettings { working_directory: None, ..self.settings.clone() };
+        let line = Attached { identity: self.identity.clone(), settings };
+        serde_json::to_string(&line).expect("settings are plain data")
+    }
+
+    /// Whether asking it the same again leads to the same answers, as it says itself.
+    pub fn is_deterministic(&self) -> bool {
+        self.identity.as_ref().is_none_or(|identity| identity.deterministic)
     }
 
     /// # Errors
@@ -140,7 +147,7 @@ impl Attached {
     /// Its name and version, or what was started.
     pub fn name(&self) -> String {
         match &self.identity {
-            Some(identity) => format!("{} {}", identity.name, identity.version),
+            Some(identity) => identity.text(),
             None => format!("`{}`", self.settings.command.text()),
         }
     }

@@ -26,6 +26,13 @@ pub struct Identity {
     pub deterministic: bool,
 }
 
+impl Identity {
+    /// Its name and version.
+    pub fn text(&self) -> String {
+        format!("{} {}", self.name, self.version)
+    }
+}
+
 /// A driving system that is ready.
 pub struct Session {
     link: Link,
@@ -45,7 +52,7 @@ impl Session {
     pub fn open(settings: &ExternalSettings, init: &Init) -> Result<Session, Failure> {
         let deadline = Deadline::after(settings.timeouts.init_s);
         let mut link =
-            Link::open(settings).map_err(|detail| Failure::new(Problem::NotStarted, "start", detail))?;
+            Link::open(settings).map_err(|broken| Failure::new(broken.problem, "start", broken.detail))?;
         link.send(&Question::Init(init.clone()).line());
         let line = link.line(deadline);
         let found = line.map_err(|broken| told(broken, settings.timeouts.init_s)).and_then(|line| {
@@ -54,7 +61,14 @@ impl Session {
         });
         match found {
             Ok(identity) => Ok(Session { link, identity, map: None, answered: None, missed: false }),
-            Err(broken) => Err(failed(&mut link, broken, "init")),
+            Err(mut broken) => {
+                if broken.problem == Problem::NoAnswer && settings.command.is_socket() {
+                    broken.detail.push_str(
+                        "; a program that serves one connection at a time needs `--jobs 1` and no agent that looks ahead",
+                    );
+                }
+                Err(failed(&mut link, broken, "init"))
+            }
         }
     }
 
@@ -155,8 +169,11 @@ impl Session {
         failed(&mut self.link, Broken { problem: Problem::OtherAnswer, detail }, stage)
     }
 
-    /// Says `close` and waits. `true` if it ended by itself, with status 0.
-    pub fn close(mut self, limit_s: f64) -> bool {
+    /// Says `close` and waits.
+    ///
+    /// # Errors
+    /// How it ended, if not by itself with status 0.
+    pub fn close(mut self, limit_s: f64) -> Result<(), String> {
         self.link.close(&Question::Close(Close {}).line(), limit_s)
     }
 }

@@ -90,7 +90,7 @@ pub enum Target {
 
 /// A target as a profile has it: one string, or a list of arguments.
 #[derive(Debug, Clone, Serialize, Deserialize)]
-#[serde(untagged)]
+#[serde(untagged, expecting = "write one string, or a list of strings: the program and its arguments")]
 enum Written {
     Text(String),
     List(Vec<String>),
@@ -144,6 +144,11 @@ impl Target {
         Ok(Target::Program(words))
     }
 
+    /// Whether it is connected to and not started.
+    pub fn is_socket(&self) -> bool {
+        matches!(self, Target::Tcp(_) | Target::Unix(_))
+    }
+
     /// As a person would write it.
     pub fn text(&self) -> String {
         match self {
@@ -195,6 +200,8 @@ fn words(text: &str) -> Result<Vec<String>, String> {
 pub enum ExternalError {
     #[error("{0}")]
     Yaml(String),
+    #[error("`ads` is a block: write `ads: {{ command: … }}`")]
+    NoBlock,
     #[error("`ads.{name}` is {found}; write a value from {low} to {high}, in s{more}")]
     Range { name: &'static str, found: String, low: f64, high: f64, more: &'static str },
 }
@@ -226,12 +233,18 @@ impl ExternalSettings {
     /// directory is one of `folder`, where the profile lies.
     ///
     /// # Errors
-    /// What is wrong with the block.
+    /// What is wrong with the block, or with the text as YAML.
     pub fn from_yaml(text: &str, folder: &Path) -> Option<Result<ExternalSettings, ExternalError>> {
-        let keys: serde_json::Map<String, serde_json::Value> = serde_yaml::from_str(text).ok()?;
-        keys.contains_key("ads").then(|| {
-            let profile: Profile = serde_yaml::from_str(text)
-                .map_err(|error| ExternalError::Yaml(yaml_mistake(&error, text)))?;
+        let mistake = |error| ExternalError::Yaml(yaml_mistake(&error, text));
+        let whole: serde_json::Value = match serde_yaml::from_str(text) {
+            Ok(whole) => whole,
+            Err(error) => return Some(Err(mistake(error))),
+        };
+        whole.get("ads").map(|block| {
+            if !block.is_object() {
+                return Err(ExternalError::NoBlock);
+            }
+            let profile: Profile = serde_yaml::from_str(text).map_err(mistake)?;
             let mut settings = profile.ads;
             settings.working_directory = settings.working_directory.map(|directory| folder.join(directory));
             settings.checked()

@@ -55,7 +55,6 @@ fn decoded(text: &str) -> String {
 mod tests {
     use super::*;
 
-    #[cfg(unix)]
     #[test]
     fn uris_and_paths_name_the_same() {
         let path = Path::new("/a b/\u{e4}%/space.ava");
