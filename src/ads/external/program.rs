@@ -14,8 +14,8 @@ use super::record::{Attached, Key, Outcome};
 use super::session::{Identity, Session};
 use super::settings::ExternalSettings;
 
-/// Most answers that are kept: those of some hundred episodes.
-const KNOWN_MAX: usize = 400_000;
+/// Most memory for answers that are kept, bytes: an episode of trajectories with a thousand points has some 30 MB.
+const KNOWN_BYTES_MAX: usize = 128 << 20;
 /// Most maps whose message is kept.
 const MAPS_MAX: usize = 16;
 
@@ -37,6 +37,7 @@ pub struct Program {
 struct Known {
     answers: BTreeMap<Key, Outcome>,
     order: VecDeque<Key>,
+    bytes: usize,
 }
 
 /// The message about a map.
@@ -182,13 +183,16 @@ impl Program {
 
     pub(super) fn learn(&self, key: Key, outcome: Outcome) {
         let mut known = locked(&self.known);
-        if known.answers.insert(key, outcome).is_none() {
-            known.order.push_back(key);
+        known.bytes += outcome.bytes();
+        match known.answers.insert(key, outcome) {
+            Some(before) => known.bytes -= before.bytes(),
+            None => known.order.push_back(key),
         }
-        if known.order.len() > KNOWN_MAX
+        while known.bytes > KNOWN_BYTES_MAX
             && let Some(oldest) = known.order.pop_front()
+            && let Some(gone) = known.answers.remove(&oldest)
         {
-            known.answers.remove(&oldest);
+            known.bytes -= gone.bytes();
         }
     }
 

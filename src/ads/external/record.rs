@@ -82,6 +82,19 @@ impl Outcome {
         Outcome::Answer(Arc::new(answer))
     }
 
+    /// Memory that it takes where it is kept, roughly, bytes.
+    pub fn bytes(&self) -> usize {
+        // Keys and the nodes of the maps that hold them included.
+        const FIXED: usize = 256;
+        let Outcome::Answer(answer) = self else { return FIXED };
+        let points = match answer.as_ref() {
+            Answer::Trajectory(trajectory) => size_of_val(&trajectory.points[..]),
+            _ => 0,
+        };
+        let planned = answer.internal().and_then(|internal| internal.planned.as_ref());
+        FIXED + points + planned.map_or(0, |planned| size_of_val(&planned[..]))
+    }
+
     /// Whether it means the same: what a driving system says of its inside may differ.
     pub fn means(&self, other: &Outcome) -> bool {
         self.essence() == other.essence()

@@ -11,7 +11,7 @@ use serde::Serialize;
 
 use crate::action::ActionTable;
 use crate::ads::Selected;
-use crate::ads::external::{ExternalSettings, Failure as Finding, Outcome, Program, Target};
+use crate::ads::external::{ExternalSettings, Failure as Finding, Outcome, Program, Target, odd_orders};
 use crate::agent;
 use crate::agent::Kind;
 use crate::cli::arguments::AdsCheckArguments;
@@ -22,6 +22,7 @@ use crate::cli::output::Output;
 use crate::episode;
 use crate::episode::{Choice, EpisodeLog};
 use crate::run::{Arena, choose};
+use crate::sim::World;
 
 /// The space that is driven if none is named, and its name.
 const SPACE: &str = "avastra45.ava";
@@ -33,7 +34,7 @@ const STDERR_LINES: usize = 12;
 /// What was checked.
 #[derive(Debug, Serialize)]
 struct Part {
-    /// In a word: `start`, `episode`, `reset`, `process`, `close`.
+    /// In a word: `start`, `episode`, `reset`, `process`, `orders`, `close`.
     stage: &'static str,
     passed: bool,
     /// What was found, in words.
@@ -194,6 +195,15 @@ impl Checks<'_> {
             fresh.failure.as_ref(),
         ) {
             return Ok(());
+        }
+        let setup = arena.setup(0, self.seed);
+        let sensed = World::new(Arc::clone(&setup.scene), &setup.start).sensed();
+        match odd_orders(&program, &setup.scene, &sensed, self.seed) {
+            Ok(tried) => self.pass("orders", format!("it takes {}", tried.join(", "))),
+            Err((what, failure)) => {
+                self.fail("orders", &format!("it does not take {what}"), *failure);
+                return Ok(());
+            }
         }
         let ended = program.close().and(ended);
         match ended {
