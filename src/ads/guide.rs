@@ -190,24 +190,23 @@ impl Guide {
         let Some(near_m) = near_m else { return self.beside_sample(point, self.first_near(point)) };
         let within = Stretch { first: self.index(near_m - NEAR_M), last: self.index(near_m + NEAR_M) };
         let found = self.slide(point, self.index(near_m), within);
-        self.beside_sample(point, found.unwrap_or_else(|| self.nearest(point, within)))
+        self.beside_sample(point, found.unwrap_or_else(|| self.nearest(point, within)).index)
     }
 
     /// The nearest place of the route between two stations.
     pub fn project(&self, point: Vec2, from_m: f64, to_m: f64) -> Beside {
         let within = Stretch { first: self.index(from_m), last: self.index(to_m) };
-        self.beside_sample(point, self.nearest(point, within))
+        self.beside_sample(point, self.nearest(point, within).index)
     }
 
     /// Projects a moving point: returns the first projection and a [`Tracer`] for the following ones, which
     /// returns `None` beyond `reach_m`, most often without a search.
     pub fn trace(&self, point: Vec2, from_m: f64, to_m: f64, reach_m: f64) -> (Beside, Tracer<'_>) {
         let within = Stretch { first: self.index(from_m), last: self.index(to_m) };
-        let index = self.nearest(point, within);
-        let distance_m = (point - self.samples[index].position).norm();
+        let nearest = self.nearest(point, within);
         let reach_m = reach_m + SPACING_M;
-        let tracer = Tracer { guide: self, within, reach_m, point, index, distance_m };
-        (self.beside_sample(point, index), tracer)
+        let tracer = Tracer { guide: self, within, reach_m, point, nearest };
+        (self.beside_sample(point, nearest.index), tracer)
     }
 
     fn beside_sample(&self, point: Vec2, index: usize) -> Beside {
@@ -229,39 +228,39 @@ impl Guide {
     fn first_near(&self, point: Vec2) -> usize {
         let whole = Stretch { first: 0, last: self.samples.len() - 1 };
         let nearest = self.nearest(point, whole);
-        let reach_m = self.squared_m2(point, nearest).sqrt() + POSITION_ERROR_M;
+        let reach_m = nearest.distance_m2.sqrt() + POSITION_ERROR_M;
         let is_near = |index: &usize| self.squared_m2(point, *index) <= reach_m * reach_m;
-        let first = (0..nearest).find(is_near).unwrap_or(nearest);
-        self.descend(point, first, whole)
+        let first = (0..nearest.index).find(is_near).unwrap_or(nearest.index);
+        self.descend(point, first, whole).index
     }
 
     /// The sample of a stretch that is nearest to a point, coarse to fine.
-    fn nearest(&self, point: Vec2, within: Stretch) -> usize {
+    fn nearest(&self, point: Vec2, within: Stretch) -> Nearest {
         let Stretch { mut first, mut last } = within;
-        let mut best = (last, self.squared_m2(point, last));
+        let mut best = Nearest { index: last, distance_m2: self.squared_m2(point, last) };
         for stride in STRIDES {
             // Not `step_by`: it costs as much as the distances.
-            let mut index = first;
-            while index < last {
-                let candidate = self.squared_m2(point, index);
-                if candidate < best.1 {
-                    best = (index, candidate);
+            let (samples, mut index) = (&self.samples[..last], first);
+            while let Some(sample) = samples.get(index) {
+                let distance_m2 = (point - sample.position).norm_squared();
+                if distance_m2 < best.distance_m2 {
+                    best = Nearest { index, distance_m2 };
                 }
                 index += stride;
             }
-            first = best.0.saturating_sub(stride - 1);
-            last = (best.0 + stride).min(self.samples.len());
+            first = best.index.saturating_sub(stride - 1);
+            last = (best.index + stride).min(self.samples.len());
         }
-        best.0
+        best
     }
 
     /// The nearest sample, found by stepping along tangents from a sample nearby: much quicker than a
     /// search, but `None` where the steps do not settle.
-    fn slide(&self, point: Vec2, from: usize, within: Stretch) -> Option<usize> {
+    fn slide(&self, point: Vec2, from: usize, within: Stretch) -> Option<Nearest> {
         let mut index = from;
         for _ in 0..SLIDES_MAX {
             let Sample { position, forward, .. } = self.samples[index];
-            let ahead = (forward.dot(&(point - position)) / SPACING_M) as isize;
+            let ahead = (forward.dot(&(point - position)) / SPACING_M) as i32 as isize;
             let next = index.saturating_add_signed(ahead).clamp(within.first, within.last);
             if next == index {
                 return Some(self.descend(point, index, within));
@@ -273,23 +272,23 @@ impl Guide {
 
     /// Walks from a sample to one whose neighbours are both farther from a point; of several equally near,
     /// to the first.
-    fn descend(&self, point: Vec2, from: usize, within: Stretch) -> usize {
-        let mut best = (from, self.squared_m2(point, from));
-        while best.0 < within.last {
-            let next = self.squared_m2(point, best.0 + 1);
-            if next >= best.1 {
+    fn descend(&self, point: Vec2, from: usize, within: Stretch) -> Nearest {
+        let mut best = Nearest { index: from, distance_m2: self.squared_m2(point, from) };
+        while best.index < within.last {
+            let distance_m2 = self.squared_m2(point, best.index + 1);
+            if distance_m2 >= best.distance_m2 {
                 break;
             }
-            best = (best.0 + 1, next);
+            best = Nearest { index: best.index + 1, distance_m2 };
         }
-        while best.0 > within.first {
-            let before = self.squared_m2(point, best.0 - 1);
-            if before > best.1 {
+        while best.index > within.first {
+            let distance_m2 = self.squared_m2(point, best.index - 1);
+            if distance_m2 > best.distance_m2 {
                 break;
             }
-            best = (best.0 - 1, before);
+            best = Nearest { index: best.index - 1, distance_m2 };
         }
-        best.0
+        best
     }
 
     fn index(&self, station_m: f64) -> usize {
@@ -311,37 +310,42 @@ struct Stretch {
     last: usize,
 }
 
+/// The sample that is nearest to a point.
+#[derive(Debug, Clone, Copy)]
+struct Nearest {
+    index: usize,
+    distance_m2: f64,
+}
+
 /// Projects a moving point onto a stretch of a guide, position after position.
 #[derive(Debug)]
 pub struct Tracer<'a> {
     guide: &'a Guide,
     within: Stretch,
     reach_m: f64,
-    /// The last position, its nearest sample, and the distance between the two, m.
+    /// The last position, and its nearest sample.
     point: Vec2,
-    index: usize,
-    distance_m: f64,
+    nearest: Nearest,
 }
 
 impl Tracer<'_> {
     /// The projection of the next position; `None` if it is out of reach.
     pub fn next(&mut self, point: Vec2) -> Option<Beside> {
-        let moved_m = (point - self.point).norm();
-        // The point cannot be nearer than the last distance less the way that it has moved.
-        if self.distance_m - moved_m > self.reach_m {
+        let distance_m = self.nearest.distance_m2.sqrt();
+        let slid = if distance_m <= self.reach_m {
+            self.guide.slide(point, self.nearest.index, self.within)
+        } else if distance_m - (point - self.point).norm() > self.reach_m {
+            // The point cannot be nearer than the last distance less the way that it has moved.
             return None;
-        }
-        let slid = if self.distance_m <= self.reach_m {
-            self.guide.slide(point, self.index, self.within)
         } else {
             None
         };
-        let near = |index: &usize| self.guide.squared_m2(point, *index) <= self.reach_m * self.reach_m;
         // A point that is out of reach of the stretch near by may be in reach of another bend.
-        self.index = slid.filter(near).unwrap_or_else(|| self.guide.nearest(point, self.within));
+        let near = |nearest: &Nearest| nearest.distance_m2 <= self.reach_m * self.reach_m;
+        self.nearest = slid.filter(near).unwrap_or_else(|| self.guide.nearest(point, self.within));
         self.point = point;
-        self.distance_m = self.guide.squared_m2(point, self.index).sqrt();
-        (self.distance_m <= self.reach_m).then(|| self.guide.beside_sample(point, self.index))
+        let is_in_reach = self.nearest.distance_m2.sqrt() <= self.reach_m;
+        is_in_reach.then(|| self.guide.beside_sample(point, self.nearest.index))
     }
 }
 

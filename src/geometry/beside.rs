@@ -1,5 +1,6 @@
 //! Places beside a path, by the tangent of the path there.
 
+use super::extreme::{larger, smaller};
 use super::pose::Vec2;
 
 /// A place beside a path.
@@ -48,11 +49,11 @@ impl Beside {
             if right.y > half_way_m || left.y < -half_way_m {
                 continue;
             }
-            let rise_m = (left.y - right.y).max(1e-9);
-            for edge_m in [right.y.max(-half_way_m), left.y.min(half_way_m)] {
+            let rise_m = larger(left.y - right.y, 1e-9);
+            for edge_m in [larger(right.y, -half_way_m), smaller(left.y, half_way_m)] {
                 let station_m = right.x + (left.x - right.x) * ((edge_m - right.y) / rise_m).clamp(0.0, 1.0);
-                span.from_m = span.from_m.min(station_m);
-                span.to_m = span.to_m.max(station_m);
+                span.from_m = smaller(span.from_m, station_m);
+                span.to_m = larger(span.to_m, station_m);
             }
         }
         (span.from_m <= span.to_m).then_some(span)

@@ -14,7 +14,8 @@
 //! | `ads::guide` | the tangent of the nearest even sample | a driving system, for every predicted position |
 
 use super::beside::Beside;
-use super::pose::{Pose, Vec2, wrap_angle};
+use super::extreme::larger;
+use super::pose::{Pose, Vec2, unit_vector, wrap_angle};
 
 /// A vertex of a [`Path`].
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -42,18 +43,25 @@ pub struct Projection {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Path {
     points: Vec<PathPoint>,
-    /// The segment that holds each of some evenly spread places: where the search for a station begins.
+    /// The unit vector along the heading of each vertex: on a straight segment it is that of every place.
+    forwards: Vec<Vec2>,
+    /// The segment that holds each of some evenly spread places: where the search for a station begins; with [`SURE`]
+    /// where it ends there, too.
     cells: Vec<u32>,
     cells_per_m: f64,
     /// The box around each run of [`BLOCK`] segments.
     blocks: Vec<Bounds>,
+    sharpest_per_m: f64,
 }
 
 /// Number of segments that share a box: a projection looks only into boxes that can hold its answer.
 const BLOCK: usize = 16;
 
 /// Number of cells for each vertex: bends have many vertices close together, and a cell should hold few of them.
-const CELLS_PER_VERTEX: usize = 4;
+const CELLS_PER_VERTEX: usize = 8;
+
+/// Marks a cell that lies in one segment, as do those beside it, so that rounding changes nothing.
+const SURE: u32 = 1 << 31;
 
 /// A path turns at once by more than this, rad; less is rounding.
 const TURN_RAD_MIN: f64 = 1e-6;
@@ -98,10 +106,13 @@ impl Bounds {
         })
     }
 
+    /// Around this box and another.
+    pub fn with(&self, other: &Bounds) -> Bounds {
+        Bounds { least: self.least.inf(&other.least), most: self.most.sup(&other.most) }
+    }
+
     /// Squared distance to the box, m²; rounded down, so that no point of a segment in it is nearer.
     pub fn distance_m2_min(&self, point: Vec2) -> f64 {
-        // Not `f64::max`: it also looks for NaN, and this is asked for every box of every lane near a spawn.
-        let larger = |a: f64, b: f64| if a > b { a } else { b };
         let outside_m =
             |axis: usize| larger(larger(self.least[axis] - point[axis], point[axis] - self.most[axis]), 0.0);
         let (x_m, y_m) = (outside_m(0), outside_m(1));
@@ -163,7 +174,22 @@ impl Path {
             let last = (first + BLOCK).min(points.len() - 1);
             Bounds::of(&points[first..=last])
         });
-        Some(Path { cells: cells.collect(), cells_per_m, blocks: blocks.collect(), points })
+        let segments: Vec<u32> = cells.collect();
+        let last = points.len() as u32 - 2;
+        let is_sure = |cell: usize| {
+            let (before, after) = (segments[cell.saturating_sub(1)], segments.get(cell + 1).unwrap_or(&last));
+            before == segments[cell] && *after == segments[cell]
+        };
+        let cells = (0..cell_count).map(|cell| segments[cell] | if is_sure(cell) { SURE } else { 0 });
+        let forwards = points.iter().map(|point| unit_vector(wrap_angle(point.heading_rad)));
+        Some(Path {
+            cells: cells.collect(),
+            cells_per_m,
+            blocks: blocks.collect(),
+            forwards: forwards.collect(),
+            sharpest_per_m: points.iter().map(|point| point.curvature_per_m.abs()).fold(0.0, f64::max),
+            points,
+        })
     }
 
     pub fn points(&self) -> &[PathPoint] {
@@ -174,23 +200,37 @@ impl Path {
         self.points[self.points.len() - 1].station_m
     }
 
+    /// The greatest curvature at a vertex, to either side, 1/m.
+    pub fn sharpest_per_m(&self) -> f64 {
+        self.sharpest_per_m
+    }
+
     /// The box around the whole path.
     pub fn bounds(&self) -> Bounds {
-        self.blocks.iter().fold(self.blocks[0], |bounds, block| Bounds {
-            least: bounds.least.inf(&block.least),
-            most: bounds.most.sup(&block.most),
-        })
+        self.blocks.iter().fold(self.blocks[0], |bounds, block| bounds.with(block))
+    }
+
+    /// The box around the part between two stations.
+    pub fn bounds_between(&self, from_m: f64, to_m: f64) -> Bounds {
+        let inner = &self.points[self.vertex_after(from_m)..=self.vertex_after(to_m)];
+        let inner = inner.iter().take_while(|point| point.station_m < to_m).map(|point| point.position);
+        Bounds::grow(self.position_at(from_m), inner.chain([self.position_at(to_m)]))
     }
 
     /// The pose at a station; beyond the ends the path goes on straight.
     pub fn pose_at(&self, station_m: f64) -> Pose {
         let (index, fraction) = self.locate(station_m);
         let (a, b) = (&self.points[index], &self.points[index + 1]);
-        let turn_rad = wrap_angle(b.heading_rad - a.heading_rad) * fraction.clamp(0.0, 1.0);
         Pose {
             position: a.position + (b.position - a.position) * fraction,
-            heading_rad: wrap_angle(a.heading_rad + turn_rad),
+            heading_rad: heading_between(a, b, fraction),
         }
+    }
+
+    /// The heading of [`Path::pose_at`], rad.
+    pub fn heading_at(&self, station_m: f64) -> f64 {
+        let (index, fraction) = self.locate(station_m);
+        heading_between(&self.points[index], &self.points[index + 1], fraction)
     }
 
     /// The position of [`Path::pose_at`], without the work for its heading.
@@ -198,6 +238,19 @@ impl Path {
         let (index, fraction) = self.locate(station_m);
         let (a, b) = (&self.points[index], &self.points[index + 1]);
         a.position + (b.position - a.position) * fraction
+    }
+
+    /// The position of [`Path::pose_at`], and the unit vector along its heading: without trigonometry where the path is
+    /// straight.
+    pub fn along(&self, station_m: f64) -> (Vec2, Vec2) {
+        let (index, fraction) = self.locate(station_m);
+        let (a, b) = (&self.points[index], &self.points[index + 1]);
+        let forward = if a.heading_rad == b.heading_rad {
+            self.forwards[index]
+        } else {
+            unit_vector(heading_between(a, b, fraction))
+        };
+        (a.position + (b.position - a.position) * fraction, forward)
     }
 
     /// 1/m, positive to the left; 0 beyond the ends.
@@ -228,8 +281,8 @@ impl Path {
     pub fn project_from(&self, point: Vec2, guess_m: f64) -> Option<Beside> {
         let mut station_m = guess_m;
         for _ in 0..5 {
-            let pose = self.pose_at(station_m);
-            let (forward, away) = (pose.forward(), point - pose.position);
+            let (position, forward) = self.along(station_m);
+            let away = point - position;
             let ahead_m = forward.dot(&away);
             if ahead_m.abs() < 0.02 {
                 return Some(Beside { station_m, offset_m: forward.perp(&away), forward });
@@ -265,6 +318,9 @@ impl Path {
 
     /// The nearest point among the segments from `first` up to the vertex `last`.
     fn project_segments(&self, point: Vec2, first: usize, last: usize) -> Projection {
+        if last - first <= BLOCK {
+            return self.projection(point, self.nearest(point, first..last));
+        }
         let blocks = first / BLOCK..=(last - 1) / BLOCK;
         let within = |block: usize| (block * BLOCK).max(first)..((block + 1) * BLOCK).min(last);
         let bound = |block: usize| self.blocks[block].distance_m2_min(point);
@@ -290,6 +346,10 @@ impl Path {
                 best = found;
             }
         }
+        self.projection(point, best)
+    }
+
+    fn projection(&self, point: Vec2, best: Nearest) -> Projection {
         let (a, b) = (&self.points[best.segment], &self.points[best.segment + 1]);
         let chord = b.position - a.position;
         let length_m = b.station_m - a.station_m;
@@ -323,11 +383,21 @@ impl Path {
         if station_m < 0.0 { 0 } else { self.segment(station_m) + 1 }
     }
 
+    /// The two vertices around a station; of a station beyond an end those of the segment there.
+    pub fn segment_at(&self, station_m: f64) -> (&PathPoint, &PathPoint) {
+        let index = self.segment(station_m);
+        (&self.points[index], &self.points[index + 1])
+    }
+
     /// Index of the segment that holds a station, clamped to the ends.
     fn segment(&self, station_m: f64) -> usize {
         // The conversion makes 0 of what is negative.
         let cell = (station_m * self.cells_per_m) as u32 as usize;
-        let mut index = self.cells[cell.min(self.cells.len() - 1)] as usize;
+        let begin = self.cells[cell.min(self.cells.len() - 1)];
+        let mut index = (begin & !SURE) as usize;
+        if begin & SURE != 0 {
+            return index;
+        }
         while index + 2 < self.points.len() && self.points[index + 1].station_m <= station_m {
             index += 1;
         }
@@ -344,6 +414,12 @@ impl Path {
         let (a, b) = (&self.points[index], &self.points[index + 1]);
         (index, (station_m - a.station_m) / (b.station_m - a.station_m))
     }
+}
+
+/// The heading at a fraction of the segment between two vertices, rad.
+fn heading_between(a: &PathPoint, b: &PathPoint, fraction: f64) -> f64 {
+    let turn_rad = wrap_angle(b.heading_rad - a.heading_rad) * fraction.clamp(0.0, 1.0);
+    wrap_angle(a.heading_rad + turn_rad)
 }
 
 /// The nearest point of a path, and its distance.

@@ -61,6 +61,7 @@ struct Stretch {
     lane: LaneIndex,
     from_m: f64,
     to_m: f64,
+    bounds: Bounds,
 }
 
 impl LaneGrid {
@@ -75,7 +76,9 @@ impl LaneGrid {
             let step_m = lane.centre.length_m() / stretches;
             for i in 0..stretches as u32 {
                 let from_m = step_m * f64::from(i);
-                grid.insert(&lane.centre, Stretch { lane: LaneIndex(index), from_m, to_m: from_m + step_m });
+                let to_m = from_m + step_m;
+                let bounds = lane.centre.bounds_between(from_m, to_m);
+                grid.insert(&lane.centre, Stretch { lane: LaneIndex(index), from_m, to_m, bounds });
             }
         }
         grid
@@ -97,6 +100,7 @@ impl LaneGrid {
                 match entries.last_mut() {
                     Some(last) if last.lane == stretch.lane && last.to_m >= stretch.from_m - 1e-9 => {
                         last.to_m = stretch.to_m;
+                        last.bounds = last.bounds.with(&stretch.bounds);
                     }
                     _ => entries.push(stretch),
                 }
@@ -146,19 +150,23 @@ impl LaneGrid {
             });
             return in_reach.collect();
         }
-        let mut found: BTreeMap<LaneIndex, Projection> = BTreeMap::new();
+        let mut found: Vec<(LaneIndex, Projection)> = Vec::new();
         for x in low.0..=high.0 {
-            for stretch in (low.1..=high.1).filter_map(|y| self.cells.get(&(x, y))).flatten() {
+            for stretch in self.cells.range((x, low.1)..=(x, high.1)).flat_map(|(_, stretches)| stretches) {
+                if stretch.bounds.distance_m2_min(point) > radius_m * radius_m {
+                    continue;
+                }
                 let (middle_m, half_m) =
                     ((stretch.from_m + stretch.to_m) / 2.0, (stretch.to_m - stretch.from_m) / 2.0);
                 let projection = lanes[stretch.lane.0].centre.project_near(point, middle_m, half_m);
-                let best = found.entry(stretch.lane).or_insert(projection);
-                if projection.distance_m < best.distance_m {
-                    *best = projection;
+                match found.binary_search_by_key(&stretch.lane, |(lane, _)| *lane) {
+                    Ok(at) if projection.distance_m < found[at].1.distance_m => found[at].1 = projection,
+                    Ok(_) => {}
+                    Err(at) => found.insert(at, (stretch.lane, projection)),
                 }
             }
         }
-        found.into_iter().collect()
+        found
     }
 }
 

@@ -316,7 +316,7 @@ impl RoadMap {
             if beyond_m > reach_m {
                 continue;
             }
-            let lane_heading_rad = lane.centre.pose_at(projection.station_m).heading_rad;
+            let lane_heading_rad = lane.centre.heading_at(projection.station_m);
             let turn_rad = wrap_angle(lane_heading_rad - heading_rad).abs();
             let misfit = turn_rad + MISFIT_RAD_PER_M * projection.distance_m;
             if best.is_none_or(|(best_m, best_misfit, _)| {

@@ -136,7 +136,7 @@ impl Ego {
     /// Rolling straight on at `speed_mps`, with no pedal pressed.
     pub fn new(rear_axle: Pose, speed_mps: f64) -> Ego {
         let motion = EgoMotion::straight(rear_axle, speed_mps);
-        let outline = outline_at(&rear_axle);
+        let outline = outline_at(&rear_axle, rear_axle.forward());
         Ego { motion, throttle_pct: 0.0, brake_pct: 0.0, outline, frame: Frame::of(&outline) }
     }
 
@@ -192,8 +192,9 @@ impl Ego {
     /// Sets the motion, whatever moves the vehicle.
     pub fn place(&mut self, motion: EgoMotion) {
         self.motion = motion;
-        self.outline = outline_at(&self.motion.rear_axle);
-        self.frame = Frame::of(&self.outline);
+        let forward = motion.rear_axle.forward();
+        self.outline = outline_at(&motion.rear_axle, forward);
+        self.frame = Frame::along(&self.outline, forward);
     }
 
     /// Every bit that later ticks depend on.
@@ -216,10 +217,11 @@ impl Ego {
     }
 }
 
-/// The outline of the ego vehicle whose rear axle is at a pose.
-fn outline_at(rear_axle: &Pose) -> OrientedBox {
+/// The outline of the ego vehicle whose rear axle is at a pose, of which `forward` is the unit vector.
+fn outline_at(rear_axle: &Pose, forward: Vec2) -> OrientedBox {
     let car = &VehicleParameters::MKZ;
-    OrientedBox::new(rear_axle.offset(car.rear_axle_to_centre_m(), 0.0), car.length_m, car.width_m)
+    let position = rear_axle.position + forward * car.rear_axle_to_centre_m();
+    OrientedBox::new(Pose { position, ..*rear_axle }, car.length_m, car.width_m)
 }
 
 /// Curvature of the rear axle's way under an angle of the road wheels, 1/m.

@@ -4,6 +4,8 @@
 //! parameters and in what they do beyond comfort, each with its reason in its file; the wanted gap is
 //! the model's in all three.
 
+use crate::geometry::larger;
+
 /// How a driver follows a leader.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Following {
@@ -21,7 +23,7 @@ impl Following {
     pub fn wanted_gap_m(&self, speed_mps: f64, leader_mps: f64) -> f64 {
         let gentle_mps2 = (self.acceleration_mps2 * self.comfortable_mps2).sqrt();
         let approach_m = speed_mps * (speed_mps - leader_mps) / (2.0 * gentle_mps2);
-        self.gap_m_min + (speed_mps * self.time_gap_s + approach_m).max(0.0)
+        self.gap_m_min + larger(speed_mps * self.time_gap_s + approach_m, 0.0)
     }
 }
 

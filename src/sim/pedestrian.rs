@@ -94,6 +94,8 @@ pub(super) struct Walk {
 #[derive(Debug, Clone)]
 pub(super) struct Walker {
     from: Pose,
+    /// Unit vector along the way.
+    along: Vec2,
     /// From the beginning to the other kerb, and to where the walk ends, m.
     way_m: f64,
     end_m: f64,
@@ -125,6 +127,7 @@ impl Walker {
         let manner = Manner::draw(rng);
         Walker {
             from,
+            along: from.forward(),
             way_m,
             end_m: way_m + beyond_m,
             speed_mps,
@@ -217,10 +220,12 @@ impl Walker {
     /// Where it is now, with the velocity since it was at `this`.
     fn moved(&self, this: &Obstacle) -> Moved {
         let turn_rad = if self.returns { core::f64::consts::PI } else { 0.0 };
-        let position = self.from.offset(self.walked_m, self.aside_m).position;
+        let left = Vec2::new(-self.along.y, self.along.x);
+        let position = self.from.position + self.along * self.walked_m + left * self.aside_m;
         let pose = Pose { position, heading_rad: wrap_angle(self.from.heading_rad + turn_rad) };
+        let forward = if pose.heading_rad == self.from.heading_rad { self.along } else { pose.forward() };
         let velocity_mps = (position - this.outline.pose.position) / DT_S;
-        Moved { pose, forward: pose.forward(), lane_heading_rad: pose.heading_rad, velocity_mps }
+        Moved { pose, forward, lane_heading_rad: pose.heading_rad, velocity_mps }
     }
 
     /// Looks, ten times a second, for vehicles that come and for what is in the way, and sets the pace.
@@ -273,9 +278,10 @@ impl Walker {
     /// Whether another pedestrian is ahead on about the same line.
     fn meets_pedestrian(&self, around: &Around) -> bool {
         around.obstacles().filter(|other| !other.body.is_vehicle()).any(|other| {
-            let there = self.from.to_local(other.outline.pose.position);
-            let ahead_m = if self.returns { self.walked_m - there.x } else { there.x - self.walked_m };
-            (-1.0..MEET_M).contains(&ahead_m) && there.y.abs() < 2.0 * ASIDE_M
+            let away = other.outline.pose.position - self.from.position;
+            let along_m = self.along.dot(&away);
+            let ahead_m = if self.returns { self.walked_m - along_m } else { along_m - self.walked_m };
+            (-1.0..MEET_M).contains(&ahead_m) && self.along.perp(&away).abs() < 2.0 * ASIDE_M
         })
     }
 }

@@ -168,6 +168,8 @@ pub(super) struct Rights {
     meeting: Option<Meeting>,
     /// Who has priority, it as a wreck in the ego vehicle's way or the ego vehicle; `None` as long as it is neither.
     wreck: Option<Priority>,
+    /// Where a pedestrian was last looked for on the carriageway, and whether it was there: most stand and wait.
+    on_road: Option<(Vec2, bool)>,
 }
 
 /// The road user or the ego vehicle came into the other's way.
@@ -295,7 +297,15 @@ impl Rights {
         let strip = Strip::of(this, around);
         let position = this.outline.pose.position;
         // The step onto the carriageway is what counts: from there on the ego vehicle may expect the rest.
-        let is_on_road = || around.scene.map.nearest(position, this.outline.pose.heading_rad, 0.0).is_some();
+        let on_road = &mut self.on_road;
+        let mut is_on_road = || match *on_road {
+            Some((known, found)) if known == position => found,
+            _ => {
+                let lane = around.scene.map.nearest(position, this.outline.pose.heading_rad, 0.0);
+                *on_road = Some((position, lane.is_some()));
+                lane.is_some()
+            }
+        };
         let shares = strip.aside_m < CARRIAGEWAY_M
             && strip.ahead_m > -this.outline.half_length_m - strip.length_m
             && (strip.aside_m < BESIDE_M || is_on_road());

@@ -4,7 +4,7 @@
 //! This is the physical side of sensing (line of sight, light, weather). What a driving system makes
 //! of it, with its errors and delays, is `ads`.
 
-use crate::geometry::{Frame, OrientedBox, Pose, Vec2};
+use crate::geometry::{Frame, OrientedBox, Pose, Vec2, larger};
 use crate::model::vocabulary::Body;
 
 use super::road_user::Obstacle;
@@ -121,13 +121,15 @@ pub(super) fn visible_fraction<'a>(
     }
     // One bit for each obstacle that may stand in the way; most often there is none.
     let mut hiders = 0_u32;
+    let radius_m = target.outline.radius_m();
     for (index, other) in obstacles.clone().take(u32::BITS as usize).enumerate() {
-        hiders |= u32::from(may_hide(eye, towards, distance_m, target, other)) << index;
+        let hides = other.id != target.id && may_hide(eye, towards, distance_m, radius_m, &other.outline);
+        hiders |= u32::from(hides) << index;
     }
     if hiders == 0 {
         return 1.0;
     }
-    let (first, last) = silhouette(eye, towards, &target.outline);
+    let (first, last) = silhouette(eye, towards, target);
     let rays: [(Vec2, f64); RAYS] = core::array::from_fn(|ray| {
         let point = first + (last - first) * ((ray as f64 + 0.5) / RAYS as f64);
         let reach_m = (point - eye).norm();
@@ -138,7 +140,7 @@ pub(super) fn visible_fraction<'a>(
         let above = (1.0 - other.height_m / target.height_m).max(0.0);
         let other = Frame::along(&other.outline, other.forward);
         for ((direction, reach_m), shown) in rays.iter().zip(&mut shown) {
-            if *shown > above && other.ray_hit_m(eye, *direction, *reach_m).is_some() {
+            if *shown > above && other.is_hit(eye, *direction, *reach_m) {
                 *shown = above;
             }
         }
@@ -146,37 +148,36 @@ pub(super) fn visible_fraction<'a>(
     shown.iter().map(|shown| shown / RAYS as f64).sum()
 }
 
-/// Whether a circle around `other` reaches into the cone that holds the target, in front of it.
-fn may_hide(eye: Vec2, towards: Vec2, distance_m: f64, target: &Obstacle, other: &Obstacle) -> bool {
-    if other.id == target.id {
+/// Whether a circle around `other` reaches into the cone that holds the circle of `target_m` around the target, in
+/// front of it.
+fn may_hide(eye: Vec2, towards: Vec2, distance_m: f64, target_m: f64, other: &OrientedBox) -> bool {
+    let delta = other.pose.position - eye;
+    let ahead_m = towards.dot(&delta) / distance_m;
+    if ahead_m >= distance_m + target_m {
         return false;
     }
-    let delta = other.outline.pose.position - eye;
-    let ahead_m = towards.dot(&delta) / distance_m;
+    let radius_m = other.radius_m();
     let aside_m = (towards.x * delta.y - towards.y * delta.x).abs() / distance_m;
-    let radius_m = other.outline.radius_m();
-    ahead_m > -radius_m
-        && ahead_m < distance_m + target.outline.radius_m()
-        && aside_m < radius_m + target.outline.radius_m() * (ahead_m / distance_m).max(0.0)
+    ahead_m > -radius_m && aside_m < radius_m + target_m * larger(ahead_m / distance_m, 0.0)
 }
 
 /// The outermost corners of an outline as seen from a point: left and right of the line to it.
-fn silhouette(eye: Vec2, towards: Vec2, outline: &OrientedBox) -> (Vec2, Vec2) {
-    let slope = |corner: &Vec2| {
+fn silhouette(eye: Vec2, towards: Vec2, target: &Obstacle) -> (Vec2, Vec2) {
+    let seen = Frame::along(&target.outline, target.forward).corners().map(|corner| {
         let delta = corner - eye;
-        (towards.x * delta.y - towards.y * delta.x) / towards.dot(&delta).max(1e-6)
-    };
-    let corners = outline.corners();
-    let mut ends = (corners[0], corners[0]);
-    for corner in corners {
-        if slope(&corner) > slope(&ends.0) {
-            ends.0 = corner;
+        let slope = (towards.x * delta.y - towards.y * delta.x) / larger(towards.dot(&delta), 1e-6);
+        (slope, corner)
+    });
+    let (mut left, mut right) = (seen[0], seen[0]);
+    for corner in seen {
+        if corner.0 > left.0 {
+            left = corner;
         }
-        if slope(&corner) < slope(&ends.1) {
-            ends.1 = corner;
+        if corner.0 < right.0 {
+            right = corner;
         }
     }
-    ends
+    (left.1, right.1)
 }
 
 #[cfg(test)]

@@ -197,9 +197,14 @@ impl Way {
         self.lanes.iter().find(|part| part.lane == lane).map(|part| part.from_m)
     }
 
+    /// Whether the way may take a lane: `false` is certain.
+    pub fn may_take(&self, lane: LaneIndex) -> bool {
+        self.lane_bits & lane_bit(lane) != 0
+    }
+
     /// Station at which a lane begins, if the way takes it and a rear at `rear_m` has not left it yet.
     pub fn lane_ahead_m(&self, lane: LaneIndex, rear_m: f64) -> Option<f64> {
-        if self.lane_bits & lane_bit(lane) == 0 {
+        if !self.may_take(lane) {
             return None;
         }
         let first = self.lanes.partition_point(|part| part.from_m <= rear_m).max(1) - 1;

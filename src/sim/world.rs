@@ -3,6 +3,8 @@
 
 mod playback;
 mod survey;
+#[cfg(test)]
+mod tests;
 
 use std::sync::Arc;
 
@@ -51,6 +53,9 @@ const QUEUE_M: f64 = 40.0;
 
 /// A queue before a light is at most this long, m: seven cars.
 const LIGHT_QUEUE_M: f64 = 50.0;
+
+/// Added to the way of two bodies before they are taken to be too far apart to touch, m: far more than rounding.
+const NEAR_M: f64 = 1e-3;
 
 /// How far along the route the ego vehicle is looked for from where it was, m. More than it drives
 /// in a tick, so that it is found again after a corner cut, and less than any loop of a route.
@@ -512,10 +517,12 @@ impl World {
         if mover.touched || is_apart(self.ego_elevation_m, obstacle.elevation_m) {
             return true;
         }
-        let other = Party {
-            sweep: Sweep { start: before.outline, end: moved.pose },
-            velocity_mps: moved.velocity_mps,
-        };
+        let sweep = Sweep { start: before.outline, end: moved.pose };
+        if before.distance_m > ego.sweep.most_m() + sweep.most_m() + NEAR_M {
+            // The gap is wider than both together can close it in a tick.
+            return true;
+        }
+        let other = Party { sweep, velocity_mps: moved.velocity_mps };
         if let Some(contact) = meet(ego, ego_mps, &other, before.id, self.ticks) {
             let around = self.around([&[], &[]]);
             let priority = if mover.has_crashed() {
@@ -576,144 +583,5 @@ impl World {
             .iter()
             .filter(|line| passed.contains(&line.station_m) && self.signal(line.signal) == SignalColour::Red)
             .count() as u32;
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::model::vocabulary::{Body, Colour, Priority, Verb};
-    use crate::road::LaneIndex;
-    use crate::sim::body::parameters;
-    use crate::sim::npc::{Cruise, Driver, choices};
-    use crate::sim::road_user::{Motion, Mover};
-    use crate::sim::testing;
-    use crate::sim::way::Way;
-
-    impl World {
-        /// Puts a sedan on a lane of a road, at a station of its way, with a speed that it keeps where it can; its
-        /// way leads through the other road. It does not yield to the ego vehicle.
-        pub(crate) fn put(&mut self, road: &str, lane: i32, through: &str, station_m: f64, speed_mps: f64) {
-            let map = &self.scene.map;
-            let first = map.place(road, lane, 100.0).expect("the lane is there").lane;
-            let next = map.lane(first).successors.iter().copied();
-            let next = next.filter(|lane| map.lane(*lane).key.road == through);
-            let lanes: Vec<LaneIndex> = [first].into_iter().chain(next).collect();
-            let mut rng = choices(self.seed, self.next_id, 0);
-            let way = Way::along(&self.scene, &lanes, &mut rng).expect("the lanes follow each other");
-            let size = parameters(Body::Sedan);
-            let driver =
-                Driver::new(&self.scene, way, station_m, Cruise::Commanded(speed_mps), Vec::new(), 1);
-            let moved = driver.moved(&size);
-            let mover = Mover::new(size, Motion::Drive(driver));
-            let around = self.around([&self.users, &[]]);
-            let verb = Verb::CrossRoad;
-            let user = RoadUser::new(&around, self.next_id, Body::Sedan, Colour::Red, verb, mover, moved);
-            self.users.push(user);
-            self.next_id += 1;
-        }
-    }
-
-    #[test]
-    fn of_two_contacts_in_a_tick_neither_sees_the_other() {
-        let mut world = testing::world(&testing::straight());
-        world.ego.motion.speed_mps = 10.0;
-        for distance_m in [8.0, 10.0] {
-            world.spawn(&testing::request(Verb::Stand, distance_m, 0.0)).expect("there is room");
-        }
-        // Side by side, where no request would put them.
-        let beside = world.users[0].obstacle.outline.pose.position + Vec2::new(0.0, 0.7);
-        world.users[1].obstacle.outline.pose.position = beside;
-        let contacts = loop {
-            let contacts = world.tick(&Control::default()).to_vec();
-            if !contacts.is_empty() {
-                break contacts;
-            }
-        };
-        let [first, second] = contacts[..] else { panic!("{contacts:?}") };
-        assert_eq!(first.ego_speed_mps, second.ego_speed_mps);
-        let common_mps = |speed_mps| common_speed_mps(speed_mps, 0.0, 0.075);
-        assert_eq!(world.ego().speed_mps, common_mps(common_mps(first.ego_speed_mps)));
-    }
-
-    #[test]
-    fn a_wreck_has_priority_unless_it_came_to_lie_there_too_late() {
-        let priority = |distance_m: f64, turned_rad: f64| {
-            let mut world = testing::world(&testing::straight());
-            let drives = |world: &World| Control {
-                throttle_pct: if world.ego().speed_mps < 10.0 { 60.0 } else { 0.0 },
-                ..Control::default()
-            };
-            while world.ego().speed_mps < 10.0 {
-                let control = drives(&world);
-                world.tick(&control);
-            }
-            world.spawn(&testing::request(Verb::DriveAhead, distance_m, 0.1)).expect("there is room");
-            let user = &mut world.users[0];
-            user.obstacle.outline.pose.heading_rad += turned_rad;
-            user.obstacle.forward = user.obstacle.outline.pose.forward();
-            user.obstacle.velocity_mps = Vec2::zeros();
-            user.mover.crash(9);
-            loop {
-                let control = drives(&world);
-                if let Some(contact) = world.tick(&control).first() {
-                    return contact.priority;
-                }
-                assert!(world.time_s() < 60.0);
-            }
-        };
-        // 10 m/s: 4 m until the brakes act, and 17 m to stop gently. How the wreck lies changes nothing.
-        for turned_rad in [0.0, 1.2, 3.0] {
-            assert_eq!(priority(26.0, turned_rad), Priority::Other, "{turned_rad}");
-            assert_eq!(priority(12.0, turned_rad), Priority::None, "{turned_rad}");
-        }
-    }
-
-    #[test]
-    fn a_wreck_in_its_lane_blocks_the_ego_vehicle_and_one_beside_does_not() {
-        let mut world = testing::world(&testing::straight());
-        world.spawn(&testing::request(Verb::DriveAhead, 12.0, 4.0)).expect("there is room");
-        let stop = Control { brake_pct: 100.0, ..Control::default() };
-        (0..100).for_each(|_| drop(world.tick(&stop).to_vec()));
-        assert!(!world.is_blocked(), "it drives");
-        world.users[0].mover.crash(9);
-        (0..200).for_each(|_| drop(world.tick(&stop).to_vec()));
-        assert!(world.is_blocked());
-        world.users[0].obstacle.outline.pose.position += Vec2::new(0.0, 3.5);
-        assert!(!world.is_blocked(), "it stands in the other lane");
-        world.users[0].obstacle.outline.pose.position -= Vec2::new(0.0, 3.5);
-        world.ego.motion.touched = true;
-        assert!(!world.is_blocked(), "the ego vehicle is a wreck itself");
-    }
-
-    #[test]
-    fn a_vehicle_that_left_its_lane_is_astray() {
-        let mut world = testing::world(&testing::straight());
-        let steers = |steer_rad| Control { throttle_pct: 20.0, steer_rad, ..Control::default() };
-        while world.ego_offset_m() < 1.6 {
-            world.tick(&steers(0.1));
-            assert!(!world.is_astray() && world.time_s() < 20.0);
-        }
-        while world.ego_offset_m() < 1.8 {
-            world.tick(&steers(0.1));
-        }
-        assert!(world.is_astray());
-        world.ego.motion.touched = true;
-        assert!(!world.is_astray(), "it was pushed");
-    }
-
-    #[test]
-    fn the_ego_vehicle_arrives_and_counts_red_lights() {
-        let mut world = testing::world(&testing::crossing());
-        let throttle = Control { throttle_pct: 40.0, ..Control::default() };
-        // 100 m in 8 s, the stop line at 185 m after about 13 s, when its light is yellow.
-        while !world.arrived() {
-            let control = if world.ego().speed_mps < 10.0 { throttle } else { Control::default() };
-            world.tick(&control);
-            assert!(world.time_s() < 60.0);
-        }
-        assert!((world.ego_station_m() + 3.705 - 399.0).abs() < 0.3);
-        assert_eq!(world.ego_offset_m(), 0.0);
-        assert_eq!(world.red_runs(), 1);
     }
 }

@@ -83,6 +83,33 @@ struct Ahead {
     reason: Reason,
 }
 
+/// Number of moments at which crossings are looked for.
+const LOOKS: usize = (LOOK_AHEAD_S / LOOK_STEP_S) as usize;
+
+/// The stretch on which the ego vehicle may be about a moment.
+#[derive(Debug, Clone, Copy)]
+struct Reach {
+    /// From now, s.
+    time_s: f64,
+    from_m: f64,
+    to_m: f64,
+}
+
+impl Reach {
+    /// The stretches of all moments, for a speed and a place of the front bumper.
+    fn of_moments(speed_mps: f64, front_m: f64) -> [Reach; LOOKS] {
+        let rear_m = front_m - VehicleParameters::MKZ.length_m;
+        core::array::from_fn(|index| {
+            let time_s = (index + 1) as f64 * LOOK_STEP_S;
+            // A slow ego vehicle may speed up meanwhile.
+            let reach_s = time_s + CONFLICT_S;
+            let way_m = (speed_mps * reach_s + reach_s * reach_s).min(RULES.cruise_mps * reach_s);
+            let from_m = rear_m + speed_mps * (time_s - CONFLICT_S).max(0.0);
+            Reach { time_s, from_m, to_m: front_m + way_m }
+        })
+    }
+}
+
 impl Ahead {
     fn gap_m(&self, front_m: f64) -> f64 {
         self.near_m + self.speed_mps * self.age_s - front_m
@@ -137,7 +164,8 @@ impl Idm {
         ahead.extend(self.lights(sensed, front_m));
         ahead.extend(self.sign(sensed, front_m));
         let objects = sensed.objects.iter().filter(|object| object.distance_m < SIGHT_M);
-        ahead.extend(objects.filter_map(|object| self.ahead(sensed, object, front_m)));
+        let reaches = Reach::of_moments(sensed.ego.speed_mps, front_m);
+        ahead.extend(objects.filter_map(|object| self.ahead(sensed, object, front_m, &reaches)));
         ahead.extend(self.last_chance());
         self.ahead = ahead;
         self.report(sensed);
@@ -232,8 +260,13 @@ impl Idm {
     }
 
     /// What a road user means for the ego vehicle: a leader, something in the way, or something that crosses it.
-    fn ahead(&self, sensed: &Sensed, object: &SensedObject, front_m: f64) -> Option<Ahead> {
-        let speed_mps = sensed.ego.speed_mps;
+    fn ahead(
+        &self,
+        sensed: &Sensed,
+        object: &SensedObject,
+        front_m: f64,
+        reaches: &[Reach; LOOKS],
+    ) -> Option<Ahead> {
         let half_way_m = VehicleParameters::MKZ.width_m / 2.0 + SIDE_M;
         let rear_m = front_m - VehicleParameters::MKZ.length_m;
         let forward = unit_vector(object.pose.heading_rad);
@@ -254,13 +287,8 @@ impl Idm {
             return None;
         }
         let front = self.guide.pose_at(front_m).position;
-        for step in 1..=(LOOK_AHEAD_S / LOOK_STEP_S) as usize {
-            let time_s = step as f64 * LOOK_STEP_S;
+        for &Reach { time_s, from_m: ego_from_m, to_m: ego_to_m } in reaches {
             let position = object.pose.position + object.velocity_mps * time_s;
-            // A slow ego vehicle may speed up meanwhile.
-            let reach_s = time_s + CONFLICT_S;
-            let ego_to_m =
-                front_m + (speed_mps * reach_s + reach_s * reach_s).min(RULES.cruise_mps * reach_s);
             let within_m = GUIDE_STRETCH_MAX * (ego_to_m - front_m) + reach_m;
             if (position - front).norm_squared() > within_m * within_m {
                 continue;
@@ -268,7 +296,6 @@ impl Idm {
             let Some(beside) = tracer.next(position) else { continue };
             let Some(span) = taken(&beside) else { continue };
             let (near_m, far_m) = (span.from_m, span.to_m);
-            let ego_from_m = rear_m + speed_mps * (time_s - CONFLICT_S).max(0.0);
             if near_m <= ego_to_m && far_m >= ego_from_m && near_m >= front_m {
                 if goes_before(&self.scene, sensed, object, front_m) {
                     return None;

@@ -216,7 +216,7 @@ impl Driver {
         change.to_station_m =
             change.to.path.project_from(from.position, guess_m).map_or(guess_m, |found| found.station_m);
         let to = change.to.body_at(change.to_station_m, size);
-        let to_lane_rad = change.to.path.pose_at(change.to_station_m).heading_rad;
+        let to_lane_rad = change.to.path.heading_at(change.to_station_m);
         let progress_per_m = 1.0 / (self.speed_mps.max(CHANGE_FULL_MPS) * change.duration_s);
         change.progress += progress_per_m * way_m;
         if change.progress >= 1.0 {

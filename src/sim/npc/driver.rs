@@ -153,7 +153,7 @@ impl Driver {
 
     /// Heading of the way where it is, rad.
     pub(super) fn lane_heading_rad(&self) -> f64 {
-        self.way.path.pose_at(self.station_m).heading_rad
+        self.way.path.heading_at(self.station_m)
     }
 
     /// One tick; `None` if it leaves the world, which it does only while the ego vehicle does not see it
@@ -166,7 +166,8 @@ impl Driver {
         in_sight: bool,
         around: &Around,
     ) -> Option<Moved> {
-        if !touched && (around.tick + u64::from(this.id)).is_multiple_of(FRAME_TICKS) {
+        let looks = !touched && (around.tick + u64::from(this.id)).is_multiple_of(FRAME_TICKS);
+        if looks {
             self.look(this, size, around);
         }
         let braking_mps2 = around.braking_mps2(size, self.speed_mps);
@@ -189,6 +190,10 @@ impl Driver {
         // ends at the edge of the map while the vehicle is in sight.
         if self.is_beyond_map() && !in_sight {
             return None;
+        }
+        // What stands is where it was; a look may have laid its way anew.
+        if way_m == 0.0 && self.change.is_none() && !looks {
+            return Some(Moved::at_rest(this));
         }
         Some(self.advance_change(way_m, this.outline.pose.position, size))
     }

@@ -155,6 +155,10 @@ impl Driver {
         let impatient = f64::from(self.waited_ticks) * DT_S >= PATIENCE_S;
         let mut others = around.drivers();
         let for_others = others.any(|(obstacle, body, driver)| {
+            // Most others take no lane that meets this area.
+            if !driver.way.may_take(area.other) {
+                return false;
+            }
             let reach_m = APPROACH_M + JUNCTION_M;
             let away = obstacle.outline.pose.position - this.outline.pose.position;
             if away.norm_squared() > reach_m * reach_m {

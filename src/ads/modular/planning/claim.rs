@@ -3,7 +3,7 @@
 use core::ops::Range;
 
 use crate::ads::guide::Guide;
-use crate::geometry::{Beside, Span, Vec2};
+use crate::geometry::{Beside, Span, Vec2, larger, smaller};
 use crate::sim::VehicleParameters;
 
 use super::super::prediction::{Forecast, STEP_S, STEPS};
@@ -153,12 +153,12 @@ impl Claim {
 
     /// When it comes onto the way, s from now.
     pub fn entry_s(&self) -> f64 {
-        self.first as f64 * STEP_S
+        moment_s(self.first)
     }
 
     /// When it has left the way, s from now; infinite if it does not within the prediction.
     pub fn exit_s(&self) -> f64 {
-        if self.last == STEPS { f64::INFINITY } else { (self.last + 1) as f64 * STEP_S }
+        if self.last == STEPS { f64::INFINITY } else { moment_s(self.last + 1) }
     }
 
     /// Whether it drives along the way, at once or in the end.
@@ -179,31 +179,37 @@ impl Claim {
 
     /// The parts of the way that it takes, each with its time from now, s.
     pub fn steps(&self) -> impl Iterator<Item = (f64, Span)> {
-        (self.first..=self.last).map(|step| (step as f64 * STEP_S, self.spans[step]))
+        (self.first..=self.last).map(|step| (moment_s(step), self.spans[step]))
     }
 
     /// Nearest station that it takes while it is on the way, m.
     pub fn near_m(&self) -> f64 {
-        self.steps().fold(f64::INFINITY, |near_m, (_, span)| near_m.min(span.from_m))
+        self.steps().fold(f64::INFINITY, |near_m, (_, span)| smaller(near_m, span.from_m))
     }
 
     /// Station of its near end (m) and its speed along the way (m/s) at a time from now; before its entry as
     /// if it came along the way, after the prediction as if it went on.
     pub fn near_end(&self, time_s: f64) -> (f64, f64) {
-        let place = (time_s / STEP_S).max(0.0);
-        if place < self.first as f64 {
-            let along_mps = self.speed_mps * self.cosine.max(0.0);
+        let place = larger(time_s / STEP_S, 0.0);
+        let index = place as u32 as usize;
+        if index < self.first {
+            let along_mps = self.speed_mps * larger(self.cosine, 0.0);
             return (self.spans[self.first].from_m - along_mps * (self.entry_s() - time_s), along_mps);
         }
-        let index = place as usize;
         if index >= self.last {
             let along_mps = self.speed_mps * self.cosine_last;
-            let since_s = time_s - self.last as f64 * STEP_S;
+            let since_s = time_s - moment_s(self.last);
             return (self.spans[self.last].from_m + along_mps * since_s, along_mps);
         }
         let (from_m, to_m) = (self.spans[index].from_m, self.spans[index + 1].from_m);
-        (from_m + (to_m - from_m) * (place - index as f64), (to_m - from_m) / STEP_S)
+        (from_m + (to_m - from_m) * (place - f64::from(index as u32)), (to_m - from_m) / STEP_S)
     }
+}
+
+/// Time of a predicted step, s from now.
+fn moment_s(step: usize) -> f64 {
+    // There are few steps, and small numbers are converted at once.
+    f64::from(step as u32) * STEP_S
 }
 
 /// Unit vector along a displacement, or `otherwise` if there is hardly any.

@@ -6,6 +6,7 @@
 
 use crate::ads::guide::Guide;
 use crate::ads::status::Reason;
+use crate::geometry::{larger, smaller};
 use crate::sim::{Following, VehicleParameters};
 
 use super::super::config::PlanningConfig;
@@ -107,20 +108,21 @@ impl Constraint {
                 let emergency = hardest_mps2 > config.deceleration_mps2_max;
                 let planned = fence_mps2(config, speed_mps, stop_m - front_m);
                 Some(Bound {
-                    acceleration_mps2: if emergency { planned.min(-hardest_mps2) } else { planned },
+                    acceleration_mps2: if emergency { smaller(planned, -hardest_mps2) } else { planned },
                     emergency,
                 })
             }
             Kind::Creep { stop_m, speed_mps: creep_mps } => {
                 let creeping_mps2 = (creep_mps - speed_mps) / SPEED_ERROR_S;
-                let acceleration_mps2 = fence_mps2(config, speed_mps, stop_m - front_m).max(creeping_mps2);
+                let acceleration_mps2 =
+                    larger(fence_mps2(config, speed_mps, stop_m - front_m), creeping_mps2);
                 Some(Bound { acceleration_mps2, emergency: false })
             }
             Kind::Limit { from_m, to_m, speed_mps: limit_mps } => {
                 if front_m > *to_m || front_m < *from_m - speed_mps * PREVIEW_S {
                     return None;
                 }
-                let slowing_mps2 = ((limit_mps - speed_mps) / SPEED_ERROR_S).max(-config.comfortable_mps2);
+                let slowing_mps2 = larger((limit_mps - speed_mps) / SPEED_ERROR_S, -config.comfortable_mps2);
                 Some(Bound { acceleration_mps2: slowing_mps2, emergency: false })
             }
             Kind::Leader(index) => leader_bound(config, &claims[*index], time_s, front_m, speed_mps),
@@ -158,14 +160,14 @@ fn leader_bound(
     let planned_mps2 = leader_mps2(config, speed_mps, along_mps, gap_m);
     if time_s < claim.entry_s() {
         return Some(Bound {
-            acceleration_mps2: planned_mps2.max(-config.comfortable_mps2),
+            acceleration_mps2: larger(planned_mps2, -config.comfortable_mps2),
             emergency: false,
         });
     }
-    let hardest_mps2 = braking_mps2((speed_mps - along_mps).max(0.0), gap_m - EMERGENCY_GAP_M);
+    let hardest_mps2 = braking_mps2(larger(speed_mps - along_mps, 0.0), gap_m - EMERGENCY_GAP_M);
     let emergency = hardest_mps2 > config.deceleration_mps2_max;
     Some(Bound {
-        acceleration_mps2: if emergency { planned_mps2.min(-hardest_mps2) } else { planned_mps2 },
+        acceleration_mps2: if emergency { smaller(planned_mps2, -hardest_mps2) } else { planned_mps2 },
         emergency,
     })
 }
@@ -209,8 +211,8 @@ pub fn roll(
 /// Acceleration on a free road.
 fn free_mps2(config: &PlanningConfig, guide: &Guide, point: &Point) -> f64 {
     let ahead_m = point.station_m + point.speed_mps * PREVIEW_S;
-    let allowed_mps = guide.speed_mps_max(point.station_m).min(guide.speed_mps_max(ahead_m));
-    ((allowed_mps - point.speed_mps) / SPEED_ERROR_S).min(config.acceleration_mps2_max)
+    let allowed_mps = smaller(guide.speed_mps_max(point.station_m), guide.speed_mps_max(ahead_m));
+    smaller((allowed_mps - point.speed_mps) / SPEED_ERROR_S, config.acceleration_mps2_max)
 }
 
 /// Acceleration that stops the vehicle in `room_m`: coming nearer, it is the braking parabola of
@@ -219,7 +221,7 @@ fn fence_mps2(config: &PlanningConfig, speed_mps: f64, room_m: f64) -> f64 {
     let comfortable_mps2 = config.comfortable_mps2;
     // Beyond its place the vehicle must not roll on, however slowly.
     if room_m <= 0.0 && speed_mps > 0.0 {
-        return -comfortable_mps2.max(braking_mps2(speed_mps, room_m));
+        return -larger(comfortable_mps2, braking_mps2(speed_mps, room_m));
     }
     // Until the braking has built up, the vehicle goes on as if for half that time.
     let build_up_m = speed_mps * comfortable_mps2 / config.jerk_mps3_down / 2.0;
@@ -227,7 +229,7 @@ fn fence_mps2(config: &PlanningConfig, speed_mps: f64, room_m: f64) -> f64 {
     if needed_mps2 >= comfortable_mps2 {
         return -needed_mps2;
     }
-    let parabola_mps = (2.0 * comfortable_mps2 * (room_m - STOPPED_SHORT_M).max(0.0)).sqrt();
+    let parabola_mps = (2.0 * comfortable_mps2 * larger(room_m - STOPPED_SHORT_M, 0.0)).sqrt();
     (parabola_mps - speed_mps) / SPEED_ERROR_S
 }
 
@@ -242,17 +244,17 @@ fn leader_mps2(config: &PlanningConfig, speed_mps: f64, leader_mps: f64, gap_m: 
         acceleration_mps2,
         comfortable_mps2,
     };
-    let ratio = following.wanted_gap_m(speed_mps, leader_mps) / gap_m.max(0.1);
+    let ratio = following.wanted_gap_m(speed_mps, leader_mps) / larger(gap_m, 0.1);
     let floor_mps2 =
         if gap_m > config.follow_gap_m { comfortable_mps2 } else { config.deceleration_mps2_max };
-    let model_mps2 = (acceleration_mps2 * (1.0 - ratio * ratio)).max(-floor_mps2);
-    let needed_mps2 = braking_mps2((speed_mps - leader_mps).max(0.0), gap_m - LEADER_GAP_M);
-    if needed_mps2 > comfortable_mps2 / 2.0 { model_mps2.min(-needed_mps2) } else { model_mps2 }
+    let model_mps2 = larger(acceleration_mps2 * (1.0 - ratio * ratio), -floor_mps2);
+    let needed_mps2 = braking_mps2(larger(speed_mps - leader_mps, 0.0), gap_m - LEADER_GAP_M);
+    if needed_mps2 > comfortable_mps2 / 2.0 { smaller(model_mps2, -needed_mps2) } else { model_mps2 }
 }
 
 /// Deceleration that loses a speed within a distance, m/s².
 fn braking_mps2(speed_mps: f64, room_m: f64) -> f64 {
-    speed_mps * speed_mps / (2.0 * room_m.max(0.1))
+    speed_mps * speed_mps / (2.0 * larger(room_m, 0.1))
 }
 
 #[cfg(test)]

@@ -10,6 +10,7 @@
 //! bind count in the cost, weighted with their probability.
 
 use crate::ads::guide::Guide;
+use crate::geometry::{larger, smaller};
 use crate::sim::VehicleParameters;
 
 use super::super::config::PlanningConfig;
@@ -86,12 +87,12 @@ impl Region {
             held: Stance::Open,
         };
         for (time_s, span) in claim.steps() {
-            let first = ((time_s - buffer_s) / UNIT_S).ceil().max(0.0) as usize;
-            let last = ((time_s + buffer_s) / UNIT_S).floor() as usize;
+            let first = rounded_up((time_s - buffer_s) / UNIT_S);
+            let last = ((time_s + buffer_s) / UNIT_S) as u32 as usize;
             for column in first..=last.min(COLUMNS - 1) {
-                region.low_m[column] = region.low_m[column].min(span.from_m - front_m);
+                region.low_m[column] = smaller(region.low_m[column], span.from_m - front_m);
                 let clear_m = span.to_m + VehicleParameters::MKZ.length_m - front_m;
-                region.high_m[column] = region.high_m[column].max(clear_m);
+                region.high_m[column] = larger(region.high_m[column], clear_m);
                 region.near[column] = 1.0;
             }
         }
@@ -143,7 +144,7 @@ impl Region {
         };
         let is_wrong = below && self.held == Stance::Overtake || above && self.held == Stance::Yield;
         let wrong = if is_wrong { INSIDE_COST } else { 0.0 };
-        (wrong + share * missing_m.max(0.0) * missing_m.max(0.0), above)
+        (wrong + share * larger(missing_m, 0.0) * larger(missing_m, 0.0), above)
     }
 }
 
@@ -258,16 +259,16 @@ impl Search<'_> {
             if from.cost.is_infinite() {
                 continue;
             }
-            let slowest_mps = (from.speed_mps - self.config.deceleration_mps2_max * UNIT_S).max(0.0);
+            let slowest_mps = larger(from.speed_mps - self.config.deceleration_mps2_max * UNIT_S, 0.0);
             let fastest_mps = from.speed_mps + self.config.acceleration_mps2_max * UNIT_S;
-            let first = row + (slowest_mps * UNIT_S / ROW_M).ceil() as usize;
-            let last = row + (fastest_mps * UNIT_S / ROW_M) as usize;
+            let first = row + rounded_up(slowest_mps * UNIT_S / ROW_M);
+            let last = row + (fastest_mps * UNIT_S / ROW_M) as u32 as usize;
             for next in first..=last.min(end - 1) {
                 let place = *places[next].get_or_insert_with(|| self.place(column, next));
                 if (from.above ^ place.above) & compared != 0 {
                     continue;
                 }
-                let speed_mps = (next - row) as f64 * ROW_M / UNIT_S;
+                let speed_mps = f64::from((next - row) as u32) * ROW_M / UNIT_S;
                 let acceleration_mps2 = (speed_mps - from.speed_mps) / UNIT_S;
                 let jerk_mps3 = (acceleration_mps2 - from.acceleration_mps2) / UNIT_S;
                 let cost = from.cost
@@ -314,9 +315,15 @@ impl Search<'_> {
     }
 }
 
+/// A small number rounded up, at least 0: `f64::ceil` is a call where the processor need not have it.
+fn rounded_up(value: f64) -> usize {
+    let down = value as u32;
+    (down + u32::from(f64::from(down) < value)) as usize
+}
+
 /// Cost of a step between two columns, by Apollo's speed, acceleration and jerk costs.
 fn way_cost(speed_mps: f64, acceleration_mps2: f64, jerk_mps3: f64, limit_mps: f64) -> f64 {
-    let excess = (speed_mps - limit_mps) / limit_mps.max(0.1);
+    let excess = (speed_mps - limit_mps) / larger(limit_mps, 0.1);
     let speed_cost =
         if excess > 0.0 { EXCEED_PENALTY * excess * excess } else { LOW_PENALTY * -excess } * SPEED_COST;
     speed_cost

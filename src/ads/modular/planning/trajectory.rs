@@ -1,6 +1,7 @@
 //! A planned drive along the route: where, how fast, and why.
 
 use crate::ads::status::Reason;
+use crate::geometry::larger;
 use crate::sim::VehicleParameters;
 
 use super::claim::Claim;
@@ -35,12 +36,12 @@ impl Default for Trajectory {
 impl Trajectory {
     /// The point a time (s) after the beginning, interpolated; the last one afterwards.
     pub fn at(&self, time_s: f64) -> Point {
-        let place = (time_s / POINT_S).max(0.0);
-        let index = place as usize;
+        let place = larger(time_s / POINT_S, 0.0);
+        let index = place as u32 as usize;
         if index >= POINTS - 1 {
             return self.points[POINTS - 1];
         }
-        let fraction = place - index as f64;
+        let fraction = place - f64::from(index as u32);
         let (a, b) = (&self.points[index], &self.points[index + 1]);
         let mix = |a: f64, b: f64| a + (b - a) * fraction;
         Point {
@@ -82,11 +83,15 @@ impl Trajectory {
 impl Point {
     /// One point on, at an acceleration; there is no driving backwards.
     pub fn after(&self, acceleration_mps2: f64) -> Point {
-        let speed_mps = (self.speed_mps + acceleration_mps2 * POINT_S).max(0.0);
+        let speed_mps = larger(self.speed_mps + acceleration_mps2 * POINT_S, 0.0);
         Point {
             station_m: self.station_m + (self.speed_mps + speed_mps) / 2.0 * POINT_S,
             speed_mps,
-            acceleration_mps2: if speed_mps > 0.0 { acceleration_mps2 } else { acceleration_mps2.max(0.0) },
+            acceleration_mps2: if speed_mps > 0.0 {
+                acceleration_mps2
+            } else {
+                larger(acceleration_mps2, 0.0)
+            },
         }
     }
 }

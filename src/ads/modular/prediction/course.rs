@@ -6,7 +6,7 @@
 //! curves: heading and place beside each sibling, and the braking that the bend of a successor would take.
 //! The figures are ours.
 
-use crate::geometry::{PathPoint, Vec2, wrap_angle};
+use crate::geometry::{PathPoint, Vec2, larger, wrap_angle};
 use crate::road::{LaneIndex, LanePlace, RoadMap, Turn};
 
 use super::super::config::PredictionConfig;
@@ -65,7 +65,7 @@ pub fn find(
             for sibling in core::iter::once(place.lane).chain(others).take(COURSES_MAX) {
                 let found = map.lane(sibling).centre.project_near(position, place.station_m, FRAME_REACH_M);
                 let off_m = found.distance_m - map.lane(sibling).width_at(found.station_m) / 2.0;
-                let lane_rad = map.lane(sibling).centre.pose_at(found.station_m).heading_rad;
+                let lane_rad = map.lane(sibling).centre.heading_at(found.station_m);
                 let turned_rad = wrap_angle(heading_rad - lane_rad);
                 let possible = off_m <= SIBLING_REACH_M && turned_rad.abs() <= config.off_lane_rad;
                 if !possible && sibling != place.lane {
@@ -136,9 +136,7 @@ fn bell(value: f64) -> f64 {
 
 /// Braking that the sharpest bend of a lane takes of a vehicle that is `ahead_m` before it, m/s².
 fn bend_braking_mps2(map: &RoadMap, lane: LaneIndex, speed_mps: f64, ahead_m: f64) -> f64 {
-    let points = map.lane(lane).centre.points();
-    let sharpest_per_m = points.iter().fold(0.0_f64, |worst, point| worst.max(point.curvature_per_m.abs()));
-    let allowed_mps2 = LATERAL_MPS2 / sharpest_per_m.max(1e-6);
+    let allowed_mps2 = LATERAL_MPS2 / map.lane(lane).centre.sharpest_per_m().max(1e-6);
     ((speed_mps * speed_mps - allowed_mps2) / (2.0 * ahead_m.max(BRAKING_M_MIN))).max(0.0)
 }
 
@@ -175,6 +173,11 @@ impl Course {
     fn push(&mut self, lane: LaneIndex) {
         self.lanes[self.count] = lane;
         self.count += 1;
+    }
+
+    /// The greatest curvature of its lanes, 1/m.
+    pub fn sharpest_per_m(&self, map: &RoadMap) -> f64 {
+        self.lanes().iter().map(|lane| map.lane(*lane).centre.sharpest_per_m()).fold(0.0, larger)
     }
 
     /// From the vehicle to the end of the last lane, m.
@@ -288,8 +291,7 @@ impl Walk {
             centre = &map.lane(course.lanes[self.lane]).centre;
         }
         let on_lane_m = station_m - self.begin_m;
-        let (points, segment) = (centre.points(), centre.vertex_after(on_lane_m).saturating_sub(1));
-        let (a, b) = (&points[segment], &points[segment + 1]);
+        let (a, b) = centre.segment_at(on_lane_m);
         (a, b, on_lane_m - a.station_m)
     }
 }

@@ -406,7 +406,7 @@ fn still_on(
 }
 
 fn aligned(config: &PredictionConfig, map: &RoadMap, place: LanePlace, heading_rad: f64) -> bool {
-    let lane_rad = map.lane(place.lane).centre.pose_at(place.station_m).heading_rad;
+    let lane_rad = map.lane(place.lane).centre.heading_at(place.station_m);
     wrap_angle(heading_rad - lane_rad).abs() <= config.off_lane_rad
 }
 

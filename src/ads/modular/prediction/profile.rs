@@ -4,6 +4,7 @@
 //! slower. The leader keeps its own speed. This stands for Apollo's `MOVE_SEQUENCE`, in which a lane is followed
 //! with a speed of its own.
 
+use crate::geometry::{larger, smaller};
 use crate::road::RoadMap;
 use crate::sim::Following;
 
@@ -53,29 +54,37 @@ pub fn roll(map: &RoadMap, course: &Course, motion: &Motion, stations_m: &mut [f
     let leader = motion.leader.filter(|leader| leader.gap_m < LEADER_M_MAX);
     let (mut gone_m, mut speed_mps) = (0.0, motion.speed_mps);
     let mut ahead = Walk::new();
+    let sharpest_mps = bend_mps(course.sharpest_per_m(map));
     for (step, station_m) in stations_m.iter_mut().enumerate() {
         *station_m = gone_m;
         let time_s = step as f64 * STEP_S;
-        let mut wanted_mps2 = motion.acceleration_mps2 * (1.0 - time_s / FADE_S).max(0.0);
-        // Until it accelerates of itself, the vehicle is not predicted to.
-        let (a, _, _) = ahead.to(map, course, gone_m + speed_mps * BEND_S);
-        let bend_mps = (LATERAL_MPS2 / a.curvature_per_m.abs().max(1e-6)).sqrt();
-        if bend_mps < speed_mps {
-            wanted_mps2 = wanted_mps2.min(((bend_mps - speed_mps) / BEND_S).max(-BEND_MPS2));
-        }
-        if let Some(leader) = leader {
-            let gap_m = (leader.gap_m + leader.speed_mps * time_s - gone_m).max(0.1);
-            let ratio = FOLLOWING.wanted_gap_m(speed_mps, leader.speed_mps) / gap_m;
-            wanted_mps2 = wanted_mps2.min(FOLLOWING.acceleration_mps2 * (1.0 - ratio * ratio));
-        }
-        if let Some(stop_m) = stop_m {
-            let needed_mps2 = speed_mps * speed_mps / (2.0 * (stop_m - gone_m).max(0.1));
-            if needed_mps2 > STOP_MPS2 {
-                wanted_mps2 = wanted_mps2.min(-needed_mps2);
+        let mut wanted_mps2 = motion.acceleration_mps2 * larger(1.0 - time_s / FADE_S, 0.0);
+        // Until it accelerates of itself, the vehicle is not predicted to. Most courses have no bend that matters.
+        if sharpest_mps < speed_mps {
+            let (a, _, _) = ahead.to(map, course, gone_m + speed_mps * BEND_S);
+            let bend_mps = bend_mps(a.curvature_per_m.abs());
+            if bend_mps < speed_mps {
+                wanted_mps2 = smaller(wanted_mps2, larger((bend_mps - speed_mps) / BEND_S, -BEND_MPS2));
             }
         }
-        let next_mps = (speed_mps + wanted_mps2.max(-BRAKING_MPS2_MAX) * STEP_S).max(0.0);
+        if let Some(leader) = leader {
+            let gap_m = larger(leader.gap_m + leader.speed_mps * time_s - gone_m, 0.1);
+            let ratio = FOLLOWING.wanted_gap_m(speed_mps, leader.speed_mps) / gap_m;
+            wanted_mps2 = smaller(wanted_mps2, FOLLOWING.acceleration_mps2 * (1.0 - ratio * ratio));
+        }
+        if let Some(stop_m) = stop_m {
+            let needed_mps2 = speed_mps * speed_mps / (2.0 * larger(stop_m - gone_m, 0.1));
+            if needed_mps2 > STOP_MPS2 {
+                wanted_mps2 = smaller(wanted_mps2, -needed_mps2);
+            }
+        }
+        let next_mps = larger(speed_mps + larger(wanted_mps2, -BRAKING_MPS2_MAX) * STEP_S, 0.0);
         gone_m += (speed_mps + next_mps) / 2.0 * STEP_S;
         speed_mps = next_mps;
     }
+}
+
+/// Speed at which drivers take a bend, m/s.
+fn bend_mps(curvature_per_m: f64) -> f64 {
+    (LATERAL_MPS2 / larger(curvature_per_m, 1e-6)).sqrt()
 }

@@ -134,6 +134,10 @@ impl Tracking {
         while index < self.tracks.len() {
             let own = &self.tracks[index];
             let is_duplicate = self.tracks.iter().enumerate().any(|(number, other)| {
+                // Cheaper than the rest, and true of most pairs.
+                if other.is_far_from(own, room_m) {
+                    return false;
+                }
                 let older = (rank(other), own.id) > (rank(own), other.id);
                 number != index
                     && older
