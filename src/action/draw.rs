@@ -181,7 +181,7 @@ impl<'a> Judge<'a> {
                 functions: self.row.space.functions.clone(),
                 locals: values.to_vec(),
                 road: self.row.road.cloned(),
-                step: self.situation.step,
+                step_ms: (self.row.space.episode.step_s * 1000.0).round() as u64,
             })
         })
     }

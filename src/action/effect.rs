@@ -86,14 +86,15 @@ pub struct LaneChangeRules {
     pub(super) functions: Vec<FnDef>,
     pub(super) locals: Vec<Value>,
     pub(super) road: Option<RoadFacts>,
-    /// Number of the step in which it appeared.
-    pub(super) step: u64,
+    /// How long a step lasts, ms.
+    pub(super) step_ms: u64,
 }
 
 impl LaneChangeRules {
     /// Whether a lane change may begin at a moment.
     pub fn allow(&self, moment: MomentFacts, npc: NpcFacts) -> bool {
-        let world = WorldFacts { moment, step: self.step, ..WorldFacts::default() };
+        let step = (moment.elapsed_s * 1000.0).round() as u64 / self.step_ms.max(1);
+        let world = WorldFacts { moment, step, ..WorldFacts::default() };
         let spawn = SpawnFacts { spawn_gap_m: npc.gap_m, npc, ..SpawnFacts::default() };
         // No such condition names a state.
         let memory = Memory::default();

@@ -8,7 +8,7 @@ use crate::check::report::Report;
 use crate::check::rule::names_in;
 use crate::model::expr::{Expr, ExprKind};
 use crate::model::vocabulary::{Level, Phenomenon, TimeOfDay, Word, WorldState};
-use crate::model::{EnumDef, EnumIndex, FnDef, Initial, StateDef, StateMeaning, Type, code};
+use crate::model::{EnumDef, EnumIndex, FnDef, Initial, STATE_MAX, StateDef, StateMeaning, Type, code};
 use crate::prove::VARIANTS_MAX;
 use crate::syntax::ast::{ItemKind, Span};
 use crate::syntax::{Diagnostic, ast, listed, nearest};
@@ -398,7 +398,14 @@ impl Checker {
         match value {
             Some(value) => {
                 let value = self.typed(value, &Place::default(), ty)?;
-                Some(Initial::Value(Expr { kind: self.fold(&value)?, ..value }))
+                let kind = self.fold(&value)?;
+                if let ExprKind::Number(number) = kind
+                    && number.to_f64().abs() > STATE_MAX
+                {
+                    let error = Diagnostic::error(code::NUMBER, "no state holds such a number");
+                    return self.reject(error.at(value.span, "the largest is 2^53, either side of 0"));
+                }
+                Some(Initial::Value(Expr { kind, ..value }))
             }
             None if matches!(ty, Type::Bool | Type::Enum(_)) => Some(Initial::Any),
             None => {

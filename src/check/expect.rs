@@ -156,7 +156,9 @@ fn obstacle(found: &[Realised]) -> Option<&'static str> {
     }
     let has = |wanted| found.contains(&wanted);
     Some(match () {
-        () if has(Realised::NotSearched) => "was not looked at: the table is too large",
+        () if has(Realised::NotSearched) => {
+            "was not searched for: the searches for other rows came to their limit"
+        }
         () if has(Realised::Unknown) => "may run or not: its rules could not be solved",
         () if has(Realised::Elsewhere) => {
             "runs in states of which it is not known whether an episode comes to them"

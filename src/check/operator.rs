@@ -11,6 +11,7 @@ use crate::model::vocabulary::{Body, Known, LaneChoice, Word, WordFact};
 use crate::model::{BodyWord, Type, code};
 use crate::syntax::ast::{BinaryOp, Span};
 use crate::syntax::{Diagnostic, ast, one_of};
+use crate::units::Rational;
 
 impl Checker {
     /// Two sides and what joins them.
@@ -50,6 +51,10 @@ impl Checker {
         let right = self.numeric(right, place);
         let (left, right) = (left?, right?);
         let (a, b) = (dimension(left.ty), dimension(right.ty));
+        if op == Arithmetic::Divide && right.kind == ExprKind::Number(Rational::ZERO) {
+            let error = Diagnostic::error(code::NUMBER, "a division by 0 has no value");
+            return self.reject(error.at(span, "").beside(right.span, "is 0"));
+        }
         let both_whole = left.ty == Type::Int && right.ty == Type::Int;
         let result = match op {
             Arithmetic::Add | Arithmetic::Subtract if a == b => Some(a),

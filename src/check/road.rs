@@ -90,6 +90,17 @@ impl Checker {
         if !unlit {
             self.refuse_idle_lights(block, &map, &route)?;
         }
+        if let Some((leap_m, from, to)) = route.leap(&map) {
+            let [from, to] = [from, to].map(|lane| &map.lane(lane).key);
+            let message = format!("the route of road `{}` leaps over a gap of the map", block.name.text);
+            let label = format!(
+                "{leap_m:.1} m, from lane {}/{} to lane {}/{}",
+                from.road, from.lane, to.road, to.lane
+            );
+            self.report(Diagnostic::warning(code::NO_ROUTE, message).at(block.name.span, label).help(
+                "mend the map, or choose places between which it has none; `avastra road MAP` lists the gaps",
+            ));
+        }
         let facts = facts(&block.name.text, &map, &route);
         let name = block.name.text.clone();
         Some(Road { name, docs: docs(item), map_path, map, start, goal, route, facts })

@@ -7,7 +7,9 @@ use crate::check::references::Symbol;
 use crate::check::report::Report;
 use crate::model::expr::{Expr, ExprKind};
 use crate::model::vocabulary::{CHANGE, Known, Site, Then, Verb};
-use crate::model::{ActionDef, EffectDef, RuleBinding, RuleBody, RuleDef, SetDef, Type, WordExpr, code};
+use crate::model::{
+    ActionDef, EffectDef, EnumIndex, Initial, RuleBinding, RuleBody, RuleDef, SetDef, Type, WordExpr, code,
+};
 use crate::syntax::ast::ItemKind;
 use crate::syntax::{Diagnostic, ast, listed};
 
@@ -200,8 +202,8 @@ impl Checker {
     }
 
     /// The actions that a rule without `on` binds. These are the actions that could break it: those that spawn,
-    /// if the rule asks about spawns, and those that set a state which it reads. A rule that does neither binds
-    /// all actions.
+    /// if the rule asks about spawns, and those that set a state which it reads. A rule that does neither, or asks for
+    /// the time, binds all actions.
     fn targets_of_global(&mut self, rule: &ast::Rule, condition: &ast::Expr) -> Option<Vec<usize>> {
         let named = names_in(condition);
         let parameter = self.actions.iter().flatten().find_map(|action| {
@@ -229,7 +231,9 @@ impl Checker {
         };
         let each_step = compiled.known() != Known::Spawn
             && self.each_step.iter().any(|set| reads_state(&compiled, &self.states[set.state]));
-        let open = each_step || compiled.known() != Known::Spawn && !compiled.reads_memory();
+        // What time may break has to be kept by every action.
+        let timed = compiled.is_known_at_start() && compiled.asks_the_world();
+        let open = each_step || timed || compiled.known() != Known::Spawn && !compiled.reads_memory();
         let all = self.actions.iter().enumerate();
         let bound = all.filter(|(index, a)| {
             a.as_ref().is_some_and(|a| open || binds(a) || self.half_broken.contains(index))
@@ -336,7 +340,11 @@ impl Checker {
         if !sound {
             return None;
         }
-        self.check_graph(rule, &variants, &allowed);
+        let begins = |variant: usize| match definition.initial.get(position) {
+            Some(Initial::Value(initial)) => initial.kind == ExprKind::Variant(EnumIndex(of), variant),
+            Some(Initial::Any) | None => true,
+        };
+        self.check_graph(rule, &variants, &allowed, &begins);
         let may_set = |set: &SetDef| match set.key.as_ref().map(|key| &key.kind) {
             Some(ExprKind::Variant(_, other)) => set.state == index && *other == position,
             _ => set.state == index,
@@ -363,8 +371,15 @@ impl Checker {
         found
     }
 
-    /// Reports a value from which no move is allowed, and a value to which no other value may move.
-    fn check_graph(&mut self, rule: &ast::Rule, variants: &[String], allowed: &[Vec<bool>]) {
+    /// Reports a value from which no move is allowed, and a value to which no other value may move and with which no
+    /// episode begins.
+    fn check_graph(
+        &mut self,
+        rule: &ast::Rule,
+        variants: &[String],
+        allowed: &[Vec<bool>],
+        begins: &dyn Fn(usize) -> bool,
+    ) {
         let rows = |test: &dyn Fn(usize) -> bool| -> Vec<&str> {
             (0..variants.len()).filter(|v| test(*v)).map(|v| variants[v].as_str()).collect()
         };
@@ -375,11 +390,12 @@ impl Checker {
                 .at(rule.name.span, "from there no move is allowed, not even to stay");
             self.report(error.help(format!("add `{0} -> {0}` or another move", stuck[0])));
         }
-        let unreachable = rows(&|to| (0..variants.len()).all(|from| from == to || !allowed[from][to]));
+        let is_led_to = |to: usize| (0..variants.len()).any(|from| from != to && allowed[from][to]);
+        let unreachable = rows(&|to| !is_led_to(to) && !begins(to));
         if !unreachable.is_empty() && variants.len() > 1 {
             let message = format!("rule `{}` never leads to {}", rule.name.text, listed(&unreachable));
             let warning = Diagnostic::warning(code::UNREACHABLE, message)
-                .at(rule.name.span, "only an episode that begins there ever sees it");
+                .at(rule.name.span, "no episode begins there either");
             let (from, to) = (first_other(variants, unreachable[0]), unreachable[0]);
             self.report(warning.help(format!("add a move to it, for example `{from} -> {to}`")));
         }

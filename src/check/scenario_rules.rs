@@ -35,6 +35,11 @@ pub(super) fn breaches(space: &Space, moment: &Moment<'_>, in_force: &RulesInFor
     let (_, before) = moment.history.last().expect("it begins with the start");
     let candidate = Candidate { values: moment.locals, before, after: moment.after, world: None };
     let error = |breach: Breach<'_>| {
+        if let Breach::Number { .. } = breach {
+            let message = format!("step {} leaves a state without a value", moment.step.number.digits);
+            let error = Diagnostic::error(code::BROKEN_RULE, message);
+            return Some(error.at(moment.step.span, rules.words(breach, candidate)));
+        }
         let rule = &space.rules[breach.rule()?];
         let message = format!("step {} breaks rule `{}`", moment.step.number.digits, rule.name);
         let error = Diagnostic::error(code::BROKEN_RULE, message);
@@ -44,7 +49,7 @@ pub(super) fn breaches(space: &Space, moment: &Moment<'_>, in_force: &RulesInFor
                 let error = error.at(moment.step.span, rules.words(breach, candidate));
                 Some(forbidden_move(space, rule, (state, cell, from, to), moment, error))
             }
-            Breach::Where(..) | Breach::Spawn { .. } => None,
+            Breach::Where(..) | Breach::Number { .. } | Breach::Spawn { .. } => None,
         }
     };
     rules.breaches(candidate).filter_map(error).collect()

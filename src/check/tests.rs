@@ -529,7 +529,7 @@ fn rules_of_the_first_step_bind_the_start() {
         "{BASE}state dark: Bool = any
 action switch(each to: Bool) {{ set dark = to }}
 rule begins: step == 0 implies dark
-rule later: elapsed < 12 s or not dark
+rule early: elapsed >= 12 s or dark
 "
     );
     let loaded = load_files(&[("space.ava", &text)]);

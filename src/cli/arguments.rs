@@ -238,7 +238,7 @@ pub struct DocArguments {
     /// The space.
     pub file: PathBuf,
     /// Where to write [default: stdout].
-    #[arg(long, short)]
+    #[arg(long = "out", short = 'o')]
     pub output: Option<PathBuf>,
 }
 
@@ -269,7 +269,7 @@ pub struct CompileArguments {
     /// The space.
     pub file: PathBuf,
     /// Where to write the table [default: build/STEM.table.yaml].
-    #[arg(long, short)]
+    #[arg(long = "out", short = 'o')]
     pub output: Option<PathBuf>,
 }
 
@@ -475,7 +475,7 @@ pub struct DistillArguments {
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=1000))]
     pub episodes: Option<u32>,
     /// Where to write [default: STEM.distilled.ava beside the file].
-    #[arg(long, short)]
+    #[arg(long = "out", short = 'o')]
     pub output: Option<PathBuf>,
 }
 
@@ -505,7 +505,7 @@ pub struct ExportWeightsArguments {
     /// The policy.
     pub file: PathBuf,
     /// Where to write [default: STEM.safetensors beside the file].
-    #[arg(long, short)]
+    #[arg(long = "out", short = 'o')]
     pub output: Option<PathBuf>,
 }
 
@@ -593,7 +593,7 @@ pub struct DiagnoseArguments {
 #[derive(Debug, Args)]
 pub struct ShrinkArguments {
     /// Where to write, if there is one file [default: a folder `shrunk` beside the scenarios].
-    #[arg(long, short)]
+    #[arg(long = "out", short = 'o')]
     pub output: Option<PathBuf>,
     /// Driving system of your own that the scenarios were made against: a command (PROTOCOL.md), `tcp:HOST:PORT` or
     /// `unix:PATH`.
@@ -652,7 +652,7 @@ pub struct RenderArguments {
     #[arg(long, conflicts_with = "at")]
     pub strip: bool,
     /// Where to write [default: STEM.svg here; `-` is stdout].
-    #[arg(long, short)]
+    #[arg(long = "out", short = 'o')]
     pub output: Option<PathBuf>,
     /// Draw the drive of another driving system.
     #[arg(long, value_parser = Named::ADS)]

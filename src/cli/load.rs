@@ -80,6 +80,9 @@ pub fn check_text(path: &Path, text: &str) -> Result<Loaded, Failure> {
 }
 
 fn check_read(path: &Path, read: &check::ReadFile<'_>) -> Result<Loaded, Failure> {
+    if path.is_dir() {
+        return Err(Failure::file("read", path, "it is a folder: name a file in it"));
+    }
     let mut loaded = check::load(path, read).map_err(|error| Failure::file("read", path, error))?;
     if loaded.diagnostics.iter().any(crate::syntax::Diagnostic::is_error) {
         check::suggest_uses(&mut loaded, &nearby(path));

@@ -27,7 +27,7 @@ pub fn shrink(output: &Output, arguments: &ShrinkArguments) -> Result<(), Failur
     if let Some(path) = arguments.output.as_ref().filter(|_| arguments.many.files.len() > 1) {
         let path = path.display();
         return Err(Failure::usage(format!(
-            "`--output {path}` is for one file: of several, each is written to a folder `{FOLDER}`"
+            "`--out {path}` is for one file: of several, each is written to a folder `{FOLDER}`"
         )));
     }
     let asked = load::asked(None, arguments.ads_config.as_deref(), arguments.ads_cmd.as_deref())?;

@@ -67,6 +67,11 @@ pub fn test(output: &Output, arguments: &TestArguments) -> Result<(), Failure> {
     }
     suite.tell_outdated();
     if let Some(path) = &arguments.junit {
+        // A folder that is misspelt is not made.
+        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
+        if folder.is_some_and(|folder| !folder.is_dir()) {
+            return Err(Failure::file("write", path, "its folder does not exist"));
+        }
         write(path, &junit(&named, &cases))?;
     }
     let count = |is: &dyn Fn(&Outcome) -> bool| cases.iter().filter(|case| is(&case.outcome)).count();

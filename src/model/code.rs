@@ -103,6 +103,8 @@ pub const NO_START: &str = "AV0411";
 pub const LATER: &str = "AV0412";
 /// A rule under which no lane change begins.
 pub const NO_CHANGE: &str = "AV0413";
+/// A rule on states and time that a step without an action breaks.
+pub const BROKEN_BY_TIME: &str = "AV0414";
 /// A value that a transition rule does not lead out of.
 pub const DEADLOCK: &str = "AV0501";
 /// A value that a transition rule does not lead to.

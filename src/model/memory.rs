@@ -103,7 +103,7 @@ impl Space {
     }
 
     /// The memory after a step without an action. If the effects of every step would break a rule in force that
-    /// stands for all states or orders their changes, they do not happen. `step` is its number, if it is known.
+    /// stands for all states or orders their changes, or give a state no value, they do not happen. `step` is its number, if it is known.
     pub fn memory_after_wait(
         &self,
         before: &Memory,
@@ -123,7 +123,8 @@ impl Space {
             let [from, to] = [before, &after].map(|memory| memory.cells[*cell].variant());
             self.may_set_each_step(*cell) && !allowed[from][to]
         };
-        if rules.all().any(is_broken) { before.clone() } else { after }
+        let is_kept = after.cells.iter().all(|value| value.is_kept());
+        if !is_kept || rules.all().any(is_broken) { before.clone() } else { after }
     }
 
     /// Whether the effects of every step may set a cell.

@@ -46,4 +46,5 @@ pub use space::{
     Parameter, RewardCase, Road, RoadFacts, RuleBinding, RuleBody, RuleDef, SetDef, Space, SpawnDef,
     StateDef, StateMeaning, VerdictDef, WordExpr,
 };
+pub(crate) use value::STATE_MAX;
 pub use value::{EnumIndex, Memory, Type, Value};

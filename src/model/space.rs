@@ -321,6 +321,13 @@ pub struct EpisodeDef {
     pub step_limit: u32,
 }
 
+impl EpisodeDef {
+    /// When a step begins, s: the number nearest to the exact time, so that `elapsed >= 0.7 s` holds at 0.7 s.
+    pub(crate) fn time_s(&self, step: u64) -> f64 {
+        (step as f64 * self.step_s * 1000.0).round() / 1000.0
+    }
+}
+
 #[derive(Debug, Clone, PartialEq)]
 pub struct RewardCase {
     /// `None` for `_`.

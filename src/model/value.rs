@@ -17,6 +17,9 @@ pub enum Type {
     Enum(EnumIndex),
 }
 
+/// The largest number of a state, either side of 0: 2^53.
+pub(crate) const STATE_MAX: f64 = 9_007_199_254_740_992.0;
+
 /// A value at run time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Value {
@@ -37,6 +40,15 @@ impl Value {
         match self {
             Value::Number(number) => number,
             Value::Bool(_) | Value::Variant(..) => f64::NAN,
+        }
+    }
+
+    /// Whether a state may have it: whole numbers up to [`STATE_MAX`] are exact, and an infinite one would make rules
+    /// mean nothing.
+    pub fn is_kept(self) -> bool {
+        match self {
+            Value::Number(number) => number.abs() <= STATE_MAX,
+            Value::Bool(_) | Value::Variant(..) => true,
         }
     }
 

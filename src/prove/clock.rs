@@ -21,8 +21,8 @@ struct Graph<'a> {
     begin: u128,
 }
 
-/// One warning each for values that no move leaves, values that no episode reaches, and rows that no move
-/// enables.
+/// One remark for values that no move leaves; one warning each for values that no episode reaches, and for rows that
+/// no move enables.
 pub(crate) fn report(space: &Space) -> Vec<Diagnostic> {
     let mut diagnostics = Vec::new();
     for rule in &space.rules {
@@ -39,10 +39,11 @@ pub(crate) fn report(space: &Space) -> Vec<Diagnostic> {
         if stuck != 0 && variants.len() > 1 && graph.rows.len() > 1 {
             let names = names(stuck);
             let message = format!("`{moved}` can never leave {}", listed(&names));
-            let warning = Diagnostic::warning(code::STUCK, message)
+            // The rule says so itself, so it may well be meant.
+            let remark = Diagnostic::remark(code::STUCK, message)
                 .at(rule.span, "allows no move from there to another value")
                 .help(format!("add `{} -> …` with another value, if an episode should go on", names[0]));
-            diagnostics.push(warning);
+            diagnostics.push(remark);
         }
         // A value that no move leads to was reported with the rule itself.
         let led_to =

@@ -72,7 +72,7 @@ impl Values {
     }
 
     /// The positions as bits; `false` is bit 0 and `true` is bit 1.
-    fn variants(self) -> u128 {
+    pub fn variants(self) -> u128 {
         match self {
             Values::Variants(set) => set,
             Values::Truth { may_hold, may_fail } => u128::from(may_fail) | u128::from(may_hold) << 1,

@@ -39,8 +39,12 @@ fn warning(space: &Space, rule: usize, reasons: &[usize]) -> Diagnostic {
     let definition = &space.rules[rule];
     if reasons.is_empty() {
         let message = format!("rule `{}` can never refuse anything", definition.name);
+        let label = match space.each_step.is_empty() {
+            true => "holds for every value that its actions can have",
+            false => "holds for every value that its actions can have, and after all that `each step` sets",
+        };
         return Diagnostic::warning(code::NEVER_ACTS, message)
-            .at(definition.span, "holds for every value that its actions can have")
+            .at(definition.span, label)
             .help("remove it, or say what it should forbid");
     }
     let names: Vec<&str> = reasons.iter().map(|rule| space.rules[*rule].name.as_str()).collect();

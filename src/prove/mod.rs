@@ -15,6 +15,7 @@ mod realise;
 mod reduce;
 mod spawn_bounds;
 mod start;
+mod time;
 mod twins;
 mod undecided;
 mod unfair;
@@ -25,6 +26,8 @@ pub use cut::{Removal, removals};
 pub(crate) use enclose::{Known, VARIANTS_MAX, Values, enclose};
 pub(crate) use reach::{product_size, rows};
 pub(crate) use realise::{Realisable, Realised, realise, with_dead};
+pub use time::BrokenByTime;
+pub(crate) use time::lasts;
 pub use witness::{Witness, witness};
 
 use crate::model::Space;
@@ -34,6 +37,7 @@ use crate::syntax::Diagnostic;
 pub(crate) fn report(space: &Space, realisable: &Realisable) -> Vec<Diagnostic> {
     let mut diagnostics = reach::report(space);
     diagnostics.extend(start::report(space));
+    diagnostics.extend(time::report(space));
     diagnostics.extend(spawn_bounds::report(space));
     diagnostics.extend(twins::report(space));
     diagnostics.extend(undecided::report(space, realisable));

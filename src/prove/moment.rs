@@ -2,14 +2,16 @@
 //! moment, nor does `ego.speed >= 200 m/s`.
 //!
 //! What a fact may be is cut into pieces where a condition compares it with something known. If in every combination
-//! of pieces some condition fails, no moment meets them all. Facts are taken to be independent of each other, so a
-//! combination that is possible here may still never come.
+//! of pieces some condition fails, no moment meets them all. What is known of facts together stands in [`Case::is_possible`], and of
+//! a newcomer in [`newcomers`]; otherwise facts are taken to be independent, so a combination that is possible here may
+//! still never come.
 
 use crate::model::expr::{Comparison, Expr, ExprKind};
 use crate::model::rules::RowRules;
-use crate::model::vocabulary::{Fact, Known as From, WordFact};
+use crate::model::vocabulary::{Fact, Known as From, RoadKind, Verb, Word, WordFact};
 use crate::model::{
-    End, EpisodeDef, Interval, Row, RuleBody, RulesInForce, SPAWN_SPEED_MPS, Space, Type, code,
+    ActionDef, EffectDef, End, EpisodeDef, Interval, Row, RuleBody, RulesInForce, SPAWN_SPEED_MPS, Space,
+    SpawnDef, Type, WordExpr, code,
 };
 use crate::prove::enclose::{Known, enclose, fact_range};
 use crate::syntax::Diagnostic;
@@ -26,8 +28,43 @@ pub(crate) struct Case {
 }
 
 impl Case {
+    /// A moment of which the time alone is known.
+    pub fn of_time(elapsed: Interval, step: Interval) -> Case {
+        Case { numbers: vec![(Fact::Elapsed, elapsed), (Fact::StepNumber, step)], words: Vec::new() }
+    }
+
     pub fn number(&self, fact: Fact) -> Option<Interval> {
         self.numbers.iter().find(|(known, _)| *known == fact).map(|(_, piece)| *piece)
+    }
+
+    /// Whether the facts may have these values at one moment, by what the engine says of each two of them.
+    fn is_possible(&self, episode: &EpisodeDef) -> bool {
+        let of = |fact: Fact| self.number(fact);
+        let both = |a: Fact, b: Fact| Some((of(a)?, of(b)?));
+        let is_zero = |piece: &Interval| piece.single() == Some(Rational::ZERO);
+        // An action of a scenario may happen within its step.
+        let in_time = both(Fact::StepNumber, Fact::Elapsed).is_none_or(|(step, elapsed)| {
+            let Some(step_s) = Rational::from_f64(episode.step_s) else { return true };
+            let from = step.mul(&Interval::point(step_s));
+            let within = Interval { low: End::At(Rational::ZERO, true), high: End::At(step_s, false) };
+            !from.add(&within).intersect(&elapsed).is_empty()
+        });
+        let on_road =
+            match (self.word(WordFact::EgoRoad).and_then(RoadKind::from_name), of(Fact::EgoJunctionAhead)) {
+                (Some(RoadKind::InJunction), Some(ahead)) => ahead.contains(Rational::ZERO),
+                (Some(RoadKind::NearJunction), Some(ahead)) => !ahead
+                    .intersect(&Interval::closed(Rational::ZERO, Rational::integer(NEAR_JUNCTION_M)))
+                    .is_empty(),
+                _ => true,
+            };
+        let is_alone = of(Fact::RoadUsers).is_some_and(|count| is_zero(&count));
+        let at_default =
+            |fact: Fact, value: i64| of(fact).is_none_or(|piece| piece.contains(Rational::integer(value)));
+        let alone =
+            !is_alone || at_default(Fact::NearestGap, NO_ROAD_USER_M) && at_default(Fact::NearestSpeed, 0);
+        // The gap of a spawn is that to the vehicle which is parked with it, if that is nearer.
+        let gaps = both(Fact::SpawnGap, Fact::NpcGap).is_none_or(|(spawn, npc)| !npc.is_below(&spawn));
+        in_time && on_road && alone && gaps
     }
 
     pub fn word(&self, fact: WordFact) -> Option<&'static str> {
@@ -35,22 +72,81 @@ impl Case {
     }
 }
 
-/// Whether the conditions may all hold at one moment of a draw.
-pub(super) fn may_hold_together(conditions: &[&Expr], known: &Known<'_>, episode: &EpisodeDef) -> bool {
+/// At most so far before a junction the ego vehicle is `NearJunction`, m.
+const NEAR_JUNCTION_M: i64 = 20;
+/// `nearest.gap` where there is nobody, m.
+const NO_ROAD_USER_M: i64 = 100;
+
+/// What is known of each newcomer of an action before it appears. The world lets nothing appear faster than it was asked
+/// to be. Where `lands` is set, it also appears at the distance that was asked for, as far as its verb means a place on
+/// the route: so it is where the road is straight and free.
+pub(super) fn newcomers(action: &ActionDef, known: &Known<'_>, lands: bool) -> Vec<Case> {
+    let spawns = action.effects.iter().filter_map(|effect| match effect {
+        EffectDef::Spawn(spawn) => Some(&**spawn),
+        EffectDef::Set(_) => None,
+    });
+    spawns.map(|spawn| newcomer(spawn, known, lands)).collect()
+}
+
+fn newcomer(spawn: &SpawnDef, known: &Known<'_>, lands: bool) -> Case {
+    let verbs = match &spawn.verb {
+        WordExpr::Fixed(verb) => vec![*verb],
+        WordExpr::Of(expr, words) => {
+            let may_be = enclose(expr, known).variants();
+            words
+                .iter()
+                .enumerate()
+                .filter(|(word, _)| may_be >> word & 1 == 1)
+                .map(|(_, verb)| *verb)
+                .collect()
+        }
+    };
+    let mut numbers = Vec::new();
+    let asked = enclose(&spawn.speed, known).interval().intersect(&at_most(*SPAWN_SPEED_MPS.end()));
+    // On foot one waits at first, or stands for good.
+    let speed = match verbs.iter().all(|verb| matches!(verb, Verb::Walk | Verb::Stand)) {
+        true => Interval::point(Rational::ZERO),
+        false => Interval { low: End::At(Rational::ZERO, true), high: asked.high },
+    };
+    if !speed.is_empty() {
+        numbers.push((Fact::NpcSpeed, speed));
+    }
+    let distance = enclose(&spawn.distance, known).interval().intersect(&Interval::NOT_NEGATIVE);
+    let is_on_route = |verb: &Verb| !matches!(verb, Verb::Walk | Verb::CrossRoad);
+    if lands && verbs.iter().all(is_on_route) && !distance.is_empty() {
+        numbers.extend([(Fact::NpcGap, distance), (Fact::SpawnGap, distance)]);
+    }
+    Case { numbers, words: Vec::new() }
+}
+
+/// Whether the conditions may all hold at one moment of a draw, for each of these newcomers.
+pub(super) fn may_hold_together(
+    conditions: &[&Expr],
+    known: &Known<'_>,
+    episode: &EpisodeDef,
+    newcomers: &[Case],
+) -> bool {
     let may_all_hold = |conditions: &[&Expr], known: &Known<'_>| {
         conditions.iter().all(|condition| enclose(condition, known).may_hold())
     };
     let asking: Vec<&Expr> = conditions.iter().copied().filter(|c| c.known() > From::Road).collect();
     let is_met = |case: &Case| may_all_hold(&asking, &Known { case: Some(case), ..*known });
+    let meets = |newcomer: &Case| cases(&asking, known, episode, newcomer).iter().any(is_met);
     may_all_hold(conditions, known)
-        && (asking.is_empty() || cases(&asking, known, episode).iter().any(is_met))
+        && (asking.is_empty()
+            || match newcomers {
+                [] => meets(&Case::default()),
+                newcomers => newcomers.iter().all(meets),
+            })
 }
 
 /// Whether the condition can fail at no moment, given what is known.
 pub(super) fn always_holds(condition: &Expr, known: &Known<'_>, episode: &EpisodeDef) -> bool {
     let holds = |known: &Known<'_>| !enclose(condition, known).may_fail();
     holds(known)
-        || cases(&[condition], known, episode).iter().all(|case| holds(&Known { case: Some(case), ..*known }))
+        || cases(&[condition], known, episode, &Case::default())
+            .iter()
+            .all(|case| holds(&Known { case: Some(case), ..*known }))
 }
 
 /// One warning for each rule that lets no lane change begin, at any moment.
@@ -71,7 +167,7 @@ pub(super) fn report(space: &Space) -> Vec<Diagnostic> {
                 return true;
             };
             let cells = space.cells_unknown();
-            !may_hold_together(&[condition], &rules.known(&locals, &cells), &space.episode)
+            !may_hold_together(&[condition], &rules.known(&locals, &cells), &space.episode, &[])
         };
         if bound.all(never) {
             let message = format!("rule `{}` lets no lane change begin", definition.name);
@@ -84,14 +180,23 @@ pub(super) fn report(space: &Space) -> Vec<Diagnostic> {
     diagnostics
 }
 
-/// The facts of the moment that conditions name and that are bounded, each with its range, in words.
-pub(super) fn ranges_named(conditions: &[&Expr], episode: &EpisodeDef) -> Vec<(Fact, Interval)> {
+/// The facts of the moment and of newcomers that conditions name and that are bounded, each with its range.
+pub(super) fn ranges_named(
+    conditions: &[&Expr],
+    episode: &EpisodeDef,
+    newcomers: &[Case],
+) -> Vec<(Fact, Interval)> {
+    let of = |fact: Fact| {
+        let known =
+            newcomers.iter().map(|newcomer| newcomer.number(fact).unwrap_or_else(|| range(fact, episode)));
+        known.reduce(|a, b| a.hull(&b)).unwrap_or_else(|| range(fact, episode))
+    };
     let named = facts_named(conditions).0.into_iter();
-    named.map(|fact| (fact, range(fact, episode))).filter(|(_, range)| range.high != End::Unbounded).collect()
+    named.map(|fact| (fact, of(fact))).filter(|(_, range)| range.high != End::Unbounded).collect()
 }
 
-/// Every combination of pieces.
-fn cases(conditions: &[&Expr], known: &Known<'_>, episode: &EpisodeDef) -> Vec<Case> {
+/// Every combination of pieces that is possible, within what is known of a newcomer.
+fn cases(conditions: &[&Expr], known: &Known<'_>, episode: &EpisodeDef, newcomer: &Case) -> Vec<Case> {
     let (numbers, words) = facts_named(conditions);
     let mut cases = vec![Case::default()];
     for fact in words {
@@ -111,7 +216,7 @@ fn cases(conditions: &[&Expr], known: &Known<'_>, episode: &EpisodeDef) -> Vec<C
         cases = cases.iter().flat_map(with).collect();
     }
     for fact in numbers {
-        let whole = range(fact, episode);
+        let whole = newcomer.number(fact).unwrap_or_else(|| range(fact, episode));
         let mut pieces = pieces(&whole, cuts(fact, conditions, known));
         if cases.len() * pieces.len() > CASES_MAX {
             pieces = vec![whole];
@@ -127,6 +232,7 @@ fn cases(conditions: &[&Expr], known: &Known<'_>, episode: &EpisodeDef) -> Vec<C
         };
         cases = cases.iter().flat_map(with).collect();
     }
+    cases.retain(|case| case.is_possible(episode));
     cases
 }
 
@@ -151,17 +257,17 @@ fn facts_named(conditions: &[&Expr]) -> (Vec<Fact>, Vec<WordFact>) {
 
 /// What a fact may be at a draw.
 fn range(fact: Fact, episode: &EpisodeDef) -> Interval {
-    let at_most = |high: f64| match Rational::from_f64(high) {
-        Some(high) => Interval::closed(Rational::ZERO, high),
-        None => Interval::NOT_NEGATIVE,
-    };
     match fact {
         Fact::Elapsed => at_most(episode.step_s * f64::from(episode.step_limit)),
         Fact::StepNumber => at_most(f64::from(episode.step_limit.saturating_sub(1))),
-        // A commanded road user is at most as fast as it was asked to be.
         Fact::NpcSpeed => at_most(*SPAWN_SPEED_MPS.end()),
         _ => fact_range(fact).unwrap_or(Interval::ALL),
     }
+}
+
+/// From 0 to a number.
+fn at_most(high: f64) -> Interval {
+    Rational::from_f64(high).map_or(Interval::NOT_NEGATIVE, |high| Interval::closed(Rational::ZERO, high))
 }
 
 /// Where conditions compare a fact with something that no fact of the moment decides.

@@ -13,7 +13,7 @@ use crate::model::{
     Type, Value, code, evaluate, locals,
 };
 use crate::prove::enclose::{Known, Values, enclose};
-use crate::prove::moment::{may_hold_together, ranges_named};
+use crate::prove::moment::{may_hold_together, newcomers, ranges_named};
 use crate::syntax::{Diagnostic, listed};
 
 /// Rounds of narrowing: a bound may depend on another one, rarely on two.
@@ -173,7 +173,9 @@ impl<'a> RowRules<'a> {
             },
         });
         let known = self.known(&locals, &after);
-        let possible = may_move && may_hold_together(&self.conditions(), &known, &self.space.episode);
+        let newcomers = newcomers(&self.space.actions[self.row.action], &known, false);
+        let possible =
+            may_move && may_hold_together(&self.conditions(), &known, &self.space.episode, &newcomers);
         possible.then_some(locals)
     }
 
@@ -233,7 +235,8 @@ impl<'a> RowRules<'a> {
             .iter()
             .filter_map(|rule| self.space.rules[*rule].body.demand(self.row.action)?.condition())
             .collect();
-        for (fact, range) in ranges_named(&conditions, &self.space.episode) {
+        let newcomers = newcomers(&self.space.actions[self.row.action], &known, false);
+        for (fact, range) in ranges_named(&conditions, &self.space.episode, &newcomers) {
             let unit = match fact.ty() {
                 Type::Quantity(dimension) => format!(" {}", dimension.si_unit()),
                 Type::Int | Type::Bool | Type::Enum(_) => String::new(),

@@ -1,8 +1,10 @@
 //! Rows that were not found to run: those of which nothing is known, and those that would run only in states to
 //! which no episode comes.
 
+use crate::model::expr::ExprKind;
 use crate::model::rules::RowRules;
-use crate::model::{ActionDef, Road, Row, RulesInForce, Space, code};
+use crate::model::vocabulary::Known;
+use crate::model::{ActionDef, Road, Row, RuleBody, RulesInForce, Space, code};
 use crate::prove::clock::never_enabled;
 use crate::prove::reach::numbers;
 use crate::prove::realise::{Realisable, Realised};
@@ -90,13 +92,27 @@ fn error(space: &Space, many: &[Unknown<'_>]) -> Diagnostic {
     let others = many[1..].iter();
     let error = others.fold(error, |error, one| error.beside(one.action.span, numbers(&one.rows)));
     let rules = first.rules.iter().map(|rule| &space.rules[*rule]);
-    let error = rules.fold(error, |error, rule| error.beside(rule.span, "too complicated to be solved"));
+    let asks_about_newcomer = first.rules.iter().any(|rule| asks_about_newcomer(&space.rules[*rule].body));
+    let why = match asks_about_newcomer {
+        true => "not found to hold for a newcomer",
+        false => "too complicated to be solved",
+    };
+    let error = rules.fold(error, |error, rule| error.beside(rule.span, why));
     let obeyed = match rule_names(space, &first.rules).as_str() {
         "" => String::new(),
         names => format!(" that obey {names}"),
     };
     let error = error.note(format!("no values were found{obeyed}, and no proof that there are none"));
-    error.help("say it by sums, products and `match`, of at most six drawn numbers and with low powers")
+    match asks_about_newcomer {
+        true => error.help("a newcomer is taken to appear as far away and as fast as its spawn asks: let the rule allow that"),
+        false => error.help("say it by sums, products and `match`, of at most six drawn numbers and with low powers"),
+    }
+}
+
+fn asks_about_newcomer(body: &RuleBody) -> bool {
+    let RuleBody::Holds(bindings) = body else { return false };
+    let asks = |kind: &ExprKind| matches!(kind, ExprKind::Fact(fact) if fact.known() == Known::Spawn);
+    bindings.iter().any(|binding| binding.condition.any(asks))
 }
 
 /// The rules that leave a row undecided: without any one of the others it is undecided still.

@@ -19,7 +19,7 @@ use crate::model::{
     SetDef, Space, SpawnFacts, StateDef, Type, Value, WorldFacts, evaluate, locals, spawn_out_of_bounds,
 };
 use crate::prove::enclose::Values;
-use crate::prove::moment::may_hold_together;
+use crate::prove::moment::{may_hold_together, newcomers};
 use crate::units::Rational;
 
 /// The most boxes of ranges looked at for one choice of the listed values and one memory.
@@ -272,9 +272,13 @@ impl Search<'_> {
         }
         let world = WorldFacts { spawns, ..WorldFacts::default() };
         let candidate = Candidate { values, before, after, world: Some(&world) };
-        let mut breaches = self.rules.breaches(candidate).peekable();
-        breaches.peek().is_none()
-            || breaches.all(|breach| breach.asks_about_moment()) && self.is_left_open(candidate)
+        // What the moment or the place decides is not judged by this world, but by whether it may come.
+        self.rules.breaches(candidate).all(|breach| breach.asks_about_moment())
+            && (!self.asks_about_moment() || self.is_left_open(candidate))
+    }
+
+    fn asks_about_moment(&self) -> bool {
+        self.rules.conditions().iter().any(|condition| condition.asks_about_moment())
     }
 
     /// The states that one step with this row leads to, and whether there can be no other.
@@ -316,7 +320,8 @@ impl Search<'_> {
         let points = |values: &[Value]| values.iter().map(|value| Values::point(*value)).collect::<Vec<_>>();
         let (locals, cells) = (points(candidate.values), points(candidate.after.cells()));
         let known = self.rules.known(&locals, &cells);
-        may_hold_together(&self.rules.conditions(), &known, &self.rules.space.episode)
+        let newcomers = newcomers(self.action(), &known, true);
+        may_hold_together(&self.rules.conditions(), &known, &self.rules.space.episode, &newcomers)
     }
 
     /// Memories to try: the initial one first, then every value of the cells that the rules or effects of the

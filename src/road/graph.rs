@@ -241,14 +241,14 @@ impl<'a> Builder<'a> {
                     None => continue,
                     Some(RoadLink::Junction { id, line }) => {
                         if !self.junctions.contains_key(id.as_str()) {
-                            self.warn_dead_end(road, &format!("junction `{id}`"), *line);
+                            self.warn_broken_link(road, &format!("junction `{id}`"), *line);
                         }
                         continue;
                     }
                     Some(RoadLink::Road { id, contact, line }) => (id, *contact, *line),
                 };
                 let Some(other) = self.roads.get(id.as_str()).copied() else {
-                    self.warn_dead_end(road, &format!("road `{id}`"), line);
+                    self.warn_broken_link(road, &format!("road `{id}`"), line);
                     continue;
                 };
                 let section = end_section(road, contact);
@@ -266,9 +266,9 @@ impl<'a> Builder<'a> {
         }
     }
 
-    fn warn_dead_end(&mut self, road: &RoadElement, missing: &str, line: u32) {
+    fn warn_broken_link(&mut self, road: &RoadElement, missing: &str, line: u32) {
         let message =
-            format!("road `{}` leads to {missing}, which does not exist: it is a dead end", road.id);
+            format!("road `{}` leads to {missing}, which does not exist: the link is left out", road.id);
         self.warn(line, message);
     }
 
@@ -455,15 +455,18 @@ struct End {
 /// Ends of linked lanes that are farther apart than this do not meet, m: a car would have to jump.
 const LOOSE_M: f64 = 0.5;
 
+/// How far two linked lanes are apart, m; `None` where they meet.
+pub(super) fn leap_m(lane: &Lane, next: &Lane) -> Option<f64> {
+    let end = lane.centre.pose_at(lane.centre.length_m()).position;
+    let apart_m = (next.centre.pose_at(0.0).position - end).norm();
+    (apart_m > LOOSE_M).then_some(apart_m)
+}
+
 /// Warns of linked lanes whose ends do not meet.
 fn loose_links(map: &RoadMap) -> Option<String> {
     let links =
         map.lanes.iter().flat_map(|lane| lane.successors.iter().map(move |next| (lane, map.lane(*next))));
-    let loose = links.filter_map(|(lane, next)| {
-        let end = lane.centre.pose_at(lane.centre.length_m()).position;
-        let apart_m = (next.centre.pose_at(0.0).position - end).norm();
-        (apart_m > LOOSE_M).then_some((apart_m, lane, next))
-    });
+    let loose = links.filter_map(|(lane, next)| Some((leap_m(lane, next)?, lane, next)));
     let loose: Vec<_> = loose.collect();
     let (apart_m, lane, next) = loose.iter().max_by(|a, b| a.0.total_cmp(&b.0))?;
     let name = |lane: &Lane| format!("lane {} of road `{}`", lane.key.lane, lane.key.road);

@@ -5,6 +5,7 @@ use std::collections::BTreeSet;
 use crate::geometry::{Path, smooth_step, wrap_angle};
 
 use super::conflict::{conflicts, spans_inside};
+use super::graph::leap_m;
 use super::heights::is_apart;
 use super::join::Joined;
 use super::lane_change::LENGTH_M_MIN;
@@ -176,6 +177,15 @@ impl Route {
         let limit_mps = |lane: &RouteLane| map.lane(lane.lane).speed_limit_mps;
         let slowest = self.lanes.iter().min_by(|a, b| limit_mps(a).total_cmp(&limit_mps(b)))?;
         self.lanes.iter().any(|lane| limit_mps(lane) > limit_mps(slowest)).then_some(*slowest)
+    }
+
+    /// The widest gap of the map that the route leaps over: how wide it is, m, and between which lanes.
+    pub fn leap(&self, map: &RoadMap) -> Option<(f64, LaneIndex, LaneIndex)> {
+        let pairs = self.lanes.windows(2).map(|pair| (pair[0].lane, pair[1].lane));
+        let linked = pairs.filter(|(lane, next)| map.lane(*lane).successors.contains(next));
+        let leaps =
+            linked.filter_map(|(lane, next)| Some((leap_m(map.lane(lane), map.lane(next))?, lane, next)));
+        leaps.max_by(|a, b| a.0.total_cmp(&b.0))
     }
 
     /// The lane of the route at a station, clamped to its ends.

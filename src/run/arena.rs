@@ -14,6 +14,7 @@ use crate::episode::{Choice, Moment};
 use crate::mdp::ProcKind;
 use crate::model::{Road, RulesInForce, Space};
 use crate::oracle::AvoidabilitySettings;
+use crate::prove;
 use crate::rng;
 use crate::rng::{Rng, Stream};
 use crate::sim::{Scene, Start, TrafficProfile};
@@ -56,6 +57,10 @@ impl Arena {
         let rules = RulesInForce::new(space, with, without)?;
         for (index, _) in &roads {
             space.memory_at_start(&space.roads[*index], &rules, 0)?;
+            // The rules by default were shown to last when the space was checked.
+            if rules != RulesInForce::by_default(space) {
+                prove::lasts(space, &space.roads[*index], &rules)?;
+            }
         }
         Ok(Arena { table, rules, ads, traffic: TrafficProfile::default(), roads })
     }

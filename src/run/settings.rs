@@ -119,6 +119,8 @@ pub enum RunError {
     Rule(#[from] crate::model::UnknownRule),
     #[error(transparent)]
     Start(#[from] crate::model::NoStart),
+    #[error(transparent)]
+    Time(#[from] crate::prove::BrokenByTime),
     #[error("`{name}` is asked for twice, or both on and off")]
     Twice { name: String },
     #[error("{found} episodes a road: from 1 to {EPISODES_MAX} are possible")]

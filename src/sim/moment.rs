@@ -27,7 +27,7 @@ impl World {
 }
 
 impl Around<'_> {
-    /// The facts of this moment. Where one road user looks around, the nearest is another.
+    /// The facts of this moment. Where one road user looks around, it does not count itself: see [`MomentFacts::with`].
     pub fn moment_facts(&self) -> MomentFacts {
         let (scene, station_m) = (self.scene, self.ego_station_m);
         let gaps =
@@ -45,7 +45,8 @@ impl Around<'_> {
             road_users: self.obstacles_on_level().count() as u32,
             nearest_gap_m: nearest.map_or(NO_ROAD_USER_M, |(gap_m, _)| gap_m),
             nearest_speed_mps: nearest.map_or(0.0, |(_, speed_mps)| speed_mps),
-            elapsed_s: self.tick as f64 * DT_S,
+            // The number nearest to the exact time, so that `elapsed >= 0.7 s` holds at 0.7 s.
+            elapsed_s: (self.tick as f64 * DT_S * 1000.0).round() / 1000.0,
         }
     }
 
@@ -68,6 +69,21 @@ impl Scene {
         let first = self.route.lanes.partition_point(|lane| lane.enter_m <= station_m).max(1) - 1;
         let ahead = self.route.lanes[first..].iter().map(|RouteLane { lane, enter_m, .. }| (*lane, *enter_m));
         junction_ahead_m(&self.map, ahead, station_m)
+    }
+}
+
+impl MomentFacts {
+    /// The same moment with one road user more: the one that looked around, and did not count itself.
+    pub(super) fn with(self, this: &Obstacle) -> MomentFacts {
+        if this.is_apart {
+            return self;
+        }
+        let is_nearest = self.road_users == 0 || this.distance_m < self.nearest_gap_m;
+        let (nearest_gap_m, nearest_speed_mps) = match is_nearest {
+            true => (this.distance_m, this.velocity_mps.norm()),
+            false => (self.nearest_gap_m, self.nearest_speed_mps),
+        };
+        MomentFacts { road_users: self.road_users + 1, nearest_gap_m, nearest_speed_mps, ..self }
     }
 }
 

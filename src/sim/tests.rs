@@ -134,7 +134,7 @@ fn does_not_come_where_it_cannot_pass() {
     let mut world = testing::world(&testing::crossing());
     drive(&mut world, 8.0, 6.0);
     let refusal = world.survey(&request(Verb::Overtake, 15.0, 12.0)).expect_err("there is one lane");
-    assert_eq!(refusal, "no room to change lanes before the junction");
+    assert_eq!(refusal, "no lane beside it to change to");
     let refusal = world.survey(&request(Verb::Overtake, 15.0, 7.0)).expect_err("it is too slow");
     assert_eq!(refusal, "it would be no faster than the ego vehicle");
 }

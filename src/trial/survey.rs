@@ -254,7 +254,12 @@ fn attempt(moment: &Moment, draw: &Draw) -> Try {
                 found.failure = Some(format!("cannot spawn: {reason}"));
                 return found;
             }
-            (Effect::Spawn(request), Ok(Some(id))) => newcomers.push((*request, id)),
+            (Effect::Spawn(request), Ok(Some(id))) => {
+                if let Some(rules) = &draw.lane_changes {
+                    world.bind_lane_changes(id, rules);
+                }
+                newcomers.push((*request, id));
+            }
             (_, Ok(_)) => {}
         }
     }

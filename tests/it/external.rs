@@ -223,7 +223,7 @@ fn threads_and_processes_change_nothing_and_crashes_replay_with_and_without_the_
     // It is made small with the program; what only the program can show is not tried without it.
     let small = scratch.path().join("small.ava").display().to_string();
     let (status, stdout, stderr) =
-        outcome(&mut avastra(&["shrink", &path, "--ads-config", &config, "--output", &small]));
+        outcome(&mut avastra(&["shrink", &path, "--ads-config", &config, "--out", &small]));
     assert_eq!(status, 0, "{stdout}{stderr}");
     let claims_minimal = std::fs::read_to_string(&small).unwrap().contains("expect minimal");
     for (more, is_tried) in [(&[][..], false), (&["--ads-config", &config], true)] {

@@ -90,7 +90,7 @@ fn found_scenarios_are_explained_shrunk_and_tested_again() {
     }
 
     let small = path("small.ava");
-    let (status, found) = json(&["shrink", &file, "--output", &small]);
+    let (status, found) = json(&["shrink", &file, "--out", &small]);
     let shrunk = &found["scenarios"][0];
     assert!(status == 0 && shrunk["refuted"] == 0, "{shrunk}");
     assert!(shrunk["actions"].as_u64() <= shrunk["actions_before"].as_u64(), "{shrunk}");
@@ -123,7 +123,7 @@ fn found_scenarios_are_explained_shrunk_and_tested_again() {
     assert_eq!(document.descendants().filter(|node| node.has_tag_name("failure")).count(), files.len());
 
     let cases: [(&[&str], &str); 4] = [
-        (&["shrink", &small, &small, "--output", &small], "is for one file"),
+        (&["shrink", &small, &small, "--out", &small], "is for one file"),
         (&["test", "scenarios/ads"], "no scenario in"),
         (&["test", &out, "--ads", "apolo"], "no driving system `apolo`"),
         (&["run", "scenarios/avastra45.ava", "--ads", "idm", "--causes"], "`idm` is not made of modules"),

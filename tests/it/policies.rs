@@ -111,7 +111,7 @@ fn both_faces_are_played_and_what_they_claim_is_checked() {
 fn rules_are_distilled_anew_and_hold() {
     let file = trained().display().to_string();
     let fewer = trained().with_file_name("fewer.ava").display().to_string();
-    avastra(&["distill", &file, "--leaves", "2", "--episodes", "2", "--output", &fewer]).assert().success();
+    avastra(&["distill", &file, "--leaves", "2", "--episodes", "2", "--out", &fewer]).assert().success();
     let policy = load(&moved(&std::fs::read_to_string(&fewer).expect("it is written"))).expect("it is sound");
     assert!((1..=2).contains(&policy.rules.len()));
     assert!(

@@ -71,7 +71,7 @@ fn a_scenario_keeps_the_profile_that_it_was_found_with() {
     assert!(status == 0 && stdout.contains("against modular with scenarios/ads/cautious.yaml"), "{stdout}");
 
     let svg = scratch.path().join("strip.svg").display().to_string();
-    let drawn = ["render", &path, "--strip", "--ads-config", cautious, "--output", &svg];
+    let drawn = ["render", &path, "--strip", "--ads-config", cautious, "--out", &svg];
     let (status, _, stderr) = outcome(&mut avastra(&drawn));
     assert!(status == 0 && Path::new(&svg).is_file(), "{stderr}");
 

@@ -5,14 +5,18 @@
 //! `verdicts_agree_with_sampling` in `sound` did not see that rows were never realised and that the start was not
 //! checked: it asks only that dead rows are not drawn and that witnesses run, so that a refused draw passed; its rules
 //! read no state in a bound and bind one action by name; and what it draws is judged by the code that draws.
+//!
+//! This audit in turn did not see that time alone may break a rule: its rules asked for no time, only draws were
+//! judged, and a step without an action was played only where every step does something. Now rules ask for `step` and
+//! `elapsed`, every kind of space has such steps and whole episodes of them, and the states are judged after each.
 
 use core::fmt;
 use std::collections::BTreeMap;
 
 use crate::action::tests::Plain;
 use crate::action::tests::sound::compiled;
-use crate::action::{ActionTable, Draw, Offer, Situation};
-use crate::model::{Memory, Row, RulesInForce, Space, Type, Value, code};
+use crate::action::{ActionTable, Draw, Offer, Situation, SpawnFacts, SpawnRequest, Surroundings};
+use crate::model::{Memory, MomentFacts, Row, RulesInForce, Space, Type, Value, code};
 use crate::prove::{Realised, realise};
 use crate::rng;
 use crate::rng::{Rng, Stream};
@@ -62,6 +66,10 @@ enum Condition {
     Same,
     Flag,
     Road(usize),
+    /// `step >= 3`.
+    Step(&'static str, u64),
+    /// `elapsed >= 18 s`.
+    Elapsed(&'static str, u64),
     /// `quiet(LEVEL)`.
     Quiet(Level),
     Not(Box<Condition>),
@@ -117,6 +125,7 @@ struct Made {
 #[derive(Clone)]
 struct Twin {
     road: usize,
+    step: u64,
     fog: usize,
     wet: [usize; 2],
     was: usize,
@@ -153,6 +162,15 @@ impl Level {
 }
 
 impl Condition {
+    fn asks_for_time(&self) -> bool {
+        match self {
+            Condition::Step(..) | Condition::Elapsed(..) => true,
+            Condition::Not(of) => of.asks_for_time(),
+            Condition::Join(_, a, b) => a.asks_for_time() || b.asks_for_time(),
+            _ => false,
+        }
+    }
+
     fn holds(&self, twin: &Twin) -> bool {
         match self {
             Condition::Compare(op, a, b) => compared(op, a.value(twin), b.value(twin)),
@@ -167,6 +185,8 @@ impl Condition {
             Condition::Same => twin.mode == twin.was,
             Condition::Flag => twin.flag,
             Condition::Road(road) => twin.road == *road,
+            Condition::Step(op, step) => compared(op, twin.step as f64, *step as f64),
+            Condition::Elapsed(op, time_s) => compared(op, 6.0 * twin.step as f64, *time_s as f64),
             Condition::Quiet(level) => level.value(twin) < 2,
             Condition::Not(of) => !of.holds(twin),
             Condition::Join(word, a, b) => match *word {
@@ -231,6 +251,8 @@ impl fmt::Display for Condition {
             Condition::Same => f.write_str("mode == was"),
             Condition::Flag => f.write_str("flag"),
             Condition::Road(road) => write!(f, "road == {}", ROADS[*road].0),
+            Condition::Step(op, step) => write!(f, "step {op} {step}"),
+            Condition::Elapsed(op, time_s) => write!(f, "elapsed {op} {time_s} s"),
             Condition::Quiet(level) => write!(f, "quiet({level})"),
             Condition::Not(of) => write!(f, "not ({of})"),
             Condition::Join(word, a, b) => write!(f, "({a}) {word} ({b})"),
@@ -298,6 +320,17 @@ impl Maker {
         }
     }
 
+    /// A condition on states and time.
+    fn of_time(&mut self) -> Condition {
+        let op = self.one(&["<", "<", "<", "<=", "<=", ">", ">=", "=="]);
+        let time = match self.below(2) {
+            0 => Condition::Step(op, self.below(6) as u64),
+            _ => Condition::Elapsed(op, self.below(40) as u64),
+        };
+        let of_states = self.of_states();
+        Condition::Join(self.one(&["implies", "implies", "or"]), Box::new(time), Box::new(of_states))
+    }
+
     /// A condition on an action with `speed`, these lengths, and perhaps `mode`.
     fn of_action(&mut self, lengths: &[&'static str], has_mode: bool, depth: u32) -> Condition {
         let a_length = Number::Parameter(lengths.first().copied().unwrap_or("speed"));
@@ -347,6 +380,9 @@ impl Maker {
         }
         for _ in 0..self.below(3) {
             rules.push(Rule::Holds(Binds::Always, self.of_states()));
+        }
+        for _ in 0..self.below(3) {
+            rules.push(Rule::Holds(Binds::Always, self.of_time()));
         }
         if self.below(3) == 0 {
             let mut moves = [[false; 3]; 3];
@@ -452,13 +488,14 @@ impl Made {
 
 impl Twin {
     /// The states of a memory, read by name.
-    fn of(space: &Space, memory: &Memory, road: usize) -> Twin {
+    fn of(space: &Space, memory: &Memory, road: usize, step: u64) -> Twin {
         let cells = |name: &str| {
             let state = space.state(name).expect("it is declared");
             &memory.cells()[state.first_cell..][..state.cells]
         };
         Twin {
             road,
+            step,
             fog: cells("fog")[0].variant(),
             wet: [cells("wet")[0].variant(), cells("wet")[1].variant()],
             was: cells("was")[0].variant(),
@@ -523,6 +560,15 @@ impl Twin {
         after
     }
 
+    /// Asserts that the rules hold that hold always.
+    fn stands(&self, made: &Made) {
+        for rule in &made.rules {
+            if let Rule::Holds(Binds::Always, condition) = rule {
+                assert!(condition.holds(self), "step {} breaks {condition}\n{}", self.step, made.text());
+            }
+        }
+    }
+
     /// The rule that a step from `self` to `after` breaks, by its number.
     fn broken(&self, after: &Twin, action: &str, made: &Made) -> Option<usize> {
         made.rules.iter().position(|rule| match rule {
@@ -546,8 +592,10 @@ struct Seen {
     /// Spaces that the checker refused before a rule was dropped, by the first code.
     refused: BTreeMap<&'static str, u32>,
     draws: u64,
-    /// Steps without an action, where every step does something.
+    /// Steps without an action.
     waits: u64,
+    /// Rules on states and time that the checker let stand.
+    timed: u64,
     rows_realised: u32,
     /// The most draws before a realisable row was drawn.
     longest_wait: u64,
@@ -566,7 +614,7 @@ fn audit(spaces: u64, draws: u32) -> Seen {
             let errors = loaded.diagnostics.iter().filter(|found| found.is_error());
             let first = errors.map(|found| found.code).next().expect("a space is refused with a reason");
             assert!(
-                [code::DEAD, code::NO_START, code::UNDECIDED].contains(&first),
+                [code::DEAD, code::NO_START, code::UNDECIDED, code::BROKEN_BY_TIME].contains(&first),
                 "{first}: {:?}\n{}",
                 loaded.diagnostics.iter().map(|found| &found.message).collect::<Vec<_>>(),
                 made.text()
@@ -575,12 +623,28 @@ fn audit(spaces: u64, draws: u32) -> Seen {
             made.rules.pop().expect("without rules every space is sound");
         };
         seen.spaces += 1;
+        let timed =
+            |rule: &&Rule| matches!(rule, Rule::Holds(Binds::Always, condition) if condition.asks_for_time());
+        seen.timed += made.rules.iter().filter(timed).count() as u64;
         played(&space, &made, draws, &mut seen);
     }
     seen
 }
 
-/// Plays random episodes on each road and judges every offer.
+/// [`Plain`] so many seconds after the start.
+struct Later(f64);
+
+impl Surroundings for Later {
+    fn survey(&self, request: &SpawnRequest) -> Result<SpawnFacts, String> {
+        Plain.survey(request)
+    }
+
+    fn moment(&self) -> MomentFacts {
+        MomentFacts { elapsed_s: self.0, ..Plain.moment() }
+    }
+}
+
+/// Plays random episodes on each road and judges every offer, and the states of every step.
 fn played(space: &std::sync::Arc<Space>, made: &Made, draws: u32, seen: &mut Seen) {
     let realised = realise(space);
     let table = ActionTable::new(space.clone());
@@ -593,19 +657,17 @@ fn played(space: &std::sync::Arc<Space>, made: &Made, draws: u32, seen: &mut See
         while count < draws {
             let mut choices = rng::stream(episode, Stream::Exploration, 78);
             let mut memory = space.memory_at_start(road, &rules, episode).expect("the checker found a start");
-            let start = Twin::of(space, &memory, road_number);
-            for rule in &made.rules {
-                if let Rule::Holds(Binds::Always, condition) = rule {
-                    assert!(condition.holds(&start), "the start breaks {condition}\n{}", made.text());
-                }
-            }
+            let start = Twin::of(space, &memory, road_number, 0);
+            start.stands(made);
+            // Time alone may break what actions keep.
+            let waits_always = episode % 8 == 0;
             for step in 0..STEPS {
-                let before = Twin::of(space, &memory, road_number);
+                let before = Twin::of(space, &memory, road_number, step);
                 let situation = Situation {
                     memory: &memory,
                     road,
                     rules: &rules,
-                    surroundings: &Plain,
+                    surroundings: &Later(6.0 * step as f64),
                     seed: episode,
                     step,
                 };
@@ -618,7 +680,10 @@ fn played(space: &std::sync::Arc<Space>, made: &Made, draws: u32, seen: &mut See
                     let name = &space.actions[row.action].name;
                     let broken = before.broken(&after, name, made);
                     assert_eq!(broken, None, "{} {:?}\n{}", row.label, draw.values, made.text());
-                    assert_eq!(Twin::of(space, &draw.memory_after, road_number).states(), after.states());
+                    assert_eq!(
+                        Twin::of(space, &draw.memory_after, road_number, step).states(),
+                        after.states()
+                    );
                     let found = realised[draw.row][road_index];
                     let is_said = !matches!(found, Realised::Never | Realised::Unreached);
                     assert!(is_said, "{} is {found:?} and drawn\n{}", row.label, made.text());
@@ -629,20 +694,17 @@ fn played(space: &std::sync::Arc<Space>, made: &Made, draws: u32, seen: &mut See
                     }
                     legal.push(draw);
                 }
-                let waits = made.each_step != EachStep::Nothing && rng::below(&mut choices, 4) == 0;
-                if waits {
+                if legal.is_empty() || waits_always || rng::below(&mut choices, 4) == 0 {
                     let (_, waited) = table.wait(&memory, step, road, &rules);
-                    let found = Twin::of(space, &waited, road_number).states();
-                    assert_eq!(found, before.waited(made).states(), "{}", made.text());
+                    let found = Twin::of(space, &waited, road_number, step);
+                    assert_eq!(found.states(), before.waited(made).states(), "{}", made.text());
                     memory = waited;
                     seen.waits += 1;
-                    continue;
+                } else {
+                    let chosen = rng::below(&mut choices, legal.len() as u32) as usize;
+                    memory = legal.swap_remove(chosen).memory_after;
                 }
-                if legal.is_empty() {
-                    break;
-                }
-                let chosen = rng::below(&mut choices, legal.len() as u32) as usize;
-                memory = legal.swap_remove(chosen).memory_after;
+                Twin::of(space, &memory, road_number, step).stands(made);
             }
             episode += 1;
             // A space in which nothing is ever legal would not end.
@@ -669,7 +731,7 @@ fn played(space: &std::sync::Arc<Space>, made: &Made, draws: u32, seen: &mut See
 #[test]
 fn random_spaces_keep_the_promise() {
     let seen = audit(24, 400);
-    assert!(seen.rows_realised >= 24 * 8 && seen.waits > 100, "{seen:?}");
+    assert!(seen.rows_realised >= 24 * 8 && seen.waits > 100 && seen.timed >= 6, "{seen:?}");
 }
 
 /// `cargo test --lib -- --ignored --nocapture random_spaces_keep_the_promise_at_length`
@@ -678,7 +740,7 @@ fn random_spaces_keep_the_promise() {
 fn random_spaces_keep_the_promise_at_length() {
     let seen = audit(300, DRAWS_MAX);
     println!("{seen:?}");
-    assert!(seen.rows_realised >= 300 * 8, "{seen:?}");
+    assert!(seen.rows_realised >= 300 * 8 && seen.timed >= 60, "{seen:?}");
 }
 
 /// The types of the drawn values are those of the parameters.

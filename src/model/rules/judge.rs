@@ -35,6 +35,10 @@ pub(crate) enum Breach<'a> {
         condition: &'a Expr,
         spawn: SpawnFacts,
     },
+    /// An effect gives a state a number that no state may have: see [`Value::is_kept`].
+    Number {
+        cell: usize,
+    },
     /// A state makes a move that the rule does not allow.
     Move {
         rule: usize,
@@ -46,12 +50,15 @@ pub(crate) enum Breach<'a> {
 }
 
 impl<'a> RowRules<'a> {
-    /// Everything that the candidate breaks: `where`s first, then the rules in force that bind the row.
+    /// Everything that the candidate breaks: `where`s first, then the numbers that states may have, then the rules in
+    /// force that bind the row.
     pub fn breaches(self, candidate: Candidate<'a>) -> impl Iterator<Item = Breach<'a>> {
         let parameters = 0..self.space.actions[self.row.action].parameters.len();
         let wheres = parameters.filter_map(move |parameter| self.where_breach(parameter, candidate));
         let rules = self.demands().filter_map(move |(rule, demand)| self.breach(rule, demand, candidate));
-        wheres.chain(rules)
+        let cells = candidate.before.cells.iter().zip(&candidate.after.cells).enumerate();
+        let numbers = cells.filter(|(_, (before, after))| before != after && !after.is_kept());
+        wheres.chain(numbers.map(|(cell, _)| Breach::Number { cell })).chain(rules)
     }
 
     /// Whether this clause forbids the candidate.
@@ -133,6 +140,10 @@ impl<'a> RowRules<'a> {
                 self.gap_words(decisive, spawn, facts)
                     .unwrap_or_else(|| self.figures(Some(rule), decisive, candidate, Some(spawn)))
             }
+            Breach::Number { cell } => format!(
+                "`{}` would have no value: a division by 0, or a number beyond 2^53",
+                self.space.cell_name(cell)
+            ),
             Breach::Move { state, cell, from, to, .. } => {
                 let ty = self.space.states[state].ty;
                 let (from, to) = (self.space.show(from, ty), self.space.show(to, ty));
@@ -239,6 +250,11 @@ impl<'a> RowRules<'a> {
             }
             (None, _) => {}
         }
+        let has_no_value = |expr: &Expr| matches!(evaluate(expr, &self.space.functions, &facts), Value::Number(n) if !n.is_finite());
+        if condition.any(|kind| matches!(kind, ExprKind::Compare(_, left, right) if has_no_value(left) || has_no_value(right)))
+        {
+            shown.push("a division by 0 has no value".to_owned());
+        }
         let asks_for_limit = condition.any(|kind| matches!(kind, ExprKind::Fact(Fact::RoadLimit)));
         let limited_at = self.road.and_then(|road| road.limited_at.as_ref());
         if let Some(place) = limited_at.filter(|_| asks_for_limit) {
@@ -258,14 +274,14 @@ impl Breach<'_> {
             Breach::Where(_, condition)
             | Breach::Condition { condition, .. }
             | Breach::Spawn { condition, .. } => condition.asks_about_moment(),
-            Breach::Move { .. } => false,
+            Breach::Number { .. } | Breach::Move { .. } => false,
         }
     }
 
-    /// The rule that is broken; `None` for a `where`.
+    /// The rule that is broken; `None` for a `where` and for a number that no state may have.
     pub fn rule(&self) -> Option<usize> {
         match self {
-            Breach::Where(..) => None,
+            Breach::Where(..) | Breach::Number { .. } => None,
             Breach::Condition { rule, .. } | Breach::Spawn { rule, .. } | Breach::Move { rule, .. } => {
                 Some(*rule)
             }

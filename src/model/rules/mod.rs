@@ -38,6 +38,7 @@ pub(crate) use room::Room;
 pub(crate) use solve::{Before, Choose, Nearest, TRIES_MAX, Unsolved};
 
 pub use start::NoStart;
+pub(crate) use start::cells_read;
 
 use bound::locals;
 

@@ -85,7 +85,7 @@ impl Space {
             None if condition.asks_the_world() => return true,
             step => step.unwrap_or(0),
         };
-        let elapsed_s = step as f64 * self.episode.step_s;
+        let elapsed_s = self.episode.time_s(step);
         let moment = MomentFacts { elapsed_s, ..MomentFacts::default() };
         let world = WorldFacts { moment, step, ..WorldFacts::default() };
         let facts = Facts { road, world: Some(&world), ..Facts::new(&[], memory) };
@@ -220,7 +220,7 @@ impl<'a> Starts<'a> {
 }
 
 /// The cells that an expression reads.
-fn cells_read(expr: &Expr, states: &[StateDef]) -> Vec<usize> {
+pub(crate) fn cells_read(expr: &Expr, states: &[StateDef]) -> Vec<usize> {
     let mut found = Vec::new();
     expr.walk(&mut |part| match part.kind {
         ExprKind::Cell(cell) => found.push(cell),

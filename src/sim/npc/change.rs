@@ -88,7 +88,7 @@ impl Driver {
             }
         };
         let allowed = |rules: &Arc<LaneChangeRules>| {
-            rules.allow(around.moment_facts(), driver_facts(around, this, self))
+            rules.allow(around.moment_facts().with(this), driver_facts(around, this, self))
         };
         if !due || !self.lane_changes.as_ref().is_none_or(allowed) {
             return;

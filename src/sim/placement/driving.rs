@@ -3,6 +3,7 @@
 use crate::action::SpawnRequest;
 use crate::model::vocabulary::{LaneChoice, Side, Then};
 use crate::rng;
+use crate::road::LaneIndex;
 
 use crate::sim::around::Around;
 use crate::sim::body::BodyParameters;
@@ -42,13 +43,21 @@ pub(super) fn drive_ahead(
         let possible = |side: &Side| can_change(around, &way, begin_m, *side, request.speed_mps);
         let sides: Vec<Side> = sides.iter().copied().filter(possible).collect();
         if sides.is_empty() {
-            return Err("no room to change lanes before the junction".into());
+            return Err(no_change(around, lane).into());
         }
         let towards = Towards::To(sides[rng::below(&mut rng, sides.len() as u32) as usize]);
         let when = When::Tick(around.tick + (CHANGE_AFTER_S / DT_S + 0.5) as u64);
         plan.push(Manoeuvre { when, towards });
     }
     Ok(commanded(around, request, way, station_m, plan))
+}
+
+/// Why a vehicle in this lane cannot change it.
+fn no_change(around: &Around, lane: LaneIndex) -> &'static str {
+    match [Side::Left, Side::Right].into_iter().all(|side| lane_beside(around, lane, side).is_none()) {
+        true => "no lane beside it to change to",
+        false => "no room to change lanes before the junction",
+    }
 }
 
 pub(super) fn overtake(
@@ -92,7 +101,7 @@ pub(super) fn overtake(
     let way = Way::along(around.scene, &lanes, &mut rng).ok_or("that lane leads nowhere")?;
     let passes = |side| can_change(around, &way, station_m, side, request.speed_mps);
     if request.lane == LaneChoice::Current && !passes(Side::Left) && !passes(Side::Right) {
-        return Err("no room to change lanes before the junction".into());
+        return Err(no_change(around, lane).into());
     }
     Ok(commanded(around, request, way, station_m, plan))
 }
