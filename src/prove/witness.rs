@@ -305,7 +305,9 @@ impl Search<'_> {
             match self.rules.solve(chosen, &open, before, &mut Share(SHARES[0])) {
                 Ok(values) => {
                     let led_to = self.rules.space.memory_after(self.rules.row.action, &values, memory);
-                    if !after.contains(&led_to) {
+                    // An effect without a value is refused.
+                    let is_kept = led_to.cells().iter().all(|value| value.is_kept());
+                    if is_kept && !after.contains(&led_to) {
                         after.push(led_to);
                     }
                 }
