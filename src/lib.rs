@@ -21,6 +21,7 @@ pub mod agent;
 pub mod episode;
 pub mod oracle;
 pub mod run;
+pub mod estimate;
 pub mod train;
 pub mod trial;
 pub mod study;

@@ -53,6 +53,8 @@ pub enum Stream {
     Distillation = 41,
     /// The order into which the values of a variable are shuffled; one index for each variable and repeat.
     Permutation = 42,
+    /// Seeds of the parts of an estimate, and what splitting draws in one.
+    Estimate = 51,
 }
 
 /// The stream of one consumer; `index` tells its uses apart, and may be the number of a step.

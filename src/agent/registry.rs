@@ -9,7 +9,7 @@ use crate::rng::Rng;
 use super::branch::Branch;
 use super::hyperparameters::SettingsError;
 use super::presets::Preset;
-use super::search::{AvFuzzerSettings, GoExploreSettings};
+use super::search::{AvFuzzerSettings, BanditSettings, ConstantSettings, GoExploreSettings};
 use super::settings::Settings;
 use super::{greedy, presets, random};
 
@@ -107,6 +107,16 @@ pub const REGISTRY: &[Entry] = &[
         kind: Kind::Searching(|text| Settings::of_search(text, AvFuzzerSettings::check, Settings::AvFuzzer)),
     },
     Entry {
+        name: "constant",
+        summary: "one row in every step: the one that crashed most in training, or the next best that is legal",
+        kind: Kind::Searching(|text| Settings::of_search(text, ConstantSettings::check, Settings::Constant)),
+    },
+    Entry {
+        name: "bandit",
+        summary: "the row that has crashed most in such a situation, without looking ahead",
+        kind: Kind::Searching(|text| Settings::of_search(text, BanditSettings::check, Settings::Bandit)),
+    },
+    Entry {
         name: "go-explore",
         summary: "returns to promising moments by snapshots and explores from there",
         kind: Kind::Searching(|text| {
@@ -194,8 +204,10 @@ mod tests {
                 continue;
             }
             assert!(choices(1).iter().flatten().all(Option::is_some), "{}", entry.name);
-            for (one, other) in choices(1).iter().zip(choices(2)) {
-                assert_ne!(*one, other, "{}", entry.name);
+            // A constant row may be the same for two seeds, but not for all.
+            let others: Vec<Vec<Vec<Option<usize>>>> = (2..10).map(choices).collect();
+            for (preset, one) in choices(1).iter().enumerate() {
+                assert!(others.iter().any(|other| other[preset] != *one), "{}", entry.name);
             }
         }
     }

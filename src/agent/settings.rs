@@ -11,7 +11,10 @@ use super::hyperparameters::{Hyperparameters, RewardSource, SettingsError};
 use super::learner::Learner;
 use super::q_policy::Rows;
 use super::registry::{Entry, Kind};
-use super::search::{AvFuzzer, AvFuzzerSettings, GoExplore, GoExploreSettings};
+use super::search::{
+    AvFuzzer, AvFuzzerSettings, Bandit, BanditSettings, Constant, ConstantSettings, GoExplore,
+    GoExploreSettings,
+};
 use super::trainable::Trainable;
 
 /// All settings of one agent. In a file, the names of the settings tell which kind of agent it is.
@@ -20,6 +23,8 @@ use super::trainable::Trainable;
 pub enum Settings {
     Learning(Box<Hyperparameters>),
     AvFuzzer(AvFuzzerSettings),
+    Constant(ConstantSettings),
+    Bandit(BanditSettings),
     GoExplore(GoExploreSettings),
 }
 
@@ -70,6 +75,8 @@ impl Settings {
                 Box::new(Learner::new(Arc::new(Hyperparameters::clone(settings)), rows, seed))
             }
             Settings::AvFuzzer(settings) => Box::new(AvFuzzer::new(settings, rows.allowed.len())),
+            Settings::Constant(settings) => Box::new(Constant::new(settings, rows.allowed.len())),
+            Settings::Bandit(settings) => Box::new(Bandit::new(settings, rows.allowed.len())),
             Settings::GoExplore(settings) => Box::new(GoExplore::new(settings, rows.allowed.len())),
         }
     }
@@ -81,6 +88,8 @@ impl Settings {
                 Box::new(Learner::restore(Arc::new(Hyperparameters::clone(settings)), rows, bytes)?)
             }
             Settings::AvFuzzer(settings) => Box::new(AvFuzzer::restore(settings, rows.allowed.len(), bytes)?),
+            Settings::Constant(settings) => Box::new(Constant::restore(settings, rows.allowed.len(), bytes)?),
+            Settings::Bandit(settings) => Box::new(Bandit::restore(settings, rows.allowed.len(), bytes)?),
             Settings::GoExplore(settings) => {
                 Box::new(GoExplore::restore(settings, rows.allowed.len(), bytes)?)
             }
@@ -91,7 +100,9 @@ impl Settings {
     pub fn hyperparameters(&self) -> Option<&Hyperparameters> {
         match self {
             Settings::Learning(settings) => Some(settings.as_ref()),
-            Settings::AvFuzzer(_) | Settings::GoExplore(_) => None,
+            Settings::AvFuzzer(_) | Settings::Constant(_) | Settings::Bandit(_) | Settings::GoExplore(_) => {
+                None
+            }
         }
     }
 

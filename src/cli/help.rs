@@ -128,6 +128,24 @@ const EXAMPLES: &[(&str, &[(&str, &str)])] = &[
         ],
     ),
     (
+        "estimate",
+        &[
+            ("estimate scenarios/avastra45.ava --ads-config scenarios/ads/degraded.yaml", "by counting"),
+            ("estimate scenarios/avastra45.ava --road corner --method split", "for rare crashes"),
+            ("estimate --resume runs/0001", "go on after Ctrl-C"),
+        ],
+    ),
+    (
+        "compare",
+        &[
+            (
+                "compare scenarios/avastra45.ava scenarios/ads/default.yaml scenarios/ads/degraded.yaml",
+                "what do dirty sensors cost?",
+            ),
+            ("compare scenarios/avastra45.ava modular idm --event collision", ""),
+        ],
+    ),
+    (
         "replay",
         &[
             ("replay runs/0001/critical/*.ava", "check every claim"),

@@ -81,7 +81,7 @@ pub fn check_text(path: &Path, text: &str) -> Result<Loaded, Failure> {
 
 fn check_read(path: &Path, read: &check::ReadFile<'_>) -> Result<Loaded, Failure> {
     if path.is_dir() {
-        return Err(Failure::file("read", path, "it is a folder: name a file in it"));
+        return Err(Failure::file("read", path, FOLDER));
     }
     let mut loaded = check::load(path, read).map_err(|error| Failure::file("read", path, error))?;
     if loaded.diagnostics.iter().any(crate::syntax::Diagnostic::is_error) {
@@ -342,6 +342,9 @@ pub fn text(path: &Path) -> Result<String, Failure> {
     read(path).map_err(|error| Failure::file("read", path, error))
 }
 
+/// Why a folder is not read.
+const FOLDER: &str = "it is a folder: name a file in it";
+
 /// Reads a text file; everything that avastra reads comes this way.
 pub fn read(path: &Path) -> Result<String, ReadError> {
     read_up_to(path, if is_source(path) { SOURCE_BYTES_MAX } else { FILE_BYTES_MAX })
@@ -364,7 +367,7 @@ fn read_up_to(path: &Path, bytes_max: u64) -> Result<String, ReadError> {
     let unread = |error| ReadError(reason(&error));
     let metadata = std::fs::metadata(path).map_err(unread)?;
     if metadata.is_dir() {
-        return Err(ReadError("is a directory".to_owned()));
+        return Err(ReadError(FOLDER.to_owned()));
     }
     if !metadata.is_file() {
         return Err(ReadError("it is no regular file".to_owned()));

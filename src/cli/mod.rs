@@ -11,6 +11,7 @@ mod distill;
 mod doc;
 mod editor_files;
 mod error;
+mod estimate;
 mod explain;
 mod explain_policy;
 mod export_weights;
@@ -105,6 +106,8 @@ pub fn main() -> ExitCode {
         Command::ExplainPolicy(arguments) => explain_policy::explain_policy(&output, arguments),
         Command::ExportWeights(arguments) => export_weights::export_weights(&output, arguments),
         Command::Study(arguments) => study::study(&output, arguments),
+        Command::Estimate(arguments) => estimate::estimate(&output, arguments),
+        Command::Compare(arguments) => estimate::compare(&output, arguments),
         Command::Verify(arguments) => verify::verify(&output, arguments),
         Command::Replay(arguments) => replay::replay(&output, arguments),
         Command::Diagnose(arguments) => diagnose::diagnose(&output, arguments),

@@ -178,10 +178,12 @@ pub fn resume<S: serde::de::DeserializeOwned>(
     Ok(Resumed { settings, text, table, held })
 }
 
-/// `run`, `training` or `study`, if the directory holds one.
+/// `run`, `training`, `study` or `estimate`, if the directory holds one.
 fn what_was_begun(directory: &Path) -> Option<&'static str> {
-    if directory.join("study.yaml").is_file() {
-        return Some("study");
+    if let Some(kind) =
+        ["study", "estimate"].into_iter().find(|kind| directory.join(format!("{kind}.yaml")).is_file())
+    {
+        return Some(kind);
     }
     let text = load::read(&directory.join("run.yaml")).ok()?;
     let settings: serde_json::Map<String, serde_json::Value> = serde_yaml::from_str(&text).ok()?;

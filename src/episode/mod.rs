@@ -14,4 +14,4 @@ pub use facts::{at_fault, collision_facts, side, struck};
 pub use log::{Collision, End, EpisodeLog, Held, Outcome, StepLog};
 pub use run::{Choice, Moment, Snapshot, Watch, run, run_from};
 pub use script::{Script, ScriptedAction};
-pub use setup::{Setup, scene, start};
+pub use setup::{Fork, Setup, scene, start};

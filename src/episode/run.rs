@@ -46,6 +46,11 @@ impl<'a> Moment<'a> {
         copy.into_log(self.setup, End::Script)
     }
 
+    /// Ticks since the start of the episode.
+    pub fn ticks(&self) -> u64 {
+        self.play.world.ticks()
+    }
+
     /// A snapshot of this moment, for [`run_from`].
     pub fn snapshot(&self) -> Snapshot {
         Snapshot(self.play.clone())
@@ -93,6 +98,7 @@ pub fn run_from(
         if let Some(end) = play.failed() {
             break end;
         }
+        play.fork(setup);
         let observation = Observation::new(&play.world, play.ads.status());
         let choice = choose(&play.moment(setup, &observation, &play.situation(setup)));
         let begun = match choice {
@@ -165,6 +171,8 @@ struct Play {
     own_bodies: BTreeMap<u32, usize>,
     collisions: Vec<Collision>,
     incidents: Vec<Incident>,
+    /// Seed of the draws of actions, and of the agent's choices.
+    seed: u64,
     trace: Trace,
     distance_m: f64,
     /// Steps without progress up to now.
@@ -189,6 +197,7 @@ impl Play {
             own_bodies: BTreeMap::new(),
             collisions: Vec::new(),
             incidents: Vec::new(),
+            seed: setup.seed,
             trace: Trace::default(),
             distance_m: 0.0,
             stalled: 0,
@@ -201,8 +210,18 @@ impl Play {
             road: setup.road,
             rules: setup.rules,
             surroundings: &self.world,
-            seed: setup.seed,
+            seed: self.seed,
             step: self.steps.len() as u64,
+        }
+    }
+
+    /// Lets chance fall otherwise, if the setup says so of this moment. A second time it changes nothing.
+    fn fork(&mut self, setup: &Setup) {
+        let now = self.world.ticks();
+        for fork in setup.forks.iter().filter(|fork| fork.tick == now) {
+            self.seed = fork.seed;
+            self.world.reseed(fork.seed);
+            self.ads.reseed(setup.ads.seed_of_errors(fork.seed));
         }
     }
 
@@ -320,6 +339,7 @@ impl Play {
     /// nothing moved. It is 1 at the tick of a contact. After that
     /// the obstacle is ignored: it stands against the ego vehicle for a while and is no danger any more.
     fn tick(&mut self, setup: &Setup, watch: &mut Watch) -> Option<Near> {
+        self.fork(setup);
         self.world.sense(&mut self.sensed);
         let control = self.ads.drive(&self.sensed);
         if self.ads.failure().is_some() {

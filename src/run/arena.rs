@@ -121,6 +121,7 @@ impl Arena {
             start: Start { traffic: self.traffic, ..episode::start(space, &memory, seed) },
             memory,
             period_shifts: Vec::new(),
+            forks: Vec::new(),
             proc: ProcKind::default(),
         }
     }

@@ -86,10 +86,13 @@ impl Database {
     }
 }
 
+/// What [`kind`] calls a pedestrian.
+pub(crate) const PEDESTRIAN: &str = "pedestrian";
+
 /// The kind of an obstacle by the name of its body.
 pub(crate) fn kind(body: &str) -> &'static str {
     match Body::from_name(body) {
-        Some(Body::Pedestrian) => "pedestrian",
+        Some(Body::Pedestrian) => PEDESTRIAN,
         Some(Body::Motorcycle | Body::Bicycle) => "two-wheeler",
         Some(Body::BoxTruck | Body::SchoolBus) => "large vehicle",
         Some(Body::Jeep | Body::Sedan | Body::SUV | Body::Hatchback) | None => "car",

@@ -25,7 +25,7 @@ pub use database::{Database, FailureCount, RefusalCount, Totals};
 pub(crate) use database::{LAYOUT, add_all};
 pub use gauges::Gauges;
 pub use groups::Group;
-pub(crate) use groups::kind;
+pub(crate) use groups::{PEDESTRIAN, kind};
 pub use offered::{Offered, RowCount};
 pub use play::{Run, play};
 pub use profile::{

@@ -152,9 +152,19 @@ impl Run {
     /// Everything that the nth episode is made of but the choices.
     pub fn setup(&self, number: usize) -> episode::Setup<'_> {
         let seed = rng::child_seed(self.settings.seed, Stream::Episode, number as u64);
-        let mut setup = self.arena.setup(number / self.settings.episodes as usize, seed);
+        self.setup_of(number / self.settings.episodes as usize, seed)
+    }
+
+    /// An episode of any seed on the nth of the roads.
+    pub fn setup_of(&self, road: usize, seed: u64) -> episode::Setup<'_> {
+        let mut setup = self.arena.setup(road, seed);
         setup.start.ambient = self.settings.ambient;
         setup
+    }
+
+    /// A fresh agent for one episode.
+    pub fn agent(&self) -> Box<dyn Agent> {
+        (self.agent)()
     }
 }
 

@@ -69,6 +69,7 @@ impl<'a> Stage<'a> {
             },
             memory,
             period_shifts: Vec::new(),
+            forks: Vec::new(),
             proc: ProcKind::default(),
         }
     }

@@ -86,6 +86,62 @@ pub fn wilson(count: u32, trials: u32) -> (f64, f64) {
     (low, high)
 }
 
+/// The exact interval of a probability, of which `count` was observed in `trials` (Clopper and Pearson 1934); from 0 to 1
+/// without trials.
+pub fn binomial(count: u64, trials: u64) -> Interval {
+    let low = match count {
+        0 => 0.0,
+        _ => bisect(0.0, 1.0, |share| 1.0 - binomial_at_most(count - 1, trials, share) >= 0.025),
+    };
+    let high = match count {
+        _ if count >= trials => 1.0,
+        _ => bisect(0.0, 1.0, |share| binomial_at_most(count, trials, share) <= 0.025),
+    };
+    Interval { low, high: Some(high) }
+}
+
+/// Probability that at most `count` of `trials` come true, each with probability `share` in `(0, 1)`.
+fn binomial_at_most(count: u64, trials: u64, share: f64) -> f64 {
+    if share <= 0.0 {
+        return 1.0;
+    }
+    if share >= 1.0 {
+        return f64::from(u8::from(count >= trials));
+    }
+    let (log_share, log_rest) = (libm::log(share), libm::log1p(-share));
+    let of_trials = libm::lgamma(trials as f64 + 1.0);
+    let chance = |hits: u64| {
+        let (hits, misses) = (hits as f64, (trials - hits) as f64);
+        let ways = of_trials - libm::lgamma(hits + 1.0) - libm::lgamma(misses + 1.0);
+        libm::exp(ways + hits * log_share + misses * log_rest)
+    };
+    (0..=count).map(chance).sum::<f64>().min(1.0)
+}
+
+/// The difference of two shares in pairs, the second's less the first's, with its interval (Newcombe 1998, method 10).
+/// `counts` are the pairs in which both came true, the first alone, the second alone.
+pub fn paired_difference([both, first_only, second_only]: [u64; 3], pairs: u64) -> (f64, Interval) {
+    let neither = pairs.saturating_sub(both + first_only + second_only);
+    let [a, b, c, d] = [both, second_only, first_only, neither].map(|count| count as f64);
+    let n = pairs as f64;
+    let (first, second) = ((a + c) / n, (a + b) / n);
+    let interval =
+        |count: u64| wilson(count.min(u64::from(u32::MAX)) as u32, pairs.min(u64::from(u32::MAX)) as u32);
+    let (first_low, first_high) = interval(both + first_only);
+    let (second_low, second_high) = interval(both + second_only);
+    // The correlation of the pairs, corrected for continuity where it is positive.
+    let product = a * d - b * c;
+    let corrected = if product > 0.0 { (product - n / 2.0).max(0.0) } else { product };
+    let scale = ((a + b) * (c + d) * (a + c) * (b + d)).sqrt();
+    let correlation = if scale > 0.0 { corrected / scale } else { 0.0 };
+    let reach =
+        |one: f64, other: f64| (one * one - 2.0 * correlation * one * other + other * other).max(0.0).sqrt();
+    let difference = second - first;
+    let low = difference - reach(second - second_low, first_high - first);
+    let high = difference + reach(second_high - second, first - first_low);
+    (difference, Interval { low, high: Some(high) })
+}
+
 /// The exact interval of the mean of a Poisson variable, of which `count` was observed (Garwood 1936).
 pub fn poisson(count: u64) -> Interval {
     // Ten standard deviations and some more: far enough on both sides.
@@ -177,6 +233,41 @@ mod tests {
         assert_eq!(mean(&[4.0]).unwrap().interval, None);
         assert_eq!(mean(&[0.0, 0.0, 0.0]).unwrap().interval, None);
         assert_eq!(mean(&[]), None);
+    }
+
+    /// Bisection over tails summed with exact binomial coefficients.
+    #[test]
+    fn intervals_of_probabilities_are_clopper_and_pearsons() {
+        let known = [
+            (0, 20, 0.0, 0.16843347098308534),
+            (3, 20, 0.032070937185463715, 0.37892682654531396),
+            (20, 20, 0.8315665290169147, 1.0),
+            (5, 400, 0.0040708358445997374, 0.028928343785286807),
+            (1, 2, 0.01257911709342505, 0.987420882906575),
+        ];
+        for (count, trials, low, high) in known {
+            let found = binomial(count, trials);
+            let wrong = (found.low - low).abs().max((found.high.unwrap() - high).abs());
+            assert!(wrong < 1e-9, "{count} of {trials}: {found:?}");
+        }
+        assert_eq!(binomial(0, 0), Interval { low: 0.0, high: Some(1.0) });
+    }
+
+    /// Newcombe 1998 b, table II, method 10: of 36, 12, 2, 0 and of 20, 12, 2, 16 pairs.
+    #[test]
+    fn differences_of_pairs_are_newcombes() {
+        for (counts, pairs, low, high) in [
+            ([36, 2, 12], 50, 0.0569, 0.3404),
+            ([20, 2, 12], 50, 0.0562, 0.3292),
+            ([0, 0, 0], 50, -0.0713, 0.0713),
+        ] {
+            let (found, interval) = paired_difference(counts, pairs);
+            assert!((found - (counts[2] as f64 - counts[1] as f64) / pairs as f64).abs() < 1e-12);
+            assert!(
+                (interval.low - low).abs() < 5e-5 && (interval.high.unwrap() - high).abs() < 5e-5,
+                "{interval:?}"
+            );
+        }
     }
 
     /// `chi2.ppf(0.025, 2 * n) / 2` and `chi2.ppf(0.975, 2 * n + 2) / 2` of `scipy.stats`.

@@ -7,8 +7,10 @@ mod intervals;
 mod ranks;
 mod survival;
 
-pub use intervals::{Estimate, Interval, mean, poisson, proportion, ratio_of_means, wilson};
-pub use ranks::{RankTest, holm, mann_whitney, superiority};
+pub use intervals::{
+    Estimate, Interval, binomial, mean, paired_difference, poisson, proportion, ratio_of_means, wilson,
+};
+pub use ranks::{PairedTest, RankTest, holm, mann_whitney, sign_test, signed_ranks, superiority};
 pub use survival::{Lifetime, restricted_mean};
 
 /// Where `is_above` turns true, by bisection; it must be false at `low` and true at `high`.

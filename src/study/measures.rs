@@ -3,6 +3,8 @@
 
 use std::collections::BTreeSet;
 
+use crate::episode::End;
+use crate::run::PEDESTRIAN;
 use crate::statistics::{Lifetime, restricted_mean};
 
 use crate::study::file::EvaluationPlan;
@@ -40,6 +42,8 @@ pub const MEASURES: &[Measure] = &[
         number(cell, plan, |found| found.avoidability == "beyond_reference")
     }),
     shown("unavoidable", |cell, plan| number(cell, plan, |found| found.avoidability == "unavoidable")),
+    // At most one pedestrian an episode, as the published package counts.
+    compared("counted_one_pedestrian", |cell, plan| per_seed(cell, plan, counted_one_pedestrian)),
     // With an obstacle hit before.
     shown("repeated", |cell, plan| number(cell, plan, |found| found.repeated)),
     // Just after it appeared.
@@ -58,7 +62,9 @@ pub const MEASURES: &[Measure] = &[
     // Time to the first counted collision, where there is one, s.
     shown("ttfc_s", |cell, _| ttfc_s(cell)),
     // Time to the first counted collision, restricted mean, s.
-    compared("ttfc_restricted_s", |cell, plan| restricted_mean(&lifetimes(&cell.episodes), plan.horizon_s)),
+    compared("ttfc_restricted_s", |cell, plan| {
+        restricted_mean(&lifetimes(&cell.episodes, plan.horizon_s), plan.horizon_s)
+    }),
     // Red lights run.
     shown("red_runs", |cell, plan| per_seed(cell, plan, |episode| f64::from(episode.red_runs))),
     // Share of time above the speed limit.
@@ -67,19 +73,23 @@ pub const MEASURES: &[Measure] = &[
     shown("astray_share", |cell, _| time_share(cell, |episode| episode.astray_s)),
     // Share of episodes that end at the goal.
     shown("arrived_share", |cell, _| {
-        Some(mean(cell.episodes.iter().map(|episode| f64::from(episode.ended == "arrived"))))
+        Some(mean(cell.episodes.iter().map(|episode| f64::from(episode.ended == End::Arrived.name()))))
     }),
     // Simulated time of the evaluation, h.
-    shown("evaluation_h", |cell, _| {
-        let all_s = cell.episodes.iter().map(|episode| episode.duration_s + episode.branched_s);
-        Some(all_s.sum::<f64>() / 3600.0)
-    }),
+    shown("evaluation_h", |cell, _| Some(evaluation_h(cell))),
     // Simulated time of the training, h.
     shown("training_h", |cell, _| {
         of_training(cell, |episode| episode.simulated_s).map(|all_s| all_s / 3600.0)
     }),
     // Counted collisions of the training.
     shown("training_counted", |cell, _| of_training(cell, |episode| f64::from(episode.counted))),
+    // Counted collisions of an hour of everything that was simulated: trainings, branches and evaluations.
+    compared("counted_per_h", |cell, _| {
+        let trained = |of: fn(&TrainedRecord) -> f64| of_training(cell, of).unwrap_or(0.0);
+        let all_h = evaluation_h(cell) + trained(|episode| episode.simulated_s) / 3600.0;
+        let counted = cell.episodes.iter().map(|episode| episode.counted() as f64).sum::<f64>();
+        (all_h > 0.0).then(|| (counted + trained(|episode| f64::from(episode.counted))) / all_h)
+    }),
 ];
 
 /// The distinct failures among the counted collisions of episodes.
@@ -90,10 +100,18 @@ pub(super) fn failures<'a>(
     collisions.filter(|found| found.counted).map(|found| &found.failure).collect()
 }
 
-/// How long each episode lasted, or until its first counted collision.
-pub(super) fn lifetimes<'a>(episodes: impl IntoIterator<Item = &'a EpisodeRecord>) -> Vec<Lifetime> {
+/// How long each episode lasted, or until its first counted collision. An ego vehicle that has arrived cannot fail any
+/// more: it survives the horizon. To take its arrival for the end of watching would say that it might have failed
+/// like the others, though those that are in danger arrive late.
+pub(super) fn lifetimes<'a>(
+    episodes: impl IntoIterator<Item = &'a EpisodeRecord>,
+    horizon_s: f64,
+) -> Vec<Lifetime> {
     let lifetime = |episode: &EpisodeRecord| match episode.first_counted_s() {
         Some(time_s) => Lifetime { time_s, failed: true },
+        None if episode.ended == End::Arrived.name() => {
+            Lifetime { time_s: episode.duration_s.max(horizon_s), failed: false }
+        }
         None => Lifetime { time_s: episode.duration_s, failed: false },
     };
     episodes.into_iter().map(lifetime).collect()
@@ -115,6 +133,19 @@ fn number(
     is_meant: impl Fn(&CollisionRecord) -> bool,
 ) -> Option<f64> {
     per_seed(cell, plan, |episode| episode.collisions.iter().filter(|found| is_meant(found)).count() as f64)
+}
+
+/// Simulated time of the evaluation, branches included, h.
+fn evaluation_h(cell: &CellRecord) -> f64 {
+    cell.episodes.iter().map(|episode| episode.duration_s + episode.branched_s).sum::<f64>() / 3600.0
+}
+
+/// Counted collisions of an episode, of which at most one with a pedestrian: the published package calls every
+/// further one repeated.
+fn counted_one_pedestrian(episode: &EpisodeRecord) -> f64 {
+    let counted = || episode.collisions.iter().filter(|found| found.counted);
+    let pedestrians = counted().filter(|found| found.failure.kind == PEDESTRIAN).count();
+    (counted().count() - pedestrians.saturating_sub(1)) as f64
 }
 
 fn distinct(cell: &CellRecord, plan: &EvaluationPlan) -> Option<f64> {

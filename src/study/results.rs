@@ -7,7 +7,8 @@ use std::collections::BTreeMap;
 use crate::rng;
 use crate::rng::Stream;
 use crate::statistics::{
-    Estimate, Interval, RankTest, holm, mann_whitney, mean, poisson, ratio_of_means, superiority, wilson,
+    Estimate, Interval, PairedTest, RankTest, holm, mann_whitney, mean, poisson, ratio_of_means,
+    signed_ranks, superiority, wilson,
 };
 
 use crate::study::file::EvaluationPlan;
@@ -141,6 +142,8 @@ pub struct BaselineComparison {
     pub test: RankTest,
     /// `p` after Holm's correction over all comparisons of the study by the same measure.
     pub p_holm: f64,
+    /// The same by pairs: the nth trainings or repetitions of both meet the same episodes. `None` without pairs.
+    pub paired: Option<PairedTest>,
     /// Â12: how probable it is that a value of the agent is larger than one of the baseline.
     pub superiority: f64,
     pub superiority_interval: Interval,
@@ -301,8 +304,7 @@ fn comparisons(settings: &StudySettings, groups: &[(&str, Vec<&CellRecord>)]) ->
         let Some((_, theirs)) = groups.iter().find(|(label, _)| label == baseline) else { continue };
         for (label, own) in groups.iter().filter(|(label, _)| label != baseline) {
             for measure in MEASURES.iter().filter(|measure| measure.is_compared) {
-                let samples = (values(settings, measure, own), values(settings, measure, theirs));
-                found.extend(comparison(settings, (label, baseline), measure.name, samples));
+                found.extend(comparison(settings, measure, (label, own), (baseline, theirs)));
             }
         }
     }
@@ -312,22 +314,30 @@ fn comparisons(settings: &StudySettings, groups: &[(&str, Vec<&CellRecord>)]) ->
 /// `None` if one of the samples is still empty.
 fn comparison(
     settings: &StudySettings,
-    (agent, baseline): (&str, &str),
-    measure: &'static str,
-    (own, theirs): (Vec<f64>, Vec<f64>),
+    measure: &Measure,
+    (agent, own_cells): (&str, &[&CellRecord]),
+    (baseline, their_cells): (&str, &[&CellRecord]),
 ) -> Option<BaselineComparison> {
+    let (own, theirs) = (values(settings, measure, own_cells), values(settings, measure, their_cells));
     let test = mann_whitney(&own, &theirs)?;
     let (superiority, superiority_interval) = superiority(&own, &theirs)?;
     let mut rng = rng::stream(settings.first_seed, Stream::Bootstrap, 0);
+    let of = |cell: &CellRecord| (measure.of)(cell, &settings.evaluation);
+    let pairs = own_cells.iter().filter_map(|own| {
+        let theirs = their_cells.iter().find(|cell| cell.number == own.number)?;
+        Some((of(own)?, of(theirs)?))
+    });
+    let (first, second): (Vec<f64>, Vec<f64>) = pairs.unzip();
     let ratio = ratio_of_means(&own, &theirs, &mut rng);
     Some(BaselineComparison {
         agent: agent.to_owned(),
         baseline: baseline.to_owned(),
-        measure,
+        measure: measure.name,
         ratio: ratio.map(|(ratio, _)| ratio),
         ratio_interval: ratio.map(|(_, interval)| interval),
         test,
         p_holm: test.p,
+        paired: signed_ranks(&first, &second),
         superiority,
         superiority_interval,
     })

@@ -1,6 +1,7 @@
 //! The command line: what it prints and writes, and how it fails.
 
 use std::path::Path;
+use std::process::{Child, Stdio};
 
 use assert_cmd::Command;
 
@@ -12,6 +13,17 @@ pub fn avastra(arguments: &[&str]) -> Command {
     let mut command = Command::cargo_bin("avastra").expect("the binary is built with the tests");
     command.current_dir(root()).args(arguments);
     command
+}
+
+/// `avastra` in the background, to be interrupted or killed.
+pub fn background(arguments: &[&str]) -> Child {
+    std::process::Command::new(avastra(&[]).get_program())
+        .current_dir(root())
+        .args(arguments)
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("it starts")
 }
 
 /// Exit status, stdout and stderr.
@@ -73,7 +85,7 @@ fn what_cannot_be_read_is_said_so() {
     let binary = scratch.path().join("binary.ava");
     std::fs::write(&binary, [0x7f, b'E', b'L', b'F', 0xff, 0xfe, 0x00]).expect("it is writable");
     let cases: [(&Path, &str); 3] = [
-        (scratch.path(), "is a directory"),
+        (scratch.path(), "it is a folder: name a file in it"),
         (&binary, "not text: byte 4 is not UTF-8"),
         (&scratch.path().join("absent.ava"), "no such file"),
     ];
@@ -194,7 +206,8 @@ fn an_interrupted_run_goes_on_where_it_was() {
     // The directory is left as by a run that was killed half-way.
     let database = rusqlite::Connection::open(scratch.path().join("cut/run.db")).expect("it is a database");
     let cut = "DELETE FROM step WHERE episode >= 5; DELETE FROM collision WHERE episode >= 5;
-               DELETE FROM offer WHERE episode >= 5; DELETE FROM episode WHERE episode >= 5;
+               DELETE FROM offer WHERE episode >= 5; DELETE FROM held WHERE episode >= 5;
+               DELETE FROM episode WHERE episode >= 5;
                DELETE FROM seal WHERE unit >= 5;";
     database.execute_batch(cut).expect("it can be cut");
     drop(database);

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use crate::cases::root;
 
 /// From left to right, as in `src/lib.rs` and ARCHITECTURE.md.
-const ORDER: [&str; 23] = [
+const ORDER: [&str; 24] = [
     "units",
     "rng",
     "statistics",
@@ -23,6 +23,7 @@ const ORDER: [&str; 23] = [
     "episode",
     "oracle",
     "run",
+    "estimate",
     "train",
     "trial",
     "study",

@@ -11,6 +11,7 @@ mod disks;
 mod drives;
 mod editor;
 mod emitted;
+mod estimates;
 mod examples;
 mod external;
 mod failures;

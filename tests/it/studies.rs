@@ -1,7 +1,6 @@
 //! Studies: their results depend on their file alone, and bad files are refused.
 
 use std::path::Path;
-use std::process::Stdio;
 use std::time::Duration;
 
 use avastra::run::Database;
@@ -9,7 +8,7 @@ use avastra::study::StudyDatabase;
 use serde_json::Value;
 
 use crate::cases::{expect_snapshot, root};
-use crate::command::{avastra, outcome};
+use crate::command::{avastra, background, outcome};
 use crate::world::FLICKER;
 
 /// Plays the smoke study into a directory.
@@ -46,7 +45,7 @@ fn a_study_depends_on_its_file_alone() {
     // The study is interrupted, resumed with more workers, killed, and resumed again.
     let broken = scratch.path().join("broken");
     if interrupted(&broken, &whole) {
-        let mut child = background(&["--jobs", "2", "--resume"], &broken);
+        let mut child = background(&["study", "--jobs", "2", "--resume", &broken.display().to_string()]);
         std::thread::sleep(Duration::from_millis(900));
         child.kill().expect("it is ours to kill");
         child.wait().expect("it ends");
@@ -58,22 +57,16 @@ fn a_study_depends_on_its_file_alone() {
     cells_are_runs(&whole);
 }
 
-/// Starts a study in the background; the last argument is its directory.
-fn background(arguments: &[&str], directory: &Path) -> std::process::Child {
-    std::process::Command::new(avastra(&[]).get_program())
-        .current_dir(root())
-        .arg("study")
-        .args(arguments)
-        .arg(directory)
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()
-        .expect("it starts")
-}
-
 /// Ctrl-C ends a study in good order. Returns false if the study was over before, as on a fast machine.
 fn interrupted(directory: &Path, whole: &Value) -> bool {
-    let child = background(&["scenarios/studies/smoke.yaml", "--jobs", "1", "--out"], directory);
+    let child = background(&[
+        "study",
+        "scenarios/studies/smoke.yaml",
+        "--jobs",
+        "1",
+        "--out",
+        &directory.display().to_string(),
+    ]);
     // The study handles Ctrl-C as soon as there is a database.
     for _ in 0..1200 {
         if directory.join("study.db").is_file() {

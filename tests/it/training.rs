@@ -86,12 +86,12 @@ fn a_killed_training_resumes_to_the_same_bytes() {
     assert_eq!(policy_of(&out), whole);
 }
 
-/// The long form: twenty kills at random moments, of a learner and of both searches. About two minutes:
+/// The long form: twenty kills at random moments, of a learner and of every search. About four minutes:
 /// `cargo test --test it -- --ignored twenty_kills`.
 #[test]
 #[ignore = "takes minutes"]
 fn twenty_kills_change_nothing() {
-    for agent in ["ddqn", "go-explore", "av-fuzzer"] {
+    for agent in ["ddqn", "constant", "bandit", "go-explore", "av-fuzzer"] {
         let scratch = tempfile::tempdir().expect("a scratch directory");
         let begun = |name: &str| {
             let out = scratch.path().join(name);
@@ -210,7 +210,10 @@ fn what_cannot_be_trained_is_said_so() {
         (&["train", space, "--agent", "go-explore", "--preset", "paper"], "`go-explore` has none"),
         (&["run", space, "--agent", "av-fuzzer"], "has to be trained first"),
         (&["train", space, "--agent", "random"], "nothing to learn"),
-        (&["train", space, "--agent", "dqn"], "`ddqn`, `deep_collision`, `av-fuzzer` and `go-explore`"),
+        (
+            &["train", space, "--agent", "dqn"],
+            "`ddqn`, `deep_collision`, `av-fuzzer`, `constant`, `bandit` and `go-explore`",
+        ),
         (&["train", space, "--preset", "realesed"], "`avastra`, `paper` and `released`"),
         (&["train", space, "--config", &config], "did you mean `discount`?"),
         (&["run", space, "--agent", "ddqn"], "has to be trained first"),

@@ -30,12 +30,21 @@ pub struct Localization {
     spread: Option<f64>,
 }
 
+fn draws(seed: u64) -> Rng {
+    rng::stream(seed, Stream::Localization, 0)
+}
+
 impl Localization {
     pub fn new(config: &LocalizationConfig, seed: u64) -> Localization {
-        let mut rng = rng::stream(seed, Stream::Localization, 0);
+        let mut rng = draws(seed);
         let errors = core::array::from_fn(|_| rng::normal(&mut rng));
         let keep = libm::exp(-DT_S / config.correlation_s);
         Localization { config: *config, rng, errors, keep, renew: (1.0 - keep * keep).sqrt(), spread: None }
+    }
+
+    /// From now on errors come from another seed; what they are now stays.
+    pub fn reseed(&mut self, seed: u64) {
+        self.rng = draws(seed);
     }
 
     /// Pose of the rear axle as believed now. `in_street` says that the sky is not open.

@@ -2,17 +2,15 @@
 //! then explore from there.
 //!
 //! Moments are told apart by coarse cells. A moment is returned to by a snapshot, which costs nothing,
-//! or, after a kill, by playing its choices again. From there rows are random or, for a share of the
-//! choices, those that have led to most crashes in such a situation ([`Worth`]). That record is also what
-//! the search leaves behind to act by, on starts that it has never seen; the original trains a policy by
-//! imitation at this point.
+//! or, after a kill, by playing its choices again. From there rows are chosen as by a [bandit](super::Bandit), whose
+//! record is also what the search leaves behind to act by, on starts that it has never seen; the original trains a
+//! policy by imitation at this point. So the bandit alone is its baseline: returning has to add something.
 
 use std::collections::BTreeSet;
 
 use ndarray::ArrayView1;
 
-use crate::agent::hyperparameters::{Requirement, SettingsError, require, within};
-use crate::agent::random::any;
+use crate::agent::hyperparameters::{SettingsError, require, within};
 use crate::agent::registry::Agent;
 use crate::agent::trainable::{Beginning, Trainable};
 use crate::agent::trajectory::{Lesson, Trajectory};
@@ -20,9 +18,10 @@ use crate::mdp::Observation;
 use crate::rng;
 use crate::rng::{Rng, Stream};
 
+use super::bandit::{BanditSettings, Recorded};
 use super::played::{Gene, Genes};
 use super::situation::{cell, situation};
-use super::worth::{Doubt, Worth, worths};
+use super::worth::Worth;
 
 /// Settings of [`GoExplore`]; all ours.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -30,33 +29,15 @@ use super::worth::{Doubt, Worth, worths};
 pub struct GoExploreSettings {
     /// Share of the episodes that begin at a new start, in `[0, 1]`.
     pub fresh_share: f64,
-    /// Share of the choices that follow the record of what has led to crashes, in `[0, 1]`.
-    pub record_share: f64,
-    /// How much a short record is doubted: the standard deviation that the worth of one choice is taken to
-    /// have, at least 0. In the search doubtful rows are tried, afterwards they are avoided.
-    pub doubt: f64,
-    /// What a choice is worth that was made a step before the one that made the obstacle appear, in
-    /// `[0, 1]`; two steps before, its square.
-    pub credit_discount: f64,
-    /// Choices after which a situation's own record counts as much as that of all situations, above 0.
-    pub prior_choices: f64,
     /// Cells that are kept for each road, at most 100000.
     pub cells_max: usize,
-    /// Share of random choices when the record acts in the end, in `[0, 1]`.
-    pub evaluation_epsilon: f64,
+    /// How rows are chosen from there.
+    pub choices: BanditSettings,
 }
 
 impl Default for GoExploreSettings {
     fn default() -> GoExploreSettings {
-        GoExploreSettings {
-            fresh_share: 0.5,
-            record_share: 0.75,
-            doubt: 0.3,
-            credit_discount: 0.5,
-            prior_choices: 10.0,
-            cells_max: 2000,
-            evaluation_epsilon: 0.05,
-        }
+        GoExploreSettings { fresh_share: 0.5, cells_max: 2000, choices: BanditSettings::default() }
     }
 }
 
@@ -64,19 +45,11 @@ impl GoExploreSettings {
     /// # Errors
     /// If a value is out of range.
     pub fn check(&self) -> Result<(), SettingsError> {
-        let unit = |name, value: f64| within(name, value, 0.0..=1.0, "from 0 to 1");
         require([
-            unit("fresh_share", self.fresh_share),
-            unit("record_share", self.record_share),
-            unit("credit_discount", self.credit_discount),
-            unit("evaluation_epsilon", self.evaluation_epsilon),
-            within("doubt", self.doubt, 0.0..=100.0, "from 0 to 100"),
-            Requirement {
-                is_met: self.prior_choices > 0.0 && self.prior_choices <= 1e6,
-                ..within("prior_choices", self.prior_choices, 0.0..=1e6, "above 0, and at most 1e6")
-            },
+            within("fresh_share", self.fresh_share, 0.0..=1.0, "from 0 to 1"),
             within("cells_max", self.cells_max, 0..=100_000, "up to 100000"),
-        ])
+        ])?;
+        self.choices.check()
     }
 }
 
@@ -222,18 +195,7 @@ impl Agent for GoExplore {
         // Each step has its own stream, so that it does not matter whether earlier steps were played again.
         let mut rng = rng::stream(self.fresh, Stream::Search, 1 + self.step as u64);
         let here = situation(observation);
-        let by_record = rng::unit(&mut rng) < self.settings.record_share;
-        let row = if by_record {
-            self.memory.worth.best(
-                here,
-                legal,
-                self.settings.prior_choices,
-                Doubt::Try(self.settings.doubt),
-                &mut rng,
-            )
-        } else {
-            any(legal, &mut rng)
-        }?;
+        let row = self.settings.choices.explore(&self.memory.worth, here, legal, &mut rng)?;
         self.memory.steps += 1;
         if self.genes.len() <= self.step {
             self.genes.resize(self.step + 1, None);
@@ -264,9 +226,8 @@ impl Trainable for GoExplore {
 
     fn learn(&mut self, episode: &Trajectory, _: &mut Rng) -> Lesson {
         assert_eq!(self.made.len(), episode.steps.len(), "each new choice is an experience");
-        for (made, worth) in self.made.iter().zip(worths(episode, self.settings.credit_discount)) {
-            self.memory.worth.note(made.situation, made.row as usize, worth);
-        }
+        let made = self.made.iter().map(|made| (made.situation, made.row as usize));
+        self.settings.choices.note(&mut self.memory.worth, made, episode);
         if let Some((index, _)) = self.beginning.from {
             let cell = &mut self.memory.cells[index];
             cell.visits += 1;
@@ -286,31 +247,14 @@ impl Trainable for GoExplore {
     }
 
     fn exploration_epsilon(&self) -> f64 {
-        1.0 - self.settings.record_share
+        1.0 - self.settings.choices.record_share
     }
 
     fn actor(&self) -> Box<dyn Agent> {
-        Box::new(Recorded { settings: self.settings.clone(), worth: self.memory.worth.clone() })
+        Box::new(Recorded { settings: self.settings.choices.clone(), worth: self.memory.worth.clone() })
     }
 
     fn save(&self) -> Vec<u8> {
         serde_json::to_vec(&self.memory).expect("a search is plain data")
-    }
-}
-
-/// Acts by the record alone.
-#[derive(Debug, Clone)]
-struct Recorded {
-    settings: GoExploreSettings,
-    worth: Worth,
-}
-
-impl Agent for Recorded {
-    fn choose(&mut self, observation: &Observation, legal: ArrayView1<bool>, rng: &mut Rng) -> Option<usize> {
-        if rng::unit(rng) < self.settings.evaluation_epsilon {
-            return any(legal, rng);
-        }
-        let GoExploreSettings { prior_choices, doubt, .. } = self.settings;
-        self.worth.best(situation(observation), legal, prior_choices, Doubt::Avoid(doubt), rng)
     }
 }

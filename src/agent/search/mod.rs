@@ -4,6 +4,8 @@
 //! draws, and so come back to a moment where they have been.
 
 mod av_fuzzer;
+mod bandit;
+mod constant;
 mod go_explore;
 mod played;
 mod population;
@@ -12,4 +14,6 @@ mod situation;
 mod worth;
 
 pub use av_fuzzer::{AvFuzzer, AvFuzzerSettings};
+pub use bandit::{Bandit, BanditSettings};
+pub use constant::{Constant, ConstantSettings};
 pub use go_explore::{GoExplore, GoExploreSettings};

@@ -13,19 +13,19 @@ use super::situation::SITUATIONS;
 
 /// How many worths were noted, and their sum.
 #[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
-struct Tally {
+pub struct Tally {
     count: f64,
     sum: f64,
 }
 
 impl Tally {
-    fn note(&mut self, worth: f64) {
+    pub fn note(&mut self, worth: f64) {
         self.count += 1.0;
         self.sum += worth;
     }
 
     /// The mean, shrunk towards `prior`, which weighs as much as `weight` observations.
-    fn mean(&self, prior: f64, weight: f64) -> f64 {
+    pub fn mean(&self, prior: f64, weight: f64) -> f64 {
         (self.sum + prior * weight) / (self.count + weight)
     }
 }
@@ -38,6 +38,17 @@ pub enum Doubt {
     Try(f64),
     /// The record may be luck: its mean is lowered. Otherwise the best of many rows is a lucky one.
     Avoid(f64),
+}
+
+impl Doubt {
+    /// How far a mean is moved for it; `weight` as in [`Tally::mean`].
+    pub fn shift(self, tally: &Tally, weight: f64, rng: &mut Rng) -> f64 {
+        let error = 1.0 / (tally.count + weight).sqrt();
+        match self {
+            Doubt::Try(spread) => spread * error * rng::normal(rng),
+            Doubt::Avoid(spread) => -spread * error,
+        }
+    }
 }
 
 /// The record.
@@ -86,13 +97,8 @@ impl Worth {
         let mut most = f64::NEG_INFINITY;
         let mut best = Vec::new();
         for row in (0..self.rows).filter(|&row| legal[row]) {
-            let count = self.own[situation as usize * self.rows + row].count;
-            let error = 1.0 / (count + weight).sqrt();
-            let value = self.expected(situation, row, weight)
-                + match doubt {
-                    Doubt::Try(spread) => spread * error * rng::normal(rng),
-                    Doubt::Avoid(spread) => -spread * error,
-                };
+            let own = &self.own[situation as usize * self.rows + row];
+            let value = self.expected(situation, row, weight) + doubt.shift(own, weight, rng);
             if value > most {
                 best.clear();
                 most = value;

@@ -47,6 +47,11 @@ struct Watched {
     frame: u64,
 }
 
+/// The luck of an object.
+fn draws(seed: u64, id: u32) -> Rng {
+    rng::stream(seed, Stream::Perception, u64::from(id))
+}
+
 impl Perception {
     pub fn new(config: &PerceptionConfig, limited: bool, seed: u64) -> Perception {
         Perception {
@@ -102,6 +107,15 @@ impl Perception {
         &self.detections
     }
 
+    /// From now on errors come from another seed. What an object's luck has been, and its size as seen, stays.
+    pub fn reseed(&mut self, seed: u64) {
+        self.seed = seed;
+        for watched in &mut self.watched {
+            watched.rng = draws(seed, watched.id);
+        }
+        self.ghosts.reseed(seed);
+    }
+
     fn ranges_in(&mut self, conditions: &Conditions) -> Ranges {
         match self.ranges {
             Some((of, ranges)) if of == *conditions => ranges,
@@ -115,7 +129,7 @@ impl Perception {
 
     fn watch(&mut self, id: u32) -> usize {
         let index = self.watched.iter().position(|watched| watched.id == id).unwrap_or_else(|| {
-            let mut rng = rng::stream(self.seed, Stream::Perception, u64::from(id));
+            let mut rng = draws(self.seed, id);
             let size_factor = 1.0 + self.config.size_sigma * rng::normal(&mut rng).clamp(-3.0, 3.0);
             self.watched.push(Watched {
                 id,

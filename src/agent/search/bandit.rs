@@ -1,0 +1,189 @@
+//! A contextual bandit: each choice by what such choices have led to in such a situation ([`Worth`]), without
+//! looking further ahead than to the crash that the choice itself brings about.
+
+use ndarray::ArrayView1;
+
+use crate::agent::hyperparameters::{Requirement, SettingsError, require, within};
+use crate::agent::random::any;
+use crate::agent::registry::Agent;
+use crate::agent::trainable::{Beginning, Trainable};
+use crate::agent::trajectory::{Lesson, Trajectory};
+use crate::mdp::Observation;
+use crate::rng;
+use crate::rng::{Rng, Stream};
+
+use super::situation::situation;
+use super::worth::{Doubt, Worth, worths};
+
+/// Settings of [`Bandit`]; all ours.
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct BanditSettings {
+    /// Share of the choices that follow the record of what has led to crashes, in `[0, 1]`.
+    pub record_share: f64,
+    /// How much a short record is doubted: the standard deviation that the worth of one choice is taken to
+    /// have, at least 0. In the search doubtful rows are tried, afterwards they are avoided.
+    pub doubt: f64,
+    /// What a choice is worth that was made a step before the one that made the obstacle appear, in
+    /// `[0, 1]`; two steps before, its square.
+    pub credit_discount: f64,
+    /// Choices after which a situation's own record counts as much as that of all situations, above 0.
+    pub prior_choices: f64,
+    /// Share of random choices when the record acts in the end, in `[0, 1]`.
+    pub evaluation_epsilon: f64,
+}
+
+impl Default for BanditSettings {
+    fn default() -> BanditSettings {
+        BanditSettings {
+            record_share: 0.75,
+            doubt: 0.3,
+            credit_discount: 0.5,
+            prior_choices: 10.0,
+            evaluation_epsilon: 0.05,
+        }
+    }
+}
+
+impl BanditSettings {
+    /// # Errors
+    /// If a value is out of range.
+    pub fn check(&self) -> Result<(), SettingsError> {
+        let unit = |name, value: f64| within(name, value, 0.0..=1.0, "from 0 to 1");
+        require([
+            unit("record_share", self.record_share),
+            unit("credit_discount", self.credit_discount),
+            unit("evaluation_epsilon", self.evaluation_epsilon),
+            within("doubt", self.doubt, 0.0..=100.0, "from 0 to 100"),
+            Requirement {
+                is_met: self.prior_choices > 0.0 && self.prior_choices <= 1e6,
+                ..within("prior_choices", self.prior_choices, 0.0..=1e6, "above 0, and at most 1e6")
+            },
+        ])
+    }
+
+    /// A choice of the search: by the record for its share of the choices, else any legal row.
+    pub(super) fn explore(
+        &self,
+        worth: &Worth,
+        situation: u32,
+        legal: ArrayView1<bool>,
+        rng: &mut Rng,
+    ) -> Option<usize> {
+        if rng::unit(rng) < self.record_share {
+            worth.best(situation, legal, self.prior_choices, Doubt::Try(self.doubt), rng)
+        } else {
+            any(legal, rng)
+        }
+    }
+
+    /// Enters an episode into the record; `made` has the situation and the row of each of its choices.
+    pub(super) fn note(
+        &self,
+        worth: &mut Worth,
+        made: impl Iterator<Item = (u32, usize)>,
+        episode: &Trajectory,
+    ) {
+        for ((situation, row), value) in made.zip(worths(episode, self.credit_discount)) {
+            worth.note(situation, row, value);
+        }
+    }
+}
+
+/// The bandit.
+pub struct Bandit {
+    settings: BanditSettings,
+    memory: Memory,
+    // The episode under way.
+    fresh: u64,
+    step: usize,
+    /// The situation and the row of each choice.
+    made: Vec<(u32, usize)>,
+}
+
+/// What the bandit keeps from episode to episode.
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
+struct Memory {
+    steps: u64,
+    worth: Worth,
+}
+
+impl Bandit {
+    /// A bandit over so many rows.
+    pub fn new(settings: &BanditSettings, rows: usize) -> Bandit {
+        let memory = Memory { steps: 0, worth: Worth::new(rows) };
+        Bandit { settings: settings.clone(), memory, fresh: 0, step: 0, made: Vec::new() }
+    }
+
+    /// The bandit that was saved; `None` if the bytes are not those of one over so many rows.
+    pub fn restore(settings: &BanditSettings, rows: usize, bytes: &[u8]) -> Option<Bandit> {
+        let memory: Memory = serde_json::from_slice(bytes).ok()?;
+        memory.worth.is_of(rows).then(|| Bandit { memory, ..Bandit::new(settings, rows) })
+    }
+}
+
+impl Agent for Bandit {
+    fn begin(&mut self) {
+        self.made.clear();
+        self.step = 0;
+    }
+
+    fn draw_seed(&mut self, step: usize) -> Option<u64> {
+        self.step = step;
+        None
+    }
+
+    fn choose(&mut self, observation: &Observation, legal: ArrayView1<bool>, _: &mut Rng) -> Option<usize> {
+        let mut rng = rng::stream(self.fresh, Stream::Search, 1 + self.step as u64);
+        let here = situation(observation);
+        let row = self.settings.explore(&self.memory.worth, here, legal, &mut rng)?;
+        self.memory.steps += 1;
+        self.made.push((here, row));
+        Some(row)
+    }
+}
+
+impl Trainable for Bandit {
+    fn beginning(&mut self, _: usize, fresh: u64) -> Beginning {
+        self.fresh = fresh;
+        Beginning { seed: fresh, from: None }
+    }
+
+    fn learn(&mut self, episode: &Trajectory, _: &mut Rng) -> Lesson {
+        assert_eq!(self.made.len(), episode.steps.len(), "each choice is an experience");
+        self.settings.note(&mut self.memory.worth, self.made.iter().copied(), episode);
+        Lesson::default()
+    }
+
+    fn steps(&self) -> u64 {
+        self.memory.steps
+    }
+
+    fn exploration_epsilon(&self) -> f64 {
+        1.0 - self.settings.record_share
+    }
+
+    fn actor(&self) -> Box<dyn Agent> {
+        Box::new(Recorded { settings: self.settings.clone(), worth: self.memory.worth.clone() })
+    }
+
+    fn save(&self) -> Vec<u8> {
+        serde_json::to_vec(&self.memory).expect("a bandit is plain data")
+    }
+}
+
+/// Acts by the record alone.
+pub(super) struct Recorded {
+    pub settings: BanditSettings,
+    pub worth: Worth,
+}
+
+impl Agent for Recorded {
+    fn choose(&mut self, observation: &Observation, legal: ArrayView1<bool>, rng: &mut Rng) -> Option<usize> {
+        let BanditSettings { evaluation_epsilon, prior_choices, doubt, .. } = self.settings;
+        if rng::unit(rng) < evaluation_epsilon {
+            return any(legal, rng);
+        }
+        self.worth.best(situation(observation), legal, prior_choices, Doubt::Avoid(doubt), rng)
+    }
+}

@@ -1,0 +1,92 @@
+//! Estimates: they depend on their settings alone, splitting agrees with counting, and bad requests are refused.
+
+use std::path::Path;
+use std::time::Duration;
+
+use serde_json::Value;
+
+use crate::command::{avastra, background, outcome};
+
+const SPACE: &str = "scenarios/avastra45.ava";
+
+/// Episodes of one road with a system that crashes often enough to count.
+fn arguments<'a>(method: &'a str, episodes: &'a str, parts: &'a str, out: &'a str) -> Vec<&'a str> {
+    let ads = ["--ads", "reactive", "--traffic", "released", "--event", "collision", "--road", "corner"];
+    let how =
+        ["--method", method, "--episodes", episodes, "--parts", parts, "--out", out, "--format", "json"];
+    [&["estimate", SPACE][..], &ads, &how].concat()
+}
+
+/// The result that was printed last.
+fn result(stdout: &str) -> Value {
+    serde_json::from_str(stdout.lines().last().expect("a line is printed")).expect("it is JSON")
+}
+
+fn kept(directory: &Path) -> Vec<u8> {
+    std::fs::read(directory.join("results.json")).expect("every estimate writes it")
+}
+
+#[test]
+fn an_estimate_depends_on_its_settings_alone_and_splitting_agrees_with_counting() {
+    let scratch = tempfile::tempdir().expect("a scratch directory");
+    let mut found = Vec::new();
+    for (method, episodes, parts) in [("count", "20", "4"), ("split", "20", "4")] {
+        let whole = scratch.path().join(method);
+        let out = whole.display().to_string();
+        let (status, stdout, stderr) =
+            outcome(avastra(&arguments(method, episodes, parts, &out)).args(["--jobs", "1"]));
+        assert_eq!(status, 0, "{stderr}");
+        let all = result(&stdout)["results"]["together"].clone();
+        found.push(["low", "high"].map(|end| all["interval"][end].as_f64().expect("it has an interval")));
+        assert!(all["per_1000_km"].as_f64() > Some(0.0), "{all}");
+
+        // Killed in the middle, and gone on with on two threads.
+        let broken = scratch.path().join(format!("{method}_broken"));
+        let out = broken.display().to_string();
+        let mut child = background(&arguments(method, episodes, parts, &out));
+        std::thread::sleep(Duration::from_millis(1500));
+        // It may have ended: then there is nothing left to do.
+        let _ = child.kill();
+        child.wait().expect("it ends");
+        let resume = ["estimate", "--jobs", "2", "--resume", &out];
+        let (status, _, stderr) = outcome(&mut avastra(&resume));
+        assert_eq!(status, 0, "{stderr}");
+        assert_eq!(kept(&broken), kept(&whole), "{method}");
+    }
+    let [[count_low, count_high], [split_low, split_high]] = [found[0], found[1]];
+    assert!(count_low < split_high && split_low < count_high, "{found:?}");
+}
+
+#[test]
+fn two_driving_systems_are_told_apart_in_the_same_episodes() {
+    let compare = |sides: [&str; 2], jobs: &str| {
+        let how = ["--traffic", "released", "--event", "collision", "--episodes", "40", "--road", "corner"];
+        let arguments =
+            [&["compare", SPACE][..], &sides, &how, &["--jobs", jobs, "--format", "json"]].concat();
+        let (status, stdout, stderr) = outcome(&mut avastra(&arguments));
+        assert_eq!(status, 0, "{stderr}");
+        result(&stdout)["results"].clone()
+    };
+    let same = compare(["reactive", "reactive"], "1");
+    assert_eq!((&same["first_only"], &same["second_only"], &same["p"]), (&0.into(), &0.into(), &1.0.into()));
+    assert!(same["both"].as_u64() > Some(0), "{same}");
+    let apart = compare(["modular", "reactive"], "1");
+    assert_eq!(apart, compare(["modular", "reactive"], "2"));
+    assert!(apart["difference"].as_f64() > Some(0.0), "{apart}");
+}
+
+#[test]
+fn requests_that_cannot_be_met_are_refused() {
+    let cases: [(&[&str], &str); 5] = [
+        (&["estimate", SPACE, "--parts", "1"], "from 2 to"),
+        (&["estimate", SPACE, "--method", "split", "--episodes", "3"], "at least 10"),
+        (&["estimate", SPACE, "--method", "split", "--ads-cmd", "true"], "--method count"),
+        (&["estimate", SPACE, "--agent", "ddqn"], "has to be trained first"),
+        (&["compare", SPACE, "modular", "nobody"], "no driving system `nobody`"),
+    ];
+    for (arguments, reason) in cases {
+        let (status, _, stderr) = outcome(&mut avastra(arguments));
+        assert_eq!(status, 1, "{arguments:?}");
+        assert!(stderr.contains(reason), "{arguments:?}: {stderr}");
+    }
+}
