@@ -26,6 +26,8 @@ FILES = [
     "src/check/scenario_rules.rs",
     "src/prove/reach.rs",
     "src/prove/realise.rs",
+    "src/prove/time.rs",
+    "src/prove/moment.rs",
     "src/prove/witness.rs",
 ]
 TESTS = ["cargo", "test", "--lib", "-q", "--", "action::", "model::", "prove::", "check::"]
