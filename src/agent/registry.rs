@@ -108,12 +108,12 @@ pub const REGISTRY: &[Entry] = &[
     },
     Entry {
         name: "constant",
-        summary: "one row in every step: the one that crashed most in training, or the next best that is legal",
+        summary: "a fixed list of rows, those first that crashed most in training: the first legal one acts",
         kind: Kind::Searching(|text| Settings::of_search(text, ConstantSettings::check, Settings::Constant)),
     },
     Entry {
         name: "bandit",
-        summary: "the row that has crashed most in such a situation, without looking ahead",
+        summary: "the row after which most crashes came in such a situation; it plans nothing",
         kind: Kind::Searching(|text| Settings::of_search(text, BanditSettings::check, Settings::Bandit)),
     },
     Entry {

@@ -416,10 +416,10 @@ pub struct EstimateArguments {
     /// What is looked for in an episode.
     #[arg(long, value_enum, default_value_t = EventArgument::Counted)]
     pub event: EventArgument,
-    /// How: `count` plays every episode from its start, `split` goes on from dangerous moments, for rare events.
+    /// How: `count` plays every episode from its start, `split` goes on from dangerous moments (unbiased, and says what it gained or lost).
     #[arg(long, value_enum, default_value_t = MethodArgument::Count)]
     pub method: MethodArgument,
-    /// Independent parts on each road; the interval of `split` comes from their spread.
+    /// Independent parts on each road; the interval of `split` comes from their spread, so give it twenty or more.
     #[arg(long, default_value_t = 20)]
     pub parts: u32,
     /// Episodes of a part.

@@ -1,11 +1,11 @@
 //! `avastra estimate`: how often would it crash; and `avastra compare`: which of two crashes more often.
 
 use std::path::Path;
-use std::sync::atomic::Ordering;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::estimate::{
     Comparison, ComparisonResults, Estimate, EstimateDatabase, EstimateResults, EstimateSettings, EventKind,
-    Method, Probability, compared, play_parts,
+    Method, Probability, RoadEstimate, compared, play_parts,
 };
 use crate::run::{Run, RunSettings, TrafficRecord};
 use crate::statistics::Interval;
@@ -45,6 +45,11 @@ pub fn estimate(output: &Output, arguments: &EstimateArguments) -> Result<(), Fa
         Progress::new(output, estimate.parts().len() as u64 * episodes, done.len() as u64 * episodes);
     let jobs = jobs(arguments.jobs, estimate.run().program())?;
     play_parts(&estimate, &todo, jobs, &stop, &mut |record| {
+        // Such a part says nothing, and is not kept: with a repaired system the estimate can go on.
+        if record.failed > 0 {
+            output.say("no estimate: the driving system failed; `avastra run` with it says how");
+            return Err(Failure::Ads { findings: record.failed as usize });
+        }
         for number in 0..record.episodes {
             progress.episode(usize::from(number < record.events));
         }
@@ -53,11 +58,6 @@ pub fn estimate(output: &Output, arguments: &EstimateArguments) -> Result<(), Fa
     drop(progress);
 
     let records = database.parts().map_err(unread)?;
-    let failed: usize = records.iter().map(|record| record.failed as usize).sum();
-    if failed > 0 {
-        output.say("no estimate, because the driving system did not drive every episode to its end");
-        return Err(Failure::Ads { findings: failed });
-    }
     let results = EstimateResults::new(estimate.settings(), &records);
     let text = serde_json::to_string_pretty(&results).expect("results have string keys only");
     write(&path.join("results.json"), &format!("{text}\n"))?;
@@ -118,7 +118,8 @@ pub fn compare(output: &Output, arguments: &CompareArguments) -> Result<(), Fail
         arguments.second,
         plural(numbers.len(), "episode")
     ));
-    let stop = stop_on_interrupt();
+    // Nothing is kept of a comparison, so Ctrl-C ends it at once.
+    let stop = AtomicBool::new(false);
     let mut progress = Progress::new(output, numbers.len() as u64, 0);
     let mut pairs = Vec::new();
     // Whichever has a program serves so many at a time.
@@ -130,13 +131,10 @@ pub fn compare(output: &Output, arguments: &CompareArguments) -> Result<(), Fail
         Ok::<_, Failure>(())
     })?;
     drop(progress);
-    if pairs.len() < numbers.len() {
-        return Err(Failure::usage("interrupted: nothing is kept of a comparison; say fewer `--episodes`"));
-    }
     let failed =
         pairs.iter().map(|pair| usize::from(pair.first.failed) + usize::from(pair.second.failed)).sum();
     if failed > 0 {
-        output.say("no comparison, because a driving system did not drive every episode to its end");
+        output.say("no comparison: a driving system failed; `avastra run` with it says how");
         return Err(Failure::Ads { findings: failed });
     }
     let results = ComparisonResults::new(comparison.event, &pairs).expect("there is at least one episode");
@@ -220,15 +218,17 @@ fn estimate_text(results: &EstimateResults) -> String {
         }
         _ => {}
     }
-    if let Some(all) =
-        results.together.as_ref().filter(|all| results.method == Method::Split && all.gain.is_some())
-    {
-        let gain = all.gain.unwrap_or_default();
-        let how = if gain >= 1.0 { "less" } else { "more" };
-        let factor = if gain >= 1.0 { gain } else { 1.0 / gain };
+    if let Some(gain) = results.together.as_ref().and_then(|all| all.gain) {
+        let (factor, how) = if gain >= 1.0 { (gain, "less") } else { (1.0 / gain, "more") };
         text.push_str(&format!(
-            "about {factor:.1} times {how} simulated time than counting for the same precision\n"
+            "roughly {factor:.1} times {how} simulated time than counting for the same precision (from the spread of the parts)\n"
         ));
+    }
+    let misses = |road: &RoadEstimate| 2 * road.estimate.parts_without > road.estimate.parts;
+    if results.method == Method::Split && results.roads.iter().any(misses) {
+        text.push_str(
+            "where most parts have not found it, the interval is too short: say more `--episodes`\n",
+        );
     }
     text.trim_end().to_owned()
 }
@@ -238,12 +238,17 @@ fn probability_text(found: &Probability) -> String {
         (Some(rate), interval) => format!(", {} in 1000 km", bracketed(rate, interval)),
         (None, _) => String::new(),
     };
+    let without = match found.parts_without {
+        0 => String::new(),
+        _ if found.interval.is_none() => String::new(),
+        without => format!("; {without} of {} without", plural(found.parts, "part")),
+    };
     let spread = match found.interval {
         None => format!("; all {} alike: no interval", plural(found.parts, "part")),
         Some(_) => String::new(),
     };
     format!(
-        "{}{rate}{spread} ({} over {:.1} km, {:.2} h simulated)",
+        "{}{rate}{spread}{without} ({} over {:.1} km, {:.2} h simulated)",
         bracketed(found.probability, found.interval),
         plural(found.episodes as usize, "episode"),
         found.driven_km,
@@ -289,12 +294,14 @@ fn comparison_text(results: &ComparisonResults, [first, second]: [&String; 2]) -
         results.second_only
     ));
     text.push_str(&format!(
-        "difference: {}, sign test p = {:.4}\n",
+        "difference: {}, sign test p {}\n",
         bracketed(results.difference, Some(results.difference_interval)),
-        results.p
+        if results.p < 1e-4 { "< 0.0001".to_owned() } else { format!("= {:.4}", results.p) }
     ));
     text.push_str(&match results.told_apart_km {
-        Some(km) => format!("told apart after {km:.0} km of both together"),
+        Some(km) => {
+            format!("told apart after {km:.0} km of both together (looked at after each pair: no test)")
+        }
         None => "not told apart".to_owned(),
     });
     text

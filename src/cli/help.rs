@@ -131,7 +131,7 @@ const EXAMPLES: &[(&str, &[(&str, &str)])] = &[
         "estimate",
         &[
             ("estimate scenarios/avastra45.ava --ads-config scenarios/ads/degraded.yaml", "by counting"),
-            ("estimate scenarios/avastra45.ava --road corner --method split", "for rare crashes"),
+            ("estimate scenarios/avastra45.ava --road corner --method split", "by splitting"),
             ("estimate --resume runs/0001", "go on after Ctrl-C"),
         ],
     ),

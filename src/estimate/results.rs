@@ -36,9 +36,11 @@ pub struct Probability {
     /// Probability of the event in an episode.
     pub probability: f64,
     /// Clopper and Pearson's exact interval where events are counted; Student's over the parts where episodes split, cut
-    /// off at 0 and 1. `None` where all parts are alike: they say nothing about the spread.
+    /// off at 0 and 1: too short where most parts have not found the event. `None` where all parts are alike: they say
+    /// nothing about the spread.
     pub interval: Option<Interval>,
-    /// Episodes with the event in 1,000 km, as a ratio of means; `None` if nothing was driven.
+    /// Episodes with the event in 1,000 km, as a ratio of means; `None` if nothing was driven. Its interval is that of the
+    /// probability over the mean distance, which it takes as known.
     pub per_1000_km: Option<f64>,
     pub per_1000_km_interval: Option<Interval>,
     /// Episodes from start to end, and how far they went together.
@@ -46,13 +48,17 @@ pub struct Probability {
     pub driven_km: f64,
     /// Everything that was simulated, h.
     pub simulated_h: f64,
-    /// The number of simulated hours that counting would need for a standard error as small, over those that were
-    /// needed; `None` if the standard error is not known. For counting about 1.
+    /// Of splitting: the simulated hours that counting would need for a standard error as small, over those that were
+    /// needed. A rough figure, from the spread of the parts: `None` for fewer than twenty of them, or where most have
+    /// not found the event.
     pub gain: Option<f64>,
     /// Parts whose estimate is 0.
     pub parts_without: usize,
     pub parts: usize,
 }
+
+/// Parts from which on a gain is told. Ours.
+const GAIN_PARTS_MIN: usize = 20;
 
 impl EstimateResults {
     /// The result over parts in any order.
@@ -113,6 +119,8 @@ impl Probability {
         let is_driven = driven_km > 0.0;
         // Of means of episodes: what one of them varies by, over what the estimate varies by.
         let variance = variance_of_mean(&samples);
+        let parts_without = samples.iter().filter(|&&sample| sample == 0.0).count();
+        let is_telling = samples.len() >= GAIN_PARTS_MIN && 2 * parts_without <= samples.len();
         let counting_s =
             |variance: f64| probability * (1.0 - probability) / variance * duration_s / episodes as f64;
         Probability {
@@ -126,9 +134,9 @@ impl Probability {
             driven_km,
             simulated_h: simulated_s / 3600.0,
             gain: variance
-                .filter(|&variance| variance > 0.0)
+                .filter(|&variance| method == Method::Split && is_telling && variance > 0.0)
                 .map(|variance| counting_s(variance) / simulated_s),
-            parts_without: samples.iter().filter(|&&sample| sample == 0.0).count(),
+            parts_without,
             parts: samples.len(),
         }
     }
@@ -170,10 +178,13 @@ mod tests {
         assert!((found.per_1000_km.unwrap() - 20.0).abs() < 1e-9);
         let first = Probability::new(Method::Count, &by_road[..1]);
         assert!((first.per_1000_km.unwrap() - 40.0).abs() < 1e-9);
-        assert_eq!((first.episodes, first.parts, first.parts_without), (200, 2, 0));
-        // Of 200 episodes: p (1 - p) / 200 is the variance of counting; that of two parts 1 % and 3 % is 1e-4.
-        let gain = first.gain.unwrap();
-        assert!((gain - 0.02 * 0.98 / 200.0 / 1e-4).abs() < 1e-9, "{gain}");
+        assert_eq!((first.episodes, first.parts, first.parts_without, first.gain), (200, 2, 0, None));
+        // Of 2,000 episodes: p (1 - p) / 2,000 is the variance of counting; that of twenty parts with 1 % and 3 % in turn
+        // is 1e-4 / 19.
+        let many: Vec<PartRecord> = (0..20).map(|number| record(0, number, 1 + 2 * (number % 2))).collect();
+        let split = Probability::new(Method::Split, &[many.iter().collect()]);
+        let gain = split.gain.unwrap();
+        assert!((gain - 0.02 * 0.98 / 2000.0 / (1e-4 / 19.0)).abs() < 1e-9, "{gain}");
         let nothing = Probability::new(Method::Split, &by_road[1..]);
         assert_eq!((nothing.probability, nothing.interval, nothing.gain), (0.0, None, None));
     }

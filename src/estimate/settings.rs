@@ -46,6 +46,8 @@ pub struct EstimateSettings {
     pub run: RunSettings,
 }
 
+/// The agent that tries rows out before it chooses.
+const GREEDY: &str = "greedy";
 /// Largest number of parts of a road. Ours.
 const PARTS_MAX: u32 = 100_000;
 /// A part that splits needs at least so many episodes. Ours: with fewer, most parts die out.
@@ -56,17 +58,20 @@ const SPLIT_EPISODES_MIN: u32 = 10;
 pub enum EstimateError {
     #[error(transparent)]
     Run(#[from] RunError),
-    #[error(
-        "{found} parts: from 2 to {PARTS_MAX} are possible, because the interval comes from their spread"
-    )]
+    #[error("{found} parts: from 2 to {PARTS_MAX} are possible")]
     Parts { found: u32 },
     #[error("{found} episodes a part: splitting needs at least {SPLIT_EPISODES_MIN}")]
     Episodes { found: u32 },
     #[error(
-        "splitting goes on from moments in the middle of episodes, which `{ads}`, a program of its own, cannot do: \
-         estimate by counting (`--method count`)"
+        "splitting goes on from moments in the middle of episodes, which a program of its own cannot do: estimate by \
+         counting (`--method count`)"
     )]
-    External { ads: String },
+    External,
+    #[error(
+        "splitting lets chance fall otherwise after a moment, and `{agent}` has looked at what comes after: estimate by \
+         counting (`--method count`)"
+    )]
+    Ahead { agent: String },
 }
 
 impl EstimateSettings {
@@ -81,7 +86,10 @@ impl EstimateSettings {
                 return Err(EstimateError::Episodes { found: self.run.episodes });
             }
             if self.run.external.is_some() {
-                return Err(EstimateError::External { ads: self.run.ads.clone() });
+                return Err(EstimateError::External);
+            }
+            if self.run.agent == GREEDY {
+                return Err(EstimateError::Ahead { agent: self.run.agent.clone() });
             }
         }
         Ok(())

@@ -1,7 +1,7 @@
 //! The one evaluator of expressions: it computes rules, functions and verdicts in `f64`.
 //!
-//! Evaluation cannot fail: the checker has resolved names and types, functions cannot recurse, and a
-//! division by 0 gives infinity or NaN. NaN satisfies no comparison but `!=`.
+//! Evaluation cannot fail: the checker has resolved names and types, functions cannot recurse, and what has no
+//! value (a division by 0, a number too large) is NaN, which satisfies no comparison but `!=`.
 
 use crate::model::expr::{Arithmetic, Comparison, Expr, ExprKind};
 use crate::model::space::{BodyWord, COUNTED, FnDef, RoadFacts, Space, WordExpr};
@@ -230,13 +230,15 @@ fn has_lane(facts: &Facts<'_>, lane: LaneChoice) -> bool {
     facts.road.is_some_and(|road| road.has_lane(lane))
 }
 
+/// The result, or NaN if it has no value: an infinity would satisfy comparisons.
 pub(crate) fn arithmetic(op: Arithmetic, left: f64, right: f64) -> f64 {
-    match op {
+    let result = match op {
         Arithmetic::Add => left + right,
         Arithmetic::Subtract => left - right,
         Arithmetic::Multiply => left * right,
         Arithmetic::Divide => left / right,
-    }
+    };
+    if result.is_finite() { result } else { f64::NAN }
 }
 
 /// Compares numbers by size, variants by position, and truth values by equality.

@@ -313,7 +313,11 @@ impl Printer<'_> {
                 _ => format!("{separator} {}", name.text),
             };
             self.comments_before(name.span.end);
-            self.line(name.span.start);
+            // Where the separator comes first, a blank line between it and the name would not be found again.
+            match separator {
+                "," => self.line(name.span.start),
+                _ => self.plain_line(false),
+            }
             self.words(&text);
             if !last {
                 self.trailing_comment(name.span.end);

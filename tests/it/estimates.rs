@@ -77,10 +77,11 @@ fn two_driving_systems_are_told_apart_in_the_same_episodes() {
 
 #[test]
 fn requests_that_cannot_be_met_are_refused() {
-    let cases: [(&[&str], &str); 5] = [
+    let cases: [(&[&str], &str); 6] = [
         (&["estimate", SPACE, "--parts", "1"], "from 2 to"),
         (&["estimate", SPACE, "--method", "split", "--episodes", "3"], "at least 10"),
         (&["estimate", SPACE, "--method", "split", "--ads-cmd", "true"], "--method count"),
+        (&["estimate", SPACE, "--method", "split", "--agent", "greedy"], "has looked at what comes after"),
         (&["estimate", SPACE, "--agent", "ddqn"], "has to be trained first"),
         (&["compare", SPACE, "modular", "nobody"], "no driving system `nobody`"),
     ];

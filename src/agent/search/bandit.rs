@@ -1,5 +1,5 @@
-//! A contextual bandit: each choice by what such choices have led to in such a situation ([`Worth`]), without
-//! looking further ahead than to the crash that the choice itself brings about.
+//! A contextual bandit: each choice by what such choices have led to in such a situation ([`Worth`]). It plans nothing
+//! and returns to nothing; a choice before the one that made the obstacle appear shares in the crash.
 
 use ndarray::ArrayView1;
 

@@ -1,8 +1,9 @@
-//! The most trivial search: one row in every step. What it finds, every other agent has to beat.
+//! The most trivial search: a fixed list of rows, of which the first legal one acts, whatever the moment. What it
+//! finds, every other agent has to beat.
 //!
-//! In training each episode is led by one row, tried by Thompson sampling (1933) over the counted collisions of an
-//! episode. What is left behind is a list of all rows, the best first; the first legal one acts, whatever the
-//! moment.
+//! In training each episode is led by one row, tried by Thompson sampling (1933) over the counted collisions of the
+//! episodes in which it acted. Where the leader is not legal, the next of the list acts, and so the leader also gets
+//! the collisions of what stands in for it.
 
 use ndarray::ArrayView1;
 
@@ -53,6 +54,8 @@ pub struct Constant {
     memory: Memory,
     /// Rows in the order in which they lead the episode under way.
     order: Vec<usize>,
+    /// Whether its leader has acted.
+    has_led: bool,
 }
 
 /// What the search keeps from episode to episode.
@@ -60,7 +63,7 @@ pub struct Constant {
 struct Memory {
     steps: u64,
     all: Tally,
-    /// By row: counted collisions of the episodes that it led.
+    /// By row: counted collisions of the episodes that it led, and in which it was legal at least once.
     led: Vec<Tally>,
 }
 
@@ -68,7 +71,7 @@ impl Constant {
     /// A search over so many rows.
     pub fn new(settings: &ConstantSettings, rows: usize) -> Constant {
         let memory = Memory { steps: 0, all: Tally::default(), led: vec![Tally::default(); rows] };
-        Constant { settings: settings.clone(), memory, order: (0..rows).collect() }
+        Constant { settings: settings.clone(), memory, order: (0..rows).collect(), has_led: false }
     }
 
     /// The search that was saved; `None` if the bytes are not those of one over so many rows.
@@ -97,6 +100,7 @@ fn first_legal(order: &[usize], legal: ArrayView1<bool>) -> Option<usize> {
 impl Agent for Constant {
     fn choose(&mut self, _: &Observation, legal: ArrayView1<bool>, _: &mut Rng) -> Option<usize> {
         let row = first_legal(&self.order, legal)?;
+        self.has_led |= Some(&row) == self.order.first();
         self.memory.steps += 1;
         Some(row)
     }
@@ -106,13 +110,14 @@ impl Trainable for Constant {
     fn beginning(&mut self, _: usize, fresh: u64) -> Beginning {
         let mut rng = rng::stream(fresh, Stream::Search, 0);
         self.order = self.ordered(Doubt::Try(self.settings.doubt), &mut rng);
+        self.has_led = false;
         Beginning { seed: fresh, from: None }
     }
 
     fn learn(&mut self, episode: &Trajectory, _: &mut Rng) -> Lesson {
         let counted = episode.steps.iter().map(|step| step.crashes.len()).sum::<usize>() as f64;
         self.memory.all.note(counted);
-        if let Some(&leader) = self.order.first() {
+        if let Some(&leader) = self.order.first().filter(|_| self.has_led) {
             self.memory.led[leader].note(counted);
         }
         Lesson::default()
