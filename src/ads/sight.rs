@@ -66,17 +66,7 @@ impl Sight {
                 .map(|before| core::mem::take(&mut before.predicted))
                 .unwrap_or_default();
             predicted.clear();
-            let seen = PerceivedObject {
-                id: Some(object.id),
-                track: object.id,
-                body: object.body,
-                pose: object.pose,
-                velocity_mps: object.velocity_mps,
-                length_m: object.length_m,
-                width_m: object.width_m,
-                height_m: object.height_m,
-                predicted,
-            };
+            let seen = PerceivedObject { predicted, ..PerceivedObject::as_it_is(object) };
             match perceived.get_mut(index) {
                 Some(place) => *place = seen,
                 None => perceived.push(seen),

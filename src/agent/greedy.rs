@@ -52,6 +52,10 @@ impl Agent for Greedy {
         any(&best, rng)
     }
 
+    fn looks_ahead(&self) -> bool {
+        true
+    }
+
     fn branched_s(&self) -> f64 {
         self.branched_s
     }

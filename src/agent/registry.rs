@@ -45,6 +45,11 @@ pub trait Agent: Send {
         None
     }
 
+    /// Whether it tries rows out before it chooses.
+    fn looks_ahead(&self) -> bool {
+        false
+    }
+
     /// Time driven in branches since the episode began, s.
     fn branched_s(&self) -> f64 {
         0.0

@@ -6,9 +6,7 @@
 
 use std::sync::atomic::AtomicBool;
 
-use crate::episode;
-use crate::episode::{EpisodeLog, Moment};
-use crate::run::{EpisodeSummary, Run, choose, on_threads};
+use crate::run::{Run, on_threads};
 use crate::statistics::{Interval, binomial, paired_difference, sign_test};
 
 use crate::estimate::settings::EventKind;
@@ -92,21 +90,9 @@ pub fn compared<E>(
         let episode = comparison.episode(*number);
         let side = |run: &Run| {
             let setup = run.setup(episode);
-            let mut agent = run.agent();
-            agent.begin();
-            let log = episode::run(
-                &setup,
-                &mut |moment: &Moment| choose(agent.as_mut(), moment).0,
-                &mut |_, _, _| {},
-            );
-            let happened = |log: &EpisodeLog| match comparison.event {
-                EventKind::Collision => !log.collisions.is_empty(),
-                EventKind::Counted => {
-                    EpisodeSummary::judged(&setup, episode, log, &run.settings().avoidability).counted() > 0
-                }
-            };
-            let failed = log.failure.is_some();
-            Side { happened: happened(&log), failed, driven_m: log.distance_m }
+            let (log, _) = run.played(&setup);
+            let happened = comparison.event.happened(&setup, &log, run.settings());
+            Side { happened, failed: log.failure.is_some(), driven_m: log.distance_m }
         };
         tell(Pair { number: *number, first: side(&comparison.first), second: side(&comparison.second) });
     };

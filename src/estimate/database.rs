@@ -16,7 +16,7 @@ const SCHEMA: &str = "
 CREATE TABLE part (
   part INTEGER PRIMARY KEY, road INTEGER NOT NULL, number INTEGER NOT NULL, probability REAL NOT NULL,
   episodes INTEGER NOT NULL, driven_m REAL NOT NULL, duration_s REAL NOT NULL, events INTEGER NOT NULL,
-  simulated_s REAL NOT NULL, levels INTEGER NOT NULL, failed INTEGER NOT NULL, UNIQUE (road, number)
+  simulated_s REAL NOT NULL, levels INTEGER NOT NULL, UNIQUE (road, number)
 ) STRICT;
 ";
 
@@ -44,7 +44,7 @@ impl EstimateDatabase {
         let place = i64::from(number) * estimate.settings().run.roads.len() as i64 + road as i64;
         let transaction = self.connection.transaction()?;
         transaction.execute(
-            "INSERT INTO part VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+            "INSERT INTO part VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
             params![
                 place,
                 road as i64,
@@ -56,7 +56,6 @@ impl EstimateDatabase {
                 record.events,
                 record.simulated_s,
                 record.levels,
-                record.failed,
             ],
         )?;
         LAYOUT.seal(&transaction, place)?;
@@ -70,7 +69,7 @@ impl EstimateDatabase {
     /// If the file cannot be read.
     pub fn parts(&self) -> Result<Vec<PartRecord>, DatabaseError> {
         let mut query = self.connection.prepare(
-            "SELECT road, number, probability, episodes, driven_m, duration_s, events, simulated_s, levels, failed
+            "SELECT road, number, probability, episodes, driven_m, duration_s, events, simulated_s, levels
              FROM part ORDER BY part",
         )?;
         let records = query.query_map([], |row| {
@@ -83,7 +82,7 @@ impl EstimateDatabase {
                 events: row.get(6)?,
                 simulated_s: row.get(7)?,
                 levels: row.get(8)?,
-                failed: row.get(9)?,
+                failed: 0,
             })
         })?;
         Ok(records.collect::<Result<_, _>>()?)

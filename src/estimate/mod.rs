@@ -4,8 +4,8 @@
 //! An [`Estimate`] consists of independent parts, each with seeds of its own, played on any number of threads. A part
 //! either counts ([`Method::Count`]: crude Monte Carlo) or splits ([`Method::Split`]: adaptive multilevel
 //! splitting, see `splitting`). Both are unbiased for agents that do not look ahead. What splitting gains over counting
-//! is measured and printed; where it was tried (probabilities of 0.1 to 0.005) it was a loss. [`Comparison`] plays two driving systems in the same
-//! episodes.
+//! is measured and printed; where it was tried (probabilities of 0.1 to 0.005) it was a loss. [`Comparison`] plays two
+//! driving systems in the same episodes.
 
 mod compare;
 mod database;

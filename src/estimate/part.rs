@@ -1,10 +1,9 @@
 //! Parts: what an estimate consists of, played on any number of threads.
 
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, Ordering};
 
-use crate::episode;
-use crate::episode::Moment;
-use crate::run::{choose, on_threads};
+use crate::episode::EpisodeLog;
+use crate::run::on_threads;
 
 use crate::estimate::ready::Estimate;
 use crate::estimate::settings::Method;
@@ -25,8 +24,8 @@ pub struct PartRecord {
     pub part: Part,
     /// Estimate of the probability of the event in an episode.
     pub probability: f64,
-    /// Episodes of the part, and those that were played from their start to their end without any choice by the
-    /// method: they say how far an episode goes. The other ones are branches.
+    /// Episodes that were played from their start to their end, and, summed over them, how far and how long they went.
+    /// Branches are not among them.
     pub episodes: u32,
     pub driven_m: f64,
     pub duration_s: f64,
@@ -37,7 +36,7 @@ pub struct PartRecord {
     pub simulated_s: f64,
     /// Levels that the method went through; 0 if it counts.
     pub levels: u32,
-    /// Episodes that an external driving system failed in: such a part says nothing.
+    /// Episodes that an external driving system failed in: such a part says nothing, and is not kept.
     pub failed: u32,
 }
 
@@ -69,16 +68,13 @@ pub fn play_parts<E>(
 fn count(estimate: &Estimate, part: Part, stop: &AtomicBool) -> Option<PartRecord> {
     let mut record = PartRecord::new(part);
     for number in 0..estimate.settings().run.episodes {
-        if stop.load(std::sync::atomic::Ordering::Relaxed) {
+        if stop.load(Ordering::Relaxed) {
             return None;
         }
         let setup = estimate.setup(part, number);
-        let mut agent = estimate.run().agent();
-        agent.begin();
-        let log =
-            episode::run(&setup, &mut |moment: &Moment| choose(agent.as_mut(), moment).0, &mut |_, _, _| {});
+        let (log, branched_s) = estimate.run().played(&setup);
         record.note_whole(&log);
-        record.simulated_s += log.duration_s + agent.branched_s();
+        record.simulated_s += log.duration_s + branched_s;
         record.events += u32::from(estimate.happened(&setup, &log));
     }
     record.probability = f64::from(record.events) / f64::from(record.episodes);
@@ -101,7 +97,7 @@ impl PartRecord {
     }
 
     /// Takes in an episode that was played from start to end.
-    pub(super) fn note_whole(&mut self, log: &episode::EpisodeLog) {
+    pub(super) fn note_whole(&mut self, log: &EpisodeLog) {
         self.episodes += 1;
         self.driven_m += log.distance_m;
         self.duration_s += log.duration_s;

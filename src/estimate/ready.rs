@@ -1,12 +1,12 @@
 //! An estimate that is ready to play: its parts and their episodes.
 
 use crate::action::ActionTable;
-use crate::episode::Setup;
+use crate::episode::{EpisodeLog, Setup};
 use crate::estimate::part::Part;
-use crate::estimate::settings::{EstimateError, EstimateSettings, EventKind};
+use crate::estimate::settings::{EstimateError, EstimateSettings, Method};
 use crate::rng;
 use crate::rng::Stream;
-use crate::run::{EpisodeSummary, Run};
+use crate::run::Run;
 
 /// An estimate that is ready to play.
 pub struct Estimate {
@@ -22,6 +22,9 @@ impl Estimate {
     pub fn new(table: ActionTable, settings: EstimateSettings) -> Result<Estimate, EstimateError> {
         settings.check()?;
         let run = Run::new(table, settings.run.clone())?;
+        if settings.method == Method::Split && run.agent().looks_ahead() {
+            return Err(EstimateError::Ahead { agent: settings.run.agent.clone() });
+        }
         Ok(Estimate { run, settings })
     }
 
@@ -54,12 +57,7 @@ impl Estimate {
     }
 
     /// Whether the event is in an episode.
-    pub(super) fn happened(&self, setup: &Setup, log: &crate::episode::EpisodeLog) -> bool {
-        match self.settings.event {
-            EventKind::Collision => !log.collisions.is_empty(),
-            EventKind::Counted => {
-                EpisodeSummary::judged(setup, 0, log, &self.settings.run.avoidability).counted() > 0
-            }
-        }
+    pub(super) fn happened(&self, setup: &Setup, log: &EpisodeLog) -> bool {
+        self.settings.event.happened(setup, log, &self.settings.run)
     }
 }

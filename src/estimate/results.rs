@@ -2,7 +2,7 @@
 //!
 //! Computed from the parts alone. While some are missing, the result covers those that are there, and says so.
 
-use crate::statistics::{Interval, binomial, mean};
+use crate::statistics::{Interval, binomial, mean, variance_of_mean};
 
 use crate::estimate::part::PartRecord;
 use crate::estimate::settings::{EstimateSettings, EventKind, Method};
@@ -117,12 +117,11 @@ impl Probability {
         let per_km = episodes as f64 / driven_km;
         let scaled = |value: f64| 1000.0 * value * per_km;
         let is_driven = driven_km > 0.0;
-        // Of means of episodes: what one of them varies by, over what the estimate varies by.
         let variance = variance_of_mean(&samples);
         let parts_without = samples.iter().filter(|&&sample| sample == 0.0).count();
         let is_telling = samples.len() >= GAIN_PARTS_MIN && 2 * parts_without <= samples.len();
-        let counting_s =
-            |variance: f64| probability * (1.0 - probability) / variance * duration_s / episodes as f64;
+        // Counting has this variance after so many episodes, each of the mean duration.
+        let counting_s = probability * (1.0 - probability) / variance * duration_s / episodes as f64;
         Probability {
             probability,
             interval,
@@ -133,21 +132,11 @@ impl Probability {
             episodes,
             driven_km,
             simulated_h: simulated_s / 3600.0,
-            gain: variance
-                .filter(|&variance| method == Method::Split && is_telling && variance > 0.0)
-                .map(|variance| counting_s(variance) / simulated_s),
+            gain: (method == Method::Split && is_telling && variance > 0.0).then(|| counting_s / simulated_s),
             parts_without,
             parts: samples.len(),
         }
     }
-}
-
-/// The variance of a mean, estimated from its sample; `None` for fewer than two values.
-fn variance_of_mean(values: &[f64]) -> Option<f64> {
-    let count = values.len() as f64;
-    let mean = values.iter().sum::<f64>() / count;
-    let squares: f64 = values.iter().map(|value| (value - mean) * (value - mean)).sum();
-    (values.len() > 1).then(|| squares / (count - 1.0) / count)
 }
 
 #[cfg(test)]

@@ -1,6 +1,7 @@
 //! The settings of an estimate in full, as `estimate.yaml` keeps them.
 
-use crate::run::{RunError, RunSettings};
+use crate::episode::{EpisodeLog, Setup};
+use crate::run::{EpisodeSummary, RunError, RunSettings};
 
 /// What is counted: whether it happens in an episode.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
@@ -14,6 +15,14 @@ pub enum EventKind {
 }
 
 impl EventKind {
+    /// Whether it is in an episode, judged by the settings of a run.
+    pub(super) fn happened(self, setup: &Setup, log: &EpisodeLog, run: &RunSettings) -> bool {
+        match self {
+            EventKind::Collision => !log.collisions.is_empty(),
+            EventKind::Counted => EpisodeSummary::judged(setup, 0, log, &run.avoidability).counted() > 0,
+        }
+    }
+
     /// The event in words.
     pub fn in_words(self) -> &'static str {
         match self {
@@ -46,8 +55,6 @@ pub struct EstimateSettings {
     pub run: RunSettings,
 }
 
-/// The agent that tries rows out before it chooses.
-const GREEDY: &str = "greedy";
 /// Largest number of parts of a road. Ours.
 const PARTS_MAX: u32 = 100_000;
 /// A part that splits needs at least so many episodes. Ours: with fewer, most parts die out.
@@ -87,9 +94,6 @@ impl EstimateSettings {
             }
             if self.run.external.is_some() {
                 return Err(EstimateError::External);
-            }
-            if self.run.agent == GREEDY {
-                return Err(EstimateError::Ahead { agent: self.run.agent.clone() });
             }
         }
         Ok(())

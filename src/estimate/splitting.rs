@@ -15,7 +15,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use crate::ads::Ads;
 use crate::episode;
 use crate::episode::{EpisodeLog, Fork, Moment, Setup, Snapshot};
-use crate::mdp::Criticality;
+use crate::mdp::{Criticality, TTC_S_MAX};
 use crate::rng;
 use crate::rng::{Rng, Stream};
 use crate::run::choose;
@@ -26,10 +26,8 @@ use crate::estimate::ready::Estimate;
 
 /// Share of the episodes that are given up in a round, at least. Ours.
 const GIVEN_UP: f64 = 0.2;
-/// Levels between no expected contact within [`HORIZON_S`] and a contact.
+/// Levels between no expected contact within [`TTC_S_MAX`] and a contact.
 const LEVELS: u32 = 64;
-/// Times to collision are looked for up to here, s; as `mdp::Criticality`.
-const HORIZON_S: f64 = 8.0;
 /// The level of a contact.
 const TOP: u32 = LEVELS + 1;
 
@@ -198,5 +196,5 @@ impl Score {
 fn level(world: &World) -> u32 {
     let mut now = Criticality::default();
     now.note(world, &|_| false);
-    now.ttc_s.map_or(0, |ttc_s| 1 + ((1.0 - ttc_s / HORIZON_S) * f64::from(LEVELS - 1)) as u32)
+    now.ttc_s.map_or(0, |ttc_s| 1 + ((1.0 - ttc_s / TTC_S_MAX) * f64::from(LEVELS - 1)) as u32)
 }

@@ -9,7 +9,7 @@ use crate::geometry::{Bounds, OrientedBox, Pose, Sweep, Vec2, distance_m, first_
 use crate::sim::{FRAME_S, FRAME_TICKS, Obstacle, World};
 
 /// Contacts later than this are not looked for, s.
-const HORIZON_S: f64 = 8.0;
+pub const TTC_S_MAX: f64 = 8.0;
 /// Encroachments farther apart in time than this are not looked for, s. Above 2 s is normal traffic.
 const PET_S_MAX: f64 = 5.0;
 /// Places of the ego vehicle that are looked at together, 0.8 s.
@@ -100,16 +100,16 @@ pub fn time_to_collision_s(world: &World, obstacle: &Obstacle) -> Option<f64> {
     let ego = world.ego_outline();
     let ego_velocity_mps = ego.pose.forward() * world.ego().speed_mps;
     let relative_mps = obstacle.velocity_mps - ego_velocity_mps;
-    if obstacle.distance_m > relative_mps.norm() * HORIZON_S {
+    if obstacle.distance_m > relative_mps.norm() * TTC_S_MAX {
         return None;
     }
     let sweep = |start: OrientedBox, velocity_mps: Vec2| {
-        let position = start.pose.position + velocity_mps * HORIZON_S;
+        let position = start.pose.position + velocity_mps * TTC_S_MAX;
         Sweep { start, end: Pose { position, heading_rad: start.pose.heading_rad } }
     };
     let first =
         first_contact(&sweep(ego, ego_velocity_mps), &sweep(obstacle.outline, obstacle.velocity_mps))?;
-    Some(first.fraction * HORIZON_S)
+    Some(first.fraction * TTC_S_MAX)
 }
 
 /// An obstacle in the frame of the ego vehicle.

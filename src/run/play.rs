@@ -102,9 +102,16 @@ impl Run {
 
     /// Plays one episode; numbers run through the roads one after another.
     pub fn episode(&self, number: usize) -> EpisodeLog {
-        let mut agent = (self.agent)();
+        self.played(&self.setup(number)).0
+    }
+
+    /// Plays an episode of a setup by a fresh agent. Beside the log comes the time that the agent simulated in branches, s.
+    pub fn played(&self, setup: &episode::Setup) -> (EpisodeLog, f64) {
+        let mut agent = self.agent();
         agent.begin();
-        self.play(number, &mut |moment| choose(agent.as_mut(), moment).0, &mut |_, _, _| {})
+        let mut choose = |moment: &Moment| choose(agent.as_mut(), moment).0;
+        let log = episode::run(setup, &mut choose, &mut |_, _, _| {});
+        (log, agent.branched_s())
     }
 
     /// Plays one episode and judges its collisions.

@@ -35,11 +35,18 @@ pub fn mean(values: &[f64]) -> Option<Estimate> {
     let mean = values.iter().sum::<f64>() / count;
     let is_constant = values.iter().all(|value| *value == values[0]);
     let interval = (!is_constant).then(|| {
-        let squares: f64 = values.iter().map(|value| (value - mean) * (value - mean)).sum();
-        let half = student_quantile(values.len() - 1) * (squares / (count - 1.0) / count).sqrt();
+        let half = student_quantile(values.len() - 1) * variance_of_mean(values).sqrt();
         Interval { low: mean - half, high: Some(mean + half) }
     });
     Some(Estimate { mean, interval, values: values.to_vec() })
+}
+
+/// The variance of a mean, estimated from its sample; NaN for fewer than two values.
+pub fn variance_of_mean(values: &[f64]) -> f64 {
+    let count = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / count;
+    let squares: f64 = values.iter().map(|value| (value - mean) * (value - mean)).sum();
+    squares / (count - 1.0) / count
 }
 
 /// The bound below which the magnitude of a Student variable stays with probability 0.95.

@@ -8,7 +8,8 @@ mod ranks;
 mod survival;
 
 pub use intervals::{
-    Estimate, Interval, binomial, mean, paired_difference, poisson, proportion, ratio_of_means, wilson,
+    Estimate, Interval, binomial, mean, paired_difference, poisson, proportion, ratio_of_means,
+    variance_of_mean, wilson,
 };
 pub use ranks::{PairedTest, RankTest, holm, mann_whitney, sign_test, signed_ranks, superiority};
 pub use survival::{Lifetime, restricted_mean};
