@@ -7,12 +7,10 @@ use crate::estimate::{
     Comparison, ComparisonResults, Estimate, EstimateDatabase, EstimateResults, EstimateSettings, EventKind,
     Method, Probability, RoadEstimate, compared, play_parts,
 };
-use crate::run::{Run, RunSettings, TrafficRecord};
+use crate::run::{Run, RunSettings};
 use crate::statistics::Interval;
 
-use super::arguments::{
-    CompareArguments, ConditionArguments, EstimateArguments, EventArgument, MethodArgument,
-};
+use super::arguments::{CompareArguments, EstimateArguments, EventArgument, MethodArgument};
 use super::error::Failure;
 use super::files::write;
 use super::interrupt::stop_on_interrupt;
@@ -20,9 +18,8 @@ use super::load::UnderTest;
 use super::output::{Output, plural};
 use super::parallel::jobs;
 use super::progress::Progress;
-use super::run::roads_or_all;
 use super::run_directory::{Held, Resumed};
-use super::{load, run_directory};
+use super::{conditions, load, run_directory};
 
 /// Plays what an estimate still lacks and prints its result.
 pub fn estimate(output: &Output, arguments: &EstimateArguments) -> Result<(), Failure> {
@@ -74,8 +71,8 @@ pub fn estimate(output: &Output, arguments: &EstimateArguments) -> Result<(), Fa
 fn begun(output: &Output, arguments: &EstimateArguments) -> Result<(Estimate, Held, String), Failure> {
     let file = arguments.file.as_ref().expect("clap asks for it where there is no `--resume`");
     let table = load::table(output, file)?;
-    let under_test =
-        load::under_test(&arguments.ads, arguments.ads_config.as_deref(), arguments.ads_cmd.as_deref())?;
+    let under_test = conditions::named(&arguments.under_test)?;
+    let (conditions, episodes) = (&arguments.conditions, arguments.episodes);
     let settings = EstimateSettings {
         event: event(arguments.event),
         method: match arguments.method {
@@ -83,7 +80,7 @@ fn begun(output: &Output, arguments: &EstimateArguments) -> Result<(Estimate, He
             MethodArgument::Split => Method::Split,
         },
         parts: arguments.parts,
-        run: conditions(&table, &arguments.conditions, under_test, arguments.episodes)?,
+        run: conditions::settings(table.space(), conditions, &conditions.agent, under_test, episodes)?,
     };
     let estimate = Estimate::new(table, settings).map_err(Failure::usage)?;
     let held = run_directory::create_empty(arguments.out.as_deref())?;
@@ -105,7 +102,10 @@ fn resumed(output: &Output, path: &Path) -> Result<(Estimate, Held, String), Fai
 pub fn compare(output: &Output, arguments: &CompareArguments) -> Result<(), Failure> {
     let table = load::table(output, &arguments.file)?;
     let side = |named: &str| {
-        let settings = conditions(&table, &arguments.conditions, side_of(named)?, arguments.episodes)?;
+        let (conditions, under_test) = (&arguments.conditions, side_of(named)?);
+        let episodes = arguments.episodes;
+        let settings =
+            conditions::settings(table.space(), conditions, &conditions.agent, under_test, episodes)?;
         Ok::<_, Failure>(Run::new(table.clone(), settings)?)
     };
     let (first, second) = (side(&arguments.first)?, side(&arguments.second)?);
@@ -158,29 +158,6 @@ fn event(argument: EventArgument) -> EventKind {
         EventArgument::Counted => EventKind::Counted,
         EventArgument::Collision => EventKind::Collision,
     }
-}
-
-/// The settings of a run under these conditions.
-fn conditions(
-    table: &crate::action::ActionTable,
-    arguments: &ConditionArguments,
-    under_test: UnderTest,
-    episodes: u32,
-) -> Result<RunSettings, Failure> {
-    let space = table.space();
-    let traffic = arguments.traffic.as_deref().map(load::traffic).transpose()?;
-    let UnderTest { ads, profile, external } = under_test;
-    Ok(RunSettings {
-        roads: roads_or_all(&arguments.road, space),
-        ads,
-        profile,
-        external,
-        ambient: arguments.ambient,
-        traffic: traffic.as_ref().and_then(TrafficRecord::new),
-        without: arguments.rules.without.clone(),
-        with: arguments.rules.with.clone(),
-        ..RunSettings::new(space, &arguments.agent, episodes, arguments.seed)
-    })
 }
 
 fn heading(estimate: &Estimate, directory: &Path) -> String {

@@ -5,6 +5,7 @@ mod arguments;
 mod check;
 mod compile;
 mod completions;
+mod conditions;
 mod diagnose;
 mod diff;
 mod distill;

@@ -8,16 +8,13 @@ use crate::action::ActionTable;
 use crate::agent::Face;
 use crate::emit;
 use crate::episode::EpisodeLog;
-use crate::model::{Policy, Space, digest};
-use crate::run::{
-    EpisodeSummary, Group, PolicyReference, RefusalCount, Run, RunSettings, Totals, TrafficRecord, play,
-};
+use crate::model::{Policy, digest};
+use crate::run::{EpisodeSummary, Group, PolicyReference, RefusalCount, Run, RunSettings, Totals, play};
 
 use super::arguments::{FaceArgument, RunArguments};
 use super::error::Failure;
 use super::findings::{doubts, failures_text};
 use super::interrupt::stop_on_interrupt;
-use super::load::UnderTest;
 use super::never::Never;
 use super::output::Output;
 use super::output::plural;
@@ -26,7 +23,7 @@ use super::parallel::jobs;
 use super::progress::Progress;
 use super::run_directory::{Resumed, RunDirectory};
 use super::verify::acting;
-use super::{compile, load, run_directory};
+use super::{compile, conditions, load, run_directory};
 
 /// Largest number of critical scenarios, groups and refusal reasons that the summary lists.
 const NAMED_MAX: usize = 10;
@@ -105,23 +102,10 @@ fn begun(output: &Output, arguments: &RunArguments) -> Result<(Run, RunDirectory
         (None, None) => compile::last(output)?,
     };
     let space = table.space();
-    let agent = policy.as_ref().map_or(&arguments.agent, |(_, policy)| &policy.name);
-    let settings = RunSettings::new(space, agent, arguments.episodes, arguments.seed);
-    let traffic = arguments.traffic.as_deref().map(load::traffic).transpose()?;
-    let UnderTest { ads, profile, external } =
-        load::under_test(&arguments.ads, arguments.ads_config.as_deref(), arguments.ads_cmd.as_deref())?;
-    let settings = RunSettings {
-        roads: roads_or_all(&arguments.road, space),
-        ads,
-        profile,
-        external,
-        ambient: arguments.ambient,
-        traffic: traffic.as_ref().and_then(TrafficRecord::new),
-        causes: arguments.causes,
-        without: arguments.rules.without.clone(),
-        with: arguments.rules.with.clone(),
-        ..settings
-    };
+    let agent = policy.as_ref().map_or(&arguments.conditions.agent, |(_, policy)| &policy.name);
+    let under_test = conditions::named(&arguments.under_test)?;
+    let settings = conditions::settings(space, &arguments.conditions, agent, under_test, arguments.episodes)?;
+    let settings = RunSettings { causes: arguments.causes, ..settings };
     let face = match arguments.face {
         FaceArgument::Network => Face::Network,
         FaceArgument::Rules => Face::Rules,
@@ -146,11 +130,6 @@ fn begun(output: &Output, arguments: &RunArguments) -> Result<(Run, RunDirectory
     let settings = RunSettings { space, policy: reference, external, ..run.settings().clone() };
     let text = run_directory::write_settings(path, "run", &settings)?;
     Ok((run, RunDirectory::open(held, &text)?))
-}
-
-/// The roads that a command line names, or all of the space.
-pub fn roads_or_all(named: &[String], space: &Space) -> Vec<String> {
-    if named.is_empty() { space.roads.iter().map(|road| road.name.clone()).collect() } else { named.to_vec() }
 }
 
 /// The rest of an interrupted run.
@@ -273,12 +252,15 @@ fn heading(run: &Run, arguments: &RunArguments, directory: &Path) -> String {
         wanted => format!(", {} of ambient traffic", plural(wanted as usize, "vehicle")),
     };
     let traffic = settings.traffic.as_ref().map_or(String::new(), |record| {
-        let name = arguments.traffic.as_deref().or(record.settings.shipped_as());
+        let name = arguments.conditions.traffic.as_deref().or(record.settings.shipped_as());
         format!(", traffic {}", name.unwrap_or("of a profile of its own"))
     });
     let ads = run.ads_name();
-    let profile =
-        arguments.ads_config.as_ref().map_or(String::new(), |path| format!(" with {}", path.display()));
+    let profile = arguments
+        .under_test
+        .ads_config
+        .as_ref()
+        .map_or(String::new(), |path| format!(" with {}", path.display()));
     format!(
         "{}: {} against {}{profile}, {} on {}{ambient}{traffic}, seed {}, into {}",
         run.space().path.display(),

@@ -14,6 +14,8 @@ use crate::syntax::listed;
 use crate::train::{Evaluation, TrainSettings, TrainedEpisode, Training, evaluate, rounded};
 
 use super::arguments::TrainArguments;
+use super::conditions;
+use super::conditions::roads_or_all;
 use super::distill::rules_text;
 use super::error::Failure;
 use super::files::write;
@@ -24,7 +26,6 @@ use super::output::Output;
 use super::output::plural;
 use super::pack::pack_space;
 use super::progress::{TrainingProgress, Working};
-use super::run::roads_or_all;
 use super::run_directory::{Resumed, RunDirectory};
 use super::{distill, load, run_directory};
 
@@ -61,14 +62,13 @@ fn begun(output: &Output, arguments: &TrainArguments) -> Result<(Training, RunDi
     let table = load::table(output, file)?;
     let hyperparameters = settings(arguments)?;
     let space = table.space();
-    let UnderTest { ads, profile, external } =
-        load::under_test(&arguments.ads, arguments.ads_config.as_deref(), arguments.ads_cmd.as_deref())?;
+    let UnderTest { ads, profile, external } = conditions::named(&arguments.under_test)?;
     let traffic = arguments.traffic.as_deref().map(load::traffic).transpose()?;
     let conditions = RunSettings {
         roads: roads_or_all(&arguments.road, space),
         ads,
         // Without a file nothing is recorded.
-        profile: profile.filter(|_| arguments.ads_config.is_some()),
+        profile: profile.filter(|_| arguments.under_test.ads_config.is_some()),
         external,
         traffic: traffic.as_ref().and_then(TrafficRecord::new),
         without: arguments.rules.without.clone(),

@@ -12,12 +12,12 @@ use crate::trial::{Cell, TrialSettings, Trials};
 
 use super::arguments::TableArguments;
 use super::compile::TableResult;
+use super::conditions::roads_or_all;
 use super::error::Failure;
 use super::files::write;
 use super::load;
 use super::output::Output;
 use super::progress::Pieces;
-use super::run::roads_or_all;
 
 /// Tries the rows of a table and prints the results.
 pub fn trials(output: &Output, arguments: &TableArguments, table: ActionTable) -> Result<(), Failure> {

@@ -1,0 +1,155 @@
+//! What is asked of the commands that play episodes: who drives, under which conditions, how many.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+
+use super::language::RuleArguments;
+use crate::cli::help::Named;
+
+/// The driving system under test.
+#[derive(Debug, Args)]
+pub struct UnderTestArguments {
+    /// Driving system under test.
+    #[arg(long, default_value = crate::run::DEFAULT_ADS, value_parser = Named::ADS)]
+    pub ads: String,
+    /// Profile of the `modular` driving system, for example scenarios/ads/cautious.yaml, or of one of your own, with an
+    /// `ads` block [default: as it comes].
+    #[arg(long, value_name = "FILE")]
+    pub ads_config: Option<PathBuf>,
+    /// Driving system of your own: a command (PROTOCOL.md), `tcp:HOST:PORT` or `unix:PATH`.
+    #[arg(long, value_name = "COMMAND", conflicts_with = "ads")]
+    pub ads_cmd: Option<String>,
+}
+
+/// The conditions of episodes besides space and driving system.
+#[derive(Debug, Args)]
+pub struct ConditionArguments {
+    /// Road to drive; may be given several times [default: all of the space].
+    #[arg(long)]
+    pub road: Vec<String>,
+    /// Who chooses the actions.
+    #[arg(long, default_value = "random", value_parser = Named::AGENT)]
+    pub agent: String,
+    /// Seed of everything.
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+    /// Vehicles of ambient traffic around the ego vehicle, besides those that actions make appear.
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=i64::from(crate::model::AMBIENT_MAX)))]
+    pub ambient: u32,
+    /// How other vehicles drive: a name, or a profile like scenarios/traffic/careful.yaml [default: careful].
+    #[arg(long, value_name = "NAME|FILE", value_parser = Named::TRAFFIC)]
+    pub traffic: Option<String>,
+    #[command(flatten)]
+    pub rules: RuleArguments,
+}
+
+#[derive(Debug, Args)]
+pub struct RunArguments {
+    /// The space [default: the one compiled last here].
+    pub file: Option<PathBuf>,
+    #[command(flatten)]
+    pub under_test: UnderTestArguments,
+    #[command(flatten)]
+    pub conditions: ConditionArguments,
+    /// Let a trained policy choose them; without FILE on its own space.
+    #[arg(long, value_name = "POLICY", conflicts_with = "agent")]
+    pub policy: Option<PathBuf>,
+    /// Which face of the policy acts: its network, or the rules distilled from it.
+    #[arg(long, value_enum, requires = "policy", default_value_t = FaceArgument::Network)]
+    pub face: FaceArgument,
+    /// Episodes on each road.
+    #[arg(long, default_value_t = 100, value_parser = clap::value_parser!(u32).range(1..=i64::from(crate::run::EPISODES_MAX)))]
+    pub episodes: u32,
+    /// Say of each counted collision which module of the driving system is at fault; takes some twenty
+    /// replays for each.
+    #[arg(long)]
+    pub causes: bool,
+    /// Worker threads; the result does not depend on it [default: one for each core].
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=1024))]
+    pub jobs: Option<u32>,
+    /// Run directory, new or empty [default: the next free runs/NNNN].
+    #[arg(long)]
+    pub out: Option<PathBuf>,
+    /// Put the space and its maps into `critical/space`, so that the scenarios can be moved with them.
+    #[arg(long)]
+    pub self_contained: bool,
+    /// Go on with an interrupted run directory; its own settings hold.
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["file", "road", "ads", "ads_config", "ads_cmd", "agent", "policy", "face", "episodes", "seed", "ambient", "traffic", "causes", "out", "self_contained", "without", "with"])]
+    pub resume: Option<PathBuf>,
+    /// Exit with status 4 if a counted collision was found.
+    #[arg(long)]
+    pub fail_on_collision: bool,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum FaceArgument {
+    Network,
+    Rules,
+}
+
+#[derive(Debug, Args)]
+pub struct EstimateArguments {
+    /// The space.
+    #[arg(required_unless_present = "resume")]
+    pub file: Option<PathBuf>,
+    /// What is looked for in an episode.
+    #[arg(long, value_enum, default_value_t = EventArgument::Counted)]
+    pub event: EventArgument,
+    /// How: `count` plays every episode from its start, `split` goes on from dangerous moments (unbiased, and says what it gained or lost).
+    #[arg(long, value_enum, default_value_t = MethodArgument::Count)]
+    pub method: MethodArgument,
+    /// Independent parts on each road; the interval of `split` comes from their spread, so give it twenty or more.
+    #[arg(long, default_value_t = 20)]
+    pub parts: u32,
+    /// Episodes of a part.
+    #[arg(long, default_value_t = 50, value_parser = clap::value_parser!(u32).range(1..=i64::from(crate::run::EPISODES_MAX)))]
+    pub episodes: u32,
+    #[command(flatten)]
+    pub under_test: UnderTestArguments,
+    #[command(flatten)]
+    pub conditions: ConditionArguments,
+    /// Worker threads; the result does not depend on it [default: one for each core].
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=1024))]
+    pub jobs: Option<u32>,
+    /// Directory, new or empty [default: the next free runs/NNNN].
+    #[arg(long)]
+    pub out: Option<PathBuf>,
+    /// Go on with an interrupted estimate; its own settings hold.
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["file", "event", "method", "parts", "episodes", "ads", "ads_config", "ads_cmd", "road", "agent", "seed", "ambient", "traffic", "out", "without", "with"])]
+    pub resume: Option<PathBuf>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum EventArgument {
+    Counted,
+    Collision,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum MethodArgument {
+    Count,
+    Split,
+}
+
+#[derive(Debug, Args)]
+pub struct CompareArguments {
+    /// The space.
+    pub file: PathBuf,
+    /// The first driving system: a name like `modular`, or a profile like scenarios/ads/default.yaml (of one of your own,
+    /// with an `ads` block).
+    pub first: String,
+    /// The second one, likewise.
+    pub second: String,
+    /// What is looked for in an episode.
+    #[arg(long, value_enum, default_value_t = EventArgument::Counted)]
+    pub event: EventArgument,
+    /// Episodes on each road.
+    #[arg(long, default_value_t = 250, value_parser = clap::value_parser!(u32).range(1..=i64::from(crate::run::EPISODES_MAX)))]
+    pub episodes: u32,
+    #[command(flatten)]
+    pub conditions: ConditionArguments,
+    /// Worker threads; the result does not depend on it [default: one for each core].
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=1024))]
+    pub jobs: Option<u32>,
+}

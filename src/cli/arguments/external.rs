@@ -1,0 +1,91 @@
+//! What is asked of `avastra ads`.
+
+use std::path::PathBuf;
+
+use clap::{Args, Subcommand, ValueEnum};
+
+#[derive(Debug, Args)]
+pub struct AdsArguments {
+    #[command(subcommand)]
+    pub command: AdsCommand,
+}
+
+#[derive(Debug, Subcommand)]
+pub enum AdsCommand {
+    /// Check that a driving system follows PROTOCOL.md, answers alike to the like, and how fast.
+    Check(AdsCheckArguments),
+    /// Print the JSON Schema of every message.
+    Schema,
+    /// Be a small driving system that speaks the protocol over stdin and stdout, well or not.
+    Toy(ToyArguments),
+}
+
+#[derive(Debug, Args)]
+pub struct AdsCheckArguments {
+    /// The program and its arguments, after `--`; or `tcp:HOST:PORT` or `unix:PATH`.
+    #[arg(last = true, required_unless_present = "ads_config", value_name = "COMMAND")]
+    pub program: Vec<String>,
+    /// Its profile, with an `ads` block.
+    #[arg(long, value_name = "FILE")]
+    pub ads_config: Option<PathBuf>,
+    /// The space whose first road it drives [default: a space of avastra's own].
+    #[arg(long, value_name = "FILE")]
+    pub space: Option<PathBuf>,
+    /// Road to drive [default: the first of the space].
+    #[arg(long)]
+    pub road: Option<String>,
+    /// Seed of the episodes.
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+    /// Length of each of the four episodes, in steps of an agent (6 s), at most.
+    #[arg(long, default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    pub steps: u32,
+}
+
+#[derive(Debug, Args)]
+pub struct ToyArguments {
+    /// The kind of its answers.
+    #[arg(long, value_enum, default_value_t = ToyAnswer::Acceleration)]
+    pub answer: ToyAnswer,
+    /// Drive on whatever is in the way.
+    #[arg(long)]
+    pub blind: bool,
+    /// What it does wrong, from the twentieth step on.
+    #[arg(long, value_enum)]
+    pub misbehave: Option<Misbehaviour>,
+    /// How late it is, s, if it is late.
+    #[arg(long, default_value_t = 3.0)]
+    pub late: f64,
+    /// The version that it says to be.
+    #[arg(long, value_name = "VERSION", default_value = "1")]
+    pub as_version: String,
+    /// Say that it may answer otherwise when asked the same again.
+    #[arg(long)]
+    pub not_deterministic: bool,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum ToyAnswer {
+    Control,
+    Pedals,
+    Trajectory,
+    Acceleration,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Misbehaviour {
+    CrashAtStart,
+    CrashInEpisode,
+    CrashAtReset,
+    Hang,
+    Garbage,
+    Nan,
+    Late,
+    Twice,
+    WrongSeq,
+    HugeLine,
+    CloseStdout,
+    FloodStderr,
+    Error,
+    Forgetful,
+}

@@ -1,0 +1,156 @@
+//! What is asked of the commands that read and write the language.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+
+use crate::cli::help::Named;
+
+#[derive(Debug, Args)]
+pub struct CheckArguments {
+    /// Spaces, scenarios, policies.
+    #[arg(required = true, value_name = "FILE")]
+    pub files: Vec<PathBuf>,
+    /// List each rule, the rows it binds and where it is enforced.
+    #[arg(long)]
+    pub audit: bool,
+    /// Take warnings for errors.
+    #[arg(long)]
+    pub strict: bool,
+    /// Print a stage of the pipeline as JSON.
+    #[arg(long, value_enum)]
+    pub dump: Option<Dump>,
+    /// Make the changes that the diagnostics offer, in the files named here.
+    #[arg(long)]
+    pub fix: bool,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Dump {
+    Ast,
+    Actions,
+}
+
+#[derive(Debug, Args)]
+pub struct CompileArguments {
+    /// The space.
+    pub file: PathBuf,
+    /// Where to write the table [default: build/STEM.table.yaml].
+    #[arg(long = "out", short = 'o')]
+    pub output: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+pub struct TableArguments {
+    /// The space.
+    pub file: PathBuf,
+    /// Only what this road allows, with the reason where it does not.
+    #[arg(long)]
+    pub road: Option<String>,
+    /// Carry every row out on the road, or on all of them, without other traffic, and judge whether it does what it says.
+    #[arg(long)]
+    pub r#try: bool,
+    #[command(flatten)]
+    pub trials: TrialArguments,
+}
+
+#[derive(Debug, Args)]
+pub struct TrialArguments {
+    /// Tries of each row on each road, at most.
+    #[arg(long, requires = "try", default_value_t = 6, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    pub tries: u32,
+    /// Undisturbed drives of each road, from whose steps the tries set out.
+    #[arg(long, requires = "try", default_value_t = 8, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    pub drives: u32,
+    /// Driving system of the ego vehicle.
+    #[arg(long, requires = "try", default_value = crate::run::DEFAULT_ADS, value_parser = Named::ADS)]
+    pub ads: String,
+    /// Seed of the drives and tries.
+    #[arg(long, requires = "try", default_value_t = 1)]
+    pub seed: u64,
+    /// Write one try of each row and road as a scenario, one that failed if there is any.
+    #[arg(long, requires = "try", value_name = "DIR")]
+    pub out: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+pub struct WhyArguments {
+    /// The space.
+    pub file: PathBuf,
+    /// Number of the row in the table.
+    #[arg(long)]
+    pub row: usize,
+    /// Road of the question [default: the first of the space].
+    #[arg(long)]
+    pub road: Option<String>,
+    /// States at that moment, for example `time: Night, sky: { Rain: High }`.
+    #[arg(long)]
+    pub state: Option<String>,
+    #[command(flatten)]
+    pub rules: RuleArguments,
+}
+
+#[derive(Debug, Args)]
+pub struct FmtArguments {
+    /// Files to rewrite; `-` reads stdin and writes stdout.
+    #[arg(required = true, value_name = "FILE")]
+    pub files: Vec<PathBuf>,
+    /// Change nothing; exit 2 if a file is not formatted.
+    #[arg(long)]
+    pub check: bool,
+}
+
+#[derive(Debug, Clone, Default, Args)]
+pub struct RuleArguments {
+    /// Switch a rule off; may be given several times.
+    #[arg(long, value_name = "RULE")]
+    pub without: Vec<String>,
+    /// Switch an optional rule on.
+    #[arg(long, value_name = "RULE")]
+    pub with: Vec<String>,
+}
+
+#[derive(Debug, Args)]
+pub struct ExplainArguments {
+    /// A code, for example AV0401, or `json`: what `--format json` prints [default: list all].
+    pub code: Option<String>,
+}
+
+#[derive(Debug, Args)]
+pub struct DiffArguments {
+    /// A space.
+    pub old: PathBuf,
+    /// The space that it became.
+    pub new: PathBuf,
+}
+
+#[derive(Debug, Args)]
+pub struct DocArguments {
+    /// The space.
+    pub file: PathBuf,
+    /// Where to write [default: stdout].
+    #[arg(long = "out", short = 'o')]
+    pub output: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+pub struct NewArguments {
+    /// Write an example instead, with the files that it uses.
+    #[arg(long, value_name = "NAME", value_parser = crate::cli::new::template_names())]
+    pub template: Option<String>,
+    /// Made if need be; no file in it is replaced.
+    pub directory: PathBuf,
+}
+
+#[derive(Debug, Args)]
+pub struct CompletionsArguments {
+    /// The shell.
+    #[arg(value_enum)]
+    pub shell: clap_complete::Shell,
+}
+
+#[derive(Debug, Args)]
+pub struct EditorFilesArguments {
+    /// The folder of the extension.
+    pub directory: PathBuf,
+}

@@ -1,0 +1,123 @@
+//! What is asked of the commands that train, explain and compare agents.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+use super::drive::UnderTestArguments;
+use super::language::RuleArguments;
+use crate::cli::help::Named;
+
+#[derive(Debug, Args)]
+pub struct TrainArguments {
+    /// The space.
+    #[arg(required_unless_present = "resume")]
+    pub file: Option<PathBuf>,
+    /// Road to drive; with several, episodes go round them [default: all of the space].
+    #[arg(long)]
+    pub road: Vec<String>,
+    #[command(flatten)]
+    pub under_test: UnderTestArguments,
+    /// Who learns.
+    #[arg(long, default_value = "ddqn", value_parser = Named::TRAINED)]
+    pub agent: String,
+    /// Settings to begin with; searches have none [default: the agent's first].
+    #[arg(long, value_parser = Named::PRESET)]
+    pub preset: Option<String>,
+    /// Settings that differ from the preset, as YAML.
+    #[arg(long, value_name = "YAML")]
+    pub config: Option<PathBuf>,
+    /// Episodes on all roads together.
+    #[arg(long, default_value_t = 750, value_parser = clap::value_parser!(u32).range(1..=i64::from(crate::run::EPISODES_MAX)))]
+    pub episodes: u32,
+    /// Seed of the whole training.
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+    /// How other vehicles drive: a name, or a profile like scenarios/traffic/careful.yaml [default: careful].
+    #[arg(long, value_name = "NAME|FILE", value_parser = Named::TRAFFIC)]
+    pub traffic: Option<String>,
+    #[command(flatten)]
+    pub rules: RuleArguments,
+    /// Run directory, new or empty [default: the next free runs/NNNN].
+    #[arg(long)]
+    pub out: Option<PathBuf>,
+    /// Put the space and its maps into `critical/space`, so that the scenarios can be moved with them.
+    #[arg(long)]
+    pub self_contained: bool,
+    /// Go on with an interrupted run directory; its own settings hold.
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["file", "road", "ads", "ads_config", "ads_cmd", "agent", "preset", "config", "episodes", "seed", "traffic", "out", "self_contained", "without", "with"])]
+    pub resume: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+pub struct DistillArguments {
+    /// The policy.
+    pub file: PathBuf,
+    /// Lines, at most [default: as the policy was trained with, like the others].
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=256))]
+    pub leaves: Option<u32>,
+    /// Tests that a line may take, at most.
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=32))]
+    pub depth: Option<u32>,
+    /// Rounds; the rules of each drive the next.
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    pub rounds: Option<u32>,
+    /// Episodes of a round, on each road.
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    pub episodes: Option<u32>,
+    /// Where to write [default: STEM.distilled.ava beside the file].
+    #[arg(long = "out", short = 'o')]
+    pub output: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+pub struct ExplainPolicyArguments {
+    /// The policy.
+    pub file: PathBuf,
+    /// Values in place of the mean state's, for example `ego_speed: 12 m/s, time: Night`.
+    #[arg(long)]
+    pub state: Option<String>,
+    /// Road to drive; may be given several times [default: those of the training].
+    #[arg(long)]
+    pub road: Vec<String>,
+    /// Episodes on each road.
+    #[arg(long, default_value_t = 20, value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    pub episodes: u32,
+    /// Seed of the episodes and of the shuffles.
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+    /// Shuffles of each variable.
+    #[arg(long, default_value_t = 10, value_parser = clap::value_parser!(u32).range(2..=1000))]
+    pub repeats: u32,
+}
+
+#[derive(Debug, Args)]
+pub struct ExportWeightsArguments {
+    /// The policy.
+    pub file: PathBuf,
+    /// Where to write [default: STEM.safetensors beside the file].
+    #[arg(long = "out", short = 'o')]
+    pub output: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+pub struct StudyArguments {
+    /// The study, for example scenarios/studies/rq1.yaml.
+    #[arg(required_unless_present = "resume")]
+    pub file: Option<PathBuf>,
+    /// Driving system of your own in place of the study's: a command (PROTOCOL.md), `tcp:HOST:PORT` or `unix:PATH`.
+    #[arg(long, value_name = "COMMAND")]
+    pub ads_cmd: Option<String>,
+    /// Directory of the study, new or empty [default: the next free runs/NNNN].
+    #[arg(long)]
+    pub out: Option<PathBuf>,
+    /// Worker threads; the result does not depend on it [default: one for each core].
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=1024))]
+    pub jobs: Option<u32>,
+    /// Go on with an interrupted study; its own settings hold.
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["file", "ads_cmd", "out", "quick"])]
+    pub resume: Option<PathBuf>,
+    /// Cut it down to see that it works: two short trainings, few episodes. No result.
+    #[arg(long)]
+    pub quick: bool,
+}

@@ -1,0 +1,132 @@
+//! The command line: every command, with what is asked of each in a file for its kind.
+
+mod drive;
+mod external;
+mod language;
+mod learn;
+mod scenarios;
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+
+pub use drive::{
+    CompareArguments, ConditionArguments, EstimateArguments, EventArgument, FaceArgument, MethodArgument,
+    RunArguments, UnderTestArguments,
+};
+pub use external::{AdsArguments, AdsCheckArguments, AdsCommand, Misbehaviour, ToyAnswer, ToyArguments};
+pub use language::{
+    CheckArguments, CompileArguments, CompletionsArguments, DiffArguments, DocArguments, Dump,
+    EditorFilesArguments, ExplainArguments, FmtArguments, NewArguments, TableArguments, WhyArguments,
+};
+pub use learn::{
+    DistillArguments, ExplainPolicyArguments, ExportWeightsArguments, StudyArguments, TrainArguments,
+};
+pub use scenarios::{
+    DiagnoseArguments, FilesArguments, PackArguments, RenderArguments, ReplayArguments, RoadArguments,
+    ShrinkArguments, TestArguments, VerifyArguments,
+};
+
+/// Finds out which of the things that may happen around a self-driving car make it crash.
+#[derive(Debug, Parser)]
+#[command(name = "avastra", version, max_term_width = 100)]
+pub struct Arguments {
+    #[command(subcommand)]
+    pub command: Command,
+    #[command(flatten)]
+    pub output: OutputArguments,
+}
+
+// Values have no help of their own, here and below: with any, clap prints every option in three lines.
+#[derive(Debug, Clone, Args)]
+#[command(next_help_heading = "Every command")]
+pub struct OutputArguments {
+    /// How to print.
+    #[arg(long, global = true, value_enum, default_value_t = Format::Human)]
+    pub format: Format,
+    /// When to use colour.
+    #[arg(long, global = true, value_enum, default_value_t = When::Auto, value_name = "WHEN")]
+    pub color: When,
+    /// Print results and errors only.
+    #[arg(long, short, global = true, conflicts_with = "verbose")]
+    pub quiet: bool,
+    /// Print all: whole lists, and notes about used files.
+    #[arg(long, short, global = true)]
+    pub verbose: bool,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Format {
+    Human,
+    Plain,
+    Json,
+    Sarif,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum When {
+    Auto,
+    Always,
+    Never,
+}
+
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Check files and list every mistake.
+    Check(CheckArguments),
+    /// Write the typed action table of a space, with masks per road.
+    Compile(CompileArguments),
+    /// Print the action table.
+    Table(TableArguments),
+    /// Say whether a row is legal here, and which rule says no.
+    Why(WhyArguments),
+    /// Format files in the one style.
+    Fmt(FmtArguments),
+    /// Say what a code like AV0101 means, or list all.
+    Explain(ExplainArguments),
+    /// Say how two spaces differ in rows, rules and draws.
+    Diff(DiffArguments),
+    /// Print a space as Markdown.
+    Doc(DocArguments),
+    /// Write a small space with its road, to begin with.
+    New(NewArguments),
+    /// Print a script by which a shell completes this command line.
+    Completions(CompletionsArguments),
+    /// Serve an editor: mistakes as you type, and all else that it asks for, over stdin and stdout.
+    Lsp,
+    /// Write the parts of the VS Code extension that follow from the language.
+    #[command(hide = true)]
+    EditorFiles(EditorFilesArguments),
+    /// Play episodes and write the crashes back as scenarios.
+    Run(RunArguments),
+    /// Train an agent and write what it learned as a policy.
+    Train(TrainArguments),
+    /// Distil readable rules from a policy's network once more, with other settings.
+    Distill(DistillArguments),
+    /// Say which rows a policy favours and when, what it expects of them, and which variables matter to it.
+    ExplainPolicy(ExplainPolicyArguments),
+    /// Write the weights of a policy's network as safetensors, for other tools.
+    ExportWeights(ExportWeightsArguments),
+    /// Compare agents over roads and independent trainings, with statistics.
+    Study(StudyArguments),
+    /// Say how often a crash would happen: its probability in an episode and its rate, with intervals.
+    Estimate(EstimateArguments),
+    /// Play two driving systems in the same episodes and say which one crashes more often.
+    Compare(CompareArguments),
+    /// Run emitted scenarios again and check every claim they make.
+    Replay(ReplayArguments),
+    /// Check every claim of emitted scenarios and policies.
+    Verify(VerifyArguments),
+    /// Say which module of the driving system an emitted scenario's crash is the fault of.
+    Diagnose(DiagnoseArguments),
+    /// Find the smallest scenario that still makes the same crash.
+    Shrink(ShrinkArguments),
+    /// Copy scenarios and policies with all that they use into a folder that can be moved.
+    Pack(PackArguments),
+    /// Play emitted scenarios as a regression suite for a driving system.
+    Test(TestArguments),
+    /// Draw moments of an emitted scenario as SVG.
+    Render(RenderArguments),
+    /// Print or draw a map, and a route through it.
+    Road(RoadArguments),
+    /// Attach a driving system of your own: check it, print the schema of the messages, play with a toy.
+    Ads(AdsArguments),
+}

@@ -1,0 +1,159 @@
+//! What is asked of the commands that take emitted scenarios, and maps.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+use crate::cli::help::Named;
+
+#[derive(Debug, Clone, Args)]
+pub struct FilesArguments {
+    /// Scenarios, as `avastra run` writes them; `verify` takes policies, too.
+    #[arg(required = true, value_name = "FILE")]
+    pub files: Vec<PathBuf>,
+    /// Worker threads over files [default: one for each core].
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=1024))]
+    pub jobs: Option<u32>,
+}
+
+#[derive(Debug, Args)]
+pub struct VerifyArguments {
+    /// Driving system of your own that the scenarios were made against, to be asked anew: a command (PROTOCOL.md),
+    /// `tcp:HOST:PORT` or `unix:PATH` [default: its recorded answers].
+    #[arg(long, value_name = "COMMAND")]
+    pub ads_cmd: Option<String>,
+    /// Its profile, with an `ads` block.
+    #[arg(long, value_name = "FILE")]
+    pub ads_config: Option<PathBuf>,
+    #[command(flatten)]
+    pub many: FilesArguments,
+}
+
+#[derive(Debug, Args)]
+pub struct ReplayArguments {
+    /// Replay against another driving system: shows what happens, checks no claim.
+    #[arg(long, value_parser = Named::ADS)]
+    pub ads: Option<String>,
+    /// Replay against another profile of `modular`, or of a driving system of your own: claims are checked only if it
+    /// means the same as the recorded one.
+    #[arg(long, value_name = "FILE")]
+    pub ads_config: Option<PathBuf>,
+    /// Driving system of your own: a command (PROTOCOL.md), `tcp:HOST:PORT` or `unix:PATH`.
+    #[arg(long, value_name = "COMMAND", conflicts_with = "ads")]
+    pub ads_cmd: Option<String>,
+    #[command(flatten)]
+    pub many: FilesArguments,
+}
+
+#[derive(Debug, Args)]
+pub struct DiagnoseArguments {
+    /// Another profile of `modular` than the recorded one. Only `modular` is made of modules that can be told apart.
+    #[arg(long, value_name = "FILE")]
+    pub ads_config: Option<PathBuf>,
+    /// Profile that says how good each module should be [default: `modular` as it comes].
+    #[arg(long, value_name = "FILE", conflicts_with = "mechanisms")]
+    pub baseline: Option<PathBuf>,
+    /// Say also how many of N small variations of timing, speeds and sensor errors still crash.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000), conflicts_with = "mechanisms")]
+    pub likelihood: Option<u32>,
+    /// Instead of modules, the documented weaknesses: the share of the collisions of all files
+    /// that vanish when one alone is switched off as the obstacle appears, beside the share that other sensor noise
+    /// alone makes vanish.
+    #[arg(long)]
+    pub mechanisms: bool,
+    #[command(flatten)]
+    pub many: FilesArguments,
+}
+
+#[derive(Debug, Args)]
+pub struct ShrinkArguments {
+    /// Where to write, if there is one file [default: a folder `shrunk` beside the scenarios].
+    #[arg(long = "out", short = 'o')]
+    pub output: Option<PathBuf>,
+    /// Driving system of your own that the scenarios were made against: a command (PROTOCOL.md), `tcp:HOST:PORT` or
+    /// `unix:PATH`.
+    #[arg(long, value_name = "COMMAND")]
+    pub ads_cmd: Option<String>,
+    /// Its profile, with an `ads` block.
+    #[arg(long, value_name = "FILE")]
+    pub ads_config: Option<PathBuf>,
+    #[command(flatten)]
+    pub many: FilesArguments,
+}
+
+#[derive(Debug, Args)]
+pub struct PackArguments {
+    /// Scenarios and policies.
+    #[arg(required = true, value_name = "FILE")]
+    pub files: Vec<PathBuf>,
+    /// The folder that they are copied to.
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+}
+
+#[derive(Debug, Args)]
+pub struct TestArguments {
+    /// Scenarios, directories of them, and run directories.
+    #[arg(required = true, value_name = "PATH")]
+    pub paths: Vec<PathBuf>,
+    /// Let pass what crashes with another obstacle, or is hit from another side, than its scenario says.
+    #[arg(long)]
+    pub allow_changed: bool,
+    /// Where the space has changed, take the change over into the scenarios that still play as they claim.
+    #[arg(long)]
+    pub accept: bool,
+    /// Driving system under test [default: the one that each scenario was found with].
+    #[arg(long, value_parser = Named::ADS)]
+    pub ads: Option<String>,
+    /// Profile of the `modular` driving system, or of one of your own.
+    #[arg(long, value_name = "FILE")]
+    pub ads_config: Option<PathBuf>,
+    /// Driving system of your own: a command (PROTOCOL.md), `tcp:HOST:PORT` or `unix:PATH`.
+    #[arg(long, value_name = "COMMAND", conflicts_with = "ads")]
+    pub ads_cmd: Option<String>,
+    /// Write the results as JUnit XML, too.
+    #[arg(long, value_name = "FILE")]
+    pub junit: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+pub struct RenderArguments {
+    /// The scenario.
+    pub file: PathBuf,
+    /// Moments to draw, in s since the start; several make a strip.
+    #[arg(long, value_delimiter = ',', value_name = "T", allow_negative_numbers = true)]
+    pub at: Vec<f64>,
+    /// A strip of the six seconds up to the first collision.
+    #[arg(long, conflicts_with = "at")]
+    pub strip: bool,
+    /// Where to write [default: STEM.svg here; `-` is stdout].
+    #[arg(long = "out", short = 'o')]
+    pub output: Option<PathBuf>,
+    /// Draw the drive of another driving system.
+    #[arg(long, value_parser = Named::ADS)]
+    pub ads: Option<String>,
+    /// Draw the drive of another profile of `modular`, or of a driving system of your own.
+    #[arg(long, value_name = "FILE")]
+    pub ads_config: Option<PathBuf>,
+    /// Driving system of your own: a command (PROTOCOL.md), `tcp:HOST:PORT` or `unix:PATH`.
+    #[arg(long, value_name = "COMMAND", conflicts_with = "ads")]
+    pub ads_cmd: Option<String>,
+}
+
+#[derive(Debug, Args)]
+pub struct RoadArguments {
+    /// An OpenDRIVE map, or a space (`.ava`) whose road is meant.
+    pub file: PathBuf,
+    /// Road of the space [default: its first].
+    #[arg(long)]
+    pub road: Option<String>,
+    /// Where a route starts, for example `1/-1@12.5`: road, lane, station of the road in m.
+    #[arg(long, value_name = "PLACE", requires = "to", allow_hyphen_values = true)]
+    pub from: Option<String>,
+    /// Where it ends.
+    #[arg(long, value_name = "PLACE", requires = "from", allow_hyphen_values = true)]
+    pub to: Option<String>,
+    /// Draw it to a file as well; `-` is stdout, and nothing else is printed.
+    #[arg(long, value_name = "FILE")]
+    pub svg: Option<PathBuf>,
+}

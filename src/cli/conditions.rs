@@ -1,0 +1,42 @@
+//! The settings of episodes that a command line asks for: who drives, where, under which conditions.
+
+use crate::model::Space;
+use crate::run::{RunSettings, TrafficRecord};
+
+use super::arguments::{ConditionArguments, UnderTestArguments};
+use super::error::Failure;
+use super::load;
+use super::load::UnderTest;
+
+/// The driving system that a command line names.
+pub fn named(arguments: &UnderTestArguments) -> Result<UnderTest, Failure> {
+    load::under_test(&arguments.ads, arguments.ads_config.as_deref(), arguments.ads_cmd.as_deref())
+}
+
+/// So many episodes of an agent on each road against a driving system.
+pub fn settings(
+    space: &Space,
+    arguments: &ConditionArguments,
+    agent: &str,
+    under_test: UnderTest,
+    episodes: u32,
+) -> Result<RunSettings, Failure> {
+    let traffic = arguments.traffic.as_deref().map(load::traffic).transpose()?;
+    let UnderTest { ads, profile, external } = under_test;
+    Ok(RunSettings {
+        roads: roads_or_all(&arguments.road, space),
+        ads,
+        profile,
+        external,
+        ambient: arguments.ambient,
+        traffic: traffic.as_ref().and_then(TrafficRecord::new),
+        without: arguments.rules.without.clone(),
+        with: arguments.rules.with.clone(),
+        ..RunSettings::new(space, agent, episodes, arguments.seed)
+    })
+}
+
+/// The roads that a command line names, or all of the space.
+pub fn roads_or_all(named: &[String], space: &Space) -> Vec<String> {
+    if named.is_empty() { space.roads.iter().map(|road| road.name.clone()).collect() } else { named.to_vec() }
+}
