@@ -92,6 +92,7 @@ fn episode(rng: &mut rng::Rng, steps: usize) -> Trajectory {
         last_legal: Array1::from_elem(ROWS, true),
         terminal: true,
         closeness: Closeness::default(),
+        collisions: Vec::new(),
     }
 }
 

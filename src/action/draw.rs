@@ -43,11 +43,11 @@ impl<'a> Judge<'a> {
         Judge { row, action, situation, moment }
     }
 
-    /// Draws until all rules hold.
+    /// Draws until all rules hold; the first time at these shares of the ranges, by parameter, as far as they go.
     ///
     /// # Errors
     /// The most frequent refusal; the earliest, if several are equally frequent.
-    pub fn draw(&self) -> Result<Draw, Refusal> {
+    pub fn draw(&self, shares: &[f64]) -> Result<Draw, Refusal> {
         let seed = rng::child_seed(self.situation.seed, Stream::Draw, self.situation.step);
         let mut rng = rng::stream(seed, Stream::Draw, self.row.row.index as u64);
         let mut failures: Vec<(usize, Refusal)> = Vec::new();
@@ -68,9 +68,11 @@ impl<'a> Judge<'a> {
         let mut solver = self.row.solver(given, &open, before).map_err(refused)?;
         // With nothing to draw, every try gives the same result.
         let fixed = self.action.drawn().next().is_none();
+        let mut chance = Chance { rng: &mut rng, shares: shares.iter().copied().map(Some).collect() };
         for _ in 0..if fixed { 1 } else { DRAWS_MAX } {
             tries.set(TRIES_MAX);
-            let values = solver.solve(&mut Chance { rng: &mut rng }).map_err(refused)?;
+            let values = solver.solve(&mut chance).map_err(refused)?;
+            chance.shares.clear();
             match self.judge(&values, 1).map_err(first) {
                 Ok(draw) => return Ok(draw),
                 Err(refusal) => note(refusal),
@@ -299,19 +301,31 @@ impl<'a> Judge<'a> {
     }
 }
 
-/// Draws every value with equal chances.
+/// Draws every value with equal chances, but for the shares that are given.
 struct Chance<'a> {
     rng: &'a mut Rng,
+    /// By parameter: where in its range the value shall lie, in `[0, 1)`. Each holds once, because a solver that asks
+    /// again could not use what it got.
+    shares: Vec<Option<f64>>,
+}
+
+impl Chance<'_> {
+    fn share(&mut self, local: usize) -> Option<f64> {
+        self.shares.get_mut(local).and_then(Option::take)
+    }
 }
 
 impl Choose for Chance<'_> {
-    fn value(&mut self, _local: usize, left: &[Value]) -> Value {
-        left[rng::below(self.rng, left.len() as u32) as usize]
+    fn value(&mut self, local: usize, left: &[Value]) -> Value {
+        match self.share(local) {
+            Some(share) => left[((share * left.len() as f64) as usize).min(left.len() - 1)],
+            None => left[rng::below(self.rng, left.len() as u32) as usize],
+        }
     }
 
-    fn number(&mut self, _local: usize, room: &Room) -> Option<f64> {
+    fn number(&mut self, local: usize, room: &Room) -> Option<f64> {
         // Also where a rule sets the value: to switch it off must not shift later draws.
-        room.at(rng::unit(self.rng))
+        room.at(self.share(local).unwrap_or_else(|| rng::unit(self.rng)))
     }
 }
 

@@ -71,15 +71,25 @@ impl ActionTable {
     /// One offer for each row. Every row draws from a stream of its own, so that one row's draws do not
     /// change another's.
     pub fn offers(&self, situation: &Situation<'_>) -> Vec<Offer> {
+        self.offers_at(situation, &[])
+    }
+
+    /// The offers whose first try draws values at these shares of their ranges, each in `[0, 1)`, by parameter of the
+    /// row; what is left out is drawn by chance, and so is every further try.
+    pub fn offers_at(&self, situation: &Situation<'_>, shares: &[f64]) -> Vec<Offer> {
         let kept = situation.surroundings.for_many();
         let surroundings = kept.as_deref().unwrap_or(situation.surroundings);
         let situation = Situation { surroundings, ..*situation };
-        (0..self.rows().len()).map(|row| self.offer(&situation, row)).collect()
+        (0..self.rows().len()).map(|row| self.drawn(&situation, row, shares)).collect()
     }
 
     /// The offer of one row: the same as in [`ActionTable::offers`].
     pub fn offer(&self, situation: &Situation<'_>, row: usize) -> Offer {
-        match Judge::new(&self.space, situation, row).draw() {
+        self.drawn(situation, row, &[])
+    }
+
+    fn drawn(&self, situation: &Situation<'_>, row: usize, shares: &[f64]) -> Offer {
+        match Judge::new(&self.space, situation, row).draw(shares) {
             Ok(draw) => Offer::Legal(draw),
             Err(refusal) => Offer::Refused(refusal),
         }

@@ -22,6 +22,9 @@ impl Learner {
         bytes.f64s(&self.policy.quirks.random_weights);
         bytes.f32s(self.policy.network.parameters());
         bytes.f32s(self.target.parameters());
+        if let Some(average) = &self.average {
+            bytes.f32s(average.network.parameters());
+        }
         bytes.f32s(&self.adam.mean);
         bytes.f32s(&self.adam.square);
         bytes.f64s(&[self.adam.mean_power, self.adam.square_power]);
@@ -51,6 +54,9 @@ impl Learner {
         learner.policy.quirks.random_weights = bytes.f64s(rows.allowed.len())?;
         learner.policy.network.parameters_mut().copy_from_slice(&bytes.f32s(parameters)?);
         learner.target.parameters_mut().copy_from_slice(&bytes.f32s(parameters)?);
+        if let Some(average) = &mut learner.average {
+            average.network.parameters_mut().copy_from_slice(&bytes.f32s(parameters)?);
+        }
         let (mean, square) = (bytes.f32s(parameters)?, bytes.f32s(parameters)?);
         let powers = bytes.f64s(2)?;
         learner.adam = Adam { mean, square, mean_power: powers[0], square_power: powers[1] };

@@ -58,6 +58,9 @@ pub struct Hyperparameters {
     /// Whether a collision pays at the step that made its obstacle appear, and a third at its own step.
     /// Published package: yes. A quirk (see `quirks`).
     pub delayed_credit: bool,
+    /// Whether a collision that counts pays R_col at the step whose choice made its obstacle appear, and its own step
+    /// then earns `uncounted_reward`: it only happened there. Ours; needs `reward: equation`.
+    pub pays_maker: bool,
 
     // The network.
     /// Widths of the hidden layers, each 1 to 4096; one to four of them.
@@ -80,6 +83,9 @@ pub struct Hyperparameters {
     pub updates_per_step: u32,
     /// Updates between two copies of the online network to the target network.
     pub target_period_updates: u64,
+    /// What acts in the end is the running mean of the online network over its updates, and this is the share of the
+    /// mean that an update keeps, in `[0, 1)`: 0.99 averages over some hundred updates. 0: the last network acts.
+    pub average_decay: f64,
 
     // The target.
     /// Double DQN: the online network chooses the next row, the target network values it.
@@ -117,6 +123,9 @@ pub struct Hyperparameters {
     pub exploration_end: f64,
     /// Steps until ε is at its floor; for an exponential, its time constant.
     pub exploration_steps: u64,
+    /// In place of `exploration_steps`: the share of the training's episodes until ε is at its floor, above 0 and at
+    /// most 1. So a short training explores as large a part of it as a long one.
+    pub exploration_share: Option<f64>,
     /// Number of first steps in which ε is 1.
     pub random_steps: u64,
     /// Whether ε is the share of greedy choices, as in DeepCollision's published code. A quirk (see
@@ -139,6 +148,9 @@ pub struct Hyperparameters {
     /// Episodes in a round, on each road.
     pub rules_episodes: u32,
 }
+
+/// Settings that came after the first policies: a policy without one was trained with the setting off.
+const LATER: [&str; 3] = ["pays_maker", "average_decay", "exploration_share"];
 
 /// Sets of state variables.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
@@ -239,13 +251,16 @@ impl Hyperparameters {
     /// Settings as a policy file records them.
     ///
     /// # Errors
-    /// As [`Hyperparameters::from_yaml`], and if one is missing.
+    /// As [`Hyperparameters::from_yaml`], and if one is missing that the first policies had.
     pub fn from_record(record: &serde_json::Map<String, Value>) -> Result<Hyperparameters, SettingsError> {
-        let known = (presets::DDQN[0].settings)().record();
-        if let Some(missing) = known.keys().find(|name| !record.contains_key(*name)) {
+        // In the published presets, what came later is off.
+        let base = presets::paper();
+        let required = |name: &&String| !LATER.contains(&name.as_str());
+        if let Some(missing) = base.record().keys().filter(required).find(|name| !record.contains_key(*name))
+        {
             return Err(SettingsError::Text(format!("the setting `{missing}` is missing")));
         }
-        (presets::DDQN[0].settings)().changed(record.clone())
+        base.changed(record.clone())
     }
 
     /// Every setting by name.
@@ -267,13 +282,16 @@ impl Hyperparameters {
         }
     }
 
-    /// ε of training after so many steps.
-    pub(super) fn exploration_epsilon(&self, steps: u64) -> f64 {
+    /// ε of training after so many steps, when a share of the training's episodes is over.
+    pub(super) fn exploration_epsilon(&self, steps: u64, over: f64) -> f64 {
         if steps < self.random_steps {
             return 1.0;
         }
         let (begin, end) = (self.exploration_begin, self.exploration_end);
-        let share = steps as f64 / self.exploration_steps as f64;
+        let share = match self.exploration_share {
+            Some(share) => over / share,
+            None => steps as f64 / self.exploration_steps as f64,
+        };
         match self.exploration {
             Exploration::Linear => begin + (end - begin) * share.min(1.0),
             Exploration::ExponentialThenEnd if share > 1.0 => end,
@@ -338,6 +356,10 @@ impl Hyperparameters {
             unit("exploration_begin", self.exploration_begin),
             unit("exploration_end", self.exploration_end),
             unit("random_decay", self.random_decay),
+            Requirement {
+                is_met: (0.0..1.0).contains(&self.average_decay),
+                ..within("average_decay", self.average_decay, 0.0..=1.0, "at least 0, and below 1")
+            },
             unit("evaluation_epsilon", self.evaluation_epsilon),
             positive("learning_rate", self.learning_rate),
             positive("priority_floor", self.priority_floor),
@@ -381,8 +403,18 @@ impl Hyperparameters {
                 .map(|period_s| within("observation_period_s", period_s, 0.5..=60.0, "from 0.5 to 60")),
             deviation
                 .map(|value| within("initialization", value, 0.0..=10.0, "`he`, or normal from 0 to 10")),
+            self.exploration_share.map(|share| Requirement {
+                is_met: share > 0.0 && share <= 1.0,
+                ..within("exploration_share", share, 0.0..=1.0, "above 0, and at most 1")
+            }),
         ];
-        require(optional.into_iter().flatten())
+        require(optional.into_iter().flatten())?;
+        if self.pays_maker && (self.delayed_credit || self.reward == RewardSource::Space) {
+            let message =
+                "`pays_maker` needs `reward: equation`, and `delayed_credit: false`, which it would undo";
+            return Err(SettingsError::Text(message.to_owned()));
+        }
+        Ok(())
     }
 }
 
@@ -453,7 +485,7 @@ mod tests {
                 random_steps: 10,
                 ..presets::avastra()
             };
-            settings.exploration_epsilon(steps)
+            settings.exploration_epsilon(steps, 0.5)
         };
         let near = |found: f64, expected: f64| assert!((found - expected).abs() < 1e-9, "{found} {expected}");
         near(at(Exploration::Linear, 9), 1.0);
@@ -462,6 +494,35 @@ mod tests {
         near(at(Exploration::Exponential, 100), 0.1 + 0.9 * 0.367_879_441_171);
         near(at(Exploration::ExponentialThenEnd, 100), 0.1 + 0.9 * 0.367_879_441_171);
         near(at(Exploration::ExponentialThenEnd, 101), 0.1);
+        let by_share = Hyperparameters {
+            exploration_begin: 1.0,
+            exploration_end: 0.1,
+            exploration_share: Some(0.4),
+            ..presets::avastra()
+        };
+        near(by_share.exploration_epsilon(1_000_000, 0.0), 1.0);
+        near(by_share.exploration_epsilon(0, 0.2), 0.55);
+        near(by_share.exploration_epsilon(0, 0.9), 0.1);
+    }
+
+    #[test]
+    fn a_policy_of_before_a_setting_came_was_trained_without_it() {
+        let now = Hyperparameters {
+            pays_maker: true,
+            average_decay: 0.99,
+            exploration_share: Some(0.5),
+            ..presets::avastra()
+        };
+        let mut record = now.record();
+        assert_eq!(Hyperparameters::from_record(&record).unwrap(), now);
+        for name in LATER {
+            record.remove(name).expect("it is a setting");
+        }
+        let before =
+            Hyperparameters { pays_maker: false, average_decay: 0.0, exploration_share: None, ..now };
+        assert_eq!(Hyperparameters::from_record(&record).unwrap(), before);
+        record.remove("discount");
+        assert!(Hyperparameters::from_record(&record).unwrap_err().to_string().contains("`discount`"));
     }
 
     #[test]
@@ -479,5 +540,7 @@ mod tests {
             message("loss: cubed")
         );
         assert!(message("- 3").contains("lines like"));
+        assert!(message("pays_maker: true\ndelayed_credit: true").starts_with("`pays_maker` needs"));
+        assert_eq!(message("average_decay: 1"), "`average_decay` is 1, but must be at least 0, and below 1");
     }
 }

@@ -18,6 +18,7 @@ use super::network::{Adam, Network};
 use super::q_policy::{QPolicy, Rows, best};
 use super::registry::Agent;
 use super::replay::{Replay, Transition};
+use super::shuffled::{STATES, Shuffled};
 use super::trainable::Trainable;
 use super::trajectory::{Lesson, Trajectory};
 
@@ -25,6 +26,8 @@ use super::trajectory::{Lesson, Trajectory};
 pub struct Learner {
     /// The online network, and how it acts.
     pub(super) policy: QPolicy,
+    /// The mean of the online networks, which acts in the end, if the settings ask for one.
+    pub(super) average: Option<QPolicy>,
     pub(super) target: Network,
     pub(super) adam: Adam,
     pub(super) replay: Replay,
@@ -32,6 +35,8 @@ pub struct Learner {
     pub(super) steps: u64,
     /// Updates made.
     pub(super) updates: u64,
+    /// The share of the training's episodes that are over.
+    over: f64,
 }
 
 impl Learner {
@@ -40,14 +45,16 @@ impl Learner {
         let shape = QPolicy::shape(&settings, rows.allowed.len());
         let mut rng = rng::stream(seed, Stream::Initialization, 0);
         let network = Network::new(shape, settings.initialization, &mut rng);
-        Learner {
-            target: network.clone(),
-            adam: Adam::new(network.parameters().len()),
-            replay: Replay::new(settings.replay_capacity, settings.priorities()),
-            steps: 0,
-            updates: 0,
-            policy: QPolicy::new(settings, rows, network),
-        }
+        let (target, adam) = (network.clone(), Adam::new(network.parameters().len()));
+        let replay = Replay::new(settings.replay_capacity, settings.priorities());
+        let policy = QPolicy::new(settings.clone(), rows, network);
+        let average = (settings.average_decay > 0.0).then(|| policy.clone());
+        Learner { policy, average, target, adam, replay, steps: 0, updates: 0, over: 0.0 }
+    }
+
+    /// What acts after the training.
+    fn trained(&self) -> &QPolicy {
+        self.average.as_ref().unwrap_or(&self.policy)
     }
 
     /// Draws a batch, improves the online network by it and renews its priorities; its loss.
@@ -65,6 +72,11 @@ impl Learner {
         self.updates += 1;
         if self.updates.is_multiple_of(settings.target_period_updates) {
             self.target.copy_from(&self.policy.network);
+        }
+        if let Some(average) = &mut self.average {
+            // At first it is the plain mean, or the first weights, which know nothing, would stay in it for long.
+            let decay = settings.average_decay.min(1.0 - 1.0 / self.updates as f64);
+            average.network.approach(&self.policy.network, (1.0 - decay) as f32);
         }
         loss
     }
@@ -95,9 +107,16 @@ impl Agent for Learner {
 }
 
 impl Trainable for Learner {
+    fn progress(&mut self, over: f64) {
+        self.over = over;
+    }
+
     /// Keeps what the episode showed, and makes the updates that its steps are worth.
     fn learn(&mut self, episode: &Trajectory, rng: &mut Rng) -> Lesson {
-        let rewards = self.policy.quirks.rewards(episode);
+        let rewards = match self.policy.settings().pays_maker {
+            true => paid_to_makers(episode, self.policy.settings()),
+            false => self.policy.quirks.rewards(episode),
+        };
         for transition in transitions(episode, &rewards, &self.policy) {
             self.replay.push(transition);
         }
@@ -115,20 +134,47 @@ impl Trainable for Learner {
     }
 
     fn exploration_epsilon(&self) -> f64 {
-        self.policy.settings().exploration_epsilon(self.steps)
+        self.policy.settings().exploration_epsilon(self.steps, self.over)
     }
 
     fn actor(&self) -> Box<dyn Agent> {
-        Box::new(self.policy.clone())
+        Box::new(self.trained().clone())
+    }
+
+    fn shuffled(&self) -> Option<Box<dyn Agent>> {
+        let states = self.replay.latest(STATES).map(|transition| transition.inputs.clone()).collect();
+        Some(Box::new(Shuffled { policy: self.trained().clone(), states: Arc::new(states) }))
     }
 
     fn policy(&self) -> Option<&QPolicy> {
-        Some(&self.policy)
+        Some(self.trained())
     }
 
     fn save(&self) -> Vec<u8> {
         self.to_bytes()
     }
+}
+
+/// The reward of each step of an episode, shape `(steps,)`, where a collision that counts pays R_col at the step that
+/// made its obstacle appear, and not where it happened: that choice had no part in it.
+///
+/// A collision whose obstacle no choice made pays where it happened.
+fn paid_to_makers(episode: &Trajectory, settings: &Hyperparameters) -> Vec<f64> {
+    let mut rewards: Vec<f64> = episode.steps.iter().map(|step| step.reward).collect();
+    let crashes = || {
+        episode
+            .steps
+            .iter()
+            .enumerate()
+            .flat_map(|(at, step)| step.crashes.iter().map(move |maker| (at, maker.unwrap_or(at))))
+    };
+    for (at, _) in crashes() {
+        rewards[at] = settings.uncounted_reward;
+    }
+    for (_, maker) in crashes() {
+        rewards[maker] = settings.collision_reward;
+    }
+    rewards
 }
 
 /// One update of the online network on a batch: its loss, and the TD errors, shape `(batch,)`.

@@ -4,11 +4,12 @@
 //! [`Observation`](crate::mdp::Observation) and the mask of rows that the rules allow, never the world.
 //! [`REGISTRY`] has every agent by name.
 //!
-//! - `random` and `greedy` need no training.
+//! - `random`, `space-filling` and `greedy` need no training.
 //! - [`Trainable`] agents take in a [`Trajectory`] when an episode has ended and has been judged.
 //! - The [`Learner`] is deep Q-learning; [`improve`] is one update. `n_step` makes transitions of an
 //!   episode, `replay` keeps them, `network` computes Q-values and gradients, `checkpoint` saves it all.
 //!   `quirks` holds what only the published packages do.
+//! - `shuffled` shows a policy states of other episodes, to tell whether it has learned when.
 //! - A [`QPolicy`] acts by a trained network, or by the rules that `decision` distils from it; `features`
 //!   says what a network sees.
 //! - `search` has the searches: AV-Fuzzer and Go-Explore.
@@ -32,6 +33,8 @@ mod registry;
 mod replay;
 mod search;
 mod settings;
+mod shuffled;
+mod space_filling;
 mod trainable;
 mod trajectory;
 
@@ -45,4 +48,4 @@ pub use registry::{Agent, Entry, Kind, REGISTRY, by_name};
 pub use replay::Transition;
 pub use settings::Settings;
 pub use trainable::{Beginning, Trainable};
-pub use trajectory::{Experience, Lesson, Trajectory};
+pub use trajectory::{Collided, Experience, Lesson, Trajectory};

@@ -140,8 +140,12 @@ impl QPolicy {
 
     /// Q-values of a state, shape `(rows,)`.
     pub fn q_values(&self, observation: &Observation) -> Array1<f32> {
-        let inputs = self.features.encode(observation);
-        let inputs = ArrayView2::from_shape((1, inputs.len()), &inputs).expect("one row of its length");
+        self.values(&self.features.encode(observation))
+    }
+
+    /// Q-values of a state that is encoded already, shape `(rows,)`.
+    pub(super) fn values(&self, inputs: &[f32]) -> Array1<f32> {
+        let inputs = ArrayView2::from_shape((1, inputs.len()), inputs).expect("one row of its length");
         self.network.q_values(inputs).index_axis_move(Axis(0), 0)
     }
 

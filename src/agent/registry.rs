@@ -9,9 +9,11 @@ use crate::rng::Rng;
 use super::branch::Branch;
 use super::hyperparameters::SettingsError;
 use super::presets::Preset;
-use super::search::{AvFuzzerSettings, BanditSettings, ConstantSettings, GoExploreSettings};
+use super::search::{
+    AvFuzzerSettings, BanditSettings, ConstantSettings, GoExploreSettings, MapElitesSettings,
+};
 use super::settings::Settings;
-use super::{greedy, presets, random};
+use super::{greedy, presets, random, space_filling};
 
 /// Chooses rows of the action table.
 pub trait Agent: Send {
@@ -43,6 +45,13 @@ pub trait Agent: Send {
     fn draw_seed(&mut self, step: usize) -> Option<u64> {
         let _ = step;
         None
+    }
+
+    /// A step begins in an episode of that seed: where in their ranges the drawn values of the row shall lie, each in
+    /// `[0, 1)`, by parameter; what is left out is drawn by chance.
+    fn draw_shares(&mut self, step: usize, seed: u64) -> &[f64] {
+        let _ = (step, seed);
+        &[]
     }
 
     /// Whether it tries rows out before it chooses.
@@ -92,6 +101,11 @@ pub const REGISTRY: &[Entry] = &[
         kind: Kind::Ready(|| Box::new(random::RawRandom)),
     },
     Entry {
+        name: "space-filling",
+        summary: "random, but spread evenly over the rows and their drawn values: a Latin hypercube in each episode",
+        kind: Kind::Ready(|| Box::new(space_filling::SpaceFilling::default())),
+    },
+    Entry {
         name: "ddqn",
         summary: "the paper's agent: Double DQN with prioritised replay",
         kind: Kind::Learning(presets::DDQN),
@@ -110,6 +124,11 @@ pub const REGISTRY: &[Entry] = &[
         name: "av-fuzzer",
         summary: "AV-Fuzzer's genetic search over scripts of rows",
         kind: Kind::Searching(|text| Settings::of_search(text, AvFuzzerSettings::check, Settings::AvFuzzer)),
+    },
+    Entry {
+        name: "map-elites",
+        summary: "the best script of every kind of collision, and new ones by changing those",
+        kind: Kind::Searching(MapElitesSettings::read),
     },
     Entry {
         name: "constant",
@@ -153,7 +172,7 @@ mod tests {
     use std::sync::Arc;
 
     use super::*;
-    use crate::agent::{Experience, Learner, Rows, Trainable, Trajectory};
+    use crate::agent::{Collided, Experience, Learner, Rows, Trainable, Trajectory};
     use crate::mdp::Closeness;
     use crate::rng::{Stream, child_seed, stream};
     use ndarray::Array1;
@@ -193,6 +212,7 @@ mod tests {
                     let observation = Observation::zeros();
                     let choose = |step| {
                         agent.draw_seed(step);
+                        agent.draw_shares(step, seed);
                         agent.choose(&observation, legal.view(), &mut rng)
                     };
                     let chosen: Vec<Option<usize>> = (0..50).map(choose).collect();
@@ -237,6 +257,7 @@ mod tests {
             last_legal: Array1::from_elem(ROWS, true),
             terminal: true,
             closeness: Closeness { distance_m: 5.0 + rows[0] as f64, margin_m: 0.0 },
+            collisions: vec![Collided { kind: format!("walk {}", rows[0]), counted: true }],
         }
     }
 
@@ -247,7 +268,7 @@ mod tests {
             let text = match entry.kind {
                 // So small that everything which a checkpoint holds is in use.
                 Kind::Learning(_) => {
-                    "learning_starts: 32\nreplay_capacity: 60\nrandom_decay: 0.05\nhidden_units: [16]"
+                    "learning_starts: 32\nreplay_capacity: 60\nrandom_decay: 0.05\nhidden_units: [16]\naverage_decay: 0.9"
                 }
                 Kind::Ready(_) | Kind::Searching(_) => "",
             };

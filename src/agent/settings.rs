@@ -13,7 +13,7 @@ use super::q_policy::Rows;
 use super::registry::{Entry, Kind};
 use super::search::{
     AvFuzzer, AvFuzzerSettings, Bandit, BanditSettings, Constant, ConstantSettings, GoExplore,
-    GoExploreSettings,
+    GoExploreSettings, MapElites, MapElitesSettings,
 };
 use super::trainable::Trainable;
 
@@ -26,6 +26,7 @@ pub enum Settings {
     Constant(ConstantSettings),
     Bandit(BanditSettings),
     GoExplore(GoExploreSettings),
+    MapElites(MapElitesSettings),
 }
 
 impl Settings {
@@ -78,6 +79,7 @@ impl Settings {
             Settings::Constant(settings) => Box::new(Constant::new(settings, rows.allowed.len())),
             Settings::Bandit(settings) => Box::new(Bandit::new(settings, rows.allowed.len())),
             Settings::GoExplore(settings) => Box::new(GoExplore::new(settings, rows.allowed.len())),
+            Settings::MapElites(settings) => Box::new(MapElites::new(settings, rows.allowed.len())),
         }
     }
 
@@ -93,6 +95,9 @@ impl Settings {
             Settings::GoExplore(settings) => {
                 Box::new(GoExplore::restore(settings, rows.allowed.len(), bytes)?)
             }
+            Settings::MapElites(settings) => {
+                Box::new(MapElites::restore(settings, rows.allowed.len(), bytes)?)
+            }
         })
     }
 
@@ -100,9 +105,11 @@ impl Settings {
     pub fn hyperparameters(&self) -> Option<&Hyperparameters> {
         match self {
             Settings::Learning(settings) => Some(settings.as_ref()),
-            Settings::AvFuzzer(_) | Settings::Constant(_) | Settings::Bandit(_) | Settings::GoExplore(_) => {
-                None
-            }
+            Settings::AvFuzzer(_)
+            | Settings::Constant(_)
+            | Settings::Bandit(_)
+            | Settings::GoExplore(_)
+            | Settings::MapElites(_) => None,
         }
     }
 

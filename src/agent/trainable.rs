@@ -6,8 +6,14 @@ use super::q_policy::QPolicy;
 use super::registry::Agent;
 use super::trajectory::{Lesson, Trajectory};
 
-/// An agent in training. An episode is: `beginning`, [`Agent::begin`], a choice for each step, `learn`.
+/// An agent in training. An episode is: `progress`, `beginning`, [`Agent::begin`], a choice for each
+/// step, `learn`.
 pub trait Trainable: Agent {
+    /// The share of the training's episodes that are over, in `[0, 1)`; told before each episode.
+    fn progress(&mut self, over: f64) {
+        let _ = over;
+    }
+
     /// Where the next episode begins, on the nth of the roads. `fresh` is a seed that no episode had
     /// before; an agent that returns to an old start gives that start's seed instead.
     fn beginning(&mut self, road: usize, fresh: u64) -> Beginning {
@@ -32,6 +38,12 @@ pub trait Trainable: Agent {
 
     /// What it has learned, ready to act for one episode on any start.
     fn actor(&self) -> Box<dyn Agent>;
+
+    /// The same, but at each choice it is shown the state of another episode, drawn from the last ones of the training;
+    /// `None` if it is no network.
+    fn shuffled(&self) -> Option<Box<dyn Agent>> {
+        None
+    }
 
     /// What it has learned as a network, if there is one.
     fn policy(&self) -> Option<&QPolicy> {

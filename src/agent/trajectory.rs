@@ -19,6 +19,16 @@ pub struct Trajectory {
     pub terminal: bool,
     /// How close other road users came; measured for searches only.
     pub closeness: Closeness,
+    /// Its collisions, in order.
+    pub collisions: Vec<Collided>,
+}
+
+/// What kind of collision it was.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Collided {
+    /// Mechanism, priority and geometry, in words: what the obstacle did, who went first, which side was hit.
+    pub kind: String,
+    pub counted: bool,
 }
 
 /// One choice and what it was worth.

@@ -160,7 +160,9 @@ pub(crate) fn choose(agent: &mut dyn Agent, moment: &Moment) -> (Choice, Array1<
 
 /// What each row would do now.
 pub(crate) fn offers(agent: &mut dyn Agent, moment: &Moment) -> Vec<Offer> {
-    moment.setup().table.offers(&situation(agent, moment))
+    let situation = situation(agent, moment);
+    let shares = agent.draw_shares(moment.step, moment.situation.seed);
+    moment.setup().table.offers_at(&situation, shares)
 }
 
 /// The situation of the moment, with values drawn from the agent's seed if it gives one.

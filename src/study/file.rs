@@ -80,6 +80,10 @@ pub struct AgentFile {
     /// for each road of the study, on that road alone.
     #[serde(default)]
     pub train_roads: Vec<String>,
+    /// Whether the trained network is shown states of other episodes when it is judged: what it loses by it, it owed
+    /// to knowing when. Trainings are as without it.
+    #[serde(default)]
+    pub shuffled_states: bool,
     /// Independent repetitions of the evaluation, of an agent that has nothing to learn; without a number 10.
     pub repeats: Option<u32>,
     /// Profile of the driving system for this agent, in place of the study's: the name of a file, or the settings

@@ -2,10 +2,13 @@
 
 use std::sync::atomic::AtomicBool;
 
+use crate::agent::Agent;
 use crate::run::on_threads;
+use crate::train::Training;
 
 use crate::study::ready::Study;
 use crate::study::record::{CellRecord, EpisodeRecord, Spent, TrainedRecord};
+use crate::study::settings::AgentSettings;
 
 /// One training, or one repetition of an agent that has nothing to learn, with its evaluation.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -47,6 +50,13 @@ pub fn play_jobs<E>(
     on_threads(jobs, threads, stop, work, on)
 }
 
+/// What a training made, as the study judges it.
+fn actor(training: &Training, settings: &AgentSettings) -> Box<dyn Agent> {
+    let shuffled = settings.training.as_ref().is_some_and(|plan| plan.shuffled_states);
+    let shuffled = shuffled.then(|| training.shuffled_actor().expect("only networks are shuffled"));
+    shuffled.unwrap_or_else(|| training.actor())
+}
+
 /// Plays one job. `tell` gets the counted collisions of every episode and says whether to go on; if not, the
 /// result is `None`.
 fn play(
@@ -79,7 +89,7 @@ fn play(
             let run = study.evaluation(job, seed, road).expect("the study was checked when it was made");
             for number in 0..run.episodes() {
                 let (summary, log) = match &training {
-                    Some(training) => run.judged_by(number, training.actor().as_mut()),
+                    Some(training) => run.judged_by(number, actor(training, agent).as_mut()),
                     None => run.judged(number),
                 };
                 episodes.push(EpisodeRecord::new(run.settings().seed, &summary, &log));

@@ -77,6 +77,9 @@ pub struct TrainingPlan {
     /// Roads that a training goes round; empty: the one on which it is evaluated.
     pub roads: Vec<String>,
     pub hyperparameters: Settings,
+    /// Whether it is judged on states of other episodes.
+    #[serde(default, skip_serializing_if = "core::ops::Not::not")]
+    pub shuffled_states: bool,
 }
 
 /// Why a study cannot begin.
@@ -182,6 +185,7 @@ fn agent_settings(
                 ("preset", file.preset.is_some()),
                 ("config", file.config.is_some()),
                 ("train_roads", !file.train_roads.is_empty()),
+                ("shuffled_states", file.shuffled_states),
             ];
             if let Some((field, _)) = learning.into_iter().find(|(_, is_there)| *is_there) {
                 return Err(StudyError::NotLearning { label, name: file.name, field });
@@ -197,8 +201,15 @@ fn agent_settings(
             let hyperparameters = Settings::from_yaml(entry, file.preset.as_deref(), &text)
                 .expect("an agent that is trained has settings")
                 .map_err(|error| refuse(error.to_string()))?;
-            let episodes = file.episodes.unwrap_or(TRAINING_EPISODES);
-            (file.trainings, Some(TrainingPlan { episodes, roads: file.train_roads, hyperparameters }))
+            let shuffled_states = file.shuffled_states;
+            if shuffled_states && hyperparameters.hyperparameters().is_none() {
+                return Err(refuse(format!(
+                    "`shuffled_states` is for networks, and `{}` has none",
+                    file.name
+                )));
+            }
+            let (episodes, roads) = (file.episodes.unwrap_or(TRAINING_EPISODES), file.train_roads);
+            (file.trainings, Some(TrainingPlan { episodes, roads, hyperparameters, shuffled_states }))
         }
     };
     let refuse = |reason| StudyError::Settings { label: label.clone(), reason };

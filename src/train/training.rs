@@ -11,19 +11,21 @@ use crate::action::ActionTable;
 use crate::ads::Ads;
 use crate::ads::external::Attached;
 use crate::agent::{
-    Agent, Beginning, Experience, Kind, Lesson, QPolicy, Rows, Settings, Trainable, Trajectory,
+    Agent, Beginning, Collided, Experience, Kind, Lesson, QPolicy, Rows, Settings, Trainable, Trajectory,
 };
 use crate::episode;
 use crate::episode::{Choice, End, EpisodeLog, Moment, Outcome, Script, Setup, Snapshot};
 use crate::mdp;
 use crate::mdp::{Closeness, Observation, ProcKind, StepOutcome};
 use crate::model::Space;
+use crate::model::vocabulary::Word;
+use crate::oracle;
 use crate::oracle::AvoidabilitySettings;
 use crate::rng;
 use crate::rng::Stream;
 use crate::run::{
     Arena, EpisodeSummary, Finding, Profile, RunError, RunSettings, TrafficRecord, agent_named,
-    check_episodes, choose, legal, traffic_of, under_test,
+    check_episodes, choose, kind, legal, traffic_of, under_test,
 };
 use crate::sim::{Contact, World};
 
@@ -166,6 +168,11 @@ impl Training {
         self.agent.actor()
     }
 
+    /// The same on states of other episodes; `None` if what it has learned is no network.
+    pub fn shuffled_actor(&self) -> Option<Box<dyn Agent>> {
+        self.agent.shuffled()
+    }
+
     /// Episodes done.
     pub fn episodes(&self) -> usize {
         self.next
@@ -185,6 +192,7 @@ impl Training {
         let number = self.next;
         let road = number % self.arena.roads();
         let fresh = rng::child_seed(self.settings.seed, Stream::Episode, number as u64);
+        self.agent.progress(number as f64 / f64::from(self.settings.episodes));
         let beginning = self.agent.beginning(road, fresh);
         let exploration_epsilon = self.agent.exploration_epsilon();
         let mut setup = self.arena.setup(road, beginning.seed);
@@ -205,6 +213,7 @@ impl Training {
             last_legal,
             terminal: log.end == End::Arrived,
             closeness: played.closeness,
+            collisions: summary.collisions.iter().map(collided).collect(),
         };
         let mut rng = rng::stream(self.settings.seed, Stream::Replay, number as u64);
         let lesson = self.agent.learn(&trajectory, &mut rng);
@@ -305,6 +314,17 @@ struct Chosen {
     observation: Observation,
     legal: Array1<bool>,
     row: usize,
+}
+
+/// What a search is told of a collision.
+fn collided(finding: &Finding) -> Collided {
+    let mechanism = (kind(finding.collision.body.like.name()), finding.collision.verb.name());
+    let severity = oracle::severity(&finding.collision);
+    let (priority, side) = (finding.facts.priority.name(), severity.side);
+    Collided {
+        kind: format!("{} {}, priority {priority}, {} {side}", mechanism.0, mechanism.1, severity.approach),
+        counted: finding.counted,
+    }
 }
 
 /// The reward and the consequences of each choice. A step in which nothing could be chosen teaches nothing.

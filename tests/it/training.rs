@@ -91,7 +91,7 @@ fn a_killed_training_resumes_to_the_same_bytes() {
 #[test]
 #[ignore = "takes minutes"]
 fn twenty_kills_change_nothing() {
-    for agent in ["ddqn", "constant", "bandit", "go-explore", "av-fuzzer"] {
+    for agent in ["ddqn", "constant", "bandit", "go-explore", "av-fuzzer", "map-elites"] {
         let scratch = tempfile::tempdir().expect("a scratch directory");
         let begun = |name: &str| {
             let out = scratch.path().join(name);
@@ -212,7 +212,7 @@ fn what_cannot_be_trained_is_said_so() {
         (&["train", space, "--agent", "random"], "nothing to learn"),
         (
             &["train", space, "--agent", "dqn"],
-            "`ddqn`, `deep_collision`, `av-fuzzer`, `constant`, `bandit` and `go-explore`",
+            "`ddqn`, `deep_collision`, `av-fuzzer`, `map-elites`, `constant`, `bandit` and `go-explore`",
         ),
         (&["train", space, "--preset", "realesed"], "`avastra`, `paper` and `released`"),
         (&["train", space, "--config", &config], "did you mean `discount`?"),

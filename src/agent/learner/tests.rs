@@ -69,6 +69,7 @@ fn ended(steps: Vec<Experience>, last: usize, rows: usize) -> Trajectory {
         last_legal: all(rows),
         terminal: true,
         closeness: Closeness::default(),
+        collisions: Vec::new(),
     }
 }
 
@@ -122,6 +123,65 @@ fn returns_take_n_steps_and_know_the_end() {
     let released = Hyperparameters { arrival_is_terminal: false, ..settings };
     assert_eq!(discounts(of(released.clone(), true)), [0.25, 0.25, 0.5]);
     assert_eq!(of(released, true)[2].next_legal, [true, false, false, false]);
+}
+
+#[test]
+fn a_collision_pays_where_its_obstacle_was_made() {
+    let settings = Hyperparameters { collision_reward: 20.0, uncounted_reward: 0.0, ..small() };
+    let mut trajectory = episode(&[-1.0, 0.4, 20.0, 20.0]);
+    trajectory.steps[2].crashes = vec![Some(0), Some(0)];
+    trajectory.steps[3].crashes = vec![None];
+    // An uncounted collision, which the reward of its step says already, changes nothing.
+    trajectory.steps[1].hits = vec![0];
+    assert_eq!(paid_to_makers(&trajectory, &settings), [20.0, 0.4, 0.0, 20.0]);
+    // The step of one collision may have made the obstacle of another.
+    trajectory.steps[3].crashes = vec![Some(2)];
+    assert_eq!(paid_to_makers(&trajectory, &settings), [20.0, 0.4, 20.0, 0.0]);
+}
+
+#[test]
+fn on_shuffled_states_it_no_longer_knows_when() {
+    // Row 0 is right in state 0, row 1 in state 1.
+    let settings = Hyperparameters { discount: 0.0, evaluation_epsilon: 0.0, ..small() };
+    let mut learner = learner(settings, 2, 7);
+    for number in 0..200 {
+        let (state, row) = (number % 2, number / 2 % 2);
+        let reward = f64::from(u8::from(state == row));
+        let one = ended(vec![experience(state, row, reward, 2)], 9, 2);
+        learner.learn(&one, &mut stream(number as u64, Stream::Replay, 0));
+    }
+    let right = |mut agent: Box<dyn Agent>| {
+        let chosen = |step: usize| {
+            let mut rng = stream(3, Stream::Exploration, step as u64);
+            agent.choose(&sight(step % 2), all(2).view(), &mut rng).expect("rows are open") == step % 2
+        };
+        (0..200).map(chosen).filter(|is_right| *is_right).count()
+    };
+    assert_eq!(right(learner.actor()), 200);
+    let by_luck = right(learner.shuffled().expect("it is a network"));
+    assert!((70..130).contains(&by_luck), "{by_luck} of 200");
+}
+
+#[test]
+fn the_mean_of_the_networks_acts_in_the_end() {
+    let settings =
+        Hyperparameters { average_decay: 0.75, updates_per_step: 1, learning_starts: 1, ..small() };
+    let mut learner = learner(settings, 4, 5);
+    let mut mean: Vec<f32> = Vec::new();
+    for number in 1..=6_u32 {
+        let one = ended(vec![experience(0, 1, 1.0, 4)], 9, 4);
+        assert_eq!(learner.learn(&one, &mut stream(u64::from(number), Stream::Replay, 0)).updates, 1);
+        let online = learner.policy.network().parameters();
+        // A plain mean of the first four, a running mean from then on.
+        let share = 1.0 / number.min(4) as f32;
+        mean = match number {
+            1 => online.to_vec(),
+            _ => mean.iter().zip(online).map(|(mean, online)| mean + share * (online - mean)).collect(),
+        };
+    }
+    let trained = learner.policy().expect("a learner has a network").network().parameters();
+    assert!(trained.iter().zip(&mean).all(|(found, expected)| (found - expected).abs() < 1e-5));
+    assert!(trained != learner.policy.network().parameters());
 }
 
 #[test]

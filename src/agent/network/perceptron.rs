@@ -104,6 +104,14 @@ impl Network {
         self.parameters.clone_from(&other.parameters);
     }
 
+    /// Moves every parameter by a share of the way to another network's, share in `[0, 1]`; the shapes must be the same.
+    pub fn approach(&mut self, other: &Network, share: f32) {
+        assert_eq!(self.shape, other.shape, "it approaches one of the same shape");
+        for (own, goal) in self.parameters.iter_mut().zip(&other.parameters) {
+            *own += share * (goal - *own);
+        }
+    }
+
     /// Q-values, shape `(batch, actions)`, of inputs `(batch, inputs)`.
     pub fn q_values(&self, inputs: ArrayView2<f32>) -> Array2<f32> {
         self.forward(inputs).q_values

@@ -91,6 +91,12 @@ impl Replay {
         self.transitions.len()
     }
 
+    /// The last transitions, at most so many, the newest first.
+    pub fn latest(&self, count: usize) -> impl Iterator<Item = &Transition> {
+        let newest = self.next + self.capacity - 1;
+        (0..count.min(self.len())).map(move |back| &self.transitions[(newest - back) % self.capacity])
+    }
+
     pub fn get(&self, index: usize) -> &Transition {
         &self.transitions[index]
     }
@@ -186,5 +192,11 @@ mod tests {
         assert_eq!(replay.tree.get(0), 4.1);
         replay.push(transition(8.0));
         assert_eq!((replay.get(0).reward, replay.get(1).reward), (9.0, 8.0));
+        let latest = |replay: &Replay, count| replay.latest(count).map(|one| one.reward).collect::<Vec<_>>();
+        assert_eq!(latest(&replay, 3), [8.0, 9.0, 4.0]);
+        assert_eq!(latest(&replay, 9), [8.0, 9.0, 4.0, 3.0, 2.0]);
+        let mut short = Replay::new(5, Priorities { exponent: 1.0, floor: 0.1, first: 1.0 });
+        short.push(transition(7.0));
+        assert_eq!(latest(&short, 3), [7.0]);
     }
 }

@@ -175,6 +175,7 @@ mod tests {
             last_legal: Array1::from_elem(4, true),
             terminal: true,
             closeness: Closeness::default(),
+            collisions: Vec::new(),
         }
     }
 

@@ -16,18 +16,27 @@ pub struct Individual {
 }
 
 impl Individual {
+    pub fn random(steps: usize, rows: usize, rng: &mut Rng) -> Individual {
+        Individual { genes: (0..steps).map(|_| Gene::random(rows, rng)).collect(), fitness: 0.0 }
+    }
+
     pub fn rows(&self) -> Vec<u32> {
         self.genes.iter().map(|gene| gene.row).collect()
     }
 
     /// A new draw or a new row at one step, each as likely.
-    fn change(&mut self, rows: usize, rng: &mut Rng) {
+    pub fn change(&mut self, rows: usize, rng: &mut Rng) {
         let at = rng::below(rng, self.genes.len() as u32) as usize;
         if rng::below(rng, 2) == 0 {
             self.genes[at].draw_seed = seed(rng);
         } else {
             self.genes[at] = Gene::random(rows, rng);
         }
+    }
+
+    /// Whether it has `steps` steps, with rows below `rows`.
+    pub fn is_sound(&self, steps: usize, rows: usize) -> bool {
+        self.genes.len() == steps && self.genes.iter().all(|gene| (gene.row as usize) < rows)
     }
 }
 
@@ -39,9 +48,7 @@ pub struct Population {
 
 impl Population {
     pub fn random(size: usize, steps: usize, rows: usize, rng: &mut Rng) -> Population {
-        let mut script =
-            || Individual { genes: (0..steps).map(|_| Gene::random(rows, rng)).collect(), fitness: 0.0 };
-        Population { individuals: (0..size).map(|_| script()).collect() }
+        Population { individuals: (0..size).map(|_| Individual::random(steps, rows, rng)).collect() }
     }
 
     /// Copies of one script, each with one change.
@@ -144,10 +151,7 @@ impl Population {
 
     /// Whether it has `size` scripts of `steps` steps, with rows below `rows`.
     pub fn is_sound(&self, size: usize, steps: usize, rows: usize) -> bool {
-        let fits = |one: &Individual| {
-            one.genes.len() == steps && one.genes.iter().all(|gene| (gene.row as usize) < rows)
-        };
-        self.individuals.len() == size && self.individuals.iter().all(fits)
+        self.individuals.len() == size && self.individuals.iter().all(|one| one.is_sound(steps, rows))
     }
 }
 

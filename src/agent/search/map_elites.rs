@@ -1,0 +1,288 @@
+//! MAP-Elites (Mouret and Clune, 2015): of every kind of collision the best script, and new scripts by changing one
+//! of those. It looks for collisions of many kinds, where a search for the fittest ends with one.
+//!
+//! A kind is a cell of mechanism (what the obstacle did), priority (whose it was) and geometry (which side of the ego
+//! vehicle met it); an episode belongs to the kind of its first collision that counts, else of its first one, else to
+//! a cell of its own: "nothing". A script is a row with its draws for each step, as AV-Fuzzer's here. It is changed
+//! where it was played: the world is deterministic, so that a change of one step leaves what came before it.
+
+use std::collections::BTreeMap;
+
+use ndarray::ArrayView1;
+
+use crate::agent::hyperparameters::{SettingsError, require, within};
+use crate::agent::random::any;
+use crate::agent::registry::Agent;
+use crate::agent::settings::Settings;
+use crate::agent::trainable::{Beginning, Trainable};
+use crate::agent::trajectory::{Lesson, Trajectory};
+use crate::mdp::Observation;
+use crate::rng;
+use crate::rng::{Rng, Stream};
+
+use super::played::{Gene, start_of};
+use super::population::Individual;
+use super::scripts::{Found, Scripts};
+
+/// Settings of [`MapElites`]; all ours.
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct MapElitesSettings {
+    /// Share of the episodes that play a random script on a start that no episode had, in `[0, 1]`; the others
+    /// change an elite.
+    pub fresh_share: f64,
+    /// Most steps of an elite that are changed for a new script, from 1 to 100; how many is drawn evenly.
+    pub changes_max: u32,
+    /// Steps of a script, from 1 to 1000; it begins anew after its end.
+    pub elite_steps: usize,
+}
+
+impl Default for MapElitesSettings {
+    fn default() -> MapElitesSettings {
+        MapElitesSettings { fresh_share: 0.25, changes_max: 2, elite_steps: 20 }
+    }
+}
+
+impl MapElitesSettings {
+    /// # Errors
+    /// If a value is out of range.
+    pub fn check(&self) -> Result<(), SettingsError> {
+        require([
+            within("fresh_share", self.fresh_share, 0.0..=1.0, "from 0 to 1"),
+            within("changes_max", self.changes_max, 1..=100, "from 1 to 100"),
+            within("elite_steps", self.elite_steps, 1..=1000, "from 1 to 1000"),
+        ])
+    }
+
+    /// The settings of a YAML text.
+    ///
+    /// # Errors
+    /// As [`Settings::from_yaml`].
+    pub fn read(text: &str) -> Result<Settings, SettingsError> {
+        Settings::of_search(text, MapElitesSettings::check, Settings::MapElites)
+    }
+}
+
+/// The search.
+pub struct MapElites {
+    settings: MapElitesSettings,
+    rows: usize,
+    memory: Memory,
+    // The episode under way.
+    road: usize,
+    seed: u64,
+    script: Individual,
+    step: usize,
+    started_at: Option<[f32; 2]>,
+}
+
+/// What the search keeps from episode to episode.
+#[derive(Debug, Clone, Default, PartialEq, serde::Serialize, serde::Deserialize)]
+struct Memory {
+    steps: u64,
+    /// By road, then by kind of collision.
+    elites: Vec<BTreeMap<String, Elite>>,
+}
+
+/// The best script of a cell.
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
+struct Elite {
+    /// Seed of the episode's start.
+    seed: u64,
+    start: [f32; 2],
+    script: Individual,
+    /// Collisions that counted.
+    crashes: usize,
+}
+
+impl Elite {
+    /// Whether it is better than another of its cell: more collisions count, or else an obstacle came closer.
+    fn beats(&self, other: &Elite) -> bool {
+        (self.crashes, self.script.fitness) > (other.crashes, other.script.fitness)
+    }
+}
+
+impl MapElites {
+    /// A search over scripts of so many rows.
+    pub fn new(settings: &MapElitesSettings, rows: usize) -> MapElites {
+        MapElites {
+            settings: settings.clone(),
+            rows,
+            memory: Memory::default(),
+            road: 0,
+            seed: 0,
+            script: Individual { genes: Vec::new(), fitness: 0.0 },
+            step: 0,
+            started_at: None,
+        }
+    }
+
+    /// The search that was saved; `None` if the bytes are not those of one over so many rows.
+    pub fn restore(settings: &MapElitesSettings, rows: usize, bytes: &[u8]) -> Option<MapElites> {
+        let memory: Memory = serde_json::from_slice(bytes).ok()?;
+        let fits = |elite: &Elite| elite.script.is_sound(settings.elite_steps, rows);
+        let fits = memory.elites.iter().flat_map(BTreeMap::values).all(fits);
+        fits.then(|| MapElites { memory, ..MapElites::new(settings, rows) })
+    }
+}
+
+impl Agent for MapElites {
+    fn begin(&mut self) {
+        self.step = 0;
+        self.started_at = None;
+    }
+
+    fn draw_seed(&mut self, step: usize) -> Option<u64> {
+        self.step = step;
+        let genes = &self.script.genes;
+        (!genes.is_empty()).then(|| genes[step % genes.len()].draw_seed)
+    }
+
+    fn choose(&mut self, observation: &Observation, legal: ArrayView1<bool>, rng: &mut Rng) -> Option<usize> {
+        self.memory.steps += 1;
+        self.started_at.get_or_insert(start_of(observation));
+        let (step, genes) = (self.step, &mut self.script.genes);
+        if genes.is_empty() {
+            return any(legal, rng);
+        }
+        let at = step % genes.len();
+        let gene: &mut Gene = &mut genes[at];
+        if !legal[gene.row as usize] {
+            let mut rng = rng::stream(gene.draw_seed, Stream::Search, step as u64);
+            gene.row = any(legal, &mut rng)? as u32;
+        }
+        Some(gene.row as usize)
+    }
+}
+
+impl Trainable for MapElites {
+    fn beginning(&mut self, road: usize, fresh: u64) -> Beginning {
+        self.road = road;
+        if self.memory.elites.len() <= road {
+            self.memory.elites.resize(road + 1, BTreeMap::new());
+        }
+        let mut rng = rng::stream(fresh, Stream::Search, 0);
+        let elites = &self.memory.elites[road];
+        let chosen = match rng::unit(&mut rng) < self.settings.fresh_share {
+            false if !elites.is_empty() => {
+                elites.values().nth(rng::below(&mut rng, elites.len() as u32) as usize)
+            }
+            _ => None,
+        };
+        (self.seed, self.script) = match chosen {
+            None => (fresh, Individual::random(self.settings.elite_steps, self.rows, &mut rng)),
+            Some(elite) => {
+                let mut script = elite.script.clone();
+                for _ in 0..=rng::below(&mut rng, self.settings.changes_max) {
+                    script.change(self.rows, &mut rng);
+                }
+                (elite.seed, script)
+            }
+        };
+        Beginning { seed: self.seed, from: None }
+    }
+
+    fn learn(&mut self, episode: &Trajectory, _: &mut Rng) -> Lesson {
+        let found = Elite {
+            seed: self.seed,
+            start: self.started_at.unwrap_or_default(),
+            script: Individual { fitness: episode.closeness.fitness(), ..self.script.clone() },
+            crashes: episode.steps.iter().map(|step| step.crashes.len()).sum(),
+        };
+        let kinds = &episode.collisions;
+        let kind = kinds.iter().find(|collision| collision.counted).or(kinds.first());
+        let cell = kind.map_or_else(|| "nothing".to_owned(), |collision| collision.kind.clone());
+        let elites = &mut self.memory.elites[self.road];
+        if elites.get(&cell).is_none_or(|elite| found.beats(elite)) {
+            elites.insert(cell, found);
+        }
+        Lesson::default()
+    }
+
+    fn steps(&self) -> u64 {
+        self.memory.steps
+    }
+
+    fn exploration_epsilon(&self) -> f64 {
+        1.0
+    }
+
+    /// Plays the elites whose collisions counted, or all if there is none.
+    fn actor(&self) -> Box<dyn Agent> {
+        let elites = || self.memory.elites.iter().flat_map(BTreeMap::values);
+        let any_counts = elites().any(|elite| elite.crashes > 0);
+        let found = elites().filter(|elite| elite.crashes > 0 || !any_counts).map(|elite| Found {
+            start: elite.start,
+            rows: elite.script.rows(),
+            crashes: elite.crashes,
+            fitness: elite.script.fitness,
+        });
+        Box::new(Scripts::new(found.collect()))
+    }
+
+    fn save(&self) -> Vec<u8> {
+        serde_json::to_vec(&self.memory).expect("a search is plain data")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::agent::trajectory::Collided;
+    use crate::mdp::Closeness;
+    use ndarray::Array1;
+
+    /// An episode with these collisions, and an obstacle that came this close.
+    fn episode(collisions: &[(&str, bool)], distance_m: f64) -> Trajectory {
+        let collided = |&(kind, counted): &(&str, bool)| Collided { kind: kind.to_owned(), counted };
+        Trajectory {
+            steps: Vec::new(),
+            last: Observation::zeros(),
+            last_legal: Array1::from_elem(4, true),
+            terminal: true,
+            closeness: Closeness { distance_m, margin_m: 0.0 },
+            collisions: collisions.iter().map(collided).collect(),
+        }
+    }
+
+    #[test]
+    fn each_kind_keeps_its_best() {
+        let settings = MapElitesSettings { elite_steps: 3, fresh_share: 0.0, ..MapElitesSettings::default() };
+        let mut search = MapElites::new(&settings, 4);
+        let mut rng = rng::stream(1, Stream::Replay, 0);
+        let mut play = |search: &mut MapElites, fresh, played: &Trajectory| {
+            let seed = search.beginning(0, fresh).seed;
+            search.learn(played, &mut rng);
+            (seed, search.script.rows())
+        };
+        // The first start is fresh, because nothing is known; from then on that episode is changed.
+        let (first, _) = play(&mut search, 5, &episode(&[], 9.0));
+        assert_eq!(first, 5);
+        let cells = |search: &MapElites| -> Vec<(String, u64)> {
+            let elites = search.memory.elites[0].iter();
+            elites.map(|(kind, elite)| (kind.clone(), elite.script.fitness as u64)).collect()
+        };
+        let (second, _) = play(&mut search, 6, &episode(&[("walk", false), ("overtake", true)], 2.0));
+        assert_eq!(second, 5);
+        play(&mut search, 7, &episode(&[("walk", false)], 4.0));
+        play(&mut search, 8, &episode(&[("walk", false)], 8.0));
+        play(&mut search, 9, &episode(&[], 5.0));
+        let found = [("nothing", 127), ("overtake", 129), ("walk", 128)];
+        assert_eq!(cells(&search), found.map(|(kind, fitness)| (kind.to_owned(), fitness)));
+    }
+
+    #[test]
+    fn a_changed_script_differs_in_few_steps_and_stays_where_it_was_played() {
+        let settings = MapElitesSettings { fresh_share: 0.0, ..MapElitesSettings::default() };
+        let mut search = MapElites::new(&settings, 45);
+        let mut rng = rng::stream(1, Stream::Replay, 0);
+        search.beginning(0, 1);
+        search.learn(&episode(&[], 9.0), &mut rng);
+        let elite = search.script.clone();
+        for fresh in 2..50 {
+            assert_eq!(search.beginning(0, fresh).seed, 1);
+            let differ = search.script.genes.iter().zip(&elite.genes).filter(|(new, old)| new != old).count();
+            assert!((1..=2).contains(&differ), "{differ} steps");
+        }
+    }
+}
