@@ -54,7 +54,8 @@ impl Features {
             StateSet::Internal => (EXTERNAL_LEN..STATE_LEN).collect(),
             StateSet::DeepCollision => DEEP_COLLISION.map(named).to_vec(),
             // Where the nearest obstacle and the road ahead are: the last of the variables.
-            StateSet::Extended => (0..STATE_LEN).chain(named("nearestAhead")..VARIABLES.len()).collect(),
+            StateSet::Extended => (0..STATE_LEN).chain(named("nearestAhead")..=named("time")).collect(),
+            StateSet::Timed => (0..STATE_LEN).chain(named("nearestAhead")..VARIABLES.len()).collect(),
         };
         let mut features = Features { variables, encoding, len: 0 };
         features.len = features.encode(&Observation::zeros()).len();
@@ -102,10 +103,12 @@ fn scale(index: usize) -> Scale {
     match variable.observed_as {
         "weather" => Scale::Weather,
         "numObs" | "speed" | "speedNearestObs" | "nearestSpeedAhead" | "nearestSpeedLeft" => Scale::By(10.0),
-        "distToNearestObs" | "nearestAhead" => Scale::By(50.0),
-        "nearestLeft" => Scale::By(10.0),
+        "distToNearestObs" | "nearestAhead" | "secondAhead" | "newestAhead" => Scale::By(50.0),
+        "nearestLeft" | "secondLeft" | "newestLeft" | "newestAge" | "lightChangesIn" => Scale::By(10.0),
         "velocityDiff" | "accRate" => Scale::By(5.0),
-        "throttle" | "steerTarget" | "brakePercentage" | "junctionAhead" | "time" => Scale::By(100.0),
+        "throttle" | "steerTarget" | "brakePercentage" | "junctionAhead" | "conflictAhead" | "time" => {
+            Scale::By(100.0)
+        }
         "routeLeft" | "egoX" | "egoY" => Scale::By(300.0),
         "angleDeviation" | "directionDiff" | "egoHeading" => Scale::By(core::f32::consts::PI),
         _ => Scale::By(1.0),
@@ -122,6 +125,7 @@ mod tests {
         let sets = [StateSet::Full, StateSet::Internal, StateSet::External, StateSet::DeepCollision];
         assert_eq!(sets.map(len), [19, 12, 7, 12]);
         assert_eq!(Features::new(StateSet::Extended, Encoding::Scaled).len(), 36);
+        assert_eq!(Features::new(StateSet::Timed, Encoding::Scaled).len(), 36 + 7 + 7);
     }
 
     #[test]

@@ -166,6 +166,9 @@ pub enum StateSet {
     DeepCollision,
     /// The paper's 19 and where the nearest obstacle and the road ahead are: ours.
     Extended,
+    /// These, and what tells when: how long the light stays, how far the next conflict is, where the second obstacle
+    /// is, and what an action made appear last. Ours.
+    Timed,
 }
 
 /// How a variable goes into the network.

@@ -24,6 +24,16 @@ impl World {
     pub fn moment_facts(&self) -> MomentFacts {
         self.alone().moment_facts()
     }
+
+    /// As [`Around::light_changes_in_s`].
+    pub fn light_changes_in_s(&self, most_s: f64) -> Option<f64> {
+        self.alone().light_changes_in_s(most_s)
+    }
+
+    /// As [`Around::conflict_ahead_m`].
+    pub fn conflict_ahead_m(&self) -> Option<f64> {
+        self.alone().conflict_ahead_m()
+    }
 }
 
 impl Around<'_> {
@@ -50,11 +60,35 @@ impl Around<'_> {
         }
     }
 
-    /// What the next traffic light on the route shows.
-    fn light_ahead(&self) -> Light {
+    /// Time until the next traffic light on the route changes its colour, s, in steps of half a second and at most
+    /// `most_s`; `None` without a light within reach.
+    pub fn light_changes_in_s(&self, most_s: f64) -> Option<f64> {
+        const STEP_S: f64 = 0.5;
+        let signal = self.signal_ahead()?;
+        let colour = |later_s: f64| {
+            self.signals.colour(&self.scene.map, signal, self.tick + (later_s / DT_S).round() as u64)
+        };
+        let now = colour(0.0);
+        let steps = (1..=(most_s / STEP_S) as u32).map(|step| f64::from(step) * STEP_S);
+        Some(steps.into_iter().find(|&later_s| colour(later_s) != now).unwrap_or(most_s))
+    }
+
+    /// Distance along the route to the next place where another lane crosses or joins it, m.
+    pub fn conflict_ahead_m(&self) -> Option<f64> {
+        let ahead = self.scene.route.conflicts.iter().map(|conflict| conflict.station_m - self.ego_station_m);
+        ahead.into_iter().find(|&ahead_m| ahead_m >= 0.0)
+    }
+
+    /// The next traffic light on the route, if it is within reach.
+    fn signal_ahead(&self) -> Option<usize> {
         let ahead = self.ego_station_m..=self.ego_station_m + LIGHT_AHEAD_M;
         let next = self.scene.route.stop_lines.iter().find(|line| ahead.contains(&line.station_m));
-        match next.map(|line| self.signals.colour(&self.scene.map, line.signal, self.tick)) {
+        next.map(|line| line.signal)
+    }
+
+    /// What the next traffic light on the route shows.
+    fn light_ahead(&self) -> Light {
+        match self.signal_ahead().map(|signal| self.signals.colour(&self.scene.map, signal, self.tick)) {
             None => Light::None,
             Some(SignalColour::Red) => Light::Red,
             Some(SignalColour::Yellow) => Light::Yellow,
@@ -154,7 +188,7 @@ mod tests {
     use crate::check::{ReadError, load};
     use crate::model::vocabulary::{Light, RoadKind, Verb};
     use crate::model::{NpcFacts, Row, RulesInForce};
-    use crate::sim::{Control, Scene, World, testing};
+    use crate::sim::{Control, DT_S, Scene, World, testing};
 
     #[test]
     fn a_moment_says_how_far_it_is_to_the_junction() {
@@ -167,6 +201,29 @@ mod tests {
         assert_eq!((facts.ego_road, facts.ego_light), (RoadKind::OneWay, Light::None));
         assert_eq!((facts.road_users, facts.nearest_gap_m), (0, 100.0));
         assert_eq!(testing::world(&testing::straight()).moment_facts().ego_junction_ahead_m, 1000.0);
+    }
+
+    #[test]
+    fn the_light_changes_when_it_is_said_to() {
+        let mut world = testing::world(&testing::crossing());
+        assert_eq!(world.light_changes_in_s(60.0), None, "it is out of reach");
+        let conflict_m = world.conflict_ahead_m().expect("another street crosses");
+        assert!(conflict_m > world.moment_facts().ego_junction_ahead_m, "{conflict_m}");
+        let drive = Control { throttle_pct: 20.0, ..Control::default() };
+        while world.light_changes_in_s(60.0).is_none() && world.time_s() < 60.0 {
+            world.tick(&drive);
+        }
+        let (light, left_s) = (world.moment_facts().ego_light, world.light_changes_in_s(60.0));
+        let left_s = left_s.expect("it is in reach by now");
+        assert!((0.5..60.0).contains(&left_s), "{left_s}");
+        assert_eq!(world.light_changes_in_s(0.5), Some(0.5));
+        let end_s = world.time_s() + left_s;
+        while world.time_s() + 0.5 * DT_S < end_s {
+            // It looks ahead in steps of half a second.
+            assert!(world.moment_facts().ego_light == light || end_s - world.time_s() <= 0.5);
+            world.tick(&Control { brake_pct: 100.0, ..Control::default() });
+        }
+        assert_ne!(world.moment_facts().ego_light, light);
     }
 
     #[test]

@@ -147,6 +147,8 @@ fn what_no_study_can_be_is_said_so() {
         ("agents: [{ name: ddqn, config: nowhere.yaml }]", "cannot read `nowhere.yaml`"),
         ("agents: [{ name: ddqn, config: 3 }]", "settings are the name of a file"),
         ("agents: [{ name: ddqn, config: { actions: [walkers] } }]", "agent `ddqn`: "),
+        ("agents: [{ name: random, shuffled_states: true }]", "`shuffled_states` is for agents that learn"),
+        ("agents: [{ name: bandit, shuffled_states: true }]", "is for networks, and `bandit` has none"),
         ("agents: [{ name: ddqn, train_roads: [moon] }]", "no road `moon`"),
         ("agents: [{ name: random, without: [gravity] }]", "agent `random`: "),
         ("agents: [{ name: random }]\nroads: [moon]", "no road `moon`"),

@@ -133,12 +133,31 @@ pub const VARIABLES: &[Variable] = &[
     between(("junction_ahead", "junctionAhead"), "m", 0.0, 100.0),
     any("lane_offset", "laneOffset", "m"),
     from_zero("elapsed", "time", "s"),
+    between(("light_changes_in", "lightChangesIn"), "s", 0.0, 60.0),
+    between(("conflict_ahead", "conflictAhead"), "m", 0.0, 100.0),
+    any("second_ahead", "secondAhead", "m"),
+    any("second_left", "secondLeft", "m"),
+    words("newest", "newest", NEWEST),
+    any("newest_ahead", "newestAhead", "m"),
+    any("newest_left", "newestLeft", "m"),
+    between(("newest_age", "newestAge"), "s", 0.0, 60.0),
+];
+
+/// What the road user does that an action made appear last.
+const NEWEST: &[(&str, f32)] = &[
+    ("None", 0.0),
+    ("DriveAhead", 1.0),
+    ("Overtake", 2.0),
+    ("DriveOpposite", 3.0),
+    ("CrossRoad", 4.0),
+    ("Walk", 5.0),
+    ("Stand", 6.0),
 ];
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::vocabulary::{Level, TimeOfDay, Word};
+    use crate::model::vocabulary::{Level, TimeOfDay, Verb, Word};
 
     #[test]
     fn words_are_the_engines() {
@@ -147,6 +166,8 @@ mod tests {
             VariableKind::Words { words, .. } => words.iter().map(|(word, _)| *word).collect(),
             VariableKind::Quantity { .. } => Vec::new(),
         };
+        let verbs: Vec<&str> = Verb::ALL.iter().map(|verb| verb.name()).collect();
+        assert_eq!(spelt("newest"), [&["None"], verbs.as_slice()].concat());
         assert_eq!(spelt("time"), TimeOfDay::ALL.iter().map(|time| time.name()).collect::<Vec<_>>());
         for level in Level::ALL {
             assert_eq!(of("fog").word(level.intensity() as f32), Some(level.name()));
