@@ -177,6 +177,15 @@ const EXAMPLES: &[(&str, &[(&str, &str)])] = &[
     ),
     ("pack", &[("pack runs/0001/critical/*.ava --out suite", "a folder that can be moved")]),
     (
+        "report",
+        &[
+            ("report runs/0001", "write runs/0001/report.html"),
+            ("report runs/0001/critical/corner_0004.ava -o crash.html", "one scenario"),
+            ("report runs/0001 --compare scenarios/ads/default.yaml", "two driving systems on one clock"),
+            ("report runs/0001 --compare cc", "beside UN R157's careful driver"),
+        ],
+    ),
+    (
         "render",
         &[
             ("render runs/0001/critical/corner_0004.ava --strip", "the seconds up to the crash"),

@@ -31,6 +31,7 @@ mod parallel;
 mod progress;
 mod render;
 mod replay;
+mod report;
 mod road;
 mod run;
 mod run_directory;
@@ -115,6 +116,7 @@ pub fn main() -> ExitCode {
         Command::Shrink(arguments) => shrink::shrink(&output, arguments),
         Command::Pack(arguments) => pack::pack(&output, arguments),
         Command::Test(arguments) => test::test(&output, arguments),
+        Command::Report(arguments) => report::report(&output, arguments),
         Command::Render(arguments) => render::render(&output, arguments),
         Command::Road(arguments) => road::road(&output, arguments),
         Command::Ads(arguments) => ads::ads(&output, arguments),

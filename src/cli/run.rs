@@ -366,6 +366,7 @@ fn critical_text(directory: &Path, files: &[PathBuf]) -> String {
     let directory = directory.display().to_string();
     let directory = if directory.contains(' ') { format!("'{directory}'") } else { directory };
     text.push_str(&format!("\nreplay them with: avastra replay {directory}/critical/*.ava"));
+    text.push_str(&format!("\nwatch them with: avastra report {directory}"));
     text
 }
 

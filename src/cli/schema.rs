@@ -349,6 +349,16 @@ pub const SHAPES: &[Shape] = &[
         fields: &[f("directory", "text", "the folder"), f("files[]", "text", "paths of the files in it")],
     },
     Shape {
+        command: "report",
+        fields: &[
+            f("page", "text", "its path"),
+            f("scenarios", "number", "on the page"),
+            f("left_out", "number", "scenarios beyond `--most`"),
+            f("bytes", "number", "size of the page"),
+            FAILED,
+        ],
+    },
+    Shape {
         command: "render",
         fields: &[
             f("picture", "text", "its path"),

@@ -134,7 +134,58 @@ pub fn judge(
     settings: &AvoidabilitySettings,
 ) -> Vec<Judgement> {
     let mut judgements = Vec::new();
-    let Some(last) = log.collisions.last() else { return judgements };
+    before_each(setup, script, log, settings, &mut |recording, contact, met| {
+        judgements.push(judge_one(recording, contact, met, settings));
+    });
+    judgements
+}
+
+/// As [`judge`], with the ways that the reference drivers took.
+pub fn judge_with_drives(
+    setup: &Setup,
+    script: &Script,
+    log: &EpisodeLog,
+    settings: &AvoidabilitySettings,
+) -> Vec<(Judgement, Vec<ReferenceDrive>)> {
+    let mut found = Vec::new();
+    before_each(setup, script, log, settings, &mut |recording, contact, met| {
+        let judgement = judge_one(recording, contact, met, settings);
+        let from = recording.partition_point(|world| world.time_s() < judgement.onset_s);
+        let case = Case { recording, from, obstacle: contact.obstacle, settings };
+        found.push((judgement, case.drives()));
+    });
+    found
+}
+
+/// What a reference driver does from the onset of a hazard on, until it is clear or touches something.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ReferenceDrive {
+    pub name: String,
+    pub avoids: bool,
+    /// Every 0.1 s.
+    pub places: Vec<DrivenPlace>,
+}
+
+/// Where a reference driver has the ego vehicle.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DrivenPlace {
+    pub time_s: f64,
+    /// Centre of its outline.
+    pub pose: Pose,
+    pub speed_mps: f64,
+}
+
+/// Plays an episode again up to its last collision, and hands on the worlds before each, its contact, and the outline of
+/// the ego vehicle there.
+fn before_each(
+    setup: &Setup,
+    script: &Script,
+    log: &EpisodeLog,
+    settings: &AvoidabilitySettings,
+    judge: &mut dyn FnMut(&[World], &Contact, OrientedBox),
+) {
+    let Some(last) = log.collisions.last() else { return };
+    let mut judged = 0;
     let mut choose = |moment: &Moment<'_>| match moment.step > last.step {
         true => Choice::Stop,
         false => script.choose(setup.table, moment),
@@ -143,10 +194,11 @@ pub fn judge(
     let mut recording: VecDeque<World> = VecDeque::with_capacity(kept);
     episode::run(setup, &mut choose, &mut |world, _, contacts| {
         for contact in contacts {
-            judgements.push(judge_one(recording.make_contiguous(), contact, world.ego_outline(), settings));
+            judge(recording.make_contiguous(), contact, world.ego_outline());
+            judged += 1;
         }
         // Only the worlds before a contact are asked for.
-        let next = log.collisions.get(judgements.len());
+        let next = log.collisions.get(judged);
         let is_soon = |time_s: f64| world.ticks() as usize + kept >= ticks(time_s);
         if next.is_some_and(|next| is_soon(next.contact.time_s - DT_S)) {
             if recording.len() == kept {
@@ -157,8 +209,7 @@ pub fn judge(
             recording.clear();
         }
     });
-    assert_eq!(judgements.len(), log.collisions.len(), "an episode played again is the same episode");
-    judgements
+    assert_eq!(judged, log.collisions.len(), "an episode played again is the same episode");
 }
 
 /// Judges one collision by the worlds before it.
@@ -209,6 +260,24 @@ impl Case<'_> {
     fn avoids(&self, driver: &mut dyn Ads) -> bool {
         self.show(driver);
         self.drive(driver, &mut |_| true)
+    }
+
+    /// The drives of all reference drivers.
+    fn drives(&self) -> Vec<ReferenceDrive> {
+        let names = self.settings.careful.iter().chain(&self.settings.reported);
+        let drive = |name: &String| {
+            let entry = ads::by_name(name).expect("settings name drivers that exist");
+            let mut driver = (entry.build)(self.recording[self.from].scene(), 0);
+            let mut places = Vec::new();
+            self.show(driver.as_mut());
+            let avoids = self.drive(driver.as_mut(), &mut |world| {
+                let (time_s, pose) = (world.time_s(), world.ego_outline().pose);
+                places.push(DrivenPlace { time_s, pose, speed_mps: world.ego().speed_mps });
+                true
+            });
+            ReferenceDrive { name: name.clone(), avoids, places }
+        };
+        names.map(drive).collect()
     }
 
     /// Shows a driver the time before the onset.

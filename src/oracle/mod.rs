@@ -15,7 +15,10 @@ mod tests;
 mod variation;
 mod verify;
 
-pub use avoidable::{AvoidabilityError, AvoidabilitySettings, Judgement, judge, judge_one};
+pub use avoidable::{
+    AvoidabilityError, AvoidabilitySettings, DrivenPlace, Judgement, ReferenceDrive, judge, judge_one,
+    judge_with_drives,
+};
 pub use cause::{Diagnosis, ModuleFinding, NoModules, WeaknessFinding, diagnose, fate};
 pub use crash::{Fate, Regression, regression};
 pub use facts::{counted, counts, facts};

@@ -1,12 +1,21 @@
-//! Results for people: pictures of maps and of moments of an episode.
+//! Results for people: pages to look at (`page`, with what `recording`, `ground` and `overview` put into it), pictures of
+//! maps and of moments of an episode, and tables of text.
 
 mod canvas;
+mod columns;
+mod ground;
+mod overview;
+mod page;
 mod picture;
+mod recording;
 mod road;
 mod study;
 mod trials;
 
+pub use overview::{of_run, of_study};
+pub use page::{Page, Scene};
 pub use picture::{Snapshot, picture};
+pub use recording::{Recording, record};
 pub use road::draw;
 pub use study::study;
 pub use trials::trials;

@@ -6,6 +6,7 @@
 //! as totals and as groups of like failures. [`Stage`] plays one emitted scenario again.
 
 mod arena;
+mod coverage;
 mod database;
 mod gauges;
 mod groups;
@@ -21,11 +22,13 @@ mod threads;
 
 pub use arena::{Arena, road_named};
 pub(crate) use arena::{choose, legal};
+pub use coverage::{CoverageCell, LearningPoint};
 pub use database::{Database, FailureCount, RefusalCount, Totals};
 pub(crate) use database::{LAYOUT, add_all};
 pub use gauges::Gauges;
 pub use groups::Group;
 pub(crate) use groups::{PEDESTRIAN, kind};
+pub(crate) use offered::in_words as refusal_in_words;
 pub use offered::{Offered, RowCount};
 pub use play::{Run, play};
 pub use profile::{

@@ -64,7 +64,7 @@ pub struct RowCount {
 
 /// Why a row is refused, with the rule if one refuses it. Figures are replaced by `…`, so that reasons which differ
 /// only in figures count as one.
-pub(super) fn in_words(rule: Option<&str>, reason: &str) -> String {
+pub(crate) fn in_words(rule: Option<&str>, reason: &str) -> String {
     let reason = without_figures(reason);
     rule.map_or(reason.clone(), |rule| format!("{rule}: {reason}"))
 }

@@ -26,6 +26,7 @@ mod pedestrians;
 mod policies;
 mod profiles;
 mod references;
+mod report;
 mod road;
 mod rules;
 mod studies;

@@ -117,6 +117,25 @@ pub struct TestArguments {
 }
 
 #[derive(Debug, Args)]
+pub struct ReportArguments {
+    /// A directory that `run`, `train` or `study` wrote, or a folder of scenarios; or scenarios.
+    #[arg(required = true, value_name = "DIR|FILE")]
+    pub paths: Vec<PathBuf>,
+    /// Where to write [default: DIR/report.html, STEM.html].
+    #[arg(long = "out", short = 'o')]
+    pub output: Option<PathBuf>,
+    /// Another driving system, whose drives are shown beside: a profile (a file), or a name.
+    #[arg(long, value_name = "FILE|NAME")]
+    pub compare: Option<String>,
+    /// Scenarios to show at most; one of each kind of failure comes first.
+    #[arg(long, value_name = "N", default_value_t = 200, value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    pub most: u32,
+    /// Worker threads [default: one for each core].
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=1024))]
+    pub jobs: Option<u32>,
+}
+
+#[derive(Debug, Args)]
 pub struct RenderArguments {
     /// The scenario.
     pub file: PathBuf,

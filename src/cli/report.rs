@@ -1,0 +1,199 @@
+//! `avastra report`: one page of HTML for a run, a training, a study or single scenarios.
+
+use std::path::{Path, PathBuf};
+
+use serde_json::Value;
+
+use crate::action::ActionTable;
+use crate::model::Scenario;
+use crate::report;
+use crate::report::{Page, Scene, record};
+use crate::run::{Asked, Database};
+
+use super::arguments::{FilesArguments, ReportArguments};
+use super::error::Failure;
+use super::files::write;
+use super::load;
+use super::output::{Output, plural};
+use super::parallel::{PerFile, each_file};
+
+/// Name of the page in a directory.
+const NAME: &str = "report.html";
+
+/// The folders of a run directory that hold scenarios.
+const FOLDERS: [&str; 3] = ["critical", "failures", "shrunk"];
+
+/// Writes the page of a directory or of files.
+pub fn report(output: &Output, arguments: &ReportArguments) -> Result<(), Failure> {
+    let asked = compared(arguments)?;
+    let found = match arguments.paths.as_slice() {
+        [directory] if directory.is_dir() => of_directory(output, directory)?,
+        files => Found { title: title(files), files: files.to_vec(), ..Found::default() },
+    };
+    let (files, left_out) = chosen(&found, arguments.most as usize);
+    let many = FilesArguments { files, jobs: arguments.jobs };
+    let played = match many.files.is_empty() {
+        true => None,
+        false => Some(each_file(output, &many, None, |file| scene(output, file, asked.as_ref()))?),
+    };
+    let mut remarks = found.remarks;
+    if left_out > 0 {
+        remarks.push(format!(
+            "{} left out: one scenario of each kind of failure comes first, then the others by name; `--most N` shows more",
+            plural(left_out, "scenario")
+        ));
+    }
+    let failed = played.as_ref().map_or_else(Vec::new, PerFile::failed_in_json);
+    for failed in &failed {
+        remarks.push(format!(
+            "{} cannot be played: {}",
+            failed["file"].as_str().unwrap_or_default(),
+            failed["error"].as_str().unwrap_or_default()
+        ));
+    }
+    if found.overview.is_null() && played.as_ref().is_none_or(|played| played.done.is_empty()) {
+        return match played {
+            Some(played) => played.complete("played"),
+            None => Err(Failure::usage(format!("`{}` holds nothing to report", found.title))),
+        };
+    }
+    let scenes = played.map_or_else(Vec::new, |played| played.done);
+    let (scenarios, title) = (scenes.len(), found.title.clone());
+    let compared_with = arguments.compare.clone();
+    let page = Page { title, overview: found.overview, remarks, scenes, compared_with };
+    let html = page.html();
+    let path = arguments.output.clone().unwrap_or_else(|| default_path(&arguments.paths));
+    write(&path, &html)?;
+    output.say(&format!(
+        "{}: {}, {:.1} MB; open it with a browser",
+        path.display(),
+        plural(scenarios, "scenario"),
+        html.len() as f64 / 1e6
+    ));
+    output.result(serde_json::json!({
+        "page": path, "scenarios": scenarios, "left_out": left_out, "bytes": html.len(), "failed": failed,
+    }));
+    Ok(())
+}
+
+/// What a path holds.
+#[derive(Default)]
+struct Found {
+    title: String,
+    overview: Value,
+    files: Vec<PathBuf>,
+    /// Names of the scenarios that show a kind of failure each.
+    examples: Vec<String>,
+    remarks: Vec<String>,
+}
+
+/// A run, a training, a study, or a folder of scenarios.
+fn of_directory(output: &Output, directory: &Path) -> Result<Found, Failure> {
+    let mut found = Found { title: title(&[directory.to_owned()]), ..Found::default() };
+    for folder in FOLDERS {
+        let folder = directory.join(folder);
+        if folder.is_dir() {
+            found.files.extend(load::sources_in(&folder)?);
+        }
+    }
+    let (run, study) = (directory.join("run.yaml"), directory.join("study.yaml"));
+    if run.is_file() {
+        of_run(output, directory, &load::text(&run)?, &mut found)?;
+    } else if study.is_file() {
+        let path = directory.join("results.json");
+        let text = load::text(&path).map_err(|_| {
+            let directory = directory.display();
+            Failure::usage(format!(
+                "`{directory}` has no results yet: finish it with `avastra study --resume {directory}`"
+            ))
+        })?;
+        let results = serde_json::from_str(&text).map_err(|error| Failure::file("read", &path, error))?;
+        found.overview = report::of_study(results, &load::text(&study)?);
+    } else if found.files.is_empty() {
+        found.files = load::sources_in(directory)?;
+    }
+    Ok(found)
+}
+
+/// Adds what the database of a run or training says. `settings` is the text of its `run.yaml`.
+fn of_run(output: &Output, directory: &Path, settings: &str, found: &mut Found) -> Result<(), Failure> {
+    #[derive(serde::Deserialize)]
+    struct Begun {
+        space: PathBuf,
+    }
+    let path = directory.join("run.db");
+    if !path.is_file() {
+        found.remarks.push(format!("`{}` is missing: only scenarios are shown", path.display()));
+        return Ok(());
+    }
+    let unread = |error| Failure::file("read", &path, error);
+    let database = Database::open(&path, settings).map_err(unread)?;
+    let space = serde_yaml::from_str::<Begun>(settings).ok().map(|begun| directory.join(begun.space));
+    // A page of what was found is worth having without the names of the rows.
+    let table: Option<ActionTable> = space.and_then(|space| load::table(output, &space).ok());
+    if table.is_none() {
+        found.remarks.push("the space of the run cannot be read: its rows have numbers only".to_owned());
+    }
+    found.overview = report::of_run(&database, table.as_ref(), settings).map_err(unread)?;
+    let groups = database.groups().map_err(unread)?;
+    found.examples = groups.iter().map(|group| format!("{}_{:04}", group.road, group.episode)).collect();
+    Ok(())
+}
+
+/// The files to play, and how many are left out.
+fn chosen(found: &Found, most: usize) -> (Vec<PathBuf>, usize) {
+    let stem = |file: &PathBuf| file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let is_example = |file: &PathBuf| found.examples.contains(&stem(file));
+    let (first, rest): (Vec<_>, Vec<_>) = found.files.iter().cloned().partition(is_example);
+    let mut files: Vec<PathBuf> = first.into_iter().chain(rest).collect();
+    let left_out = files.len().saturating_sub(most);
+    files.truncate(most);
+    (files, left_out)
+}
+
+/// The driving system to compare with, if one is asked for: a profile by its file, or a driver by its name.
+fn compared(arguments: &ReportArguments) -> Result<Option<Asked>, Failure> {
+    let Some(wanted) = arguments.compare.as_deref() else { return Ok(None) };
+    let is_file = [".yaml", ".yml", "/"].iter().any(|part| wanted.contains(part));
+    let asked = match is_file {
+        true => load::asked(None, Some(Path::new(wanted)), None)?,
+        false => {
+            // Asked for here, so that a name that is none is said once and not for every file.
+            crate::run::driving_system(wanted)?;
+            load::asked(Some(wanted), None, None)?
+        }
+    };
+    Ok(Some(asked))
+}
+
+fn scene(output: &Output, file: &Path, compared: Option<&Asked>) -> Result<Scene, Failure> {
+    let (table, scenario) = load::scenario(output, file)?;
+    let source = load::text(file)?;
+    let play = |asked: &Asked, table: &ActionTable, scenario: &Scenario| {
+        let (ads, _) = asked.selected_for(scenario)?;
+        record(table, scenario, &ads, &source)
+    };
+    let recording = play(&Asked::default(), &table, &scenario)?;
+    let compared = compared.map(|asked| play(asked, &table, &scenario)).transpose()?;
+    let is_shrunk = file.parent().is_some_and(|folder| folder.ends_with("shrunk"));
+    let shrunk_from = is_shrunk.then(|| scenario.name.clone());
+    let names: Vec<_> =
+        file.components().rev().take(2).map(|part| part.as_os_str().to_string_lossy()).collect();
+    let file = names.iter().rev().map(|name| name.as_ref()).collect::<Vec<&str>>().join("/");
+    Ok(Scene { file, recording, compared, shrunk_from })
+}
+
+fn title(paths: &[PathBuf]) -> String {
+    match paths {
+        [path] => path.display().to_string(),
+        paths => plural(paths.len(), "scenario"),
+    }
+}
+
+fn default_path(paths: &[PathBuf]) -> PathBuf {
+    match paths {
+        [path] if path.is_dir() => path.join(NAME),
+        [path] => PathBuf::from(path.file_stem().unwrap_or_default()).with_extension("html"),
+        _ => PathBuf::from(NAME),
+    }
+}

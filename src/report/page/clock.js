@@ -1,0 +1,61 @@
+// The clock of a replay: one time for all views and plots.
+
+export const RATES = [0.1, 0.25, 0.5, 1, 2, 4, 8];
+
+export class Clock {
+  /** `changed` is called with each new time. */
+  constructor(endS, tickS, changed) {
+    this.endS = endS;
+    this.tickS = tickS;
+    this.changed = changed;
+    this.timeS = 0;
+    this.rate = 1;
+    this.playing = false;
+  }
+
+  seek(timeS) {
+    this.timeS = Math.min(Math.max(timeS, 0), this.endS);
+    this.changed(this.timeS);
+  }
+
+  /** Goes some ticks on or back, onto a tick. */
+  ticks(count) {
+    this.pause();
+    const now = Math.round(this.timeS / this.tickS + (count > 0 ? -1e-6 : 1e-6));
+    this.seek((now + count) * this.tickS);
+  }
+
+  play() {
+    if (this.playing) return;
+    if (this.timeS >= this.endS - 1e-6) this.timeS = 0;
+    this.playing = true;
+    let before = performance.now();
+    const frame = (now) => {
+      if (!this.playing) return;
+      const next = this.timeS + ((now - before) / 1000) * this.rate;
+      before = now;
+      if (next >= this.endS) this.pause();
+      this.seek(next);
+      if (this.playing) requestAnimationFrame(frame);
+    };
+    requestAnimationFrame(frame);
+    this.changed(this.timeS);
+  }
+
+  pause() {
+    this.playing = false;
+    this.changed(this.timeS);
+  }
+
+  toggle() {
+    if (this.playing) this.pause();
+    else this.play();
+  }
+
+  /** The next slower or faster rate. */
+  faster(by) {
+    const at = RATES.indexOf(this.rate) + by;
+    this.rate = RATES[Math.min(Math.max(at, 0), RATES.length - 1)];
+    this.changed(this.timeS);
+  }
+}

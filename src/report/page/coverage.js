@@ -1,0 +1,41 @@
+// Rows of the action table on the roads: what was legal, chosen and carried out, and why a row never was.
+import { el } from "./dom.js";
+
+/** The table, and what its signs mean. */
+export function coverage(overview) {
+  const cells = overview.coverage ?? [];
+  if (cells.length === 0) return null;
+  const roads = [...new Set(cells.map((cell) => cell.road))];
+  const known = new Map(cells.map((cell) => [`${cell.row} ${cell.road}`, cell]));
+  const count = Math.max(overview.rows?.length ?? 0, ...cells.map((cell) => cell.row + 1));
+  const rows = Array.from({ length: count }, (_, row) =>
+    el("tr", {}, el("th", { scope: "row" }, `${row} · ${overview.rows?.[row] ?? ""}`), roads.map((road) => box(known.get(`${row} ${road}`)))),
+  );
+  return el(
+    "section",
+    { "aria-labelledby": "h-coverage" },
+    el("h2", { id: "h-coverage" }, "Rows on roads"),
+    el("p", { class: "legend" }, "● carried out so often · ◐ legal, and never chosen · ○ never legal, with what refused it most often · – not offered"),
+    el(
+      "div",
+      { class: "scroll", tabindex: "0", role: "region", "aria-label": "Rows on roads" },
+      el(
+        "table",
+        { class: "coverage" },
+        el("caption", {}, "Steps in which each row of the action table was carried out, of those in which it was legal."),
+        el("thead", {}, el("tr", {}, el("th", { scope: "col" }, "Row"), roads.map((road) => el("th", { scope: "col" }, road)))),
+        el("tbody", {}, rows),
+      ),
+    ),
+  );
+}
+
+function box(cell) {
+  if (!cell) return el("td", {}, "–");
+  const { legal, refused, chosen, realised, why } = cell;
+  const steps = legal + refused;
+  if (realised > 0) return el("td", { class: "done", style: `--share:${Math.round((100 * realised) / Math.max(1, legal))}%` }, `● ${realised} of ${legal}`);
+  if (chosen > 0) return el("td", { class: "some" }, `◐ chosen ${chosen}, never carried out`);
+  if (legal > 0) return el("td", { class: "some" }, `◐ ${legal} of ${steps}`);
+  return el("td", { class: "never" }, "○ never", el("span", { class: "why" }, why ?? ""));
+}

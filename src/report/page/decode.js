@@ -1,0 +1,68 @@
+// Data of the page: packed columns become arrays of numbers. `columns.rs` writes what is read here.
+
+/** Bytes of a base64 text. */
+function bytesOf(text) {
+  const raw = atob(text);
+  const bytes = new Uint8Array(raw.length);
+  for (let i = 0; i < raw.length; i += 1) bytes[i] = raw.charCodeAt(i);
+  return bytes;
+}
+
+/** A zlib stream, inflated by the browser. */
+async function inflated(bytes) {
+  const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"));
+  return new Uint8Array(await new Response(stream).arrayBuffer());
+}
+
+/** Reads `count` variable-length integers from a place on; gives them and the place after. */
+function integers(bytes, from, count) {
+  const values = new Float64Array(count);
+  let at = from;
+  for (let i = 0; i < count; i += 1) {
+    let value = 0;
+    let factor = 1;
+    let byte = 0;
+    do {
+      byte = bytes[at];
+      at += 1;
+      value += (byte & 0x7f) * factor;
+      factor *= 128;
+    } while (byte >= 0x80);
+    values[i] = value % 2 === 1 ? -(value + 1) / 2 : value / 2;
+  }
+  return [values, at];
+}
+
+/** Undoes the differences of a column, and gives its values in their unit. */
+function restored(values, order, step) {
+  for (let round = 0; round < order; round += 1) {
+    let sum = 0;
+    for (let i = 0; i < values.length; i += 1) {
+      sum += values[i];
+      values[i] = sum;
+    }
+  }
+  // A step is a decimal such as 0.01: dividing by 100 is exact where multiplying is not.
+  const parts = Math.round(1 / step);
+  return step < 1 ? values.map((value) => value / parts) : values;
+}
+
+/** The header and the columns of an element's data. */
+export async function unpacked(id) {
+  const element = document.getElementById(id);
+  const bytes = await inflated(bytesOf(element.textContent.trim()));
+  const length = new DataView(bytes.buffer).getUint32(0, true);
+  const { columns: layouts, header } = JSON.parse(new TextDecoder().decode(bytes.subarray(4, 4 + length)));
+  let at = 4 + length;
+  const columns = layouts.map(([step, order, count]) => {
+    const [values, next] = integers(bytes, at, count);
+    at = next;
+    return restored(values, order, step);
+  });
+  return { header, columns };
+}
+
+/** What the page was made with: everything but what is packed. */
+export function index() {
+  return JSON.parse(document.getElementById("index").textContent);
+}

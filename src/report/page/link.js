@@ -1,0 +1,35 @@
+// The link is the state: what is open, which moment, which layers and filters. So a link shows another what one sees.
+
+/** The parts of the link after `#`, as an object of texts. */
+export function linked() {
+  return Object.fromEntries(new URLSearchParams(location.hash.replace(/^#/, "")));
+}
+
+/** Changes parts of the link; `null` takes a part away. With `step`, the way back leads here. */
+export function relink(changes, step = false) {
+  const parts = { ...linked(), ...changes };
+  const kept = Object.entries(parts).filter(([, value]) => value !== null && value !== undefined && value !== "");
+  const hash = linkOf(Object.fromEntries(kept));
+  if (hash === location.hash) return;
+  if (step) location.hash = hash;
+  else history.replaceState(null, "", hash || "#");
+}
+
+/** A link with these parts. */
+export function linkOf(parts) {
+  const text = new URLSearchParams(parts).toString().replaceAll("%2C", ",");
+  return `#${text}`;
+}
+
+/** Copies the whole link. Where the browser forbids that, it is shown to be copied by hand. */
+export async function copyLink(button) {
+  const text = location.href;
+  const before = button.textContent;
+  try {
+    await navigator.clipboard.writeText(text);
+    button.textContent = "Copied";
+  } catch {
+    window.prompt("Link to this moment", text);
+  }
+  setTimeout(() => (button.textContent = before), 1500);
+}

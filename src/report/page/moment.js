@@ -1,0 +1,168 @@
+// A scenario as it was at any time: places between ticks, who was there, what was believed and planned.
+import { unpacked } from "./decode.js";
+
+const recordings = new Map();
+
+/** The recording of an element, read once. */
+export function recording(id) {
+  if (!recordings.has(id)) recordings.set(id, unpacked(id).then((data) => new Recording(data)));
+  return recordings.get(id);
+}
+
+export class Recording {
+  constructor({ header, columns }) {
+    this.header = header;
+    this.columns = columns;
+    this.tickS = 0.02;
+    this.lookS = 0.1;
+    this.thoughtS = 0.2;
+    this.ticks = columns[header.ego.speed].length - 1;
+    this.endS = this.ticks * this.tickS;
+    for (const track of header.tracks) track.offsets = this.#offsets(columns[track.counts]);
+    this.planOffsets = this.#offsets(columns[header.plans.counts]);
+  }
+
+  #offsets(counts) {
+    const offsets = [0];
+    for (const count of counts) offsets.push(offsets[offsets.length - 1] + count);
+    return offsets;
+  }
+
+  /** A column's value at a place between two of its values. */
+  between(column, at) {
+    const values = this.columns[column];
+    const low = Math.min(Math.max(Math.floor(at), 0), values.length - 1);
+    const high = Math.min(low + 1, values.length - 1);
+    return values[low] + (values[high] - values[low]) * Math.min(Math.max(at - low, 0), 1);
+  }
+
+  /** A pose from its three columns. */
+  pose([x, y, heading], at) {
+    return { x: this.between(x, at), y: this.between(y, at), heading: this.between(heading, at) };
+  }
+
+  tickAt(timeS) {
+    return Math.min(Math.max(timeS / this.tickS, 0), this.ticks);
+  }
+
+  ego(timeS) {
+    const { ego, drawn } = this.header;
+    const at = this.tickAt(timeS);
+    return {
+      ...this.pose(ego.places, at),
+      length: drawn[0],
+      width: drawn[1],
+      speed: this.between(ego.speed, at),
+      acceleration: this.between(ego.acceleration, at),
+      steer: this.between(ego.steer, at),
+      throttle: this.between(ego.throttle, at),
+      brake: this.between(ego.brake, at),
+      proc: this.between(ego.proc, at),
+    };
+  }
+
+  /** Everybody else who is there. */
+  obstacles(timeS) {
+    const found = [];
+    for (const one of this.header.obstacles) {
+      const at = this.tickAt(timeS) - one.from;
+      const last = this.columns[one.speed].length - 1;
+      // Between the last tick of one and the end of the episode it has left.
+      if (at < 0 || at > last) continue;
+      found.push({ ...one, ...this.pose(one.places, at), speed: this.between(one.speed, at), braking: this.#brakes(one, at) });
+    }
+    return found;
+  }
+
+  /** Whether a vehicle slows down by more than 1 m/s² over 0.3 s: nothing else tells of its brake lights. */
+  #brakes(one, at) {
+    const before = this.between(one.speed, at - 15);
+    return at >= 15 && one.like !== "Pedestrian" && (before - this.between(one.speed, at)) / 0.3 > 1;
+  }
+
+  /** What the driving system believes to be there, as of its last look. */
+  tracks(timeS) {
+    const look = Math.floor(timeS / this.lookS + 1e-6);
+    const found = [];
+    for (const track of this.header.tracks) {
+      const at = look - track.from;
+      if (at < 0 || at >= this.columns[track.speed].length) continue;
+      const [x, y] = track.places.map((column) => this.columns[column][at]);
+      const thought = Math.floor(look / 2) - Math.ceil(track.from / 2);
+      found.push({
+        ...track,
+        x,
+        y,
+        heading: this.columns[track.places[2]][at],
+        speed: this.columns[track.speed][at],
+        way: this.#points(track.predicted, track.offsets, thought).map((point) => ({ x: x + point.x, y: y + point.y })),
+      });
+    }
+    return found;
+  }
+
+  plan(timeS) {
+    const { x, y } = this.header.plans;
+    return this.#points([x, y], this.planOffsets, Math.floor(timeS / this.thoughtS + 1e-6));
+  }
+
+  #points([x, y], offsets, number) {
+    if (number < 0 || number + 1 >= offsets.length) return [];
+    const points = [];
+    for (let i = offsets[number]; i < offsets[number + 1]; i += 1) {
+      points.push({ x: this.columns[x][i], y: this.columns[y][i] });
+    }
+    return points;
+  }
+
+  /** Where a reference driver is; `null` before it takes over and after its end. */
+  driver(way, timeS) {
+    if (way.from_s === null || way.from_s === undefined) return null;
+    const at = (timeS - way.from_s) / way.every_s;
+    const last = this.columns[way.speed].length - 1;
+    if (at < 0 || at > last) return null;
+    return { ...this.pose(way.places, at), speed: this.between(way.speed, at), length: this.header.drawn[0], width: this.header.drawn[1] };
+  }
+
+  /** All places of a reference driver. */
+  wayOf(way) {
+    const [x, y] = way.places.map((column) => this.columns[column]);
+    return Array.from(x, (value, i) => ({ x: value, y: y[i] }));
+  }
+
+  /** The latest entry of a list of `[from, …]` at a time or tick. */
+  latest(list, at) {
+    let found = null;
+    for (const entry of list) {
+      if (entry[0] > at + 1e-6) break;
+      found = entry;
+    }
+    return found;
+  }
+
+  held(timeS) {
+    // At a tick, what is said at its beginning drives to the next one.
+    return this.latest(this.header.held, timeS)?.[1] ?? "";
+  }
+
+  sky(timeS) {
+    return this.latest(this.header.skies, this.tickAt(timeS))?.[1] ?? "";
+  }
+
+  signal(number, timeS) {
+    return this.latest(this.header.signals[number] ?? [], this.tickAt(timeS))?.[1] ?? null;
+  }
+
+  /** Number of the step at a time. */
+  step(timeS) {
+    const { steps } = this.header;
+    let found = 0;
+    for (let i = 0; i < steps.length; i += 1) if (steps[i].at_s <= timeS + 1e-6) found = i;
+    return found;
+  }
+
+  collision() {
+    const { collisions } = this.header;
+    return collisions.find((one) => one.counted) ?? collisions[0] ?? null;
+  }
+}

@@ -1,0 +1,54 @@
+// The film strip: five stills up to the collision, to see at a glance and to point at.
+import { el, refill } from "./dom.js";
+import { View } from "./view.js";
+import { figure } from "./words.js";
+
+const STILL_LAYERS = new Set(["truth", "signals"]);
+
+/** The five moments of a scenario: four seconds up to the collision, or evenly through it. */
+export function stillTimes(recording) {
+  const collision = recording.collision();
+  if (!collision) return [0, 0.25, 0.5, 0.75, 1].map((share) => share * recording.endS);
+  const at = collision.at_s;
+  return [-4, -2.5, -1.5, -0.5, 0].map((before) => Math.max(0, at + before));
+}
+
+/** Fills an element with the stills; `seek` opens a moment, `peek` shows one while somebody points at it. */
+export function drawStrip(place, recording, road, seek, peek) {
+  const times = stillTimes(recording);
+  const views = [];
+  const stills = times.map((timeS, i) => {
+    const canvas = el("canvas", { "aria-hidden": "true" });
+    const isLast = i === times.length - 1 && recording.collision();
+    const caption = `${figure(timeS, "s", 1)}${isLast ? " · contact" : ""}`;
+    const view = new View(canvas, recording, road, STILL_LAYERS);
+    views.push([view, timeS]);
+    return el(
+      "button",
+      {
+        type: "button",
+        class: "still",
+        onclick: () => seek(timeS),
+        onpointerenter: (event) => event.pointerType === "mouse" && peek(timeS),
+        onpointerleave: (event) => event.pointerType === "mouse" && peek(null),
+        "aria-label": `Go to ${caption}`,
+      },
+      canvas,
+      el("span", {}, caption),
+    );
+  });
+  refill(place, stills);
+  return () => {
+    for (const [view, timeS] of views) {
+      const ego = recording.ego(timeS);
+      const collision = recording.collision();
+      const partner = collision && recording.obstacles(timeS).find((body) => body.id === collision.obstacle);
+      const reach = partner ? Math.hypot(partner.x - ego.x, partner.y - ego.y) : 20;
+      const half = Math.min(Math.max(reach * 0.75, 11), 40);
+      view.zoomed = (view.canvas.element.clientWidth || 200) / (2 * half);
+      view.shift = partner && reach < 55 ? { x: (partner.x - ego.x) / 2, y: (partner.y - ego.y) / 2 } : { x: 0, y: 0 };
+      view.repaint();
+      view.draw(timeS);
+    }
+  };
+}

@@ -1,0 +1,88 @@
+//! What a run or a training did, in more detail than its totals: rows on roads, and the episodes of a training.
+
+use crate::run::database::Database;
+use crate::run::sealed::DatabaseError;
+
+/// What became of a row on a road.
+#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
+pub struct CoverageCell {
+    pub road: String,
+    pub row: i64,
+    /// Steps in which it was legal, refused, chosen and carried out.
+    pub legal: i64,
+    pub refused: i64,
+    pub chosen: i64,
+    pub realised: i64,
+    /// What refused it most often.
+    pub why: Option<String>,
+}
+
+/// An episode of a training.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct LearningPoint {
+    pub episode: i64,
+    pub reward: f64,
+    pub counted: i64,
+    pub exploration: f64,
+    pub loss: Option<f64>,
+}
+
+impl Database {
+    /// Every row on every road on which it was offered or chosen, by road and row.
+    ///
+    /// # Errors
+    /// If the file cannot be read.
+    pub fn coverage(&self) -> Result<Vec<CoverageCell>, DatabaseError> {
+        // The bare column of an aggregate query with `max` is that of the row that has the maximum.
+        let mut statement = self.connection.prepare(
+            "WITH offered AS (
+               SELECT road, action_row, reason, sum(offer.steps) AS times FROM offer JOIN episode USING (episode)
+               GROUP BY road, action_row, reason),
+             refused AS (
+               SELECT road, action_row, sum(times) AS times, max(times), text AS why
+               FROM offered JOIN reason USING (reason) GROUP BY road, action_row),
+             legal AS (SELECT road, action_row, times FROM offered WHERE reason = 0),
+             chosen AS (
+               SELECT road, action_row, count(*) AS times, count(action) AS done FROM step JOIN episode USING (episode)
+               WHERE action_row IS NOT NULL GROUP BY road, action_row),
+             cell AS (
+               SELECT road, action_row FROM offered UNION SELECT road, action_row FROM chosen)
+             SELECT road, action_row, coalesce(legal.times, 0), coalesce(refused.times, 0), coalesce(chosen.times, 0),
+                    coalesce(done, 0), why
+             FROM cell LEFT JOIN legal USING (road, action_row) LEFT JOIN refused USING (road, action_row)
+                  LEFT JOIN chosen USING (road, action_row)
+             ORDER BY road, action_row",
+        )?;
+        let cells = statement.query_map([], |row| {
+            Ok(CoverageCell {
+                road: row.get(0)?,
+                row: row.get(1)?,
+                legal: row.get(2)?,
+                refused: row.get(3)?,
+                chosen: row.get(4)?,
+                realised: row.get(5)?,
+                why: row.get(6)?,
+            })
+        })?;
+        Ok(cells.collect::<Result<_, _>>()?)
+    }
+
+    /// The episodes of a training; none for a run.
+    ///
+    /// # Errors
+    /// If the file cannot be read.
+    pub fn learning(&self) -> Result<Vec<LearningPoint>, DatabaseError> {
+        let query = "SELECT episode, return, counted, epsilon, loss FROM learning ORDER BY episode";
+        let mut statement = self.connection.prepare(query)?;
+        let points = statement.query_map([], |row| {
+            Ok(LearningPoint {
+                episode: row.get(0)?,
+                reward: row.get(1)?,
+                counted: row.get(2)?,
+                exploration: row.get(3)?,
+                loss: row.get(4)?,
+            })
+        })?;
+        Ok(points.collect::<Result<_, _>>()?)
+    }
+}

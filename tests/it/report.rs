@@ -1,0 +1,162 @@
+//! The page that `avastra report` writes: it holds everything, asks for nothing, and says what the world did.
+
+use std::path::Path;
+
+use avastra::action::ActionTable;
+use avastra::ads::Selected;
+use avastra::geometry::wrap_angle;
+use avastra::model::Scenario;
+use avastra::report::{Page, Recording, Scene, record};
+use avastra::run::{Stage, recorded};
+use base64::Engine;
+use serde_json::Value;
+
+use crate::cases::root;
+use crate::world::read;
+
+/// A pedestrian walks in front of a driving system that yields to nobody. Its seed, and so what is driven, is fixed.
+const SOURCE: &str = r#"language 1
+use "avastra45.ava"
+
+/// A pedestrian, and an SUV that comes the other way; <b>&amp; marks</b> stay text.
+scenario walk {
+  origin {
+    seed: 9236459692659895448
+    ads: "modular"
+    profile: "{planning: {never_yields: true}}"
+  }
+  road: corner
+  start { time: Morning, sky: None, signal_phase: 92.328125 s, traffic_seed: 9236459692659895448 }
+  steps {
+    0: pedestrian(from: Left) with { mode: Far, speed: 0.921875 m/s, distance: 40 m }
+    1: drive_opposite(mode: Near, then: Keep) with {
+      vehicle: SUV
+      colour: Skyblue
+      speed: 10.734375 m/s
+      distance: 17.3671875 m
+    }
+    2: clear_sky()
+  }
+}
+"#;
+
+/// The scenario, with its table and driving system.
+fn walk() -> (ActionTable, Scenario, Selected) {
+    let path = root().join("scenarios/walk.ava");
+    let with_it = |path: &Path| if path.ends_with("walk.ava") { Ok(SOURCE.to_owned()) } else { read(path) };
+    let loaded = avastra::check::load(&path, &with_it).expect("it is there");
+    let scenario = loaded.scenario.expect("it has a scenario");
+    let ads = recorded(&scenario).expect("its driving system exists");
+    (ActionTable::new(loaded.space.expect("its space is sound")), scenario, ads)
+}
+
+fn page_of(recording: Recording) -> String {
+    let scene = Scene { file: "walk.ava".to_owned(), recording, compared: None, shrunk_from: None };
+    let title = "runs/<walk> & {{script}}".to_owned();
+    Page { title, overview: Value::Null, remarks: Vec::new(), scenes: vec![scene], compared_with: None }
+        .html()
+}
+
+/// Header and columns of an element, read independently of the code that wrote them.
+fn unpacked(html: &str, id: &str) -> (Value, Vec<Vec<f64>>) {
+    let begin = format!("<script type=\"text/plain\" id=\"{id}\">");
+    let text = html.split(&begin).nth(1).and_then(|rest| rest.split("</script>").next()).expect(id);
+    let deflated = base64::engine::general_purpose::STANDARD.decode(text).expect("it is base64");
+    let bytes = miniz_oxide::inflate::decompress_to_vec_zlib(&deflated).expect("it is a zlib stream");
+    let (length, rest) = bytes.split_at(4);
+    let (header, mut rest) = rest.split_at(u32::from_le_bytes(length.try_into().unwrap()) as usize);
+    let whole: Value = serde_json::from_slice(header).expect("the header is JSON");
+    let mut next = || {
+        let (mut value, mut shift) = (0u64, 0);
+        loop {
+            let (byte, after) = rest.split_first().expect("all values are there");
+            rest = after;
+            value |= u64::from(byte & 0x7f) << shift;
+            shift += 7;
+            if byte & 0x80 == 0 {
+                return (value >> 1) as i64 ^ -((value & 1) as i64);
+            }
+        }
+    };
+    let mut column = |layout: &Value| {
+        let (step, count) = (layout[0].as_f64().unwrap(), layout[2].as_u64().unwrap());
+        let mut values: Vec<i64> = (0..count).map(|_| next()).collect();
+        for _ in 0..layout[1].as_u64().unwrap() {
+            let mut sum = 0;
+            values.iter_mut().for_each(|value| {
+                sum += *value;
+                *value = sum;
+            });
+        }
+        values.iter().map(|value| *value as f64 * step).collect()
+    };
+    let columns = whole["columns"].as_array().unwrap().iter().map(&mut column).collect();
+    assert!(rest.is_empty(), "nothing is left over");
+    (whole["header"].clone(), columns)
+}
+
+#[test]
+fn a_page_says_what_the_world_did() {
+    let (table, scenario, ads) = walk();
+    let html = page_of(record(&table, &scenario, &ads, SOURCE).expect("it plays"));
+    let (header, columns) = unpacked(&html, "s0");
+    let column = |number: &Value| &columns[number.as_u64().unwrap() as usize];
+    let near = |found: f64, truth: f64, half_step: f64| (found - truth).abs() <= half_step + 1e-9;
+    let (mut ticks, mut others) = (0, 0);
+    let stage = Stage::new(&table, &scenario).expect("it is of this engine");
+    let log = stage.play(&ads, &mut |world, _, _| {
+        let tick = world.ticks() as usize;
+        ticks += 1;
+        let ego = &header["ego"];
+        let pose = world.ego_outline().pose;
+        assert!(near(column(&ego["places"][0])[tick], pose.position.x, 0.005), "x at tick {tick}");
+        assert!(near(column(&ego["places"][1])[tick], pose.position.y, 0.005), "y at tick {tick}");
+        assert!(near(wrap_angle(column(&ego["places"][2])[tick] - pose.heading_rad), 0.0, 0.0005));
+        assert!(near(column(&ego["speed"])[tick], world.ego().speed_mps, 0.005));
+        for obstacle in world.obstacles() {
+            let users = header["obstacles"].as_array().unwrap();
+            let user = users.iter().find(|user| user["id"] == obstacle.id).expect("everybody is there");
+            let at = tick - user["from"].as_u64().unwrap() as usize;
+            let position = obstacle.outline.pose.position;
+            assert!(near(column(&user["places"][0])[at], position.x, 0.005), "{} at {tick}", obstacle.id);
+            assert!(near(column(&user["places"][1])[at], position.y, 0.005), "{} at {tick}", obstacle.id);
+            others += 1;
+        }
+    });
+    assert_eq!(column(&header["ego"]["speed"]).len(), ticks);
+    assert!(others > 0, "somebody else was there");
+    let collisions = header["collisions"].as_array().unwrap();
+    assert_eq!(collisions.len(), log.collisions.len());
+    for (told, was) in collisions.iter().zip(&log.collisions) {
+        assert_eq!(told["at_s"], was.contact.time_s);
+        assert_eq!(told["ways"].as_array().unwrap().len(), 4, "four reference drivers");
+    }
+    let held: Vec<&str> =
+        header["held"].as_array().unwrap().iter().filter_map(|held| held[1].as_str()).collect();
+    assert_eq!(held, log.held.iter().map(|held| held.text()).collect::<Vec<_>>());
+    assert_eq!(header["source"], SOURCE);
+    let (ground, lines) = unpacked(&html, "g0");
+    let lane = |index: &Value| lines[index.as_u64().unwrap() as usize].len();
+    assert!(ground["lanes"].as_array().unwrap().iter().all(|shape| lane(&shape["left"][0]) >= 2));
+}
+
+#[test]
+fn a_page_holds_everything_and_repeats_itself() {
+    let (table, scenario, ads) = walk();
+    let page = || page_of(record(&table, &scenario, &ads, SOURCE).expect("it plays"));
+    let html = page();
+    assert_eq!(html, page(), "the same scenario gives the same bytes");
+    for wish in ["http://", "https://", " src=", "<link", "@import", "url(", "fetch(", "import(", "Worker("] {
+        // A namespace is a name, and no address to go to.
+        let text = html.replace("http://www.w3.org/2000/svg", "");
+        assert!(!text.contains(wish), "{wish}");
+    }
+    assert!(html.contains("default-src 'none'"), "the browser is told to ask for nothing");
+    assert!(html.contains("<title>runs/&lt;walk&gt; &amp; {{script}} · avastra</title>"));
+    assert!(!html.contains("\nimport ") && !html.contains("\nexport "), "modules are joined");
+    assert_eq!(html.matches("<script").count(), html.matches("</script>").count());
+    let index = html.split("id=\"index\">").nth(1).and_then(|rest| rest.split("</script>").next()).unwrap();
+    let index: Value = serde_json::from_str(index).expect("the index is JSON");
+    assert_eq!(index["scenarios"][0]["summary"]["name"], "walk");
+    assert!(html.len() < 150_000, "{} bytes for one short scenario", html.len());
+}
