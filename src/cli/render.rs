@@ -1,15 +1,14 @@
 //! `avastra render`: moments of an emitted scenario as a picture.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::path::{Path, PathBuf};
 
 use crate::action::ActionTable;
 use crate::ads::Selected;
-use crate::geometry::Vec2;
 use crate::model::{Claim, Scenario};
-use crate::report::{Snapshot, picture};
+use crate::report::{Snapshot, Subject, picture};
 use crate::run::Stage;
-use crate::sim::DT_S;
+use crate::sim::{Contact, DT_S, World};
 
 use super::arguments::RenderArguments;
 use super::error::Failure;
@@ -19,8 +18,8 @@ use super::output::Output;
 
 /// A contact is marked this long after it happened, s.
 const CONTACT_SHOWN_S: f64 = 1.0;
-/// Moments of a strip: this many, one second apart, the last at the first collision.
-const STRIP_LEN: u32 = 7;
+/// The moments of a strip, s before the first collision.
+const STRIP_S: [f64; 5] = [4.0, 2.5, 1.5, 0.5, 0.0];
 /// Without a collision: this far apart, the first at the last action, s.
 const ACTION_STRIDE_S: f64 = 2.0;
 
@@ -32,7 +31,7 @@ pub fn render(output: &Output, arguments: &RenderArguments) -> Result<(), Failur
     let asked =
         load::asked(arguments.ads.as_deref(), arguments.ads_config.as_deref(), arguments.ads_cmd.as_deref())?;
     let (ads, _) = asked.selected_for(scenario)?;
-    let (moments, names) = moments(&table, scenario, &ads, &times_s)?;
+    let (moments, subject) = moments(&table, scenario, &ads, &times_s)?;
     // A strip ends with its scenario.
     if moments.is_empty() || (!arguments.strip && moments.len() < times_s.len()) {
         return Err(Failure::usage(format!(
@@ -41,7 +40,7 @@ pub fn render(output: &Output, arguments: &RenderArguments) -> Result<(), Failur
             times_s[moments.len()]
         )));
     }
-    let svg = picture(&moments, &names);
+    let svg = picture(&moments, &subject);
     let path = arguments.output.clone().unwrap_or_else(|| {
         let stem = arguments.file.file_stem().unwrap_or_default().to_string_lossy();
         PathBuf::from(format!("{stem}.svg"))
@@ -82,37 +81,72 @@ fn times(arguments: &RenderArguments, scenario: &Scenario, step_s: f64) -> Resul
         })?;
         // The action is carried out between two ticks and is seen one tick later.
         let begin_s = acted.number as f64 * step_s + DT_S;
-        return Ok((0..STRIP_LEN).map(|n| begin_s + ACTION_STRIDE_S * f64::from(n)).collect());
+        return Ok((0..STRIP_S.len()).map(|n| begin_s + ACTION_STRIDE_S * n as f64).collect());
     };
-    let back = |n: u32| (first_s - f64::from(STRIP_LEN - 1 - n)).max(0.0);
-    Ok((0..STRIP_LEN).map(back).collect())
+    Ok(STRIP_S.iter().map(|before_s| (first_s - before_s).max(0.0)).collect())
 }
 
-/// The world at the first tick at or after each time, as far as the episode lasts; and what the author calls road users,
-/// by number, where the engine has no name for them.
+/// The world at the first tick at or after each time, as far as the episode lasts; and what the picture is about.
 fn moments(
     table: &ActionTable,
     scenario: &Scenario,
     ads: &Selected,
     times_s: &[f64],
-) -> Result<(Vec<Snapshot>, BTreeMap<u32, String>), Failure> {
+) -> Result<(Vec<Snapshot>, Subject), Failure> {
     let mut moments: Vec<Snapshot> = Vec::new();
-    let mut last_contact: Option<(f64, Vec2)> = None;
+    let mut last_contact: Option<Contact> = None;
+    let mut brakes = BrakeLights::default();
     let stage = Stage::new(table, scenario)?;
     let log = stage.play(ads, &mut |world, ads, contacts| {
-        if let Some(contact) = contacts.last() {
-            last_contact = Some((contact.time_s, contact.point));
-        }
+        last_contact = contacts.last().copied().or(last_contact);
+        brakes.note(world);
         // Half a tick of slack: times are decimals, ticks are multiples of 20 ms.
         while times_s.get(moments.len()).is_some_and(|&time_s| world.time_s() + DT_S / 2.0 >= time_s) {
-            let fresh = last_contact.filter(|(time_s, _)| world.time_s() - time_s <= CONTACT_SHOWN_S);
             moments.push(Snapshot {
                 world: world.clone(),
                 status: ads.status().clone(),
-                contact: fresh.map(|(_, point)| point),
+                contact: last_contact.filter(|contact| world.time_s() - contact.time_s <= CONTACT_SHOWN_S),
+                braking: brakes.lit(),
             });
         }
     });
     let name = |(id, own): (u32, usize)| (id, table.space().bodies[own].name.clone());
-    Ok((moments, log.own_bodies().into_iter().map(name).collect()))
+    let names = log.own_bodies().into_iter().map(name).collect();
+    let hit = log.collisions.first().map(|first| (first.contact.obstacle, first.contact.time_s));
+    let title = match scenario.docs.first() {
+        Some(doc) => format!("{}: {}", scenario.name, doc.trim()),
+        None => scenario.name.clone(),
+    };
+    Ok((moments, Subject { title, hit, names }))
+}
+
+/// Who brakes: whose speed fell by more than 1 m/s² over the last 0.3 s. Other vehicles have no lights of their own.
+#[derive(Default)]
+struct BrakeLights {
+    /// Speeds of the last ticks, m/s.
+    speeds_mps: BTreeMap<u32, VecDeque<f64>>,
+}
+
+impl BrakeLights {
+    const TICKS: usize = 15;
+    const DECEL_MPS2: f64 = 1.0;
+
+    fn note(&mut self, world: &World) {
+        for obstacle in world.obstacles() {
+            let speeds_mps = self.speeds_mps.entry(obstacle.id).or_default();
+            if speeds_mps.len() > Self::TICKS {
+                speeds_mps.pop_front();
+            }
+            speeds_mps.push_back(obstacle.velocity_mps.norm());
+        }
+    }
+
+    fn lit(&self) -> BTreeSet<u32> {
+        let slows = |speeds_mps: &VecDeque<f64>| {
+            let lost_mps =
+                speeds_mps.front().zip(speeds_mps.back()).map_or(0.0, |(first, last)| first - last);
+            speeds_mps.len() > Self::TICKS && lost_mps > Self::DECEL_MPS2 * Self::TICKS as f64 * DT_S
+        };
+        self.speeds_mps.iter().filter(|(_, speeds_mps)| slows(speeds_mps)).map(|(id, _)| *id).collect()
+    }
 }

@@ -70,6 +70,24 @@ pub fn lane_outline(lane: &Lane) -> Vec<Vec2> {
     outline
 }
 
+/// A line without the points that lie on it anyway, to 2 cm.
+pub fn thinned(points: &[Vec2]) -> Vec<Vec2> {
+    const OFF_M: f64 = 0.02;
+    let mut kept: Vec<Vec2> = Vec::new();
+    for (index, &point) in points.iter().enumerate() {
+        let is_needless = |before: &Vec2| {
+            let Some(after) = points.get(index + 1) else { return false };
+            let (way, aside) = (after - before, point - before);
+            // What turns back is needed, however near it passes.
+            way.perp(&aside).abs() <= OFF_M * way.norm() && way.dot(&aside) > 0.0 && aside.norm() < way.norm()
+        };
+        if !kept.last().is_some_and(is_needless) {
+            kept.push(point);
+        }
+    }
+    kept
+}
+
 /// A line across a lane, from left to right.
 pub fn across(lane: &Lane, station_m: f64) -> [Vec2; 2] {
     let half_m = lane.width_at(station_m) / 2.0;

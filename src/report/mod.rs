@@ -4,6 +4,7 @@
 mod canvas;
 mod columns;
 mod ground;
+mod labels;
 mod overview;
 mod page;
 mod picture;
@@ -14,7 +15,7 @@ mod trials;
 
 pub use overview::{of_run, of_study};
 pub use page::{Page, Scene};
-pub use picture::{Snapshot, picture};
+pub use picture::{Snapshot, Subject, picture};
 pub use recording::{Recording, record};
 pub use road::draw;
 pub use study::study;

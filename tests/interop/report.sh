@@ -15,7 +15,7 @@ binary=${AVASTRA:-$root/target/release/avastra}
 
 if [ ! -d "$work/node_modules/axe-core" ]; then
   [ -f "$work/package.json" ] || echo '{"private": true}' > "$work/package.json"
-  (cd "$work" && npm install --no-audit --no-fund --silent puppeteer-core axe-core eslint@9 @eslint/js@9 globals)
+  (cd "$work" && npm install --no-audit --no-fund --silent puppeteer-core axe-core eslint @eslint/js globals)
 fi
 
 # The linter reads each module, and all of them joined, where a name may stand once.

@@ -142,7 +142,7 @@ pub struct RenderArguments {
     /// Moments to draw, in s since the start; several make a strip.
     #[arg(long, value_delimiter = ',', value_name = "T", allow_negative_numbers = true)]
     pub at: Vec<f64>,
-    /// A strip of the six seconds up to the first collision.
+    /// A strip of five moments, the last at the first collision.
     #[arg(long, conflicts_with = "at")]
     pub strip: bool,
     /// Where to write [default: STEM.svg here; `-` is stdout].

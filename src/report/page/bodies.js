@@ -90,17 +90,21 @@ export class Labels {
   }
 
   /** Keeps a body free of names. */
-  keep(point, radius) {
-    const { x, y } = this.canvas.at(point);
-    this.taken.push({ left: x - radius, right: x + radius, top: y - radius, bottom: y + radius });
+  keep(body, radius) {
+    // A long body is three boxes: at its ends and in its middle.
+    const half = body.length && body.like !== "Pedestrian" ? body.length / 2 : 0;
+    for (const ahead of half > 0 ? [-half, 0, half] : [0]) {
+      const { x, y } = this.canvas.at(half > 0 ? beside(body, ahead, 0) : body);
+      this.taken.push({ left: x - radius, right: x + radius, top: y - radius, bottom: y + radius });
+    }
   }
 
   write(point, text, away, colour) {
     const { context, colours } = this.canvas;
     const { x, y } = this.canvas.at(point);
     const width = context.measureText(text).width + 8;
-    const room = away + 6;
-    const places = [[room, -room], [room, room], [-room - width, -room], [-room - width, room], [-width / 2, -room - 12], [-width / 2, room + 12]];
+    const around = (room) => [[room, -room], [room, room], [-room - width, -room], [-room - width, room], [-width / 2, -room - 12], [-width / 2, room + 12]];
+    const places = [1, 1.8, 2.8, 4].flatMap((far) => around((away + 6) * far));
     const boxes = places.map(([dx, dy]) => ({ left: x + dx, right: x + dx + width, top: y + dy - 9, bottom: y + dy + 9 }));
     const isFree = (box) =>
       box.left >= 0 && box.top >= 0 && box.right <= this.canvas.width && box.bottom <= this.canvas.height &&

@@ -12,8 +12,8 @@ export function bars(title, counts, linkFor) {
   return el("section", { class: "bars" }, el("h3", {}, title), rows.length === 0 ? el("p", { class: "muted" }, "None.") : el("ul", {}, rows));
 }
 
-const WIDE = 640;
-const HIGH = 200;
+const WIDE = 460;
+const HIGH = 180;
 const PAD = { left: 48, right: 12, top: 12, bottom: 26 };
 
 /** A figure with axes; `inside` draws with the two scales. */
@@ -50,8 +50,8 @@ export function curve(title, values, axis, window) {
     const part = values.slice(from, i + 1);
     return part.reduce((sum, value) => sum + value, 0) / part.length;
   });
-  return framed(`${title}; line: mean of the last ${window}`, [0, Math.max(1, values.length - 1)], extent, axis, (x, y) => [
-    values.map((value, i) => svg("circle", { cx: x(i).toFixed(1), cy: y(value).toFixed(1), r: 1.3, class: "dot" })),
+  return framed(window > 1 ? `${title}; line: mean of the last ${window}` : title, [0, Math.max(1, values.length - 1)], extent, axis, (x, y) => [
+    values.map((value, i) => svg("circle", { cx: x(i).toFixed(1), cy: y(value).toFixed(1), r: 1.8, class: "dot" })),
     svg("polyline", { points: mean.map((value, i) => `${x(i).toFixed(1)},${y(value).toFixed(1)}`).join(" "), class: "curve" }),
   ]);
 }
@@ -63,7 +63,7 @@ export function intervals(title, estimates) {
   const most = Math.max(...known.map(([, value, , high]) => (high ?? value) || 0), 1e-9) * 1.05;
   const rowPx = 24;
   const high = known.length * rowPx + 30;
-  const left = 150;
+  const left = 112;
   const x = (value) => left + (Math.min(value, most) / most) * (WIDE - left - 70);
   const rows = known.map(([name, value, low, top], i) => {
     const y = 14 + i * rowPx;

@@ -18,7 +18,7 @@ export function coverage(overview) {
     el("p", { class: "legend" }, "● carried out so often · ◐ legal, and never chosen · ○ never legal, with what refused it most often · – not offered"),
     el(
       "div",
-      { class: "scroll", tabindex: "0", role: "region", "aria-label": "Rows on roads" },
+      { class: "scroll", tabindex: "0", role: "region", "aria-label": "Table of rows on roads" },
       el(
         "table",
         { class: "coverage" },

@@ -21,13 +21,13 @@ function integers(bytes, from, count) {
   for (let i = 0; i < count; i += 1) {
     let value = 0;
     let factor = 1;
-    let byte = 0;
-    do {
-      byte = bytes[at];
-      at += 1;
-      value += (byte & 0x7f) * factor;
+    while (bytes[at] >= 0x80) {
+      value += (bytes[at] & 0x7f) * factor;
       factor *= 128;
-    } while (byte >= 0x80);
+      at += 1;
+    }
+    value += bytes[at] * factor;
+    at += 1;
     values[i] = value % 2 === 1 ? -(value + 1) / 2 : value / 2;
   }
   return [values, at];

@@ -31,19 +31,20 @@ function isShown(child) {
 
 /** A table with a caption; a cell is a text, a number or an element. The first of a row is its heading. */
 export function table(caption, heads, rows, attributes = {}) {
+  const isNumeric = (value) => typeof value === "number" || /^[-\d.,]+( [\w/%]+)?$/.test(String(value?.textContent ?? value));
   const cell = (value, at) => {
-    const numeric = typeof value === "number" || /^[-\d.,]+( [\w/%]+)?$/.test(String(value?.textContent ?? value));
+    const numeric = isNumeric(value);
     const shown = typeof value === "number" ? value.toLocaleString("en") : (value ?? "–");
     return at === 0 ? el("th", { scope: "row" }, shown) : el("td", { class: numeric ? "number" : null }, shown);
   };
   return el(
     "div",
-    { class: "scroll", tabindex: "0", role: "region", "aria-label": caption },
+    { class: "scroll", tabindex: "0", role: "region", "aria-label": `Table: ${caption}` },
     el(
       "table",
       attributes,
       el("caption", {}, caption),
-      el("thead", {}, el("tr", {}, heads.map((head) => el("th", { scope: "col" }, head)))),
+      el("thead", {}, el("tr", {}, heads.map((head, at) => el("th", { scope: "col", class: at > 0 && isNumeric(rows[0]?.[at]) ? "number" : null }, head)))),
       el("tbody", {}, rows.map((row) => (row instanceof Element ? row : el("tr", {}, row.map(cell))))),
     ),
   );

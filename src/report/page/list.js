@@ -87,7 +87,7 @@ function listing(list) {
       "table",
       { id: "list" },
       el("caption", {}, "Scenarios, worst first: those that count, then by the larger change of velocity of the two."),
-      el("thead", {}, el("tr", {}, heads.map((head) => el("th", { scope: "col" }, head)))),
+      el("thead", {}, el("tr", {}, heads.map((head, i) => el("th", { scope: "col", class: [5, 6, 10].includes(i) ? "number" : null }, head)))),
       el("tbody", {}, rows),
     ),
   );

@@ -61,7 +61,7 @@ function learning(points) {
       curve("Return of an episode", points.map((point) => point.reward), "episode", window),
       curve("Counted collisions of an episode", points.map((point) => point.counted), "episode", window),
       curve("Loss", points.map((point) => point.loss).filter((loss) => loss !== null), "update", window),
-      curve("Exploration", points.map((point) => point.exploration), "episode", 1),
+      points.some((point) => point.exploration > 0) && curve("Exploration", points.map((point) => point.exploration), "episode", 1),
     ),
   );
 }

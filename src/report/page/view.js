@@ -141,6 +141,12 @@ export class View {
     }
     labels.write(ego, `ego ${kmh(ego.speed)}`, size(ego), canvas.colours.ego);
     const hit = new Set(this.recording.header.collisions.map((collision) => collision.obstacle));
+    if (this.layers.has("drivers")) {
+      for (const way of this.recording.collision()?.ways ?? []) {
+        const place = this.recording.driver(way, this.timeS);
+        if (place) labels.write(place, `${way.name} ${kmh(place.speed)}`, size(place), canvas.colours.driver);
+      }
+    }
     const sorted = [...others].sort((a, b) => Number(hit.has(b.id)) - Number(hit.has(a.id)));
     for (const body of sorted) {
       const at = canvas.at(body);

@@ -9,7 +9,7 @@ import { Plots } from "./plots.js";
 import { showSource } from "./source.js";
 import { drawStrip } from "./strip.js";
 import { LAYERS, LAYERS_AT_FIRST, View } from "./view.js";
-import { figure, mainCollision } from "./words.js";
+import { DRIVERS, figure, mainCollision } from "./words.js";
 
 let open = null;
 
@@ -36,12 +36,15 @@ export async function showWatch(place, data, entry) {
 /** What is shown beside: the other driving system's drive (`c`), or another scenario. */
 async function other(data, entry, wanted) {
   if (wanted === "c" && entry.compared) {
-    return { recording: await recording(`c${entry.n}`), road: await ground(entry.ground), name: data.compared_with };
+    return { recording: await recording(`c${entry.n}`), road: await ground(entry.ground), name: `the same scenario with ${driverName(data)}` };
   }
   const found = /^\d+$/.test(wanted ?? "") ? data.scenarios[Number(wanted)] : null;
   if (!found) return null;
   return { recording: await recording(`s${found.n}`), road: await ground(found.ground), name: found.file };
 }
+
+/** The driving system that all scenarios are compared with, in words. */
+const driverName = (data) => DRIVERS[data.compared_with] ?? data.compared_with;
 
 class Watch {
   constructor(place, data, entry, { first, road, second }) {
@@ -170,7 +173,7 @@ class Watch {
   #comparison() {
     const { data, entry } = this;
     const options = [el("option", { value: "" }, "nothing")];
-    if (entry.compared) options.push(el("option", { value: "c" }, `the drive of ${data.compared_with}`));
+    if (entry.compared) options.push(el("option", { value: "c" }, `the drive of ${driverName(data)}`));
     for (const one of data.scenarios) if (one.n !== entry.n) options.push(el("option", { value: one.n }, one.file));
     if (options.length === 1) return null;
     const select = el("select", { id: "with", onchange: (event) => relink({ with: event.target.value, t: this.clock.timeS.toFixed(2) }, true) }, options);
@@ -266,7 +269,7 @@ export function showKeys() {
   let dialog = document.getElementById("help");
   if (!dialog) {
     const close = el("button", { type: "button", onclick: () => dialog.close() }, "Close");
-    const list = el("dl", { class: "keys" }, keys.map(([key, text]) => [el("dt", {}, el("kbd", {}, key)), el("dd", {}, text)]));
+    const list = el("dl", { class: "keys" }, keys.map(([name, text]) => [el("dt", {}, el("kbd", {}, name)), el("dd", {}, text)]));
     dialog = el("dialog", { id: "help", "aria-labelledby": "h-help" }, el("h2", { id: "h-help" }, "Keys"), list, el("p", {}, "Drag moves the view; ctrl with the wheel, or two fingers, zoom."), close);
     document.body.append(dialog);
   }
