@@ -161,9 +161,9 @@ fn obstacle(found: &[Realised]) -> Option<&'static str> {
         }
         () if has(Realised::Unknown) => "may run or not: its rules could not be solved",
         () if has(Realised::Elsewhere) => {
-            "runs in states of which it is not known whether an episode comes to them"
+            "runs in states, or at times, of which it is not known whether a step begins so"
         }
-        () if has(Realised::Unreached) => "runs only in states to which no episode comes",
+        () if has(Realised::Unreached) => "runs only in states, or at times, with which no step begins",
         () => "cannot run",
     })
 }

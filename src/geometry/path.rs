@@ -210,6 +210,15 @@ impl Path {
         self.blocks.iter().fold(self.blocks[0], |bounds, block| bounds.with(block))
     }
 
+    /// The segments, in order, of those runs whose box meets the box: none that meets it is left out.
+    pub fn segments_near<'a>(&'a self, near: &'a Bounds) -> impl Iterator<Item = &'a [PathPoint]> {
+        let blocks = self.blocks.iter().enumerate().filter(|(_, block)| block.meets(near));
+        blocks.flat_map(|(block, _)| {
+            let last = ((block + 1) * BLOCK).min(self.points.len() - 1);
+            self.points[block * BLOCK..=last].windows(2)
+        })
+    }
+
     /// The box around the part between two stations.
     pub fn bounds_between(&self, from_m: f64, to_m: f64) -> Bounds {
         let inner = &self.points[self.vertex_after(from_m)..=self.vertex_after(to_m)];

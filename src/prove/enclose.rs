@@ -6,7 +6,7 @@
 use crate::model::expr::{Arithmetic, Comparison, Expr, ExprKind};
 use crate::model::vocabulary::Fact;
 use crate::model::{
-    EGO_ACCELERATION_MPS2_MAX, FnDef, Interval, JUNCTION_AHEAD_M_MAX, RoadFacts, SPEED_MPS_MAX, Value,
+    EGO_ACCELERATION_MPS2_MAX, FnDef, Interval, JUNCTION_AHEAD_M_MAX, RoadFacts, SPEED_MPS_MAX, Type, Value,
 };
 use crate::prove::moment::Case;
 use crate::units::Rational;
@@ -123,7 +123,7 @@ pub(crate) fn enclose(expr: &Expr, known: &Known<'_>) -> Values {
         ExprKind::Arithmetic(op, left, right) => {
             Values::Number(arithmetic(*op, &values(left).interval(), &values(right).interval()))
         }
-        ExprKind::Compare(op, left, right) => compare(*op, values(left), values(right)),
+        ExprKind::Compare(op, left, right) => compare_parts(*op, left, right, known),
         ExprKind::And(left, right) => and(values(left), values(right)),
         ExprKind::Or(left, right) => or(values(left), values(right)),
         ExprKind::Implies(left, right) => {
@@ -131,15 +131,11 @@ pub(crate) fn enclose(expr: &Expr, known: &Known<'_>) -> Values {
             or(Values::Truth { may_hold: left.may_fail(), may_fail: left.may_hold() }, values(right))
         }
         ExprKind::InRange(inner, low, high) => {
-            let inner = values(inner);
-            and(
-                compare(Comparison::GreaterEqual, inner, values(low)),
-                compare(Comparison::LessEqual, inner, values(high)),
-            )
+            let compared = |op, end: &Expr| compare_parts(op, inner, end, known);
+            and(compared(Comparison::GreaterEqual, low), compared(Comparison::LessEqual, high))
         }
         ExprKind::InList(inner, list) => {
-            let inner = values(inner);
-            let equals = list.iter().map(|item| compare(Comparison::Equal, inner, values(item)));
+            let equals = list.iter().map(|item| compare_parts(Comparison::Equal, inner, item, known));
             equals.reduce(or).unwrap_or(Values::truth(false))
         }
         ExprKind::InLanes(inner, lanes) => match known.road {
@@ -229,6 +225,103 @@ fn arithmetic(op: Arithmetic, left: &Interval, right: &Interval) -> Interval {
     }
 }
 
+/// Compares two expressions. What both name has one value: `step > step` never holds, whatever the step is, and
+/// `ego.speed > ego.speed + nearest.gap` neither.
+fn compare_parts(op: Comparison, left: &Expr, right: &Expr, known: &Known<'_>) -> Values {
+    let apart = compare(op, enclose(left, known), enclose(right, known));
+    if !(apart.may_hold() && apart.may_fail()) {
+        return apart;
+    }
+    let zero = Interval::point(Rational::ZERO);
+    match difference(left, right, known) {
+        // Nearly equal numbers are `==`, so only those that are the same are surely so.
+        Some(found) if found == zero || !matches!(op, Comparison::Equal | Comparison::NotEqual) => {
+            compare(op, Values::Number(found), Values::Number(zero))
+        }
+        _ => apart,
+    }
+}
+
+/// What the left side is more than the right one; `None` if they name nothing alike, or where one may have no value.
+fn difference(left: &Expr, right: &Expr, known: &Known<'_>) -> Option<Interval> {
+    if is_same(left, right) {
+        return Some(Interval::point(Rational::ZERO));
+    }
+    let mut sum = Sum { terms: Vec::new(), constant: Rational::ZERO, are_shared: false };
+    sum.add(left, Rational::ONE, known)?;
+    sum.add(right, Rational::integer(-1), known)?;
+    let of_term =
+        |(term, factor): &(&Expr, Rational)| enclose(term, known).interval().mul(&Interval::point(*factor));
+    let constant = Interval::point(sum.constant);
+    sum.are_shared.then(|| sum.terms.iter().map(of_term).fold(constant, |sum, term| sum.add(&term)))
+}
+
+/// A sum of parts of expressions, each with its factor.
+struct Sum<'a> {
+    terms: Vec<(&'a Expr, Rational)>,
+    constant: Rational,
+    /// Whether something was added that was there already.
+    are_shared: bool,
+}
+
+impl<'a> Sum<'a> {
+    /// Adds an expression times a factor; `None` if it is no number, or may have no value.
+    fn add(&mut self, expr: &'a Expr, factor: Rational, known: &Known<'_>) -> Option<()> {
+        let fixed = |expr: &Expr| enclose(expr, known).interval().single();
+        match &expr.kind {
+            ExprKind::Number(number) => {
+                self.constant = self.constant.checked_add(number.checked_mul(factor)?)?;
+            }
+            ExprKind::Negate(inner) => self.add(inner, factor.checked_neg()?, known)?,
+            ExprKind::Arithmetic(op, left, right) => match op {
+                Arithmetic::Add => {
+                    self.add(left, factor, known)?;
+                    self.add(right, factor, known)?;
+                }
+                Arithmetic::Subtract => {
+                    self.add(left, factor, known)?;
+                    self.add(right, factor.checked_neg()?, known)?;
+                }
+                Arithmetic::Multiply => match (fixed(left), fixed(right)) {
+                    (_, Some(by)) => self.add(left, factor.checked_mul(by)?, known)?,
+                    (Some(by), _) => self.add(right, factor.checked_mul(by)?, known)?,
+                    (None, None) if may_lack_a_value(expr) => return None,
+                    (None, None) => self.terms.push((expr, factor)),
+                },
+                Arithmetic::Divide => self.add(left, factor.checked_div(fixed(right)?)?, known)?,
+            },
+            _ if !matches!(expr.ty, Type::Int | Type::Quantity(_)) || may_lack_a_value(expr) => return None,
+            _ => match self.terms.iter_mut().find(|(term, _)| is_same(term, expr)) {
+                Some((_, sum)) => {
+                    *sum = sum.checked_add(factor)?;
+                    self.are_shared = true;
+                }
+                None => self.terms.push((expr, factor)),
+            },
+        }
+        Some(())
+    }
+}
+
+/// Whether two expressions are the same name.
+fn is_same(left: &Expr, right: &Expr) -> bool {
+    match (&left.kind, &right.kind) {
+        (ExprKind::CellAt(a, left), ExprKind::CellAt(b, right)) => a == b && is_same(left, right),
+        (ExprKind::Local(_) | ExprKind::Cell(_) | ExprKind::Fact(_) | ExprKind::Variant(..), right) => {
+            left.kind == *right
+        }
+        _ => false,
+    }
+}
+
+/// A quotient by 0 has no value, nor has a fact about a road user that is not there.
+fn may_lack_a_value(expr: &Expr) -> bool {
+    expr.any(|kind| {
+        let divides = matches!(kind, ExprKind::Arithmetic(Arithmetic::Divide, ..));
+        divides || matches!(kind, ExprKind::Call(..) | ExprKind::OfRoadUser(..))
+    })
+}
+
 fn compare(op: Comparison, left: Values, right: Values) -> Values {
     // `(may hold, may fail)` of equality, of less, and of less or equal.
     let (less, at_most, equal) = match (left, right) {
@@ -261,4 +354,57 @@ fn compare(op: Comparison, left: Values, right: Values) -> Values {
         Comparison::GreaterEqual => (less.1, less.0),
     };
     Values::Truth { may_hold, may_fail }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::{Facts, Memory, evaluate};
+    use crate::syntax::ast::{FileId, Span};
+    use proptest::prelude::*;
+
+    fn number(kind: ExprKind) -> Expr {
+        Expr { kind, ty: Type::Int, span: Span::new(FileId(0), 0, 0) }
+    }
+
+    /// `a * x + b * y - (c * x - d)`, with `x` and `y` as parameters.
+    fn sum([a, b, c, d]: [i64; 4]) -> Expr {
+        let literal = |value| number(ExprKind::Number(Rational::integer(value)));
+        let of = |op, left, right| number(ExprKind::Arithmetic(op, Box::new(left), Box::new(right)));
+        let times = |factor, local| of(Arithmetic::Multiply, literal(factor), number(ExprKind::Local(local)));
+        let inner = of(Arithmetic::Subtract, times(c, 0), literal(d));
+        of(Arithmetic::Subtract, of(Arithmetic::Add, times(a, 0), times(b, 1)), inner)
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(400))]
+
+        /// What two sums share is cancelled: the verdict holds for every value, and where nothing else is left it is sharp.
+        #[test]
+        fn sums_that_share_terms_are_compared(
+            left in prop::array::uniform4(-3..4_i64), right in prop::array::uniform4(-3..4_i64),
+            low in prop::array::uniform2(-5..5_i64), wide in prop::array::uniform2(0..4_i64), at in prop::array::uniform2(0..4_i64),
+            op in 0..6_usize,
+        ) {
+            use Comparison::{Equal, Greater, GreaterEqual, Less, LessEqual, NotEqual};
+            let op = [Equal, NotEqual, Less, LessEqual, Greater, GreaterEqual][op];
+            let (l, r) = (sum(left), sum(right));
+            let compared = Expr {
+                ty: Type::Bool,
+                ..number(ExprKind::Compare(op, Box::new(l), Box::new(r)))
+            };
+            let interval = |of: usize| {
+                Values::Number(Interval::closed(Rational::integer(low[of]), Rational::integer(low[of] + wide[of])))
+            };
+            let known = Known { functions: &[], locals: &[interval(0), interval(1)], cells: &[], road: None, case: None };
+            let found = enclose(&compared, &known);
+            let values = [0, 1].map(|of| Value::Number((low[of] + at[of].min(wide[of])) as f64));
+            let holds = evaluate(&compared, &[], &Facts::new(&values, &Memory::default())).truth();
+            let is_allowed = if holds { found.may_hold() } else { found.may_fail() };
+            prop_assert!(is_allowed);
+            let shares_all = left[0] - left[2] == right[0] - right[2] && left[1] == right[1];
+            let is_sharp = !(found.may_hold() && found.may_fail());
+            prop_assert!(is_sharp || !shares_all || matches!(op, Equal | NotEqual));
+        }
+    }
 }

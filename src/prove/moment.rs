@@ -6,6 +6,8 @@
 //! a newcomer in [`newcomers`]; otherwise facts are taken to be independent, so a combination that is possible here may
 //! still never come.
 
+use core::ops::RangeInclusive;
+
 use crate::model::expr::{Comparison, Expr, ExprKind};
 use crate::model::rules::RowRules;
 use crate::model::vocabulary::{Fact, Known as From, RoadKind, Verb, Word, WordFact};
@@ -28,9 +30,17 @@ pub(crate) struct Case {
 }
 
 impl Case {
-    /// A moment of which the time alone is known.
-    pub fn of_time(elapsed: Interval, step: Interval) -> Case {
-        Case { numbers: vec![(Fact::Elapsed, elapsed), (Fact::StepNumber, step)], words: Vec::new() }
+    /// A moment of which the steps alone are known: one of their beginnings, or, of whole steps, any moment within them.
+    pub fn of_steps(episode: &EpisodeDef, steps: RangeInclusive<u64>, are_whole: bool) -> Case {
+        let at = |step: u64| Rational::from_f64(episode.time_s(step));
+        let (first, last) = (*steps.start(), *steps.end());
+        let elapsed = match (at(first), at(last + u64::from(are_whole))) {
+            (Some(from), Some(to)) => Interval::closed(from, to),
+            _ => Interval::NOT_NEGATIVE,
+        };
+        let number = |step: u64| Rational::integer(i64::try_from(step).unwrap_or(i64::MAX));
+        let steps = Interval::closed(number(first), number(last));
+        Case { numbers: vec![(Fact::Elapsed, elapsed), (Fact::StepNumber, steps)], words: Vec::new() }
     }
 
     pub fn number(&self, fact: Fact) -> Option<Interval> {
@@ -77,15 +87,19 @@ const NEAR_JUNCTION_M: i64 = 20;
 /// `nearest.gap` where there is nobody, m.
 const NO_ROAD_USER_M: i64 = 100;
 
-/// What is known of each newcomer of an action before it appears. The world lets nothing appear faster than it was asked
-/// to be. Where `lands` is set, it also appears at the distance that was asked for, as far as its verb means a place on
+/// What is known of each newcomer of an action before it appears, beside what is known of the moment; of an action
+/// without newcomers, that of the moment. The world lets nothing appear faster than it was asked to be. Where `lands` is set, it also appears at the distance that was asked for, as far as its verb means a place on
 /// the route: so it is where the road is straight and free.
 pub(super) fn newcomers(action: &ActionDef, known: &Known<'_>, lands: bool) -> Vec<Case> {
     let spawns = action.effects.iter().filter_map(|effect| match effect {
         EffectDef::Spawn(spawn) => Some(&**spawn),
         EffectDef::Set(_) => None,
     });
-    spawns.map(|spawn| newcomer(spawn, known, lands)).collect()
+    let newcomers: Vec<Case> = spawns.map(|spawn| newcomer(spawn, known, lands)).collect();
+    match newcomers.is_empty() {
+        true => vec![known.case.cloned().unwrap_or_default()],
+        false => newcomers,
+    }
 }
 
 fn newcomer(spawn: &SpawnDef, known: &Known<'_>, lands: bool) -> Case {
@@ -101,7 +115,7 @@ fn newcomer(spawn: &SpawnDef, known: &Known<'_>, lands: bool) -> Case {
                 .collect()
         }
     };
-    let mut numbers = Vec::new();
+    let Case { mut numbers, words } = known.case.cloned().unwrap_or_default();
     let asked = enclose(&spawn.speed, known).interval().intersect(&at_most(*SPAWN_SPEED_MPS.end()));
     // On foot one waits at first, or stands for good.
     let speed = match verbs.iter().all(|verb| matches!(verb, Verb::Walk | Verb::Stand)) {
@@ -116,7 +130,7 @@ fn newcomer(spawn: &SpawnDef, known: &Known<'_>, lands: bool) -> Case {
     if lands && verbs.iter().all(is_on_route) && !distance.is_empty() {
         numbers.extend([(Fact::NpcGap, distance), (Fact::SpawnGap, distance)]);
     }
-    Case { numbers, words: Vec::new() }
+    Case { numbers, words }
 }
 
 /// Whether the conditions may all hold at one moment of a draw, for each of these newcomers.
@@ -132,12 +146,7 @@ pub(super) fn may_hold_together(
     let asking: Vec<&Expr> = conditions.iter().copied().filter(|c| c.known() > From::Road).collect();
     let is_met = |case: &Case| may_all_hold(&asking, &Known { case: Some(case), ..*known });
     let meets = |newcomer: &Case| cases(&asking, known, episode, newcomer).iter().any(is_met);
-    may_all_hold(conditions, known)
-        && (asking.is_empty()
-            || match newcomers {
-                [] => meets(&Case::default()),
-                newcomers => newcomers.iter().all(meets),
-            })
+    may_all_hold(conditions, known) && (asking.is_empty() || newcomers.iter().all(meets))
 }
 
 /// Whether the condition can fail at no moment, given what is known.
@@ -167,7 +176,12 @@ pub(super) fn report(space: &Space) -> Vec<Diagnostic> {
                 return true;
             };
             let cells = space.cells_unknown();
-            !may_hold_together(&[condition], &rules.known(&locals, &cells), &space.episode, &[])
+            !may_hold_together(
+                &[condition],
+                &rules.known(&locals, &cells),
+                &space.episode,
+                &[Case::default()],
+            )
         };
         if bound.all(never) {
             let message = format!("rule `{}` lets no lane change begin", definition.name);

@@ -13,7 +13,7 @@ use crate::model::{
     Type, Value, code, evaluate, locals,
 };
 use crate::prove::enclose::{Known, Values, enclose};
-use crate::prove::moment::{may_hold_together, newcomers, ranges_named};
+use crate::prove::moment::{Case, may_hold_together, newcomers, ranges_named};
 use crate::syntax::{Diagnostic, listed};
 
 /// Rounds of narrowing: a bound may depend on another one, rarely on two.
@@ -137,11 +137,17 @@ impl<'a> RowRules<'a> {
 
     /// All values that the parameters may have under the rules in force; `None` if the rules leave none.
     pub fn settle(self) -> Option<Vec<Values>> {
-        self.narrow(declared(self.space, self.row), &self.space.cells_unknown())
+        self.narrow(declared(self.space, self.row), &self.space.cells_unknown(), None)
     }
 
-    /// As [`RowRules::settle`], begun with these values of the parameters and cells.
-    pub fn narrow(self, mut locals: Vec<Values>, before: &[Values]) -> Option<Vec<Values>> {
+    /// As [`RowRules::settle`], begun with these values of the parameters and cells, and with what is known of the
+    /// moment.
+    pub fn narrow(
+        self,
+        mut locals: Vec<Values>,
+        before: &[Values],
+        moment: Option<&Case>,
+    ) -> Option<Vec<Values>> {
         for _ in 0..ROUNDS {
             let was = locals.clone();
             let after = self.space.cells_after(self.row.action, &locals, before);
@@ -172,7 +178,7 @@ impl<'a> RowRules<'a> {
                 Values::Truth { .. } | Values::Number(_) => true,
             },
         });
-        let known = self.known(&locals, &after);
+        let known = Known { case: moment, ..self.known(&locals, &after) };
         let newcomers = newcomers(&self.space.actions[self.row.action], &known, false);
         let possible =
             may_move && may_hold_together(&self.conditions(), &known, &self.space.episode, &newcomers);

@@ -1,26 +1,32 @@
 //! Which rows run on which road, in the states to which an episode comes.
 //!
-//! A row is searched for in the states in which an episode begins, then in those to which rows lead from there, until
-//! every row has run once. What never ran there is searched for in other states.
+//! A row is searched for in the states in which an episode begins, then step by step in those to which rows and time lead
+//! from there, until every row has run once or the episode is over. What never ran there is searched for in other states
+//! and at other times.
 
+use std::collections::BTreeSet;
+
+use crate::model::expr::ExprKind;
 use crate::model::rules::RowRules;
-use crate::model::{Reach, Road, Row, RulesInForce, Space, StateDef};
+use crate::model::vocabulary::Fact;
+use crate::model::{Memory, Reach, Road, Row, RulesInForce, Space};
+use crate::prove::moment::Case;
 use crate::prove::witness::{Found, Left, Search};
 use crate::syntax::listed;
 
 /// The most boxes of ranges that the searches of all rows look at; most rows need one for each road.
 const BOXES_MAX: usize = 20_000;
-/// The most states that are followed from step to step on one road.
+/// The most states that are followed from step to step on one road, beside those to which time alone leads.
 const STATES_MAX: usize = 256;
 
 /// What is found of a row on a road.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Realised {
-    /// It runs in a state to which an episode comes.
+    /// It runs in a state in which a step of an episode may begin, at its time.
     Runs,
-    /// It runs, but not in a state to which an episode comes.
+    /// It runs, but not in a state in which a step begins, at its time.
     Unreached,
-    /// It runs, but in no state of which it was found out that an episode comes to it.
+    /// It runs, but in no state and at no time of which that was found out.
     Elsewhere,
     /// There are no values that obey its rules.
     Never,
@@ -67,16 +73,22 @@ fn dead(space: &Space, row: &Row, road: &Road, in_force: &RulesInForce, left: &L
     for rule in in_force.on_row(row) {
         let fewer = conflict.except(rule);
         let rules = RowRules { space, row, road: Some(&road.facts), in_force: &fewer };
-        let search = Search { rules, left };
+        let search = Search { rules, left, moment: None };
         if search.memories().0.iter().all(|memory| search.at(memory) == Found::Never) {
             conflict = fewer;
         }
     }
     let rules: Vec<usize> = conflict.on_row(row).collect();
     let names: Vec<&str> = rules.iter().map(|rule| space.rules[*rule].name.as_str()).collect();
+    let rules_on_row = RowRules { space, row, road: Some(&road.facts), in_force };
+    let search = Search { rules: rules_on_row, left, moment: None };
+    let place = match search.reads_any() {
+        true => " in states to which an episode comes in time",
+        false => "",
+    };
     let reason = match names.as_slice() {
         [] => "its own ranges and conditions leave no value".to_owned(),
-        names => format!("no values obey {} (road `{}`)", listed(names), road.name),
+        names => format!("no values obey {}{place} (road `{}`)", listed(names), road.name),
     };
     Reach::Dead { rules, reason }
 }
@@ -90,74 +102,68 @@ struct OnRoad<'a> {
 }
 
 impl<'a> OnRoad<'a> {
-    fn search(&self, row: &'a Row) -> Search<'a> {
+    /// A search for values of a row, at a moment of which that is known.
+    fn search<'s>(&'s self, row: &'s Row, moment: Option<&'s Case>) -> Search<'s> {
         let OnRoad { space, road, in_force, left } = *self;
-        Search { rules: RowRules { space, row, road: Some(&road.facts), in_force }, left }
+        Search { rules: RowRules { space, row, road: Some(&road.facts), in_force }, left, moment }
+    }
+
+    fn asked(&self, row: &'a Row) -> Asked<'a> {
+        let search = self.search(row, None);
+        Asked {
+            row,
+            about_states: search.reads_any(),
+            about_time: is_about_time(search.rules),
+            is_undecided: false,
+        }
+    }
+
+    /// Whether a row may run in some state at that moment.
+    fn is_in_time(&self, asked: &Asked<'_>, moment: &Case) -> bool {
+        !asked.about_time || self.search(asked.row, Some(moment)).may_run(&self.space.cells_unknown())
     }
 
     /// What is found of each row.
     fn rows(&self, index: usize) -> Vec<Realised> {
-        let rows = &self.space.rows;
-        let mut found: Vec<Realised> = rows
-            .iter()
-            .map(|row| match row.roads[index] {
-                Reach::Dead { .. } => Realised::Never,
-                Reach::Open(_) => Realised::NotSearched,
-            })
-            .collect();
-        let mut pending: Vec<&Row> =
-            rows.iter().filter(|row| found[row.index] == Realised::NotSearched).collect();
-        let (mut states, mut is_complete) = self.space.initial_memories(self.road, self.in_force, STATES_MAX);
-        let mut next = 0;
-        while next < states.len() && !pending.is_empty() && !self.left.is_spent() {
-            let state = states[next].clone();
-            next += 1;
-            pending.retain(|row| {
-                // A row that depends on no state was searched for already.
-                if next > 1 && !self.depends_on_states(row) || self.left.is_spent() {
-                    return true;
-                }
-                let runs = matches!(self.search(row).at(&state), Found::Runs(_));
+        let is_open = |row: &&Row| matches!(row.roads[index], Reach::Open(_));
+        let open: Vec<Asked<'_>> =
+            self.space.rows.iter().filter(is_open).map(|row| self.asked(row)).collect();
+        let sets = |asked: &&Asked<'_>| self.space.actions[asked.row.action].sets().next().is_some();
+        let movers: Vec<Asked<'_>> = open.iter().filter(sets).copied().collect();
+        let mut found = vec![Realised::Never; self.space.rows.len()];
+        let mut pending = open;
+        let mut way = Way::begin(self, &movers);
+        for step in 0..u64::from(self.space.episode.step_limit) {
+            let moment = Case::of_steps(&self.space.episode, step..=step, false);
+            pending.retain_mut(|asked| {
+                let runs = way.runs(self, asked, step, &moment);
                 if runs {
-                    found[row.index] = Realised::Runs;
+                    found[asked.row.index] = Realised::Runs;
                 }
                 !runs
             });
-            if !pending.iter().any(|row| self.depends_on_states(row)) {
+            if self.left.is_spent() || !pending.iter().any(|asked| asked.about_states || asked.about_time) {
                 break;
             }
-            let waited = self.space.memory_after_wait(&state, None, Some(&self.road.facts), self.in_force);
-            match states.len() < STATES_MAX {
-                _ if states.contains(&waited) => {}
-                true => states.push(waited),
-                false => is_complete = false,
-            }
-            for row in rows.iter().filter(|row| !matches!(row.roads[index], Reach::Dead { .. })) {
-                let (led_to, are_all) = self.search(row).successors(&state);
-                is_complete &= are_all;
-                for after in led_to {
-                    match states.len() < STATES_MAX {
-                        _ if states.contains(&after) => {}
-                        true => states.push(after),
-                        false => is_complete = false,
-                    }
-                }
+            let is_at_rest = !way.go_on(self, &movers, step, &moment);
+            if is_at_rest && !pending.iter().any(|asked| asked.about_time) {
+                break;
             }
         }
-        is_complete &= next == states.len();
-        for row in pending {
-            found[row.index] = self.elsewhere(row, is_complete);
+        for asked in pending {
+            found[asked.row.index] = self.elsewhere(&asked, way.is_complete);
         }
         found
     }
 
     /// What there is of a row that did not run in any state that was followed.
-    fn elsewhere(&self, row: &Row, is_complete: bool) -> Realised {
-        let search = self.search(row);
-        let (memories, are_all) = match self.depends_on_states(row) {
+    fn elsewhere(&self, asked: &Asked<'a>, is_way_complete: bool) -> Realised {
+        let search = self.search(asked.row, None);
+        let (memories, are_all) = match asked.about_states {
             true => search.memories(),
             false => (vec![self.space.initial_memory(0)], true),
         };
+        let is_complete = !asked.is_undecided && (is_way_complete || !asked.about_states);
         let mut is_proved = are_all || is_complete;
         for memory in &memories {
             if self.left.is_spent() {
@@ -171,15 +177,142 @@ impl<'a> OnRoad<'a> {
                 Found::Unknown => is_proved = false,
             }
         }
-        match is_proved {
-            true => Realised::Never,
-            false => Realised::Unknown,
+        match (is_proved, is_complete) {
+            (true, _) => Realised::Never,
+            (false, true) => Realised::Unreached,
+            (false, false) => Realised::Unknown,
         }
     }
+}
 
-    fn depends_on_states(&self, row: &Row) -> bool {
-        let search = self.search(row);
-        let cells = |state: &StateDef| (0..state.cells).any(|cell| search.reads(state, cell));
-        self.space.states.iter().any(cells)
+/// Whether a rule on a row asks for the time.
+pub(super) fn is_about_time(rules: RowRules<'_>) -> bool {
+    let is_time = |kind: &ExprKind| matches!(kind, ExprKind::Fact(Fact::Elapsed | Fact::StepNumber));
+    rules.conditions().iter().any(|condition| condition.any(is_time))
+}
+
+/// A row, and on what it depends whether it runs.
+#[derive(Clone, Copy)]
+struct Asked<'a> {
+    row: &'a Row,
+    about_states: bool,
+    about_time: bool,
+    /// Whether in some state and step neither values were found nor a proof that there are none.
+    is_undecided: bool,
+}
+
+/// The states to which episodes come, step by step.
+struct Way {
+    states: Vec<Met>,
+    /// The states in which the step may begin.
+    now: BTreeSet<usize>,
+    /// Whether no state was left out.
+    is_complete: bool,
+}
+
+/// A state that was met.
+struct Met {
+    memory: Memory,
+    since: u64,
+    /// Whether the first start comes here without an action. Such states are followed however many others there are.
+    is_waited_for: bool,
+    /// What rows make of it that ask for no time.
+    led_to: BTreeSet<usize>,
+    /// The rows, by position, that were not tried here, or that ask for the time.
+    open: Vec<usize>,
+}
+
+impl Way {
+    fn begin(on_road: &OnRoad<'_>, movers: &[Asked<'_>]) -> Way {
+        let (starts, are_all) = on_road.space.initial_memories(on_road.road, on_road.in_force, STATES_MAX);
+        let mut way = Way { states: Vec::new(), now: BTreeSet::new(), is_complete: are_all };
+        for (nth, start) in starts.into_iter().enumerate() {
+            let start = way.number(start, 0, nth == 0, movers);
+            way.now.extend(start);
+        }
+        way
+    }
+
+    /// The number of a state; `None` if there are too many.
+    fn number(
+        &mut self,
+        memory: Memory,
+        since: u64,
+        is_waited_for: bool,
+        movers: &[Asked<'_>],
+    ) -> Option<usize> {
+        if let Some(known) = self.states.iter().position(|known| known.memory == memory) {
+            self.states[known].is_waited_for |= is_waited_for;
+            return Some(known);
+        }
+        if self.states.len() >= STATES_MAX && !is_waited_for {
+            self.is_complete = false;
+            return None;
+        }
+        let open = (0..movers.len()).collect();
+        self.states.push(Met { memory, since, is_waited_for, led_to: BTreeSet::new(), open });
+        Some(self.states.len() - 1)
+    }
+
+    /// Whether a row runs in a state in which the step begins, as far as it was not asked before.
+    fn runs(&self, on_road: &OnRoad<'_>, asked: &mut Asked<'_>, step: u64, moment: &Case) -> bool {
+        if !on_road.is_in_time(asked, moment) {
+            return false;
+        }
+        let search = on_road.search(asked.row, asked.about_time.then_some(moment));
+        for (nth, state) in self.now.iter().map(|state| &self.states[*state]).enumerate() {
+            let is_due = match (asked.about_states, asked.about_time) {
+                (true, true) => true,
+                (true, false) => state.since == step,
+                (false, true) => nth == 0,
+                (false, false) => nth == 0 && step == 0,
+            };
+            if !is_due {
+                continue;
+            }
+            if on_road.left.is_spent() {
+                return false;
+            }
+            match search.at(&state.memory) {
+                Found::Runs(_) => return true,
+                Found::Never => {}
+                Found::Unknown => asked.is_undecided = true,
+            }
+        }
+        false
+    }
+
+    /// Goes on to the states in which the next step begins. Gives whether they are others, or may be later.
+    fn go_on(&mut self, on_road: &OnRoad<'_>, movers: &[Asked<'_>], step: u64, moment: &Case) -> bool {
+        let OnRoad { space, road, in_force, .. } = *on_road;
+        let in_time: Vec<bool> = movers.iter().map(|mover| on_road.is_in_time(mover, moment)).collect();
+        let now = core::mem::take(&mut self.now);
+        for state in &now {
+            let Met { memory, is_waited_for, .. } = &self.states[*state];
+            let (memory, is_waited_for) = (memory.clone(), *is_waited_for);
+            let waited = space.memory_after_wait(&memory, Some(step), Some(&road.facts), in_force);
+            let waited = self.number(waited, step + 1, is_waited_for, movers);
+            self.now.extend(waited);
+            for position in core::mem::take(&mut self.states[*state].open) {
+                let mover = &movers[position];
+                if mover.about_time {
+                    self.states[*state].open.push(position);
+                }
+                if !in_time[position] {
+                    continue;
+                }
+                let search = on_road.search(mover.row, mover.about_time.then_some(moment));
+                let (led_to, are_all) = search.successors(&memory);
+                self.is_complete &= are_all;
+                let led_to: Vec<usize> =
+                    led_to.into_iter().filter_map(|to| self.number(to, step + 1, false, movers)).collect();
+                match mover.about_time {
+                    true => self.now.extend(led_to),
+                    false => self.states[*state].led_to.extend(led_to),
+                }
+            }
+            self.now.extend(&self.states[*state].led_to);
+        }
+        self.now != now || now.iter().any(|state| !self.states[*state].open.is_empty())
     }
 }

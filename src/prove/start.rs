@@ -4,18 +4,38 @@ use crate::model::{Initial, NoStart, RulesInForce, Space, code};
 use crate::syntax::ast::Span;
 use crate::syntax::{Diagnostic, listed};
 
-/// One error for each rule that leaves no states to begin with on some roads; a road shows its first one alone.
+/// One error for each rule that leaves no states to begin with on some roads; a road shows its first one alone. One
+/// warning for each optional rule that leaves none beside those by default.
 pub(super) fn report(space: &Space) -> Vec<Diagnostic> {
-    let in_force = RulesInForce::by_default(space);
+    let by_default = RulesInForce::by_default(space);
+    let found = without_start(space, &by_default);
+    let mut diagnostics: Vec<Diagnostic> =
+        found.iter().map(|(no_start, roads)| error(space, no_start, roads)).collect();
+    let is_open = |rule: &usize| {
+        let rule = &space.rules[*rule];
+        found.is_empty() && rule.optional && rule.binds_start()
+    };
+    for rule in (0..space.rules.len()).filter(is_open) {
+        let Some((no_start, roads)) = without_start(space, &by_default.with(rule)).pop() else { continue };
+        let error = error(space, &no_start, &roads);
+        let message = format!("with optional rule `{}`: {}", space.rules[rule].name, error.message);
+        let warning = Diagnostic::warning(code::NO_START, message);
+        diagnostics.push(Diagnostic { labels: error.labels, help: error.help, ..warning });
+    }
+    diagnostics
+}
+
+/// The rules that leave no states to begin with, and the roads where that is so.
+fn without_start<'a>(space: &'a Space, in_force: &RulesInForce) -> Vec<(NoStart, Vec<&'a str>)> {
     let mut found: Vec<(NoStart, Vec<&str>)> = Vec::new();
     for road in &space.roads {
-        let Err(no_start) = space.memory_at_start(road, &in_force, 0) else { continue };
+        let Err(no_start) = space.memory_at_start(road, in_force, 0) else { continue };
         match found.iter_mut().find(|(known, _)| known.index == no_start.index) {
             Some((_, roads)) => roads.push(&road.name),
             None => found.push((no_start, vec![&road.name])),
         }
     }
-    found.iter().map(|(no_start, roads)| error(space, no_start, roads)).collect()
+    found
 }
 
 fn error(space: &Space, no_start: &NoStart, roads: &[&str]) -> Diagnostic {

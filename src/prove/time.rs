@@ -6,10 +6,13 @@
 //! ([`Values`]), so that too many may be followed, never too few: a rule may be refused that would hold, none is let
 //! pass that would not.
 
+use core::ops::RangeInclusive;
+
 use crate::model::expr::{Expr, ExprKind};
 use crate::model::rules::Demand;
 use crate::model::{
-    Initial, Interval, Reach, Road, Row, RuleBody, RulesInForce, STATE_MAX, SetDef, Space, Type, code,
+    Initial, Interval, Reach, Road, Row, RuleBody, RuleDef, RulesInForce, STATE_MAX, SetDef, Space, Type,
+    code,
 };
 use crate::prove::enclose::{Known, Values, enclose};
 use crate::prove::moment::Case;
@@ -32,28 +35,40 @@ pub struct BrokenByTime {
     pub rule: String,
     /// The index of the rule.
     index: usize,
-    /// The step that breaks it, its time, s, and the states before it in words; `None` where the states are too many
-    /// to be followed.
-    at: Option<(u64, f64, String)>,
+    how: How,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+enum How {
+    /// The step that breaks it, its time, s, and the states before it in words.
+    At(u64, f64, String),
+    /// There are too many states to be followed.
+    TooMany,
+    /// The states that were met until this step made too much work.
+    TooLong(u64),
 }
 
 impl BrokenByTime {
     fn words(&self) -> String {
-        match &self.at {
-            Some((step, time_s, states)) => {
+        match &self.how {
+            How::At(step, time_s, states) => {
                 format!(
                     "time breaks rule `{}` in a step without an action: at step {step} ({time_s} s), where {states}",
                     self.rule
                 )
             }
-            None => format!("whether rule `{}` lasts as time passes is not known", self.rule),
+            How::TooMany | How::TooLong(_) => {
+                format!("whether rule `{}` lasts as time passes is not known", self.rule)
+            }
         }
     }
 }
 
-/// One error for each rule that time breaks on some road.
+/// One error for each rule that time breaks on some road; one warning for each optional rule with which time breaks
+/// one, if it is in force beside those by default.
 pub(super) fn report(space: &Space) -> Vec<Diagnostic> {
     let mut found: Vec<BrokenByTime> = Vec::new();
+    let mut with_optional: Vec<(usize, BrokenByTime)> = Vec::new();
     for road in &space.roads {
         let mut in_force = RulesInForce::by_default(space);
         while let Err(broken) = lasts(space, road, &in_force) {
@@ -62,21 +77,38 @@ pub(super) fn report(space: &Space) -> Vec<Diagnostic> {
                 found.push(broken);
             }
         }
+        for rule in (0..space.rules.len()).filter(|rule| space.rules[*rule].optional) {
+            let is_open =
+                space.rules[rule].binds_start() && !with_optional.iter().any(|(known, _)| *known == rule);
+            let broken = if is_open { lasts(space, road, &in_force.with(rule)).err() } else { None };
+            with_optional.extend(broken.map(|broken| (rule, broken)));
+        }
     }
-    found.iter().map(|broken| error(space, broken)).collect()
+    let of_optional = with_optional.iter().map(|(rule, broken)| warning(space, &space.rules[*rule], broken));
+    found.iter().map(|broken| error(space, broken)).chain(of_optional).collect()
+}
+
+fn warning(space: &Space, optional: &RuleDef, broken: &BrokenByTime) -> Diagnostic {
+    let error = error(space, broken);
+    let message = format!("with optional rule `{}`: {}", optional.name, error.message);
+    let mut warning = Diagnostic::warning(code::BROKEN_BY_TIME, message);
+    if space.rules[broken.index].name != optional.name {
+        warning = warning.at(optional.span, "a run that asks for it is refused");
+    }
+    warning.labels.extend(error.labels);
+    Diagnostic { help: error.help, ..warning }
 }
 
 fn error(space: &Space, broken: &BrokenByTime) -> Diagnostic {
     let rule = &space.rules[broken.index];
-    let (message, label) = match &broken.at {
-        Some((step, time_s, states)) => (
+    let unknown = || format!("whether rule `{}` lasts as time passes is not known", rule.name);
+    let (message, label) = match &broken.how {
+        How::At(step, time_s, states) => (
             format!("time alone breaks rule `{}`", rule.name),
             format!("does not hold at step {step} ({time_s} s) where {states}, if that step has no action"),
         ),
-        None => (
-            format!("whether rule `{}` lasts as time passes is not known", rule.name),
-            "too many states to follow from step to step".to_owned(),
-        ),
+        How::TooMany => (unknown(), "too many states to follow from step to step".to_owned()),
+        How::TooLong(step) => (unknown(), format!("the states were followed to step {step} alone")),
     };
     let mut cells: Vec<String> = Vec::new();
     for cell in rule.start.iter().flat_map(|start| cells_read(space, start)) {
@@ -85,11 +117,19 @@ fn error(space: &Space, broken: &BrokenByTime) -> Diagnostic {
             cells.push(name);
         }
     }
-    let help = format!(
-        "let `each step {{ … }}` set {} in time, counting the steps in a state of its own; or bind the rule to actions \
-         by `on`, if it is about them alone",
-        listed(&cells)
-    );
+    let help = match &broken.how {
+        How::At(..) => format!(
+            "let `each step {{ … }}` set {} in time, counting the steps in a state of its own; or bind the rule to \
+             actions by `on`, if it is about them alone",
+            listed(&cells)
+        ),
+        How::TooMany | How::TooLong(_) => format!(
+            "let {} and what sets {} have fewer values, with counters that stop; or bind the rule to actions by `on`, \
+             if it is about them alone",
+            listed(&cells),
+            if cells.len() == 1 { "it" } else { "them" }
+        ),
+    };
     Diagnostic::error(code::BROKEN_BY_TIME, message).at(rule.span, label).help(help)
 }
 
@@ -102,16 +142,22 @@ pub(crate) fn lasts(space: &Space, road: &Road, in_force: &RulesInForce) -> Resu
     let Some(first) = timed.first() else { return Ok(()) };
     let mut states = States::new(space, road, in_force, &timed);
     let mut now = states.begin();
-    for step in 0..u64::from(space.episode.step_limit) {
+    let last = u64::from(space.episode.step_limit).saturating_sub(1);
+    for step in 0..=last {
         let mut next: Vec<usize> = Vec::new();
-        for state in now {
-            if let Err(rule) = states.go_on(state, step, &timed, &mut next) {
-                return Err(states.broken(rule, step, state));
+        for state in &now {
+            if let Err(rule) = states.go_on(*state, step..=step, &timed, &mut next) {
+                return Err(states.broken(rule, step, *state));
             }
         }
         if states.is_too_large() {
+            let how = if states.met.len() > STATES_MAX { How::TooMany } else { How::TooLong(step) };
             let (road, rule) = (road.name.clone(), space.rules[*first].name.clone());
-            return Err(BrokenByTime { road, rule, index: *first, at: None });
+            return Err(BrokenByTime { road, rule, index: *first, how });
+        }
+        next.sort_unstable();
+        if next == now && states.stay_within(&now, step..=last, &timed) {
+            break;
         }
         now = next;
     }
@@ -166,9 +212,10 @@ impl<'a> States<'a> {
                 cells[*cell] = Values::point(fixed.cells()[*cell]);
             }
         }
+        let at_first = Case::of_steps(&self.space.episode, 0..=0, false);
         let mut begun = Vec::new();
         for start in self.parts(&cells) {
-            if self.stands(&start, 0).0 {
+            if self.stands(&start, &at_first).0 {
                 let start = self.number(start);
                 note(&mut begun, start);
             }
@@ -176,11 +223,19 @@ impl<'a> States<'a> {
         begun
     }
 
-    /// Adds the states that come after one, in the step of that number; the first timed rule that may be broken there.
+    /// Whether all these steps lead from these states to these alone, and break no timed rule there: then no episode is
+    /// too long to be followed.
+    fn stay_within(&mut self, now: &[usize], steps: RangeInclusive<u64>, timed: &[usize]) -> bool {
+        let mut next = Vec::new();
+        let keeps = |state: &usize| self.go_on(*state, steps.clone(), timed, &mut next).is_ok();
+        now.iter().all(keeps) && next.iter().all(|state| now.contains(state)) && !self.is_too_large()
+    }
+
+    /// Adds the states that come after one, in any of these steps; the first timed rule that may be broken there.
     fn go_on(
         &mut self,
         state: usize,
-        step: u64,
+        steps: RangeInclusive<u64>,
         timed: &[usize],
         next: &mut Vec<usize>,
     ) -> Result<(), usize> {
@@ -191,25 +246,27 @@ impl<'a> States<'a> {
             Some(known) => known,
             None => (self.moves_of(state), self.waits_of(state)),
         };
+        let at_begin = Case::of_steps(&self.space.episode, steps.clone(), false);
+        // Where every step does something, actions happen when their step begins (AV0609).
+        let of_action = Case::of_steps(&self.space.episode, steps, self.space.each_step.is_empty());
         let mut broken = None;
         for wait in &waits {
             let (may_hold, may_fail) = match self.space.each_step.is_empty() {
                 // Nothing happens, so nothing is kept from happening.
                 true => (false, true),
-                false => self.stands_after(&self.met[state], &self.met[*wait], step),
+                false => self.stands_after(&self.met[state], &self.met[*wait], &at_begin),
             };
             if may_hold {
                 note(next, *wait);
             }
             if may_fail {
-                let case = self.case(step, false);
-                let fails = |rule: &&usize| self.condition(**rule, &self.met[state], &case).may_fail();
+                let fails = |rule: &&usize| self.condition(**rule, &self.met[state], &at_begin).may_fail();
                 broken = broken.or(timed.iter().find(fails).copied());
                 note(next, state);
             }
         }
         for Move { row, locals, to } in &moves {
-            if self.may_obey(*row, locals, state, *to, step) {
+            if self.may_obey(*row, locals, state, *to, &of_action) {
                 note(next, *to);
             }
         }
@@ -218,18 +275,17 @@ impl<'a> States<'a> {
         broken.map_or(Ok(()), Err)
     }
 
-    /// Whether all rules that stand for all states may hold in a step, and whether one may fail.
-    fn stands(&self, cells: &[Values], step: u64) -> (bool, bool) {
-        let case = self.case(step, false);
+    /// Whether all rules that stand for all states may hold at a moment, and whether one may fail.
+    fn stands(&self, cells: &[Values], case: &Case) -> (bool, bool) {
         let standing = self.in_force.all().filter(|rule| self.space.rules[*rule].start.is_some());
         standing
-            .map(|rule| self.condition(rule, cells, &case))
+            .map(|rule| self.condition(rule, cells, case))
             .fold((true, false), |(hold, fail), found| (hold && found.may_hold(), fail || found.may_fail()))
     }
 
     /// As [`States::stands`], with the moves that every step would make.
-    fn stands_after(&self, from: &[Values], to: &[Values], step: u64) -> (bool, bool) {
-        let mut found = self.stands(to, step);
+    fn stands_after(&self, from: &[Values], to: &[Values], case: &Case) -> (bool, bool) {
+        let mut found = self.stands(to, case);
         // What every step does does not happen either where a number would leave what a state may be.
         for cell in &self.followed {
             if let Values::Number(number) = to[*cell] {
@@ -258,24 +314,12 @@ impl<'a> States<'a> {
         Known { functions, locals, cells, road: Some(&self.road.facts), case: Some(case) }
     }
 
-    /// The time of a step: of its beginning, or of all of it.
-    fn case(&self, step: u64, is_whole: bool) -> Case {
-        let at = |step: u64| Rational::from_f64(self.space.episode.time_s(step));
-        let elapsed = match (at(step), at(step + u64::from(is_whole))) {
-            (Some(from), Some(to)) => Interval::closed(from, to),
-            _ => Interval::NOT_NEGATIVE,
-        };
-        Case::of_time(elapsed, Interval::point(Rational::integer(i64::try_from(step).unwrap_or(i64::MAX))))
-    }
-
     /// Whether the rules on a row may allow what it makes of a state.
-    fn may_obey(&self, row: usize, locals: &[Values], from: usize, to: usize, step: u64) -> bool {
+    fn may_obey(&self, row: usize, locals: &[Values], from: usize, to: usize, case: &Case) -> bool {
         let row = &self.space.rows[row];
         let (from, to) = (&self.met[from], &self.met[to]);
-        // Where every step does something, actions happen when their step begins (AV0609).
-        let case = self.case(step, self.space.each_step.is_empty());
         self.in_force.on_row(row).all(|rule| match self.space.rules[rule].body.demand(row.action) {
-            Some(Demand::Holds(condition)) => enclose(condition, &self.known(locals, to, &case)).may_hold(),
+            Some(Demand::Holds(condition)) => enclose(condition, &self.known(locals, to, case)).may_hold(),
             Some(Demand::Moves { cell, allowed, .. }) => may_move(allowed, from[cell], to[cell]).0,
             None => true,
         })
@@ -396,7 +440,7 @@ impl<'a> States<'a> {
             road: self.road.name.clone(),
             rule: rule.name.clone(),
             index,
-            at: Some((step, self.space.episode.time_s(step), states.join(" and "))),
+            how: How::At(step, self.space.episode.time_s(step), states.join(" and ")),
         }
     }
 

@@ -1,13 +1,13 @@
 //! Rows that were not found to run: those of which nothing is known, and those that would run only in states to
 //! which no episode comes.
 
-use crate::model::expr::ExprKind;
+use crate::model::expr::{Arithmetic, Expr, ExprKind};
 use crate::model::rules::RowRules;
 use crate::model::vocabulary::Known;
-use crate::model::{ActionDef, Road, Row, RuleBody, RulesInForce, Space, code};
+use crate::model::{ActionDef, Road, Row, RuleBody, RuleDef, RulesInForce, Space, code};
 use crate::prove::clock::never_enabled;
 use crate::prove::reach::numbers;
-use crate::prove::realise::{Realisable, Realised};
+use crate::prove::realise::{Realisable, Realised, is_about_time};
 use crate::prove::witness::{Found, Left, Search};
 use crate::syntax::{Diagnostic, listed};
 
@@ -18,6 +18,7 @@ const BOXES_MAX: usize = 2_000;
 /// enables.
 pub(super) fn report(space: &Space, realisable: &Realisable) -> Vec<Diagnostic> {
     let mut diagnostics = report_unknown(space, realisable);
+    diagnostics.extend(report_optional(space, realisable));
     let told = never_enabled(space);
     let in_force = RulesInForce::by_default(space);
     // Where no episode begins, no state is reached.
@@ -35,13 +36,60 @@ pub(super) fn report(space: &Space, realisable: &Realisable) -> Vec<Diagnostic> 
         let unreached: Vec<&Row> = rows().filter(is_unreached).collect();
         let Some(first) = unreached.first() else { continue };
         let message = format!("`{}` is never enabled", first.label);
-        let warning = Diagnostic::warning(code::NEVER_ENABLED, message)
-            .at(definition.span, numbers(&unreached))
-            .note(format!("it would obey {} only in states to which no episode comes", names(space, first)))
-            .help("begin in such a state, or add an action that leads to one");
-        diagnostics.push(warning);
+        let warning =
+            Diagnostic::warning(code::NEVER_ENABLED, message).at(definition.span, numbers(&unreached));
+        let rules = RowRules { space, row: first, road: None, in_force: &in_force };
+        let (only, help) = match is_about_time(rules) {
+            true => (
+                "at times, or in states, with which no step begins",
+                "let the rule hold when a step begins, or add an action that leads to such a state in time",
+            ),
+            false => (
+                "in states to which no episode comes",
+                "begin in such a state, or add an action that leads to one",
+            ),
+        };
+        let note = format!("it would obey {} only {only}", names(space, first));
+        diagnostics.push(warning.note(note).help(help));
     }
     diagnostics
+}
+
+/// One warning for each optional rule with which it is not known of some rows whether they run.
+fn report_optional(space: &Space, realisable: &Realisable) -> Vec<Diagnostic> {
+    let mut diagnostics = Vec::new();
+    for (rule, definition) in space.rules.iter().enumerate().filter(|(_, rule)| rule.optional) {
+        let (in_force, left) = (RulesInForce::by_default(space).with(rule), Left::new(BOXES_MAX));
+        let is_unknown = |row: &&Row| {
+            let mut roads = space.roads.iter().zip(&realisable[row.index]);
+            row.rules.contains(&rule)
+                && roads.any(|(road, found)| {
+                    *found == Realised::Runs
+                        && is_unknown(
+                            RowRules { space, row, road: Some(&road.facts), in_force: &in_force },
+                            &left,
+                        )
+                })
+        };
+        let rows: Vec<&Row> = space.rows.iter().filter(is_unknown).collect();
+        let Some(first) = rows.first() else { continue };
+        let message = format!(
+            "with optional rule `{}`: whether {} can run is not known",
+            definition.name,
+            numbers(&rows)
+        );
+        let warning = Diagnostic::warning(code::UNDECIDED, message)
+            .at(definition.span, why(&[definition]))
+            .beside(space.actions[first.action].span, numbers(&rows));
+        diagnostics.push(warning.note("no values were found, and no proof that there are none"));
+    }
+    diagnostics
+}
+
+/// Whether neither values nor a proof that there are none were found for a row after any memory.
+fn is_unknown(rules: RowRules<'_>, left: &Left) -> bool {
+    let search = Search { rules, left, moment: None };
+    search.memories().0.iter().all(|memory| search.at(memory) == Found::Unknown)
 }
 
 /// The rows of an action of which it is not known whether they run, with the roads on which that is so.
@@ -91,27 +139,47 @@ fn error(space: &Space, many: &[Unknown<'_>]) -> Diagnostic {
     let error = Diagnostic::error(code::UNDECIDED, message).at(first.action.span, numbers(&first.rows));
     let others = many[1..].iter();
     let error = others.fold(error, |error, one| error.beside(one.action.span, numbers(&one.rows)));
-    let rules = first.rules.iter().map(|rule| &space.rules[*rule]);
-    let asks_about_newcomer = first.rules.iter().any(|rule| asks_about_newcomer(&space.rules[*rule].body));
-    let why = match asks_about_newcomer {
-        true => "not found to hold for a newcomer",
-        false => "too complicated to be solved",
-    };
-    let error = rules.fold(error, |error, rule| error.beside(rule.span, why));
+    let rules: Vec<&RuleDef> = first.rules.iter().map(|rule| &space.rules[*rule]).collect();
+    let error = rules.iter().fold(error, |error, rule| error.beside(rule.span, why(&rules)));
     let obeyed = match rule_names(space, &first.rules).as_str() {
         "" => String::new(),
         names => format!(" that obey {names}"),
     };
     let error = error.note(format!("no values were found{obeyed}, and no proof that there are none"));
-    match asks_about_newcomer {
+    match rules.iter().any(|rule| asks_about(&rule.body, Known::Spawn)) {
         true => error.help("a newcomer is taken to appear as far away and as fast as its spawn asks: let the rule allow that"),
         false => error.help("say it by sums, products and `match`, of at most six drawn numbers and with low powers"),
     }
 }
 
-fn asks_about_newcomer(body: &RuleBody) -> bool {
+/// What is not known of rules that leave rows undecided.
+fn why(rules: &[&RuleDef]) -> &'static str {
+    let ask = |from: Known| rules.iter().any(|rule| asks_about(&rule.body, from));
+    match () {
+        () if ask(Known::Spawn) => "not found to hold for a newcomer",
+        () if ask(Known::World) => "not found to hold at a moment",
+        () if rules.iter().any(|rule| has_powers(&rule.body)) => "too complicated to be solved",
+        () => "not solved for so many numbers",
+    }
+}
+
+/// Whether a rule has more than sums of numbers, each times a constant.
+fn has_powers(body: &RuleBody) -> bool {
     let RuleBody::Holds(bindings) = body else { return false };
-    let asks = |kind: &ExprKind| matches!(kind, ExprKind::Fact(fact) if fact.known() == Known::Spawn);
+    let is_fixed = |expr: &Expr| matches!(expr.kind, ExprKind::Number(_));
+    let is_power = |kind: &ExprKind| match kind {
+        ExprKind::Arithmetic(Arithmetic::Multiply, left, right) => !is_fixed(left) && !is_fixed(right),
+        ExprKind::Arithmetic(Arithmetic::Divide, _, by) => !is_fixed(by),
+        ExprKind::Call(..) => true,
+        _ => false,
+    };
+    bindings.iter().any(|binding| binding.condition.any(is_power))
+}
+
+/// Whether a rule asks for a fact that is known from then on.
+fn asks_about(body: &RuleBody, from: Known) -> bool {
+    let RuleBody::Holds(bindings) = body else { return false };
+    let asks = |kind: &ExprKind| matches!(kind, ExprKind::Fact(fact) if fact.known() == from);
     bindings.iter().any(|binding| binding.condition.any(asks))
 }
 
@@ -122,8 +190,7 @@ fn to_blame(space: &Space, row: &Row, road: &Road) -> Vec<usize> {
     for rule in in_force.clone().on_row(row) {
         let fewer = in_force.except(rule);
         let rules = RowRules { space, row, road: Some(&road.facts), in_force: &fewer };
-        let search = Search { rules, left: &left };
-        if search.memories().0.iter().all(|memory| search.at(memory) == Found::Unknown) {
+        if is_unknown(rules, &left) {
             in_force = fewer;
         }
     }

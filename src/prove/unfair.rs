@@ -59,7 +59,7 @@ pub(super) fn unfair(
     if rules.demands().any(|(_, demand)| asks(demand)) {
         return None;
     }
-    Search { rules, left }.find(&|values, memory| {
+    Search { rules, left, moment: None }.find(&|values, memory| {
         let figures = figures(space, road, spawn, values, memory);
         figures.needed_m > figures.distance_m + MARGIN_M
     })

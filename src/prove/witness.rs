@@ -18,8 +18,9 @@ use crate::model::{
     ActionDef, Domain, EffectDef, End, Facts, Initial, Interval, Memory, Parameter, Road, Row, RulesInForce,
     SetDef, Space, SpawnFacts, StateDef, Type, Value, WorldFacts, evaluate, locals, spawn_out_of_bounds,
 };
-use crate::prove::enclose::Values;
-use crate::prove::moment::{may_hold_together, newcomers};
+use crate::prove::enclose::{Known, Values};
+use crate::prove::moment::{Case, may_hold_together, newcomers};
+use crate::prove::reach::declared;
 use crate::units::Rational;
 
 /// The most boxes of ranges looked at for one choice of the listed values and one memory.
@@ -51,7 +52,7 @@ pub struct Witness {
 pub fn witness(space: &Space, row: &Row, road: &Road) -> Option<Witness> {
     let in_force = RulesInForce::by_default(space);
     let rules = RowRules { space, row, road: Some(&road.facts), in_force: &in_force };
-    let search = Search { rules, left: &Left::new(BOXES_IN_ALL_MAX) };
+    let search = Search { rules, left: &Left::new(BOXES_IN_ALL_MAX), moment: None };
     search.memories().0.into_iter().find_map(|memory| match search.at(&memory) {
         Found::Runs(values) => {
             let values = search.action().drawn_of(&values);
@@ -76,6 +77,8 @@ pub(super) enum Found {
 pub(super) struct Search<'a> {
     pub rules: RowRules<'a>,
     pub left: &'a Left,
+    /// What is known of the moment; `None`: any moment.
+    pub moment: Option<&'a Case>,
 }
 
 /// What searches may still do; at 0 they find nothing more.
@@ -146,6 +149,9 @@ impl Search<'_> {
     /// What there is with this memory before the row.
     pub fn at(&self, memory: &Memory) -> Found {
         self.left.take_box();
+        if self.asks_about_moment() && !self.may_run(&points(memory.cells())) {
+            return Found::Never;
+        }
         let lent = self.left.tries.get().min(TRIES_A_MEMORY);
         let tries = Cell::new(lent);
         let found = self.solved(memory, &tries);
@@ -161,6 +167,12 @@ impl Search<'_> {
         let mut chosen = choices(action, &locals(action, self.rules.row, &[])).into_iter();
         let found = chosen.find_map(|chosen| self.numbers(&chosen, memory, &|_, _| true));
         found.map_or(Found::Unknown, Found::Runs)
+    }
+
+    /// Whether the row may run after these values of the cells, as far as intervals tell.
+    pub fn may_run(&self, before: &[Values]) -> bool {
+        let declared = declared(self.rules.space, self.rules.row);
+        self.rules.narrow(declared, before, self.moment).is_some()
     }
 
     /// Values by solving alone; `None` if they exist and the row does not run with them, or if they are not found.
@@ -190,18 +202,14 @@ impl Search<'_> {
     fn numbers(&self, chosen: &[Value], memory: &Memory, wish: &Wish<'_>) -> Option<Vec<Value>> {
         let action = self.action();
         let open: Vec<usize> = action.drawn_numbers().collect();
-        let before: Vec<Values> = memory.cells().iter().map(|value| Values::point(*value)).collect();
-        let mut declared: Vec<Values> = chosen.iter().map(|value| Values::point(*value)).collect();
-        for local in &open {
-            if let Domain::Range(low, high) = &action.parameters[*local].domain {
-                declared[*local] = Values::Number(Interval::closed(*low, *high));
-            }
-        }
+        let before = points(memory.cells());
         let corners = 0..1_usize << open.len().min(CORNER_BITS);
-        let mut boxes = VecDeque::from([declared]);
+        let mut boxes = VecDeque::from([self.ranges(chosen, &open)]);
         for _ in 0..BOXES_MAX.min(self.left.boxes.get()) {
             self.left.take_box();
-            let Some(narrowed) = self.rules.narrow(boxes.pop_front()?, &before) else { continue };
+            let Some(narrowed) = self.rules.narrow(boxes.pop_front()?, &before, self.moment) else {
+                continue;
+            };
             for place in corners.clone().map(Place::Corner).chain([Place::Middle]) {
                 let values = self.candidate(chosen, &open, &narrowed, place, memory);
                 if let Some(found) = values.filter(|values| self.runs(values, memory, wish)) {
@@ -211,6 +219,17 @@ impl Search<'_> {
             boxes.extend(halves(&narrowed, &open));
         }
         None
+    }
+
+    /// What is chosen from lists, and the whole ranges of the open numbers.
+    fn ranges(&self, chosen: &[Value], open: &[usize]) -> Vec<Values> {
+        let mut ranges = points(chosen);
+        for local in open {
+            if let Domain::Range(low, high) = &self.action().parameters[*local].domain {
+                ranges[*local] = Values::Number(Interval::closed(*low, *high));
+            }
+        }
+        ranges
     }
 
     /// One point of a box, its equalities solved as drawing solves them.
@@ -307,7 +326,14 @@ impl Search<'_> {
                     let led_to = self.rules.space.memory_after(self.rules.row.action, &values, memory);
                     // An effect without a value is refused.
                     let is_kept = led_to.cells().iter().all(|value| value.is_kept());
-                    if is_kept && !after.contains(&led_to) {
+                    let candidate =
+                        Candidate { values: &values, before: memory, after: &led_to, world: None };
+                    let may_come = !self.asks_about_moment() || self.is_left_open(candidate);
+                    if !may_come {
+                        let ranges = self.ranges(&values, &open);
+                        is_complete &=
+                            self.rules.narrow(ranges, &points(memory.cells()), self.moment).is_none();
+                    } else if is_kept && !after.contains(&led_to) {
                         after.push(led_to);
                     }
                 }
@@ -319,9 +345,8 @@ impl Search<'_> {
 
     /// Whether some moment or place, which an empty world does not have, might meet all conditions with these values.
     fn is_left_open(&self, candidate: Candidate<'_>) -> bool {
-        let points = |values: &[Value]| values.iter().map(|value| Values::point(*value)).collect::<Vec<_>>();
         let (locals, cells) = (points(candidate.values), points(candidate.after.cells()));
-        let known = self.rules.known(&locals, &cells);
+        let known = Known { case: self.moment, ..self.rules.known(&locals, &cells) };
         let newcomers = newcomers(self.action(), &known, true);
         may_hold_together(&self.rules.conditions(), &known, &self.rules.space.episode, &newcomers)
     }
@@ -355,8 +380,14 @@ impl Search<'_> {
         (memories, is_complete)
     }
 
+    /// Whether a rule or an effect of the row depends on what any state was before.
+    pub fn reads_any(&self) -> bool {
+        let reads = |state: &StateDef| (0..state.cells).any(|cell| self.reads(state, cell));
+        self.rules.space.states.iter().any(reads)
+    }
+
     /// Whether a rule or an effect of the row depends on what the cell was before.
-    pub fn reads(&self, state: &StateDef, cell: usize) -> bool {
+    fn reads(&self, state: &StateDef, cell: usize) -> bool {
         let named = |expr: &Expr| {
             expr.any(|kind| match kind {
                 ExprKind::Cell(named) => *named == state.first_cell + cell,
@@ -377,6 +408,10 @@ impl Search<'_> {
             || self.rules.space.sets(Some(self.rules.row.action)).any(by_set)
             || self.action().effects.iter().any(by_spawn)
     }
+}
+
+fn points(values: &[Value]) -> Vec<Values> {
+    values.iter().map(|value| Values::point(*value)).collect()
 }
 
 /// Every choice of the listed values, the first values first; what is a range stays as it is.

@@ -1,9 +1,11 @@
 //! Centre lines of lanes: the exact offset curve of a reference line, sampled.
 
+use core::cell::Cell;
+
 use crate::geometry::{Path, Vec2, unit_vector, wrap_angle};
 
 use super::conflict::segment_crossing;
-use super::opendrive::{RoadElement, SectionElement};
+use super::opendrive::{Across, RoadElement, SectionElement};
 
 /// Largest distance of a chord from the curve, m; other modules rely on twice as much.
 const CHORD_ERROR_M: f64 = 5e-4;
@@ -117,7 +119,7 @@ pub fn centre_line(
     breaks_m.sort_by(f64::total_cmp);
     breaks_m.dedup_by(|a, b| (*a - *b).abs() < 1e-6);
 
-    let curve = Curve { road, section, lane };
+    let curve = Curve { road, across: road.across(section, lane), left_at: Cell::default() };
     let mut samples: Vec<Sample> = Vec::new();
     for (i, piece) in breaks_m.windows(2).enumerate() {
         let (begin_m, limit_m) = (piece[0], piece[1]);
@@ -217,8 +219,9 @@ fn loop_around(samples: &[Sample], back: usize) -> Option<(usize, usize, Sample)
 /// A lane's centre as a function of the road's station.
 struct Curve<'a> {
     road: &'a RoadElement,
-    section: &'a SectionElement,
-    lane: i32,
+    across: Across<'a>,
+    /// The heading that was met last, rad, and the unit vector to its left: a straight has one for all its places.
+    left_at: Cell<Option<(f64, Vec2)>>,
 }
 
 impl Curve<'_> {
@@ -226,7 +229,7 @@ impl Curve<'_> {
     /// derivatives are `(1 - k t) T + t' N` and `-(k' t + 2 k t') T + ((1 - k t) k + t'') N`.
     fn at(&self, s_m: f64) -> Sample {
         let reference = self.road.reference.at(s_m);
-        let (t, width) = self.road.lane_at(self.section, self.lane, s_m);
+        let (t, width) = self.across.at(s_m);
         let (k, k_rate) = (reference.curvature_per_m, reference.curvature_rate_per_m2);
         let (ahead, aside) = (1.0 - k * t.value, t.first);
         let (ahead_rate, aside_rate) =
@@ -235,11 +238,21 @@ impl Curve<'_> {
         let folded = ahead < 1e-3;
         let curvature_per_m =
             if folded { 0.0 } else { (ahead * aside_rate - aside * ahead_rate) / (speed * speed * speed) };
-        let heading_rad = reference.heading_rad + if folded { 0.0 } else { libm::atan2(aside, ahead) };
-        let (sin, cos) = libm::sincos(reference.heading_rad);
+        // Where the lane runs beside the line, `atan2` gives the 0 that it is asked about.
+        let turned_rad = if aside == 0.0 { aside } else { libm::atan2(aside, ahead) };
+        let heading_rad = reference.heading_rad + if folded { 0.0 } else { turned_rad };
+        let left = match self.left_at.get() {
+            Some((known_rad, left)) if known_rad.to_bits() == reference.heading_rad.to_bits() => left,
+            _ => {
+                let (sin, cos) = libm::sincos(reference.heading_rad);
+                let left = Vec2::new(-sin, cos);
+                self.left_at.set(Some((reference.heading_rad, left)));
+                left
+            }
+        };
         Sample {
             s_m,
-            position: reference.position + Vec2::new(-sin, cos) * t.value,
+            position: reference.position + left * t.value,
             heading_rad,
             curvature_per_m,
             width_m: width.value,

@@ -94,10 +94,11 @@ pub fn crossings(a: &Path, b: &Path) -> Vec<(f64, f64)> {
     let near = b.bounds().grown(1e-3);
     for p in a.points().windows(2) {
         // Most segments of a route are far from the other lane: their boxes tell so quickly.
-        if !Bounds::of(p).meets(&near) {
+        let here = Bounds::of(p);
+        if !here.meets(&near) {
             continue;
         }
-        for q in b.points().windows(2) {
+        for q in b.segments_near(&here.grown(1e-3)) {
             let Some((x, y)) = segment_crossing(p[0].position, p[1].position, q[0].position, q[1].position)
             else {
                 continue;

@@ -23,6 +23,9 @@ impl Rational {
 
     /// `numerator / denominator`; `None` if the denominator is 0 or a part does not fit.
     pub fn new(numerator: i128, denominator: i128) -> Option<Rational> {
+        if denominator == 1 {
+            return Some(Rational { numerator, denominator });
+        }
         let divisor = i128::try_from(gcd(numerator.unsigned_abs(), denominator.unsigned_abs())).ok()?;
         if denominator == 0 {
             return None;
@@ -107,6 +110,9 @@ impl Rational {
     }
 
     pub fn checked_add(self, other: Rational) -> Option<Rational> {
+        if self.denominator == other.denominator {
+            return Rational::new(self.numerator.checked_add(other.numerator)?, self.denominator);
+        }
         let left = self.numerator.checked_mul(other.denominator)?;
         let right = other.numerator.checked_mul(self.denominator)?;
         Rational::new(left.checked_add(right)?, self.denominator.checked_mul(other.denominator)?)
@@ -117,6 +123,9 @@ impl Rational {
     }
 
     pub fn checked_mul(self, other: Rational) -> Option<Rational> {
+        if self.is_integer() && other.is_integer() {
+            return Rational::new(self.numerator.checked_mul(other.numerator)?, 1);
+        }
         // Crosswise reduction first keeps products small.
         let left = Rational::new(self.numerator, other.denominator)?;
         let right = Rational::new(other.numerator, self.denominator)?;
@@ -156,8 +165,13 @@ impl PartialOrd for Rational {
 }
 
 impl Ord for Rational {
-    /// Exact, by comparing whole parts and then the remainders' reciprocals: no product can overflow.
+    /// Exact, by products where they fit, else by comparing whole parts and then the remainders' reciprocals.
     fn cmp(&self, other: &Rational) -> Ordering {
+        let products =
+            (self.numerator.checked_mul(other.denominator), other.numerator.checked_mul(self.denominator));
+        if let (Some(left), Some(right)) = products {
+            return left.cmp(&right);
+        }
         let (mut left, mut right) = (*self, *other);
         let mut reversed = false;
         loop {
@@ -193,7 +207,11 @@ impl fmt::Display for Rational {
 
 fn gcd(mut a: u128, mut b: u128) -> u128 {
     while b != 0 {
-        (a, b) = (b, a % b);
+        // Numbers of 64 bits, which most are, machines divide themselves.
+        (a, b) = match (u64::try_from(a), u64::try_from(b)) {
+            (Ok(short_a), Ok(short_b)) => (b, u128::from(short_a % short_b)),
+            _ => (b, a % b),
+        };
     }
     a
 }

@@ -859,6 +859,12 @@ fn a_document_has_a_structure() {
         "{list:?}"
     );
 
+    let bodies =
+        format!("{head}body Scooter {{ like: Motorcycle }}\nverdict v: hit == Sedan or near in [Bicycle, |");
+    let list =
+        labels(editor.ask_at("textDocument/completion", &here, &bodies, json!({})).expect("it proposes"));
+    assert!(["Scooter", "Pedestrian"].iter().all(|body| list.iter().any(|word| word == body)), "{list:?}");
+
     let walker = "action a() { spawn Pedestrian ahead 9 m { d|oes: Walk, side: Left, speed: 1 m/s } }\n";
     let hover = editor.ask_at("textDocument/hover", &here, &format!("{head}{walker}"), json!({}));
     assert!(text(&hover.expect("it knows it")["contents"]["value"]).starts_with("**does**"));

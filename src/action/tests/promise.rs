@@ -8,7 +8,8 @@
 //!
 //! This audit in turn did not see that time alone may break a rule: its rules asked for no time, only draws were
 //! judged, and a step without an action was played only where every step does something. Now rules ask for `step` and
-//! `elapsed`, every kind of space has such steps and whole episodes of them, and the states are judged after each.
+//! `elapsed`, every kind of space has such steps and whole episodes of them, and the states are judged after each. What
+//! the checker says of rows for which an episode is too short is asked too: episodes end where those of the space do.
 
 use core::fmt;
 use std::collections::BTreeMap;
@@ -433,6 +434,7 @@ action pair(any speed: Speed in {} m/s .. {} m/s, any a: Length in {} m .. {} m,
   spawn Jeep ahead b {{ lane: Current, speed: speed, does: DriveAhead }}
 }}
 group cars = ahead, pair
+episode {{ limit: {STEPS} steps }}
 ",
             begin(any[0], "None"),
             begin(any[1], "Light"),

@@ -65,6 +65,10 @@ impl List<'_> {
                 self.kind(&Kind::Enums);
                 self.words(&words::types(), CLASS, LIKELY);
             }
+            Kind::Bodies => {
+                self.words(&words::engine_words("body"), FIELD, WANTED);
+                self.symbols(ENUM, |symbol| matches!(symbol, Symbol::Body(_)));
+            }
             Kind::Enums => self.symbols(ENUM, |symbol| matches!(symbol, Symbol::Enum(_))),
             Kind::Units => {
                 for unit in units::UNITS {

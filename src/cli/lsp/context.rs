@@ -22,6 +22,8 @@ pub enum Kind {
     Keyword(&'static str),
     Types,
     Enums,
+    /// The bodies of the engine, and those that are declared.
+    Bodies,
     Units,
     Actions,
     Groups,
@@ -285,12 +287,12 @@ impl<'a> Place<'a> {
             (0, _) => Vec::new(),
             (_, "set") => vec![Kind::States],
             (_, "spawn") => {
-                let mut kinds = vec![Kind::Words(words::engine_words("body"))];
+                let mut kinds = vec![Kind::Bodies];
                 kinds.extend(self.value(None));
                 kinds
             }
             (1, "behind") if self.last(1) == "from" => {
-                let mut kinds = vec![Kind::Words(words::engine_words("body"))];
+                let mut kinds = vec![Kind::Bodies];
                 kinds.extend(self.value(None));
                 kinds
             }
@@ -377,6 +379,15 @@ impl<'a> Place<'a> {
     fn in_outcome(&self) -> Vec<Kind> {
         if !self.wants_operand() && !self.begins_entry() {
             return vec![Kind::Operators];
+        }
+        let open = self.open.last().copied().filter(|open| self.text(*open) == "[");
+        let compared = match (self.last(0), open) {
+            ("==" | "!=", _) => self.last(1),
+            ("[" | ",", Some(open)) if open >= 2 && self.text(open - 1) == "in" => self.text(open - 2),
+            _ => "",
+        };
+        if matches!(compared, "hit" | "near") {
+            return vec![Kind::Bodies];
         }
         let site = if self.keyword() == "reward" { Site::Reward } else { Site::Verdict };
         let mut kinds = vec![Kind::Words(words::facts(site))];

@@ -59,6 +59,13 @@ impl RulesInForce {
         rules
     }
 
+    /// These rules and one more.
+    pub(crate) fn with(&self, rule: usize) -> RulesInForce {
+        let mut rules = self.clone();
+        rules.in_force[rule] = true;
+        rules
+    }
+
     /// Whether the rule with that index is in force.
     pub fn contains(&self, rule: usize) -> bool {
         self.in_force[rule]

@@ -198,21 +198,43 @@ impl RoadElement {
 
     /// Centre (m left of the reference line) and width of a lane of a section, at a station.
     pub fn lane_at(&self, section: &SectionElement, lane: i32, s_m: f64) -> (Jet, Jet) {
+        self.across(section, lane).at(s_m)
+    }
+
+    /// What decides where a lane of a section lies.
+    pub fn across<'a>(&'a self, section: &'a SectionElement, lane: i32) -> Across<'a> {
+        let side = lane.signum();
+        let lanes = (1..=lane.abs()).map(|id| section.lane(id * side)).collect();
+        Across { lane_offset: &self.lane_offset, begin_m: section.begin_m, side: f64::from(side), lanes }
+    }
+}
+
+/// A lane of a section with those between it and the reference line.
+pub struct Across<'a> {
+    lane_offset: &'a Cubics,
+    begin_m: f64,
+    side: f64,
+    /// From the inside out; `None` where the file leaves a number out.
+    lanes: Vec<Option<&'a LaneElement>>,
+}
+
+impl Across<'_> {
+    /// Centre (m left of the reference line) and width at a station.
+    pub fn at(&self, s_m: f64) -> (Jet, Jet) {
         let zero = self.lane_offset.at(s_m);
-        let distance_m = s_m - section.begin_m;
-        let side = f64::from(lane.signum());
+        let distance_m = s_m - self.begin_m;
         let mut inner = zero;
         let mut outer = zero;
-        for id in 1..=lane.abs() {
+        for lane in &self.lanes {
             inner = outer;
-            let Some(element) = section.lane(id * lane.signum()) else { continue };
+            let Some(element) = lane else { continue };
             outer = if element.widths.is_empty() && !element.borders.is_empty() {
                 zero + element.borders.at(distance_m)
             } else {
-                inner + element.widths.at(distance_m) * side
+                inner + element.widths.at(distance_m) * self.side
             };
         }
-        ((inner + outer) * 0.5, (outer - inner) * side)
+        ((inner + outer) * 0.5, (outer - inner) * self.side)
     }
 }
 

@@ -53,6 +53,8 @@ pub struct Piece {
     pub length_m: f64,
     pub origin: Vec2,
     pub heading_rad: f64,
+    /// The unit vector along the heading.
+    forward: Vec2,
     pub shape: Shape,
 }
 
@@ -130,12 +132,9 @@ impl ReferenceLine {
             let rounding = (turn_rad.abs() < CORNER_RAD_MAX)
                 .then(|| rounding(before.at(at_m - half_m - before.begin_m), after.at(half_m)))
                 .flatten()
-                .map(|shape| Piece {
-                    begin_m: at_m - half_m,
-                    length_m: 2.0 * half_m,
-                    origin: before.at(at_m - half_m - before.begin_m).position,
-                    heading_rad: before.at(at_m - half_m - before.begin_m).heading_rad,
-                    shape,
+                .map(|shape| {
+                    let from = before.at(at_m - half_m - before.begin_m);
+                    Piece::new(at_m - half_m, 2.0 * half_m, (from.position, from.heading_rad), shape)
                 });
             let position = begin.position;
             let off_m = rounding.as_ref().map(|curve| (curve.at(half_m).position - position).norm());
@@ -215,6 +214,11 @@ impl Shape {
 }
 
 impl Piece {
+    /// A piece with its origin and its heading there, rad.
+    pub fn new(begin_m: f64, length_m: f64, (origin, heading_rad): (Vec2, f64), shape: Shape) -> Piece {
+        Piece { begin_m, length_m, origin, heading_rad, forward: unit_vector(heading_rad), shape }
+    }
+
     /// Beyond its ends a piece goes on straight.
     fn at(&self, distance_m: f64) -> ReferencePoint {
         let beyond_m = distance_m - distance_m.clamp(0.0, self.length_m);
@@ -231,7 +235,7 @@ impl Piece {
     }
 
     fn within(&self, distance_m: f64) -> ReferencePoint {
-        let forward = unit_vector(self.heading_rad);
+        let forward = self.forward;
         let left = Vec2::new(-forward.y, forward.x);
         let local = match &self.shape {
             Shape::Line => local_point(distance_m, 0.0, 0.0, 0.0, 0.0),
@@ -343,7 +347,7 @@ mod tests {
     use super::*;
 
     fn piece(length_m: f64, shape: Shape) -> Piece {
-        Piece { begin_m: 0.0, length_m, origin: Vec2::new(0.0, 0.0), heading_rad: 0.0, shape }
+        Piece::new(0.0, length_m, (Vec2::zeros(), 0.0), shape)
     }
 
     /// Fresnel integrals at 1 (Abramowitz and Stegun, table 7.7): C = 0.7798934, S = 0.4382591.
@@ -361,12 +365,7 @@ mod tests {
         let turn_rad = FRAC_PI_2 / 6.0;
         let mut at = (Vec2::zeros(), 0.0);
         let pieces = (0..6).map(|i| {
-            let straight = Piece {
-                begin_m: 4.0 * f64::from(i),
-                origin: at.0,
-                heading_rad: at.1,
-                ..piece(4.0, Shape::Line)
-            };
+            let straight = Piece::new(4.0 * f64::from(i), 4.0, at, Shape::Line);
             at = (at.0 + unit_vector(at.1) * 4.0, at.1 + turn_rad);
             straight
         });
@@ -389,8 +388,7 @@ mod tests {
     #[test]
     fn a_line_that_turns_back_is_not_rounded() {
         let there = piece(4.0, Shape::Line);
-        let back =
-            Piece { begin_m: 4.0, origin: Vec2::new(4.0, 0.0), heading_rad: 3.0, ..piece(4.0, Shape::Line) };
+        let back = Piece::new(4.0, 4.0, (Vec2::new(4.0, 0.0), 3.0), Shape::Line);
         let mut line = ReferenceLine::new(vec![there, back]).unwrap();
         assert_eq!(line.round_corners()[0].off_m, None);
         assert_eq!(line.breaks_m(), [4.0]);

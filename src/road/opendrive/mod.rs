@@ -10,7 +10,7 @@ mod read;
 mod xml;
 
 pub use elements::{
-    Contact, Document, MarkRule, Meaning, ObjectKind, Orientation, Outline, RoadElement, RoadLink,
+    Across, Contact, Document, MarkRule, Meaning, ObjectKind, Orientation, Outline, RoadElement, RoadLink,
     SectionElement, SignalElement,
 };
 pub use read::read;

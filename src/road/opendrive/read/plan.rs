@@ -88,13 +88,9 @@ fn piece(geometry: Element) -> Result<Piece, RoadError> {
             name => return Err(shape.wrong(format!("unknown geometry `{name}`"))),
         },
     };
-    Ok(Piece {
-        begin_m: geometry.number("s")?,
-        length_m,
-        origin: Vec2::new(geometry.number("x")?, geometry.number("y")?),
-        heading_rad: geometry.number("hdg")?,
-        shape,
-    })
+    let begin_m = geometry.number("s")?;
+    let origin = Vec2::new(geometry.number("x")?, geometry.number("y")?);
+    Ok(Piece::new(begin_m, length_m, (origin, geometry.number("hdg")?), shape))
 }
 
 fn curvature(shape: Element, name: &str, length_m: f64) -> Result<f64, RoadError> {
