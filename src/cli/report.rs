@@ -32,9 +32,10 @@ pub fn report(output: &Output, arguments: &ReportArguments) -> Result<(), Failur
     };
     let (files, left_out) = chosen(&found, arguments.most as usize);
     let many = FilesArguments { files, jobs: arguments.jobs };
+    let program = asked.as_ref().and_then(|asked| asked.external.as_ref());
     let played = match many.files.is_empty() {
         true => None,
-        false => Some(each_file(output, &many, None, |file| scene(output, file, asked.as_ref()))?),
+        false => Some(each_file(output, &many, program, |file| scene(output, file, asked.as_ref()))?),
     };
     let mut remarks = found.remarks;
     if left_out > 0 {

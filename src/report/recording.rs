@@ -18,7 +18,8 @@ use crate::model::vocabulary::{Phenomenon, Word};
 use crate::model::{Claim, Scenario, digest_text};
 use crate::oracle;
 use crate::oracle::ReferenceDrive;
-use crate::run::{RunError, Stage, refusal_in_words};
+use crate::run;
+use crate::run::{Gauges, RunError, Shape, Stage, refusal_in_words};
 use crate::sim::{Contact, DT_S, FRAME_TICKS, Obstacle, SignalColour, VehicleParameters, World};
 
 use super::columns::Columns;
@@ -74,6 +75,7 @@ pub fn record(
     let setup = stage.setup(ads);
     let script = Script::of_scenario(scenario);
     let mut recorder = Recorder::default();
+    let mut gauges = Gauges::default();
     let mut offers = Vec::new();
     let mut choose = |moment: &Moment<'_>| {
         if moment.step < script.steps.len() {
@@ -83,6 +85,7 @@ pub fn record(
     };
     let log = episode::run(&setup, &mut choose, &mut |world, ads, contacts| {
         recorder.note(world, ads, contacts);
+        gauges.note(world, contacts);
     });
     let judged = oracle::judge_with_drives(&setup, &script, &log, stage.avoidability());
     let judgements: Vec<_> = judged.iter().map(|(judgement, _)| judgement.clone()).collect();
@@ -93,7 +96,9 @@ pub fn record(
         .enumerate()
         .map(|(index, (judgement, drives))| {
             let ways: Vec<Value> = drives.iter().map(|drive| way(&mut columns, drive)).collect();
-            collision(table, scenario, (&log, index), (judgement, counted.contains(&index)), ways)
+            let shape = gauges.shapes().get(index).copied().flatten().map(Shape::name);
+            let told = (judgement, counted.contains(&index), shape);
+            collision(table, scenario, (&log, index), told, ways)
         })
         .collect();
     let summary = json!({
@@ -158,7 +163,7 @@ fn collision(
     table: &ActionTable,
     scenario: &Scenario,
     (log, index): (&EpisodeLog, usize),
-    (judgement, counted): (&oracle::Judgement, bool),
+    (judgement, counted, shape): (&oracle::Judgement, bool, Option<&str>),
     ways: Vec<Value>,
 ) -> Value {
     let found = &log.collisions[index];
@@ -174,7 +179,8 @@ fn collision(
         _ => None,
     });
     json!({
-        "at_s": contact.time_s, "obstacle": contact.obstacle, "body": table.space().body_name(found.body), "verb": found.verb.name(),
+        "at_s": contact.time_s, "obstacle": contact.obstacle, "body": table.space().body_name(found.body),
+        "kind": run::kind(found.body.like.name()), "shape": shape, "verb": found.verb.name(),
         "x": contact.point.x, "y": contact.point.y, "counted": counted, "class": judgement.class.name(),
         "onset_s": judgement.onset_s, "avoided_by": judgement.avoided_by, "letter": judgement.r157_letter,
         "evasion": judgement.evasion, "priority": contact.priority.name(), "side": severity.side, "approach": severity.approach,

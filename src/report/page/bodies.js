@@ -83,6 +83,9 @@ export class Labels {
   constructor(canvas) {
     this.canvas = canvas;
     this.taken = [];
+    // The scale and the arrow to the north have their corners.
+    this.taken.push({ left: 0, right: canvas.width / 5 + 26, top: canvas.height - 38, bottom: canvas.height });
+    this.taken.push({ left: canvas.width - 38, right: canvas.width, top: canvas.height - 56, bottom: canvas.height });
     canvas.enterScreen();
     canvas.context.font = "600 12px system-ui, sans-serif";
     canvas.context.textAlign = "left";

@@ -27,12 +27,13 @@ export function filtered(scenarios) {
   });
 }
 
-/** What makes two failures alike on this page: obstacle's manoeuvre and movement, side, priority, cause. */
+/** What makes two failures alike, as `avastra run` groups them. */
 export function kindOf(entry) {
   const collision = mainCollision(entry.summary);
   if (!collision) return `ended: ${entry.summary.end}`;
-  const cause = collision.cause ? `, ${causeInWords(collision.cause)}` : "";
-  return `${collision.body}, ${collision.verb}, ${collision.approach}, ${collision.side}, priority ${collision.priority}${cause}`;
+  const { kind, verb, approach, side, shape, priority, cause } = collision;
+  const first = { ego: ", ego first", other: ", the other first" }[priority] ?? "";
+  return `${kind} (${verb}, ${approach}${first}), hit by the ${side}${shape ? ` (${shape})` : ""}${cause ? `, ${causeInWords(cause)}` : ""}`;
 }
 
 /** The filters, the list and its charts; they stay in step with the link. */
@@ -60,7 +61,7 @@ export function showList(place, data) {
   const hasShrunk = scenarios.some((entry) => entry.shrunk_from);
   const shrunk = hasShrunk && el("label", {}, el("input", { type: "checkbox", id: "shrunk", checked: linked().shrunk === "1", onchange: (event) => change("shrunk", event.target.checked ? "1" : null) }), " with shrunk ones");
   const clear = el("button", { type: "button", id: "clear", onclick: () => (location.hash = "#") }, "Clear");
-  refill(place, el("div", { class: "filters" }, selects, el("label", {}, "Search ", search), shrunk, clear), charts, found);
+  refill(place, el("div", { class: "filters" }, selects, el("label", {}, "Search ", search), shrunk, clear), found, charts);
   update();
 }
 

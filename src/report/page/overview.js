@@ -13,7 +13,7 @@ export function showOverview(place, data) {
   const list = el("div", { id: "scenarios" });
   refill(
     place,
-    el("h1", {}, data.title.replace(/^.*\/(?=.)/, "")),
+    el("h1", {}, heading(data)),
     overview && overview.totals && totals(overview.totals),
     data.remarks.map((remark) => el("p", { class: "warning" }, remark)),
     overview?.kind === "training" && learning(overview.learning),
@@ -25,6 +25,12 @@ export function showOverview(place, data) {
     overview && el("details", { class: "settings" }, el("summary", {}, "Settings, to do it again"), el("pre", { tabindex: "0" }, overview.settings)),
   );
   if (scenarios.length > 0) showList(list, data);
+}
+
+/** `Run 0001`, or what there is without one. */
+function heading({ title, overview }) {
+  const name = title.replace(/\/$/, "").replace(/^.*\//, "");
+  return overview?.kind ? `${overview.kind[0].toUpperCase()}${overview.kind.slice(1)} ${name}` : name;
 }
 
 function totals(sums) {
