@@ -26,5 +26,6 @@ pub mod train;
 pub mod trial;
 pub mod study;
 pub mod emit;
+pub mod export;
 pub mod report;
 pub mod cli;

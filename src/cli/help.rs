@@ -175,6 +175,15 @@ const EXAMPLES: &[(&str, &[(&str, &str)])] = &[
             ("test runs/0001 --accept", "take changes of its space over"),
         ],
     ),
+    (
+        "export",
+        &[
+            ("export --to openscenario runs/0001/critical/*.ava", "with their maps, for any player"),
+            ("export --to openscenario --ego none --out suite runs/0001/critical/*.ava", ""),
+            ("export --to commonroad runs/0001/critical/corner_0004.ava", "with a planning problem"),
+            ("export --to csv runs/0001/critical/corner_0004.ava", "where everyone was at every tick"),
+        ],
+    ),
     ("pack", &[("pack runs/0001/critical/*.ava --out suite", "a folder that can be moved")]),
     (
         "report",

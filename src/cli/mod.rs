@@ -15,6 +15,7 @@ mod error;
 mod estimate;
 mod explain;
 mod explain_policy;
+mod export;
 mod export_weights;
 mod files;
 mod findings;
@@ -115,6 +116,7 @@ pub fn main() -> ExitCode {
         Command::Diagnose(arguments) => diagnose::diagnose(&output, arguments),
         Command::Shrink(arguments) => shrink::shrink(&output, arguments),
         Command::Pack(arguments) => pack::pack(&output, arguments),
+        Command::Export(arguments) => export::export(&output, arguments),
         Command::Test(arguments) => test::test(&output, arguments),
         Command::Report(arguments) => report::report(&output, arguments),
         Command::Render(arguments) => render::render(&output, arguments),

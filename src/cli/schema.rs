@@ -359,6 +359,14 @@ pub const SHAPES: &[Shape] = &[
         ],
     },
     Shape {
+        command: "export",
+        fields: &[
+            f("files[]", "text", "paths of what was written, maps too"),
+            f("refuted", "number", "scenarios that do not replay, and were not written"),
+            FAILED,
+        ],
+    },
+    Shape {
         command: "render",
         fields: &[
             f("picture", "text", "its path"),

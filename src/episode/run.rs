@@ -391,7 +391,7 @@ impl Play {
             contact,
             step: self.steps.len(),
             body: BodyWord { like: obstacle.body, own: self.own_bodies.get(&contact.obstacle).copied() },
-            mass_t: self.world.mass_t(contact.obstacle).unwrap_or(0.0),
+            mass_t: self.world.body(contact.obstacle).map_or(0.0, |body| body.mass_t),
             verb: obstacle.verb,
             spawned_s: obstacle.spawned_tick as f64 * DT_S,
         }

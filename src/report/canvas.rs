@@ -88,13 +88,6 @@ pub fn thinned(points: &[Vec2]) -> Vec<Vec2> {
     kept
 }
 
-/// A line across a lane, from left to right.
-pub fn across(lane: &Lane, station_m: f64) -> [Vec2; 2] {
-    let half_m = lane.width_at(station_m) / 2.0;
-    let pose = lane.centre.pose_at(station_m);
-    [pose.offset(0.0, half_m).position, pose.offset(0.0, -half_m).position]
-}
-
 /// Text as SVG has to write it.
 pub fn escape(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")

@@ -4,7 +4,7 @@ use crate::geometry::{Bounds, Pose, Vec2};
 use crate::road::{Lane, Neighbour, Strip, StripKind};
 use crate::sim::Scene;
 
-use super::canvas::{across, lane_edge};
+use super::canvas::lane_edge;
 use super::columns::Columns;
 
 /// Lines are kept to this, m.
@@ -152,7 +152,7 @@ fn stop_lines(lane: &Lane) -> Vec<StopShape> {
     let signs = lane.sign_lines.iter().map(|line| (line.station_m, None));
     lights
         .chain(signs)
-        .map(|(station_m, signal)| StopShape { at: across(lane, station_m).map(point), signal })
+        .map(|(station_m, signal)| StopShape { at: lane.across(station_m).map(point), signal })
         .collect()
 }
 

@@ -14,7 +14,7 @@ use crate::model::vocabulary::{Body, Phenomenon, Word};
 use crate::road::Lane;
 use crate::sim::{Contact, Obstacle, SignalColour, World};
 
-use super::canvas::{Canvas, across, escape, lane_edge, lane_outline, thinned};
+use super::canvas::{Canvas, escape, lane_edge, lane_outline, thinned};
 use super::labels::Labels;
 
 /// Edge of a panel, px.
@@ -212,7 +212,7 @@ impl Panel<'_> {
             SignalColour::Yellow => ("#d79300", "Y"),
             SignalColour::Green => ("#1a8f45", "G"),
         };
-        let line = across(lane, station_m);
+        let line = lane.across(station_m);
         self.line(&line, &format!(r##"stroke="{paint}" stroke-width="4""##));
         let (x, y) = self.canvas.at((line[0] + line[1]) / 2.0);
         if (0.0..=PANEL_PX).contains(&x) && (0.0..=PANEL_PX).contains(&y) {

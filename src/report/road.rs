@@ -9,7 +9,7 @@ use std::fmt::Write;
 use crate::geometry::{Path, Vec2};
 use crate::road::{Junction, Lane, LaneIndex, Neighbour, RoadMap, Route};
 
-use super::canvas::{Canvas, across, escape, lane_edge, lane_outline};
+use super::canvas::{Canvas, escape, lane_edge, lane_outline};
 
 /// The longer edge of the picture, px.
 const LONGER_PX: f64 = 1600.0;
@@ -206,7 +206,7 @@ impl Drawing<'_> {
             for line in &lane.stop_lines {
                 let paint = group_paint(self.map.signals[line.signal].group);
                 let style = format!(r##"stroke="{paint}" stroke-width="3""##);
-                self.canvas.polyline(&across(lane, line.station_m), &style);
+                self.canvas.polyline(&lane.across(line.station_m), &style);
             }
         }
         for signal in &self.map.signals {
@@ -252,7 +252,7 @@ fn median(lane: &Lane, oncoming: &Lane) -> Vec<Vec2> {
     let mut strip = near.clone();
     strip.extend(near.iter().rev().map(|point| {
         let beside_m = oncoming.centre.project(*point).station_m;
-        across(oncoming, beside_m)[0]
+        oncoming.across(beside_m)[0]
     }));
     strip
 }

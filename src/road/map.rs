@@ -363,6 +363,13 @@ impl Lane {
         self.interpolated(&self.widths_m, station_m)
     }
 
+    /// The ends of a line across the lane at a station: left, right.
+    pub fn across(&self, station_m: f64) -> [Vec2; 2] {
+        let half_m = self.width_at(station_m) / 2.0;
+        let pose = self.centre.pose_at(station_m);
+        [pose.offset(0.0, half_m).position, pose.offset(0.0, -half_m).position]
+    }
+
     /// The lane's own station beside a station of the road's reference line, clamped to the lane, m.
     pub fn station_of(&self, s_m: f64) -> f64 {
         let stations_m = &self.road_stations_m;

@@ -28,6 +28,8 @@ pub struct Control {
 pub struct VehicleParameters {
     pub length_m: f64,
     pub width_m: f64,
+    /// With what stands on its roof. The world does not need it, other programs do.
+    pub height_m: f64,
     pub wheelbase_m: f64,
     pub rear_axle_to_front_m: f64,
     pub rear_axle_to_back_m: f64,
@@ -50,6 +52,7 @@ impl VehicleParameters {
     pub const MKZ: VehicleParameters = VehicleParameters {
         length_m: 4.70,
         width_m: 2.06,
+        height_m: 2.05,
         wheelbase_m: 2.837007,
         rear_axle_to_front_m: 3.705,
         rear_axle_to_back_m: 0.995,

@@ -152,6 +152,11 @@ impl Grip {
     }
 }
 
+/// The part of a dry road's friction that this depth of water leaves at up to 50 km/h.
+pub fn friction_scale(water_mm: f64) -> f64 {
+    Grip::under(water_mm).friction(0.0) / Grip::under(0.0).friction(0.0)
+}
+
 /// The entry at or before a value in a rising list, and how far it lies towards the next, in `[0, 1]`.
 fn place(entries: &[f64], value: f64) -> (usize, f64) {
     let after = entries.partition_point(|entry| *entry <= value).clamp(1, entries.len() - 1);

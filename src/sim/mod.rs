@@ -51,6 +51,7 @@ use crate::model::body;
 
 pub use contact::Contact;
 pub use ego::{Control, VehicleParameters, pedal_acceleration_mps2, pedals_for};
+pub use environment::friction_scale;
 pub use following::Following;
 pub use incident::Incident;
 pub use right_of_way::right_of_way;

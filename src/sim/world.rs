@@ -10,6 +10,7 @@ use std::sync::Arc;
 
 use crate::action::{Effect, LaneChangeRules, SpawnRequest};
 use crate::geometry::{Frame, OrientedBox, Sweep, Vec2};
+use crate::model::body::BodyParameters;
 use crate::model::vocabulary::{Level, TimeOfDay};
 use crate::model::{NpcFacts, TICK_MS};
 use crate::road::{RouteLaneChange, is_apart};
@@ -210,9 +211,9 @@ impl World {
         Ok(None)
     }
 
-    /// Mass of a road user, t; `None` if there is none with that id.
-    pub fn mass_t(&self, id: u32) -> Option<f64> {
-        self.users.iter().find(|user| user.obstacle.id == id).map(|user| user.mover.size.mass_t)
+    /// Dimensions, mass and limits of a road user; `None` if there is none with that id.
+    pub fn body(&self, id: u32) -> Option<&BodyParameters> {
+        self.users.iter().find(|user| user.obstacle.id == id).map(|user| &user.mover.size)
     }
 
     pub fn ticks(&self) -> u64 {

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use crate::cases::root;
 
 /// From left to right, as in `src/lib.rs` and ARCHITECTURE.md.
-const ORDER: [&str; 24] = [
+const ORDER: [&str; 25] = [
     "units",
     "rng",
     "statistics",
@@ -28,6 +28,7 @@ const ORDER: [&str; 24] = [
     "trial",
     "study",
     "emit",
+    "export",
     "report",
     "cli",
 ];

@@ -13,6 +13,7 @@ mod editor;
 mod emitted;
 mod estimates;
 mod examples;
+mod exports;
 mod external;
 mod failures;
 mod faults;

@@ -24,8 +24,6 @@ const PATH_SPACING_M: f64 = 1.0;
 const SIGNALS_M: f64 = 150.0;
 /// A vehicle this far outside of every lane is on none, m.
 const LANE_REACH_M: f64 = 0.5;
-/// Height of the vehicle (Apollo `vehicle_param.pb.txt` of the LGSVL calibration), m.
-const HEIGHT_M: f64 = 2.05;
 /// Standard deviation that localisation is told to have, m: `modular`'s in an open street.
 const POSITION_STD_M: f64 = 0.07;
 /// Seeds are integers that every language reads exactly.
@@ -51,7 +49,7 @@ pub fn init(settings: &ExternalSettings) -> Init {
         vehicle: Vehicle {
             length: car.length_m,
             width: car.width_m,
-            height: HEIGHT_M,
+            height: car.height_m,
             wheelbase: car.wheelbase_m,
             rear_axle_to_front: car.rear_axle_to_front_m,
             rear_axle_to_back: car.rear_axle_to_back_m,

@@ -21,8 +21,9 @@ pub use learn::{
     DistillArguments, ExplainPolicyArguments, ExportWeightsArguments, StudyArguments, TrainArguments,
 };
 pub use scenarios::{
-    DiagnoseArguments, FilesArguments, PackArguments, RenderArguments, ReplayArguments, ReportArguments,
-    RoadArguments, ShrinkArguments, TestArguments, VerifyArguments,
+    DiagnoseArguments, ExportArguments, ExportEgo, ExportFormat, ExportVersion, FilesArguments,
+    PackArguments, RenderArguments, ReplayArguments, ReportArguments, RoadArguments, ShrinkArguments,
+    TestArguments, VerifyArguments,
 };
 
 /// Finds out which of the things that may happen around a self-driving car make it crash.
@@ -123,6 +124,8 @@ pub enum Command {
     Pack(PackArguments),
     /// Play emitted scenarios as a regression suite for a driving system.
     Test(TestArguments),
+    /// Write emitted scenarios as files of other tools: OpenSCENARIO, CommonRoad, tables.
+    Export(ExportArguments),
     /// Write one page of HTML to look at: of a run, a training, a study or scenarios, with replays.
     Report(ReportArguments),
     /// Draw moments of an emitted scenario as SVG.

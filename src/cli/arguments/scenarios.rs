@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use clap::Args;
+use clap::{Args, ValueEnum};
 
 use crate::cli::help::Named;
 
@@ -89,6 +89,48 @@ pub struct PackArguments {
     /// The folder that they are copied to.
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
+}
+
+#[derive(Debug, Args)]
+pub struct ExportArguments {
+    /// What to write: `openscenario` (`.xosc`, with its map beside it), `commonroad` (XML 2020a) or `csv` (a row for each
+    /// road user and tick).
+    #[arg(long, value_enum, value_name = "FORMAT")]
+    pub to: ExportFormat,
+    /// The folder to write to [default: a folder `exported` beside the scenarios].
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// The ego vehicle: it drives as recorded; by a controller `ads` of the player's (OpenSCENARIO); or the player has it, in
+    /// CommonRoad as a planning problem, which is there in any case [default: `trajectory`, `none` for `commonroad`].
+    #[arg(long, value_enum)]
+    pub ego: Option<ExportEgo>,
+    /// Version of OpenSCENARIO [default: 1.2].
+    #[arg(long, value_enum, value_name = "VERSION")]
+    pub osc_version: Option<ExportVersion>,
+    #[command(flatten)]
+    pub many: FilesArguments,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum ExportFormat {
+    Openscenario,
+    Commonroad,
+    Csv,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum ExportEgo {
+    Trajectory,
+    Controller,
+    None,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum ExportVersion {
+    #[value(name = "1.2")]
+    V1_2,
+    #[value(name = "1.3")]
+    V1_3,
 }
 
 #[derive(Debug, Args)]

@@ -1,0 +1,174 @@
+//! `avastra export`: emitted scenarios as files of other tools.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
+
+use crate::export;
+use crate::export::{ExportError, Recording, record};
+
+use super::arguments::{ExportArguments, ExportEgo, ExportFormat, ExportVersion};
+use super::error::Failure;
+use super::files::write;
+use super::load;
+use super::output::{Output, plural};
+use super::parallel::each_file;
+use super::replay::refutation;
+
+/// The folder of what is written, beside the scenarios, unless another one is named.
+const FOLDER: &str = "exported";
+
+/// Writes every file's scenario, played again, in another tool's format. A scenario that does not replay is refused.
+pub fn export(output: &Output, arguments: &ExportArguments) -> Result<(), Failure> {
+    refuse_senseless(arguments)?;
+    let targets = targets(arguments)?;
+    let asked = load::asked(None, None, None)?;
+    let maps = Mutex::new(());
+    let exported = each_file(output, &arguments.many, None, |file| {
+        let (table, scenario) = load::scenario(output, file)?;
+        let (ads, _) = asked.selected_for(&scenario)?;
+        let recording = match record(&table, &scenario, &ads) {
+            Ok(recording) => recording,
+            Err(ExportError::Run(error)) => return Err(error.into()),
+            Err(error @ ExportError::Refuted { .. }) => {
+                return Ok(Exported { file: file.clone(), written: Err(error.to_string()) });
+            }
+        };
+        let target = &targets[file];
+        let written = write_all(arguments, &recording, target, &maps)?;
+        Ok(Exported { file: file.clone(), written: Ok(written) })
+    })?;
+    let mut refuted = 0;
+    for Exported { file, written } in &exported.done {
+        match written {
+            Ok(files) => output.tell(&format!("{}: {}", file.display(), files[0].display())),
+            Err(reason) => {
+                refuted += 1;
+                output.say(&format!("{}: {reason}", file.display()));
+            }
+        }
+    }
+    let written: BTreeSet<&PathBuf> =
+        exported.done.iter().filter_map(|exported| exported.written.as_ref().ok()).flatten().collect();
+    if !exported.is_single() {
+        let done = exported.done.len() - refuted;
+        output.say(&format!("{}: {} written", plural(done, "scenario"), plural(written.len(), "file")));
+    }
+    output.result(serde_json::json!({
+        "files": written, "refuted": refuted, "failed": exported.failed_in_json(),
+    }));
+    exported.complete("exported")?;
+    refutation(refuted)
+}
+
+/// What came of one file: the files that were written, or why it does not replay.
+struct Exported {
+    file: PathBuf,
+    written: Result<Vec<PathBuf>, String>,
+}
+
+/// Options that mean nothing for a format are mistakes.
+fn refuse_senseless(arguments: &ExportArguments) -> Result<(), Failure> {
+    let is_openscenario = arguments.to == ExportFormat::Openscenario;
+    if arguments.osc_version.is_some() && !is_openscenario {
+        return Err(Failure::usage("`--osc-version` is for `--to openscenario`"));
+    }
+    match (arguments.to, arguments.ego) {
+        (ExportFormat::Commonroad, Some(ExportEgo::Controller)) => Err(Failure::usage(
+            "CommonRoad has no controllers: `--ego controller` is for `--to openscenario`",
+        )),
+        (ExportFormat::Csv, Some(_)) => {
+            Err(Failure::usage("`--ego` is not for `--to csv`: the ego vehicle is number 0"))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Where each file goes: no two to one place.
+fn targets(arguments: &ExportArguments) -> Result<BTreeMap<PathBuf, PathBuf>, Failure> {
+    let mut targets = BTreeMap::new();
+    let mut sources: BTreeMap<PathBuf, &Path> = BTreeMap::new();
+    for file in &arguments.many.files {
+        let folder = match &arguments.out {
+            Some(folder) => folder.clone(),
+            None => file.parent().unwrap_or(Path::new("")).join(FOLDER),
+        };
+        let stem = file.file_stem().ok_or_else(|| Failure::usage("a file has a name"))?;
+        let target = folder.join(stem).with_added_extension(extension(arguments.to));
+        if let Some(other) = sources.insert(target.clone(), file).filter(|other| other != file) {
+            return Err(Failure::usage(format!(
+                "`{}` and `{}` would both be written to `{}`: export them to two folders",
+                other.display(),
+                file.display(),
+                target.display()
+            )));
+        }
+        targets.insert(file.clone(), target);
+    }
+    Ok(targets)
+}
+
+fn extension(format: ExportFormat) -> &'static str {
+    match format {
+        ExportFormat::Openscenario => "xosc",
+        ExportFormat::Commonroad => "xml",
+        ExportFormat::Csv => "csv",
+    }
+}
+
+/// Writes the file of a scenario and what it needs beside it; the paths of all of them, its own first. Scenarios share
+/// `maps`, so that two of them do not write the same map at once.
+fn write_all(
+    arguments: &ExportArguments,
+    recording: &Recording,
+    target: &Path,
+    maps: &Mutex<()>,
+) -> Result<Vec<PathBuf>, Failure> {
+    match arguments.to {
+        ExportFormat::Openscenario => {
+            let map = {
+                let _one_at_a_time = maps.lock().unwrap_or_else(PoisonError::into_inner);
+                copy_map(&recording.map_path, target)?
+            };
+            let name = map.file_name().and_then(|name| name.to_str()).unwrap_or_default();
+            let version = match arguments.osc_version {
+                None | Some(ExportVersion::V1_2) => export::Version::V1_2,
+                Some(ExportVersion::V1_3) => export::Version::V1_3,
+            };
+            let ego = match arguments.ego {
+                None | Some(ExportEgo::Trajectory) => export::Ego::Trajectory,
+                Some(ExportEgo::Controller) => export::Ego::Controller,
+                Some(ExportEgo::None) => export::Ego::None,
+            };
+            write(target, &export::openscenario(recording, name, version, ego))?;
+            Ok(vec![target.to_owned(), map])
+        }
+        ExportFormat::Commonroad => {
+            let with_ego = arguments.ego == Some(ExportEgo::Trajectory);
+            write(target, &export::commonroad(recording, with_ego))?;
+            Ok(vec![target.to_owned()])
+        }
+        ExportFormat::Csv => {
+            write(target, &export::csv(recording))?;
+            Ok(vec![target.to_owned()])
+        }
+    }
+}
+
+/// Copies the map beside a file. Several files share it; another map with its name is not overwritten.
+fn copy_map(map: &Path, beside: &Path) -> Result<PathBuf, Failure> {
+    let name = map.file_name().ok_or_else(|| Failure::file("read", map, "it has no name"))?;
+    let target = beside.with_file_name(name);
+    let text = load::text(map)?;
+    match load::text(&target) {
+        Ok(there) if there == text => {}
+        Ok(_) => {
+            return Err(Failure::usage(format!(
+                "another map is already at `{}`: name another folder with `--out`",
+                target.display()
+            )));
+        }
+        Err(_) => write(&target, &text)?,
+    }
+    Ok(target)
+}

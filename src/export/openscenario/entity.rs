@@ -1,0 +1,94 @@
+//! Road users as OpenSCENARIO describes them.
+
+use crate::model::vocabulary::Body;
+
+use super::super::recording::Actor;
+use super::super::xml::Element;
+use super::Ego;
+
+/// Diameter of a wheel, and how far the wheels of an axle are apart as a part of the width: usual values, which matter to
+/// a picture alone.
+const WHEEL_M: f64 = 0.65;
+const TRACK_PART: f64 = 0.85;
+/// The largest angle of front wheels, rad: the ego vehicle's.
+const STEER_RAD_MAX: f64 = 0.5127;
+/// Fast enough for every recording, m/s.
+const SPEED_MPS_MAX: f64 = 60.0;
+
+/// A vehicle is where the middle of its rear axle is, as the standard wants it; a pedestrian is where its middle is. How
+/// far that lies before the middle of the outline, m.
+pub fn ahead_of_centre_m(actor: &Actor) -> f64 {
+    if actor.is_vehicle() { -actor.shape.rear_axle_m } else { 0.0 }
+}
+
+/// An entry of `Entities`.
+pub fn entity(actor: &Actor, ego: Ego) -> Element {
+    let name = actor.name();
+    let entity = Element::new("ScenarioObject").with("name", &name);
+    if !actor.is_vehicle() {
+        let pedestrian = Element::new("Pedestrian")
+            .with("name", &name)
+            .with("pedestrianCategory", "pedestrian")
+            .measured("mass", actor.shape.mass_t * 1000.0)
+            .holding(bounding_box(actor))
+            .holding(properties());
+        return entity.holding(pedestrian);
+    }
+    let performance = Element::new("Performance")
+        .measured("maxSpeed", SPEED_MPS_MAX)
+        .measured("maxAcceleration", actor.shape.acceleration_mps2_max)
+        .measured("maxDeceleration", actor.shape.deceleration_mps2_max);
+    let axle = |kind, steer_rad, ahead_m| {
+        Element::new(kind)
+            .measured("maxSteering", steer_rad)
+            .measured("wheelDiameter", WHEEL_M)
+            .measured("trackWidth", actor.shape.width_m * TRACK_PART)
+            .measured("positionX", ahead_m)
+            .measured("positionZ", WHEEL_M / 2.0)
+    };
+    let axles = Element::new("Axles")
+        .holding(axle("FrontAxle", STEER_RAD_MAX, actor.shape.wheelbase_m))
+        .holding(axle("RearAxle", 0.0, 0.0));
+    let vehicle = Element::new("Vehicle")
+        .with("name", &name)
+        .with("vehicleCategory", category(actor.body))
+        .measured("mass", actor.shape.mass_t * 1000.0)
+        .holding(bounding_box(actor))
+        .holding(performance)
+        .holding(axles)
+        .holding(properties());
+    let driven = (actor.id == 0 && ego == Ego::Controller).then(|| {
+        let controller = Element::new("Controller").with("name", "ads").holding(Element::new("Properties"));
+        Element::new("ObjectController").holding(controller)
+    });
+    entity.holding(vehicle).holding_all(driven)
+}
+
+/// esmini turns a road user late along a polyline unless it is told to turn evenly between the vertices; others ignore it.
+fn properties() -> Element {
+    let evenly = Element::new("Property").with("name", "plineInterpolation").with("value", "segment");
+    Element::new("Properties").holding(evenly)
+}
+
+fn bounding_box(actor: &Actor) -> Element {
+    let shape = &actor.shape;
+    let centre = Element::new("Center")
+        .measured("x", -ahead_of_centre_m(actor))
+        .with("y", 0)
+        .measured("z", shape.height_m / 2.0);
+    let dimensions = Element::new("Dimensions")
+        .measured("width", shape.width_m)
+        .measured("length", shape.length_m)
+        .measured("height", shape.height_m);
+    Element::new("BoundingBox").holding(centre).holding(dimensions)
+}
+
+fn category(body: Body) -> &'static str {
+    match body {
+        Body::Jeep | Body::Sedan | Body::SUV | Body::Hatchback | Body::Pedestrian => "car",
+        Body::BoxTruck => "truck",
+        Body::SchoolBus => "bus",
+        Body::Motorcycle => "motorbike",
+        Body::Bicycle => "bicycle",
+    }
+}
