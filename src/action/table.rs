@@ -55,6 +55,13 @@ pub struct Refusal {
     pub reason: String,
 }
 
+impl Draw {
+    /// Whether it makes road users appear.
+    pub fn makes_appear(&self) -> bool {
+        self.effects.iter().any(|effect| effect.newcomers() > 0)
+    }
+}
+
 impl ActionTable {
     pub fn new(space: Arc<Space>) -> ActionTable {
         ActionTable { space }
@@ -66,6 +73,11 @@ impl ActionTable {
 
     pub fn rows(&self) -> &[Row] {
         &self.space.rows
+    }
+
+    /// How often each row is drawn by chance, relative to the others.
+    pub fn odds(&self) -> Vec<u32> {
+        self.rows().iter().map(|row| self.space.actions[row.action].odds).collect()
     }
 
     /// One offer for each row. Every row draws from a stream of its own, so that one row's draws do not

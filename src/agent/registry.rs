@@ -1,7 +1,7 @@
 //! What an agent is, and every agent by name. A new agent is a file and one entry here; the conformance
 //! tests run through all of them.
 
-use ndarray::ArrayView1;
+use ndarray::{Array1, ArrayView1};
 
 use crate::mdp::Observation;
 use crate::rng::Rng;
@@ -54,6 +54,13 @@ pub trait Agent: Send {
         &[]
     }
 
+    /// The probability with which each row is chosen, shape `(rows,)`, where it depends on nothing but what is legal;
+    /// `None` for an agent that knows no probabilities.
+    fn chances(&self, legal: ArrayView1<bool>) -> Option<Array1<f64>> {
+        let _ = legal;
+        None
+    }
+
     /// Whether it tries rows out before it chooses.
     fn looks_ahead(&self) -> bool {
         false
@@ -74,8 +81,8 @@ pub struct Entry {
 
 /// How an agent is made.
 pub enum Kind {
-    /// It can act at once: a fresh one for each episode.
-    Ready(fn() -> Box<dyn Agent>),
+    /// It can act at once: a fresh one for each episode, under the odds of the rows.
+    Ready(fn(&[u32]) -> Box<dyn Agent>),
     /// It must be trained: its presets, the default first. See [`super::Learner`].
     Learning(&'static [Preset]),
     /// It searches over many episodes, and what it found can act: how its settings are read from the changes
@@ -88,22 +95,22 @@ pub const REGISTRY: &[Entry] = &[
     Entry {
         name: "none",
         summary: "nothing happens but ordinary traffic, if there is any",
-        kind: Kind::Ready(|| Box::new(Idle)),
+        kind: Kind::Ready(|_| Box::new(Idle)),
     },
     Entry {
         name: "random",
-        summary: "uniform over the rows that the rules allow at the moment",
-        kind: Kind::Ready(|| Box::new(random::MaskedRandom)),
+        summary: "by chance among the rows that the rules allow at the moment, each as likely unless the space gives odds",
+        kind: Kind::Ready(|odds| Box::new(random::MaskedRandom::new(odds))),
     },
     Entry {
         name: "random-raw",
         summary: "uniform over all rows, as the published random search; an illegal choice is a step lost",
-        kind: Kind::Ready(|| Box::new(random::RawRandom)),
+        kind: Kind::Ready(|_| Box::new(random::RawRandom)),
     },
     Entry {
         name: "space-filling",
         summary: "random, but spread evenly over the rows and their drawn values: a Latin hypercube in each episode",
-        kind: Kind::Ready(|| Box::new(space_filling::SpaceFilling::default())),
+        kind: Kind::Ready(|_| Box::new(space_filling::SpaceFilling::default())),
     },
     Entry {
         name: "ddqn",
@@ -118,7 +125,7 @@ pub const REGISTRY: &[Entry] = &[
     Entry {
         name: "greedy",
         summary: "one step of lookahead: tries every legal row in a copy of the world, takes the most dangerous",
-        kind: Kind::Ready(|| Box::new(greedy::Greedy::default())),
+        kind: Kind::Ready(|_| Box::new(greedy::Greedy::default())),
     },
     Entry {
         name: "av-fuzzer",
@@ -175,7 +182,6 @@ mod tests {
     use crate::agent::{Collided, Experience, Learner, Rows, Trainable, Trajectory};
     use crate::mdp::Closeness;
     use crate::rng::{Stream, child_seed, stream};
-    use ndarray::Array1;
 
     const ROWS: usize = 5;
 
@@ -183,7 +189,7 @@ mod tests {
     fn fresh(entry: &Entry, seed: u64) -> Vec<(Box<dyn Agent>, bool)> {
         let rows = || Arc::new(Rows { allowed: vec![true; ROWS], environment: vec![false; ROWS] });
         match entry.kind {
-            Kind::Ready(build) => vec![(build(), entry.name != "random-raw")],
+            Kind::Ready(build) => vec![(build(&[1; ROWS]), entry.name != "random-raw")],
             Kind::Learning(presets) => {
                 let learner = |preset: &Preset| -> (Box<dyn Agent>, bool) {
                     let settings = (preset.settings)();

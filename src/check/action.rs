@@ -94,6 +94,8 @@ impl Checker {
             docs: docs(item),
             parameters,
             effects: effects.into_iter().flatten().collect(),
+            // Until `odds actions` says otherwise.
+            odds: 1,
             span: declared.name.span,
         };
         Some((action, is_whole))

@@ -103,6 +103,7 @@ pub(super) fn space(
     checker.declare_states(items);
     checker.declare_actions(items);
     checker.declare_groups(items);
+    checker.declare_action_odds(items);
     checker.declare_also(items);
     checker.declare_each_step(items);
     let rules = checker.rules(items);
@@ -216,6 +217,7 @@ impl Checker {
     /// Looks at a declaration that does not stand: it is overridden, left out, or the second of its name.
     fn look_at_item(&mut self, item: &ast::Item) {
         match item.kind.plain() {
+            ItemKind::Odds(declared) if self.is_of_actions(declared) => drop(self.action_odds(declared)),
             ItemKind::Odds(declared) => drop(self.odds(declared)),
             ItemKind::State(declared) => drop(self.state(item, declared)),
             ItemKind::Body(declared) => drop(self.body(item, declared)),

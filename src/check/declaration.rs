@@ -1,13 +1,13 @@
 //! Checks the declarations of enums, constants, functions and states.
 
-use crate::check::checker::{Checker, Signature, docs};
+use crate::check::checker::{Checker, Signature, docs, each};
 use crate::check::expression::Place;
 use crate::check::names::unknown;
 use crate::check::references::Symbol;
 use crate::check::report::Report;
 use crate::check::rule::names_in;
 use crate::model::expr::{Expr, ExprKind};
-use crate::model::vocabulary::{Level, Phenomenon, TimeOfDay, Word, WorldState};
+use crate::model::vocabulary::{Level, Phenomenon, SpaceClaim, TimeOfDay, Word, WorldState};
 use crate::model::{EnumDef, EnumIndex, FnDef, Initial, STATE_MAX, StateDef, StateMeaning, Type, code};
 use crate::prove::VARIANTS_MAX;
 use crate::syntax::ast::{ItemKind, Span};
@@ -34,6 +34,8 @@ struct Cost {
 
 /// Largest value that `odds` may give to a variant.
 const ODDS_MAX: u32 = 100;
+/// Largest value that it may give to the rows of an action: with all that a table may have, the sum still fits.
+const ACTION_ODDS_MAX: u32 = 10_000;
 
 impl Checker {
     pub(super) fn declare_enums(&mut self, items: &[&ast::Item]) {
@@ -61,9 +63,59 @@ impl Checker {
     /// The odds of variants: whole numbers, folded like constants.
     pub(super) fn declare_odds(&mut self, items: &[&ast::Item]) {
         for (_, declared) in self.declared("odds of", items, ItemKind::as_odds).1 {
+            if self.is_of_actions(declared) {
+                continue;
+            }
             if let Some((of, odds)) = self.odds(declared) {
                 self.enums[of].odds = odds;
             }
+        }
+    }
+
+    /// The odds of rows, which are those of their actions.
+    pub(super) fn declare_action_odds(&mut self, items: &[&ast::Item]) {
+        // A second declaration was reported before.
+        let of_actions = each(items, ItemKind::as_odds).find(|(_, declared)| self.is_of_actions(declared));
+        let Some((_, declared)) = of_actions else { return };
+        for (action, odds) in self.action_odds(declared).into_iter().enumerate() {
+            self.actions[action].iter_mut().for_each(|known| known.odds = odds);
+        }
+    }
+
+    /// Whether odds are those of actions and not those of an enum with that name.
+    pub(super) fn is_of_actions(&self, declared: &ast::Odds) -> bool {
+        declared.name.text == SpaceClaim::Actions.name() && self.enum_names.get(&declared.name.text).is_none()
+    }
+
+    /// The odds of each action.
+    pub(super) fn action_odds(&mut self, declared: &ast::Odds) -> Vec<u32> {
+        self.references.word(declared.name.span, SpaceClaim::Actions);
+        let mut odds: Vec<Option<u32>> = vec![None; self.actions.len()];
+        for arm in &declared.arms {
+            let value = self.odds_of(&arm.value, ACTION_ODDS_MAX).unwrap_or(1);
+            let named: Vec<usize> = arm.patterns.iter().flat_map(|pattern| self.targets(pattern)).collect();
+            let taken = if arm.patterns.is_empty() { (0..odds.len()).collect() } else { named };
+            self.share_out(arm, value, &taken, &mut odds);
+        }
+        let odds: Vec<u32> = odds.into_iter().map(|odds| odds.unwrap_or(1)).collect();
+        if !odds.is_empty() && odds.iter().all(|odds| *odds == 0) {
+            let error = Diagnostic::error(code::EMPTY, "no action is ever drawn")
+                .at(declared.name.span, "all its odds are 0");
+            self.report(error.help("give at least one action odds above 0"));
+        }
+        odds
+    }
+
+    /// Gives a line's odds to what has none yet of what it takes.
+    fn share_out(&mut self, arm: &ast::Arm, value: u32, taken: &[usize], odds: &mut [Option<u32>]) {
+        // An unknown name was reported.
+        let sound = arm.patterns.is_empty() || !taken.is_empty();
+        if sound && !taken.iter().any(|index| odds[*index].is_none()) {
+            let error = Diagnostic::error(code::NEVER_REACHED, "these odds never count");
+            self.report(error.at(arm.span, "the lines before it say it all").help("remove the line"));
+        }
+        for index in taken {
+            odds[*index] = odds[*index].or(Some(value));
         }
     }
 
@@ -80,22 +132,14 @@ impl Checker {
         };
         let mut odds: Vec<Option<u32>> = vec![None; self.enums[of].variants.len()];
         for arm in &declared.arms {
-            let value = self.odds_of(&arm.value).unwrap_or(1);
+            let value = self.odds_of(&arm.value, ODDS_MAX).unwrap_or(1);
             let named: Vec<Option<usize>> =
                 arm.patterns.iter().map(|pattern| self.variant(pattern, of)).collect();
             let taken: Vec<usize> = match arm.patterns.is_empty() {
-                true => (0..odds.len()).filter(|variant| odds[*variant].is_none()).collect(),
+                true => (0..odds.len()).collect(),
                 false => named.into_iter().flatten().collect(),
             };
-            // An unknown variant was reported.
-            let sound = arm.patterns.is_empty() || !taken.is_empty();
-            if sound && !taken.iter().any(|variant| odds[*variant].is_none()) {
-                let error = Diagnostic::error(code::NEVER_REACHED, "these odds never count");
-                self.report(error.at(arm.span, "the lines before it say it all").help("remove the line"));
-            }
-            for variant in taken {
-                odds[variant] = odds[variant].or(Some(value));
-            }
+            self.share_out(arm, value, &taken, &mut odds);
         }
         // Variants that are not named are as likely as before.
         let odds: Vec<u32> = odds.into_iter().map(|odds| odds.unwrap_or(1)).collect();
@@ -107,7 +151,7 @@ impl Checker {
         Some((of, odds))
     }
 
-    fn odds_of(&mut self, value: &ast::Expr) -> Option<u32> {
+    fn odds_of(&mut self, value: &ast::Expr, most: u32) -> Option<u32> {
         let expr = self.expr(value, &Place::default(), Some(Type::Int))?;
         let found = match (expr.ty, self.fold(&expr)?) {
             (Type::Int, ExprKind::Number(number)) => {
@@ -115,9 +159,9 @@ impl Checker {
             }
             _ => None,
         };
-        found.filter(|odds| *odds <= ODDS_MAX).or_else(|| {
+        found.filter(|odds| *odds <= most).or_else(|| {
             let error = Diagnostic::error(code::SETTING, "odds are whole numbers")
-                .at(value.span, format!("wanted a whole number from 0 to {ODDS_MAX}"));
+                .at(value.span, format!("wanted a whole number from 0 to {most}"));
             self.reject(error.help("`BoxTruck => 2` makes trucks twice as likely as what has 1"))
         })
     }

@@ -1,11 +1,11 @@
 //! `avastra estimate`: how often would it crash; and `avastra compare`: which of two crashes more often.
 
 use std::path::Path;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::AtomicBool;
 
 use crate::estimate::{
     Comparison, ComparisonResults, Estimate, EstimateDatabase, EstimateResults, EstimateSettings, EventKind,
-    Method, Probability, RoadEstimate, compared, play_parts,
+    Found, Mass, Met, Method, Part, Pilot, Plan, Played, Probability, Stopping, compared, pilot, play_parts,
 };
 use crate::run::{Run, RunSettings};
 use crate::statistics::Interval;
@@ -13,12 +13,14 @@ use crate::statistics::Interval;
 use super::arguments::{CompareArguments, EstimateArguments, EventArgument, MethodArgument};
 use super::error::Failure;
 use super::files::write;
+use super::findings::doubts;
 use super::interrupt::stop_on_interrupt;
 use super::load::UnderTest;
 use super::output::{Output, plural};
 use super::parallel::jobs;
-use super::progress::Progress;
-use super::run_directory::{Held, Resumed};
+use super::progress::{Progress, Working};
+use super::run::{critical_text, cut_short};
+use super::run_directory::{Held, Resumed, write_scenario};
 use super::{conditions, load, run_directory};
 
 /// Plays what an estimate still lacks and prints its result.
@@ -33,38 +35,121 @@ pub fn estimate(output: &Output, arguments: &EstimateArguments) -> Result<(), Fa
     let mut database =
         EstimateDatabase::open(&file, &settings).map_err(|error| Failure::file("open", &file, error))?;
     let unread = |error| Failure::file("read", &file, error);
-    let done: Vec<_> = database.parts().map_err(unread)?.iter().map(|record| record.part).collect();
-    let todo: Vec<_> = estimate.parts().into_iter().filter(|part| !done.contains(part)).collect();
     output.tell(&heading(&estimate, &path));
-
-    let episodes = u64::from(estimate.settings().run.episodes);
-    let mut progress =
-        Progress::new(output, estimate.parts().len() as u64 * episodes, done.len() as u64 * episodes);
     let jobs = jobs(arguments.jobs, estimate.run().program())?;
-    play_parts(&estimate, &todo, jobs, &stop, &mut |record| {
-        // Such a part says nothing, and is not kept: with a repaired system the estimate can go on.
-        if record.failed > 0 {
-            output.say("no estimate: the driving system failed; `avastra run` with it says how");
-            return Err(Failure::Ads { findings: record.failed as usize });
+    let interrupted = || Failure::Interrupted { command: "estimate", directory: path.clone() };
+    let Some(pilot) = piloted(output, &estimate, (&mut database, &file), jobs, &stop)? else {
+        return Err(interrupted());
+    };
+    let plan = Plan::of(&pilot, 0.0);
+
+    let labels: Vec<String> = estimate.run().table().rows().iter().map(|row| row.label.clone()).collect();
+    let (episodes, roads) =
+        (u64::from(estimate.settings().run.episodes), estimate.settings().run.roads.len());
+    let total = estimate.settings().parts as usize * roads;
+    let mut progress = Progress::new(
+        output,
+        estimate.settings().event.noun(),
+        total as u64 * episodes,
+        database.parts().map_err(unread)?.len() as u64 * episodes,
+    );
+    let mut results = None;
+    for look in estimate.settings().looks() {
+        let parts = estimate.parts();
+        let until = &parts[..look as usize * roads];
+        let done: Vec<Part> = database.parts().map_err(unread)?.iter().map(|record| record.part).collect();
+        let todo: Vec<Part> = until.iter().copied().filter(|part| !done.contains(part)).collect();
+        play_parts(&estimate, &todo, &plan, jobs, &stop, &mut |played| {
+            // Such a part says nothing, and is not kept: with a repaired system the estimate can go on.
+            if played.record.failed > 0 {
+                output.say("no estimate: the driving system failed; `avastra run` with it says how");
+                return Err(Failure::Ads { findings: played.record.failed as usize });
+            }
+            let scenarios = written(&estimate, &path, &played)?;
+            for number in 0..played.record.episodes {
+                progress.episode(usize::from(number < played.record.events));
+            }
+            database.add(&estimate, &played, &scenarios).map_err(|error| Failure::file("write", &file, error))
+        })?;
+        // What was played beyond this look, before a kill or with other rules, does not count at it.
+        let is_at_look = |part: &Part| part.number < look;
+        let (mut records, mut events) =
+            (database.parts().map_err(unread)?, database.events().map_err(unread)?);
+        records.retain(|record| is_at_look(&record.part));
+        events.retain(|(part, _)| is_at_look(part));
+        let pilot_s = pilot.whole_s + pilot.tried_s;
+        let found = Found { records: &records, events: &events, pilot_s, labels: &labels };
+        let at_look = EstimateResults::new(estimate.settings(), found);
+        let is_over = records.len() < until.len()
+            || at_look.together.as_ref().is_some_and(|found| estimate.settings().is_enough(found));
+        results = Some((at_look, records.len() < until.len()));
+        if is_over {
+            break;
         }
-        for number in 0..record.episodes {
-            progress.episode(usize::from(number < record.events));
-        }
-        database.add(&estimate, &record).map_err(|error| Failure::file("write", &file, error))
-    })?;
+    }
     drop(progress);
 
-    let records = database.parts().map_err(unread)?;
-    let results = EstimateResults::new(estimate.settings(), &records);
+    let (results, is_unfinished) = results.expect("every estimate looks once");
     let text = serde_json::to_string_pretty(&results).expect("results have string keys only");
     write(&path.join("results.json"), &format!("{text}\n"))?;
-    output.say(&estimate_text(&results));
-    let is_unfinished = results.parts < results.parts_wanted;
-    output.result(serde_json::json!({ "directory": path, "results": results }));
-    if stop.load(Ordering::Relaxed) && is_unfinished {
-        return Err(Failure::Interrupted { command: "estimate", directory: path });
+    output.say(&estimate_text(&results, is_unfinished));
+    let critical = load::sources_in(&path.join("critical"))?;
+    output.say(&critical_text(&path, &critical));
+    let doubts = doubts(estimate.run().program());
+    doubts.iter().for_each(|doubt| output.warn(doubt));
+    output.result(serde_json::json!({
+        "directory": path, "results": results, "critical": critical, "reproducible": doubts.is_empty(),
+    }));
+    if is_unfinished { Err(interrupted()) } else { Ok(()) }
+}
+
+/// What the pilot of an estimate saw: kept, or played now. `None` if it was stopped; nothing for a method without one.
+fn piloted(
+    output: &Output,
+    estimate: &Estimate,
+    (database, file): (&mut EstimateDatabase, &Path),
+    jobs: usize,
+    stop: &AtomicBool,
+) -> Result<Option<Pilot>, Failure> {
+    if estimate.settings().method != Method::Probe {
+        return Ok(Some(Pilot::default()));
     }
-    Ok(())
+    let kept = database.pilot().map_err(|error| Failure::file("read", file, error))?;
+    if kept.is_some() {
+        return Ok(kept);
+    }
+    let found = {
+        let _working = Working::new(output, "a pilot learns which rows are dangerous");
+        pilot(estimate, jobs, stop)
+    };
+    if let Some(pilot) = &found {
+        database.keep_pilot(pilot).map_err(|error| Failure::file("write", file, error))?;
+    }
+    Ok(found)
+}
+
+/// Writes what a part met as scenarios, where the space's verdict counts it; the file of each event, if there is one.
+fn written(estimate: &Estimate, directory: &Path, played: &Played) -> Result<Vec<Option<String>>, Failure> {
+    let settings = &estimate.settings().run;
+    let rules = [&settings.without[..], &settings.with];
+    let critical = directory.join("critical");
+    let write_one = |met: &Met| {
+        if met.summary.counted() == 0 {
+            return Ok(None);
+        }
+        // An episode and the trials beside it have one number, and differ by step and row.
+        let tried = match met.event.row {
+            Some(row) if estimate.settings().method == Method::Probe => {
+                format!("_{:02}_{row:02}", met.event.step)
+            }
+            _ => String::new(),
+        };
+        let name = format!("{}_{:04}{tried}.ava", met.log.road, met.summary.episode);
+        let (table, episode) = (estimate.run().table(), (&met.log, &met.summary));
+        write_scenario(&critical.join(&name), "estimate", table, episode, &settings.agent, rules)?;
+        Ok(Some(name))
+    };
+    played.met.iter().map(write_one).collect()
 }
 
 /// A new estimate, from the command line, with the text of its settings.
@@ -77,16 +162,20 @@ fn begun(output: &Output, arguments: &EstimateArguments) -> Result<(Estimate, He
         event: event(arguments.event),
         method: match arguments.method {
             MethodArgument::Count => Method::Count,
+            MethodArgument::Probe => Method::Probe,
             MethodArgument::Split => Method::Split,
         },
         parts: arguments.parts,
+        stopping: Stopping { precision: arguments.precision, hours: arguments.hours },
         run: conditions::settings(table.space(), conditions, &conditions.agent, under_test, episodes)?,
     };
     let estimate = Estimate::new(table, settings).map_err(Failure::usage)?;
-    let held = run_directory::create_empty(arguments.out.as_deref())?;
+    let held = run_directory::create(arguments.out.as_deref())?;
     let space = load::relative(&held.path, &estimate.run().space().path)?;
+    let attached = estimate.run().attached();
+    let external = attached.map(|attached| run_directory::to_record(&held.path, attached)).transpose()?;
     let settings = estimate.settings().clone();
-    let settings = EstimateSettings { run: RunSettings { space, ..settings.run }, ..settings };
+    let settings = EstimateSettings { run: RunSettings { space, external, ..settings.run }, ..settings };
     let text = run_directory::write_settings(&held.path, "estimate", &settings)?;
     Ok((estimate, held, text))
 }
@@ -95,6 +184,8 @@ fn begun(output: &Output, arguments: &EstimateArguments) -> Result<(Estimate, He
 fn resumed(output: &Output, path: &Path) -> Result<(Estimate, Held, String), Failure> {
     let resumed: Resumed<EstimateSettings> = run_directory::resume(output, path, "estimate", "estimate")?;
     let Resumed { settings, text, table, held } = resumed;
+    let external = settings.run.external.map(|attached| run_directory::from_record(path, attached));
+    let settings = EstimateSettings { run: RunSettings { external, ..settings.run }, ..settings };
     Ok((Estimate::new(table, settings).map_err(Failure::usage)?, held, text))
 }
 
@@ -120,7 +211,7 @@ pub fn compare(output: &Output, arguments: &CompareArguments) -> Result<(), Fail
     ));
     // Nothing is kept of a comparison, so Ctrl-C ends it at once.
     let stop = AtomicBool::new(false);
-    let mut progress = Progress::new(output, numbers.len() as u64, 0);
+    let mut progress = Progress::new(output, comparison.event.noun(), numbers.len() as u64, 0);
     let mut pairs = Vec::new();
     // Whichever has a program serves so many at a time.
     let program = comparison.first.program().or(comparison.second.program());
@@ -140,7 +231,11 @@ pub fn compare(output: &Output, arguments: &CompareArguments) -> Result<(), Fail
     let results = ComparisonResults::new(comparison.event, &pairs).expect("there is at least one episode");
     let sides = [&arguments.first, &arguments.second];
     output.say(&comparison_text(&results, sides));
-    output.result(serde_json::json!({ "sides": sides, "results": results }));
+    let doubts: Vec<String> =
+        [&comparison.first, &comparison.second].into_iter().flat_map(|run| doubts(run.program())).collect();
+    doubts.iter().for_each(|doubt| output.warn(doubt));
+    output
+        .result(serde_json::json!({ "sides": sides, "results": results, "reproducible": doubts.is_empty() }));
     Ok(())
 }
 
@@ -164,6 +259,7 @@ fn heading(estimate: &Estimate, directory: &Path) -> String {
     let settings = estimate.settings();
     let method = match settings.method {
         Method::Count => "by counting",
+        Method::Probe => "by trying rows out",
         Method::Split => "by splitting",
     };
     format!(
@@ -180,10 +276,12 @@ fn heading(estimate: &Estimate, directory: &Path) -> String {
     )
 }
 
-fn estimate_text(results: &EstimateResults) -> String {
+fn estimate_text(results: &EstimateResults, is_unfinished: bool) -> String {
     let mut text = String::new();
-    if results.parts < results.parts_wanted {
+    if is_unfinished {
         text.push_str(&format!("unfinished: {} of {} parts\n", results.parts, results.parts_wanted));
+    } else if results.parts < results.parts_wanted {
+        text.push_str(&format!("enough after {} of {} parts\n", results.parts, results.parts_wanted));
     }
     text.push_str(&format!("\nepisodes with {}; in brackets: 95 % intervals\n", results.event.in_words()));
     for road in &results.roads {
@@ -195,37 +293,40 @@ fn estimate_text(results: &EstimateResults) -> String {
         }
         _ => {}
     }
-    if let Some(gain) = results.together.as_ref().and_then(|all| all.gain) {
-        let (factor, how) = if gain >= 1.0 { (gain, "less") } else { (1.0 / gain, "more") };
-        text.push_str(&format!(
-            "roughly {factor:.1} times {how} simulated time than counting for the same precision (from the spread of the parts)\n"
-        ));
+    if let Some(all) = &results.together {
+        if let Some(events) = all.effective_events {
+            text.push_str(&format!("events met: as good as {events:.1} of one weight\n"));
+        }
+        if let Some(gain) = all.gain {
+            let (factor, how) = if gain >= 1.0 { (gain, "less") } else { (1.0 / gain, "more") };
+            text.push_str(&format!(
+                "roughly {factor:.1} times {how} simulated time than counting for an interval as narrow\n"
+            ));
+        }
     }
-    let misses = |road: &RoadEstimate| 2 * road.estimate.parts_without > road.estimate.parts;
-    if results.method == Method::Split && results.roads.iter().any(misses) {
-        text.push_str(
-            "where most parts have not found it, the interval is too short: say more `--episodes`\n",
-        );
+    if !results.mass.is_empty() {
+        let line = |mass: &Mass| {
+            let row = mass.row.as_deref().unwrap_or("what no action made appear");
+            format!(
+                "{:>4.1} %  {}: {row} ({})",
+                100.0 * mass.share,
+                mass.road,
+                plural(mass.events as usize, "event")
+            )
+        };
+        let more = |more| format!("and {more} others");
+        text.push_str(&cut_short("where the probability lies:".to_owned(), &results.mass, line, more));
     }
     text.trim_end().to_owned()
 }
 
 fn probability_text(found: &Probability) -> String {
-    let rate = match (found.per_1000_km, found.per_1000_km_interval) {
-        (Some(rate), interval) => format!(", {} in 1000 km", bracketed(rate, interval)),
-        (None, _) => String::new(),
-    };
-    let without = match found.parts_without {
-        0 => String::new(),
-        _ if found.interval.is_none() => String::new(),
-        without => format!("; {without} of {} without", plural(found.parts, "part")),
-    };
-    let spread = match found.interval {
-        None => format!("; all {} alike: no interval", plural(found.parts, "part")),
-        Some(_) => String::new(),
-    };
+    let rate = found
+        .per_1000_km
+        .zip(found.per_1000_km_interval)
+        .map_or(String::new(), |(rate, interval)| format!(", {} in 1000 km", bracketed(rate, interval)));
     format!(
-        "{}{rate}{spread}{without} ({} over {:.1} km, {:.2} h simulated)",
+        "{}{rate} ({} over {:.1} km, {:.2} h simulated)",
         bracketed(found.probability, found.interval),
         plural(found.episodes as usize, "episode"),
         found.driven_km,
@@ -234,13 +335,8 @@ fn probability_text(found: &Probability) -> String {
 }
 
 /// `0.00123 [0.0004, 0.0021]`.
-fn bracketed(value: f64, interval: Option<Interval>) -> String {
-    match interval {
-        None => figures(value),
-        Some(Interval { low, high }) => {
-            format!("{} [{}, {}]", figures(value), figures(low), high.map_or("∞".to_owned(), figures))
-        }
-    }
+fn bracketed(value: f64, Interval { low, high }: Interval) -> String {
+    format!("{} [{}, {}]", figures(value), figures(low), high.map_or("∞".to_owned(), figures))
 }
 
 /// Three significant figures.
@@ -254,7 +350,7 @@ fn figures(value: f64) -> String {
 
 fn comparison_text(results: &ComparisonResults, [first, second]: [&String; 2]) -> String {
     let [of_first, of_second] = results.probability;
-    let [interval_first, interval_second] = results.intervals.map(Some);
+    let [interval_first, interval_second] = results.intervals;
     let [km_first, km_second] = results.driven_km;
     let mut text = format!(
         "\nepisodes with {} of {}; in brackets: 95 % intervals\n",
@@ -272,7 +368,7 @@ fn comparison_text(results: &ComparisonResults, [first, second]: [&String; 2]) -
     ));
     text.push_str(&format!(
         "difference: {}, sign test p {}\n",
-        bracketed(results.difference, Some(results.difference_interval)),
+        bracketed(results.difference, results.difference_interval),
         if results.p < 1e-4 { "< 0.0001".to_owned() } else { format!("= {:.4}", results.p) }
     ));
     text.push_str(&match results.told_apart_km {

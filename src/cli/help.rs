@@ -131,7 +131,11 @@ const EXAMPLES: &[(&str, &[(&str, &str)])] = &[
         "estimate",
         &[
             ("estimate scenarios/avastra45.ava --ads-config scenarios/ads/degraded.yaml", "by counting"),
-            ("estimate scenarios/avastra45.ava --road corner --method split", "by splitting"),
+            (
+                "estimate scenarios/avastra45.ava --road corner --method probe",
+                "rare crashes: try dangerous rows out",
+            ),
+            ("estimate scenarios/avastra45.ava --precision 0.2 --parts 400", "until it is precise enough"),
             ("estimate --resume runs/0001", "go on after Ctrl-C"),
         ],
     ),

@@ -17,18 +17,20 @@ use super::output::{Output, Telling, plural, remark};
 pub struct Progress {
     count: Count,
     found: usize,
+    /// What became of the collisions that are told: `counted`, for example.
+    how: &'static str,
 }
 
 impl Progress {
     /// `resumed` episodes count as done already.
-    pub fn new(output: &Output, total: u64, resumed: u64) -> Progress {
-        Progress { count: Count::new(output, "episodes", total, resumed), found: 0 }
+    pub fn new(output: &Output, how: &'static str, total: u64, resumed: u64) -> Progress {
+        Progress { count: Count::new(output, "episodes", total, resumed), found: 0, how }
     }
 
-    /// One more episode is done, with so many counted collisions.
-    pub fn episode(&mut self, counted: usize) {
-        self.found += counted;
-        self.count.up(format!("{} counted", plural(self.found, "collision")));
+    /// One more episode is done, with so many of the collisions that are told.
+    pub fn episode(&mut self, found: usize) {
+        self.found += found;
+        self.count.up(format!("{} {}", plural(self.found, "collision"), self.how));
     }
 }
 

@@ -47,7 +47,7 @@ pub fn run(output: &Output, arguments: &RunArguments) -> Result<(), Failure> {
     #[allow(clippy::disallowed_methods, reason = "this is cli, and the time goes nowhere but the summary")]
     let started = Instant::now();
     let jobs = jobs(arguments.jobs, run.program())?;
-    let mut progress = Progress::new(output, run.episodes() as u64, done.len() as u64);
+    let mut progress = Progress::new(output, "counted", run.episodes() as u64, done.len() as u64);
     play(&run, &todo, jobs, &stop, &mut |summary, log| {
         keep(&run, &mut directory, &summary, &log)?;
         progress.episode(summary.counted());
@@ -355,7 +355,7 @@ fn groups_text(groups: &[Group]) -> String {
     cut_short(head, groups, line, |more| format!("and {more} others"))
 }
 
-fn critical_text(directory: &Path, files: &[PathBuf]) -> String {
+pub fn critical_text(directory: &Path, files: &[PathBuf]) -> String {
     if files.is_empty() {
         return "no critical scenario".to_owned();
     }

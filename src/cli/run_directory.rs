@@ -244,19 +244,33 @@ impl RunDirectory {
         table: &ActionTable,
         (log, summary): (&EpisodeLog, &EpisodeSummary),
         agent: &str,
-        [without, with]: [&[String]; 2],
+        rules: [&[String]; 2],
     ) -> Result<String, Failure> {
-        let name = scenario_name(&log.road, summary.episode);
-        let critical = self.path.join("critical");
-        let space_path = load::relative(&critical, &table.space().path)?;
-        let (name, space_path, episode) = (name.as_str(), space_path.as_str(), summary.episode);
-        let source = emit::Provenance { command, name, space_path, episode, agent, without, with };
-        let file = emit::scenario(table, log, summary, &source);
-        let text = crate::syntax::print(&file);
-        write_answers(&self.critical(&log.road, episode), log)?;
-        write(&self.critical(&log.road, episode), &text)?;
-        Ok(digest(text.as_bytes()))
+        let path = self.critical(&log.road, summary.episode);
+        write_scenario(&path, command, table, (log, summary), agent, rules)
     }
+}
+
+/// Writes the counted collisions of an episode as a scenario that has the name of the file, and gives its digest. `agent`
+/// is the one that played it, `rules` are those switched off and those switched on.
+pub fn write_scenario(
+    path: &Path,
+    command: &str,
+    table: &ActionTable,
+    (log, summary): (&EpisodeLog, &EpisodeSummary),
+    agent: &str,
+    [without, with]: [&[String]; 2],
+) -> Result<String, Failure> {
+    let (folder, name) = (path.parent().unwrap_or(Path::new(".")), path.file_stem().unwrap_or_default());
+    let space_path = load::relative(folder, &table.space().path)?;
+    let name = name.to_string_lossy();
+    let (name, space_path, episode) = (&*name, space_path.as_str(), summary.episode);
+    let source = emit::Provenance { command, name, space_path, episode, agent, without, with };
+    let file = emit::scenario(table, log, summary, &source);
+    let text = crate::syntax::print(&file);
+    write_answers(path, log)?;
+    write(path, &text)?;
+    Ok(digest(text.as_bytes()))
 }
 
 fn scenario_name(road: &str, episode: usize) -> String {
@@ -281,7 +295,7 @@ fn is_unbegun(path: &Path) -> std::io::Result<bool> {
     for entry in std::fs::read_dir(path)? {
         let name = entry?.file_name();
         let is_left = match name.to_str() {
-            Some("run.yaml.partial" | "study.yaml.partial") => true,
+            Some("run.yaml.partial" | "study.yaml.partial" | "estimate.yaml.partial") => true,
             Some("critical") => {
                 let inside: Vec<_> = std::fs::read_dir(path.join(name))?.collect::<Result<_, _>>()?;
                 inside.iter().all(|entry| entry.file_name() == OsStr::new(pack::SPACE))

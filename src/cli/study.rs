@@ -55,7 +55,7 @@ pub fn study(output: &Output, arguments: &StudyArguments) -> Result<(), Failure>
     let probe = study.settings().external.as_ref().map(|attached| Program::new(attached.settings.clone()));
     let jobs = jobs(arguments.jobs, probe.as_ref())?;
     drop(probe);
-    let mut progress = Progress::new(output, all, all - left);
+    let mut progress = Progress::new(output, "counted", all, all - left);
     play_jobs(&study, &todo, jobs, &stop, &spent, &mut |event| match event {
         Event::Episode { counted } => {
             progress.episode(counted);

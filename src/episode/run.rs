@@ -46,6 +46,25 @@ impl<'a> Moment<'a> {
         copy.into_log(self.setup, End::Script)
     }
 
+    /// The log of the episode up to now.
+    pub fn log(&self) -> EpisodeLog {
+        self.play.clone().into_log(self.setup, End::Script)
+    }
+
+    /// Number of collisions up to now.
+    pub fn collisions(&self) -> usize {
+        self.play.collisions.len()
+    }
+
+    /// Whether anything is still there that the action of a step made appear.
+    pub fn is_around(&self, step: usize) -> bool {
+        let spawned = match self.play.steps.get(step).map(|step| &step.outcome) {
+            Some(Outcome::Done { spawned, .. }) => &spawned[..],
+            _ => &[],
+        };
+        spawned.iter().any(|id| self.play.world.obstacle(*id).is_some())
+    }
+
     /// Ticks since the start of the episode.
     pub fn ticks(&self) -> u64 {
         self.play.world.ticks()

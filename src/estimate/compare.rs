@@ -142,7 +142,8 @@ fn told_apart_km(pairs: &[Pair]) -> Option<f64> {
         match (pair.first.happened, pair.second.happened) {
             (true, false) => first_only += 1,
             (false, true) => second_only += 1,
-            _ => {}
+            // Such a pair changes nothing.
+            _ => continue,
         }
         since =
             if sign_test(first_only, second_only) < 0.05 { since.or(Some(driven_m / 1000.0)) } else { None };

@@ -1,22 +1,40 @@
-//! `estimate.db`: the parts of an estimate, in SQLite, one transaction each.
+//! `estimate.db`: the pilot, the parts and the events of an estimate, in SQLite, one transaction for each part.
 
 use std::path::Path;
 
-use rusqlite::{Connection, params};
+use rusqlite::{Connection, OptionalExtension, params};
 
 use crate::run::{DatabaseError, Layout};
 
-use crate::estimate::part::{Part, PartRecord};
+use crate::estimate::part::{Event, Part, PartRecord, Played};
+use crate::estimate::plan::{Cell, Pilot, Seen};
 use crate::estimate::ready::Estimate;
 
 /// Versions begin at 2001, so that it is never taken for another database.
-const LAYOUT: Layout = Layout { version: 2001, unit: "part", tables: &["part"], naming: None };
+const LAYOUT: Layout =
+    Layout { version: 2002, unit: "part", tables: &["part", "event", "pilot", "seen"], naming: None };
+
+/// What a pilot saw stands under a part that no estimate has.
+const PILOT: i64 = -1;
 
 const SCHEMA: &str = "
 CREATE TABLE part (
   part INTEGER PRIMARY KEY, road INTEGER NOT NULL, number INTEGER NOT NULL, probability REAL NOT NULL,
   episodes INTEGER NOT NULL, driven_m REAL NOT NULL, duration_s REAL NOT NULL, events INTEGER NOT NULL,
-  simulated_s REAL NOT NULL, levels INTEGER NOT NULL, UNIQUE (road, number)
+  squares REAL NOT NULL, largest REAL NOT NULL, simulated_s REAL NOT NULL, levels INTEGER NOT NULL,
+  UNIQUE (road, number)
+) STRICT;
+CREATE TABLE event (
+  part INTEGER NOT NULL REFERENCES part, event INTEGER NOT NULL, episode INTEGER NOT NULL, step INTEGER NOT NULL,
+  action_row INTEGER, weight REAL NOT NULL, scenario TEXT, PRIMARY KEY (part, event)
+) STRICT;
+CREATE TABLE pilot (
+  part INTEGER PRIMARY KEY, whole_s REAL NOT NULL, tried_s REAL NOT NULL, tried INTEGER NOT NULL
+) STRICT;
+CREATE TABLE seen (
+  part INTEGER NOT NULL REFERENCES pilot, action_row INTEGER NOT NULL, road INTEGER NOT NULL,
+  situation INTEGER NOT NULL, trials INTEGER NOT NULL, events INTEGER NOT NULL, moments INTEGER NOT NULL,
+  chance REAL NOT NULL, PRIMARY KEY (part, action_row, road, situation)
 ) STRICT;
 ";
 
@@ -26,7 +44,7 @@ pub struct EstimateDatabase {
 }
 
 impl EstimateDatabase {
-    /// Opens the file, making the table if it is new. `settings` is the text of `estimate.yaml`.
+    /// Opens the file, making the tables if it is new. `settings` is the text of `estimate.yaml`.
     ///
     /// # Errors
     /// If the file cannot be opened, has another layout or other settings, or was damaged or changed.
@@ -34,17 +52,23 @@ impl EstimateDatabase {
         Ok(EstimateDatabase { connection: LAYOUT.open(path, SCHEMA, settings)? })
     }
 
-    /// Adds a part.
+    /// Adds a part. `scenarios` has the file that was written of each of its events, if one was.
     ///
     /// # Errors
     /// If the file cannot be written.
-    pub fn add(&mut self, estimate: &Estimate, record: &PartRecord) -> Result<(), DatabaseError> {
+    pub fn add(
+        &mut self,
+        estimate: &Estimate,
+        played: &Played,
+        scenarios: &[Option<String>],
+    ) -> Result<(), DatabaseError> {
+        let record = &played.record;
         let Part { road, number } = record.part;
         // By its place among all parts, so that the file does not depend on the order in which parts end.
         let place = i64::from(number) * estimate.settings().run.roads.len() as i64 + road as i64;
         let transaction = self.connection.transaction()?;
         transaction.execute(
-            "INSERT INTO part VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+            "INSERT INTO part VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
             params![
                 place,
                 road as i64,
@@ -54,13 +78,86 @@ impl EstimateDatabase {
                 record.driven_m,
                 record.duration_s,
                 record.events,
+                record.squares,
+                record.largest,
                 record.simulated_s,
                 record.levels,
             ],
         )?;
+        for (index, (met, scenario)) in played.met.iter().zip(scenarios).enumerate() {
+            let Event { episode, step, row, weight } = met.event;
+            let row = row.map(|row| row as i64);
+            transaction.execute(
+                "INSERT INTO event VALUES (?, ?, ?, ?, ?, ?, ?)",
+                params![place, index as i64, episode, step as i64, row, weight, scenario],
+            )?;
+        }
         LAYOUT.seal(&transaction, place)?;
         transaction.commit()?;
         Ok(())
+    }
+
+    /// Keeps what a pilot saw.
+    ///
+    /// # Errors
+    /// If the file cannot be written.
+    pub fn keep_pilot(&mut self, pilot: &Pilot) -> Result<(), DatabaseError> {
+        let transaction = self.connection.transaction()?;
+        let Pilot { cells, whole_s, tried_s, tried } = pilot;
+        transaction
+            .execute("INSERT INTO pilot VALUES (?, ?, ?, ?)", params![PILOT, whole_s, tried_s, tried])?;
+        for (Cell { row, road, situation }, seen) in cells {
+            transaction.execute(
+                "INSERT INTO seen VALUES (?, ?, ?, ?, ?, ?, ?, ?)",
+                params![
+                    PILOT,
+                    *row as i64,
+                    *road as i64,
+                    situation,
+                    seen.trials,
+                    seen.events,
+                    seen.moments,
+                    seen.chance,
+                ],
+            )?;
+        }
+        LAYOUT.seal(&transaction, PILOT)?;
+        transaction.commit()?;
+        Ok(())
+    }
+
+    /// What a pilot saw, if there was one.
+    ///
+    /// # Errors
+    /// If the file cannot be read.
+    pub fn pilot(&self) -> Result<Option<Pilot>, DatabaseError> {
+        let totals = self
+            .connection
+            .query_row("SELECT whole_s, tried_s, tried FROM pilot", [], |row| {
+                Ok(Pilot {
+                    whole_s: row.get(0)?,
+                    tried_s: row.get(1)?,
+                    tried: row.get(2)?,
+                    ..Pilot::default()
+                })
+            })
+            .optional()?;
+        let Some(mut pilot) = totals else { return Ok(None) };
+        let mut query = self.connection.prepare(
+            "SELECT action_row, road, situation, trials, events, moments, chance FROM seen ORDER BY 1, 2, 3",
+        )?;
+        let cells = query.query_map([], |row| {
+            let cell = Cell {
+                row: row.get::<_, i64>(0)? as usize,
+                road: row.get::<_, i64>(1)? as usize,
+                situation: row.get(2)?,
+            };
+            let seen =
+                Seen { trials: row.get(3)?, events: row.get(4)?, moments: row.get(5)?, chance: row.get(6)? };
+            Ok((cell, seen))
+        })?;
+        pilot.cells = cells.collect::<Result<_, _>>()?;
+        Ok(Some(pilot))
     }
 
     /// All parts so far, in order.
@@ -69,7 +166,7 @@ impl EstimateDatabase {
     /// If the file cannot be read.
     pub fn parts(&self) -> Result<Vec<PartRecord>, DatabaseError> {
         let mut query = self.connection.prepare(
-            "SELECT road, number, probability, episodes, driven_m, duration_s, events, simulated_s, levels
+            "SELECT road, number, probability, episodes, driven_m, duration_s, events, squares, largest, simulated_s, levels
              FROM part ORDER BY part",
         )?;
         let records = query.query_map([], |row| {
@@ -80,11 +177,35 @@ impl EstimateDatabase {
                 driven_m: row.get(4)?,
                 duration_s: row.get(5)?,
                 events: row.get(6)?,
-                simulated_s: row.get(7)?,
-                levels: row.get(8)?,
+                squares: row.get(7)?,
+                largest: row.get(8)?,
+                simulated_s: row.get(9)?,
+                levels: row.get(10)?,
                 failed: 0,
             })
         })?;
         Ok(records.collect::<Result<_, _>>()?)
+    }
+
+    /// All events so far, each with its part, in order.
+    ///
+    /// # Errors
+    /// If the file cannot be read.
+    pub fn events(&self) -> Result<Vec<(Part, Event)>, DatabaseError> {
+        let mut query = self.connection.prepare(
+            "SELECT road, number, episode, step, action_row, weight FROM event JOIN part USING (part)
+             ORDER BY part, event",
+        )?;
+        let events = query.query_map([], |row| {
+            let part = Part { road: row.get::<_, i64>(0)? as usize, number: row.get(1)? };
+            let event = Event {
+                episode: row.get(2)?,
+                step: row.get::<_, i64>(3)? as usize,
+                row: row.get::<_, Option<i64>>(4)?.map(|row| row as usize),
+                weight: row.get(5)?,
+            };
+            Ok((part, event))
+        })?;
+        Ok(events.collect::<Result<_, _>>()?)
     }
 }

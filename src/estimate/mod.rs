@@ -2,14 +2,16 @@
 //! and the rate in 1,000 km, with intervals.
 //!
 //! An [`Estimate`] consists of independent parts, each with seeds of its own, played on any number of threads. A part
-//! either counts ([`Method::Count`]: crude Monte Carlo) or splits ([`Method::Split`]: adaptive multilevel
-//! splitting, see `splitting`). Both are unbiased for agents that do not look ahead. What splitting gains over counting
-//! is measured and printed; where it was tried (probabilities of 0.1 to 0.005) it was a loss. [`Comparison`] plays two
-//! driving systems in the same episodes.
+//! counts ([`Method::Count`]: crude Monte Carlo), tries rows out beside those that chance chooses ([`Method::Probe`]: importance
+//! sampling, see `probing` and `plan`) or splits ([`Method::Split`]: adaptive multilevel splitting, see `splitting`). All are
+//! unbiased for agents that do not look ahead. What is gained over counting is printed. [`Comparison`] plays two driving
+//! systems in the same episodes.
 
 mod compare;
 mod database;
 mod part;
+mod plan;
+mod probing;
 mod ready;
 mod results;
 mod settings;
@@ -17,7 +19,9 @@ mod splitting;
 
 pub use compare::{Comparison, ComparisonResults, Pair, Side, compared};
 pub use database::EstimateDatabase;
-pub use part::{Part, PartRecord, play_parts};
+pub use part::{Event, Met, Part, PartRecord, Played, play_parts};
+pub use plan::{Pilot, Plan};
+pub use probing::pilot;
 pub use ready::Estimate;
-pub use results::{EstimateResults, Probability, RoadEstimate};
-pub use settings::{EstimateError, EstimateSettings, EventKind, Method};
+pub use results::{EstimateResults, Found, Mass, Probability, RoadEstimate};
+pub use settings::{EstimateError, EstimateSettings, EventKind, Method, Stopping};

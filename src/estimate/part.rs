@@ -2,9 +2,11 @@
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use crate::episode::EpisodeLog;
-use crate::run::on_threads;
+use crate::episode::{EpisodeLog, Outcome};
+use crate::run::{EpisodeSummary, on_threads};
 
+use crate::estimate::plan::Plan;
+use crate::estimate::probing::probe;
 use crate::estimate::ready::Estimate;
 use crate::estimate::settings::Method;
 use crate::estimate::splitting::split;
@@ -29,56 +31,116 @@ pub struct PartRecord {
     pub episodes: u32,
     pub driven_m: f64,
     pub duration_s: f64,
-    /// Episodes (and branches that are alive in the end) with the event.
+    /// Episodes (and branches that are alive in the end, and trials) with the event.
     pub events: u32,
+    /// The sum of the squares of the weights with which each episode counts; and the largest that any could have had, as far
+    /// as the part came. Splitting, which gives no weights, leaves them at 0.
+    pub squares: f64,
+    pub largest: f64,
     /// Everything that was simulated, branches and the ticks that lead up to them included, s. The replays of
-    /// verdicts are not in it, with either method.
+    /// verdicts are not in it, with any method.
     pub simulated_s: f64,
-    /// Levels that the method went through; 0 if it counts.
+    /// Levels that the method went through; 0 if it does not split.
     pub levels: u32,
     /// Episodes that an external driving system failed in: such a part says nothing, and is not kept.
     pub failed: u32,
 }
 
+/// An event that a part met.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Event {
+    /// Number of the episode in its part.
+    pub episode: u32,
+    /// The step that it belongs to, and the row that was carried out there, if one was.
+    pub step: usize,
+    pub row: Option<usize>,
+    /// For how many of the part's episodes it counts.
+    pub weight: f64,
+}
+
+/// An event with the episode that it happened in, judged.
+pub struct Met {
+    pub event: Event,
+    pub log: EpisodeLog,
+    pub summary: EpisodeSummary,
+}
+
+/// A part that was played.
+pub struct Played {
+    pub record: PartRecord,
+    /// What it met. Splitting keeps nothing: its branches have seeds that no scenario can state.
+    pub met: Vec<Met>,
+}
+
 /// Plays parts on so many threads and hands each to `on`, on this one. Stops early when `stop` is set or `on` fails;
-/// a part that is not finished then is lost.
+/// a part that is not finished then is lost. The plan is for the method that tries rows out.
 ///
 /// # Errors
 /// The first error of `on`.
 pub fn play_parts<E>(
     estimate: &Estimate,
     parts: &[Part],
+    plan: &Plan,
     threads: usize,
     stop: &AtomicBool,
-    on: &mut dyn FnMut(PartRecord) -> Result<(), E>,
+    on: &mut dyn FnMut(Played) -> Result<(), E>,
 ) -> Result<(), E> {
-    let work = |part: &Part, tell: &mut dyn FnMut(PartRecord) -> bool| {
-        let record = match estimate.settings().method {
+    let work = |part: &Part, tell: &mut dyn FnMut(Played) -> bool| {
+        let played = match estimate.settings().method {
             Method::Count => count(estimate, *part, stop),
             Method::Split => split(estimate, *part, stop),
+            Method::Probe => probe(estimate, *part, plan, stop),
         };
-        if let Some(record) = record {
-            tell(record);
+        if let Some(played) = played {
+            tell(played);
         }
     };
     on_threads(parts, threads, stop, work, on)
 }
 
 /// Crude Monte Carlo: every episode from its start. `None` if it was stopped.
-fn count(estimate: &Estimate, part: Part, stop: &AtomicBool) -> Option<PartRecord> {
-    let mut record = PartRecord::new(part);
+fn count(estimate: &Estimate, part: Part, stop: &AtomicBool) -> Option<Played> {
+    let mut played = Played::new(part);
+    played.record.largest = 1.0;
     for number in 0..estimate.settings().run.episodes {
         if stop.load(Ordering::Relaxed) {
             return None;
         }
         let setup = estimate.setup(part, number);
         let (log, branched_s) = estimate.run().played(&setup);
-        record.note_whole(&log);
-        record.simulated_s += log.duration_s + branched_s;
-        record.events += u32::from(estimate.happened(&setup, &log));
+        played.record.note_whole(&log);
+        played.record.simulated_s += log.duration_s + branched_s;
+        let event = estimate.event(&setup, &log).map(|found| {
+            let row = match log.steps.get(found.step).map(|step| &step.outcome) {
+                Some(Outcome::Done { draw, .. }) => Some(draw.row),
+                _ => None,
+            };
+            (Event { episode: number, step: found.step, row, weight: 1.0 }, log)
+        });
+        played.note_sample(estimate, event.into_iter().collect());
     }
-    record.probability = f64::from(record.events) / f64::from(record.episodes);
-    Some(record)
+    Some(played)
+}
+
+impl Played {
+    pub(super) fn new(part: Part) -> Played {
+        Played { record: PartRecord::new(part), met: Vec::new() }
+    }
+
+    /// Takes in what an episode, with what was tried beside it, met.
+    pub(super) fn note_sample(&mut self, estimate: &Estimate, events: Vec<(Event, EpisodeLog)>) {
+        let record = &mut self.record;
+        let sample: f64 = events.iter().map(|(event, _)| event.weight).sum();
+        // The mean of the samples so far.
+        record.probability += (sample - record.probability) / f64::from(record.episodes);
+        record.squares += sample * sample;
+        record.largest = record.largest.max(sample);
+        record.events += events.len() as u32;
+        for (event, log) in events {
+            let summary = estimate.judged(record.part, event.episode, &log);
+            self.met.push(Met { event, log, summary });
+        }
+    }
 }
 
 impl PartRecord {
@@ -90,6 +152,8 @@ impl PartRecord {
             driven_m: 0.0,
             duration_s: 0.0,
             events: 0,
+            squares: 0.0,
+            largest: 0.0,
             simulated_s: 0.0,
             levels: 0,
             failed: 0,

@@ -1,12 +1,23 @@
 //! An estimate that is ready to play: its parts and their episodes.
 
+use ndarray::Array1;
+
 use crate::action::ActionTable;
-use crate::episode::{EpisodeLog, Setup};
+use crate::episode::{EpisodeLog, Outcome, Setup, StepLog};
 use crate::estimate::part::Part;
 use crate::estimate::settings::{EstimateError, EstimateSettings, Method};
 use crate::rng;
 use crate::rng::Stream;
-use crate::run::Run;
+use crate::run::{EpisodeSummary, Run};
+
+/// Where the event of an episode is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Found {
+    /// The step that it belongs to: the one whose action made appear what was hit, else the one in which it was hit.
+    pub step: usize,
+    /// The step in which it was hit.
+    pub hit_step: usize,
+}
 
 /// An estimate that is ready to play.
 pub struct Estimate {
@@ -24,6 +35,12 @@ impl Estimate {
         let run = Run::new(table, settings.run.clone())?;
         if settings.method == Method::Split && run.agent().looks_ahead() {
             return Err(EstimateError::Ahead { agent: settings.run.agent.clone() });
+        }
+        let rows = run.table().rows().len();
+        if settings.method == Method::Probe
+            && run.agent().chances(Array1::from_elem(rows, true).view()).is_none()
+        {
+            return Err(EstimateError::NoChances { agent: settings.run.agent.clone() });
         }
         Ok(Estimate { run, settings })
     }
@@ -56,8 +73,20 @@ impl Estimate {
         self.run.setup_of(part.road, rng::child_seed(self.seed(part), Stream::Episode, u64::from(number)))
     }
 
-    /// Whether the event is in an episode.
-    pub(super) fn happened(&self, setup: &Setup, log: &EpisodeLog) -> bool {
-        self.settings.event.happened(setup, log, &self.settings.run)
+    /// Where the event of an episode is, if it is there.
+    pub(super) fn event(&self, setup: &Setup, log: &EpisodeLog) -> Option<Found> {
+        let first = self.settings.event.first(setup, log, &self.settings.run)?;
+        let hit = &log.collisions[first];
+        let made_it = |step: &StepLog| match &step.outcome {
+            Outcome::Done { spawned, .. } => spawned.contains(&hit.contact.obstacle),
+            Outcome::Passed | Outcome::Refused { .. } => false,
+        };
+        Some(Found { step: log.steps.iter().position(made_it).unwrap_or(hit.step), hit_step: hit.step })
+    }
+
+    /// An episode of a part, judged, under a number that no other episode of the estimate on its road has.
+    pub(super) fn judged(&self, part: Part, number: u32, log: &EpisodeLog) -> EpisodeSummary {
+        let of_estimate = part.number as usize * self.settings.run.episodes as usize + number as usize;
+        EpisodeSummary::judged(&self.setup(part, number), of_estimate, log, &self.settings.run.avoidability)
     }
 }

@@ -1,10 +1,12 @@
-//! What an estimate found: probabilities and rates with their intervals.
+//! What an estimate found: probabilities and rates with their intervals, and where the probability lies.
 //!
 //! Computed from the parts alone. While some are missing, the result covers those that are there, and says so.
 
-use crate::statistics::{Interval, binomial, mean, variance_of_mean};
+use std::collections::BTreeMap;
 
-use crate::estimate::part::PartRecord;
+use crate::statistics::{Interval, binomial_missing, bisect, variance_of_mean, weighted};
+
+use crate::estimate::part::{Event, Part, PartRecord};
 use crate::estimate::settings::{EstimateSettings, EventKind, Method};
 
 /// The result of an estimate; written to `results.json`.
@@ -14,12 +16,18 @@ pub struct EstimateResults {
     pub schema: u32,
     pub event: EventKind,
     pub method: Method,
-    /// Number of parts that are there, and of all parts.
+    /// Number of parts that are there, and of all parts, if no rule stops the estimate before.
     pub parts: usize,
     pub parts_wanted: usize,
+    /// Share of estimates like this whose interval misses the truth, at most, with all looks that its stopping rules take; and
+    /// the share that this interval alone may miss it in.
+    pub missing: f64,
+    pub missing_at_look: f64,
     pub roads: Vec<RoadEstimate>,
     /// All roads together, each as often as any other; `None` until each road has the same parts.
     pub together: Option<Probability>,
+    /// Where the probability lies, the most of it first; empty for a method that does not keep its events.
+    pub mass: Vec<Mass>,
 }
 
 /// The estimate on one road.
@@ -30,15 +38,27 @@ pub struct RoadEstimate {
     pub estimate: Probability,
 }
 
+/// What a row on a road contributes.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct Mass {
+    pub road: String,
+    /// The row, as the table calls it; `None` where what was hit appeared by no action.
+    pub row: Option<String>,
+    /// Share of the probability on all roads together.
+    pub share: f64,
+    /// Events that it was found in.
+    pub events: u32,
+}
+
 /// A probability, and the rate that follows from it.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Probability {
     /// Probability of the event in an episode.
     pub probability: f64,
-    /// Clopper and Pearson's exact interval where events are counted; Student's over the parts where episodes split, cut
-    /// off at 0 and 1: too short where most parts have not found the event. `None` where all parts are alike: they say
-    /// nothing about the spread.
-    pub interval: Option<Interval>,
+    /// Clopper and Pearson's exact interval where events are counted, else Fay and Feuer's for weighted events: of episodes
+    /// where rows are tried out, of whole parts where episodes split. Its upper end allows for an event as heavy as any could
+    /// have been; of whole parts, as the heaviest that was met.
+    pub interval: Interval,
     /// Episodes with the event in 1,000 km, as a ratio of means; `None` if nothing was driven. Its interval is that of the
     /// probability over the mean distance, which it takes as known.
     pub per_1000_km: Option<f64>,
@@ -48,24 +68,36 @@ pub struct Probability {
     pub driven_km: f64,
     /// Everything that was simulated, h.
     pub simulated_h: f64,
-    /// Of splitting: the simulated hours that counting would need for a standard error as small, over those that were
-    /// needed. A rough figure, from the spread of the parts: `None` for fewer than twenty of them, or where most have
-    /// not found the event.
+    /// The simulated hours that counting would need for an interval as narrow, over those that were needed. A rough
+    /// figure: `None` for counting, and where too few events were met.
     pub gain: Option<f64>,
+    /// As many events of one weight would say as much (Kish); `None` where there are no weights.
+    pub effective_events: Option<f64>,
     /// Parts whose estimate is 0.
     pub parts_without: usize,
     pub parts: usize,
 }
 
-/// Parts from which on a gain is told. Ours.
-const GAIN_PARTS_MIN: usize = 20;
+/// Effective events, or parts with the event, from which on a gain is told. Ours.
+const GAIN_EVENTS_MIN: f64 = 10.0;
+
+/// What the results are made of.
+#[derive(Debug, Clone, Copy)]
+pub struct Found<'a> {
+    pub records: &'a [PartRecord],
+    pub events: &'a [(Part, Event)],
+    /// Everything that a pilot simulated before, s.
+    pub pilot_s: f64,
+    /// What the table calls its rows.
+    pub labels: &'a [String],
+}
 
 impl EstimateResults {
     /// The result over parts in any order.
-    pub fn new(settings: &EstimateSettings, records: &[PartRecord]) -> EstimateResults {
+    pub fn new(settings: &EstimateSettings, found: Found) -> EstimateResults {
         let roads = &settings.run.roads;
         let of = |road: usize| -> Vec<&PartRecord> {
-            let mut own: Vec<_> = records.iter().filter(|record| record.part.road == road).collect();
+            let mut own: Vec<_> = found.records.iter().filter(|record| record.part.road == road).collect();
             own.sort_by_key(|record| record.part.number);
             own
         };
@@ -73,76 +105,162 @@ impl EstimateResults {
         let numbers = |own: &[&PartRecord]| own.iter().map(|record| record.part.number).collect::<Vec<_>>();
         let is_even = by_road.iter().all(|own| numbers(own) == numbers(&by_road[0]) && !own.is_empty());
         let named = roads.iter().zip(&by_road).filter(|(_, own)| !own.is_empty());
+        let missing_at_look = settings.missing_at_look();
+        let sample =
+            |by_road, pilot_s| Sample { method: settings.method, by_road, pilot_s, missing: missing_at_look };
         EstimateResults {
-            schema: 1,
+            schema: 2,
             event: settings.event,
             method: settings.method,
-            parts: records.len(),
+            parts: found.records.len(),
             parts_wanted: settings.parts as usize * roads.len(),
+            missing: super::settings::MISSING,
+            missing_at_look,
             roads: named
                 .map(|(road, own)| RoadEstimate {
                     road: road.clone(),
-                    estimate: Probability::new(settings.method, std::slice::from_ref(own)),
+                    estimate: sample(std::slice::from_ref(own), found.pilot_s / roads.len() as f64)
+                        .probability(),
                 })
                 .collect(),
-            together: is_even.then(|| Probability::new(settings.method, &by_road)),
+            together: is_even.then(|| sample(&by_road, found.pilot_s).probability()),
+            mass: mass(roads, &by_road, found),
         }
     }
 }
 
-impl Probability {
-    /// Over the parts of some roads, by road, the same numbers on each.
-    fn new(method: Method, by_road: &[Vec<&PartRecord>]) -> Probability {
-        let all = || by_road.iter().flatten();
-        let roads = by_road.len() as f64;
+/// Where the probability lies.
+fn mass(roads: &[String], by_road: &[Vec<&PartRecord>], found: Found) -> Vec<Mass> {
+    // Each road as often as any other, however many of its episodes were played.
+    let episodes: Vec<f64> =
+        by_road.iter().map(|own| own.iter().map(|record| f64::from(record.episodes)).sum()).collect();
+    let mut sums: BTreeMap<(usize, Option<usize>), (f64, u32)> = BTreeMap::new();
+    for (part, event) in found.events {
+        let (weight, events) = sums.entry((part.road, event.row)).or_default();
+        *weight += event.weight / episodes[part.road];
+        *events += 1;
+    }
+    let all: f64 = sums.values().map(|(weight, _)| weight).sum();
+    let mut mass: Vec<Mass> = sums
+        .into_iter()
+        .map(|((road, row), (weight, events))| Mass {
+            road: roads[road].clone(),
+            row: row.map(|row| found.labels[row].clone()),
+            share: weight / all,
+            events,
+        })
+        .collect();
+    mass.sort_by(|a, b| b.share.total_cmp(&a.share));
+    mass
+}
+
+/// The parts of some roads, by road, the same numbers on each.
+#[derive(Clone, Copy)]
+struct Sample<'a> {
+    method: Method,
+    by_road: &'a [Vec<&'a PartRecord>],
+    pilot_s: f64,
+    missing: f64,
+}
+
+impl Sample<'_> {
+    fn probability(self) -> Probability {
+        let all = || self.by_road.iter().flatten();
+        let roads = self.by_road.len() as f64;
         // The nth parts of all roads are one sample.
-        let samples: Vec<f64> = (0..by_road[0].len())
-            .map(|number| by_road.iter().map(|own| own[number].probability).sum::<f64>() / roads)
+        let samples: Vec<f64> = (0..self.by_road[0].len())
+            .map(|number| self.by_road.iter().map(|own| own[number].probability).sum::<f64>() / roads)
             .collect();
-        let estimate = mean(&samples).expect("there is a part");
-        let probability = estimate.mean;
+        let probability = samples.iter().sum::<f64>() / samples.len() as f64;
         let episodes: u64 = all().map(|record| u64::from(record.episodes)).sum();
         let events: u64 = all().map(|record| u64::from(record.events)).sum();
-        let interval = match method {
-            Method::Count => Some(binomial(events, episodes)),
-            Method::Split => estimate.interval.map(|found| Interval {
-                low: found.low.max(0.0),
-                high: found.high.map(|high| high.min(1.0)),
-            }),
+        let (variance, heaviest) = self.spread(&samples, episodes);
+        let interval = match self.method {
+            Method::Count => binomial_missing(events, episodes, self.missing),
+            Method::Split | Method::Probe => {
+                let Interval { low, high } = weighted(probability, variance, heaviest, self.missing);
+                Interval { low, high: high.map(|high| high.min(1.0)) }
+            }
         };
         let driven_km = all().map(|record| record.driven_m).sum::<f64>() / 1000.0;
-        let (simulated_s, duration_s) = all().fold((0.0, 0.0), |(all_s, whole_s), record| {
+        let (simulated_s, duration_s) = all().fold((self.pilot_s, 0.0), |(all_s, whole_s), record| {
             (all_s + record.simulated_s, whole_s + record.duration_s)
         });
         let per_km = episodes as f64 / driven_km;
         let scaled = |value: f64| 1000.0 * value * per_km;
         let is_driven = driven_km > 0.0;
-        let variance = variance_of_mean(&samples);
         let parts_without = samples.iter().filter(|&&sample| sample == 0.0).count();
-        let is_telling = samples.len() >= GAIN_PARTS_MIN && 2 * parts_without <= samples.len();
-        // Counting has this variance after so many episodes, each of the mean duration.
-        let counting_s = probability * (1.0 - probability) / variance * duration_s / episodes as f64;
+        let effective_events = self.effective_events();
+        let is_telling = match self.method {
+            Method::Count => false,
+            Method::Split => (samples.len() - parts_without) as f64 >= GAIN_EVENTS_MIN,
+            Method::Probe => effective_events.is_some_and(|events| events >= GAIN_EVENTS_MIN),
+        };
+        let counting_s =
+            || counted_episodes(probability, interval, self.missing) * duration_s / episodes as f64;
         Probability {
             probability,
             interval,
             per_1000_km: is_driven.then(|| scaled(probability)),
-            per_1000_km_interval: interval
-                .filter(|_| is_driven)
-                .map(|found| Interval { low: scaled(found.low), high: found.high.map(scaled) }),
+            per_1000_km_interval: is_driven
+                .then(|| Interval { low: scaled(interval.low), high: interval.high.map(scaled) }),
             episodes,
             driven_km,
             simulated_h: simulated_s / 3600.0,
-            gain: (method == Method::Split && is_telling && variance > 0.0).then(|| counting_s / simulated_s),
+            gain: is_telling.then(|| counting_s() / simulated_s),
+            effective_events,
             parts_without,
             parts: samples.len(),
         }
     }
+
+    /// The variance of the mean, and the share of it that the heaviest value has.
+    fn spread(self, samples: &[f64], episodes: u64) -> (f64, f64) {
+        if self.method == Method::Split {
+            let largest = samples.iter().copied().fold(0.0, f64::max);
+            // Before anything was met, an event in a whole episode, which weighs 1.
+            let heaviest = if largest > 0.0 { largest / samples.len() as f64 } else { 1.0 / episodes as f64 };
+            return (variance_of_mean(samples), heaviest);
+        }
+        let roads = self.by_road.len() as f64;
+        self.by_road.iter().fold((0.0, 0.0_f64), |(variance, heaviest), own| {
+            let count: f64 = own.iter().map(|record| f64::from(record.episodes)).sum();
+            let sum: f64 = own.iter().map(|record| record.probability * f64::from(record.episodes)).sum();
+            let squares: f64 = own.iter().map(|record| record.squares).sum();
+            let of_road = (squares - sum * sum / count).max(0.0) / (count - 1.0).max(1.0) / count;
+            let largest = own.iter().map(|record| record.largest).fold(0.0, f64::max);
+            (variance + of_road / (roads * roads), heaviest.max(largest / count / roads))
+        })
+    }
+
+    /// See [`Probability::effective_events`].
+    fn effective_events(self) -> Option<f64> {
+        if self.method != Method::Probe {
+            return None;
+        }
+        let all = || self.by_road.iter().flatten();
+        let sum: f64 = all().map(|record| record.probability * f64::from(record.episodes)).sum();
+        let squares: f64 = all().map(|record| record.squares).sum();
+        Some(if squares > 0.0 { sum * sum / squares } else { 0.0 })
+    }
+}
+
+/// The number of episodes after which counting events of this probability has an interval as narrow.
+fn counted_episodes(probability: f64, Interval { low, high }: Interval, missing: f64) -> f64 {
+    let width = high.unwrap_or(1.0) - low;
+    let is_narrow = |log_episodes: f64| {
+        let episodes = libm::exp(log_episodes);
+        let found = weighted(probability, probability / episodes, 1.0 / episodes, missing);
+        found.high.unwrap_or(1.0) - found.low <= width
+    };
+    // From one episode to more than anybody counts.
+    libm::exp(bisect(0.0, 30.0, is_narrow))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::estimate::part::Part;
+    use crate::statistics::binomial;
 
     fn record(road: usize, number: u32, events: u32) -> PartRecord {
         PartRecord {
@@ -151,30 +269,60 @@ mod tests {
             driven_m: 50_000.0,
             duration_s: 4000.0,
             events,
+            squares: f64::from(events),
+            largest: 1.0,
             simulated_s: 4000.0,
             ..PartRecord::new(Part { road, number })
         }
+    }
+
+    fn found(method: Method, by_road: &[Vec<&PartRecord>]) -> Probability {
+        Sample { method, by_road, pilot_s: 0.0, missing: 0.05 }.probability()
     }
 
     #[test]
     fn counted_parts_give_the_exact_interval_and_the_rate() {
         let parts = [record(0, 0, 1), record(0, 1, 3), record(1, 0, 0), record(1, 1, 0)];
         let by_road = [vec![&parts[0], &parts[1]], vec![&parts[2], &parts[3]]];
-        let found = Probability::new(Method::Count, &by_road);
-        assert!((found.probability - 0.01).abs() < 1e-15);
-        assert_eq!(found.interval, Some(binomial(4, 400)));
+        let both = found(Method::Count, &by_road);
+        assert!((both.probability - 0.01).abs() < 1e-15);
+        assert_eq!(both.interval, binomial(4, 400));
         // Two in a hundred episodes of half a kilometre on the first road, none on the second.
-        assert!((found.per_1000_km.unwrap() - 20.0).abs() < 1e-9);
-        let first = Probability::new(Method::Count, &by_road[..1]);
+        assert!((both.per_1000_km.unwrap() - 20.0).abs() < 1e-9);
+        let first = found(Method::Count, &by_road[..1]);
         assert!((first.per_1000_km.unwrap() - 40.0).abs() < 1e-9);
         assert_eq!((first.episodes, first.parts, first.parts_without, first.gain), (200, 2, 0, None));
-        // Of 2,000 episodes: p (1 - p) / 2,000 is the variance of counting; that of twenty parts with 1 % and 3 % in turn
-        // is 1e-4 / 19.
         let many: Vec<PartRecord> = (0..20).map(|number| record(0, number, 1 + 2 * (number % 2))).collect();
-        let split = Probability::new(Method::Split, &[many.iter().collect()]);
+        let split = found(Method::Split, &[many.iter().collect()]);
+        // Twenty parts with 1 % and 3 % in turn: a variance of 1e-4 / 19, where that of counting is 0.02 * 0.98 / 2,000.
         let gain = split.gain.unwrap();
-        assert!((gain - 0.02 * 0.98 / 2000.0 / (1e-4 / 19.0)).abs() < 1e-9, "{gain}");
-        let nothing = Probability::new(Method::Split, &by_road[1..]);
-        assert_eq!((nothing.probability, nothing.interval, nothing.gain), (0.0, None, None));
+        assert!((0.8..1.9).contains(&gain), "{gain}");
+        // Whole weights are counts: no gain, and nearly the interval of counting.
+        let probed = found(Method::Probe, &[many.iter().collect()]);
+        assert!((probed.gain.unwrap() - 1.0).abs() < 0.03, "{probed:?}");
+        assert!((probed.effective_events.unwrap() - 40.0).abs() < 1e-9);
+        let exact = binomial(40, 2000);
+        assert!((probed.interval.low - exact.low).abs() < 3e-4, "{probed:?} {exact:?}");
+        assert!((probed.interval.high.unwrap() - exact.high.unwrap()).abs() < 3e-4, "{probed:?} {exact:?}");
+        // Nothing in 200 episodes: what counting would say of them.
+        let nothing = found(Method::Split, &by_road[1..]);
+        assert_eq!((nothing.probability, nothing.interval.low, nothing.gain), (0.0, 0.0, None));
+        assert!((nothing.interval.high.unwrap() - 3.6888794541139363 / 200.0).abs() < 1e-9, "{nothing:?}");
+    }
+
+    #[test]
+    fn the_mass_lies_where_the_weight_is() {
+        let parts = [record(0, 0, 2), record(1, 0, 1)];
+        let by_road = [vec![&parts[0]], vec![&parts[1]]];
+        let event =
+            |road, row, weight| (Part { road, number: 0 }, Event { episode: 0, step: 0, row, weight });
+        let events = [event(0, Some(1), 0.1), event(0, Some(1), 0.2), event(1, None, 0.9)];
+        let labels = ["a".to_owned(), "b".to_owned()];
+        let roads = ["one".to_owned(), "two".to_owned()];
+        let found = Found { records: &parts, events: &events, pilot_s: 0.0, labels: &labels };
+        let mass = mass(&roads, &by_road, found);
+        assert_eq!((mass[0].road.as_str(), mass[0].row.as_deref(), mass[0].events), ("two", None, 1));
+        assert!((mass[0].share - 0.75).abs() < 1e-12);
+        assert_eq!((mass[1].row.as_deref(), mass[1].events), (Some("b"), 2));
     }
 }

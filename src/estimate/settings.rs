@@ -3,6 +3,8 @@
 use crate::episode::{EpisodeLog, Setup};
 use crate::run::{EpisodeSummary, RunError, RunSettings};
 
+use crate::estimate::results::Probability;
+
 /// What is counted: whether it happens in an episode.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -15,11 +17,28 @@ pub enum EventKind {
 }
 
 impl EventKind {
-    /// Whether it is in an episode, judged by the settings of a run.
-    pub(super) fn happened(self, setup: &Setup, log: &EpisodeLog, run: &RunSettings) -> bool {
+    /// The first collision of an episode that is the event, judged by the settings of a run.
+    pub(super) fn first(self, setup: &Setup, log: &EpisodeLog, run: &RunSettings) -> Option<usize> {
         match self {
-            EventKind::Collision => !log.collisions.is_empty(),
-            EventKind::Counted => EpisodeSummary::judged(setup, 0, log, &run.avoidability).counted() > 0,
+            _ if log.collisions.is_empty() => None,
+            EventKind::Collision => Some(0),
+            EventKind::Counted => {
+                let summary = EpisodeSummary::judged(setup, 0, log, &run.avoidability);
+                summary.collisions.iter().position(|finding| finding.counted)
+            }
+        }
+    }
+
+    /// Whether it is in an episode.
+    pub(super) fn happened(self, setup: &Setup, log: &EpisodeLog, run: &RunSettings) -> bool {
+        self.first(setup, log, run).is_some()
+    }
+
+    /// What so many of them are called, after their number.
+    pub fn noun(self) -> &'static str {
+        match self {
+            EventKind::Counted => "counted",
+            EventKind::Collision => "met",
         }
     }
 
@@ -41,6 +60,8 @@ pub enum Method {
     Count,
     /// Adaptive multilevel splitting.
     Split,
+    /// Importance sampling of rows: dangerous ones are tried out beside those that chance chooses.
+    Probe,
 }
 
 /// Everything that is needed to repeat an estimate; written to `estimate.yaml`.
@@ -50,10 +71,31 @@ pub struct EstimateSettings {
     pub method: Method,
     /// Independent parts on each road.
     pub parts: u32,
+    /// When to stop before all parts are played, if ever.
+    #[serde(flatten)]
+    pub stopping: Stopping,
     /// Space, driving system, agent and conditions; `episodes` are those of a part.
     #[serde(flatten)]
     pub run: RunSettings,
 }
+
+/// When an estimate has played enough. It looks when a quarter, half and all of the parts are done, on every road; what it
+/// finds between two looks does not count, so the result depends on no number of threads.
+#[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
+pub struct Stopping {
+    /// Stops when half the width of the interval is at most this share of the probability.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub precision: Option<f64>,
+    /// Stops when so much was simulated, h.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub hours: Option<f64>,
+}
+
+/// Share of estimates whose interval may miss the truth.
+pub(super) const MISSING: f64 = 0.05;
+
+/// An estimate that may stop looks when one part in so many is done. Ours.
+const LOOKS: [u32; 3] = [4, 2, 1];
 
 /// Largest number of parts of a road. Ours.
 const PARTS_MAX: u32 = 100_000;
@@ -67,10 +109,14 @@ pub enum EstimateError {
     Run(#[from] RunError),
     #[error("{found} parts: from 2 to {PARTS_MAX} are possible")]
     Parts { found: u32 },
+    #[error("a precision of {found}: it is a share of the probability, above 0 and at most 1")]
+    Precision { found: f64 },
+    #[error("{found} hours: a limit above 0 is possible")]
+    Hours { found: f64 },
     #[error("{found} episodes a part: splitting needs at least {SPLIT_EPISODES_MIN}")]
     Episodes { found: u32 },
     #[error(
-        "splitting goes on from moments in the middle of episodes, which a program of its own cannot do: estimate by \
+        "this method goes on from moments in the middle of episodes, which a program of its own cannot do: estimate by \
          counting (`--method count`)"
     )]
     External,
@@ -79,22 +125,55 @@ pub enum EstimateError {
          counting (`--method count`)"
     )]
     Ahead { agent: String },
+    #[error(
+        "`{agent}` does not say how likely it chooses a row, so what is tried out beside it has no weight: estimate by \
+         counting (`--method count`), or with `--agent random`"
+    )]
+    NoChances { agent: String },
 }
 
 impl EstimateSettings {
+    /// The numbers of parts of a road after which it is looked whether to stop; all parts are the last.
+    pub fn looks(&self) -> Vec<u32> {
+        if self.stopping == Stopping::default() {
+            return vec![self.parts];
+        }
+        let mut looks: Vec<u32> = LOOKS.iter().map(|share| self.parts.div_ceil(*share).max(2)).collect();
+        looks.dedup();
+        looks
+    }
+
+    /// Share in which the interval of one look may miss the truth, so that those of all looks together keep theirs
+    /// (Bonferroni): whichever look the estimate stops at, its interval is valid.
+    pub(super) fn missing_at_look(&self) -> f64 {
+        MISSING / self.looks().len() as f64
+    }
+
+    /// Whether what was found so far is enough.
+    pub fn is_enough(&self, found: &Probability) -> bool {
+        let Stopping { precision, hours } = self.stopping;
+        let half = found.interval.high.map(|high| (high - found.interval.low) / 2.0);
+        let is_precise = precision.zip(half).is_some_and(|(share, half)| half <= share * found.probability);
+        is_precise || hours.is_some_and(|hours| found.simulated_h >= hours)
+    }
+
     /// # Errors
     /// If a number is out of range, or the method is not possible with this driving system.
     pub fn check(&self) -> Result<(), EstimateError> {
         if !(2..=PARTS_MAX).contains(&self.parts) {
             return Err(EstimateError::Parts { found: self.parts });
         }
-        if self.method == Method::Split {
-            if self.run.episodes < SPLIT_EPISODES_MIN {
-                return Err(EstimateError::Episodes { found: self.run.episodes });
-            }
-            if self.run.external.is_some() {
-                return Err(EstimateError::External);
-            }
+        if let Some(found) = self.stopping.precision.filter(|share| !(*share > 0.0 && *share <= 1.0)) {
+            return Err(EstimateError::Precision { found });
+        }
+        if let Some(found) = self.stopping.hours.filter(|hours| hours.is_nan() || *hours <= 0.0) {
+            return Err(EstimateError::Hours { found });
+        }
+        if self.method == Method::Split && self.run.episodes < SPLIT_EPISODES_MIN {
+            return Err(EstimateError::Episodes { found: self.run.episodes });
+        }
+        if self.method != Method::Count && self.run.external.is_some() {
+            return Err(EstimateError::External);
         }
         Ok(())
     }

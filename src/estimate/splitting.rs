@@ -21,7 +21,7 @@ use crate::rng::{Rng, Stream};
 use crate::run::choose;
 use crate::sim::{Contact, DT_S, World};
 
-use crate::estimate::part::{Part, PartRecord};
+use crate::estimate::part::{Part, PartRecord, Played};
 use crate::estimate::ready::Estimate;
 
 /// Share of the episodes that are given up in a round, at least. Ours.
@@ -57,7 +57,7 @@ impl Path {
 }
 
 /// One run of the method; `None` if it was stopped.
-pub fn split(estimate: &Estimate, part: Part, stop: &AtomicBool) -> Option<PartRecord> {
+pub fn split(estimate: &Estimate, part: Part, stop: &AtomicBool) -> Option<Played> {
     let mut record = PartRecord::new(part);
     let mut rng = rng::stream(estimate.seed(part), Stream::Estimate, 0);
     let wanted = estimate.settings().run.episodes;
@@ -70,44 +70,61 @@ pub fn split(estimate: &Estimate, part: Part, stop: &AtomicBool) -> Option<PartR
         record.note_whole(&path.log);
         paths.push(path);
     }
-    let mut probability = 1.0;
-    loop {
-        let level = level_to_leave(&paths);
-        if level >= TOP {
-            break;
-        }
-        let (gone, alive): (Vec<usize>, Vec<usize>) =
-            (0..paths.len()).partition(|&index| paths[index].score() <= level);
-        probability *= alive.len() as f64 / paths.len() as f64;
-        record.levels += 1;
-        if alive.is_empty() {
-            break;
-        }
-        for index in gone {
-            if stop.load(Ordering::Relaxed) {
-                return None;
-            }
-            let parent = &paths[alive[rng::below(&mut rng, alive.len() as u32) as usize]];
-            paths[index] = branch(estimate, part, parent, level, &mut rng, &mut record);
-        }
-    }
+    let mut grow = |parent: &Path, level: u32, rng: &mut Rng| {
+        let goes_on = !stop.load(Ordering::Relaxed);
+        goes_on.then(|| branch(estimate, part, parent, level, rng, &mut record))
+    };
+    let (probability, levels) = rounds(&mut paths, &Path::score, &mut rng, &mut grow)?;
+    record.levels = levels;
     // After extinction nothing has the event, and the estimate is 0.
     if probability > 0.0 {
         let happened = |path: &&Path| {
             path.score() == TOP
-                && estimate.happened(&setup(estimate, part, path.number, path.forks.clone()), &path.log)
+                && estimate
+                    .event(&setup(estimate, part, path.number, path.forks.clone()), &path.log)
+                    .is_some()
         };
         record.events = paths.iter().filter(happened).count() as u32;
     }
     record.probability = probability * f64::from(record.events) / f64::from(wanted);
-    Some(record)
+    Some(Played { record, met: Vec::new() })
+}
+
+/// Gives the lowest paths up and replaces them by branches of the others, round by round, until enough are at the top: the
+/// product of the shares that survived, which is 0 after extinction, and the number of rounds. `grow` branches off a parent that came above
+/// a level, there; where it gives nothing, there is no result.
+fn rounds<P>(
+    paths: &mut [P],
+    score: &dyn Fn(&P) -> u32,
+    rng: &mut Rng,
+    grow: &mut dyn FnMut(&P, u32, &mut Rng) -> Option<P>,
+) -> Option<(f64, u32)> {
+    let (mut probability, mut rounds) = (1.0, 0);
+    loop {
+        let scores: Vec<u32> = paths.iter().map(score).collect();
+        let level = level_to_leave(&scores);
+        if level >= TOP {
+            return Some((probability, rounds));
+        }
+        let (gone, alive): (Vec<usize>, Vec<usize>) =
+            (0..paths.len()).partition(|&index| scores[index] <= level);
+        probability *= alive.len() as f64 / paths.len() as f64;
+        rounds += 1;
+        if alive.is_empty() {
+            return Some((0.0, rounds));
+        }
+        for index in gone {
+            let parent = &paths[alive[rng::below(rng, alive.len() as u32) as usize]];
+            paths[index] = grow(parent, level, rng)?;
+        }
+    }
 }
 
 /// The lowest level up to which enough episodes stayed.
-fn level_to_leave(paths: &[Path]) -> u32 {
-    let mut scores: Vec<u32> = paths.iter().map(Path::score).collect();
+fn level_to_leave(scores: &[u32]) -> u32 {
+    let mut scores = scores.to_vec();
     scores.sort_unstable();
-    scores[(GIVEN_UP * paths.len() as f64).ceil() as usize - 1]
+    scores[(GIVEN_UP * scores.len() as f64).ceil() as usize - 1]
 }
 
 /// A copy of an episode up to the moment at which it first came above a level, and from there by other seeds.
@@ -197,4 +214,56 @@ fn level(world: &World) -> u32 {
     let mut now = Criticality::default();
     now.note(world, &|_| false);
     now.ttc_s.map_or(0, |ttc_s| 1 + ((1.0 - ttc_s / TTC_S_MAX) * f64::from(LEVELS - 1)) as u32)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::statistics::variance_of_mean;
+
+    /// How far a climber comes who leaves each level with this probability, from a level on.
+    fn climb(from: u32, onwards: f64, rng: &mut Rng) -> u32 {
+        let mut level = from;
+        while level < TOP && rng::unit(rng) < onwards {
+            level += 1;
+        }
+        level
+    }
+
+    /// What the rounds say of climbers: the probability that one comes to the top.
+    fn estimated(climbers: usize, onwards: f64, rng: &mut Rng) -> (f64, u32) {
+        let mut heights: Vec<u32> = (0..climbers).map(|_| climb(0, onwards, rng)).collect();
+        let mut grow = |parent: &u32, level: u32, rng: &mut Rng| {
+            assert!(*parent > level, "a parent came above the level that is left");
+            Some(climb(level + 1, onwards, rng))
+        };
+        let (probability, rounds) = rounds(&mut heights, &|height| *height, rng, &mut grow).unwrap();
+        let at_top = heights.iter().filter(|&&height| height == TOP).count();
+        (probability * at_top as f64 / climbers as f64, rounds)
+    }
+
+    #[test]
+    fn rounds_have_no_bias_and_ties_do_not_matter() {
+        // A probability of a thousandth, by levels of which each is left by nine of ten: most scores are shared.
+        let onwards: f64 = 0.9;
+        let truth = libm::pow(onwards, f64::from(TOP));
+        let mut rng = rng::stream(3, Stream::Estimate, 0);
+        let found: Vec<f64> = (0..2000).map(|_| estimated(20, onwards, &mut rng).0).collect();
+        let mean = found.iter().sum::<f64>() / found.len() as f64;
+        let error = variance_of_mean(&found).sqrt();
+        assert!((mean - truth).abs() < 4.0 * error, "{mean} against {truth}, give or take {error}");
+        // Far better than counting twenty climbers, whose variance is that of a rare event.
+        assert!(error * error * 2000.0 < truth / 20.0 / 10.0, "{error}");
+    }
+
+    #[test]
+    fn rounds_end_at_the_top_and_at_extinction() {
+        let mut rng = rng::stream(1, Stream::Estimate, 0);
+        assert_eq!(estimated(20, 1.0, &mut rng), (1.0, 0), "all are at the top at once");
+        let (probability, rounds) = estimated(20, 0.0, &mut rng);
+        assert_eq!((probability, rounds), (0.0, 1), "nobody leaves the ground");
+        let mut heights = vec![0, 1, 2];
+        let stopped = super::rounds(&mut heights, &|height| *height, &mut rng, &mut |_, _, _| None);
+        assert_eq!(stopped, None);
+    }
 }

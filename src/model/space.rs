@@ -154,6 +154,8 @@ pub struct ActionDef {
     pub parameters: Vec<Parameter>,
     /// Its own, then those that `on … also` adds.
     pub effects: Vec<EffectDef>,
+    /// How often each of its rows is drawn by chance, relative to other rows.
+    pub odds: u32,
     pub span: Span,
 }
 

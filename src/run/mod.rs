@@ -21,7 +21,7 @@ mod summary;
 mod threads;
 
 pub use arena::{Arena, road_named};
-pub(crate) use arena::{choose, legal};
+pub(crate) use arena::{carry_out, choose, legal, offers};
 pub use coverage::{CoverageCell, LearningPoint};
 pub use database::{Database, FailureCount, RefusalCount, Totals};
 pub(crate) use database::{LAYOUT, add_all};

@@ -96,15 +96,85 @@ pub fn wilson(count: u32, trials: u32) -> (f64, f64) {
 /// The exact interval of a probability, of which `count` was observed in `trials` (Clopper and Pearson 1934); from 0 to 1
 /// without trials.
 pub fn binomial(count: u64, trials: u64) -> Interval {
+    binomial_missing(count, trials, 0.05)
+}
+
+/// As [`binomial`], for an interval that misses the probability in at most this share of samples.
+pub fn binomial_missing(count: u64, trials: u64, missing: f64) -> Interval {
+    let tail = missing / 2.0;
     let low = match count {
         0 => 0.0,
-        _ => bisect(0.0, 1.0, |share| 1.0 - binomial_at_most(count - 1, trials, share) >= 0.025),
+        _ => bisect(0.0, 1.0, |share| 1.0 - binomial_at_most(count - 1, trials, share) >= tail),
     };
     let high = match count {
         _ if count >= trials => 1.0,
-        _ => bisect(0.0, 1.0, |share| binomial_at_most(count, trials, share) <= 0.025),
+        _ => bisect(0.0, 1.0, |share| binomial_at_most(count, trials, share) <= tail),
     };
     Interval { low, high: Some(high) }
+}
+
+/// The interval of a mean of values of at least 0, most of which are 0 and the others of different weight (Fay and Feuer
+/// 1997): gamma quantiles with the mean and its variance, for the upper end as if the heaviest value had come once more.
+/// `heaviest` is the share of the mean that this value has. It misses the mean in at most the given share of samples as far as no
+/// value is heavier.
+pub fn weighted(mean: f64, variance: f64, heaviest: f64, missing: f64) -> Interval {
+    let tail = missing / 2.0;
+    let low = if mean > 0.0 && variance > 0.0 {
+        gamma_quantile(tail, mean * mean / variance, variance / mean)
+    } else {
+        0.0
+    };
+    let (mean, variance) = (mean + heaviest, variance.max(0.0) + heaviest * heaviest);
+    Interval { low, high: Some(gamma_quantile(1.0 - tail, mean * mean / variance, variance / mean)) }
+}
+
+/// The value below which a gamma variable stays with this probability.
+fn gamma_quantile(probability: f64, shape: f64, scale: f64) -> f64 {
+    // Far beyond any quantile that is asked for.
+    let far = shape + 40.0 * shape.sqrt() + 200.0;
+    scale * bisect(0.0, far, |value| gamma_at_most(value, shape) >= probability)
+}
+
+/// Probability that a gamma variable of scale 1 is at most `value`: Abramowitz and Stegun 6.5.29 below the mean, the continued
+/// fraction 6.5.31 by Lentz's method above it.
+fn gamma_at_most(value: f64, shape: f64) -> f64 {
+    if value <= 0.0 {
+        return 0.0;
+    }
+    let scale = libm::exp(shape * libm::log(value) - value - libm::lgamma(shape));
+    // Each loop ends when its terms are too small to count; a large shape needs some multiple of its root.
+    const TERMS_MAX: u32 = 1_000_000;
+    if value < shape + 1.0 {
+        let (mut term, mut sum) = (1.0 / shape, 1.0 / shape);
+        for number in 1..TERMS_MAX {
+            term *= value / (shape + f64::from(number));
+            sum += term;
+            if term < sum * 1e-17 {
+                break;
+            }
+        }
+        return (scale * sum).min(1.0);
+    }
+    const TINY: f64 = 1e-300;
+    let mut under = value + 1.0 - shape;
+    let mut over = 1.0 / TINY;
+    let mut inverse = 1.0 / under;
+    let mut fraction = inverse;
+    for number in 1..TERMS_MAX {
+        let number = f64::from(number);
+        let numerator = -number * (number - shape);
+        under += 2.0;
+        inverse = numerator * inverse + under;
+        inverse = 1.0 / if inverse.abs() < TINY { TINY } else { inverse };
+        over = under + numerator / over;
+        over = if over.abs() < TINY { TINY } else { over };
+        let factor = over * inverse;
+        fraction *= factor;
+        if (factor - 1.0).abs() < 1e-16 {
+            break;
+        }
+    }
+    (1.0 - scale * fraction).max(0.0)
 }
 
 /// Probability that at most `count` of `trials` come true, each with probability `share` in `(0, 1)`.
@@ -258,6 +328,23 @@ mod tests {
             assert!(wrong < 1e-9, "{count} of {trials}: {found:?}");
         }
         assert_eq!(binomial(0, 0), Interval { low: 0.0, high: Some(1.0) });
+    }
+
+    /// Equal weights give Garwood's interval; the others are roots of mpmath's `gammainc`.
+    #[test]
+    fn intervals_of_weighted_counts_are_fay_and_feuers() {
+        for count in [0_u32, 1, 5, 40] {
+            let found = weighted(f64::from(count) / 100.0, f64::from(count) / 1e4, 0.01, 0.05);
+            let exact = poisson(u64::from(count));
+            assert!((100.0 * found.low - exact.low).abs() < 1e-6, "{found:?} {exact:?}");
+            assert!((100.0 * found.high.unwrap() - exact.high.unwrap()).abs() < 1e-6, "{found:?} {exact:?}");
+        }
+        // Two events of weight 1 and ten of weight 0.1 among 1,000.
+        let found = weighted(3.0 / 1e3, 2.1 / 1e6, 1.0 / 1e3, 0.05);
+        assert!((found.low - 0.000865837810245).abs() < 1e-9, "{found:?}");
+        assert!((found.high.unwrap() - 0.00811776904705).abs() < 1e-9, "{found:?}");
+        // A narrower miss makes a wider interval.
+        assert!(weighted(3.0 / 1e3, 2.1 / 1e6, 1.0 / 1e3, 0.01).low < found.low);
     }
 
     /// Newcombe 1998 b, table II, method 10: of 36, 12, 2, 0 and of 20, 12, 2, 16 pairs.

@@ -8,14 +8,14 @@ mod ranks;
 mod survival;
 
 pub use intervals::{
-    Estimate, Interval, binomial, mean, paired_difference, poisson, proportion, ratio_of_means,
-    variance_of_mean, wilson,
+    Estimate, Interval, binomial, binomial_missing, mean, paired_difference, poisson, proportion,
+    ratio_of_means, variance_of_mean, weighted, wilson,
 };
 pub use ranks::{PairedTest, RankTest, holm, mann_whitney, sign_test, signed_ranks, superiority};
 pub use survival::{Lifetime, restricted_mean};
 
 /// Where `is_above` turns true, by bisection; it must be false at `low` and true at `high`.
-fn bisect(mut low: f64, mut high: f64, is_above: impl Fn(f64) -> bool) -> f64 {
+pub(crate) fn bisect(mut low: f64, mut high: f64, is_above: impl Fn(f64) -> bool) -> f64 {
     // 200 halvings exhaust an f64, wherever the two begin.
     for _ in 0..200 {
         let middle = low + (high - low) / 2.0;

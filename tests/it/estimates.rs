@@ -1,4 +1,4 @@
-//! Estimates: they depend on their settings alone, splitting agrees with counting, and bad requests are refused.
+//! Estimates: they depend on their settings alone, all methods agree, and bad requests are refused.
 
 use std::path::Path;
 use std::time::Duration;
@@ -27,10 +27,10 @@ fn kept(directory: &Path) -> Vec<u8> {
 }
 
 #[test]
-fn an_estimate_depends_on_its_settings_alone_and_splitting_agrees_with_counting() {
+fn an_estimate_depends_on_its_settings_alone_and_all_methods_agree() {
     let scratch = tempfile::tempdir().expect("a scratch directory");
     let mut found = Vec::new();
-    for (method, episodes, parts) in [("count", "20", "4"), ("split", "20", "4")] {
+    for (method, episodes, parts) in [("count", "20", "4"), ("split", "20", "4"), ("probe", "10", "3")] {
         let whole = scratch.path().join(method);
         let out = whole.display().to_string();
         let (status, stdout, stderr) =
@@ -53,8 +53,39 @@ fn an_estimate_depends_on_its_settings_alone_and_splitting_agrees_with_counting(
         assert_eq!(status, 0, "{stderr}");
         assert_eq!(kept(&broken), kept(&whole), "{method}");
     }
-    let [[count_low, count_high], [split_low, split_high]] = [found[0], found[1]];
-    assert!(count_low < split_high && split_low < count_high, "{found:?}");
+    let [count_low, count_high] = found[0];
+    for [low, high] in &found[1..] {
+        assert!(count_low < *high && *low < count_high, "{found:?}");
+    }
+    // What was tried out beside the episodes replays like any episode: it has their seeds and a script of its own.
+    let critical = scratch.path().join("probe/critical");
+    let mut files: Vec<_> = std::fs::read_dir(critical)
+        .expect("every estimate has it")
+        .map(|entry| entry.expect("it is readable").path())
+        .collect();
+    files.sort();
+    assert!(!files.is_empty(), "a trial found something");
+    let verified = outcome(avastra(&["verify"]).args(files.iter().take(3)));
+    assert_eq!(verified.0, 0, "{verified:?}");
+}
+
+#[test]
+fn an_estimate_stops_when_it_is_precise_enough_wherever_it_was_killed() {
+    let scratch = tempfile::tempdir().expect("a scratch directory");
+    let out = scratch.path().join("whole").display().to_string();
+    let mut asked = arguments("count", "10", "8", &out);
+    asked.extend(["--precision", "1", "--jobs", "2"]);
+    let (status, stdout, stderr) = outcome(&mut avastra(&asked));
+    assert_eq!(status, 0, "{stderr}");
+    let results = result(&stdout)["results"].clone();
+    // Three looks, at 2, 4 and 8 parts, share the 5 %.
+    assert_eq!(results["missing"].as_f64(), Some(0.05));
+    assert!((results["missing_at_look"].as_f64().expect("it is there") - 0.05 / 3.0).abs() < 1e-12);
+    assert!(results["parts"].as_u64() < results["parts_wanted"].as_u64(), "{results}");
+    // Gone on with, it has nothing left to do.
+    let (status, stdout, stderr) = outcome(&mut avastra(&["estimate", "--resume", &out, "--format", "json"]));
+    assert_eq!(status, 0, "{stderr}");
+    assert_eq!(result(&stdout)["results"], results);
 }
 
 #[test]
@@ -77,11 +108,14 @@ fn two_driving_systems_are_told_apart_in_the_same_episodes() {
 
 #[test]
 fn requests_that_cannot_be_met_are_refused() {
-    let cases: [(&[&str], &str); 6] = [
+    let cases: [(&[&str], &str); 9] = [
         (&["estimate", SPACE, "--parts", "1"], "from 2 to"),
         (&["estimate", SPACE, "--method", "split", "--episodes", "3"], "at least 10"),
         (&["estimate", SPACE, "--method", "split", "--ads-cmd", "true"], "--method count"),
         (&["estimate", SPACE, "--method", "split", "--agent", "greedy"], "has looked at what comes after"),
+        (&["estimate", SPACE, "--method", "probe", "--ads-cmd", "true"], "--method count"),
+        (&["estimate", SPACE, "--method", "probe", "--agent", "greedy"], "no weight"),
+        (&["estimate", SPACE, "--precision", "2"], "a share of the probability"),
         (&["estimate", SPACE, "--agent", "ddqn"], "has to be trained first"),
         (&["compare", SPACE, "modular", "nobody"], "no driving system `nobody`"),
     ];

@@ -140,6 +140,21 @@ fn trucks_are_twice_as_likely() {
 }
 
 #[test]
+fn in_most_steps_nothing_happens() {
+    let table = wish("rare_pedestrians");
+    let odds = |action: &str| {
+        let rows = table.rows().iter().zip(table.odds());
+        let of_action = rows.filter(|(row, _)| row.label.split('(').next() == Some(action));
+        of_action.map(|(_, odds)| odds).collect::<Vec<_>>()
+    };
+    assert_eq!(odds("nothing"), [1000]);
+    assert_eq!(odds("pedestrian"), [5; 2]);
+    assert_eq!(odds("cross_road"), [20; 8]);
+    assert_eq!(odds("fog"), [1; 3], "what is not named is `_`");
+    assert_eq!(ActionTable::new(space_at("scenarios/avastra45.ava")).odds(), [1; 45]);
+}
+
+#[test]
 fn snow_is_seen_and_felt() {
     let table = wish("snow");
     let memory = table.space().initial_memory(1);

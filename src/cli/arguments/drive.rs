@@ -96,15 +96,23 @@ pub struct EstimateArguments {
     /// What is looked for in an episode.
     #[arg(long, value_enum, default_value_t = EventArgument::Counted)]
     pub event: EventArgument,
-    /// How: `count` plays every episode from its start, `split` goes on from dangerous moments (unbiased, and says what it gained or lost).
+    /// How: `count` plays every episode from its start; `probe` tries dangerous rows out beside those that chance chooses, each
+    /// with its weight; `split` goes on from dangerous moments. All are unbiased, and say what they gained or lost.
     #[arg(long, value_enum, default_value_t = MethodArgument::Count)]
     pub method: MethodArgument,
-    /// Independent parts on each road; the interval of `split` comes from their spread, so give it twenty or more.
+    /// Independent parts on each road, at most; the interval of `split` comes from their spread, so give it twenty or more.
     #[arg(long, default_value_t = 20)]
     pub parts: u32,
     /// Episodes of a part.
     #[arg(long, default_value_t = 50, value_parser = clap::value_parser!(u32).range(1..=i64::from(crate::run::EPISODES_MAX)))]
     pub episodes: u32,
+    /// Stop when half the width of the interval is at most this share of the probability; looks when a quarter, half and all
+    /// parts are done.
+    #[arg(long, value_name = "SHARE")]
+    pub precision: Option<f64>,
+    /// Stop, at such a look, when so many hours were simulated.
+    #[arg(long, value_name = "H")]
+    pub hours: Option<f64>,
     #[command(flatten)]
     pub under_test: UnderTestArguments,
     #[command(flatten)]
@@ -116,7 +124,7 @@ pub struct EstimateArguments {
     #[arg(long)]
     pub out: Option<PathBuf>,
     /// Go on with an interrupted estimate; its own settings hold.
-    #[arg(long, value_name = "DIR", conflicts_with_all = ["file", "event", "method", "parts", "episodes", "ads", "ads_config", "ads_cmd", "road", "agent", "seed", "ambient", "traffic", "out", "without", "with"])]
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["file", "event", "method", "parts", "precision", "hours", "episodes", "ads", "ads_config", "ads_cmd", "road", "agent", "seed", "ambient", "traffic", "out", "without", "with"])]
     pub resume: Option<PathBuf>,
 }
 
@@ -129,6 +137,7 @@ pub enum EventArgument {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum MethodArgument {
     Count,
+    Probe,
     Split,
 }
 

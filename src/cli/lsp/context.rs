@@ -5,7 +5,7 @@ use crate::check::{Declaration, References, Symbol};
 use crate::model::Type;
 use crate::model::vocabulary::{
     CHANGE, EpisodeField, RoadField, ScenarioClaim, Site, SpaceClaim, SpawnField, StartField, StopReason,
-    WAIT, parts_of, things,
+    WAIT, Word as _, parts_of, things,
 };
 use crate::syntax::keyword;
 
@@ -211,6 +211,9 @@ impl<'a> Place<'a> {
                 false => vec![Kind::Keyword("digest"), Kind::Keyword("without")],
             },
             "odds" => match self.begins_entry() || self.last(0) == "|" {
+                true if self.text(1) == SpaceClaim::Actions.name() => {
+                    vec![Kind::Actions, Kind::Groups, Kind::Keyword("_")]
+                }
                 true => vec![Kind::Variants(self.text(1).to_owned()), Kind::Keyword("_")],
                 false if self.last(0) == "odds" => vec![Kind::Enums],
                 false => Vec::new(),
