@@ -6,6 +6,8 @@
 //!
 //! [`Lane::changes_left_m`]: super::map::Lane::changes_left_m
 
+use core::ops::RangeInclusive;
+
 use crate::geometry::wrap_angle;
 
 use super::map::{LaneIndex, RoadMap};
@@ -21,6 +23,12 @@ const FOLLOWS_M: f64 = 0.1;
 
 /// The widest median, m: an opposing lane farther away belongs to another street.
 const MEDIAN_M_MAX: f64 = 40.0;
+
+/// Opposing lanes are looked for as near as this first, m.
+const NEAR_M: f64 = 10.0;
+
+/// How much farther is looked than is asked for, m: one lane may stand for another beside it, but no ten in a row do.
+const BESIDE_M: f64 = 1.0;
 
 /// A lane beside a place on another.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -52,22 +60,31 @@ impl RoadMap {
     /// left to right. The lane itself is left out, and so are lanes of another level. For a lane outside
     /// junctions, so are the lanes inside junctions.
     pub fn abreast(&self, lane: LaneIndex, station_m: f64, reach_m: f64) -> Vec<Abreast> {
-        let directions = [true, false].map(|same| self.abreast_towards(lane, station_m, reach_m, same));
+        let beside = -reach_m..=reach_m;
+        let directions = [true, false].map(|same| self.abreast_towards(lane, station_m, &beside, same));
         let mut found = directions.concat();
         found.sort_by(|a, b| b.lateral_m.total_cmp(&a.lateral_m).then(a.lane.cmp(&b.lane)));
         found
     }
 
-    /// Those of [`RoadMap::abreast`] that lead in our direction, or those that lead the other way, by rising index.
-    fn abreast_towards(&self, lane: LaneIndex, station_m: f64, reach_m: f64, same: bool) -> Vec<Abreast> {
+    /// The lanes as in [`RoadMap::abreast`] that lead in our direction, or those that lead the other way, by rising
+    /// index, with an edge or a part within these distances to the left. A few others may be among them.
+    fn abreast_towards(
+        &self,
+        lane: LaneIndex,
+        station_m: f64,
+        aside_m: &RangeInclusive<f64>,
+        same: bool,
+    ) -> Vec<Abreast> {
         let own = self.lane(lane);
         let pose = own.centre.pose_at(station_m);
         let mut found: Vec<Abreast> = Vec::new();
         // The edge of a lane is at most half the width of the widest lane away from the lane's centre.
-        let centre_m = reach_m + self.grid.half_width_m();
+        let half_m = self.grid.half_width_m();
+        let centres_m = aside_m.start() - half_m..=aside_m.end() + half_m;
         let heading_rad = pose.heading_rad + if same { 0.0 } else { core::f64::consts::PI };
         let toward = (heading_rad, PARALLEL_RAD);
-        for index in self.grid.beside(&pose, toward, ABREAST_M, centre_m) {
+        for index in self.grid.beside(&pose, toward, ABREAST_M, centres_m) {
             let other = self.lane(index);
             let is_inside = other.junction.is_some() && own.junction.is_none();
             if index == lane || is_inside {
@@ -88,7 +105,8 @@ impl RoadMap {
             }
             let offset = pose.to_local(there.position);
             let width_m = other.width_at(projection.station_m);
-            if offset.x.abs() > ABREAST_M || offset.y.abs() - width_m / 2.0 > reach_m {
+            let (right_m, left_m) = (offset.y - width_m / 2.0, offset.y + width_m / 2.0);
+            if offset.x.abs() > ABREAST_M || right_m > *aside_m.end() || left_m < *aside_m.start() {
                 continue;
             }
             let (station_m, lateral_m) = (projection.station_m, offset.y);
@@ -108,19 +126,26 @@ impl RoadMap {
         let own = self.lane(lane);
         let side = if own.keeps_left { -1.0 } else { 1.0 };
         let aside_m = |beside: &Abreast| side * beside.lateral_m;
-        // Twice the width of a median, because lanes of our own direction may lie between.
-        let opposite = self.abreast_towards(lane, station_m, 2.0 * MEDIAN_M_MAX, false);
-        let nearest = opposite
-            .iter()
-            .filter(|beside| aside_m(beside) > 0.0)
-            .min_by(|a, b| aside_m(a).total_cmp(&aside_m(b)))?;
+        let within = |reach_m: f64| match own.keeps_left {
+            true => -reach_m..=BESIDE_M,
+            false => -BESIDE_M..=reach_m,
+        };
+        let nearest_within = |reach_m: f64| {
+            let opposite = self.abreast_towards(lane, station_m, &within(reach_m), false);
+            let aside = opposite.into_iter().filter(|beside| aside_m(beside) > 0.0);
+            aside.min_by(|a, b| aside_m(a).total_cmp(&aside_m(b)))
+        };
+        // Most are next to our own lane. Else twice the width of a median, because lanes of our own direction may lie
+        // between.
+        let near = nearest_within(NEAR_M + BESIDE_M).filter(|beside| aside_m(beside) < NEAR_M);
+        let nearest = near.or_else(|| nearest_within(2.0 * MEDIAN_M_MAX))?;
         // No farther than the opposing lane; a little more, because one lane may stand for another beside it.
-        let same = self.abreast_towards(lane, station_m, aside_m(nearest) + FOLLOWS_M, true);
-        let ours = same.iter().filter(|beside| aside_m(beside) > 0.0 && aside_m(beside) < aside_m(nearest));
+        let same = self.abreast_towards(lane, station_m, &within(aside_m(&nearest) + FOLLOWS_M), true);
+        let ours = same.iter().filter(|beside| aside_m(beside) > 0.0 && aside_m(beside) < aside_m(&nearest));
         let edge_m = ours
             .map(|beside| aside_m(beside) + beside.width_m / 2.0)
             .fold(own.width_at(station_m) / 2.0, f64::max);
-        let gap_m = aside_m(nearest) - nearest.width_m / 2.0 - edge_m;
+        let gap_m = aside_m(&nearest) - nearest.width_m / 2.0 - edge_m;
         let (lane, station_m, lateral_m) = (nearest.lane, nearest.station_m, nearest.lateral_m);
         // Rounding leaves tiny gaps between lanes that share a line.
         let median_m = if gap_m > 1e-3 { gap_m } else { 0.0 };

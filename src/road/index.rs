@@ -1,5 +1,6 @@
 //! A grid over the plane that finds the lanes near a point.
 
+use core::ops::RangeInclusive;
 use std::collections::BTreeMap;
 
 use crate::geometry::{Bounds, Path, Pose, Projection, Vec2, wrap_angle};
@@ -108,24 +109,26 @@ impl LaneGrid {
         }
     }
 
-    /// The lanes that may have a point within `ahead_m` before or behind a pose and `reach_m` beside it, with a heading
-    /// there within an angle of the given one, by rising index. A few lanes farther away, or with other headings, may be
-    /// among them.
+    /// The lanes that may have a point within `ahead_m` before or behind a pose and at one of these distances to the left
+    /// of it, with a heading there within an angle of the given one, by rising index. A few lanes elsewhere, or with
+    /// other headings, may be among them.
     pub fn beside(
         &self,
         pose: &Pose,
         (heading_rad, within_rad): (f64, f64),
         ahead_m: f64,
-        reach_m: f64,
+        aside_m: RangeInclusive<f64>,
     ) -> impl Iterator<Item = LaneIndex> {
         let forward = pose.forward();
         let left = Vec2::new(-forward.y, forward.x);
         let position = pose.position;
         let may_be = move |&Bounds { least, most }: &Bounds| {
             let (middle, half) = ((least + most) / 2.0 - position, (most - least) / 2.0);
-            let within =
-                |axis: &Vec2, reach_m: f64| axis.dot(&middle).abs() <= reach_m + axis.abs().dot(&half);
-            within(&forward, ahead_m + SLACK_M) && within(&left, reach_m + SLACK_M)
+            let within = |axis: &Vec2, from_m: f64, to_m: f64| {
+                let (at_m, half_m) = (axis.dot(&middle), axis.abs().dot(&half) + SLACK_M);
+                at_m + half_m >= from_m && at_m - half_m <= to_m
+            };
+            within(&forward, -ahead_m, ahead_m) && within(&left, *aside_m.start(), *aside_m.end())
         };
         let candidates = (0..self.boxes.len()).filter(move |index| {
             may_be(&self.boxes[*index]) && self.headings[*index].may_be_parallel(heading_rad, within_rad)

@@ -1,5 +1,6 @@
 //! What lies beside a lane: on its own road, across a median, in a junction.
 
+use crate::road::abreast::{Abreast, Opposing};
 use crate::road::testing::{lanes, street};
 use crate::road::{LaneIndex, RoadMap, Route, Side};
 
@@ -99,6 +100,47 @@ fn without_a_median_the_neighbour_is_the_opposing_lane() {
     // A one-way street has no opposing lane.
     let one_way = map.place("5", -3, 60.0).unwrap();
     assert_eq!(map.opposing(one_way.lane, one_way.station_m), None);
+}
+
+/// What [`RoadMap::opposing`] finds, from all that is abreast, however far away.
+fn opposing_of_all(map: &RoadMap, lane: LaneIndex, station_m: f64) -> Option<Opposing> {
+    let own = map.lane(lane);
+    let side = if own.keeps_left { -1.0 } else { 1.0 };
+    let aside_m = |beside: &Abreast| side * beside.lateral_m;
+    let opposite = map.abreast(lane, station_m, 80.0).into_iter().filter(|beside| !beside.same_direction);
+    let nearest =
+        opposite.filter(|beside| aside_m(beside) > 0.0).min_by(|a, b| aside_m(a).total_cmp(&aside_m(b)))?;
+    let same = map.abreast(lane, station_m, aside_m(&nearest) + 0.1).into_iter();
+    let between = |beside: &Abreast| aside_m(beside) > 0.0 && aside_m(beside) < aside_m(&nearest);
+    let edge_m = same
+        .filter(|beside| beside.same_direction && between(beside))
+        .map(|beside| aside_m(&beside) + beside.width_m / 2.0)
+        .fold(own.width_at(station_m) / 2.0, f64::max);
+    let gap_m = aside_m(&nearest) - nearest.width_m / 2.0 - edge_m;
+    let median_m = if gap_m > 1e-3 { gap_m } else { 0.0 };
+    let Abreast { lane, station_m, lateral_m, .. } = nearest;
+    (median_m <= 40.0).then_some(Opposing { lane, station_m, lateral_m, median_m })
+}
+
+#[test]
+fn the_opposing_lane_is_that_of_a_search_of_all_lanes() {
+    let roads = concat!(env!("CARGO_MANIFEST_DIR"), "/scenarios/roads");
+    let shipped = ["residential", "corner", "crossroad", "boulevard"].map(|name| {
+        let text = std::fs::read_to_string(format!("{roads}/{name}.xodr")).expect("it is shipped");
+        RoadMap::from_opendrive(name, &text).expect("it is a map")
+    });
+    let (mut found, mut missing) = (0, 0);
+    for map in shipped.into_iter().chain(["RHT", "LHT"].map(boulevard)) {
+        for lane in (0..map.lanes.len()).map(LaneIndex) {
+            for tenth in 0..=10 {
+                let station_m = map.lane(lane).centre.length_m() * f64::from(tenth) / 10.0;
+                let opposing = map.opposing(lane, station_m);
+                assert_eq!(opposing, opposing_of_all(&map, lane, station_m), "{lane:?} at {station_m} m");
+                *if opposing.is_some() { &mut found } else { &mut missing } += 1;
+            }
+        }
+    }
+    assert!(found > 500 && missing > 100, "{found} {missing}");
 }
 
 #[test]
