@@ -73,16 +73,22 @@ pub fn lane_outline(lane: &Lane) -> Vec<Vec2> {
 /// A line without the points that lie on it anyway, to 2 cm.
 pub fn thinned(points: &[Vec2]) -> Vec<Vec2> {
     const OFF_M: f64 = 0.02;
-    let mut kept: Vec<Vec2> = Vec::new();
-    for (index, &point) in points.iter().enumerate() {
-        let is_needless = |before: &Vec2| {
-            let Some(after) = points.get(index + 1) else { return false };
-            let (way, aside) = (after - before, point - before);
+    let Some(&first) = points.first() else { return Vec::new() };
+    let mut kept = vec![first];
+    let mut last = 0;
+    for index in 1..points.len() {
+        let lies_on_the_way = |point: &Vec2, to: &Vec2| {
+            let (way, aside) = (to - points[last], point - points[last]);
             // What turns back is needed, however near it passes.
             way.perp(&aside).abs() <= OFF_M * way.norm() && way.dot(&aside) > 0.0 && aside.norm() < way.norm()
         };
-        if !kept.last().is_some_and(is_needless) {
-            kept.push(point);
+        // All that was left out since the last point that was kept, or a wide bend would become a straight line.
+        let is_needless = points
+            .get(index + 1)
+            .is_some_and(|next| points[last + 1..=index].iter().all(|point| lies_on_the_way(point, next)));
+        if !is_needless {
+            kept.push(points[index]);
+            last = index;
         }
     }
     kept
@@ -91,4 +97,38 @@ pub fn thinned(points: &[Vec2]) -> Vec<Vec2> {
 /// Text as SVG has to write it.
 pub fn escape(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_thinned_line_keeps_its_corners_and_ends() {
+        let points =
+            |list: &[(f64, f64)]| -> Vec<Vec2> { list.iter().map(|&(x, y)| Vec2::new(x, y)).collect() };
+        let line =
+            points(&[(0.0, 0.0), (1.0, 0.0), (2.0, 0.001), (3.0, 0.0), (3.0, 2.0), (3.0, 4.0), (3.0, 1.0)]);
+        let kept = points(&[(0.0, 0.0), (3.0, 0.0), (3.0, 4.0), (3.0, 1.0)]);
+        assert_eq!(thinned(&line), kept);
+        assert_eq!(thinned(&line[..1]), line[..1]);
+        assert!(thinned(&[]).is_empty());
+    }
+
+    #[test]
+    fn a_bend_of_many_points_stays_a_bend() {
+        let at = |n: u32| crate::geometry::unit_vector(f64::from(n) * 0.01) * 50.0;
+        let bend: Vec<Vec2> = (0..=150).map(at).collect();
+        let kept = thinned(&bend);
+        assert!(kept.len() > 10 && kept.len() < 120, "{}", kept.len());
+        // Nothing that was left out lies far from what was kept.
+        for point in &bend {
+            let off_m = kept.windows(2).map(|pair| {
+                let (way, aside) = (pair[1] - pair[0], point - pair[0]);
+                let share = (way.dot(&aside) / way.norm_squared()).clamp(0.0, 1.0);
+                (aside - way * share).norm()
+            });
+            assert!(off_m.fold(f64::INFINITY, f64::min) <= 0.021);
+        }
+    }
 }

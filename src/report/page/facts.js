@@ -3,10 +3,10 @@ import { el, refill, table } from "./dom.js";
 import { linkOf } from "./link.js";
 import { DRIVERS, ENDS, PRIORITIES, VERDICTS, causeInWords, collisionInWords, figure, kmh, plural } from "./words.js";
 
-/** Everything about the collisions of a scenario. */
-export function showVerdict(place, recording, seek) {
+/** Everything about the collisions of a scenario; `watchDrivers` shows the reference drivers from a time on. */
+export function showVerdict(place, recording, seek, watchDrivers) {
   const { collisions, summary } = recording.header;
-  const parts = collisions.map((collision) => verdict(collision, summary, seek));
+  const parts = collisions.map((collision) => verdict(recording, collision, seek, watchDrivers));
   if (parts.length === 0) parts.push(el("p", {}, `No collision: ${ENDS[summary.end] ?? `it ended with ${summary.end}`}.`));
   if (summary.same === false) {
     parts.push(el("p", { class: "warning" }, "This replay is not the recorded episode: the file, its space or the engine has changed since."));
@@ -16,9 +16,11 @@ export function showVerdict(place, recording, seek) {
   refill(place, parts);
 }
 
-function verdict(collision, summary, seek) {
+function verdict(recording, collision, seek, watchDrivers) {
+  const { summary } = recording.header;
   const says = collision.counted ? "Counts" : "Does not count";
   const jump = el("button", { type: "button", onclick: () => seek(collision.at_s) }, `Go to ${figure(collision.at_s, "s", 2)}`);
+  const watch = collision.ways.length > 0 && el("button", { type: "button", class: "drivers-from", onclick: () => watchDrivers(collision.onset_s) }, "Watch the reference drivers");
   const onset = el("button", { type: "button", onclick: () => seek(collision.onset_s) }, `Hazard begins: ${figure(collision.onset_s, "s", 2)}`);
   const rows = [
     ["Verdict", `${says}: ${VERDICTS[collision.class]}`],
@@ -32,17 +34,29 @@ function verdict(collision, summary, seek) {
   const drivers = collision.ways.map((way) => [
     DRIVERS[way.name] ?? way.name,
     way.avoids ? "✓ avoids it" : "✕ does not",
+    endOf(recording, way),
     collision.letter.includes(way.name) ? "✓" : ["cc", "fsm"].includes(way.name) ? "✕" : "–",
   ]);
   return el(
     "section",
     { class: `verdict ${collision.counted ? "counted" : ""}` },
     el("p", { class: "lead" }, `${collisionInWords(collision, summary.road)}.`),
-    el("p", { class: "buttons" }, jump, onset),
+    el("p", { class: "buttons" }, jump, onset, watch),
     el("dl", {}, rows.map(([name, text]) => [el("dt", {}, name), el("dd", {}, text)])),
     drivers.length > 0 &&
-      table("Reference drivers from the beginning of the hazard on", ["Driver", "Result", "By braking alone"], drivers),
+      table("Reference drivers from the beginning of the hazard on", ["Driver", "Result", "What it does", "By braking alone"], drivers),
   );
+}
+
+/** What a reference driver comes to: where it stands, or how it drives on. */
+function endOf(recording, way) {
+  const speeds = recording.columns[way.speed];
+  if (speeds.length === 0) return "–";
+  const stands = speeds.findIndex((speed) => speed < 0.05);
+  const timeOf = (at) => figure(way.from_s + at * way.every_s, "s", 1);
+  if (stands >= 0) return `stands from ${timeOf(stands)} on`;
+  const slowest = speeds.reduce((least, speed) => Math.min(least, speed), Infinity);
+  return `slows down to ${kmh(slowest)}${way.avoids ? "" : `, until ${timeOf(speeds.length - 1)}`}`;
 }
 
 /** The moment in figures; gives a function that updates it. */

@@ -99,7 +99,9 @@ function counts(list) {
     ["Kinds of failure", "group", kindOf],
     ...FILTERS.filter(([name]) => ["verdict", "priority", "manoeuvre", "side", "cause"].includes(name)).map(([name, title, value]) => [title, name, value]),
   ];
-  return charts.map(([title, name, value]) => {
+  // Where no cause was looked for there is nothing to count.
+  const isTold = ([, name, value]) => name !== "cause" || list.some((entry) => value(entry) !== causeInWords(null));
+  return charts.filter(isTold).map(([title, name, value]) => {
     const sums = new Map();
     for (const entry of list) sums.set(value(entry), (sums.get(value(entry)) ?? 0) + 1);
     const sorted = [...sums].sort((a, b) => b[1] - a[1] || a[0].localeCompare(b[0]));

@@ -117,6 +117,7 @@ export class View {
     const { colours } = canvas;
     const collision = recording.collision();
     for (const way of collision?.ways ?? []) {
+      if (way.from_s === null || timeS < way.from_s - way.every_s) continue;
       const dash = way.avoids ? [] : [0.6, 0.6];
       canvas.line(recording.wayOf(way), colours.driver, Math.max(0.15, canvas.px(1.6)), dash);
       const place = recording.driver(way, timeS);

@@ -77,7 +77,7 @@ class Watch {
   }
 
   #build(place) {
-    const { data, entry } = this;
+    const { clock, data, entry } = this;
     const collision = mainCollision(entry.summary);
     const canvas = (name) => el("canvas", { class: "stage", role: "img", "aria-label": `View from above: ${name}` });
     const stages = [[this.recording, this.road, entry.file], ...(this.second ? [[this.second.recording, this.second.road, this.second.name]] : [])];
@@ -123,7 +123,13 @@ class Watch {
     this.places = { users };
     this.plots = new Plots(plots, this.recording, seek, this.second?.recording ?? null);
     this.showMoment = showMoment(moment);
-    showVerdict(verdict, this.recording, seek);
+    showVerdict(verdict, this.recording, seek, (timeS) => {
+      const box = document.querySelector('input[name="drivers"]');
+      if (!box.checked) box.click();
+      clock.seek(timeS);
+      clock.play();
+      this.views[0].canvas.element.scrollIntoView({ block: "nearest" });
+    });
     this.markStep = showSteps(steps, this.recording, seek);
     this.markSource = showSource(source, this.recording.header.source, (step) => seek(this.recording.header.steps[step]?.at_s ?? 0));
     this.drawStills = drawStrip(strip, this.recording, this.road, seek, (timeS) => this.#peek(timeS));
