@@ -12,6 +12,7 @@ use base64::Engine;
 use serde_json::Value;
 
 use crate::cases::root;
+use crate::command::{avastra, outcome};
 use crate::world::read;
 
 /// A pedestrian walks in front of a driving system that yields to nobody. Its seed, and so what is driven, is fixed.
@@ -159,4 +160,22 @@ fn a_page_holds_everything_and_repeats_itself() {
     let index: Value = serde_json::from_str(index).expect("the index is JSON");
     assert_eq!(index["scenarios"][0]["summary"]["name"], "walk");
     assert!(html.len() < 150_000, "{} bytes for one short scenario", html.len());
+}
+
+/// `sh scenarios/found/make.sh` draws it again, should the engine or the driving system change.
+#[test]
+fn the_picture_of_the_readme_is_of_its_scenario() {
+    let found = "scenarios/found/boulevard_0383";
+    let (status, _, stderr) = outcome(&mut avastra(&["verify", &format!("{found}.ava")]));
+    assert_eq!(status, 0, "{stderr}");
+    let (status, drawn, stderr) =
+        outcome(&mut avastra(&["render", &format!("{found}.ava"), "--strip", "--out", "-"]));
+    assert_eq!(status, 0, "{stderr}");
+    let kept = std::fs::read_to_string(root().join(format!("{found}.svg"))).expect("it is shipped");
+    assert_eq!(drawn.trim_end(), kept.trim_end());
+    let document = roxmltree::Document::parse(&kept).expect("it is well-formed XML");
+    let panels = document.descendants().filter(|node| node.has_tag_name("svg")).count() - 1;
+    assert_eq!(panels, 5);
+    let readme = std::fs::read_to_string(root().join("README.md")).expect("it is shipped");
+    assert!(readme.contains(&format!("({found}.svg)")));
 }
