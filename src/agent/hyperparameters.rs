@@ -413,8 +413,7 @@ impl Hyperparameters {
         ];
         require(optional.into_iter().flatten())?;
         if self.pays_maker && (self.delayed_credit || self.reward == RewardSource::Space) {
-            let message =
-                "`pays_maker` needs `reward: equation`, and `delayed_credit: false`, which it would undo";
+            let message = "`pays_maker` needs `reward: equation` and `delayed_credit: false`; or say `pays_maker: false`";
             return Err(SettingsError::Text(message.to_owned()));
         }
         Ok(())
@@ -485,6 +484,7 @@ mod tests {
                 exploration_begin: 1.0,
                 exploration_end: 0.1,
                 exploration_steps: 100,
+                exploration_share: None,
                 random_steps: 10,
                 ..presets::avastra()
             };

@@ -15,6 +15,12 @@ fn small() -> Hyperparameters {
     Hyperparameters {
         encoding: Encoding::Raw,
         state: StateSet::Full,
+        pays_maker: false,
+        loss: Loss::Huber,
+        average_decay: 0.0,
+        discount: 0.9,
+        n_step: 3,
+        exploration_share: None,
         hidden_units: vec![16],
         learning_rate: 3e-3,
         batch_len: 16,
