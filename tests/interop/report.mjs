@@ -41,6 +41,13 @@ async function ready(one, shown = null) {
   await one.evaluate(() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done))));
 }
 
+/** When something was first seen, ms after the page was asked for. */
+async function painted(one) {
+  await one.bringToFront();
+  await one.waitForFunction(() => performance.getEntriesByName("first-contentful-paint").length > 0);
+  return one.evaluate(() => performance.getEntriesByName("first-contentful-paint")[0].startTime);
+}
+
 async function accessible(one, name) {
   await one.evaluate(axe);
   const found = await one.evaluate(() => window.axe.run(document, { resultTypes: ["violations"] }));
@@ -56,7 +63,7 @@ const tick = 0.02;
 // The overview: painted soon, filters that live in the link.
 const wide = await tab();
 await open(wide, page);
-const paint = await wide.evaluate(() => performance.getEntriesByName("first-contentful-paint")[0].startTime);
+const paint = await painted(wide);
 console.log(`first paint of ${size(page)}: ${Math.round(paint)} ms`);
 const all = await wide.$$eval("#list tbody tr", (rows) => rows.length);
 assert(all > 1, "the page lists scenarios");
@@ -75,8 +82,10 @@ await wide.waitForFunction((count) => document.querySelectorAll("#list tbody tr"
 console.log(`filters: ${roads.length} of ${all} on ${road}, by the link too`);
 
 // The worst scenario: play, scrub, step, to the collision.
+// Its number need not be 0: a shrunk twin, which the list leaves out at first, may hit harder.
+const worst = await wide.$eval("#list tbody tr:first-child a", (link) => new URLSearchParams(link.hash.slice(1)).get("s"));
 await wide.click("#list tbody tr:first-child a");
-await ready(wide, "s0");
+await ready(wide, `s${worst}`);
 const start = await time(wide);
 await wide.keyboard.press("Space");
 await new Promise((done) => setTimeout(done, 600));
@@ -147,7 +156,7 @@ for (let i = 0; i < 20; i += 1) {
 console.log("20 random ticks: the page uses the numbers of the file (tests/it/report.rs holds those against the world)");
 
 // Two on one clock.
-await open(wide, page, "#s=0&with=c&t=3.00");
+await open(wide, page, `#s=${worst}&with=c&t=3.00`);
 assert.equal(await wide.$$eval("canvas.stage", (all) => all.length), 2);
 await wide.evaluate((at) => window.avastra.opened().clock.seek(at), collision.at_s);
 assert.notEqual(await picture(wide, 0), await picture(wide, 1), "the careful driver is elsewhere");
@@ -160,13 +169,13 @@ console.log(`two drives on one clock; prints to ${(pdf.length / 1e6).toFixed(1)}
 
 // Dark, and on a phone.
 const dark = await tab(1440, 1000, "dark");
-await open(dark, page, `#s=0&t=${(collision.at_s - 1).toFixed(2)}`);
+await open(dark, page, `#s=${worst}&t=${(collision.at_s - 1).toFixed(2)}`);
 await accessible(dark, "replay, dark");
 await dark.screenshot({ path: join(work, "replay_dark.png") });
 await open(dark, page);
 await accessible(dark, "overview, dark");
 const phone = await tab(390, 844);
-for (const [name, hash] of [["overview", ""], ["replay", "#s=0"], ["compare", "#s=0&with=c"]]) {
+for (const [name, hash] of [["overview", ""], ["replay", `#s=${worst}`], ["compare", `#s=${worst}&with=c`]]) {
   await open(phone, page, hash);
   const [wider, seen] = await phone.evaluate(() => [document.documentElement.scrollWidth, window.innerWidth]);
   assert(wider <= seen, `${name} on a phone is ${wider} px wide`);
@@ -178,7 +187,7 @@ for (const [name, hash] of [["overview", ""], ["replay", "#s=0"], ["compare", "#
 for (const [file, most] of [[page50, 3e6], [page500, 30e6]]) {
   const one = await tab();
   await open(one, file);
-  const first = await one.evaluate(() => performance.getEntriesByName("first-contentful-paint")[0].startTime);
+  const first = await painted(one);
   const count = await one.evaluate(() => window.avastra.data.scenarios.length);
   console.log(`${count} scenarios: ${size(file)}, first paint after ${Math.round(first)} ms`);
   assert(statSync(file).size < most);

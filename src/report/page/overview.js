@@ -80,7 +80,8 @@ function refusals(overview) {
 
 /** The line at the top of every page. */
 export function showTop(place, data) {
-  const worst = data.scenarios[0];
+  // A shrunk twin may hit harder; the worst is one that was found.
+  const worst = data.scenarios.find((entry) => !entry.shrunk_from) ?? data.scenarios[0];
   const collision = worst && mainCollision(worst.summary);
   refill(
     place,
