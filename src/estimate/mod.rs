@@ -4,8 +4,10 @@
 //! An [`Estimate`] consists of independent parts, each with seeds of its own, played on any number of threads. A part
 //! counts ([`Method::Count`]: crude Monte Carlo), tries rows out beside those that chance chooses ([`Method::Probe`]: importance
 //! sampling, see `probing` and `plan`) or splits ([`Method::Split`]: adaptive multilevel splitting, see `splitting`). All are
-//! unbiased for agents that do not look ahead. What is gained over counting is printed. [`Comparison`] plays two driving
-//! systems in the same episodes.
+//! unbiased for agents that do not look ahead, if the number of parts is fixed. Rules that stop early ([`Stopping`]) bias
+//! the probability a little, since they look at it or at what goes with it; the interval stays valid, because the looks share
+//! what it may miss (Bonferroni). What is gained over counting is printed. [`Comparison`] plays two driving systems in the
+//! same episodes.
 
 mod compare;
 mod database;

@@ -97,7 +97,8 @@ pub struct EstimateArguments {
     #[arg(long, value_enum, default_value_t = EventArgument::Counted)]
     pub event: EventArgument,
     /// How: `count` plays every episode from its start; `probe` tries dangerous rows out beside those that chance chooses, each
-    /// with its weight; `split` goes on from dangerous moments. All are unbiased, and say what they gained or lost.
+    /// with its weight; `split` goes on from dangerous moments. All are unbiased with a fixed number of parts, and say what
+    /// they gained or lost.
     #[arg(long, value_enum, default_value_t = MethodArgument::Count)]
     pub method: MethodArgument,
     /// Independent parts on each road, at most; the interval of `split` comes from their spread, so give it twenty or more.
@@ -107,10 +108,10 @@ pub struct EstimateArguments {
     #[arg(long, default_value_t = 50, value_parser = clap::value_parser!(u32).range(1..=i64::from(crate::run::EPISODES_MAX)))]
     pub episodes: u32,
     /// Stop when half the width of the interval is at most this share of the probability; looks when a quarter, half and all
-    /// parts are done.
+    /// parts are done. The interval allows for the looks; the probability itself gets a small bias.
     #[arg(long, value_name = "SHARE")]
     pub precision: Option<f64>,
-    /// Stop, at such a look, when so many hours were simulated.
+    /// Stop, at such a look, when so many hours were simulated. Holds the interval and biases the probability likewise.
     #[arg(long, value_name = "H")]
     pub hours: Option<f64>,
     #[command(flatten)]
