@@ -1,8 +1,8 @@
 //! Space-filling random search: a Latin hypercube (McKay, Beckman and Conover, 1979) over rows and drawn values, in
 //! place of independent draws, which leave holes and come in heaps.
 //!
-//! Of ten steps in a row, each tenth of the legal rows is chosen from once, and each tenth of each drawn value's range
-//! is drawn from once. An episode has its own hypercubes, from its seed: so episodes stay independent of each other,
+//! The legal rows are cut into ten parts, and so is the range of each drawn value. Ten steps in a row take one from each
+//! part, in a random order. An episode has its own hypercubes, from its seed: so episodes stay independent of each other,
 //! and a run is the same on any number of threads.
 
 use ndarray::ArrayView1;

@@ -46,7 +46,7 @@ impl Adam {
 }
 
 /// The number, or 0 if it is subnormal: a parameter whose slope stays 0 has moments that die away, and processors take
-/// a hundred times as long over a subnormal number.
+/// fifty times as long over a subnormal number.
 #[inline(always)]
 fn normal(number: f32) -> f32 {
     if number.abs() < f32::MIN_POSITIVE { 0.0 } else { number }
