@@ -109,7 +109,7 @@ pub(super) fn released() -> Hyperparameters {
 
 /// Ours: scaled variables, learning from the first few hundred transitions, a dueling head, and R_col only for
 /// collisions that count, paid where their obstacles were made. R_col, discount, averaging and how ε falls were chosen
-/// by trainings on the crossroad against `planning_never_yields`, with seeds that no study uses.
+/// by trainings on the crossroad against `planning_never_yields` (`learner_choice.yaml`), with seeds that no other study uses.
 pub(super) fn avastra() -> Hyperparameters {
     Hyperparameters {
         preset: "avastra".to_owned(),

@@ -51,6 +51,7 @@ examples! {
     "night_and_fog",
     "own_road" "roads/high_street.xodr",
     "pedestrians_weigh_double",
+    "rare",
     "slow_rain",
     "two_vehicles",
     "wet_trucks",
