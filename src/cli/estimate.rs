@@ -239,13 +239,10 @@ pub fn compare(output: &Output, arguments: &CompareArguments) -> Result<(), Fail
     Ok(())
 }
 
-/// The driving system of a side: a profile if it is a file, else a name.
+/// The driving system of a side.
 fn side_of(named: &str) -> Result<UnderTest, Failure> {
-    let path = Path::new(named);
-    if path.extension().is_some_and(|extension| extension == "yaml" || extension == "yml") {
-        return load::under_test(crate::run::DEFAULT_ADS, Some(path), None);
-    }
-    load::under_test(named, None, None)
+    let (name, profile) = load::profile_or_name(named);
+    load::under_test(name.unwrap_or(crate::run::DEFAULT_ADS), profile, None)
 }
 
 fn event(argument: EventArgument) -> EventKind {
@@ -321,13 +318,15 @@ fn estimate_text(results: &EstimateResults, is_unfinished: bool) -> String {
 }
 
 fn probability_text(found: &Probability) -> String {
-    let rate = found
-        .per_1000_km
-        .zip(found.per_1000_km_interval)
-        .map_or(String::new(), |(rate, interval)| format!(", {} in 1000 km", bracketed(rate, interval)));
+    let rate = |rate: Option<f64>, interval: Option<Interval>, of: &str| {
+        let both = rate.zip(interval);
+        both.map_or(String::new(), |(rate, interval)| format!(", {} in {of}", bracketed(rate, interval)))
+    };
     format!(
-        "{}{rate} ({} over {:.1} km, {:.2} h simulated)",
+        "{}{}{} ({} over {:.1} km, {:.2} h simulated)",
         bracketed(found.probability, found.interval),
+        rate(found.per_1000_km, found.per_1000_km_interval, "1000 km"),
+        rate(found.per_hour, found.per_hour_interval, "an hour"),
         plural(found.episodes as usize, "episode"),
         found.driven_km,
         found.simulated_h

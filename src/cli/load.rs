@@ -241,6 +241,14 @@ pub fn asked(ads: Option<&str>, config: Option<&Path>, command: Option<&str>) ->
     Ok(Asked { ads: ads.map(str::to_owned), profile, external: None })
 }
 
+/// What a text that is a profile or a name says, as the name and the file that [`under_test`] and [`asked`] take: a profile if
+/// it ends like YAML or has a folder, else a name.
+pub fn profile_or_name(text: &str) -> (Option<&str>, Option<&Path>) {
+    let path = Path::new(text);
+    let is_yaml = path.extension().is_some_and(|extension| extension == "yaml" || extension == "yml");
+    if is_yaml || text.contains(std::path::is_separator) { (None, Some(path)) } else { (Some(text), None) }
+}
+
 /// An external driving system, by a command or by the `ads` block of a profile; with both, the command goes before the
 /// one of the profile.
 pub fn external(config: Option<&Path>, command: Option<&str>) -> Result<Option<ExternalSettings>, Failure> {

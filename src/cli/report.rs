@@ -155,16 +155,12 @@ fn chosen(found: &Found, most: usize) -> (Vec<PathBuf>, usize) {
 /// The driving system to compare with, if one is asked for: a profile by its file, or a driver by its name.
 fn compared(arguments: &ReportArguments) -> Result<Option<Asked>, Failure> {
     let Some(wanted) = arguments.compare.as_deref() else { return Ok(None) };
-    let is_file = [".yaml", ".yml", "/"].iter().any(|part| wanted.contains(part));
-    let asked = match is_file {
-        true => load::asked(None, Some(Path::new(wanted)), None)?,
-        false => {
-            // Asked for here, so that a name that is none is said once and not for every file.
-            crate::run::driving_system(wanted)?;
-            load::asked(Some(wanted), None, None)?
-        }
-    };
-    Ok(Some(asked))
+    let (name, profile) = load::profile_or_name(wanted);
+    if let Some(name) = name {
+        // Asked for here, so that a name that is none is said once and not for every file.
+        crate::run::driving_system(name)?;
+    }
+    Ok(Some(load::asked(name, profile, None)?))
 }
 
 fn scene(output: &Output, file: &Path, compared: Option<&Asked>) -> Result<Scene, Failure> {

@@ -231,6 +231,8 @@ pub const SHAPES: &[Shape] = &[
             f("results.together.interval", "object", "`low` and `high`"),
             f("results.together.per_1000_km", "number?", "episodes with the event in 1,000 km"),
             f("results.together.per_1000_km_interval", "object?", "`low` and `high`"),
+            f("results.together.per_hour", "number?", "the same in an hour of driving"),
+            f("results.together.per_hour_interval", "object?", "`low` and `high`"),
             f("results.together.episodes", "number", "played from start to end"),
             f("results.together.driven_km", "number", "in these"),
             f("results.together.simulated_h", "number", "in all, branches, trials and the pilot included"),

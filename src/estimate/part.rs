@@ -35,8 +35,8 @@ pub struct PartRecord {
     pub events: u32,
     /// The sum of the squares of the weights with which each episode counts; and the largest that any could have had, as far
     /// as the part came. Splitting, which gives no weights, leaves them at 0.
-    pub squares: f64,
-    pub largest: f64,
+    pub weight_squares: f64,
+    pub weight_max: f64,
     /// Everything that was simulated, branches and the ticks that lead up to them included, s. The replays of
     /// verdicts are not in it, with any method.
     pub simulated_s: f64,
@@ -101,7 +101,7 @@ pub fn play_parts<E>(
 /// Crude Monte Carlo: every episode from its start. `None` if it was stopped.
 fn count(estimate: &Estimate, part: Part, stop: &AtomicBool) -> Option<Played> {
     let mut played = Played::new(part);
-    played.record.largest = 1.0;
+    played.record.weight_max = 1.0;
     for number in 0..estimate.settings().run.episodes {
         if stop.load(Ordering::Relaxed) {
             return None;
@@ -133,8 +133,8 @@ impl Played {
         let sample: f64 = events.iter().map(|(event, _)| event.weight).sum();
         // The mean of the samples so far.
         record.probability += (sample - record.probability) / f64::from(record.episodes);
-        record.squares += sample * sample;
-        record.largest = record.largest.max(sample);
+        record.weight_squares += sample * sample;
+        record.weight_max = record.weight_max.max(sample);
         record.events += events.len() as u32;
         for (event, log) in events {
             let summary = estimate.judged(record.part, event.episode, &log);
@@ -152,8 +152,8 @@ impl PartRecord {
             driven_m: 0.0,
             duration_s: 0.0,
             events: 0,
-            squares: 0.0,
-            largest: 0.0,
+            weight_squares: 0.0,
+            weight_max: 0.0,
             simulated_s: 0.0,
             levels: 0,
             failed: 0,

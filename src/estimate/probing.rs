@@ -22,7 +22,7 @@ use crate::run::{carry_out, choose, legal, offers, on_threads};
 
 use crate::estimate::part::{Event, Part, PartRecord, Played};
 use crate::estimate::plan::{Cell, Pilot, Plan, situation, weight};
-use crate::estimate::ready::{Estimate, Found};
+use crate::estimate::ready::{Estimate, EventPlace};
 
 /// Rounds of a pilot; the first tries all rows alike, each other one goes by what was found before it. Ours.
 const ROUNDS: u32 = 3;
@@ -122,7 +122,7 @@ fn sampled(
     let mut agent = estimate.run().agent();
     agent.begin();
     let mut steps = Vec::new();
-    let heaviest = &mut record.largest;
+    let heaviest = &mut record.weight_max;
     let mut choices = |moment: &Moment| {
         let (choice, step) =
             considered(agent.as_mut(), moment, part.road, plan, &mut rng, heaviest, seen.as_deref_mut());
@@ -142,7 +142,7 @@ fn sampled(
     }
     // What begins after the event has it behind itself already.
     let until = own.map_or(steps.len(), |own| own.hit_step + 1);
-    if let Some(Found { step, .. }) = own {
+    if let Some(EventPlace { step, .. }) = own {
         on(steps.get(step).and_then(|step| step.chosen), step, log);
     }
     for (at, step) in steps.into_iter().enumerate().take(until) {

@@ -12,7 +12,7 @@ use crate::run::{EpisodeSummary, Run};
 
 /// Where the event of an episode is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Found {
+pub(super) struct EventPlace {
     /// The step that it belongs to: the one whose action made appear what was hit, else the one in which it was hit.
     pub step: usize,
     /// The step in which it was hit.
@@ -74,14 +74,14 @@ impl Estimate {
     }
 
     /// Where the event of an episode is, if it is there.
-    pub(super) fn event(&self, setup: &Setup, log: &EpisodeLog) -> Option<Found> {
+    pub(super) fn event(&self, setup: &Setup, log: &EpisodeLog) -> Option<EventPlace> {
         let first = self.settings.event.first(setup, log, &self.settings.run)?;
         let hit = &log.collisions[first];
         let made_it = |step: &StepLog| match &step.outcome {
             Outcome::Done { spawned, .. } => spawned.contains(&hit.contact.obstacle),
             Outcome::Passed | Outcome::Refused { .. } => false,
         };
-        Some(Found { step: log.steps.iter().position(made_it).unwrap_or(hit.step), hit_step: hit.step })
+        Some(EventPlace { step: log.steps.iter().position(made_it).unwrap_or(hit.step), hit_step: hit.step })
     }
 
     /// An episode of a part, judged, under a number that no other episode of the estimate on its road has.

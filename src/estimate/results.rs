@@ -63,6 +63,9 @@ pub struct Probability {
     /// probability over the mean distance, which it takes as known.
     pub per_1000_km: Option<f64>,
     pub per_1000_km_interval: Option<Interval>,
+    /// Likewise in an hour of driving, that is in 600 steps of 6 s.
+    pub per_hour: Option<f64>,
+    pub per_hour_interval: Option<Interval>,
     /// Episodes from start to end, and how far they went together.
     pub episodes: u64,
     pub driven_km: f64,
@@ -186,9 +189,14 @@ impl Sample<'_> {
         let (simulated_s, duration_s) = all().fold((self.pilot_s, 0.0), |(all_s, whole_s), record| {
             (all_s + record.simulated_s, whole_s + record.duration_s)
         });
-        let per_km = episodes as f64 / driven_km;
-        let scaled = |value: f64| 1000.0 * value * per_km;
-        let is_driven = driven_km > 0.0;
+        // The rate in so many kilometres or hours, of which all episodes together had so many.
+        let rates = |in_all: f64, of: f64| {
+            let scaled = |value: f64| of * value * episodes as f64 / in_all;
+            let between = Interval { low: scaled(interval.low), high: interval.high.map(scaled) };
+            (in_all > 0.0).then(|| (scaled(probability), between)).unzip()
+        };
+        let (per_1000_km, per_1000_km_interval) = rates(driven_km, 1000.0);
+        let (per_hour, per_hour_interval) = rates(duration_s / 3600.0, 1.0);
         let parts_without = samples.iter().filter(|&&sample| sample == 0.0).count();
         let effective_events = self.effective_events();
         let is_telling = match self.method {
@@ -201,9 +209,10 @@ impl Sample<'_> {
         Probability {
             probability,
             interval,
-            per_1000_km: is_driven.then(|| scaled(probability)),
-            per_1000_km_interval: is_driven
-                .then(|| Interval { low: scaled(interval.low), high: interval.high.map(scaled) }),
+            per_1000_km,
+            per_1000_km_interval,
+            per_hour,
+            per_hour_interval,
             episodes,
             driven_km,
             simulated_h: simulated_s / 3600.0,
@@ -226,9 +235,9 @@ impl Sample<'_> {
         self.by_road.iter().fold((0.0, 0.0_f64), |(variance, heaviest), own| {
             let count: f64 = own.iter().map(|record| f64::from(record.episodes)).sum();
             let sum: f64 = own.iter().map(|record| record.probability * f64::from(record.episodes)).sum();
-            let squares: f64 = own.iter().map(|record| record.squares).sum();
+            let squares: f64 = own.iter().map(|record| record.weight_squares).sum();
             let of_road = (squares - sum * sum / count).max(0.0) / (count - 1.0).max(1.0) / count;
-            let largest = own.iter().map(|record| record.largest).fold(0.0, f64::max);
+            let largest = own.iter().map(|record| record.weight_max).fold(0.0, f64::max);
             (variance + of_road / (roads * roads), heaviest.max(largest / count / roads))
         })
     }
@@ -240,7 +249,7 @@ impl Sample<'_> {
         }
         let all = || self.by_road.iter().flatten();
         let sum: f64 = all().map(|record| record.probability * f64::from(record.episodes)).sum();
-        let squares: f64 = all().map(|record| record.squares).sum();
+        let squares: f64 = all().map(|record| record.weight_squares).sum();
         Some(if squares > 0.0 { sum * sum / squares } else { 0.0 })
     }
 }
@@ -269,8 +278,8 @@ mod tests {
             driven_m: 50_000.0,
             duration_s: 4000.0,
             events,
-            squares: f64::from(events),
-            largest: 1.0,
+            weight_squares: f64::from(events),
+            weight_max: 1.0,
             simulated_s: 4000.0,
             ..PartRecord::new(Part { road, number })
         }
@@ -291,6 +300,9 @@ mod tests {
         assert!((both.per_1000_km.unwrap() - 20.0).abs() < 1e-9);
         let first = found(Method::Count, &by_road[..1]);
         assert!((first.per_1000_km.unwrap() - 40.0).abs() < 1e-9);
+        // Forty seconds each.
+        assert!((both.per_hour.unwrap() - 0.9).abs() < 1e-9);
+        assert!((both.per_hour_interval.unwrap().low - 90.0 * both.interval.low).abs() < 1e-9);
         assert_eq!((first.episodes, first.parts, first.parts_without, first.gain), (200, 2, 0, None));
         let many: Vec<PartRecord> = (0..20).map(|number| record(0, number, 1 + 2 * (number % 2))).collect();
         let split = found(Method::Split, &[many.iter().collect()]);
