@@ -135,3 +135,33 @@ pub enum Command {
     /// Attach a driving system of your own: check it, print the schema of the messages, play with a toy.
     Ads(AdsArguments),
 }
+
+#[cfg(test)]
+mod tests {
+    use clap::CommandFactory;
+
+    use super::Arguments;
+
+    /// What may be said anew when a directory is gone on with: it changes no result.
+    const ANEW: [&str; 4] = ["resume", "jobs", "fail_on_collision", "help"];
+
+    #[test]
+    fn a_directory_that_is_gone_on_with_keeps_its_settings() {
+        let mut command = Arguments::command();
+        command.build();
+        let mut resumed = Vec::new();
+        for command in command.get_subcommands() {
+            let Some(resume) = command.get_arguments().find(|argument| argument.get_id() == "resume") else {
+                continue;
+            };
+            resumed.push(command.get_name());
+            let refused = command.get_arg_conflicts_with(resume);
+            for argument in command.get_arguments().filter(|argument| !argument.is_global_set()) {
+                let is_refused = refused.iter().any(|other| other.get_id() == argument.get_id());
+                let id = argument.get_id().as_str();
+                assert_eq!(is_refused, !ANEW.contains(&id), "`{} --resume` and `{id}`", command.get_name());
+            }
+        }
+        assert_eq!(resumed, ["run", "train", "study", "estimate"]);
+    }
+}
