@@ -1,6 +1,7 @@
 //! `avastra export`: emitted scenarios as files of other tools.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
@@ -9,7 +10,7 @@ use crate::export::{ExportError, Recording, record};
 
 use super::arguments::{ExportArguments, ExportEgo, ExportFormat, ExportVersion};
 use super::error::Failure;
-use super::files::write;
+use super::files::{write, write_new};
 use super::load;
 use super::output::{Output, plural};
 use super::parallel::each_file;
@@ -126,11 +127,12 @@ fn write_all(
 ) -> Result<Vec<PathBuf>, Failure> {
     match arguments.to {
         ExportFormat::Openscenario => {
-            let map = {
+            let name = map_name(&recording.map_path)?;
+            let map = target.with_file_name(name);
+            {
                 let _one_at_a_time = maps.lock().unwrap_or_else(PoisonError::into_inner);
-                copy_map(&recording.map_path, target)?
-            };
-            let name = map.file_name().and_then(|name| name.to_str()).unwrap_or_default();
+                copy_map(&recording.map_path, &map)?;
+            }
             let version = match arguments.osc_version {
                 None | Some(ExportVersion::V1_2) => export::Version::V1_2,
                 Some(ExportVersion::V1_3) => export::Version::V1_3,
@@ -155,20 +157,27 @@ fn write_all(
     }
 }
 
-/// Copies the map beside a file. Several files share it; another map with its name is not overwritten.
-fn copy_map(map: &Path, beside: &Path) -> Result<PathBuf, Failure> {
-    let name = map.file_name().ok_or_else(|| Failure::file("read", map, "it has no name"))?;
-    let target = beside.with_file_name(name);
+/// What a file calls the map that lies beside it.
+fn map_name(map: &Path) -> Result<&str, Failure> {
+    map.file_name().and_then(|name| name.to_str()).ok_or_else(|| {
+        Failure::usage(format!(
+            "no OpenSCENARIO file can name the map `{}`: give it a name in UTF-8",
+            map.display()
+        ))
+    })
+}
+
+/// Copies a map. Several scenarios share it; nothing else that has its name is overwritten.
+fn copy_map(map: &Path, target: &Path) -> Result<(), Failure> {
     let text = load::text(map)?;
-    match load::text(&target) {
-        Ok(there) if there == text => {}
-        Ok(_) => {
-            return Err(Failure::usage(format!(
-                "another map is already at `{}`: name another folder with `--out`",
-                target.display()
-            )));
-        }
-        Err(_) => write(&target, &text)?,
+    let is_free = std::fs::symlink_metadata(target).is_err_and(|error| error.kind() == ErrorKind::NotFound);
+    if is_free {
+        return write_new(target, &text);
     }
-    Ok(target)
+    let other = match load::read(target) {
+        Ok(there) if there == text => return Ok(()),
+        Ok(_) => format!("another map is already at `{}`", target.display()),
+        Err(reason) => format!("`{}` is in the place of the map: {reason}", target.display()),
+    };
+    Err(Failure::usage(format!("{other}: name another folder with `--out`")))
 }
