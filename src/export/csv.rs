@@ -10,18 +10,14 @@ use super::xml::number;
 
 /// Columns: `time_s`; `id` (0 is the ego vehicle, others as claims number them); `body`; `x_m`, `y_m` of the middle of the
 /// outline, in the plane of the map; `heading_rad`; `vx_mps`, `vy_mps` in the same plane; `length_m`, `width_m`,
-/// `height_m`; `contact`: 1 in the tick in which it and the ego vehicle began to touch. By rising time, then in order of
+/// `height_m`; `contact`: 1 at the end of the tick in which it and the ego vehicle began to touch. By rising time, then in order of
 /// appearance.
 pub fn csv(recording: &Recording) -> String {
     let mut text =
         "time_s,id,body,x_m,y_m,heading_rad,vx_mps,vy_mps,length_m,width_m,height_m,contact\n".to_owned();
     for tick in 0..=recording.end_tick {
-        // A contact lies within the tick that ends at the next sample.
-        let touched = |id: u32| {
-            recording.contacts.iter().any(|contact| {
-                (contact.obstacle == id || id == 0) && (contact.time_s / DT_S).ceil() as u64 == tick
-            })
-        };
+        let touched =
+            |id: u32| recording.touches.iter().any(|touch| touch.tick == tick && (touch.id == id || id == 0));
         for actor in recording.actors() {
             let Some(sample) =
                 tick.checked_sub(actor.first_tick()).and_then(|index| actor.samples.get(index as usize))

@@ -39,7 +39,7 @@ pub struct Recording {
     /// The lights that hold a lane.
     pub lights: Vec<Lights>,
     /// Contacts of the ego vehicle with others.
-    pub contacts: Vec<Contact>,
+    pub touches: Vec<Touch>,
     /// Where the scenario comes from and what it claims: name and value.
     pub facts: Vec<(String, String)>,
 }
@@ -63,6 +63,14 @@ pub struct Sample {
     /// Middle of the outline.
     pub pose: Pose,
     pub velocity_mps: Vec2,
+}
+
+/// The ego vehicle and another begin to touch.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Touch {
+    /// At the end of the tick in which they do.
+    pub tick: u64,
+    pub id: u32,
 }
 
 /// Time of day and weather, from a time on.
@@ -170,7 +178,7 @@ pub fn record(table: &ActionTable, scenario: &Scenario, ads: &Selected) -> Resul
         others: recorder.others,
         skies: recorder.skies,
         lights: recorder.lights,
-        contacts: recorder.contacts,
+        touches: recorder.touches,
         facts: facts(scenario, &road.name),
     })
 }
@@ -229,7 +237,7 @@ struct Recorder {
     places: BTreeMap<u32, usize>,
     skies: Vec<Sky>,
     lights: Vec<Lights>,
-    contacts: Vec<Contact>,
+    touches: Vec<Touch>,
 }
 
 impl Recorder {
@@ -251,7 +259,7 @@ impl Recorder {
         }
         self.note_sky(world);
         self.note_lights(world);
-        self.contacts.extend(contacts);
+        self.touches.extend(contacts.iter().map(|contact| Touch { tick, id: contact.obstacle }));
     }
 
     fn note_sky(&mut self, world: &World) {
@@ -288,7 +296,7 @@ impl Recorder {
 }
 
 /// The ego vehicle, seen nowhere yet.
-fn ego_actor() -> Actor {
+pub(super) fn ego_actor() -> Actor {
     let mkz = VehicleParameters::MKZ;
     let shape = BodyParameters {
         length_m: mkz.length_m,
