@@ -13,8 +13,8 @@
 use crate::geometry::Vec2;
 use crate::model::vocabulary::Body;
 use crate::road::{Lane, LaneIndex, Neighbour, RoadMap, Turn};
-use crate::sim::SignalColour;
 
+use super::DATE;
 use super::recording::{Actor, Lights, Recording, Sample};
 use super::xml::{Element, number};
 
@@ -45,7 +45,7 @@ pub fn commonroad(recording: &Recording, with_ego: bool) -> String {
     Element::new("commonRoad")
         .with("commonRoadVersion", "2020a")
         .with("benchmarkID", benchmark(&recording.name))
-        .with("date", "2026-01-01")
+        .with("date", DATE)
         .with("author", "avastra")
         .with("affiliation", "avastra")
         .with("source", "avastra")
@@ -156,14 +156,9 @@ fn light(recording: &Recording, number: usize, lights: &Lights) -> Element {
     let elements = lights.changes.iter().zip(ends).filter_map(|((from, colour), to)| {
         // Whole steps whose sum does not drift from the recorded time.
         let steps = to.div_ceil(STEP_TICKS) - from.div_ceil(STEP_TICKS);
-        let colour = match colour {
-            SignalColour::Red => "red",
-            SignalColour::Yellow => "yellow",
-            SignalColour::Green => "green",
-        };
         let element = Element::new("cycleElement")
             .holding(Element::text("duration", steps))
-            .holding(Element::text("color", colour));
+            .holding(Element::text("color", colour.name()));
         (steps > 0).then_some(element)
     });
     let cycle = Element::new("cycle").holding_all(elements);

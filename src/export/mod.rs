@@ -13,4 +13,7 @@ mod xml;
 pub use commonroad::commonroad;
 pub use csv::csv;
 pub use openscenario::{Ego, Version, openscenario};
-pub use recording::{Actor, ExportError, Lights, Recording, Sample, Sky, record};
+pub use recording::{Actor, ExportError, Lights, Recording, Sample, Sky, Touch, record};
+
+/// Everything has the same date: a file depends on its scenario alone.
+const DATE: &str = "2026-01-01";

@@ -20,7 +20,7 @@ use crate::oracle;
 use crate::oracle::ReferenceDrive;
 use crate::run;
 use crate::run::{Gauges, RunError, Shape, Stage, refusal_in_words};
-use crate::sim::{Contact, DT_S, FRAME_TICKS, Obstacle, SignalColour, VehicleParameters, World};
+use crate::sim::{Contact, DT_S, FRAME_TICKS, Obstacle, VehicleParameters, World};
 
 use super::columns::Columns;
 use super::ground::ground;
@@ -318,11 +318,7 @@ impl Recorder {
         let drawn: BTreeSet<usize> =
             map.lanes.iter().flat_map(|lane| lane.stop_lines.iter().map(|line| line.signal)).collect();
         for signal in drawn {
-            let colour = match world.signal(signal) {
-                SignalColour::Red => "red",
-                SignalColour::Yellow => "yellow",
-                SignalColour::Green => "green",
-            };
+            let colour = world.signal(signal).name();
             let changes = self.signals.entry(signal).or_default();
             if changes.last().is_none_or(|(_, before)| *before != colour) {
                 changes.push((world.ticks(), colour));

@@ -104,6 +104,17 @@ pub enum SignalColour {
     Green,
 }
 
+impl SignalColour {
+    /// As other tools call it, too.
+    pub fn name(self) -> &'static str {
+        match self {
+            SignalColour::Red => "red",
+            SignalColour::Yellow => "yellow",
+            SignalColour::Green => "green",
+        }
+    }
+}
+
 /// Part of an obstacle's outline that can be seen from a point, in `[0, 1]`.
 ///
 /// Lines of sight run to points spread evenly over its width as seen from `eye`. A line that meets a

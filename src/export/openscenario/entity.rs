@@ -1,6 +1,7 @@
 //! Road users as OpenSCENARIO describes them.
 
 use crate::model::vocabulary::Body;
+use crate::sim::VehicleParameters;
 
 use super::super::recording::Actor;
 use super::super::xml::Element;
@@ -10,8 +11,6 @@ use super::Ego;
 /// a picture alone.
 const WHEEL_M: f64 = 0.65;
 const TRACK_PART: f64 = 0.85;
-/// The largest angle of front wheels, rad: the ego vehicle's.
-const STEER_RAD_MAX: f64 = 0.5127;
 /// Fast enough for every recording, m/s.
 const SPEED_MPS_MAX: f64 = 60.0;
 
@@ -25,7 +24,7 @@ pub fn ahead_of_centre_m(actor: &Actor) -> f64 {
 pub fn entity(actor: &Actor, ego: Ego) -> Element {
     let name = actor.name();
     let entity = Element::new("ScenarioObject").with("name", &name);
-    if !actor.is_vehicle() {
+    let Some(category) = vehicle_category(actor.body) else {
         let pedestrian = Element::new("Pedestrian")
             .with("name", &name)
             .with("pedestrianCategory", "pedestrian")
@@ -33,7 +32,7 @@ pub fn entity(actor: &Actor, ego: Ego) -> Element {
             .holding(bounding_box(actor))
             .holding(properties());
         return entity.holding(pedestrian);
-    }
+    };
     let performance = Element::new("Performance")
         .measured("maxSpeed", SPEED_MPS_MAX)
         .measured("maxAcceleration", actor.shape.acceleration_mps2_max)
@@ -47,11 +46,12 @@ pub fn entity(actor: &Actor, ego: Ego) -> Element {
             .measured("positionZ", WHEEL_M / 2.0)
     };
     let axles = Element::new("Axles")
-        .holding(axle("FrontAxle", STEER_RAD_MAX, actor.shape.wheelbase_m))
+        // Of others no largest angle is known; the ego vehicle's serves for all.
+        .holding(axle("FrontAxle", VehicleParameters::MKZ.steer_rad_max, actor.shape.wheelbase_m))
         .holding(axle("RearAxle", 0.0, 0.0));
     let vehicle = Element::new("Vehicle")
         .with("name", &name)
-        .with("vehicleCategory", category(actor.body))
+        .with("vehicleCategory", category)
         .measured("mass", actor.shape.mass_t * 1000.0)
         .holding(bounding_box(actor))
         .holding(performance)
@@ -83,12 +83,14 @@ fn bounding_box(actor: &Actor) -> Element {
     Element::new("BoundingBox").holding(centre).holding(dimensions)
 }
 
-fn category(body: Body) -> &'static str {
+/// `None` for a pedestrian.
+fn vehicle_category(body: Body) -> Option<&'static str> {
     match body {
-        Body::Jeep | Body::Sedan | Body::SUV | Body::Hatchback | Body::Pedestrian => "car",
-        Body::BoxTruck => "truck",
-        Body::SchoolBus => "bus",
-        Body::Motorcycle => "motorbike",
-        Body::Bicycle => "bicycle",
+        Body::Jeep | Body::Sedan | Body::SUV | Body::Hatchback => Some("car"),
+        Body::BoxTruck => Some("truck"),
+        Body::SchoolBus => Some("bus"),
+        Body::Motorcycle => Some("motorbike"),
+        Body::Bicycle => Some("bicycle"),
+        Body::Pedestrian => None,
     }
 }

@@ -15,9 +15,9 @@ use std::collections::{BTreeMap, BTreeSet};
 use crate::model::vocabulary::{Level, TimeOfDay};
 use crate::sim::{DT_S, SignalColour};
 
+use super::super::DATE;
 use super::super::recording::{Lights, Recording, Sky};
 use super::super::xml::Element;
-use super::DATE;
 
 /// A sky as a `GlobalAction`.
 pub fn environment(sky: &Sky, number: usize) -> Element {
@@ -26,8 +26,7 @@ pub fn environment(sky: &Sky, number: usize) -> Element {
         TimeOfDay::Noon => ("T12:00:00", 60.0, PI, 100_000.0),
         TimeOfDay::Night => ("T23:00:00", -30.0, 0.0, 0.1),
     };
-    let date = DATE.split('T').next().unwrap_or(DATE);
-    let time = Element::new("TimeOfDay").with("animation", false).with("dateTime", format!("{date}{clock}"));
+    let time = Element::new("TimeOfDay").with("animation", false).with("dateTime", format!("{DATE}{clock}"));
     let sun = Element::new("Sun")
         .measured("illuminance", illuminance_lx)
         .measured("azimuth", azimuth_rad)

@@ -14,15 +14,13 @@ mod environment;
 use crate::geometry::Pose;
 use crate::sim::DT_S;
 
+use super::DATE;
 use super::recording::{Actor, Recording};
 use super::vertices::{Vertex, vertices};
 use super::xml::{Element, number};
 
 use entity::{ahead_of_centre_m, entity};
 use environment::{environment, signals};
-
-/// Everything has the same date: a file depends on its scenario alone.
-const DATE: &str = "2026-01-01T00:00:00";
 
 /// The standard's version.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -70,7 +68,7 @@ fn header(recording: &Recording, minor: u8) -> Element {
     Element::new("FileHeader")
         .with("revMajor", 1)
         .with("revMinor", minor)
-        .with("date", DATE)
+        .with("date", format!("{DATE}T00:00:00"))
         .with("description", description)
         .with("author", "avastra")
         .holding(Element::new("Properties").holding_all(recording.facts.iter().map(property)))
