@@ -2,7 +2,10 @@
 //! tools understand it is the question of `tests/interop/export.sh`.
 
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
+
+use avastra::geometry::{Pose, Vec2, wrap_angle};
+use roxmltree::{Document, Node};
 
 use crate::cases::{expect_snapshot, root};
 use crate::command::{avastra, outcome};
@@ -102,6 +105,148 @@ fn a_recording_is_complete_and_at_its_times() {
     assert!(of_ego(&["--osc-version", "1.3"]).contains("revMinor=\"3\""));
 }
 
+/// What the exporter promises of a player's polyline, and half a millionth that a number loses when it is written, twice.
+const STRAY_M: f64 = 0.01 + 2e-6;
+const STRAY_RAD: f64 = 0.002 + 2e-6;
+/// What numbers lose alone.
+const ROUNDED: f64 = 2e-6;
+
+#[test]
+fn every_format_has_everyone_where_the_table_has_them() {
+    for file in [root().join(SCENARIO), crash()] {
+        let scratch = tempfile::tempdir().expect("a scratch directory");
+        let name = file.display().to_string();
+        for (format, more) in
+            [("openscenario", &[][..]), ("commonroad", &["--ego", "trajectory"]), ("csv", &[])]
+        {
+            let (status, _, stderr) = export(format, &name, scratch.path(), more);
+            assert_eq!(status, 0, "{format}: {stderr}");
+        }
+        let written = texts(scratch.path());
+        let stem = file.file_stem().expect("it has a name").to_string_lossy();
+        let users = table(&written[&format!("{stem}.csv")]);
+        assert!(users.len() > 1, "the ego vehicle is not alone");
+        let played = Document::parse(&written[&format!("{stem}.xosc")]).expect("it is well-formed");
+        let planned = Document::parse(&written[&format!("{stem}.xml")]).expect("it is well-formed");
+        for (id, poses) in &users {
+            let user = if *id == 0 { "ego".to_owned() } else { format!("npc_{id}") };
+            follows(&played, &user, poses);
+            steps(&planned, *id, poses);
+        }
+    }
+}
+
+/// The shipped crash.
+fn crash() -> PathBuf {
+    let entries = std::fs::read_dir(root().join("scenarios/found")).expect("it is shipped").flatten();
+    let mut files: Vec<PathBuf> = entries.map(|entry| entry.path()).collect();
+    files.retain(|file| file.extension().is_some_and(|extension| extension == "ava"));
+    files.sort();
+    files.swap_remove(0)
+}
+
+/// The rows of a table: poses of each road user by tick.
+fn table(text: &str) -> BTreeMap<u32, BTreeMap<u64, Pose>> {
+    let mut users: BTreeMap<u32, BTreeMap<u64, Pose>> = BTreeMap::new();
+    for row in text.lines().skip(1) {
+        let row: Vec<&str> = row.split(',').collect();
+        let number = |column: usize| row[column].parse::<f64>().expect("it is a number");
+        let pose = Pose::new(number(3), number(4), number(5));
+        let user = users.entry(row[1].parse().expect("it is a number")).or_default();
+        user.insert((number(0) * 50.0).round() as u64, pose);
+    }
+    users
+}
+
+/// The nodes of a name under a node.
+fn all<'a>(under: Node<'a, 'a>, name: &'a str) -> impl Iterator<Item = Node<'a, 'a>> {
+    under.descendants().filter(move |node| node.has_tag_name(name))
+}
+
+fn attribute(node: Node<'_, '_>, name: &str) -> f64 {
+    node.attribute(name).and_then(|text| text.parse().ok()).expect("a number")
+}
+
+/// A road user of an OpenSCENARIO file is, between the vertices of its polyline, where the table has it at every tick.
+fn follows(document: &Document<'_>, user: &str, poses: &BTreeMap<u64, Pose>) {
+    let object = all(document.root(), "ScenarioObject").find(|node| node.attribute("name") == Some(user));
+    let centre = all(object.expect("everyone is there"), "Center").next().expect("it has an outline");
+    let ahead_m = -attribute(centre, "x");
+    let way_name = format!("{user}_way");
+    let way = all(document.root(), "Trajectory").find(|node| node.attribute("name") == Some(&way_name));
+    let vertices: Vec<(f64, Pose)> = all(way.expect("everyone has a way"), "Vertex")
+        .map(|vertex| {
+            let place = all(vertex, "WorldPosition").next().expect("a vertex is somewhere");
+            let pose = Pose::new(attribute(place, "x"), attribute(place, "y"), attribute(place, "h"));
+            (attribute(vertex, "time"), pose)
+        })
+        .collect();
+    assert!(vertices.len() < poses.len(), "{user}: its way is thinned");
+    for (tick, pose) in poses {
+        let time_s = *tick as f64 / 50.0;
+        let next = vertices.partition_point(|(at_s, _)| *at_s < time_s - ROUNDED).max(1);
+        let [(from_s, from), (to_s, to)] = [vertices[next - 1], vertices[next]];
+        let part = (time_s - from_s) / (to_s - from_s);
+        let place = from.position * (1.0 - part) + to.position * part;
+        let wanted = pose.offset(ahead_m, 0.0);
+        let stray_m = (place - wanted.position).norm();
+        assert!(stray_m <= STRAY_M, "{user} at {time_s} s: {stray_m} m");
+        let heading_rad = from.heading_rad + part * wrap_angle(to.heading_rad - from.heading_rad);
+        let stray_rad = wrap_angle(heading_rad - pose.heading_rad).abs();
+        assert!(stray_rad <= STRAY_RAD, "{user} at {time_s} s: {stray_rad} rad");
+    }
+}
+
+/// A road user of a CommonRoad file is at every step where the table has it, and has all steps.
+fn steps(document: &Document<'_>, id: u32, poses: &BTreeMap<u64, Pose>) {
+    let number = |node: Node<'_, '_>, path: &[&str]| -> f64 {
+        let found = path.iter().fold(node, |node, name| {
+            node.children().find(|child| child.has_tag_name(*name)).expect("the format has it")
+        });
+        found.text().and_then(|text| text.parse().ok()).expect("a number")
+    };
+    let obstacle = all(document.root(), "dynamicObstacle")
+        .find(|node| attribute(*node, "id") as u32 % 10_000 == id)
+        .expect("everyone is there");
+    let states: Vec<Node<'_, '_>> = all(obstacle, "initialState").chain(all(obstacle, "state")).collect();
+    let steps: Vec<u64> = states.iter().map(|state| number(*state, &["time", "exact"]) as u64).collect();
+    let wanted: Vec<u64> = poses.keys().filter(|tick| *tick % 5 == 0).map(|tick| tick / 5).collect();
+    assert_eq!(steps, wanted, "npc_{id}");
+    for (state, step) in states.into_iter().zip(steps) {
+        let pose = &poses[&(step * 5)];
+        let place =
+            Vec2::new(number(state, &["position", "point", "x"]), number(state, &["position", "point", "y"]));
+        assert!((place - pose.position).norm() <= ROUNDED, "npc_{id} at step {step}");
+        let turned_rad = wrap_angle(number(state, &["orientation", "exact"]) - pose.heading_rad).abs();
+        assert!(turned_rad <= ROUNDED, "npc_{id} at step {step}");
+    }
+}
+
+#[test]
+fn a_contact_is_in_the_row_at_the_end_of_its_tick() {
+    let file = crash();
+    let claimed = std::fs::read_to_string(&file).expect("it is shipped");
+    let claim = claimed.split("expect collision with npc#").nth(1).expect("it claims a collision");
+    let mut words = claim.split_whitespace();
+    let id = words.next().expect("a number");
+    let claimed_s: f64 = words.nth(1).expect("a time").parse().expect("a time");
+    let scratch = tempfile::tempdir().expect("a scratch directory");
+    let (status, _, stderr) = export("csv", &file.display().to_string(), scratch.path(), &[]);
+    assert_eq!(status, 0, "{stderr}");
+    let table = texts(scratch.path()).into_values().next().expect("it was written");
+    let rows: Vec<Vec<&str>> = table.lines().skip(1).map(|line| line.split(',').collect()).collect();
+    for user in ["0", id] {
+        let touches: Vec<f64> = rows
+            .iter()
+            .filter(|row| row[1] == user && row[11] == "1")
+            .map(|row| row[0].parse().expect("a time"))
+            .collect();
+        // Claims round to a hundredth of a second; a tick takes two.
+        let late_s = touches[0] - claimed_s;
+        assert!((-0.005..=0.025).contains(&late_s), "{user}: {touches:?}, claimed {claimed_s} s");
+    }
+}
+
 #[test]
 fn what_is_no_scenario_or_does_not_replay_is_refused() {
     let scratch = tempfile::tempdir().expect("a scratch directory");
@@ -139,6 +284,15 @@ fn nothing_of_others_is_overwritten() {
     let (status, _, stderr) = export("openscenario", SCENARIO, scratch.path(), &[]);
     assert_eq!((status, stderr.contains("another map is already at")), (1, true), "{stderr}");
     assert!(!scratch.path().join("wet_corner.xosc").exists());
+    // What cannot be read as a map is somebody's all the same.
+    let bytes = [0x50, 0x4b, 0xff, 0xfe];
+    let taken = scratch.path().join("taken");
+    std::fs::create_dir(&taken).expect("it is new");
+    std::fs::write(taken.join("corner.xodr"), bytes).expect("it is writable");
+    let (status, _, stderr) = export("openscenario", SCENARIO, &taken, &[]);
+    assert_eq!((status, stderr.contains("is in the place of the map: not text")), (1, true), "{stderr}");
+    assert_eq!(std::fs::read(taken.join("corner.xodr")).expect("it is there"), bytes);
+    assert!(!taken.join("wet_corner.xosc").exists());
     // A folder that is a file.
     let (status, _, stderr) = export("csv", SCENARIO, &scratch.path().join("corner.xodr"), &[]);
     assert_eq!((status, stderr.contains("cannot")), (1, true), "{stderr}");
