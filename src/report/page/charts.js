@@ -41,18 +41,27 @@ function framed(title, [x0, x1], [y0, y1], axis, inside) {
   );
 }
 
-/** A curve of single values (dots) and their mean over a window (line). */
-export function curve(title, values, axis, window) {
-  if (values.length === 0) return null;
-  const extent = [Math.min(0, ...values), Math.max(...values, 0)];
-  const mean = values.map((_, i) => {
-    const from = Math.max(0, i - window + 1);
-    const part = values.slice(from, i + 1);
-    return part.reduce((sum, value) => sum + value, 0) / part.length;
+/** Points that a curve draws at most: more cannot be told apart. */
+const POINTS_MAX = 1000;
+
+/** A curve through points `[x, y]`: dots, and a line for their mean over a window. */
+export function curve(title, points, axis, window) {
+  if (points.length === 0) return null;
+  let [low, high, sum] = [0, 0, 0];
+  const means = points.map(([at, value], i) => {
+    low = Math.min(low, value);
+    high = Math.max(high, value);
+    sum += value - (i >= window ? points[i - window][1] : 0);
+    return [at, sum / Math.min(i + 1, window)];
   });
-  return framed(window > 1 ? `${title}; line: mean of the last ${window}` : title, [0, Math.max(1, values.length - 1)], extent, axis, (x, y) => [
-    values.map((value, i) => svg("circle", { cx: x(i).toFixed(1), cy: y(value).toFixed(1), r: 1.8, class: "dot" })),
-    svg("polyline", { points: mean.map((value, i) => `${x(i).toFixed(1)},${y(value).toFixed(1)}`).join(" "), class: "curve" }),
+  const every = Math.ceil(points.length / POINTS_MAX);
+  const thinned = (all) => all.filter((_, i) => i % every === 0 || i === all.length - 1);
+  const line = window > 1 ? `; line: mean of the last ${window}` : "";
+  const heading = `${title}${line}${every > 1 ? `; one of ${every} is drawn` : ""}`;
+  const [first, last] = [points[0][0], points[points.length - 1][0]];
+  return framed(heading, [first, Math.max(first + 1, last)], [low, high], axis, (x, y) => [
+    thinned(points).map(([at, value]) => svg("circle", { cx: x(at).toFixed(1), cy: y(value).toFixed(1), r: 1.8, class: "dot" })),
+    svg("polyline", { points: thinned(means).map(([at, value]) => `${x(at).toFixed(1)},${y(value).toFixed(1)}`).join(" "), class: "curve" }),
   ]);
 }
 

@@ -19,12 +19,18 @@ export function showOverview(place, data) {
     overview?.kind === "training" && learning(overview.learning),
     overview?.kind === "study" && study(overview.study),
     scenarios.length > 0 && el("section", { "aria-labelledby": "h-list" }, el("h2", { id: "h-list" }, "Scenarios"), list),
-    scenarios.length === 0 && overview?.kind !== "study" && el("p", {}, "No scenario was written: nothing that counts happened."),
+    scenarios.length === 0 && overview?.kind !== "study" && el("p", {}, nothingShown(overview)),
     overview && coverage(overview),
     overview && refusals(overview),
     overview && el("details", { class: "settings" }, el("summary", {}, "Settings, to do it again"), el("pre", { tabindex: "0" }, overview.settings)),
   );
   if (scenarios.length > 0) showList(list, data);
+}
+
+/** Why there is no scenario. */
+function nothingShown(overview) {
+  const isCalm = overview?.totals?.counted === 0 && overview.totals.failed === 0;
+  return isCalm ? "No scenario was written: nothing that counts happened." : "None of the scenarios can be shown here.";
 }
 
 /** `Run 0001`, or what there is without one. */
@@ -56,6 +62,8 @@ function totals(sums) {
 
 function learning(points) {
   if (points.length === 0) return null;
+  // Before the first update there is no loss.
+  const of = (name) => points.filter((point) => point[name] !== null).map((point) => [point.episode, point[name]]);
   const window = Math.max(5, Math.round(points.length / 20));
   return el(
     "section",
@@ -64,10 +72,10 @@ function learning(points) {
     el(
       "div",
       { class: "grid" },
-      curve("Return of an episode", points.map((point) => point.reward), "episode", window),
-      curve("Counted collisions of an episode", points.map((point) => point.counted), "episode", window),
-      curve("Loss", points.map((point) => point.loss).filter((loss) => loss !== null), "update", window),
-      points.some((point) => point.exploration > 0) && curve("Exploration", points.map((point) => point.exploration), "episode", 1),
+      curve("Return of an episode", of("reward"), "episode", window),
+      curve("Counted collisions of an episode", of("counted"), "episode", window),
+      curve("Loss", of("loss"), "episode", window),
+      points.some((point) => point.exploration > 0) && curve("Exploration", of("exploration"), "episode", 1),
     ),
   );
 }
