@@ -7,27 +7,35 @@ export function coverage(overview) {
   if (cells.length === 0) return null;
   const roads = [...new Set(cells.map((cell) => cell.road))];
   const known = new Map(cells.map((cell) => [`${cell.row} ${cell.road}`, cell]));
+  // A training does not keep what it could have chosen.
+  const isOffered = cells.some((cell) => cell.legal + cell.refused > 0);
   const count = Math.max(overview.rows?.length ?? 0, ...cells.map((cell) => cell.row + 1));
   const rows = Array.from({ length: count }, (_, row) =>
-    el("tr", {}, el("th", { scope: "row" }, `${row} · ${overview.rows?.[row] ?? ""}`), roads.map((road) => box(known.get(`${row} ${road}`)))),
+    el("tr", {}, el("th", { scope: "row" }, `${row} · ${overview.rows?.[row] ?? ""}`), roads.map((road) => (isOffered ? box : onlyCounts)(known.get(`${row} ${road}`)))),
   );
   return el(
     "section",
     { "aria-labelledby": "h-coverage" },
     el("h2", { id: "h-coverage" }, "Rows on roads"),
-    el("p", { class: "legend" }, "● carried out so often · ◐ legal, and never chosen · ○ never legal, with what refused it most often · – not offered"),
+    el("p", { class: "legend" }, isOffered ? "● carried out so often · ◐ legal, and never chosen · ○ never legal, with what refused it most often · – not offered" : "● carried out so often · – never chosen"),
     el(
       "div",
       { class: "scroll", tabindex: "0", role: "region", "aria-label": "Table of rows on roads" },
       el(
         "table",
         { class: "coverage" },
-        el("caption", {}, "Steps in which each row of the action table was carried out, of those in which it was legal."),
+        el("caption", {}, `Steps in which each row of the action table was carried out${isOffered ? ", of those in which it was legal" : ""}.`),
         el("thead", {}, el("tr", {}, el("th", { scope: "col" }, "Row"), roads.map((road) => el("th", { scope: "col" }, road)))),
         el("tbody", {}, rows),
       ),
     ),
   );
+}
+
+/** A cell of a training. */
+function onlyCounts(cell) {
+  if (!cell) return el("td", {}, "–");
+  return el("td", { class: "some" }, cell.realised > 0 ? `● ${cell.realised}` : `chosen ${cell.chosen}, never carried out`);
 }
 
 function box(cell) {
