@@ -18,6 +18,19 @@ use super::load::answers_path;
 /// Longest name of a file that common file systems take, in bytes.
 const NAME_BYTES_MAX: usize = 255;
 
+/// Refuses a file by its name before work begins, so that nobody's scenario or database is written over by mistake. A pipe
+/// or a device may have any name.
+pub fn must_end_in(path: &Path, extension: &str) -> Result<(), Failure> {
+    let is_device = path.exists() && !path.is_file();
+    if is_device || path.extension().is_some_and(|found| found == extension) {
+        return Ok(());
+    }
+    Err(Failure::usage(format!(
+        "`{}` must end in `.{extension}`: choose such a name for what is written",
+        path.display()
+    )))
+}
+
 /// Writes a file completely or not at all: after a kill or a loss of power the old one or the new one is there. A
 /// symbolic link is followed; what is no regular file (a pipe, a terminal, the null device) is written to and not
 /// replaced.

@@ -12,7 +12,7 @@ use crate::sim::{Contact, DT_S, World};
 
 use super::arguments::RenderArguments;
 use super::error::Failure;
-use super::files::write;
+use super::files::{must_end_in, write};
 use super::load;
 use super::output::Output;
 
@@ -25,6 +25,12 @@ const ACTION_STRIDE_S: f64 = 2.0;
 
 /// Draws the file's scenario.
 pub fn render(output: &Output, arguments: &RenderArguments) -> Result<(), Failure> {
+    let stem = arguments.file.file_stem().unwrap_or_default().to_string_lossy();
+    let path = arguments.output.clone().unwrap_or_else(|| PathBuf::from(format!("{stem}.svg")));
+    let on_stdout = path == Path::new("-");
+    if !on_stdout {
+        must_end_in(&path, "svg")?;
+    }
     let (table, scenario) = load::scenario(output, &arguments.file)?;
     let scenario = &scenario;
     let times_s = times(arguments, scenario, table.space().episode.step_s)?;
@@ -41,11 +47,6 @@ pub fn render(output: &Output, arguments: &RenderArguments) -> Result<(), Failur
         )));
     }
     let svg = picture(&moments, &subject);
-    let path = arguments.output.clone().unwrap_or_else(|| {
-        let stem = arguments.file.file_stem().unwrap_or_default().to_string_lossy();
-        PathBuf::from(format!("{stem}.svg"))
-    });
-    let on_stdout = path == Path::new("-");
     if on_stdout {
         output.say(svg.trim_end());
     } else {
@@ -120,7 +121,7 @@ fn moments(
     Ok((moments, Subject { title, hit, names }))
 }
 
-/// Who brakes: whose speed fell by more than 1 m/s² over the last 0.3 s. Other vehicles have no lights of their own.
+/// Tells which obstacles brake: those whose speed fell by more than 1 m/s² over the last 0.3 s. Other vehicles have no lights of their own.
 #[derive(Default)]
 struct BrakeLights {
     /// Speeds of the last ticks, m/s.

@@ -1,5 +1,6 @@
 //! `avastra report`: one page of HTML for a run, a training, a study or single scenarios.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use serde_json::Value;
@@ -12,19 +13,22 @@ use crate::run::{Asked, Database};
 
 use super::arguments::{FilesArguments, ReportArguments};
 use super::error::Failure;
-use super::files::write;
+use super::files::{must_end_in, write};
 use super::load;
 use super::output::{Output, plural};
 use super::parallel::{PerFile, each_file};
+use super::shrink;
 
 /// Name of the page in a directory.
 const NAME: &str = "report.html";
 
 /// The folders of a run directory that hold scenarios.
-const FOLDERS: [&str; 3] = ["critical", "failures", "shrunk"];
+const FOLDERS: [&str; 3] = ["critical", "failures", shrink::FOLDER];
 
 /// Writes the page of a directory or of files.
 pub fn report(output: &Output, arguments: &ReportArguments) -> Result<(), Failure> {
+    let path = arguments.output.clone().unwrap_or_else(|| default_path(&arguments.paths));
+    must_end_in(&path, "html")?;
     let asked = compared(arguments)?;
     let found = match arguments.paths.as_slice() {
         [directory] if directory.is_dir() => of_directory(output, directory)?,
@@ -33,15 +37,20 @@ pub fn report(output: &Output, arguments: &ReportArguments) -> Result<(), Failur
     let (files, left_out) = chosen(&found, arguments.most as usize);
     let many = FilesArguments { files, jobs: arguments.jobs };
     let program = asked.as_ref().and_then(|asked| asked.external.as_ref());
-    let played = match many.files.is_empty() {
+    let mut played = match many.files.is_empty() {
         true => None,
         false => Some(each_file(output, &many, program, |file| scene(output, file, asked.as_ref()))?),
     };
     let mut remarks = found.remarks;
     if left_out > 0 {
         remarks.push(format!(
-            "{} left out: one scenario of each kind of failure comes first, then the others by name; `--most N` shows more",
-            plural(left_out, "scenario")
+            "{} left out: {}; `--most N` shows more",
+            plural(left_out, "scenario"),
+            match found.worst.is_empty() {
+                true => "those that are shown come first by name, and the worst may be missing",
+                false =>
+                    "the worst comes first, then one of each kind of failure, then the others, worst first",
+            }
         ));
     }
     let failed = played.as_ref().map_or_else(Vec::new, PerFile::failed_in_json);
@@ -58,12 +67,11 @@ pub fn report(output: &Output, arguments: &ReportArguments) -> Result<(), Failur
             None => Err(Failure::usage(format!("`{}` holds nothing to report", found.title))),
         };
     }
-    let scenes = played.map_or_else(Vec::new, |played| played.done);
+    let scenes = played.as_mut().map_or_else(Vec::new, |played| std::mem::take(&mut played.done));
     let (scenarios, title) = (scenes.len(), found.title.clone());
     let compared_with = arguments.compare.clone();
     let page = Page { title, overview: found.overview, remarks, scenes, compared_with };
     let html = page.html();
-    let path = arguments.output.clone().unwrap_or_else(|| default_path(&arguments.paths));
     write(&path, &html)?;
     output.say(&format!(
         "{}: {}, {:.1} MB; open it with a browser",
@@ -74,7 +82,7 @@ pub fn report(output: &Output, arguments: &ReportArguments) -> Result<(), Failur
     output.result(serde_json::json!({
         "page": path, "scenarios": scenarios, "left_out": left_out, "bytes": html.len(), "failed": failed,
     }));
-    Ok(())
+    played.map_or(Ok(()), |played| played.complete("played"))
 }
 
 /// What a path holds.
@@ -85,6 +93,8 @@ struct Found {
     files: Vec<PathBuf>,
     /// Names of the scenarios that show a kind of failure each.
     examples: Vec<String>,
+    /// Names of the scenarios with a collision, the worst first; empty if nothing tells.
+    worst: Vec<String>,
     remarks: Vec<String>,
 }
 
@@ -137,16 +147,26 @@ fn of_run(output: &Output, directory: &Path, settings: &str, found: &mut Found) 
     }
     found.overview = report::of_run(&database, table.as_ref(), settings).map_err(unread)?;
     let groups = database.groups().map_err(unread)?;
-    found.examples = groups.iter().map(|group| format!("{}_{:04}", group.road, group.episode)).collect();
+    let name = |road: &str, episode: i64| format!("{road}_{episode:04}");
+    found.examples = groups.iter().map(|group| name(&group.road, group.episode)).collect();
+    let worst = database.worst().map_err(unread)?;
+    found.worst = worst.iter().map(|(road, episode)| name(road, *episode)).collect();
     Ok(())
 }
 
-/// The files to play, and how many are left out.
+/// The files to play, and how many are left out: the worst comes first, then one of each kind of failure, then the others,
+/// worst first.
 fn chosen(found: &Found, most: usize) -> (Vec<PathBuf>, usize) {
-    let stem = |file: &PathBuf| file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-    let is_example = |file: &PathBuf| found.examples.contains(&stem(file));
-    let (first, rest): (Vec<_>, Vec<_>) = found.files.iter().cloned().partition(is_example);
-    let mut files: Vec<PathBuf> = first.into_iter().chain(rest).collect();
+    let rank_of: BTreeMap<&str, usize> =
+        found.worst.iter().enumerate().map(|(rank, name)| (name.as_str(), rank)).collect();
+    let place = |file: &PathBuf| {
+        let stem = file.file_stem().unwrap_or_default().to_string_lossy();
+        let rank = rank_of.get(stem.as_ref()).copied().unwrap_or(usize::MAX);
+        let is_first = rank == 0 || found.examples.iter().any(|example| *example == stem);
+        (!is_first, rank)
+    };
+    let mut files = found.files.clone();
+    files.sort_by_cached_key(place);
     let left_out = files.len().saturating_sub(most);
     files.truncate(most);
     (files, left_out)
@@ -172,8 +192,8 @@ fn scene(output: &Output, file: &Path, compared: Option<&Asked>) -> Result<Scene
     };
     let recording = play(&Asked::default(), &table, &scenario)?;
     let compared = compared.map(|asked| play(asked, &table, &scenario)).transpose()?;
-    let is_shrunk = file.parent().is_some_and(|folder| folder.ends_with("shrunk"));
-    let shrunk_from = is_shrunk.then(|| scenario.name.clone());
+    let is_shrunk = file.parent().is_some_and(|folder| folder.ends_with(shrink::FOLDER));
+    let shrunk_from = is_shrunk.then(|| shrink::found_name(&scenario.name).to_owned());
     let names: Vec<_> =
         file.components().rev().take(2).map(|part| part.as_os_str().to_string_lossy()).collect();
     let file = names.iter().rev().map(|name| name.as_ref()).collect::<Vec<&str>>().join("/");

@@ -20,7 +20,15 @@ use super::parallel::each_file;
 use super::replay::refutation;
 
 /// The folder of what is written, beside the scenarios. What a run found stays apart from what was made of it.
-const FOLDER: &str = "shrunk";
+pub const FOLDER: &str = "shrunk";
+
+/// What the name of a shrunk scenario ends with.
+const SUFFIX: &str = "_shrunk";
+
+/// The name of the scenario that was found, by that of the shrunk one.
+pub fn found_name(shrunk: &str) -> &str {
+    shrunk.strip_suffix(SUFFIX).unwrap_or(shrunk)
+}
 
 /// Writes each file's scenario as small as possible, and checks every claim of what it wrote.
 pub fn shrink(output: &Output, arguments: &ShrinkArguments) -> Result<(), Failure> {
@@ -135,10 +143,7 @@ fn smaller(output: &Output, file: &Path, path: &Path, asked: &Asked) -> Result<S
         std::fs::create_dir_all(folder).map_err(|error| Failure::file("create", folder, error))?;
     }
     let origin = &scenario.origin;
-    let name = match scenario.name.strip_suffix("_shrunk") {
-        Some(_) => scenario.name.clone(),
-        None => format!("{}_shrunk", scenario.name),
-    };
+    let name = format!("{}{SUFFIX}", found_name(&scenario.name));
     let source = emit::Provenance {
         command: "shrink",
         name: &name,

@@ -84,6 +84,23 @@ impl Database {
         groups.sort_by_key(|group| core::cmp::Reverse(group.count));
         Ok(groups)
     }
+
+    /// Road and number of each episode with a collision, the worst first: those that count, then by the larger change of
+    /// velocity of the two.
+    ///
+    /// # Errors
+    /// If the database cannot be read.
+    pub fn worst(&self) -> Result<Vec<(String, i64)>, DatabaseError> {
+        let mut statement = self.connection.prepare(
+            "WITH hardest AS (
+               SELECT episode, collision.counted AS counts, max(max(delta_v_mps, obstacle_delta_v_mps)) AS delta_v_mps
+               FROM collision GROUP BY episode, counts)
+             SELECT road, episode FROM hardest JOIN episode USING (episode) GROUP BY episode
+             ORDER BY max(counts) DESC, max(CASE counts WHEN counted > 0 THEN delta_v_mps END) DESC, episode",
+        )?;
+        let episodes = statement.query_map([], |row| Ok((row.get(0)?, row.get(1)?)))?;
+        Ok(episodes.collect::<Result<_, _>>()?)
+    }
 }
 
 /// What [`kind`] calls a pedestrian.

@@ -179,3 +179,29 @@ fn the_picture_of_the_readme_is_of_its_scenario() {
     let readme = std::fs::read_to_string(root().join("README.md")).expect("it is shipped");
     assert!(readme.contains(&format!("({found}.svg)")));
 }
+
+#[test]
+fn a_shrunk_scenario_and_the_found_one_name_each_other() {
+    let scratch = tempfile::tempdir().expect("a scratch directory");
+    let critical = scratch.path().join("critical");
+    std::fs::create_dir(&critical).expect("it can be made");
+    let space = root().join("scenarios/avastra45.ava");
+    let source = SOURCE.replace("avastra45.ava", &space.display().to_string());
+    let file = critical.join("walk.ava");
+    std::fs::write(&file, source).expect("it can be written");
+    let at = |path: &Path| path.display().to_string();
+    let (status, _, stderr) = outcome(&mut avastra(&["shrink", &at(&file)]));
+    assert_eq!(status, 0, "{stderr}");
+    let (status, _, stderr) = outcome(&mut avastra(&["report", &at(scratch.path())]));
+    assert_eq!(status, 0, "{stderr}");
+    let html = std::fs::read_to_string(scratch.path().join("report.html")).expect("it was written");
+    let index = html.split("id=\"index\">").nth(1).and_then(|rest| rest.split("</script>").next()).unwrap();
+    let index: Value = serde_json::from_str(index).expect("the index is JSON");
+    let scenarios = index["scenarios"].as_array().unwrap();
+    let (shrunk, found): (Vec<_>, Vec<_>) =
+        scenarios.iter().partition(|scenario| scenario["shrunk_from"].is_string());
+    assert_eq!((shrunk.len(), found.len()), (1, 1));
+    // The page links two where this is so.
+    assert_eq!(shrunk[0]["shrunk_from"], found[0]["summary"]["name"]);
+    assert_ne!(shrunk[0]["summary"]["name"], found[0]["summary"]["name"]);
+}

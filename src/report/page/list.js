@@ -15,12 +15,19 @@ export const FILTERS = [
   ["cause", "Cause", (entry) => causeInWords(mainCollision(entry.summary)?.cause)],
 ];
 
+/** Whether a shrunk scenario stays out of the list until it is asked for: where the one that it was made from is there. */
+function hiddenTwins(scenarios) {
+  const found = new Set(scenarios.filter((entry) => !entry.shrunk_from).map((entry) => entry.summary.name));
+  return (entry) => entry.shrunk_from && found.has(entry.shrunk_from);
+}
+
 /** The scenarios that the link asks for. */
 export function filtered(scenarios) {
   const parts = linked();
+  const isHidden = hiddenTwins(scenarios);
   const group = parts.group;
   return scenarios.filter((entry) => {
-    if (parts.shrunk !== "1" && entry.shrunk_from) return false;
+    if (parts.shrunk !== "1" && isHidden(entry)) return false;
     if (group && kindOf(entry) !== group) return false;
     if (parts.q && !`${entry.file} ${JSON.stringify(entry.summary)}`.toLowerCase().includes(parts.q.toLowerCase())) return false;
     return FILTERS.every(([name, , value]) => !parts[name] || value(entry) === parts[name]);
@@ -58,7 +65,7 @@ export function showList(place, data) {
     return el("label", {}, `${title} `, select);
   });
   const search = el("input", { type: "search", id: "search", value: linked().q ?? "", oninput: (event) => change("q", event.target.value) });
-  const hasShrunk = scenarios.some((entry) => entry.shrunk_from);
+  const hasShrunk = scenarios.some(hiddenTwins(scenarios));
   const shrunk = hasShrunk && el("label", {}, el("input", { type: "checkbox", id: "shrunk", checked: linked().shrunk === "1", onchange: (event) => change("shrunk", event.target.checked ? "1" : null) }), " with shrunk ones");
   const clear = el("button", { type: "button", id: "clear", onclick: () => (location.hash = "#") }, "Clear");
   refill(place, el("div", { class: "filters" }, selects, el("label", {}, "Search ", search), shrunk, clear), found, charts);
