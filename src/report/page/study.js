@@ -46,7 +46,7 @@ function onRoad(road) {
 /** The curve of an agent's trainings, averaged over them. */
 function learned({ agent, curve: points }, road) {
   const window = Math.max(5, Math.round(points.length / 20));
-  return curve(`Counted collisions of an episode of training: ${agent} on ${road}`, points.map((point, i) => [point.episode ?? i, point.counted]), "episode", window);
+  return curve(`Counted collisions of an episode of training: ${agent} on ${road}`, points.map((point) => [point.episode, point.counted]), "episode", window);
 }
 
 function together(results) {
