@@ -94,7 +94,10 @@ pub fn estimate(output: &Output, arguments: &EstimateArguments) -> Result<(), Fa
     write(&path.join("results.json"), &format!("{text}\n"))?;
     output.say(&estimate_text(&results, is_unfinished));
     let critical = load::sources_in(&path.join("critical"))?;
-    output.say(&critical_text(&path, &critical));
+    output.say(&match results.method {
+        Method::Split => "no scenarios: a branch of `split` has no file of its own".to_owned(),
+        Method::Count | Method::Probe => critical_text(&path, &critical),
+    });
     let doubts = doubts(estimate.run().program());
     doubts.iter().for_each(|doubt| output.warn(doubt));
     output.result(serde_json::json!({

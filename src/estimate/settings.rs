@@ -166,7 +166,7 @@ impl EstimateSettings {
         if let Some(found) = self.stopping.precision.filter(|share| !(*share > 0.0 && *share <= 1.0)) {
             return Err(EstimateError::Precision { found });
         }
-        if let Some(found) = self.stopping.hours.filter(|hours| hours.is_nan() || *hours <= 0.0) {
+        if let Some(found) = self.stopping.hours.filter(|hours| !(hours.is_finite() && *hours > 0.0)) {
             return Err(EstimateError::Hours { found });
         }
         if self.method == Method::Split && self.run.episodes < SPLIT_EPISODES_MIN {

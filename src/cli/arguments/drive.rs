@@ -97,8 +97,9 @@ pub struct EstimateArguments {
     #[arg(long, value_enum, default_value_t = EventArgument::Counted)]
     pub event: EventArgument,
     /// How: `count` plays every episode from its start; `probe` tries dangerous rows out beside those that chance chooses, each
-    /// with its weight; `split` goes on from dangerous moments. All are unbiased with a fixed number of parts, and say what
-    /// they gained or lost.
+    /// with its weight, which pays where a crash comes in fewer than one of a hundred episodes or so;
+    /// `split` goes on from dangerous moments, and writes no scenarios. All are unbiased with a fixed number of parts, and say
+    /// what they gained or lost.
     #[arg(long, value_enum, default_value_t = MethodArgument::Count)]
     pub method: MethodArgument,
     /// Independent parts on each road, at most; the interval of `split` comes from their spread, so give it twenty or more.
