@@ -36,8 +36,11 @@ pub fn render(output: &Output, arguments: &RenderArguments) -> Result<(), Failur
     let times_s = times(arguments, scenario, table.space().episode.step_s)?;
     let asked =
         load::asked(arguments.ads.as_deref(), arguments.ads_config.as_deref(), arguments.ads_cmd.as_deref())?;
-    let (ads, _) = asked.selected_for(scenario)?;
-    let (moments, subject) = moments(&table, scenario, &ads, &times_s)?;
+    let (ads, is_recorded) = asked.selected_for(scenario)?;
+    let (moments, mut subject) = moments(&table, scenario, &ads, &times_s)?;
+    if !is_recorded {
+        subject.title = title_of_another(arguments, scenario, &subject);
+    }
     // A strip ends with its scenario.
     if moments.is_empty() || (!arguments.strip && moments.len() < times_s.len()) {
         return Err(Failure::usage(format!(
@@ -119,6 +122,20 @@ fn moments(
         None => scenario.name.clone(),
     };
     Ok((moments, Subject { title, hit, names }))
+}
+
+/// The title of a drive that is not the recorded one: whose it is, and what happens, because what the file says of its crash
+/// may not.
+fn title_of_another(arguments: &RenderArguments, scenario: &Scenario, subject: &Subject) -> String {
+    let profile = arguments.ads_config.as_ref().map(|path| path.display().to_string());
+    let driver = arguments.ads.clone().into_iter().chain(profile).collect::<Vec<_>>().join(" with ");
+    let driver = if driver.is_empty() { "another driving system".to_owned() } else { driver };
+    match subject.hit {
+        Some((obstacle, at_s)) => {
+            format!("{}, driven by {driver}: collision with npc#{obstacle} at {at_s:.1} s", scenario.name)
+        }
+        None => format!("{}, driven by {driver}: no collision", scenario.name),
+    }
 }
 
 /// Tells which obstacles brake: those whose speed fell by more than 1 m/s² over the last 0.3 s. Other vehicles have no lights of their own.

@@ -73,7 +73,9 @@ fn a_scenario_keeps_the_profile_that_it_was_found_with() {
     let svg = scratch.path().join("strip.svg").display().to_string();
     let drawn = ["render", &path, "--strip", "--ads-config", cautious, "--out", &svg];
     let (status, _, stderr) = outcome(&mut avastra(&drawn));
-    assert!(status == 0 && Path::new(&svg).is_file(), "{stderr}");
+    assert_eq!(status, 0, "{stderr}");
+    let svg = std::fs::read_to_string(&svg).expect("it was drawn");
+    assert!(svg.contains(&format!("driven by {cautious}: ")), "a picture says whose drive it is");
 
     // A scenario names the reference drivers that judge it; they must exist.
     let other = file.with_file_name("other.ava");
