@@ -1,14 +1,14 @@
 //! `avastra render`: moments of an emitted scenario as a picture.
 
-use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::path::{Path, PathBuf};
 
 use crate::action::ActionTable;
-use crate::ads::Selected;
+use crate::ads::{Selected, Status};
+use crate::episode::Recorder;
 use crate::model::{Claim, Scenario};
 use crate::report::{Snapshot, Subject, picture};
 use crate::run::Stage;
-use crate::sim::{Contact, DT_S, World};
+use crate::sim::{DT_S, World};
 
 use super::arguments::RenderArguments;
 use super::error::Failure;
@@ -97,23 +97,28 @@ fn moments(
     ads: &Selected,
     times_s: &[f64],
 ) -> Result<(Vec<Snapshot>, Subject), Failure> {
-    let mut moments: Vec<Snapshot> = Vec::new();
-    let mut last_contact: Option<Contact> = None;
-    let mut brakes = BrakeLights::default();
+    let mut seen: Vec<(World, Status)> = Vec::new();
+    let mut recorder = Recorder::default();
     let stage = Stage::new(table, scenario)?;
     let log = stage.play(ads, &mut |world, ads, contacts| {
-        last_contact = contacts.last().copied().or(last_contact);
-        brakes.note(world);
+        recorder.note(world, ads, contacts);
         // Half a tick of slack: times are decimals, ticks are multiples of 20 ms.
-        while times_s.get(moments.len()).is_some_and(|&time_s| world.time_s() + DT_S / 2.0 >= time_s) {
-            moments.push(Snapshot {
-                world: world.clone(),
-                status: ads.status().clone(),
-                contact: last_contact.filter(|contact| world.time_s() - contact.time_s <= CONTACT_SHOWN_S),
-                braking: brakes.lit(),
-            });
+        while times_s.get(seen.len()).is_some_and(|&time_s| world.time_s() + DT_S / 2.0 >= time_s) {
+            seen.push((world.clone(), ads.status().clone()));
         }
     });
+    let contacts = || log.collisions.iter().map(|collision| collision.contact);
+    let snapshot = |(world, status): (World, Status)| {
+        let since_s = |time_s: f64| world.time_s() - time_s;
+        let is_shown = |time_s: f64| (0.0..=CONTACT_SHOWN_S).contains(&since_s(time_s));
+        Snapshot {
+            contact: contacts().rfind(|contact| is_shown(contact.time_s)),
+            braking: recorder.braking(world.ticks()),
+            world,
+            status,
+        }
+    };
+    let moments = seen.into_iter().map(snapshot).collect();
     let name = |(id, own): (u32, usize)| (id, table.space().bodies[own].name.clone());
     let names = log.own_bodies().into_iter().map(name).collect();
     let hit = log.collisions.first().map(|first| (first.contact.obstacle, first.contact.time_s));
@@ -135,36 +140,5 @@ fn title_of_another(arguments: &RenderArguments, scenario: &Scenario, subject: &
             format!("{}, driven by {driver}: collision with npc#{obstacle} at {at_s:.1} s", scenario.name)
         }
         None => format!("{}, driven by {driver}: no collision", scenario.name),
-    }
-}
-
-/// Tells which obstacles brake: those whose speed fell by more than 1 m/s² over the last 0.3 s. Other vehicles have no lights of their own.
-#[derive(Default)]
-struct BrakeLights {
-    /// Speeds of the last ticks, m/s.
-    speeds_mps: BTreeMap<u32, VecDeque<f64>>,
-}
-
-impl BrakeLights {
-    const TICKS: usize = 15;
-    const DECEL_MPS2: f64 = 1.0;
-
-    fn note(&mut self, world: &World) {
-        for obstacle in world.obstacles() {
-            let speeds_mps = self.speeds_mps.entry(obstacle.id).or_default();
-            if speeds_mps.len() > Self::TICKS {
-                speeds_mps.pop_front();
-            }
-            speeds_mps.push_back(obstacle.velocity_mps.norm());
-        }
-    }
-
-    fn lit(&self) -> BTreeSet<u32> {
-        let slows = |speeds_mps: &VecDeque<f64>| {
-            let lost_mps =
-                speeds_mps.front().zip(speeds_mps.back()).map_or(0.0, |(first, last)| first - last);
-            speeds_mps.len() > Self::TICKS && lost_mps > Self::DECEL_MPS2 * Self::TICKS as f64 * DT_S
-        };
-        self.speeds_mps.iter().filter(|(_, speeds_mps)| slows(speeds_mps)).map(|(id, _)| *id).collect()
     }
 }

@@ -6,12 +6,14 @@
 
 mod facts;
 mod log;
+mod recorder;
 mod run;
 mod script;
 mod setup;
 
 pub use facts::{at_fault, collision_facts, side, struck};
 pub use log::{Collision, End, EpisodeLog, Held, Outcome, StepLog};
+pub use recorder::{Actor, Lights, Recorder, Sample, Sky, Touch};
 pub use run::{Choice, Moment, Snapshot, Watch, run, run_from};
 pub use script::{Script, ScriptedAction};
 pub use setup::{Fork, Setup, scene, start};

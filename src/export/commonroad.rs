@@ -10,12 +10,13 @@
 //!
 //! Left out: weather (the format has words that do not fit ours), crosswalks, and signs other than speed limits.
 
+use crate::episode::{Actor, Lights, Sample};
 use crate::geometry::Vec2;
 use crate::model::vocabulary::Body;
 use crate::road::{Lane, LaneIndex, Neighbour, RoadMap, Turn};
 
 use super::DATE;
-use super::recording::{Actor, Lights, Recording, Sample};
+use super::recording::Recording;
 use super::xml::{Element, number};
 
 /// Ticks of a time step.
@@ -239,7 +240,7 @@ fn state(name: &'static str, sample: &Sample) -> Element {
         .holding(Element::new("position").holding(point(sample.pose.position)))
         .holding(exact("orientation", sample.pose.heading_rad))
         .holding(Element::new("time").holding(Element::text("exact", sample.tick / STEP_TICKS)))
-        .holding(exact("velocity", sample.velocity_mps.dot(&sample.pose.forward())))
+        .holding(exact("velocity", sample.speed_mps()))
 }
 
 /// Where the ego vehicle is at the start, and that it is to be on its route at the end.

@@ -1,7 +1,6 @@
 //! Crashes for other tools: an emitted scenario, played again, as a file that simulators and planners of others read.
 //!
-//! [`Recording`] is what a replay looked like, free of any format: where every road user was at every tick, sky, lights,
-//! contacts and claims. Each format is a pure function from it to text. Nothing here is read back.
+//! [`Recording`] is what a replay looked like, free of any format: what [`Recorder`](crate::episode::Recorder) saw, and claims. Each format is a pure function from it to text. Nothing here is read back.
 
 mod commonroad;
 mod csv;
@@ -13,7 +12,7 @@ mod xml;
 pub use commonroad::commonroad;
 pub use csv::csv;
 pub use openscenario::{Ego, Version, openscenario};
-pub use recording::{Actor, ExportError, Lights, Recording, Sample, Sky, Touch, record};
+pub use recording::{ExportError, Recording, record};
 
 /// Everything has the same date: a file depends on its scenario alone.
 const DATE: &str = "2026-01-01";

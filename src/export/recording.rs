@@ -1,22 +1,20 @@
-//! What the replay of an emitted scenario looked like, tick by tick.
+//! What the replay of an emitted scenario looked like, and what its file says of it.
 
-use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 
 use crate::action::ActionTable;
 use crate::ads::Selected;
-use crate::geometry::{Pose, Vec2};
-use crate::model::body::BodyParameters;
-use crate::model::vocabulary::{Body, Level, TimeOfDay, Word};
+use crate::episode::{Actor, Lights, Recorder, Sky, Touch};
+use crate::model::vocabulary::Word;
 use crate::model::{Claim, Scenario};
 use crate::oracle;
 use crate::oracle::{ClaimResult, NoModules, NoTries, Replays};
 use crate::road::{LaneIndex, LanePlace, RoadMap};
 use crate::run::{RunError, Stage};
-use crate::sim::{Contact, DT_S, SignalColour, VehicleParameters, World, friction_scale};
+use crate::sim::DT_S;
 
-/// Everything that can be seen of an episode from outside the vehicles.
+/// A replay as [`Recorder`] saw it, with its road and the facts of its file.
 #[derive(Debug, Clone)]
 pub struct Recording {
     pub name: String,
@@ -44,59 +42,6 @@ pub struct Recording {
     pub facts: Vec<(String, String)>,
 }
 
-/// A road user, from its appearance to its leaving.
-#[derive(Debug, Clone)]
-pub struct Actor {
-    /// As claims number it; 0 is the ego vehicle.
-    pub id: u32,
-    /// What it is like, in the engine's words.
-    pub body: Body,
-    pub shape: BodyParameters,
-    /// One for each tick, without gaps.
-    pub samples: Vec<Sample>,
-}
-
-/// A road user at a tick.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Sample {
-    pub tick: u64,
-    /// Middle of the outline.
-    pub pose: Pose,
-    pub velocity_mps: Vec2,
-}
-
-/// The ego vehicle and another begin to touch.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Touch {
-    /// At the end of the tick in which they do.
-    pub tick: u64,
-    pub id: u32,
-}
-
-/// Time of day and weather, from a time on.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Sky {
-    pub time_s: f64,
-    pub time_of_day: TimeOfDay,
-    /// Levels of rain, fog and wetness.
-    pub levels: [Level; 3],
-    pub rain_mmph: f64,
-    pub visibility_m: f64,
-    /// Water on the road, mm.
-    pub water_mm: f64,
-    /// The part of a dry road's friction that is left.
-    pub friction_scale: f64,
-}
-
-/// A set of lights, and what it showed.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Lights {
-    /// Index in [`RoadMap::signals`].
-    pub signal: usize,
-    /// The tick from which it shows a colour; the first is 0.
-    pub changes: Vec<(u64, SignalColour)>,
-}
-
 /// Why a scenario has no recording.
 #[derive(Debug, thiserror::Error)]
 pub enum ExportError {
@@ -105,33 +50,6 @@ pub enum ExportError {
     /// The replay is not what the scenario says.
     #[error("it does not replay: claimed {}, found {}", claims[0].claim, claims[0].found)]
     Refuted { claims: Vec<ClaimResult> },
-}
-
-impl Actor {
-    /// What it is called in all formats: `ego`, or `npc_3` for the one that claims call `npc#3`.
-    pub fn name(&self) -> String {
-        if self.id == 0 { "ego".to_owned() } else { format!("npc_{}", self.id) }
-    }
-
-    /// Whether it is not a pedestrian.
-    pub fn is_vehicle(&self) -> bool {
-        self.body.is_vehicle()
-    }
-
-    pub fn first_tick(&self) -> u64 {
-        self.samples[0].tick
-    }
-
-    pub fn last_tick(&self) -> u64 {
-        self.samples[self.samples.len() - 1].tick
-    }
-}
-
-impl Lights {
-    /// The colour at a tick.
-    pub fn at(&self, tick: u64) -> SignalColour {
-        self.changes[self.changes.partition_point(|(from, _)| *from <= tick) - 1].1
-    }
 }
 
 impl Recording {
@@ -153,7 +71,7 @@ impl Recording {
 pub fn record(table: &ActionTable, scenario: &Scenario, ads: &Selected) -> Result<Recording, ExportError> {
     let stage = Stage::new(table, scenario)?;
     let mut recorder = Recorder::default();
-    let log = stage.play(ads, &mut |world, _, contacts| recorder.note(world, contacts));
+    let log = stage.play(ads, &mut |world, ads, contacts| recorder.note(world, ads, contacts));
     let driven = |claim: &&Claim| {
         matches!(claim, Claim::Collision { .. } | Claim::Trace(_) | Claim::Proc(_) | Claim::End(_))
     };
@@ -166,6 +84,7 @@ pub fn record(table: &ActionTable, scenario: &Scenario, ads: &Selected) -> Resul
         return Err(ExportError::Refuted { claims });
     }
     let road = &table.space().roads[scenario.road];
+    let Recorder { end_tick, ego, others, skies, lights, touches, .. } = recorder;
     Ok(Recording {
         name: scenario.name.clone(),
         docs: scenario.docs.clone(),
@@ -173,12 +92,12 @@ pub fn record(table: &ActionTable, scenario: &Scenario, ads: &Selected) -> Resul
         map_path: road.map_path.clone(),
         goal: road.goal,
         route: road.route.lanes.iter().map(|part| part.lane).collect(),
-        end_tick: recorder.ticks,
-        ego: recorder.ego.expect("an episode is seen once before its first tick"),
-        others: recorder.others,
-        skies: recorder.skies,
-        lights: recorder.lights,
-        touches: recorder.touches,
+        end_tick,
+        ego,
+        others,
+        skies,
+        lights,
+        touches,
         facts: facts(scenario, &road.name),
     })
 }
@@ -225,88 +144,4 @@ fn fact(claim: &Claim) -> Option<(String, String)> {
         Claim::Trace(digest) => ("trace".to_owned(), digest.clone()),
         Claim::Proc(_) => return None,
     })
-}
-
-/// Collects what is seen after every tick.
-#[derive(Default)]
-struct Recorder {
-    ticks: u64,
-    ego: Option<Actor>,
-    others: Vec<Actor>,
-    /// Where in `others` a road user is.
-    places: BTreeMap<u32, usize>,
-    skies: Vec<Sky>,
-    lights: Vec<Lights>,
-    touches: Vec<Touch>,
-}
-
-impl Recorder {
-    fn note(&mut self, world: &World, contacts: &[Contact]) {
-        let tick = world.ticks();
-        self.ticks = tick;
-        let ego = world.ego();
-        let forward = ego.rear_axle.forward();
-        let sample = Sample { tick, pose: world.ego_outline().pose, velocity_mps: forward * ego.speed_mps };
-        self.ego.get_or_insert_with(ego_actor).samples.push(sample);
-        for obstacle in world.obstacles() {
-            let place = *self.places.entry(obstacle.id).or_insert(self.others.len());
-            if place == self.others.len() {
-                let shape = *world.body(obstacle.id).expect("it is there");
-                self.others.push(Actor { id: obstacle.id, body: obstacle.body, shape, samples: Vec::new() });
-            }
-            let sample = Sample { tick, pose: obstacle.outline.pose, velocity_mps: obstacle.velocity_mps };
-            self.others[place].samples.push(sample);
-        }
-        self.note_sky(world);
-        self.note_lights(world);
-        self.touches.extend(contacts.iter().map(|contact| Touch { tick, id: contact.obstacle }));
-    }
-
-    fn note_sky(&mut self, world: &World) {
-        let (time_of_day, levels) = (world.time_of_day(), world.sky());
-        if self.skies.last().is_some_and(|sky| (sky.time_of_day, sky.levels) == (time_of_day, levels)) {
-            return;
-        }
-        let conditions = world.conditions();
-        self.skies.push(Sky {
-            time_s: world.time_s(),
-            time_of_day,
-            levels,
-            rain_mmph: conditions.rain_mmph,
-            visibility_m: conditions.visibility_m,
-            water_mm: conditions.water_mm,
-            friction_scale: friction_scale(conditions.water_mm),
-        });
-    }
-
-    fn note_lights(&mut self, world: &World) {
-        let tick = world.ticks();
-        if tick == 0 {
-            let signals = world.scene().map.signals.iter().enumerate();
-            let holding = signals.filter(|(_, signal)| signal.for_vehicles && !signal.lanes.is_empty());
-            self.lights = holding.map(|(signal, _)| Lights { signal, changes: Vec::new() }).collect();
-        }
-        for lights in &mut self.lights {
-            let colour = world.signal(lights.signal);
-            if lights.changes.last().is_none_or(|(_, last)| *last != colour) {
-                lights.changes.push((tick, colour));
-            }
-        }
-    }
-}
-
-/// The ego vehicle, seen nowhere yet.
-pub(super) fn ego_actor() -> Actor {
-    let mkz = VehicleParameters::MKZ;
-    let shape = BodyParameters {
-        length_m: mkz.length_m,
-        width_m: mkz.width_m,
-        height_m: mkz.height_m,
-        wheelbase_m: mkz.wheelbase_m,
-        rear_axle_m: mkz.rear_axle_to_centre_m(),
-        mass_t: mkz.mass_t,
-        acceleration_mps2_max: mkz.acceleration_mps2_max,
-        deceleration_mps2_max: mkz.deceleration_mps2_max,
-    };
-    Actor { id: 0, body: Body::Sedan, shape, samples: Vec::new() }
 }

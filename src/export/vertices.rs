@@ -1,9 +1,8 @@
 //! A recorded way with as few vertices as it needs.
 
+use crate::episode::Actor;
 use crate::geometry::{Pose, wrap_angle};
 use crate::sim::DT_S;
-
-use super::recording::Actor;
 
 /// A player that goes straight from vertex to vertex at constant speed is nowhere farther than this from the recorded
 /// place, m.
@@ -54,14 +53,14 @@ fn is_near(vertex: &Vertex, from: &Vertex, to: &Vertex) -> bool {
 mod tests {
     use proptest::prelude::*;
 
-    use super::super::recording::{Sample, ego_actor};
     use super::*;
+    use crate::episode::Sample;
 
     /// The ego vehicle where it is after each tick of a speed (m/s) and a turn (rad/s), which change evenly from one of
     /// these to the next in `TICKS_BETWEEN` ticks.
     fn driven(moments: &[(f64, f64)]) -> Actor {
         const TICKS_BETWEEN: usize = 60;
-        let mut actor = ego_actor();
+        let mut actor = Actor::ego();
         let mut pose = Pose::new(10.0, -20.0, 3.0);
         for pair in moments.windows(2) {
             for step in 0..TICKS_BETWEEN {

@@ -1,10 +1,11 @@
-//! Results for people: pages to look at (`page`, with what `recording`, `ground` and `overview` put into it), pictures of
-//! maps and of moments of an episode, and tables of text.
+//! Results for people: pages to look at (`page`, with what `recording`, `mind`, `ground` and `overview` put into it),
+//! pictures of maps and of moments of an episode, and tables of text.
 
 mod canvas;
 mod columns;
 mod ground;
 mod labels;
+mod mind;
 mod overview;
 mod page;
 mod picture;
@@ -12,6 +13,7 @@ mod recording;
 mod road;
 mod study;
 mod trials;
+mod words;
 
 pub use overview::{of_run, of_study};
 pub use page::{Page, Scene};

@@ -10,12 +10,13 @@ use std::fmt::Write;
 
 use crate::ads::{PerceivedObject, Status};
 use crate::geometry::{Bounds, OrientedBox, Vec2};
-use crate::model::vocabulary::{Body, Phenomenon, Word};
+use crate::model::vocabulary::{Body, Word};
 use crate::road::Lane;
 use crate::sim::{Contact, Obstacle, SignalColour, World};
 
 use super::canvas::{Canvas, escape, lane_edge, lane_outline, thinned};
 use super::labels::Labels;
+use super::words;
 
 /// Edge of a panel, px.
 const PANEL_PX: f64 = 400.0;
@@ -36,8 +37,6 @@ const CHEVRON_M: f64 = 0.7;
 const VELOCITY_S: f64 = 1.0;
 /// Slower than this nothing gets an arrow, m/s.
 const STANDING_MPS: f64 = 0.3;
-/// The brake lights of the ego vehicle burn from this much brake on, %.
-const BRAKE_PCT_MIN: f64 = 1.0;
 /// Height of names, px.
 const NAME_PX: f64 = 12.0;
 
@@ -47,7 +46,7 @@ pub struct Snapshot {
     pub status: Status,
     /// A contact of the ego vehicle within the last moments.
     pub contact: Option<Contact>,
-    /// Numbers of the vehicles that brake.
+    /// Numbers of the vehicles that brake; 0 is the ego vehicle.
     pub braking: BTreeSet<u32>,
 }
 
@@ -228,7 +227,7 @@ impl Panel<'_> {
         let velocity_mps = outline.pose.forward() * self.moment.world.ego().speed_mps;
         self.arrow(&outline, velocity_mps, "#08285f");
         self.vehicle(&outline, r##"fill="#1c5fd4" stroke="#08285f" stroke-width="1.2""##, "#ffffff");
-        if self.moment.status.control.brake_pct > BRAKE_PCT_MIN {
+        if self.moment.braking.contains(&0) {
             self.brake_lights(&outline);
         }
     }
@@ -406,24 +405,18 @@ fn caption(svg: &mut String, (left_px, top_px): (f64, f64), moment: &Snapshot, s
         _ => String::new(),
     };
     let control = &moment.status.control;
-    let pedals = match control.brake_pct > BRAKE_PCT_MIN {
+    let pedals = match moment.braking.contains(&0) {
         true => format!("brakes with {:.0} %", control.brake_pct),
         false => format!("throttle {:.0} %", control.throttle_pct),
     };
-    let sky: Vec<String> = Phenomenon::ALL
-        .iter()
-        .zip(world.sky())
-        .filter(|(_, level)| level.intensity() > 0.0)
-        .map(|(phenomenon, level)| format!("{} {}", phenomenon.name(), level.name()))
-        .collect();
-    let sky = if sky.is_empty() { "clear".to_owned() } else { sky.join(", ") };
+    let sky = words::sky(world.time_of_day(), world.sky());
     let lines = [
         (r##"font-size="13" font-weight="bold" fill="#14181f""##, format!("{time_s:.2} s{when}")),
         (
             r##"font-size="12" fill="#14181f""##,
             format!("ego {}, {pedals}; held by: {}", kmh(world.ego().speed_mps), moment.status.reason_text()),
         ),
-        (r##"font-size="12" fill="#5a6372""##, format!("{}, {sky}", world.time_of_day().name())),
+        (r##"font-size="12" fill="#5a6372""##, sky),
     ];
     for (index, (style, line)) in lines.iter().enumerate() {
         text(svg, (left_px + 6.0, top_px + PANEL_PX + 17.0 + 17.0 * index as f64), style, line);

@@ -1,46 +1,44 @@
 //! A scenario played again and kept tick by tick, for the page.
 //!
-//! What is true and what the driving system commands is kept at every tick; what it perceives every 0.1 s, and what it
-//! plans and predicts every 0.2 s, because it thinks no faster. All of it in columns (`columns`) with the steps below.
+//! What is true ([`Recorder`]) and what the driving system commands (`mind`) is kept at every tick; what it perceives
+//! every 0.1 s, and what it plans and predicts every 0.2 s, because it thinks no faster. All of it in columns (`columns`)
+//! with the steps below.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use serde_json::{Value, json};
 
 use crate::action::{ActionTable, Offer};
-use crate::ads::{Ads, GHOST_ID_MIN, PerceivedObject, Selected, Status};
+use crate::ads::Selected;
 use crate::emit;
 use crate::episode;
-use crate::episode::{EpisodeLog, Held, Moment, Outcome, Script};
-use crate::geometry::{Pose, Vec2, wrap_angle};
-use crate::mdp::ProcKind;
-use crate::model::vocabulary::{Phenomenon, Word};
+use crate::episode::{Actor, EpisodeLog, Held, Moment, Outcome, Recorder, Sample, Script, Sky};
+use crate::geometry::{Pose, wrap_angle};
+use crate::model::vocabulary::Word;
 use crate::model::{Claim, Scenario, digest_text};
 use crate::oracle;
 use crate::oracle::ReferenceDrive;
 use crate::run;
 use crate::run::{Gauges, RunError, Shape, Stage, refusal_in_words};
-use crate::sim::{Contact, DT_S, FRAME_TICKS, Obstacle, VehicleParameters, World};
+use crate::sim::{DT_S, FRAME_TICKS, SignalColour};
 
 use super::columns::Columns;
 use super::ground::ground;
+use super::mind::Mind;
+use super::words;
 
 /// Steps of the columns; half a step is how far a number may be off.
 const PLACE_M: f64 = 0.01;
 const HEADING_RAD: f64 = 0.001;
-const SPEED_MPS: f64 = 0.01;
-const ACCELERATION_MPS2: f64 = 0.02;
-const STEERING_RAD: f64 = 0.002;
-const PERCENT: f64 = 1.0;
-const PROBABILITY: f64 = 0.001;
-const SKETCH_M: f64 = 0.1;
+pub(super) const SPEED_MPS: f64 = 0.01;
+pub(super) const ACCELERATION_MPS2: f64 = 0.02;
+pub(super) const STEERING_RAD: f64 = 0.002;
+pub(super) const PERCENT: f64 = 1.0;
+pub(super) const PROBABILITY: f64 = 0.001;
+pub(super) const SKETCH_M: f64 = 0.1;
 
 /// Ticks between two moments at which plans and predictions are kept.
-const THOUGHT_TICKS: u64 = 2 * FRAME_TICKS;
-/// Of a plan every fifth point is kept (0.5 s), of a prediction every second (1 s), up to so many.
-const PLAN_STRIDE: usize = 5;
-const PREDICTION_STRIDE: usize = 2;
-const PREDICTION_POINTS: usize = 5;
+pub(super) const THOUGHT_TICKS: u64 = 2 * FRAME_TICKS;
 
 /// What the page must state of the numbers in it.
 pub fn quantisation() -> Value {
@@ -75,6 +73,7 @@ pub fn record(
     let setup = stage.setup(ads);
     let script = Script::of_scenario(scenario);
     let mut recorder = Recorder::default();
+    let mut mind = Mind::default();
     let mut gauges = Gauges::default();
     let mut offers = Vec::new();
     let mut choose = |moment: &Moment<'_>| {
@@ -85,6 +84,7 @@ pub fn record(
     };
     let log = episode::run(&setup, &mut choose, &mut |world, ads, contacts| {
         recorder.note(world, ads, contacts);
+        mind.note(world, ads, contacts);
         gauges.note(world, contacts);
     });
     let judged = oracle::judge_with_drives(&setup, &script, &log, stage.avoidability());
@@ -113,9 +113,9 @@ pub fn record(
         "summary": summary, "docs": scenario.docs, "source": source, "rows": table.rows().iter().map(|row| &row.label).collect::<Vec<_>>(),
         "step_s": table.space().episode.step_s, "collisions": collisions, "steps": steps,
         "held": log.held.iter().map(|held| json!([held.from_s, held.text()])).collect::<Vec<_>>(),
-        "ego": recorder.ego(&mut columns), "obstacles": recorder.obstacles(table, &log, &mut columns),
-        "tracks": recorder.tracks(&mut columns), "plans": recorder.plans(&mut columns),
-        "signals": recorder.signals, "skies": recorder.skies, "drawn": [VehicleParameters::MKZ.length_m, VehicleParameters::MKZ.width_m],
+        "ego": ego(&recorder.ego, &mind, &mut columns), "obstacles": obstacles(table, &log, &recorder, &mut columns),
+        "tracks": mind.tracks(&mut columns), "plans": mind.plans(&mut columns),
+        "signals": signals(&recorder), "skies": recorder.skies.iter().map(sky).collect::<Vec<_>>(),
     });
     Ok(Recording { summary, packed: columns.pack(&header), ground: ground(&setup.scene) })
 }
@@ -181,7 +181,7 @@ fn collision(
     json!({
         "at_s": contact.time_s, "obstacle": contact.obstacle, "body": table.space().body_name(found.body),
         "kind": run::kind(found.body.like.name()), "shape": shape, "verb": found.verb.name(),
-        "x": contact.point.x, "y": contact.point.y, "counted": counted, "class": judgement.class.name(),
+        "x_m": contact.point.x, "y_m": contact.point.y, "counted": counted, "class": judgement.class.name(),
         "onset_s": judgement.onset_s, "avoided_by": judgement.avoided_by, "letter": judgement.r157_letter,
         "evasion": judgement.evasion, "priority": contact.priority.name(), "side": severity.side, "approach": severity.approach,
         "ego_mps": contact.ego_speed_mps, "closing_mps": severity.closing_speed_mps, "delta_v_mps": severity.delta_v_mps,
@@ -203,12 +203,61 @@ fn way(columns: &mut Columns, drive: &ReferenceDrive) -> Value {
     json!({
         "name": drive.name, "avoids": drive.avoids, "from_s": drive.places.first().map(|place| place.time_s),
         "every_s": DT_S * FRAME_TICKS as f64, "places": places(columns, &poses),
-        "speed": columns.add(SPEED_MPS, drive.places.iter().map(|place| place.speed_mps)),
+        "speed_mps": columns.add(SPEED_MPS, drive.places.iter().map(|place| place.speed_mps)),
     })
 }
 
-/// Columns of x, y and heading.
-fn places(columns: &mut Columns, poses: &[Pose]) -> [usize; 3] {
+/// The ego vehicle, from outside and from inside.
+fn ego(actor: &Actor, mind: &Mind, columns: &mut Columns) -> Value {
+    let mut told = mind.commands(columns);
+    told["places"] = json!(places(columns, &poses(actor)));
+    told["speed_mps"] = json!(columns.add(SPEED_MPS, actor.samples.iter().map(Sample::speed_mps)));
+    told["brake_lights"] = json!(actor.brake_lights);
+    told["length_m"] = json!(actor.shape.length_m);
+    told["width_m"] = json!(actor.shape.width_m);
+    told
+}
+
+fn obstacles(
+    table: &ActionTable,
+    log: &EpisodeLog,
+    recorder: &Recorder,
+    columns: &mut Columns,
+) -> Vec<Value> {
+    let own = log.own_bodies();
+    let mut told = |actor: &Actor| {
+        let first = actor.first.as_ref()?;
+        let body = own.get(&actor.id).map_or(actor.body.name(), |own| &table.space().bodies[*own].name);
+        Some(json!({
+            "id": actor.id, "body": body, "like": actor.body.name(), "colour": first.colour.name(), "verb": first.verb.name(),
+            "ambient": first.is_ambient(), "from_tick": actor.first_tick(), "length_m": actor.shape.length_m,
+            "width_m": actor.shape.width_m, "places": places(columns, &poses(actor)),
+            "speed_mps": columns.add(SPEED_MPS, actor.samples.iter().map(Sample::speed_mps)),
+            "brake_lights": actor.brake_lights,
+        }))
+    };
+    recorder.others.iter().filter_map(&mut told).collect()
+}
+
+/// By number of the signal, each change: tick and colour.
+fn signals(recorder: &Recorder) -> BTreeMap<usize, Vec<(u64, &'static str)>> {
+    let changes = |changes: &[(u64, SignalColour)]| {
+        changes.iter().map(|(tick, colour)| (*tick, colour.name())).collect()
+    };
+    recorder.lights.iter().map(|lights| (lights.signal, changes(&lights.changes))).collect()
+}
+
+/// The time from which the sky is so, s, and how it is.
+fn sky(sky: &Sky) -> Value {
+    json!([sky.time_s, words::sky(sky.time_of_day, sky.levels)])
+}
+
+fn poses(actor: &Actor) -> Vec<Pose> {
+    actor.samples.iter().map(|sample| sample.pose).collect()
+}
+
+/// Columns of x and y (m) and of the heading (rad).
+pub(super) fn places(columns: &mut Columns, poses: &[Pose]) -> [usize; 3] {
     let x = columns.add(PLACE_M, poses.iter().map(|pose| pose.position.x));
     let y = columns.add(PLACE_M, poses.iter().map(|pose| pose.position.y));
     [x, y, columns.add(HEADING_RAD, unwound(poses))]
@@ -225,198 +274,6 @@ fn unwound(poses: &[Pose]) -> Vec<f64> {
     poses.iter().map(next).collect()
 }
 
-fn rounded(value: f64) -> f64 {
+pub(super) fn rounded(value: f64) -> f64 {
     (value * 1000.0).round() / 1000.0
-}
-
-/// What is seen of an episode.
-#[derive(Default)]
-struct Recorder {
-    ego: Vec<EgoMoment>,
-    obstacles: BTreeMap<u32, Seen>,
-    /// By the number of the track and the sample at which it begins.
-    tracks: BTreeMap<(u32, usize), Track>,
-    open_tracks: BTreeMap<u32, usize>,
-    samples: usize,
-    plans: Vec<Vec<Vec2>>,
-    hit: BTreeSet<u32>,
-    /// Number of a signal, then each change: tick and colour.
-    signals: BTreeMap<usize, Vec<(u64, &'static str)>>,
-    /// Tick from which the sky is so.
-    skies: Vec<(u64, String)>,
-}
-
-struct EgoMoment {
-    pose: Pose,
-    speed_mps: f64,
-    acceleration_mps2: f64,
-    steer_rad: f64,
-    throttle_pct: f64,
-    brake_pct: f64,
-    probability: f64,
-}
-
-/// An obstacle in every tick since it appeared.
-struct Seen {
-    first: Obstacle,
-    from_tick: u64,
-    poses: Vec<Pose>,
-    speeds_mps: Vec<f64>,
-}
-
-/// An object as it is followed, in every sample since it was found.
-struct Track {
-    object: PerceivedObject,
-    poses: Vec<Pose>,
-    speeds_mps: Vec<f64>,
-    /// In each second sample, relative to the object.
-    predicted: Vec<Vec<Vec2>>,
-}
-
-impl Recorder {
-    fn note(&mut self, world: &World, ads: &dyn Ads, contacts: &[Contact]) {
-        self.hit.extend(contacts.iter().map(|contact| contact.obstacle));
-        let danger = ProcKind::default().danger(world, &|id| self.hit.contains(&id));
-        let status = ads.status();
-        let motion = world.ego();
-        self.ego.push(EgoMoment {
-            pose: world.ego_outline().pose,
-            speed_mps: motion.speed_mps,
-            acceleration_mps2: motion.acceleration_mps2,
-            steer_rad: motion.steer_rad,
-            throttle_pct: status.control.throttle_pct,
-            brake_pct: status.control.brake_pct,
-            probability: if contacts.is_empty() { danger.probability } else { 1.0 },
-        });
-        for obstacle in world.obstacles() {
-            self.obstacle(world.ticks(), obstacle);
-        }
-        self.lights(world);
-        let sky = sky(world);
-        if self.skies.last().is_none_or(|(_, before)| *before != sky) {
-            self.skies.push((world.ticks(), sky));
-        }
-        if world.ticks().is_multiple_of(FRAME_TICKS) {
-            self.thoughts(world.ticks(), status);
-            self.samples += 1;
-        }
-    }
-
-    fn obstacle(&mut self, tick: u64, obstacle: &Obstacle) {
-        let seen = self.obstacles.entry(obstacle.id).or_insert_with(|| Seen {
-            first: *obstacle,
-            from_tick: tick,
-            poses: Vec::new(),
-            speeds_mps: Vec::new(),
-        });
-        seen.poses.push(obstacle.outline.pose);
-        seen.speeds_mps.push(obstacle.velocity_mps.dot(&obstacle.forward));
-    }
-
-    fn lights(&mut self, world: &World) {
-        let map = &world.scene().map;
-        let drawn: BTreeSet<usize> =
-            map.lanes.iter().flat_map(|lane| lane.stop_lines.iter().map(|line| line.signal)).collect();
-        for signal in drawn {
-            let colour = world.signal(signal).name();
-            let changes = self.signals.entry(signal).or_default();
-            if changes.last().is_none_or(|(_, before)| *before != colour) {
-                changes.push((world.ticks(), colour));
-            }
-        }
-    }
-
-    fn thoughts(&mut self, tick: u64, status: &Status) {
-        let is_thought = tick.is_multiple_of(THOUGHT_TICKS);
-        if is_thought {
-            self.plans.push(status.planned.iter().step_by(PLAN_STRIDE).copied().collect());
-        }
-        let present: BTreeSet<u32> = status.perceived.iter().map(|object| object.track).collect();
-        self.open_tracks.retain(|track, _| present.contains(track));
-        let mut told = BTreeSet::new();
-        for object in status.perceived.iter().filter(|object| told.insert(object.track)) {
-            let begun = *self.open_tracks.entry(object.track).or_insert(self.samples);
-            let track = self.tracks.entry((object.track, begun)).or_insert_with(|| Track {
-                object: object.clone(),
-                poses: Vec::new(),
-                speeds_mps: Vec::new(),
-                predicted: Vec::new(),
-            });
-            track.poses.push(object.pose);
-            track.speeds_mps.push(object.velocity_mps.dot(&object.pose.forward()));
-            if is_thought {
-                let points = object.predicted.iter().skip(PREDICTION_STRIDE - 1).step_by(PREDICTION_STRIDE);
-                let relative = points.take(PREDICTION_POINTS).map(|point| point - object.pose.position);
-                track.predicted.push(relative.collect());
-            }
-        }
-    }
-
-    fn ego(&self, columns: &mut Columns) -> Value {
-        let poses: Vec<Pose> = self.ego.iter().map(|moment| moment.pose).collect();
-        let mut add = |step: f64, of: fn(&EgoMoment) -> f64| columns.add(step, self.ego.iter().map(of));
-        let (speed, acceleration) = (
-            add(SPEED_MPS, |moment| moment.speed_mps),
-            add(ACCELERATION_MPS2, |moment| moment.acceleration_mps2),
-        );
-        let (steer, throttle) =
-            (add(STEERING_RAD, |moment| moment.steer_rad), add(PERCENT, |moment| moment.throttle_pct));
-        let (brake, proc) =
-            (add(PERCENT, |moment| moment.brake_pct), add(PROBABILITY, |moment| moment.probability));
-        json!({
-            "places": places(columns, &poses), "speed": speed, "acceleration": acceleration, "steer": steer,
-            "throttle": throttle, "brake": brake, "proc": proc,
-        })
-    }
-
-    fn obstacles(&self, table: &ActionTable, log: &EpisodeLog, columns: &mut Columns) -> Vec<Value> {
-        let own = log.own_bodies();
-        let mut told = |seen: &Seen| {
-            let first = &seen.first;
-            let body =
-                own.get(&first.id).map_or(first.body.name(), |own| table.space().bodies[*own].name.as_str());
-            json!({
-                "id": first.id, "body": body, "like": first.body.name(), "colour": first.colour.name(), "verb": first.verb.name(),
-                "ambient": first.is_ambient(), "from": seen.from_tick, "length": 2.0 * first.outline.half_length_m,
-                "width": 2.0 * first.outline.half_width_m, "places": places(columns, &seen.poses),
-                "speed": columns.add(SPEED_MPS, seen.speeds_mps.iter().copied()),
-            })
-        };
-        self.obstacles.values().map(&mut told).collect()
-    }
-
-    fn tracks(&self, columns: &mut Columns) -> Vec<Value> {
-        let mut told = |((number, from), track): (&(u32, usize), &Track)| {
-            let object = &track.object;
-            let points = || track.predicted.iter().flatten();
-            json!({
-                "track": if *number >= GHOST_ID_MIN { None } else { Some(*number) }, "of": object.id, "from": from,
-                "body": object.body.name(), "length": rounded(object.length_m), "width": rounded(object.width_m),
-                "places": places(columns, &track.poses), "speed": columns.add(SPEED_MPS, track.speeds_mps.iter().copied()),
-                "counts": columns.add(1.0, track.predicted.iter().map(|points| points.len() as f64)),
-                "predicted": [
-                    columns.add(SKETCH_M, points().map(|point| point.x)), columns.add(SKETCH_M, points().map(|point| point.y)),
-                ],
-            })
-        };
-        self.tracks.iter().map(&mut told).collect()
-    }
-
-    fn plans(&self, columns: &mut Columns) -> Value {
-        let points = || self.plans.iter().flatten();
-        json!({
-            "counts": columns.add(1.0, self.plans.iter().map(|points| points.len() as f64)),
-            "x": columns.add(SKETCH_M, points().map(|point| point.x)), "y": columns.add(SKETCH_M, points().map(|point| point.y)),
-        })
-    }
-}
-
-/// Time of day and weather, in words.
-fn sky(world: &World) -> String {
-    let weather = Phenomenon::ALL.iter().zip(world.sky()).filter(|(_, level)| level.intensity() > 0.0).map(
-        |(phenomenon, level)| format!("{} {}", level.name().to_lowercase(), phenomenon.name().to_lowercase()),
-    );
-    let weather: Vec<String> = weather.collect();
-    let weather = if weather.is_empty() { "clear".to_owned() } else { weather.join(", ") };
-    format!("{}, {weather}", world.time_of_day().name())
 }

@@ -142,15 +142,15 @@ const [header, columns] = unpacked(readFileSync(page, "utf8"), "s1");
 let chance = 20261122;
 for (let i = 0; i < 20; i += 1) {
   chance = (chance * 1103515245 + 12345) % 2147483648;
-  const at = chance % columns[header.ego.speed].length;
+  const at = chance % columns[header.ego.speed_mps].length;
   const found = await wide.evaluate((number) => window.avastra.opened().recording.ego(number * 0.02), at);
-  for (const [name, column] of [["x", header.ego.places[0]], ["y", header.ego.places[1]], ["heading", header.ego.places[2]], ["speed", header.ego.speed], ["proc", header.ego.proc]]) {
+  for (const [name, column] of [["x", header.ego.places[0]], ["y", header.ego.places[1]], ["heading", header.ego.places[2]], ["speed", header.ego.speed_mps], ["proc", header.ego.proc]]) {
     assert(Math.abs(found[name] - columns[column][at]) < 1e-6, `${name} at tick ${at}`);
   }
   const others = await wide.evaluate((number) => window.avastra.opened().recording.obstacles(number * 0.02), at);
   for (const other of others) {
     const one = header.obstacles.find((known) => known.id === other.id);
-    assert(Math.abs(other.x - columns[one.places[0]][at - one.from]) < 1e-6, `${other.id} at tick ${at}`);
+    assert(Math.abs(other.x - columns[one.places[0]][at - one.from_tick]) < 1e-6, `${other.id} at tick ${at}`);
   }
 }
 console.log("20 random ticks: the page uses the numbers of the file (tests/it/report.rs holds those against the world)");

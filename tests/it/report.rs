@@ -113,18 +113,18 @@ fn a_page_says_what_the_world_did() {
         assert!(near(column(&ego["places"][0])[tick], pose.position.x, 0.005), "x at tick {tick}");
         assert!(near(column(&ego["places"][1])[tick], pose.position.y, 0.005), "y at tick {tick}");
         assert!(near(wrap_angle(column(&ego["places"][2])[tick] - pose.heading_rad), 0.0, 0.0005));
-        assert!(near(column(&ego["speed"])[tick], world.ego().speed_mps, 0.005));
+        assert!(near(column(&ego["speed_mps"])[tick], world.ego().speed_mps, 0.005));
         for obstacle in world.obstacles() {
             let users = header["obstacles"].as_array().unwrap();
             let user = users.iter().find(|user| user["id"] == obstacle.id).expect("everybody is there");
-            let at = tick - user["from"].as_u64().unwrap() as usize;
+            let at = tick - user["from_tick"].as_u64().unwrap() as usize;
             let position = obstacle.outline.pose.position;
             assert!(near(column(&user["places"][0])[at], position.x, 0.005), "{} at {tick}", obstacle.id);
             assert!(near(column(&user["places"][1])[at], position.y, 0.005), "{} at {tick}", obstacle.id);
             others += 1;
         }
     });
-    assert_eq!(column(&header["ego"]["speed"]).len(), ticks);
+    assert_eq!(column(&header["ego"]["speed_mps"]).len(), ticks);
     assert!(others > 0, "somebody else was there");
     let collisions = header["collisions"].as_array().unwrap();
     assert_eq!(collisions.len(), log.collisions.len());

@@ -1,9 +1,9 @@
 //! Road users as OpenSCENARIO describes them.
 
+use crate::episode::Actor;
 use crate::model::vocabulary::Body;
 use crate::sim::VehicleParameters;
 
-use super::super::recording::Actor;
 use super::super::xml::Element;
 use super::Ego;
 

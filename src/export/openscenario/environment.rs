@@ -12,11 +12,12 @@
 use core::f64::consts::{FRAC_PI_2, PI};
 use std::collections::{BTreeMap, BTreeSet};
 
+use crate::episode::{Lights, Sky};
 use crate::model::vocabulary::{Level, TimeOfDay};
 use crate::sim::{DT_S, SignalColour};
 
 use super::super::DATE;
-use super::super::recording::{Lights, Recording, Sky};
+use super::super::recording::Recording;
 use super::super::xml::Element;
 
 /// A sky as a `GlobalAction`.

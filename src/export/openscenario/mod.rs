@@ -11,11 +11,12 @@
 mod entity;
 mod environment;
 
+use crate::episode::Actor;
 use crate::geometry::Pose;
 use crate::sim::DT_S;
 
 use super::DATE;
-use super::recording::{Actor, Recording};
+use super::recording::Recording;
 use super::vertices::{Vertex, vertices};
 use super::xml::{Element, number};
 

@@ -50,7 +50,7 @@ function verdict(recording, collision, seek, watchDrivers) {
 
 /** What a reference driver comes to: where it stands, or how it drives on. */
 function endOf(recording, way) {
-  const speeds = recording.columns[way.speed];
+  const speeds = recording.columns[way.speed_mps];
   if (speeds.length === 0) return "–";
   const stands = speeds.findIndex((speed) => speed < 0.05);
   const timeOf = (at) => figure(way.from_s + at * way.every_s, "s", 1);
@@ -66,7 +66,7 @@ export function showMoment(place) {
   refill(place, names.map((name, i) => el("div", {}, el("dt", {}, name), cells[i])));
   return (recording, timeS) => {
     const ego = recording.ego(timeS);
-    const pedals = ego.brake > 0.5 ? `brake ${figure(ego.brake, "%", 0)}` : `throttle ${figure(ego.throttle, "%", 0)}`;
+    const pedals = ego.braking ? `brake ${figure(ego.brake, "%", 0)}` : `throttle ${figure(ego.throttle, "%", 0)}`;
     const texts = [
       `${figure(timeS, "s", 2)} of ${figure(recording.endS, "s", 1)}`,
       `${kmh(ego.speed)}, ${figure(ego.acceleration, "m/s²", 1)}`,

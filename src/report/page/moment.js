@@ -1,22 +1,23 @@
 // A scenario as it was at any time: places between ticks, who was there, what was believed and planned.
-import { unpacked } from "./decode.js";
+import { index, unpacked } from "./decode.js";
 
 const recordings = new Map();
 
 /** The recording of an element, read once. */
 export function recording(id) {
-  if (!recordings.has(id)) recordings.set(id, unpacked(id).then((data) => new Recording(data)));
+  if (!recordings.has(id)) recordings.set(id, unpacked(id).then((data) => new Recording(data, index().quantisation)));
   return recordings.get(id);
 }
 
 export class Recording {
-  constructor({ header, columns }) {
+  constructor({ header, columns }, { tick_s: tickS, perceived_s: lookS, thought_s: thoughtS }) {
     this.header = header;
     this.columns = columns;
-    this.tickS = 0.02;
-    this.lookS = 0.1;
-    this.thoughtS = 0.2;
-    this.ticks = columns[header.ego.speed].length - 1;
+    this.tickS = tickS;
+    this.lookS = lookS;
+    this.thoughtS = thoughtS;
+    this.looksPerThought = Math.round(thoughtS / lookS);
+    this.ticks = columns[header.ego.speed_mps].length - 1;
     this.endS = this.ticks * this.tickS;
     for (const track of header.tracks) track.offsets = this.#offsets(columns[track.counts]);
     this.planOffsets = this.#offsets(columns[header.plans.counts]);
@@ -46,17 +47,18 @@ export class Recording {
   }
 
   ego(timeS) {
-    const { ego, drawn } = this.header;
+    const { ego } = this.header;
     const at = this.tickAt(timeS);
     return {
       ...this.pose(ego.places, at),
-      length: drawn[0],
-      width: drawn[1],
-      speed: this.between(ego.speed, at),
-      acceleration: this.between(ego.acceleration, at),
-      steer: this.between(ego.steer, at),
-      throttle: this.between(ego.throttle, at),
-      brake: this.between(ego.brake, at),
+      length: ego.length_m,
+      width: ego.width_m,
+      speed: this.between(ego.speed_mps, at),
+      acceleration: this.between(ego.acceleration_mps2, at),
+      steer: this.between(ego.steer_rad, at),
+      throttle: this.between(ego.throttle_pct, at),
+      brake: this.between(ego.brake_pct, at),
+      braking: this.#brakes(ego, timeS),
       proc: this.between(ego.proc, at),
     };
   }
@@ -65,19 +67,20 @@ export class Recording {
   obstacles(timeS) {
     const found = [];
     for (const one of this.header.obstacles) {
-      const at = this.tickAt(timeS) - one.from;
-      const last = this.columns[one.speed].length - 1;
+      const at = this.tickAt(timeS) - one.from_tick;
+      const last = this.columns[one.speed_mps].length - 1;
       // Between the last tick of one and the end of the episode it has left.
       if (at < 0 || at > last) continue;
-      found.push({ ...one, ...this.pose(one.places, at), speed: this.between(one.speed, at), braking: this.#brakes(one, at) });
+      const { id, body, like, verb, ambient, length_m: length, width_m: width } = one;
+      const speed = this.between(one.speed_mps, at);
+      const braking = this.#brakes(one, timeS);
+      found.push({ id, body, like, verb, ambient, length, width, ...this.pose(one.places, at), speed, braking });
     }
     return found;
   }
 
-  /** Whether a vehicle slows down by more than 1 m/s² over 0.3 s: nothing else tells of its brake lights. */
-  #brakes(one, at) {
-    const before = this.between(one.speed, at - 15);
-    return at >= 15 && one.like !== "Pedestrian" && (before - this.between(one.speed, at)) / 0.3 > 1;
+  #brakes({ brake_lights: lights }, timeS) {
+    return this.latest(lights, this.tickAt(timeS))?.[1] ?? false;
   }
 
   /** What the driving system believes to be there, as of its last look. */
@@ -85,24 +88,26 @@ export class Recording {
     const look = Math.floor(timeS / this.lookS + 1e-6);
     const found = [];
     for (const track of this.header.tracks) {
-      const at = look - track.from;
-      if (at < 0 || at >= this.columns[track.speed].length) continue;
+      const at = look - track.from_look;
+      if (at < 0 || at >= this.columns[track.speed_mps].length) continue;
       const [x, y] = track.places.map((column) => this.columns[column][at]);
-      const thought = Math.floor(look / 2) - Math.ceil(track.from / 2);
+      const thought = Math.floor(look / this.looksPerThought) - Math.ceil(track.from_look / this.looksPerThought);
       found.push({
-        ...track,
+        of: track.of,
+        length: track.length_m,
+        width: track.width_m,
         x,
         y,
         heading: this.columns[track.places[2]][at],
-        speed: this.columns[track.speed][at],
-        way: this.#points(track.predicted, track.offsets, thought).map((point) => ({ x: x + point.x, y: y + point.y })),
+        speed: this.columns[track.speed_mps][at],
+        way: this.#points(track.predicted_m, track.offsets, thought).map((point) => ({ x: x + point.x, y: y + point.y })),
       });
     }
     return found;
   }
 
   plan(timeS) {
-    const { x, y } = this.header.plans;
+    const { x_m: x, y_m: y } = this.header.plans;
     return this.#points([x, y], this.planOffsets, Math.floor(timeS / this.thoughtS + 1e-6));
   }
 
@@ -119,9 +124,10 @@ export class Recording {
   driver(way, timeS) {
     if (way.from_s === null || way.from_s === undefined) return null;
     const at = (timeS - way.from_s) / way.every_s;
-    const last = this.columns[way.speed].length - 1;
+    const last = this.columns[way.speed_mps].length - 1;
     if (at < 0 || at > last) return null;
-    return { ...this.pose(way.places, at), speed: this.between(way.speed, at), length: this.header.drawn[0], width: this.header.drawn[1] };
+    const { length_m: length, width_m: width } = this.header.ego;
+    return { ...this.pose(way.places, at), speed: this.between(way.speed_mps, at), length, width };
   }
 
   /** All places of a reference driver. */
@@ -146,7 +152,7 @@ export class Recording {
   }
 
   sky(timeS) {
-    return this.latest(this.header.skies, this.tickAt(timeS))?.[1] ?? "";
+    return this.latest(this.header.skies, timeS)?.[1] ?? "";
   }
 
   signal(number, timeS) {
@@ -159,6 +165,11 @@ export class Recording {
     let found = 0;
     for (let i = 0; i < steps.length; i += 1) if (steps[i].at_s <= timeS + 1e-6) found = i;
     return found;
+  }
+
+  /** Where the ego vehicle and another met. */
+  impact({ x_m: x, y_m: y }) {
+    return { x, y };
   }
 
   collision() {

@@ -91,13 +91,14 @@ export class Plots {
     context.fillText({ speed: "Speed", acceleration: "Accel.", ProC: "ProC", reason: "Held by", steps: "Actions" }[name], 2, top);
     if (name === "reason") return this.#reasons(top, height);
     if (name === "steps") return this.#steps(top, height);
-    const { ego } = this.recording.header;
-    const { columns } = this.recording;
-    const [values, unit, factor] = {
-      speed: [columns[ego.speed], "km/h", 3.6], acceleration: [columns[ego.acceleration], "m/s²", 1], ProC: [columns[ego.proc], "", 1],
+    const [column, unit, factor] = {
+      speed: ["speed_mps", "km/h", 3.6],
+      acceleration: ["acceleration_mps2", "m/s²", 1],
+      ProC: ["proc", "", 1],
     }[name];
-    const others = this.other && { speed: "speed", acceleration: "acceleration", ProC: "proc" }[name];
-    const second = others ? this.other.columns[this.other.header.ego[others]] : null;
+    const series = ({ columns, header }) => columns[header.ego[column]];
+    const values = series(this.recording);
+    const second = this.other && series(this.other);
     const all = second ? [values, second] : [values];
     const extent = (fold, start) => all.reduce((found, list) => list.reduce((a, b) => fold(a, b), found), start) * factor;
     const range = name === "ProC" ? [0, 1] : [Math.min(0, extent(Math.min, 0)), Math.max(1, extent(Math.max, 0))];
@@ -105,7 +106,7 @@ export class Plots {
     if (second) this.#curve(second, factor, range, top, height, colours.warn, [5, 3]);
     context.font = "11px system-ui, sans-serif";
     context.fillStyle = colours.muted;
-    context.fillText(`${figure(range[1], "", name === "ProC" ? 0 : 0)} ${unit}`, 2, top + 15);
+    context.fillText(`${figure(range[1], "", 0)} ${unit}`, 2, top + 15);
     if (range[0] < -0.5) context.fillText(figure(range[0], "", 0), 2, top + height - 12);
     return undefined;
   }

@@ -79,7 +79,7 @@ export class View {
       drawBody(canvas, body, { fill, line: colours.truthLine, alpha: body.ambient ? 0.75 : 1 });
     }
     drawSpeed(canvas, ego, colours.egoLine);
-    drawBody(canvas, { ...ego, braking: ego.brake > 1 }, { fill: colours.ego, line: colours.egoLine });
+    drawBody(canvas, ego, { fill: colours.ego, line: colours.egoLine });
   }
 
   #trails(timeS, others) {
@@ -128,7 +128,7 @@ export class View {
   #impacts(timeS) {
     for (const collision of this.recording.header.collisions) {
       const since = timeS - collision.at_s;
-      if (since >= -1e-6 && since <= IMPACT_SHOWN_S) drawImpact(this.canvas, collision);
+      if (since >= -1e-6 && since <= IMPACT_SHOWN_S) drawImpact(this.canvas, this.recording.impact(collision));
     }
   }
 
@@ -138,7 +138,7 @@ export class View {
     const size = (body) => (body.like === "Pedestrian" ? 6 : Math.max(8, (body.width / 2) * canvas.camera.pxPerM));
     for (const body of [ego, ...others]) labels.keep(body, size(body));
     for (const collision of this.recording.header.collisions) {
-      if (Math.abs(this.timeS - collision.at_s) <= IMPACT_SHOWN_S) labels.keep(collision, 12);
+      if (Math.abs(this.timeS - collision.at_s) <= IMPACT_SHOWN_S) labels.keep(this.recording.impact(collision), 12);
     }
     labels.write(ego, `ego ${kmh(ego.speed)}`, size(ego), canvas.colours.ego);
     const hit = new Set(this.recording.header.collisions.map((collision) => collision.obstacle));
