@@ -2,6 +2,19 @@
 //!
 //! An action reaches the world only through this table. Drawing (`offers`) and judging given values
 //! (`check`) call the same judgement, `model::rules`. Which rows are dead on which road was found by `prove`.
+//!
+//! ```
+//! use std::path::Path;
+//!
+//! use avastra::action::ActionTable;
+//! use avastra::check::load;
+//!
+//! let text = "language 1\nenum Time = Day | Night\nstate time: Time = Day\naction set(each to: Time) { set time = to }\n";
+//! let space = load(Path::new("mine.ava"), &|_| Ok(text.to_owned()))?.space.expect("it has no mistakes");
+//! let labels: Vec<String> = ActionTable::new(space).rows().iter().map(|row| row.label.clone()).collect();
+//! assert_eq!(labels, ["set(to: Day)", "set(to: Night)"]);
+//! # Ok::<(), avastra::check::ReadError>(())
+//! ```
 
 mod audit;
 mod draw;

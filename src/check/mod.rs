@@ -5,6 +5,18 @@
 //! hands them to the checker. The checker (`checker`, with a file for each kind of declaration) goes on after a
 //! mistake, so that one run shows every mistake. A sound space then goes through `prove`.
 //! `explain` has a page for each diagnostic code.
+//!
+//! ```
+//! use std::path::Path;
+//!
+//! use avastra::check::load;
+//!
+//! let text = "language 1\nenum Time = Day | Night\nstate time: Time = Nihgt\n";
+//! let loaded = load(Path::new("mine.ava"), &|_| Ok(text.to_owned()))?;
+//! assert!(loaded.space.is_none());
+//! assert!(loaded.diagnostics.iter().any(|mistake| mistake.message.contains("Nihgt")));
+//! # Ok::<(), avastra::check::ReadError>(())
+//! ```
 
 mod action;
 mod body;

@@ -128,6 +128,13 @@ const EXAMPLES: &[(&str, &[(&str, &str)])] = &[
         ],
     ),
     (
+        "results",
+        &[
+            ("results", "write RESULTS.md from scenarios/studies"),
+            ("results --add runs/0001 --commit 8c11ccf", "keep what a study found, and write it"),
+        ],
+    ),
+    (
         "estimate",
         &[
             ("estimate scenarios/avastra45.ava --ads-config scenarios/ads/degraded.yaml", "by counting"),
@@ -176,7 +183,8 @@ const EXAMPLES: &[(&str, &[(&str, &str)])] = &[
         &[
             ("test runs/0001", "do its scenarios still crash?"),
             ("test runs/0001 --ads-config scenarios/ads/cautious.yaml --junit out.xml", ""),
-            ("test runs/0001 --accept", "take changes of its space over"),
+            ("test runs/0001 --review", "what has changed for each of them, in meaning"),
+            ("test runs/0001 --accept", "and take it over"),
         ],
     ),
     (

@@ -33,6 +33,8 @@ mod progress;
 mod render;
 mod replay;
 mod report;
+mod results;
+mod review;
 mod road;
 mod run;
 mod run_directory;
@@ -109,6 +111,7 @@ pub fn main() -> ExitCode {
         Command::ExplainPolicy(arguments) => explain_policy::explain_policy(&output, arguments),
         Command::ExportWeights(arguments) => export_weights::export_weights(&output, arguments),
         Command::Study(arguments) => study::study(&output, arguments),
+        Command::Results(arguments) => results::results(&output, arguments),
         Command::Estimate(arguments) => estimate::estimate(&output, arguments),
         Command::Compare(arguments) => estimate::compare(&output, arguments),
         Command::Verify(arguments) => verify::verify(&output, arguments),

@@ -294,6 +294,17 @@ pub const SHAPES: &[Shape] = &[
         ],
     },
     Shape {
+        command: "results",
+        fields: &[
+            f("output", "text", "where the results were written"),
+            f(
+                "studies[]",
+                "object",
+                "`study`, its name; of a played one its `cells`, and how it departs from its file: `smaller`, `other`",
+            ),
+        ],
+    },
+    Shape {
         command: "replay",
         fields: &[
             f("confirmed", "number", "claims that hold"),
@@ -357,6 +368,11 @@ pub const SHAPES: &[Shape] = &[
             f("errors", "number", "scenarios that could not be played"),
             f("ads_failed", "number", "scenarios in which an external driving system failed"),
             f("accepted", "number", "scenarios that `--accept` changed"),
+            f(
+                "reviewed[]",
+                "object",
+                "with `--review` or `--accept`: `file`, `scenario`, the `change` in a few words, and its `differences`",
+            ),
             REPRODUCIBLE,
             f("scenarios[].file", "text", ""),
             f("scenarios[].scenario", "text", "its name"),

@@ -4,6 +4,7 @@ use std::path::Path;
 use std::sync::atomic::Ordering;
 use std::time::Instant;
 
+use crate::action::ActionTable;
 use crate::ads::external::Program;
 use crate::report;
 use crate::run::{RunError, TrafficRecord};
@@ -122,13 +123,23 @@ fn failed_text(directory: &Path, cells: &[FailedCell]) -> String {
 
 /// A new study, from its file.
 fn begun(output: &Output, path: &Path, arguments: &StudyArguments) -> Result<Study, Failure> {
+    let (_, table, settings) = wanted(output, path, arguments.ads_cmd.as_deref())?;
+    let settings = if arguments.quick { settings.quick() } else { settings };
+    Study::new(table, settings).map_err(|error| Failure::file("use", path, error))
+}
+
+/// What a study's file says, and asks for in full.
+pub fn wanted(
+    output: &Output,
+    path: &Path,
+    ads_cmd: Option<&str>,
+) -> Result<(StudyFile, ActionTable, StudySettings), Failure> {
     let refuse = |reason: String| Failure::file("use", path, reason);
-    let text = load::text(path)?;
-    let file = StudyFile::from_yaml(&text).map_err(refuse)?;
+    let file = StudyFile::from_yaml(&load::text(path)?).map_err(refuse)?;
     let beside = |name: &str| path.parent().unwrap_or(Path::new("")).join(name);
     let table = load::table(output, &beside(&file.space))?;
     let config = file.ads_config.as_deref().map(beside);
-    let under_test = load::under_test(&file.ads, config.as_deref(), arguments.ads_cmd.as_deref())?;
+    let under_test = load::under_test(&file.ads, config.as_deref(), ads_cmd)?;
     let read = |name: &str| load::read(&beside(name)).map_err(|error| error.to_string());
     let traffic = file.traffic.as_ref().map(|wanted| {
         // A name is a name; a file lies beside the study's.
@@ -138,10 +149,9 @@ fn begun(output: &Output, path: &Path, arguments: &StudyArguments) -> Result<Stu
         traffic.as_deref().map(load::traffic).transpose().map_err(|error| refuse(error.to_string()))?;
     let traffic = traffic.as_ref().and_then(TrafficRecord::new);
     let settings =
-        StudySettings::new(file, &table, (under_test.profile, under_test.external), traffic, &read);
+        StudySettings::new(file.clone(), &table, (under_test.profile, under_test.external), traffic, &read);
     let settings = settings.map_err(|error| refuse(error.to_string()))?;
-    let settings = if arguments.quick { settings.quick() } else { settings };
-    Study::new(table, settings).map_err(|error| refuse(error.to_string()))
+    Ok((file, table, settings))
 }
 
 /// The rest of an interrupted study, with the text of its settings.

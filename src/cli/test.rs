@@ -17,12 +17,13 @@ use crate::syntax::{Diagnostic, apply_fixes};
 
 use super::arguments::TestArguments;
 use super::error::Failure;
-use super::files::write;
+use super::files::{write, write_answers};
 use super::findings::doubts;
 use super::load;
 use super::load::Emitted;
 use super::output::Output;
 use super::output::plural;
+use super::review::{Review, review};
 
 /// The result for one scenario.
 struct Case {
@@ -51,7 +52,8 @@ pub fn test(output: &Output, arguments: &TestArguments) -> Result<(), Failure> {
     if let Some(name) = &arguments.ads {
         run::driving_system(name)?;
     }
-    let mut suite = Suite { output, arguments, asked, outdated: Vec::new(), accepted: 0 };
+    let mut suite =
+        Suite { output, arguments, asked, outdated: Vec::new(), reviewed: Vec::new(), accepted: 0 };
     let mut cases = Vec::new();
     for file in suite_files(&arguments.paths)? {
         let Some(case) = suite.play(&file)? else { continue };
@@ -83,6 +85,9 @@ pub fn test(output: &Output, arguments: &TestArguments) -> Result<(), Failure> {
     let ads_failed = count(&|outcome| matches!(outcome, Outcome::Played(Regression::AdsFailed(_))));
     let errors = count(&|outcome| matches!(outcome, Outcome::NotPlayed { .. }));
     let in_source = count(&|outcome| matches!(outcome, Outcome::NotPlayed { in_source: true, .. }));
+    if arguments.accept {
+        output.say(&format!("{} written anew", plural(suite.accepted, "scenario")));
+    }
     output.say(&format!(
         "{}: {fails} still fail, {fixed} fixed, {changed} changed, {errors} not played",
         plural(cases.len(), "scenario")
@@ -102,7 +107,7 @@ pub fn test(output: &Output, arguments: &TestArguments) -> Result<(), Failure> {
         .collect();
     output.result(
         serde_json::json!({ "still_fails": fails, "fixed": fixed, "changed": changed, "errors": errors, "ads_failed": ads_failed, "reproducible": doubts.is_empty(),
-                                      "accepted": suite.accepted, "scenarios": listed }),
+                                      "accepted": suite.accepted, "reviewed": suite.reviewed, "scenarios": listed }),
     );
     let failing = count(&Outcome::is_failure);
     if errors > 0 {
@@ -139,7 +144,9 @@ struct Suite<'a> {
     asked: Asked,
     /// Scenarios that use a space which means something else now.
     outdated: Vec<Loaded>,
-    /// Number of scenarios that `--accept` took the change over into.
+    /// What differs in meaning, of each scenario that was reviewed.
+    reviewed: Vec<serde_json::Value>,
+    /// Number of scenarios that `--accept` wrote anew.
     accepted: usize,
 }
 
@@ -167,37 +174,54 @@ impl Suite<'_> {
         Ok(Some(Case { file: file.to_owned(), scenario, road, outcome, elapsed_s }))
     }
 
-    /// Reads a file. One whose space has changed is noted, or accepted.
+    /// Reads a file. One whose space has changed is noted, or reviewed.
     fn open(&mut self, file: &Path) -> Result<Emitted, Failure> {
         let loaded = load::read_and_check(file)?;
+        if self.arguments.accept || self.arguments.review {
+            return self.review(file, &loaded);
+        }
         if !is_outdated(&loaded) {
             return load::emitted_in(self.output, file, loaded);
-        }
-        if self.arguments.accept {
-            return self.accept(file, &loaded);
         }
         self.outdated.push(loaded);
         Err(Failure::Outdated)
     }
 
-    /// Takes the change of its space over into a scenario, if it still plays as it claims.
-    fn accept(&mut self, file: &Path, loaded: &Loaded) -> Result<Emitted, Failure> {
+    /// Plays a scenario as things are now, says what differs in meaning, and takes it over if asked. What is gone or cannot
+    /// be played stays as it is.
+    fn review(&mut self, file: &Path, loaded: &Loaded) -> Result<Emitted, Failure> {
         let root = FileId::default();
-        let (text, _) = apply_fixes(root, loaded.sources.text(root), &loaded.diagnostics);
+        let (before, mut spaces) = (loaded.sources.text(root), Vec::new());
+        let text = match is_outdated(loaded) {
+            false => before.to_owned(),
+            true => {
+                spaces = loaded.diagnostics.iter().flat_map(|found| found.notes.clone()).collect();
+                apply_fixes(root, before, &loaded.diagnostics).0
+            }
+        };
         let emitted = load::emitted_in(self.output, file, load::check_text(file, &text)?)?;
         let Emitted::Scenario(table, scenario) = &emitted else { return Ok(emitted) };
-        let ads = run::recorded(scenario)?;
-        let stage = Stage::new(table, scenario)?;
-        let log = stage.play(&ads, &mut |_, _, _| {});
-        if let Some(wrong) = stage.verify(&ads, &log).iter().find(|claim| claim.is_refuted()) {
-            return Err(Failure::usage(format!(
-                "not accepted, because it does not play as it claims: claimed {}, found {}",
-                wrong.claim, wrong.found
-            )));
+        let Review { change, mut differences, now } = review(table, scenario, &self.asked, &text)?;
+        differences.splice(0..0, spaces);
+        self.output.say(&format!("{}: {}", file.display(), change.in_words()));
+        differences.iter().for_each(|difference| self.output.say(&format!("    {difference}")));
+        self.reviewed.push(serde_json::json!({
+            "file": file, "scenario": scenario.name, "change": change.in_words(), "differences": differences,
+        }));
+        let Some((text, log)) = now else {
+            return Err(Failure::usage(
+                "no collision of it counts any more: it is kept as it was; delete it if that is right",
+            ));
+        };
+        if text == before {
+            return Ok(emitted);
         }
-        write(file, &text)?;
-        self.accepted += 1;
-        self.output.tell(&format!("accepted    {}", file.display()));
+        let emitted = load::emitted_in(self.output, file, load::check_text(file, &text)?)?;
+        if self.arguments.accept {
+            write_answers(file, &log)?;
+            write(file, &text)?;
+            self.accepted += 1;
+        }
         Ok(emitted)
     }
 

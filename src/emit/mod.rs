@@ -9,4 +9,4 @@ mod tree;
 
 pub use policy::policy_text;
 pub use safetensors::safetensors;
-pub use scenario::{Provenance, action_text, failure, scenario, unclaimed};
+pub use scenario::{Provenance, action_text, failure, retold, scenario, unclaimed};

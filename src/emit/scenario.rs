@@ -50,6 +50,16 @@ pub fn scenario(
     file(table, log, source, origin, [&emitted, &headline], steps, expects(log, summary, steps))
 }
 
+/// The same of an emitted scenario that was played again: with all its steps, because they are the scenario.
+pub fn retold(table: &ActionTable, log: &EpisodeLog, summary: &EpisodeSummary, source: &Provenance) -> File {
+    let emitted = format!("Emitted by `avastra {}`; replay with `avastra replay FILE`.", source.command);
+    let counted = summary.collisions.iter().find(|finding| finding.counted);
+    let headline = counted.map_or_else(String::new, |first| headline(table.space(), log, &first.collision));
+    let origin = origin(log, source, &summary.avoidability);
+    let steps = log.steps.len();
+    file(table, log, source, origin, [&emitted, &headline], steps, expects(log, summary, steps))
+}
+
 /// An episode that an external driving system failed in, as a scenario that ends so; it must have a step.
 pub fn failure(table: &ActionTable, log: &EpisodeLog, headline: &str, source: &Provenance) -> File {
     let emitted = format!("Emitted by `avastra {}`; replay with `avastra replay FILE`.", source.command);

@@ -1,5 +1,5 @@
 //! Results for people: pages to look at (`page`, with what `recording`, `mind`, `ground` and `overview` put into it),
-//! pictures of maps and of moments of an episode, and tables of text.
+//! pictures of maps and of moments of an episode, tables of text, and the text of all studies (`results`).
 
 mod canvas;
 mod columns;
@@ -10,6 +10,7 @@ mod overview;
 mod page;
 mod picture;
 mod recording;
+mod results;
 mod road;
 mod study;
 mod trials;
@@ -19,6 +20,7 @@ pub use overview::{of_run, of_study};
 pub use page::{Page, Scene};
 pub use picture::{Snapshot, Subject, picture};
 pub use recording::{Recording, record};
+pub use results::{Chapter, results};
 pub use road::draw;
 pub use study::study;
 pub use trials::trials;

@@ -1,7 +1,9 @@
 //! The result of a study as tables for people. Everything else that it holds is in `results.json`.
 
 use crate::statistics::{Estimate, Interval};
-use crate::study::{AgentResults, BaselineComparison, Rate, RoadResults, StudyResults};
+use crate::study::{
+    AgentResults, BaselineComparison, QUICK_EPISODES, QUICK_REPEATS, Rate, RoadResults, StudyResults,
+};
 
 /// What every terminal shows in a line.
 const WIDTH_MAX: usize = 80;
@@ -16,7 +18,9 @@ pub fn study(results: &StudyResults) -> String {
         text.push_str(&format!("\n{question}\n"));
     }
     if results.quick {
-        text.push_str("\ncut down by `--quick`: no result, but a sign that it works\n");
+        text.push_str(&format!(
+            "\ncut down by `--quick` to {QUICK_REPEATS} trainings of {QUICK_EPISODES} episodes at most: no result, but a sign that it works\n"
+        ));
     }
     if results.cells < results.cells_wanted {
         text.push_str(&format!("\nunfinished: {} of {} cells\n", results.cells, results.cells_wanted));
@@ -90,13 +94,14 @@ fn comparison_table(road: &RoadResults) -> String {
             with_interval(one.superiority, Some(one.superiority_interval)),
             format!("{:.4}", one.test.p),
             format!("{:.4}", one.p_holm),
+            one.paired.map_or("-".to_owned(), |paired| format!("{:.4}", paired.p)),
         ]
     };
     let rows: Vec<Vec<String>> = printed.map(row).collect();
     if rows.is_empty() {
         return String::new();
     }
-    table(["comparison", "by", "ratio", "Â12", "p", "p (Holm)"], rows)
+    table(["comparison", "by", "ratio", "Â12", "p", "p (Holm)", "p (pairs)"], rows)
 }
 
 fn causes_text(road: &RoadResults) -> String {
@@ -135,7 +140,7 @@ fn together_table(results: &StudyResults) -> String {
     table(head, rows)
 }
 
-fn estimate(found: &Estimate) -> String {
+pub(super) fn estimate(found: &Estimate) -> String {
     with_interval(found.mean, found.interval)
 }
 

@@ -1,6 +1,16 @@
 //! Roads: an OpenDRIVE map as a graph of driving lanes, and routes through it.
 //!
 //! No vehicles here, and no time: signals have a place, not a colour.
+//!
+//! ```
+//! use avastra::road::RoadMap;
+//!
+//! let text = std::fs::read_to_string("scenarios/roads/corner.xodr")?;
+//! let map = RoadMap::from_opendrive("corner", &text)?;
+//! let place = map.place("1", -1, 105.88)?;
+//! assert!(map.lane(place.lane).width_at(place.station_m) > 3.0);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
 mod abreast;
 mod centre_line;

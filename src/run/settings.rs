@@ -166,7 +166,10 @@ pub enum RunError {
     Answers { name: String, error: RecordError },
     #[error("`{name}` does not say which external driving system it was made against: {reason}")]
     Attached { name: String, reason: String },
-    #[error("`{scenario}` was made in world `{engine}`; this is `{ENGINE}`, where nothing need happen alike")]
+    #[error(
+        "`{scenario}` was made in world `{engine}`; this is `{ENGINE}`, where nothing need happen alike: \
+         `avastra test --review` plays it here and says what differs"
+    )]
     Engine { scenario: String, engine: String },
 }
 

@@ -2,6 +2,15 @@
 //!
 //! Written here and not taken from a crate because results must be the same bytes on every machine:
 //! those at hand use the platform's logarithm and exponential function. All intervals are 95 %.
+//!
+//! ```
+//! use avastra::statistics::{mann_whitney, superiority};
+//!
+//! let (ours, theirs) = ([9.0, 11.0, 10.0, 12.0], [4.0, 5.0, 3.0, 6.0]);
+//! let (superiority, _) = superiority(&ours, &theirs).expect("neither is empty");
+//! assert_eq!(superiority, 1.0);
+//! assert!(mann_whitney(&ours, &theirs).expect("neither is empty").p < 0.05);
+//! ```
 
 mod intervals;
 mod ranks;

@@ -1,5 +1,7 @@
 //! What a study file says, field by field. Unknown fields are refused.
 
+use std::collections::BTreeMap;
+
 use serde_json::Value;
 
 use crate::run::DEFAULT_ADS;
@@ -39,6 +41,23 @@ pub struct StudyFile {
     /// Labels of the agents that each other agent is compared with.
     #[serde(default)]
     pub baselines: Vec<String>,
+    /// Published figures that the result is held against by `avastra results`.
+    #[serde(default)]
+    pub published: Vec<PublishedTable>,
+    /// What the result means, and why it differs from what is published; printed by `avastra results`.
+    pub remarks: Option<String>,
+}
+
+/// Figures that others published.
+#[derive(Debug, Clone, PartialEq, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PublishedTable {
+    /// Where they stand.
+    pub source: String,
+    /// The measure of ours that they are compared with, by its name in `results.json`.
+    pub measure: String,
+    /// By agent and road.
+    pub figures: BTreeMap<String, BTreeMap<String, f64>>,
 }
 
 /// How an agent is judged once it is ready.

@@ -1,5 +1,5 @@
 //! Measures: what is computed for each cell. The statistics run over the cells, that is over trainings or
-//! repetitions.
+//! repetitions, and need nothing of a cell but its measures ([`MeasuredCell`]).
 
 use std::collections::BTreeSet;
 
@@ -8,7 +8,7 @@ use crate::run::PEDESTRIAN;
 use crate::statistics::{Lifetime, restricted_mean};
 
 use crate::study::file::EvaluationPlan;
-use crate::study::record::{CellRecord, CollisionRecord, EpisodeRecord, FailureClass, TrainedRecord};
+use crate::study::record::{CellRecord, CollisionRecord, EpisodeRecord, FailureClass, Spent, TrainedRecord};
 
 /// Computes a number; `None` if the cell has no such number, for example the time to a collision without any
 /// collision.
@@ -91,6 +91,35 @@ pub const MEASURES: &[Measure] = &[
         (all_h > 0.0).then(|| (counted + trained(|episode| f64::from(episode.counted))) / all_h)
     }),
 ];
+
+/// A cell without its episodes: all that the statistics need.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MeasuredCell {
+    pub agent: String,
+    pub road: String,
+    /// Number of the training or repetition, from 0.
+    pub number: u32,
+    pub spent: Spent,
+    /// In the order of [`MEASURES`].
+    pub values: Vec<Option<f64>>,
+}
+
+impl MeasuredCell {
+    pub fn new(cell: &CellRecord, plan: &EvaluationPlan) -> MeasuredCell {
+        MeasuredCell {
+            agent: cell.agent.clone(),
+            road: cell.road.clone(),
+            number: cell.number,
+            spent: cell.spent,
+            values: MEASURES.iter().map(|measure| (measure.of)(cell, plan)).collect(),
+        }
+    }
+
+    /// The value of a measure, by its name.
+    pub fn value(&self, measure: &str) -> Option<f64> {
+        self.values[MEASURES.iter().position(|one| one.name == measure)?]
+    }
+}
 
 /// The distinct failures among the counted collisions of episodes.
 pub(super) fn failures<'a>(

@@ -5,24 +5,42 @@
 //! of each other, so the result depends neither on how many run at a time nor on interruptions. [`play_jobs`] plays
 //! them on threads, each road of a job becomes a [`CellRecord`] in [`StudyDatabase`], and [`StudyResults`] are
 //! computed from the cells alone: a number for each cell and measure (`measures`), then [`statistics`] over them.
+//! [`Played`] is what is kept of a study beside its file: these numbers as text, from which the statistics follow again;
+//! [`Agreement`] holds them against published figures.
 //!
 //! [`statistics`]: crate::statistics
+//!
+//! ```
+//! use avastra::study::StudyFile;
+//!
+//! let file = StudyFile::from_yaml("space: mine.ava\nagents: [{ name: random, repeats: 3 }]\n")?;
+//! assert_eq!((file.evaluation.episodes, file.evaluation.seeds), (15, 5));
+//! assert!(StudyFile::from_yaml("space: mine.ava\nagents: [{ name: random, repats: 3 }]\n").is_err());
+//! # Ok::<(), String>(())
+//! ```
 
+mod agreement;
 mod database;
 mod failed;
 mod file;
 mod job;
 mod measures;
+mod played;
 mod ready;
 mod record;
 mod results;
 mod settings;
 
+pub use agreement::{Agreement, ComparedFigure, ComparedPair, P_MAX, Verdict};
 pub use database::StudyDatabase;
 pub use failed::FailedCell;
-pub use file::StudyFile;
+pub use file::{PublishedTable, StudyFile};
 pub use job::{Event, play_jobs};
+pub use played::{Departures, Played};
 pub use ready::Study;
 pub use record::{CellRecord, Spent};
-pub use results::{AgentResults, BaselineComparison, Rate, RoadResults, StudyResults};
-pub use settings::{StudyError, StudySettings};
+pub use results::{
+    AgentResults, BaselineComparison, MeasuredAgent, MeasuredRoad, Rate, RoadResults, StudyResults,
+    measured_roads,
+};
+pub use settings::{AgentSettings, QUICK_EPISODES, QUICK_REPEATS, StudyError, StudySettings};

@@ -12,7 +12,7 @@ use crate::statistics::{
 };
 
 use crate::study::file::EvaluationPlan;
-use crate::study::measures::{MEASURES, Measure, failures};
+use crate::study::measures::{MEASURES, MeasuredCell, failures};
 use crate::study::record::{CellRecord, EpisodeRecord, FailureClass};
 use crate::study::settings::StudySettings;
 
@@ -152,24 +152,17 @@ pub struct BaselineComparison {
 impl StudyResults {
     /// The result over cells in any order.
     pub fn new(settings: &StudySettings, cells: &[CellRecord]) -> StudyResults {
-        let of = |agent: &str, road: &str| -> Vec<&CellRecord> {
-            let mut own: Vec<_> =
-                cells.iter().filter(|cell| cell.agent == agent && cell.road == road).collect();
-            own.sort_by_key(|cell| cell.number);
-            own
-        };
-        let mut roads: Vec<RoadResults> = Vec::new();
-        for road in &settings.roads {
-            let groups: Vec<_> =
-                settings.agents.iter().map(|agent| (agent.label.as_str(), of(&agent.label, road))).collect();
-            let agents = groups.iter().filter(|(_, cells)| !cells.is_empty());
-            roads.push(RoadResults {
-                road: road.clone(),
-                agents: agents.map(|(label, cells)| agent_results(settings, label, cells)).collect(),
-                comparisons: comparisons(settings, &groups),
+        let measured: Vec<MeasuredCell> =
+            cells.iter().map(|cell| MeasuredCell::new(cell, &settings.evaluation)).collect();
+        let roads = measured_roads(settings, &measured).into_iter().map(|measured| {
+            let agents = measured.agents.into_iter().map(|agent| {
+                let own = cells.iter().filter(|cell| cell.agent == agent.agent && cell.road == measured.road);
+                let mut own: Vec<&CellRecord> = own.collect();
+                own.sort_by_key(|cell| cell.number);
+                agent_results(agent, &own)
             });
-        }
-        correct(&mut roads);
+            RoadResults { agents: agents.collect(), road: measured.road, comparisons: measured.comparisons }
+        });
         let together = settings.agents.iter().map(|agent| {
             let own = cells.iter().filter(|cell| cell.agent == agent.label);
             let mut own: Vec<_> = own.collect();
@@ -188,17 +181,64 @@ impl StudyResults {
             cells: cells.len(),
             cells_wanted: repeats * settings.roads.len(),
             together: together.collect(),
-            roads,
+            roads: roads.collect(),
         }
     }
 }
 
-fn agent_results(settings: &StudySettings, label: &str, cells: &[&CellRecord]) -> AgentResults {
+/// What the measures of a study's cells say about one road.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MeasuredRoad {
+    pub road: String,
+    /// The agents that have cells, in the study's order.
+    pub agents: Vec<MeasuredAgent>,
+    pub comparisons: Vec<BaselineComparison>,
+}
+
+/// The measures of an agent on one road.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MeasuredAgent {
+    pub agent: String,
+    /// Trainings or repetitions.
+    pub cells: usize,
+    /// Mean over them of each measure, by the names of [`MEASURES`].
+    pub measures: BTreeMap<&'static str, Estimate>,
+}
+
+/// The statistics of a study, from the measures of its cells in any order.
+pub fn measured_roads(settings: &StudySettings, cells: &[MeasuredCell]) -> Vec<MeasuredRoad> {
+    let mut roads: Vec<MeasuredRoad> = Vec::new();
+    for road in &settings.roads {
+        let of = |agent: &str| {
+            let own = cells.iter().filter(|cell| cell.agent == agent && cell.road == *road);
+            let mut own: Vec<&MeasuredCell> = own.collect();
+            own.sort_by_key(|cell| cell.number);
+            own
+        };
+        let groups: Vec<_> =
+            settings.agents.iter().map(|agent| (agent.label.as_str(), of(&agent.label))).collect();
+        let agents = groups.iter().filter(|(_, cells)| !cells.is_empty());
+        roads.push(MeasuredRoad {
+            road: road.clone(),
+            agents: agents.map(|(label, cells)| measured_agent(label, cells)).collect(),
+            comparisons: comparisons(settings, &groups),
+        });
+    }
+    correct(&mut roads);
+    roads
+}
+
+fn measured_agent(label: &str, cells: &[&MeasuredCell]) -> MeasuredAgent {
+    let estimate = |measure| Some((measure, not_negative(mean(&values(measure, cells))?)));
+    MeasuredAgent {
+        agent: label.to_owned(),
+        cells: cells.len(),
+        measures: MEASURES.iter().filter_map(|measure| estimate(measure.name)).collect(),
+    }
+}
+
+fn agent_results(measured: MeasuredAgent, cells: &[&CellRecord]) -> AgentResults {
     let episodes = || cells.iter().flat_map(|cell| &cell.episodes);
-    let measures = MEASURES
-        .iter()
-        .filter_map(|measure| Some((measure.name, not_negative(mean(&values(settings, measure, cells))?))))
-        .collect();
     let counted = || episodes().flat_map(|episode| &episode.collisions).filter(|found| found.counted);
     let mut causes: BTreeMap<String, usize> = BTreeMap::new();
     for cause in counted().filter_map(|found| found.failure.cause.as_ref()) {
@@ -214,9 +254,9 @@ fn agent_results(settings: &StudySettings, label: &str, cells: &[&CellRecord]) -
         .collect();
     found.sort_by_key(|failure| core::cmp::Reverse(failure.count));
     AgentResults {
-        agent: label.to_owned(),
-        cells: cells.len(),
-        measures,
+        agent: measured.agent,
+        cells: measured.cells,
+        measures: measured.measures,
         episodes: Pooled::new(episodes()),
         causes,
         failures: found,
@@ -231,8 +271,8 @@ fn not_negative(estimate: Estimate) -> Estimate {
     Estimate { interval, ..estimate }
 }
 
-fn values(settings: &StudySettings, measure: &Measure, cells: &[&CellRecord]) -> Vec<f64> {
-    cells.iter().filter_map(|cell| (measure.of)(cell, &settings.evaluation)).collect()
+pub(super) fn values(measure: &str, cells: &[&MeasuredCell]) -> Vec<f64> {
+    cells.iter().filter_map(|cell| cell.value(measure)).collect()
 }
 
 fn seeds(cell: &CellRecord) -> CellSeeds {
@@ -298,13 +338,13 @@ fn curve(cells: &[&CellRecord]) -> Vec<CurvePoint> {
 }
 
 /// Every agent compared with every baseline but itself, not yet corrected.
-fn comparisons(settings: &StudySettings, groups: &[(&str, Vec<&CellRecord>)]) -> Vec<BaselineComparison> {
+fn comparisons(settings: &StudySettings, groups: &[(&str, Vec<&MeasuredCell>)]) -> Vec<BaselineComparison> {
     let mut found = Vec::new();
     for baseline in &settings.baselines {
         let Some((_, theirs)) = groups.iter().find(|(label, _)| label == baseline) else { continue };
         for (label, own) in groups.iter().filter(|(label, _)| label != baseline) {
             for measure in MEASURES.iter().filter(|measure| measure.is_compared) {
-                found.extend(comparison(settings, measure, (label, own), (baseline, theirs)));
+                found.extend(comparison(settings, measure.name, (label, own), (baseline, theirs)));
             }
         }
     }
@@ -314,25 +354,24 @@ fn comparisons(settings: &StudySettings, groups: &[(&str, Vec<&CellRecord>)]) ->
 /// `None` if one of the samples is still empty.
 fn comparison(
     settings: &StudySettings,
-    measure: &Measure,
-    (agent, own_cells): (&str, &[&CellRecord]),
-    (baseline, their_cells): (&str, &[&CellRecord]),
+    measure: &'static str,
+    (agent, own_cells): (&str, &[&MeasuredCell]),
+    (baseline, their_cells): (&str, &[&MeasuredCell]),
 ) -> Option<BaselineComparison> {
-    let (own, theirs) = (values(settings, measure, own_cells), values(settings, measure, their_cells));
+    let (own, theirs) = (values(measure, own_cells), values(measure, their_cells));
     let test = mann_whitney(&own, &theirs)?;
     let (superiority, superiority_interval) = superiority(&own, &theirs)?;
     let mut rng = rng::stream(settings.first_seed, Stream::Bootstrap, 0);
-    let of = |cell: &CellRecord| (measure.of)(cell, &settings.evaluation);
     let pairs = own_cells.iter().filter_map(|own| {
         let theirs = their_cells.iter().find(|cell| cell.number == own.number)?;
-        Some((of(own)?, of(theirs)?))
+        Some((own.value(measure)?, theirs.value(measure)?))
     });
     let (first, second): (Vec<f64>, Vec<f64>) = pairs.unzip();
     let ratio = ratio_of_means(&own, &theirs, &mut rng);
     Some(BaselineComparison {
         agent: agent.to_owned(),
         baseline: baseline.to_owned(),
-        measure: measure.name,
+        measure,
         ratio: ratio.map(|(ratio, _)| ratio),
         ratio_interval: ratio.map(|(_, interval)| interval),
         test,
@@ -344,7 +383,7 @@ fn comparison(
 }
 
 /// Holm's correction over all roads, agents and baselines, for each measure by itself.
-fn correct(roads: &mut [RoadResults]) {
+fn correct(roads: &mut [MeasuredRoad]) {
     for measure in MEASURES {
         let mut family: Vec<&mut BaselineComparison> = roads
             .iter_mut()

@@ -12,7 +12,8 @@ use crate::run::{EPISODES_MAX, Profile, RunError, TrafficRecord, VERSION, agent_
 use crate::sim::ENGINE;
 use crate::syntax::listed;
 
-use crate::study::file::{AgentFile, EvaluationPlan, StudyFile};
+use crate::study::file::{AgentFile, EvaluationPlan, PublishedTable, StudyFile};
+use crate::study::measures::MEASURES;
 
 /// Everything that is needed to repeat a study; written to `study.yaml`.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -91,6 +92,8 @@ pub enum StudyError {
     LabelTwice { label: String },
     #[error("no agent is called `{label}`, which `baselines` names: there are {known}")]
     Baseline { label: String, known: String },
+    #[error("`published` names the {what} `{name}`, which the study does not have: there are {known}")]
+    Published { what: &'static str, name: String, known: String },
     #[error("agent `{label}`: `{field}` is for agents that learn, `{name}` does not")]
     NotLearning { label: String, name: String, field: &'static str },
     #[error("agent `{label}`: `repeats` is for agents that do not learn, `{name}` does; say `trainings`")]
@@ -114,6 +117,9 @@ const REPEATS_MAX: u32 = 10_000;
 const REPEATS: u32 = 10;
 /// Episodes of a training if the file gives no number: the default of `avastra train`.
 const TRAINING_EPISODES: u32 = 750;
+/// What `--quick` leaves of the trainings or repetitions of an agent, and of the episodes of a training. Ours.
+pub const QUICK_REPEATS: u32 = 2;
+pub const QUICK_EPISODES: u32 = 12;
 
 impl StudySettings {
     /// The settings that a file asks for, in full. `read` gives the text of a file that it names.
@@ -132,8 +138,9 @@ impl StudySettings {
             [] => space.roads.iter().map(|road| road.name.clone()).collect(),
             _ => file.roads,
         };
+        let published = file.published;
         let agents = file.agents.into_iter().map(|agent| agent_settings(agent, read));
-        Ok(StudySettings {
+        let settings = StudySettings {
             avastra: VERSION.to_owned(),
             engine: ENGINE.to_owned(),
             question: file.question,
@@ -152,7 +159,26 @@ impl StudySettings {
             agents: agents.collect::<Result<_, _>>()?,
             baselines: file.baselines,
             avoidability: AvoidabilitySettings::default(),
-        })
+        };
+        published.iter().try_for_each(|table| settings.has_what_is_published(table))?;
+        Ok(settings)
+    }
+
+    /// Whether a table of published figures speaks of this study.
+    fn has_what_is_published(&self, table: &PublishedTable) -> Result<(), StudyError> {
+        let among = |what, name: &str, known: &[&str]| match known.contains(&name) {
+            true => Ok(()),
+            false => Err(StudyError::Published { what, name: name.to_owned(), known: listed(known) }),
+        };
+        let measures: Vec<&str> = MEASURES.iter().map(|measure| measure.name).collect();
+        let labels: Vec<&str> = self.agents.iter().map(|agent| agent.label.as_str()).collect();
+        let roads: Vec<&str> = self.roads.iter().map(String::as_str).collect();
+        among("measure", &table.measure, &measures)?;
+        for (label, figures) in &table.figures {
+            among("agent", label, &labels)?;
+            figures.keys().try_for_each(|road| among("road", road, &roads))?;
+        }
+        Ok(())
     }
 
     /// Cuts the study down to a minute or two: enough to see that it works, not enough to learn anything from.
@@ -161,9 +187,9 @@ impl StudySettings {
         self.evaluation.episodes = self.evaluation.episodes.min(3);
         self.evaluation.seeds = self.evaluation.seeds.min(1);
         for agent in &mut self.agents {
-            agent.repeats = agent.repeats.min(2);
+            agent.repeats = agent.repeats.min(QUICK_REPEATS);
             if let Some(training) = &mut agent.training {
-                training.episodes = training.episodes.min(12);
+                training.episodes = training.episodes.min(QUICK_EPISODES);
             }
         }
         self

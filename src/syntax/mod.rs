@@ -1,6 +1,14 @@
 //! Text to tree and back: the grammar, `parse`, `format`, and diagnostics.
 //!
 //! Nothing here knows what a name means, and nothing outside knows what the grammar looks like.
+//!
+//! ```
+//! use avastra::syntax::ast::FileId;
+//! use avastra::syntax::format;
+//!
+//! let text = format(FileId::default(), "language 1\nlet far=40m // enough\n").expect("it has no mistakes");
+//! assert!(text.ends_with("let far = 40 m // enough\n"));
+//! ```
 
 pub mod ast;
 mod build;

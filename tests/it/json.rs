@@ -92,7 +92,7 @@ fn results_are_as_explain_describes_them() {
     let scratch = tempfile::tempdir().expect("a scratch directory");
     let at = |name: &str| scratch.path().join(name).display().to_string();
     let space = "scenarios/avastra45.ava";
-    let quick: [&[&str]; 14] = [
+    let quick: [&[&str]; 15] = [
         &["check", "--audit", space],
         &["check", "--dump", "actions", space],
         &["compile", space, "-o", &at("table.yaml")],
@@ -104,6 +104,7 @@ fn results_are_as_explain_describes_them() {
         &["diff", space, "scenarios/deepcollision52.ava"],
         &["doc", space],
         &["new", &at("mine")],
+        &["results", "--out", &at("RESULTS.md")],
         &["completions", "bash"],
         &["export-weights", "policies/corner.ava", "-o", &at("corner.safetensors")],
         &["road", space, "--road", "corner"],

@@ -36,6 +36,7 @@ mod surveys;
 mod tables;
 mod traces;
 mod torch;
+mod tour;
 mod training;
 mod traffic;
 mod trials;

@@ -55,6 +55,46 @@ fn a_study_depends_on_its_file_alone() {
     assert_eq!(results(&broken), whole);
 
     cells_are_runs(&whole);
+    kept_and_written_again(scratch.path(), &alone);
+}
+
+/// What a study found is kept beside its file, and from that alone its text is written again to the same bytes.
+fn kept_and_written_again(scratch: &Path, played: &Path) {
+    let scenarios = scratch.join("scenarios");
+    std::fs::create_dir_all(scenarios.join("studies")).expect("it is writable");
+    for shared in ["avastra45.ava", "roads.ava", "roads", "ads"] {
+        let link = scenarios.join(shared);
+        std::os::unix::fs::symlink(root().join("scenarios").join(shared), link).expect("links can be made");
+    }
+    // By now the study asks for more than was played, and there are figures to compare with.
+    let published = "published:\n  - source: a paper\n    measure: counted\n    \
+                     figures: { random: { corner: 3.2 }, tiny: { corner: 0.1 } }\n\
+                     remarks: It is too small to say anything.\n";
+    let study = std::fs::read_to_string(root().join("scenarios/studies/smoke.yaml")).expect("it is shipped");
+    let study = study.replace("trainings: 2\n    episodes: 6\n", "trainings: 4\n    episodes: 600\n");
+    let file = scenarios.join("studies/smoke.yaml");
+    std::fs::write(&file, format!("{study}{published}")).expect("it is writable");
+    std::fs::copy(root().join("scenarios/studies/random.yaml"), scenarios.join("studies/random.yaml"))
+        .expect("it is shipped");
+
+    let out = scratch.join("RESULTS.md").display().to_string();
+    let write = |more: &[&str]| {
+        let mut command = avastra(&[&["results", "scenarios/studies", "--out", &out], more].concat());
+        let (status, _, stderr) = outcome(command.current_dir(scratch));
+        assert_eq!(status, 0, "{stderr}");
+        std::fs::read_to_string(&out).expect("it was written")
+    };
+    let first = write(&["--add", &played.display().to_string(), "--commit", "0123abc"]);
+    assert_eq!(write(&[]), first);
+    let (_, chapters) = first.split_once("\n## ").expect("a chapter for each study");
+    // How long it took depends on the machine.
+    let (before, rest) = chapters.split_once(" h simulated in ").expect("it was played");
+    let (_, after) = rest.split_once(" of one worker").expect("it took some time");
+    expect_snapshot("studies", "results", &format!("## {before} h simulated in … of one worker{after}"));
+
+    std::fs::write(&file, format!("{study}{}", published.replace("tiny", "tinny"))).expect("it is writable");
+    let refused = outcome(avastra(&["results", "scenarios/studies", "--out", &out]).current_dir(scratch));
+    assert!(refused.0 == 1 && refused.2.contains("names the agent `tinny`"), "{}", refused.2);
 }
 
 /// Ctrl-C ends a study in good order. Returns false if the study was over before, as on a fast machine.
@@ -178,9 +218,23 @@ fn what_no_study_can_be_is_said_so() {
 }
 
 #[test]
+fn the_results_are_what_the_kept_studies_say() {
+    let scratch = tempfile::tempdir().expect("a scratch directory");
+    let out = scratch.path().join("RESULTS.md");
+    let written = ["results", "scenarios/studies", "--out", &out.display().to_string()];
+    let (status, _, stderr) = outcome(avastra(&written).current_dir(root()));
+    assert_eq!(status, 0, "{stderr}");
+    let read = |path: &Path| std::fs::read_to_string(path).expect("it is readable");
+    assert!(read(&out) == read(&root().join("RESULTS.md")), "write it again with `avastra results`");
+}
+
+#[test]
 fn every_shipped_study_can_begin() {
     let folder = root().join("scenarios/studies");
     for entry in std::fs::read_dir(folder).expect("it is there").flatten() {
+        if entry.path().extension().is_none_or(|extension| extension != "yaml") {
+            continue;
+        }
         let text = std::fs::read_to_string(entry.path()).expect("it is readable");
         let study = loaded(&text);
         // No episode is used both for training and for evaluation.

@@ -110,6 +110,84 @@ fn a_suite_outlives_changes_of_its_space() {
     assert_eq!(unchanged as u64, kept);
 }
 
+/// Scenarios that say what is not so are shown with what differs in meaning, and written anew to the byte.
+#[test]
+fn a_review_says_what_differs_in_meaning() {
+    let found = Found::new(&[]);
+    let (run, before) = (found.path("run"), found.texts());
+    let names: Vec<String> = found.files("run/critical").iter().map(|file| name(file)).collect();
+    let edit = |number: usize, from: &str, to: &str| {
+        let file = format!("run/critical/{}", names[number]);
+        let path = found.scratch.path().join(&file);
+        let text = std::fs::read_to_string(&path).expect("it is readable");
+        assert!(text.contains(from), "{file} has no `{from}`");
+        std::fs::write(&path, text.replace(from, to)).expect("it is writable");
+    };
+    let changes = |tested: &serde_json::Value| -> Vec<String> {
+        let reviewed = tested["reviewed"].as_array().expect("a list");
+        reviewed.iter().map(|one| one["change"].as_str().expect("a text").to_owned()).collect()
+    };
+    let between = |text: &str, from: &str, to: &str| -> String {
+        let (_, rest) = text.split_once(from).expect("it is there");
+        rest.split_once(to).expect("it ends").0.to_owned()
+    };
+    let (status, tested, stderr) = found.test(&["--review", &run]);
+    assert!(status == 4 && changes(&tested).iter().all(|change| change == "same"), "{tested}{stderr}");
+
+    // The first was made in an older world, where it crashed earlier; somebody wrote a comment into it.
+    let time = between(&before[0], "expect collision with ", " s\n");
+    let (first, _) = time.split_once(" at ").expect("it says when");
+    edit(0, &format!("{time} s"), &format!("{first} at 1.00 s"));
+    edit(0, " is hit at ", " is hit at 1.0 s, not at ");
+    edit(0, "engine: \"plane/", "engine: \"plane/0");
+    edit(0, "  road: corner", "  // looked at\n  road: corner");
+    // The second crashed with somebody else.
+    let obstacle = between(&before[1], "expect collision with ", " at ");
+    edit(1, &obstacle, "npc#77");
+    let wrong = found.texts();
+    let (_, tested, _) = found.test(&[&run]);
+    assert_eq!(tested["errors"], 1, "the world is another: {tested}");
+    let (status, tested, stderr) = found.test(&["--review", &run]);
+    assert_eq!(changes(&tested)[..2], ["same crash, other time", "another crash"], "{stderr}");
+    let told = tested["reviewed"][0]["differences"].to_string();
+    assert!(told.contains("in place of `plane/0") && told.contains("at 1.00 s: at "), "{told}");
+    assert!(tested["reviewed"][1]["differences"].to_string().contains(&format!("{obstacle} is hit at")));
+    assert_eq!((status, found.texts()), (4, wrong), "to look changes nothing");
+    let (status, tested, _) = found.test(&["--accept", &run]);
+    assert_eq!((status, tested["accepted"].as_u64()), (4, Some(2)), "{tested}");
+    edit(0, "  // looked at\n", "");
+    assert_eq!(found.texts(), before);
+
+    let (class, other) = match before[0].contains("expect avoidable") {
+        true => ("expect avoidable", "expect unavoidable"),
+        false => ("expect beyond_reference", "expect unavoidable"),
+    };
+    edit(0, class, other);
+    let (_, tested, _) = found.test(&["--accept", &run]);
+    assert_eq!(changes(&tested)[0], "same crash, other verdict");
+    assert_eq!(found.texts(), before);
+
+    // Another driving system takes the place of the recorded one where it crashes, too; elsewhere nothing is written.
+    let (_, tested, _) = found.test(&["--accept", "--ads", "idm", &run]);
+    let changes = changes(&tested);
+    for ((then, now), change) in before.iter().zip(found.texts()).zip(&changes) {
+        let is_gone = change == "gone";
+        assert_eq!((*then == now, now.contains("ads: \"idm\"")), (is_gone, !is_gone), "{change}: {now}");
+        assert!(is_gone || !now.contains("profile"), "{now}");
+    }
+    let files = found.files("run/critical").into_iter().zip(&changes).filter(|(_, change)| *change != "gone");
+    let files: Vec<String> = files.map(|(file, _)| file.display().to_string()).collect();
+    if !files.is_empty() {
+        let files: Vec<&str> = files.iter().map(String::as_str).collect();
+        let (status, stdout, stderr) = outcome(&mut avastra(&[&["verify"], &files[..]].concat()));
+        assert_eq!(status, 0, "{stdout}{stderr}");
+    }
+}
+
+fn name(path: &Path) -> String {
+    path.file_name().expect("it has a name").to_string_lossy().into_owned()
+}
+
 impl Found {
     fn texts(&self) -> Vec<String> {
         let read = |path: &PathBuf| std::fs::read_to_string(path).expect("it is readable");

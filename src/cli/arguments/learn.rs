@@ -121,3 +121,19 @@ pub struct StudyArguments {
     #[arg(long)]
     pub quick: bool,
 }
+
+#[derive(Debug, Args)]
+pub struct ResultsArguments {
+    /// Folder of studies; what was kept of playing `NAME.yaml` is `NAME.jsonl` beside it.
+    #[arg(default_value = "scenarios/studies")]
+    pub studies: PathBuf,
+    /// Keep what a study's directory holds, finished or not, for the study that asks the same question.
+    #[arg(long, value_name = "DIR")]
+    pub add: Vec<PathBuf>,
+    /// What avastra was built from when it played them.
+    #[arg(long, requires = "add")]
+    pub commit: Option<String>,
+    /// Where to write.
+    #[arg(long, short, default_value = "RESULTS.md")]
+    pub out: PathBuf,
+}

@@ -18,7 +18,8 @@ pub use language::{
     EditorFilesArguments, ExplainArguments, FmtArguments, NewArguments, TableArguments, WhyArguments,
 };
 pub use learn::{
-    DistillArguments, ExplainPolicyArguments, ExportWeightsArguments, StudyArguments, TrainArguments,
+    DistillArguments, ExplainPolicyArguments, ExportWeightsArguments, ResultsArguments, StudyArguments,
+    TrainArguments,
 };
 pub use scenarios::{
     DiagnoseArguments, ExportArguments, ExportEgo, ExportFormat, ExportVersion, FilesArguments,
@@ -108,6 +109,8 @@ pub enum Command {
     ExportWeights(ExportWeightsArguments),
     /// Compare agents over roads and independent trainings, with statistics.
     Study(StudyArguments),
+    /// Write what a folder of studies found as one Markdown file, beside published figures.
+    Results(ResultsArguments),
     /// Say how often a crash would happen: its probability in an episode and its rate, with intervals.
     Estimate(EstimateArguments),
     /// Play two driving systems in the same episodes and say which one crashes more often.

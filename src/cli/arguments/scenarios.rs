@@ -141,7 +141,10 @@ pub struct TestArguments {
     /// Let pass what crashes with another obstacle, or is hit from another side, than its scenario says.
     #[arg(long)]
     pub allow_changed: bool,
-    /// Where the space has changed, take the change over into the scenarios that still play as they claim.
+    /// Where space, rules, driving system or engine have changed: say of each scenario what differs in meaning.
+    #[arg(long)]
+    pub review: bool,
+    /// The same, and write into the scenarios what is so now.
     #[arg(long)]
     pub accept: bool,
     /// Driving system under test [default: the one that each scenario was found with].

@@ -1,0 +1,132 @@
+//! `avastra results`: what a folder of studies found, as one text.
+
+use std::path::{Path, PathBuf};
+
+use crate::report;
+use crate::report::Chapter;
+use crate::study::{FailedCell, Played, StudyDatabase, StudySettings};
+use crate::syntax::yaml_mistake;
+
+use super::arguments::ResultsArguments;
+use super::error::Failure;
+use super::files::write;
+use super::load;
+use super::output::{Output, plural};
+use super::study;
+
+/// Takes played studies in, and writes what all studies of a folder found.
+pub fn results(output: &Output, arguments: &ResultsArguments) -> Result<(), Failure> {
+    let mut chapters = chapters(output, &arguments.studies)?;
+    for directory in &arguments.add {
+        let played = played(directory, arguments.commit.clone())?;
+        let chapter = chapter_of(&mut chapters, directory, &played)?;
+        let played = as_from_file(played, chapter);
+        let path = kept(&arguments.studies, &chapter.name);
+        write(&path, &played.to_text())?;
+        output.tell(&format!(
+            "{} of {} into {}",
+            plural(played.cells.len(), "cell"),
+            directory.display(),
+            path.display()
+        ));
+        chapter.played = Some(played);
+    }
+    write(&arguments.out, &report::results(&chapters))?;
+    let there = chapters.iter().filter(|chapter| chapter.played.is_some()).count();
+    output.say(&format!(
+        "{}: {there} of {} are played",
+        arguments.out.display(),
+        plural(chapters.len(), "study")
+    ));
+    let listed = chapters.iter().map(|chapter| {
+        let departures = chapter.played.as_ref().map(|played| played.departures(&chapter.wanted));
+        serde_json::json!({
+            "study": chapter.name,
+            "cells": chapter.played.as_ref().map(|played| played.cells.len()),
+            "smaller": departures.as_ref().map(|found| &found.smaller),
+            "other": departures.as_ref().map(|found| &found.other),
+        })
+    });
+    output.result(serde_json::json!({ "output": arguments.out, "studies": listed.collect::<Vec<_>>() }));
+    Ok(())
+}
+
+/// The studies of a folder, in the order of their names, with what is kept of playing them.
+fn chapters(output: &Output, folder: &Path) -> Result<Vec<Chapter>, Failure> {
+    let entries = std::fs::read_dir(folder).map_err(|error| Failure::file("read", folder, error))?;
+    let mut files: Vec<PathBuf> = entries.flatten().map(|entry| entry.path()).collect();
+    files.retain(|file| file.extension().is_some_and(|extension| extension == "yaml"));
+    files.sort();
+    if files.is_empty() {
+        return Err(Failure::file("use", folder, "it has no study (`*.yaml`)"));
+    }
+    files.iter().map(|file| chapter(output, folder, file)).collect()
+}
+
+fn chapter(output: &Output, folder: &Path, path: &Path) -> Result<Chapter, Failure> {
+    let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let (file, _, wanted) = study::wanted(output, path, None)?;
+    let kept = kept(folder, &name);
+    let played = match kept.is_file() {
+        false => None,
+        true => {
+            let played = Played::from_text(&load::text(&kept)?);
+            Some(played.map_err(|reason| Failure::file("read", &kept, reason))?)
+        }
+    };
+    Ok(Chapter { name, command: format!("avastra study {}", path.display()), file, wanted, played })
+}
+
+/// Where a played study is kept.
+fn kept(folder: &Path, name: &str) -> PathBuf {
+    folder.join(format!("{name}.jsonl"))
+}
+
+/// What a study's directory holds, finished or not.
+fn played(directory: &Path, commit: Option<String>) -> Result<Played, Failure> {
+    let (path, file) = (directory.join("study.yaml"), directory.join("study.db"));
+    if !path.is_file() || !file.is_file() {
+        let directory = directory.display();
+        return Err(Failure::usage(format!(
+            "`{directory}` is no study's directory: `avastra study FILE --out {directory}` makes one"
+        )));
+    }
+    let text = load::text(&path)?;
+    let settings: StudySettings = serde_yaml::from_str(&text)
+        .map_err(|error| Failure::file("read", &path, yaml_mistake(&error, &text)))?;
+    let read = |error| Failure::file("read", &file, error);
+    let cells = StudyDatabase::open(&file, &text).map_err(read)?.cells().map_err(read)?;
+    if !FailedCell::among(&cells).is_empty() {
+        return Err(Failure::file("use", &file, "the driving system failed in it, so there are no results"));
+    }
+    Ok(Played::new(settings, &cells, commit))
+}
+
+/// The study that a directory was played for: the one that asks the same question.
+fn chapter_of<'a>(
+    chapters: &'a mut [Chapter],
+    directory: &Path,
+    played: &Played,
+) -> Result<&'a mut Chapter, Failure> {
+    let question = &played.settings.question;
+    let mut found = chapters.iter_mut().filter(|chapter| chapter.file.question == *question);
+    let (Some(chapter), None) = (found.next(), found.next()) else {
+        let question = question.as_deref().unwrap_or_default();
+        return Err(Failure::file(
+            "add",
+            directory,
+            format!("not one of the studies alone asks its question, `{question}`"),
+        ));
+    };
+    Ok(chapter)
+}
+
+/// The same without the paths of the machine that played it.
+fn as_from_file(played: Played, chapter: &Chapter) -> Played {
+    let mut settings = played.settings;
+    settings.space = chapter.file.space.clone();
+    if let Some(attached) = &mut settings.external {
+        attached.settings.working_directory = None;
+    }
+    Played { settings, ..played }
+}

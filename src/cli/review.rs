@@ -1,0 +1,267 @@
+//! What a scenario says of its world against what is there now: the space, the engine and the driving system may have
+//! changed since it was written. It is played again as they are now, each difference is said in words, and the text is
+//! made that says the new. Of the file only what differs is replaced: digests, origin, claims.
+
+use std::ops::Range;
+
+use crate::action::ActionTable;
+use crate::emit;
+use crate::episode::{EpisodeLog, Outcome};
+use crate::model::{COUNTED, Claim, Scenario};
+use crate::oracle;
+use crate::oracle::ClaimResult;
+use crate::run::{Asked, EpisodeSummary, RunError, Stage, recorded_traffic};
+use crate::sim::ENGINE;
+use crate::syntax::ast::{self, Doc, FileId, ItemKind, Span};
+
+use super::error::Failure;
+
+/// Fields of an origin that say by what the scenario was played.
+const PLAYED_BY: [&str; 6] = ["ads", "profile", "profile_digest", "answers", "engine", "traffic_digest"];
+
+/// How the crash of a scenario differs from what the scenario says; the larger difference comes later.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Change {
+    Same,
+    /// The same crash at the same time, by a drive that is not the same to the bit.
+    OtherDrive,
+    OtherTime,
+    OtherVerdict,
+    OtherObstacle,
+    /// No collision counts any more.
+    Gone,
+}
+
+impl Change {
+    pub fn in_words(self) -> &'static str {
+        match self {
+            Change::Same => "same",
+            Change::OtherDrive => "same crash, another drive",
+            Change::OtherTime => "same crash, other time",
+            Change::OtherVerdict => "same crash, other verdict",
+            Change::OtherObstacle => "another crash",
+            Change::Gone => "gone",
+        }
+    }
+}
+
+/// What came of playing a scenario as things are now.
+pub struct Review {
+    pub change: Change,
+    /// Each difference in words.
+    pub differences: Vec<String>,
+    /// The text that says what is so now, and the log of it; `None` for what is gone.
+    pub now: Option<(String, EpisodeLog)>,
+}
+
+/// Plays a scenario as things are now: against the driving system that is asked for, or else the recorded one. `text` is its
+/// file's, with the digest that its space has now.
+///
+/// # Errors
+/// If it cannot be played: its driving system, rules or traffic do not exist any more, or a step is not legal any more.
+pub fn review(
+    table: &ActionTable,
+    scenario: &Scenario,
+    asked: &Asked,
+    text: &str,
+) -> Result<Review, Failure> {
+    let mut differences = Vec::new();
+    let mut scenario = scenario.clone();
+    if let Some(engine) = scenario.origin.engine.replace(ENGINE.to_owned()).filter(|engine| engine != ENGINE)
+    {
+        differences.push(format!("the world is `{ENGINE}` in place of `{engine}`"));
+    }
+    if matches!(recorded_traffic(&scenario), Err(RunError::TrafficDigest { .. })) {
+        scenario.origin.traffic_digest = None;
+        differences.push("the settings of its traffic mean something else by now".to_owned());
+    }
+    let (ads, is_recorded) = match asked.selected_for(&scenario) {
+        Err(RunError::ProfileDigest { .. }) => {
+            scenario.origin.profile_digest = None;
+            differences.push("the settings of its driving system mean something else by now".to_owned());
+            (asked.selected_for(&scenario)?.0, false)
+        }
+        found => {
+            let (ads, is_recorded) = found?;
+            if !is_recorded {
+                differences.push(format!("played against {} as asked for", ads.name()));
+            }
+            (ads, is_recorded)
+        }
+    };
+    let stage = Stage::new(table, &scenario)?;
+    let log = stage.play(&ads, &mut |_, _, _| {});
+    must_be_legal(&log)?;
+    let results = stage.verify(&ads, &log);
+    let refuted = || scenario.claims.iter().zip(&results).filter(|(_, result)| result.is_refuted());
+
+    // A scenario that claims no collision, but how its driving system fails, has nothing to be rewritten by.
+    let has_collision = scenario.claims.iter().any(|claim| matches!(claim, Claim::Collision { .. }));
+    if !has_collision {
+        let change = if refuted().count() == 0 { Change::Same } else { Change::Gone };
+        differences.extend(refuted().map(|(_, result)| in_words(result)));
+        let now = (change == Change::Same && is_recorded).then(|| (text.to_owned(), log));
+        return Ok(Review { change, differences, now });
+    }
+
+    let setup = stage.setup(&ads);
+    let episode = scenario.origin.episode.unwrap_or(0) as usize;
+    let mut summary = EpisodeSummary::judged(&setup, episode, &log, stage.avoidability());
+    let change = change(&scenario, &summary, &results);
+    let told = refuted().filter(|(claim, _)| !matches!(claim, Claim::Proc(_) | Claim::Trace(_)));
+    differences.extend(told.map(|(_, result)| in_words(result)));
+    if change == Change::Gone {
+        return Ok(Review { change, differences, now: None });
+    }
+    differences.extend(newly_hit(&scenario, &summary));
+    let claims = |is: fn(&Claim) -> bool| scenario.claims.iter().any(is);
+    if claims(|claim| matches!(claim, Claim::Cause { .. })) {
+        summary.find_causes(&setup, &log).map_err(Failure::usage)?;
+    }
+    if claims(|claim| matches!(claim, Claim::Minimal { .. })) {
+        let judgements: Vec<_> = summary.collisions.iter().map(|found| found.judgement.clone()).collect();
+        for found in summary.collisions.iter_mut().filter(|found| found.counted) {
+            let spare = oracle::spare_steps(&setup, &log, found.number, &judgements, stage.avoidability());
+            found.minimal = spare.is_empty();
+        }
+    }
+    let source = emit::Provenance {
+        command: "test",
+        name: &scenario.name,
+        space_path: "",
+        episode,
+        agent: scenario.origin.policy.as_deref().unwrap_or("none"),
+        without: &scenario.origin.without,
+        with: &scenario.origin.with,
+    };
+    let told_anew = crate::syntax::print(&emit::retold(table, &log, &summary, &source));
+    let now = rewritten(text, &told_anew, change > Change::Same);
+    Ok(Review { change, differences, now: Some((now, log)) })
+}
+
+/// What is refused now would be another scenario.
+fn must_be_legal(log: &EpisodeLog) -> Result<(), Failure> {
+    for (number, step) in log.steps.iter().enumerate() {
+        if let Outcome::Refused { rule, reason, .. } = &step.outcome {
+            let rule = rule.as_ref().map_or(String::new(), |rule| format!("rule `{rule}`: "));
+            return Err(Failure::usage(format!("step {number} is not legal any more: {rule}{reason}")));
+        }
+    }
+    Ok(())
+}
+
+fn in_words(result: &ClaimResult) -> String {
+    format!("{}: {}", result.claim, result.found)
+}
+
+/// The largest difference between what a scenario claims and what was found.
+fn change(scenario: &Scenario, summary: &EpisodeSummary, results: &[ClaimResult]) -> Change {
+    let Some(first) = summary.collisions.iter().find(|found| found.counted) else { return Change::Gone };
+    let claimed = scenario.claims.iter().find_map(|claim| match claim {
+        Claim::Verdict { name, obstacle } if name == COUNTED => *obstacle,
+        _ => None,
+    });
+    if claimed.is_some_and(|claimed| claimed.number != first.collision.contact.obstacle) {
+        return Change::OtherObstacle;
+    }
+    let of = |(claim, result): (&Claim, &ClaimResult)| match claim {
+        _ if !result.is_refuted() => Change::Same,
+        Claim::Proc(_) | Claim::Trace(_) | Claim::End(_) | Claim::Minimal { .. } => Change::OtherDrive,
+        Claim::Collision { .. } => Change::OtherTime,
+        Claim::Verdict { .. } | Claim::Avoidability { .. } | Claim::Cause { .. } | Claim::Priority { .. } => {
+            Change::OtherVerdict
+        }
+    };
+    scenario.claims.iter().zip(results).map(of).max().unwrap_or(Change::Same)
+}
+
+/// Obstacles that are hit now and were not.
+fn newly_hit(scenario: &Scenario, summary: &EpisodeSummary) -> Vec<String> {
+    let was_hit = |number: u32| {
+        scenario.claims.iter().any(|claim| match claim {
+            Claim::Collision { obstacle, .. } => obstacle.is_none_or(|obstacle| obstacle.number == number),
+            _ => false,
+        })
+    };
+    let contacts = summary.collisions.iter().map(|found| &found.collision.contact);
+    let new = contacts.filter(|contact| !was_hit(contact.obstacle));
+    new.map(|contact| format!("npc#{} is hit at {:.2} s", contact.obstacle, contact.time_s)).collect()
+}
+
+/// A scenario's file with what another text of it says by what it was played and, if asked, with its claims; everything else,
+/// comments included, stays.
+fn rewritten(text: &str, anew: &str, has_other_claims: bool) -> String {
+    let (old_file, new_file) = (parsed(text), parsed(anew));
+    let (Some((old, old_docs)), Some((new, new_docs))) = (scenario_of(&old_file), scenario_of(&new_file))
+    else {
+        return text.to_owned();
+    };
+    let mut edits: Vec<(Range<usize>, String)> = Vec::new();
+    for name in PLAYED_BY {
+        edits.extend(field_edit(name, (text, old), (anew, new)));
+    }
+    if has_other_claims
+        && let ([first, .., last] | [first @ last], [new_first, .., new_last] | [new_first @ new_last]) =
+            (old.expects.as_slice(), new.expects.as_slice())
+    {
+        let claims = &anew[new_first.span.start..new_last.span.end];
+        edits.push((first.span.start..last.span.end, claims.to_owned()));
+        // The sentence above it tells of the crash, unless somebody wrote another one.
+        if let ([old], [new]) = (old_docs, new_docs)
+            && old.text.contains(" is hit at ")
+        {
+            edits.push((range(old.span), anew[range(new.span)].to_owned()));
+        }
+    }
+    edits.sort_by_key(|(range, _)| range.start);
+    let mut result = String::with_capacity(text.len());
+    let mut at = 0;
+    for (range, with) in edits {
+        result.push_str(&text[at..range.start]);
+        result.push_str(&with);
+        at = range.end;
+    }
+    result + &text[at..]
+}
+
+/// How one field of an origin becomes what it is now.
+fn field_edit(
+    name: &str,
+    (text, old): (&str, &ast::Scenario),
+    (anew, new): (&str, &ast::Scenario),
+) -> Option<(Range<usize>, String)> {
+    let find = |scenario: &ast::Scenario| {
+        let field = scenario.origin.iter().find(|field| field.name.text == name);
+        field.map(|field| range(field.span))
+    };
+    match (find(old), find(new)) {
+        (Some(old), Some(new)) => {
+            (text[old.clone()] != anew[new.clone()]).then(|| (old, anew[new].to_owned()))
+        }
+        // It goes with its line.
+        (Some(old), None) => {
+            let from = text[..old.start].rfind('\n').unwrap_or(old.start);
+            Some((from..old.end, String::new()))
+        }
+        (None, Some(new)) => {
+            let end = old.origin.last()?.span.end;
+            Some((end..end, format!("\n    {}", &anew[new])))
+        }
+        (None, None) => None,
+    }
+}
+
+fn range(span: Span) -> Range<usize> {
+    span.start..span.end
+}
+
+fn parsed(text: &str) -> ast::File {
+    crate::syntax::parse(FileId::default(), text).0
+}
+
+fn scenario_of(file: &ast::File) -> Option<(&ast::Scenario, &[Doc])> {
+    file.items.iter().find_map(|item| match &item.kind {
+        ItemKind::Scenario(scenario) => Some((scenario, item.docs.as_slice())),
+        _ => None,
+    })
+}
