@@ -226,8 +226,8 @@ fn check_digests(files: &[LoadedFile], maps: &mut MapReader<'_>) -> Vec<Diagnost
                 error = error.note(differences);
             }
             error = error.note(format!("its digest is now {}", found.digest())).help(
-                "get back the files as they were, or accept the change; for scenarios, `avastra test --accept` accepts \
-                 it if they still play as they claim",
+                "get back the files as they were, or accept the change; `avastra test --review` says what it changes for \
+                 scenarios, and `--accept` writes that into them",
             );
             // A policy's digest of itself covers this one: it has to be trained again.
             if !file.tree.items.iter().any(|item| item.kind.as_policy().is_some()) {

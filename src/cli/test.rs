@@ -195,7 +195,7 @@ impl Suite<'_> {
         let text = match is_outdated(loaded) {
             false => before.to_owned(),
             true => {
-                spaces = loaded.diagnostics.iter().flat_map(|found| found.notes.clone()).collect();
+                spaces.push(meaning_text(loaded));
                 apply_fixes(root, before, &loaded.diagnostics).0
             }
         };
@@ -268,6 +268,14 @@ impl Suite<'_> {
         let is_allowed = self.arguments.allow_changed && found.is_other_crash();
         Ok(if is_allowed { Outcome::Allowed(found) } else { Outcome::Played(found) })
     }
+}
+
+/// What of the space means something else, in words: the first note of the diagnostic, unless that gives the digest alone.
+fn meaning_text(loaded: &Loaded) -> String {
+    let notes = loaded.diagnostics.iter().filter(|found| found.code == code::DIGEST);
+    let notes: Vec<String> = notes.filter_map(|found| found.notes.split_last()?.1.first().cloned()).collect();
+    let what = if notes.is_empty() { String::new() } else { format!(": {}", notes.join("; ")) };
+    format!("the space means something else by now{what}")
 }
 
 /// How an external driving system fails at the end of a scenario, if the scenario claims so.

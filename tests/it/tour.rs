@@ -32,8 +32,8 @@ fn run(line: &str, folder: &Path) -> String {
     let mut shell = Command::new("sh");
     let binary = assert_cmd::cargo::cargo_bin("avastra");
     let binaries = binary.parent().expect("it lies in a folder").display().to_string();
-    let path = std::env::var("PATH").unwrap_or_default();
-    shell.current_dir(folder).env("PATH", format!("{binaries}:{path}")).args(["-c", command]);
+    let found = format!("PATH=\"$AVASTRA:$PATH\"; {command}");
+    shell.current_dir(folder).env("AVASTRA", binaries).args(["-c", &found]);
     let (status, stdout, stderr) = outcome(&mut shell);
     assert_eq!(status.to_string(), wanted, "{line}\n{stdout}\n{stderr}");
     stdout
