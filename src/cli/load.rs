@@ -191,8 +191,17 @@ pub fn table_of(output: &Output, loaded: Loaded, path: &Path) -> Result<ActionTa
 /// As [`load`], and if the file has no scenario.
 pub fn scenario(output: &Output, path: &Path) -> Result<(ActionTable, Scenario), Failure> {
     let mut loaded = load(output, path)?;
-    let scenario = loaded.scenario.take();
-    let scenario = scenario.ok_or_else(|| Failure::usage(format!("`{}` has no scenario", path.display())))?;
+    let Some(scenario) = loaded.scenario.take() else {
+        let path = path.display();
+        let hint = match (&loaded.policy, &loaded.space) {
+            (Some(_), _) => format!(": it is a policy, and `avastra run --policy {path}` plays it"),
+            (None, Some(space)) if !space.actions.is_empty() => {
+                format!(": it is a space, and `avastra run {path}` looks for scenarios in it")
+            }
+            _ => String::new(),
+        };
+        return Err(Failure::usage(format!("`{path}` has no scenario{hint}")));
+    };
     let scenario = with_answers(scenario, path)?;
     Ok((ActionTable::new(space(loaded, path)?), scenario))
 }

@@ -1,14 +1,14 @@
-//! `avastra report`: one page of HTML for a run, a training, a study or single scenarios.
+//! `avastra report`: one page of HTML for a run, a training, a study, an estimate or single scenarios.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
 use crate::action::ActionTable;
-use crate::model::Scenario;
+use crate::check::normal;
 use crate::report;
-use crate::report::{Page, Scene, record};
+use crate::report::{Page, Scene, record, record_another};
 use crate::run::{Asked, Database};
 
 use super::arguments::{FilesArguments, ReportArguments};
@@ -17,6 +17,7 @@ use super::files::{must_end_in, write};
 use super::load;
 use super::output::{Output, plural};
 use super::parallel::{PerFile, each_file};
+use super::replay::refutation;
 use super::shrink;
 
 /// Name of the page in a directory.
@@ -25,14 +26,15 @@ const NAME: &str = "report.html";
 /// The folders of a run directory that hold scenarios.
 const FOLDERS: [&str; 3] = ["critical", "failures", shrink::FOLDER];
 
-/// Writes the page of a directory or of files.
+/// Writes the page of a directory or of files. A scenario that does not play as its file claims is shown, said so of before
+/// all else, and fails the command.
 pub fn report(output: &Output, arguments: &ReportArguments) -> Result<(), Failure> {
     let path = arguments.output.clone().unwrap_or_else(|| default_path(&arguments.paths));
     must_end_in(&path, "html")?;
     let asked = compared(arguments)?;
     let found = match arguments.paths.as_slice() {
         [directory] if directory.is_dir() => of_directory(output, directory)?,
-        files => Found { title: title(files), files: files.to_vec(), ..Found::default() },
+        files => of_files(files)?,
     };
     let (files, left_out) = chosen(&found, arguments.most as usize);
     let many = FilesArguments { files, jobs: arguments.jobs };
@@ -67,7 +69,16 @@ pub fn report(output: &Output, arguments: &ReportArguments) -> Result<(), Failur
             None => Err(Failure::usage(format!("`{}` holds nothing to report", found.title))),
         };
     }
-    let scenes = played.as_mut().map_or_else(Vec::new, |played| std::mem::take(&mut played.done));
+    let mut scenes = played.as_mut().map_or_else(Vec::new, |played| std::mem::take(&mut played.done));
+    name_apart(&mut scenes);
+    let refuted = scenes.iter().map(|scene| scene.recording.refuted.len()).sum();
+    for Scene { file, recording, .. } in scenes.iter().filter(|scene| !scene.recording.refuted.is_empty()) {
+        let first = &recording.refuted[0];
+        output.warn(&format!(
+            "{file} does not play as it claims: claimed {}, found {}",
+            first.claim, first.found
+        ));
+    }
     let (scenarios, title) = (scenes.len(), found.title.clone());
     let compared_with = arguments.compare.clone();
     let page = Page { title, overview: found.overview, remarks, scenes, compared_with };
@@ -80,9 +91,11 @@ pub fn report(output: &Output, arguments: &ReportArguments) -> Result<(), Failur
         html.len() as f64 / 1e6
     ));
     output.result(serde_json::json!({
-        "page": path, "scenarios": scenarios, "left_out": left_out, "bytes": html.len(), "failed": failed,
+        "page": path, "scenarios": scenarios, "left_out": left_out, "bytes": html.len(), "refuted": refuted,
+        "failed": failed,
     }));
-    played.map_or(Ok(()), |played| played.complete("played"))
+    played.map_or(Ok(()), |played| played.complete("played"))?;
+    refutation(refuted)
 }
 
 /// What a path holds.
@@ -98,7 +111,20 @@ struct Found {
     remarks: Vec<String>,
 }
 
-/// A run, a training, a study, or a folder of scenarios.
+/// Scenarios, each once.
+fn of_files(paths: &[PathBuf]) -> Result<Found, Failure> {
+    if let Some(folder) = paths.iter().find(|path| path.is_dir()) {
+        let folder = folder.display();
+        return Err(Failure::usage(format!(
+            "`{folder}` is a folder: a page is about one folder, or about scenarios; name it alone"
+        )));
+    }
+    let mut known = BTreeSet::new();
+    let files = paths.iter().filter(|path| known.insert(normal(path))).cloned().collect();
+    Ok(Found { title: title(paths), files, ..Found::default() })
+}
+
+/// A run, a training, a study, an estimate, or a folder of scenarios.
 fn of_directory(output: &Output, directory: &Path) -> Result<Found, Failure> {
     let mut found = Found { title: title(&[directory.to_owned()]), ..Found::default() };
     for folder in FOLDERS {
@@ -107,23 +133,30 @@ fn of_directory(output: &Output, directory: &Path) -> Result<Found, Failure> {
             found.files.extend(load::sources_in(&folder)?);
         }
     }
-    let (run, study) = (directory.join("run.yaml"), directory.join("study.yaml"));
-    if run.is_file() {
-        of_run(output, directory, &load::text(&run)?, &mut found)?;
-    } else if study.is_file() {
-        let path = directory.join("results.json");
-        let text = load::text(&path).map_err(|_| {
-            let directory = directory.display();
-            Failure::usage(format!(
-                "`{directory}` has no results yet: finish it with `avastra study --resume {directory}`"
-            ))
-        })?;
-        let results = serde_json::from_str(&text).map_err(|error| Failure::file("read", &path, error))?;
-        found.overview = report::of_study(results, &load::text(&study)?);
+    let settings = |command: &str| directory.join(command).with_extension("yaml");
+    if settings("run").is_file() {
+        of_run(output, directory, &load::text(&settings("run"))?, &mut found)?;
+    } else if settings("study").is_file() {
+        found.overview = report::of_study(&results(directory, "study")?, &load::text(&settings("study"))?);
+    } else if settings("estimate").is_file() {
+        let results = results(directory, "estimate")?;
+        found.overview = report::of_estimate(&results, &load::text(&settings("estimate"))?);
     } else if found.files.is_empty() {
         found.files = load::sources_in(directory)?;
     }
     Ok(found)
+}
+
+/// What `command` wrote at its end into its directory.
+fn results(directory: &Path, command: &str) -> Result<Value, Failure> {
+    let path = directory.join("results.json");
+    if !path.is_file() {
+        let directory = directory.display();
+        return Err(Failure::usage(format!(
+            "`{directory}` has no results yet: finish it with `avastra {command} --resume {directory}`"
+        )));
+    }
+    serde_json::from_str(&load::text(&path)?).map_err(|error| Failure::file("read", &path, error))
 }
 
 /// Adds what the database of a run or training says. `settings` is the text of its `run.yaml`.
@@ -145,7 +178,12 @@ fn of_run(output: &Output, directory: &Path, settings: &str, found: &mut Found) 
     if table.is_none() {
         found.remarks.push("the space of the run cannot be read: its rows have numbers only".to_owned());
     }
-    found.overview = report::of_run(&database, table.as_ref(), settings).map_err(unread)?;
+    // A training that is not finished has not been judged yet, and a run never is.
+    let results = match directory.join("results.json").is_file() {
+        true => Some(results(directory, "train")?),
+        false => None,
+    };
+    found.overview = report::of_run(&database, table.as_ref(), settings, results.as_ref()).map_err(unread)?;
     let groups = database.groups().map_err(unread)?;
     let name = |road: &str, episode: i64| format!("{road}_{episode:04}");
     found.examples = groups.iter().map(|group| name(&group.road, group.episode)).collect();
@@ -186,18 +224,31 @@ fn compared(arguments: &ReportArguments) -> Result<Option<Asked>, Failure> {
 fn scene(output: &Output, file: &Path, compared: Option<&Asked>) -> Result<Scene, Failure> {
     let (table, scenario) = load::scenario(output, file)?;
     let source = load::text(file)?;
-    let play = |asked: &Asked, table: &ActionTable, scenario: &Scenario| {
-        let (ads, _) = asked.selected_for(scenario)?;
-        record(table, scenario, &ads, &source)
+    let (ads, _) = Asked::default().selected_for(&scenario)?;
+    let recording = record(&table, &scenario, &ads, &source)?;
+    let another = |asked: &Asked| {
+        let (other, _) = asked.selected_for(&scenario)?;
+        record_another((&table, &scenario), (&recording, &ads), &other, &source)
     };
-    let recording = play(&Asked::default(), &table, &scenario)?;
-    let compared = compared.map(|asked| play(asked, &table, &scenario)).transpose()?;
+    let compared = compared.map(another).transpose()?;
     let is_shrunk = file.parent().is_some_and(|folder| folder.ends_with(shrink::FOLDER));
     let shrunk_from = is_shrunk.then(|| shrink::found_name(&scenario.name).to_owned());
-    let names: Vec<_> =
-        file.components().rev().take(2).map(|part| part.as_os_str().to_string_lossy()).collect();
-    let file = names.iter().rev().map(|name| name.as_ref()).collect::<Vec<&str>>().join("/");
-    Ok(Scene { file, recording, compared, shrunk_from })
+    Ok(Scene { file: file.display().to_string(), recording, compared, shrunk_from })
+}
+
+/// Shortens the names of the files to their last two parts, as `critical/corner_0004.ava`, or to as many as tell them apart.
+fn name_apart(scenes: &mut [Scene]) {
+    let files: Vec<Vec<String>> =
+        scenes.iter().map(|scene| scene.file.split('/').map(str::to_owned).collect()).collect();
+    let end = |file: &[String], most: usize| file[file.len().saturating_sub(most)..].join("/");
+    let longest = files.iter().map(Vec::len).max().unwrap_or(0);
+    let mut left: Vec<usize> = (0..files.len()).collect();
+    for most in 2..=longest.max(2) {
+        let mut count: BTreeMap<String, usize> = BTreeMap::new();
+        left.iter().for_each(|&index| *count.entry(end(&files[index], most)).or_default() += 1);
+        left.iter().for_each(|&index| scenes[index].file = end(&files[index], most));
+        left.retain(|&index| count[&scenes[index].file] > 1);
+    }
 }
 
 fn title(paths: &[PathBuf]) -> String {

@@ -391,6 +391,7 @@ pub const SHAPES: &[Shape] = &[
             f("scenarios", "number", "on the page"),
             f("left_out", "number", "scenarios beyond `--most`"),
             f("bytes", "number", "size of the page"),
+            f("refuted", "number", "claims that do not hold: what only further plays show is not tried"),
             FAILED,
         ],
     },

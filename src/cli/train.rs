@@ -196,10 +196,7 @@ fn finish(output: &Output, training: &Training, directory: &RunDirectory) -> Res
             }
             output.say(&format!("{}\nplay it with: avastra run --policy {}", path.display(), path.display()))
         }
-        None => output.say(&format!(
-            "a search has no policy file: what it found stands in {}",
-            directory.path.join("critical").display()
-        )),
+        None => output.say(&search_text(&directory.path)?),
     }
     let failures = directory.database.failures().map_err(read)?;
     if !failures.is_empty() {
@@ -221,18 +218,33 @@ fn finish(output: &Output, training: &Training, directory: &RunDirectory) -> Res
     }
     let doubts = doubts(training.arena().program());
     doubts.iter().for_each(|doubt| output.warn(doubt));
+    let evaluation = serde_json::json!({
+        "episodes": played(settings, &evaluation), "collisions": evaluation.collisions,
+        "counted": evaluation.counted, "colliding": evaluation.colliding,
+        "simulated_h": evaluation.simulated_s / 3600.0, "return": evaluation.return_mean,
+        "failures": evaluation.failures,
+    });
+    let results = serde_json::json!({ "simulated_h": simulated_h, "rules": rules, "evaluation": evaluation });
+    let text = serde_json::to_string_pretty(&results).expect("results have string keys only");
+    write(&directory.path.join("results.json"), &format!("{text}\n"))?;
     output.result(serde_json::json!({
         "reproducible": doubts.is_empty(),
         "directory": directory.path, "totals": totals, "policy": kept.as_ref().map(|(path, _)| path),
-        "rules": rules, "simulated_h": simulated_h, "failures": failures,
-        "evaluation": {
-            "episodes": played(settings, &evaluation), "collisions": evaluation.collisions,
-            "counted": evaluation.counted, "colliding": evaluation.colliding,
-            "simulated_h": evaluation.simulated_s / 3600.0, "return": evaluation.return_mean,
-            "failures": evaluation.failures,
-        },
+        "rules": rules, "simulated_h": simulated_h, "failures": failures, "evaluation": evaluation,
     }));
     Ok(())
+}
+
+/// Where to find what a search found, which has no policy file.
+fn search_text(directory: &Path) -> Result<String, Failure> {
+    let critical = directory.join("critical");
+    let found = if critical.is_dir() { load::sources_in(&critical)?.len() } else { 0 };
+    Ok(match found {
+        0 => "a search has no policy file; no scenario was written".to_owned(),
+        found => {
+            format!("a search has no policy file: {} in {}", plural(found, "scenario"), critical.display())
+        }
+    })
 }
 
 /// Episodes of an evaluation, on all roads together.

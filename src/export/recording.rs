@@ -8,8 +8,7 @@ use crate::ads::Selected;
 use crate::episode::{Actor, Lights, Recorder, Sky, Touch};
 use crate::model::vocabulary::Word;
 use crate::model::{Claim, Scenario};
-use crate::oracle;
-use crate::oracle::{ClaimResult, NoModules, NoTries, Replays};
+use crate::oracle::ClaimResult;
 use crate::road::{LaneIndex, LanePlace, RoadMap};
 use crate::run::{RunError, Stage};
 use crate::sim::DT_S;
@@ -72,14 +71,10 @@ pub fn record(table: &ActionTable, scenario: &Scenario, ads: &Selected) -> Resul
     let stage = Stage::new(table, scenario)?;
     let mut recorder = Recorder::default();
     let log = stage.play(ads, &mut |world, ads, contacts| recorder.note(world, ads, contacts));
-    let driven = |claim: &&Claim| {
+    let driven = |claim: &Claim| {
         matches!(claim, Claim::Collision { .. } | Claim::Trace(_) | Claim::Proc(_) | Claim::End(_))
     };
-    let claims = scenario.claims.iter().filter(driven).cloned().collect();
-    let replays = Replays { cause: &|_| Err(NoModules { ads: ads.title() }), spare_steps: &|_| Err(NoTries) };
-    let drive = Scenario { claims, ..scenario.clone() };
-    let mut claims = oracle::verify(table.space(), &drive, &log, &[], &replays);
-    claims.retain(ClaimResult::is_refuted);
+    let claims = stage.refuted(ads, &log, &[], driven);
     if !claims.is_empty() {
         return Err(ExportError::Refuted { claims });
     }

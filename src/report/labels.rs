@@ -66,15 +66,26 @@ mod tests {
     #[test]
     fn names_of_neighbours_lie_apart_and_in_the_picture() {
         let mut labels = Labels::new(300.0);
-        let places: Vec<Option<(f64, f64)>> = (0..8)
-            .map(|n| labels.place((150.0 + f64::from(n), 150.0), "Pedestrian #4 5 km/h", 12.0, 10.0))
-            .collect();
-        let found = places.iter().flatten().count();
-        assert!(found >= 4, "{places:?}");
-        for (n, a) in labels.taken.iter().enumerate() {
-            assert!(a[0] >= 0.0 && a[2] <= 300.0);
-            assert!(labels.taken[n + 1..].iter().all(|b| are_apart(a, b)), "{a:?}");
+        let (name, height_px, away_px) = ("SUV #4 5 km/h", 12.0, 10.0);
+        let kept = (150.0, 120.0);
+        labels.keep(kept, 8.0);
+        let points: Vec<(f64, f64)> = (0..8).map(|n| (150.0 + f64::from(n), 150.0)).collect();
+        let places: Vec<_> =
+            points.iter().map(|point| labels.place(*point, name, height_px, away_px)).collect();
+        // The box of a text by its base line, found without the code under test.
+        let width_px = name.len() as f64 * height_px * LETTER_WIDTH;
+        let boxes: Vec<Box4> =
+            places.iter().flatten().map(|(x, y)| [*x, y - height_px, x + width_px, *y]).collect();
+        // Above and below, left and right, near and farther: there is room for all that fit side by side.
+        assert!(boxes.len() >= 6, "{places:?}");
+        for (n, a) in boxes.iter().enumerate() {
+            assert!(a.iter().all(|px| (0.0..=300.0).contains(px)), "{a:?} is outside");
+            let overlaps = |b: &Box4| a[0] < b[2] && b[0] < a[2] && a[1] < b[3] && b[1] < a[3];
+            assert!(!boxes[n + 1..].iter().any(overlaps), "{a:?} lies on another");
+            assert!(!overlaps(&[kept.0, kept.1, kept.0, kept.1]), "{a:?} lies on what is to stay free");
         }
+        // The first has the choice: to the right of its point and above it, as near as it may be.
+        assert_eq!(places[0], Some((points[0].0 + away_px + 2.0, points[0].1 - away_px - 4.0)));
     }
 
     #[test]

@@ -16,10 +16,10 @@ mod study;
 mod trials;
 mod words;
 
-pub use overview::{of_run, of_study};
+pub use overview::{of_estimate, of_run, of_study};
 pub use page::{Page, Scene};
 pub use picture::{Snapshot, Subject, picture};
-pub use recording::{Recording, record};
+pub use recording::{Recording, record, record_another};
 pub use results::{Chapter, results};
 pub use road::draw;
 pub use study::study;

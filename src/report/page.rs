@@ -2,7 +2,7 @@
 //!
 //! The script is ES modules, one file for each subject; here they are joined into one, in the order in which they use
 //! each other, without their `import` lines and the word `export`. A name is therefore declared once in all of them;
-//! `tests/interop/report.sh` has a linter look.
+//! a browser refuses the page otherwise (`tests/interop/report.sh`).
 
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -33,22 +33,25 @@ const MODULES: &[&str] = &[
     include_str!("page/source.js"),
     include_str!("page/facts.js"),
     include_str!("page/clock.js"),
+    include_str!("page/keys.js"),
+    include_str!("page/controls.js"),
     include_str!("page/watch.js"),
     include_str!("page/charts.js"),
     include_str!("page/list.js"),
     include_str!("page/coverage.js"),
     include_str!("page/study.js"),
+    include_str!("page/estimate.js"),
     include_str!("page/overview.js"),
     include_str!("page/main.js"),
 ];
 
 /// A scenario of a page.
 pub struct Scene {
-    /// Its file, as it is to be named.
+    /// Its file, as it is to be named; links name it so, and no two scenarios have one name.
     pub file: String,
     pub recording: Recording,
-    /// The same scenario with another driving system, if one was asked for.
-    pub compared: Option<Recording>,
+    /// The same scenario with another driving system, if one was asked for, and what became of its crash.
+    pub compared: Option<(Recording, Value)>,
     /// Name of the scenario of which this is the shrunk one.
     pub shrunk_from: Option<String>,
 }
@@ -79,12 +82,13 @@ impl Page {
             let Scene { file, recording, compared, shrunk_from } = scene;
             blob(&mut blobs, &format!("s{number}"), &recording.packed);
             let ground = ground_id(&mut grounds, &recording.ground);
-            if let Some(compared) = compared {
+            if let Some((compared, _)) = compared {
                 blob(&mut blobs, &format!("c{number}"), &compared.packed);
             }
+            let change = compared.as_ref().map(|(_, change)| change);
             listed.push(json!({
                 "n": number, "file": file, "ground": ground, "summary": recording.summary, "shrunk_from": shrunk_from,
-                "compared": compared.as_ref().map(|compared| &compared.summary),
+                "compared": compared.is_some(), "change": change,
             }));
         }
         for (packed, id) in &grounds {
@@ -99,16 +103,17 @@ impl Page {
         let (title, script) = (escape(&self.title), script());
         // Each part is looked for in the frame alone, whatever the others hold.
         let mut html = String::new();
-        for (number, part) in FRAME.split("{{").enumerate() {
-            let (name, rest) =
-                if number == 0 { ("", part) } else { part.split_once("}}").unwrap_or(("", part)) };
+        let mut parts = FRAME.split("{{");
+        html.push_str(parts.next().unwrap_or_default());
+        for part in parts {
+            let (name, rest) = part.split_once("}}").expect("page.html ends each name that it begins");
             html.push_str(match name {
                 "title" => &title,
                 "style" => STYLE,
                 "script" => &script,
                 "blobs" => &blobs,
                 "index" => &index,
-                _ => "",
+                _ => unreachable!("page.html names no other part than these: {name}"),
             });
             html.push_str(rest);
         }
@@ -141,7 +146,13 @@ fn blob(blobs: &mut String, id: &str, packed: &str) {
 fn script() -> String {
     let mut script = String::from("(() => {\n\"use strict\";\n");
     for module in MODULES {
-        for line in module.lines().filter(|line| !line.starts_with("import ")) {
+        let mut is_import = false;
+        for line in module.lines() {
+            is_import |= line.starts_with("import ");
+            if is_import {
+                is_import = !line.ends_with(';');
+                continue;
+            }
             script.push_str(line.strip_prefix("export ").unwrap_or(line));
             script.push('\n');
         }

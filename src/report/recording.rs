@@ -12,12 +12,12 @@ use crate::action::{ActionTable, Offer};
 use crate::ads::Selected;
 use crate::emit;
 use crate::episode;
-use crate::episode::{Actor, EpisodeLog, Held, Moment, Outcome, Recorder, Sample, Script, Sky};
+use crate::episode::{Actor, End, EpisodeLog, Held, Moment, Outcome, Recorder, Sample, Script, Sky};
 use crate::geometry::{Pose, wrap_angle};
 use crate::model::vocabulary::Word;
 use crate::model::{Claim, Scenario, digest_text};
 use crate::oracle;
-use crate::oracle::ReferenceDrive;
+use crate::oracle::{ClaimResult, ReferenceDrive, Regression};
 use crate::run;
 use crate::run::{Gauges, RunError, Shape, Stage, refusal_in_words};
 use crate::sim::{DT_S, FRAME_TICKS, SignalColour};
@@ -26,6 +26,9 @@ use super::columns::Columns;
 use super::ground::ground;
 use super::mind::Mind;
 use super::words;
+
+/// Two crashes nearer than this in time are one, as the page tells times, s.
+const SAME_S: f64 = 0.005;
 
 /// Steps of the columns; half a step is how far a number may be off.
 const PLACE_M: f64 = 0.01;
@@ -51,6 +54,11 @@ pub fn quantisation() -> Value {
 
 /// A scenario that was played.
 pub struct Recording {
+    log: EpisodeLog,
+    /// Index of the collision that it is about: the first that counts, or the first.
+    main: Option<usize>,
+    /// Claims of its file that the replay refutes.
+    pub refuted: Vec<ClaimResult>,
     /// Facts for the list of scenarios.
     pub summary: Value,
     /// Everything, packed.
@@ -59,7 +67,8 @@ pub struct Recording {
     pub ground: String,
 }
 
-/// Plays a scenario with a driving system and keeps everything. `source` is the text of its file.
+/// Plays a scenario with the driving system that it was recorded with, and keeps everything. `source` is the text of its
+/// file. What only further plays could show, causes and minimality, is not checked.
 ///
 /// # Errors
 /// If it cannot be played any more, as [`Stage::new`] tells.
@@ -69,7 +78,54 @@ pub fn record(
     ads: &Selected,
     source: &str,
 ) -> Result<Recording, RunError> {
+    let asked = |claim: &Claim| !matches!(claim, Claim::Cause { .. } | Claim::Minimal { .. });
+    played(&Stage::new(table, scenario)?, (table, scenario), ads, source, asked)
+}
+
+/// Another driving system in the same scenario, and what becomes of its crash, in a word of the page's.
+///
+/// # Errors
+/// As [`record`].
+pub fn record_another(
+    (table, scenario): (&ActionTable, &Scenario),
+    (first, ads): (&Recording, &Selected),
+    other: &Selected,
+    source: &str,
+) -> Result<(Recording, Value), RunError> {
     let stage = Stage::new(table, scenario)?;
+    // What the file claims, it claims of the recorded driving system.
+    let recording = played(&stage, (table, scenario), other, source, |_| false)?;
+    let change = match (first.main, recording.main, recording.log.end) {
+        (Some(index), _, _) => {
+            let at_s = first.log.collisions[index].contact.time_s;
+            match oracle::regression(&stage.setup(ads), &first.log, index, other) {
+                Regression::StillFails { time_s } if (time_s - at_s).abs() < SAME_S => {
+                    json!({ "kind": "same" })
+                }
+                Regression::StillFails { time_s } => {
+                    json!({ "kind": "other_time", "later_s": time_s - at_s })
+                }
+                Regression::Fixed => json!({ "kind": "gone" }),
+                Regression::OtherCrash => json!({ "kind": "other_crash" }),
+                Regression::Struck => json!({ "kind": "struck" }),
+                Regression::NeverMet => json!({ "kind": "never_met" }),
+                Regression::AdsFailed(_) | Regression::FailsAgain(_) => json!({ "kind": "failed" }),
+            }
+        }
+        (None, Some(_), _) => json!({ "kind": "new" }),
+        (None, None, End::Failed(_)) => json!({ "kind": "failed" }),
+        (None, None, _) => json!({ "kind": "none" }),
+    };
+    Ok((recording, change))
+}
+
+fn played(
+    stage: &Stage<'_>,
+    (table, scenario): (&ActionTable, &Scenario),
+    ads: &Selected,
+    source: &str,
+    asked: impl Fn(&Claim) -> bool,
+) -> Result<Recording, RunError> {
     let setup = stage.setup(ads);
     let script = Script::of_scenario(scenario);
     let mut recorder = Recorder::default();
@@ -101,23 +157,44 @@ pub fn record(
             collision(table, scenario, (&log, index), told, ways)
         })
         .collect();
+    let refuted = stage.refuted(ads, &log, &judgements, asked);
     let summary = json!({
         "name": scenario.name, "road": log.road, "ads": ads.name(), "duration_s": log.duration_s, "end": log.end.name(),
         "steps": log.steps.len(), "actions": log.steps.iter().filter(|step| matches!(step.outcome, Outcome::Done { .. })).count(),
         "collisions": collisions.iter().map(without_ways).collect::<Vec<_>>(),
-        "same": is_same(scenario, &log),
+        "refuted": refuted, "same": is_same(scenario, &log),
     });
     let steps: Vec<Value> =
         log.steps.iter().enumerate().map(|(index, _)| step(table, &log, index, offers.get(index))).collect();
     let header = json!({
-        "summary": summary, "docs": scenario.docs, "source": source, "rows": table.rows().iter().map(|row| &row.label).collect::<Vec<_>>(),
+        "summary": summary, "origin": origin(table, scenario, ads), "source": source, "rows": table.rows().iter().map(|row| &row.label).collect::<Vec<_>>(),
         "step_s": table.space().episode.step_s, "collisions": collisions, "steps": steps,
         "held": log.held.iter().map(|held| json!([held.from_s, held.text()])).collect::<Vec<_>>(),
         "ego": ego(&recorder.ego, &mind, &mut columns), "obstacles": obstacles(table, &log, &recorder, &mut columns),
         "tracks": mind.tracks(&mut columns), "plans": mind.plans(&mut columns),
         "signals": signals(&recorder), "skies": recorder.skies.iter().map(sky).collect::<Vec<_>>(),
     });
-    Ok(Recording { summary, packed: columns.pack(&header), ground: ground(&setup.scene) })
+    let main = counted.first().copied().or(if log.collisions.is_empty() { None } else { Some(0) });
+    let packed = columns.pack(&header);
+    Ok(Recording { log, main, refuted, summary, packed, ground: ground(&setup.scene) })
+}
+
+/// Where a scenario comes from: name and text of each.
+fn origin(table: &ActionTable, scenario: &Scenario, ads: &Selected) -> Vec<(&'static str, String)> {
+    let origin = &scenario.origin;
+    let space = table.space().path.file_name().map(|name| name.to_string_lossy().into_owned());
+    let driver = match &origin.profile {
+        Some(profile) if origin.ads.as_deref() == Some(ads.name()) => format!("{} {profile}", ads.name()),
+        _ => ads.name().to_owned(),
+    };
+    let known = [
+        ("space", space),
+        ("driving system", Some(driver)),
+        ("seed", origin.seed.map(|seed| seed.to_string())),
+        ("episode", origin.episode.map(|episode| episode.to_string())),
+        ("chosen by", origin.policy.clone()),
+    ];
+    known.into_iter().filter_map(|(name, text)| Some((name, text?))).collect()
 }
 
 /// Whether the replay is the recorded episode, to the bit; `None` if the scenario does not say.

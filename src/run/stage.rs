@@ -7,9 +7,9 @@ use crate::ads::{ModularConfig, Selected};
 use crate::episode;
 use crate::episode::{EpisodeLog, Script, Watch};
 use crate::mdp::ProcKind;
-use crate::model::{RulesInForce, Scenario};
+use crate::model::{Claim, RulesInForce, Scenario};
 use crate::oracle;
-use crate::oracle::{AvoidabilitySettings, ClaimResult, Judgement, NoTries, Replays};
+use crate::oracle::{AvoidabilitySettings, ClaimResult, Judgement, NoModules, NoTries, Replays};
 use crate::sim::{ENGINE, Scene, Start, TrafficProfile};
 
 use crate::run::profile::recorded_traffic;
@@ -102,6 +102,24 @@ impl<'a> Stage<'a> {
             },
         };
         oracle::verify(self.table.space(), self.scenario, log, &judgements, &replays)
+    }
+
+    /// The claims that a log of it refutes, among those that `asked` names: only such as need no further play, so neither
+    /// causes nor minimality. `judgements` has one for each collision, if one of these claims is about verdicts.
+    pub fn refuted(
+        &self,
+        ads: &Selected,
+        log: &EpisodeLog,
+        judgements: &[Judgement],
+        asked: impl Fn(&Claim) -> bool,
+    ) -> Vec<ClaimResult> {
+        let claims = self.scenario.claims.iter().filter(|claim| asked(claim)).cloned().collect();
+        let scenario = Scenario { claims, ..self.scenario.clone() };
+        let replays =
+            Replays { cause: &|_| Err(NoModules { ads: ads.title() }), spare_steps: &|_| Err(NoTries) };
+        let mut results = oracle::verify(self.table.space(), &scenario, log, judgements, &replays);
+        results.retain(ClaimResult::is_refuted);
+        results
     }
 
     /// Judges the collisions of its log, by playing it again.

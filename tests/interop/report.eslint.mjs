@@ -10,7 +10,7 @@ export default [
     rules: {
       "no-unused-vars": "error", "no-undef": "error", "no-shadow": ["error", { builtinGlobals: false }], "no-var": "error", "prefer-const": "error",
       eqeqeq: "error", "no-implicit-globals": "error", "no-eval": "error", "no-implied-eval": "error", "consistent-return": "error",
-      "no-duplicate-imports": "error", "max-lines": ["error", 350], complexity: ["error", 20],
+      "no-duplicate-imports": "error", "max-lines": ["error", 350], "max-len": ["error", 120], complexity: ["error", 20],
     },
   },
 ];

@@ -7,7 +7,7 @@ import { join } from "node:path";
 import { pathToFileURL } from "node:url";
 import { inflateSync } from "node:zlib";
 
-const [, , work, page, page50, page500] = process.argv;
+const [, , work, page, page50, page500, ...others] = process.argv;
 const require = createRequire(join(work, "package.json"));
 const puppeteer = (await import(pathToFileURL(require.resolve("puppeteer-core")))).default;
 const axe = readFileSync(require.resolve("axe-core/axe.min.js"), "utf8");
@@ -58,13 +58,17 @@ async function accessible(one, name) {
 
 const time = (one) => one.evaluate(() => window.avastra.opened().clock.timeS);
 const picture = (one, at = 0) => one.evaluate((number) => document.querySelectorAll("canvas.stage")[number].toDataURL(), at);
-const tick = 0.02;
 
 // The overview: painted soon, filters that live in the link.
 const wide = await tab();
 await open(wide, page);
 const paint = await painted(wide);
 console.log(`first paint of ${size(page)}: ${Math.round(paint)} ms`);
+const tick = await wide.evaluate(() => window.avastra.data.quantisation.tick_s);
+const said = await wide.$eval(".conditions", (list) => list.textContent);
+assert.match(said, /Space.*avastra45.*Driving system.*never_yields.*Seed3/, "the first screen says what was played");
+assert.match(await wide.$eval("#compared", (line) => line.textContent), /careful driver.*×/, "and what the comparison gave");
+assert.equal(await wide.$("#refuted"), null, "all replay as they claim");
 const all = await wide.$$eval("#list tbody tr", (rows) => rows.length);
 assert(all > 1, "the page lists scenarios");
 await wide.screenshot({ path: join(work, "overview_wide.png"), fullPage: true });
@@ -82,10 +86,14 @@ await wide.waitForFunction((count) => document.querySelectorAll("#list tbody tr"
 console.log(`filters: ${roads.length} of ${all} on ${road}, by the link too`);
 
 // The worst scenario: play, scrub, step, to the collision.
-// Its number need not be 0: a shrunk twin, which the list leaves out at first, may hit harder.
 const worst = await wide.$eval("#list tbody tr:first-child a", (link) => new URLSearchParams(link.hash.slice(1)).get("s"));
 await wide.click("#list tbody tr:first-child a");
-await ready(wide, `s${worst}`);
+await ready(wide, worst);
+assert.equal(await wide.$$eval("canvas.stage", (stages) => stages.length), 2, "the other drive is there at first");
+assert((await wide.$eval("#change", (line) => line.textContent)).includes("careful driver"), "with its result");
+await wide.select("#with", "~nothing");
+await wide.waitForFunction(() => document.querySelectorAll("canvas.stage").length === 1);
+await ready(wide, worst);
 const start = await time(wide);
 await wide.keyboard.press("Space");
 await new Promise((done) => setTimeout(done, 600));
@@ -130,7 +138,11 @@ await accessible(wide, "replay");
 await wide.screenshot({ path: join(work, "replay_wide.png"), fullPage: true });
 
 // A link to a moment: what one copies, another sees.
-await open(wide, page, "#s=1&t=5.00&layers=truth,planned");
+const [linked, number] = await wide.evaluate((name) => {
+  const other = window.avastra.data.scenarios.find((one) => !one.shrunk_from && one.file !== `${name}.ava`);
+  return [other.file.replace(/\.ava$/, ""), other.n];
+}, worst);
+await open(wide, page, `#s=${linked}&with=~nothing&t=5.00&layers=truth,planned`);
 assert.equal(await time(wide), 5);
 assert.deepEqual(await wide.$$eval(".layers input:checked", (boxes) => boxes.map((box) => box.name)), ["truth", "planned"]);
 const marked = await wide.$$eval(".source .marked", (lines) => lines.map((line) => line.textContent.trim()));
@@ -138,16 +150,16 @@ assert(marked.length > 0 && / 0:|^\d+\s+0:/.test(marked[0]), `the row of the mom
 console.log(`a deep link opens its moment and layers; marked in the source: ${marked[0]}`);
 
 // Numbers read back: those that the page uses are those of the file, read here by other code.
-const [header, columns] = unpacked(readFileSync(page, "utf8"), "s1");
+const [header, columns] = unpacked(readFileSync(page, "utf8"), `s${number}`);
 let chance = 20261122;
 for (let i = 0; i < 20; i += 1) {
   chance = (chance * 1103515245 + 12345) % 2147483648;
   const at = chance % columns[header.ego.speed_mps].length;
-  const found = await wide.evaluate((number) => window.avastra.opened().recording.ego(number * 0.02), at);
+  const found = await wide.evaluate((number) => window.avastra.opened().recording.ego(number * window.avastra.data.quantisation.tick_s), at);
   for (const [name, column] of [["x", header.ego.places[0]], ["y", header.ego.places[1]], ["heading", header.ego.places[2]], ["speed", header.ego.speed_mps], ["proc", header.ego.proc]]) {
     assert(Math.abs(found[name] - columns[column][at]) < 1e-6, `${name} at tick ${at}`);
   }
-  const others = await wide.evaluate((number) => window.avastra.opened().recording.obstacles(number * 0.02), at);
+  const others = await wide.evaluate((number) => window.avastra.opened().recording.obstacles(number * window.avastra.data.quantisation.tick_s), at);
   for (const other of others) {
     const one = header.obstacles.find((known) => known.id === other.id);
     assert(Math.abs(other.x - columns[one.places[0]][at - one.from_tick]) < 1e-6, `${other.id} at tick ${at}`);
@@ -155,8 +167,21 @@ for (let i = 0; i < 20; i += 1) {
 }
 console.log("20 random ticks: the page uses the numbers of the file (tests/it/report.rs holds those against the world)");
 
+// Of two quick clicks the later one counts; a link whose scenario is gone says so.
+await open(wide, page);
+await wide.evaluate(([first, second]) => {
+  location.hash = `#s=${first}`;
+  setTimeout(() => (location.hash = `#s=${second}`));
+}, [linked, worst]);
+await ready(wide, worst);
+await new Promise((done) => setTimeout(done, 300));
+assert.equal(await wide.$eval("h1", (title) => title.textContent), worst.replace(/^.*\//, ""));
+await open(wide, page, "#s=critical/gone_0001");
+assert.match(await wide.$eval(".warning", (line) => line.textContent), /not on this page/);
+console.log("two quick clicks end with the later one; a dead link says so");
+
 // Two on one clock.
-await open(wide, page, `#s=${worst}&with=c&t=3.00`);
+await open(wide, page, `#s=${worst}&t=3.00`);
 assert.equal(await wide.$$eval("canvas.stage", (all) => all.length), 2);
 await wide.evaluate((at) => window.avastra.opened().clock.seek(at), collision.at_s);
 assert.notEqual(await picture(wide, 0), await picture(wide, 1), "the careful driver is elsewhere");
@@ -172,15 +197,30 @@ const dark = await tab(1440, 1000, "dark");
 await open(dark, page, `#s=${worst}&t=${(collision.at_s - 1).toFixed(2)}`);
 await accessible(dark, "replay, dark");
 await dark.screenshot({ path: join(work, "replay_dark.png") });
+const paper = () => dark.evaluate(() => getComputedStyle(document.documentElement).getPropertyValue("--paper").trim());
+const shown = [await paper(), await picture(dark)];
+await dark.evaluate(() => window.dispatchEvent(new Event("beforeprint")));
+assert.deepEqual([await paper(), (await picture(dark)) === shown[1]], ["#ffffff", false], "paper is light");
+await dark.evaluate(() => window.dispatchEvent(new Event("afterprint")));
+assert.deepEqual([await paper(), await picture(dark)], shown, "and the screen is dark again");
+writeFileSync(join(work, "replay_dark.pdf"), await dark.pdf({ format: "A4", printBackground: true }));
 await open(dark, page);
 await accessible(dark, "overview, dark");
 const phone = await tab(390, 844);
-for (const [name, hash] of [["overview", ""], ["replay", `#s=${worst}`], ["compare", `#s=${worst}&with=c`]]) {
+for (const [name, hash] of [["overview", ""], ["replay", `#s=${worst}&with=~nothing`], ["compare", `#s=${worst}`]]) {
   await open(phone, page, hash);
   const [wider, seen] = await phone.evaluate(() => [document.documentElement.scrollWidth, window.innerWidth]);
   assert(wider <= seen, `${name} on a phone is ${wider} px wide`);
   await accessible(phone, `${name} on a phone`);
   await phone.screenshot({ path: join(work, `${name}_phone.png`) });
+}
+
+// A training, an estimate, and what else is given.
+for (const file of others) {
+  const name = file.replace(/^.*\//, "").replace(/\.html$/, "");
+  await open(wide, file);
+  await accessible(wide, name);
+  await wide.screenshot({ path: join(work, `${name}.png`), fullPage: true });
 }
 
 // Sizes.
@@ -194,7 +234,7 @@ for (const [file, most] of [[page50, 3e6], [page500, 30e6]]) {
   await one.close();
 }
 await browser.close();
-const own = [page, page50, page500].map((file) => pathToFileURL(file).href);
+const own = [page, page50, page500, ...others].map((file) => pathToFileURL(file).href);
 assert.deepEqual(asked.filter((url) => url !== "about:blank" && !own.some((known) => url.startsWith(known))), [], "no request");
 assert.deepEqual(wrong, [], "no error in the console");
 console.log("no request, no error in the console");

@@ -1,7 +1,8 @@
 #!/bin/sh
 # Opens a report in a real browser: plays, scrubs to the collision, toggles each layer, filters, opens a deep link, compares
 # two drives, prints, and takes screenshots on a wide screen and on a phone's. No console error, no request; axe-core finds
-# no violation; numbers read back are those of the file; a linter reads the script. Then sizes at 50 and 500 scenarios.
+# no violation; numbers read back are those of the file; a linter reads the script. Pages of a training and an estimate, and
+# sizes at 50 and 500 scenarios.
 #
 # Needs node with npm (for the first run its registry) and Chromium: `CHROMIUM=/path/to/it`, or Debian's package `chromium`.
 # `RUN=DIR` takes a run directory in place of a new one. Everything it makes stays under target/interop/report.
@@ -13,15 +14,16 @@ mkdir -p "$work"
 binary=${AVASTRA:-$root/target/release/avastra}
 [ -n "${AVASTRA:-}" ] || (cd "$root" && cargo build --release --quiet)
 
-if [ ! -d "$work/node_modules/axe-core" ]; then
+if [ ! -d "$work/node_modules/axe-core" ] || [ ! -d "$work/node_modules/prettier" ]; then
   [ -f "$work/package.json" ] || echo '{"private": true}' > "$work/package.json"
-  (cd "$work" && npm install --no-audit --no-fund --silent puppeteer-core axe-core eslint @eslint/js globals)
+  (cd "$work" && npm install --no-audit --no-fund --silent puppeteer-core axe-core eslint @eslint/js globals prettier)
 fi
 
-# The linter reads each module, and all of them joined, where a name may stand once.
+# The linter reads each module. That a name stands once in all of them, which become one script, shows when the page opens.
 cp "$root/tests/interop/report.eslint.mjs" "$work/eslint.config.mjs"
 rm -rf "$work/lint" && mkdir "$work/lint"
 cp "$root"/src/report/page/*.js "$work/lint"
+(cd "$work" && npx prettier --print-width 120 --check "lint/*.js" > lint.txt) || { cat "$work/lint.txt"; exit 1; }
 (cd "$work" && npx eslint --max-warnings 0 lint)
 for file in "$root"/src/report/page/*; do
   [ "$(wc -l < "$file")" -lt 350 ] || { echo "$file is too long"; exit 1; }
@@ -38,6 +40,20 @@ fi
 page=$work/page.html
 "$binary" report "$RUN" --compare cc --out "$page"
 
+# Pages of what has no crash to watch: a training's and an estimate's; STUDY=DIR adds a study's.
+short="--road corner --seed 5 --quiet"
+rm -rf "$work/train" "$work/estimate"
+"$binary" train "$root/scenarios/avastra45.ava" --agent bandit --episodes 20 $short --out "$work/train" > /dev/null
+"$binary" estimate "$root/scenarios/avastra45.ava" --ads reactive --traffic released --event collision --parts 3 \
+  --episodes 30 $short --out "$work/estimate" > /dev/null
+"$binary" report "$work/train" --most 5 --out "$work/training.html"
+"$binary" report "$work/estimate" --most 5 --out "$work/estimate.html"
+others="$work/training.html $work/estimate.html"
+if [ -n "${STUDY:-}" ]; then
+  "$binary" report "$STUDY" --out "$work/study.html"
+  others="$others $work/study.html"
+fi
+
 # Copies have other names and the same contents: each is packed on its own, so sizes are as of so many different ones.
 for wanted in 50 500; do
   folder=$RUN/copies_$wanted
@@ -53,4 +69,4 @@ for wanted in 50 500; do
 done
 
 cd "$work"
-NODE_PATH=$work/node_modules exec node "$root/tests/interop/report.mjs" "$work" "$page" "$work/page_50.html" "$work/page_500.html"
+NODE_PATH=$work/node_modules exec node "$root/tests/interop/report.mjs" "$work" "$page" "$work/page_50.html" "$work/page_500.html" $others

@@ -58,6 +58,12 @@ fn page_of(recording: Recording) -> String {
         .html()
 }
 
+/// What a page says of itself and of its scenarios in short.
+fn index_of(html: &str) -> Value {
+    let index = html.split("id=\"index\">").nth(1).and_then(|rest| rest.split("</script>").next());
+    serde_json::from_str(index.expect("a page has an index")).expect("the index is JSON")
+}
+
 /// Header and columns of an element, read independently of the code that wrote them.
 fn unpacked(html: &str, id: &str) -> (Value, Vec<Vec<f64>>) {
     let begin = format!("<script type=\"text/plain\" id=\"{id}\">");
@@ -156,8 +162,7 @@ fn a_page_holds_everything_and_repeats_itself() {
     assert!(html.contains("<title>runs/&lt;walk&gt; &amp; {{script}} · avastra</title>"));
     assert!(!html.contains("\nimport ") && !html.contains("\nexport "), "modules are joined");
     assert_eq!(html.matches("<script").count(), html.matches("</script>").count());
-    let index = html.split("id=\"index\">").nth(1).and_then(|rest| rest.split("</script>").next()).unwrap();
-    let index: Value = serde_json::from_str(index).expect("the index is JSON");
+    let index = index_of(&html);
     assert_eq!(index["scenarios"][0]["summary"]["name"], "walk");
     assert!(html.len() < 150_000, "{} bytes for one short scenario", html.len());
 }
@@ -195,8 +200,7 @@ fn a_shrunk_scenario_and_the_found_one_name_each_other() {
     let (status, _, stderr) = outcome(&mut avastra(&["report", &at(scratch.path())]));
     assert_eq!(status, 0, "{stderr}");
     let html = std::fs::read_to_string(scratch.path().join("report.html")).expect("it was written");
-    let index = html.split("id=\"index\">").nth(1).and_then(|rest| rest.split("</script>").next()).unwrap();
-    let index: Value = serde_json::from_str(index).expect("the index is JSON");
+    let index = index_of(&html);
     let scenarios = index["scenarios"].as_array().unwrap();
     let (shrunk, found): (Vec<_>, Vec<_>) =
         scenarios.iter().partition(|scenario| scenario["shrunk_from"].is_string());
@@ -204,4 +208,113 @@ fn a_shrunk_scenario_and_the_found_one_name_each_other() {
     // The page links two where this is so.
     assert_eq!(shrunk[0]["shrunk_from"], found[0]["summary"]["name"]);
     assert_ne!(shrunk[0]["summary"]["name"], found[0]["summary"]["name"]);
+}
+
+/// The page of what `report` is told, in a scratch directory; its status, what it says on stderr, and the index.
+fn reported(scratch: &Path, arguments: &[&str]) -> (i32, String, Value) {
+    let page = scratch.join("page.html").display().to_string();
+    let (status, _, stderr) =
+        outcome(&mut avastra(&[&["report"], arguments, &["--out", &page, "--jobs", "1"]].concat()));
+    let html = std::fs::read_to_string(&page).unwrap_or_default();
+    (status, stderr, if html.is_empty() { Value::Null } else { index_of(&html) })
+}
+
+/// A scenario of a folder of its own, with more lines before its end.
+fn written(folder: &Path, name: &str, claims: &str) -> String {
+    std::fs::create_dir_all(folder).expect("it can be made");
+    let space = root().join("scenarios/avastra45.ava");
+    let source = SOURCE.replace("avastra45.ava", &space.display().to_string());
+    let end = source.rfind('}').expect("a scenario ends");
+    let file = folder.join(name);
+    std::fs::write(&file, format!("{}{claims}}}\n", &source[..end])).expect("it can be written");
+    file.display().to_string()
+}
+
+#[test]
+fn a_refuted_scenario_is_said_so_of_and_fails_the_command() {
+    let scratch = tempfile::tempdir().expect("a scratch directory");
+    let wrong = written(scratch.path(), "wrong.ava", "  expect collision at 3 s\n");
+    let right = written(scratch.path(), "right.ava", "  expect collision with npc#1\n");
+    // Named twice, it is there once.
+    let (status, stderr, index) = reported(scratch.path(), &[&wrong, &right, &right]);
+    assert_eq!(status, 3, "{stderr}");
+    assert!(stderr.contains("wrong.ava does not play as it claims"), "{stderr}");
+    assert!(!stderr.contains("right.ava does"), "{stderr}");
+    let scenarios = index["scenarios"].as_array().expect("they are listed");
+    assert_eq!(scenarios.len(), 2);
+    for scenario in scenarios {
+        let is_wrong = scenario["file"].as_str().is_some_and(|file| file.ends_with("wrong.ava"));
+        assert_eq!(scenario["summary"]["refuted"].as_array().map(Vec::len), Some(usize::from(is_wrong)));
+    }
+}
+
+#[test]
+fn a_comparison_says_what_becomes_of_each_crash() {
+    let scratch = tempfile::tempdir().expect("a scratch directory");
+    let file = written(scratch.path(), "walk.ava", "");
+    let change = |other: &str| {
+        let (status, stderr, index) = reported(scratch.path(), &[&file, "--compare", other]);
+        assert_eq!(status, 0, "{stderr}");
+        index["scenarios"][0]["change"]["kind"].as_str().expect("it is compared").to_owned()
+    };
+    let itself = root().join("scenarios/ads/faults/planning_never_yields.yaml");
+    assert_eq!(change(&itself.display().to_string()), "same");
+    assert_eq!(change("cc"), "gone");
+}
+
+#[test]
+fn scenarios_of_one_name_are_told_apart_by_their_folders() {
+    let scratch = tempfile::tempdir().expect("a scratch directory");
+    let [first, second] =
+        ["a", "b"].map(|folder| written(&scratch.path().join(folder).join("critical"), "walk.ava", ""));
+    let (status, stderr, index) = reported(scratch.path(), &[&first, &second]);
+    assert_eq!(status, 0, "{stderr}");
+    let mut names: Vec<&str> = index["scenarios"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .filter_map(|scenario| scenario["file"].as_str())
+        .collect();
+    names.sort_unstable();
+    assert_eq!(names, ["a/critical/walk.ava", "b/critical/walk.ava"]);
+}
+
+#[test]
+fn a_folder_among_others_and_a_space_are_refused_with_a_hint() {
+    let scratch = tempfile::tempdir().expect("a scratch directory");
+    let file = written(scratch.path(), "walk.ava", "");
+    let folder = scratch.path().display().to_string();
+    let (status, stderr, _) = reported(scratch.path(), &[&folder, &file]);
+    assert_eq!((status, stderr.contains("name it alone")), (1, true), "{stderr}");
+    let (status, stderr, _) = reported(scratch.path(), &["scenarios/avastra45.ava"]);
+    assert_eq!((status, stderr.contains("it is a space, and `avastra run")), (1, true), "{stderr}");
+}
+
+#[test]
+fn trainings_and_estimates_have_pages_with_their_results() {
+    let scratch = tempfile::tempdir().expect("a scratch directory");
+    let at = |name: &str| scratch.path().join(name).display().to_string();
+    let short = ["--road", "corner", "--seed", "5"];
+    let (train, estimate) = (at("train"), at("estimate"));
+    let space = "scenarios/avastra45.ava";
+    let training =
+        ["train", space, "--agent", "constant", "--episodes", "6", "--out", &train, "--format", "json"];
+    let (status, stdout, stderr) = outcome(&mut avastra(&[&training[..], &short].concat()));
+    assert_eq!(status, 0, "{stderr}");
+    let printed: Value = serde_json::from_str(stdout.lines().last().expect("a result")).expect("it is JSON");
+    let (status, stderr, index) = reported(scratch.path(), &[&train]);
+    assert_eq!(status, 0, "{stderr}");
+    let overview = &index["overview"];
+    assert_eq!(overview["kind"], "training");
+    assert_eq!(overview["simulated_h"], printed["simulated_h"]);
+    assert_eq!(overview["evaluation"], printed["evaluation"]);
+    assert_eq!(overview["conditions"][1], serde_json::json!(["Driving system", "modular, default profile"]));
+
+    let estimating = ["estimate", space, "--parts", "2", "--episodes", "2", "--out", &estimate];
+    let (status, _, stderr) = outcome(&mut avastra(&[&estimating[..], &short].concat()));
+    assert_eq!(status, 0, "{stderr}");
+    let (status, stderr, index) = reported(scratch.path(), &[&estimate]);
+    assert_eq!(status, 0, "{stderr}");
+    assert_eq!(index["overview"]["kind"], "estimate");
+    assert_eq!(index["overview"]["estimate"]["roads"][0]["road"], "corner");
 }

@@ -163,7 +163,7 @@ pub struct TestArguments {
 
 #[derive(Debug, Args)]
 pub struct ReportArguments {
-    /// A directory that `run`, `train` or `study` wrote, or a folder of scenarios; or scenarios.
+    /// A directory that `run`, `train`, `study` or `estimate` wrote, or a folder of scenarios; or scenarios.
     #[arg(required = true, value_name = "DIR|FILE")]
     pub paths: Vec<PathBuf>,
     /// Where to write [default: DIR/report.html, STEM.html].

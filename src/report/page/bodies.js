@@ -19,7 +19,11 @@ export function drawBody(canvas, body, { fill, line, dashed = false, alpha = 1 }
   // The windscreen shows which end is the front.
   const { length, width } = body;
   canvas.line(
-    [beside(body, length * 0.18, width * 0.42), beside(body, length * 0.28, 0), beside(body, length * 0.18, -width * 0.42)],
+    [
+      beside(body, length * 0.18, width * 0.42),
+      beside(body, length * 0.28, 0),
+      beside(body, length * 0.18, -width * 0.42),
+    ],
     line,
     thin,
   );
@@ -71,9 +75,19 @@ export function drawPlan(canvas, plan) {
 /** A cross where two met. */
 export function drawImpact(canvas, { x, y }) {
   const arm = Math.max(0.9, canvas.px(9));
-  for (const [colour, width] of [[canvas.colours.paper, 5], [canvas.colours.danger, 2.6]]) {
+  for (const [colour, width] of [
+    [canvas.colours.paper, 5],
+    [canvas.colours.danger, 2.6],
+  ]) {
     for (const side of [1, -1]) {
-      canvas.line([{ x: x - arm, y: y - arm * side }, { x: x + arm, y: y + arm * side }], colour, canvas.px(width));
+      canvas.line(
+        [
+          { x: x - arm, y: y - arm * side },
+          { x: x + arm, y: y + arm * side },
+        ],
+        colour,
+        canvas.px(width),
+      );
     }
   }
 }
@@ -106,12 +120,29 @@ export class Labels {
     const { context, colours } = this.canvas;
     const { x, y } = this.canvas.at(point);
     const width = context.measureText(text).width + 8;
-    const around = (room) => [[room, -room], [room, room], [-room - width, -room], [-room - width, room], [-width / 2, -room - 12], [-width / 2, room + 12]];
+    const around = (room) => [
+      [room, -room],
+      [room, room],
+      [-room - width, -room],
+      [-room - width, room],
+      [-width / 2, -room - 12],
+      [-width / 2, room + 12],
+    ];
     const places = [1, 1.8, 2.8, 4].flatMap((far) => around((away + 6) * far));
-    const boxes = places.map(([dx, dy]) => ({ left: x + dx, right: x + dx + width, top: y + dy - 9, bottom: y + dy + 9 }));
+    const boxes = places.map(([dx, dy]) => ({
+      left: x + dx,
+      right: x + dx + width,
+      top: y + dy - 9,
+      bottom: y + dy + 9,
+    }));
     const isFree = (box) =>
-      box.left >= 0 && box.top >= 0 && box.right <= this.canvas.width && box.bottom <= this.canvas.height &&
-      this.taken.every((other) => box.right < other.left || box.left > other.right || box.bottom < other.top || box.top > other.bottom);
+      box.left >= 0 &&
+      box.top >= 0 &&
+      box.right <= this.canvas.width &&
+      box.bottom <= this.canvas.height &&
+      this.taken.every(
+        (other) => box.right < other.left || box.left > other.right || box.bottom < other.top || box.top > other.bottom,
+      );
     const box = boxes.find(isFree);
     // A name that fits nowhere is left out; the table below the view has all of them.
     if (!box) return;

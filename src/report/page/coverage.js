@@ -11,21 +11,47 @@ export function coverage(overview) {
   const isOffered = cells.some((cell) => cell.legal + cell.refused > 0);
   const count = Math.max(overview.rows?.length ?? 0, ...cells.map((cell) => cell.row + 1));
   const rows = Array.from({ length: count }, (_, row) =>
-    el("tr", {}, el("th", { scope: "row" }, `${row} · ${overview.rows?.[row] ?? ""}`), roads.map((road) => (isOffered ? box : onlyCounts)(known.get(`${row} ${road}`)))),
+    el(
+      "tr",
+      {},
+      el("th", { scope: "row" }, `${row} · ${overview.rows?.[row] ?? ""}`),
+      roads.map((road) => (isOffered ? box : onlyCounts)(known.get(`${row} ${road}`))),
+    ),
   );
   return el(
     "section",
     { "aria-labelledby": "h-coverage" },
     el("h2", { id: "h-coverage" }, "Rows on roads"),
-    el("p", { class: "legend" }, isOffered ? "● carried out so often · ◐ legal, and never chosen · ○ never legal, with what refused it most often · – not offered" : "● carried out so often · – never chosen"),
+    el(
+      "p",
+      { class: "legend" },
+      isOffered
+        ? "● carried out so often · ◐ legal, and never chosen · " +
+            "○ never legal, with what refused it most often · – not offered"
+        : "● carried out so often · – never chosen",
+    ),
     el(
       "div",
       { class: "scroll", tabindex: "0", role: "region", "aria-label": "Table of rows on roads" },
       el(
         "table",
         { class: "coverage" },
-        el("caption", {}, `Steps in which each row of the action table was carried out${isOffered ? ", of those in which it was legal" : ""}.`),
-        el("thead", {}, el("tr", {}, el("th", { scope: "col" }, "Row"), roads.map((road) => el("th", { scope: "col" }, road)))),
+        el(
+          "caption",
+          {},
+          "Steps in which each row of the action table was carried out" +
+            (isOffered ? ", of those in which it was legal." : "."),
+        ),
+        el(
+          "thead",
+          {},
+          el(
+            "tr",
+            {},
+            el("th", { scope: "col" }, "Row"),
+            roads.map((road) => el("th", { scope: "col" }, road)),
+          ),
+        ),
         el("tbody", {}, rows),
       ),
     ),
@@ -35,14 +61,23 @@ export function coverage(overview) {
 /** A cell of a training. */
 function onlyCounts(cell) {
   if (!cell) return el("td", {}, "–");
-  return el("td", { class: "some" }, cell.realised > 0 ? `● ${cell.realised}` : `chosen ${cell.chosen}, never carried out`);
+  return el(
+    "td",
+    { class: "some" },
+    cell.realised > 0 ? `● ${cell.realised}` : `chosen ${cell.chosen}, never carried out`,
+  );
 }
 
 function box(cell) {
   if (!cell) return el("td", {}, "–");
   const { legal, refused, chosen, realised, why } = cell;
   const steps = legal + refused;
-  if (realised > 0) return el("td", { class: "done", style: `--share:${Math.round((100 * realised) / Math.max(1, legal))}%` }, `● ${realised} of ${legal}`);
+  if (realised > 0)
+    return el(
+      "td",
+      { class: "done", style: `--share:${Math.round((100 * realised) / Math.max(1, legal))}%` },
+      `● ${realised} of ${legal}`,
+    );
   if (chosen > 0) return el("td", { class: "some" }, `◐ chosen ${chosen}, never carried out`);
   if (legal > 0) return el("td", { class: "some" }, `◐ ${legal} of ${steps}`);
   return el("td", { class: "never" }, "○ never", el("span", { class: "why" }, why ?? ""));

@@ -31,7 +31,8 @@ function isShown(child) {
 
 /** A table with a caption; a cell is a text, a number or an element. The first of a row is its heading. */
 export function table(caption, heads, rows, attributes = {}) {
-  const isNumeric = (value) => typeof value === "number" || /^[-\d.,]+( [\w/%]+)?$/.test(String(value?.textContent ?? value));
+  const isNumeric = (value) =>
+    typeof value === "number" || /^[-\d.,]+( [\w/%]+)?$/.test(String(value?.textContent ?? value));
   const cell = (value, at) => {
     const numeric = isNumeric(value);
     const shown = typeof value === "number" ? value.toLocaleString("en") : (value ?? "–");
@@ -44,8 +45,22 @@ export function table(caption, heads, rows, attributes = {}) {
       "table",
       attributes,
       el("caption", {}, caption),
-      el("thead", {}, el("tr", {}, heads.map((head, at) => el("th", { scope: "col", class: at > 0 && isNumeric(rows[0]?.[at]) ? "number" : null }, head)))),
-      el("tbody", {}, rows.map((row) => (row instanceof Element ? row : el("tr", {}, row.map(cell))))),
+      el(
+        "thead",
+        {},
+        el(
+          "tr",
+          {},
+          heads.map((head, at) =>
+            el("th", { scope: "col", class: at > 0 && isNumeric(rows[0]?.[at]) ? "number" : null }, head),
+          ),
+        ),
+      ),
+      el(
+        "tbody",
+        {},
+        rows.map((row) => (row instanceof Element ? row : el("tr", {}, row.map(cell)))),
+      ),
     ),
   );
 }

@@ -1,16 +1,26 @@
 // What is known of a scenario's collision and of the moment, in words and tables.
 import { el, refill, table } from "./dom.js";
-import { linkOf } from "./link.js";
-import { DRIVERS, ENDS, PRIORITIES, VERDICTS, causeInWords, collisionInWords, figure, kmh, plural } from "./words.js";
+import { linkOf, nameOf } from "./link.js";
+import {
+  ENDS,
+  PRIORITIES,
+  VERDICTS,
+  atTime,
+  causeInWords,
+  collisionInWords,
+  driverInWords,
+  figure,
+  kmh,
+  plural,
+} from "./words.js";
 
 /** Everything about the collisions of a scenario; `watchDrivers` shows the reference drivers from a time on. */
 export function showVerdict(place, recording, seek, watchDrivers) {
   const { collisions, summary } = recording.header;
   const parts = collisions.map((collision) => verdict(recording, collision, seek, watchDrivers));
-  if (parts.length === 0) parts.push(el("p", {}, `No collision: ${ENDS[summary.end] ?? `it ended with ${summary.end}`}.`));
-  if (summary.same === false) {
-    parts.push(el("p", { class: "warning" }, "This replay is not the recorded episode: the file, its space or the engine has changed since."));
-  } else if (summary.same) {
+  if (parts.length === 0)
+    parts.push(el("p", {}, `No collision: ${ENDS[summary.end] ?? `it ended with ${summary.end}`}.`));
+  if (summary.same && summary.refuted.length === 0) {
     parts.push(el("p", { class: "muted" }, "This replay equals the recorded episode in every bit of every tick."));
   }
   refill(place, parts);
@@ -19,20 +29,34 @@ export function showVerdict(place, recording, seek, watchDrivers) {
 function verdict(recording, collision, seek, watchDrivers) {
   const { summary } = recording.header;
   const says = collision.counted ? "Counts" : "Does not count";
-  const jump = el("button", { type: "button", onclick: () => seek(collision.at_s) }, `Go to ${figure(collision.at_s, "s", 2)}`);
-  const watch = collision.ways.length > 0 && el("button", { type: "button", class: "drivers-from", onclick: () => watchDrivers(collision.onset_s) }, "Watch the reference drivers");
-  const onset = el("button", { type: "button", onclick: () => seek(collision.onset_s) }, `Hazard begins: ${figure(collision.onset_s, "s", 2)}`);
+  const jump = el("button", { type: "button", onclick: () => seek(collision.at_s) }, `Go to ${atTime(collision.at_s)}`);
+  const watch =
+    collision.ways.length > 0 &&
+    el(
+      "button",
+      { type: "button", class: "drivers-from", onclick: () => watchDrivers(collision.onset_s) },
+      "Watch the reference drivers",
+    );
+  const onset = el(
+    "button",
+    { type: "button", onclick: () => seek(collision.onset_s) },
+    `Hazard begins: ${atTime(collision.onset_s)}`,
+  );
   const rows = [
     ["Verdict", `${says}: ${VERDICTS[collision.class]}`],
     ["Priority", PRIORITIES[collision.priority]],
     ["Cause", causeInWords(collision.cause)],
     ["Held by, at contact", collision.held ?? "nothing"],
-    ["Closing speed", `${kmh(collision.closing_mps)}; change of velocity ${kmh(collision.delta_v_mps)}, the other's ${kmh(collision.other_delta_v_mps)}`],
+    [
+      "Closing speed",
+      `${kmh(collision.closing_mps)}; change of velocity ${kmh(collision.delta_v_mps)}, ` +
+        `the other's ${kmh(collision.other_delta_v_mps)}`,
+    ],
     ["Manoeuvre", `${collision.verb}${collision.sudden ? ", appeared less than 0.75 s before" : ""}`],
   ];
   if (collision.evasion) rows.push(["Evasion that works", collision.evasion]);
   const drivers = collision.ways.map((way) => [
-    DRIVERS[way.name] ?? way.name,
+    driverInWords(way.name),
     way.avoids ? "✓ avoids it" : "✕ does not",
     endOf(recording, way),
     collision.letter.includes(way.name) ? "✓" : ["cc", "fsm"].includes(way.name) ? "✕" : "–",
@@ -42,9 +66,17 @@ function verdict(recording, collision, seek, watchDrivers) {
     { class: `verdict ${collision.counted ? "counted" : ""}` },
     el("p", { class: "lead" }, `${collisionInWords(collision, summary.road)}.`),
     el("p", { class: "buttons" }, jump, onset, watch),
-    el("dl", {}, rows.map(([name, text]) => [el("dt", {}, name), el("dd", {}, text)])),
+    el(
+      "dl",
+      {},
+      rows.map(([name, text]) => [el("dt", {}, name), el("dd", {}, text)]),
+    ),
     drivers.length > 0 &&
-      table("Reference drivers from the beginning of the hazard on", ["Driver", "Result", "What it does", "By braking alone"], drivers),
+      table(
+        "Reference drivers from the beginning of the hazard on",
+        ["Driver", "Result", "What it does", "By braking alone"],
+        drivers,
+      ),
   );
 }
 
@@ -59,16 +91,44 @@ function endOf(recording, way) {
   return `slows down to ${kmh(slowest)}${way.avoids ? "" : `, until ${timeOf(speeds.length - 1)}`}`;
 }
 
+/** A warning before everything else, where the replay is not what the file claims. */
+export function refutedClaims({ refuted }) {
+  if (refuted.length === 0) return null;
+  return el(
+    "div",
+    { class: "warning", id: "refuted" },
+    el(
+      "p",
+      {},
+      el("strong", {}, "This replay is not what the file claims"),
+      ": the file, its space, the driving system or the engine has changed since. What is drawn here is the replay.",
+    ),
+    el(
+      "ul",
+      {},
+      refuted.map(({ claim, found }) => el("li", {}, `claimed: ${claim}; found: ${found}`)),
+    ),
+  );
+}
+
+/** Where a scenario comes from: space, driving system with its profile, seed. */
+export function origin({ origin: known }) {
+  return el("p", { class: "muted", id: "origin" }, known.map(([name, text]) => `${name}: ${text}`).join(" · "));
+}
+
 /** The moment in figures; gives a function that updates it. */
 export function showMoment(place) {
   const names = ["Time", "Speed", "Pedals", "ProC", "Held by", "Weather"];
   const cells = names.map(() => el("dd", {}, ""));
-  refill(place, names.map((name, i) => el("div", {}, el("dt", {}, name), cells[i])));
+  refill(
+    place,
+    names.map((name, i) => el("div", {}, el("dt", {}, name), cells[i])),
+  );
   return (recording, timeS) => {
     const ego = recording.ego(timeS);
     const pedals = ego.braking ? `brake ${figure(ego.brake, "%", 0)}` : `throttle ${figure(ego.throttle, "%", 0)}`;
     const texts = [
-      `${figure(timeS, "s", 2)} of ${figure(recording.endS, "s", 1)}`,
+      `${atTime(timeS)} of ${atTime(recording.endS)}`,
       `${kmh(ego.speed)}, ${figure(ego.acceleration, "m/s²", 1)}`,
       pedals,
       figure(ego.proc, "", 2),
@@ -84,13 +144,20 @@ export function showMoment(place) {
 /** Everybody at the moment, as a table. */
 export function showUsers(place, recording, timeS) {
   const ego = recording.ego(timeS);
-  const rows = recording.obstacles(timeS).map((body) => [
-    `${body.body} #${body.id}`,
-    kmh(Math.abs(body.speed)),
-    figure(Math.hypot(body.x - ego.x, body.y - ego.y), "m", 1),
-    body.ambient ? "ambient" : body.verb,
-  ]);
-  refill(place, rows.length === 0 ? el("p", { class: "muted" }, "Nobody else is there.") : table(`Road users at ${figure(timeS, "s", 1)}`, ["Who", "Speed", "Distance", "Does"], rows));
+  const rows = recording
+    .obstacles(timeS)
+    .map((body) => [
+      `${body.body} #${body.id}`,
+      kmh(Math.abs(body.speed)),
+      figure(Math.hypot(body.x - ego.x, body.y - ego.y), "m", 1),
+      body.ambient ? "ambient" : body.verb,
+    ]);
+  refill(
+    place,
+    rows.length === 0
+      ? el("p", { class: "muted" }, "Nobody else is there.")
+      : table(`Road users at ${atTime(timeS)}`, ["Who", "Speed", "Distance", "Does"], rows),
+  );
 }
 
 /** The actions of all steps: offered, masked and by which rule, chosen, refused. */
@@ -105,18 +172,39 @@ export function showSteps(place, recording, seek) {
     }[outcome.kind]();
     const masked = offers?.masked ?? [];
     const isMasked = masked.reduce((sum, [, list]) => sum + list.length, 0);
-    const details = offers && el(
-      "details",
-      {},
-      el("summary", {}, `${offers.legal.length} offered, ${isMasked} masked`),
-      el("p", {}, el("strong", {}, "Offered: "), offers.legal.map((row) => rows[row]).join(" · ") || "none"),
-      masked.length > 0 &&
-        el("ul", {}, masked.map(([why, list]) => el("li", {}, el("strong", {}, why), ` masks ${plural(list.length, "row")}: ${list.map((row) => rows[row]).join(" · ")}`))),
-    );
+    const details =
+      offers &&
+      el(
+        "details",
+        {},
+        el("summary", {}, `${offers.legal.length} offered, ${isMasked} masked`),
+        el("p", {}, el("strong", {}, "Offered: "), offers.legal.map((row) => rows[row]).join(" · ") || "none"),
+        masked.length > 0 &&
+          el(
+            "ul",
+            {},
+            masked.map(([why, list]) =>
+              el(
+                "li",
+                {},
+                el("strong", {}, why),
+                ` masks ${plural(list.length, "row")}: ${list.map((row) => rows[row]).join(" · ")}`,
+              ),
+            ),
+          ),
+      );
     return el(
       "tr",
       { "data-step": number, class: outcome.kind },
-      el("th", { scope: "row" }, el("button", { type: "button", class: "plain", onclick: () => seek(step.at_s) }, `${number} · ${figure(step.at_s, "s", 0)}`)),
+      el(
+        "th",
+        { scope: "row" },
+        el(
+          "button",
+          { type: "button", class: "plain", onclick: () => seek(step.at_s) },
+          `${number} · ${figure(step.at_s, "s", 0)}`,
+        ),
+      ),
       el("td", {}, said),
       el("td", {}, details || "–"),
       el("td", { class: "number" }, figure(step.proc, "", 3)),
@@ -128,10 +216,21 @@ export function showSteps(place, recording, seek) {
 
 /** Links to the shrunk twin, or to that of which this is one. */
 export function twins(entry, scenarios) {
-  const link = (other, text) => el("a", { href: linkOf({ s: other.n }) }, text);
+  const link = (other, text) => el("a", { href: linkOf({ s: nameOf(other) }) }, text);
   const own = entry.shrunk_from;
-  const found = scenarios.filter((other) => other.n !== entry.n && (own ? other.summary.name === own && !other.shrunk_from : other.shrunk_from === entry.summary.name));
+  const found = scenarios.filter(
+    (other) =>
+      other.n !== entry.n &&
+      (own ? other.summary.name === own && !other.shrunk_from : other.shrunk_from === entry.summary.name),
+  );
   return found.map((other) =>
-    el("p", {}, own ? "Shrunk from " : "Shrunk twin: ", link(other, other.file), ` with ${plural(other.summary.actions, "action")} in ${plural(other.summary.steps, "step")} (here ${entry.summary.actions} in ${entry.summary.steps}).`),
+    el(
+      "p",
+      {},
+      own ? "Shrunk from " : "Shrunk twin: ",
+      link(other, nameOf(other)),
+      ` with ${plural(other.summary.actions, "action")} in ${plural(other.summary.steps, "step")}` +
+        ` (here ${entry.summary.actions} in ${entry.summary.steps}).`,
+    ),
   );
 }

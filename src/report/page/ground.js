@@ -46,7 +46,10 @@ export function drawGround(canvas, road, recording, timeS, layers) {
 function drawLines(canvas, lane) {
   const { colours } = canvas;
   const thin = Math.max(0.12, canvas.px(1));
-  for (const [edge, beyond] of [[lane.left, lane.beyond_left], [lane.right, lane.beyond_right]]) {
+  for (const [edge, beyond] of [
+    [lane.left, lane.beyond_left],
+    [lane.right, lane.beyond_right],
+  ]) {
     if (beyond === "same") canvas.line(edge, colours.laneLine, thin, [3, 4]);
     else canvas.line(edge, beyond === "oncoming" ? colours.oncoming : colours.edge, thin);
   }
@@ -74,7 +77,15 @@ function drawZebra(canvas, outline) {
   // Stripes lie along the shorter side of the outline, side by side along the longer one.
   const [a, b, c, d] = outline;
   const isLong = Math.hypot(b.x - a.x, b.y - a.y) >= Math.hypot(c.x - b.x, c.y - b.y);
-  const [from, to] = isLong ? [[a, b], [d, c]] : [[b, c], [a, d]];
+  const [from, to] = isLong
+    ? [
+        [a, b],
+        [d, c],
+      ]
+    : [
+        [b, c],
+        [a, d],
+      ];
   const length = Math.hypot(from[1].x - from[0].x, from[1].y - from[0].y);
   const stripes = Math.max(1, Math.round(length / 1.1));
   const mix = ([p, q], share) => ({ x: p.x + (q.x - p.x) * share, y: p.y + (q.y - p.y) * share });

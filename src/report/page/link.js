@@ -17,9 +17,33 @@ export function relink(changes, step = false) {
 
 /** A link with these parts. */
 export function linkOf(parts) {
-  const text = new URLSearchParams(parts).toString().replaceAll("%2C", ",");
+  const text = new URLSearchParams(parts).toString().replaceAll("%2C", ",").replaceAll("%2F", "/");
   return `#${text}`;
 }
+
+/** The parts of a link that belong to an open scenario. */
+const OF_A_SCENARIO = ["s", "t", "layers", "with"];
+
+/** The link to the list, with its filters. */
+export function linkToList() {
+  const parts = linked();
+  for (const part of OF_A_SCENARIO) delete parts[part];
+  return linkOf(parts);
+}
+
+/** What a link calls a scenario: its file, so that a link still holds when other scenarios come or go. */
+export const nameOf = (entry) => entry.file.replace(/\.ava$/, "");
+
+/** The scenario of that name, or of a file that ends with it; `null` if there is none. */
+export function byName(scenarios, name) {
+  if (!name) return null;
+  const ends = (entry) => nameOf(entry).endsWith(`/${name}`);
+  return scenarios.find((entry) => nameOf(entry) === name) ?? scenarios.find(ends) ?? null;
+}
+
+/** What `with` says of the other driving system's drive, and of none beside; scenarios stand there by name. */
+export const COMPARED = "~compared";
+export const NOTHING = "~nothing";
 
 /** Copies the whole link. Where the browser forbids that, it is shown to be copied by hand. */
 export async function copyLink(button) {

@@ -1,9 +1,10 @@
 // What the page begins with, and what the link leads to.
 import { index } from "./decode.js";
 import { el, refill } from "./dom.js";
-import { linked } from "./link.js";
+import { byName, linked, nameOf } from "./link.js";
 import { showOverview, showTop } from "./overview.js";
-import { closeWatch, key, opened, showKeys, showWatch } from "./watch.js";
+import { key, showKeys } from "./keys.js";
+import { closeWatch, opened, showWatch } from "./watch.js";
 
 const data = index();
 const main = document.getElementById("main");
@@ -11,18 +12,19 @@ let shown = null;
 
 /** Shows what the link asks for. */
 async function route() {
-  const parts = linked();
-  const wanted = /^\d+$/.test(parts.s ?? "") ? data.scenarios[Number(parts.s)] : null;
+  const { s: wanted = null } = linked();
+  const found = byName(data.scenarios, wanted);
   // With one scenario and nothing around it, that one is the page.
-  const entry = wanted ?? (data.scenarios.length === 1 && !data.overview ? data.scenarios[0] : null);
+  const entry = found ?? (data.scenarios.length === 1 && !data.overview ? data.scenarios[0] : null);
   const was = shown;
-  shown = entry ? `s${entry.n}` : "overview";
+  shown = entry ? nameOf(entry) : "overview";
   document.title = entry ? `${entry.summary.name} · avastra` : `${data.title} · avastra`;
   if (!entry) {
     closeWatch();
-    showOverview(main, data);
-  } else {
-    await showWatch(main, data, entry);
+    showOverview(main, data, wanted);
+  } else if (!(await showWatch(main, data, entry))) {
+    // Meanwhile something else was asked for.
+    return;
   }
   main.dataset.ready = shown;
   if (was !== null && was !== shown) {
@@ -36,9 +38,20 @@ window.avastra = { data, opened };
 
 function begin() {
   showTop(document.getElementById("top"), data);
-  refill(document.getElementById("foot"), el("p", {}, `avastra ${data.avastra}, engine ${data.engine}. Everything is in this file; it asks nothing of a network. Press ? for keys.`));
+  refill(
+    document.getElementById("foot"),
+    el(
+      "p",
+      {},
+      `avastra ${data.avastra}, engine ${data.engine}. Everything is in this file; it asks nothing of a network. ` +
+        "Press ? for keys.",
+    ),
+  );
   if (typeof DecompressionStream === "undefined") {
-    refill(main, el("p", { class: "warning" }, "This browser is too old for this page: it needs DecompressionStream (2023)."));
+    refill(
+      main,
+      el("p", { class: "warning" }, "This browser is too old for this page: it needs DecompressionStream (2023)."),
+    );
     return;
   }
   window.addEventListener("hashchange", () => route().catch(failed));
@@ -46,10 +59,20 @@ function begin() {
     const isTyping = event.target.closest("input:not([type=range]):not([type=checkbox]), select, textarea, dialog");
     if (event.ctrlKey || event.metaKey || event.altKey || isTyping) return;
     if (event.key === "?") showKeys();
-    else if (!opened() || isPress(event) || !key(event)) return;
+    else if (!opened() || isPress(event) || !key(event, opened())) return;
     event.preventDefault();
   });
   window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => opened()?.repaint());
+  // Paper is light: canvases are painted anew in the colours that `print` has in the sheet.
+  for (const [name, isPrinted] of [
+    ["beforeprint", true],
+    ["afterprint", false],
+  ]) {
+    window.addEventListener(name, () => {
+      document.documentElement.classList.toggle("printed", isPrinted);
+      opened()?.repaint();
+    });
+  }
   route().catch(failed);
 }
 

@@ -5,7 +5,11 @@ const recordings = new Map();
 
 /** The recording of an element, read once. */
 export function recording(id) {
-  if (!recordings.has(id)) recordings.set(id, unpacked(id).then((data) => new Recording(data, index().quantisation)));
+  if (!recordings.has(id))
+    recordings.set(
+      id,
+      unpacked(id).then((data) => new Recording(data, index().quantisation)),
+    );
   return recordings.get(id);
 }
 
@@ -100,7 +104,10 @@ export class Recording {
         y,
         heading: this.columns[track.places[2]][at],
         speed: this.columns[track.speed_mps][at],
-        way: this.#points(track.predicted_m, track.offsets, thought).map((point) => ({ x: x + point.x, y: y + point.y })),
+        way: this.#points(track.predicted_m, track.offsets, thought).map((point) => ({
+          x: x + point.x,
+          y: y + point.y,
+        })),
       });
     }
     return found;

@@ -2,29 +2,51 @@
 import { el, refill, table } from "./dom.js";
 import { curve } from "./charts.js";
 import { coverage } from "./coverage.js";
+import { estimate } from "./estimate.js";
 import { showList } from "./list.js";
-import { linkOf } from "./link.js";
+import { linkOf, nameOf } from "./link.js";
 import { study } from "./study.js";
-import { figure, mainCollision, plural } from "./words.js";
+import { CHANGES, driverInWords, figure, mainCollision, plural, simulated } from "./words.js";
 
-/** Fills an element with the overview. */
-export function showOverview(place, data) {
+/** Fills an element with the overview; `missing` is what the link names and the page has not. */
+export function showOverview(place, data, missing = null) {
   const { overview, scenarios } = data;
   const list = el("div", { id: "scenarios" });
   refill(
     place,
     el("h1", {}, heading(data)),
-    overview && overview.totals && totals(overview.totals),
+    overview && conditions(overview.conditions),
+    missing && el("p", { class: "warning" }, `The link names a scenario that is not on this page: ${missing}.`),
+    refuted(scenarios),
+    overview && overview.totals && totals(overview.totals, overview.simulated_h),
+    compared(data),
     data.remarks.map((remark) => el("p", { class: "warning" }, remark)),
-    overview?.kind === "training" && learning(overview.learning),
-    overview?.kind === "study" && study(overview.study),
-    scenarios.length > 0 && el("section", { "aria-labelledby": "h-list" }, el("h2", { id: "h-list" }, "Scenarios"), list),
-    scenarios.length === 0 && overview?.kind !== "study" && el("p", {}, nothingShown(overview)),
+    overview && results(overview),
+    scenarios.length > 0 &&
+      el("section", { "aria-labelledby": "h-list" }, el("h2", { id: "h-list" }, "Scenarios"), list),
+    scenarios.length === 0 && ["run", "training"].includes(overview?.kind) && el("p", {}, nothingShown(overview)),
     overview && coverage(overview),
     overview && refusals(overview),
-    overview && el("details", { class: "settings" }, el("summary", {}, "Settings, to do it again"), el("pre", { tabindex: "0" }, overview.settings)),
+    overview &&
+      el(
+        "details",
+        { class: "settings" },
+        el("summary", {}, "Settings, to do it again"),
+        el("pre", { tabindex: "0" }, overview.settings),
+      ),
   );
   if (scenarios.length > 0) showList(list, data);
+}
+
+/** What was measured, by what the directory holds. */
+function results(overview) {
+  const of = {
+    run: () => null,
+    training: () => [overview.evaluation && evaluation(overview.evaluation), learning(overview.learning)],
+    study: () => study(overview.study),
+    estimate: () => estimate(overview.estimate),
+  };
+  return of[overview.kind]();
 }
 
 /** Why there is no scenario. */
@@ -39,10 +61,72 @@ function heading({ title, overview }) {
   return overview?.kind ? `${overview.kind[0].toUpperCase()}${overview.kind.slice(1)} ${name}` : name;
 }
 
-function totals(sums) {
-  const tile = (value, name, kind) => el("div", { class: `tile ${kind ?? ""}` }, el("dd", {}, value), el("dt", {}, name));
-  const ends = [["arrived", "at the goal"], ["stalled", "stalled"], ["blocked", "blocked"], ["astray", "out of its lane"], ["step_limit", "at the step limit"], ["failed", "driving system failed"]];
-  const said = ends.filter(([name]) => sums[name] > 0).map(([name, words]) => `${sums[name]} ${words}`).join(", ");
+/** What was played against what: name and text of each. */
+function conditions(known) {
+  if (!known) return null;
+  return el(
+    "dl",
+    { class: "conditions", "aria-label": "Conditions" },
+    known.map(([name, text]) => el("div", {}, el("dt", {}, name), el("dd", {}, text))),
+  );
+}
+
+/** Scenarios that do not play as their files say, before anything that is told of them. */
+function refuted(scenarios) {
+  const wrong = scenarios.filter((entry) => entry.summary.refuted.length > 0);
+  if (wrong.length === 0) return null;
+  const links = wrong.flatMap((entry, i) => [
+    i > 0 ? ", " : "",
+    el("a", { href: linkOf({ s: nameOf(entry) }) }, nameOf(entry)),
+  ]);
+  const verb = wrong.length === 1 ? "does not play as its file claims" : "do not play as their files claim";
+  return el(
+    "p",
+    { class: "warning", id: "refuted" },
+    el("strong", {}, `${wrong.length} of ${plural(scenarios.length, "scenario")} ${verb}: `),
+    ...links,
+    ". The page shows what the replay did.",
+  );
+}
+
+/** What the other driving system makes of the scenarios, in a sentence. */
+function compared({ scenarios, compared_with: other }) {
+  if (!other) return null;
+  const sums = new Map();
+  for (const { change } of scenarios) if (change) sums.set(change.kind, (sums.get(change.kind) ?? 0) + 1);
+  const told = [...sums].map(([kind, count]) => `${count} × ${CHANGES[kind] ?? kind}`);
+  return el("p", { class: "lead", id: "compared" }, `With ${driverInWords(other)}: ${told.join(", ")}.`);
+}
+
+/** What a finished training can do, on episodes that it did not learn from. */
+function evaluation(found) {
+  const sentence =
+    `On ${plural(found.episodes, "episode")} of its own: ${plural(found.counted, "collision")} that count in ` +
+    `${plural(found.colliding, "episode")}, ${found.collisions} in all, return ${figure(found.return, "", 3)}, in ` +
+    `${simulated(found.simulated_h)} of simulated time.`;
+  return el(
+    "section",
+    { "aria-labelledby": "h-evaluation" },
+    el("h2", { id: "h-evaluation" }, "What it learned"),
+    el("p", {}, sentence),
+  );
+}
+
+function totals(sums, simulatedH) {
+  const tile = (value, name, kind) =>
+    el("div", { class: `tile ${kind ?? ""}` }, el("dd", {}, value), el("dt", {}, name));
+  const ends = [
+    ["arrived", "at the goal"],
+    ["stalled", "stalled"],
+    ["blocked", "blocked"],
+    ["astray", "out of its lane"],
+    ["step_limit", "at the step limit"],
+    ["failed", "driving system failed"],
+  ];
+  const said = ends
+    .filter(([name]) => sums[name] > 0)
+    .map(([name, words]) => `${sums[name]} ${words}`)
+    .join(", ");
   return el(
     "section",
     { "aria-label": "Totals" },
@@ -53,10 +137,16 @@ function totals(sums) {
       tile(sums.collisions, "collisions in all"),
       tile(sums.episodes, "episodes"),
       tile(figure(sums.driven_m / 1000, "km", 1), "driven"),
-      tile(figure(sums.simulated_s / 3600, "h", 1), "of simulated time"),
+      tile(simulated(simulatedH), "of simulated time"),
       tile(sums.red_runs, "red lights passed", sums.red_runs > 0 ? "bad" : ""),
     ),
-    el("p", { class: "muted" }, `Episodes ended: ${said}. Of all collisions, a careful driver would have avoided ${sums.avoidable}, only one without delay ${sums.beyond_reference}, none ${sums.unavoidable}; the ego vehicle had priority in ${sums.wronged}, the other in ${sums.wrong}.`),
+    el(
+      "p",
+      { class: "muted" },
+      `Episodes ended: ${said}. Of all collisions, a careful driver would have avoided ${sums.avoidable}, ` +
+        `only one without delay ${sums.beyond_reference}, none ${sums.unavoidable}; the ego vehicle had priority in ` +
+        `${sums.wronged}, the other in ${sums.wrong}.`,
+    ),
   );
 }
 
@@ -83,7 +173,12 @@ function learning(points) {
 function refusals(overview) {
   const rows = (overview.refusals ?? []).map(({ reason, times }) => [reason, times]);
   if (rows.length === 0) return null;
-  return el("section", {}, el("h2", {}, "Refused actions"), table("Chosen actions that could not be carried out", ["Reason", "Times"], rows.slice(0, 30)));
+  return el(
+    "section",
+    {},
+    el("h2", {}, "Refused actions"),
+    table("Chosen actions that could not be carried out", ["Reason", "Times"], rows.slice(0, 30)),
+  );
 }
 
 /** The line at the top of every page. */
@@ -95,6 +190,6 @@ export function showTop(place, data) {
     place,
     el("a", { class: "brand", href: "#" }, "avastra"),
     el("span", { class: "muted" }, data.overview?.kind ?? plural(data.scenarios.length, "scenario")),
-    collision && el("a", { href: linkOf({ s: worst.n }), class: "worst" }, "Watch the worst"),
+    collision && el("a", { href: linkOf({ s: nameOf(worst) }), class: "worst" }, "Watch the worst"),
   );
 }

@@ -4,10 +4,38 @@ import { styled } from "./dom.js";
 /** Colours of the style sheet, read anew when the scheme changes. */
 export function palette() {
   const names = [
-    "ground", "road", "junction", "lane-line", "edge", "oncoming", "walkway", "solid", "crosswalk", "ego", "ego-line", "ink", "paper",
-    "truth", "truth-line", "pedestrian", "perceived", "planned", "ghost", "route", "danger", "warn", "good", "brake", "muted", "driver", "grid", "accent",
+    "ground",
+    "road",
+    "junction",
+    "lane-line",
+    "edge",
+    "oncoming",
+    "walkway",
+    "solid",
+    "crosswalk",
+    "ego",
+    "ego-line",
+    "ink",
+    "paper",
+    "truth",
+    "truth-line",
+    "pedestrian",
+    "perceived",
+    "planned",
+    "ghost",
+    "route",
+    "danger",
+    "warn",
+    "good",
+    "brake",
+    "muted",
+    "driver",
+    "grid",
+    "accent",
   ];
-  return Object.fromEntries(names.map((name) => [name.replace(/-(\w)/g, (_, letter) => letter.toUpperCase()), styled(`--${name}`)]));
+  return Object.fromEntries(
+    names.map((name) => [name.replace(/-(\w)/g, (_, letter) => letter.toUpperCase()), styled(`--${name}`)]),
+  );
 }
 
 export class Canvas {

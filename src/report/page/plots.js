@@ -7,7 +7,11 @@ const RIGHT = 10;
 
 /** The rows of the plot: name, height in px, and how to draw it. */
 const ROWS = [
-  ["speed", 62], ["acceleration", 52], ["ProC", 44], ["reason", 30], ["steps", 34],
+  ["speed", 62],
+  ["acceleration", 52],
+  ["ProC", 44],
+  ["reason", 30],
+  ["steps", 34],
 ];
 
 export class Plots {
@@ -88,7 +92,11 @@ export class Plots {
     context.fillStyle = colours.ink;
     context.textAlign = "left";
     context.textBaseline = "top";
-    context.fillText({ speed: "Speed", acceleration: "Accel.", ProC: "ProC", reason: "Held by", steps: "Actions" }[name], 2, top);
+    context.fillText(
+      { speed: "Speed", acceleration: "Accel.", ProC: "ProC", reason: "Held by", steps: "Actions" }[name],
+      2,
+      top,
+    );
     if (name === "reason") return this.#reasons(top, height);
     if (name === "steps") return this.#steps(top, height);
     const [column, unit, factor] = {
@@ -100,7 +108,8 @@ export class Plots {
     const values = series(this.recording);
     const second = this.other && series(this.other);
     const all = second ? [values, second] : [values];
-    const extent = (fold, start) => all.reduce((found, list) => list.reduce((a, b) => fold(a, b), found), start) * factor;
+    const extent = (fold, start) =>
+      all.reduce((found, list) => list.reduce((a, b) => fold(a, b), found), start) * factor;
     const range = name === "ProC" ? [0, 1] : [Math.min(0, extent(Math.min, 0)), Math.max(1, extent(Math.max, 0))];
     this.#curve(values, factor, range, top, height, colours.accent, []);
     if (second) this.#curve(second, factor, range, top, height, colours.warn, [5, 3]);
@@ -165,7 +174,10 @@ export class Plots {
       context.setLineDash(kind === "done" ? [] : [3, 3]);
       context.strokeRect(left + 0.5, top + 0.5, Math.max(right - left - 2, 1), height - 1);
       context.setLineDash([]);
-      const label = kind === "done" ? text.split("(")[0] : { passed: "–", refused: `refused ${this.recording.header.rows[row] ?? ""}` }[kind];
+      const label =
+        kind === "done"
+          ? text.split("(")[0]
+          : { passed: "–", refused: `refused ${this.recording.header.rows[row] ?? ""}` }[kind];
       context.save();
       context.beginPath();
       context.rect(left, top, right - left - 3, height);
@@ -201,8 +213,11 @@ export class Plots {
 
 /** A reason has one colour everywhere; what makes it brake hard is red. */
 export function reasonColour(text, colours) {
-  if (/^(emergency|stop after|fallback|degraded)/.test(text)) return `color-mix(in srgb, ${colours.danger} 45%, ${colours.paper})`;
-  if (/^(stop|red light|crosswalk|yield|creep|approach|keep clear)/.test(text)) return `color-mix(in srgb, ${colours.warn} 40%, ${colours.paper})`;
-  if (/^(follow|nudge|lane change|sight)/.test(text)) return `color-mix(in srgb, ${colours.accent} 28%, ${colours.paper})`;
+  if (/^(emergency|stop after|fallback|degraded)/.test(text))
+    return `color-mix(in srgb, ${colours.danger} 45%, ${colours.paper})`;
+  if (/^(stop|red light|crosswalk|yield|creep|approach|keep clear)/.test(text))
+    return `color-mix(in srgb, ${colours.warn} 40%, ${colours.paper})`;
+  if (/^(follow|nudge|lane change|sight)/.test(text))
+    return `color-mix(in srgb, ${colours.accent} 28%, ${colours.paper})`;
   return `color-mix(in srgb, ${colours.muted} 18%, ${colours.paper})`;
 }

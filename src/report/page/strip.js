@@ -1,7 +1,7 @@
 // The film strip: five stills up to the collision, to see at a glance and to point at.
 import { el, refill } from "./dom.js";
 import { View } from "./view.js";
-import { figure } from "./words.js";
+import { atTime } from "./words.js";
 
 const STILL_LAYERS = new Set(["truth", "signals"]);
 
@@ -20,7 +20,7 @@ export function drawStrip(place, recording, road, seek, peek) {
   const stills = times.map((timeS, i) => {
     const canvas = el("canvas", { "aria-hidden": "true" });
     const isLast = i === times.length - 1 && recording.collision();
-    const caption = `${figure(timeS, "s", 1)}${isLast ? " · contact" : ""}`;
+    const caption = `${atTime(timeS)}${isLast ? " · contact" : ""}`;
     const view = new View(canvas, recording, road, STILL_LAYERS);
     views.push([view, timeS]);
     return el(

@@ -88,7 +88,12 @@ export class View {
     const times = [];
     for (let t = since; t < timeS; t += 0.2) times.push(t);
     const thin = Math.max(0.1, canvas.px(1.2));
-    canvas.line([...times, timeS].map((t) => recording.ego(t)), canvas.colours.ego, thin, [0.3, 0.7]);
+    canvas.line(
+      [...times, timeS].map((t) => recording.ego(t)),
+      canvas.colours.ego,
+      thin,
+      [0.3, 0.7],
+    );
     const ways = new Map(others.map((body) => [body.id, []]));
     for (const t of [...times, timeS]) {
       for (const body of recording.obstacles(t)) ways.get(body.id)?.push(body);
@@ -207,12 +212,16 @@ export class View {
   }
 
   #handle(element) {
-    element.addEventListener("wheel", (event) => {
-      // Without a key the page scrolls past the view, as everywhere.
-      if (!event.ctrlKey && !event.metaKey) return;
-      event.preventDefault();
-      this.zoom(event.deltaY < 0 ? 1.15 : 1 / 1.15);
-    }, { passive: false });
+    element.addEventListener(
+      "wheel",
+      (event) => {
+        // Without a key the page scrolls past the view, as everywhere.
+        if (!event.ctrlKey && !event.metaKey) return;
+        event.preventDefault();
+        this.zoom(event.deltaY < 0 ? 1.15 : 1 / 1.15);
+      },
+      { passive: false },
+    );
     const fingers = new Map();
     element.addEventListener("pointerdown", (event) => {
       fingers.set(event.pointerId, event);
@@ -233,6 +242,7 @@ export class View {
       this.shift.y += (event.clientY - before.clientY) / pxPerM;
       this.draw(this.timeS);
     });
-    for (const name of ["pointerup", "pointercancel"]) element.addEventListener(name, (event) => fingers.delete(event.pointerId));
+    for (const name of ["pointerup", "pointercancel"])
+      element.addEventListener(name, (event) => fingers.delete(event.pointerId));
   }
 }

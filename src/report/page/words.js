@@ -19,6 +19,9 @@ export const DRIVERS = {
   r157: "least performance of UN R157",
 };
 
+/** A driving system that scenarios are compared with, in words. */
+export const driverInWords = (name) => DRIVERS[name] ?? name;
+
 export const ENDS = {
   arrived: "it arrived",
   stalled: "it stood for several steps",
@@ -34,6 +37,15 @@ export function figure(value, unit = "", digits = 1) {
   const text = value.toFixed(digits).replace(/^-(0(\.0*)?)$/, "$1");
   return unit ? `${text} ${unit}` : text;
 }
+
+/** Three digits, however small or large. */
+export const short = (value) => Number(value).toLocaleString("en", { maximumSignificantDigits: 3 });
+
+/** Simulated time, in hours or, if it is short, in minutes. */
+export const simulated = (hours) => (hours < 1 ? figure(hours * 60, "min", 1) : figure(hours, "h", 1));
+
+/** A moment of a replay, to a hundredth wherever the page tells it. */
+export const atTime = (timeS) => figure(timeS, "s", 2);
 
 export const kmh = (mps) => figure(mps * 3.6, "km/h", 0);
 
@@ -53,9 +65,28 @@ export function collisionInWords(collision, road) {
   const how = others[collision.approach] ?? `coming ${collision.approach}`;
   const struck = collision.struck ? " runs into the ego vehicle" : " is hit by the ego vehicle";
   return (
-    `${collision.body} #${collision.obstacle} (${how})${struck} at ${figure(collision.at_s, "s", 2)}` +
+    `${collision.body} #${collision.obstacle} (${how})${struck} at ${atTime(collision.at_s)}` +
     ` on ${road}: the ego vehicle drives ${kmh(collision.ego_mps)}, contact at its ${collision.side}`
   );
+}
+
+/** What another driving system makes of a scenario, by the word of the page's data. */
+export const CHANGES = {
+  same: "same crash",
+  other_time: "same crash, at another time",
+  struck: "the same obstacle runs into it",
+  other_crash: "another crash",
+  gone: "no crash any more",
+  never_met: "the obstacle never appears",
+  failed: "the driving system failed",
+  new: "a new crash",
+  none: "no crash in either",
+};
+
+/** The result of a comparison, with how far the time of the crash has moved. */
+export function changeInWords({ kind, later_s: laterS }) {
+  if (kind !== "other_time") return CHANGES[kind] ?? kind;
+  return `same crash, ${figure(Math.abs(laterS), "s", 2)} ${laterS > 0 ? "later" : "earlier"}`;
 }
 
 /** A cause in words. */

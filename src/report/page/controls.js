@@ -1,0 +1,108 @@
+// The controls of a replay: play, scrub, rate, zoom, layers, and what is shown beside.
+import { RATES } from "./clock.js";
+import { el } from "./dom.js";
+import { showKeys } from "./keys.js";
+import { COMPARED, NOTHING, linked, nameOf } from "./link.js";
+import { LAYERS } from "./view.js";
+import { driverInWords, figure } from "./words.js";
+
+const ZOOM = 1.3;
+
+export class Controls {
+  /** Of an open replay, whose clock and views they move. */
+  constructor(watch) {
+    const { clock } = watch;
+    this.play = button("▶", "Play (space)", () => clock.toggle(), { id: "play", class: "primary" });
+    this.scrubber = el("input", {
+      type: "range",
+      id: "scrub",
+      min: 0,
+      max: clock.endS,
+      step: clock.tickS,
+      value: 0,
+      "aria-label": "Time in s",
+      oninput: (event) => {
+        clock.playing = false;
+        clock.seek(Number(event.target.value));
+      },
+    });
+    this.rate = el(
+      "select",
+      { id: "rate", "aria-label": "Playing rate", onchange: (event) => (clock.rate = Number(event.target.value)) },
+      RATES.map((rate) => el("option", { value: rate, selected: rate === 1 }, `${rate} ×`)),
+    );
+    this.element = el(
+      "div",
+      { class: "controls" },
+      el(
+        "div",
+        { class: "row" },
+        this.play,
+        button("‹", "A tick back (←)", () => clock.ticks(-1), { id: "back" }),
+        button("›", "A tick on (→)", () => clock.ticks(1), { id: "on" }),
+        button("✕", "To the collision (c)", () => watch.toCollision(), { id: "hit" }),
+        this.scrubber,
+        this.rate,
+        button("−", "Zoom out (-)", () => watch.zoom(1 / ZOOM)),
+        button("+", "Zoom in (+)", () => watch.zoom(ZOOM), { id: "zoom" }),
+        el(
+          "label",
+          { class: "layer" },
+          checkbox({ id: "follow", checked: true }, (on) => watch.follow(on)),
+          " Follow",
+        ),
+        el("button", { type: "button", id: "copy", onclick: (event) => watch.copy(event.target) }, "Copy link"),
+        button("?", "Keys (?)", showKeys, { id: "keys" }),
+      ),
+      el("fieldset", { class: "row layers" }, el("legend", {}, "Layers"), layers(watch)),
+      comparison(watch),
+    );
+  }
+
+  /** Follows the clock. */
+  show({ timeS, playing, rate }) {
+    this.scrubber.value = timeS;
+    this.scrubber.setAttribute("aria-valuetext", figure(timeS, "s", 2));
+    this.play.textContent = playing ? "❚❚" : "▶";
+    this.play.setAttribute("aria-label", playing ? "Pause (space)" : "Play (space)");
+    this.rate.value = String(rate);
+  }
+}
+
+function button(label, title, onclick, attributes = {}) {
+  return el("button", { type: "button", title, "aria-label": title, onclick, ...attributes }, label);
+}
+
+function checkbox(attributes, changed) {
+  return el("input", { type: "checkbox", ...attributes, onchange: (event) => changed(event.target.checked) });
+}
+
+function layers(watch) {
+  return LAYERS.map(([name, label, sign]) =>
+    el(
+      "label",
+      { class: `layer ${name}` },
+      checkbox({ name, checked: watch.layers.has(name) }, (on) => watch.toggleLayer(name, on)),
+      el("span", { "aria-hidden": "true" }, sign),
+      ` ${label}`,
+    ),
+  );
+}
+
+/** What is shown on the same clock; nothing to choose where there is nothing else. */
+function comparison(watch) {
+  const { data, entry } = watch;
+  const option = (value, text) => el("option", { value }, text);
+  const others = data.scenarios.filter((one) => one.n !== entry.n).map((one) => option(nameOf(one), nameOf(one)));
+  const compared = entry.compared ? [option(COMPARED, `the drive of ${driverInWords(data.compared_with)}`)] : [];
+  if (others.length + compared.length === 0) return null;
+  const select = el(
+    "select",
+    { id: "with", onchange: (event) => watch.compareWith(event.target.value) },
+    option(NOTHING, "nothing"),
+    compared,
+    others,
+  );
+  select.value = linked().with ?? (entry.compared ? COMPARED : NOTHING);
+  return el("div", { class: "row" }, el("label", {}, "On the same clock: ", select));
+}
