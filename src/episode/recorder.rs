@@ -1,4 +1,4 @@
-//! What an episode looks like from outside the vehicles, tick by tick: everybody's way, sky, lights and contacts.
+//! What an episode looks like from outside the vehicles, tick by tick: the way of each road user, sky, lights and contacts.
 //!
 //! One recorder for all that shows an episode again: exports, pages and pictures. What goes on inside the driving system
 //! is left to those that show it.
@@ -191,7 +191,7 @@ impl Actor {
         Actor { id: obstacle.id, body: obstacle.body, shape, first: Some(*obstacle), samples, brake_lights }
     }
 
-    /// What it is called outside: `ego`, or `npc_3` for the one that claims call `npc#3`.
+    /// What other tools call it: `ego`, or `npc_3` for the one that claims call `npc#3`.
     pub fn name(&self) -> String {
         if self.id == 0 { "ego".to_owned() } else { format!("npc_{}", self.id) }
     }

@@ -25,7 +25,7 @@ impl Labels {
     }
 
     /// The left end of the base line for a text beside a point, `away_px` or a little more from it; `None` if there is no
-    /// room. Who asks first has the choice.
+    /// room. The first name has the free choice, each later one what is left.
     pub fn place(
         &mut self,
         (x, y): (f64, f64),

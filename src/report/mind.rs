@@ -16,7 +16,7 @@ use super::recording::{
     rounded,
 };
 
-/// Of a plan every fifth point is kept (0.5 s), of a prediction every second (1 s), up to so many.
+/// Every fifth point of a plan is kept (0.5 s apart), and every second one of a prediction (1 s apart), up to this many.
 const PLAN_STRIDE: usize = 5;
 const PREDICTION_STRIDE: usize = 2;
 const PREDICTION_POINTS: usize = 5;

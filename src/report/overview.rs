@@ -6,7 +6,7 @@ use crate::action::ActionTable;
 use crate::ads::external::Attached;
 use crate::run::{Database, DatabaseError, Profile, TrafficRecord};
 
-/// Of a run or a training: totals, groups of like failures, rows on roads, refusals, the curve of learning, and what was
+/// What a run or a training found: totals, groups of like failures, rows on roads, refusals, the curve of learning, and what was
 /// learned. `settings` is the text of its `run.yaml`, `results` what a finished training wrote.
 ///
 /// # Errors
@@ -20,7 +20,7 @@ pub fn of_run(
     let rows = table.map(|table| table.rows().iter().map(|row| row.label.as_str()).collect::<Vec<_>>());
     let learning = database.learning()?;
     let totals = database.totals()?;
-    // Of a training, what was played again before a return is no time that was simulated for it, and branches are.
+    // A training simulates branches too, and returns to moments without playing up to them again.
     let simulated_s = if learning.is_empty() { totals.simulated_s } else { database.trained_s()? };
     Ok(json!({
         "kind": if learning.is_empty() { "run" } else { "training" },
@@ -31,12 +31,12 @@ pub fn of_run(
     }))
 }
 
-/// Of a study: its results, as its `results.json` has them.
+/// A study's results, as its `results.json` has them.
 pub fn of_study(results: &Value, settings: &str) -> Value {
     json!({ "kind": "study", "settings": settings, "conditions": conditions(settings), "study": results })
 }
 
-/// Of an estimate: its results, as its `results.json` has them.
+/// An estimate's results, as its `results.json` has them.
 pub fn of_estimate(results: &Value, settings: &str) -> Value {
     json!({ "kind": "estimate", "settings": settings, "conditions": conditions(settings), "estimate": results })
 }
@@ -56,7 +56,7 @@ fn conditions(settings: &str) -> Vec<(&'static str, String)> {
         ambient: u32,
         agent: Option<String>,
         seed: Option<u64>,
-        /// Of a study, whose agents stand in its tables.
+        /// A study has this in place of `seed`.
         first_seed: Option<u64>,
     }
     let Ok(of) = serde_yaml::from_str::<Conditions>(settings) else { return Vec::new() };

@@ -50,7 +50,7 @@ pub struct Scene {
     /// Its file, as it is to be named; links name it so, and no two scenarios have one name.
     pub file: String,
     pub recording: Recording,
-    /// The same scenario with another driving system, if one was asked for, and what became of its crash.
+    /// The drive of another driving system, if one was asked for, and what became of the crash.
     pub compared: Option<(Recording, Value)>,
     /// Name of the scenario of which this is the shrunk one.
     pub shrunk_from: Option<String>,

@@ -30,6 +30,8 @@ async function tab(width = 1440, height = 1000, scheme = "light") {
 }
 
 async function open(one, file, hash = "") {
+  // A tab behind another draws no frames.
+  await one.bringToFront();
   await one.goto("about:blank");
   await one.goto(pathToFileURL(file).href + hash);
   await ready(one);
@@ -202,8 +204,13 @@ const shown = [await paper(), await picture(dark)];
 await dark.evaluate(() => window.dispatchEvent(new Event("beforeprint")));
 assert.deepEqual([await paper(), (await picture(dark)) === shown[1]], ["#ffffff", false], "paper is light");
 await dark.evaluate(() => window.dispatchEvent(new Event("afterprint")));
-assert.deepEqual([await paper(), await picture(dark)], shown, "and the screen is dark again");
+assert.deepEqual([await paper(), (await picture(dark)) === shown[1]], [shown[0], true], "and the screen is dark again");
 writeFileSync(join(work, "replay_dark.pdf"), await dark.pdf({ format: "A4", printBackground: true }));
+await dark.emulateMediaType("print");
+await dark.evaluate(() => window.dispatchEvent(new Event("beforeprint")));
+await dark.screenshot({ path: join(work, "replay_print.png"), fullPage: true });
+await dark.emulateMediaType(null);
+await dark.evaluate(() => window.dispatchEvent(new Event("afterprint")));
 await open(dark, page);
 await accessible(dark, "overview, dark");
 const phone = await tab(390, 844);

@@ -9,7 +9,7 @@ import { driverInWords, figure } from "./words.js";
 const ZOOM = 1.3;
 
 export class Controls {
-  /** Of an open replay, whose clock and views they move. */
+  /** Makes the controls that move the clock and the views of an open replay. */
   constructor(watch) {
     const { clock } = watch;
     this.play = button("▶", "Play (space)", () => clock.toggle(), { id: "play", class: "primary" });

@@ -5,7 +5,7 @@ export function el(name, attributes = {}, ...children) {
   return filled(document.createElement(name), attributes, children);
 }
 
-/** The same in SVG. */
+/** An SVG element with attributes and children, as `el` makes them. */
 export function svg(name, attributes = {}, ...children) {
   return filled(document.createElementNS("http://www.w3.org/2000/svg", name), attributes, children);
 }
@@ -65,7 +65,7 @@ export function table(caption, heads, rows, attributes = {}) {
   );
 }
 
-/** Says something to a screen reader, and for a moment to everybody. */
+/** Says something to a screen reader, and shows it for a moment. */
 export function announce(text) {
   const place = document.getElementById("said");
   if (!place) return;

@@ -141,7 +141,7 @@ export function showMoment(place) {
   };
 }
 
-/** Everybody at the moment, as a table. */
+/** The road users of a moment as a table. */
 export function showUsers(place, recording, timeS) {
   const ego = recording.ego(timeS);
   const rows = recording

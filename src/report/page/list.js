@@ -16,7 +16,7 @@ export const FILTERS = [
   ["change", "Compared", (entry) => CHANGES[entry.change?.kind] ?? "–"],
 ];
 
-/** Whether a shrunk scenario stays out of the list until it is asked for: where the one that it comes from is there. */
+/** Tells shrunk scenarios that the list leaves out until asked: those whose original is on the page. */
 function hiddenTwins(scenarios) {
   const found = new Set(scenarios.filter((entry) => !entry.shrunk_from).map((entry) => entry.summary.name));
   return (entry) => entry.shrunk_from && found.has(entry.shrunk_from);

@@ -1,4 +1,4 @@
-// A scenario as it was at any time: places between ticks, who was there, what was believed and planned.
+// A scenario as it was at any time: places between ticks, road users, what was believed and planned.
 import { index, unpacked } from "./decode.js";
 
 const recordings = new Map();
@@ -67,7 +67,7 @@ export class Recording {
     };
   }
 
-  /** Everybody else who is there. */
+  /** The road users that are there, without the ego vehicle. */
   obstacles(timeS) {
     const found = [];
     for (const one of this.header.obstacles) {

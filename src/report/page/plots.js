@@ -15,7 +15,7 @@ const ROWS = [
 ];
 
 export class Plots {
-  /** `seek` is called with the time that somebody points at. */
+  /** `seek` is called with the time under a pressed pointer. */
   constructor(element, recording, seek, other = null) {
     this.canvas = new Canvas(element);
     this.recording = recording;

@@ -13,7 +13,7 @@ export function stillTimes(recording) {
   return [-4, -2.5, -1.5, -0.5, 0].map((before) => Math.max(0, at + before));
 }
 
-/** Fills an element with the stills; `seek` opens a moment, `peek` shows one while somebody points at it. */
+/** Fills an element with the stills; `seek` opens a moment, `peek` shows one while the pointer is on its still. */
 export function drawStrip(place, recording, road, seek, peek) {
   const times = stillTimes(recording);
   const views = [];

@@ -101,7 +101,7 @@ export class View {
     for (const way of ways.values()) canvas.line(way, canvas.colours.truthLine, thin, [0.3, 0.7]);
   }
 
-  /** Where everybody will be: the recording knows. */
+  /** Road users where the recording has them some seconds later. */
   #ghosts(timeS, others) {
     const { canvas, recording } = this;
     for (const ahead of AHEAD_S) {

@@ -152,7 +152,7 @@ class Watch {
       const driven = i === 0 ? `${name} with ${recorded.header.summary.ads}` : name;
       return second && el("figcaption", {}, el("strong", {}, i === 0 ? "A · " : "B · "), driven);
     });
-    return elements.map((element, i) => el("figure", { class: "staged" }, element, captions[i]));
+    return elements.map((element, i) => el("figure", { class: "staged" }, captions[i], element));
   }
 
   /** What the other driving system makes of this scenario. */
@@ -212,7 +212,7 @@ class Watch {
     return [...this.layers].join(",") || "none";
   }
 
-  /** Shows a moment while somebody points at its still. */
+  /** Shows a moment while the pointer is on its still; `null` goes back. */
   #peek(timeS) {
     if (this.clock.playing) return;
     this.views.forEach((view) => view.draw(timeS ?? this.clock.timeS));
