@@ -79,6 +79,7 @@ pub fn report(output: &Output, arguments: &ReportArguments) -> Result<(), Failur
             first.claim, first.found
         ));
     }
+    let changes = changes(&scenes);
     let (scenarios, title) = (scenes.len(), found.title.clone());
     let compared_with = arguments.compare.clone();
     let page = Page { title, overview: found.overview, remarks, scenes, compared_with };
@@ -90,9 +91,14 @@ pub fn report(output: &Output, arguments: &ReportArguments) -> Result<(), Failur
         plural(scenarios, "scenario"),
         html.len() as f64 / 1e6
     ));
+    if let Some(other) = &arguments.compare {
+        let told: Vec<String> =
+            changes.iter().map(|(kind, count)| format!("{count} {}", kind.replace('_', " "))).collect();
+        output.say(&format!("with {other}: {}", told.join(", ")));
+    }
     output.result(serde_json::json!({
         "page": path, "scenarios": scenarios, "left_out": left_out, "bytes": html.len(), "refuted": refuted,
-        "failed": failed,
+        "compared": arguments.compare.as_ref().map(|_| changes), "failed": failed,
     }));
     played.map_or(Ok(()), |played| played.complete("played"))?;
     refutation(refuted)
@@ -234,6 +240,14 @@ fn scene(output: &Output, file: &Path, compared: Option<&Asked>) -> Result<Scene
     let is_shrunk = file.parent().is_some_and(|folder| folder.ends_with(shrink::FOLDER));
     let shrunk_from = is_shrunk.then(|| shrink::found_name(&scenario.name).to_owned());
     Ok(Scene { file: file.display().to_string(), recording, compared, shrunk_from })
+}
+
+/// How many crashes became what with the other driving system, by the page's words for it.
+fn changes(scenes: &[Scene]) -> BTreeMap<String, usize> {
+    let kinds = scenes.iter().filter_map(|scene| scene.compared.as_ref()?.1["kind"].as_str());
+    let mut count = BTreeMap::new();
+    kinds.for_each(|kind| *count.entry(kind.to_owned()).or_default() += 1);
+    count
 }
 
 /// Shortens the names of the files to their last two parts, as `critical/corner_0004.ava`, or to as many as tell them apart.

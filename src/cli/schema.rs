@@ -392,6 +392,11 @@ pub const SHAPES: &[Shape] = &[
             f("left_out", "number", "scenarios beyond `--most`"),
             f("bytes", "number", "size of the page"),
             f("refuted", "number", "claims that do not hold: what only further plays show is not tried"),
+            f(
+                "compared",
+                "object?",
+                "with `--compare`: how many crashes are the `same`, at an `other_time`, `gone`, `new` and so on",
+            ),
             FAILED,
         ],
     },
