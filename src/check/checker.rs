@@ -18,7 +18,7 @@ use crate::model::{
     ActionDef, BodyDef, EnumDef, FnDef, GroupDef, Meaning, SetDef, Space, StateDef, Type, Value, code,
 };
 use crate::prove;
-use crate::prove::{Known, Values, enclose};
+use crate::prove::{Known, RunsIn, Values, enclose};
 use crate::syntax::ast::{FileId, ItemKind, Span};
 use crate::syntax::{Diagnostic, ast};
 use crate::units::Rational;
@@ -58,14 +58,31 @@ pub(super) struct Checker {
     pub(super) row_counts: Vec<Option<u64>>,
     /// What each name stands for.
     pub(super) references: References,
+    /// The claims that rows run, as far as that was shown.
+    pub(super) claims: Vec<Claim>,
     /// Declarations that are not checked, because another has their name.
     pub(super) doubles: BTreeSet<Span>,
+}
+
+/// A claim that rows can run.
+#[derive(Debug, Clone)]
+pub struct Claim {
+    pub span: Span,
+    pub rows: Vec<usize>,
+}
+
+/// What was found of rows, of which the places in the world were not asked for yet.
+#[derive(Debug, Clone, Default)]
+pub struct Runs {
+    pub claims: Vec<Claim>,
+    pub runs_in: RunsIn,
 }
 
 /// What checking the declarations of a space gives.
 pub(super) struct Checked {
     /// `None` if it is not sound.
     pub space: Option<Space>,
+    pub runs: Runs,
     pub diagnostics: Vec<Diagnostic>,
     pub references: References,
 }
@@ -120,7 +137,7 @@ pub(super) fn space(
     // A broken declaration is missing from its list, so the indices of the others would be wrong.
     if checker.has_errors() || !has_maps {
         checker.look_at_expects(&own);
-        return checker.finish(None);
+        return checker.finish(None, RunsIn::default());
     }
     let actions: Vec<ActionDef> = core::mem::take(&mut checker.actions).into_iter().flatten().collect();
     let bounds = bounds(&actions, &rules);
@@ -146,14 +163,14 @@ pub(super) fn space(
     };
     space.clauses = clauses(&space);
     space.rows = prove::rows(&space);
-    let realisable = prove::realise(&space);
+    let (realisable, runs_in) = prove::realise(&space);
     space.rows = prove::with_dead(&space, &realisable);
     checker.expects(&own, &space, &realisable);
     checker.diagnostics.extend(unused::report(&own, items));
     checker.diagnostics.extend(style::report(&own));
     checker.diagnostics.extend(prove::report(&space, &realisable));
     let is_sound = !checker.has_errors();
-    checker.finish(is_sound.then_some(space))
+    checker.finish(is_sound.then_some(space), runs_in)
 }
 
 impl Report for Checker {
@@ -169,7 +186,7 @@ impl Checker {
 
     /// The diagnostics in the order of the text. A rule is checked for each of its actions, so equal diagnostics
     /// are kept once.
-    fn finish(self, space: Option<Space>) -> Checked {
+    fn finish(self, space: Option<Space>, runs_in: RunsIn) -> Checked {
         let mut kept: Vec<Diagnostic> = Vec::new();
         // What is equal says the same of the same place.
         let mut known: BTreeMap<(Option<Span>, String), Vec<usize>> = BTreeMap::new();
@@ -187,7 +204,8 @@ impl Checker {
             let worst = left.iter().find(|one| one.is_error()).unwrap_or(&left[0]);
             kept.push(Diagnostic { severity: worst.severity, ..Diagnostic::error(worst.code, message) });
         }
-        Checked { space, diagnostics: kept, references: self.references }
+        let runs = Runs { claims: self.claims, runs_in };
+        Checked { space, runs, diagnostics: kept, references: self.references }
     }
 
     /// Looks at what is broken already, for its names alone: no mistake is reported.

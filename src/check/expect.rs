@@ -1,6 +1,6 @@
 //! Static claims of a space: `expect count(actions) == 45`, `expect every(actions, realisable)`.
 
-use crate::check::checker::{Checker, each};
+use crate::check::checker::{Checker, Claim, each};
 use crate::check::names::unknown;
 use crate::check::report::Report;
 use crate::model::vocabulary::{SpaceClaim, Word};
@@ -63,6 +63,8 @@ impl Checker {
                     .filter_map(|row| Some((row.label.as_str(), obstacle(&realisable[row.index])?)))
                     .collect();
                 if idle.is_empty() {
+                    let rows = rows.iter().map(|row| row.index).collect();
+                    self.claims.push(Claim { span, rows });
                     return Some(());
                 }
                 let message = format!("{} of {} rows were not found to run", idle.len(), rows.len());

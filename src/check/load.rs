@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use std::path::{Component, Path, PathBuf};
 use std::sync::Arc;
 
-use crate::check::checker::{Checked, Root};
+use crate::check::checker::{Checked, Root, Runs};
 use crate::check::meaning::meaning;
 use crate::check::references::References;
 use crate::check::road::Maps;
@@ -52,6 +52,8 @@ pub struct Loaded {
     pub scenario: Option<Scenario>,
     /// The policy of the root, if it has one and it is sound.
     pub policy: Option<Policy>,
+    /// What was found of the rows of the root. A scenario or a policy claims nothing of its space.
+    pub runs: Runs,
     /// Indices of files, imports before the files that use them.
     order: Vec<usize>,
 }
@@ -125,7 +127,7 @@ pub fn load_with(root: &Path, read: &ReadFile<'_>, cache: &mut MapCache) -> Resu
         diagnostics.extend(check_digests(&files, &mut maps));
     }
     let checked = check_space(&files, &order, &mut maps, is_whole);
-    let Checked { space, diagnostics: found, mut references } = checked;
+    let Checked { space, runs, diagnostics: found, mut references } = checked;
     files.iter().for_each(|file| scenario_names::note(&file.tree, &mut references));
     references.settle(&sources);
     let (mut remarks, found): (Vec<_>, Vec<_>) =
@@ -149,7 +151,8 @@ pub fn load_with(root: &Path, read: &ReadFile<'_>, cache: &mut MapCache) -> Resu
     }
     let (diagnostics, remarks) = (merged(diagnostics), merged(remarks));
     let space = space.map(Arc::new);
-    Ok(Loaded { sources, diagnostics, remarks, files, references, space, scenario, policy, order })
+    let runs = if has_scenario || has_policy { Runs::default() } else { runs };
+    Ok(Loaded { sources, diagnostics, remarks, files, references, space, scenario, policy, runs, order })
 }
 
 /// Diagnostics that say the same of the same place become one, which shows the other places of all.

@@ -48,6 +48,7 @@ mod style;
 mod suggest;
 mod unused;
 
+pub use checker::{Claim, Runs};
 pub use difference::{Change, Difference, differences};
 pub use load::{
     Loaded, LoadedFile, MapCache, ReadError, ReadFile, WrittenPath, files_used, load, load_with, normal,

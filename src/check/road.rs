@@ -8,7 +8,7 @@ use crate::check::expression::Place;
 use crate::check::names::unknown;
 use crate::check::report::{Report, field};
 use crate::model::vocabulary::{RoadField, Word};
-use crate::model::{Road, RoadFacts, SPAWN_SPEED_MPS, Type, code};
+use crate::model::{Road, RoadFacts, SPAWN_SPEED_MPS, Type, code, stretches};
 use crate::road::{LanePlace, RoadError, RoadMap, Route};
 use crate::syntax::ast::ItemKind;
 use crate::syntax::{Diagnostic, ast, print_expr};
@@ -207,7 +207,16 @@ fn facts(name: &str, map: &RoadMap, route: &Route) -> RoadFacts {
         format!("lane {}/{} from {from_m:.0} to {to_m:.0} m along the route", key.road, key.lane)
     });
     let lanes = [beside(true), true, beside(false)];
-    RoadFacts { name: name.to_owned(), limit, limit_mps: limit.to_f64(), limited_at, lanes }
+    let all = || map.lanes.iter().map(|lane| lane.speed_limit_mps);
+    RoadFacts {
+        name: name.to_owned(),
+        limit,
+        limit_mps: limit.to_f64(),
+        limited_at,
+        lanes,
+        map_limits_mps: [all().fold(f64::INFINITY, f64::min), all().fold(0.0, f64::max)],
+        stretches: stretches(map, route).into(),
+    }
 }
 
 /// The exact limit: a whole number of km/h or mph if the map's `f64` is close to one, as on road signs.

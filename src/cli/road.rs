@@ -52,7 +52,7 @@ pub fn road(output: &Output, arguments: &RoadArguments) -> Result<(), Failure> {
             "outline_m": crosswalk.outline.iter().map(|corner| [corner.x, corner.y]).collect::<Vec<_>>(),
         })).collect::<Vec<_>>(),
         "route": route.as_ref().map(|route| route_json(&map, route)),
-        "warnings": map.warnings,
+        "warnings": warnings(&map),
         "svg": on_stdout.map(|(_, svg)| svg),
     }));
     Ok(())
@@ -101,6 +101,11 @@ fn place(map: &RoadMap, text: &str) -> Result<LanePlace, Failure> {
     map.place(road, lane, s_m).map_err(Failure::usage)
 }
 
+/// What is odd about a map.
+fn warnings(map: &RoadMap) -> Vec<String> {
+    map.warnings.iter().cloned().chain(map.crossings_without_junction()).collect()
+}
+
 fn words(map: &RoadMap, route: Option<&Route>) -> String {
     let roads: std::collections::BTreeSet<&str> =
         map.lanes.iter().map(|lane| lane.key.road.as_str()).collect();
@@ -133,7 +138,7 @@ fn words(map: &RoadMap, route: Option<&Route>) -> String {
         ));
     }
     lines.extend(route.map(|route| route_words(map, route)));
-    lines.extend(map.warnings.iter().map(|warning| format!("warning: {warning}")));
+    lines.extend(warnings(map).iter().map(|warning| format!("warning: {warning}")));
     lines.join("\n")
 }
 

@@ -25,6 +25,12 @@ pub const SIGNAL_PHASE_S: RangeInclusive<f64> = 0.0..=3600.0;
 /// Most ambient vehicles around the ego vehicle.
 pub const AMBIENT_MAX: u32 = 20;
 
+/// Most road users at a time that actions made appear (published package).
+pub const COMMANDED_MAX: u32 = 10;
+
+/// Most of a lane's limit at which ambient vehicles drive, whatever their profile.
+pub const LIMIT_PART_MAX: f64 = 1.5;
+
 /// Why the world must not be asked for a spawn with these figures, whatever the rules say; `None` if it
 /// may. NaN is out of bounds, too.
 pub(crate) fn spawn_out_of_bounds(speed_mps: f64, distance_m: f64) -> Option<String> {

@@ -14,6 +14,7 @@ mod interval;
 mod limits;
 mod meaning;
 mod memory;
+mod on_route;
 pub mod policy;
 mod row;
 pub(crate) mod rules;
@@ -29,10 +30,12 @@ pub use eval::{
 pub use interval::{End, Interval};
 pub(crate) use limits::spawn_out_of_bounds;
 pub use limits::{
-    AMBIENT_MAX, EGO_ACCELERATION_MPS2_MAX, SIGNAL_PHASE_S, SPAWN_DISTANCE_M, SPAWN_SPEED_MPS, SPEED_MPS_MAX,
-    TICK_MS,
+    AMBIENT_MAX, COMMANDED_MAX, EGO_ACCELERATION_MPS2_MAX, LIMIT_PART_MAX, SIGNAL_PHASE_S, SPAWN_DISTANCE_M,
+    SPAWN_SPEED_MPS, SPEED_MPS_MAX, TICK_MS,
 };
 pub use meaning::Meaning;
+pub(crate) use on_route::stretches;
+pub use on_route::{NEAR_JUNCTION_M, OnRoute, Stretch, junction_ahead_m};
 pub use policy::Policy;
 pub(crate) use row::locals;
 pub use row::{Reach, Row};

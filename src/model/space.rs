@@ -7,6 +7,7 @@ use std::sync::Arc;
 use crate::model::body::BodyParameters;
 use crate::model::expr::Expr;
 use crate::model::meaning::Meaning;
+use crate::model::on_route::Stretch;
 use crate::model::row::Row;
 use crate::model::rules::{Bound, Clause};
 use crate::model::value::{EnumIndex, Type, Value};
@@ -372,6 +373,10 @@ pub struct RoadFacts {
     /// Which lanes in the ego vehicle's direction exist somewhere along the route, by
     /// [`LaneChoice`] in its order: left, current, right.
     pub lanes: [bool; 3],
+    /// The lowest and the highest limit of any lane of the map, m/s.
+    pub map_limits_mps: [f64; 2],
+    /// The route, by what each part of it says of a moment; none, if that is not known.
+    pub stretches: Arc<[Stretch]>,
 }
 
 impl RoadFacts {

@@ -6,9 +6,11 @@
 use crate::model::expr::{Arithmetic, Comparison, Expr, ExprKind};
 use crate::model::vocabulary::Fact;
 use crate::model::{
-    EGO_ACCELERATION_MPS2_MAX, FnDef, Interval, JUNCTION_AHEAD_M_MAX, RoadFacts, SPEED_MPS_MAX, Type, Value,
+    AMBIENT_MAX, COMMANDED_MAX, EGO_ACCELERATION_MPS2_MAX, FnDef, Interval, JUNCTION_AHEAD_M_MAX, RoadFacts,
+    SPEED_MPS_MAX, Value,
 };
 use crate::prove::moment::Case;
+use crate::prove::sums::{difference, is_same, lacks_value};
 use crate::units::Rational;
 
 /// The most variants of an enum: a set of them fits one integer.
@@ -120,6 +122,9 @@ pub(crate) fn enclose(expr: &Expr, known: &Known<'_>) -> Values {
             Values::Truth { may_hold: inner.may_fail(), may_fail: inner.may_hold() }
         }
         ExprKind::Negate(inner) => Values::Number(values(inner).interval().neg()),
+        ExprKind::Arithmetic(Arithmetic::Subtract, left, right) if is_same(left, right) => {
+            Values::Number(Interval::point(Rational::ZERO))
+        }
         ExprKind::Arithmetic(op, left, right) => {
             Values::Number(arithmetic(*op, &values(left).interval(), &values(right).interval()))
         }
@@ -181,9 +186,9 @@ pub(super) fn fact_range(fact: Fact) -> Option<Interval> {
         Fact::EgoAcceleration => between(-EGO_ACCELERATION_MPS2_MAX, EGO_ACCELERATION_MPS2_MAX),
         Fact::EgoJunctionAhead | Fact::NpcJunctionAhead => between(0.0, JUNCTION_AHEAD_M_MAX),
         Fact::EgoOffset | Fact::EgoRouteLeft => Interval::ALL,
+        Fact::RoadUsers => between(0.0, f64::from(COMMANDED_MAX + AMBIENT_MAX)),
         Fact::RoadLimit
         | Fact::EgoLimit
-        | Fact::RoadUsers
         | Fact::NearestGap
         | Fact::NearestSpeed
         | Fact::Elapsed
@@ -228,6 +233,9 @@ fn arithmetic(op: Arithmetic, left: &Interval, right: &Interval) -> Interval {
 /// Compares two expressions. What both name has one value: `step > step` never holds, whatever the step is, and
 /// `ego.speed > ego.speed + nearest.gap` neither.
 fn compare_parts(op: Comparison, left: &Expr, right: &Expr, known: &Known<'_>) -> Values {
+    if lacks_value(left, known) || lacks_value(right, known) {
+        return Values::truth(op == Comparison::NotEqual);
+    }
     let apart = compare(op, enclose(left, known), enclose(right, known));
     if !(apart.may_hold() && apart.may_fail()) {
         return apart;
@@ -240,86 +248,6 @@ fn compare_parts(op: Comparison, left: &Expr, right: &Expr, known: &Known<'_>) -
         }
         _ => apart,
     }
-}
-
-/// What the left side is more than the right one; `None` if they name nothing alike, or where one may have no value.
-fn difference(left: &Expr, right: &Expr, known: &Known<'_>) -> Option<Interval> {
-    if is_same(left, right) {
-        return Some(Interval::point(Rational::ZERO));
-    }
-    let mut sum = Sum { terms: Vec::new(), constant: Rational::ZERO, are_shared: false };
-    sum.add(left, Rational::ONE, known)?;
-    sum.add(right, Rational::integer(-1), known)?;
-    let of_term =
-        |(term, factor): &(&Expr, Rational)| enclose(term, known).interval().mul(&Interval::point(*factor));
-    let constant = Interval::point(sum.constant);
-    sum.are_shared.then(|| sum.terms.iter().map(of_term).fold(constant, |sum, term| sum.add(&term)))
-}
-
-/// A sum of parts of expressions, each with its factor.
-struct Sum<'a> {
-    terms: Vec<(&'a Expr, Rational)>,
-    constant: Rational,
-    /// Whether something was added that was there already.
-    are_shared: bool,
-}
-
-impl<'a> Sum<'a> {
-    /// Adds an expression times a factor; `None` if it is no number, or may have no value.
-    fn add(&mut self, expr: &'a Expr, factor: Rational, known: &Known<'_>) -> Option<()> {
-        let fixed = |expr: &Expr| enclose(expr, known).interval().single();
-        match &expr.kind {
-            ExprKind::Number(number) => {
-                self.constant = self.constant.checked_add(number.checked_mul(factor)?)?;
-            }
-            ExprKind::Negate(inner) => self.add(inner, factor.checked_neg()?, known)?,
-            ExprKind::Arithmetic(op, left, right) => match op {
-                Arithmetic::Add => {
-                    self.add(left, factor, known)?;
-                    self.add(right, factor, known)?;
-                }
-                Arithmetic::Subtract => {
-                    self.add(left, factor, known)?;
-                    self.add(right, factor.checked_neg()?, known)?;
-                }
-                Arithmetic::Multiply => match (fixed(left), fixed(right)) {
-                    (_, Some(by)) => self.add(left, factor.checked_mul(by)?, known)?,
-                    (Some(by), _) => self.add(right, factor.checked_mul(by)?, known)?,
-                    (None, None) if may_lack_a_value(expr) => return None,
-                    (None, None) => self.terms.push((expr, factor)),
-                },
-                Arithmetic::Divide => self.add(left, factor.checked_div(fixed(right)?)?, known)?,
-            },
-            _ if !matches!(expr.ty, Type::Int | Type::Quantity(_)) || may_lack_a_value(expr) => return None,
-            _ => match self.terms.iter_mut().find(|(term, _)| is_same(term, expr)) {
-                Some((_, sum)) => {
-                    *sum = sum.checked_add(factor)?;
-                    self.are_shared = true;
-                }
-                None => self.terms.push((expr, factor)),
-            },
-        }
-        Some(())
-    }
-}
-
-/// Whether two expressions are the same name.
-fn is_same(left: &Expr, right: &Expr) -> bool {
-    match (&left.kind, &right.kind) {
-        (ExprKind::CellAt(a, left), ExprKind::CellAt(b, right)) => a == b && is_same(left, right),
-        (ExprKind::Local(_) | ExprKind::Cell(_) | ExprKind::Fact(_) | ExprKind::Variant(..), right) => {
-            left.kind == *right
-        }
-        _ => false,
-    }
-}
-
-/// A quotient by 0 has no value, nor has a fact about a road user that is not there.
-fn may_lack_a_value(expr: &Expr) -> bool {
-    expr.any(|kind| {
-        let divides = matches!(kind, ExprKind::Arithmetic(Arithmetic::Divide, ..));
-        divides || matches!(kind, ExprKind::Call(..) | ExprKind::OfRoadUser(..))
-    })
 }
 
 fn compare(op: Comparison, left: Values, right: Values) -> Values {
@@ -359,7 +287,7 @@ fn compare(op: Comparison, left: Values, right: Values) -> Values {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::{Facts, Memory, evaluate};
+    use crate::model::{Facts, Memory, Type, evaluate};
     use crate::syntax::ast::{FileId, Span};
     use proptest::prelude::*;
 

@@ -2,20 +2,21 @@
 //! moment, nor does `ego.speed >= 200 m/s`.
 //!
 //! What a fact may be is cut into pieces where a condition compares it with something known. If in every combination
-//! of pieces some condition fails, no moment meets them all. What is known of facts together stands in [`Case::is_possible`], and of
-//! a newcomer in [`newcomers`]; otherwise facts are taken to be independent, so a combination that is possible here may
+//! of pieces some condition fails, no moment meets them all. What is known of facts together stands in [`Case::is_possible`], of
+//! a newcomer in [`newcomers`], and of a road in its stretches, one of which the ego vehicle is on; otherwise facts are taken to be independent, so a combination that is possible here may
 //! still never come.
 
 use core::ops::RangeInclusive;
 
 use crate::model::expr::{Comparison, Expr, ExprKind};
 use crate::model::rules::RowRules;
-use crate::model::vocabulary::{Fact, Known as From, RoadKind, Verb, Word, WordFact};
+use crate::model::vocabulary::{Fact, Known as From, Light, RoadKind, Verb, Word, WordFact};
 use crate::model::{
-    ActionDef, EffectDef, End, EpisodeDef, Interval, Row, RuleBody, RulesInForce, SPAWN_SPEED_MPS, Space,
-    SpawnDef, Type, WordExpr, code,
+    ActionDef, EffectDef, End, EpisodeDef, Interval, LIMIT_PART_MAX, NEAR_JUNCTION_M, RoadFacts, Row,
+    RuleBody, RulesInForce, SPAWN_SPEED_MPS, SPEED_MPS_MAX, Space, SpawnDef, Stretch, Type, WordExpr, code,
 };
 use crate::prove::enclose::{Known, enclose, fact_range};
+use crate::prove::sums::oppose;
 use crate::syntax::Diagnostic;
 use crate::units::Rational;
 
@@ -27,6 +28,8 @@ const CASES_MAX: usize = 2_048;
 pub(crate) struct Case {
     numbers: Vec<(Fact, Interval)>,
     words: Vec<(WordFact, &'static str)>,
+    /// What some facts are not.
+    not_words: Vec<(WordFact, &'static str)>,
 }
 
 impl Case {
@@ -40,11 +43,35 @@ impl Case {
         };
         let number = |step: u64| Rational::integer(i64::try_from(step).unwrap_or(i64::MAX));
         let steps = Interval::closed(number(first), number(last));
-        Case { numbers: vec![(Fact::Elapsed, elapsed), (Fact::StepNumber, steps)], words: Vec::new() }
+        Case { numbers: vec![(Fact::Elapsed, elapsed), (Fact::StepNumber, steps)], ..Case::default() }
     }
 
     pub fn number(&self, fact: Fact) -> Option<Interval> {
         self.numbers.iter().find(|(known, _)| *known == fact).map(|(_, piece)| *piece)
+    }
+
+    /// What a stretch of a route says of a moment.
+    fn of_stretch(stretch: &Stretch) -> Case {
+        let Stretch { limit_mps, junction_ahead_m, route_left_m, has_light, road } = stretch;
+        let numbers = vec![
+            (Fact::EgoLimit, measured(*limit_mps, *limit_mps)),
+            (Fact::EgoJunctionAhead, measured(*junction_ahead_m.start(), *junction_ahead_m.end())),
+            (Fact::EgoRouteLeft, measured(*route_left_m.start(), *route_left_m.end())),
+        ];
+        let no_light = (WordFact::EgoLight, Light::None.name());
+        let (lights, not_words) =
+            if *has_light { (None, vec![no_light]) } else { (Some(no_light), Vec::new()) };
+        let words = lights.into_iter().chain([(WordFact::EgoRoad, road.name())]).collect();
+        Case { numbers, words, not_words }
+    }
+
+    /// What both say, of facts that only one of them knows.
+    fn and(&self, other: &Case) -> Case {
+        let mut both = self.clone();
+        both.numbers.extend(&other.numbers);
+        both.words.extend(&other.words);
+        both.not_words.extend(&other.not_words);
+        both
     }
 
     /// Whether the facts may have these values at one moment, by what the engine says of each two of them.
@@ -62,9 +89,9 @@ impl Case {
         let on_road =
             match (self.word(WordFact::EgoRoad).and_then(RoadKind::from_name), of(Fact::EgoJunctionAhead)) {
                 (Some(RoadKind::InJunction), Some(ahead)) => ahead.contains(Rational::ZERO),
-                (Some(RoadKind::NearJunction), Some(ahead)) => !ahead
-                    .intersect(&Interval::closed(Rational::ZERO, Rational::integer(NEAR_JUNCTION_M)))
-                    .is_empty(),
+                (Some(RoadKind::NearJunction), Some(ahead)) => {
+                    !ahead.intersect(&at_most(NEAR_JUNCTION_M)).is_empty()
+                }
                 _ => true,
             };
         let is_alone = of(Fact::RoadUsers).is_some_and(|count| is_zero(&count));
@@ -82,8 +109,6 @@ impl Case {
     }
 }
 
-/// At most so far before a junction the ego vehicle is `NearJunction`, m.
-const NEAR_JUNCTION_M: i64 = 20;
 /// `nearest.gap` where there is nobody, m.
 const NO_ROAD_USER_M: i64 = 100;
 
@@ -115,7 +140,7 @@ fn newcomer(spawn: &SpawnDef, known: &Known<'_>, lands: bool) -> Case {
                 .collect()
         }
     };
-    let Case { mut numbers, words } = known.case.cloned().unwrap_or_default();
+    let Case { mut numbers, words, not_words } = known.case.cloned().unwrap_or_default();
     let asked = enclose(&spawn.speed, known).interval().intersect(&at_most(*SPAWN_SPEED_MPS.end()));
     // On foot one waits at first, or stands for good.
     let speed = match verbs.iter().all(|verb| matches!(verb, Verb::Walk | Verb::Stand)) {
@@ -130,7 +155,7 @@ fn newcomer(spawn: &SpawnDef, known: &Known<'_>, lands: bool) -> Case {
     if lands && verbs.iter().all(is_on_route) && !distance.is_empty() {
         numbers.extend([(Fact::NpcGap, distance), (Fact::SpawnGap, distance)]);
     }
-    Case { numbers, words }
+    Case { numbers, words, not_words }
 }
 
 /// Whether the conditions may all hold at one moment of a draw, for each of these newcomers.
@@ -146,7 +171,27 @@ pub(super) fn may_hold_together(
     let asking: Vec<&Expr> = conditions.iter().copied().filter(|c| c.known() > From::Road).collect();
     let is_met = |case: &Case| may_all_hold(&asking, &Known { case: Some(case), ..*known });
     let meets = |newcomer: &Case| cases(&asking, known, episode, newcomer).iter().any(is_met);
-    may_all_hold(conditions, known) && (asking.is_empty() || newcomers.iter().all(meets))
+    let meets_all = |place: &Case| newcomers.iter().all(|newcomer| meets(&newcomer.and(place)));
+    may_all_hold(conditions, known)
+        && (asking.is_empty()
+            || !oppose(&asking, known, false) && places(&asking, known).iter().any(meets_all))
+}
+
+/// What the road says of the moments of which conditions ask: a case for each stretch of the route, or one of which nothing is
+/// known.
+fn places(asking: &[&Expr], known: &Known<'_>) -> Vec<Case> {
+    let is_of_place = |kind: &ExprKind| {
+        matches!(
+            kind,
+            ExprKind::Fact(Fact::EgoLimit | Fact::EgoJunctionAhead | Fact::EgoRouteLeft)
+                | ExprKind::IsWord(WordFact::EgoRoad | WordFact::EgoLight, _)
+        )
+    };
+    let stretches = known.road.map_or(&[][..], |road| &road.stretches);
+    match stretches.is_empty() || !asking.iter().any(|condition| condition.any(is_of_place)) {
+        true => vec![Case::default()],
+        false => stretches.iter().map(Case::of_stretch).collect(),
+    }
 }
 
 /// Whether the condition can fail at no moment, given what is known.
@@ -197,13 +242,14 @@ pub(super) fn report(space: &Space) -> Vec<Diagnostic> {
 /// The facts of the moment and of newcomers that conditions name and that are bounded, each with its range.
 pub(super) fn ranges_named(
     conditions: &[&Expr],
+    known: &Known<'_>,
     episode: &EpisodeDef,
     newcomers: &[Case],
 ) -> Vec<(Fact, Interval)> {
+    let range = |fact: Fact| range(fact, known.road, episode);
     let of = |fact: Fact| {
-        let known =
-            newcomers.iter().map(|newcomer| newcomer.number(fact).unwrap_or_else(|| range(fact, episode)));
-        known.reduce(|a, b| a.hull(&b)).unwrap_or_else(|| range(fact, episode))
+        let ranges = newcomers.iter().map(|newcomer| newcomer.number(fact).unwrap_or_else(|| range(fact)));
+        ranges.reduce(|a, b| a.hull(&b)).unwrap_or_else(|| range(fact))
     };
     let named = facts_named(conditions).0.into_iter();
     named.map(|fact| (fact, of(fact))).filter(|(_, range)| range.high != End::Unbounded).collect()
@@ -214,13 +260,18 @@ fn cases(conditions: &[&Expr], known: &Known<'_>, episode: &EpisodeDef, newcomer
     let (numbers, words) = facts_named(conditions);
     let mut cases = vec![Case::default()];
     for fact in words {
-        let named = fact.words();
+        let is_possible = |word: &'static str| {
+            newcomer.word(fact).is_none_or(|known| known == word)
+                && !newcomer.not_words.contains(&(fact, word))
+        };
+        let named: Vec<&'static str> =
+            fact.words().into_iter().map(|(word, _)| word).filter(|word| is_possible(word)).collect();
         if cases.len() * named.len() > CASES_MAX {
             continue;
         }
         let with = |case: &Case| {
             let case = case.clone();
-            let one = |(word, _): &(&'static str, &'static str)| {
+            let one = |word: &&'static str| {
                 let mut case = case.clone();
                 case.words.push((fact, *word));
                 case
@@ -230,7 +281,7 @@ fn cases(conditions: &[&Expr], known: &Known<'_>, episode: &EpisodeDef, newcomer
         cases = cases.iter().flat_map(with).collect();
     }
     for fact in numbers {
-        let whole = newcomer.number(fact).unwrap_or_else(|| range(fact, episode));
+        let whole = newcomer.number(fact).unwrap_or_else(|| range(fact, known.road, episode));
         let mut pieces = pieces(&whole, cuts(fact, conditions, known));
         if cases.len() * pieces.len() > CASES_MAX {
             pieces = vec![whole];
@@ -269,13 +320,44 @@ fn facts_named(conditions: &[&Expr]) -> (Vec<Fact>, Vec<WordFact>) {
     (numbers, words)
 }
 
-/// What a fact may be at a draw.
-fn range(fact: Fact, episode: &EpisodeDef) -> Interval {
-    match fact {
-        Fact::Elapsed => at_most(episode.step_s * f64::from(episode.step_limit)),
-        Fact::StepNumber => at_most(f64::from(episode.step_limit.saturating_sub(1))),
-        Fact::NpcSpeed => at_most(*SPAWN_SPEED_MPS.end()),
-        _ => fact_range(fact).unwrap_or(Interval::ALL),
+/// What a fact may be at a draw, on a road if one is given.
+fn range(fact: Fact, road: Option<&RoadFacts>, episode: &EpisodeDef) -> Interval {
+    let all = fact_range(fact).unwrap_or(Interval::ALL);
+    let along = |of: fn(&Stretch) -> (f64, f64)| {
+        let ranges = road?.stretches.iter().map(of).map(|(low, high)| measured(low, high));
+        ranges.reduce(|a, b| a.hull(&b))
+    };
+    let of_road = match fact {
+        Fact::Elapsed => Some(at_most(episode.step_s * f64::from(episode.step_limit))),
+        Fact::StepNumber => Some(at_most(f64::from(episode.step_limit.saturating_sub(1)))),
+        Fact::NpcSpeed => Some(at_most(*SPAWN_SPEED_MPS.end())),
+        Fact::EgoLimit => along(|stretch| (stretch.limit_mps, stretch.limit_mps)),
+        Fact::EgoJunctionAhead => {
+            along(|stretch| (*stretch.junction_ahead_m.start(), *stretch.junction_ahead_m.end()))
+        }
+        Fact::EgoRouteLeft => along(|stretch| (*stretch.route_left_m.start(), *stretch.route_left_m.end())),
+        Fact::NpcLimit => road.map(|road| measured(road.map_limits_mps[0], road.map_limits_mps[1])),
+        // What is pushed is no faster than what pushes it.
+        Fact::NearestSpeed => road.map(|road| {
+            let ambient_mps = LIMIT_PART_MAX * road.map_limits_mps[1];
+            measured(0.0, SPEED_MPS_MAX.max(ambient_mps))
+        }),
+        // So far it may come beside its route if it drives straight away from it.
+        Fact::EgoOffset => {
+            let way_m = SPEED_MPS_MAX * episode.step_s * f64::from(episode.step_limit);
+            Some(measured(-way_m, way_m))
+        }
+        _ => None,
+    };
+    of_road.map_or(all, |range| range.intersect(&all))
+}
+
+/// A range of measured numbers, a little wider than it is, because authors round.
+fn measured(low: f64, high: f64) -> Interval {
+    let wider = |end: f64, by: f64| Rational::from_f64(end + by * (1e-6 + end.abs() * 1e-6));
+    match (wider(low, -1.0), wider(high, 1.0)) {
+        (Some(low), Some(high)) => Interval::closed(low, high),
+        _ => Interval::ALL,
     }
 }
 

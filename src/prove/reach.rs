@@ -242,7 +242,7 @@ impl<'a> RowRules<'a> {
             .filter_map(|rule| self.space.rules[*rule].body.demand(self.row.action)?.condition())
             .collect();
         let newcomers = newcomers(&self.space.actions[self.row.action], &known, false);
-        for (fact, range) in ranges_named(&conditions, &self.space.episode, &newcomers) {
+        for (fact, range) in ranges_named(&conditions, &known, &self.space.episode, &newcomers) {
             let unit = match fact.ty() {
                 Type::Quantity(dimension) => format!(" {}", dimension.si_unit()),
                 Type::Int | Type::Bool | Type::Enum(_) => String::new(),

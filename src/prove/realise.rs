@@ -39,18 +39,43 @@ pub(crate) enum Realised {
 /// What is found of every row on every road, by row and road.
 pub(crate) type Realisable = Vec<Vec<Realised>>;
 
+/// The states in which rows were found to run.
+#[derive(Debug, Clone, Default)]
+pub struct RunsIn {
+    /// By road.
+    states: Vec<Vec<Memory>>,
+    /// By row and road: a position among the states of the road.
+    found: Vec<Vec<Option<usize>>>,
+}
+
+impl RunsIn {
+    /// The number of a state in which a step begins on the road, and the row runs; `None` if none was found.
+    pub fn state_of(&self, row: usize, road: usize) -> Option<usize> {
+        *self.found.get(row)?.get(road)?
+    }
+
+    /// The state of a road with that number.
+    pub fn state(&self, road: usize, number: usize) -> &Memory {
+        &self.states[road][number]
+    }
+}
+
 /// Searches for values of every row on every road.
-pub(crate) fn realise(space: &Space) -> Realisable {
+pub(crate) fn realise(space: &Space) -> (Realisable, RunsIn) {
     let left = Left::new(BOXES_MAX);
     let in_force = RulesInForce::by_default(space);
     let mut realisable = vec![vec![Realised::NotSearched; space.roads.len()]; space.rows.len()];
+    let mut runs_in = RunsIn { states: Vec::new(), found: vec![Vec::new(); space.rows.len()] };
     for (index, road) in space.roads.iter().enumerate() {
         let on_road = OnRoad { space, road, in_force: &in_force, left: &left };
-        for (row, found) in on_road.rows(index).into_iter().enumerate() {
+        let OfRoad { found, runs_in: places, states } = on_road.rows(index);
+        for (row, (found, state)) in found.into_iter().zip(places).enumerate() {
             realisable[row][index] = found;
+            runs_in.found[row].push(state);
         }
+        runs_in.states.push(states);
     }
-    realisable
+    (realisable, runs_in)
 }
 
 /// The rows with those marked as dead for which no values exist.
@@ -93,6 +118,14 @@ fn dead(space: &Space, row: &Row, road: &Road, in_force: &RulesInForce, left: &L
     Reach::Dead { rules, reason }
 }
 
+/// What is found of each row on a road.
+struct OfRoad {
+    found: Vec<Realised>,
+    /// The state in which it runs, by position in `states`.
+    runs_in: Vec<Option<usize>>,
+    states: Vec<Memory>,
+}
+
 /// The rows of a space on one of its roads.
 struct OnRoad<'a> {
     space: &'a Space,
@@ -124,23 +157,25 @@ impl<'a> OnRoad<'a> {
     }
 
     /// What is found of each row.
-    fn rows(&self, index: usize) -> Vec<Realised> {
+    fn rows(&self, index: usize) -> OfRoad {
         let is_open = |row: &&Row| matches!(row.roads[index], Reach::Open(_));
         let open: Vec<Asked<'_>> =
             self.space.rows.iter().filter(is_open).map(|row| self.asked(row)).collect();
         let sets = |asked: &&Asked<'_>| self.space.actions[asked.row.action].sets().next().is_some();
         let movers: Vec<Asked<'_>> = open.iter().filter(sets).copied().collect();
         let mut found = vec![Realised::Never; self.space.rows.len()];
+        let mut runs_in = vec![None; self.space.rows.len()];
         let mut pending = open;
         let mut way = Way::begin(self, &movers);
         for step in 0..u64::from(self.space.episode.step_limit) {
             let moment = Case::of_steps(&self.space.episode, step..=step, false);
             pending.retain_mut(|asked| {
-                let runs = way.runs(self, asked, step, &moment);
-                if runs {
+                let state = way.runs(self, asked, step, &moment);
+                if state.is_some() {
                     found[asked.row.index] = Realised::Runs;
+                    runs_in[asked.row.index] = state;
                 }
-                !runs
+                state.is_none()
             });
             if self.left.is_spent() || !pending.iter().any(|asked| asked.about_states || asked.about_time) {
                 break;
@@ -153,7 +188,7 @@ impl<'a> OnRoad<'a> {
         for asked in pending {
             found[asked.row.index] = self.elsewhere(&asked, way.is_complete);
         }
-        found
+        OfRoad { found, runs_in, states: way.states.into_iter().map(|met| met.memory).collect() }
     }
 
     /// What there is of a row that did not run in any state that was followed.
@@ -254,13 +289,14 @@ impl Way {
         Some(self.states.len() - 1)
     }
 
-    /// Whether a row runs in a state in which the step begins, as far as it was not asked before.
-    fn runs(&self, on_road: &OnRoad<'_>, asked: &mut Asked<'_>, step: u64, moment: &Case) -> bool {
+    /// A state in which the step begins and a row runs, as far as it was not asked before.
+    fn runs(&self, on_road: &OnRoad<'_>, asked: &mut Asked<'_>, step: u64, moment: &Case) -> Option<usize> {
         if !on_road.is_in_time(asked, moment) {
-            return false;
+            return None;
         }
         let search = on_road.search(asked.row, asked.about_time.then_some(moment));
-        for (nth, state) in self.now.iter().map(|state| &self.states[*state]).enumerate() {
+        for (nth, number) in self.now.iter().enumerate() {
+            let state = &self.states[*number];
             let is_due = match (asked.about_states, asked.about_time) {
                 (true, true) => true,
                 (true, false) => state.since == step,
@@ -271,15 +307,15 @@ impl Way {
                 continue;
             }
             if on_road.left.is_spent() {
-                return false;
+                return None;
             }
             match search.at(&state.memory) {
-                Found::Runs(_) => return true,
+                Found::Runs(_) => return Some(*number),
                 Found::Never => {}
                 Found::Unknown => asked.is_undecided = true,
             }
         }
-        false
+        None
     }
 
     /// Goes on to the states in which the next step begins. Gives whether they are others, or may be later.

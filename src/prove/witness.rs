@@ -21,6 +21,7 @@ use crate::model::{
 use crate::prove::enclose::{Known, Values};
 use crate::prove::moment::{Case, may_hold_together, newcomers};
 use crate::prove::reach::declared;
+use crate::prove::sums::oppose;
 use crate::units::Rational;
 
 /// The most boxes of ranges looked at for one choice of the listed values and one memory.
@@ -348,7 +349,9 @@ impl Search<'_> {
         let (locals, cells) = (points(candidate.values), points(candidate.after.cells()));
         let known = Known { case: self.moment, ..self.rules.known(&locals, &cells) };
         let newcomers = newcomers(self.action(), &known, true);
-        may_hold_together(&self.rules.conditions(), &known, &self.rules.space.episode, &newcomers)
+        let conditions = self.rules.conditions();
+        !oppose(&conditions, &known, true)
+            && may_hold_together(&conditions, &known, &self.rules.space.episode, &newcomers)
     }
 
     /// Memories to try: the initial one first, then every value of the cells that the rules or effects of the

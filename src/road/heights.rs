@@ -1,11 +1,17 @@
 //! Heights of roads: they tell which roads pass over each other. Slopes change nothing else; everything drives as on
 //! the flat.
 
+use std::collections::BTreeSet;
+
+use super::conflict::crossings;
 use super::map::{Lane, RoadMap};
 
 /// Surfaces farther apart than this lie on two levels, m. Ours: the highest body of the engine has 3.2 m, and the
 /// lowest bridges over streets leave some 4 m below a deck of half a metre or more.
 const LEVEL_M: f64 = 3.5;
+
+/// Crossings nearer than this to the end of a lane are joints, m. Ours.
+const JOINED_M: f64 = 3.0;
 
 /// Distance of two stations at which a lane's height is taken, m. In between it is linear: where a road goes from
 /// level to a slope of 10 % within 100 m, that is 3 mm wrong.
@@ -71,5 +77,36 @@ impl RoadMap {
         let (lowest_m, highest_m) =
             (heights_m().fold(f64::INFINITY, f64::min), heights_m().fold(f64::NEG_INFINITY, f64::max));
         is_apart(lowest_m, highest_m)
+    }
+
+    /// A warning for each two roads that cross on one level and outside junctions: nobody gives way there, because only
+    /// junctions say who does. It is asked for where a map is looked at, as it takes longer than reading.
+    pub fn crossings_without_junction(&self) -> Vec<String> {
+        let streets: Vec<&Lane> = self.lanes.iter().filter(|lane| lane.junction.is_none()).collect();
+        let mut known: BTreeSet<[&str; 2]> = BTreeSet::new();
+        let mut warnings = Vec::new();
+        for (nth, a) in streets.iter().enumerate() {
+            for b in &streets[nth + 1..] {
+                let roads = [a.key.road.as_str(), b.key.road.as_str()];
+                if roads[0] == roads[1] || known.contains(&roads) {
+                    continue;
+                }
+                // Where roads are joined, their lanes may overlap a little.
+                let is_inside =
+                    |lane: &Lane, at_m: f64| (JOINED_M..lane.centre.length_m() - JOINED_M).contains(&at_m);
+                let crosses = crossings(&a.centre, &b.centre).into_iter().find(|(a_m, b_m)| {
+                    is_inside(a, *a_m) && is_inside(b, *b_m) && !a.is_apart_at(*a_m, b, *b_m)
+                });
+                let Some((at_m, _)) = crosses else { continue };
+                known.insert(roads);
+                let at = a.centre.position_at(at_m);
+                warnings.push(format!(
+                    "roads `{}` and `{}` cross at {:.1}, {:.1} on one level without a junction: nobody gives way \
+                     there; make it a junction, or give one of them its height",
+                    roads[0], roads[1], at.x, at.y
+                ));
+            }
+        }
+        warnings
     }
 }

@@ -1,21 +1,15 @@
 //! What can be asked about a moment: the facts of the ego vehicle and its surroundings, and those of another road
 //! user. Rules, policies and the paper's state variables read the same ones.
 
-use crate::model::vocabulary::{Light, RoadKind};
-use crate::model::{JUNCTION_AHEAD_M_MAX, MomentFacts, NpcFacts};
-use crate::road::{LaneIndex, RoadMap, RouteLane};
+use crate::model::vocabulary::Light;
+use crate::model::{MomentFacts, NpcFacts, OnRoute, junction_ahead_m};
 
 use super::around::Around;
 use super::npc::Driver;
 use super::road_user::{Motion, Obstacle};
-use super::scene::Scene;
 use super::sense::SignalColour;
 use super::world::{DT_S, World};
 
-/// How far ahead a traffic light is searched for, m.
-const LIGHT_AHEAD_M: f64 = 100.0;
-/// The ego vehicle is at a junction that is nearer than this, m, as in the published package.
-const NEAR_JUNCTION_M: f64 = 20.0;
 /// Distance that stands for "no road user around", m, as in the published package.
 const NO_ROAD_USER_M: f64 = 100.0;
 
@@ -39,19 +33,19 @@ impl World {
 impl Around<'_> {
     /// The facts of this moment. Where one road user looks around, it does not count itself: see [`MomentFacts::with`].
     pub fn moment_facts(&self) -> MomentFacts {
-        let (scene, station_m) = (self.scene, self.ego_station_m);
+        let OnRoute { limit_mps, junction_ahead_m, route_left_m, signal, road } = self.on_route();
         let gaps =
             self.obstacles_on_level().map(|obstacle| (obstacle.distance_m, obstacle.velocity_mps.norm()));
         let nearest = gaps.min_by(|a, b| a.0.total_cmp(&b.0));
         MomentFacts {
             ego_speed_mps: self.ego.speed_mps,
             ego_acceleration_mps2: self.ego.acceleration_mps2,
-            ego_limit_mps: scene.map.lane(scene.route.lane_at(station_m).lane).speed_limit_mps,
-            ego_junction_ahead_m: scene.route_junction_ahead_m(station_m),
-            ego_route_left_m: scene.route.goal_m - station_m,
+            ego_limit_mps: limit_mps,
+            ego_junction_ahead_m: junction_ahead_m,
+            ego_route_left_m: route_left_m,
             ego_offset_m: self.ego_offset_m,
-            ego_light: self.light_ahead(),
-            ego_road: road_kind(scene, station_m),
+            ego_light: self.light(signal),
+            ego_road: road,
             road_users: self.obstacles_on_level().count() as u32,
             nearest_gap_m: nearest.map_or(NO_ROAD_USER_M, |(gap_m, _)| gap_m),
             nearest_speed_mps: nearest.map_or(0.0, |(_, speed_mps)| speed_mps),
@@ -60,11 +54,16 @@ impl Around<'_> {
         }
     }
 
+    /// What the ego vehicle's place says.
+    fn on_route(&self) -> OnRoute {
+        OnRoute::at(&self.scene.map, &self.scene.route, self.ego_station_m)
+    }
+
     /// Time until the next traffic light on the route changes its colour, s, in steps of half a second and at most
     /// `most_s`; `None` without a light within reach.
     pub fn light_changes_in_s(&self, most_s: f64) -> Option<f64> {
         const STEP_S: f64 = 0.5;
-        let signal = self.signal_ahead()?;
+        let signal = self.on_route().signal?;
         let colour = |later_s: f64| {
             self.signals.colour(&self.scene.map, signal, self.tick + (later_s / DT_S).round() as u64)
         };
@@ -79,30 +78,14 @@ impl Around<'_> {
         ahead.into_iter().find(|&ahead_m| ahead_m >= 0.0)
     }
 
-    /// The next traffic light on the route, if it is within reach.
-    fn signal_ahead(&self) -> Option<usize> {
-        let ahead = self.ego_station_m..=self.ego_station_m + LIGHT_AHEAD_M;
-        let next = self.scene.route.stop_lines.iter().find(|line| ahead.contains(&line.station_m));
-        next.map(|line| line.signal)
-    }
-
-    /// What the next traffic light on the route shows.
-    fn light_ahead(&self) -> Light {
-        match self.signal_ahead().map(|signal| self.signals.colour(&self.scene.map, signal, self.tick)) {
+    /// What a traffic light shows; `None` without one.
+    fn light(&self, signal: Option<usize>) -> Light {
+        match signal.map(|signal| self.signals.colour(&self.scene.map, signal, self.tick)) {
             None => Light::None,
             Some(SignalColour::Red) => Light::Red,
             Some(SignalColour::Yellow) => Light::Yellow,
             Some(SignalColour::Green) => Light::Green,
         }
-    }
-}
-
-impl Scene {
-    /// Distance along the route from a station to the next junction, m.
-    fn route_junction_ahead_m(&self, station_m: f64) -> f64 {
-        let first = self.route.lanes.partition_point(|lane| lane.enter_m <= station_m).max(1) - 1;
-        let ahead = self.route.lanes[first..].iter().map(|RouteLane { lane, enter_m, .. }| (*lane, *enter_m));
-        junction_ahead_m(&self.map, ahead, station_m)
     }
 }
 
@@ -128,8 +111,8 @@ pub(super) fn npc_facts(around: &Around, obstacle: &Obstacle, motion: &Motion) -
         Motion::Drive(driver) => driver_facts(around, obstacle, driver),
         Motion::Walk(_) | Motion::Stand => {
             let station_m = scene.route.path.project(obstacle.outline.pose.position).station_m;
-            let limit_mps = scene.map.lane(scene.route.lane_at(station_m).lane).speed_limit_mps;
-            facts(obstacle, limit_mps, scene.route_junction_ahead_m(station_m))
+            let beside = OnRoute::at(&scene.map, &scene.route, station_m);
+            facts(obstacle, beside.limit_mps, beside.junction_ahead_m)
         }
     }
 }
@@ -151,32 +134,6 @@ pub(super) fn driver_facts(around: &Around, obstacle: &Obstacle, driver: &Driver
 fn facts(obstacle: &Obstacle, limit_mps: f64, junction_ahead_m: f64) -> NpcFacts {
     let (speed_mps, gap_m) = (obstacle.velocity_mps.norm(), obstacle.distance_m);
     NpcFacts { speed_mps, gap_m, junction_ahead_m, limit_mps }
-}
-
-/// Distance from a station to the first lane inside a junction, m. `ahead` has the lanes from the station on, each
-/// with the station at which it begins.
-fn junction_ahead_m(map: &RoadMap, mut ahead: impl Iterator<Item = (LaneIndex, f64)>, station_m: f64) -> f64 {
-    let junction = ahead.find(|(lane, _)| map.lane(*lane).junction.is_some());
-    junction.map_or(JUNCTION_AHEAD_M_MAX, |(_, from_m)| (from_m - station_m).clamp(0.0, JUNCTION_AHEAD_M_MAX))
-}
-
-fn road_kind(scene: &Scene, station_m: f64) -> RoadKind {
-    let here = scene.map.lane(scene.route.lane_at(station_m).lane);
-    let soon = scene.map.lane(scene.route.lane_at(station_m + NEAR_JUNCTION_M).lane);
-    if here.junction.is_some() {
-        return RoadKind::InJunction;
-    }
-    if soon.junction.is_some() {
-        return RoadKind::NearJunction;
-    }
-    let mut beside = here.left;
-    while let Some(neighbour) = beside {
-        if !neighbour.same_direction {
-            return RoadKind::TwoWay;
-        }
-        beside = scene.map.lane(neighbour.lane).left;
-    }
-    RoadKind::OneWay
 }
 
 #[cfg(test)]

@@ -8,12 +8,13 @@ use std::fmt::Write as _;
 
 use sha2::{Digest, Sha256};
 
+use crate::model::LIMIT_PART_MAX;
 use crate::syntax::{listed, yaml_mistake};
 
 /// The struct, its `Default`, and the range of each number.
 macro_rules! profile {
     ($(#[$about:meta])* pub struct $profile:ident {
-        $($(#[$doc:meta])* $name:ident: $kind:ty = $default:expr $(, $low:literal..=$high:literal)?;)*
+        $($(#[$doc:meta])* $name:ident: $kind:ty = $default:expr $(, $low:literal..=$high:expr)?;)*
     }) => {
         $(#[$about])*
         #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -39,9 +40,9 @@ profile! {
         /// Whether ambient vehicles yield to the ego vehicle at junctions. Commanded ones never do: see `npc::manners`.
         yields_to_ego: bool = true;
         /// Ambient vehicles drive at least at this part of each lane's limit, in `[0.1, 1.5]`. Ours.
-        limit_part_min: f64 = 0.8, 0.1..=1.5;
+        limit_part_min: f64 = 0.8, 0.1..=LIMIT_PART_MAX;
         /// And at most at this part, in `[0.1, 1.5]`. Ours.
-        limit_part_max: f64 = 1.0, 0.1..=1.5;
+        limit_part_max: f64 = 1.0, 0.1..=LIMIT_PART_MAX;
         /// Whether drivers see only what three rays ahead of them meet, and stop at once inside a stop distance. LGSVL. Otherwise they look along their way and follow by the Intelligent Driver Model.
         rays: bool = false;
         /// Length of the ray from the middle of the front, m, in `[1, 100]`; those from its corners are half as long. LGSVL: 20.

@@ -12,7 +12,7 @@ use crate::action::{Effect, LaneChangeRules, SpawnRequest};
 use crate::geometry::{Frame, OrientedBox, Sweep, Vec2};
 use crate::model::body::BodyParameters;
 use crate::model::vocabulary::{Level, TimeOfDay};
-use crate::model::{NpcFacts, TICK_MS};
+use crate::model::{COMMANDED_MAX, NpcFacts, TICK_MS};
 use crate::road::{RouteLaneChange, is_apart};
 
 use super::ambient::{Ambient, RENEWAL_TICKS, is_gone};
@@ -45,9 +45,9 @@ pub const DT_S: f64 = TICK_MS as f64 / 1000.0;
 /// Speed at which an episode begins, m/s.
 const START_MPS: f64 = 3.0;
 
-/// Commanded obstacles at a time (published package). For the next one, the oldest that is out of sight
-/// leaves; in the package the oldest leaves wherever it is.
-const OBSTACLES_MAX: usize = 10;
+/// Commanded obstacles at a time. For the next one, the oldest that is out of sight leaves; in the published package the
+/// oldest leaves wherever it is.
+const OBSTACLES_MAX: usize = COMMANDED_MAX as usize;
 
 /// What stands farther ahead than this on the route does not block the ego vehicle, m: a queue of five cars.
 const QUEUE_M: f64 = 40.0;
@@ -119,16 +119,21 @@ impl World {
     /// The beginning of an episode: the ego vehicle rolls at 3 m/s with its rear axle on the start of
     /// the route; beside ambient traffic, if asked for, nothing else is there.
     pub fn new(scene: Arc<Scene>, start: &Start) -> World {
+        World::with_ego_at(scene, start, 0.0, START_MPS)
+    }
+
+    /// The beginning of an episode that begins elsewhere on the route, at another speed.
+    pub fn with_ego_at(scene: Arc<Scene>, start: &Start, station_m: f64, speed_mps: f64) -> World {
         let environment = Environment::new(start.time, [start.rain, start.fog, start.wetness]);
         let mut world = World {
             ticks: 0,
-            ego: Ego::new(scene.route.path.pose_at(0.0), START_MPS),
-            ego_station_m: 0.0,
+            ego: Ego::new(scene.route.path.pose_at(station_m), speed_mps),
+            ego_station_m: station_m,
             ego_offset_m: 0.0,
-            ego_elevation_m: scene.route.height_at(&scene.map, 0.0),
+            ego_elevation_m: scene.route.height_at(&scene.map, station_m),
             red_runs: 0,
             ego_passed: None,
-            conditions: environment.conditions(START_MPS),
+            conditions: environment.conditions(speed_mps),
             environment,
             signals: SignalClock::new(start.signal_phase_s),
             users: Vec::with_capacity(OBSTACLES_MAX),

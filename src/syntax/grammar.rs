@@ -9,6 +9,8 @@ pub struct AvaParser;
 
 /// What an author calls a name.
 pub const NAME: &str = "a name";
+/// What is expected where a transition names a value.
+pub const VARIANT: &str = "a variant";
 
 /// What an author calls a rule, in a sentence that begins "expected …". `None` for rules that are
 /// possible in so many places that naming them would not help.
@@ -19,7 +21,7 @@ pub fn words(rule: Rule) -> Option<&'static str> {
         Rule::expression | Rule::operand | Rule::prefix => "an expression",
         Rule::name | Rule::names => NAME,
         Rule::argument | Rule::argument_name => "an argument",
-        Rule::moved => "a variant",
+        Rule::moved => VARIANT,
         Rule::pattern | Rule::arm => "a variant or `_`",
         Rule::initial_key => "a key like `Rain: High`",
         Rule::integer => "a whole number",

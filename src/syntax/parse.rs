@@ -11,7 +11,7 @@ use pest::iterators::Pair;
 use crate::syntax::ast::{Doc, Field, File, FileId, Item, Span};
 use crate::syntax::build::{Builder, end_of};
 use crate::syntax::diagnostic::{enumerated, one_of};
-use crate::syntax::grammar::{AvaParser, NAME, Rule, continues_expression, words};
+use crate::syntax::grammar::{AvaParser, NAME, Rule, VARIANT, continues_expression, words};
 use crate::syntax::keyword::{CLAUSES, DECLARATIONS, OPERATORS};
 use crate::syntax::scan::{Comment, Scan, scan};
 use crate::syntax::{Diagnostic, code, nearest};
@@ -227,6 +227,11 @@ impl Reader<'_> {
             return Diagnostic::error(code::UNCLOSED, format!("`{bracket}` is never closed"))
                 .at(*opener, "opened here")
                 .beside(Span::new(self.file, before, before), format!("expected {expected}"));
+        }
+        if found == "_" && words.contains(&VARIANT) {
+            return Diagnostic::error(code::SYNTAX, "a transition names its values, found `_`")
+                .at(Span::new(self.file, token_start, token_start + 1), "stands for no value here")
+                .help("write a line for each value that the state may change from");
         }
         let before = self.end_of_token_before(token_start);
         if at_end || self.text[before..token_start].contains('\n') {

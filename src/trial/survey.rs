@@ -305,7 +305,7 @@ fn unmet(world: &World, effects: &[Effect]) -> Option<String> {
     time.filter(|time| *time != world.time_of_day()).map(|_| "the time is not what was asked for".to_owned())
 }
 
-fn refused(refusal: &Refusal) -> String {
+pub(super) fn refused(refusal: &Refusal) -> String {
     match &refusal.rule {
         Some(rule) => format!("rule `{rule}`: {}", refusal.reason),
         None => refusal.reason.clone(),
@@ -313,7 +313,7 @@ fn refused(refusal: &Refusal) -> String {
 }
 
 /// Counts a reason; reasons that differ only in their figures count as one.
-fn count(counts: &mut Vec<Count>, reason: &str) {
+pub(super) fn count(counts: &mut Vec<Count>, reason: &str) {
     let words = |text: &str| text.replace(|c: char| c.is_ascii_digit() || "-.".contains(c), "");
     match counts.iter_mut().find(|known| words(&known.reason) == words(reason)) {
         Some(known) => known.count += 1,

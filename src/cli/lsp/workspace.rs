@@ -16,6 +16,7 @@ use crate::model;
 use crate::model::Space;
 use crate::syntax::Diagnostic;
 use crate::syntax::ast::{FileId, Span};
+use crate::trial::places;
 
 use super::position::Lines;
 use super::uri;
@@ -110,6 +111,7 @@ impl Workspace {
             read(documents, path)
         };
         let mut loaded = check::load_with(path, &read, &mut self.maps).ok()?;
+        places::judge_claims(&mut loaded);
         let is_unknown = |found: &Diagnostic| found.is_error() && found.code == model::code::UNKNOWN;
         if loaded.diagnostics.iter().any(is_unknown) {
             check::suggest_uses(&mut loaded, &load::nearby(path));
