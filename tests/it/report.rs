@@ -308,7 +308,7 @@ fn trainings_and_estimates_have_pages_with_their_results() {
     assert_eq!(overview["kind"], "training");
     assert_eq!(overview["simulated_h"], printed["simulated_h"]);
     assert_eq!(overview["evaluation"], printed["evaluation"]);
-    assert_eq!(overview["conditions"][1], serde_json::json!(["Driving system", "modular, default profile"]));
+    assert_eq!(overview["conditions"][1], serde_json::json!(["Driving system", "modular"]));
 
     let estimating = ["estimate", space, "--parts", "2", "--episodes", "2", "--out", &estimate];
     let (status, _, stderr) = outcome(&mut avastra(&[&estimating[..], &short].concat()));
