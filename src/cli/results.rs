@@ -33,11 +33,7 @@ pub fn results(output: &Output, arguments: &ResultsArguments) -> Result<(), Fail
     }
     write(&arguments.out, &report::results(&chapters))?;
     let there = chapters.iter().filter(|chapter| chapter.played.is_some()).count();
-    output.say(&format!(
-        "{}: {there} of {} are played",
-        arguments.out.display(),
-        plural(chapters.len(), "study")
-    ));
+    output.say(&format!("{}: {there} of {} studies are played", arguments.out.display(), chapters.len()));
     let listed = chapters.iter().map(|chapter| {
         let departures = chapter.played.as_ref().map(|played| played.departures(&chapter.wanted));
         serde_json::json!({

@@ -5,7 +5,7 @@ use crate::statistics::{Estimate, holm, mann_whitney, mean, superiority};
 
 use crate::study::file::PublishedTable;
 use crate::study::measures::MeasuredCell;
-use crate::study::results::values;
+use crate::study::results::{not_negative, values};
 
 /// From this p-value on, two agents are not told apart.
 pub const P_MAX: f64 = 0.05;
@@ -70,7 +70,7 @@ impl Agreement {
             for (agent, published, own) in &published {
                 let Some(ours) = mean(own) else { continue };
                 let (agent, road) = ((*agent).to_owned(), (*road).to_owned());
-                figures.push(ComparedFigure { agent, road, published: *published, ours });
+                figures.push(ComparedFigure { agent, road, published: *published, ours: not_negative(ours) });
             }
             for (larger, figure, own) in &published {
                 for (smaller, other, theirs) in &published {

@@ -266,7 +266,7 @@ fn agent_results(measured: MeasuredAgent, cells: &[&CellRecord]) -> AgentResults
 }
 
 /// No measure is below 0, so its interval is cut off there.
-fn not_negative(estimate: Estimate) -> Estimate {
+pub(super) fn not_negative(estimate: Estimate) -> Estimate {
     let interval = estimate.interval.map(|interval| Interval { low: interval.low.max(0.0), ..interval });
     Estimate { interval, ..estimate }
 }
