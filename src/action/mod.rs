@@ -9,10 +9,10 @@
 //! use avastra::action::ActionTable;
 //! use avastra::check::load;
 //!
-//! let text = "language 1\nenum Time = Day | Night\nstate time: Time = Day\naction set(each to: Time) { set time = to }\n";
+//! let text = "language 1\nenum Time = Noon | Night\nstate time: Time = Noon\naction set(each to: Time) { set time = to }\n";
 //! let space = load(Path::new("mine.ava"), &|_| Ok(text.to_owned()))?.space.expect("it has no mistakes");
 //! let labels: Vec<String> = ActionTable::new(space).rows().iter().map(|row| row.label.clone()).collect();
-//! assert_eq!(labels, ["set(to: Day)", "set(to: Night)"]);
+//! assert_eq!(labels, ["set(to: Noon)", "set(to: Night)"]);
 //! # Ok::<(), avastra::check::ReadError>(())
 //! ```
 

@@ -11,7 +11,7 @@
 //!
 //! use avastra::check::load;
 //!
-//! let text = "language 1\nenum Time = Day | Night\nstate time: Time = Nihgt\n";
+//! let text = "language 1\nenum Time = Noon | Night\nstate time: Time = Nihgt\n";
 //! let loaded = load(Path::new("mine.ava"), &|_| Ok(text.to_owned()))?;
 //! assert!(loaded.space.is_none());
 //! assert!(loaded.diagnostics.iter().any(|mistake| mistake.message.contains("Nihgt")));
