@@ -292,10 +292,10 @@ impl Maker {
         let (speed, distance, a, b) = (range(self, 16), range(self, 70), range(self, 70), range(self, 70));
         let text = format!(
             "language 1
-pub(super) enum Mode = Near | Far
-pub(super) enum Level = None < Light < High
-pub(super) enum Key = Front | Back
-pub(super) enum Car = Sedan | SUV | Jeep
+enum Mode = Near | Far
+enum Level = None < Light < High
+enum Key = Front | Back
+enum Car = Sedan | SUV | Jeep
 state fog: Level = {}
 state wet: Key -> Level = {}
 state was: Mode = {}
