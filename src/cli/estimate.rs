@@ -1,18 +1,20 @@
 //! `avastra estimate`: how often would it crash; and `avastra compare`: which of two crashes more often.
 
+use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
 use crate::estimate::{
     Comparison, ComparisonResults, Estimate, EstimateDatabase, EstimateResults, EstimateSettings, EventKind,
-    Found, Mass, Met, Method, Part, Pilot, Plan, Played, Probability, Stopping, compared, pilot, play_parts,
+    Found, Mass, Met, Method, PILOT, Part, Pilot, Plan, Played, Probability, Stopping, compared, pilot,
+    play_parts,
 };
-use crate::run::{Run, RunSettings};
+use crate::run::{Numbered, Run, RunSettings, Shard, Units};
 use crate::statistics::Interval;
 
 use super::arguments::{CompareArguments, EstimateArguments, EventArgument, MethodArgument};
 use super::error::Failure;
-use super::files::write;
+use super::files::{remove, write};
 use super::findings::doubts;
 use super::interrupt::stop_on_interrupt;
 use super::load::UnderTest;
@@ -21,22 +23,37 @@ use super::parallel::jobs;
 use super::progress::{Progress, Working};
 use super::run::{critical_text, cut_short};
 use super::run_directory::{Held, Resumed, write_scenario};
-use super::{conditions, load, run_directory};
+use super::{conditions, load, run_directory, shard};
 
 /// Plays what an estimate still lacks and prints its result.
 pub fn estimate(output: &Output, arguments: &EstimateArguments) -> Result<(), Failure> {
-    let (estimate, held, settings) = match &arguments.resume {
+    let begun = match &arguments.resume {
         Some(path) => resumed(output, path)?,
         None => begun(output, arguments)?,
     };
+    play_all(output, begun, arguments.jobs)
+}
+
+/// Ends an estimate whose parts were all played, in shards.
+pub fn conclude(output: &Output, path: &Path) -> Result<(), Failure> {
+    play_all(output, resumed(output, path)?, None)
+}
+
+/// Plays the parts that a directory still lacks, and says what all of them came to.
+fn play_all(
+    output: &Output,
+    (estimate, held, settings): (Estimate, Held, String),
+    asked_jobs: Option<u32>,
+) -> Result<(), Failure> {
     let path = held.path.clone();
     let file = path.join("estimate.db");
     let stop = stop_on_interrupt();
     let mut database =
         EstimateDatabase::open(&file, &settings).map_err(|error| Failure::file("open", &file, error))?;
     let unread = |error| Failure::file("read", &file, error);
+    let shard = shard::kept(&path)?;
     output.tell(&heading(&estimate, &path));
-    let jobs = jobs(arguments.jobs, estimate.run().program())?;
+    let jobs = jobs(asked_jobs, estimate.run().program())?;
     let interrupted = || Failure::Interrupted { command: "estimate", directory: path.clone() };
     let Some(pilot) = piloted(output, &estimate, (&mut database, &file), jobs, &stop)? else {
         return Err(interrupted());
@@ -44,21 +61,27 @@ pub fn estimate(output: &Output, arguments: &EstimateArguments) -> Result<(), Fa
     let plan = Plan::of(&pilot, 0.0);
 
     let labels: Vec<String> = estimate.run().table().rows().iter().map(|row| row.label.clone()).collect();
-    let (episodes, roads) =
-        (u64::from(estimate.settings().run.episodes), estimate.settings().run.roads.len());
-    let total = estimate.settings().parts as usize * roads;
+    let all = estimate.settings().all_parts();
+    let own: Vec<Part> = shard.share(&vec![1; all.len()]).into_iter().map(|part| all[part]).collect();
+    let episodes = u64::from(estimate.settings().run.episodes);
     let mut progress = Progress::new(
         output,
         estimate.settings().event.noun(),
-        total as u64 * episodes,
+        own.len() as u64 * episodes,
         database.parts().map_err(unread)?.len() as u64 * episodes,
     );
+    // A shard cannot know when all of them together are precise enough: it plays all of its parts, and the looks are taken
+    // when they are merged.
+    let looks = match shard.is_whole() {
+        true => estimate.settings().looks(),
+        false => vec![estimate.settings().parts],
+    };
     let mut results = None;
-    for look in estimate.settings().looks() {
-        let parts = estimate.parts();
-        let until = &parts[..look as usize * roads];
+    for look in looks {
+        let is_at_look = |part: &Part| part.number < look;
         let done: Vec<Part> = database.parts().map_err(unread)?.iter().map(|record| record.part).collect();
-        let todo: Vec<Part> = until.iter().copied().filter(|part| !done.contains(part)).collect();
+        let wanted: Vec<Part> = own.iter().copied().filter(is_at_look).collect();
+        let todo: Vec<Part> = wanted.iter().copied().filter(|part| !done.contains(part)).collect();
         play_parts(&estimate, &todo, &plan, jobs, &stop, &mut |played| {
             // Such a part says nothing, and is not kept: with a repaired system the estimate can go on.
             if played.record.failed > 0 {
@@ -71,8 +94,7 @@ pub fn estimate(output: &Output, arguments: &EstimateArguments) -> Result<(), Fa
             }
             database.add(&estimate, &played, &scenarios).map_err(|error| Failure::file("write", &file, error))
         })?;
-        // What was played beyond this look, before a kill or with other rules, does not count at it.
-        let is_at_look = |part: &Part| part.number < look;
+        // What was played beyond this look, before a kill, with other rules or in shards, does not count at it.
         let (mut records, mut events) =
             (database.parts().map_err(unread)?, database.events().map_err(unread)?);
         records.retain(|record| is_at_look(&record.part));
@@ -80,19 +102,24 @@ pub fn estimate(output: &Output, arguments: &EstimateArguments) -> Result<(), Fa
         let pilot_s = pilot.whole_s + pilot.tried_s;
         let found = Found { records: &records, events: &events, pilot_s, labels: &labels };
         let at_look = EstimateResults::new(estimate.settings(), found);
-        let is_over = records.len() < until.len()
+        let is_unfinished = records.len() < wanted.len();
+        let is_over = is_unfinished
             || at_look.together.as_ref().is_some_and(|found| estimate.settings().is_enough(found));
-        results = Some((at_look, records.len() < until.len()));
+        let kept: Vec<Part> = records.iter().map(|record| record.part).collect();
+        results = Some((at_look, kept, is_unfinished));
         if is_over {
             break;
         }
     }
     drop(progress);
 
-    let (results, is_unfinished) = results.expect("every estimate looks once");
+    let (results, kept, is_unfinished) = results.expect("every estimate looks once");
+    if !is_unfinished {
+        settled(estimate.settings(), database, &path, &kept)?;
+    }
     let text = serde_json::to_string_pretty(&results).expect("results have string keys only");
     write(&path.join("results.json"), &format!("{text}\n"))?;
-    output.say(&estimate_text(&results, is_unfinished));
+    output.say(&estimate_text(&results, is_unfinished, shard));
     let critical = load::sources_in(&path.join("critical"))?;
     output.say(&match results.method {
         Method::Split => "no scenarios: a branch of `split` has no file of its own".to_owned(),
@@ -103,7 +130,36 @@ pub fn estimate(output: &Output, arguments: &EstimateArguments) -> Result<(), Fa
     output.result(serde_json::json!({
         "directory": path, "results": results, "critical": critical, "reproducible": doubts.is_empty(),
     }));
-    if is_unfinished { Err(interrupted()) } else { Ok(()) }
+    if is_unfinished {
+        return Err(interrupted());
+    }
+    if !shard.is_whole() {
+        output.say(&shard::next_step(shard));
+    }
+    Ok(())
+}
+
+/// Settles the database with these parts alone; what was found in others goes, too.
+fn settled(
+    settings: &EstimateSettings,
+    database: EstimateDatabase,
+    directory: &Path,
+    parts: &[Part],
+) -> Result<EstimateDatabase, Failure> {
+    let file = directory.join("estimate.db");
+    let unread = |error| Failure::file("read", &file, error);
+    let wanted: BTreeSet<i64> = parts.iter().map(|part| settings.place(*part)).chain([PILOT]).collect();
+    let (kept, left): (Vec<i64>, Vec<i64>) =
+        database.numbers().map_err(unread)?.into_iter().partition(|number| wanted.contains(number));
+    for part in left {
+        for name in database.scenarios(part).map_err(unread)? {
+            let scenario = directory.join("critical").join(name);
+            remove(&load::answers_path(&scenario))?;
+            remove(&scenario)?;
+        }
+    }
+    let kept: Vec<Numbered> = kept.into_iter().map(|number| (number, number)).collect();
+    database.settle(&kept).map_err(|error| Failure::file("write", &file, error))
 }
 
 /// What the pilot of an estimate saw: kept, or played now. `None` if it was stopped; nothing for a method without one.
@@ -159,6 +215,7 @@ fn written(estimate: &Estimate, directory: &Path, played: &Played) -> Result<Vec
 fn begun(output: &Output, arguments: &EstimateArguments) -> Result<(Estimate, Held, String), Failure> {
     let file = arguments.file.as_ref().expect("clap asks for it where there is no `--resume`");
     let table = load::table(output, file)?;
+    let shard = shard::asked(output, arguments.shard.shard)?;
     let under_test = conditions::named(&arguments.under_test)?;
     let (conditions, episodes) = (&arguments.conditions, arguments.episodes);
     let settings = EstimateSettings {
@@ -174,6 +231,7 @@ fn begun(output: &Output, arguments: &EstimateArguments) -> Result<(Estimate, He
     };
     let estimate = Estimate::new(table, settings).map_err(Failure::usage)?;
     let held = run_directory::create(arguments.out.as_deref())?;
+    shard::keep(&held.path, shard)?;
     let space = load::relative(&held.path, &estimate.run().space().path)?;
     let attached = estimate.run().attached();
     let external = attached.map(|attached| run_directory::to_record(&held.path, attached)).transpose()?;
@@ -276,9 +334,11 @@ fn heading(estimate: &Estimate, directory: &Path) -> String {
     )
 }
 
-fn estimate_text(results: &EstimateResults, is_unfinished: bool) -> String {
+fn estimate_text(results: &EstimateResults, is_unfinished: bool, shard: Shard) -> String {
     let mut text = String::new();
-    if is_unfinished {
+    if !shard.is_whole() {
+        text.push_str(&format!("shard {shard}: {} of {} parts\n", results.parts, results.parts_wanted));
+    } else if is_unfinished {
         text.push_str(&format!("unfinished: {} of {} parts\n", results.parts, results.parts_wanted));
     } else if results.parts < results.parts_wanted {
         text.push_str(&format!("enough after {} of {} parts\n", results.parts, results.parts_wanted));

@@ -77,6 +77,16 @@ pub fn write_new(path: &Path, text: &str) -> Result<(), Failure> {
     })
 }
 
+/// Removes a file, if it is there.
+pub fn remove(file: &Path) -> Result<(), Failure> {
+    match std::fs::remove_file(file) {
+        Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
+            Err(Failure::file("remove", file, error))
+        }
+        _ => Ok(()),
+    }
+}
+
 /// Asks whether somebody reads from a named pipe: to open one that nobody reads would wait without end. As long as the
 /// result lives, the pipe has a writer.
 fn is_read(path: &Path) -> std::io::Result<Option<File>> {

@@ -100,6 +100,7 @@ const EXAMPLES: &[(&str, &[(&str, &str)])] = &[
             ("run --policy policies/corner.ava", "let a learned policy choose"),
             ("run scenarios/avastra45.ava --ads-cmd './my_planner --fast'", "a driving system of your own"),
             ("run --resume runs/0001", "go on after Ctrl-C"),
+            ("run scenarios/avastra45.ava --shard 3/8 --out shards/3", "an eighth of it, for `merge`"),
         ],
     ),
     (
@@ -125,6 +126,7 @@ const EXAMPLES: &[(&str, &[(&str, &str)])] = &[
             ("study scenarios/studies/rq1.yaml", "compare agents; takes hours"),
             ("study scenarios/studies/rq1.yaml --quick", "see that it works"),
             ("study --resume runs/0001", "go on after Ctrl-C"),
+            ("study scenarios/studies/rq1.yaml --shard 3/8 --out shards/3", "an eighth of it, for `merge`"),
         ],
     ),
     (
@@ -144,6 +146,13 @@ const EXAMPLES: &[(&str, &[(&str, &str)])] = &[
             ),
             ("estimate scenarios/avastra45.ava --precision 0.2 --parts 400", "until it is precise enough"),
             ("estimate --resume runs/0001", "go on after Ctrl-C"),
+        ],
+    ),
+    (
+        "merge",
+        &[
+            ("merge shards/* --out runs/whole", "the directory that one machine would have made"),
+            ("merge shards/* --missing", "which shards are to be played again"),
         ],
     ),
     (
@@ -378,6 +387,61 @@ mod tests {
                 command().try_get_matches_from(all).unwrap_or_else(|error| panic!("{line}: {error}"));
             }
         }
+    }
+
+    /// Every line of a script that calls avastra, comments included, parses once its variables have values.
+    fn parse_calls(script: &str, values: &[(&str, &str)]) -> usize {
+        let calls = script.lines().map(|line| line.trim_start_matches(['#', ' ']));
+        let calls: Vec<&str> = calls.filter(|line| line.starts_with("avastra ")).collect();
+        for call in &calls {
+            let call = call.split(" # ").next().unwrap_or(call).replace('"', "");
+            let call =
+                values.iter().fold(call, |call, (name, value)| call.replace(&format!("${name}"), value));
+            assert!(!call.contains('$'), "{call}");
+            let all = words(&call);
+            command().try_get_matches_from(all).unwrap_or_else(|error| panic!("{call}: {error}"));
+        }
+        calls.len()
+    }
+
+    #[test]
+    fn the_slurm_script_calls_what_there_is() {
+        let script = include_str!("../../examples/cluster/slurm.sh");
+        let (_, count) = script.split_once("#SBATCH --array=1-").expect("it is an array");
+        let count = count.lines().next().expect("there is a number");
+        assert!(script.contains(&format!("\nSHARDS={count}\n")), "one number of shards");
+        let values = [("SLURM_ARRAY_TASK_ID", "7"), ("SHARDS", count), ("out", "shards/7")];
+        assert_eq!(parse_calls(script, &values), 3);
+        assert!(
+            script.contains("--array=\"$(avastra merge shards/* --missing)\""),
+            "killed ones are played again"
+        );
+    }
+
+    #[test]
+    fn the_kubernetes_job_calls_what_there_is() {
+        let text = include_str!("../../examples/cluster/kubernetes.yaml");
+        let job: serde_json::Value = serde_yaml::from_str(text).expect("it is YAML");
+        assert_eq!((&job["apiVersion"], &job["kind"]), (&"batch/v1".into(), &"Job".into()));
+        assert_eq!(job["spec"]["completionMode"], "Indexed");
+        let pod = &job["spec"]["template"]["spec"];
+        // An Indexed Job takes no other policy with `backoffLimitPerIndex`.
+        assert_eq!(pod["restartPolicy"], "Never");
+        let container = &pod["containers"][0];
+        let count = job["spec"]["completions"].to_string();
+        let set = container["env"].as_array().expect("a list");
+        let set = set.iter().find(|variable| variable["name"] == "JOB_COMPLETIONS").expect("it is set");
+        assert_eq!(set["value"], count.as_str());
+        let script = container["args"][0].as_str().expect("a script");
+        let values = [("out", "/shards/7")];
+        assert_eq!(
+            parse_calls(script, &values) + parse_calls(text.split("apiVersion").next().unwrap(), &[]),
+            3
+        );
+        let image = include_str!("../../examples/cluster/Containerfile");
+        let name = container["image"].as_str().expect("a name");
+        assert!(image.contains(name) && name.ends_with(env!("CARGO_PKG_VERSION")), "{name}");
+        assert!(image.contains(&format!("rust:{}", env!("CARGO_PKG_RUST_VERSION"))), "{image}");
     }
 
     #[test]

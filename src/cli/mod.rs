@@ -24,6 +24,7 @@ mod help;
 mod interrupt;
 mod load;
 pub mod lsp;
+mod merge;
 mod never;
 mod new;
 mod output;
@@ -40,9 +41,11 @@ mod run;
 mod run_directory;
 mod sarif;
 mod schema;
+mod shard;
 mod shrink;
 mod study;
 mod test;
+mod timing;
 mod train;
 mod trials;
 mod verify;
@@ -113,6 +116,7 @@ pub fn main() -> ExitCode {
         Command::Study(arguments) => study::study(&output, arguments),
         Command::Results(arguments) => results::results(&output, arguments),
         Command::Estimate(arguments) => estimate::estimate(&output, arguments),
+        Command::Merge(arguments) => merge::merge(&output, arguments),
         Command::Compare(arguments) => estimate::compare(&output, arguments),
         Command::Verify(arguments) => verify::verify(&output, arguments),
         Command::Replay(arguments) => replay::replay(&output, arguments),

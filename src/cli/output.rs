@@ -131,6 +131,13 @@ impl Output {
         }
     }
 
+    /// What explains what a command does, on stderr.
+    pub fn aside(&self, text: &str) {
+        if !self.quiet && !self.is_json() {
+            remark(text);
+        }
+    }
+
     /// Whether all that was printed reached its reader.
     ///
     /// # Errors

@@ -9,7 +9,7 @@ use crate::action::ActionTable;
 use crate::check::normal;
 use crate::report;
 use crate::report::{Page, Scene, record, record_another};
-use crate::run::{Asked, Database};
+use crate::run::{Asked, Database, Units};
 
 use super::arguments::{FilesArguments, ReportArguments};
 use super::error::Failure;

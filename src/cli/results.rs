@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use crate::report;
 use crate::report::Chapter;
+use crate::run::Units;
 use crate::study::{FailedCell, Played, StudyDatabase, StudySettings};
 use crate::syntax::yaml_mistake;
 
@@ -13,6 +14,7 @@ use super::files::write;
 use super::load;
 use super::output::{Output, plural};
 use super::study;
+use super::timing::Times;
 
 /// Takes played studies in, and writes what all studies of a folder found.
 pub fn results(output: &Output, arguments: &ResultsArguments) -> Result<(), Failure> {
@@ -91,7 +93,8 @@ fn played(directory: &Path, commit: Option<String>) -> Result<Played, Failure> {
     let settings: StudySettings = serde_yaml::from_str(&text)
         .map_err(|error| Failure::file("read", &path, yaml_mistake(&error, &text)))?;
     let read = |error| Failure::file("read", &file, error);
-    let cells = StudyDatabase::open(&file, &text).map_err(read)?.cells().map_err(read)?;
+    let database = StudyDatabase::open(&file, &text).map_err(read)?;
+    let cells = Times::read(directory, &database)?.on(database.cells().map_err(read)?);
     if !FailedCell::among(&cells).is_empty() {
         return Err(Failure::file("use", &file, "the driving system failed in it, so there are no results"));
     }

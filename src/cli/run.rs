@@ -1,7 +1,6 @@
 //! `avastra run`: plays episodes and writes their crashes as scenarios.
 
 use std::path::{Path, PathBuf};
-use std::sync::atomic::Ordering;
 use std::time::Instant;
 
 use crate::action::ActionTable;
@@ -9,7 +8,9 @@ use crate::agent::Face;
 use crate::emit;
 use crate::episode::EpisodeLog;
 use crate::model::{Policy, digest};
-use crate::run::{EpisodeSummary, Group, PolicyReference, RefusalCount, Run, RunSettings, Totals, play};
+use crate::run::{
+    EpisodeSummary, Group, PolicyReference, RefusalCount, Run, RunSettings, Totals, Units, play,
+};
 
 use super::arguments::{FaceArgument, RunArguments};
 use super::error::Failure;
@@ -23,37 +24,66 @@ use super::parallel::jobs;
 use super::progress::Progress;
 use super::run_directory::{Resumed, RunDirectory};
 use super::verify::acting;
-use super::{compile, conditions, load, run_directory};
+use super::{compile, conditions, load, run_directory, shard};
 
 /// Largest number of critical scenarios, groups and refusal reasons that the summary lists.
 const NAMED_MAX: usize = 10;
 
 /// Plays the episodes of a new run, or those that an interrupted one still lacks.
 pub fn run(output: &Output, arguments: &RunArguments) -> Result<(), Failure> {
-    let (run, mut directory) = match &arguments.resume {
+    let (run, directory) = match &arguments.resume {
         Some(path) => resumed(output, path)?,
         None => begun(output, arguments)?,
     };
-    if arguments.resume.is_some() {
-        restore(output, &run, &directory)?;
+    output.tell(&heading(&run, arguments, &directory.path));
+    let found = play_all(output, run, directory, arguments.jobs)?;
+    if arguments.fail_on_collision && found.counted > 0 {
+        return Err(Failure::Collision { collisions: found.counted as usize });
     }
+    if arguments.fail_on_collision && found.failed > 0 {
+        return Err(Failure::Ads { findings: found.failed as usize });
+    }
+    Ok(())
+}
+
+/// Ends a run whose episodes were all played, in shards.
+pub fn conclude(output: &Output, path: &Path) -> Result<(), Failure> {
+    let (run, directory) = resumed(output, path)?;
+    play_all(output, run, directory, None).map(drop)
+}
+
+/// Plays the episodes that a directory still lacks, and says what all of them came to.
+fn play_all(
+    output: &Output,
+    run: Run,
+    mut directory: RunDirectory,
+    asked_jobs: Option<u32>,
+) -> Result<Totals, Failure> {
     let path = directory.path.clone();
     let unread = |error| Failure::file("read", &path, error);
+    let shard = shard::kept(&path)?;
+    let own = shard.share(&vec![1; run.episodes()]);
     let done = directory.database.episodes().map_err(unread)?;
-    let todo: Vec<usize> = (0..run.episodes()).filter(|number| !done.contains(number)).collect();
-    output.tell(&heading(&run, arguments, &directory.path));
+    let todo: Vec<usize> = own.iter().copied().filter(|number| !done.contains(number)).collect();
 
     let stop = stop_on_interrupt();
     #[allow(clippy::disallowed_methods, reason = "this is cli, and the time goes nowhere but the summary")]
     let started = Instant::now();
-    let jobs = jobs(arguments.jobs, run.program())?;
-    let mut progress = Progress::new(output, "counted", run.episodes() as u64, done.len() as u64);
+    let jobs = jobs(asked_jobs, run.program())?;
+    let mut progress = Progress::new(output, "counted", own.len() as u64, (own.len() - todo.len()) as u64);
     play(&run, &todo, jobs, &stop, &mut |summary, log| {
         keep(&run, &mut directory, &summary, &log)?;
         progress.episode(summary.counted());
         Ok::<_, Failure>(())
     })?;
     drop(progress);
+    let all = directory.database.numbers().map_err(unread)?;
+    let is_over = own.iter().all(|&number| all.contains(&(number as i64)));
+    if is_over {
+        let settled =
+            directory.database.settle(&all.iter().map(|&number| (number, number)).collect::<Vec<_>>());
+        directory.database = settled.map_err(|error| Failure::file("write", &path.join("run.db"), error))?;
+    }
 
     let totals = directory.database.totals().map_err(unread)?;
     let refusals = directory.database.refusals().map_err(unread)?;
@@ -81,16 +111,13 @@ pub fn run(output: &Output, arguments: &RunArguments) -> Result<(), Failure> {
         "directory": directory.path, "totals": totals, "refusals": refusals, "groups": groups, "never": never,
         "critical": critical, "failures": failures, "reproducible": doubts.is_empty(),
     }));
-    if stop.load(Ordering::Relaxed) && (totals.episodes as usize) < run.episodes() {
+    if !is_over {
         return Err(Failure::Interrupted { command: "run", directory: directory.path });
     }
-    if arguments.fail_on_collision && totals.counted > 0 {
-        return Err(Failure::Collision { collisions: totals.counted as usize });
+    if !shard.is_whole() {
+        output.say(&shard::next_step(shard));
     }
-    if arguments.fail_on_collision && totals.failed > 0 {
-        return Err(Failure::Ads { findings: totals.failed as usize });
-    }
-    Ok(())
+    Ok(totals)
 }
 
 /// A new run, from the command line.
@@ -102,6 +129,7 @@ fn begun(output: &Output, arguments: &RunArguments) -> Result<(Run, RunDirectory
         (None, None) => compile::last(output)?,
     };
     let space = table.space();
+    let shard = shard::asked(output, arguments.shard.shard)?;
     let agent = policy.as_ref().map_or(&arguments.conditions.agent, |(_, policy)| &policy.name);
     let under_test = conditions::named(&arguments.under_test)?;
     let settings = conditions::settings(space, &arguments.conditions, agent, under_test, arguments.episodes)?;
@@ -113,6 +141,7 @@ fn begun(output: &Output, arguments: &RunArguments) -> Result<(Run, RunDirectory
     let run = ready(table, settings, policy.as_ref(), face)?;
     let held = run_directory::create(arguments.out.as_deref())?;
     let path = &held.path;
+    shard::keep(path, shard)?;
     let run = if arguments.self_contained {
         let copy = pack_space(output, &run.space().path, &path.join("critical"))?;
         ready(load::table(output, &copy)?, run.settings().clone(), policy.as_ref(), face)?
@@ -152,7 +181,10 @@ fn resumed(output: &Output, path: &Path) -> Result<(Run, RunDirectory), Failure>
         }
     };
     let face = settings.policy.as_ref().map_or(Face::Network, |reference| reference.face);
-    Ok((ready(table, settings, policy.as_ref(), face)?, RunDirectory::open(held, &text)?))
+    let run = ready(table, settings, policy.as_ref(), face)?;
+    let directory = RunDirectory::open(held, &text)?;
+    restore(output, &run, &directory)?;
+    Ok((run, directory))
 }
 
 /// A run of the agent that the settings name, or of the given policy, whose table must have the same rows.

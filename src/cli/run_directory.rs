@@ -13,7 +13,7 @@ use crate::ads::external::{Attached, ExternalSettings};
 use crate::emit;
 use crate::episode::EpisodeLog;
 use crate::model::digest;
-use crate::run::{Database, EpisodeSummary, VERSION};
+use crate::run::{Database, EpisodeSummary, Units, VERSION};
 use crate::sim::ENGINE;
 use crate::syntax::yaml_mistake;
 
@@ -54,7 +54,7 @@ pub fn create(out: Option<&Path>) -> Result<Held, Failure> {
 }
 
 /// Takes a directory for this process alone.
-fn hold(path: &Path) -> Result<Held, Failure> {
+pub fn hold(path: &Path) -> Result<Held, Failure> {
     // Where folders cannot be opened or locked, as on some network drives, there is no lock.
     let lock = File::open(path).ok();
     if let Some(Err(TryLockError::WouldBlock)) = lock.as_ref().map(File::try_lock) {
@@ -155,16 +155,8 @@ pub fn resume<S: serde::de::DeserializeOwned>(
         Some(how) => output.tell(&format!("`{}` is {how}: the {what} begins anew", database.display())),
         None => {}
     }
-    let text = load::text(&path)?;
-    let refuse = |error| Failure::file("read", &path, yaml_mistake(&error, &text));
-    let settings = serde_yaml::from_str(&text).map_err(refuse)?;
-    let begun: Begun = serde_yaml::from_str(&text).map_err(refuse)?;
-    if (begun.engine.as_str(), begun.avastra.as_str()) != (ENGINE, VERSION) {
-        return Err(Failure::usage(format!(
-            "the {what} was begun by avastra {} in world `{}`, this is avastra {VERSION} in `{ENGINE}`: begin a new one",
-            begun.avastra, begun.engine
-        )));
-    }
+    let (settings, text) = settings_of(directory, kind, what)?;
+    let begun: Begun = serde_yaml::from_str(&text).expect("it was read so before");
     let table = load::table(output, &directory.join(&begun.space))?;
     let meaning = &table.space().meaning;
     if !meaning.is_sealed_by(&begun.space_digest) {
@@ -178,8 +170,31 @@ pub fn resume<S: serde::de::DeserializeOwned>(
     Ok(Resumed { settings, text, table, held })
 }
 
+/// The settings in the file `KIND.yaml` and their text, if they were written by this version of avastra.
+pub fn settings_of<S: serde::de::DeserializeOwned>(
+    directory: &Path,
+    kind: &str,
+    what: &str,
+) -> Result<(S, String), Failure> {
+    let path = directory.join(format!("{kind}.yaml"));
+    let text = load::text(&path)?;
+    let refuse = |error| Failure::file("read", &path, yaml_mistake(&error, &text));
+    // Settings of another version may have other fields: this comes first.
+    let begun: Begun = serde_yaml::from_str(&text).map_err(refuse)?;
+    if (begun.engine.as_str(), begun.avastra.as_str()) != (ENGINE, VERSION) {
+        return Err(Failure::usage(format!(
+            "the {what} in `{}` was begun by avastra {} in world `{}`, this is avastra {VERSION} in `{ENGINE}`: begin a new one",
+            directory.display(),
+            begun.avastra,
+            begun.engine
+        )));
+    }
+    let settings = serde_yaml::from_str(&text).map_err(refuse)?;
+    Ok((settings, text))
+}
+
 /// `run`, `training`, `study` or `estimate`, if the directory holds one.
-fn what_was_begun(directory: &Path) -> Option<&'static str> {
+pub fn what_was_begun(directory: &Path) -> Option<&'static str> {
     if let Some(kind) =
         ["study", "estimate"].into_iter().find(|kind| directory.join(format!("{kind}.yaml")).is_file())
     {
@@ -273,7 +288,7 @@ pub fn write_scenario(
     Ok(digest(text.as_bytes()))
 }
 
-fn scenario_name(road: &str, episode: usize) -> String {
+pub fn scenario_name(road: &str, episode: usize) -> String {
     format!("{road}_{episode:04}")
 }
 
@@ -291,11 +306,12 @@ fn make_empty(path: &Path) -> Result<Held, Failure> {
 }
 
 /// Whether a directory is empty but for what a kill leaves before the settings are written.
-fn is_unbegun(path: &Path) -> std::io::Result<bool> {
+pub fn is_unbegun(path: &Path) -> std::io::Result<bool> {
     for entry in std::fs::read_dir(path)? {
         let name = entry?.file_name();
         let is_left = match name.to_str() {
             Some("run.yaml.partial" | "study.yaml.partial" | "estimate.yaml.partial") => true,
+            Some("shard.yaml" | "shard.yaml.partial") => true,
             Some("critical") => {
                 let inside: Vec<_> = std::fs::read_dir(path.join(name))?.collect::<Result<_, _>>()?;
                 inside.iter().all(|entry| entry.file_name() == OsStr::new(pack::SPACE))

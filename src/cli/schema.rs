@@ -261,6 +261,14 @@ pub const SHAPES: &[Shape] = &[
         ],
     },
     Shape {
+        command: "merge",
+        fields: &[
+            f("directory", "text?", "the merged directory; null with `--missing`"),
+            f("shards", "number", "how many there are"),
+            f("missing[]", "number", "a shard that is to be played again, or gone on with"),
+        ],
+    },
+    Shape {
         command: "compare",
         fields: &[
             f("sides[]", "text", "the two driving systems"),

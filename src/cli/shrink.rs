@@ -38,7 +38,7 @@ pub fn shrink(output: &Output, arguments: &ShrinkArguments) -> Result<(), Failur
             "`--out {path}` is for one file: of several, each is written to a folder `{FOLDER}`"
         )));
     }
-    let asked = load::asked(None, arguments.ads_config.as_deref(), arguments.ads_cmd.as_deref())?;
+    let asked = load::asked(None, arguments.own.ads_config.as_deref(), arguments.own.ads_cmd.as_deref())?;
     let shrunk = each_file(output, &arguments.many, asked.external.as_ref(), |file| {
         let path = arguments.output.clone().unwrap_or_else(|| apart(file));
         smaller(output, file, &path, &asked)

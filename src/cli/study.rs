@@ -1,13 +1,12 @@
 //! `avastra study`: agents compared, with statistics.
 
 use std::path::Path;
-use std::sync::atomic::Ordering;
 use std::time::Instant;
 
 use crate::action::ActionTable;
 use crate::ads::external::Program;
 use crate::report;
-use crate::run::{RunError, TrafficRecord};
+use crate::run::{RunError, TrafficRecord, Units};
 use crate::study::{
     CellRecord, Event, FailedCell, Spent, Study, StudyDatabase, StudyError, StudyFile, StudyResults,
     StudySettings, play_jobs,
@@ -15,7 +14,7 @@ use crate::study::{
 
 use super::arguments::StudyArguments;
 use super::error::Failure;
-use super::files::write;
+use super::files::{remove, write};
 use super::findings::kinds_text;
 use super::interrupt::stop_on_interrupt;
 use super::output::Output;
@@ -23,16 +22,19 @@ use super::output::plural;
 use super::parallel::jobs;
 use super::progress::Progress;
 use super::run_directory::{Held, Resumed};
-use super::{load, run_directory};
+use super::timing::Times;
+use super::{load, run_directory, shard};
 
 /// Plays what a study still lacks and prints its result.
 pub fn study(output: &Output, arguments: &StudyArguments) -> Result<(), Failure> {
-    let (study, held, settings) = match &arguments.resume {
+    let begun = match &arguments.resume {
         Some(path) => resumed(output, path)?,
         None => {
             let file = arguments.file.as_ref().expect("clap asks for it where there is no `--resume`");
+            let shard = shard::asked(output, arguments.shard.shard)?;
             let study = begun(output, file, arguments)?;
             let held = run_directory::create_empty(arguments.out.as_deref())?;
+            shard::keep(&held.path, shard)?;
             let space = load::relative(&held.path, &study.table().space().path)?;
             let external = study.settings().external.clone();
             let external =
@@ -42,63 +44,88 @@ pub fn study(output: &Output, arguments: &StudyArguments) -> Result<(), Failure>
             (study, held, text)
         }
     };
+    play_all(output, begun, arguments.jobs)
+}
+
+/// Ends a study whose jobs were all played, in shards.
+pub fn conclude(output: &Output, path: &Path) -> Result<(), Failure> {
+    play_all(output, resumed(output, path)?, None)
+}
+
+/// Plays the jobs that a directory still lacks, and says what all of them came to.
+fn play_all(
+    output: &Output,
+    (study, held, settings): (Study, Held, String),
+    asked_jobs: Option<u32>,
+) -> Result<(), Failure> {
     let path = held.path.clone();
     let stop = stop_on_interrupt();
     let file = path.join("study.db");
+    let unread = |error| Failure::file("read", &file, error);
+    let unwritten = |error| Failure::file("write", &file, error);
     let mut database =
         StudyDatabase::open(&file, &settings).map_err(|error| Failure::file("open", &file, error))?;
-    let todo = database.missing(&study).map_err(|error| Failure::file("read", &file, error))?;
+    let shard = shard::kept(&path)?;
+    let all = study.jobs();
+    let costs: Vec<u64> = all.iter().map(|job| study.episodes(job)).collect();
+    let own: Vec<_> = shard.share(&costs).into_iter().map(|job| all[job].clone()).collect();
+    let missing = |database: &StudyDatabase| database.missing(study.settings(), own.clone());
+    let todo = missing(&database).map_err(unread)?;
     output.tell(&heading(&study, &path));
 
     let episodes = |jobs: &[_]| jobs.iter().map(|job| study.episodes(job)).sum::<u64>();
-    let (all, left) = (episodes(&study.jobs()), episodes(&todo));
+    let (episodes, left) = (episodes(&own), episodes(&todo));
     // Each job has a process, or a connection, of its own: these are only to see that they can be had.
     let probe = study.settings().external.as_ref().map(|attached| Program::new(attached.settings.clone()));
-    let jobs = jobs(arguments.jobs, probe.as_ref())?;
+    let jobs = jobs(asked_jobs, probe.as_ref())?;
     drop(probe);
-    let mut progress = Progress::new(output, "counted", all, all - left);
+    let mut progress = Progress::new(output, "counted", episodes, episodes - left);
+    let mut times = Times::read(&path, &database)?;
     play_jobs(&study, &todo, jobs, &stop, &spent, &mut |event| match event {
         Event::Episode { counted } => {
             progress.episode(counted);
             Ok(())
         }
-        Event::Done(cells) => database.add(&cells).map_err(|error| Failure::file("write", &file, error)),
+        Event::Done(cells) => {
+            times.add(&cells);
+            database.add(&cells).map_err(unwritten)?;
+            times.write(&path)
+        }
     })?;
     drop(progress);
+    let is_over = missing(&database).map_err(unread)?.is_empty();
+    if is_over {
+        times.write(&path)?;
+        let places = database.places(study.settings()).map_err(unread)?;
+        database = database.settle(&places).map_err(unwritten)?;
+    }
 
-    let cells = database.cells().map_err(|error| Failure::file("read", &file, error))?;
+    let cells = times.on(database.cells().map_err(unread)?);
     let failed = FailedCell::among(&cells);
+    let timing = timing(&cells);
     if !failed.is_empty() {
         // An interruption may have left some of the cells before.
         remove(&path.join("results.json"))?;
         let findings = FailedCell::findings(&failed);
         output.say(&failed_text(&path, &failed));
-        output.result(serde_json::json!({ "directory": path, "failures": failed, "timing": timing(&cells) }));
+        output.result(serde_json::json!({ "directory": path, "failures": failed, "timing": timing }));
         return Err(Failure::Ads { findings });
     }
     let results = StudyResults::new(study.settings(), &cells);
     let text = serde_json::to_string_pretty(&results).expect("results have string keys only");
     write(&path.join("results.json"), &format!("{text}\n"))?;
     output.say(&report::study(&results));
-    let timing = timing(&cells);
     output.say(&timing_text(&path, &timing));
     output.result(
         serde_json::json!({ "directory": path, "results": results, "failures": failed, "timing": timing }),
     );
-    if stop.load(Ordering::Relaxed) && results.cells < results.cells_wanted {
+    if !is_over {
         return Err(Failure::Interrupted { command: "study", directory: path });
     }
-    Ok(())
-}
-
-/// Removes a file, if it is there.
-fn remove(file: &Path) -> Result<(), Failure> {
-    match std::fs::remove_file(file) {
-        Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
-            Err(Failure::file("remove", file, error))
-        }
-        _ => Ok(()),
+    if !shard.is_whole() {
+        output.say(&shard::next_step(shard));
     }
+    Ok(())
 }
 
 /// The cells that the driving system failed in, and what to do.

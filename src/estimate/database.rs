@@ -1,21 +1,25 @@
 //! `estimate.db`: the pilot, the parts and the events of an estimate, in SQLite, one transaction for each part.
 
-use std::path::Path;
-
 use rusqlite::{Connection, OptionalExtension, params};
 
-use crate::run::{DatabaseError, Layout};
+use crate::run::{DatabaseError, Layout, Units};
 
 use crate::estimate::part::{Event, Part, PartRecord, Played};
-use crate::estimate::plan::{Cell, Pilot, Seen};
+use crate::estimate::plan::{Cell, Pilot, Seen, Situation};
 use crate::estimate::ready::Estimate;
 
 /// Versions begin at 2001, so that it is never taken for another database.
-const LAYOUT: Layout =
-    Layout { version: 2002, unit: "part", tables: &["part", "event", "pilot", "seen"], naming: None };
+const LAYOUT: Layout = Layout {
+    version: 2002,
+    older: &[],
+    unit: "part",
+    tables: &["part", "event", "pilot", "seen"],
+    naming: None,
+    local: &[],
+};
 
 /// What a pilot saw stands under a part that no estimate has.
-const PILOT: i64 = -1;
+pub const PILOT: i64 = -1;
 
 const SCHEMA: &str = "
 CREATE TABLE part (
@@ -43,15 +47,25 @@ pub struct EstimateDatabase {
     connection: Connection,
 }
 
-impl EstimateDatabase {
-    /// Opens the file, making the tables if it is new. `settings` is the text of `estimate.yaml`.
-    ///
-    /// # Errors
-    /// If the file cannot be opened, has another layout or other settings, or was damaged or changed.
-    pub fn open(path: &Path, settings: &str) -> Result<EstimateDatabase, DatabaseError> {
-        Ok(EstimateDatabase { connection: LAYOUT.open(path, SCHEMA, settings)? })
+impl Units for EstimateDatabase {
+    fn layout() -> &'static Layout {
+        &LAYOUT
     }
 
+    fn schema() -> String {
+        SCHEMA.to_owned()
+    }
+
+    fn connection(&self) -> &Connection {
+        &self.connection
+    }
+
+    fn from_connection(connection: Connection) -> EstimateDatabase {
+        EstimateDatabase { connection }
+    }
+}
+
+impl EstimateDatabase {
     /// Adds a part. `scenarios` has the file that was written of each of its events, if one was.
     ///
     /// # Errors
@@ -64,8 +78,7 @@ impl EstimateDatabase {
     ) -> Result<(), DatabaseError> {
         let record = &played.record;
         let Part { road, number } = record.part;
-        // By its place among all parts, so that the file does not depend on the order in which parts end.
-        let place = i64::from(number) * estimate.settings().run.roads.len() as i64 + road as i64;
+        let place = estimate.settings().place(record.part);
         let transaction = self.connection.transaction()?;
         transaction.execute(
             "INSERT INTO part VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
@@ -113,7 +126,7 @@ impl EstimateDatabase {
                     PILOT,
                     *row as i64,
                     *road as i64,
-                    situation,
+                    situation.number(),
                     seen.trials,
                     seen.events,
                     seen.moments,
@@ -150,7 +163,7 @@ impl EstimateDatabase {
             let cell = Cell {
                 row: row.get::<_, i64>(0)? as usize,
                 road: row.get::<_, i64>(1)? as usize,
-                situation: row.get(2)?,
+                situation: Situation::from_number(row.get(2)?),
             };
             let seen =
                 Seen { trials: row.get(3)?, events: row.get(4)?, moments: row.get(5)?, chance: row.get(6)? };
@@ -158,6 +171,18 @@ impl EstimateDatabase {
         })?;
         pilot.cells = cells.collect::<Result<_, _>>()?;
         Ok(Some(pilot))
+    }
+
+    /// The files that were written of the events of a part.
+    ///
+    /// # Errors
+    /// If the file cannot be read.
+    pub fn scenarios(&self, part: i64) -> Result<Vec<String>, DatabaseError> {
+        let mut query = self.connection.prepare_cached(
+            "SELECT scenario FROM event WHERE part = ? AND scenario IS NOT NULL ORDER BY event",
+        )?;
+        let names = query.query_map([part], |row| row.get(0))?;
+        Ok(names.collect::<Result<_, _>>()?)
     }
 
     /// All parts so far, in order.

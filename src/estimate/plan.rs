@@ -26,8 +26,12 @@ pub struct Cell {
     pub row: usize,
     /// Index among the roads of the estimate.
     pub road: usize,
-    pub situation: u32,
+    pub situation: Situation,
 }
+
+/// A class of situations: the kind of road, and how fast the ego vehicle is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Situation(u32);
 
 /// What a pilot saw of a cell.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -71,20 +75,32 @@ struct Risks {
     all: f64,
 }
 
-/// The class of a moment: the kind of road, and how fast the ego vehicle is.
-pub fn situation(moment: &MomentFacts) -> u32 {
-    let road = match moment.ego_road {
-        RoadKind::OneWay => 0,
-        RoadKind::TwoWay => 1,
-        RoadKind::NearJunction => 2,
-        RoadKind::InJunction => 3,
-    };
-    let speed = match moment.ego_speed_mps {
-        speed_mps if speed_mps < STANDING_MPS_MAX => 0,
-        speed_mps if speed_mps < SLOW_MPS_MAX => 1,
-        _ => 2,
-    };
-    3 * road + speed
+impl Situation {
+    /// The class of a moment.
+    pub fn of(moment: &MomentFacts) -> Situation {
+        let road = match moment.ego_road {
+            RoadKind::OneWay => 0,
+            RoadKind::TwoWay => 1,
+            RoadKind::NearJunction => 2,
+            RoadKind::InJunction => 3,
+        };
+        let speed = match moment.ego_speed_mps {
+            speed_mps if speed_mps < STANDING_MPS_MAX => 0,
+            speed_mps if speed_mps < SLOW_MPS_MAX => 1,
+            _ => 2,
+        };
+        Situation(3 * road + speed)
+    }
+
+    /// The class that a database has under a number.
+    pub(super) fn from_number(number: u32) -> Situation {
+        Situation(number)
+    }
+
+    /// The number under which a database keeps it.
+    pub(super) fn number(self) -> u32 {
+        self.0
+    }
 }
 
 /// The weight of an event after a row of this chance that is tried out with probability `share`.
@@ -208,6 +224,10 @@ mod tests {
     /// How likely a step is not calm.
     const WILD: f64 = 0.25;
 
+    fn cell(row: usize, situation: u32) -> Cell {
+        Cell { row, road: 0, situation: Situation(situation) }
+    }
+
     /// The exact probability of the event in an episode.
     fn truth() -> f64 {
         let of = |situation: usize| (0..4).map(|row| CHANCES[row] * RISKS[row][situation]).sum::<f64>();
@@ -220,18 +240,18 @@ mod tests {
     fn sample(plan: &Plan, rng: &mut Rng, pilot: &mut Pilot, heaviest: &mut f64) -> f64 {
         let (mut weights, mut is_over) = (0.0, false);
         for _ in 0..STEPS {
-            let situation = u32::from(rng::unit(rng) < WILD);
+            let situation = usize::from(rng::unit(rng) < WILD);
             let mut ticket = rng::unit(rng);
             let chosen = CHANCES.iter().position(|chance| {
                 ticket -= chance;
                 ticket < 0.0
             });
             for row in 0..MATTERS {
-                let cell = Cell { row, road: 0, situation };
+                let cell = cell(row, situation as u32);
                 let share = plan.share(&cell, CHANCES[row], MATTERS);
                 *heaviest = heaviest.max(weight(CHANCES[row], share));
                 let is_tried = rng::unit(rng) < share;
-                let has_event = rng::unit(rng) < RISKS[row][situation as usize];
+                let has_event = rng::unit(rng) < RISKS[row][situation];
                 let seen = pilot.cells.entry(cell).or_default();
                 seen.moments += 1;
                 seen.chance += CHANCES[row];
@@ -249,7 +269,7 @@ mod tests {
             pilot.whole_s += 6.0;
             // Trials of this step come before its end, and a later one has the event behind it.
             let ends = chosen.is_some_and(|row| {
-                let risk = RISKS[row][situation as usize];
+                let risk = RISKS[row][situation];
                 rng::unit(rng) < risk
             });
             is_over |= ends;
@@ -270,11 +290,11 @@ mod tests {
     #[test]
     fn a_plan_tries_what_a_pilot_found_dangerous_and_rare() {
         let plan = learned(&mut rng::stream(1, Stream::Estimate, 0));
-        let share = |row, situation| plan.share(&Cell { row, road: 0, situation }, CHANCES[row], 4);
+        let share = |row, situation| plan.share(&cell(row, situation), CHANCES[row], 4);
         assert!(share(0, 1) > 20.0 * CHANCES[0], "{}", share(0, 1));
-        assert_eq!(plan.share(&Cell { row: 0, road: 0, situation: 1 }, 0.0, 4), 0.0);
+        assert_eq!(plan.share(&cell(0, 1), 0.0, 4), 0.0);
         // What the pilot has not seen is as its row is, or as all rows are.
-        let rarely = |row, situation| plan.share(&Cell { row, road: 0, situation }, 1e-5, 4);
+        let rarely = |row, situation| plan.share(&cell(row, situation), 1e-5, 4);
         assert!(rarely(0, 0) < rarely(0, 7) && rarely(0, 7) < rarely(0, 1), "{}", rarely(0, 7));
         assert!(rarely(9, 1) < rarely(0, 7), "{}", rarely(9, 1));
     }

@@ -21,7 +21,7 @@ use crate::rng::{Rng, Stream};
 use crate::run::{carry_out, choose, legal, offers, on_threads};
 
 use crate::estimate::part::{Event, Part, PartRecord, Played};
-use crate::estimate::plan::{Cell, Pilot, Plan, situation, weight};
+use crate::estimate::plan::{Cell, Pilot, Plan, Situation, weight};
 use crate::estimate::ready::{Estimate, EventPlace};
 
 /// Rounds of a pilot; the first tries all rows alike, each other one goes by what was found before it. Ours.
@@ -177,7 +177,7 @@ fn considered(
     let offers = offers(agent, moment);
     let legal = legal(&offers);
     let chances = agent.chances(legal.view()).expect("an estimate that tries rows out asked for them");
-    let situation = situation(&moment.situation.surroundings.moment());
+    let situation = Situation::of(&moment.situation.surroundings.moment());
     // Where nothing appears by itself, only what an action makes appear can be hit: no event belongs to other rows.
     let ambient = moment.setup().start.ambient;
     let may_matter = |offer: &Offer| match offer {

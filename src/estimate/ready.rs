@@ -53,15 +53,6 @@ impl Estimate {
         &self.settings
     }
 
-    /// All parts: the first of every road before the second of any, so that an unfinished estimate says something
-    /// about all roads.
-    pub fn parts(&self) -> Vec<Part> {
-        let roads = self.settings.run.roads.len();
-        (0..self.settings.parts)
-            .flat_map(|number| (0..roads).map(move |road| Part { road, number }))
-            .collect()
-    }
-
     /// Seed of everything that a part draws. It depends neither on the driving system nor on the agent.
     pub(super) fn seed(&self, part: Part) -> u64 {
         let of_road = rng::child_seed(self.settings.run.seed, Stream::Estimate, part.road as u64);

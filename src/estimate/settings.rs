@@ -3,6 +3,7 @@
 use crate::episode::{EpisodeLog, Setup};
 use crate::run::{EpisodeSummary, RunError, RunSettings};
 
+use crate::estimate::part::Part;
 use crate::estimate::results::Probability;
 
 /// What is counted: whether it happens in an episode.
@@ -133,6 +134,18 @@ pub enum EstimateError {
 }
 
 impl EstimateSettings {
+    /// All parts: the first of every road before the second of any, so that an unfinished estimate says something
+    /// about all roads.
+    pub fn all_parts(&self) -> Vec<Part> {
+        let roads = self.run.roads.len();
+        (0..self.parts).flat_map(|number| (0..roads).map(move |road| Part { road, number })).collect()
+    }
+
+    /// The place of a part among all, which is its number in `estimate.db`.
+    pub fn place(&self, part: Part) -> i64 {
+        i64::from(part.number) * self.run.roads.len() as i64 + part.road as i64
+    }
+
     /// The numbers of parts of a road after which it is looked whether to stop; all parts are the last.
     pub fn looks(&self) -> Vec<u32> {
         if self.stopping == Stopping::default() {

@@ -18,14 +18,18 @@ use crate::oracle;
 
 use crate::run::offered::{RowCount, without_figures};
 use crate::run::sealed::{DatabaseError, Layout};
+use crate::run::settled::{Numbered, Units};
 use crate::run::shape::Shape;
 use crate::run::summary::{EpisodeSummary, Finding};
 
 pub(crate) const LAYOUT: Layout = Layout {
     version: 9,
+    older: &[],
     unit: "episode",
     tables: &["episode", "step", "held", "offer", "collision", "failure", "learning", "scenario"],
     naming: Some(("offer", "reason")),
+    // A scenario names its space by a path from the file.
+    local: &["scenario"],
 };
 
 /// `held` says what held the speed of the ego vehicle back, from a time until that of the next row. `offer` says for each row in how many steps of an episode it was legal (reason 0) or was refused for a reason; a
@@ -78,16 +82,25 @@ pub struct Database {
     pub(crate) connection: Connection,
 }
 
-impl Database {
-    /// Opens the file, making the tables if it is new. `settings` is the text of `run.yaml`.
-    ///
-    /// # Errors
-    /// If the file cannot be opened, has another layout or other settings, or was damaged or changed.
-    pub fn open(path: &Path, settings: &str) -> Result<Database, DatabaseError> {
-        let connection = LAYOUT.open(path, &format!("{SCHEMA}{}", step_table()), settings)?;
-        Ok(Database { connection })
+impl Units for Database {
+    fn layout() -> &'static Layout {
+        &LAYOUT
     }
 
+    fn schema() -> String {
+        format!("{SCHEMA}{}", step_table())
+    }
+
+    fn connection(&self) -> &Connection {
+        &self.connection
+    }
+
+    fn from_connection(connection: Connection) -> Database {
+        Database { connection }
+    }
+}
+
+impl Database {
     /// Adds a whole episode, or nothing. `in_words` says what a draw does in the space's own words; `scenario` is the
     /// digest of the file that was written of it.
     ///
@@ -137,6 +150,25 @@ impl Database {
             Ok((episode, road, digest))
         })
         .collect()
+    }
+
+    /// As [`Units::take`]. `scenarios` has the episodes of which a scenario was written anew, with the digest of the file.
+    ///
+    /// # Errors
+    /// As [`Units::take`].
+    pub fn take_episodes(
+        &mut self,
+        other: &Path,
+        units: &[Numbered],
+        scenarios: &[(usize, String)],
+    ) -> Result<(), DatabaseError> {
+        self.take(other, units, &|connection| {
+            let mut update = connection.prepare("UPDATE scenario SET digest = ? WHERE episode = ?")?;
+            for (episode, digest) in scenarios {
+                update.execute(params![digest, *episode as i64])?;
+            }
+            Ok(())
+        })
     }
 
     /// Why chosen actions were refused, and how often; the most frequent reason first. Figures in a reason are

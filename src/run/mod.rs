@@ -15,7 +15,9 @@ mod play;
 mod profile;
 mod sealed;
 mod settings;
+mod settled;
 mod shape;
+mod shard;
 mod stage;
 mod summary;
 mod threads;
@@ -36,11 +38,13 @@ pub use profile::{
     started, trained_against,
 };
 pub(crate) use profile::{traffic_of, under_test};
-pub use sealed::DatabaseError;
-pub(crate) use sealed::Layout;
+pub(crate) use sealed::differences as settings_differences;
+pub use sealed::{DatabaseError, Layout};
 pub use settings::{EPISODES_MAX, PolicyReference, RunError, RunSettings, VERSION};
 pub(crate) use settings::{agent_named, check_episodes};
+pub use settled::{Numbered, Units};
 pub use shape::Shape;
+pub use shard::Shard;
 pub use stage::Stage;
 pub use summary::{EpisodeSummary, Finding};
 pub use threads::on_threads;

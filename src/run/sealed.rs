@@ -35,6 +35,12 @@ pub enum DatabaseError {
     Rows { unit: &'static str, number: i64 },
     #[error("it is damaged ({what}): begin a new one")]
     Damaged { what: String },
+    #[error(
+        "its {unit} {number} is another than that of the directories before: one of them was not played alike"
+    )]
+    Differs { unit: &'static str, number: i64 },
+    #[error(transparent)]
+    File(#[from] std::io::Error),
     #[error(transparent)]
     Sqlite(rusqlite::Error),
 }
@@ -50,9 +56,11 @@ impl From<rusqlite::Error> for DatabaseError {
 }
 
 /// The layout of a database.
-pub(crate) struct Layout {
+pub struct Layout {
     /// Raised whenever a column changes.
     pub version: i64,
+    /// Versions before whose files can be read and gone on with; in them every table has at least the columns of today.
+    pub older: &'static [i64],
     /// What is added as a whole, in a word, which is also its key: `episode`, `cell`. The first of the tables has
     /// one row for each.
     pub unit: &'static str,
@@ -60,6 +68,8 @@ pub(crate) struct Layout {
     pub tables: &'static [&'static str],
     /// A table whose rows name rows of another by a column with that one's name. What they name is sealed with them.
     pub naming: Option<(&'static str, &'static str)>,
+    /// Those of the tables whose rows depend on where the directory is.
+    pub local: &'static [&'static str],
 }
 
 impl Layout {
@@ -78,7 +88,7 @@ impl Layout {
             transaction.execute("INSERT INTO begun VALUES (1, ?)", [settings])?;
             transaction.pragma_update(None, "user_version", self.version)?;
             transaction.commit()?;
-        } else if found != self.version {
+        } else if found != self.version && !self.older.contains(&found) {
             return Err(DatabaseError::Layout { found, wanted: self.version });
         } else {
             self.check(&connection, settings)?;
@@ -126,8 +136,7 @@ impl Layout {
         Ok(())
     }
 
-    /// The digest of all rows of a unit. SQLite need not give them in one order, so each has a digest, and these are
-    /// sorted.
+    /// The digest of all rows of a unit.
     fn rows_digest(&self, connection: &Connection, number: i64) -> Result<String, rusqlite::Error> {
         let mut whole = Sha256::new();
         for table in self.tables {
@@ -135,20 +144,33 @@ impl Layout {
             let join =
                 named.map_or(String::new(), |(_, named)| format!(" LEFT JOIN {named} USING ({named})"));
             let query = format!("SELECT * FROM {table}{join} WHERE {} = ?", self.unit);
-            let mut statement = connection.prepare_cached(&query)?;
-            let columns = statement.column_count();
-            let mut digests: Vec<[u8; 32]> = Vec::new();
-            let mut rows = statement.query([number])?;
-            while let Some(row) = rows.next()? {
-                digests.push(row_digest(row, columns)?);
-            }
-            digests.sort_unstable();
-            whole.update(table.as_bytes());
-            whole.update((digests.len() as u64).to_le_bytes());
-            digests.iter().for_each(|digest| whole.update(digest));
+            add_rows(&mut whole, connection, table, &query, number)?;
         }
         Ok(digest_text(&whole.finalize().into()))
     }
+}
+
+/// Adds the rows of a unit in a table to a digest. SQLite need not give them in one order, so each has a digest, and these
+/// are sorted.
+pub(super) fn add_rows(
+    whole: &mut Sha256,
+    connection: &Connection,
+    table: &str,
+    query: &str,
+    number: i64,
+) -> Result<(), rusqlite::Error> {
+    let mut statement = connection.prepare_cached(query)?;
+    let columns = statement.column_count();
+    let mut digests: Vec<[u8; 32]> = Vec::new();
+    let mut rows = statement.query([number])?;
+    while let Some(row) = rows.next()? {
+        digests.push(row_digest(row, columns)?);
+    }
+    digests.sort_unstable();
+    whole.update(table.as_bytes());
+    whole.update((digests.len() as u64).to_le_bytes());
+    digests.iter().for_each(|digest| whole.update(digest));
+    Ok(())
 }
 
 /// The digest of a row: a tag for each value and, where the length is not fixed, the length.
@@ -176,7 +198,7 @@ fn row_digest(row: &Row, columns: usize) -> Result<[u8; 32], rusqlite::Error> {
 }
 
 /// The settings that differ, each with what it was; `None` if there is none.
-fn differences(begun: &str, now: &str) -> Option<String> {
+pub(crate) fn differences(begun: &str, now: &str) -> Option<String> {
     let read = |text: &str| serde_yaml::from_str::<Map<String, Value>>(text).unwrap_or_default();
     let (begun, now) = (read(begun), read(now));
     let mut keys: Vec<&String> = begun.keys().chain(now.keys()).collect();
@@ -198,9 +220,11 @@ mod tests {
     const SETTINGS: &str = "seed: 1\nroads: [corner]\n";
     const LAYOUT: Layout = Layout {
         version: 3,
+        older: &[],
         unit: "episode",
         tables: &["episode", "step"],
         naming: Some(("step", "reason")),
+        local: &[],
     };
     const OWN: &str = "CREATE TABLE episode (episode INTEGER PRIMARY KEY, name TEXT) STRICT;
                        CREATE TABLE reason (reason INTEGER PRIMARY KEY, text TEXT) STRICT;

@@ -1,30 +1,35 @@
-//! `study.db`: the cells of a study, in SQLite. The cells of one job are one transaction.
+//! `study.db`: the cells of a study, in SQLite. The cells of one job are one transaction. They are numbered as they come, and
+//! by their place in the study when it is settled.
 
 use std::collections::BTreeMap;
-use std::path::Path;
 
 use rusqlite::types::Type as Kind;
 use rusqlite::{Connection, Row, params};
 
-use crate::run::{DatabaseError, Layout};
+use crate::run::{DatabaseError, Layout, Numbered, Units};
 
 use crate::study::job::Job;
-use crate::study::ready::Study;
 use crate::study::record::{CellRecord, CollisionRecord, EpisodeRecord, FailureClass, Spent, TrainedRecord};
+use crate::study::settings::StudySettings;
 
 /// Versions begin at 1001, so that a `run.db` is never taken for a `study.db`.
 const LAYOUT: Layout = Layout {
-    version: 1004,
+    version: 1005,
+    older: &[TIMED],
     unit: "cell",
     tables: &["cell", "trained", "evaluated", "collision"],
     naming: None,
+    local: &[],
 };
+
+/// This layout has the time that a machine took beside each cell (`wall_s`, `cpu_s`), which is no part of the result.
+const TIMED: i64 = 1004;
 
 /// Seeds are text: SQLite's integers have a sign.
 const SCHEMA: &str = "
 CREATE TABLE cell (
   cell INTEGER PRIMARY KEY, agent TEXT NOT NULL, road TEXT NOT NULL, number INTEGER NOT NULL,
-  training_seed TEXT, wall_s REAL NOT NULL, cpu_s REAL, UNIQUE (agent, road, number)
+  training_seed TEXT, UNIQUE (agent, road, number)
 ) STRICT;
 CREATE TABLE trained (
   cell INTEGER NOT NULL REFERENCES cell, episode INTEGER NOT NULL, ended TEXT NOT NULL, return REAL NOT NULL,
@@ -49,33 +54,42 @@ pub struct StudyDatabase {
     connection: Connection,
 }
 
-impl StudyDatabase {
-    /// Opens the file, making the tables if it is new. `settings` is the text of `study.yaml`.
-    ///
-    /// # Errors
-    /// If the file cannot be opened, has another layout or other settings, or was damaged or changed.
-    pub fn open(path: &Path, settings: &str) -> Result<StudyDatabase, DatabaseError> {
-        Ok(StudyDatabase { connection: LAYOUT.open(path, SCHEMA, settings)? })
+impl Units for StudyDatabase {
+    fn layout() -> &'static Layout {
+        &LAYOUT
     }
 
+    fn schema() -> String {
+        SCHEMA.to_owned()
+    }
+
+    fn connection(&self) -> &Connection {
+        &self.connection
+    }
+
+    fn from_connection(connection: Connection) -> StudyDatabase {
+        StudyDatabase { connection }
+    }
+}
+
+impl StudyDatabase {
     /// Adds all cells of a job, or nothing.
     ///
     /// # Errors
     /// If the file cannot be written.
     pub fn add(&mut self, cells: &[CellRecord]) -> Result<(), DatabaseError> {
         let transaction = self.connection.transaction()?;
+        let layout: i64 = transaction.pragma_query_value(None, "user_version", |row| row.get(0))?;
         for record in cells {
-            transaction.execute(
-                "INSERT INTO cell (agent, road, number, training_seed, wall_s, cpu_s) VALUES (?, ?, ?, ?, ?, ?)",
-                params![
-                    record.agent,
-                    record.road,
-                    record.number,
-                    record.training_seed.map(|seed| seed.to_string()),
-                    record.spent.wall_s,
-                    record.spent.cpu_s,
-                ],
-            )?;
+            let seed = record.training_seed.map(|seed| seed.to_string());
+            let CellRecord { agent, road, number, spent, .. } = record;
+            if layout == TIMED {
+                let insert = "INSERT INTO cell (agent, road, number, training_seed, wall_s, cpu_s) VALUES (?, ?, ?, ?, ?, ?)";
+                transaction.execute(insert, params![agent, road, number, seed, spent.wall_s, spent.cpu_s])?;
+            } else {
+                let insert = "INSERT INTO cell (agent, road, number, training_seed) VALUES (?, ?, ?, ?)";
+                transaction.execute(insert, params![agent, road, number, seed])?;
+            }
             let cell = transaction.last_insert_rowid();
             let mut insert =
                 transaction.prepare_cached("INSERT INTO trained VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)")?;
@@ -101,23 +115,61 @@ impl StudyDatabase {
         Ok(())
     }
 
-    /// The jobs of a study that are not done yet, in order.
+    /// The times of cells, which a file of the layout before has: agent, road, number.
     ///
     /// # Errors
     /// If the file cannot be read.
-    pub fn missing(&self, study: &Study) -> Result<Vec<Job>, DatabaseError> {
+    pub fn times(&self) -> Result<Vec<(String, String, u32, Spent)>, DatabaseError> {
+        let layout: i64 = self.connection.pragma_query_value(None, "user_version", |row| row.get(0))?;
+        if layout != TIMED {
+            return Ok(Vec::new());
+        }
+        let mut query = self.connection.prepare("SELECT agent, road, number, wall_s, cpu_s FROM cell")?;
+        let times = query.query_map([], |row| {
+            let spent = Spent { wall_s: row.get(3)?, cpu_s: row.get(4)? };
+            Ok((row.get(0)?, row.get(1)?, row.get(2)?, spent))
+        })?;
+        Ok(times.collect::<Result<_, _>>()?)
+    }
+
+    /// Those of some jobs that are not done yet.
+    ///
+    /// # Errors
+    /// If the file cannot be read.
+    pub fn missing(&self, settings: &StudySettings, jobs: Vec<Job>) -> Result<Vec<Job>, DatabaseError> {
         let mut is_there =
             self.connection.prepare("SELECT 1 FROM cell WHERE agent = ? AND road = ? AND number = ?")?;
-        let mut jobs = Vec::new();
-        for job in study.jobs() {
-            let settings = study.settings();
+        let mut missing = Vec::new();
+        for job in jobs {
             // All cells of a job come together.
             let (agent, road) = (&settings.agents[job.agent].label, &settings.roads[job.roads[0]]);
             if !is_there.exists(params![agent, road, job.number])? {
-                jobs.push(job);
+                missing.push(job);
             }
         }
-        Ok(jobs)
+        Ok(missing)
+    }
+
+    /// The numbers of all cells, each with the one that it has in a settled file: its place in the study.
+    ///
+    /// # Errors
+    /// If the file cannot be read, or has a cell that is none of the study's.
+    pub fn places(&self, settings: &StudySettings) -> Result<Vec<Numbered>, DatabaseError> {
+        let places: BTreeMap<(&str, &str, u32), i64> = settings.cells().zip(1..).collect();
+        let mut query =
+            self.connection.prepare("SELECT cell, agent, road, number FROM cell ORDER BY cell")?;
+        let cells = query.query_map([], |row| {
+            Ok((row.get(0)?, row.get::<_, String>(1)?, row.get::<_, String>(2)?, row.get(3)?))
+        })?;
+        let placed = |cell: Result<(i64, String, String, u32), rusqlite::Error>| {
+            let (cell, agent, road, number) = cell?;
+            let place = places.get(&(agent.as_str(), road.as_str(), number)).copied();
+            let what = || {
+                format!("it has a cell of `{agent}` on `{road}`, number {number}, which is not in the study")
+            };
+            place.map(|place| (cell, place)).ok_or_else(|| DatabaseError::Damaged { what: what() })
+        };
+        cells.map(placed).collect()
     }
 
     /// All cells so far, in the order in which they ended.
@@ -126,7 +178,7 @@ impl StudyDatabase {
     /// If the file cannot be read.
     pub fn cells(&self) -> Result<Vec<CellRecord>, DatabaseError> {
         let mut cells: BTreeMap<i64, CellRecord> = self
-            .by_cell("SELECT cell, agent, road, number, training_seed, wall_s, cpu_s FROM cell", |row| {
+            .by_cell("SELECT cell, agent, road, number, training_seed FROM cell", |row| {
                 Ok(CellRecord {
                     agent: row.get(1)?,
                     road: row.get(2)?,
@@ -137,7 +189,7 @@ impl StudyDatabase {
                         .transpose()?,
                     trained: Vec::new(),
                     episodes: Vec::new(),
-                    spent: Spent { wall_s: row.get(5)?, cpu_s: row.get(6)? },
+                    spent: Spent::default(),
                 })
             })?
             .into_iter()

@@ -35,7 +35,7 @@ pub use agreement::{Agreement, ComparedFigure, ComparedPair, P_MAX, Verdict};
 pub use database::StudyDatabase;
 pub use failed::FailedCell;
 pub use file::{PublishedTable, StudyFile};
-pub use job::{Event, play_jobs};
+pub use job::{Event, Job, play_jobs};
 pub use played::{Departures, Played};
 pub use ready::Study;
 pub use record::{CellRecord, Spent};

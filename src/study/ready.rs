@@ -7,7 +7,6 @@ use crate::rng::Stream;
 use crate::run::{Run, RunError, RunSettings};
 use crate::train::{TrainSettings, Training, with_period};
 
-use crate::study::file::EvaluationPlan;
 use crate::study::job::Job;
 use crate::study::settings::{AgentSettings, StudyError, StudySettings, check};
 
@@ -55,31 +54,14 @@ impl Study {
         self.settings.external.as_ref().map_or_else(|| self.settings.ads.clone(), Attached::name)
     }
 
-    /// All jobs. The first training or repetition of every agent comes before the second of any, so that an
-    /// unfinished study says something about all of them.
+    /// As [`StudySettings::jobs`].
     pub fn jobs(&self) -> Vec<Job> {
-        let StudySettings { agents, roads, .. } = &self.settings;
-        let most = agents.iter().map(|agent| agent.repeats).max().unwrap_or(0);
-        let mut jobs = Vec::new();
-        for number in 0..most {
-            for (agent, settings) in agents.iter().enumerate().filter(|(_, agent)| number < agent.repeats) {
-                let all = (0..roads.len()).collect::<Vec<_>>();
-                match &settings.training {
-                    Some(training) if !training.roads.is_empty() => {
-                        jobs.push(Job { agent, roads: all, number })
-                    }
-                    _ => jobs.extend(all.into_iter().map(|road| Job { agent, roads: vec![road], number })),
-                }
-            }
-        }
-        jobs
+        self.settings.jobs()
     }
 
-    /// Episodes of a job, trainings and evaluations together.
+    /// As [`StudySettings::episodes`].
     pub fn episodes(&self, job: &Job) -> u64 {
-        let EvaluationPlan { episodes, seeds, .. } = self.settings.evaluation;
-        let training = self.agent(job).training.as_ref().map_or(0, |training| u64::from(training.episodes));
-        training + u64::from(episodes) * u64::from(seeds) * job.roads.len() as u64
+        self.settings.episodes(job)
     }
 
     pub(super) fn agent(&self, job: &Job) -> &AgentSettings {

@@ -20,11 +20,12 @@ pub struct CellRecord {
     pub trained: Vec<TrainedRecord>,
     /// All evaluated episodes, seed by seed.
     pub episodes: Vec<EpisodeRecord>,
+    /// Zero where nothing says it: `study.db` does not.
     pub spent: Spent,
 }
 
 /// Time that a cell took on this machine; no part of the result.
-#[derive(Debug, Clone, Copy, Default, PartialEq, serde::Serialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Spent {
     pub wall_s: f64,
     /// Processor time of the thread, s, where the system tells.

@@ -13,6 +13,7 @@ use crate::sim::ENGINE;
 use crate::syntax::listed;
 
 use crate::study::file::{AgentFile, EvaluationPlan, PublishedTable, StudyFile};
+use crate::study::job::Job;
 use crate::study::measures::MEASURES;
 
 /// Everything that is needed to repeat a study; written to `study.yaml`.
@@ -179,6 +180,42 @@ impl StudySettings {
             figures.keys().try_for_each(|road| among("road", road, &roads))?;
         }
         Ok(())
+    }
+
+    /// All jobs. The first training or repetition of every agent comes before the second of any, so that an
+    /// unfinished study says something about all of them.
+    pub fn jobs(&self) -> Vec<Job> {
+        let most = self.agents.iter().map(|agent| agent.repeats).max().unwrap_or(0);
+        let mut jobs = Vec::new();
+        for number in 0..most {
+            let repeated = self.agents.iter().enumerate().filter(|(_, agent)| number < agent.repeats);
+            for (agent, settings) in repeated {
+                let all = (0..self.roads.len()).collect::<Vec<_>>();
+                match &settings.training {
+                    Some(training) if !training.roads.is_empty() => {
+                        jobs.push(Job { agent, roads: all, number })
+                    }
+                    _ => jobs.extend(all.into_iter().map(|road| Job { agent, roads: vec![road], number })),
+                }
+            }
+        }
+        jobs
+    }
+
+    /// Episodes of a job, trainings and evaluations together.
+    pub fn episodes(&self, job: &Job) -> u64 {
+        let EvaluationPlan { episodes, seeds, .. } = self.evaluation;
+        let training = self.agents[job.agent].training.as_ref();
+        let training = training.map_or(0, |training| u64::from(training.episodes));
+        training + u64::from(episodes) * u64::from(seeds) * job.roads.len() as u64
+    }
+
+    /// All cells in the order of the jobs: agent, road, and number of the training or repetition.
+    pub fn cells(&self) -> impl Iterator<Item = (&str, &str, u32)> {
+        self.jobs().into_iter().flat_map(move |job| {
+            let agent = self.agents[job.agent].label.as_str();
+            job.roads.into_iter().map(move |road| (agent, self.roads[road].as_str(), job.number))
+        })
     }
 
     /// Cuts the study down to a minute or two: enough to see that it works, not enough to learn anything from.

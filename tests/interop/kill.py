@@ -36,15 +36,12 @@ def call(arguments, **fault):
 
 
 def rows(path):
-    """All rows of a database but those of SQLite's own; without the times that a study took, and their seals."""
+    """All rows of a database but those of SQLite's own: a training is not settled."""
     database = sqlite3.connect(path)
     tables = [name for (name,) in database.execute("SELECT name FROM sqlite_master WHERE type = 'table' ORDER BY 1")]
     found = {}
     for table in tables:
         columns = [row[1] for row in database.execute(f"PRAGMA table_info({table})")]
-        columns = [name for name in columns if name not in ("wall_s", "cpu_s")]
-        if path.name == "study.db" and table == "seal":
-            columns = ["unit"]
         named = ", ".join(f'"{name}"' for name in columns)
         found[table] = sorted(map(repr, database.execute(f"SELECT {named} FROM {table}")))
     return found
@@ -54,8 +51,10 @@ def kept(out):
     """What a directory holds, file by file."""
     found = {}
     for path in sorted(out.rglob("*")):
-        if path.is_file() and not path.name.endswith((".partial", "-journal")):
-            found[str(path.relative_to(out))] = rows(path) if path.suffix == ".db" else path.read_bytes()
+        # Two plays of a study need not take the same time.
+        if path.is_file() and not path.name.endswith((".partial", "-journal", "timing.jsonl")):
+            is_settled = path.name != "run.db" or "hyperparameters:" not in (out / "run.yaml").read_text()
+            found[str(path.relative_to(out))] = path.read_bytes() if is_settled else rows(path)
     return found
 
 

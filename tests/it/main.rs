@@ -30,6 +30,7 @@ mod references;
 mod report;
 mod road;
 mod rules;
+mod shards;
 mod studies;
 mod suites;
 mod surveys;

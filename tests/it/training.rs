@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use avastra::model::policy::{Policy, seal};
 use avastra::rng::{Stream, below, stream};
-use avastra::run::Database;
+use avastra::run::{Database, Units};
 use avastra::syntax::ast::FileId;
 
 use crate::cases::root;

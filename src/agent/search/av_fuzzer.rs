@@ -262,9 +262,7 @@ impl AvFuzzer {
 
     fn gene(&mut self) -> Option<&mut Gene> {
         let step = self.step;
-        let genes = &mut self.hunt()?.played().genes;
-        let turn = step % genes.len();
-        Some(&mut genes[turn])
+        self.hunt()?.played().gene(step)
     }
 }
 
@@ -282,13 +280,11 @@ impl Agent for AvFuzzer {
     fn choose(&mut self, observation: &Observation, legal: ArrayView1<bool>, rng: &mut Rng) -> Option<usize> {
         self.memory.steps += 1;
         self.started_at.get_or_insert(start_of(observation));
-        let step = self.step as u64;
-        let Some(gene) = self.gene() else { return any(legal, rng) };
-        if !legal[gene.row as usize] {
-            let mut rng = rng::stream(gene.draw_seed, Stream::Search, step);
-            gene.row = any(legal, &mut rng)? as u32;
+        let step = self.step;
+        match self.gene() {
+            Some(gene) => gene.legal_row(step, legal),
+            None => any(legal, rng),
         }
-        Some(gene.row as usize)
     }
 }
 

@@ -20,7 +20,7 @@ use crate::mdp::Observation;
 use crate::rng;
 use crate::rng::{Rng, Stream};
 
-use super::played::{Gene, start_of};
+use super::played::start_of;
 use super::population::Individual;
 use super::scripts::{Found, Scripts};
 
@@ -134,24 +134,16 @@ impl Agent for MapElites {
 
     fn draw_seed(&mut self, step: usize) -> Option<u64> {
         self.step = step;
-        let genes = &self.script.genes;
-        (!genes.is_empty()).then(|| genes[step % genes.len()].draw_seed)
+        self.script.gene(step).map(|gene| gene.draw_seed)
     }
 
     fn choose(&mut self, observation: &Observation, legal: ArrayView1<bool>, rng: &mut Rng) -> Option<usize> {
         self.memory.steps += 1;
         self.started_at.get_or_insert(start_of(observation));
-        let (step, genes) = (self.step, &mut self.script.genes);
-        if genes.is_empty() {
-            return any(legal, rng);
+        match self.script.gene(self.step) {
+            Some(gene) => gene.legal_row(self.step, legal),
+            None => any(legal, rng),
         }
-        let at = step % genes.len();
-        let gene: &mut Gene = &mut genes[at];
-        if !legal[gene.row as usize] {
-            let mut rng = rng::stream(gene.draw_seed, Stream::Search, step as u64);
-            gene.row = any(legal, &mut rng)? as u32;
-        }
-        Some(gene.row as usize)
     }
 }
 

@@ -24,6 +24,12 @@ impl Individual {
         self.genes.iter().map(|gene| gene.row).collect()
     }
 
+    /// The gene of a step; a script begins anew after its end. `None` if the script is empty.
+    pub fn gene(&mut self, step: usize) -> Option<&mut Gene> {
+        let at = step.checked_rem(self.genes.len())?;
+        Some(&mut self.genes[at])
+    }
+
     /// A new draw or a new row at one step, each as likely.
     pub fn change(&mut self, rows: usize, rng: &mut Rng) {
         let at = rng::below(rng, self.genes.len() as u32) as usize;

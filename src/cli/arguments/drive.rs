@@ -6,6 +6,7 @@ use clap::{Args, ValueEnum};
 
 use super::language::RuleArguments;
 use crate::cli::help::Named;
+use crate::run::Shard;
 
 /// The driving system under test.
 #[derive(Debug, Args)]
@@ -20,6 +21,15 @@ pub struct UnderTestArguments {
     /// Driving system of your own: a command (PROTOCOL.md), `tcp:HOST:PORT` or `unix:PATH`.
     #[arg(long, value_name = "COMMAND", conflicts_with = "ads")]
     pub ads_cmd: Option<String>,
+}
+
+/// Which piece of a run, a study or an estimate is played.
+#[derive(Debug, Args)]
+pub struct ShardArguments {
+    /// Play one of N pieces of it, on a machine of its own; `avastra merge` brings them together [default: as a Slurm array or a
+    /// Kubernetes Indexed Job says, else all].
+    #[arg(long, value_name = "I/N")]
+    pub shard: Option<Shard>,
 }
 
 /// The conditions of episodes besides space and driving system.
@@ -74,8 +84,10 @@ pub struct RunArguments {
     /// Put the space and its maps into `critical/space`, so that the scenarios can be moved with them.
     #[arg(long)]
     pub self_contained: bool,
+    #[command(flatten)]
+    pub shard: ShardArguments,
     /// Go on with an interrupted run directory; its own settings hold.
-    #[arg(long, value_name = "DIR", conflicts_with_all = ["file", "road", "ads", "ads_config", "ads_cmd", "agent", "policy", "face", "episodes", "seed", "ambient", "traffic", "causes", "out", "self_contained", "without", "with"])]
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["file", "road", "ads", "ads_config", "ads_cmd", "agent", "policy", "face", "episodes", "seed", "ambient", "traffic", "causes", "out", "self_contained", "shard", "without", "with"])]
     pub resume: Option<PathBuf>,
     /// Exit with status 4 if a counted collision was found.
     #[arg(long)]
@@ -125,8 +137,10 @@ pub struct EstimateArguments {
     /// Directory, new or empty [default: the next free runs/NNNN].
     #[arg(long)]
     pub out: Option<PathBuf>,
+    #[command(flatten)]
+    pub shard: ShardArguments,
     /// Go on with an interrupted estimate; its own settings hold.
-    #[arg(long, value_name = "DIR", conflicts_with_all = ["file", "event", "method", "parts", "precision", "hours", "episodes", "ads", "ads_config", "ads_cmd", "road", "agent", "seed", "ambient", "traffic", "out", "without", "with"])]
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["file", "event", "method", "parts", "precision", "hours", "episodes", "ads", "ads_config", "ads_cmd", "road", "agent", "seed", "ambient", "traffic", "out", "shard", "without", "with"])]
     pub resume: Option<PathBuf>,
 }
 
@@ -141,6 +155,19 @@ pub enum MethodArgument {
     Count,
     Probe,
     Split,
+}
+
+#[derive(Debug, Args)]
+pub struct MergeArguments {
+    /// Directories of shards of one run, study or estimate, in any order.
+    #[arg(required = true, value_name = "DIR")]
+    pub directories: Vec<PathBuf>,
+    /// The directory of the whole, new or empty.
+    #[arg(long, value_name = "DIR", required_unless_present = "missing")]
+    pub out: Option<PathBuf>,
+    /// Write nothing; print the numbers of the shards that are to be run again, or gone on with.
+    #[arg(long, conflicts_with = "out")]
+    pub missing: bool,
 }
 
 #[derive(Debug, Args)]

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::drive::UnderTestArguments;
+use super::drive::{ShardArguments, UnderTestArguments};
 use super::language::RuleArguments;
 use crate::cli::help::Named;
 
@@ -111,11 +111,13 @@ pub struct StudyArguments {
     /// Directory of the study, new or empty [default: the next free runs/NNNN].
     #[arg(long)]
     pub out: Option<PathBuf>,
+    #[command(flatten)]
+    pub shard: ShardArguments,
     /// Worker threads; the result does not depend on it [default: one for each core].
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=1024))]
     pub jobs: Option<u32>,
     /// Go on with an interrupted study; its own settings hold.
-    #[arg(long, value_name = "DIR", conflicts_with_all = ["file", "ads_cmd", "out", "quick"])]
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["file", "ads_cmd", "out", "shard", "quick"])]
     pub resume: Option<PathBuf>,
     /// Cut it down to see that it works: two short trainings, few episodes. No result.
     #[arg(long)]

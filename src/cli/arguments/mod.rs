@@ -9,8 +9,8 @@ mod scenarios;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
 pub use drive::{
-    CompareArguments, ConditionArguments, EstimateArguments, EventArgument, FaceArgument, MethodArgument,
-    RunArguments, UnderTestArguments,
+    CompareArguments, ConditionArguments, EstimateArguments, EventArgument, FaceArgument, MergeArguments,
+    MethodArgument, RunArguments, UnderTestArguments,
 };
 pub use external::{AdsArguments, AdsCheckArguments, AdsCommand, Misbehaviour, ToyAnswer, ToyArguments};
 pub use language::{
@@ -113,6 +113,8 @@ pub enum Command {
     Results(ResultsArguments),
     /// Say how often a crash would happen: its probability in an episode and its rate, with intervals.
     Estimate(EstimateArguments),
+    /// Bring the shards of a run, a study or an estimate together.
+    Merge(MergeArguments),
     /// Play two driving systems in the same episodes and say which one crashes more often.
     Compare(CompareArguments),
     /// Run emitted scenarios again and check every claim they make.

@@ -16,15 +16,22 @@ pub struct FilesArguments {
     pub jobs: Option<u32>,
 }
 
+/// A driving system of one's own that scenarios were made against.
 #[derive(Debug, Args)]
-pub struct VerifyArguments {
+pub struct OwnSystemArguments {
     /// Driving system of your own that the scenarios were made against, to be asked anew: a command (PROTOCOL.md),
-    /// `tcp:HOST:PORT` or `unix:PATH` [default: its recorded answers].
+    /// `tcp:HOST:PORT` or `unix:PATH` [default: recorded answers, where there are any].
     #[arg(long, value_name = "COMMAND")]
     pub ads_cmd: Option<String>,
     /// Its profile, with an `ads` block.
     #[arg(long, value_name = "FILE")]
     pub ads_config: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+pub struct VerifyArguments {
+    #[command(flatten)]
+    pub own: OwnSystemArguments,
     #[command(flatten)]
     pub many: FilesArguments,
 }
@@ -70,13 +77,8 @@ pub struct ShrinkArguments {
     /// Where to write, if there is one file [default: a folder `shrunk` beside the scenarios].
     #[arg(long = "out", short = 'o')]
     pub output: Option<PathBuf>,
-    /// Driving system of your own that the scenarios were made against: a command (PROTOCOL.md), `tcp:HOST:PORT` or
-    /// `unix:PATH`.
-    #[arg(long, value_name = "COMMAND")]
-    pub ads_cmd: Option<String>,
-    /// Its profile, with an `ads` block.
-    #[arg(long, value_name = "FILE")]
-    pub ads_config: Option<PathBuf>,
+    #[command(flatten)]
+    pub own: OwnSystemArguments,
     #[command(flatten)]
     pub many: FilesArguments,
 }

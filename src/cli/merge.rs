@@ -1,0 +1,537 @@
+//! `avastra merge`: the shards of a run, a study or an estimate as the directory that one machine would have made.
+//!
+//! The units of all shards are taken over into one database, whichever shard has them, with the scenarios that were written
+//! of them. What comes out is a directory in which all is played. It is ended by the command itself, which settles the
+//! database and writes the results: there is no second writer, and the bytes are those of the unsharded directory.
+//!
+//! Until it is whole, the directory has the name `OUT.partial`.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+
+use crate::ads::external::Attached;
+use crate::estimate::{EstimateDatabase, EstimateSettings, PILOT};
+use crate::model::digest;
+use crate::run::{
+    Database, DatabaseError, Numbered, PolicyReference, RunSettings, Shard, Units, settings_differences,
+};
+use crate::study::{StudyDatabase, StudySettings};
+use crate::syntax::ast::{Expr, ExprKind, FileId, ItemKind};
+use crate::syntax::{parse, print_expr};
+
+use super::arguments::{Format, MergeArguments};
+use super::error::Failure;
+use super::files::write;
+use super::output::{Output, plural};
+use super::timing::Times;
+use super::{estimate, load, pack, run, run_directory, shard, study, timing};
+
+/// Tells a directory that a killed merge left from one of somebody else's.
+const MARK: &str = "merge.partial";
+
+/// Brings shards together, or says which are missing.
+pub fn merge(output: &Output, arguments: &MergeArguments) -> Result<(), Failure> {
+    let mut directories = Vec::new();
+    for path in &arguments.directories {
+        // A shard that was killed at once is as good as one that was never played.
+        match path.is_dir() && run_directory::is_unbegun(path).unwrap_or(false) {
+            true => output.aside(&format!("{}: nothing was begun there", path.display())),
+            false => directories.push(path.clone()),
+        }
+    }
+    let Some(first) = directories.first() else {
+        return Err(Failure::usage("none of the directories holds a run, a study or an estimate"));
+    };
+    let out = arguments.out.as_deref();
+    match run_directory::what_was_begun(first) {
+        Some("run") => merged::<RunSettings>(output, &directories, out),
+        Some("study") => merged::<StudySettings>(output, &directories, out),
+        Some("estimate") => merged::<EstimateSettings>(output, &directories, out),
+        Some(other) => Err(Failure::usage(format!(
+            "`{}` holds a {other}, which is one piece: each episode is chosen with what was learned before",
+            first.display()
+        ))),
+        None => Err(Failure::usage(format!("`{}` holds no run, study or estimate", first.display()))),
+    }
+}
+
+/// What is cut into shards, by its settings.
+trait Cut: Serialize + DeserializeOwned {
+    type Database: Units;
+    /// The name of its files: `run.yaml`, `run.db`.
+    const KIND: &'static str;
+    /// The settings as they stand in another directory.
+    fn moved(self, from: &Path, to: &Path) -> Result<Self, Failure>;
+    /// Everything that is shared out.
+    fn work(&self) -> Vec<Item>;
+    /// The numbers of the units of a file, each with the one in a settled file.
+    fn numbered(&self, database: &Self::Database) -> Result<Vec<Numbered>, DatabaseError>;
+    /// Takes a shard's units over, with the files that were written of them.
+    fn take(into: &mut Self::Database, shard: &Played<Self>, to: &Path) -> Result<(), Failure>;
+    /// Ends a directory in which all is played.
+    fn conclude(output: &Output, directory: &Path) -> Result<(), Failure>;
+}
+
+/// What a shard has as a whole, or not at all.
+struct Item {
+    cost: u64,
+    /// The numbers of its units in a settled file.
+    units: Vec<i64>,
+}
+
+/// A directory of a shard.
+struct Played<C: Cut> {
+    path: PathBuf,
+    /// The settings as they would stand in the merged directory.
+    settings: C,
+    shard: Shard,
+    /// `None` if nothing was kept before a kill.
+    database: Option<C::Database>,
+    units: Vec<Numbered>,
+}
+
+impl<C: Cut> Played<C> {
+    fn file(&self) -> PathBuf {
+        self.path.join(format!("{}.db", C::KIND))
+    }
+
+    fn text(&self) -> String {
+        serde_yaml::to_string(&self.settings).expect("settings are plain strings and numbers")
+    }
+
+    /// Reads a directory; `to` is one beside the merged directory, or itself.
+    fn read(path: &Path, to: &Path) -> Result<Played<C>, Failure> {
+        if run_directory::what_was_begun(path) != Some(C::KIND) {
+            let (path, kind) = (path.display(), C::KIND);
+            return Err(Failure::usage(format!("`{path}` holds no {kind}, which the first directory does")));
+        }
+        let (settings, text) = run_directory::settings_of::<C>(path, C::KIND, C::KIND)?;
+        let mut played = Played {
+            path: path.to_owned(),
+            settings: settings.moved(path, to)?,
+            shard: shard::kept(path)?,
+            database: None,
+            units: Vec::new(),
+        };
+        let file = played.file();
+        if std::fs::metadata(&file).is_ok_and(|found| found.len() > 0) {
+            let database = C::Database::open(&file, &text);
+            let database = database.map_err(|error| Failure::file("open", &file, error))?;
+            let units = played.settings.numbered(&database);
+            played.units = units.map_err(|error| Failure::file("read", &file, error))?;
+            played.database = Some(database);
+        }
+        Ok(played)
+    }
+}
+
+/// Without `out`, only says what is missing.
+fn merged<C: Cut>(output: &Output, directories: &[PathBuf], out: Option<&Path>) -> Result<(), Failure> {
+    let Some(out) = out else {
+        // Paths in settings are made to lead from one place, to be compared; any place serves.
+        let survey = Survey::of::<C>(directories, Path::new("."))?;
+        match survey.missing.is_empty() {
+            true => output.aside("nothing is missing"),
+            false => output.say(&survey.named()),
+        }
+        let Survey { shards, missing, .. } = survey;
+        output.result(serde_json::json!({ "directory": null, "shards": shards, "missing": missing }));
+        return Ok(());
+    };
+    let partial = begin_partial(out)?;
+    let brought = Survey::of::<C>(directories, &partial).and_then(|survey| {
+        survey.complete()?;
+        bring_together::<C>(directories, &partial, &survey.settings)?;
+        publish::<C>(out, &partial)?;
+        Ok(survey.shards)
+    });
+    if brought.is_err() && partial.exists() {
+        discard(&partial)?;
+    }
+    let shards = brought?;
+    output.tell(&format!("{}: {} brought together", out.display(), plural(directories.len(), "shard")));
+    C::conclude(output, out)?;
+    output.result(serde_json::json!({ "directory": out, "shards": shards, "missing": [] }));
+    Ok(())
+}
+
+/// What the directories of shards are of, and what they have.
+struct Survey {
+    /// The text of the settings in the merged directory.
+    settings: String,
+    shards: u32,
+    /// Those of the shards that lack a unit.
+    missing: BTreeSet<u32>,
+}
+
+impl Survey {
+    /// Looks at all directories; `to` is the merged one, or one beside it.
+    fn of<C: Cut>(directories: &[PathBuf], to: &Path) -> Result<Survey, Failure> {
+        let mut wanted: Option<(String, Vec<Item>)> = None;
+        let mut have: BTreeSet<i64> = BTreeSet::new();
+        let mut cut: Option<(Shard, &Path)> = None;
+        for path in directories {
+            // One after another: there may be more shards than files that a process may have open.
+            let played = Played::<C>::read(path, to)?;
+            let text = played.text();
+            let (first, _) = wanted.get_or_insert_with(|| (text.clone(), played.settings.work()));
+            if let Some(what) = settings_differences(first, &text) {
+                let (path, first) = (path.display(), directories[0].display());
+                return Err(Failure::usage(format!(
+                    "`{path}` is no shard of the {} in `{first}`, where {what}",
+                    C::KIND
+                )));
+            }
+            have.extend(played.units.iter().map(|(_, place)| place));
+            if !played.shard.is_whole() {
+                let (known, known_path) = cut.get_or_insert((played.shard, path));
+                if known.count() != played.shard.count() {
+                    let (path, shard, known_path) = (path.display(), played.shard, known_path.display());
+                    return Err(Failure::usage(format!(
+                        "`{path}` is shard {shard}, `{known_path}` is shard {known}: play all with one number of shards"
+                    )));
+                }
+            }
+        }
+        let (settings, work) = wanted.expect("there is a directory");
+        let shards = cut.map_or(1, |(shard, _)| shard.count());
+        let costs: Vec<u64> = work.iter().map(|item| item.cost).collect();
+        let of_items = Shard::of_items(&costs, shards);
+        let lacks = |(item, _): &(&Item, u32)| !item.units.iter().all(|unit| have.contains(unit));
+        let missing = work.iter().zip(of_items).filter(lacks).map(|(_, shard)| shard).collect();
+        Ok(Survey { settings, shards, missing })
+    }
+
+    /// The missing shards: `3,17`, as a scheduler takes them.
+    fn named(&self) -> String {
+        self.missing.iter().map(u32::to_string).collect::<Vec<_>>().join(",")
+    }
+
+    /// Refuses if something is missing.
+    fn complete(&self) -> Result<(), Failure> {
+        let (count, named) = (self.shards, self.named());
+        let (missing, them) = match self.missing.len() {
+            0 => return Ok(()),
+            1 => (format!("shard {named} of {count} is"), "it"),
+            _ => (format!("shards {named} of {count} are"), "them"),
+        };
+        Err(Failure::usage(format!(
+            "{missing} missing or not played to the end: play {them} (`--shard I/{count}`) or go on with {them} (`--resume`), then \
+             merge again"
+        )))
+    }
+}
+
+/// Makes an empty directory beside the merged one, in place of what a killed merge left.
+fn begin_partial(out: &Path) -> Result<PathBuf, Failure> {
+    let mut name = out.file_name().ok_or_else(|| Failure::usage("`--out` needs a name"))?.to_owned();
+    name.push(".partial");
+    let partial = out.with_file_name(name);
+    if partial.join(MARK).exists() {
+        discard(&partial)?;
+    }
+    let failed = |error| Failure::file("create", &partial, error);
+    std::fs::create_dir_all(&partial).map_err(failed)?;
+    if std::fs::read_dir(&partial).map_err(failed)?.next().is_some() {
+        return Err(Failure::usage(format!(
+            "`{}` is in the way: a merge is written there before it has its name",
+            partial.display()
+        )));
+    }
+    write(&partial.join(MARK), "")?;
+    Ok(partial)
+}
+
+/// Removes an unfinished merge; its mark goes last.
+fn discard(partial: &Path) -> Result<(), Failure> {
+    let failed = |error| Failure::file("remove", partial, error);
+    for entry in std::fs::read_dir(partial).map_err(failed)? {
+        let path = entry.map_err(failed)?.path();
+        if path.file_name().is_some_and(|name| name == MARK) {
+            continue;
+        }
+        if path.is_dir() { std::fs::remove_dir_all(&path) } else { std::fs::remove_file(&path) }
+            .map_err(failed)?;
+    }
+    std::fs::remove_dir_all(partial).map_err(failed)
+}
+
+/// Writes settings, database and scenarios.
+fn bring_together<C: Cut>(directories: &[PathBuf], partial: &Path, text: &str) -> Result<(), Failure> {
+    write(&partial.join(format!("{}.yaml", C::KIND)), text)?;
+    let file = partial.join(format!("{}.db", C::KIND));
+    let mut into = C::Database::open(&file, text).map_err(|error| Failure::file("open", &file, error))?;
+    for path in directories {
+        let _held = run_directory::hold(path)?;
+        let played = Played::<C>::read(path, partial)?;
+        if played.database.is_some() {
+            C::take(&mut into, &played, partial)?;
+        }
+    }
+    Ok(())
+}
+
+/// Gives the merged directory its name, unless it stands there already, to the byte.
+fn publish<C: Cut>(out: &Path, partial: &Path) -> Result<(), Failure> {
+    let mark = partial.join(MARK);
+    if !out.exists() || std::fs::read_dir(out).is_ok_and(|mut entries| entries.next().is_none()) {
+        std::fs::remove_file(&mark).map_err(|error| Failure::file("remove", &mark, error))?;
+        return std::fs::rename(partial, out).map_err(|error| Failure::file("write", out, error));
+    }
+    // In JSON, a command prints at its end, which this has not.
+    C::conclude(&Output::of(Format::Json), partial)?;
+    let (mut merged, mut known) = (files_of(partial)?, files_of(out)?);
+    // Machines need not have taken the same time.
+    for name in [MARK, timing::FILE] {
+        merged.remove(Path::new(name));
+        known.remove(Path::new(name));
+    }
+    let is_equal = |(name, path): (&PathBuf, &PathBuf)| -> Result<bool, Failure> {
+        let read = |path| std::fs::read(path).map_err(|error| Failure::file("read", path, error));
+        known.get(name).map_or(Ok(false), |known| Ok(read(known)? == read(path)?))
+    };
+    let equal: Vec<bool> = merged.iter().map(is_equal).collect::<Result<_, _>>()?;
+    let is_it = merged.len() == known.len() && equal.into_iter().all(|is_equal| is_equal);
+    discard(partial)?;
+    match is_it {
+        true => Ok(()),
+        false => Err(Failure::usage(format!("`{}` is not empty: name a new directory", out.display()))),
+    }
+}
+
+/// All files of a directory, by their paths in it.
+fn files_of(directory: &Path) -> Result<BTreeMap<PathBuf, PathBuf>, Failure> {
+    let mut found = BTreeMap::new();
+    let mut open = vec![directory.to_owned()];
+    while let Some(folder) = open.pop() {
+        let failed = |error| Failure::file("read", &folder, error);
+        for entry in std::fs::read_dir(&folder).map_err(failed)? {
+            let path = entry.map_err(failed)?.path();
+            if path.is_dir() {
+                open.push(path);
+            } else {
+                let name = path.strip_prefix(directory).expect("it is below").to_owned();
+                found.insert(name, path);
+            }
+        }
+    }
+    Ok(found)
+}
+
+/// A path in the settings of one directory as it stands in those of another. What is inside the directory stays there.
+fn moved_path(path: &str, from: &Path, to: &Path) -> Result<String, Failure> {
+    let is_inside = Path::new(path).is_relative() && !Path::new(path).starts_with("..");
+    if is_inside { Ok(path.to_owned()) } else { load::relative(to, &from.join(path)) }
+}
+
+/// Settings of a run as they stand in another directory.
+fn moved_run(settings: RunSettings, from: &Path, to: &Path) -> Result<RunSettings, Failure> {
+    let policy = settings
+        .policy
+        .map(|policy| moved_path(&policy.file, from, to).map(|file| PolicyReference { file, ..policy }));
+    Ok(RunSettings {
+        space: moved_path(&settings.space, from, to)?,
+        policy: policy.transpose()?,
+        external: moved_external(settings.external, from, to)?,
+        ..settings
+    })
+}
+
+fn moved_external(external: Option<Attached>, from: &Path, to: &Path) -> Result<Option<Attached>, Failure> {
+    let moved = |external| run_directory::to_record(to, run_directory::from_record(from, external));
+    external.map(moved).transpose()
+}
+
+/// Copies a scenario with what lies beside it, and gives its text. What it uses is named by a path from the file.
+fn copy_scenario(name: &str, from: &Path, to: &Path) -> Result<String, Failure> {
+    let source = from.join(name);
+    let text = moved_scenario(&load::text(&source)?, from, to)?;
+    copy_text(&to.join(name), &text)?;
+    let answers = load::answers_path(&source);
+    if answers.is_file() {
+        copy_text(&load::answers_path(&to.join(name)), &load::text(&answers)?)?;
+    }
+    Ok(text)
+}
+
+/// Writes a text where none is; one that is there must be the same.
+fn copy_text(to: &Path, text: &str) -> Result<(), Failure> {
+    match to.exists() {
+        false => write(to, text),
+        true if load::text(to)? == *text => Ok(()),
+        true => {
+            let name = to.file_name().unwrap_or_default().to_string_lossy();
+            Err(Failure::usage(format!("two of the directories have another `{name}`: one was edited")))
+        }
+    }
+}
+
+/// The text of an emitted scenario with the path of its space as it is from another folder.
+fn moved_scenario(text: &str, from: &Path, to: &Path) -> Result<String, Failure> {
+    let (file, _) = parse(FileId::default(), text);
+    let mut moved = text.to_owned();
+    for item in file.items.iter().rev() {
+        let ItemKind::Use(used) = &item.kind else { continue };
+        let path = ExprKind::Text(moved_path(&used.path.value, from, to)?);
+        moved.replace_range(used.path.span.start..used.path.span.end, &print_expr(&Expr::built(path)));
+    }
+    Ok(moved)
+}
+
+/// Copies a folder with all that is in it.
+fn copy_folder(from: &Path, to: &Path) -> Result<(), Failure> {
+    let failed = |error| Failure::file("read", from, error);
+    for entry in std::fs::read_dir(from).map_err(failed)? {
+        let entry = entry.map_err(failed)?;
+        let (path, target) = (entry.path(), to.join(entry.file_name()));
+        match path.is_dir() {
+            true => copy_folder(&path, &target)?,
+            false => copy_text(&target, &load::text(&path)?)?,
+        }
+    }
+    Ok(())
+}
+
+impl Cut for RunSettings {
+    type Database = Database;
+    const KIND: &'static str = "run";
+
+    fn moved(self, from: &Path, to: &Path) -> Result<RunSettings, Failure> {
+        moved_run(self, from, to)
+    }
+
+    fn work(&self) -> Vec<Item> {
+        let episodes = self.roads.len() as i64 * i64::from(self.episodes);
+        (0..episodes).map(|number| Item { cost: 1, units: vec![number] }).collect()
+    }
+
+    fn numbered(&self, database: &Database) -> Result<Vec<Numbered>, DatabaseError> {
+        as_they_are(database)
+    }
+
+    fn take(into: &mut Database, shard: &Played<RunSettings>, to: &Path) -> Result<(), Failure> {
+        let from = &shard.path;
+        let [critical, failures] =
+            ["critical", "failures"].map(|folder| (from.join(folder), to.join(folder)));
+        std::fs::create_dir_all(&critical.1).map_err(|error| Failure::file("create", &critical.1, error))?;
+        let space = critical.0.join(pack::SPACE);
+        if space.is_dir() {
+            copy_folder(&space, &critical.1.join(pack::SPACE))?;
+        }
+        let database = shard.database.iter().map(Database::scenarios).next();
+        let written = database.transpose().map_err(|error| Failure::file("read", &shard.file(), error))?;
+        let mut scenarios = Vec::new();
+        for (episode, road, known) in written.unwrap_or_default() {
+            let name = format!("{}.ava", run_directory::scenario_name(&road, episode));
+            let source = critical.0.join(&name);
+            if load::read(&source).ok().is_none_or(|text| digest(text.as_bytes()) != known) {
+                return Err(Failure::usage(format!(
+                    "`{}` is gone or was edited: delete it, and `avastra run --resume {}` writes it again",
+                    source.display(),
+                    from.display()
+                )));
+            }
+            let text = copy_scenario(&name, &critical.0, &critical.1)?;
+            scenarios.push((episode, digest(text.as_bytes())));
+        }
+        if failures.0.is_dir() {
+            let failed = |error| Failure::file("read", &failures.0, error);
+            for entry in std::fs::read_dir(&failures.0).map_err(failed)? {
+                let path = entry.map_err(failed)?.path();
+                let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+                match path.extension().and_then(std::ffi::OsStr::to_str) {
+                    Some("ava") => drop(copy_scenario(&name, &failures.0, &failures.1)?),
+                    Some("txt") => copy_text(&failures.1.join(name), &load::text(&path)?)?,
+                    _ => {}
+                }
+            }
+        }
+        let taken = into.take_episodes(&shard.file(), &shard.units, &scenarios);
+        taken.map_err(|error| Failure::file("merge", &shard.file(), error))
+    }
+
+    fn conclude(output: &Output, directory: &Path) -> Result<(), Failure> {
+        run::conclude(output, directory)
+    }
+}
+
+impl Cut for StudySettings {
+    type Database = StudyDatabase;
+    const KIND: &'static str = "study";
+
+    fn moved(self, from: &Path, to: &Path) -> Result<StudySettings, Failure> {
+        let space = moved_path(&self.space, from, to)?;
+        let external = moved_external(self.external.clone(), from, to)?;
+        Ok(StudySettings { space, external, ..self })
+    }
+
+    fn work(&self) -> Vec<Item> {
+        let mut places = 1..;
+        let job = |job: crate::study::Job| Item {
+            cost: self.episodes(&job),
+            units: places.by_ref().take(job.roads.len()).collect(),
+        };
+        self.jobs().into_iter().map(job).collect()
+    }
+
+    fn numbered(&self, database: &StudyDatabase) -> Result<Vec<Numbered>, DatabaseError> {
+        database.places(self)
+    }
+
+    fn take(into: &mut StudyDatabase, shard: &Played<StudySettings>, to: &Path) -> Result<(), Failure> {
+        let mut times = Times::read(to, into)?;
+        if let Some(database) = &shard.database {
+            times.extend(Times::read(&shard.path, database)?);
+        }
+        times.write(to)?;
+        let taken = into.take(&shard.file(), &shard.units, &|_| Ok(()));
+        taken.map_err(|error| Failure::file("merge", &shard.file(), error))
+    }
+
+    fn conclude(output: &Output, directory: &Path) -> Result<(), Failure> {
+        study::conclude(output, directory)
+    }
+}
+
+impl Cut for EstimateSettings {
+    type Database = EstimateDatabase;
+    const KIND: &'static str = "estimate";
+
+    fn moved(self, from: &Path, to: &Path) -> Result<EstimateSettings, Failure> {
+        Ok(EstimateSettings { run: moved_run(self.run, from, to)?, ..self })
+    }
+
+    fn work(&self) -> Vec<Item> {
+        self.all_parts().into_iter().map(|part| Item { cost: 1, units: vec![self.place(part)] }).collect()
+    }
+
+    fn numbered(&self, database: &EstimateDatabase) -> Result<Vec<Numbered>, DatabaseError> {
+        as_they_are(database)
+    }
+
+    fn take(into: &mut EstimateDatabase, shard: &Played<EstimateSettings>, to: &Path) -> Result<(), Failure> {
+        let [from, to] = [&*shard.path, to].map(|directory| directory.join("critical"));
+        std::fs::create_dir_all(&to).map_err(|error| Failure::file("create", &to, error))?;
+        for (part, _) in shard.units.iter().filter(|(part, _)| *part != PILOT) {
+            let names = shard.database.iter().map(|database| database.scenarios(*part)).next().transpose();
+            let names = names.map_err(|error| Failure::file("read", &shard.file(), error))?;
+            for name in names.unwrap_or_default() {
+                copy_scenario(&name, &from, &to)?;
+            }
+        }
+        let taken = into.take(&shard.file(), &shard.units, &|_| Ok(()));
+        taken.map_err(|error| Failure::file("merge", &shard.file(), error))
+    }
+
+    fn conclude(output: &Output, directory: &Path) -> Result<(), Failure> {
+        estimate::conclude(output, directory)
+    }
+}
+
+/// Units that have the same numbers in every file.
+fn as_they_are(database: &impl Units) -> Result<Vec<Numbered>, DatabaseError> {
+    Ok(database.numbers()?.into_iter().map(|number| (number, number)).collect())
+}

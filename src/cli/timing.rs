@@ -1,0 +1,83 @@
+//! `timing.jsonl`: what the cells of a study took on the machines that played them. No part of its result, so it is no part of
+//! `study.db`: two machines agree on everything else.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use crate::study::{CellRecord, Spent, StudyDatabase};
+
+use super::error::Failure;
+use super::files::write;
+use super::load;
+
+/// The file's name.
+pub const FILE: &str = "timing.jsonl";
+
+/// Times of cells, by agent, road and number.
+#[derive(Default)]
+pub struct Times {
+    of_cells: BTreeMap<(String, String, u32), Spent>,
+}
+
+#[derive(serde::Serialize, serde::Deserialize)]
+struct Line {
+    agent: String,
+    road: String,
+    number: u32,
+    #[serde(flatten)]
+    spent: Spent,
+}
+
+impl Times {
+    /// Those that a directory of a study has; a database of the layout before has its own.
+    ///
+    /// # Errors
+    /// If a file cannot be read.
+    pub fn read(directory: &Path, database: &StudyDatabase) -> Result<Times, Failure> {
+        let unread = |error| Failure::file("read", &directory.join("study.db"), error);
+        let mut times = Times::default();
+        for (agent, road, number, spent) in database.times().map_err(unread)? {
+            times.of_cells.insert((agent, road, number), spent);
+        }
+        let file = directory.join(FILE);
+        if file.exists() {
+            // A line that cannot be read is a time that is not known.
+            for Line { agent, road, number, spent } in
+                load::text(&file)?.lines().filter_map(|line| serde_json::from_str(line).ok())
+            {
+                times.of_cells.insert((agent, road, number), spent);
+            }
+        }
+        Ok(times)
+    }
+
+    /// Takes the times of cells in that were played.
+    pub fn add(&mut self, cells: &[CellRecord]) {
+        let timed = |cell: &CellRecord| ((cell.agent.clone(), cell.road.clone(), cell.number), cell.spent);
+        self.of_cells.extend(cells.iter().map(timed));
+    }
+
+    /// Takes those of another directory in.
+    pub fn extend(&mut self, others: Times) {
+        self.of_cells.extend(others.of_cells);
+    }
+
+    /// Writes them, sorted.
+    pub fn write(&self, directory: &Path) -> Result<(), Failure> {
+        let line = |((agent, road, number), spent): (&(String, String, u32), &Spent)| {
+            let line = Line { agent: agent.clone(), road: road.clone(), number: *number, spent: *spent };
+            serde_json::to_string(&line).expect("it has string keys only") + "\n"
+        };
+        let file: PathBuf = directory.join(FILE);
+        write(&file, &self.of_cells.iter().map(line).collect::<String>())
+    }
+
+    /// The cells with their times.
+    pub fn on(&self, mut cells: Vec<CellRecord>) -> Vec<CellRecord> {
+        for cell in &mut cells {
+            let key = (cell.agent.clone(), cell.road.clone(), cell.number);
+            cell.spent = self.of_cells.get(&key).copied().unwrap_or_default();
+        }
+        cells
+    }
+}

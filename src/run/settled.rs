@@ -1,0 +1,207 @@
+//! Databases written anew, so that their bytes follow from their rows alone.
+//!
+//! SQLite puts a row where there is room when it arrives. So the same rows make other bytes when threads end in another
+//! order, when a kill came between, or when they were played as shards. When all is played, a database is *settled*: its
+//! units are written into a new file in the order of their numbers, which takes the place of the old one. A merge of shards
+//! takes over units from other files in the same way. Training is one thread that writes in order, and is not settled.
+
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+
+use rusqlite::Connection;
+use sha2::{Digest, Sha256};
+
+use crate::run::sealed::{DatabaseError, Layout, add_rows};
+
+/// A unit to take over: its number in the other file, and the one that it gets.
+pub type Numbered = (i64, i64);
+
+/// A database of units that know nothing of each other.
+pub trait Units: Sized {
+    #[doc(hidden)]
+    fn layout() -> &'static Layout;
+    /// The tables of a new file.
+    #[doc(hidden)]
+    fn schema() -> String;
+    #[doc(hidden)]
+    fn connection(&self) -> &Connection;
+    #[doc(hidden)]
+    fn from_connection(connection: Connection) -> Self;
+
+    /// Opens the file, making the tables if it is new. `settings` is the text of the settings that it is begun with.
+    ///
+    /// # Errors
+    /// If the file cannot be opened, has another layout or other settings, or was damaged or changed.
+    fn open(path: &Path, settings: &str) -> Result<Self, DatabaseError> {
+        Ok(Self::from_connection(Self::layout().open(path, &Self::schema(), settings)?))
+    }
+
+    /// The numbers of all units, in order.
+    ///
+    /// # Errors
+    /// If the file cannot be read.
+    fn numbers(&self) -> Result<BTreeSet<i64>, DatabaseError> {
+        let mut seals = self.connection().prepare("SELECT unit FROM seal ORDER BY unit")?;
+        let numbers = seals.query_map([], |row| row.get(0))?;
+        Ok(numbers.collect::<Result<_, _>>()?)
+    }
+
+    /// Takes units over from another file of the kind, all or none; those that are here already must be alike. `adjust` is
+    /// called before they are sealed.
+    ///
+    /// # Errors
+    /// If one of the files cannot be used, or both have a unit, and in one of them it is another.
+    fn take(
+        &mut self,
+        other: &Path,
+        units: &[Numbered],
+        adjust: &dyn Fn(&Connection) -> Result<(), rusqlite::Error>,
+    ) -> Result<(), DatabaseError> {
+        Self::layout().take(self.connection(), other, units, adjust)
+    }
+
+    /// Writes the file anew with these units, in the order of their new numbers.
+    ///
+    /// # Errors
+    /// If a file cannot be written.
+    fn settle(self, units: &[Numbered]) -> Result<Self, DatabaseError> {
+        let path = PathBuf::from(self.connection().path().unwrap_or_default());
+        let query = "SELECT settings FROM begun";
+        let settings: String = self.connection().query_row(query, [], |row| row.get(0))?;
+        // The last connection to a file removes its journal.
+        drop(self);
+        let named = |ending: &str| {
+            let mut name = path.clone().into_os_string();
+            name.push(ending);
+            PathBuf::from(name)
+        };
+        let partial = named(".partial");
+        for left in [&partial, &named(".partial-journal")] {
+            if left.exists() {
+                std::fs::remove_file(left)?;
+            }
+        }
+        let mut settled = Self::open(&partial, &settings)?;
+        settled.take(&path, units, &|_| Ok(()))?;
+        drop(settled);
+        std::fs::rename(&partial, &path)?;
+        // Where a folder cannot be synchronised, the old file may come back after a loss of power; it is whole, too.
+        let folder = path.parent().unwrap_or(Path::new("."));
+        let _ = std::fs::File::open(folder).and_then(|folder| folder.sync_all());
+        Ok(Self::from_connection(Connection::open(&path)?))
+    }
+}
+
+/// A column of a table, and its place in the table's key, from 1; 0 if it is not in it.
+struct Column {
+    name: String,
+    key: i64,
+}
+
+impl Layout {
+    fn take(
+        &self,
+        connection: &Connection,
+        other: &Path,
+        units: &[Numbered],
+        adjust: &dyn Fn(&Connection) -> Result<(), rusqlite::Error>,
+    ) -> Result<(), DatabaseError> {
+        let other = other.canonicalize()?;
+        connection.execute("ATTACH DATABASE ? AS other", [other.to_string_lossy()])?;
+        let taken = self.take_attached(connection, units, adjust);
+        // Without a transaction under way, detaching cannot fail for a reason of its own.
+        let detached = connection.execute_batch("DETACH DATABASE other");
+        taken?;
+        Ok(detached?)
+    }
+
+    fn take_attached(
+        &self,
+        connection: &Connection,
+        units: &[Numbered],
+        adjust: &dyn Fn(&Connection) -> Result<(), rusqlite::Error>,
+    ) -> Result<(), DatabaseError> {
+        let transaction = connection.unchecked_transaction()?;
+        let mut new = Vec::new();
+        for &(old, number) in units {
+            let mut seal = transaction.prepare_cached("SELECT 1 FROM main.seal WHERE unit = ?")?;
+            if !seal.exists([number])? {
+                new.push((old, number));
+            } else if self.content(&transaction, "other", old)?
+                != self.content(&transaction, "main", number)?
+            {
+                return Err(DatabaseError::Differs { unit: self.unit, number });
+            }
+        }
+        transaction.execute_batch(
+            "CREATE TEMP TABLE IF NOT EXISTS taking (old INTEGER PRIMARY KEY, number INTEGER NOT NULL UNIQUE) STRICT;
+             DELETE FROM taking;",
+        )?;
+        let mut taking = transaction.prepare("INSERT INTO taking VALUES (?, ?)")?;
+        for (old, number) in &new {
+            taking.execute([old, number])?;
+        }
+        drop(taking);
+        for table in self.tables {
+            if let Some((_, named)) = self.naming.filter(|(by, _)| by == table) {
+                transaction.execute_batch(&format!(
+                    "INSERT OR IGNORE INTO main.{named} SELECT * FROM other.{named} WHERE {named} IN
+                       (SELECT {named} FROM other.{table} JOIN taking ON old = {unit}) ORDER BY {named}",
+                    unit = self.unit
+                ))?;
+            }
+            let columns = columns(&transaction, table)?;
+            let named: Vec<&str> = columns.iter().map(|column| column.name.as_str()).collect();
+            let taken: Vec<String> =
+                named
+                    .iter()
+                    .map(|name| {
+                        if *name == self.unit { "taking.number".to_owned() } else { format!("there.{name}") }
+                    })
+                    .collect();
+            let mut keys: Vec<&Column> = columns.iter().filter(|column| column.key > 0).collect();
+            keys.sort_by_key(|column| column.key);
+            let rest = keys.iter().filter(|column| column.name != self.unit);
+            let order: Vec<String> = rest.map(|column| format!(", there.{}", column.name)).collect();
+            // The columns are those of today's layout: one that an older layout had besides is left out.
+            transaction.execute_batch(&format!(
+                "INSERT INTO main.{table} ({}) SELECT {} FROM taking JOIN other.{table} AS there ON there.{} = taking.old
+                 ORDER BY taking.number{}",
+                named.join(", "),
+                taken.join(", "),
+                self.unit,
+                order.concat()
+            ))?;
+        }
+        adjust(&transaction)?;
+        let mut numbers: Vec<i64> = new.iter().map(|(_, number)| *number).collect();
+        numbers.sort_unstable();
+        for number in numbers {
+            self.seal(&transaction, number)?;
+        }
+        transaction.execute_batch("DELETE FROM taking")?;
+        transaction.commit()?;
+        Ok(())
+    }
+
+    /// The digest of what a unit holds in one of the attached files, without its number, and without what depends on where
+    /// its directory is.
+    fn content(&self, connection: &Connection, file: &str, number: i64) -> Result<[u8; 32], DatabaseError> {
+        let mut whole = Sha256::new();
+        for table in self.tables.iter().filter(|table| !self.local.contains(table)) {
+            let columns = columns(connection, table)?;
+            let names = columns.iter().map(|column| column.name.as_str());
+            let names: Vec<&str> = names.filter(|name| *name != self.unit).collect();
+            let query = format!("SELECT {} FROM {file}.{table} WHERE {} = ?", names.join(", "), self.unit);
+            add_rows(&mut whole, connection, table, &query, number)?;
+        }
+        Ok(whole.finalize().into())
+    }
+}
+
+/// The columns of a table in today's layout.
+fn columns(connection: &Connection, table: &str) -> Result<Vec<Column>, rusqlite::Error> {
+    let mut query = connection.prepare_cached("SELECT name, pk FROM pragma_table_info(?, 'main')")?;
+    let columns = query.query_map([table], |row| Ok(Column { name: row.get(0)?, key: row.get(1)? }))?;
+    columns.collect()
+}

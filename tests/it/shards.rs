@@ -1,0 +1,240 @@
+//! Shards: whatever their order, and whatever was killed between, they merge to the bytes of the unsharded directory.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use crate::cases::root;
+use crate::command::{avastra, background, outcome};
+use crate::world::FLICKER;
+
+const SPACE: &str = "scenarios/avastra45.ava";
+
+/// Every file of a directory with its bytes.
+fn files(directory: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
+    let mut found = BTreeMap::new();
+    let mut open = vec![directory.to_owned()];
+    while let Some(folder) = open.pop() {
+        for entry in std::fs::read_dir(&folder).expect("it is there").flatten() {
+            match entry.path() {
+                path if path.is_dir() => open.push(path),
+                path => {
+                    let bytes = std::fs::read(&path).expect("it is readable");
+                    found.insert(path.strip_prefix(directory).expect("it is below").to_owned(), bytes);
+                }
+            }
+        }
+    }
+    found
+}
+
+/// Two directories have the same files with the same bytes; but for the times that machines took.
+#[track_caller]
+fn equal(one: &Path, other: &Path) {
+    let (mut one, mut other) = (files(one), files(other));
+    for directory in [&mut one, &mut other] {
+        directory.remove(Path::new("timing.jsonl"));
+    }
+    assert_eq!(one.keys().collect::<Vec<_>>(), other.keys().collect::<Vec<_>>());
+    let differ: Vec<_> = one.iter().filter(|(name, bytes)| other[*name] != **bytes).collect();
+    assert!(differ.is_empty(), "{:?}", differ.iter().map(|(name, _)| name).collect::<Vec<_>>());
+}
+
+fn done(arguments: &[&str]) -> String {
+    let (status, stdout, stderr) = outcome(&mut avastra(arguments));
+    assert_eq!(status, 0, "{arguments:?}: {stderr}");
+    stdout
+}
+
+fn text(path: &Path) -> &str {
+    path.to_str().expect("it is text")
+}
+
+/// Plays a command whole, on two threads, and in shards of another order and depth, which are merged.
+fn merged(command: &[&str], kind: &str, order: &[u32]) -> tempfile::TempDir {
+    let scratch = tempfile::tempdir().expect("a scratch directory");
+    let at = |name: &str| scratch.path().join(name);
+    done(&[command, &["--jobs", "1", "--out", text(&at("whole"))]].concat());
+    done(&[command, &["--jobs", "2", "--out", text(&at("threads"))]].concat());
+    equal(&at("whole"), &at("threads"));
+
+    let count = order.len();
+    let (lost, played) = order.split_last().expect("there are shards");
+    let shard = |number: u32| {
+        let out = at(&format!("shards/{number}"));
+        done(&[command, &["--shard", &format!("{number}/{count}"), "--out", text(&out)]].concat());
+        out
+    };
+    let mut directories: Vec<PathBuf> = played.iter().map(|number| shard(*number)).collect();
+    let merge = |directories: &[PathBuf], how: &[&str]| {
+        let named: Vec<&str> = directories.iter().map(|directory| text(directory)).collect();
+        outcome(&mut avastra(&[&["merge"], &named[..], how].concat()))
+    };
+    let (status, stdout, stderr) = merge(&directories, &["--missing"]);
+    assert_eq!((status, stdout.trim()), (0, lost.to_string().as_str()), "{stderr}");
+    let (status, _, stderr) = merge(&directories, &["--out", text(&at("merged"))]);
+    assert!(status == 1 && stderr.contains(&format!("shard {lost} of {count} is missing")), "{stderr}");
+    assert!(!at("merged").exists() && !at("merged.partial").exists());
+
+    directories.push(shard(*lost));
+    assert_eq!(merge(&directories, &["--missing"]).1, "");
+    let (status, _, stderr) = merge(&directories, &["--out", text(&at("merged"))]);
+    assert_eq!(status, 0, "{stderr}");
+    equal(&at("whole"), &at("merged"));
+    // Again, in another order, with one of them twice, and with the whole beside them.
+    directories.reverse();
+    directories.extend([directories[0].clone(), at("merged")]);
+    for out in ["merged", "again"] {
+        let (status, _, stderr) = merge(&directories, &["--out", text(&at(out))]);
+        assert_eq!(status, 0, "{stderr}");
+        equal(&at("whole"), &at(out));
+    }
+    // What is merged is a directory like any other.
+    done(&[kind, "--resume", text(&at("again"))]);
+    equal(&at("whole"), &at("again"));
+    scratch
+}
+
+#[test]
+fn eight_shards_of_a_run_make_the_run() {
+    let command =
+        ["run", SPACE, "--road", "corner", "--episodes", "21", "--seed", "5", "--ads-config", FLICKER];
+    let scratch = merged(&command, "run", &[3, 8, 1, 6, 2, 5, 7, 4]);
+    let critical = scratch.path().join("merged/critical");
+    let scenarios: Vec<PathBuf> =
+        std::fs::read_dir(critical).expect("it is there").flatten().map(|entry| entry.path()).collect();
+    assert!(!scenarios.is_empty(), "without a scenario this says little");
+    scenarios.iter().for_each(|file| drop(done(&["verify", text(file)])));
+
+    let merge = |second: &Path| {
+        let first = scratch.path().join("shards/1");
+        let out = scratch.path().join("refused");
+        let (status, _, stderr) =
+            outcome(&mut avastra(&["merge", text(&first), text(second), "--out", text(&out)]));
+        assert_eq!(status, 1, "{stderr}");
+        assert!(!out.exists(), "nothing is left behind");
+        stderr
+    };
+    // Another seed, another version, another world, another cut, another kind.
+    let other = scratch.path().join("other");
+    done(&[&command[..6], &["6", "--shard", "2/8", "--ads-config", FLICKER, "--out", text(&other)]].concat());
+    let told = merge(&other);
+    assert!(told.contains("is no shard of the run in") && told.contains("`seed` was 5"), "{told}");
+    let edited = scratch.path().join("shards/2/run.yaml");
+    let settings = std::fs::read_to_string(&edited).expect("it is readable");
+    let version = env!("CARGO_PKG_VERSION");
+    for (was, is, reason) in [
+        (format!("avastra: {version}"), "avastra: 0.0.1".to_owned(), "begun by avastra 0.0.1"),
+        ("engine: plane".to_owned(), "engine: sphere".to_owned(), "in world `sphere/"),
+    ] {
+        assert!(settings.contains(&was), "{settings}");
+        std::fs::write(&edited, settings.replace(&was, &is)).expect("it is writable");
+        let told = merge(&scratch.path().join("shards/2"));
+        assert!(told.contains(reason), "{told}");
+    }
+    std::fs::write(&edited, &settings).expect("it is writable");
+    std::fs::write(scratch.path().join("shards/2/shard.yaml"), "shard: 2\nof: 9\n").expect("it is writable");
+    let told = merge(&scratch.path().join("shards/2"));
+    assert!(told.contains("is shard 2/9") && told.contains("is shard 1/8"), "{told}");
+    // Rows that were changed behind its back.
+    let database = scratch.path().join("shards/3/run.db");
+    let database = rusqlite::Connection::open(database).expect("it is a database");
+    database.execute_batch("UPDATE episode SET distance_m = distance_m + 1").expect("it can be changed");
+    let told = merge(&scratch.path().join("shards/3"));
+    assert!(told.contains("were changed since they were written"), "{told}");
+}
+
+#[test]
+fn a_shard_is_gone_on_with() {
+    let scratch = tempfile::tempdir().expect("a scratch directory");
+    let at = |name: &str| scratch.path().join(name);
+    let command = ["run", SPACE, "--road", "corner", "--episodes", "40", "--agent", "none"];
+    done(&[&command[..], &["--out", text(&at("whole"))]].concat());
+    let [one, two] = ["shards/1", "shards/2"].map(at);
+    done(&[&command[..], &["--shard", "1/2", "--out", text(&one)]].concat());
+    let arguments = [&command[..], &["--shard", "2/2", "--jobs", "1", "--out", text(&two)]].concat();
+    let mut child = background(&arguments);
+    for _ in 0..1200 {
+        if two.join("run.db").is_file() {
+            break;
+        }
+        std::thread::sleep(std::time::Duration::from_millis(20));
+    }
+    child.kill().expect("it is ours to kill");
+    child.wait().expect("it ends");
+    let resumed = ["run", "--resume", text(&two), "--format", "json"];
+    let (status, stdout, stderr) = outcome(&mut avastra(&resumed));
+    assert_eq!(status, 0, "{stderr}");
+    assert!(stdout.contains("\"episodes\":20"), "the other half is not played: {stdout}");
+    done(&["merge", text(&one), text(&two), "--out", text(&at("merged"))]);
+    equal(&at("whole"), &at("merged"));
+    // A directory that holds something else stays.
+    let (status, _, stderr) =
+        outcome(&mut avastra(&["merge", text(&one), text(&two), "--out", text(&at("shards"))]));
+    assert!(status == 1 && stderr.contains("is not empty"), "{stderr}");
+}
+
+#[test]
+fn eight_shards_of_a_study_make_the_study() {
+    merged(&["study", "scenarios/studies/smoke.yaml"], "study", &[5, 2, 8, 1, 4, 7, 3, 6]);
+}
+
+#[test]
+fn shards_of_an_estimate_make_the_estimate() {
+    let ads = ["--ads", "reactive", "--traffic", "released", "--road", "corner"];
+    for (how, event) in [
+        (["--method", "count", "--episodes", "5", "--parts", "8"], "counted"),
+        (["--method", "probe", "--episodes", "5", "--parts", "6"], "collision"),
+    ] {
+        let command = [&["estimate", SPACE, "--event", event][..], &ads, &how].concat();
+        merged(&command, "estimate", &[2, 3, 1]);
+    }
+}
+
+#[test]
+fn an_estimate_that_may_stop_looks_when_its_shards_are_merged() {
+    let ads = ["--ads", "reactive", "--traffic", "released", "--road", "corner", "--event", "collision"];
+    let how = ["--episodes", "10", "--parts", "8", "--hours", "0.3"];
+    let command = [&["estimate", SPACE][..], &ads, &how].concat();
+    let scratch = merged(&command, "estimate", &[2, 1]);
+    let results = std::fs::read_to_string(scratch.path().join("merged/results.json")).expect("it is written");
+    let results: serde_json::Value = serde_json::from_str(&results).expect("it is JSON");
+    assert!(results["parts"].as_u64() < results["parts_wanted"].as_u64(), "it stopped: {results}");
+}
+
+#[test]
+fn schedulers_say_which_shard_it_is() {
+    let scratch = tempfile::tempdir().expect("a scratch directory");
+    let out = scratch.path().join("shard");
+    let command =
+        ["run", SPACE, "--road", "corner", "--episodes", "3", "--agent", "none", "--out", text(&out)];
+    let kubernetes = [("JOB_COMPLETION_INDEX", "1"), ("JOB_COMPLETIONS", "3")];
+    let (status, _, stderr) = outcome(avastra(&command).envs(kubernetes));
+    assert_eq!(status, 0, "{stderr}");
+    assert!(stderr.contains("shard 2/3, because of JOB_COMPLETION_INDEX"), "{stderr}");
+    let kept = std::fs::read_to_string(out.join("shard.yaml")).expect("it is kept");
+    assert_eq!(kept, "shard: 2\nof: 3\n");
+    // What is asked for wins; half a message is none.
+    let out = scratch.path().join("asked");
+    let asked = [&command[..8], &["--out", text(&out)]].concat();
+    let (status, _, stderr) = outcome(avastra(&[&asked[..], &["--shard", "1/1"]].concat()).envs(kubernetes));
+    assert!(status == 0 && !stderr.contains("JOB_COMPLETION_INDEX"), "{stderr}");
+    assert!(!out.join("shard.yaml").exists());
+    let (status, _, stderr) = outcome(avastra(&asked).env("SLURM_ARRAY_TASK_ID", "4"));
+    assert!(status == 1 && stderr.contains("say `--shard I/N`"), "{stderr}");
+    let (status, _, stderr) = outcome(&mut avastra(&[&asked[..], &["--shard", "4/3"]].concat()));
+    assert!(status == 1 && stderr.contains("the last is 3"), "{stderr}");
+}
+
+#[test]
+fn trainings_and_nothing_cannot_be_merged() {
+    let scratch = tempfile::tempdir().expect("a scratch directory");
+    let folder = text(scratch.path());
+    let (status, _, stderr) = outcome(&mut avastra(&["merge", folder, "--missing"]));
+    assert!(status == 1 && stderr.contains("none of the directories holds"), "{stderr}");
+    std::fs::write(scratch.path().join("notes"), "mine").expect("it is writable");
+    let (status, _, stderr) = outcome(&mut avastra(&["merge", folder, "--missing"]));
+    assert!(status == 1 && stderr.contains("holds no run, study or estimate"), "{stderr}");
+    let (status, _, stderr) = outcome(&mut avastra(&["merge", folder]));
+    assert!(status == 1 && stderr.contains("--out"), "{stderr}");
+    assert!(root().join(SPACE).is_file());
+}
