@@ -3,8 +3,10 @@
 # yields, exports them, and asks OpenSCENARIO's schema, ASAM's checkers, CommonRoad's reader and collision checker, and, if
 # ESMINI names its program (built from its public repository, with `dat2csv` beside it), an independent player.
 # Needs Python 3 and, once, a network for `pip install`.
-# Arguments: episodes on each road (default 100).
+# Arguments: episodes on each road (default 100), and what else `run` is to be told: `540 --traffic released` finds 200 crashes.
 set -eu
+episodes=${1:-100}
+[ $# -eq 0 ] || shift
 cd "$(dirname "$0")/../.."
 work=target/interop/export
 if ! [ -x "$work/venv/bin/python" ]; then
@@ -17,7 +19,7 @@ avastra=${AVASTRA:-target/release/avastra}
 [ -x "$avastra" ] || cargo build --release
 rm -rf "$work/run" "$work/out"
 "$avastra" run scenarios/avastra45.ava --ads-config scenarios/ads/faults/planning_never_yields.yaml \
-    --episodes "${1:-100}" --seed 1 --out "$work/run" --quiet
+    --episodes "$episodes" --seed 1 --out "$work/run" --quiet "$@"
 for arguments in "openscenario" "commonroad --ego trajectory" "csv"; do
     # shellcheck disable=SC2086
     "$avastra" export --to $arguments --out "$work/out" "$work"/run/critical/*.ava
