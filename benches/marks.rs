@@ -105,6 +105,7 @@ fn load() -> Arc<Space> {
 /// A world with as many obstacles as find room, at most ten.
 fn crowded(scene: &Arc<Scene>) -> World {
     let start = Start {
+        ego_mps: avastra::model::START_MPS,
         time: TimeOfDay::Noon,
         rain: Level::None,
         fog: Level::None,

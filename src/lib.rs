@@ -50,5 +50,6 @@ pub mod trial;
 pub mod study;
 pub mod emit;
 pub mod export;
+pub mod import;
 pub mod report;
 pub mod cli;

@@ -37,6 +37,7 @@ fn all_drive_the_corner_in_any_weather() {
         for seed in 0..24_u64 {
             let level = |shift: u64| Level::ALL[((seed + shift) % 4) as usize];
             let start = Start {
+                ego_mps: crate::model::START_MPS,
                 time: TimeOfDay::ALL[(seed % 3) as usize],
                 rain: level(0),
                 fog: level(seed / 4),

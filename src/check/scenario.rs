@@ -3,7 +3,7 @@
 use std::cell::Cell;
 use std::sync::Arc;
 
-use core::ops::Range;
+use core::ops::{Range, RangeInclusive};
 
 use crate::check::checker::docs;
 use crate::check::names::unknown;
@@ -16,8 +16,8 @@ use crate::model::rules::{Before, Nearest, RowRules, TRIES_MAX};
 use crate::model::scenario::{Condition, Origin, Scenario, ScenarioStart, ScenarioStep, Trigger, ticks_s};
 use crate::model::vocabulary::{OriginField, StartField, WAIT, Word};
 use crate::model::{
-    AMBIENT_MAX, Domain, Initial, Memory, Parameter, RoadFacts, Row, RulesInForce, SIGNAL_PHASE_S, Space,
-    StateDef, TICK_MS, Value, code, locals,
+    AMBIENT_MAX, Domain, Initial, Memory, Parameter, RoadFacts, Row, RulesInForce, SIGNAL_PHASE_S,
+    SPEED_MPS_MAX, START_MPS, Space, StateDef, TICK_MS, Value, code, locals,
 };
 use crate::syntax::{Diagnostic, ast, listed, print_expr};
 use crate::units::{Dimension, Rational};
@@ -146,22 +146,25 @@ impl<'a> Reader<'a> {
     fn start(&mut self, declared: &ast::Scenario) -> ScenarioStart {
         let space = self.space;
         // Any seed will do: every state that it draws is replaced below or reported as missing.
-        let mut memory = space.initial_memory(0);
-        let mut start = (0.0, None, 0);
+        let mut start = ScenarioStart {
+            memory: space.initial_memory(0),
+            signal_phase_s: 0.0,
+            traffic_seed: None,
+            ambient: 0,
+            ego_mps: START_MPS,
+        };
         self.fields_once("field", &declared.start);
         for field in &declared.start {
             match StartField::from_name(&field.name.text) {
                 Some(StartField::SignalPhase) => {
-                    let seconds = number(&field.value, Dimension::DURATION);
-                    start.0 = self.take(seconds).unwrap_or(0.0);
-                    if !SIGNAL_PHASE_S.contains(&start.0) {
-                        let message = format!("a signal phase of {} s is not possible", start.0);
-                        let range = format!("{} .. {} s", SIGNAL_PHASE_S.start(), SIGNAL_PHASE_S.end());
-                        let error = Diagnostic::error(code::OUT_OF_RANGE, message);
-                        self.report(error.at(field.value.span, format!("must lie within {range}")));
-                    }
+                    let wanted = (Dimension::DURATION, "s", SIGNAL_PHASE_S, "a signal phase");
+                    start.signal_phase_s = self.bounded(field, wanted).unwrap_or(start.signal_phase_s);
                 }
-                Some(StartField::TrafficSeed) => start.1 = self.whole(&field.value),
+                Some(StartField::EgoSpeed) => {
+                    let wanted = (Dimension::SPEED, "m/s", 0.0..=SPEED_MPS_MAX, "a speed");
+                    start.ego_mps = self.bounded(field, wanted).unwrap_or(start.ego_mps);
+                }
+                Some(StartField::TrafficSeed) => start.traffic_seed = self.whole(&field.value),
                 Some(StartField::Ambient) => {
                     let wanted = self.whole(&field.value).unwrap_or(0);
                     if wanted > u64::from(AMBIENT_MAX) {
@@ -171,10 +174,10 @@ impl<'a> Reader<'a> {
                             error.at(field.value.span, format!("must lie within 0 .. {AMBIENT_MAX}")),
                         );
                     }
-                    start.2 = wanted.min(u64::from(AMBIENT_MAX)) as u32;
+                    start.ambient = wanted.min(u64::from(AMBIENT_MAX)) as u32;
                 }
                 None => match space.state(&field.name.text) {
-                    Some(state) => self.start_state(state, &field.value, &mut memory),
+                    Some(state) => self.start_state(state, &field.value, &mut start.memory),
                     None => {
                         let states = space.states.iter().map(|state| state.name.as_str());
                         let names = states.chain(StartField::names());
@@ -186,7 +189,24 @@ impl<'a> Reader<'a> {
         for state in &space.states {
             self.check_open(state, declared);
         }
-        ScenarioStart { memory, signal_phase_s: start.0, traffic_seed: start.1, ambient: start.2 }
+        start
+    }
+
+    /// The number of a field of the start in SI units, if it lies within its range.
+    fn bounded(
+        &mut self,
+        field: &ast::Field,
+        (dimension, unit, range, what): (Dimension, &str, RangeInclusive<f64>, &str),
+    ) -> Option<f64> {
+        let found = self.take(number(&field.value, dimension))?;
+        if !range.contains(&found) {
+            let message = format!("{what} of {found} {unit} is not possible");
+            let range = format!("{} .. {} {unit}", range.start(), range.end());
+            let error = Diagnostic::error(code::OUT_OF_RANGE, message);
+            self.report(error.at(field.value.span, format!("must lie within {range}")));
+            return None;
+        }
+        Some(found)
     }
 
     /// Reports a state of which the start leaves something to chance.

@@ -33,6 +33,9 @@ pub enum Failure {
     Ads { findings: usize },
     #[error("{count} failing", count = super::output::plural(*scenarios, "scenario"))]
     Failing { scenarios: usize },
+    /// Ctrl-C: this file, or some of several.
+    #[error("interrupted: not done")]
+    Stopped,
     /// Ctrl-C: what was done is saved.
     #[error("interrupted; go on with `avastra {command} --resume {}`", directory.display())]
     Interrupted { command: &'static str, directory: PathBuf },
@@ -60,7 +63,7 @@ impl Failure {
             Failure::Collision { .. } | Failure::Failing { .. } => 4,
             Failure::Ads { .. } => 5,
             // What a shell reports for a process that SIGINT ended.
-            Failure::Interrupted { .. } => 130,
+            Failure::Stopped | Failure::Interrupted { .. } => 130,
         }
     }
 }

@@ -1,7 +1,6 @@
 //! `avastra export`: emitted scenarios as files of other tools.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
@@ -10,7 +9,7 @@ use crate::export::{ExportError, Recording, record};
 
 use super::arguments::{ExportArguments, ExportEgo, ExportFormat, ExportVersion};
 use super::error::Failure;
-use super::files::{write, write_new};
+use super::files::{copy_map, write};
 use super::load;
 use super::output::{Output, plural};
 use super::parallel::each_file;
@@ -165,19 +164,4 @@ fn map_name(map: &Path) -> Result<&str, Failure> {
             map.display()
         ))
     })
-}
-
-/// Copies a map. Several scenarios share it; nothing else that has its name is overwritten.
-fn copy_map(map: &Path, target: &Path) -> Result<(), Failure> {
-    let text = load::text(map)?;
-    let is_free = std::fs::symlink_metadata(target).is_err_and(|error| error.kind() == ErrorKind::NotFound);
-    if is_free {
-        return write_new(target, &text);
-    }
-    let other = match load::read(target) {
-        Ok(there) if there == text => return Ok(()),
-        Ok(_) => format!("another map is already at `{}`", target.display()),
-        Err(reason) => format!("`{}` is in the place of the map: {reason}", target.display()),
-    };
-    Err(Failure::usage(format!("{other}: name another folder with `--out`")))
 }

@@ -1,7 +1,7 @@
 //! Writing files.
 
 use std::fs::File;
-use std::io::Write;
+use std::io::{ErrorKind, Write};
 use std::os::unix::fs::{FileTypeExt, OpenOptionsExt};
 use std::path::{Path, PathBuf};
 
@@ -13,6 +13,7 @@ use crate::episode::EpisodeLog;
 use crate::model::digest;
 
 use super::error::Failure;
+use super::load;
 use super::load::answers_path;
 
 /// Longest name of a file that common file systems take, in bytes.
@@ -85,6 +86,21 @@ pub fn remove(file: &Path) -> Result<(), Failure> {
         }
         _ => Ok(()),
     }
+}
+
+/// Copies a map. Several scenarios share it; nothing else that has its name is overwritten.
+pub fn copy_map(map: &Path, target: &Path) -> Result<(), Failure> {
+    let text = load::text(map)?;
+    let is_free = std::fs::symlink_metadata(target).is_err_and(|error| error.kind() == ErrorKind::NotFound);
+    if is_free {
+        return write_new(target, &text);
+    }
+    let other = match load::read(target) {
+        Ok(there) if there == text => return Ok(()),
+        Ok(_) => format!("another map is already at `{}`", target.display()),
+        Err(reason) => format!("`{}` is in the place of the map: {reason}", target.display()),
+    };
+    Err(Failure::usage(format!("{other}: name another folder with `--out`")))
 }
 
 /// Asks whether somebody reads from a named pipe: to open one that nobody reads would wait without end. As long as the

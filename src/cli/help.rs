@@ -81,7 +81,13 @@ const EXAMPLES: &[(&str, &[(&str, &str)])] = &[
         )],
     ),
     ("doc", &[("doc scenarios/avastra45.ava", ""), ("doc scenarios/avastra45.ava -o avastra45.md", "")]),
-    ("new", &[("new mine", "write mine/space.ava, mine/roads.ava and a map")]),
+    (
+        "new",
+        &[
+            ("new mine", "write mine/space.ava, mine/roads.ava and a map"),
+            ("new town --map roads/corner.xodr", "on routes through the junctions of your own map"),
+        ],
+    ),
     (
         "completions",
         &[
@@ -203,6 +209,14 @@ const EXAMPLES: &[(&str, &[(&str, &str)])] = &[
             ("export --to openscenario --ego none --out suite runs/0001/critical/*.ava", ""),
             ("export --to commonroad runs/0001/critical/corner_0004.ava", "with a planning problem"),
             ("export --to csv runs/0001/critical/corner_0004.ava", "where everyone was at every tick"),
+        ],
+    ),
+    (
+        "import",
+        &[
+            ("import cut_in.xosc", "write imported/cut_in.ava and its map, or say what cannot be said"),
+            ("import --set ego_speed=10 cut_in.xosc", "with another value of a parameter"),
+            ("import --ego Host --out catalogue suite/*.xosc", ""),
         ],
     ),
     ("pack", &[("pack runs/0001/critical/*.ava --out suite", "a folder that can be moved")]),

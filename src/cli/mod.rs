@@ -21,6 +21,7 @@ mod files;
 mod findings;
 mod fmt;
 mod help;
+mod import;
 mod interrupt;
 mod load;
 pub mod lsp;
@@ -124,6 +125,7 @@ pub fn main() -> ExitCode {
         Command::Shrink(arguments) => shrink::shrink(&output, arguments),
         Command::Pack(arguments) => pack::pack(&output, arguments),
         Command::Export(arguments) => export::export(&output, arguments),
+        Command::Import(arguments) => import::import(&output, arguments),
         Command::Test(arguments) => test::test(&output, arguments),
         Command::Report(arguments) => report::report(&output, arguments),
         Command::Render(arguments) => render::render(&output, arguments),

@@ -1,14 +1,18 @@
-//! `avastra new`: a small space of one's own, with its road, to begin with; or one of the shipped examples.
+//! `avastra new`: a small space of one's own, with its road, to begin with, or on a map of one's own; or one of the shipped
+//! examples.
+
+use std::path::Path;
 
 use clap::builder::PossibleValuesParser;
+
+use crate::emit;
+use crate::road::{RoadMap, propose};
 
 use super::arguments::NewArguments;
 use super::error::Failure;
 use super::files::write;
+use super::load;
 use super::output::Output;
-
-/// A file that is written: its name in the directory, and its text.
-type File = (String, &'static str);
 
 /// The space to begin with.
 const STARTER: [(&str, &str); 3] = [
@@ -62,32 +66,22 @@ pub fn template_names() -> PossibleValuesParser {
     PossibleValuesParser::new(EXAMPLES.iter().map(|(name, ..)| *name))
 }
 
+/// Routes that are proposed on a map.
+const ROUTES_MAX: usize = 4;
+
 /// Writes the files; none is ever replaced.
 pub fn new(output: &Output, arguments: &NewArguments) -> Result<(), Failure> {
-    let written = |files: &[(&str, &'static str)]| -> Vec<File> {
-        files.iter().map(|(name, text)| ((*name).to_owned(), *text)).collect()
+    let files = match (&arguments.map, &arguments.template) {
+        (Some(map), _) => on_map(output, map)?,
+        (None, Some(name)) => example(name),
+        (None, None) => STARTER.map(|(name, text)| (name.to_owned(), text.to_owned())).to_vec(),
     };
-    let mut own = String::new();
-    let example = EXAMPLES.iter().find(|(name, ..)| Some(*name) == arguments.template.as_deref());
-    let files = match example {
-        None => written(&STARTER),
-        Some((name, text, maps)) => {
-            // Here it stands beside what it uses.
-            own = text.replace("use \"../", "use \"");
-            let mut files = vec![(format!("{name}.ava"), "")];
-            files.extend(written(&USED));
-            files.extend(written(maps));
-            files
-        }
-    };
-    let text = |text: &'static str| if text.is_empty() { own.as_str() } else { text };
-    let paths: Vec<_> =
-        files.iter().map(|(name, given)| (arguments.directory.join(name), text(given))).collect();
+    let paths: Vec<_> = files.iter().map(|(name, text)| (arguments.directory.join(name), text)).collect();
     if let Some((path, _)) = paths.iter().find(|(path, _)| path.exists()) {
         return Err(Failure::usage(format!("`{}` exists: name another directory", path.display())));
     }
     for (path, text) in &paths {
-        write(path, text)?;
+        write(path, text.as_str())?;
         output.tell(&path.display().to_string());
     }
     let space = paths[0].0.display().to_string();
@@ -95,4 +89,46 @@ pub fn new(output: &Output, arguments: &NewArguments) -> Result<(), Failure> {
     let files: Vec<String> = paths.iter().map(|(path, _)| path.display().to_string()).collect();
     output.result(serde_json::json!({ "files": files }));
     Ok(())
+}
+
+/// An example with what it uses: names in the directory, and texts.
+fn example(name: &str) -> Vec<(String, String)> {
+    let found = EXAMPLES.iter().find(|(known, ..)| *known == name);
+    let (_, own, maps) = found.expect("clap takes the names of examples alone");
+    // Here it stands beside what it uses.
+    let mut files = vec![(format!("{name}.ava"), own.replace("use \"../", "use \""))];
+    files.extend(USED.iter().chain(*maps).map(|(name, text)| ((*name).to_owned(), (*text).to_owned())));
+    files
+}
+
+/// The space to begin with, on proposed routes of a map, with the map.
+fn on_map(output: &Output, path: &Path) -> Result<Vec<(String, String)>, Failure> {
+    let text = load::text(path)?;
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    let map = RoadMap::from_opendrive(&stem, &text).map_err(|error| Failure::file("read", path, error))?;
+    let proposals = propose(&map, ROUTES_MAX);
+    if proposals.is_empty() {
+        let message = "no way on it can be driven; `avastra road` tells what it holds";
+        return Err(Failure::file("use", path, message));
+    }
+    let file = format!("roads/{}.xodr", emit::identifier(&stem));
+    let mut roads = "//! Routes that `avastra new --map` proposes: each exercises what those before it do not.\nlanguage 1\n".to_owned();
+    let mut names: Vec<String> = Vec::new();
+    for proposal in &proposals {
+        let mut name = emit::identifier(&proposal.title.to_lowercase());
+        if names.contains(&name) {
+            name = format!("{name}_{}", names.len() + 1);
+        }
+        let (start, goal) = (emit::lane_point(&map, proposal.start), emit::lane_point(&map, proposal.goal));
+        // A junction's name may hold line breaks.
+        let reason = proposal.reason.split_whitespace().collect::<Vec<_>>().join(" ");
+        let reason = format!("{}{}", reason[..1].to_uppercase(), &reason[1..]);
+        roads += &format!(
+            "\n/// {reason}.\nroad {name} {{\n  map: \"{file}\"\n  start: {start}\n  goal: {goal}\n}}\n"
+        );
+        output.tell(&format!("{name}: {reason}"));
+        names.push(name);
+    }
+    let space = STARTER[0].1.replace("roads: [corner]", &format!("roads: [{}]", names.join(", ")));
+    Ok(vec![("space.ava".to_owned(), space), ("roads.ava".to_owned(), roads), (file, text)])
 }

@@ -1,15 +1,16 @@
 //! Work on many files at once; results come in the order of the files.
 
+use std::collections::BTreeMap;
 use std::convert::Infallible;
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
 
 use crate::ads::external::Program;
 use crate::run::{RunError, on_threads};
 
 use super::arguments::FilesArguments;
 use super::error::Failure;
+use super::interrupt;
 use super::output::{Output, plural};
 use super::progress::{Pieces, Working};
 
@@ -56,6 +57,9 @@ impl<T> PerFile<T> {
     pub fn complete(mut self, done: &str) -> Result<(), Failure> {
         match self.failed.len() {
             0 => Ok(()),
+            _ if self.failed.iter().any(|(_, failure)| matches!(failure, Failure::Stopped)) => {
+                Err(Failure::Stopped)
+            }
             _ if self.files == 1 => Err(self.failed.remove(0).1),
             failed => Err(Failure::usage(format!("{} could not be {done}", plural(failed, "file")))),
         }
@@ -63,7 +67,7 @@ impl<T> PerFile<T> {
 }
 
 /// Does `work` for every file on as many threads as [`jobs`] says, for `program` if one is to drive. Of several files, it
-/// says which failed.
+/// says which failed; after Ctrl-C those under way are ended, and it says which are not done.
 ///
 /// # Errors
 /// As [`jobs`].
@@ -83,16 +87,18 @@ pub fn each_file<T: Send>(
     let work = |&(number, file): &(usize, &PathBuf), tell: &mut dyn FnMut(_) -> bool| {
         tell((number, work(file)));
     };
-    let Ok(()) = on_threads(&numbered, jobs, &AtomicBool::new(false), work, &mut |result| {
+    // One file has nothing to be ended in good order.
+    let stop = if several.is_some() { interrupt::stop_on_interrupt() } else { Arc::default() };
+    let Ok(()) = on_threads(&numbered, jobs, &stop, work, &mut |result| {
         results.push(result);
         several.iter().for_each(Pieces::one);
         Ok::<_, Infallible>(())
     });
     drop((single, several));
-    results.sort_by_key(|(number, _)| *number);
+    let mut results: BTreeMap<usize, Result<T, Failure>> = results.into_iter().collect();
     let mut all = PerFile { done: Vec::new(), failed: Vec::new(), files: many.files.len() };
-    for ((_, result), file) in results.into_iter().zip(&many.files) {
-        match result {
+    for (number, file) in numbered {
+        match results.remove(&number).unwrap_or(Err(Failure::Stopped)) {
             Ok(found) => all.done.push(found),
             Err(failure) => {
                 if !all.is_single() {

@@ -409,6 +409,18 @@ pub const SHAPES: &[Shape] = &[
         ],
     },
     Shape {
+        command: "import",
+        fields: &[
+            f("files[]", "text", "paths of what was written, maps too"),
+            f("imported[].file", "text", "the OpenSCENARIO file"),
+            f("imported[].scenario", "text?", "path of its scenario; null if it was refused"),
+            f("imported[].notes[]", "text", "what drives otherwise than in the file"),
+            f("imported[].refused[].line", "number", "where the language cannot say what the file says"),
+            f("imported[].refused[].element", "text", ""),
+            f("imported[].refused[].reason", "text", ""),
+        ],
+    },
+    Shape {
         command: "export",
         fields: &[
             f("files[]", "text", "paths of what was written, maps too"),

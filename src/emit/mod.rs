@@ -2,11 +2,13 @@
 //!
 //! Builds syntax trees; `syntax` prints them.
 
+mod place;
 mod policy;
 mod safetensors;
 mod scenario;
 mod tree;
 
+pub use place::{identifier, lane_point, quoted};
 pub use policy::policy_text;
 pub use safetensors::safetensors;
 pub use scenario::{Provenance, action_text, failure, retold, scenario, unclaimed};

@@ -8,7 +8,7 @@ use crate::ads::external;
 use crate::ads::external::Conversation;
 use crate::episode::{Collision, EpisodeLog, Outcome};
 use crate::model::vocabulary::Word;
-use crate::model::{ActionDef, Space, StateDef, Value, digest_text, ticks_s};
+use crate::model::{ActionDef, START_MPS, Space, StateDef, Value, digest_text, ticks_s};
 use crate::oracle::AvoidabilitySettings;
 use crate::run::{EpisodeSummary, Finding};
 use crate::sim::{ENGINE, TrafficProfile};
@@ -158,6 +158,10 @@ fn start(space: &Space, log: &EpisodeLog) -> Vec<Field> {
             tree::field("signal_phase", tree::quantity(log.start.signal_phase_s, Dimension::DURATION)),
             tree::field("traffic_seed", tree::whole(log.start.seed)),
         ])
+        .chain(
+            (log.start.ego_mps != START_MPS)
+                .then(|| tree::field("ego_speed", tree::quantity(log.start.ego_mps, Dimension::SPEED))),
+        )
         .chain((log.start.ambient > 0).then(|| tree::field("ambient", tree::whole(log.start.ambient.into()))))
         .collect()
 }

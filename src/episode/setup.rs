@@ -5,7 +5,7 @@ use std::sync::Arc;
 use crate::action::ActionTable;
 use crate::ads::Selected;
 use crate::mdp::ProcKind;
-use crate::model::{Memory, Road, RulesInForce, Space};
+use crate::model::{Memory, Road, RulesInForce, START_MPS, Space};
 use crate::rng;
 use crate::rng::Stream;
 use crate::sim::{Scene, Start, TrafficProfile};
@@ -55,5 +55,15 @@ pub fn start(space: &Space, memory: &Memory, seed: u64) -> Start {
     // A multiple of 1/64 s is a short decimal in a file.
     let signal_phase_s = (rng::between(&mut rng, 0.0, SIGNAL_PHASE_S) * 64.0).floor() / 64.0;
     let (time, [rain, fog, wetness]) = space.weather(memory);
-    Start { time, rain, fog, wetness, signal_phase_s, seed, ambient: 0, traffic: TrafficProfile::default() }
+    Start {
+        ego_mps: START_MPS,
+        time,
+        rain,
+        fog,
+        wetness,
+        signal_phase_s,
+        seed,
+        ambient: 0,
+        traffic: TrafficProfile::default(),
+    }
 }

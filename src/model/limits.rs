@@ -22,6 +22,9 @@ pub const SPAWN_DISTANCE_M: RangeInclusive<f64> = 0.0..=1000.0;
 /// Offsets at which the cycle of the signals may begin, s.
 pub const SIGNAL_PHASE_S: RangeInclusive<f64> = 0.0..=3600.0;
 
+/// Speed of the ego vehicle at which an episode begins unless its scenario says otherwise, m/s.
+pub const START_MPS: f64 = 3.0;
+
 /// Most ambient vehicles around the ego vehicle.
 pub const AMBIENT_MAX: u32 = 20;
 

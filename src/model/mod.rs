@@ -31,7 +31,7 @@ pub use interval::{End, Interval};
 pub(crate) use limits::spawn_out_of_bounds;
 pub use limits::{
     AMBIENT_MAX, COMMANDED_MAX, EGO_ACCELERATION_MPS2_MAX, LIMIT_PART_MAX, SIGNAL_PHASE_S, SPAWN_DISTANCE_M,
-    SPAWN_SPEED_MPS, SPEED_MPS_MAX, TICK_MS,
+    SPAWN_SPEED_MPS, SPEED_MPS_MAX, START_MPS, TICK_MS,
 };
 pub use meaning::Meaning;
 pub(crate) use on_route::stretches;

@@ -307,6 +307,7 @@ words! {
     SignalPhase "signal_phase" = "Where the cycle of the signals begins, in seconds.",
     TrafficSeed "traffic_seed" = "The seed of the choices of other road users.",
     Ambient "ambient" = "The number of vehicles of ambient traffic.",
+    EgoSpeed "ego_speed" = "The speed of the ego vehicle as the episode begins.",
 }
 
 words! {

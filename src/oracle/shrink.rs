@@ -297,9 +297,9 @@ impl<'a> Search<'a> {
             if candidate.memory == best.memory {
                 continue;
             }
-            let Start { signal_phase_s, seed, ambient, traffic, .. } = best.start;
+            let Start { ego_mps, signal_phase_s, seed, ambient, traffic, .. } = best.start;
             let start = episode::start(space, &candidate.memory, self.setup.seed);
-            candidate.start = Start { signal_phase_s, seed, ambient, traffic, ..start };
+            candidate.start = Start { ego_mps, signal_phase_s, seed, ambient, traffic, ..start };
             self.take(best, candidate, None);
         }
     }

@@ -24,6 +24,7 @@ mod lane_change;
 mod map;
 mod opendrive;
 mod phases;
+mod proposal;
 mod route;
 mod search;
 mod signals;
@@ -40,4 +41,6 @@ pub use map::{
     Crosswalk, Junction, Lane, LaneIndex, LaneKey, LanePlace, Neighbour, Precedence, RoadError, RoadMap,
     Side, Sign, SignKind, SignLine, Signal, Solid, StopLine, Strip, StripKind, Turn,
 };
+pub use opendrive::well_formed;
+pub use proposal::{Proposal, propose};
 pub use route::{Conflict, Route, RouteLane, RouteLaneChange, RouteSignLine, RouteStopLine};

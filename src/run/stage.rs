@@ -64,6 +64,7 @@ impl<'a> Stage<'a> {
                 signal_phase_s: start.signal_phase_s,
                 seed: start.traffic_seed.unwrap_or(seed),
                 ambient: start.ambient,
+                ego_mps: start.ego_mps,
                 traffic: self.traffic,
                 ..episode::start(space, &memory, seed)
             },

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use crate::action::SpawnRequest;
 use crate::geometry::Vec2;
+use crate::model::START_MPS;
 use crate::model::vocabulary::{Body, Colour, LaneChoice, Level, Side, Then, TimeOfDay, Verb};
 use crate::road::testing::{lanes, road, street};
 use crate::road::{RoadMap, Route};
@@ -44,6 +45,7 @@ fn connection(incoming: &str, connecting: &str) -> String {
 /// Noon, dry, signals at the beginning of their cycle.
 pub fn start() -> Start {
     Start {
+        ego_mps: START_MPS,
         time: TimeOfDay::Noon,
         rain: Level::None,
         fog: Level::None,

@@ -42,9 +42,6 @@ pub const ENGINE: &str = "plane/6";
 /// One physics step, s: 50 Hz.
 pub const DT_S: f64 = TICK_MS as f64 / 1000.0;
 
-/// Speed at which an episode begins, m/s.
-const START_MPS: f64 = 3.0;
-
 /// Commanded obstacles at a time. For the next one, the oldest that is out of sight leaves; in the published package the
 /// oldest leaves wherever it is.
 const OBSTACLES_MAX: usize = COMMANDED_MAX as usize;
@@ -65,6 +62,8 @@ const ROUTE_SEARCH_M: f64 = 2.0;
 /// How an episode begins.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Start {
+    /// Speed of the ego vehicle, m/s.
+    pub ego_mps: f64,
     pub time: TimeOfDay,
     pub rain: Level,
     pub fog: Level,
@@ -116,10 +115,10 @@ impl World {
         self.seed = seed;
     }
 
-    /// The beginning of an episode: the ego vehicle rolls at 3 m/s with its rear axle on the start of
+    /// The beginning of an episode: the ego vehicle rolls with its rear axle on the start of
     /// the route; beside ambient traffic, if asked for, nothing else is there.
     pub fn new(scene: Arc<Scene>, start: &Start) -> World {
-        World::with_ego_at(scene, start, 0.0, START_MPS)
+        World::with_ego_at(scene, start, 0.0, start.ego_mps)
     }
 
     /// The beginning of an episode that begins elsewhere on the route, at another speed.

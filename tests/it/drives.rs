@@ -75,7 +75,17 @@ pub fn start(seed: u64) -> Start {
     let time = TimeOfDay::ALL[(seed % 3) as usize];
     let signal_phase_s = (seed * 7 % 60) as f64;
     let traffic = TrafficProfile::default();
-    Start { time, rain: pick(3), fog: pick(12), wetness: pick(5), signal_phase_s, seed, ambient: 0, traffic }
+    Start {
+        ego_mps: avastra::model::START_MPS,
+        time,
+        rain: pick(3),
+        fog: pick(12),
+        wetness: pick(5),
+        signal_phase_s,
+        seed,
+        ambient: 0,
+        traffic,
+    }
 }
 
 fn drive(scene: &Arc<Scene>, entry: &ads::Entry, seed: u64, limit_mps: f64) {

@@ -7,7 +7,7 @@ use avastra::model::vocabulary::{Body, Level, Side, TimeOfDay};
 use avastra::syntax::ast::FileId;
 use avastra::syntax::{Diagnostic, format};
 
-use crate::cases::root;
+use crate::cases::{expect_snapshot, root};
 use crate::command::{avastra, outcome};
 use crate::wishes::{draws, row};
 use crate::world::{assert_replays, read, run_of, space_at};
@@ -63,6 +63,22 @@ fn examples_work_wherever_they_are_written() {
         let written = target.join(format!("{name}.ava"));
         let (status, stdout, stderr) = outcome(avastra(&["check", "--strict"]).arg(written));
         assert_eq!(status, 0, "{name}: {stdout}{stderr}");
+    }
+}
+
+#[test]
+fn routes_are_proposed_on_any_map() {
+    for map in ["boulevard", "corner", "crossroad", "residential"] {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let target = folder.path().join("mine");
+        let file = format!("scenarios/roads/{map}.xodr");
+        let (status, _, stderr) = outcome(avastra(&["new", "--map", &file]).arg(&target));
+        assert_eq!(status, 0, "{map}: {stderr}");
+        let (status, stdout, stderr) = outcome(avastra(&["check"]).arg(target.join("space.ava")));
+        assert_eq!(status, 0, "{map}: {stdout}{stderr}");
+        let roads = std::fs::read_to_string(target.join("roads.ava")).expect("it was written");
+        assert_eq!(format(FileId(0), &roads).expect("it parses"), roads, "{map}");
+        expect_snapshot("proposals", map, &roads);
     }
 }
 

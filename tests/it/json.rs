@@ -131,6 +131,7 @@ fn results_of_drives_are_as_explain_describes_them() {
     is_as_described(&["render", one, "--at", "1", "-o", &at("moment.svg")]);
     is_as_described(&["report", one, "-o", &at("crash.html")]);
     is_as_described(&["export", "--to", "csv", one]);
+    is_as_described(&["import", "--out", &at("imported"), "tests/cases/imports/cut_in.xosc"]);
     is_as_described(&["shrink", one]);
     is_as_described(&["diagnose", one]);
 }

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use crate::cases::root;
 
 /// From left to right, as in `src/lib.rs` and ARCHITECTURE.md.
-const ORDER: [&str; 25] = [
+const ORDER: [&str; 26] = [
     "units",
     "rng",
     "statistics",
@@ -29,6 +29,7 @@ const ORDER: [&str; 25] = [
     "study",
     "emit",
     "export",
+    "import",
     "report",
     "cli",
 ];

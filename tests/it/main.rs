@@ -19,6 +19,7 @@ mod failures;
 mod faults;
 mod help;
 mod hostile;
+mod imports;
 mod json;
 mod language;
 mod layers;

@@ -138,6 +138,9 @@ pub struct NewArguments {
     /// Write an example instead, with the files that it uses.
     #[arg(long, value_name = "NAME", value_parser = crate::cli::new::template_names())]
     pub template: Option<String>,
+    /// Take an OpenDRIVE map of your own: routes through its junctions are proposed, and the space drives them.
+    #[arg(long, value_name = "FILE", conflicts_with = "template")]
+    pub map: Option<PathBuf>,
     /// Made if need be; no file in it is replaced.
     pub directory: PathBuf,
 }

@@ -23,8 +23,8 @@ pub use learn::{
 };
 pub use scenarios::{
     DiagnoseArguments, ExportArguments, ExportEgo, ExportFormat, ExportVersion, FilesArguments,
-    PackArguments, RenderArguments, ReplayArguments, ReportArguments, RoadArguments, ShrinkArguments,
-    TestArguments, VerifyArguments,
+    ImportArguments, PackArguments, RenderArguments, ReplayArguments, ReportArguments, RoadArguments,
+    ShrinkArguments, TestArguments, VerifyArguments,
 };
 
 /// Finds out which of the things that may happen around a self-driving car make it crash.
@@ -131,6 +131,8 @@ pub enum Command {
     Test(TestArguments),
     /// Write emitted scenarios as files of other tools: OpenSCENARIO, CommonRoad, tables.
     Export(ExportArguments),
+    /// Make scenarios of OpenSCENARIO files of others: what can be said in the language, else why not.
+    Import(ImportArguments),
     /// Write one page of HTML to look at: of a run, a training, a study or scenarios, with replays.
     Report(ReportArguments),
     /// Draw moments of an emitted scenario as SVG.

@@ -113,6 +113,22 @@ pub struct ExportArguments {
     pub many: FilesArguments,
 }
 
+#[derive(Debug, Args)]
+pub struct ImportArguments {
+    /// OpenSCENARIO XML files (`.xosc`, 1.0 to 1.3) with their maps and catalogues where they name them.
+    #[arg(required = true, value_name = "FILE")]
+    pub files: Vec<PathBuf>,
+    /// The folder to write to [default: a folder `imported` beside the files].
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// The entity that is the ego vehicle [default: the one that is called so].
+    #[arg(long, value_name = "NAME")]
+    pub ego: Option<String>,
+    /// Give a parameter that the file declares another value; may be given several times.
+    #[arg(long, value_name = "NAME=VALUE")]
+    pub set: Vec<String>,
+}
+
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum ExportFormat {
     Openscenario,

@@ -13,5 +13,5 @@ pub use elements::{
     Across, Contact, Document, MarkRule, Meaning, ObjectKind, Orientation, Outline, RoadElement, RoadLink,
     SectionElement, SignalElement,
 };
-pub use read::read;
+pub use read::{read, well_formed};
 pub use xml::wrong;

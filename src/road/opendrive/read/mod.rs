@@ -30,6 +30,15 @@ fn not_xml(text: &str, error: &roxmltree::Error) -> RoadError {
     wrong(error.pos().row, format!("this is not well-formed XML: {message}"))
 }
 
+/// The tree of an XML text, also of another format than OpenDRIVE.
+///
+/// # Errors
+/// If it is not well-formed, and in which line.
+pub fn well_formed(text: &str) -> Result<roxmltree::Document<'_>, RoadError> {
+    refuse_crowded_tags(text)?;
+    roxmltree::Document::parse(text).map_err(|error| not_xml(text, &error))
+}
+
 /// Limit on the attributes of an element; no element of OpenDRIVE has more than thirty. The XML reader compares
 /// every attribute of an element with every other.
 const ATTRIBUTES_MAX: usize = 256;
@@ -61,7 +70,7 @@ fn refuse_crowded_tags(text: &str) -> Result<(), RoadError> {
         if equals > ATTRIBUTES_MAX {
             let line = text[..begin].bytes().filter(|byte| *byte == b'\n').count() + 1;
             let message =
-                format!("an element has {equals} attributes; no map needs more than {ATTRIBUTES_MAX}");
+                format!("an element has {equals} attributes; no file needs more than {ATTRIBUTES_MAX}");
             return Err(wrong(u32::try_from(line).unwrap_or(u32::MAX), message));
         }
         at = begin + end.max(1);
@@ -77,8 +86,7 @@ pub fn read(name: &str, text: &str) -> Result<Document, RoadError> {
     if text.trim().is_empty() {
         return Err(wrong(1, "the file is empty; an OpenDRIVE map is expected"));
     }
-    refuse_crowded_tags(text)?;
-    let document = roxmltree::Document::parse(text).map_err(|error| not_xml(text, &error))?;
+    let document = well_formed(text)?;
     let lines = Lines::new(text);
     let root = Element::new(document.root_element(), &lines);
     if root.name() != "OpenDRIVE" {

@@ -1,0 +1,145 @@
+//! Triggers as conditions of the language, asked while a vehicle waits for its lane change.
+
+use super::ground::Ground;
+use super::scene::Placed;
+use super::source::{Mark, Source};
+use super::story::{Condition, Pair, Trigger, When};
+
+/// Where something is and how it moves along the way, as long as it keeps its speed.
+pub struct Kinematics {
+    pub station_m: f64,
+    pub mps: f64,
+}
+
+/// Whether a group of conditions holds from the beginning.
+pub fn is_always(all: &[Condition]) -> bool {
+    all.iter().all(|condition| matches!(condition.kind, When::Always))
+}
+
+/// A trigger for an action of `actor`, in the language; `elapsed >= 0 s` if it holds from the beginning.
+pub fn text(
+    source: &mut Source,
+    ground: &Ground,
+    trigger: &Trigger,
+    actor: &Placed,
+    placed: &[Placed],
+) -> Option<String> {
+    if trigger.is_empty() || trigger.iter().any(|all| is_always(all)) {
+        return Some("elapsed >= 0 s".to_owned());
+    }
+    let mut groups = Vec::new();
+    for all in trigger {
+        let mut parts = Vec::new();
+        for condition in all.iter().filter(|condition| !matches!(condition.kind, When::Always)) {
+            parts.push(part(source, ground, condition, actor, placed)?);
+        }
+        groups.push(parts.join(" and "));
+    }
+    Some(groups.join(" or "))
+}
+
+fn part(
+    source: &mut Source,
+    ground: &Ground,
+    condition: &Condition,
+    actor: &Placed,
+    placed: &[Placed],
+) -> Option<String> {
+    let mark = &condition.mark;
+    match &condition.kind {
+        When::Always => Some("elapsed >= 0 s".to_owned()),
+        When::After(seconds) => Some(format!("elapsed >= {seconds:.2} s")),
+        When::Headway { pair, seconds } => {
+            let gap = gap(source, mark, pair, actor, placed)?;
+            let of = if pair.of == actor.name { "npc" } else { "ego" };
+            Some(format!("{gap} {} {of}.speed * {seconds:.3} s", sign(pair)))
+        }
+        When::Collides { pair, seconds } => {
+            let gap = gap(source, mark, pair, actor, placed)?;
+            Some(format!("{gap} < (ego.speed - npc.speed) * {seconds:.3} s"))
+        }
+        When::Distance { pair, metres } => {
+            let names = [pair.of.as_str(), pair.to.as_str()];
+            if names.contains(&actor.name.as_str()) && names.contains(&placed[0].name.as_str()) {
+                let gap = gap(source, mark, pair, actor, placed)?;
+                return Some(format!("{gap} {} {metres:.2} m", sign(pair)));
+            }
+            let (of, to) = (named(source, mark, &pair.of, placed)?, named(source, mark, &pair.to, placed)?);
+            meeting(source, mark, (of, to), *metres, pair)
+        }
+        When::Reaches { entity, position, within_m } => {
+            let of = named(source, mark, entity, placed)?;
+            let there = ground.beside(source, mark, position)?;
+            let station_m = there.station_m - within_m;
+            if entity == &placed[0].name {
+                return Some(format!(
+                    "ego.route_left <= {:.2} m",
+                    (ground.route.goal_m - station_m).max(0.0)
+                ));
+            }
+            let Kinematics { station_m: from_m, mps } = of.kinematics();
+            at(source, mark, (station_m - from_m) / mps)
+        }
+    }
+}
+
+fn sign(pair: &Pair) -> &'static str {
+    if pair.is_less { "<" } else { ">" }
+}
+
+/// The distance between the ego vehicle and the actor, in the language.
+fn gap(source: &mut Source, mark: &Mark, pair: &Pair, actor: &Placed, placed: &[Placed]) -> Option<String> {
+    let ego = &placed[0];
+    let names = [pair.of.as_str(), pair.to.as_str()];
+    if !(names.contains(&actor.name.as_str()) && names.contains(&ego.name.as_str())) {
+        return source.refuse_at(mark, "it must ask about the ego vehicle and the one that acts");
+    }
+    if pair.is_free_space {
+        return Some("npc.gap".to_owned());
+    }
+    // From the ego vehicle's reference point to its front, and from the back of the one ahead to its own.
+    let (front_m, _) = ego.ends_m();
+    let (_, back_m) = actor.ends_m();
+    let more_m = front_m + actor.beside.station_m - back_m;
+    Some(format!("npc.gap + {more_m:.2} m"))
+}
+
+/// When two that keep their speeds are so far from each other.
+fn meeting(
+    source: &mut Source,
+    mark: &Mark,
+    (of, to): (&Placed, &Placed),
+    metres: f64,
+    pair: &Pair,
+) -> Option<String> {
+    let (front, back) = if of.beside.station_m <= to.beside.station_m { (to, of) } else { (of, to) };
+    let gap_m = match pair.is_free_space {
+        true => front.ends_m().1 - back.ends_m().0,
+        false => front.beside.station_m - back.beside.station_m,
+    };
+    let closing_mps = back.kinematics().mps - front.kinematics().mps;
+    let seconds = (gap_m - metres) / closing_mps;
+    if closing_mps > 0.0 && pair.is_less || closing_mps < 0.0 && !pair.is_less {
+        return at(source, mark, seconds);
+    }
+    source.refuse_at(mark, "at the speeds of the beginning this never comes")
+}
+
+/// A moment that follows from speeds and distances.
+fn at(source: &mut Source, mark: &Mark, seconds: f64) -> Option<String> {
+    if !(0.0..1e4).contains(&seconds) {
+        return source.refuse_at(mark, "at the speeds of the beginning this never comes");
+    }
+    source.note(
+        "a condition between others is asked at the time at which it comes true if they keep their speeds",
+    );
+    Some(format!("elapsed >= {seconds:.2} s"))
+}
+
+fn named<'a>(source: &mut Source, mark: &Mark, name: &str, placed: &'a [Placed]) -> Option<&'a Placed> {
+    let found = placed.iter().find(|other| other.name == name);
+    if found.is_none() {
+        source.refuse_at::<()>(mark, format!("`{name}` is no vehicle with a place"));
+    }
+    found
+}

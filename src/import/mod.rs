@@ -1,0 +1,86 @@
+//! OpenSCENARIO XML of others as a scenario of the language.
+//!
+//! A documented subset (LANGUAGE.md): vehicles and pedestrians that stand or drive before, behind or beside the ego vehicle, keep
+//! their speed, and change lanes when a condition holds. The driving system under test takes the place of whatever moves the
+//! ego vehicle in the file. All that cannot be said is refused, each with its line; nothing is left out in silence: what is
+//! left to the driving system or to the engine's drivers becomes a note in the scenario.
+//!
+//! `story` reads the file, `ground` finds places on the map, `condition` turns triggers into conditions of the language, and
+//! `write` prints the scenario. No file is read here: `cli` gives texts.
+
+mod condition;
+mod expression;
+mod ground;
+mod scene;
+mod source;
+mod story;
+mod write;
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use scene::Scene;
+use source::Source;
+
+/// Gives the texts of the files that a scenario names.
+pub trait Files {
+    /// The map at a path that the scenario names.
+    ///
+    /// # Errors
+    /// Why it cannot be read.
+    fn map(&self, path: &str) -> Result<String, String>;
+
+    /// The texts of the `.xosc` files in a folder of catalogues.
+    ///
+    /// # Errors
+    /// Why they cannot be read.
+    fn catalogues(&self, folder: &str) -> Result<Vec<String>, String>;
+}
+
+/// A scenario of another tool in the language.
+#[derive(Debug)]
+pub struct Imported {
+    /// The text of the file: the space and its one scenario.
+    pub text: String,
+    /// The map as the scenario of the other tool names it; the text names the map by its file name alone.
+    pub map: String,
+    /// What drives otherwise here than the file says.
+    pub notes: BTreeSet<String>,
+}
+
+/// Something that the language cannot say, or that is no OpenSCENARIO.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, serde::Serialize)]
+pub struct Refusal {
+    pub line: u32,
+    /// The name of the XML element.
+    pub element: String,
+    pub reason: String,
+}
+
+/// The scenario of an OpenSCENARIO XML file (1.0 to 1.3). `name` is what it is to be called, `ego` the entity that is the ego
+/// vehicle, if it is not called so, and `parameters` have values in place of those that the file declares.
+///
+/// # Errors
+/// All that cannot be said, by lines.
+pub fn openscenario(
+    text: &str,
+    name: &str,
+    ego: Option<&str>,
+    parameters: &BTreeMap<String, String>,
+    files: &dyn Files,
+) -> Result<Imported, Vec<Refusal>> {
+    let document = crate::road::well_formed(text).map_err(|error| {
+        let (line, reason) = match error {
+            crate::road::RoadError::Map { line, message } => (line, message),
+            crate::road::RoadError::Route { message } => (1, message),
+        };
+        vec![Refusal { line, element: "OpenSCENARIO".to_owned(), reason }]
+    })?;
+    let mut source = Source::new(text, parameters);
+    let imported = story::read(&mut source, &document, ego, files)
+        .and_then(|story| Scene::of(&mut source, story, files))
+        .map(|scene| write::scenario(&scene, name, source.notes()));
+    match (imported, source.refusals()) {
+        (Some(imported), refusals) if refusals.is_empty() => Ok(imported),
+        (_, refusals) => Err(refusals),
+    }
+}

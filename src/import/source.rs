@@ -1,0 +1,182 @@
+//! Elements of an OpenSCENARIO file with their parameters filled in, and what is refused of them.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use roxmltree::Node;
+
+use super::Refusal;
+use super::expression;
+
+/// More refusals help nobody.
+const REFUSALS_MAX: usize = 100;
+
+/// Larger numbers are no place, speed or time of a scenario. It keeps all arithmetic finite.
+const NUMBER_MAX: f64 = 1e7;
+
+/// Where something stands in the file, to be refused later.
+#[derive(Debug, Clone)]
+pub struct Mark {
+    pub line: u32,
+    pub element: String,
+}
+
+/// The parameters that are in force, and what was found wrong and worth a note so far.
+#[derive(Debug)]
+pub struct Source {
+    /// Where each line of the text begins.
+    lines: Vec<usize>,
+    parameters: BTreeMap<String, String>,
+    /// Values that were asked for in place of those of the file, and whether a declaration has taken them.
+    asked: BTreeMap<String, (String, bool)>,
+    refused: BTreeSet<Refusal>,
+    notes: BTreeSet<String>,
+}
+
+impl Source {
+    pub fn new(text: &str, asked: &BTreeMap<String, String>) -> Source {
+        let after_breaks = text.bytes().enumerate().filter(|(_, byte)| *byte == b'\n').map(|(at, _)| at + 1);
+        Source {
+            lines: core::iter::once(0).chain(after_breaks).collect(),
+            parameters: BTreeMap::new(),
+            asked: asked.iter().map(|(name, value)| (name.clone(), (value.clone(), false))).collect(),
+            refused: BTreeSet::new(),
+            notes: BTreeSet::new(),
+        }
+    }
+
+    /// Where an element stands.
+    pub fn mark(&self, node: Node) -> Mark {
+        let line = self.lines.partition_point(|begin| *begin <= node.range().start);
+        let line = u32::try_from(line).unwrap_or(u32::MAX);
+        Mark { line, element: node.tag_name().name().to_owned() }
+    }
+
+    /// Whether anything was refused.
+    pub fn is_refused(&self) -> bool {
+        !self.refused.is_empty()
+    }
+
+    /// Refuses values for parameters that the file does not declare.
+    pub fn refuse_unknown(&mut self, root: Node) {
+        let unknown = self.asked.iter().filter(|(_, (_, is_taken))| !is_taken).map(|(name, _)| name.clone());
+        for name in unknown.collect::<Vec<_>>() {
+            self.refuse::<()>(root, format!("it declares no parameter `{name}`"));
+        }
+    }
+
+    /// All that was refused, by lines.
+    pub fn refusals(self) -> Vec<Refusal> {
+        self.refused.into_iter().collect()
+    }
+
+    pub fn notes(&self) -> BTreeSet<String> {
+        self.notes.clone()
+    }
+
+    pub fn note(&mut self, text: impl Into<String>) {
+        self.notes.insert(text.into());
+    }
+
+    /// Refuses an element. `None`, so that a reader can end with it.
+    pub fn refuse<T>(&mut self, node: Node, reason: impl Into<String>) -> Option<T> {
+        let mark = self.mark(node);
+        self.refuse_at(&mark, reason)
+    }
+
+    pub fn refuse_at<T>(&mut self, mark: &Mark, reason: impl Into<String>) -> Option<T> {
+        if self.refused.len() < REFUSALS_MAX {
+            let reason = reason.into();
+            self.refused.insert(Refusal { line: mark.line, element: mark.element.clone(), reason });
+        }
+        None
+    }
+
+    /// Declares the parameters that a `ParameterDeclarations` within an element lists.
+    pub fn declare(&mut self, parent: Node) {
+        for list in parent.children().filter(|node| node.has_tag_name("ParameterDeclarations")) {
+            for declared in elements(list, "ParameterDeclaration") {
+                let Some(name) = declared.attribute("name") else {
+                    self.refuse::<()>(declared, "it has no `name`");
+                    continue;
+                };
+                let value = match self.asked.get_mut(name) {
+                    Some((value, is_taken)) => {
+                        *is_taken = true;
+                        Some(value.clone())
+                    }
+                    None => self.text(declared, "value"),
+                };
+                if let Some(value) = value {
+                    self.parameters.insert(name.to_owned(), value);
+                }
+            }
+        }
+    }
+
+    /// An attribute that must be there.
+    pub fn text(&mut self, node: Node, name: &str) -> Option<String> {
+        match node.attribute(name) {
+            Some(value) => self.filled(node, value),
+            None => self.refuse(node, format!("it has no `{name}`")),
+        }
+    }
+
+    /// A finite number that must be there.
+    pub fn number(&mut self, node: Node, name: &str) -> Option<f64> {
+        let text = self.text(node, name)?;
+        match text.trim().parse::<f64>() {
+            Ok(number) if number.abs() <= NUMBER_MAX => Some(number),
+            Ok(_) => self.refuse(node, format!("`{name}` is {text}, which no scenario has")),
+            Err(_) => self.refuse(node, format!("`{name}` is `{text}`, which is no number")),
+        }
+    }
+
+    pub fn number_or(&mut self, node: Node, name: &str, default: f64) -> Option<f64> {
+        if node.has_attribute(name) { self.number(node, name) } else { Some(default) }
+    }
+
+    pub fn integer(&mut self, node: Node, name: &str) -> Option<i32> {
+        let text = self.text(node, name)?;
+        // A parameter may be a sum, which is printed as a number with a fraction.
+        match text.trim().parse::<f64>() {
+            Ok(number) if number.fract() == 0.0 && number.abs() < 1e6 => Some(number as i32),
+            _ => self.refuse(node, format!("`{name}` is `{text}`, which is no whole number")),
+        }
+    }
+
+    /// A value with its parameters filled in.
+    fn filled(&mut self, node: Node, value: &str) -> Option<String> {
+        filled(value, &self.parameters).map_or_else(|reason| self.refuse(node, reason), Some)
+    }
+}
+
+/// A value with its parameters: `$name` and `${$name / 3.6}`.
+///
+/// # Errors
+/// What is not understood.
+pub fn filled(value: &str, parameters: &BTreeMap<String, String>) -> Result<String, String> {
+    let value = value.trim();
+    if let Some(inner) = value.strip_prefix("${").and_then(|rest| rest.strip_suffix('}')) {
+        let number = expression::value(inner, parameters).map_err(|reason| format!("`{value}`: {reason}"))?;
+        return Ok(number.to_string());
+    }
+    let Some(name) = value.strip_prefix('$') else { return Ok(value.to_owned()) };
+    parameters.get(name).cloned().ok_or_else(|| format!("no parameter is called `{name}`"))
+}
+
+/// The children of an element with a name.
+pub fn elements<'a, 'input>(
+    node: Node<'a, 'input>,
+    name: &'static str,
+) -> impl Iterator<Item = Node<'a, 'input>> {
+    node.children().filter(move |child| child.has_tag_name(name))
+}
+
+/// All children that are elements.
+pub fn children<'a, 'input>(node: Node<'a, 'input>) -> impl Iterator<Item = Node<'a, 'input>> {
+    node.children().filter(Node::is_element)
+}
+
+pub fn element<'a, 'input>(node: Node<'a, 'input>, name: &'static str) -> Option<Node<'a, 'input>> {
+    elements(node, name).next()
+}
