@@ -159,7 +159,7 @@ fn settled(
         }
     }
     let kept: Vec<Numbered> = kept.into_iter().map(|number| (number, number)).collect();
-    database.settle(&kept).map_err(|error| Failure::file("write", &file, error))
+    database.settle(&file, &kept).map_err(|error| Failure::file("write", &file, error))
 }
 
 /// What the pilot of an estimate saw: kept, or played now. `None` if it was stopped; nothing for a method without one.

@@ -80,9 +80,10 @@ fn play_all(
     let all = directory.database.numbers().map_err(unread)?;
     let is_over = own.iter().all(|&number| all.contains(&(number as i64)));
     if is_over {
-        let settled =
-            directory.database.settle(&all.iter().map(|&number| (number, number)).collect::<Vec<_>>());
-        directory.database = settled.map_err(|error| Failure::file("write", &path.join("run.db"), error))?;
+        let file = path.join("run.db");
+        let units: Vec<_> = all.iter().map(|&number| (number, number)).collect();
+        let settled = directory.database.settle(&file, &units);
+        directory.database = settled.map_err(|error| Failure::file("write", &file, error))?;
     }
 
     let totals = directory.database.totals().map_err(unread)?;

@@ -97,7 +97,7 @@ fn play_all(
     if is_over {
         times.write(&path)?;
         let places = database.places(study.settings()).map_err(unread)?;
-        database = database.settle(&places).map_err(unwritten)?;
+        database = database.settle(&file, &places).map_err(unwritten)?;
     }
 
     let cells = times.on(database.cells().map_err(unread)?);

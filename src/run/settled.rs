@@ -60,18 +60,17 @@ pub trait Units: Sized {
         Self::layout().take(self.connection(), other, units, adjust)
     }
 
-    /// Writes the file anew with these units, in the order of their new numbers.
+    /// Writes the file, which is at `path`, anew with these units, in the order of their new numbers.
     ///
     /// # Errors
     /// If a file cannot be written.
-    fn settle(self, units: &[Numbered]) -> Result<Self, DatabaseError> {
-        let path = PathBuf::from(self.connection().path().unwrap_or_default());
+    fn settle(self, path: &Path, units: &[Numbered]) -> Result<Self, DatabaseError> {
         let query = "SELECT settings FROM begun";
         let settings: String = self.connection().query_row(query, [], |row| row.get(0))?;
         // The last connection to a file removes its journal.
         drop(self);
         let named = |ending: &str| {
-            let mut name = path.clone().into_os_string();
+            let mut name = path.as_os_str().to_owned();
             name.push(ending);
             PathBuf::from(name)
         };
@@ -82,13 +81,13 @@ pub trait Units: Sized {
             }
         }
         let mut settled = Self::open(&partial, &settings)?;
-        settled.take(&path, units, &|_| Ok(()))?;
+        settled.take(path, units, &|_| Ok(()))?;
         drop(settled);
-        std::fs::rename(&partial, &path)?;
+        std::fs::rename(&partial, path)?;
         // Where a folder cannot be synchronised, the old file may come back after a loss of power; it is whole, too.
         let folder = path.parent().unwrap_or(Path::new("."));
         let _ = std::fs::File::open(folder).and_then(|folder| folder.sync_all());
-        Ok(Self::from_connection(Connection::open(&path)?))
+        Ok(Self::from_connection(Connection::open(path)?))
     }
 }
 
@@ -106,7 +105,8 @@ impl Layout {
         units: &[Numbered],
         adjust: &dyn Fn(&Connection) -> Result<(), rusqlite::Error>,
     ) -> Result<(), DatabaseError> {
-        let other = other.canonicalize()?;
+        // Not made absolute: the folder that one works in may have a name that is no text. A name alone may look like a URI.
+        let other = Path::new(".").join(other);
         connection.execute("ATTACH DATABASE ? AS other", [other.to_string_lossy()])?;
         let taken = self.take_attached(connection, units, adjust);
         // Without a transaction under way, detaching cannot fail for a reason of its own.

@@ -116,7 +116,7 @@ fn eight_shards_of_a_run_make_the_run() {
     };
     // Another seed, another version, another world, another cut, another kind.
     let other = scratch.path().join("other");
-    done(&[&command[..6], &["6", "--shard", "2/8", "--ads-config", FLICKER, "--out", text(&other)]].concat());
+    done(&[&command[..7], &["6", "--shard", "2/8", "--ads-config", FLICKER, "--out", text(&other)]].concat());
     let told = merge(&other);
     assert!(told.contains("is no shard of the run in") && told.contains("`seed` was 5"), "{told}");
     let edited = scratch.path().join("shards/2/run.yaml");
