@@ -38,7 +38,7 @@ COMPARED = ["--event", "collision", "--traffic", "released", "--episodes", "1500
 def avastra(*arguments):
     line = [AVASTRA, *map(str, arguments), "--jobs", "1", "--format", "json"]
     ended = subprocess.run(line, cwd=ROOT, capture_output=True, text=True)
-    assert ended.returncode == 0, f"{line}: {ended.stderr}"
+    assert ended.returncode == 0, f"{line}: {ended.returncode}: {ended.stderr}{ended.stdout}"
     return json.loads(ended.stdout.splitlines()[-1])
 
 
