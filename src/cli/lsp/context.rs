@@ -1,5 +1,5 @@
 //! What could be written at a place, told from the words before it: the declaration there is unfinished and
-//! has no tree. Why the grammar is not asked instead is said in ARCHITECTURE.md, decision 34.
+//! has no tree. Why the grammar is not asked instead is said in docs/decisions.md, 34.
 
 use crate::check::{Declaration, References, Symbol};
 use crate::model::Type;
