@@ -123,7 +123,7 @@ fn eight_shards_of_a_run_make_the_run() {
     let settings = std::fs::read_to_string(&edited).expect("it is readable");
     let version = env!("CARGO_PKG_VERSION");
     for (was, is, reason) in [
-        (format!("avastra: {version}"), "avastra: 0.0.1".to_owned(), "begun by avastra 0.0.1"),
+        (format!("avastra: \"{version}\""), "avastra: 0.0.1".to_owned(), "begun by avastra 0.0.1"),
         ("engine: plane".to_owned(), "engine: sphere".to_owned(), "in world `sphere/"),
     ] {
         assert!(settings.contains(&was), "{settings}");
