@@ -28,6 +28,8 @@ const SHARE_OF_LIMIT: f64 = 0.8;
 const FAST_MPS_MAX: f64 = 30.0;
 /// Offers in one search over all rows; a row that nowhere finds a place needs 128 on each road.
 const OFFERS_MAX: usize = 5_000;
+/// Of a table with more rows beside those that are claimed to run, nothing is warned of: it would take seconds.
+const ROWS_WARNED_MAX: usize = 1_000;
 /// Rows named in one diagnostic, at most.
 const ROWS_SHOWN: usize = 5;
 
@@ -58,6 +60,9 @@ pub fn warn(loaded: &mut Loaded) {
     let Some(space) = loaded.space.clone() else { return };
     let claimed: BTreeSet<usize> = loaded.runs.claims.iter().flat_map(|claim| claim.rows.clone()).collect();
     let rows: Vec<usize> = (0..space.rows.len()).filter(|row| !claimed.contains(row)).collect();
+    if rows.len() > ROWS_WARNED_MAX {
+        return;
+    }
     let mut lost = without_place(&space, &loaded.runs, &rows);
     lost.retain(|lost| lost.is_searched);
     for (action, definition) in space.actions.iter().enumerate() {
