@@ -469,7 +469,7 @@ fn moved(source: &mut Source, action: Node, is_ego: bool) -> Option<Begun> {
         }
         "FollowTrajectoryAction" => walk(source, action).map(Begun::Walk),
         "AssignRouteAction" if is_ego => {
-            let last = action.descendants().filter(|node| node.has_tag_name("Waypoint")).next_back();
+            let last = action.descendants().rfind(|node| node.has_tag_name("Waypoint"));
             let place = last.and_then(|waypoint| element(waypoint, "Position"));
             let Some(place) = place else {
                 return source.refuse(action, "it has no waypoint with a position");

@@ -42,7 +42,7 @@ fn every_file_becomes_a_scenario_or_is_refused_with_its_lines() {
             .map(|row| row.split(',').filter_map(|cell| cell.parse().ok()).collect())
             .expect("it has a row");
         // Without `body`, which is no number, the speed's parts are the sixth and the seventh.
-        let ego_kmh = first[5].hypot(first[6]) * 3.6;
+        let ego_kmh = libm::hypot(first[5], first[6]) * 3.6;
         let wanted_kmh = if name == "cut_in" { 36.0 } else { 30.0 };
         assert!((ego_kmh - wanted_kmh).abs() < 0.1, "{name}: the ego vehicle begins at {ego_kmh} km/h");
         // A second import finds what the first wrote.
