@@ -276,10 +276,11 @@ fn bring_together<C: Cut>(directories: &[PathBuf], partial: &Path, text: &str) -
 
 /// Gives the merged directory its name, unless it stands there already, to the byte.
 fn publish<C: Cut>(out: &Path, partial: &Path) -> Result<(), Failure> {
-    let mark = partial.join(MARK);
     if !out.exists() || std::fs::read_dir(out).is_ok_and(|mut entries| entries.next().is_none()) {
-        std::fs::remove_file(&mark).map_err(|error| Failure::file("remove", &mark, error))?;
-        return std::fs::rename(partial, out).map_err(|error| Failure::file("write", out, error));
+        // In this order: a kill in between leaves a whole directory, and not a partial one that nobody would take up.
+        std::fs::rename(partial, out).map_err(|error| Failure::file("write", out, error))?;
+        let mark = out.join(MARK);
+        return std::fs::remove_file(&mark).map_err(|error| Failure::file("remove", &mark, error));
     }
     // In JSON, a command prints at its end, which this has not.
     C::conclude(&Output::of(Format::Json), partial)?;

@@ -24,6 +24,14 @@ pub fn results(output: &Output, arguments: &ResultsArguments) -> Result<(), Fail
         let chapter = chapter_of(&mut chapters, directory, &played)?;
         let played = as_from_file(played, chapter);
         let path = kept(&arguments.studies, &chapter.name);
+        if let Some(kept) = chapter.played.as_ref().filter(|kept| kept.cells.len() > played.cells.len()) {
+            let (more, less) = (kept.cells.len(), plural(played.cells.len(), "cell"));
+            let path = path.display();
+            let reason = format!(
+                "it has {less}, and `{path}` has {more}: `avastra merge` brings shards together; to keep less, remove that file"
+            );
+            return Err(Failure::file("add", directory, reason));
+        }
         write(&path, &played.to_text())?;
         output.tell(&format!(
             "{} of {} into {}",

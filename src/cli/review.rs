@@ -217,9 +217,10 @@ fn rewritten(text: &str, anew: &str, has_other_claims: bool) -> String {
     let mut result = String::with_capacity(text.len());
     let mut at = 0;
     for (range, with) in edits {
-        result.push_str(&text[at..range.start]);
+        // Two fields that go, side by side, may both claim the comma between them.
+        result.push_str(&text[at..range.start.max(at)]);
         result.push_str(&with);
-        at = range.end;
+        at = range.end.max(at);
     }
     result + &text[at..]
 }
@@ -238,16 +239,26 @@ fn field_edit(
         (Some(old), Some(new)) => {
             (text[old.clone()] != anew[new.clone()]).then(|| (old, anew[new].to_owned()))
         }
-        // It goes with its line.
-        (Some(old), None) => {
-            let from = text[..old.start].rfind('\n').unwrap_or(old.start);
-            Some((from..old.end, String::new()))
-        }
+        (Some(old), None) => Some((with_separator(text, old), String::new())),
         (None, Some(new)) => {
             let end = old.origin.last()?.span.end;
             Some((end..end, format!("\n    {}", &anew[new])))
         }
         (None, None) => None,
+    }
+}
+
+/// A field with what parts it from its neighbours: its line, if that has nothing else, or a comma.
+fn with_separator(text: &str, field: Range<usize>) -> Range<usize> {
+    let before = text[..field.start].trim_end_matches([' ', '\t']);
+    let after = text[field.end..].trim_start_matches([' ', '\t', ',']);
+    if before.ends_with('\n') && (after.is_empty() || after.starts_with('\n')) {
+        return before.len() - 1..text.len() - after.len();
+    }
+    let is_last = !text[field.end..].trim_start().starts_with(',');
+    match before.strip_suffix(',') {
+        Some(before) if is_last => before.len()..field.end,
+        _ => field.start..text.len() - after.len(),
     }
 }
 
@@ -264,4 +275,23 @@ fn scenario_of(file: &ast::File) -> Option<(&ast::Scenario, &[Doc])> {
         ItemKind::Scenario(scenario) => Some((scenario, item.docs.as_slice())),
         _ => None,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_field_goes_with_its_line_or_with_its_comma() {
+        let without = |text: &str| {
+            let start = text.find("ads").expect("it is there");
+            let mut text = text.to_owned();
+            text.replace_range(with_separator(&text, start..start + "ads: cc".len()), "");
+            text
+        };
+        assert_eq!(without("origin {\n    ads: cc,\n    seed: 1\n}"), "origin {\n    seed: 1\n}");
+        assert_eq!(without("origin { ads: cc, seed: 1 }"), "origin { seed: 1 }");
+        assert_eq!(without("origin { seed: 1, ads: cc }"), "origin { seed: 1 }");
+        assert_eq!(without("origin { a: 1, ads: cc, seed: 1 }"), "origin { a: 1, seed: 1 }");
+    }
 }

@@ -94,7 +94,14 @@ impl Scene {
                 break;
             };
             let entity = left.remove(at);
-            if entity.body.like == "Pedestrian" {
+            // The first walk of a pedestrian is what it does.
+            let is_walker = entity.body.like == "Pedestrian";
+            for walk in entity.walks.iter().skip(usize::from(is_walker)) {
+                let reason =
+                    if is_walker { "a pedestrian walks one way" } else { "a vehicle follows its lane" };
+                source.refuse_at::<()>(&walk.mark, reason);
+            }
+            if is_walker {
                 scene.on_foot(source, &story, &ground, entity);
             } else if let Some(found) = place(source, &story, &ground, entity, &placed) {
                 placed.push(found);

@@ -254,6 +254,13 @@ impl Cast {
             return;
         }
         for action in elements(private, "PrivateAction").flat_map(children) {
+            let distance = action.descendants().find(|node| node.has_tag_name("LongitudinalDistanceAction"));
+            if let Some(distance) = distance.filter(|_| !is_ego)
+                && source.text(distance, "entityRef").is_some_and(|of| !self.is_ego(&of))
+            {
+                source.refuse::<()>(distance, "only a distance to the ego vehicle is read");
+                continue;
+            }
             let begun = begun(source, action, is_ego);
             let entity = if is_ego { Some(&mut self.ego) } else { self.other(&name) };
             if let (Some(begun), Some(entity)) = (begun, entity) {
@@ -271,7 +278,16 @@ impl Cast {
             let Some(actors) = element(group, "Actors") else { continue };
             let mut names = Vec::new();
             for actor in elements(actors, "EntityRef") {
-                names.extend(source.text(actor, "entityRef"));
+                let Some(name) = source.text(actor, "entityRef") else { continue };
+                if !self.is_ego(&name) && self.other(&name).is_none() {
+                    source.refuse::<()>(actor, format!("no entity is called `{name}`"));
+                    continue;
+                }
+                names.push(name);
+            }
+            if names.is_empty() {
+                source.refuse::<()>(actors, "it names nobody who acts");
+                continue;
             }
             for manoeuvre in elements(group, "Maneuver") {
                 source.declare(manoeuvre);
@@ -733,6 +749,9 @@ fn both(a: &Trigger, b: &Trigger) -> Trigger {
 
 fn condition(source: &mut Source, node: Node) -> Option<Condition> {
     let delay_s = source.number_or(node, "delay", 0.0)?;
+    if node.attribute("conditionEdge") == Some("falling") {
+        return source.refuse(node, "only what begins to hold is read, not what ends");
+    }
     if let Some(value) = element(node, "ByValueCondition") {
         let Some(inner) = children(value).next() else { return source.refuse(value, "it is empty") };
         let kind = match inner.tag_name().name() {

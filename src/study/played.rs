@@ -3,7 +3,7 @@
 //!
 //! The text is JSON Lines: what it is, and then a cell a line, so that a study that is played on adds lines.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use crate::study::measures::{MEASURES, MeasuredCell};
 use crate::study::record::{CellRecord, Spent};
@@ -118,7 +118,13 @@ impl Played {
                 spent: Spent { wall_s: line.wall_s, cpu_s: line.cpu_s },
             })
         };
-        let cells = lines.map(cell).collect::<Result<_, String>>()?;
+        let cells = lines.map(cell).collect::<Result<Vec<_>, String>>()?;
+        let mut known = BTreeSet::new();
+        for (index, cell) in cells.iter().enumerate() {
+            if !known.insert((&cell.agent, &cell.road, cell.number)) {
+                return Err(format!("line {}: this cell is there already", index + 2));
+            }
+        }
         Ok(Played { commit: head.commit, settings: head.settings, cells })
     }
 

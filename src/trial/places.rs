@@ -93,15 +93,28 @@ struct Lost<'a> {
 }
 
 impl Lost<'_> {
-    /// Whether the row finds a place now; a refusal is noted.
-    fn finds_place(&mut self, table: &ActionTable, situation: &Situation<'_>, road: usize) -> bool {
-        match table.offer(situation, self.row.index) {
-            Offer::Legal(_) => true,
-            Offer::Refused(refusal) => {
-                count(self.refusals.entry(road).or_default(), &refused(&refusal));
-                false
+    /// Whether the row finds a place in this world; a refusal is noted.
+    fn finds_place(
+        &mut self,
+        table: &ActionTable,
+        situation: &Situation<'_>,
+        world: &World,
+        road: usize,
+    ) -> bool {
+        let reason = match table.offer(situation, self.row.index) {
+            // Each spawn was judged alone: the first of an action may stand in the way of its second.
+            Offer::Legal(draw) if draw.effects.len() > 1 => {
+                let mut world = world.clone();
+                match draw.effects.iter().try_for_each(|effect| world.apply(effect).map(drop)) {
+                    Ok(()) => return true,
+                    Err(reason) => reason,
+                }
             }
-        }
+            Offer::Legal(_) => return true,
+            Offer::Refused(refusal) => refused(&refusal),
+        };
+        count(self.refusals.entry(road).or_default(), &reason);
+        false
     }
 
     /// The most frequent reason on each road.
@@ -158,7 +171,7 @@ fn without_place<'a>(space: &'a Arc<Space>, runs: &Runs, rows: &[usize]) -> Vec<
                     }
                     let is_offered = offers_left > 0;
                     offers_left = offers_left.saturating_sub(1);
-                    !is_offered || !lost.finds_place(&table, &situation, index)
+                    !is_offered || !lost.finds_place(&table, &situation, &world, index)
                 });
                 if offers_left == 0 {
                     open.iter_mut().for_each(|lost| lost.is_searched = false);
