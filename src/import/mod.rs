@@ -2,10 +2,10 @@
 //!
 //! A documented subset (LANGUAGE.md): vehicles and pedestrians that stand or drive before, behind or beside the ego vehicle, keep
 //! their speed, and change lanes when a condition holds. The driving system under test takes the place of whatever moves the
-//! ego vehicle in the file. All that cannot be said is refused, each with its line; nothing is left out in silence: what is
-//! left to the driving system or to the engine's drivers becomes a note in the scenario.
+//! ego vehicle in the file. What cannot be said is refused, each with its line; what is left to the driving
+//! system or to the engine's drivers becomes a note in the scenario. `docs/open.md` has what is still taken without a word.
 //!
-//! `story` reads the file, `ground` finds places on the map, `condition` turns triggers into conditions of the language, and
+//! `story` reads the file, `ground` finds places on the map, `scene` decides who is where and does what, `condition` turns triggers into conditions of the language, and
 //! `write` prints the scenario. No file is read here: `cli` gives texts.
 
 mod condition;

@@ -93,7 +93,13 @@ impl Printer<'_> {
         while let Some((comment, later)) = self.comments.split_first().filter(|(next, _)| next.start < end) {
             self.comments = later;
             self.line(comment.start);
-            self.out.push_str(&self.source[comment.start..comment.end]);
+            let text = &self.source[comment.start..comment.end];
+            // On a line of its own it would read as documentation, which it was not within its line.
+            if !comment.own_line && (text.starts_with("///") || text.starts_with("//!")) {
+                self.out.extend(["//", text.trim_start_matches(['/', '!'])]);
+            } else {
+                self.out.push_str(text);
+            }
         }
     }
 
