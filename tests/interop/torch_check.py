@@ -2,7 +2,8 @@
 
 The agreement is measured against the largest weight of each layer, because single weights may be
 nearly 0; what a layer learned (last minus first) is compared too, so that no agreement comes from
-weights that hardly moved.
+weights that hardly moved. PyTorch computes in double precision, so that only our rounding shows: in single
+precision it may choose another row where two are nearly as good, and then goes another way.
 """
 
 import json
@@ -31,7 +32,7 @@ class QNetwork(nn.Module):
         return x
 
     def load(self, numbers):
-        numbers = torch.tensor(numbers, dtype=torch.float32)
+        numbers = torch.tensor(numbers, dtype=torch.float64)
         at = 0
         with torch.no_grad():
             for linear in self.linear:
@@ -43,7 +44,7 @@ class QNetwork(nn.Module):
         assert at == len(numbers)
 
 
-def column(transitions, name, dtype=torch.float32):
+def column(transitions, name, dtype=torch.float64):
     return torch.tensor([one[name] for one in transitions], dtype=dtype)
 
 
@@ -84,6 +85,7 @@ def check(case):
     return worst <= RELATIVE_MAX
 
 
+torch.set_default_dtype(torch.float64)
 def main():
     torch.set_num_threads(1)
     cases = json.load(open(sys.argv[1]))
