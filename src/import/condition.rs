@@ -3,7 +3,7 @@
 use super::ground::Ground;
 use super::scene::Placed;
 use super::source::{Mark, Source};
-use super::story::{Condition, Pair, Trigger, When};
+use super::trigger::{Condition, Pair, Trigger, When};
 
 /// Where something is and how it moves along the way, as long as it keeps its speed.
 pub struct Kinematics {

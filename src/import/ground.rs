@@ -3,8 +3,9 @@
 use crate::geometry::{Vec2, wrap_angle};
 use crate::road::{Lane, LaneIndex, LanePlace, Neighbour, RoadError, RoadMap, Route};
 
+use super::position::Position;
 use super::source::{Mark, Source};
-use super::story::{Position, Story};
+use super::story::Story;
 
 /// The ego vehicle's way is followed this far, m.
 const WAY_M_MAX: f64 = 12_000.0;

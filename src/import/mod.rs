@@ -5,15 +5,20 @@
 //! ego vehicle in the file. What cannot be said is refused, each with its line; what is left to the driving
 //! system or to the engine's drivers becomes a note in the scenario. `docs/open.md` has what is still taken without a word.
 //!
-//! `story` reads the file, `ground` finds places on the map, `scene` decides who is where and does what, `condition` turns triggers into conditions of the language, and
-//! `write` prints the scenario. No file is read here: `cli` gives texts.
+//! `story` reads the file, with `body`, `position`, `action` and `trigger` for what stands in it; `ground` finds places on the map,
+//! `scene` decides who is where and does what, `condition` turns triggers into conditions of the language, and `write` prints the
+//! scenario. No file is read here: `cli` gives texts.
 
+mod action;
+mod body;
 mod condition;
 mod expression;
 mod ground;
+mod position;
 mod scene;
 mod source;
 mod story;
+mod trigger;
 mod write;
 
 use std::collections::{BTreeMap, BTreeSet};

@@ -3,10 +3,13 @@
 use crate::emit::lane_point;
 use crate::road::RoadMap;
 
+use super::action::{Headway, Speed, Target};
+use super::body::Shape;
 use super::condition::Kinematics;
 use super::ground::{Beside, Ground};
+use super::position::Position;
 use super::source::{Mark, Source};
-use super::story::{Change, Entity, Headway, Position, Shape, Speed, Story, Target};
+use super::story::{Change, Entity, Story};
 use super::{Files, condition};
 
 /// Vehicles keep to the middle of their lanes: a file's may be this far beside it, m.

@@ -113,6 +113,15 @@ impl Source {
         }
     }
 
+    /// A child that must be there.
+    pub fn required<'a, 'input>(
+        &mut self,
+        node: Node<'a, 'input>,
+        name: &'static str,
+    ) -> Option<Node<'a, 'input>> {
+        element(node, name).or_else(|| self.refuse(node, format!("it has no `{name}`")))
+    }
+
     /// An attribute that must be there.
     pub fn text(&mut self, node: Node, name: &str) -> Option<String> {
         match node.attribute(name) {

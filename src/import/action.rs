@@ -1,0 +1,188 @@
+//! What the actions of a file ask of an entity: a place, a speed, another lane, a way.
+
+use roxmltree::Node;
+
+use super::position::{Position, position};
+use super::source::{Mark, Source, children, element, elements};
+
+/// An action as it was read.
+#[derive(Debug, Clone)]
+pub enum Begun {
+    Placed(Mark, Position),
+    Speed(Mark, Speed, bool),
+    Headway(Mark, Headway),
+    Change(Mark, Target),
+    Walk(Walk),
+    Goal(Mark, Position),
+}
+
+#[derive(Debug, Clone)]
+pub enum Speed {
+    Absolute(f64),
+    /// More than another entity's, m/s.
+    More(String, f64),
+    /// Times another entity's.
+    Times(String, f64),
+}
+
+/// The free space ahead of the ego vehicle.
+#[derive(Debug, Clone)]
+pub enum Headway {
+    Way(f64),
+    /// At the ego vehicle's speed, s.
+    Time(f64),
+}
+
+#[derive(Debug, Clone)]
+pub enum Target {
+    Lane(i32),
+    /// So many lanes to the left of an entity's.
+    Beside(String, i32),
+}
+
+#[derive(Debug, Clone)]
+pub struct Walk {
+    pub mark: Mark,
+    pub begin: Position,
+    pub end: Position,
+    /// From the first vertex to the last, if they have times.
+    pub duration_s: Option<f64>,
+}
+
+/// What an action within a `PrivateAction` begins; `None` if nothing that matters, or it is refused.
+pub fn begun(source: &mut Source, action: Node, is_ego: bool) -> Option<Begun> {
+    let mark = source.mark(action);
+    match action.tag_name().name() {
+        "TeleportAction" => {
+            let place = source.required(action, "Position")?;
+            Some(Begun::Placed(mark, position(source, place)?))
+        }
+        "LongitudinalAction" | "LateralAction" | "RoutingAction" => {
+            let inner = children(action).next()?;
+            moved(source, inner, is_ego)
+        }
+        "ControllerAction" | "ActivateControllerAction" | "AssignControllerAction" => {
+            if !is_ego && drives(action) {
+                return source.refuse(
+                    action,
+                    "a controller of the player's drives it, of which the file says no more",
+                );
+            }
+            None
+        }
+        "VisibilityAction" => {
+            if ["graphics", "sensors", "traffic"]
+                .into_iter()
+                .any(|name| action.attribute(name) == Some("false"))
+            {
+                return source.refuse(action, "all road users can be seen");
+            }
+            None
+        }
+        "AppearanceAction" => {
+            source.note("lights and animations of vehicles are not taken over");
+            None
+        }
+        _ => source.refuse(action, "this action is not read"),
+    }
+}
+
+/// Whether a controller takes over one of the two motions.
+fn drives(action: Node) -> bool {
+    action.descendants().filter(|node| node.has_tag_name("ActivateControllerAction")).any(|activated| {
+        ["longitudinal", "lateral"].into_iter().any(|name| activated.attribute(name) != Some("false"))
+    })
+}
+
+fn moved(source: &mut Source, action: Node, is_ego: bool) -> Option<Begun> {
+    let mark = source.mark(action);
+    match action.tag_name().name() {
+        "SpeedAction" => {
+            let dynamics = source.required(action, "SpeedActionDynamics")?;
+            let is_step = dynamics.attribute("dynamicsShape") == Some("step");
+            let at_once = is_step
+                || (dynamics.attribute("dynamicsDimension") == Some("time")
+                    && source.number(dynamics, "value")? == 0.0);
+            let target = source.required(action, "SpeedActionTarget")?;
+            if let Some(absolute) = element(target, "AbsoluteTargetSpeed") {
+                let mps = source.number(absolute, "value")?;
+                return Some(Begun::Speed(mark, Speed::Absolute(mps), at_once));
+            }
+            let relative = source.required(target, "RelativeTargetSpeed")?;
+            let (entity, value) = (source.text(relative, "entityRef")?, source.number(relative, "value")?);
+            if relative.attribute("continuous") == Some("true") {
+                source.note("a speed relative to another's is taken at the beginning, and kept");
+            }
+            let speed = match source.text(relative, "speedTargetValueType")?.as_str() {
+                "delta" => Speed::More(entity, value),
+                "factor" => Speed::Times(entity, value),
+                _ => return source.refuse(relative, "`speedTargetValueType` is `delta` or `factor`"),
+            };
+            Some(Begun::Speed(mark, speed, at_once))
+        }
+        "LongitudinalDistanceAction" if !is_ego => {
+            if action.attribute("continuous") == Some("true") {
+                return source.refuse(action, "a vehicle keeps its speed, not its distance");
+            }
+            if action.attribute("freespace") != Some("true") {
+                return source.refuse(action, "only `freespace=\"true\"` is read: between the bumpers");
+            }
+            let headway = match action.attribute("timeGap") {
+                Some(_) => Headway::Time(source.number(action, "timeGap")?),
+                None => Headway::Way(source.number(action, "distance")?),
+            };
+            Some(Begun::Headway(mark, headway))
+        }
+        "LaneChangeAction" => {
+            source.note(
+                "a lane change takes as long as the engine's drivers need, and waits until the lane is free",
+            );
+            let target = source.required(action, "LaneChangeTarget")?;
+            if let Some(absolute) = element(target, "AbsoluteTargetLane") {
+                return Some(Begun::Change(mark, Target::Lane(source.integer(absolute, "value")?)));
+            }
+            let relative = source.required(target, "RelativeTargetLane")?;
+            let (entity, lanes) = (source.text(relative, "entityRef")?, source.integer(relative, "value")?);
+            Some(Begun::Change(mark, Target::Beside(entity, lanes)))
+        }
+        "FollowTrajectoryAction" => walk(source, action).map(Begun::Walk),
+        "AssignRouteAction" if is_ego => {
+            let last = action.descendants().rfind(|node| node.has_tag_name("Waypoint"));
+            let place = last.and_then(|waypoint| element(waypoint, "Position"));
+            let Some(place) = place else {
+                return source.refuse(action, "it has no waypoint with a position");
+            };
+            Some(Begun::Goal(mark, position(source, place)?))
+        }
+        "AcquirePositionAction" if is_ego => {
+            let place = source.required(action, "Position")?;
+            Some(Begun::Goal(mark, position(source, place)?))
+        }
+        "LaneOffsetAction" | "LateralDistanceAction" => {
+            source.refuse(action, "vehicles keep to the middle of their lanes")
+        }
+        "LongitudinalDistanceAction" | "SpeedProfileAction" | "SynchronizeAction" => {
+            source.refuse(action, "a vehicle keeps the speed with which it appears")
+        }
+        "AssignRouteAction" | "AcquirePositionAction" => {
+            source.refuse(action, "vehicles follow their lanes, and draw their way at junctions")
+        }
+        _ => source.refuse(action, "this action is not read"),
+    }
+}
+
+fn walk(source: &mut Source, action: Node) -> Option<Walk> {
+    let mark = source.mark(action);
+    let trajectory = action.descendants().find(|node| node.has_tag_name("Polyline"));
+    let Some(polyline) = trajectory else {
+        return source.refuse(action, "a pedestrian walks straight across the road: a `Polyline` is read");
+    };
+    let vertices: Vec<Node> = elements(polyline, "Vertex").collect();
+    let (Some(first), Some(last)) = (vertices.first(), vertices.last()) else {
+        return source.refuse(polyline, "it has no vertices");
+    };
+    let (from, to) = (source.required(*first, "Position")?, source.required(*last, "Position")?);
+    let times = (source.number_or(*first, "time", 0.0)?, source.number_or(*last, "time", 0.0)?);
+    let duration_s = (times.1 > times.0).then_some(times.1 - times.0);
+    Some(Walk { mark, begin: position(source, from)?, end: position(source, to)?, duration_s })
+}

@@ -1,0 +1,109 @@
+//! The bodies of a file: what the engine has for a vehicle or a pedestrian, described in the file or in a catalogue.
+
+use std::collections::BTreeMap;
+
+use roxmltree::Node;
+
+use super::Files;
+use super::source::{Source, children, element, elements, filled};
+
+/// The body that the engine has for it, and its own size.
+#[derive(Debug, Clone)]
+pub struct Shape {
+    pub like: &'static str,
+    pub length_m: f64,
+    pub width_m: f64,
+    pub height_m: f64,
+    /// From the reference point, a vehicle's rear axle, to the middle.
+    pub middle_m: f64,
+}
+
+pub fn body(source: &mut Source, root: Node, object: Node, files: &dyn Files) -> Option<Shape> {
+    if let Some(reference) = element(object, "CatalogReference") {
+        return of_catalogue(source, root, reference, files);
+    }
+    let described = children(object).find(|node| is_described(*node));
+    let Some(described) = described else {
+        return source.refuse(object, "only vehicles and pedestrians are read");
+    };
+    shape(described).map_or_else(|reason| source.refuse(described, reason), Some)
+}
+
+fn is_described(node: Node) -> bool {
+    matches!(node.tag_name().name(), "Vehicle" | "Pedestrian" | "MiscObject")
+}
+
+fn of_catalogue(source: &mut Source, root: Node, reference: Node, files: &dyn Files) -> Option<Shape> {
+    let (catalogue, entry) = (source.text(reference, "catalogName")?, source.text(reference, "entryName")?);
+    let locations: Vec<Node> = elements(root, "CatalogLocations").flat_map(children).collect();
+    for location in locations {
+        if !matches!(location.tag_name().name(), "VehicleCatalog" | "PedestrianCatalog") {
+            continue;
+        }
+        let Some(directory) = element(location, "Directory") else { continue };
+        let path = source.text(directory, "path")?;
+        let texts = match files.catalogues(&path) {
+            Ok(texts) => texts,
+            Err(reason) => return source.refuse(directory, format!("`{path}`: {reason}")),
+        };
+        for text in &texts {
+            let Ok(document) = crate::road::well_formed(text) else { continue };
+            let is_named = |node: &Node, name: &str| node.attribute("name") == Some(name);
+            let list = document.descendants().find(|node| node.has_tag_name("Catalog"));
+            let Some(list) = list.filter(|node| is_named(node, &catalogue)) else { continue };
+            let found = children(list).find(|node| is_described(*node) && is_named(node, &entry));
+            if let Some(found) = found {
+                return shape(found).map_or_else(
+                    |reason| source.refuse(reference, format!("`{entry}` of `{catalogue}`: {reason}")),
+                    Some,
+                );
+            }
+        }
+    }
+    source.refuse(reference, format!("no vehicle or pedestrian `{entry}` in a catalogue `{catalogue}`"))
+}
+
+/// The body of a `Vehicle` or `Pedestrian`.
+fn shape(node: Node) -> Result<Shape, String> {
+    let category = |name: &str| node.attribute(name).unwrap_or("").to_owned();
+    let like = match node.tag_name().name() {
+        "Vehicle" => match category("vehicleCategory").as_str() {
+            "car" => "Sedan",
+            "van" => "SUV",
+            "truck" => "BoxTruck",
+            "bus" => "SchoolBus",
+            "motorbike" => "Motorcycle",
+            "bicycle" => "Bicycle",
+            other => return Err(format!("no vehicle of the category `{other}` is known")),
+        },
+        "Pedestrian" => match category("pedestrianCategory").as_str() {
+            "pedestrian" | "" => "Pedestrian",
+            other => return Err(format!("no pedestrian of the category `{other}` is known")),
+        },
+        _ => return Err("only vehicles and pedestrians are read".to_owned()),
+    };
+    let bounds = element(node, "BoundingBox").ok_or("it has no `BoundingBox`")?;
+    // An entry of a catalogue may have parameters of its own, with defaults.
+    let declared = elements(node, "ParameterDeclarations").flat_map(children);
+    let declared = declared.filter_map(|one| Some((one.attribute("name")?, one.attribute("value")?)));
+    let mut parameters = BTreeMap::new();
+    for (name, value) in declared {
+        if let Ok(value) = filled(value, &parameters) {
+            parameters.insert(name.to_owned(), value);
+        }
+    }
+    let number = |name: &'static str, attribute: &str| {
+        let found = element(bounds, name).and_then(|node| node.attribute(attribute));
+        let found = found.and_then(|text| filled(text, &parameters).ok());
+        let value =
+            found.and_then(|text| text.trim().parse::<f64>().ok()).filter(|value| value.abs() < 1000.0);
+        value.ok_or_else(|| format!("`{attribute}` of its `{name}` is no number"))
+    };
+    Ok(Shape {
+        like,
+        length_m: number("Dimensions", "length")?,
+        width_m: number("Dimensions", "width")?,
+        height_m: number("Dimensions", "height")?,
+        middle_m: number("Center", "x")?,
+    })
+}
