@@ -63,6 +63,7 @@ impl Features {
     }
 
     /// Number of network inputs.
+    #[allow(clippy::len_without_is_empty, reason = "every set of variables has some")]
     pub fn len(&self) -> usize {
         self.len
     }

@@ -40,6 +40,7 @@ mod trajectory;
 
 pub use branch::{Branch, Trial};
 pub use decision::{Visit, chosen_by, distilled};
+pub use features::Features;
 pub use hyperparameters::{Hyperparameters, Loss, SettingsError};
 pub use learner::{Learner, improve};
 pub use network::{Adam, Network, Shape};

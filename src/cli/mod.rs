@@ -11,6 +11,7 @@ mod diff;
 mod distill;
 mod doc;
 mod editor_files;
+pub mod embedded;
 mod error;
 mod estimate;
 mod explain;

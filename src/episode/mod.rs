@@ -1,6 +1,6 @@
 //! Episodes: the loop of choosing an action, driving for one observation period and writing the log.
 //!
-//! [`run`] plays an episode from a [`Setup`] with any choices: of an agent, or of a [`Script`].
+//! [`run`] plays an episode from a [`Setup`] with any choices: of an agent, or of a [`Script`]. A [`Play`] is one under way.
 //!
 //! Does not know which agent or which driving system it runs.
 
@@ -14,6 +14,6 @@ mod setup;
 pub use facts::{at_fault, collision_facts, side, struck};
 pub use log::{Collision, End, EpisodeLog, Held, Outcome, StepLog};
 pub use recorder::{Actor, Lights, Recorder, Sample, Sky, Touch};
-pub use run::{Choice, Moment, Snapshot, Watch, run, run_from};
+pub use run::{Choice, Moment, Play, Watch, run, run_from};
 pub use script::{Script, ScriptedAction};
 pub use setup::{Fork, Setup, scene, start};

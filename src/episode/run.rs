@@ -71,14 +71,10 @@ impl<'a> Moment<'a> {
     }
 
     /// A snapshot of this moment, for [`run_from`].
-    pub fn snapshot(&self) -> Snapshot {
-        Snapshot(self.play.clone())
+    pub fn snapshot(&self) -> Play {
+        self.play.clone()
     }
 }
-
-/// A kept moment of an episode, from which [`run_from`] can play as often as wanted.
-#[derive(Clone)]
-pub struct Snapshot(Play);
 
 /// What is to happen in a step.
 pub enum Choice {
@@ -106,34 +102,25 @@ pub fn run(setup: &Setup, choose: &mut dyn FnMut(&Moment) -> Choice, watch: &mut
 /// `last` gets the moment at which the next choice would have been due.
 pub fn run_from(
     setup: &Setup,
-    from: Option<Snapshot>,
+    from: Option<Play>,
     choose: &mut dyn FnMut(&Moment) -> Choice,
     watch: &mut Watch,
     last: &mut dyn FnMut(&Moment),
 ) -> EpisodeLog {
-    let mut play = from.map_or_else(|| Play::new(setup), |Snapshot(play)| play);
+    let mut play = from.unwrap_or_else(|| Play::new(setup));
     watch(&play.world, play.ads.as_ref(), &[]);
     let end = loop {
-        if let Some(end) = play.failed() {
-            break end;
-        }
-        play.fork(setup);
-        let observation = Observation::new(&play.world, play.ads.status());
-        let choice = choose(&play.moment(setup, &observation, &play.situation(setup)));
-        let begun = match choice {
-            Choice::Act(draw) => Begun::With(play.carry_out(draw, 0)),
-            Choice::Await(action) => Begun::Waiting(Waiting { action, held_tick: None }),
-            Choice::Pass => Begun::With(Outcome::Passed),
-            Choice::Refused { row, rule, reason } => Begun::With(Outcome::Refused { row, rule, reason }),
-            Choice::Stop => break End::Script,
+        let observation = match play.look(setup) {
+            Ok(observation) => observation,
+            Err(end) => break end,
         };
-        play.observation_period(setup, observation, begun, watch);
-        if let Some(end) = play.end(setup) {
+        let choice = play.at(setup, &observation, |moment| choose(moment));
+        if let Some(end) = play.step(setup, observation, choice, watch) {
             break end;
         }
     };
-    let observation = Observation::new(&play.world, play.ads.status());
-    last(&play.moment(setup, &observation, &play.situation(setup)));
+    let observation = play.observation();
+    play.at(setup, &observation, |moment| last(moment));
     play.into_log(setup, end)
 }
 
@@ -177,9 +164,11 @@ struct Near {
     body: Option<BodyWord>,
 }
 
-/// An episode under way.
+/// An episode under way. [`run`] is a loop over [`Play::look`] and [`Play::step`]; whoever cannot be called from a loop
+/// steps by itself. Each call takes the setup that the episode was begun with. A clone is a snapshot, from which can be played
+/// as often as wanted.
 #[derive(Clone)]
-struct Play {
+pub struct Play {
     world: World,
     ads: Box<dyn Ads>,
     sensed: Sensed,
@@ -199,7 +188,8 @@ struct Play {
 }
 
 impl Play {
-    fn new(setup: &Setup) -> Play {
+    /// An episode before its first step.
+    pub fn new(setup: &Setup) -> Play {
         let world = World::new(setup.scene.clone(), &setup.start);
         let mut ads = setup.ads.build(&setup.scene, setup.seed);
         let mut sensed = world.sensed();
@@ -223,6 +213,58 @@ impl Play {
         }
     }
 
+    /// What is seen before the next choice.
+    ///
+    /// # Errors
+    /// The end of the episode, if its driving system cannot drive any more.
+    pub fn look(&mut self, setup: &Setup) -> Result<Observation, End> {
+        if let Some(end) = self.failed() {
+            return Err(end);
+        }
+        self.fork(setup);
+        Ok(self.observation())
+    }
+
+    /// What is seen now.
+    pub fn observation(&self) -> Observation {
+        Observation::new(&self.world, self.ads.status())
+    }
+
+    /// Hands on this moment, in which a choice is due.
+    pub fn at<T>(&self, setup: &Setup, observation: &Observation, see: impl FnOnce(&Moment) -> T) -> T {
+        let situation = self.situation(setup);
+        see(&Moment { step: self.steps.len(), observation, situation: &situation, play: self, setup })
+    }
+
+    /// Does what was chosen on an observation, and drives for one observation period; the end of the episode, if it ends so.
+    pub fn step(
+        &mut self,
+        setup: &Setup,
+        observation: Observation,
+        choice: Choice,
+        watch: &mut Watch,
+    ) -> Option<End> {
+        let begun = match choice {
+            Choice::Act(draw) => Begun::With(self.carry_out(draw, 0)),
+            Choice::Await(action) => Begun::Waiting(Waiting { action, held_tick: None }),
+            Choice::Pass => Begun::With(Outcome::Passed),
+            Choice::Refused { row, rule, reason } => Begun::With(Outcome::Refused { row, rule, reason }),
+            Choice::Stop => return Some(End::Script),
+        };
+        self.observation_period(setup, observation, begun, watch);
+        self.end(setup)
+    }
+
+    /// The steps so far.
+    pub fn steps(&self) -> &[StepLog] {
+        &self.steps
+    }
+
+    /// The collisions so far.
+    pub fn collisions(&self) -> &[Collision] {
+        &self.collisions
+    }
+
     fn situation<'s>(&'s self, setup: &'s Setup) -> Situation<'s> {
         Situation {
             memory: &self.memory,
@@ -242,15 +284,6 @@ impl Play {
             self.world.reseed(fork.seed);
             self.ads.reseed(setup.ads.seed_of_errors(fork.seed));
         }
-    }
-
-    fn moment<'m>(
-        &'m self,
-        setup: &'m Setup,
-        observation: &'m Observation,
-        situation: &'m Situation<'m>,
-    ) -> Moment<'m> {
-        Moment { step: self.steps.len(), observation, situation, play: self, setup }
     }
 
     /// Carries out a whole action or nothing of it: its second spawn may find its first in the way.
@@ -440,7 +473,8 @@ impl Play {
         }
     }
 
-    fn into_log(self, setup: &Setup, end: End) -> EpisodeLog {
+    /// The log of the episode, which ended so.
+    pub fn into_log(self, setup: &Setup, end: End) -> EpisodeLog {
         EpisodeLog {
             road: setup.road.name.clone(),
             ads: setup.ads.name().to_owned(),

@@ -15,7 +15,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use crate::action::{Draw, Offer};
 use crate::agent::Agent;
 use crate::episode;
-use crate::episode::{Choice, EpisodeLog, Moment, Setup, Snapshot};
+use crate::episode::{Choice, EpisodeLog, Moment, Play, Setup};
 use crate::rng;
 use crate::rng::{Rng, Stream};
 use crate::run::{carry_out, choose, legal, offers, on_threads};
@@ -39,7 +39,7 @@ struct Step {
     chosen: Option<Considered>,
     /// The rows to try out, with the moment that they begin at.
     trials: Vec<(Considered, Draw)>,
-    moment: Option<Snapshot>,
+    moment: Option<Play>,
 }
 
 /// A row, with the probabilities that it was up to.
@@ -229,7 +229,7 @@ fn considered(
 
 /// Tries a row out in a copy of a moment: the log until nothing can happen any more that belongs to the step, and the time
 /// that it took, s.
-fn tried(estimate: &Estimate, setup: &Setup, from: Snapshot, step: usize, draw: Draw) -> (EpisodeLog, f64) {
+fn tried(estimate: &Estimate, setup: &Setup, from: Play, step: usize, draw: Draw) -> (EpisodeLog, f64) {
     let mut agent = estimate.run().agent();
     agent.begin();
     let mut first = Some(draw);

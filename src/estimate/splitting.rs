@@ -14,7 +14,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::ads::Ads;
 use crate::episode;
-use crate::episode::{EpisodeLog, Fork, Moment, Setup, Snapshot};
+use crate::episode::{EpisodeLog, Fork, Moment, Play, Setup};
 use crate::mdp::{Criticality, TTC_S_MAX};
 use crate::rng;
 use crate::rng::{Rng, Stream};
@@ -41,7 +41,7 @@ struct Path {
     /// Each level above all before it, with the tick at which it was reached.
     rises: Vec<(u32, u64)>,
     /// The moments at which actions were chosen, with their ticks.
-    moments: Vec<(u64, Rc<Snapshot>)>,
+    moments: Vec<(u64, Rc<Play>)>,
 }
 
 impl Path {
@@ -161,7 +161,7 @@ fn play(
     record: &mut PartRecord,
 ) -> Path {
     let setup = setup(estimate, part, number, forks);
-    let mut moments: Vec<(u64, Rc<Snapshot>)> = Vec::new();
+    let mut moments: Vec<(u64, Rc<Play>)> = Vec::new();
     let mut score = Score::default();
     if let Some((parent, tick)) = parent {
         // At a fork's own tick the choice is made anew.
@@ -179,7 +179,7 @@ fn play(
     };
     let log = episode::run_from(
         &setup,
-        from.map(|(_, snapshot)| Snapshot::clone(&snapshot)),
+        from.map(|(_, snapshot)| Play::clone(&snapshot)),
         &mut choices,
         &mut |world: &World, _: &dyn Ads, contacts: &[Contact]| score.note(world, contacts),
         &mut |_| {},

@@ -177,7 +177,7 @@ fn exploration(moment: &Moment) -> Rng {
 }
 
 /// The choice of an offered row.
-fn taken(row: usize, offer: Offer) -> Choice {
+pub(super) fn taken(row: usize, offer: Offer) -> Choice {
     match offer {
         Offer::Legal(draw) => Choice::Act(draw),
         Offer::Refused(refusal) => Choice::Refused { row, rule: refusal.rule, reason: refusal.reason },

@@ -3,9 +3,11 @@
 //! [`Run`] is made from [`RunSettings`] and knows how to set up, play and judge its nth episode; [`play`] does so
 //! for many, on threads. Its episodes share an [`Arena`]: space, roads, driving system, rules in force. Each comes to
 //! an [`EpisodeSummary`] (its collisions with their verdicts), which [`Database`] keeps in `run.db` and reads back
-//! as totals and as groups of like failures. [`Stage`] plays one emitted scenario again.
+//! as totals and as groups of like failures. [`Stage`] plays one emitted scenario again, and
+//! a [`Stepped`] is an episode that another program steps through.
 
 mod arena;
+mod columns;
 mod coverage;
 mod database;
 mod gauges;
@@ -19,11 +21,13 @@ mod settled;
 mod shape;
 mod shard;
 mod stage;
+mod stepped;
 mod summary;
 mod threads;
 
 pub use arena::{Arena, road_named};
 pub(crate) use arena::{carry_out, choose, legal, offers};
+pub use columns::{Column, Values, columns};
 pub use coverage::{CoverageCell, LearningPoint};
 pub use database::{Database, FailureCount, RefusalCount, Totals};
 pub(crate) use database::{LAYOUT, add_all};
@@ -46,5 +50,6 @@ pub use settled::{Numbered, Units};
 pub use shape::Shape;
 pub use shard::Shard;
 pub use stage::Stage;
+pub use stepped::{StepError, Stepped};
 pub use summary::{EpisodeSummary, Finding};
 pub use threads::on_threads;

@@ -14,7 +14,7 @@ use crate::agent::{
     Agent, Beginning, Collided, Experience, Kind, Lesson, QPolicy, Rows, Settings, Trainable, Trajectory,
 };
 use crate::episode;
-use crate::episode::{Choice, End, EpisodeLog, Moment, Outcome, Script, Setup, Snapshot};
+use crate::episode::{Choice, End, EpisodeLog, Moment, Outcome, Play, Script, Setup};
 use crate::mdp;
 use crate::mdp::{Closeness, Observation, ProcKind, StepOutcome};
 use crate::model::Space;
@@ -99,7 +99,7 @@ pub struct Training {
     agent: Box<dyn Trainable>,
     /// Moments that a search may return to, by the numbers that it gave them. A moment that is missing after a kill
     /// is played again.
-    moments: BTreeMap<usize, Snapshot>,
+    moments: BTreeMap<usize, Play>,
     /// Number of the next episode.
     next: usize,
 }
@@ -256,7 +256,7 @@ struct Played {
     /// The observation after the last step, and the rows that were legal then, shape `(rows,)`.
     last: Option<(Observation, Array1<bool>)>,
     /// Snapshots by step, for an agent that returns to moments.
-    snapshots: BTreeMap<usize, Snapshot>,
+    snapshots: BTreeMap<usize, Play>,
     closeness: Closeness,
 }
 
@@ -264,7 +264,7 @@ fn play(
     setup: &Setup,
     agent: &mut dyn Trainable,
     beginning: Beginning,
-    moments: &BTreeMap<usize, Snapshot>,
+    moments: &BTreeMap<usize, Play>,
     settings: &TrainSettings,
 ) -> Played {
     let searches = settings.hyperparameters.hyperparameters().is_none();

@@ -1,0 +1,96 @@
+//! The tables of a run database as columns, for programs that calculate with them.
+
+use std::path::Path;
+
+use rusqlite::types::ValueRef;
+use rusqlite::{Connection, OpenFlags};
+
+use crate::run::database::LAYOUT;
+use crate::run::sealed::DatabaseError;
+
+/// A column of a table.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Column {
+    pub name: String,
+    pub values: Values,
+}
+
+/// The values of a column, one for each row.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Values {
+    /// What is missing is NaN.
+    Real(Vec<f64>),
+    /// What is missing is -1; no column has negative numbers.
+    Integer(Vec<i64>),
+    Text(Vec<Option<String>>),
+}
+
+/// The columns of a table of `run.db` (`episode`, `step`, `collision`, `learning`, …), rows by rising key. The file is read
+/// and not changed.
+///
+/// # Errors
+/// If the file cannot be read, has another layout, or has no such table.
+pub fn columns(path: &Path, table: &str) -> Result<Vec<Column>, DatabaseError> {
+    let connection = Connection::open_with_flags(path, OpenFlags::SQLITE_OPEN_READ_ONLY)?;
+    let found: i64 = connection.pragma_query_value(None, "user_version", |row| row.get(0))?;
+    if found != LAYOUT.version {
+        return Err(DatabaseError::Layout { found, wanted: LAYOUT.version });
+    }
+    let mut described = connection.prepare("SELECT name, type, pk FROM pragma_table_info(?) ORDER BY cid")?;
+    let described: Vec<(String, String, i64)> = described
+        .query_map([table], |row| Ok((row.get(0)?, row.get(1)?, row.get(2)?)))?
+        .collect::<Result<_, _>>()?;
+    if described.is_empty() {
+        return Err(DatabaseError::Damaged { what: format!("no table `{table}`") });
+    }
+    let mut columns: Vec<Column> = described
+        .iter()
+        .map(|(name, kind, _)| Column {
+            name: name.clone(),
+            values: match kind.as_str() {
+                "REAL" => Values::Real(Vec::new()),
+                "INTEGER" => Values::Integer(Vec::new()),
+                _ => Values::Text(Vec::new()),
+            },
+        })
+        .collect();
+    let mut keys: Vec<(i64, &str)> =
+        described.iter().filter(|(_, _, key)| *key > 0).map(|(name, _, key)| (*key, name.as_str())).collect();
+    keys.sort_unstable();
+    let keys: Vec<String> = keys.into_iter().map(|(_, name)| quoted(name)).collect();
+    let mut query =
+        connection.prepare(&format!("SELECT * FROM {} ORDER BY {}", quoted(table), keys.join(", ")))?;
+    let mut rows = query.query([])?;
+    while let Some(row) = rows.next()? {
+        for (index, column) in columns.iter_mut().enumerate() {
+            column.values.push(row.get_ref(index)?)?;
+        }
+    }
+    Ok(columns)
+}
+
+fn quoted(name: &str) -> String {
+    format!("\"{}\"", name.replace('"', "\"\""))
+}
+
+impl Values {
+    fn push(&mut self, value: ValueRef) -> Result<(), DatabaseError> {
+        match (self, value) {
+            (Values::Real(values), ValueRef::Null) => values.push(f64::NAN),
+            (Values::Real(values), ValueRef::Real(value)) => values.push(value),
+            (Values::Integer(values), ValueRef::Null) => values.push(-1),
+            (Values::Integer(values), ValueRef::Integer(value)) => values.push(value),
+            (Values::Text(values), ValueRef::Null) => values.push(None),
+            (Values::Text(values), ValueRef::Text(bytes)) => {
+                values.push(Some(String::from_utf8_lossy(bytes).into_owned()));
+            }
+            // The tables are strict: SQLite lets no other type in.
+            _ => {
+                return Err(DatabaseError::Damaged {
+                    what: "a value is not of its column's type".to_owned(),
+                });
+            }
+        }
+        Ok(())
+    }
+}
