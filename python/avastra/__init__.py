@@ -1,6 +1,16 @@
-"""Put a driving system written in Python under test with avastra.
+"""Find where a driving system crashes, with avastra.
+
+Two halves. The engine compiles spaces and steps their episodes; it comes with `pip install ./python`, which needs Rust:
 
     import avastra
+
+    space = avastra.compile("scenarios/avastra45.ava")
+    episodes = avastra.Episodes(space, "crossroad")
+    observation, mask = episodes.reset(seed=1)
+    observation, reward, end, info = episodes.step(int(mask.argmax()))
+
+`avastra.gym` makes Gymnasium environments of it. The other half puts a driving system written in Python under test, and needs
+nothing but Python:
 
     class Cruise(avastra.Driver):
         answer = "acceleration"
@@ -10,8 +20,10 @@
 
     avastra.serve(Cruise)
 
-Then `avastra run SPACE --ads-cmd 'python3 cruise.py'`. PROTOCOL.md describes what is sent; nothing beyond Python is needed.
+Then `avastra run SPACE --ads-cmd 'python3 cruise.py'`. PROTOCOL.md describes what is sent.
 """
+
+from typing import TYPE_CHECKING
 
 from .driver import Driver
 from .messages import (Acceleration, Answer, Conditions, Control, Crosswalk, Ego, Event, Goal, Init, Internal, Lane,
@@ -21,8 +33,29 @@ from .path import Beside, Path, Pose, wrap
 from .serve import serve
 from .way import Way
 
+if TYPE_CHECKING:
+    from .engine import (ENGINE, EpisodeError, Episodes, Snapshot, Space, SpaceError, Variable, compile, episode_seed,
+                         read_run, step_all, variables)
+
+_ENGINE = [
+    "ENGINE", "EpisodeError", "Episodes", "Snapshot", "Space", "SpaceError", "Variable", "compile", "episode_seed",
+    "read_run", "step_all", "variables",
+]
+
 __all__ = [
     "Acceleration", "Answer", "Beside", "Conditions", "Control", "Crosswalk", "Driver", "Ego", "Event", "Goal", "Init",
     "Internal", "Lane", "Map", "Object", "Path", "Pedals", "Pose", "ProtocolError", "Reset", "Route", "RoutePoint",
     "Signal", "Start", "Step", "Trajectory", "TrajectoryPoint", "Vehicle", "Way", "serve", "wrap",
 ]
+
+
+def __getattr__(name):
+    # Loaded when it is asked for: a driving system under test works without the engine.
+    if name in _ENGINE:
+        from . import engine
+        return getattr(engine, name)
+    raise AttributeError(f"module 'avastra' has no attribute '{name}'")
+
+
+def __dir__():
+    return sorted([*globals(), *_ENGINE])

@@ -1,0 +1,196 @@
+"""The engine of avastra, built from `python/native` by maturin. Use its names from `avastra`."""
+
+import os
+from typing import Dict, List, Literal, Optional, Sequence, Tuple, TypedDict, Union
+
+import numpy as np
+from numpy.typing import NDArray
+
+_Path = Union[str, "os.PathLike[str]"]
+
+#: Version of the simulated world: episodes are alike only in the same one.
+ENGINE: str
+
+class Diagnostic(TypedDict):
+    code: str
+    severity: Literal["error", "warning", "note"]
+    message: str
+    help: Optional[str]
+    file: Optional[str]
+    #: From 1; columns count characters. `None` if the diagnostic has no place.
+    line: Optional[int]
+    column: Optional[int]
+    #: As `avastra check` prints it.
+    text: str
+
+class SpaceError(ValueError):
+    """A space cannot be used. Its text has every diagnostic as `avastra check` prints it."""
+
+    #: Empty if the file cannot be read or is no space.
+    diagnostics: List[Diagnostic]
+
+class EpisodeError(RuntimeError):
+    """An episode cannot be stepped so: it has ended or not begun, or there is no such row."""
+
+class Variable:
+    """A variable of a raw observation."""
+
+    #: In the spelling of the language.
+    name: str
+    #: Name of its column in `run.db`.
+    column: str
+    #: Empty for plain numbers, words and rad/s.
+    unit: str
+    #: Bounds that it cannot pass, if there are any.
+    low: Optional[float]
+    high: Optional[float]
+    #: The words that its values stand for; empty for a quantity.
+    words: List[Tuple[str, float]]
+
+def variables() -> List[Variable]:
+    """The variables of a raw observation, in its order: the paper's 19, then 25 of our own."""
+
+class Space:
+    """A space that was compiled: the rows of its action table, and its roads."""
+
+    def __init__(self, path: _Path) -> None: ...
+    path: os.PathLike[str]
+    #: Labels of the rows, by their numbers: `drive_ahead(lane: Left, mode: Near, then: Change)`.
+    rows: List[str]
+    roads: List[str]
+    #: Names of the space's own states.
+    states: List[str]
+    #: Observation period: how long a step drives, s.
+    step_s: float
+    #: Most steps of an episode.
+    step_limit: int
+    #: What the space means: equal for two files that mean the same.
+    digest: str
+    #: Warnings and remarks.
+    diagnostics: List[Diagnostic]
+
+class Finding(TypedDict):
+    """A collision of the ego vehicle, judged."""
+
+    step: int
+    time_s: float
+    #: Whether the space's verdict counts it.
+    counted: bool
+    #: Whether a careful driver avoids it, only one without any delay does, or none.
+    avoidability: Literal["avoidable", "beyond_reference", "unavoidable"]
+    #: Who had priority.
+    priority: Literal["ego", "other", "none"]
+    body: str
+    own_body: Optional[str]
+    verb: str
+    #: Side of the ego vehicle that was hit.
+    side: str
+    approach: str
+    ego_speed_mps: float
+    closing_speed_mps: float
+    #: Change of the ego vehicle's speed.
+    delta_v_mps: float
+
+class Ended(TypedDict):
+    """An episode that has ended, judged."""
+
+    #: `arrived`, `stalled`, `blocked`, `astray`, `limit`, or the failure of an external driving system.
+    end: str
+    duration_s: float
+    distance_m: float
+    red_runs: int
+    #: Digest of every bit of the world after every tick; equal to that of `avastra run` for the same rows.
+    trace: str
+    #: Number of counted collisions.
+    counted: int
+    findings: List[Finding]
+
+class Info(TypedDict, total=False):
+    seed: int
+    #: Rows that are legal next, shape (rows,). Not in the dicts of `step_all`, which returns them as one array.
+    action_mask: NDArray[np.bool_]
+    #: When the step began, s.
+    time_s: float
+    #: Largest collision probability of the step, in [0, 1].
+    proc: float
+    #: The row that was carried out; -1 without one.
+    row: int
+    #: Why the chosen row was not carried out; `None` if it was.
+    refused: Optional[str]
+    #: Contacts of the ego vehicle that began in the step.
+    collisions: int
+    #: Those of them that count; only with `reward="judged"`.
+    counted: int
+    #: Only after the last step.
+    ended: Ended
+
+class Episodes:
+    """Episodes of a space on one road against one driving system, one at a time.
+
+    The conditions are those of `avastra run`: `ads` is a name, `ads_config` a profile, `ambient` a number of vehicles of
+    ambient traffic, `traffic` a name or a profile, `with_rules` and `without_rules` names of rules.
+
+    `observation` is `raw` (the variables of `variables()`, SI units, shape (44,)) or `scaled` (the inputs that `avastra
+    train` gives its network, about 1 in size, categories as one-hot, shape (36,)), each of `float32`.
+
+    `reward` is `space` (the space's own, which knows that a collision happened but not whether it counts) or `judged` (that of
+    `avastra train`: Eq. 8 with 20 for a collision that counts and 0 for one that does not, at its own step). Judging plays the
+    episode again with careful drivers, so a step with a collision takes as long as a whole episode or two.
+
+    Steps run without Python's lock. Calls of two threads on the same object wait for each other.
+    """
+
+    def __init__(self, space: Space, road: str, *, ads: str = "modular", ads_config: Optional[_Path] = None,
+                 ambient: int = 0, traffic: Optional[str] = None, with_rules: Sequence[str] = (),
+                 without_rules: Sequence[str] = (), observation: Literal["raw", "scaled"] = "raw",
+                 reward: Literal["space", "judged"] = "space") -> None: ...
+    #: Length of an observation.
+    observation_len: int
+    #: Number of rows.
+    rows: int
+
+    def sibling(self) -> Episodes:
+        """Other episodes under the same conditions, which share the road."""
+
+    def reset(self, seed: int) -> Tuple[NDArray[np.float32], NDArray[np.bool_]]:
+        """Begins the episode of a seed: an observation, and which rows are legal, shape (rows,).
+
+        The seed decides everything but the rows. `episode_seed` gives those of a run.
+        """
+
+    def step(self, row: Optional[int]) -> Tuple[NDArray[np.float32], float, Optional[str], Info]:
+        """Carries a row out and drives for one observation period (`Space.step_s`): observation, reward, how the episode
+        ended (`None`: it goes on), and what else is to say.
+
+        An illegal row loses the step: nothing happens in it but driving, and `refused` says which rule forbids it. `None`
+        passes, and so does any row while none is legal. An episode goes on after a collision. Collisions are judged when
+        it ends: `info["ended"]`.
+        """
+
+    def findings(self) -> List[Finding]:
+        """The collisions of the episode so far, judged. A verdict does not change any more."""
+
+    def snapshot(self) -> Snapshot:
+        """This moment, to return to as often as wanted: the world, and what the driving system has in mind."""
+
+    def restore(self, snapshot: Snapshot) -> Tuple[NDArray[np.float32], NDArray[np.bool_]]:
+        """Returns to a moment, of this object or of a sibling: its observation, and which rows are legal."""
+
+class Snapshot:
+    """A kept moment of an episode."""
+
+def step_all(
+    worlds: Sequence[Episodes], rows: Sequence[Optional[int]], seeds: Sequence[Optional[int]], threads: int
+) -> Tuple[NDArray[np.float32], NDArray[np.bool_], NDArray[np.float64], List[Optional[str]], List[Info]]:
+    """Steps episodes with equal observations and tables, on threads of Rust without Python's lock. One whose entry in `seeds`
+    is a number begins that episode instead. The result does not depend on the number of threads.
+
+    Returns observations, shape (worlds, observation_len); legal rows, shape (worlds, rows); rewards, shape (worlds,);
+    ends and infos, one each.
+    """
+
+def episode_seed(seed: int, number: int) -> int:
+    """The seed of the nth episode of a run of a seed, from 0 and through its roads one after another."""
+
+def read_table(file: _Path, table: str) -> Dict[str, NDArray[np.generic]]:
+    """A table of `run.db`, by the names of its columns; see `avastra.read_run`."""

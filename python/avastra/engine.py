@@ -1,0 +1,43 @@
+"""The engine: spaces, episodes and what runs left behind. Its names are those of `avastra` itself."""
+
+import os
+from typing import Dict, Union
+
+try:
+    from ._native import (ENGINE, EpisodeError, Episodes, Snapshot, Space, SpaceError, Variable, episode_seed,
+                          read_table, step_all, variables)
+except ImportError as error:
+    raise ImportError("the engine of avastra is not built: `pip install ./python` in its repository does it, "
+                      "and needs Rust") from error
+
+__all__ = [
+    "ENGINE", "EpisodeError", "Episodes", "Snapshot", "Space", "SpaceError", "Variable", "compile", "episode_seed",
+    "read_run", "step_all", "variables",
+]
+
+_Path = Union[str, "os.PathLike[str]"]
+
+#: Tables of `run.db` that `read_run` reads.
+TABLES = ("episode", "step", "collision", "learning")
+
+
+def compile(path: _Path) -> Space:
+    """The space in a file, checked with all that it uses.
+
+    Raises `SpaceError` if it has mistakes; its text is what `avastra check` prints, and `diagnostics` has one dict for
+    each: `code`, `severity`, `message`, `help`, `file`, `line`, `column`, `text`.
+    """
+    return Space(path)
+
+
+def read_run(directory: _Path) -> "Dict[str, Dict[str, object]]":
+    """What a run or a training wrote: for each of the tables `episode`, `step`, `collision` and `learning` a dict of
+    NumPy arrays of equal length, by the names of the columns of `run.db`.
+
+    Rows come by rising key: `episode["episode"]`, then `step["step"]` or `collision["number"]`. Names end in the unit;
+    the state variables of `step` are those of `variables()`, by their `column`. Numbers are `float64` (NaN: none) and
+    `int64` (-1: none), `seed` is `uint64`, texts are objects (`None`: none). Each value is copied once, out of the file,
+    which is not changed. Raises `ValueError` if there is no such file, or another version of avastra wrote it.
+    """
+    file = os.path.join(os.fspath(directory), "run.db")
+    return {table: read_table(file, table) for table in TABLES}

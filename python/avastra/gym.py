@@ -1,0 +1,246 @@
+"""Gymnasium environments of spaces: a learner chooses what happens around the ego vehicle, to make its driving system crash.
+
+    import gymnasium
+    import avastra.gym
+
+    env = gymnasium.make("avastra/Space-v0", space="scenarios/avastra45.ava", road="crossroad")
+    observation, info = env.reset(seed=1)
+    observation, reward, terminated, truncated, info = env.step(env.action_space.sample(info["action_mask"].astype("int8")))
+
+Needs `gymnasium>=1.1,<2`: `pip install './python[gym]'`.
+
+- An **action** is a row of the action table. An illegal one loses its step: nothing happens in it but driving, and
+  `info["refused"]` says which rule forbids it. So learners without masks work, and learn what illegal rows are worth:
+  as much as doing nothing. `info["action_mask"]` says which rows are legal next, `action_masks()` says it to
+  sb3-contrib, and with `mask="observation"` the observation is a dict with it.
+- A **step** drives for the space's observation period. A **collision** does not end an episode. Arriving at the goal
+  terminates it; its limit of steps, standing still or a failure of an external driving system truncates it.
+- The **reward** is by default the one of `avastra train` (`judged`): a collision pays at its own step, and only if it counts.
+- A **seed** that `reset` gets is the seed of that episode: the same as any other of avastra's. Without one, it is drawn.
+  `info["seed"]` has it.
+- After the last step, `info["ended"]` is the judged episode (`avastra._native.Ended`).
+"""
+
+import os
+from typing import Any, Dict, List, Optional, Sequence, Union
+
+import gymnasium
+import numpy as np
+from gymnasium import spaces
+from gymnasium.utils import seeding
+from gymnasium.vector import AutoresetMode
+from gymnasium.vector.utils import batch_space
+
+from .engine import EpisodeError, Episodes, Space, step_all, variables
+
+__all__ = ["Env", "VectorEnv"]
+
+#: Stands for a bound that avastra does not promise: environments should be bounded, and nothing comes near it.
+FAR = 1e9
+
+
+class Env(gymnasium.Env):
+    """One episode after another on one road.
+
+    `space` is a path or a compiled `Space`, `road` the name of one of its roads (without one: the first). `observation` and
+    `reward` are as in `avastra.Episodes`, and so are the other keywords (`ads`, `ads_config`, `ambient`, `traffic`,
+    `with_rules`, `without_rules`). `mask` is `info`, or `observation` for a dict of `observation` and `action_mask`.
+    """
+
+    metadata = {"render_modes": []}
+
+    def __init__(self, space: "Union[str, os.PathLike[str], Space]", road: Optional[str] = None, *,
+                 observation: str = "scaled", reward: str = "judged", mask: str = "info", **conditions: Any) -> None:
+        compiled = _compiled(space)
+        self.episodes = _episodes(compiled, road, observation, reward, conditions)
+        self.rows = compiled.rows
+        self.render_mode = None
+        self._is_masked = _is_masked(mask)
+        self.action_space = spaces.Discrete(self.episodes.rows)
+        self.observation_space = _observation_space(self.episodes, observation, self._is_masked)
+        self._legal = np.zeros(self.episodes.rows, dtype=bool)
+
+    def reset(self, *, seed: Optional[int] = None, options: Optional[Dict[str, Any]] = None):
+        super().reset(seed=seed)
+        seed = _drawn(self.np_random) if seed is None else int(seed)
+        observation, self._legal = self.episodes.reset(seed)
+        return self._shown(observation), {"seed": seed, "action_mask": self._legal.copy()}
+
+    def step(self, action):
+        observation, reward, end, info = self.episodes.step(int(action))
+        self._legal = info["action_mask"]
+        terminated = _is_terminal(end)
+        return self._shown(observation), reward, terminated, end is not None and not terminated, info
+
+    def action_masks(self) -> np.ndarray:
+        """Which rows are legal now, shape (rows,). If none is, any row passes."""
+        return self._legal.copy()
+
+    def _shown(self, observation):
+        return _with_mask(observation, self._legal) if self._is_masked else observation
+
+
+class VectorEnv(gymnasium.vector.VectorEnv):
+    """Many episodes at once, stepped on threads of Rust without Python's lock.
+
+    As `Env`, but `road` may be several, which the worlds take in turn. World i with the seed s is `Env` with the seed s + i:
+    the same observations and rewards, whatever the number of `threads` (without one: one for each processor).
+
+    `autoreset_mode` is `NEXT_STEP` (a world that has ended begins anew in the next step, whose action is ignored),
+    `SAME_STEP` (at once; the last observation and info are `final_obs` and `final_info`) or `DISABLED` (`reset` with
+    `options={"reset_mask": ...}` begins them).
+    """
+
+    def __init__(self, num_envs: int, space: "Union[str, os.PathLike[str], Space]",
+                 road: Union[str, Sequence[str], None] = None, *, observation: str = "scaled", reward: str = "judged",
+                 mask: str = "info", threads: Optional[int] = None,
+                 autoreset_mode: Union[str, AutoresetMode] = AutoresetMode.NEXT_STEP, **conditions: Any) -> None:
+        compiled = _compiled(space)
+        roads = [road] if road is None or isinstance(road, str) else list(road)
+        if num_envs < 1 or not roads:
+            raise ValueError("a vector environment has at least one world and one road")
+        first = [_episodes(compiled, name, observation, reward, conditions) for name in roads[:num_envs]]
+        self.worlds: List[Episodes] = [first[i % len(first)].sibling() for i in range(num_envs)]
+        self.num_envs = num_envs
+        self.rows = compiled.rows
+        self.render_mode = None
+        self.threads = threads or os.cpu_count() or 1
+        self.autoreset_mode = AutoresetMode(autoreset_mode)
+        self.metadata = {"render_modes": [], "autoreset_mode": self.autoreset_mode}
+        self._is_masked = _is_masked(mask)
+        self.single_action_space = spaces.Discrete(first[0].rows)
+        self.single_observation_space = _observation_space(first[0], observation, self._is_masked)
+        self.action_space = batch_space(self.single_action_space, num_envs)
+        self.observation_space = batch_space(self.single_observation_space, num_envs)
+        self._generators: List[Optional[np.random.Generator]] = [None] * num_envs
+        self._observations = np.zeros((num_envs, first[0].observation_len), dtype=np.float32)
+        self._legal = np.zeros((num_envs, first[0].rows), dtype=bool)
+        self._has_ended = np.zeros(num_envs, dtype=bool)
+
+    def reset(self, *, seed: Union[int, Sequence[Optional[int]], None] = None,
+              options: Optional[Dict[str, Any]] = None):
+        which = np.ones(self.num_envs, dtype=bool)
+        if options and "reset_mask" in options:
+            which = np.asarray(options["reset_mask"], dtype=bool)
+            if which.shape != (self.num_envs,) or not which.any():
+                raise ValueError(f"`reset_mask` has {self.num_envs} values, at least one of them true")
+        if seed is None or isinstance(seed, (int, np.integer)):
+            seed = [None if seed is None else int(seed) + world for world in range(self.num_envs)]
+        if len(seed) != self.num_envs:
+            raise ValueError(f"{self.num_envs} worlds need as many seeds")
+        infos = self._begin(np.flatnonzero(which), seed)
+        return self._shown(), infos
+
+    def step(self, actions):
+        begin = np.flatnonzero(self._has_ended)
+        if self.autoreset_mode == AutoresetMode.DISABLED and len(begin):
+            raise EpisodeError(f"the episodes of worlds {begin.tolist()} have ended: reset them with `reset_mask`")
+        seeds = [None] * self.num_envs
+        for world in begin:
+            seeds[world] = self._next_seed(world)
+        rows = [int(action) for action in actions]
+        observations, legal, rewards, ends, found = step_all(self.worlds, rows, seeds, self.threads)
+        self._observations, self._legal = observations, legal
+        self._has_ended = np.array([end is not None for end in ends])
+        terminated = np.array([_is_terminal(end) for end in ends])
+        truncated = self._has_ended & ~terminated
+        infos: Dict[str, Any] = {}
+        for world, info in enumerate(found):
+            infos = self._add_info(infos, _with_whole_seed(info), world)
+        if self.autoreset_mode == AutoresetMode.SAME_STEP and self._has_ended.any():
+            infos = self._begin_at_once(infos, found)
+        self._add_masks(infos)
+        return self._shown(), rewards, terminated, truncated, infos
+
+    def action_masks(self) -> np.ndarray:
+        """Which rows are legal now, shape (worlds, rows). If none is, any row passes."""
+        return self._legal.copy()
+
+    def _begin(self, worlds: np.ndarray, seeds: Sequence[Optional[int]]) -> Dict[str, Any]:
+        """Begins the next episodes of some worlds. A seed also begins a world's own sequence of seeds."""
+        drawn = []
+        for world in worlds:
+            seed = seeds[world]
+            if seed is not None:
+                self._generators[world] = seeding.np_random(int(seed))[0]
+            drawn.append(self._next_seed(world) if seed is None else int(seed))
+        some = [self.worlds[world] for world in worlds]
+        observations, legal, _, _, found = step_all(some, [None] * len(some), drawn, self.threads)
+        self._observations[worlds], self._legal[worlds] = observations, legal
+        self._has_ended[worlds] = False
+        infos: Dict[str, Any] = {}
+        for world, info in zip(worlds, found):
+            infos = self._add_info(infos, _with_whole_seed(info), int(world))
+        self._add_masks(infos)
+        return infos
+
+    def _begin_at_once(self, infos: Dict[str, Any], found: List[Dict[str, Any]]) -> Dict[str, Any]:
+        last = self._shown()
+        ended = np.flatnonzero(self._has_ended)
+        for world in ended:
+            own = {key: value[world] for key, value in last.items()} if self._is_masked else last[world]
+            kept = {"final_obs": own, "final_info": {**found[world], "action_mask": self._legal[world].copy()}}
+            infos = self._add_info(infos, kept, int(world))
+        begun = self._begin(ended, [None] * self.num_envs)
+        infos["seed"][ended] = begun["seed"][ended]
+        return infos
+
+    def _add_masks(self, infos: Dict[str, Any]) -> None:
+        infos["action_mask"] = self._legal.copy()
+        infos["_action_mask"] = np.ones(self.num_envs, dtype=bool)
+
+    def _next_seed(self, world: int) -> int:
+        generator = self._generators[world]
+        if generator is None:
+            generator = self._generators[world] = seeding.np_random(None)[0]
+        return _drawn(generator)
+
+    def _shown(self):
+        return _with_mask(self._observations.copy(), self._legal) if self._is_masked else self._observations.copy()
+
+
+def _compiled(space) -> Space:
+    return space if isinstance(space, Space) else Space(space)
+
+
+def _episodes(space: Space, road: Optional[str], observation: str, reward: str, conditions: Dict[str, Any]) -> Episodes:
+    return Episodes(space, road or space.roads[0], observation=observation, reward=reward, **conditions)
+
+
+def _is_masked(mask: str) -> bool:
+    if mask not in ("info", "observation"):
+        raise ValueError(f"no mask `{mask}`: `info` or `observation`")
+    return mask == "observation"
+
+
+def _observation_space(episodes: Episodes, observation: str, is_masked: bool) -> spaces.Space:
+    low = np.full(episodes.observation_len, -FAR, dtype=np.float32)
+    high = -low
+    if observation == "raw":
+        for index, variable in enumerate(variables()):
+            low[index] = -FAR if variable.low is None else variable.low
+            high[index] = FAR if variable.high is None else variable.high
+    box = spaces.Box(low, high, dtype=np.float32)
+    if not is_masked:
+        return box
+    return spaces.Dict({"observation": box, "action_mask": spaces.Box(0, 1, (episodes.rows,), dtype=np.int8)})
+
+
+def _with_mask(observation: np.ndarray, legal: np.ndarray) -> Dict[str, np.ndarray]:
+    return {"observation": observation, "action_mask": legal.astype(np.int8)}
+
+
+def _with_whole_seed(info: Dict[str, Any]) -> Dict[str, Any]:
+    # Gymnasium gathers Python's integers as int64, which half of the seeds of a run exceed.
+    return {**info, "seed": np.uint64(info["seed"])}
+
+
+def _is_terminal(end: Optional[str]) -> bool:
+    return end == "arrived"
+
+
+def _drawn(generator: np.random.Generator) -> int:
+    return int(generator.integers(2**63))
+
+
+gymnasium.register("avastra/Space-v0", entry_point="avastra.gym:Env", vector_entry_point="avastra.gym:VectorEnv")

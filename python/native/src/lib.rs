@@ -1,0 +1,27 @@
+//! The engine of avastra as the Python module `avastra._native`; `python/avastra/_native.pyi` describes it.
+//!
+//! Nothing is decided here: spaces are read by `avastra::cli::embedded`, episodes are stepped by
+//! `avastra::run::Stepped`. Python's lock is released while an episode drives.
+
+mod diagnostics;
+mod episodes;
+mod space;
+mod tables;
+
+use pyo3::prelude::*;
+
+/// The engine of avastra.
+#[pymodule]
+fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add("ENGINE", avastra::sim::ENGINE)?;
+    module.add("SpaceError", module.py().get_type::<diagnostics::SpaceError>())?;
+    module.add("EpisodeError", module.py().get_type::<episodes::EpisodeError>())?;
+    module.add_class::<space::Space>()?;
+    module.add_class::<space::Variable>()?;
+    module.add_class::<episodes::Episodes>()?;
+    module.add_class::<episodes::Snapshot>()?;
+    module.add_function(wrap_pyfunction!(space::variables, module)?)?;
+    module.add_function(wrap_pyfunction!(episodes::step_all, module)?)?;
+    module.add_function(wrap_pyfunction!(episodes::episode_seed, module)?)?;
+    module.add_function(wrap_pyfunction!(tables::read_table, module)?)
+}

@@ -1,0 +1,114 @@
+//! A compiled space, and the variables of an observation.
+
+use std::path::PathBuf;
+
+use avastra::action::ActionTable;
+use avastra::cli::embedded::{Said, compile};
+use avastra::model::policy::{VARIABLES, VariableKind};
+use pyo3::prelude::*;
+use pyo3::types::PyList;
+
+use crate::diagnostics;
+
+/// A space that was compiled.
+#[pyclass(frozen, module = "avastra")]
+pub struct Space {
+    pub table: ActionTable,
+    path: PathBuf,
+    said: Vec<Said>,
+}
+
+#[pymethods]
+impl Space {
+    #[new]
+    fn new(py: Python<'_>, path: PathBuf) -> PyResult<Space> {
+        let compiled = py.detach(|| compile(&path)).map_err(|reason| diagnostics::error(py, reason))?;
+        Ok(Space { table: compiled.table, path, said: compiled.diagnostics })
+    }
+
+    #[getter]
+    fn path(&self) -> PathBuf {
+        self.path.clone()
+    }
+
+    #[getter]
+    fn rows(&self) -> Vec<&str> {
+        self.table.rows().iter().map(|row| row.label.as_str()).collect()
+    }
+
+    #[getter]
+    fn roads(&self) -> Vec<&str> {
+        self.table.space().roads.iter().map(|road| road.name.as_str()).collect()
+    }
+
+    #[getter]
+    fn states(&self) -> Vec<&str> {
+        self.table.space().states.iter().map(|state| state.name.as_str()).collect()
+    }
+
+    #[getter]
+    fn step_s(&self) -> f64 {
+        self.table.space().episode.step_s
+    }
+
+    #[getter]
+    fn step_limit(&self) -> u32 {
+        self.table.space().episode.step_limit
+    }
+
+    #[getter]
+    fn digest(&self) -> String {
+        self.table.space().meaning.seal()
+    }
+
+    /// Warnings and remarks.
+    #[getter]
+    fn diagnostics<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
+        diagnostics::list(py, &self.said)
+    }
+
+    // Gymnasium copies the arguments of an environment deeply; a space never changes.
+    fn __deepcopy__<'py>(slf: &Bound<'py, Self>, _memo: &Bound<'py, PyAny>) -> Bound<'py, Self> {
+        slf.clone()
+    }
+
+    fn __repr__(&self) -> String {
+        let (rows, roads) = (self.table.rows().len(), self.roads().join(", "));
+        format!("<avastra.Space {}: {rows} rows on {roads}>", self.path.display())
+    }
+}
+
+/// A variable of an observation.
+#[pyclass(frozen, get_all, module = "avastra")]
+pub struct Variable {
+    name: &'static str,
+    column: &'static str,
+    unit: &'static str,
+    low: Option<f64>,
+    high: Option<f64>,
+    words: Vec<(&'static str, f32)>,
+}
+
+#[pymethods]
+impl Variable {
+    fn __repr__(&self) -> String {
+        format!("<avastra.Variable {} [{}]>", self.name, if self.unit.is_empty() { "1" } else { self.unit })
+    }
+}
+
+/// The variables of a raw observation, in its order.
+#[pyfunction]
+pub fn variables() -> Vec<Variable> {
+    let described = VARIABLES.iter().map(|variable| {
+        let (unit, low, high, words) = match variable.kind {
+            VariableKind::Quantity { unit, low, high } => (unit, low, high, Vec::new()),
+            VariableKind::Words { words, .. } => {
+                let values = words.iter().map(|(_, value)| f64::from(*value));
+                let (low, high) = (values.clone().fold(f64::MAX, f64::min), values.fold(f64::MIN, f64::max));
+                ("", Some(low), Some(high), words.to_vec())
+            }
+        };
+        Variable { name: variable.name, column: variable.observed_as, unit, low, high, words }
+    });
+    described.collect()
+}

@@ -1,0 +1,149 @@
+"""Tests of the Gymnasium environments; `tests/interop/wheel.sh` runs them with the versions that are supported."""
+
+import unittest
+import warnings
+from pathlib import Path
+
+import gymnasium
+import numpy as np
+from gymnasium.utils.env_checker import check_env
+from gymnasium.vector import AutoresetMode
+
+import avastra
+import avastra.gym
+
+ROOT = Path(__file__).resolve().parents[3]
+SPACE = avastra.compile(ROOT / "scenarios" / "avastra45.ava")
+
+
+def made(**options):
+    return gymnasium.make("avastra/Space-v0", space=SPACE, road="crossroad", **options)
+
+
+class OneWorld(unittest.TestCase):
+    def test_gymnasium_finds_nothing_wrong(self):
+        for options in [{}, {"observation": "raw", "reward": "space"}, {"mask": "observation"}]:
+            with warnings.catch_warnings(record=True) as found:
+                warnings.simplefilter("always")
+                check_env(made(**options).unwrapped, skip_render_check=True)
+            self.assertEqual([str(one.message) for one in found], [])
+
+    def test_a_given_seed_is_the_episode_s(self):
+        env = made(observation="raw")
+        observation, info = env.reset(seed=7)
+        expected, mask = avastra.Episodes(SPACE, "crossroad").reset(7)
+        np.testing.assert_array_equal(observation, expected)
+        np.testing.assert_array_equal(info["action_mask"], mask)
+        self.assertEqual(info["seed"], 7)
+        drawn = [env.reset()[1]["seed"] for _ in range(3)]
+        env.reset(seed=7)
+        self.assertEqual(drawn, [env.reset()[1]["seed"] for _ in range(3)])
+        self.assertEqual(len(set(drawn)), 3)
+
+    def test_masks_are_in_every_form(self):
+        env = made(mask="observation")
+        observation, info = env.reset(seed=1)
+        for _ in range(4):
+            legal = info["action_mask"]
+            np.testing.assert_array_equal(observation["action_mask"].astype(bool), legal)
+            np.testing.assert_array_equal(env.unwrapped.action_masks(), legal)
+            observation, _, _, _, info = env.step(int(legal.argmax()))
+            self.assertEqual(info["row"], int(legal.argmax()))
+
+    def test_an_illegal_row_loses_the_step(self):
+        env = made()
+        _, info = env.reset(seed=1)
+        _, _, terminated, truncated, info = env.step(int((~info["action_mask"]).argmax()))
+        self.assertEqual((terminated, truncated, info["row"]), (False, False, -1))
+        self.assertIn(":", info["refused"])
+
+    def test_an_episode_ends_judged(self):
+        env = made(ads="idm")
+        env.reset(seed=avastra.episode_seed(5, 11))
+        generator, counted = np.random.default_rng(0), 0
+        while True:
+            legal = np.flatnonzero(env.unwrapped.action_masks())
+            _, reward, terminated, truncated, info = env.step(int(generator.choice(legal)))
+            counted += info["counted"]
+            self.assertEqual(reward == 20.0, info["counted"] > 0)
+            if terminated or truncated:
+                break
+        self.assertEqual(terminated, info["ended"]["end"] == "arrived")
+        self.assertEqual(info["ended"]["counted"], counted)
+
+
+class ManyWorlds(unittest.TestCase):
+    def play(self, env, steps, seed):
+        """Observations, rewards and ends of chosen rows, and the seeds of the episodes."""
+        observation, info = env.reset(seed=seed)
+        found, seeds = [observation.copy()], [info["seed"].tolist()]
+        for _ in range(steps):
+            rows = env.unwrapped.action_masks().argmax(axis=1)
+            observation, reward, terminated, truncated, info = env.step(rows)
+            self.assertIn(observation, env.observation_space)
+            found.append((observation, reward, terminated, truncated))
+            seeds.append(info["seed"].tolist())
+        return found, seeds
+
+    def test_each_world_is_an_environment(self):
+        many = avastra.gym.VectorEnv(3, SPACE, "crossroad", threads=2)
+        found, _ = self.play(many, 30, 5)
+        ends = 0
+        for world in range(3):
+            one = made()
+            observation, _ = one.reset(seed=5 + world)
+            np.testing.assert_array_equal(found[0][world], observation)
+            over = False
+            for observations, rewards, terminated, truncated in found[1:]:
+                if over:
+                    observation, _ = one.reset()
+                    reward, ended, cut = 0.0, False, False
+                    ends += 1
+                else:
+                    row = int(one.unwrapped.action_masks().argmax())
+                    observation, reward, ended, cut, _ = one.step(row)
+                np.testing.assert_array_equal(observations[world], observation)
+                self.assertEqual((rewards[world], terminated[world], truncated[world]), (reward, ended, cut))
+                over = ended or cut
+        self.assertGreater(ends, 3)
+
+    def test_modes_play_the_same_episodes(self):
+        def seeds(mode):
+            env = avastra.gym.VectorEnv(2, SPACE, ["crossroad", "corner"], autoreset_mode=mode)
+            env.reset(seed=1)
+            met, last = [[], []], 0
+            for _ in range(45):
+                _, _, terminated, truncated, info = env.step(env.action_masks().argmax(axis=1))
+                ended = terminated | truncated
+                for world in np.flatnonzero(ended):
+                    own = info["final_info"] if mode == AutoresetMode.SAME_STEP else info
+                    met[world].append(int(own["ended"]["distance_m"][world] * 1000))
+                if mode == AutoresetMode.SAME_STEP and ended.any():
+                    last += 1
+                    self.assertEqual(info["_final_obs"].tolist(), ended.tolist())
+                if mode == AutoresetMode.DISABLED and ended.any():
+                    with self.assertRaisesRegex(avastra.EpisodeError, "reset_mask"):
+                        env.step([0, 0])
+                    env.reset(options={"reset_mask": ended})
+            return [own[:2] for own in met]
+
+        modes = [AutoresetMode.NEXT_STEP, AutoresetMode.SAME_STEP, AutoresetMode.DISABLED]
+        first, second, third = (seeds(mode) for mode in modes)
+        self.assertEqual(first, second)
+        self.assertEqual(first, third)
+        self.assertEqual([len(own) for own in first], [2, 2])
+
+    def test_gymnasium_makes_it(self):
+        env = gymnasium.make_vec("avastra/Space-v0", num_envs=2, vectorization_mode="vector_entry_point",
+                                 space=SPACE, road="crossroad", mask="observation")
+        observation, info = env.reset(seed=1)
+        self.assertIn(observation, env.observation_space)
+        self.assertEqual(observation["action_mask"].shape, (2, 45))
+        self.assertEqual(info["action_mask"].shape, (2, 45))
+        self.assertEqual(env.metadata["autoreset_mode"], AutoresetMode.NEXT_STEP)
+        with self.assertRaises(ValueError):
+            env.reset(options={"reset_mask": np.zeros(2, dtype=bool)})
+
+
+if __name__ == "__main__":
+    unittest.main()

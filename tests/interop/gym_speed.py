@@ -1,0 +1,65 @@
+"""Steps per second from Python, beside highway-env in the same process: gym_speed.py.
+
+A step of avastra is 6 s of driving (300 ticks at 50 Hz: sensing, the driving system, exact contacts, the collision probability)
+and the legality of every row; one of highway-env is 1 s (20 ticks at 20 Hz), with ten vehicles. So seconds of driving per second are
+printed, too. Each is measured in turn, for some seconds of wall time, three times; the median counts.
+"""
+
+import statistics
+import time
+
+import gymnasium
+import highway_env  # noqa: F401, registers its environments
+
+import avastra
+import avastra.gym
+
+SPACE = avastra.compile("scenarios/avastra45.ava")
+SECONDS = 6.0
+ROUNDS = 3
+WORLDS = 16
+
+
+def vector(threads, **conditions):
+    """Steps per second of a vector environment, resets included; rows are drawn among the legal ones."""
+    env = avastra.gym.VectorEnv(WORLDS, SPACE, "crossroad", threads=threads, **conditions)
+    env.reset(seed=1)
+    env.action_space.seed(1)
+    spaces = [gymnasium.spaces.Discrete(len(env.rows), seed=world) for world in range(WORLDS)]
+    steps, begun = 0, time.perf_counter()
+    while time.perf_counter() - begun < SECONDS:
+        masks = env.action_masks().astype("int8")
+        env.step([int(space.sample(mask)) for space, mask in zip(spaces, masks)])
+        steps += WORLDS
+    return steps / (time.perf_counter() - begun)
+
+
+def peer():
+    config = {"vehicles_count": 10, "lanes_count": 3, "simulation_frequency": 20, "policy_frequency": 1}
+    env = gymnasium.make("highway-v0", config=config)
+    env.reset(seed=1)
+    env.action_space.seed(1)
+    steps, begun = 0, time.perf_counter()
+    while time.perf_counter() - begun < SECONDS:
+        _, _, terminated, truncated, _ = env.step(env.action_space.sample())
+        steps += 1
+        if terminated or truncated:
+            env.reset()
+    return steps / (time.perf_counter() - begun)
+
+
+CASES = [
+    ("highway-env, one thread", 1.0, peer),
+    ("avastra, modular, one thread", SPACE.step_s, lambda: vector(1)),
+    ("avastra, modular, two threads", SPACE.step_s, lambda: vector(2)),
+    ("avastra, idm, one thread", SPACE.step_s, lambda: vector(1, ads="idm")),
+    ("avastra, idm, two threads", SPACE.step_s, lambda: vector(2, ads="idm")),
+]
+
+rates = {name: [] for name, _, _ in CASES}
+for _ in range(ROUNDS):
+    for name, _, rate in CASES:
+        rates[name].append(rate())
+for name, step_s, _ in CASES:
+    rate = statistics.median(rates[name])
+    print(f"{name:32} {rate:8,.0f} steps/s {rate * step_s:10,.0f} s of driving a second")

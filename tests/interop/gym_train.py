@@ -1,0 +1,129 @@
+"""Counted collisions of learners that others wrote, beside avastra's own: gym_train.py AVASTRA TRAININGS.
+
+A study of avastra trains `ddqn` and `constant`, and plays chance, for as many episodes as come to some 20,000 steps (33 h of
+driving). The others train for 20,000 steps on the same road against the same driving system, with the reward of `avastra train`.
+All are judged in the same 60 episodes. What is printed is counted collisions in 15 episodes, as in the paper's tables.
+
+The hyperparameters of the others are their own defaults; `like ours` gives DQN what it has in common with the preset `avastra`.
+"""
+
+import sqlite3
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import torch
+from sb3_contrib import MaskablePPO
+from stable_baselines3 import DQN
+
+import avastra
+import avastra.gym
+
+SPACE = Path("scenarios/avastra45.ava").resolve()
+ADS_CONFIG = Path("scenarios/ads/faults/perception_flicker.yaml").resolve()
+ROAD = "crossroad"
+STEPS = 20_000
+#: Mean steps of an episode of this road under random rows; only to choose how many episodes avastra's own agents get.
+EPISODE_STEPS = 11.7
+EVALUATION = {"episodes": 15, "seeds": 4}
+STUDY = """
+question: How do learners that others wrote compare?
+space: {space}
+ads_config: {ads_config}
+roads: [{road}]
+agents:
+  - {{ name: ddqn, trainings: {trainings}, episodes: {episodes} }}
+  - {{ name: constant, trainings: {trainings}, episodes: {episodes} }}
+  - {{ name: random, repeats: 1 }}
+baselines: [constant, random]
+evaluation: {{ episodes: {evaluation[episodes]}, seeds: {evaluation[seeds]} }}
+"""
+LIKE_OURS = dict(learning_rate=5e-4, learning_starts=300, batch_size=64, gamma=0.3, train_freq=1, gradient_steps=1,
+                 target_update_interval=200, exploration_fraction=0.5, exploration_final_eps=0.05, buffer_size=20_000,
+                 policy_kwargs=dict(net_arch=[64, 64]))
+
+
+def study(program, trainings, folder):
+    """What a study of avastra's own agents kept: its database."""
+    file, out = Path(folder) / "study.yaml", Path(folder) / "study"
+    file.write_text(STUDY.format(space=SPACE, ads_config=ADS_CONFIG, road=ROAD, trainings=trainings,
+                                 episodes=round(STEPS / EPISODE_STEPS), evaluation=EVALUATION))
+    subprocess.run([program, "study", str(file), "--jobs", "1", "--out", str(out), "--quiet"], check=True)
+    return sqlite3.connect(out / "study.db")
+
+
+def ours(database):
+    """Name, number of the training, counted collisions in all judged episodes, and hours of training."""
+    return database.execute(
+        """SELECT agent, number, (SELECT coalesce(sum(counted), 0) FROM collision WHERE collision.cell = cell.cell),
+                  (SELECT coalesce(sum(simulated_s), 0) / 3600 FROM trained WHERE trained.cell = cell.cell)
+           FROM cell ORDER BY cell""").fetchall()
+
+
+def judged_seeds(database):
+    """The seeds of the episodes in which all are judged."""
+    rows = database.execute("SELECT seed, number FROM evaluated WHERE cell = 1 ORDER BY episode")
+    return [avastra.episode_seed(int(seed), number) for seed, number in rows]
+
+
+def made():
+    return avastra.gym.Env(SPACE, ROAD, ads_config=ADS_CONFIG)
+
+
+def judged(choose, seeds):
+    """Counted collisions in the judged episodes, and the share of steps lost to illegal rows; `choose` gets an observation and
+    a mask."""
+    env, counted, lost, steps = made(), 0, 0, 0
+    for seed in seeds:
+        observation, info = env.reset(seed=seed)
+        while "ended" not in info:
+            observation, _, _, _, info = env.step(choose(observation, info["action_mask"]))
+            lost += info["refused"] is not None
+            steps += 1
+        counted += info["ended"]["counted"]
+    return counted, lost / steps
+
+
+def others(seed, seeds):
+    """Name, counted collisions, share of lost steps, and seconds of training of each learner."""
+    for name, settings in [("DQN (stable-baselines3)", {}), ("DQN (stable-baselines3), like ours", LIKE_OURS)]:
+        begun = time.monotonic()
+        model = DQN("MlpPolicy", made(), seed=seed, device="cpu", **settings).learn(STEPS)
+        took_s = time.monotonic() - begun
+        yield name, *judged(lambda seen, mask: int(model.predict(seen, deterministic=True)[0]), seeds), took_s
+    begun = time.monotonic()
+    model = MaskablePPO("MlpPolicy", made(), seed=seed, device="cpu").learn(STEPS)
+    took_s = time.monotonic() - begun
+    for name, is_greedy in [("MaskablePPO (sb3-contrib), greedy", True), ("MaskablePPO (sb3-contrib), drawn", False)]:
+        torch.manual_seed(seed)
+
+        def choose(seen, mask):
+            return int(model.predict(seen, action_masks=mask, deterministic=is_greedy)[0])
+
+        yield name, *judged(choose, seeds), took_s
+
+
+def main(program, trainings):
+    found = {}
+    with tempfile.TemporaryDirectory() as folder:
+        database = study(program, trainings, folder)
+        seeds = judged_seeds(database)
+        for name, number, counted, hours in ours(database):
+            print(f"{name} (avastra), training {number + 1}: {counted} counted in {len(seeds)} episodes, {hours:.1f} h", flush=True)
+            found.setdefault(f"{name} (avastra)", []).append(counted)
+    for number in range(1, trainings + 1):
+        for name, counted, lost, took_s in others(number, seeds):
+            print(f"{name}, training {number}: {counted} counted in {len(seeds)} episodes, {lost:.0%} of its steps lost to "
+                  f"illegal rows; trained in {took_s:.0f} s", flush=True)
+            found.setdefault(name, []).append(counted)
+    print("\nCounted collisions in 15 episodes: mean, and each training.")
+    rates = {name: [counted * 15 / len(seeds) for counted in counts] for name, counts in found.items()}
+    for name, values in sorted(rates.items(), key=lambda item: -statistics.mean(item[1])):
+        print(f"{name:38} {statistics.mean(values):5.1f}   {' '.join(f'{value:.1f}' for value in values)}")
+
+
+if __name__ == "__main__":
+    main(sys.argv[1], int(sys.argv[2]))
