@@ -130,7 +130,8 @@ class Examples(unittest.TestCase):
             self.assertEqual(program.close(), 0)
 
     def test_the_example_of_the_page_drives(self):
-        source = (ROOT / "README.md").read_text(encoding="utf-8").split("```python\n")[1].split("```")[0]
+        blocks = (ROOT / "README.md").read_text(encoding="utf-8").split("```python\n")[1:]
+        source = next(block.split("```")[0] for block in blocks if "avastra.serve" in block)
         program = Program([sys.executable, "-c", f"import sys; sys.path.insert(0, {str(ROOT)!r})\n{source}"])
         program.ask(INIT)
         self.assertEqual(drive(program, "bend").ended(), "arrived")

@@ -1,5 +1,6 @@
 """Tests of the Gymnasium environments; `tests/interop/wheel.sh` runs them with the versions that are supported."""
 
+import os
 import unittest
 import warnings
 from pathlib import Path
@@ -18,6 +19,22 @@ SPACE = avastra.compile(ROOT / "scenarios" / "avastra45.ava")
 
 def made(**options):
     return gymnasium.make("avastra/Space-v0", space=SPACE, road="crossroad", **options)
+
+
+class Page(unittest.TestCase):
+    def test_the_examples_of_the_page_run(self):
+        blocks = (ROOT / "python/README.md").read_text(encoding="utf-8").split("```python\n")[1:]
+        sources = [block.split("```")[0] for block in blocks if "avastra.serve" not in block]
+        self.assertEqual(len(sources), 2)
+        here = os.getcwd()
+        os.chdir(ROOT)
+        try:
+            for source in sources:
+                names = {}
+                exec(source, names)
+                self.assertEqual(names["info"]["refused"], None)
+        finally:
+            os.chdir(here)
 
 
 class OneWorld(unittest.TestCase):
