@@ -4,9 +4,7 @@ use std::path::{Path, PathBuf};
 
 use crate::report;
 use crate::report::Chapter;
-use crate::run::Units;
-use crate::study::{FailedCell, Played, StudyDatabase, StudySettings};
-use crate::syntax::yaml_mistake;
+use crate::study::Played;
 
 use super::arguments::ResultsArguments;
 use super::error::Failure;
@@ -14,13 +12,13 @@ use super::files::write;
 use super::load;
 use super::output::{Output, plural};
 use super::study;
-use super::timing::Times;
 
 /// Takes played studies in, and writes what all studies of a folder found.
 pub fn results(output: &Output, arguments: &ResultsArguments) -> Result<(), Failure> {
     let mut chapters = chapters(output, &arguments.studies)?;
     for directory in &arguments.add {
-        let played = played(directory, arguments.commit.clone())?;
+        let (settings, cells) = study::read(directory)?;
+        let played = Played::new(settings, &cells, arguments.commit.clone());
         let chapter = chapter_of(&mut chapters, directory, &played)?;
         let played = as_from_file(played, chapter);
         let path = kept(&arguments.studies, &chapter.name);
@@ -86,27 +84,6 @@ fn chapter(output: &Output, folder: &Path, path: &Path) -> Result<Chapter, Failu
 /// Where a played study is kept.
 fn kept(folder: &Path, name: &str) -> PathBuf {
     folder.join(format!("{name}.jsonl"))
-}
-
-/// What a study's directory holds, finished or not.
-fn played(directory: &Path, commit: Option<String>) -> Result<Played, Failure> {
-    let (path, file) = (directory.join("study.yaml"), directory.join("study.db"));
-    if !path.is_file() || !file.is_file() {
-        let directory = directory.display();
-        return Err(Failure::usage(format!(
-            "`{directory}` is no study's directory: `avastra study FILE --out {directory}` makes one"
-        )));
-    }
-    let text = load::text(&path)?;
-    let settings: StudySettings = serde_yaml::from_str(&text)
-        .map_err(|error| Failure::file("read", &path, yaml_mistake(&error, &text)))?;
-    let read = |error| Failure::file("read", &file, error);
-    let database = StudyDatabase::open(&file, &text).map_err(read)?;
-    let cells = Times::read(directory, &database)?.on(database.cells().map_err(read)?);
-    if !FailedCell::among(&cells).is_empty() {
-        return Err(Failure::file("use", &file, "the driving system failed in it, so there are no results"));
-    }
-    Ok(Played::new(settings, &cells, commit))
 }
 
 /// The study that a directory was played for: the one that asks the same question.

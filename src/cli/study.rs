@@ -1,6 +1,6 @@
 //! `avastra study`: agents compared, with statistics.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use crate::action::ActionTable;
@@ -8,9 +8,11 @@ use crate::ads::external::Program;
 use crate::report;
 use crate::run::{RunError, TrafficRecord, Units};
 use crate::study::{
-    CellRecord, Event, FailedCell, Spent, Study, StudyDatabase, StudyError, StudyFile, StudyResults,
+    CellRecord, Event, FailedCell, Job, Spent, Study, StudyDatabase, StudyError, StudyFile, StudyResults,
     StudySettings, play_jobs,
 };
+
+use crate::syntax::{listed, yaml_mistake};
 
 use super::arguments::StudyArguments;
 use super::error::Failure;
@@ -44,18 +46,19 @@ pub fn study(output: &Output, arguments: &StudyArguments) -> Result<(), Failure>
             (study, held, text)
         }
     };
-    play_all(output, begun, arguments.jobs)
+    play_all(output, begun, &arguments.reuse, arguments.jobs)
 }
 
 /// Ends a study whose jobs were all played, in shards.
 pub fn conclude(output: &Output, path: &Path) -> Result<(), Failure> {
-    play_all(output, resumed(output, path)?, None)
+    play_all(output, resumed(output, path)?, &[], None)
 }
 
 /// Plays the jobs that a directory still lacks, and says what all of them came to.
 fn play_all(
     output: &Output,
     (study, held, settings): (Study, Held, String),
+    reuse: &[PathBuf],
     asked_jobs: Option<u32>,
 ) -> Result<(), Failure> {
     let path = held.path.clone();
@@ -70,8 +73,19 @@ fn play_all(
     let costs: Vec<u64> = all.iter().map(|job| study.episodes(job)).collect();
     let own: Vec<_> = shard.share(&costs).into_iter().map(|job| all[job].clone()).collect();
     let missing = |database: &StudyDatabase| database.missing(study.settings(), own.clone());
-    let todo = missing(&database).map_err(unread)?;
     output.tell(&heading(&study, &path));
+    let mut times = Times::read(&path, &database)?;
+    for directory in reuse {
+        let found = played_elsewhere(directory, &study, &missing(&database).map_err(unread)?)?;
+        for cells in &found {
+            times.add(cells);
+            database.add(cells).map_err(unwritten)?;
+        }
+        times.write(&path)?;
+        let count = plural(found.iter().map(Vec::len).sum(), "cell");
+        output.tell(&format!("{count} taken over from {}", directory.display()));
+    }
+    let todo = missing(&database).map_err(unread)?;
 
     let episodes = |jobs: &[_]| jobs.iter().map(|job| study.episodes(job)).sum::<u64>();
     let (episodes, left) = (episodes(&own), episodes(&todo));
@@ -80,7 +94,6 @@ fn play_all(
     let jobs = jobs(asked_jobs, probe.as_ref())?;
     drop(probe);
     let mut progress = Progress::new(output, "counted", episodes, episodes - left);
-    let mut times = Times::read(&path, &database)?;
     play_jobs(&study, &todo, jobs, &stop, &spent, &mut |event| match event {
         Event::Episode { counted } => {
             progress.episode(counted);
@@ -126,6 +139,45 @@ fn play_all(
         output.say(&shard::next_step(shard));
     }
     Ok(())
+}
+
+/// The cells of a study's directory that are those of jobs of this study.
+fn played_elsewhere(directory: &Path, study: &Study, jobs: &[Job]) -> Result<Vec<Vec<CellRecord>>, Failure> {
+    let (settings, cells) = read(directory)?;
+    let refuse = |reason: String| Failure::file("reuse", directory, reason);
+    let found = study.settings().played_elsewhere(jobs, &settings, &cells);
+    let found = found.map_err(|fields| {
+        refuse(format!(
+            "it plays otherwise: its {} {} another",
+            listed(&fields),
+            if fields.len() > 1 { "are" } else { "is" }
+        ))
+    })?;
+    match found.is_empty() && !jobs.is_empty() {
+        true => Err(refuse("it has played no agent with the same settings on the same road".to_owned())),
+        false => Ok(found),
+    }
+}
+
+/// The settings of a study's directory and its cells, finished or not.
+pub fn read(directory: &Path) -> Result<(StudySettings, Vec<CellRecord>), Failure> {
+    let (path, file) = (directory.join("study.yaml"), directory.join("study.db"));
+    if !path.is_file() || !file.is_file() {
+        let directory = directory.display();
+        return Err(Failure::usage(format!(
+            "`{directory}` is no study's directory: `avastra study FILE --out {directory}` makes one"
+        )));
+    }
+    let text = load::text(&path)?;
+    let settings: StudySettings = serde_yaml::from_str(&text)
+        .map_err(|error| Failure::file("read", &path, yaml_mistake(&error, &text)))?;
+    let unread = |error| Failure::file("read", &file, error);
+    let database = StudyDatabase::open(&file, &text).map_err(unread)?;
+    let cells = Times::read(directory, &database)?.on(database.cells().map_err(unread)?);
+    if !FailedCell::among(&cells).is_empty() {
+        return Err(Failure::file("use", &file, "the driving system failed in it, so there are no results"));
+    }
+    Ok((settings, cells))
 }
 
 /// The cells that the driving system failed in, and what to do.

@@ -163,6 +163,13 @@ impl Interval {
         !self.intersect(&Interval::point(value)).is_empty()
     }
 
+    /// Whether a whole number lies in it.
+    pub fn has_integer(&self) -> bool {
+        let End::At(low, _) = self.low else { return !self.is_empty() };
+        let next = low.floor().checked_add(Rational::ONE);
+        self.contains(low.floor()) || next.is_none_or(|next| self.contains(next))
+    }
+
     /// Whether every number of `self` is less than every number of `other`.
     pub fn is_below(&self, other: &Interval) -> bool {
         match (self.high, other.low) {
@@ -225,6 +232,19 @@ mod tests {
         let from = Interval { low: End::At(Rational::ONE, true), high: End::Unbounded };
         assert!(below.intersect(&from).is_empty() && below.is_below(&from));
         assert!(!from.intersect(&Interval::point(Rational::ONE)).is_empty());
+    }
+
+    #[test]
+    fn whole_numbers_lie_between_others_or_not() {
+        let between = |low: i32, is_low_in: bool, high: i32| Interval {
+            low: End::At(fraction(low, 2), is_low_in),
+            high: End::At(fraction(high, 2), false),
+        };
+        assert!(!between(4, false, 6).has_integer() && between(4, true, 6).has_integer());
+        assert!(!between(-5, true, -4).has_integer() && between(-5, true, -3).has_integer());
+        assert!(!Interval::point(fraction(5, 2)).has_integer() && Interval::ALL.has_integer());
+        let below = Interval { low: End::Unbounded, high: End::At(fraction(1, 2), false) };
+        assert!(below.has_integer());
     }
 
     proptest! {

@@ -283,6 +283,7 @@ fn cases(conditions: &[&Expr], known: &Known<'_>, episode: &EpisodeDef, newcomer
     for fact in numbers {
         let whole = newcomer.number(fact).unwrap_or_else(|| range(fact, known.road, episode));
         let mut pieces = pieces(&whole, cuts(fact, conditions, known));
+        pieces.retain(|piece| fact.ty() != Type::Int || piece.has_integer());
         if cases.len() * pieces.len() > CASES_MAX {
             pieces = vec![whole];
         }

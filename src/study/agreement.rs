@@ -1,11 +1,11 @@
 //! A study's figures held against published ones: whether each lies within our interval, and whether every comparison
 //! that they allow goes the same way.
 
-use crate::statistics::{Estimate, holm, mann_whitney, mean, superiority};
+use crate::statistics::{Estimate, holm, mann_whitney, superiority};
 
 use crate::study::file::PublishedTable;
 use crate::study::measures::MeasuredCell;
-use crate::study::results::{not_negative, values};
+use crate::study::results::{estimate, values};
 
 /// From this p-value on, two agents are not told apart.
 pub const P_MAX: f64 = 0.05;
@@ -59,25 +59,26 @@ impl Agreement {
     pub fn new(table: &PublishedTable, agents: &[&str], roads: &[&str], cells: &[MeasuredCell]) -> Agreement {
         let of = |agent: &str, road: &str| {
             let own = cells.iter().filter(|cell| cell.agent == agent && cell.road == road);
-            values(&table.measure, &own.collect::<Vec<_>>())
+            own.collect::<Vec<_>>()
         };
         let (mut figures, mut pairs, mut tests) = (Vec::new(), Vec::new(), Vec::new());
         for road in roads {
-            let published: Vec<(&str, f64, Vec<f64>)> = agents
+            let published: Vec<(&str, f64, Vec<&MeasuredCell>)> = agents
                 .iter()
                 .filter_map(|agent| Some((*agent, *table.figures.get(*agent)?.get(*road)?, of(agent, road))))
                 .collect();
             for (agent, published, own) in &published {
-                let Some(ours) = mean(own) else { continue };
+                let Some(ours) = estimate(&table.measure, own) else { continue };
                 let (agent, road) = ((*agent).to_owned(), (*road).to_owned());
-                figures.push(ComparedFigure { agent, road, published: *published, ours: not_negative(ours) });
+                figures.push(ComparedFigure { agent, road, published: *published, ours });
             }
             for (larger, figure, own) in &published {
                 for (smaller, other, theirs) in &published {
                     if figure <= other {
                         continue;
                     }
-                    let test = mann_whitney(own, theirs).zip(superiority(own, theirs));
+                    let (own, theirs) = (values(&table.measure, own), values(&table.measure, theirs));
+                    let test = mann_whitney(&own, &theirs).zip(superiority(&own, &theirs));
                     let Some((test, (superiority, _))) = test else { continue };
                     tests.push((test.p, superiority));
                     pairs.push(ComparedPair {

@@ -19,46 +19,54 @@ pub struct Measure {
     pub name: &'static str,
     /// Whether agents are compared by it.
     pub is_compared: bool,
+    /// Whether it is a number of events.
+    pub is_count: bool,
     pub of: Compute,
 }
 
 const fn compared(name: &'static str, of: Compute) -> Measure {
-    Measure { name, is_compared: true, of }
+    Measure { name, is_compared: true, is_count: false, of }
 }
 
 const fn shown(name: &'static str, of: Compute) -> Measure {
-    Measure { name, is_compared: false, of }
+    Measure { name, is_compared: false, is_count: false, of }
+}
+
+const fn count(measure: Measure) -> Measure {
+    Measure { is_count: true, ..measure }
 }
 
 /// Every measure. If not said otherwise, a number is a total over the episodes of one seed, averaged over the
 /// seeds.
 pub const MEASURES: &[Measure] = &[
-    compared("counted", |cell, plan| number(cell, plan, |found| found.counted)),
-    compared("collisions", |cell, plan| number(cell, plan, |_| true)),
+    count(compared("counted", |cell, plan| number(cell, plan, |found| found.counted))),
+    count(compared("collisions", |cell, plan| number(cell, plan, |_| true))),
     // Avoidable by a careful driver.
-    shown("avoidable", |cell, plan| number(cell, plan, |found| found.avoidability == "avoidable")),
+    count(shown("avoidable", |cell, plan| number(cell, plan, |found| found.avoidability == "avoidable"))),
     // Avoidable without any delay only.
-    shown("beyond_reference", |cell, plan| {
+    count(shown("beyond_reference", |cell, plan| {
         number(cell, plan, |found| found.avoidability == "beyond_reference")
-    }),
-    shown("unavoidable", |cell, plan| number(cell, plan, |found| found.avoidability == "unavoidable")),
+    })),
+    count(shown("unavoidable", |cell, plan| number(cell, plan, |found| found.avoidability == "unavoidable"))),
     // At most one pedestrian an episode, as the published package counts.
-    compared("counted_one_pedestrian", |cell, plan| per_seed(cell, plan, counted_one_pedestrian)),
+    count(compared("counted_one_pedestrian", |cell, plan| per_seed(cell, plan, counted_one_pedestrian))),
     // With an obstacle hit before.
-    shown("repeated", |cell, plan| number(cell, plan, |found| found.repeated)),
+    count(shown("repeated", |cell, plan| number(cell, plan, |found| found.repeated))),
     // Just after it appeared.
-    shown("sudden", |cell, plan| number(cell, plan, |found| found.sudden)),
+    count(shown("sudden", |cell, plan| number(cell, plan, |found| found.sudden))),
     // The other ran into the ego vehicle.
-    shown("struck", |cell, plan| number(cell, plan, |found| found.struck)),
+    count(shown("struck", |cell, plan| number(cell, plan, |found| found.struck))),
     // The ego vehicle had priority.
-    shown("wronged", |cell, plan| number(cell, plan, |found| found.priority == "ego")),
+    count(shown("wronged", |cell, plan| number(cell, plan, |found| found.priority == "ego"))),
     // The other had.
-    shown("wrong", |cell, plan| number(cell, plan, |found| found.priority == "other")),
+    count(shown("wrong", |cell, plan| number(cell, plan, |found| found.priority == "other"))),
     // Episodes with a counted collision.
-    compared("colliding", |cell, plan| per_seed(cell, plan, |episode| f64::from(episode.counted() > 0))),
-    compared("distinct", distinct),
+    count(compared("colliding", |cell, plan| {
+        per_seed(cell, plan, |episode| f64::from(episode.counted() > 0))
+    })),
+    count(compared("distinct", distinct)),
     // Distinct failures under all seeds together.
-    shown("distinct_all", |cell, _| Some(failures(&cell.episodes).len() as f64)),
+    count(shown("distinct_all", |cell, _| Some(failures(&cell.episodes).len() as f64))),
     // Time to the first counted collision, where there is one, s.
     shown("ttfc_s", |cell, _| ttfc_s(cell)),
     // Time to the first counted collision, restricted mean, s.
@@ -66,7 +74,7 @@ pub const MEASURES: &[Measure] = &[
         restricted_mean(&lifetimes(&cell.episodes, plan.horizon_s), plan.horizon_s)
     }),
     // Red lights run.
-    shown("red_runs", |cell, plan| per_seed(cell, plan, |episode| f64::from(episode.red_runs))),
+    count(shown("red_runs", |cell, plan| per_seed(cell, plan, |episode| f64::from(episode.red_runs)))),
     // Share of time above the speed limit.
     shown("speeding_share", |cell, _| time_share(cell, |episode| episode.speeding_s)),
     // Share of time beside the lane.

@@ -29,6 +29,7 @@ mod played;
 mod ready;
 mod record;
 mod results;
+mod reuse;
 mod settings;
 
 pub use agreement::{Agreement, ComparedFigure, ComparedPair, P_MAX, Verdict};

@@ -12,7 +12,7 @@ use crate::statistics::{
 };
 
 use crate::study::file::EvaluationPlan;
-use crate::study::measures::{MEASURES, MeasuredCell, failures};
+use crate::study::measures::{MEASURES, Measure, MeasuredCell, failures};
 use crate::study::record::{CellRecord, EpisodeRecord, FailureClass};
 use crate::study::settings::StudySettings;
 
@@ -229,11 +229,11 @@ pub fn measured_roads(settings: &StudySettings, cells: &[MeasuredCell]) -> Vec<M
 }
 
 fn measured_agent(label: &str, cells: &[&MeasuredCell]) -> MeasuredAgent {
-    let estimate = |measure| Some((measure, not_negative(mean(&values(measure, cells))?)));
+    let named = |measure: &Measure| Some((measure.name, estimate(measure.name, cells)?));
     MeasuredAgent {
         agent: label.to_owned(),
         cells: cells.len(),
-        measures: MEASURES.iter().filter_map(|measure| estimate(measure.name)).collect(),
+        measures: MEASURES.iter().filter_map(named).collect(),
     }
 }
 
@@ -265,10 +265,21 @@ fn agent_results(measured: MeasuredAgent, cells: &[&CellRecord]) -> AgentResults
     }
 }
 
-/// No measure is below 0, so its interval is cut off there.
-pub(super) fn not_negative(estimate: Estimate) -> Estimate {
-    let interval = estimate.interval.map(|interval| Interval { low: interval.low.max(0.0), ..interval });
-    Estimate { interval, ..estimate }
+/// A measure's mean over cells. None is below 0, so its interval is cut off there. Cells that are all 0 have no spread
+/// for Student's interval; what they count is then bounded as Poisson's events are. That bound takes a cell for one
+/// observation, though it is the mean of several seeds: it is too wide rather than too short.
+pub(super) fn estimate(measure: &str, cells: &[&MeasuredCell]) -> Option<Estimate> {
+    let found = mean(&values(measure, cells))?;
+    let is_count = MEASURES.iter().any(|one| one.name == measure && one.is_count);
+    let interval = match found.interval {
+        Some(interval) => Some(Interval { low: interval.low.max(0.0), ..interval }),
+        None if is_count && found.mean == 0.0 => {
+            let Interval { low, high } = poisson(0);
+            Some(Interval { low, high: high.map(|high| high / found.values.len() as f64) })
+        }
+        None => None,
+    };
+    Some(Estimate { interval, ..found })
 }
 
 pub(super) fn values(measure: &str, cells: &[&MeasuredCell]) -> Vec<f64> {

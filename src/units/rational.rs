@@ -156,6 +156,11 @@ impl Rational {
     pub fn signum(self) -> i32 {
         self.numerator.signum() as i32
     }
+
+    /// The greatest whole number that is not above it.
+    pub fn floor(self) -> Rational {
+        Rational { numerator: self.numerator.div_euclid(self.denominator), denominator: 1 }
+    }
 }
 
 impl PartialOrd for Rational {

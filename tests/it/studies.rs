@@ -58,6 +58,46 @@ fn a_study_depends_on_its_file_alone() {
     kept_and_written_again(scratch.path(), &alone);
 }
 
+/// A cell does not depend on the study that it is played in, so a study with cells of another one has the same bytes.
+#[test]
+fn what_another_study_has_played_is_taken_over() {
+    let scratch = tempfile::tempdir().expect("a scratch directory");
+    let space = root().join("scenarios/avastra45.ava");
+    let file = |name: &str, seed: u32, agents: &str| {
+        let path = scratch.path().join(format!("{name}.yaml"));
+        let plan = "roads: [corner]\nevaluation: { episodes: 2, seeds: 1, horizon_s: 30 }";
+        let text = format!("space: {}\nfirst_seed: {seed}\n{plan}\nagents: [{agents}]\n", space.display());
+        std::fs::write(&path, text).expect("it is writable");
+        path.display().to_string()
+    };
+    let play = |file: &str, name: &str, options: &[&str]| {
+        let out = scratch.path().join(name);
+        let words = ["study", file, "--jobs", "1", "--out", &out.display().to_string()];
+        (outcome(&mut avastra(&[&words, options].concat())), out)
+    };
+    let (_, first) =
+        play(&file("first", 3, "{ name: random, repeats: 2 }, { name: none, repeats: 1 }"), "first", &[]);
+    let reuse = ["--reuse", &first.display().to_string()];
+    let agents = "{ name: random, label: dice, repeats: 3 }, { name: greedy, repeats: 1 }";
+    let second = file("second", 3, agents);
+    let ((status, ..), alone) = play(&second, "alone", &[]);
+    let ((again, _, stderr), with) = play(&second, "with", &reuse);
+    assert_eq!((status, again), (0, 0), "{stderr}");
+    assert!(stderr.contains("2 cells taken over"), "{stderr}");
+    for name in ["study.db", "results.json"] {
+        let bytes = |of: &Path| std::fs::read(of.join(name)).expect("every study writes it");
+        assert!(bytes(&alone) == bytes(&with), "{name} differs");
+    }
+
+    for (name, seed, agents, reason) in [
+        ("seeded", 4, "{ name: random }", "it plays otherwise: its `first_seed` is another"),
+        ("stranger", 3, "{ name: greedy }", "it has played no agent with the same settings on the same road"),
+    ] {
+        let ((status, _, stderr), _) = play(&file(name, seed, agents), name, &reuse);
+        assert!(status == 2 && stderr.contains(reason), "{status}: {stderr}");
+    }
+}
+
 /// What a study found is kept beside its file, and from that alone its text is written again to the same bytes.
 fn kept_and_written_again(scratch: &Path, played: &Path) {
     let scenarios = scratch.join("scenarios");

@@ -119,6 +119,10 @@ pub struct StudyArguments {
     /// Go on with an interrupted study; its own settings hold.
     #[arg(long, value_name = "DIR", conflicts_with_all = ["file", "ads_cmd", "out", "shard", "quick"])]
     pub resume: Option<PathBuf>,
+    /// Take over the cells that another study has played already: those of agents with the same settings, on the same
+    /// roads, with the same seeds. The result is the same as without.
+    #[arg(long, value_name = "DIR")]
+    pub reuse: Vec<PathBuf>,
     /// Cut it down to see that it works: two short trainings, few episodes. No result.
     #[arg(long)]
     pub quick: bool,

@@ -1,0 +1,86 @@
+//! Cells that another study has played already. A cell follows from its agent's settings, its road, its number and what
+//! all agents of a study share; neither from the agent's label nor from who else is in the study.
+
+use crate::study::job::Job;
+use crate::study::record::CellRecord;
+use crate::study::settings::{AgentSettings, StudySettings};
+
+impl StudySettings {
+    /// The cells of another study that are those of some jobs of this one, by job and under this one's labels.
+    ///
+    /// # Errors
+    /// If the two play otherwise: the settings in which they differ.
+    pub fn played_elsewhere(
+        &self,
+        jobs: &[Job],
+        other: &StudySettings,
+        cells: &[CellRecord],
+    ) -> Result<Vec<Vec<CellRecord>>, Vec<&'static str>> {
+        let differences = self.plays_otherwise(other);
+        if !differences.is_empty() {
+            return Err(differences);
+        }
+        let of_job = |job: &Job| {
+            let agent = &self.agents[job.agent];
+            let same = other.agents.iter().find(|one| self.is_same(agent, other, one))?;
+            let on_road = |&road: &usize| {
+                let is_it = |cell: &&CellRecord| {
+                    cell.agent == same.label && cell.road == self.roads[road] && cell.number == job.number
+                };
+                let cell = cells.iter().find(is_it)?;
+                Some(CellRecord { agent: agent.label.clone(), ..cell.clone() })
+            };
+            job.roads.iter().map(on_road).collect::<Option<Vec<_>>>()
+        };
+        Ok(jobs.iter().filter_map(of_job).collect())
+    }
+
+    /// The settings of all agents in which two studies differ.
+    fn plays_otherwise(&self, other: &StudySettings) -> Vec<&'static str> {
+        let StudySettings {
+            avastra,
+            engine,
+            space_digest,
+            ads,
+            external,
+            ambient,
+            traffic,
+            first_seed,
+            evaluation,
+            causes,
+            avoidability,
+            // What an agent meets is compared with the agent; the rest is no part of a cell.
+            profile: _,
+            question: _,
+            space: _,
+            roads: _,
+            quick: _,
+            agents: _,
+            baselines: _,
+        } = self;
+        let same = [
+            ("avastra", *avastra == other.avastra),
+            ("engine", *engine == other.engine),
+            ("space", *space_digest == other.space_digest),
+            // A program of others need not do the same twice.
+            ("ads", *ads == other.ads && external.is_none() && other.external.is_none()),
+            ("ambient", *ambient == other.ambient),
+            ("traffic", *traffic == other.traffic),
+            ("first_seed", *first_seed == other.first_seed),
+            ("evaluation", *evaluation == other.evaluation),
+            ("causes", *causes == other.causes),
+            ("avoidability", *avoidability == other.avoidability),
+        ];
+        same.into_iter().filter(|(_, is_same)| !is_same).map(|(name, _)| name).collect()
+    }
+
+    /// Whether an agent is one of another study, but for its label and how often it is repeated.
+    fn is_same(&self, agent: &AgentSettings, other: &StudySettings, one: &AgentSettings) -> bool {
+        let AgentSettings { name, training, profile, without, with, label: _, repeats: _ } = agent;
+        *name == one.name
+            && *training == one.training
+            && profile.as_ref().or(self.profile.as_ref()) == one.profile.as_ref().or(other.profile.as_ref())
+            && *without == one.without
+            && *with == one.with
+    }
+}
