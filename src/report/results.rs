@@ -70,7 +70,11 @@ fn played_text(chapter: &Chapter, played: &Played) -> String {
     for table in &chapter.file.published {
         text.push_str(&published_text(table, played));
     }
-    text.push_str(&comparisons_text(&roads));
+    for (measure, question) in
+        [("counted", "Who counts more collisions"), ("distinct", "Who finds more distinct failures")]
+    {
+        text.push_str(&comparisons_text(measure, question, &roads));
+    }
     if let Some(remarks) = &chapter.file.remarks {
         text.push_str(&format!("\nWhat to make of it: {}\n", remarks.trim()));
     }
@@ -222,11 +226,11 @@ fn orders_text(pairs: &[&ComparedPair]) -> String {
     orders.collect::<Vec<_>>().join("; ")
 }
 
-/// Every agent beside every baseline, by counted collisions.
-fn comparisons_text(roads: &[&MeasuredRoad]) -> String {
+/// Every agent beside every baseline, by one measure.
+fn comparisons_text(measure: &str, question: &str, roads: &[&MeasuredRoad]) -> String {
     let mut rows: Vec<(String, BTreeMap<&str, &BaselineComparison>)> = Vec::new();
     for road in roads {
-        for one in road.comparisons.iter().filter(|one| one.measure == "counted") {
+        for one in road.comparisons.iter().filter(|one| one.measure == measure) {
             let name = format!("{} / {}", one.agent, one.baseline);
             match rows.iter_mut().find(|(known, _)| *known == name) {
                 Some((_, found)) => drop(found.insert(&road.road, one)),
@@ -248,7 +252,7 @@ fn comparisons_text(roads: &[&MeasuredRoad]) -> String {
         [name].into_iter().chain(roads.iter().map(cell)).collect()
     });
     let head = ["comparison"].into_iter().chain(roads.iter().map(|road| road.road.as_str()));
-    format!("\nWho counts more collisions (Â12):\n\n{}", table(head, rows))
+    format!("\n{question} (Â12):\n\n{}", table(head, rows))
 }
 
 /// A table in Markdown; all columns but the first are aligned right.

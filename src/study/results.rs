@@ -348,12 +348,17 @@ fn curve(cells: &[&CellRecord]) -> Vec<CurvePoint> {
     (0..points).map(point).collect()
 }
 
-/// Every agent compared with every baseline but itself, not yet corrected.
+/// Every agent compared with every baseline but itself, two baselines once, not yet corrected.
 fn comparisons(settings: &StudySettings, groups: &[(&str, Vec<&MeasuredCell>)]) -> Vec<BaselineComparison> {
     let mut found = Vec::new();
     for baseline in &settings.baselines {
-        let Some((_, theirs)) = groups.iter().find(|(label, _)| label == baseline) else { continue };
-        for (label, own) in groups.iter().filter(|(label, _)| label != baseline) {
+        let Some(at) = groups.iter().position(|(label, _)| label == baseline) else { continue };
+        let theirs = &groups[at].1;
+        for (index, (label, own)) in groups.iter().enumerate() {
+            let is_baseline = settings.baselines.iter().any(|one| one == label);
+            if index == at || is_baseline && index < at {
+                continue;
+            }
             for measure in MEASURES.iter().filter(|measure| measure.is_compared) {
                 found.extend(comparison(settings, measure.name, (label, own), (baseline, theirs)));
             }

@@ -81,9 +81,9 @@ fn what_another_study_has_played_is_taken_over() {
     let agents = "{ name: random, label: dice, repeats: 3 }, { name: greedy, repeats: 1 }";
     let second = file("second", 3, agents);
     let ((status, ..), alone) = play(&second, "alone", &[]);
-    let ((again, _, stderr), with) = play(&second, "with", &reuse);
+    let ((again, stdout, stderr), with) = play(&second, "with", &reuse);
     assert_eq!((status, again), (0, 0), "{stderr}");
-    assert!(stderr.contains("2 cells taken over"), "{stderr}");
+    assert!(stdout.contains("2 cells taken over"), "{stdout}");
     for name in ["study.db", "results.json"] {
         let bytes = |of: &Path| std::fs::read(of.join(name)).expect("every study writes it");
         assert!(bytes(&alone) == bytes(&with), "{name} differs");
