@@ -82,6 +82,9 @@ fn shape(node: Node) -> Result<Shape, String> {
         },
         _ => return Err("only vehicles and pedestrians are read".to_owned()),
     };
+    if element(node, "Trailer").is_some() {
+        return Err("trailers are not read".to_owned());
+    }
     let bounds = element(node, "BoundingBox").ok_or("it has no `BoundingBox`")?;
     // An entry of a catalogue may have parameters of its own, with defaults.
     let declared = elements(node, "ParameterDeclarations").flat_map(children);
