@@ -35,7 +35,7 @@ pub fn commonroad(recording: &Recording, with_ego: bool) -> String {
     let map = &recording.map;
     let limits: Vec<usize> = map.lanes.iter().map(|_| numbers.take()).collect();
     let lights: Vec<(usize, &Lights)> =
-        recording.lights.iter().map(|lights| (numbers.take(), lights)).collect();
+        recording.seen.lights.iter().map(|lights| (numbers.take(), lights)).collect();
     let junctions: Vec<Element> =
         (0..map.junctions.len()).filter_map(|junction| intersection(map, junction, &mut numbers)).collect();
     let problem = planning_problem(recording, numbers.take());
@@ -153,7 +153,7 @@ fn limit(lane: &Lane, number: usize) -> Element {
 }
 
 fn light(recording: &Recording, number: usize, lights: &Lights) -> Element {
-    let ends = lights.changes.iter().skip(1).map(|(tick, _)| *tick).chain([recording.end_tick]);
+    let ends = lights.changes.iter().skip(1).map(|(tick, _)| *tick).chain([recording.seen.end_tick]);
     let elements = lights.changes.iter().zip(ends).filter_map(|((from, colour), to)| {
         // Whole steps whose sum does not drift from the recorded time.
         let steps = to.div_ceil(STEP_TICKS) - from.div_ceil(STEP_TICKS);
@@ -245,9 +245,9 @@ fn state(name: &'static str, sample: &Sample) -> Element {
 
 /// Where the ego vehicle is at the start, and that it is to be on its route at the end.
 fn planning_problem(recording: &Recording, own: usize) -> Element {
-    let first = &recording.ego.samples[0];
+    let first = &recording.seen.ego.samples[0];
     let start = state("initialState", first).holding(exact("yawRate", 0.0)).holding(exact("slipAngle", 0.0));
-    let end = (recording.end_tick / STEP_TICKS).max(1);
+    let end = (recording.seen.end_tick / STEP_TICKS).max(1);
     let time = Element::new("time")
         .holding(Element::text("intervalStart", end.saturating_sub(GOAL_STEPS)))
         .holding(Element::text("intervalEnd", end));

@@ -15,9 +15,10 @@ use super::xml::number;
 pub fn csv(recording: &Recording) -> String {
     let mut text =
         "time_s,id,body,x_m,y_m,heading_rad,vx_mps,vy_mps,length_m,width_m,height_m,contact\n".to_owned();
-    for tick in 0..=recording.end_tick {
-        let touched =
-            |id: u32| recording.touches.iter().any(|touch| touch.tick == tick && (touch.id == id || id == 0));
+    for tick in 0..=recording.seen.end_tick {
+        let touched = |id: u32| {
+            recording.seen.touches.iter().any(|touch| touch.tick == tick && (touch.id == id || id == 0))
+        };
         for actor in recording.actors() {
             let Some(sample) =
                 tick.checked_sub(actor.first_tick()).and_then(|index| actor.samples.get(index as usize))

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use crate::action::ActionTable;
 use crate::ads::Selected;
-use crate::episode::{Actor, Lights, Recorder, Sky, Touch};
+use crate::episode::{Actor, Recorder};
 use crate::model::vocabulary::Word;
 use crate::model::{Claim, Scenario};
 use crate::oracle::ClaimResult;
@@ -26,17 +26,7 @@ pub struct Recording {
     pub goal: LanePlace,
     /// The lanes of its route, in order.
     pub route: Vec<LaneIndex>,
-    /// The last tick.
-    pub end_tick: u64,
-    pub ego: Actor,
-    /// All others, in order of appearance.
-    pub others: Vec<Actor>,
-    /// By rising time; the first is the one of the start.
-    pub skies: Vec<Sky>,
-    /// The lights that hold a lane.
-    pub lights: Vec<Lights>,
-    /// Contacts of the ego vehicle with others.
-    pub touches: Vec<Touch>,
+    pub seen: Recorder,
     /// Where the scenario comes from and what it claims: name and value.
     pub facts: Vec<(String, String)>,
 }
@@ -53,12 +43,12 @@ pub enum ExportError {
 
 impl Recording {
     pub fn duration_s(&self) -> f64 {
-        self.end_tick as f64 * DT_S
+        self.seen.end_tick as f64 * DT_S
     }
 
     /// The ego vehicle and the others.
     pub fn actors(&self) -> impl Iterator<Item = &Actor> {
-        core::iter::once(&self.ego).chain(&self.others)
+        core::iter::once(&self.seen.ego).chain(&self.seen.others)
     }
 }
 
@@ -69,8 +59,8 @@ impl Recording {
 /// If it cannot be played, or plays otherwise than it claims.
 pub fn record(table: &ActionTable, scenario: &Scenario, ads: &Selected) -> Result<Recording, ExportError> {
     let stage = Stage::new(table, scenario)?;
-    let mut recorder = Recorder::default();
-    let log = stage.play(ads, &mut |world, ads, contacts| recorder.note(world, ads, contacts));
+    let mut seen = Recorder::default();
+    let log = stage.play(ads, &mut |world, ads, contacts| seen.note(world, ads, contacts));
     let driven = |claim: &Claim| {
         matches!(claim, Claim::Collision { .. } | Claim::Trace(_) | Claim::Proc(_) | Claim::End(_))
     };
@@ -79,7 +69,6 @@ pub fn record(table: &ActionTable, scenario: &Scenario, ads: &Selected) -> Resul
         return Err(ExportError::Refuted { claims });
     }
     let road = &table.space().roads[scenario.road];
-    let Recorder { end_tick, ego, others, skies, lights, touches, .. } = recorder;
     Ok(Recording {
         name: scenario.name.clone(),
         docs: scenario.docs.clone(),
@@ -87,12 +76,7 @@ pub fn record(table: &ActionTable, scenario: &Scenario, ads: &Selected) -> Resul
         map_path: road.map_path.clone(),
         goal: road.goal,
         route: road.route.lanes.iter().map(|part| part.lane).collect(),
-        end_tick,
-        ego,
-        others,
-        skies,
-        lights,
-        touches,
+        seen,
         facts: facts(scenario, &road.name),
     })
 }

@@ -161,12 +161,12 @@ fn is_fixed(term: &Expr) -> bool {
 
 /// What a comparison with a limit leaves of the left side; `None` if that is everything.
 fn leaves(op: Comparison, limit: Rational, is_exact: bool) -> Option<Interval> {
-    let (below, above) = (|closed| End::At(limit, closed), |closed| End::At(limit, closed));
+    let end = |is_closed| End::At(limit, is_closed);
     Some(match op {
-        Comparison::Less => Interval { low: End::Unbounded, high: below(false) },
-        Comparison::LessEqual => Interval { low: End::Unbounded, high: below(true) },
-        Comparison::Greater => Interval { low: above(false), high: End::Unbounded },
-        Comparison::GreaterEqual => Interval { low: above(true), high: End::Unbounded },
+        Comparison::Less => Interval { low: End::Unbounded, high: end(false) },
+        Comparison::LessEqual => Interval { low: End::Unbounded, high: end(true) },
+        Comparison::Greater => Interval { low: end(false), high: End::Unbounded },
+        Comparison::GreaterEqual => Interval { low: end(true), high: End::Unbounded },
         Comparison::Equal if is_exact => Interval::point(limit),
         Comparison::Equal | Comparison::NotEqual => return None,
     })

@@ -106,46 +106,37 @@ fn through(map: &RoadMap, junction: usize, way: &Connection) -> Option<Candidate
 
 /// A place before the end of a lane, in it or in those that lead to it without a junction.
 fn back(map: &RoadMap, lane: LaneIndex) -> LanePlace {
-    let (mut lane, mut left_m) = (lane, BEFORE_M);
-    let mut passed = vec![lane];
-    loop {
-        let length_m = map.lane(lane).centre.length_m();
-        let before = map.lane(lane).predecessors.iter().copied();
-        let before =
-            before.filter(|before| map.lane(*before).junction.is_none() && !passed.contains(before)).min();
-        match before {
-            Some(before) if left_m > length_m => {
-                left_m -= length_m;
-                passed.push(before);
-                lane = before;
-            }
-            _ => {
-                let station_m = (length_m - left_m).max(EDGE_M.min(length_m / 2.0));
-                return LanePlace { lane, station_m, offset_m: 0.0 };
-            }
-        }
-    }
+    let (lane, left_m) = followed(map, lane, BEFORE_M, |lane| &map.lane(lane).predecessors);
+    let length_m = map.lane(lane).centre.length_m();
+    LanePlace { lane, station_m: (length_m - left_m).max(EDGE_M.min(length_m / 2.0)), offset_m: 0.0 }
 }
 
 /// A place behind the beginning of a lane, in it or in those that it leads to without a junction.
 fn on(map: &RoadMap, lane: LaneIndex) -> LanePlace {
-    let (mut lane, mut left_m) = (lane, AFTER_M);
+    let (lane, left_m) = followed(map, lane, AFTER_M, |lane| &map.lane(lane).successors);
+    let length_m = map.lane(lane).centre.length_m();
+    LanePlace { lane, station_m: left_m.min((length_m - EDGE_M).max(length_m / 2.0)), offset_m: 0.0 }
+}
+
+/// The lane in which a way of `left_m` ends, and what of it is left there: more than the lane is long if nothing follows.
+/// No lane is taken twice.
+fn followed<'a>(
+    map: &RoadMap,
+    mut lane: LaneIndex,
+    mut left_m: f64,
+    next: impl Fn(LaneIndex) -> &'a [LaneIndex],
+) -> (LaneIndex, f64) {
     let mut passed = vec![lane];
     loop {
         let length_m = map.lane(lane).centre.length_m();
-        let after = map.lane(lane).successors.iter().copied();
-        let after =
-            after.filter(|after| map.lane(*after).junction.is_none() && !passed.contains(after)).min();
-        match after {
-            Some(after) if left_m > length_m => {
+        let is_open = |next: &LaneIndex| map.lane(*next).junction.is_none() && !passed.contains(next);
+        match next(lane).iter().copied().filter(is_open).min() {
+            Some(next) if left_m > length_m => {
                 left_m -= length_m;
-                passed.push(after);
-                lane = after;
+                passed.push(next);
+                lane = next;
             }
-            _ => {
-                let station_m = left_m.min((length_m - EDGE_M).max(length_m / 2.0));
-                return LanePlace { lane, station_m, offset_m: 0.0 };
-            }
+            _ => return (lane, left_m),
         }
     }
 }

@@ -85,7 +85,7 @@ pub trait Units: Sized {
         drop(settled);
         std::fs::rename(&partial, path)?;
         // Where a folder cannot be synchronised, the old file may come back after a loss of power; it is whole, too.
-        let folder = path.parent().unwrap_or(Path::new("."));
+        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
         let _ = std::fs::File::open(folder).and_then(|folder| folder.sync_all());
         Ok(Self::from_connection(Connection::open(path)?))
     }

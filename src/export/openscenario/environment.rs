@@ -68,7 +68,7 @@ fn wetness(sky: &Sky) -> &'static str {
 /// the last one lasts until the end of the recording. A light on its own has a controller, too.
 pub fn signals(recording: &Recording) -> Option<Element> {
     let mut junctions: BTreeMap<(Option<usize>, usize), Vec<&Lights>> = BTreeMap::new();
-    for lights in &recording.lights {
+    for lights in &recording.seen.lights {
         let junction = recording.map.signals[lights.signal].junction;
         let lone = if junction.is_some() { 0 } else { lights.signal };
         junctions.entry((junction, lone)).or_default().push(lights);
@@ -77,7 +77,7 @@ pub fn signals(recording: &Recording) -> Option<Element> {
         let name = format!("lights_{}", number + 1);
         let begins: BTreeSet<u64> =
             lights.iter().flat_map(|lights| &lights.changes).map(|(tick, _)| *tick).collect();
-        let ends = begins.iter().skip(1).copied().chain([recording.end_tick]);
+        let ends = begins.iter().skip(1).copied().chain([recording.seen.end_tick]);
         let phases = begins.iter().zip(ends).enumerate().map(|(index, (begin, end))| {
             Element::new("Phase")
                 .with("name", format!("{name}_phase_{}", index + 1))

@@ -94,7 +94,7 @@ fn storyboard(recording: &Recording, ego: Ego) -> Element {
 /// Sky, and everyone that is there at the start.
 fn init(recording: &Recording, ego: Ego) -> Element {
     let mut actions = Element::new("Actions");
-    if let Some(sky) = recording.skies.first() {
+    if let Some(sky) = recording.seen.skies.first() {
         actions = actions.holding(environment(sky, 0));
     }
     let present = recording.actors().filter(|actor| actor.first_tick() == 0);
@@ -135,7 +135,7 @@ fn group(recording: &Recording, actor: &Actor, ego: Ego) -> Option<Element> {
     if !actions.is_empty() {
         events.push(event(format!("{name}_moves"), actions, first_s));
     }
-    if actor.last_tick() < recording.end_tick {
+    if actor.last_tick() < recording.seen.end_tick {
         let deleted = of_entity(&name, Element::new("DeleteEntityAction"));
         let gone_s = (actor.last_tick() + 1) as f64 * DT_S;
         events.push(event(
@@ -153,7 +153,7 @@ fn weather_group(recording: &Recording) -> Option<Element> {
         let action = action(format!("sky_{number}"), environment(sky, number));
         event(format!("sky_{number}_begins"), vec![action], sky.time_s)
     };
-    let events: Vec<Element> = recording.skies.iter().enumerate().skip(1).map(change).collect();
+    let events: Vec<Element> = recording.seen.skies.iter().enumerate().skip(1).map(change).collect();
     (!events.is_empty()).then(|| maneuver_group("sky", None, events))
 }
 
