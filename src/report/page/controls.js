@@ -2,11 +2,9 @@
 import { RATES } from "./clock.js";
 import { el } from "./dom.js";
 import { showKeys } from "./keys.js";
-import { COMPARED, NOTHING, linked, nameOf } from "./link.js";
-import { LAYERS } from "./view.js";
+import { COMPARED, COPY_LINK, NOTHING, linked, nameOf } from "./link.js";
+import { LAYERS, ZOOM } from "./view.js";
 import { driverInWords, figure } from "./words.js";
-
-const ZOOM = 1.3;
 
 export class Controls {
   /** Makes the controls that move the clock and the views of an open replay. */
@@ -51,7 +49,7 @@ export class Controls {
           checkbox({ id: "follow", checked: true }, (on) => watch.follow(on)),
           " Follow",
         ),
-        el("button", { type: "button", id: "copy", onclick: (event) => watch.copy(event.target) }, "Copy link"),
+        el("button", { type: "button", id: "copy", onclick: (event) => watch.copy(event.target) }, COPY_LINK),
         button("?", "Keys (?)", showKeys, { id: "keys" }),
       ),
       el("fieldset", { class: "row layers" }, el("legend", {}, "Layers"), layers(watch)),

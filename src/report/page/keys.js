@@ -1,7 +1,7 @@
 // The keys of a replay, and the list of them.
 import { el } from "./dom.js";
 import { linkToList } from "./link.js";
-import { LAYERS } from "./view.js";
+import { LAYERS, ZOOM } from "./view.js";
 
 const KEYS = [
   ["space", "play, pause"],
@@ -49,8 +49,8 @@ export function key(event, watch) {
     End: () => clock.seek(clock.endS),
     c: () => watch.toCollision(),
     f: () => document.getElementById("follow").click(),
-    "-": () => watch.zoom(1 / 1.3),
-    "+": () => watch.zoom(1.3),
+    "-": () => watch.zoom(1 / ZOOM),
+    "+": () => watch.zoom(ZOOM),
     "[": () => clock.faster(-1),
     "]": () => clock.faster(1),
     Escape: () => (location.hash = linkToList()),

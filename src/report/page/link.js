@@ -45,15 +45,16 @@ export function byName(scenarios, name) {
 export const COMPARED = "~compared";
 export const NOTHING = "~nothing";
 
+export const COPY_LINK = "Copy link";
+
 /** Copies the whole link. Where the browser forbids that, it is shown to be copied by hand. */
 export async function copyLink(button) {
   const text = location.href;
-  const before = button.textContent;
   try {
     await navigator.clipboard.writeText(text);
     button.textContent = "Copied";
   } catch {
     window.prompt("Link to this moment", text);
   }
-  setTimeout(() => (button.textContent = before), 1500);
+  setTimeout(() => (button.textContent = COPY_LINK), 1500);
 }

@@ -4,6 +4,9 @@ import { Labels, drawBody, drawImpact, drawPlan, drawPrediction, drawSpeed, draw
 import { Canvas, palette } from "./paint.js";
 import { kmh } from "./words.js";
 
+/** How much nearer one step of the zoom comes. */
+export const ZOOM = 1.3;
+
 /** Layers that can be switched: name, what it is called, and a sign of its look. */
 export const LAYERS = [
   ["truth", "What is there", "■"],
