@@ -39,7 +39,8 @@ pub fn results(output: &Output, arguments: &ResultsArguments) -> Result<(), Fail
         ));
         chapter.played = Some(played);
     }
-    write(&arguments.out, &report::results(&chapters))?;
+    let folder = arguments.studies.to_string_lossy();
+    write(&arguments.out, &report::results(folder.trim_end_matches('/'), &chapters))?;
     let there = chapters.iter().filter(|chapter| chapter.played.is_some()).count();
     output.say(&format!("{}: {there} of {} studies are played", arguments.out.display(), chapters.len()));
     let listed = chapters.iter().map(|chapter| {

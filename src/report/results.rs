@@ -10,10 +10,11 @@ use crate::study::{
 
 use super::study::estimate;
 
+/// What stands before the first chapter; `{folder}` is where the studies are.
 const HEAD: &str = "\
 # Results
 
-`avastra results` wrote this file from the studies in `scenarios/studies/*.yaml` and from what was kept of playing them,
+`avastra results` wrote this file from the studies in `{folder}/*.yaml` and from what was kept of playing them,
 `*.jsonl` beside them; no figure is typed by hand, and a test writes it again. Everything was played against avastra's
 own driving systems in avastra's own world: no figure says anything about Apollo or LGSVL, which the paper used.
 
@@ -38,11 +39,11 @@ pub struct Chapter {
     pub played: Option<Played>,
 }
 
-/// All studies: first those with published figures, then the others.
-pub fn results(chapters: &[Chapter]) -> String {
+/// All studies of a folder: first those with published figures, then the others.
+pub fn results(folder: &str, chapters: &[Chapter]) -> String {
     let mut chapters: Vec<&Chapter> = chapters.iter().collect();
     chapters.sort_by_key(|chapter| (chapter.file.published.is_empty(), chapter.name.clone()));
-    let mut text = HEAD.to_owned();
+    let mut text = HEAD.replace("{folder}", folder);
     for chapter in chapters {
         let Chapter { name, command, file, .. } = chapter;
         text.push_str(&format!("\n## {name}\n"));

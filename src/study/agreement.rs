@@ -15,7 +15,7 @@ pub const P_MAX: f64 = 0.05;
 pub struct Agreement {
     /// Each figure that our study has a number for, in the order of the study's agents and roads.
     pub figures: Vec<ComparedFigure>,
-    /// Every two figures of a road that differ.
+    /// Every two figures of a road that differ and that a test can hold against each other: we played both.
     pub pairs: Vec<ComparedPair>,
 }
 

@@ -132,6 +132,23 @@ fn kept_and_written_again(scratch: &Path, played: &Path) {
     let (_, after) = rest.split_once(" of one worker").expect("it took some time");
     expect_snapshot("studies", "results", &format!("## {before} h simulated in … of one worker{after}"));
 
+    // What is kept is not replaced by less; a file that has more than was played is no such file.
+    let kept = scenarios.join("studies/smoke.jsonl");
+    let text = std::fs::read_to_string(&kept).expect("it was kept");
+    let refused = |text: &str, reason: &str| {
+        std::fs::write(&kept, text).expect("it is writable");
+        let mut command = avastra(&["results", "scenarios/studies", "--out", &out, "--add"]);
+        let (status, _, stderr) = outcome(command.arg(played).current_dir(scratch));
+        assert!(status == 1 && stderr.contains(reason), "{stderr}");
+        assert_eq!(std::fs::read_to_string(&kept).expect("it is readable"), text, "it is left as it was");
+    };
+    let last = text.lines().last().expect("it has cells");
+    let more = last.replacen("\"number\":0", "\"number\":9", 1);
+    assert_ne!(more, last, "the last cell is the first of its agent");
+    refused(&format!("{text}{more}\n"), "`avastra merge` brings shards together");
+    refused(&format!("{text}{last}\n"), "this cell is there already");
+    std::fs::write(&kept, text).expect("it is writable");
+
     std::fs::write(&file, format!("{study}{}", published.replace("tiny", "tinny"))).expect("it is writable");
     let refused = outcome(avastra(&["results", "scenarios/studies", "--out", &out]).current_dir(scratch));
     assert!(refused.0 == 1 && refused.2.contains("names the agent `tinny`"), "{}", refused.2);
