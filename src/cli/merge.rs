@@ -4,7 +4,8 @@
 //! of them. What comes out is a directory in which all is played. It is ended by the command itself, which settles the
 //! database and writes the results: there is no second writer, and the bytes are those of the unsharded directory.
 //!
-//! Until it is whole, the directory has the name `OUT.partial`.
+//! Until it is whole, the directory has the name `OUT.partial`. It gets its own name only if its space still means what it
+//! meant; then it is ended.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -145,7 +146,7 @@ fn merged<C: Cut>(output: &Output, directories: &[PathBuf], out: Option<&Path>) 
     let brought = Survey::of::<C>(directories, &partial).and_then(|survey| {
         survey.complete()?;
         bring_together::<C>(directories, &partial, &survey.settings)?;
-        publish::<C>(out, &partial)?;
+        publish::<C>(output, out, &partial)?;
         Ok(survey.shards)
     });
     if brought.is_err() && partial.exists() {
@@ -275,7 +276,10 @@ fn bring_together<C: Cut>(directories: &[PathBuf], partial: &Path, text: &str) -
 }
 
 /// Gives the merged directory its name, unless it stands there already, to the byte.
-fn publish<C: Cut>(out: &Path, partial: &Path) -> Result<(), Failure> {
+fn publish<C: Cut>(output: &Output, out: &Path, partial: &Path) -> Result<(), Failure> {
+    // Its warnings are told when the directory is ended; why it cannot be is told here.
+    let resumed = |output| run_directory::resume::<C>(output, partial, C::KIND, C::KIND).map(drop);
+    resumed(&Output::of(Format::Json)).or_else(|_| resumed(output))?;
     if !out.exists() || std::fs::read_dir(out).is_ok_and(|mut entries| entries.next().is_none()) {
         // In this order: a kill in between leaves a whole directory, and not a partial one that nobody would take up.
         std::fs::rename(partial, out).map_err(|error| Failure::file("write", out, error))?;

@@ -228,13 +228,50 @@ fn schedulers_say_which_shard_it_is() {
 #[test]
 fn trainings_and_nothing_cannot_be_merged() {
     let scratch = tempfile::tempdir().expect("a scratch directory");
-    let folder = text(scratch.path());
-    let (status, _, stderr) = outcome(&mut avastra(&["merge", folder, "--missing"]));
-    assert!(status == 1 && stderr.contains("none of the directories holds"), "{stderr}");
-    std::fs::write(scratch.path().join("notes"), "mine").expect("it is writable");
-    let (status, _, stderr) = outcome(&mut avastra(&["merge", folder, "--missing"]));
-    assert!(status == 1 && stderr.contains("holds no run, study or estimate"), "{stderr}");
-    let (status, _, stderr) = outcome(&mut avastra(&["merge", folder]));
-    assert!(status == 1 && stderr.contains("--out"), "{stderr}");
-    assert!(root().join(SPACE).is_file());
+    let (folder, training) = (scratch.path().join("folder"), scratch.path().join("training"));
+    std::fs::create_dir(&folder).expect("it is writable");
+    let refused = |arguments: &[&str], reason: &str| {
+        let (status, _, stderr) = outcome(&mut avastra(&[&["merge"], arguments].concat()));
+        assert!(status == 1 && stderr.contains(reason), "{stderr}");
+    };
+    refused(&[text(&folder), "--missing"], "none of the directories holds");
+    std::fs::write(folder.join("notes"), "mine").expect("it is writable");
+    refused(&[text(&folder), "--missing"], "holds no run, study or estimate");
+    refused(&[text(&folder)], "--out");
+    let train = ["train", SPACE, "--road", "corner", "--agent", "constant", "--episodes", "2"];
+    done(&[&train[..], &["--out", text(&training)]].concat());
+    refused(&[text(&training), "--missing"], "holds a training, which is one piece");
+}
+
+/// What cannot be ended is not published.
+#[test]
+fn a_space_that_has_changed_is_refused_before_anything_is_there() {
+    let scratch = tempfile::tempdir().expect("a scratch directory");
+    let at = |name: &str| scratch.path().join(name);
+    std::fs::create_dir(at("roads")).expect("it is writable");
+    for name in ["avastra45.ava", "roads.ava"].into_iter().chain([
+        "roads/corner.xodr",
+        "roads/residential.xodr",
+        "roads/boulevard.xodr",
+        "roads/crossroad.xodr",
+    ]) {
+        std::fs::copy(root().join("scenarios").join(name), at(name)).expect("it is shipped");
+    }
+    let space = at("avastra45.ava");
+    let command = ["run", text(&space), "--road", "corner", "--episodes", "2", "--agent", "none"];
+    let [one, two] = ["shards/1", "shards/2"].map(at);
+    for (number, out) in [("1/2", &one), ("2/2", &two)] {
+        done(&[&command[..], &["--shard", number, "--out", text(out)]].concat());
+    }
+    let whole = std::fs::read_to_string(&space).expect("it is readable");
+    let merge = |text_of_space: &str| {
+        std::fs::write(&space, text_of_space).expect("it is writable");
+        outcome(&mut avastra(&["merge", text(&one), text(&two), "--out", text(&at("merged"))]))
+    };
+    let (status, _, stderr) = merge(&whole.replace("let weight_mode = 1.0", "let weight_mode = 2.0"));
+    assert!(status == 1 && stderr.contains("has changed since the run was begun"), "{stderr}");
+    let (status, _, stderr) = merge(&format!("{whole}\nlet broken ="));
+    assert!(status == 2 && stderr.contains("error[AV"), "{stderr}");
+    assert!(!at("merged").exists() && !at("merged.partial").exists());
+    assert_eq!(merge(&whole).0, 0);
 }
