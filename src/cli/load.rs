@@ -17,6 +17,7 @@ use crate::run::{Asked, Profile, driving_system};
 use crate::sim::TrafficProfile;
 use crate::trial::places;
 
+use super::arguments::AgainstArguments;
 use super::error::Failure;
 use super::output::Output;
 
@@ -250,6 +251,15 @@ pub fn asked(ads: Option<&str>, config: Option<&Path>, command: Option<&str>) ->
     }
     let profile = config.map(profile).transpose()?;
     Ok(Asked { ads: ads.map(str::to_owned), profile, external: None })
+}
+
+/// The driving system that a command line names in place of the recorded one.
+///
+/// # Errors
+/// As [`asked`].
+pub fn against(arguments: &AgainstArguments) -> Result<Asked, Failure> {
+    let AgainstArguments { ads, ads_config, ads_cmd } = arguments;
+    asked(ads.as_deref(), ads_config.as_deref(), ads_cmd.as_deref())
 }
 
 /// What a text that is a profile or a name says, as the name and the file that [`under_test`] and [`asked`] take: a profile if

@@ -34,8 +34,7 @@ pub fn render(output: &Output, arguments: &RenderArguments) -> Result<(), Failur
     let (table, scenario) = load::scenario(output, &arguments.file)?;
     let scenario = &scenario;
     let times_s = times(arguments, scenario, table.space().episode.step_s)?;
-    let asked =
-        load::asked(arguments.ads.as_deref(), arguments.ads_config.as_deref(), arguments.ads_cmd.as_deref())?;
+    let asked = load::against(&arguments.against)?;
     let (ads, is_recorded) = asked.selected_for(scenario)?;
     let (moments, mut subject) = moments(&table, scenario, &ads, &times_s)?;
     if !is_recorded {
@@ -132,8 +131,9 @@ fn moments(
 /// The title of a drive that is not the recorded one: whose it is, and what happens, because what the file says of its crash
 /// may not.
 fn title_of_another(arguments: &RenderArguments, scenario: &Scenario, subject: &Subject) -> String {
-    let profile = arguments.ads_config.as_ref().map(|path| path.display().to_string());
-    let driver = arguments.ads.clone().into_iter().chain(profile).collect::<Vec<_>>().join(" with ");
+    let against = &arguments.against;
+    let profile = against.ads_config.as_ref().map(|path| path.display().to_string());
+    let driver = against.ads.clone().into_iter().chain(profile).collect::<Vec<_>>().join(" with ");
     let driver = if driver.is_empty() { "another driving system".to_owned() } else { driver };
     match subject.hit {
         Some((obstacle, at_s)) => {

@@ -20,15 +20,14 @@ use super::parallel::each_file;
 
 /// Replays the scenario of every file; with `--ads` or another profile only tells what happens.
 pub fn replay(output: &Output, arguments: &ReplayArguments) -> Result<(), Failure> {
-    let asked =
-        load::asked(arguments.ads.as_deref(), arguments.ads_config.as_deref(), arguments.ads_cmd.as_deref())?;
+    let asked = load::against(&arguments.against)?;
     let played = each_file(output, &arguments.many, asked.external.as_ref(), |path| {
         let (table, scenario) = load::scenario(output, path)?;
         let (ads, is_recorded) = asked.selected_for(&scenario)?;
         if is_recorded {
             return play(&table, &scenario, path, (&ads, None));
         }
-        let name = match (&arguments.ads_config, ads.program()) {
+        let name = match (&arguments.against.ads_config, ads.program()) {
             (_, Some(program)) => program.attached().name(),
             (Some(path), None) => format!("{} with {}", ads.name(), path.display()),
             (None, None) => ads.name().to_owned(),

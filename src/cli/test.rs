@@ -47,9 +47,8 @@ enum Outcome {
 
 /// Plays every scenario of a suite against a driving system.
 pub fn test(output: &Output, arguments: &TestArguments) -> Result<(), Failure> {
-    let asked =
-        load::asked(arguments.ads.as_deref(), arguments.ads_config.as_deref(), arguments.ads_cmd.as_deref())?;
-    if let Some(name) = &arguments.ads {
+    let asked = load::against(&arguments.against)?;
+    if let Some(name) = &arguments.against.ads {
         run::driving_system(name)?;
     }
     let mut suite =

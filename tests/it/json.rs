@@ -136,6 +136,22 @@ fn results_of_drives_are_as_explain_describes_them() {
     is_as_described(&["diagnose", one]);
 }
 
+#[test]
+fn estimates_and_merges_are_as_explain_describes_them() {
+    let scratch = tempfile::tempdir().expect("a scratch directory");
+    let at = |name: &str| scratch.path().join(name).display().to_string();
+    let drive = ["--event", "collision", "--traffic", "released", "--road", "corner", "--episodes", "20"];
+    let estimate = ["estimate", "scenarios/avastra45.ava", "--ads", "reactive", "--parts", "2"];
+    let [whole, one, two] = ["whole", "1", "2"].map(at);
+    is_as_described(&[&estimate[..], &drive, &["--out", &whole]].concat());
+    for (shard, out) in [("1/2", &one), ("2/2", &two)] {
+        result(&[&estimate[..], &drive, &["--shard", shard, "--out", out]].concat());
+    }
+    is_as_described(&["merge", &one, &two, "--missing"]);
+    is_as_described(&["merge", &one, &two, "--out", &at("merged")]);
+    is_as_described(&[&["compare", "scenarios/avastra45.ava", "reactive", "idm"][..], &drive].concat());
+}
+
 /// A command that fails says so under its own name, and what it found before is there.
 #[test]
 fn a_failure_is_a_result_too() {

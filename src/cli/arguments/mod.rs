@@ -22,9 +22,9 @@ pub use learn::{
     TrainArguments,
 };
 pub use scenarios::{
-    DiagnoseArguments, ExportArguments, ExportEgo, ExportFormat, ExportVersion, FilesArguments,
-    ImportArguments, PackArguments, RenderArguments, ReplayArguments, ReportArguments, RoadArguments,
-    ShrinkArguments, TestArguments, VerifyArguments,
+    AgainstArguments, DiagnoseArguments, ExportArguments, ExportEgo, ExportFormat, ExportVersion,
+    FilesArguments, ImportArguments, PackArguments, RenderArguments, ReplayArguments, ReportArguments,
+    RoadArguments, ShrinkArguments, TestArguments, VerifyArguments,
 };
 
 /// Finds out which of the things that may happen around a self-driving car make it crash.
@@ -117,7 +117,7 @@ pub enum Command {
     Merge(MergeArguments),
     /// Play two driving systems in the same episodes and say which one crashes more often.
     Compare(CompareArguments),
-    /// Run emitted scenarios again and check every claim they make.
+    /// Run emitted scenarios again and check every claim they make; against another driving system, only say what happens.
     Replay(ReplayArguments),
     /// Check every claim of emitted scenarios and policies.
     Verify(VerifyArguments),

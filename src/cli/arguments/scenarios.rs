@@ -28,6 +28,20 @@ pub struct OwnSystemArguments {
     pub ads_config: Option<PathBuf>,
 }
 
+/// Another driving system than the one that scenarios were found with.
+#[derive(Debug, Args)]
+pub struct AgainstArguments {
+    /// Driving system to play against [default: the one that each scenario was found with].
+    #[arg(long, value_parser = Named::ADS)]
+    pub ads: Option<String>,
+    /// Profile of `modular`, or of a driving system of your own.
+    #[arg(long, value_name = "FILE")]
+    pub ads_config: Option<PathBuf>,
+    /// Driving system of your own: a command (PROTOCOL.md), `tcp:HOST:PORT` or `unix:PATH`.
+    #[arg(long, value_name = "COMMAND", conflicts_with = "ads")]
+    pub ads_cmd: Option<String>,
+}
+
 #[derive(Debug, Args)]
 pub struct VerifyArguments {
     #[command(flatten)]
@@ -38,16 +52,8 @@ pub struct VerifyArguments {
 
 #[derive(Debug, Args)]
 pub struct ReplayArguments {
-    /// Replay against another driving system: shows what happens, checks no claim.
-    #[arg(long, value_parser = Named::ADS)]
-    pub ads: Option<String>,
-    /// Replay against another profile of `modular`, or of a driving system of your own: claims are checked only if it
-    /// means the same as the recorded one.
-    #[arg(long, value_name = "FILE")]
-    pub ads_config: Option<PathBuf>,
-    /// Driving system of your own: a command (PROTOCOL.md), `tcp:HOST:PORT` or `unix:PATH`.
-    #[arg(long, value_name = "COMMAND", conflicts_with = "ads")]
-    pub ads_cmd: Option<String>,
+    #[command(flatten)]
+    pub against: AgainstArguments,
     #[command(flatten)]
     pub many: FilesArguments,
 }
@@ -165,15 +171,8 @@ pub struct TestArguments {
     /// The same, and write into the scenarios what is so now.
     #[arg(long)]
     pub accept: bool,
-    /// Driving system under test [default: the one that each scenario was found with].
-    #[arg(long, value_parser = Named::ADS)]
-    pub ads: Option<String>,
-    /// Profile of the `modular` driving system, or of one of your own.
-    #[arg(long, value_name = "FILE")]
-    pub ads_config: Option<PathBuf>,
-    /// Driving system of your own: a command (PROTOCOL.md), `tcp:HOST:PORT` or `unix:PATH`.
-    #[arg(long, value_name = "COMMAND", conflicts_with = "ads")]
-    pub ads_cmd: Option<String>,
+    #[command(flatten)]
+    pub against: AgainstArguments,
     /// Write the results as JUnit XML, too.
     #[arg(long, value_name = "FILE")]
     pub junit: Option<PathBuf>,
@@ -211,15 +210,8 @@ pub struct RenderArguments {
     /// Where to write [default: STEM.svg here; `-` is stdout].
     #[arg(long = "out", short = 'o')]
     pub output: Option<PathBuf>,
-    /// Draw the drive of another driving system.
-    #[arg(long, value_parser = Named::ADS)]
-    pub ads: Option<String>,
-    /// Draw the drive of another profile of `modular`, or of a driving system of your own.
-    #[arg(long, value_name = "FILE")]
-    pub ads_config: Option<PathBuf>,
-    /// Driving system of your own: a command (PROTOCOL.md), `tcp:HOST:PORT` or `unix:PATH`.
-    #[arg(long, value_name = "COMMAND", conflicts_with = "ads")]
-    pub ads_cmd: Option<String>,
+    #[command(flatten)]
+    pub against: AgainstArguments,
 }
 
 #[derive(Debug, Args)]
