@@ -4,11 +4,14 @@
 //! of them. What comes out is a directory in which all is played. It is ended by the command itself, which settles the
 //! database and writes the results: there is no second writer, and the bytes are those of the unsharded directory.
 //!
+//! Shards may have been copied from where they were played. What their settings name outside them, the space above all, is
+//! looked for where they say, and else by the end of its path from the folder that one works in and those above.
+//!
 //! Until it is whole, the directory has the name `OUT.partial`. It gets its own name only if its space still means what it
 //! meant; then it is ended.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -64,14 +67,16 @@ trait Cut: Serialize + DeserializeOwned {
     type Database: Units;
     /// The name of its files: `run.yaml`, `run.db`.
     const KIND: &'static str;
+    /// The path and the digest of its space.
+    fn space(&self) -> (&str, &str);
     /// The settings as they stand in another directory.
-    fn moved(self, from: &Path, to: &Path) -> Result<Self, Failure>;
+    fn moved(self, way: &Way) -> Result<Self, Failure>;
     /// Everything that is shared out.
     fn work(&self) -> Vec<Item>;
     /// The numbers of the units of a file, each with the one in a settled file.
     fn numbered(&self, database: &Self::Database) -> Result<Vec<Numbered>, DatabaseError>;
     /// Takes a shard's units over, with the files that were written of them.
-    fn take(into: &mut Self::Database, shard: &Played<Self>, to: &Path) -> Result<(), Failure>;
+    fn take(into: &mut Self::Database, shard: &Played<Self>, way: &Way) -> Result<(), Failure>;
     /// Ends a directory in which all is played.
     fn conclude(output: &Output, directory: &Path) -> Result<(), Failure>;
 }
@@ -83,11 +88,20 @@ struct Item {
     units: Vec<i64>,
 }
 
+/// From one directory to another, and what lies outside both.
+struct Way<'a> {
+    from: &'a Path,
+    to: &'a Path,
+    space: &'a Path,
+}
+
 /// A directory of a shard.
 struct Played<C: Cut> {
     path: PathBuf,
     /// The settings as they would stand in the merged directory.
     settings: C,
+    /// The text of the settings as they stand in it.
+    begun: String,
     shard: Shard,
     /// `None` if nothing was kept before a kill.
     database: Option<C::Database>,
@@ -103,37 +117,48 @@ impl<C: Cut> Played<C> {
         serde_yaml::to_string(&self.settings).expect("settings are plain strings and numbers")
     }
 
-    /// Reads a directory; `to` is one beside the merged directory, or itself.
-    fn read(path: &Path, to: &Path) -> Result<Played<C>, Failure> {
+    /// Reads the settings of a directory; `to` is one beside the merged directory, or itself.
+    fn read(path: &Path, to: &Path, space: &Path) -> Result<Played<C>, Failure> {
         if run_directory::what_was_begun(path) != Some(C::KIND) {
             let (path, kind) = (path.display(), C::KIND);
             return Err(Failure::usage(format!("`{path}` holds no {kind}, which the first directory does")));
         }
-        let (settings, text) = run_directory::settings_of::<C>(path, C::KIND, C::KIND)?;
-        let mut played = Played {
+        let (settings, begun) = run_directory::settings_of::<C>(path, C::KIND, C::KIND)?;
+        Ok(Played {
             path: path.to_owned(),
-            settings: settings.moved(path, to)?,
+            settings: settings.moved(&Way { from: path, to, space })?,
+            begun,
             shard: shard::kept(path)?,
             database: None,
             units: Vec::new(),
-        };
-        let file = played.file();
+        })
+    }
+
+    /// Opens its database.
+    fn open(&mut self) -> Result<(), Failure> {
+        let file = self.file();
         if std::fs::metadata(&file).is_ok_and(|found| found.len() > 0) {
-            let database = C::Database::open(&file, &text);
+            let database = C::Database::open(&file, &self.begun);
             let database = database.map_err(|error| Failure::file("open", &file, error))?;
-            let units = played.settings.numbered(&database);
-            played.units = units.map_err(|error| Failure::file("read", &file, error))?;
-            played.database = Some(database);
+            let units = self.settings.numbered(&database);
+            self.units = units.map_err(|error| Failure::file("read", &file, error))?;
+            self.database = Some(database);
         }
-        Ok(played)
+        Ok(())
     }
 }
 
 /// Without `out`, only says what is missing.
 fn merged<C: Cut>(output: &Output, directories: &[PathBuf], out: Option<&Path>) -> Result<(), Failure> {
+    let space = space_of::<C>(&directories[0])?;
     let Some(out) = out else {
+        // A shard whose database is torn is one to be played again.
+        let torn = |failure: Failure| {
+            output.warn(&failure.to_string());
+            Ok(())
+        };
         // Paths in settings are made to lead from one place, to be compared; any place serves.
-        let survey = Survey::of::<C>(directories, Path::new("."))?;
+        let survey = Survey::of::<C>(directories, (Path::new("."), &space), &torn)?;
         match survey.missing.is_empty() {
             true => output.aside("nothing is missing"),
             false => output.say(&survey.named()),
@@ -143,9 +168,9 @@ fn merged<C: Cut>(output: &Output, directories: &[PathBuf], out: Option<&Path>) 
         return Ok(());
     };
     let partial = begin_partial(out)?;
-    let brought = Survey::of::<C>(directories, &partial).and_then(|survey| {
+    let brought = Survey::of::<C>(directories, (&partial, &space), &Err).and_then(|survey| {
         survey.complete()?;
-        bring_together::<C>(directories, &partial, &survey.settings)?;
+        bring_together::<C>(directories, (&partial, &space), &survey.settings)?;
         publish::<C>(output, out, &partial)?;
         Ok(survey.shards)
     });
@@ -169,14 +194,20 @@ struct Survey {
 }
 
 impl Survey {
-    /// Looks at all directories; `to` is the merged one, or one beside it.
-    fn of<C: Cut>(directories: &[PathBuf], to: &Path) -> Result<Survey, Failure> {
+    /// Looks at all directories; `to` is the merged one, or one beside it. `torn` says what to do about a database that cannot
+    /// be used.
+    fn of<C: Cut>(
+        directories: &[PathBuf],
+        (to, space): (&Path, &Path),
+        torn: &dyn Fn(Failure) -> Result<(), Failure>,
+    ) -> Result<Survey, Failure> {
         let mut wanted: Option<(String, Vec<Item>)> = None;
         let mut have: BTreeSet<i64> = BTreeSet::new();
         let mut cut: Option<(Shard, &Path)> = None;
         for path in directories {
             // One after another: there may be more shards than files that a process may have open.
-            let played = Played::<C>::read(path, to)?;
+            let mut played = Played::<C>::read(path, to, space)?;
+            played.open().or_else(torn)?;
             let text = played.text();
             let (first, _) = wanted.get_or_insert_with(|| (text.clone(), played.settings.work()));
             if let Some(what) = settings_differences(first, &text) {
@@ -261,15 +292,20 @@ fn discard(partial: &Path) -> Result<(), Failure> {
 }
 
 /// Writes settings, database and scenarios.
-fn bring_together<C: Cut>(directories: &[PathBuf], partial: &Path, text: &str) -> Result<(), Failure> {
+fn bring_together<C: Cut>(
+    directories: &[PathBuf],
+    (partial, space): (&Path, &Path),
+    text: &str,
+) -> Result<(), Failure> {
     write(&partial.join(format!("{}.yaml", C::KIND)), text)?;
     let file = partial.join(format!("{}.db", C::KIND));
     let mut into = C::Database::open(&file, text).map_err(|error| Failure::file("open", &file, error))?;
     for path in directories {
         let _held = run_directory::hold(path)?;
-        let played = Played::<C>::read(path, partial)?;
+        let mut played = Played::<C>::read(path, partial, space)?;
+        played.open()?;
         if played.database.is_some() {
-            C::take(&mut into, &played, partial)?;
+            C::take(&mut into, &played, &Way { from: path, to: partial, space })?;
         }
     }
     Ok(())
@@ -326,38 +362,96 @@ fn files_of(directory: &Path) -> Result<BTreeMap<PathBuf, PathBuf>, Failure> {
     Ok(found)
 }
 
-/// A path in the settings of one directory as it stands in those of another. What is inside the directory stays there.
-fn moved_path(path: &str, from: &Path, to: &Path) -> Result<String, Failure> {
-    let is_inside = Path::new(path).is_relative() && !Path::new(path).starts_with("..");
-    if is_inside { Ok(path.to_owned()) } else { load::relative(to, &from.join(path)) }
-}
-
-/// Settings of a run as they stand in another directory.
-fn moved_run(settings: RunSettings, from: &Path, to: &Path) -> Result<RunSettings, Failure> {
-    let policy = settings
-        .policy
-        .map(|policy| moved_path(&policy.file, from, to).map(|file| PolicyReference { file, ..policy }));
-    Ok(RunSettings {
-        space: moved_path(&settings.space, from, to)?,
-        policy: policy.transpose()?,
-        external: moved_external(settings.external, from, to)?,
-        ..settings
+/// The space of a directory's settings: where they say, or else by the end of that path, the one that means the same.
+fn space_of<C: Cut>(directory: &Path) -> Result<PathBuf, Failure> {
+    let (settings, _) = run_directory::settings_of::<C>(directory, C::KIND, C::KIND)?;
+    let (path, seal) = settings.space();
+    let direct = directory.join(path);
+    if direct.is_file() {
+        return Ok(direct);
+    }
+    let silent = Output::of(Format::Json);
+    let means_it = |file: &PathBuf| {
+        load::table(&silent, file).is_ok_and(|table| table.space().meaning.is_sealed_by(seal))
+    };
+    elsewhere(path, directory).into_iter().find(means_it).ok_or_else(|| {
+        let name = Path::new(path).file_name().unwrap_or_default().to_string_lossy();
+        let reason = format!(
+            "its space is not at `{path}` from there, and no `{name}` that means the same is found from the folder that you work \
+             in: merge in the folder that the shards were played from"
+        );
+        Failure::file("merge", directory, reason)
     })
 }
 
-fn moved_external(external: Option<Attached>, from: &Path, to: &Path) -> Result<Option<Attached>, Failure> {
-    let moved = |external| run_directory::to_record(to, run_directory::from_record(from, external));
-    external.map(moved).transpose()
+/// Files that a relative path may mean which leads nowhere, because its directory was moved: the path without its way up, then
+/// ever shorter ends of it, from the folder that one works in, from the directory, and from those above.
+fn elsewhere(path: &str, directory: &Path) -> Vec<PathBuf> {
+    let parts: Vec<Component> =
+        Path::new(path).components().filter(|part| matches!(part, Component::Normal(_))).collect();
+    let folders: Vec<PathBuf> =
+        [Path::new("."), directory].iter().filter_map(|folder| folder.canonicalize().ok()).collect();
+    let mut found: Vec<PathBuf> = Vec::new();
+    for begin in 0..parts.len() {
+        let end: PathBuf = parts[begin..].iter().collect();
+        let files = folders.iter().flat_map(|folder| folder.ancestors()).map(|folder| folder.join(&end));
+        let new: Vec<PathBuf> = files.filter(|file| file.is_file() && !found.contains(file)).collect();
+        found.extend(new);
+    }
+    found
+}
+
+impl Way<'_> {
+    /// A path in the settings of one directory as it stands in those of another. What is inside the directory stays there.
+    fn moved(&self, path: &str, target: &Path) -> Result<String, Failure> {
+        let is_inside = Path::new(path).is_relative() && !Path::new(path).starts_with("..");
+        if is_inside { Ok(path.to_owned()) } else { load::relative(self.to, target) }
+    }
+
+    fn space(&self, path: &str) -> Result<String, Failure> {
+        self.moved(path, self.space)
+    }
+
+    /// A file of which the digest is known elsewhere.
+    fn file(&self, path: &str) -> Result<String, Failure> {
+        let direct = self.from.join(path);
+        let other = if direct.exists() { None } else { elsewhere(path, self.from).into_iter().next() };
+        self.moved(path, &other.unwrap_or(direct))
+    }
+
+    fn external(&self, external: Option<Attached>) -> Result<Option<Attached>, Failure> {
+        let moved =
+            |external| run_directory::to_record(self.to, run_directory::from_record(self.from, external));
+        external.map(moved).transpose()
+    }
+
+    /// Settings of a run as they stand in the other directory.
+    fn run(&self, settings: RunSettings) -> Result<RunSettings, Failure> {
+        let policy = settings
+            .policy
+            .map(|policy| self.file(&policy.file).map(|file| PolicyReference { file, ..policy }));
+        Ok(RunSettings {
+            space: self.space(&settings.space)?,
+            policy: policy.transpose()?,
+            external: self.external(settings.external)?,
+            ..settings
+        })
+    }
+
+    /// The same way, in folders of the two directories.
+    fn within(&self, folder: &str) -> [PathBuf; 2] {
+        [self.from, self.to].map(|directory| directory.join(folder))
+    }
 }
 
 /// Copies a scenario with what lies beside it, and gives its text. What it uses is named by a path from the file.
-fn copy_scenario(name: &str, from: &Path, to: &Path) -> Result<String, Failure> {
-    let source = from.join(name);
-    let text = moved_scenario(&load::text(&source)?, from, to)?;
-    copy_text(&to.join(name), &text)?;
+fn copy_scenario(name: &str, way: &Way) -> Result<String, Failure> {
+    let source = way.from.join(name);
+    let text = moved_scenario(&load::text(&source)?, way)?;
+    copy_text(&way.to.join(name), &text)?;
     let answers = load::answers_path(&source);
     if answers.is_file() {
-        copy_text(&load::answers_path(&to.join(name)), &load::text(&answers)?)?;
+        copy_text(&load::answers_path(&way.to.join(name)), &load::text(&answers)?)?;
     }
     Ok(text)
 }
@@ -375,12 +469,12 @@ fn copy_text(to: &Path, text: &str) -> Result<(), Failure> {
 }
 
 /// The text of an emitted scenario with the path of its space as it is from another folder.
-fn moved_scenario(text: &str, from: &Path, to: &Path) -> Result<String, Failure> {
+fn moved_scenario(text: &str, way: &Way) -> Result<String, Failure> {
     let (file, _) = parse(FileId::default(), text);
     let mut moved = text.to_owned();
     for item in file.items.iter().rev() {
         let ItemKind::Use(used) = &item.kind else { continue };
-        let path = ExprKind::Text(moved_path(&used.path.value, from, to)?);
+        let path = ExprKind::Text(way.space(&used.path.value)?);
         moved.replace_range(used.path.span.start..used.path.span.end, &print_expr(&Expr::built(path)));
     }
     Ok(moved)
@@ -404,8 +498,12 @@ impl Cut for RunSettings {
     type Database = Database;
     const KIND: &'static str = "run";
 
-    fn moved(self, from: &Path, to: &Path) -> Result<RunSettings, Failure> {
-        moved_run(self, from, to)
+    fn space(&self) -> (&str, &str) {
+        (&self.space, &self.space_digest)
+    }
+
+    fn moved(self, way: &Way) -> Result<RunSettings, Failure> {
+        way.run(self)
     }
 
     fn work(&self) -> Vec<Item> {
@@ -417,39 +515,40 @@ impl Cut for RunSettings {
         as_they_are(database)
     }
 
-    fn take(into: &mut Database, shard: &Played<RunSettings>, to: &Path) -> Result<(), Failure> {
-        let from = &shard.path;
-        let [critical, failures] =
-            ["critical", "failures"].map(|folder| (from.join(folder), to.join(folder)));
-        std::fs::create_dir_all(&critical.1).map_err(|error| Failure::file("create", &critical.1, error))?;
-        let space = critical.0.join(pack::SPACE);
+    fn take(into: &mut Database, shard: &Played<RunSettings>, way: &Way) -> Result<(), Failure> {
+        let [from, to] = way.within("critical");
+        std::fs::create_dir_all(&to).map_err(|error| Failure::file("create", &to, error))?;
+        let critical = Way { from: &from, to: &to, ..*way };
+        let space = from.join(pack::SPACE);
         if space.is_dir() {
-            copy_folder(&space, &critical.1.join(pack::SPACE))?;
+            copy_folder(&space, &to.join(pack::SPACE))?;
         }
         let database = shard.database.iter().map(Database::scenarios).next();
         let written = database.transpose().map_err(|error| Failure::file("read", &shard.file(), error))?;
         let mut scenarios = Vec::new();
         for (episode, road, known) in written.unwrap_or_default() {
             let name = format!("{}.ava", run_directory::scenario_name(&road, episode));
-            let source = critical.0.join(&name);
+            let source = from.join(&name);
             if load::read(&source).ok().is_none_or(|text| digest(text.as_bytes()) != known) {
                 return Err(Failure::usage(format!(
                     "`{}` is gone or was edited: delete it, and `avastra run --resume {}` writes it again",
                     source.display(),
-                    from.display()
+                    way.from.display()
                 )));
             }
-            let text = copy_scenario(&name, &critical.0, &critical.1)?;
+            let text = copy_scenario(&name, &critical)?;
             scenarios.push((episode, digest(text.as_bytes())));
         }
-        if failures.0.is_dir() {
-            let failed = |error| Failure::file("read", &failures.0, error);
-            for entry in std::fs::read_dir(&failures.0).map_err(failed)? {
+        let [from, to] = way.within("failures");
+        let failures = Way { from: &from, to: &to, ..*way };
+        if from.is_dir() {
+            let failed = |error| Failure::file("read", &from, error);
+            for entry in std::fs::read_dir(&from).map_err(failed)? {
                 let path = entry.map_err(failed)?.path();
                 let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
                 match path.extension().and_then(std::ffi::OsStr::to_str) {
-                    Some("ava") => drop(copy_scenario(&name, &failures.0, &failures.1)?),
-                    Some("txt") => copy_text(&failures.1.join(name), &load::text(&path)?)?,
+                    Some("ava") => drop(copy_scenario(&name, &failures)?),
+                    Some("txt") => copy_text(&to.join(name), &load::text(&path)?)?,
                     _ => {}
                 }
             }
@@ -467,9 +566,12 @@ impl Cut for StudySettings {
     type Database = StudyDatabase;
     const KIND: &'static str = "study";
 
-    fn moved(self, from: &Path, to: &Path) -> Result<StudySettings, Failure> {
-        let space = moved_path(&self.space, from, to)?;
-        let external = moved_external(self.external.clone(), from, to)?;
+    fn space(&self) -> (&str, &str) {
+        (&self.space, &self.space_digest)
+    }
+
+    fn moved(self, way: &Way) -> Result<StudySettings, Failure> {
+        let (space, external) = (way.space(&self.space)?, way.external(self.external.clone())?);
         Ok(StudySettings { space, external, ..self })
     }
 
@@ -486,12 +588,12 @@ impl Cut for StudySettings {
         database.places(self)
     }
 
-    fn take(into: &mut StudyDatabase, shard: &Played<StudySettings>, to: &Path) -> Result<(), Failure> {
-        let mut times = Times::read(to, into)?;
+    fn take(into: &mut StudyDatabase, shard: &Played<StudySettings>, way: &Way) -> Result<(), Failure> {
+        let mut times = Times::read(way.to, into)?;
         if let Some(database) = &shard.database {
             times.extend(Times::read(&shard.path, database)?);
         }
-        times.write(to)?;
+        times.write(way.to)?;
         let taken = into.take(&shard.file(), &shard.units, &|_| Ok(()));
         taken.map_err(|error| Failure::file("merge", &shard.file(), error))
     }
@@ -505,8 +607,12 @@ impl Cut for EstimateSettings {
     type Database = EstimateDatabase;
     const KIND: &'static str = "estimate";
 
-    fn moved(self, from: &Path, to: &Path) -> Result<EstimateSettings, Failure> {
-        Ok(EstimateSettings { run: moved_run(self.run, from, to)?, ..self })
+    fn space(&self) -> (&str, &str) {
+        self.run.space()
+    }
+
+    fn moved(self, way: &Way) -> Result<EstimateSettings, Failure> {
+        Ok(EstimateSettings { run: way.run(self.run)?, ..self })
     }
 
     fn work(&self) -> Vec<Item> {
@@ -517,14 +623,14 @@ impl Cut for EstimateSettings {
         as_they_are(database)
     }
 
-    fn take(into: &mut EstimateDatabase, shard: &Played<EstimateSettings>, to: &Path) -> Result<(), Failure> {
-        let [from, to] = [&*shard.path, to].map(|directory| directory.join("critical"));
+    fn take(into: &mut EstimateDatabase, shard: &Played<EstimateSettings>, way: &Way) -> Result<(), Failure> {
+        let [from, to] = way.within("critical");
         std::fs::create_dir_all(&to).map_err(|error| Failure::file("create", &to, error))?;
         for (part, _) in shard.units.iter().filter(|(part, _)| *part != PILOT) {
             let names = shard.database.iter().map(|database| database.scenarios(*part)).next().transpose();
             let names = names.map_err(|error| Failure::file("read", &shard.file(), error))?;
             for name in names.unwrap_or_default() {
-                copy_scenario(&name, &from, &to)?;
+                copy_scenario(&name, &Way { from: &from, to: &to, ..*way })?;
             }
         }
         let taken = into.take(&shard.file(), &shard.units, &|_| Ok(()));

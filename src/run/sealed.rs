@@ -197,20 +197,46 @@ fn row_digest(row: &Row, columns: usize) -> Result<[u8; 32], rusqlite::Error> {
     Ok(hash.finalize().into())
 }
 
-/// The settings that differ, each with what it was; `None` if there is none.
+/// Settings that are named as different.
+const NAMED_MAX: usize = 8;
+
+/// The settings that differ, each by its path with what it was; `None` if there is none.
 pub(crate) fn differences(begun: &str, now: &str) -> Option<String> {
     let read = |text: &str| serde_yaml::from_str::<Map<String, Value>>(text).unwrap_or_default();
-    let (begun, now) = (read(begun), read(now));
+    let mut differ = Vec::new();
+    fields_that_differ("", &read(begun), &read(now), &mut differ);
+    let more = differ.len().saturating_sub(NAMED_MAX);
+    differ.truncate(NAMED_MAX);
+    let more = if more > 0 { format!(" and {more} more") } else { String::new() };
+    (!differ.is_empty()).then(|| differ.join(", ") + &more)
+}
+
+fn fields_that_differ(
+    prefix: &str,
+    begun: &Map<String, Value>,
+    now: &Map<String, Value>,
+    differ: &mut Vec<String>,
+) {
     let mut keys: Vec<&String> = begun.keys().chain(now.keys()).collect();
     keys.sort();
     keys.dedup();
-    let was = |key: &String| match begun.get(key) {
-        Some(value) => format!("`{key}` was {value}"),
-        None => format!("`{key}` was not there"),
-    };
-    let differ: Vec<String> =
-        keys.into_iter().filter(|key| begun.get(*key) != now.get(*key)).map(was).collect();
-    (!differ.is_empty()).then(|| differ.join(", "))
+    keys.retain(|key| begun.get(*key) != now.get(*key));
+    // What a digest is of says more than the digest.
+    if keys.len() > 1 {
+        keys.retain(|key| *key != "digest");
+    }
+    for key in keys {
+        let path = format!("{prefix}{key}");
+        match (begun.get(key), now.get(key)) {
+            (Some(Value::Object(begun)), Some(Value::Object(now))) => {
+                fields_that_differ(&format!("{path}."), begun, now, differ);
+            }
+            // A whole block would be too long to read.
+            (Some(Value::Object(_)), _) => differ.push(format!("`{path}` was given")),
+            (Some(value), _) => differ.push(format!("`{path}` was {value}")),
+            (None, _) => differ.push(format!("`{path}` was not there")),
+        }
+    }
 }
 
 #[cfg(test)]
@@ -302,5 +328,21 @@ mod tests {
             }
         }
         assert!(refused > 0, "pages are checked");
+    }
+
+    #[test]
+    fn settings_are_told_apart_by_their_fields() {
+        let profile = |range_m: u32, digest: &str| {
+            format!(
+                "seed: 1\nprofile:\n  digest: {digest}\n  settings: {{ sight: {{ range_m: {range_m} }}, plan: 1 }}\n"
+            )
+        };
+        let found = |now: &str| differences(&profile(80, "a"), now);
+        assert_eq!(found(&profile(80, "a")), None);
+        assert_eq!(found(&profile(60, "b")).unwrap(), "`profile.settings.sight.range_m` was 80");
+        assert_eq!(found(&profile(80, "b")).unwrap(), "`profile.digest` was \"a\"");
+        assert_eq!(found("seed: 2\n").unwrap(), "`profile` was given, `seed` was 1");
+        let (many, none) = ((0..11).map(|at| format!("k{at:02}: 1\n")).collect::<String>(), "");
+        assert!(differences(none, &many).unwrap().ends_with("`k07` was not there and 3 more"));
     }
 }

@@ -105,6 +105,25 @@ fn eight_shards_of_a_run_make_the_run() {
     assert!(!scenarios.is_empty(), "without a scenario this says little");
     scenarios.iter().for_each(|file| drop(done(&["verify", text(file)])));
 
+    // Copied to another depth, they are what they were; a torn one is to be played again.
+    for (name, bytes) in files(&scratch.path().join("shards")) {
+        let copy = scratch.path().join("far/away").join(name);
+        std::fs::create_dir_all(copy.parent().expect("it has one")).expect("it is writable");
+        std::fs::write(copy, bytes).expect("it is writable");
+    }
+    let copies: Vec<PathBuf> =
+        (1..=8).map(|number| scratch.path().join(format!("far/away/{number}"))).collect();
+    let copies: Vec<&str> = copies.iter().map(|copy| text(copy)).collect();
+    let moved = scratch.path().join("moved");
+    done(&[&["merge"], &copies[..], &["--out", text(&moved)]].concat());
+    equal(&scratch.path().join("whole"), &moved);
+    let database = scratch.path().join("far/away/4/run.db");
+    let bytes = std::fs::read(&database).expect("it is readable");
+    std::fs::write(&database, &bytes[..bytes.len() / 2]).expect("it is writable");
+    let (status, stdout, stderr) = outcome(&mut avastra(&[&["merge"], &copies[..], &["--missing"]].concat()));
+    assert_eq!((status, stdout.trim()), (0, "4"), "{stderr}");
+    assert!(stderr.contains("4/run.db"), "{stderr}");
+
     let merge = |second: &Path| {
         let first = scratch.path().join("shards/1");
         let out = scratch.path().join("refused");
