@@ -137,7 +137,7 @@ fn title_of_another(arguments: &RenderArguments, scenario: &Scenario, subject: &
     let driver = if driver.is_empty() { "another driving system".to_owned() } else { driver };
     match subject.hit {
         Some((obstacle, at_s)) => {
-            format!("{}, driven by {driver}: collision with npc#{obstacle} at {at_s:.1} s", scenario.name)
+            format!("{}, driven by {driver}: collision with npc#{obstacle} at {at_s:.2} s", scenario.name)
         }
         None => format!("{}, driven by {driver}: no collision", scenario.name),
     }

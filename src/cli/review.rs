@@ -1,18 +1,19 @@
 //! What a scenario says of its world against what is there now: the space, the engine and the driving system may have
 //! changed since it was written. It is played again as they are now, each difference is said in words, and the text is
-//! made that says the new. Of the file only what differs is replaced: digests, origin, claims.
+//! made that says the new. Of the file only what differs is replaced: digests, what it was played by, and claims that do not
+//! hold any more. Claims that an author took out stay out.
 
 use std::ops::Range;
 
 use crate::action::ActionTable;
 use crate::emit;
 use crate::episode::{EpisodeLog, Outcome};
-use crate::model::{COUNTED, Claim, Scenario};
+use crate::model::{Avoidability, Claim, Scenario};
 use crate::oracle;
 use crate::oracle::ClaimResult;
 use crate::run::{Asked, EpisodeSummary, RunError, Stage, recorded_traffic};
 use crate::sim::ENGINE;
-use crate::syntax::ast::{self, Doc, FileId, ItemKind, Span};
+use crate::syntax::ast::{self, ClauseKind, Doc, Expect, ExprKind, FileId, ItemKind, Span};
 
 use super::error::Failure;
 
@@ -50,7 +51,10 @@ pub struct Review {
     pub change: Change,
     /// Each difference in words.
     pub differences: Vec<String>,
-    /// The text that says what is so now, and the log of it; `None` for what is gone.
+    /// Which step is not legal any more, and why.
+    pub illegal: Option<String>,
+    /// The text that says what is so now, and the log of it; `None` for what is gone, and for what is another scenario
+    /// because a step is not legal any more.
     pub now: Option<(String, EpisodeLog)>,
 }
 
@@ -58,7 +62,7 @@ pub struct Review {
 /// file's, with the digest that its space has now.
 ///
 /// # Errors
-/// If it cannot be played: its driving system, rules or traffic do not exist any more, or a step is not legal any more.
+/// If it cannot be played: its driving system, rules or traffic do not exist any more.
 pub fn review(
     table: &ActionTable,
     scenario: &Scenario,
@@ -91,29 +95,34 @@ pub fn review(
     };
     let stage = Stage::new(table, &scenario)?;
     let log = stage.play(&ads, &mut |_, _, _| {});
-    must_be_legal(&log)?;
+    let illegal = illegal(&log);
+    differences.extend(illegal.clone());
     let results = stage.verify(&ads, &log);
-    let refuted = || scenario.claims.iter().zip(&results).filter(|(_, result)| result.is_refuted());
+    // Before those of the claims stand those of illegal steps.
+    let results = &results[results.len() - scenario.claims.len()..];
+    let refuted = || scenario.claims.iter().zip(results).filter(|(_, result)| result.is_refuted());
 
     // A scenario that claims no collision, but how its driving system fails, has nothing to be rewritten by.
-    let has_collision = scenario.claims.iter().any(|claim| matches!(claim, Claim::Collision { .. }));
-    if !has_collision {
+    if !scenario.claims.iter().any(Claim::is_of_a_collision) {
         let change = if refuted().count() == 0 { Change::Same } else { Change::Gone };
         differences.extend(refuted().map(|(_, result)| in_words(result)));
-        let now = (change == Change::Same && is_recorded).then(|| (text.to_owned(), log));
-        return Ok(Review { change, differences, now });
+        let is_kept = change == Change::Gone || illegal.is_some() || !is_recorded;
+        let now = (!is_kept).then(|| (text.to_owned(), log));
+        return Ok(Review { change, differences, illegal, now });
     }
 
     let setup = stage.setup(&ads);
     let episode = scenario.origin.episode.unwrap_or(0) as usize;
     let mut summary = EpisodeSummary::judged(&setup, episode, &log, stage.avoidability());
-    let change = change(&scenario, &summary, &results);
+    let change = change(&scenario, &summary, results);
     let told = refuted().filter(|(claim, _)| !matches!(claim, Claim::Proc(_) | Claim::Trace(_)));
     differences.extend(told.map(|(_, result)| in_words(result)));
-    if change == Change::Gone {
-        return Ok(Review { change, differences, now: None });
+    if change != Change::Gone {
+        differences.extend(newly_hit(&scenario, &summary));
     }
-    differences.extend(newly_hit(&scenario, &summary));
+    if change == Change::Gone || illegal.is_some() {
+        return Ok(Review { change, differences, illegal, now: None });
+    }
     let claims = |is: fn(&Claim) -> bool| scenario.claims.iter().any(is);
     if claims(|claim| matches!(claim, Claim::Cause { .. })) {
         summary.find_causes(&setup, &log).map_err(Failure::usage)?;
@@ -135,19 +144,20 @@ pub fn review(
         with: &scenario.origin.with,
     };
     let told_anew = crate::syntax::print(&emit::retold(table, &log, &summary, &source));
-    let now = rewritten(text, &told_anew, change > Change::Same);
-    Ok(Review { change, differences, now: Some((now, log)) })
+    let is_refuted: Vec<bool> = results.iter().map(ClaimResult::is_refuted).collect();
+    let now = rewritten(text, &told_anew, &is_refuted);
+    Ok(Review { change, differences, illegal, now: Some((now, log)) })
 }
 
-/// What is refused now would be another scenario.
-fn must_be_legal(log: &EpisodeLog) -> Result<(), Failure> {
-    for (number, step) in log.steps.iter().enumerate() {
-        if let Outcome::Refused { rule, reason, .. } = &step.outcome {
+/// The first step that is refused: without it, what is played is another scenario.
+fn illegal(log: &EpisodeLog) -> Option<String> {
+    log.steps.iter().enumerate().find_map(|(number, step)| match &step.outcome {
+        Outcome::Refused { rule, reason, .. } => {
             let rule = rule.as_ref().map_or(String::new(), |rule| format!("rule `{rule}`: "));
-            return Err(Failure::usage(format!("step {number} is not legal any more: {rule}{reason}")));
+            Some(format!("step {number} is not legal any more, because {rule}{reason}"))
         }
-    }
-    Ok(())
+        Outcome::Done { .. } | Outcome::Passed => None,
+    })
 }
 
 fn in_words(result: &ClaimResult) -> String {
@@ -156,12 +166,11 @@ fn in_words(result: &ClaimResult) -> String {
 
 /// The largest difference between what a scenario claims and what was found.
 fn change(scenario: &Scenario, summary: &EpisodeSummary, results: &[ClaimResult]) -> Change {
-    let Some(first) = summary.collisions.iter().find(|found| found.counted) else { return Change::Gone };
-    let claimed = scenario.claims.iter().find_map(|claim| match claim {
-        Claim::Verdict { name, obstacle } if name == COUNTED => *obstacle,
-        _ => None,
-    });
-    if claimed.is_some_and(|claimed| claimed.number != first.collision.contact.obstacle) {
+    let mut counted = summary.collisions.iter().filter(|found| found.counted).peekable();
+    if counted.peek().is_none() {
+        return Change::Gone;
+    }
+    if !counted.any(|found| scenario.crashes_with(found.collision.contact.obstacle)) {
         return Change::OtherObstacle;
     }
     let of = |(claim, result): (&Claim, &ClaimResult)| match claim {
@@ -180,7 +189,12 @@ fn newly_hit(scenario: &Scenario, summary: &EpisodeSummary) -> Vec<String> {
     let was_hit = |number: u32| {
         scenario.claims.iter().any(|claim| match claim {
             Claim::Collision { obstacle, .. } => obstacle.is_none_or(|obstacle| obstacle.number == number),
-            _ => false,
+            Claim::Verdict { obstacle, .. }
+            | Claim::Avoidability { obstacle, .. }
+            | Claim::Cause { obstacle, .. }
+            | Claim::Priority { obstacle, .. }
+            | Claim::Minimal { obstacle } => obstacle.is_some_and(|obstacle| obstacle.number == number),
+            Claim::Proc(_) | Claim::Trace(_) | Claim::End(_) => false,
         })
     };
     let contacts = summary.collisions.iter().map(|found| &found.collision.contact);
@@ -188,9 +202,9 @@ fn newly_hit(scenario: &Scenario, summary: &EpisodeSummary) -> Vec<String> {
     new.map(|contact| format!("npc#{} is hit at {:.2} s", contact.obstacle, contact.time_s)).collect()
 }
 
-/// A scenario's file with what another text of it says by what it was played and, if asked, with its claims; everything else,
-/// comments included, stays.
-fn rewritten(text: &str, anew: &str, has_other_claims: bool) -> String {
+/// A scenario's file with what another text of it says by what it was played, and with the other text's claims in place of
+/// those that are refuted. Everything else stays: other claims, comments, ends of lines.
+fn rewritten(text: &str, anew: &str, is_refuted: &[bool]) -> String {
     let (old_file, new_file) = (parsed(text), parsed(anew));
     let (Some((old, old_docs)), Some((new, new_docs))) = (scenario_of(&old_file), scenario_of(&new_file))
     else {
@@ -200,29 +214,67 @@ fn rewritten(text: &str, anew: &str, has_other_claims: bool) -> String {
     for name in PLAYED_BY {
         edits.extend(field_edit(name, (text, old), (anew, new)));
     }
-    if has_other_claims
-        && let ([first, .., last] | [first @ last], [new_first, .., new_last] | [new_first @ new_last]) =
-            (old.expects.as_slice(), new.expects.as_slice())
+    edits.extend(claim_edits((text, &old.expects), (anew, &new.expects), is_refuted));
+    // The sentence above it tells of the crash, unless somebody wrote another one.
+    if let ([old], [new]) = (old_docs, new_docs)
+        && is_refuted.contains(&true)
+        && old.text.contains(" is hit at ")
     {
-        let claims = &anew[new_first.span.start..new_last.span.end];
-        edits.push((first.span.start..last.span.end, claims.to_owned()));
-        // The sentence above it tells of the crash, unless somebody wrote another one.
-        if let ([old], [new]) = (old_docs, new_docs)
-            && old.text.contains(" is hit at ")
-        {
-            edits.push((range(old.span), anew[range(new.span)].to_owned()));
-        }
+        edits.push((range(old.span), anew[range(new.span)].to_owned()));
     }
     edits.sort_by_key(|(range, _)| range.start);
+    let line_end = if text.contains("\r\n") { "\r\n" } else { "\n" };
     let mut result = String::with_capacity(text.len());
     let mut at = 0;
     for (range, with) in edits {
         // Two fields that go, side by side, may both claim the comma between them.
         result.push_str(&text[at..range.start.max(at)]);
-        result.push_str(&with);
+        result.push_str(&with.replace('\n', line_end));
         at = range.end.max(at);
     }
     result + &text[at..]
+}
+
+/// What a claim is about: its kind, and the number of the obstacle.
+type About<'a> = (&'a str, Option<&'a str>);
+
+/// How claims that do not hold become what is so now: the new text's claim of the same kind about the same obstacle, else one
+/// about an obstacle of which the file claims nothing of that kind. What has none goes.
+fn claim_edits(
+    (text, old): (&str, &[Expect]),
+    (anew, new): (&str, &[Expect]),
+    is_refuted: &[bool],
+) -> Vec<(Range<usize>, String)> {
+    let claimed: Vec<About> = old.iter().map(about).collect();
+    let mut left: Vec<(About, &Expect)> = new.iter().map(|expect| (about(expect), expect)).collect();
+    let refuted = old.iter().zip(&claimed).zip(is_refuted).filter(|(_, is_refuted)| **is_refuted);
+    let edit = |((expect, known), _): ((&Expect, &About), &bool)| {
+        let is_new = |found: &About| found.0 == known.0 && !claimed.contains(found);
+        let same = left.iter().position(|(found, _)| found == known);
+        match same.or_else(|| left.iter().position(|(found, _)| is_new(found))) {
+            Some(at) => (range(expect.span), anew[range(left.remove(at).1.span)].to_owned()),
+            None => (with_separator(text, range(expect.span)), String::new()),
+        }
+    };
+    refuted.map(edit).collect()
+}
+
+fn about(expect: &Expect) -> About<'_> {
+    let kind = match &expect.claim.kind {
+        ExprKind::Name(name) if Avoidability::ALL.iter().any(|class| class.name() == name) => "avoidable",
+        ExprKind::Name(name) => name,
+        ExprKind::Binary { left, .. } => match &left.kind {
+            ExprKind::Name(name) => name,
+            _ => "",
+        },
+        _ => "",
+    };
+    let with = expect.clauses.iter().find(|clause| clause.kind == ClauseKind::With);
+    let number = with.and_then(|clause| match &clause.value.kind {
+        ExprKind::Numbered { number, .. } => Some(number.as_str()),
+        _ => None,
+    });
+    (kind, number)
 }
 
 /// How one field of an origin becomes what it is now.
@@ -252,8 +304,11 @@ fn field_edit(
 fn with_separator(text: &str, field: Range<usize>) -> Range<usize> {
     let before = text[..field.start].trim_end_matches([' ', '\t']);
     let after = text[field.end..].trim_start_matches([' ', '\t', ',']);
-    if before.ends_with('\n') && (after.is_empty() || after.starts_with('\n')) {
-        return before.len() - 1..text.len() - after.len();
+    let line_before = before.strip_suffix('\n').map(|before| before.strip_suffix('\r').unwrap_or(before));
+    if let Some(before) = line_before
+        && (after.is_empty() || after.starts_with(['\r', '\n']))
+    {
+        return before.len()..text.len() - after.len();
     }
     let is_last = !text[field.end..].trim_start().starts_with(',');
     match before.strip_suffix(',') {
@@ -293,5 +348,70 @@ mod tests {
         assert_eq!(without("origin { ads: cc, seed: 1 }"), "origin { seed: 1 }");
         assert_eq!(without("origin { seed: 1, ads: cc }"), "origin { seed: 1 }");
         assert_eq!(without("origin { a: 1, ads: cc, seed: 1 }"), "origin { a: 1, seed: 1 }");
+        assert_eq!(without("a: 1,\r\n  ads: cc,\r\n  b: 2"), "a: 1,\r\n  b: 2");
+    }
+
+    const OLD: &str = "\
+language 1
+/// Sedan npc#1 (DriveAhead) is hit at 3.0 s.
+scenario s {
+  road: corner
+  // who
+  expect collision with npc#1 at 3.00 s
+  // how
+  expect counted with npc#1
+  expect avoidable by [cc] with npc#1 // by hand
+  expect minimal with npc#1
+  expect proc == [0.1]
+}
+";
+    const NEW: &str = "\
+language 1
+/// SUV npc#2 (Stand) is hit at 4.0 s.
+scenario s {
+  road: corner
+  expect collision with npc#2 at 4.00 s
+  expect counted with npc#2
+  expect unavoidable with npc#2
+  expect priority == ego with npc#2
+  expect proc == [
+    0.2,
+    0.3,
+  ]
+  expect trace == \"sha256:0\"
+}
+";
+
+    #[test]
+    fn claims_that_hold_and_comments_stay() {
+        // Of the same crash at another time, only that goes in; what the author took out stays out.
+        let new = NEW.replace("npc#2", "npc#1").replace("unavoidable", "avoidable by [cc]");
+        let now = rewritten(OLD, &new, &[true, false, false, false, false]);
+        let wanted = OLD
+            .replace("3.00 s", "4.00 s")
+            .replace("Sedan npc#1 (DriveAhead) is hit at 3.0", "SUV npc#1 (Stand) is hit at 4.0");
+        assert_eq!(now, wanted);
+        assert_eq!(rewritten(OLD, &new, &[false; 5]), OLD);
+    }
+
+    #[test]
+    fn claims_about_another_crash_take_the_place_of_those_about_the_one() {
+        let now = rewritten(OLD, NEW, &[true; 5]);
+        let (_, claims) = now.split_once("road: corner\n").unwrap();
+        let wanted = "  // who
+  expect collision with npc#2 at 4.00 s
+  // how
+  expect counted with npc#2
+  expect unavoidable with npc#2 // by hand
+  expect proc == [
+    0.2,
+    0.3,
+  ]
+}
+";
+        assert_eq!(claims, wanted);
+        // A file keeps its ends of lines.
+        let crlf = |text: &str| text.replace('\n', "\r\n");
+        assert_eq!(rewritten(&crlf(OLD), NEW, &[true; 5]), crlf(&now));
     }
 }

@@ -23,7 +23,7 @@ use super::load;
 use super::load::Emitted;
 use super::output::Output;
 use super::output::plural;
-use super::review::{Review, review};
+use super::review::{Change, Review, review};
 
 /// The result for one scenario.
 struct Case {
@@ -38,6 +38,8 @@ enum Outcome {
     Played(Regression),
     /// Another crash than the scenario's, which `--allow-changed` lets pass.
     Allowed(Regression),
+    /// A review finds no crash of it any more, and why.
+    Gone(String),
     /// Why the scenario could not be played, and whether that is a mistake in a source.
     NotPlayed {
         reason: String,
@@ -156,13 +158,16 @@ impl Suite<'_> {
         let started = Instant::now();
         let name = file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
         let (scenario, road, outcome) = match self.open(file) {
-            Ok(Emitted::Policy(..)) => return Ok(None),
-            Ok(Emitted::Scenario(table, scenario)) => {
+            Ok((Emitted::Policy(..), _)) => return Ok(None),
+            Ok((Emitted::Scenario(table, scenario), gone)) => {
                 let road = table.space().roads[scenario.road].name.clone();
-                let outcome = self.compare(&table, &scenario);
                 let not_played =
                     |error: RunError| Outcome::NotPlayed { reason: error.to_string(), in_source: false };
-                (scenario.name, road, outcome.unwrap_or_else(not_played))
+                let outcome = match gone {
+                    Some(reason) => Outcome::Gone(reason),
+                    None => self.compare(&table, &scenario).unwrap_or_else(not_played),
+                };
+                (scenario.name, road, outcome)
             }
             Err(failure) => {
                 let in_source = matches!(failure, Failure::Source { .. } | Failure::Outdated);
@@ -173,14 +178,14 @@ impl Suite<'_> {
         Ok(Some(Case { file: file.to_owned(), scenario, road, outcome, elapsed_s }))
     }
 
-    /// Reads a file. One whose space has changed is noted, or reviewed.
-    fn open(&mut self, file: &Path) -> Result<Emitted, Failure> {
+    /// Reads a file. One whose space has changed is noted, or reviewed; then it may come out that its crash is gone, and why.
+    fn open(&mut self, file: &Path) -> Result<(Emitted, Option<String>), Failure> {
         let loaded = load::read_and_check(file)?;
         if self.arguments.accept || self.arguments.review {
             return self.review(file, &loaded);
         }
         if !is_outdated(&loaded) {
-            return load::emitted_in(self.output, file, loaded);
+            return Ok((load::emitted_in(self.output, file, loaded)?, None));
         }
         self.outdated.push(loaded);
         Err(Failure::Outdated)
@@ -188,7 +193,7 @@ impl Suite<'_> {
 
     /// Plays a scenario as things are now, says what differs in meaning, and takes it over if asked. What is gone or cannot
     /// be played stays as it is.
-    fn review(&mut self, file: &Path, loaded: &Loaded) -> Result<Emitted, Failure> {
+    fn review(&mut self, file: &Path, loaded: &Loaded) -> Result<(Emitted, Option<String>), Failure> {
         let root = FileId::default();
         let (before, mut spaces) = (loaded.sources.text(root), Vec::new());
         let text = match is_outdated(loaded) {
@@ -198,9 +203,13 @@ impl Suite<'_> {
                 apply_fixes(root, before, &loaded.diagnostics).0
             }
         };
-        let emitted = load::emitted_in(self.output, file, load::check_text(file, &text)?)?;
-        let Emitted::Scenario(table, scenario) = &emitted else { return Ok(emitted) };
-        let Review { change, mut differences, now } = review(table, scenario, &self.asked, &text)?;
+        let mut checked = load::check_text(file, &text)?;
+        for mistake in checked.diagnostics.iter_mut().filter(|_| !spaces.is_empty()) {
+            mistake.notes.push("the space has changed since the scenario was written".to_owned());
+        }
+        let emitted = load::emitted_in(self.output, file, checked)?;
+        let Emitted::Scenario(table, scenario) = &emitted else { return Ok((emitted, None)) };
+        let Review { change, mut differences, illegal, now } = review(table, scenario, &self.asked, &text)?;
         differences.splice(0..0, spaces);
         self.output.say(&format!("{}: {}", file.display(), change.in_words()));
         differences.iter().for_each(|difference| self.output.say(&format!("    {difference}")));
@@ -208,12 +217,12 @@ impl Suite<'_> {
             "file": file, "scenario": scenario.name, "change": change.in_words(), "differences": differences,
         }));
         let Some((text, log)) = now else {
-            return Err(Failure::usage(
-                "no collision of it counts any more: it is kept as it was; delete it if that is right",
-            ));
+            let why = illegal.unwrap_or_else(|| "no collision of it counts any more".to_owned());
+            let gone = format!("{why}; it is kept as it was");
+            return Ok((emitted, (change == Change::Gone).then_some(gone)));
         };
         if text == before {
-            return Ok(emitted);
+            return Ok((emitted, None));
         }
         let emitted = load::emitted_in(self.output, file, load::check_text(file, &text)?)?;
         if self.arguments.accept {
@@ -221,7 +230,7 @@ impl Suite<'_> {
             write(file, &text)?;
             self.accepted += 1;
         }
-        Ok(emitted)
+        Ok((emitted, None))
     }
 
     /// One diagnostic for all scenarios of which the same is to be said.
@@ -258,12 +267,18 @@ impl Suite<'_> {
                 Some(found) => Regression::AdsFailed(found),
             }));
         }
-        let (log, _, first) = stage.first_counted(&recorded);
-        let Some(index) = first else {
+        let (log, judgements, first) = stage.first_counted(&recorded);
+        if first.is_none() {
             let reason = "it has no counted collision with the driving system that it was found with";
             return Ok(Outcome::NotPlayed { reason: reason.to_owned(), in_source: false });
+        }
+        let counted = oracle::counted(table.space(), &log, &judgements);
+        let is_own = |index: &usize| scenario.crashes_with(log.collisions[*index].contact.obstacle);
+        let found = match counted.into_iter().find(is_own) {
+            Some(index) => oracle::regression(&stage.setup(&recorded), &log, index, &ads),
+            // Already with the driving system that it was found with.
+            None => Regression::OtherCrash,
         };
-        let found = oracle::regression(&stage.setup(&recorded), &log, index, &ads);
         let is_allowed = self.arguments.allow_changed && found.is_other_crash();
         Ok(if is_allowed { Outcome::Allowed(found) } else { Outcome::Played(found) })
     }
@@ -300,24 +315,25 @@ impl Outcome {
                 Regression::StillFails { .. } | Regression::AdsFailed(_) | Regression::FailsAgain(_),
             ) => true,
             Outcome::Played(found) => found.is_other_crash(),
-            Outcome::Allowed(_) | Outcome::NotPlayed { .. } => false,
+            Outcome::Allowed(_) | Outcome::Gone(_) | Outcome::NotPlayed { .. } => false,
         }
     }
 
     /// It says nothing about the driving system, or nothing that counts.
     fn is_skipped(&self) -> bool {
-        matches!(self, Outcome::Played(Regression::NeverMet) | Outcome::Allowed(_))
+        matches!(self, Outcome::Played(Regression::NeverMet) | Outcome::Allowed(_) | Outcome::Gone(_))
     }
 
     fn is_changed(&self) -> bool {
         self.is_skipped() || matches!(self, Outcome::Played(found) if found.is_other_crash())
     }
 
-    /// One of five words, and why.
+    /// One of six words, and why.
     fn in_words(&self) -> (&'static str, String) {
         let (found, more) = match self {
             Outcome::Played(found) => (found, ""),
             Outcome::Allowed(found) => (found, ", which is allowed"),
+            Outcome::Gone(reason) => return ("gone", reason.clone()),
             Outcome::NotPlayed { reason, .. } => return ("error", reason.clone()),
         };
         match found {
@@ -360,7 +376,7 @@ fn junit(suite: &str, cases: &[Case]) -> String {
             Outcome::NotPlayed { .. } => Some("error"),
             outcome if outcome.is_failure() => Some("failure"),
             outcome if outcome.is_skipped() => Some("skipped"),
-            Outcome::Played(_) | Outcome::Allowed(_) => None,
+            Outcome::Played(_) | Outcome::Allowed(_) | Outcome::Gone(_) => None,
         };
         let inside = element.map_or_else(String::new, |element| {
             format!("\n      <{element} type=\"{word}\" message=\"{reason}\"/>\n    ")
@@ -423,6 +439,7 @@ mod tests {
             case("d", Outcome::Played(Regression::NeverMet)),
             case("f", Outcome::Played(Regression::Struck)),
             Case { file: PathBuf::from("other/f.ava"), ..case("f", Outcome::Allowed(Regression::Struck)) },
+            case("g", Outcome::Gone("step 3 is not legal any more".to_owned())),
             case(
                 "e <&> \"\u{1}\"",
                 Outcome::NotPlayed { reason: "cannot read `x` & \"y\"\nat all".to_owned(), in_source: false },
@@ -432,12 +449,12 @@ mod tests {
         let document = roxmltree::Document::parse(&text).expect(&text);
         let suite = document.root_element().first_element_child().unwrap();
         let counts = ["tests", "failures", "errors", "skipped"].map(|name| suite.attribute(name).unwrap());
-        assert_eq!(counts, ["7", "3", "1", "2"]);
+        assert_eq!(counts, ["8", "3", "1", "3"]);
         assert_eq!(suite.attribute("name"), Some("runs/<1>"));
         let cases = suite.children().filter(|node| node.has_tag_name("testcase"));
         let names: Vec<&str> = cases.filter_map(|case| case.attribute("name")).collect();
         assert_eq!(names[4..6], ["f (f.ava)", "f (other/f.ava)"]);
         let inside = |name: &str| suite.descendants().filter(|node| node.has_tag_name(name)).count();
-        assert_eq!(["testcase", "failure", "error", "skipped"].map(inside), [7, 3, 1, 2]);
+        assert_eq!(["testcase", "failure", "error", "skipped"].map(inside), [8, 3, 1, 3]);
     }
 }

@@ -50,24 +50,25 @@ pub fn scenario(
     file(table, log, source, origin, [&emitted, &headline], steps, expects(log, summary, steps))
 }
 
-/// The same of an emitted scenario that was played again: with all its steps, because they are the scenario.
+/// The same of an emitted scenario that was played again: with all its steps, because they are the scenario, and its end.
 pub fn retold(table: &ActionTable, log: &EpisodeLog, summary: &EpisodeSummary, source: &Provenance) -> File {
     let emitted = format!("Emitted by `avastra {}`; replay with `avastra replay FILE`.", source.command);
     let counted = summary.collisions.iter().find(|finding| finding.counted);
     let headline = counted.map_or_else(String::new, |first| headline(table.space(), log, &first.collision));
     let origin = origin(log, source, &summary.avoidability);
     let steps = log.steps.len();
-    file(table, log, source, origin, [&emitted, &headline], steps, expects(log, summary, steps))
+    let mut expects = expects(log, summary, steps);
+    expects.push(end(log));
+    file(table, log, source, origin, [&emitted, &headline], steps, expects)
 }
 
 /// An episode that an external driving system failed in, as a scenario that ends so; it must have a step.
 pub fn failure(table: &ActionTable, log: &EpisodeLog, headline: &str, source: &Provenance) -> File {
     let emitted = format!("Emitted by `avastra {}`; replay with `avastra replay FILE`.", source.command);
     let origin = origin(log, source, &AvoidabilitySettings::default());
-    let end = tree::expect(tree::equal(tree::name("end"), tree::name(log.end.name())), Vec::new());
     let trace = tree::text(digest_text(&log.trace()));
     let trace = tree::expect(tree::equal(tree::name("trace"), trace), Vec::new());
-    file(table, log, source, origin, [&emitted, headline], log.steps.len(), vec![end, trace])
+    file(table, log, source, origin, [&emitted, headline], log.steps.len(), vec![end(log), trace])
 }
 
 /// All steps of an episode as a scenario without claims, to look at.
@@ -250,11 +251,16 @@ fn expects(log: &EpisodeLog, summary: &EpisodeSummary, steps: usize) -> Vec<Expe
     expects
 }
 
+/// How it ends.
+fn end(log: &EpisodeLog) -> Expect {
+    tree::expect(tree::equal(tree::name("end"), tree::name(log.end.name())), Vec::new())
+}
+
 /// What happens, in a sentence for the reader.
 fn headline(space: &Space, log: &EpisodeLog, collision: &Collision) -> String {
     let contact = &collision.contact;
     format!(
-        "{} npc#{} ({}) is hit at {:.1} s by an ego vehicle at {:.1} km/h on {}.",
+        "{} npc#{} ({}) is hit at {:.2} s by an ego vehicle at {:.1} km/h on {}.",
         space.body_name(collision.body),
         contact.obstacle,
         collision.verb.name(),

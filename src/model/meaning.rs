@@ -88,7 +88,12 @@ impl Meaning {
             parts.push(format!("{missing} {noun} of then missing"));
         }
         if parts.is_empty() {
-            parts.push("the declarations are the same, their order is not".to_owned());
+            // A mark is short, and may stay as it was; then the digest alone tells of a change.
+            let now: String = self.declarations.iter().map(|declaration| declaration.mark.as_str()).collect();
+            parts.push(match now == marks {
+                true => "no declaration is seen to differ: the digest itself may have been edited".to_owned(),
+                false => "the declarations are the same, their order is not".to_owned(),
+            });
         }
         Some(parts.join("; "))
     }
@@ -127,6 +132,11 @@ mod tests {
         assert_eq!(
             found(&["let b = 2", "let a = 1", "let c = 3"]),
             "the declarations are the same, their order is not"
+        );
+        let edited = then.seal().replace("sha256:", "sha256:0");
+        assert_eq!(
+            then.differences(&edited).as_deref(),
+            Some("no declaration is seen to differ: the digest itself may have been edited")
         );
         assert_eq!(then.differences(then.digest()), None);
         assert_eq!(then.differences("sha256:0 ää"), None);

@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use crate::model::expr::{Expr, ExprKind};
 use crate::model::limits::TICK_MS;
+use crate::model::space::COUNTED;
 use crate::model::value::{Memory, Value};
 use crate::model::vocabulary::Priority;
 
@@ -142,6 +143,34 @@ pub enum Claim {
     Minimal { obstacle: Option<Obstacle> },
     /// `expect end == arrived`: one of [`ENDS`].
     End(String),
+}
+
+impl Claim {
+    /// Whether it is about a collision, and not about the drive as a whole.
+    pub fn is_of_a_collision(&self) -> bool {
+        !matches!(self, Claim::Proc(_) | Claim::Trace(_) | Claim::End(_))
+    }
+}
+
+impl Scenario {
+    /// Whether a crash with an obstacle is one that the scenario is about: one that it calls counted, or if it calls none so,
+    /// one that it says is hit. If it names no obstacle, any crash is.
+    pub fn crashes_with(&self, number: u32) -> bool {
+        let of = |is_meant: fn(&Claim) -> Option<Obstacle>| {
+            let numbers = self.claims.iter().filter_map(is_meant).map(|obstacle| obstacle.number);
+            numbers.collect::<Vec<_>>()
+        };
+        let counted = of(|claim| match claim {
+            Claim::Verdict { name, obstacle } if name == COUNTED => *obstacle,
+            _ => None,
+        });
+        let hit = of(|claim| match claim {
+            Claim::Collision { obstacle, .. } => *obstacle,
+            _ => None,
+        });
+        let claimed = if counted.is_empty() { hit } else { counted };
+        claimed.is_empty() || claimed.contains(&number)
+    }
 }
 
 /// Whether careful drivers avoid a collision.

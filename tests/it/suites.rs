@@ -103,7 +103,8 @@ fn a_suite_outlives_changes_of_its_space() {
     found.edit(space, "fn lead(v: Speed) -> Length = v * 0.5 s", "fn lead(v: Speed) -> Length = v * 0.7 s");
     found.edit(space, "  Far => 40 m", "  Far => 41 m");
     let before = found.texts();
-    let (status, tested, _) = found.test(&["--accept", &run]);
+    let (status, tested, stderr) = found.test(&["--accept", &run]);
+    assert!(stderr.contains("the space has changed since the scenario was written"), "{stderr}");
     let kept = tested["errors"].as_u64().expect("a number");
     assert!(status == 2 && kept > 0 && tested["accepted"].as_u64() == Some(all - kept), "{tested}");
     let unchanged = before.iter().zip(found.texts()).filter(|(then, now)| *then == now).count();
@@ -147,6 +148,11 @@ fn a_review_says_what_differs_in_meaning() {
     let wrong = found.texts();
     let (_, tested, _) = found.test(&[&run]);
     assert_eq!(tested["errors"], 1, "the world is another: {tested}");
+    let of_second = |tested: &serde_json::Value| tested["scenarios"][1]["outcome"].clone();
+    assert_eq!(of_second(&tested), "changed", "{tested}");
+    let second = format!("{run}/critical/{}", names[1]);
+    assert_eq!(found.test(&[&second]).0, 4, "another obstacle is hit than it claims");
+    assert_eq!(found.test(&["--allow-changed", &second]).0, 0);
     let (status, tested, stderr) = found.test(&["--review", &run]);
     assert_eq!(changes(&tested)[..2], ["same crash, other time", "another crash"], "{stderr}");
     let told = tested["reviewed"][0]["differences"].to_string();
@@ -158,11 +164,22 @@ fn a_review_says_what_differs_in_meaning() {
     edit(0, "  // looked at\n", "");
     assert_eq!(found.texts(), before);
 
+    // Of an author's file only the claim that does not hold is replaced: what was taken out stays out, comments and the ends
+    // of lines stay.
+    let collision = format!("  expect collision with {time} s\n");
+    edit(0, &collision, "");
+    edit(0, "  expect priority", "  // who had to wait\n  expect priority");
+    edit(0, "\n", "\r\n");
+    let authored = found.texts();
     let priority = between(&before[0], "expect priority == ", " with");
     let other = if priority == "other" { "none" } else { "other" };
     edit(0, &format!("expect priority == {priority} "), &format!("expect priority == {other} "));
     let (_, tested, _) = found.test(&["--accept", &run]);
     assert_eq!(changes(&tested)[0], "same crash, other verdict");
+    assert_eq!(found.texts(), authored);
+    edit(0, "\r\n", "\n");
+    edit(0, "  // who had to wait\n", "");
+    edit(0, "  expect counted", &format!("{collision}  expect counted"));
     assert_eq!(found.texts(), before);
 
     // Another driving system takes the place of the recorded one where it crashes, too; elsewhere nothing is written.
@@ -180,6 +197,32 @@ fn a_review_says_what_differs_in_meaning() {
             assert_eq!(status, 0, "{stdout}{stderr}");
         }
     }
+}
+
+/// A driving system that no longer crashes drives another way, on which a step may have no place.
+#[test]
+fn a_review_tells_what_is_gone() {
+    let scratch = tempfile::tempdir().expect("a scratch directory");
+    let run = scratch.path().join("run").display().to_string();
+    let fault = "scenarios/ads/faults/planning_never_yields.yaml";
+    let place = ["--road", "residential", "--episodes", "9", "--seed", "1", "--ads-config", fault];
+    let space = "scenarios/avastra45.ava";
+    avastra(&[&["run", space, "--out", &run][..], &place].concat()).assert().success();
+    let review = ["test", "--format", "json", "--accept", "--ads", "idm", &run];
+    let (status, stdout, stderr) = outcome(&mut avastra(&review));
+    let tested: serde_json::Value = serde_json::from_str(stdout.trim_end()).expect("it is JSON");
+    assert_eq!(
+        (status, &tested["errors"], &tested["accepted"]),
+        (0, &0.into(), &0.into()),
+        "{tested}{stderr}"
+    );
+    let is_gone = |one: &serde_json::Value| one["outcome"] == "gone";
+    let scenarios = tested["scenarios"].as_array().expect("a list");
+    assert!(!scenarios.is_empty() && scenarios.iter().all(is_gone), "{tested}");
+    assert_eq!(tested["changed"], scenarios.len(), "{tested}");
+    assert_eq!(tested["reviewed"][0]["change"], "gone");
+    let differences = tested["reviewed"][0]["differences"].to_string();
+    assert!(differences.contains("is not legal any more, because cannot spawn"), "{tested}");
 }
 
 fn name(path: &Path) -> String {
@@ -269,6 +312,10 @@ fn what_is_packed_keeps_away_from_what_is_there() {
     assert_eq!(text, "language 1\nuse \"space/space.ava\"\n");
     let (status, _, stderr) = pack("two");
     assert!(status == 1 && stderr.contains("with another content"), "{stderr}");
+
+    // A folder is none of the files to name, but may hold some.
+    let (status, _, stderr) = outcome(&mut avastra(&["shrink", &path("one").display().to_string()]));
+    assert!(status == 1 && stderr.contains("one/*.ava`"), "{stderr}");
 
     // What fails leaves nothing behind, and a file that is named twice is one.
     let [one, two] = ["one/one.ava", "two/two.ava"].map(|name| path(name).display().to_string());
