@@ -83,7 +83,7 @@ pub fn check_text(path: &Path, text: &str) -> Result<Loaded, Failure> {
 
 fn check_read(path: &Path, read: &check::ReadFile<'_>) -> Result<Loaded, Failure> {
     if path.is_dir() {
-        return Err(Failure::file("read", path, FOLDER));
+        return Err(Failure::file("read", path, name_a_file_in(path)));
     }
     let mut loaded = check::load(path, read).map_err(|error| Failure::file("read", path, error))?;
     places::judge_claims(&mut loaded);
@@ -91,6 +91,15 @@ fn check_read(path: &Path, read: &check::ReadFile<'_>) -> Result<Loaded, Failure
         check::suggest_uses(&mut loaded, &nearby(path));
     }
     Ok(loaded)
+}
+
+/// What to name in place of a folder: the scenarios of a run, or the sources that lie in it.
+fn name_a_file_in(folder: &Path) -> String {
+    let within = ["critical", "failures", ""].map(|name| folder.join(name));
+    match within.iter().find(|folder| sources_in(folder).is_ok_and(|files| !files.is_empty())) {
+        Some(folder) => format!("it is a folder: name files in it, as `{}`", folder.join("*.ava").display()),
+        None => FOLDER.to_owned(),
+    }
 }
 
 /// Other source files in the directory of a file and in the one above, with their paths from the file.

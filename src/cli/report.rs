@@ -173,7 +173,9 @@ fn of_run(output: &Output, directory: &Path, settings: &str, found: &mut Found) 
     }
     let path = directory.join("run.db");
     if !path.is_file() {
-        found.remarks.push(format!("`{}` is missing: only scenarios are shown", path.display()));
+        let remark = format!("`{}` is missing: only scenarios are shown", path.display());
+        output.warn(&remark);
+        found.remarks.push(remark);
         return Ok(());
     }
     let unread = |error| Failure::file("read", &path, error);

@@ -249,6 +249,16 @@ fn a_refuted_scenario_is_said_so_of_and_fails_the_command() {
 }
 
 #[test]
+fn a_run_without_its_database_is_said_so_of() {
+    let scratch = tempfile::tempdir().expect("a scratch directory");
+    written(&scratch.path().join("critical"), "walk.ava", "");
+    std::fs::write(scratch.path().join("run.yaml"), "seed: 1\n").expect("it can be written");
+    let (status, stderr, index) = reported(scratch.path(), &[&scratch.path().display().to_string()]);
+    assert!(status == 0 && stderr.contains("run.db` is missing: only scenarios are shown"), "{stderr}");
+    assert_eq!(index["scenarios"].as_array().map(Vec::len), Some(1));
+}
+
+#[test]
 fn a_comparison_says_what_becomes_of_each_crash() {
     let scratch = tempfile::tempdir().expect("a scratch directory");
     let file = written(scratch.path(), "walk.ava", "");
