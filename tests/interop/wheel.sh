@@ -1,5 +1,5 @@
 #!/bin/sh
-# Builds the Python package with its engine, checks its metadata, and runs its tests with both versions of Gymnasium that
+# Lints and builds the Python package with its engine, checks its metadata, and runs its tests with both versions of Gymnasium that
 # are supported. PROFILE=dev builds faster. Needs Python 3.9 or later with venv, Rust, and PyPI for the first run.
 set -eu
 cd "$(dirname "$0")/../.."
@@ -14,6 +14,8 @@ if [ ! -e "$root/tools/installed" ]; then
     "$root/tools/bin/pip" install --quiet 'maturin>=1.10,<2' twine
     touch "$root/tools/installed"
 fi
+cargo fmt -p avastra-python --check
+cargo clippy --quiet -p avastra-python -- -D warnings
 rm -rf "$root/dist"
 PATH="$PWD/$root/tools/bin:$PATH" maturin build --profile "$profile" --manifest-path python/native/Cargo.toml --out "$root/dist"
 "$root/tools/bin/twine" check --strict "$root"/dist/*.whl
