@@ -356,6 +356,7 @@ language 1
 /// Sedan npc#1 (DriveAhead) is hit at 3.0 s.
 scenario s {
   road: corner
+  steps { 0: wait() }
   // who
   expect collision with npc#1 at 3.00 s
   // how
@@ -370,6 +371,7 @@ language 1
 /// SUV npc#2 (Stand) is hit at 4.0 s.
 scenario s {
   road: corner
+  steps { 0: wait() }
   expect collision with npc#2 at 4.00 s
   expect counted with npc#2
   expect unavoidable with npc#2
@@ -397,7 +399,7 @@ scenario s {
     #[test]
     fn claims_about_another_crash_take_the_place_of_those_about_the_one() {
         let now = rewritten(OLD, NEW, &[true; 5]);
-        let (_, claims) = now.split_once("road: corner\n").unwrap();
+        let (_, claims) = now.split_once("wait() }\n").unwrap();
         let wanted = "  // who
   expect collision with npc#2 at 4.00 s
   // how
