@@ -29,12 +29,17 @@ use super::{load, run_directory, shard};
 
 /// Plays what a study still lacks and prints its result.
 pub fn study(output: &Output, arguments: &StudyArguments) -> Result<(), Failure> {
-    let begun = match &arguments.resume {
-        Some(path) => resumed(output, path)?,
+    let (begun, reused) = match &arguments.resume {
+        Some(path) => {
+            let resumed = resumed(output, path)?;
+            let reused = played_elsewhere(&arguments.reuse, &resumed.0)?;
+            (resumed, reused)
+        }
         None => {
             let file = arguments.file.as_ref().expect("clap asks for it where there is no `--resume`");
             let shard = shard::asked(output, arguments.shard.shard)?;
             let study = begun(output, file, arguments)?;
+            let reused = played_elsewhere(&arguments.reuse, &study)?;
             let held = run_directory::create_empty(arguments.out.as_deref())?;
             shard::keep(&held.path, shard)?;
             let space = load::relative(&held.path, &study.table().space().path)?;
@@ -43,10 +48,10 @@ pub fn study(output: &Output, arguments: &StudyArguments) -> Result<(), Failure>
                 external.map(|attached| run_directory::to_record(&held.path, attached)).transpose()?;
             let settings = StudySettings { space, external, ..study.settings().clone() };
             let text = run_directory::write_settings(&held.path, "study", &settings)?;
-            (study, held, text)
+            ((study, held, text), reused)
         }
     };
-    play_all(output, begun, &arguments.reuse, arguments.jobs)
+    play_all(output, begun, &reused, arguments.jobs)
 }
 
 /// Ends a study whose jobs were all played, in shards.
@@ -58,7 +63,7 @@ pub fn conclude(output: &Output, path: &Path) -> Result<(), Failure> {
 fn play_all(
     output: &Output,
     (study, held, settings): (Study, Held, String),
-    reuse: &[PathBuf],
+    reused: &[Reused],
     asked_jobs: Option<u32>,
 ) -> Result<(), Failure> {
     let path = held.path.clone();
@@ -75,14 +80,15 @@ fn play_all(
     let missing = |database: &StudyDatabase| database.missing(study.settings(), own.clone());
     output.tell(&heading(&study, &path));
     let mut times = Times::read(&path, &database)?;
-    for directory in reuse {
-        let found = played_elsewhere(directory, &study, &missing(&database).map_err(unread)?)?;
-        for cells in &found {
+    for Reused { directory, played } in reused {
+        let lacking = missing(&database).map_err(unread)?;
+        let new: Vec<_> = played.iter().filter(|(job, _)| lacking.contains(job)).collect();
+        for (_, cells) in &new {
             times.add(cells);
             database.add(cells).map_err(unwritten)?;
         }
         times.write(&path)?;
-        let count = plural(found.iter().map(Vec::len).sum(), "cell");
+        let count = plural(new.iter().map(|(_, cells)| cells.len()).sum(), "cell");
         output.tell(&format!("{count} taken over from {}", directory.display()));
     }
     let todo = missing(&database).map_err(unread)?;
@@ -141,22 +147,28 @@ fn play_all(
     Ok(())
 }
 
-/// The cells of a study's directory that are those of jobs of this study.
-fn played_elsewhere(directory: &Path, study: &Study, jobs: &[Job]) -> Result<Vec<Vec<CellRecord>>, Failure> {
-    let (settings, cells) = read(directory)?;
-    let refuse = |reason: String| Failure::file("reuse", directory, reason);
-    let found = study.settings().played_elsewhere(jobs, &settings, &cells);
-    let found = found.map_err(|fields| {
-        refuse(format!(
-            "it plays otherwise: its {} {} another",
-            listed(&fields),
-            if fields.len() > 1 { "are" } else { "is" }
-        ))
-    })?;
-    match found.is_empty() && !jobs.is_empty() {
-        true => Err(refuse("it has played no agent with the same settings on the same road".to_owned())),
-        false => Ok(found),
-    }
+/// Another study's directory, with the jobs that it has played of this one.
+struct Reused {
+    directory: PathBuf,
+    played: Vec<(Job, Vec<CellRecord>)>,
+}
+
+fn played_elsewhere(directories: &[PathBuf], study: &Study) -> Result<Vec<Reused>, Failure> {
+    let reused = directories.iter().map(|directory| {
+        let (settings, cells) = read(directory)?;
+        let refuse = |reason: String| Failure::file("reuse", directory, reason);
+        let played = study.settings().played_elsewhere(&settings, &cells);
+        let played = played.map_err(|fields| {
+            let verb = if fields.len() == 1 { "is" } else { "are" };
+            refuse(format!("it plays otherwise: its {} {verb} another", listed(&fields)))
+        })?;
+        if played.is_empty() {
+            let reason = "it has played no agent with the same settings on the same road";
+            return Err(refuse(reason.to_owned()));
+        }
+        Ok(Reused { directory: directory.clone(), played })
+    });
+    reused.collect()
 }
 
 /// The settings of a study's directory and its cells, finished or not.

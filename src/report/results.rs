@@ -19,7 +19,7 @@ const HEAD: &str = "\
 own driving systems in avastra's own world: no figure says anything about Apollo or LGSVL, which the paper used.
 
 How to read it:
-- A number is the mean over independent trainings (or repetitions, of agents that have nothing to learn), in brackets with Student's 95 % interval over them; where none was found at all, with Poisson's.
+- A number is the mean over independent trainings (or repetitions, of agents that have nothing to learn), in brackets with Student's 95 % interval over them; where none was found at all, with Poisson's, which takes collisions to be independent.
 - Â12 is how probable it is that a value of the first is larger than one of the second; 0.5 is chance. Beside it p of Mann–Whitney's test after Holm's correction over the study, and p of Wilcoxon's test over pairs that met the same episodes, not corrected.
 - Published figures are single numbers without intervals, so only ours are tested.
 ";

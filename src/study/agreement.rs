@@ -47,9 +47,9 @@ pub enum Verdict {
 }
 
 impl ComparedFigure {
-    /// Whether the published figure lies within our interval; `None` if ours has none.
+    /// Whether the published figure lies within our interval; `None` if ours has none, or was never observed.
     pub fn is_within(&self) -> Option<bool> {
-        let interval = self.ours.interval?;
+        let interval = self.ours.interval.filter(|_| self.ours.mean > 0.0)?;
         Some(interval.low <= self.published && interval.high.is_none_or(|high| self.published <= high))
     }
 }

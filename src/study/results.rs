@@ -266,8 +266,8 @@ fn agent_results(measured: MeasuredAgent, cells: &[&CellRecord]) -> AgentResults
 }
 
 /// A measure's mean over cells. None is below 0, so its interval is cut off there. Cells that are all 0 have no spread
-/// for Student's interval; what they count is then bounded as Poisson's events are. That bound takes a cell for one
-/// observation, though it is the mean of several seeds: it is too wide rather than too short.
+/// for Student's interval; the interval of what they count is then that of Poisson's events, which takes collisions to be
+/// independent and trainings to be alike.
 pub(super) fn estimate(measure: &str, cells: &[&MeasuredCell]) -> Option<Estimate> {
     let found = mean(&values(measure, cells))?;
     let is_count = MEASURES.iter().any(|one| one.name == measure && one.is_count);

@@ -6,33 +6,36 @@ use crate::study::record::CellRecord;
 use crate::study::settings::{AgentSettings, StudySettings};
 
 impl StudySettings {
-    /// The cells of another study that are those of some jobs of this one, by job and under this one's labels.
+    /// The jobs of this study that another one has played: the cells of each, under this one's labels.
     ///
     /// # Errors
     /// If the two play otherwise: the settings in which they differ.
     pub fn played_elsewhere(
         &self,
-        jobs: &[Job],
         other: &StudySettings,
         cells: &[CellRecord],
-    ) -> Result<Vec<Vec<CellRecord>>, Vec<&'static str>> {
+    ) -> Result<Vec<(Job, Vec<CellRecord>)>, Vec<&'static str>> {
         let differences = self.plays_otherwise(other);
         if !differences.is_empty() {
             return Err(differences);
         }
-        let of_job = |job: &Job| {
+        let played = |job: Job| {
             let agent = &self.agents[job.agent];
-            let same = other.agents.iter().find(|one| self.is_same(agent, other, one))?;
+            let same: Vec<&AgentSettings> =
+                other.agents.iter().filter(|one| self.is_same(agent, other, one)).collect();
             let on_road = |&road: &usize| {
                 let is_it = |cell: &&CellRecord| {
-                    cell.agent == same.label && cell.road == self.roads[road] && cell.number == job.number
+                    cell.road == self.roads[road]
+                        && cell.number == job.number
+                        && same.iter().any(|one| one.label == cell.agent)
                 };
                 let cell = cells.iter().find(is_it)?;
                 Some(CellRecord { agent: agent.label.clone(), ..cell.clone() })
             };
-            job.roads.iter().map(on_road).collect::<Option<Vec<_>>>()
+            let cells = job.roads.iter().map(on_road).collect::<Option<Vec<_>>>()?;
+            Some((job, cells))
         };
-        Ok(jobs.iter().filter_map(of_job).collect())
+        Ok(self.jobs().into_iter().filter_map(played).collect())
     }
 
     /// The settings of all agents in which two studies differ.

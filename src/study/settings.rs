@@ -93,6 +93,8 @@ pub enum StudyError {
     LabelTwice { label: String },
     #[error("no agent is called `{label}`, which `baselines` names: there are {known}")]
     Baseline { label: String, known: String },
+    #[error("`baselines` names `{label}` twice")]
+    BaselineTwice { label: String },
     #[error("`published` names the {what} `{name}`, which the study does not have: there are {known}")]
     Published { what: &'static str, name: String, known: String },
     #[error("agent `{label}`: `{field}` is for agents that learn, `{name}` does not")]
@@ -346,7 +348,10 @@ pub(super) fn check(settings: &StudySettings) -> Result<(), StudyError> {
             return range(field, agent.repeats.to_string(), "from 1 to 10000");
         }
     }
-    for baseline in &settings.baselines {
+    for (index, baseline) in settings.baselines.iter().enumerate() {
+        if settings.baselines[..index].contains(baseline) {
+            return Err(StudyError::BaselineTwice { label: baseline.clone() });
+        }
         if !labels.contains(baseline.as_str()) {
             let known = listed(&settings.agents.iter().map(|agent| agent.label.as_str()).collect::<Vec<_>>());
             return Err(StudyError::Baseline { label: baseline.clone(), known });

@@ -75,27 +75,68 @@ fn what_another_study_has_played_is_taken_over() {
         let words = ["study", file, "--jobs", "1", "--out", &out.display().to_string()];
         (outcome(&mut avastra(&[&words, options].concat())), out)
     };
-    let (_, first) =
-        play(&file("first", 3, "{ name: random, repeats: 2 }, { name: none, repeats: 1 }"), "first", &[]);
+    let tiny = |label: &str| {
+        format!(
+            "{{ name: ddqn, label: {label}, trainings: 1, episodes: 2, train_roads: [corner, crossroad], \
+             config: {{ hidden_units: [8], batch_len: 8, learning_starts: 20 }} }}"
+        )
+    };
+    let agents = format!("{{ name: random, repeats: 2 }}, {{ name: none, repeats: 1 }}, {}", tiny("learner"));
+    let (_, first) = play(&file("first", 3, &agents), "first", &[]);
     let reuse = ["--reuse", &first.display().to_string()];
-    let agents = "{ name: random, label: dice, repeats: 3 }, { name: greedy, repeats: 1 }";
-    let second = file("second", 3, agents);
+    let agents = format!(
+        "{{ name: random, label: dice, repeats: 3 }}, {}, {{ name: greedy, repeats: 1 }}",
+        tiny("tiny")
+    );
+    let second = file("second", 3, &agents);
     let ((status, ..), alone) = play(&second, "alone", &[]);
     let ((again, stdout, stderr), with) = play(&second, "with", &reuse);
     assert_eq!((status, again), (0, 0), "{stderr}");
-    assert!(stdout.contains("2 cells taken over"), "{stdout}");
+    assert!(stdout.contains("3 cells taken over"), "{stdout}");
     for name in ["study.db", "results.json"] {
         let bytes = |of: &Path| std::fs::read(of.join(name)).expect("every study writes it");
         assert!(bytes(&alone) == bytes(&with), "{name} differs");
     }
+    // What is there already is not taken over again.
+    let resume = ["study", "--resume", &with.display().to_string()];
+    let (status, stdout, stderr) = outcome(&mut avastra(&[&resume[..], &reuse].concat()));
+    assert!(status == 0 && stdout.contains("0 cells taken over"), "{stdout}{stderr}");
 
     for (name, seed, agents, reason) in [
         ("seeded", 4, "{ name: random }", "it plays otherwise: its `first_seed` is another"),
         ("stranger", 3, "{ name: greedy }", "it has played no agent with the same settings on the same road"),
     ] {
-        let ((status, _, stderr), _) = play(&file(name, seed, agents), name, &reuse);
-        assert!(status == 2 && stderr.contains(reason), "{status}: {stderr}");
+        let ((status, _, stderr), out) = play(&file(name, seed, agents), name, &reuse);
+        assert!(status == 1 && stderr.contains(reason), "{status}: {stderr}");
+        assert!(!out.exists(), "{name} has begun a directory");
     }
+}
+
+/// Every agent is compared with every baseline, but two baselines with each other only once: each test of a family
+/// makes the correction of the others stricter.
+#[test]
+fn two_baselines_are_compared_once() {
+    let text = "space: ../avastra45.ava\nagents: [{ name: none }, { name: random }, { name: greedy }]\n\
+                baselines: [none, random]\n";
+    let cell = |agent: &str, number: u32| avastra::study::CellRecord {
+        agent: agent.to_owned(),
+        road: "corner".to_owned(),
+        number,
+        training_seed: None,
+        trained: Vec::new(),
+        episodes: Vec::new(),
+        spent: avastra::study::Spent::default(),
+    };
+    let cells = ["none", "random", "greedy"].map(|agent| [cell(agent, 0), cell(agent, 1)]).concat();
+    let found = avastra::study::StudyResults::new(loaded(text).settings(), &cells);
+    let road = found.roads.iter().find(|road| road.road == "corner").expect("it was played");
+    let counted = road.comparisons.iter().filter(|one| one.measure == "counted");
+    let pairs: Vec<_> = counted.map(|one| (one.agent.as_str(), one.baseline.as_str())).collect();
+    assert_eq!(pairs, [("random", "none"), ("greedy", "none"), ("greedy", "random")]);
+    // Nothing was counted, which bounds the mean by what Poisson's events would have.
+    let none = &road.agents[0].measures["counted"];
+    let high = none.interval.and_then(|interval| interval.high).expect("two repetitions bound it");
+    assert!(none.mean == 0.0 && (high - 3.689 / 2.0).abs() < 1e-3, "{high}");
 }
 
 /// What a study found is kept beside its file, and from that alone its text is written again to the same bytes.
@@ -250,6 +291,7 @@ fn what_no_study_can_be_is_said_so() {
         ("agents: [{ name: random, without: [gravity] }]", "agent `random`: "),
         ("agents: [{ name: random }]\nroads: [moon]", "no road `moon`"),
         ("agents: [{ name: random }]\nbaselines: [ddqn]", "no agent is called `ddqn`"),
+        ("agents: [{ name: random }]\nbaselines: [random, random]", "`baselines` names `random` twice"),
         ("agents: [{ name: random, repeats: 0 }]", "`repeats` is 0"),
         ("agents: [{ name: random }]\nevaluation: { episodes: 0 }", "`evaluation.episodes` is 0"),
         ("agents: [{ name: random }]\nads: apolo", "no driving system `apolo`"),
