@@ -94,8 +94,9 @@ impl Printer<'_> {
             self.comments = later;
             self.line(comment.start);
             let text = &self.source[comment.start..comment.end];
-            // On a line of its own it would read as documentation, which it was not within its line.
-            if !comment.own_line && (text.starts_with("///") || text.starts_with("//!")) {
+            // Before a declaration it would read as documentation, which it was not within a line or an expression.
+            if (!comment.own_line || self.level == 0) && (text.starts_with("///") || text.starts_with("//!"))
+            {
                 self.out.extend(["//", text.trim_start_matches(['/', '!'])]);
             } else {
                 self.out.push_str(text);
