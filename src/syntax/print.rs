@@ -95,8 +95,9 @@ impl Printer<'_> {
             self.line(comment.start);
             let text = &self.source[comment.start..comment.end];
             // Before a declaration it would read as documentation, which it was not within a line or an expression.
-            if (!comment.own_line || self.level == 0) && (text.starts_with("///") || text.starts_with("//!"))
-            {
+            let is_before_declaration = self.level == 0 && end != usize::MAX;
+            let is_marked = text.starts_with("///") || text.starts_with("//!");
+            if is_marked && (!comment.own_line || is_before_declaration) {
                 self.out.extend(["//", text.trim_start_matches(['/', '!'])]);
             } else {
                 self.out.push_str(text);

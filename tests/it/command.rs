@@ -85,7 +85,7 @@ fn what_cannot_be_read_is_said_so() {
     let binary = scratch.path().join("binary.ava");
     std::fs::write(&binary, [0x7f, b'E', b'L', b'F', 0xff, 0xfe, 0x00]).expect("it is writable");
     let cases: [(&Path, &str); 3] = [
-        (scratch.path(), "it is a folder: name a file in it"),
+        (scratch.path(), "it is a folder: name "),
         (&binary, "not text: byte 4 is not UTF-8"),
         (&scratch.path().join("absent.ava"), "no such file"),
     ];
