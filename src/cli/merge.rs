@@ -5,7 +5,8 @@
 //! database and writes the results: there is no second writer, and the bytes are those of the unsharded directory.
 //!
 //! Shards may have been copied from where they were played. What their settings name outside them, the space above all, is
-//! looked for where they say, and else by the end of its path from the folder that one works in and those above.
+//! looked for where they say, and else by the end of its path from the folder that one works in and those above: whatever
+//! means the same serves.
 //!
 //! Until it is whole, the directory has the name `OUT.partial`. It gets its own name only if its space still means what it
 //! meant; then it is ended.
@@ -69,6 +70,8 @@ trait Cut: Serialize + DeserializeOwned {
     const KIND: &'static str;
     /// The path and the digest of its space.
     fn space(&self) -> (&str, &str);
+    /// The policy that is played.
+    fn policy(&self) -> Option<&PolicyReference>;
     /// The settings as they stand in another directory.
     fn moved(self, way: &Way) -> Result<Self, Failure>;
     /// Everything that is shared out.
@@ -88,11 +91,17 @@ struct Item {
     units: Vec<i64>,
 }
 
+/// What the settings of all shards name outside of them.
+struct Outside {
+    space: PathBuf,
+    policy: Option<PathBuf>,
+}
+
 /// From one directory to another, and what lies outside both.
 struct Way<'a> {
     from: &'a Path,
     to: &'a Path,
-    space: &'a Path,
+    outside: &'a Outside,
 }
 
 /// A directory of a shard.
@@ -118,7 +127,7 @@ impl<C: Cut> Played<C> {
     }
 
     /// Reads the settings of a directory; `to` is one beside the merged directory, or itself.
-    fn read(path: &Path, to: &Path, space: &Path) -> Result<Played<C>, Failure> {
+    fn read(path: &Path, to: &Path, outside: &Outside) -> Result<Played<C>, Failure> {
         if run_directory::what_was_begun(path) != Some(C::KIND) {
             let (path, kind) = (path.display(), C::KIND);
             return Err(Failure::usage(format!("`{path}` holds no {kind}, which the first directory does")));
@@ -126,7 +135,7 @@ impl<C: Cut> Played<C> {
         let (settings, begun) = run_directory::settings_of::<C>(path, C::KIND, C::KIND)?;
         Ok(Played {
             path: path.to_owned(),
-            settings: settings.moved(&Way { from: path, to, space })?,
+            settings: settings.moved(&Way { from: path, to, outside })?,
             begun,
             shard: shard::kept(path)?,
             database: None,
@@ -135,13 +144,11 @@ impl<C: Cut> Played<C> {
     }
 
     /// Opens its database.
-    fn open(&mut self) -> Result<(), Failure> {
+    fn open(&mut self) -> Result<(), DatabaseError> {
         let file = self.file();
         if std::fs::metadata(&file).is_ok_and(|found| found.len() > 0) {
-            let database = C::Database::open(&file, &self.begun);
-            let database = database.map_err(|error| Failure::file("open", &file, error))?;
-            let units = self.settings.numbered(&database);
-            self.units = units.map_err(|error| Failure::file("read", &file, error))?;
+            let database = C::Database::open(&file, &self.begun)?;
+            self.units = self.settings.numbered(&database)?;
             self.database = Some(database);
         }
         Ok(())
@@ -150,15 +157,20 @@ impl<C: Cut> Played<C> {
 
 /// Without `out`, only says what is missing.
 fn merged<C: Cut>(output: &Output, directories: &[PathBuf], out: Option<&Path>) -> Result<(), Failure> {
-    let space = space_of::<C>(&directories[0])?;
+    let outside = Outside::of::<C>(&directories[0])?;
+    let unusable = |file: &Path, error| Failure::file("open", file, error);
     let Some(out) = out else {
         // A shard whose database is torn is one to be played again.
-        let torn = |failure: Failure| {
-            output.warn(&failure.to_string());
-            Ok(())
+        let torn = |file: &Path, error: DatabaseError| {
+            let is_torn = error.is_torn();
+            let failure = unusable(file, error);
+            if is_torn {
+                output.warn(&failure.to_string());
+            }
+            if is_torn { Ok(()) } else { Err(failure) }
         };
         // Paths in settings are made to lead from one place, to be compared; any place serves.
-        let survey = Survey::of::<C>(directories, (Path::new("."), &space), &torn)?;
+        let survey = Survey::of::<C>(directories, (Path::new("."), &outside), &torn)?;
         match survey.missing.is_empty() {
             true => output.aside("nothing is missing"),
             false => output.say(&survey.named()),
@@ -168,12 +180,14 @@ fn merged<C: Cut>(output: &Output, directories: &[PathBuf], out: Option<&Path>) 
         return Ok(());
     };
     let partial = begin_partial(out)?;
-    let brought = Survey::of::<C>(directories, (&partial, &space), &Err).and_then(|survey| {
-        survey.complete()?;
-        bring_together::<C>(directories, (&partial, &space), &survey.settings)?;
-        publish::<C>(output, out, &partial)?;
-        Ok(survey.shards)
-    });
+    let brought =
+        Survey::of::<C>(directories, (&partial, &outside), &|file, error| Err(unusable(file, error)))
+            .and_then(|survey| {
+                survey.complete()?;
+                bring_together::<C>(directories, (&partial, &outside), &survey.settings)?;
+                publish::<C>(output, out, &partial)?;
+                Ok(survey.shards)
+            });
     if brought.is_err() && partial.exists() {
         discard(&partial)?;
     }
@@ -194,20 +208,20 @@ struct Survey {
 }
 
 impl Survey {
-    /// Looks at all directories; `to` is the merged one, or one beside it. `torn` says what to do about a database that cannot
-    /// be used.
+    /// Looks at all directories; `to` is the merged one, or one beside it. `unusable` says what to do about a database that
+    /// cannot be used.
     fn of<C: Cut>(
         directories: &[PathBuf],
-        (to, space): (&Path, &Path),
-        torn: &dyn Fn(Failure) -> Result<(), Failure>,
+        (to, outside): (&Path, &Outside),
+        unusable: &dyn Fn(&Path, DatabaseError) -> Result<(), Failure>,
     ) -> Result<Survey, Failure> {
         let mut wanted: Option<(String, Vec<Item>)> = None;
         let mut have: BTreeSet<i64> = BTreeSet::new();
         let mut cut: Option<(Shard, &Path)> = None;
         for path in directories {
             // One after another: there may be more shards than files that a process may have open.
-            let mut played = Played::<C>::read(path, to, space)?;
-            played.open().or_else(torn)?;
+            let mut played = Played::<C>::read(path, to, outside)?;
+            played.open().or_else(|error| unusable(&played.file(), error))?;
             let text = played.text();
             let (first, _) = wanted.get_or_insert_with(|| (text.clone(), played.settings.work()));
             if let Some(what) = settings_differences(first, &text) {
@@ -294,7 +308,7 @@ fn discard(partial: &Path) -> Result<(), Failure> {
 /// Writes settings, database and scenarios.
 fn bring_together<C: Cut>(
     directories: &[PathBuf],
-    (partial, space): (&Path, &Path),
+    (partial, outside): (&Path, &Outside),
     text: &str,
 ) -> Result<(), Failure> {
     write(&partial.join(format!("{}.yaml", C::KIND)), text)?;
@@ -302,10 +316,10 @@ fn bring_together<C: Cut>(
     let mut into = C::Database::open(&file, text).map_err(|error| Failure::file("open", &file, error))?;
     for path in directories {
         let _held = run_directory::hold(path)?;
-        let mut played = Played::<C>::read(path, partial, space)?;
-        played.open()?;
+        let mut played = Played::<C>::read(path, partial, outside)?;
+        played.open().map_err(|error| Failure::file("open", &played.file(), error))?;
         if played.database.is_some() {
-            C::take(&mut into, &played, &Way { from: path, to: partial, space })?;
+            C::take(&mut into, &played, &Way { from: path, to: partial, outside })?;
         }
     }
     Ok(())
@@ -315,7 +329,7 @@ fn bring_together<C: Cut>(
 fn publish<C: Cut>(output: &Output, out: &Path, partial: &Path) -> Result<(), Failure> {
     // Its warnings are told when the directory is ended; why it cannot be is told here.
     let resumed = |output| run_directory::resume::<C>(output, partial, C::KIND, C::KIND).map(drop);
-    resumed(&Output::of(Format::Json)).or_else(|_| resumed(output))?;
+    resumed(&Output::of(Format::Sarif)).or_else(|_| resumed(output))?;
     if !out.exists() || std::fs::read_dir(out).is_ok_and(|mut entries| entries.next().is_none()) {
         // In this order: a kill in between leaves a whole directory, and not a partial one that nobody would take up.
         std::fs::rename(partial, out).map_err(|error| Failure::file("write", out, error))?;
@@ -362,23 +376,51 @@ fn files_of(directory: &Path) -> Result<BTreeMap<PathBuf, PathBuf>, Failure> {
     Ok(found)
 }
 
-/// The space of a directory's settings: where they say, or else by the end of that path, the one that means the same.
-fn space_of<C: Cut>(directory: &Path) -> Result<PathBuf, Failure> {
-    let (settings, _) = run_directory::settings_of::<C>(directory, C::KIND, C::KIND)?;
-    let (path, seal) = settings.space();
+impl Outside {
+    /// What the settings of a directory name, where they say or elsewhere, if it means what it meant.
+    fn of<C: Cut>(directory: &Path) -> Result<Outside, Failure> {
+        let (settings, _) = run_directory::settings_of::<C>(directory, C::KIND, C::KIND)?;
+        // In this form what is wrong with a file is only collected.
+        let silent = Output::of(Format::Sarif);
+        let (path, seal) = settings.space();
+        let is_sealed = |file: &PathBuf| {
+            load::table(&silent, file).is_ok_and(|table| table.space().meaning.is_sealed_by(seal))
+        };
+        let direct = directory.join(path);
+        let space = match found("space", path, directory, &is_sealed) {
+            Err(_) if direct.is_file() => {
+                // What has changed in it is said before the directory is published. A policy cannot be read in it.
+                let policy = settings.policy().map(|policy| directory.join(&policy.file));
+                return Ok(Outside { space: direct, policy });
+            }
+            found => found?,
+        };
+        let policy = settings.policy().map(|policy| {
+            let is_it = |file: &PathBuf| {
+                load::policy(&silent, file).is_ok_and(|(_, found)| found.digest == policy.digest)
+            };
+            found("policy", &policy.file, directory, &is_it)
+        });
+        Ok(Outside { space, policy: policy.transpose()? })
+    }
+}
+
+/// The file that the settings of a directory name, where they say or elsewhere.
+fn found(
+    what: &str,
+    path: &str,
+    directory: &Path,
+    is_it: &dyn Fn(&PathBuf) -> bool,
+) -> Result<PathBuf, Failure> {
     let direct = directory.join(path);
-    if direct.is_file() {
+    if is_it(&direct) {
         return Ok(direct);
     }
-    let silent = Output::of(Format::Json);
-    let means_it = |file: &PathBuf| {
-        load::table(&silent, file).is_ok_and(|table| table.space().meaning.is_sealed_by(seal))
-    };
-    elsewhere(path, directory).into_iter().find(means_it).ok_or_else(|| {
+    elsewhere(path, directory).into_iter().find(is_it).ok_or_else(|| {
         let name = Path::new(path).file_name().unwrap_or_default().to_string_lossy();
         let reason = format!(
-            "its space is not at `{path}` from there, and no `{name}` that means the same is found from the folder that you work \
-             in: merge in the folder that the shards were played from"
+            "its {what} is not at `{path}` from there, or has changed since, and no `{name}` that means the same is found from \
+             the folder that you work in: merge in the folder that the shards were played from"
         );
         Failure::file("merge", directory, reason)
     })
@@ -409,14 +451,7 @@ impl Way<'_> {
     }
 
     fn space(&self, path: &str) -> Result<String, Failure> {
-        self.moved(path, self.space)
-    }
-
-    /// A file of which the digest is known elsewhere.
-    fn file(&self, path: &str) -> Result<String, Failure> {
-        let direct = self.from.join(path);
-        let other = if direct.exists() { None } else { elsewhere(path, self.from).into_iter().next() };
-        self.moved(path, &other.unwrap_or(direct))
+        self.moved(path, &self.outside.space)
     }
 
     fn external(&self, external: Option<Attached>) -> Result<Option<Attached>, Failure> {
@@ -427,9 +462,9 @@ impl Way<'_> {
 
     /// Settings of a run as they stand in the other directory.
     fn run(&self, settings: RunSettings) -> Result<RunSettings, Failure> {
-        let policy = settings
-            .policy
-            .map(|policy| self.file(&policy.file).map(|file| PolicyReference { file, ..policy }));
+        let policy = settings.policy.zip(self.outside.policy.as_deref()).map(|(policy, found)| {
+            load::relative(self.to, found).map(|file| PolicyReference { file, ..policy })
+        });
         Ok(RunSettings {
             space: self.space(&settings.space)?,
             policy: policy.transpose()?,
@@ -502,6 +537,10 @@ impl Cut for RunSettings {
         (&self.space, &self.space_digest)
     }
 
+    fn policy(&self) -> Option<&PolicyReference> {
+        self.policy.as_ref()
+    }
+
     fn moved(self, way: &Way) -> Result<RunSettings, Failure> {
         way.run(self)
     }
@@ -570,6 +609,10 @@ impl Cut for StudySettings {
         (&self.space, &self.space_digest)
     }
 
+    fn policy(&self) -> Option<&PolicyReference> {
+        None
+    }
+
     fn moved(self, way: &Way) -> Result<StudySettings, Failure> {
         let (space, external) = (way.space(&self.space)?, way.external(self.external.clone())?);
         Ok(StudySettings { space, external, ..self })
@@ -609,6 +652,10 @@ impl Cut for EstimateSettings {
 
     fn space(&self) -> (&str, &str) {
         self.run.space()
+    }
+
+    fn policy(&self) -> Option<&PolicyReference> {
+        self.run.policy()
     }
 
     fn moved(self, way: &Way) -> Result<EstimateSettings, Failure> {

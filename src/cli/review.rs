@@ -29,7 +29,7 @@ pub enum Change {
     OtherTime,
     OtherVerdict,
     OtherObstacle,
-    /// No collision counts any more.
+    /// No collision counts any more, or a step is not legal any more: what is played is another scenario.
     Gone,
 }
 
@@ -53,8 +53,7 @@ pub struct Review {
     pub differences: Vec<String>,
     /// Which step is not legal any more, and why.
     pub illegal: Option<String>,
-    /// The text that says what is so now, and the log of it; `None` for what is gone, and for what is another scenario
-    /// because a step is not legal any more.
+    /// The text that says what is so now, and the log of it; `None` for what is gone.
     pub now: Option<(String, EpisodeLog)>,
 }
 
@@ -104,9 +103,10 @@ pub fn review(
 
     // A scenario that claims no collision, but how its driving system fails, has nothing to be rewritten by.
     if !scenario.claims.iter().any(Claim::is_of_a_collision) {
-        let change = if refuted().count() == 0 { Change::Same } else { Change::Gone };
+        let is_same = refuted().count() == 0 && illegal.is_none();
+        let change = if is_same { Change::Same } else { Change::Gone };
         differences.extend(refuted().map(|(_, result)| in_words(result)));
-        let is_kept = change == Change::Gone || illegal.is_some() || !is_recorded;
+        let is_kept = change == Change::Gone || !is_recorded;
         let now = (!is_kept).then(|| (text.to_owned(), log));
         return Ok(Review { change, differences, illegal, now });
     }
@@ -114,13 +114,17 @@ pub fn review(
     let setup = stage.setup(&ads);
     let episode = scenario.origin.episode.unwrap_or(0) as usize;
     let mut summary = EpisodeSummary::judged(&setup, episode, &log, stage.avoidability());
-    let change = change(&scenario, &summary, results);
+    let change = match &illegal {
+        None => change(&scenario, &summary, results),
+        // Whatever it crashes with: it is not this scenario that does.
+        Some(_) => Change::Gone,
+    };
     let told = refuted().filter(|(claim, _)| !matches!(claim, Claim::Proc(_) | Claim::Trace(_)));
     differences.extend(told.map(|(_, result)| in_words(result)));
     if change != Change::Gone {
         differences.extend(newly_hit(&scenario, &summary));
     }
-    if change == Change::Gone || illegal.is_some() {
+    if change == Change::Gone {
         return Ok(Review { change, differences, illegal, now: None });
     }
     let claims = |is: fn(&Claim) -> bool| scenario.claims.iter().any(is);

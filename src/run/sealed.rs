@@ -45,6 +45,13 @@ pub enum DatabaseError {
     Sqlite(rusqlite::Error),
 }
 
+impl DatabaseError {
+    /// Whether the file was damaged or changed, so that what it is of must be played again. Anything else is no loss.
+    pub fn is_torn(&self) -> bool {
+        matches!(self, DatabaseError::Damaged { .. } | DatabaseError::Rows { .. })
+    }
+}
+
 impl From<rusqlite::Error> for DatabaseError {
     fn from(error: rusqlite::Error) -> DatabaseError {
         use rusqlite::ErrorCode::{DatabaseCorrupt, NotADatabase};
@@ -226,16 +233,25 @@ fn fields_that_differ(
         keys.retain(|key| *key != "digest");
     }
     for key in keys {
-        let path = format!("{prefix}{key}");
-        match (begun.get(key), now.get(key)) {
-            (Some(Value::Object(begun)), Some(Value::Object(now))) => {
-                fields_that_differ(&format!("{path}."), begun, now, differ);
-            }
-            // A whole block would be too long to read.
-            (Some(Value::Object(_)), _) => differ.push(format!("`{path}` was given")),
-            (Some(value), _) => differ.push(format!("`{path}` was {value}")),
-            (None, _) => differ.push(format!("`{path}` was not there")),
+        value_that_differs(&format!("{prefix}{key}"), begun.get(key), now.get(key), differ);
+    }
+}
+
+fn value_that_differs(path: &str, begun: Option<&Value>, now: Option<&Value>, differ: &mut Vec<String>) {
+    match (begun, now) {
+        (Some(Value::Object(begun)), Some(Value::Object(now))) => {
+            fields_that_differ(&format!("{path}."), begun, now, differ);
         }
+        (Some(Value::Array(begun)), Some(Value::Array(now))) => {
+            let places = 0..begun.len().max(now.len());
+            for at in places.filter(|&at| begun.get(at) != now.get(at)) {
+                value_that_differs(&format!("{path}[{at}]"), begun.get(at), now.get(at), differ);
+            }
+        }
+        // A whole block would be too long to read.
+        (Some(Value::Object(_) | Value::Array(_)), _) => differ.push(format!("`{path}` was given")),
+        (Some(value), _) => differ.push(format!("`{path}` was {value}")),
+        (None, _) => differ.push(format!("`{path}` was not there")),
     }
 }
 
@@ -328,6 +344,17 @@ mod tests {
             }
         }
         assert!(refused > 0, "pages are checked");
+        for length in [300, whole.len() / 2, whole.len() / 4 * 3] {
+            std::fs::write(&path, &whole[..length]).unwrap();
+            let refused = LAYOUT.open(&path, OWN, SETTINGS).unwrap_err();
+            assert!(refused.is_torn(), "{length} bytes: {refused}");
+        }
+        std::fs::write(&path, &whole).unwrap();
+        let other = Layout { version: 4, ..LAYOUT };
+        for refused in [other.open(&path, OWN, SETTINGS), LAYOUT.open(&path, OWN, "seed: 2")] {
+            let refused = refused.unwrap_err();
+            assert!(!refused.is_torn(), "{refused}");
+        }
     }
 
     #[test]
@@ -342,6 +369,16 @@ mod tests {
         assert_eq!(found(&profile(60, "b")).unwrap(), "`profile.settings.sight.range_m` was 80");
         assert_eq!(found(&profile(80, "b")).unwrap(), "`profile.digest` was \"a\"");
         assert_eq!(found("seed: 2\n").unwrap(), "`profile` was given, `seed` was 1");
+        let agents = |rate: f64, last: &str| {
+            let agent = |rate: f64| format!("{{ agent: ddqn, training: {{ rate: {rate} }} }}");
+            format!("agents: [{}, {}{last}]", agent(0.5), agent(rate))
+        };
+        let found = |now: &str| differences(&agents(0.5, ", { agent: none }, 3"), now).unwrap();
+        let rate = "`agents[1].training.rate` was 0.5";
+        assert_eq!(found(&agents(0.25, ", { agent: none }, 3")), rate);
+        assert_eq!(found(&agents(0.25, "")), format!("{rate}, `agents[2]` was given, `agents[3]` was 3"));
+        let one_more = "`agents[4]` was not there";
+        assert_eq!(found(&agents(0.5, ", { agent: none }, 3, { agent: random }")), one_more);
         let (many, none) = ((0..11).map(|at| format!("k{at:02}: 1\n")).collect::<String>(), "");
         assert!(differences(none, &many).unwrap().ends_with("`k07` was not there and 3 more"));
     }

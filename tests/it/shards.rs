@@ -123,6 +123,12 @@ fn eight_shards_of_a_run_make_the_run() {
     let (status, stdout, stderr) = outcome(&mut avastra(&[&["merge"], &copies[..], &["--missing"]].concat()));
     assert_eq!((status, stdout.trim()), (0, "4"), "{stderr}");
     assert!(stderr.contains("4/run.db"), "{stderr}");
+    // One that another version wrote is not torn.
+    let database = rusqlite::Connection::open(scratch.path().join("far/away/5/run.db"));
+    let set = database.expect("it is a database").pragma_update(None, "user_version", 9999);
+    set.expect("it can be changed");
+    let (status, stdout, stderr) = outcome(&mut avastra(&[&["merge"], &copies[..], &["--missing"]].concat()));
+    assert!(status == 1 && stdout.is_empty() && stderr.contains("it has layout 9999"), "{stdout}{stderr}");
 
     let merge = |second: &Path| {
         let first = scratch.path().join("shards/1");
@@ -262,35 +268,64 @@ fn trainings_and_nothing_cannot_be_merged() {
     refused(&[text(&training), "--missing"], "holds a training, which is one piece");
 }
 
-/// What cannot be ended is not published.
+/// A space and a policy as they lie beside each other.
+fn checkout(folder: &Path) {
+    let roads = ["corner", "residential", "boulevard", "crossroad"].map(|road| format!("roads/{road}.xodr"));
+    std::fs::create_dir_all(folder.join("scenarios/roads")).expect("it is writable");
+    for name in ["avastra45.ava", "roads.ava"].into_iter().chain(roads.iter().map(String::as_str)) {
+        let name = Path::new("scenarios").join(name);
+        std::fs::copy(root().join(&name), folder.join(&name)).expect("it is shipped");
+    }
+    std::fs::create_dir_all(folder.join("policies")).expect("it is writable");
+    let name = "policies/corner.ava";
+    std::fs::copy(root().join(name), folder.join(name)).expect("it is shipped");
+}
+
+/// What cannot be ended is not published; what has moved is found, and nothing else of its name is taken for it.
 #[test]
-fn a_space_that_has_changed_is_refused_before_anything_is_there() {
+fn a_space_or_a_policy_that_has_changed_is_refused_before_anything_is_there() {
     let scratch = tempfile::tempdir().expect("a scratch directory");
     let at = |name: &str| scratch.path().join(name);
-    std::fs::create_dir(at("roads")).expect("it is writable");
-    for name in ["avastra45.ava", "roads.ava"].into_iter().chain([
-        "roads/corner.xodr",
-        "roads/residential.xodr",
-        "roads/boulevard.xodr",
-        "roads/crossroad.xodr",
-    ]) {
-        std::fs::copy(root().join("scenarios").join(name), at(name)).expect("it is shipped");
-    }
-    let space = at("avastra45.ava");
-    let command = ["run", text(&space), "--road", "corner", "--episodes", "2", "--agent", "none"];
+    checkout(scratch.path());
+    let (space, policy) = (at("scenarios/avastra45.ava"), at("policies/corner.ava"));
+    let command = ["run", "--policy", text(&policy), "--road", "corner", "--episodes", "2"];
     let [one, two] = ["shards/1", "shards/2"].map(at);
     for (number, out) in [("1/2", &one), ("2/2", &two)] {
         done(&[&command[..], &["--shard", number, "--out", text(out)]].concat());
     }
-    let whole = std::fs::read_to_string(&space).expect("it is readable");
-    let merge = |text_of_space: &str| {
-        std::fs::write(&space, text_of_space).expect("it is writable");
-        outcome(&mut avastra(&["merge", text(&one), text(&two), "--out", text(&at("merged"))]))
+    let merge = |folder: &Path, out: &str| {
+        let [one, two] = ["shards/1", "shards/2"].map(|shard| folder.join(shard));
+        let out = at(out);
+        let mut merge = avastra(&["merge", text(&one), text(&two), "--out", text(&out)]);
+        outcome(merge.current_dir(folder))
     };
-    let (status, _, stderr) = merge(&whole.replace("let weight_mode = 1.0", "let weight_mode = 2.0"));
+    let whole = std::fs::read_to_string(&space).expect("it is readable");
+    let changed = whole.replace("let weight_mode = 1.0", "let weight_mode = 2.0");
+    let refused = |file: &Path, text: &str| {
+        let before = std::fs::read(file).expect("it is readable");
+        std::fs::write(file, text).expect("it is writable");
+        let (status, _, stderr) = merge(scratch.path(), "merged");
+        assert!(!at("merged").exists() && !at("merged.partial").exists());
+        std::fs::write(file, before).expect("it is writable");
+        (status, stderr)
+    };
+    let other = std::fs::read_to_string(root().join("policies/residential.ava")).expect("it is shipped");
+    let (status, stderr) = refused(&policy, &other);
+    assert!(status == 1 && stderr.contains("its policy is not at `../../policies/corner.ava`"), "{stderr}");
+    let (status, stderr) = refused(&space, &changed);
     assert!(status == 1 && stderr.contains("has changed since the run was begun"), "{stderr}");
-    let (status, _, stderr) = merge(&format!("{whole}\nlet broken ="));
+    let (status, stderr) = refused(&space, &format!("{whole}\nlet broken ="));
     assert!(status == 2 && stderr.contains("error[AV"), "{stderr}");
-    assert!(!at("merged").exists() && !at("merged.partial").exists());
-    assert_eq!(merge(&whole).0, 0);
+    assert!(!stderr.contains("\"code\""), "told once, for people: {stderr}");
+    assert_eq!(merge(scratch.path(), "merged").0, 0);
+
+    // Moved to where another space and another policy have the same names.
+    let away = at("away");
+    checkout(&away);
+    std::fs::write(away.join("scenarios/avastra45.ava"), changed).expect("it is writable");
+    std::fs::write(away.join("policies/corner.ava"), other).expect("it is writable");
+    std::fs::rename(at("shards"), away.join("shards")).expect("it moves");
+    let (status, _, stderr) = merge(&away, "again");
+    assert_eq!(status, 0, "{stderr}");
+    equal(&at("merged"), &at("again"));
 }

@@ -199,6 +199,35 @@ fn a_review_says_what_differs_in_meaning() {
     }
 }
 
+/// A crash that comes in spite of a step that has no place is no crash of the scenario.
+#[test]
+fn a_review_tells_that_a_step_is_illegal_though_it_crashes() {
+    let found = Found::new(&[]);
+    let file = &found.files("run/critical")[1];
+    let text = std::fs::read_to_string(file).expect("it is readable");
+    let (steps, rest) = text.split_once("\n  }\n  expect").expect("it has steps and claims");
+    // On this road no lane is on the right.
+    let (before, last) = steps.rsplit_once("\n    ").expect("it has a step");
+    let (number, _) = last.split_once(": ").expect("a step has a number");
+    let overtake = "overtake(lane: Right, mode: Near, then: Change) with { vehicle: Jeep, colour: Pink, speed: 10 m/s, distance: 17 m }";
+    let edited = format!("{before}\n    {number}: {overtake}\n  }}\n  expect{rest}");
+    std::fs::write(file, &edited).expect("it is writable");
+    let file = file.display().to_string();
+    let (_, tested, stderr) = found.test(&[&file]);
+    assert_eq!(tested["still_fails"], 1, "{tested}{stderr}");
+    let (status, tested, stderr) = found.test(&["--accept", &file]);
+    assert_eq!(
+        (status, &tested["changed"], &tested["accepted"]),
+        (0, &1.into(), &0.into()),
+        "{tested}{stderr}"
+    );
+    assert_eq!(tested["reviewed"][0]["change"], "gone");
+    let scenario = &tested["scenarios"][0];
+    let reason = scenario["reason"].as_str().expect("a reason");
+    assert!(scenario["outcome"] == "gone" && reason.contains("is not legal any more"), "{tested}");
+    assert_eq!(std::fs::read_to_string(&file).expect("it is readable"), edited, "it is kept");
+}
+
 /// A driving system that no longer crashes drives another way, on which a step may have no place.
 #[test]
 fn a_review_tells_what_is_gone() {
