@@ -7,7 +7,7 @@ use std::sync::{Mutex, PoisonError};
 use crate::export;
 use crate::export::{ExportError, Recording, record};
 
-use super::arguments::{ExportArguments, ExportEgo, ExportFormat, ExportVersion};
+use super::arguments::{ExportArguments, ExportEgo, ExportFormat, ExportProfile, ExportVersion};
 use super::error::Failure;
 use super::files::{copy_map, write};
 use super::load;
@@ -36,6 +36,10 @@ pub fn export(output: &Output, arguments: &ExportArguments) -> Result<(), Failur
         };
         let target = &targets[file];
         let written = write_all(arguments, &recording, target, &maps)?;
+        if arguments.profile == Some(ExportProfile::Carla) {
+            let dropped = export::dropped(&recording).join("; ");
+            output.warn(&format!("{}: left out for CARLA: {dropped}", target.display()));
+        }
         Ok(Exported { file: file.clone(), written: Ok(written) })
     })?;
     let mut refuted = 0;
@@ -72,6 +76,12 @@ fn refuse_senseless(arguments: &ExportArguments) -> Result<(), Failure> {
     let is_openscenario = arguments.to == ExportFormat::Openscenario;
     if arguments.osc_version.is_some() && !is_openscenario {
         return Err(Failure::usage("`--osc-version` is for `--to openscenario`"));
+    }
+    if arguments.natural && !is_openscenario {
+        return Err(Failure::usage("`--natural` is for `--to openscenario`"));
+    }
+    if arguments.profile.is_some() && !is_openscenario {
+        return Err(Failure::usage("`--profile` is for `--to openscenario`"));
     }
     match (arguments.to, arguments.ego) {
         (ExportFormat::Commonroad, Some(ExportEgo::Controller)) => Err(Failure::usage(
@@ -132,16 +142,19 @@ fn write_all(
                 let _one_at_a_time = maps.lock().unwrap_or_else(PoisonError::into_inner);
                 copy_map(&recording.map_path, &map)?;
             }
-            let version = match arguments.osc_version {
-                None | Some(ExportVersion::V1_2) => export::Version::V1_2,
-                Some(ExportVersion::V1_3) => export::Version::V1_3,
+            let version = match (arguments.profile, arguments.osc_version) {
+                (Some(ExportProfile::Carla), _) => export::Version::Carla,
+                (None, None | Some(ExportVersion::V1_2)) => export::Version::V1_2,
+                (None, Some(ExportVersion::V1_3)) => export::Version::V1_3,
             };
             let ego = match arguments.ego {
                 None | Some(ExportEgo::Trajectory) => export::Ego::Trajectory,
                 Some(ExportEgo::Controller) => export::Ego::Controller,
                 Some(ExportEgo::None) => export::Ego::None,
             };
-            write(target, &export::openscenario(recording, name, version, ego))?;
+            let others = if arguments.natural { export::Others::Natural } else { export::Others::Exact };
+            let style = export::Style { version, ego, others };
+            write(target, &export::openscenario(recording, name, style))?;
             Ok(vec![target.to_owned(), map])
         }
         ExportFormat::Commonroad => {

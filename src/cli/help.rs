@@ -207,6 +207,10 @@ const EXAMPLES: &[(&str, &[(&str, &str)])] = &[
         &[
             ("export --to openscenario runs/0001/critical/*.ava", "with their maps, for any player"),
             ("export --to openscenario --ego none --out suite runs/0001/critical/*.ava", ""),
+            (
+                "export --to openscenario --profile carla runs/0001/critical/*.ava",
+                "for CARLA's ScenarioRunner",
+            ),
             ("export --to commonroad runs/0001/critical/corner_0004.ava", "with a planning problem"),
             ("export --to csv runs/0001/critical/corner_0004.ava", "where everyone was at every tick"),
         ],

@@ -1,7 +1,8 @@
 """Do files that `avastra export` writes mean elsewhere what they mean here?
 
-Called by export.sh with the folder that scenarios were exported to in every format, and perhaps an esmini.
-Prints one line for each check, says which files fail, and ends with status 1 if any does.
+Called by export.sh with the folder that scenarios were exported to in every format, those with their natural versions and
+with those for CARLA, and perhaps an esmini. Prints one line for each check, says which files fail, and ends with status 1 if any does; how far
+natural versions drift from the recording is told, and no failure.
 """
 
 import csv
@@ -30,25 +31,39 @@ STEP_S = 0.01
 
 
 def main():
-    exported = Path(sys.argv[1])
-    esmini = Path(sys.argv[2]).absolute() if len(sys.argv) > 2 else None
+    exported, natural, carla = map(Path, sys.argv[1:4])
+    esmini = Path(sys.argv[4]).absolute() if len(sys.argv) > 4 else None
     stems = sorted(path.stem for path in exported.glob("*.xosc"))
     if not stems:
         sys.exit(f"no .xosc in {exported}")
     recordings = {stem: recording(exported / f"{stem}.csv") for stem in stems}
-    checks = [
+    as_standards_want = [
         ("valid against OpenSCENARIO's schema", schema),
         ("without an issue or a skipped rule in asam-qc-openscenarioxml", checked("qc_openscenario", "xoscBundle")),
-        ("read by commonroad-io, with the same collision at the same step", commonroad),
     ]
-    checks.append(("read by betterosi as OSI 3.8, with everyone where the table has them", osi_recording))
+    checks = [(exported, *check) for check in as_standards_want] + [
+        (exported, "read by commonroad-io, with the same collision at the same step", commonroad),
+        (exported, "read by betterosi as OSI 3.8, with everyone where the table has them", osi_recording),
+    ]
     if esmini:
-        checks.append((f"played by esmini within {STRAY_M} m, the collision within {LATE_S} s", played(esmini)))
+        title = f"played by esmini within {STRAY_M} m, the collision within {LATE_S} s"
+        checks.append((exported, title, played(esmini)))
+    checks += [(natural, f"natural: {title}", check) for title, check in as_standards_want]
+    checks += [
+        (carla, "for CARLA: valid against the schema of 1.0", schema),
+        (carla, "for CARLA: without an issue in the rules of asam-qc-openscenarioxml for 1.0",
+         checked("qc_openscenario", "xoscBundle", may_skip=True)),
+    ]
+    drifts = {}
+    if esmini:
+        checks.append((natural, "natural: played by esmini without an error", drifted(esmini, drifts)))
     failed = False
-    for title, check in checks:
-        found = {stem: check(exported / f"{stem}.xosc", recordings[stem]) for stem in stems}
+    for folder, title, check in checks:
+        found = {stem: check(folder / f"{stem}.xosc", recordings[stem]) for stem in stems}
         failed |= tell(title, found)
-    maps = {path.stem: checked("qc_opendrive", "xodrBundle")(path, None) for path in sorted(exported.glob("*.xodr"))}
+    if drifts:
+        tell_drifts(drifts)
+    maps = {path.stem: checked("qc_opendrive", "xodrBundle", may_skip=True)(path, None) for path in sorted(exported.glob("*.xodr"))}
     failed |= tell("maps without an issue in asam-qc-opendrive", maps)
     sys.exit(1 if failed else 0)
 
@@ -93,8 +108,9 @@ def schema(path, _users):
     return None if SCHEMAS[minor].validate(tree) else str(SCHEMAS[minor].error_log.last_error)
 
 
-def checked(program, bundle):
-    """ASAM's checker. It exits with 0 whatever it finds, so its report is read."""
+def checked(program, bundle, may_skip=False):
+    """ASAM's checker. It exits with 0 whatever it finds, so its report is read. Some rules are for other versions than that
+    of a map or a file."""
 
     def check(path, _users):
         config, report = path.with_suffix(".config"), path.with_suffix(".xqar").absolute()
@@ -108,8 +124,8 @@ def checked(program, bundle):
         results = ElementTree.parse(report)
         issues = [issue.get("description") for issue in results.iter("Issue")]
         states = {checker.get("checkerId"): checker.get("status") for checker in results.iter("Checker")}
-        # Some rules are for other versions of OpenDRIVE than that of a map.
-        undone = [name for name, state in states.items() if state != "completed"] if bundle == "xoscBundle" else []
+        done = {"completed", "skipped"} if may_skip else {"completed"}
+        undone = [name for name, state in states.items() if state not in done]
         if not states:
             return "no rule was checked"
         return "; ".join(issues[:2] + undone) or None
@@ -167,42 +183,90 @@ def osi_recording(path, users):
     return None if seen == wanted else f"{seen} of {wanted} rows"
 
 
+def play(esmini, path):
+    """Plays a file: the table of where everyone was, the first collision of the ego vehicle (time and names), and what
+    went wrong."""
+    folder = path.parent / "played"
+    folder.mkdir(exist_ok=True)
+    table, log, record = (folder / f"{path.stem}.{kind}" for kind in ("csv", "txt", "dat"))
+    done = subprocess.run(
+        [esmini, "--headless", "--osc", path.absolute(), "--fixed_timestep", str(STEP_S), "--collision",
+         "--traj_filter", "0", "--record", record.absolute(), "--logfile_path", log.absolute(), "--disable_stdout"],
+        capture_output=True, text=True, check=False, cwd=folder)
+    text = log.read_text() if log.exists() else ""
+    if done.returncode or "[error]" in text:
+        return None, None, next((line for line in text.splitlines() if "[error]" in line), f"status {done.returncode}")
+    subprocess.run([esmini.with_name("dat2csv"), "--file", record.absolute()], capture_output=True, check=True, cwd=folder)
+    record.unlink()
+    hits = re.findall(r"\[([0-9.]+)\].*Collision between (.*)", text)
+    hits = [(float(time), set(re.findall(r"npc_\d+", names))) for time, names in hits if "ego" in names]
+    return table, hits[0] if hits else None, None
+
+
 def played(esmini):
     def check(path, users):
-        folder = path.parent / "played"
-        folder.mkdir(exist_ok=True)
-        table, log = folder / f"{path.stem}.csv", folder / f"{path.stem}.txt"
-        record = folder / f"{path.stem}.dat"
-        done = subprocess.run(
-            [esmini, "--headless", "--osc", path.absolute(), "--fixed_timestep", str(STEP_S), "--collision",
-             "--traj_filter", "0", "--record", record.absolute(), "--logfile_path", log.absolute(), "--disable_stdout"],
-            capture_output=True, text=True, check=False, cwd=folder)
-        text = log.read_text() if log.exists() else ""
-        if done.returncode or "[error]" in text:
-            return next((line for line in text.splitlines() if "[error]" in line), f"status {done.returncode}")
-        subprocess.run([esmini.with_name("dat2csv"), "--file", record.absolute()], capture_output=True, check=True,
-                       cwd=folder)
-        worst = strayed(table, users)
+        table, hit, wrong = play(esmini, path)
+        if wrong:
+            return wrong
+        away, who, when = max((away, name, time) for name, time, away in strays(path, table, users))
         met_s, met = first_contact_s(users)
-        hit = [(float(time), names) for time, names in re.findall(
-            r"\[([0-9.]+)\].*Collision between (.*)", text) if "ego" in names]
         if met_s is None:
             late = "a collision that there was not" if hit else None
         elif not hit:
             late = f"no collision, wanted one at {met_s:.2f} s"
         else:
-            time, names = hit[0]
-            fits = abs(time - met_s) <= LATE_S and any(f"npc_{user}" in names for user in met)
-            late = None if fits else f"{names} at {time:.2f} s, wanted {sorted(met)} at {met_s:.2f} s"
-        far = f"{worst[0]:.3f} m off ({worst[1]})" if worst[0] > STRAY_M else None
+            fits = abs(hit[0] - met_s) <= LATE_S and any(f"npc_{user}" in hit[1] for user in met)
+            late = None if fits else f"{hit[1]} at {hit[0]:.2f} s, wanted {sorted(met)} at {met_s:.2f} s"
+        far = f"{away:.3f} m off ({who} at {when} s)" if away > STRAY_M else None
         return "; ".join(reason for reason in (far, late) if reason) or None
 
     return check
 
 
-def strayed(table, users):
-    """The largest distance between a played and the recorded middle of a road user, and where that is."""
-    worst = 0.0, ""
+def drifted(esmini, drifts):
+    """Plays a natural version and notes how far it drifts."""
+
+    def check(path, users):
+        table, hit, wrong = play(esmini, path)
+        if wrong:
+            return wrong
+        met_s, met = first_contact_s(users)
+        others = [(name, time, away) for name, time, away in strays(path, table, users) if name != "ego"]
+        names = {f"npc_{user}" for user in met}
+        drifts[path.stem] = {
+            "away": [away for _, time, away in others if met_s is None or time <= met_s],
+            "at_end": [away for _, time, away in others if time >= max(time for _, time, _ in others) - 1e-6],
+            "at_contact": [away for name, time, away in others if name in names and abs(time - met_s) < STEP_S / 2],
+            "collision": (met_s, names, hit),
+        }
+        return None
+
+    return check
+
+
+def tell_drifts(drifts):
+    figures = lambda values: (f"mean {sum(values) / len(values):.2f} m, 95 % within "
+                              f"{sorted(values)[math.ceil(len(values) * 0.95) - 1]:.2f} m, at most {max(values):.2f} m")
+    for key, title in [("away", "at any time up to the collision"), ("at_contact", "what is hit, at the collision"),
+                       ("at_end", "at the end")]:
+        values = [value for drift in drifts.values() for value in drift[key]]
+        print(f"natural: drift {title}: {figures(values) if values else 'nothing'}")
+    collisions = {stem: drift["collision"] for stem, drift in drifts.items() if drift["collision"][0] is not None}
+    same = {stem: abs(hit[0] - met_s) for stem, (met_s, names, hit) in collisions.items() if hit and hit[1] & names}
+    late = sorted(same.values())
+    print(f"natural: {len(same)} of {len(collisions)} collisions happen with the same one"
+          + (f", half of them within {late[len(late) // 2]:.2f} s, all within {late[-1]:.2f} s" if late else ""))
+    for stem, (met_s, names, hit) in collisions.items():
+        if stem not in same:
+            found = f"{sorted(hit[1])} at {hit[0]:.2f} s" if hit else "no collision"
+            print(f"  {stem}: {found}, wanted {sorted(names)} at {met_s:.2f} s")
+
+
+def strays(path, table, users):
+    """Name, time and distance between the played and the recorded middle of each road user, step by step."""
+    # esmini tells where the rear axle is, the table where the middle is: the heading leads from one to the other.
+    entities = ElementTree.parse(path).iter("ScenarioObject")
+    offsets = {entity.get("name"): float(entity.find(".//Center").get("x")) for entity in entities}
     with open(table, newline="") as file:
         lines = [line for line in file if not line.startswith("Version")]
     for row in csv.DictReader(lines, skipinitialspace=True):
@@ -214,23 +278,10 @@ def strayed(table, users):
             continue
         part = tick - math.floor(tick + 1e-6)
         where = [before[axis] + (after[axis] - before[axis]) * part for axis in ("x_m", "y_m")]
-        heading = before["heading_rad"]
-        # esmini tells where the rear axle is, the table where the middle is: the heading leads from one to the other.
-        offset = OFFSETS.get((table.stem, name))
-        if offset is None:
-            xosc = ElementTree.parse(table.parent.parent / f"{table.stem}.xosc")
-            for entity in xosc.iter("ScenarioObject"):
-                OFFSETS[table.stem, entity.get("name")] = float(entity.find(".//Center").get("x"))
-            offset = OFFSETS[table.stem, name]
-        x = float(row["x"]) + offset * math.cos(float(row["h"]))
-        y = float(row["y"]) + offset * math.sin(float(row["h"]))
-        away = math.hypot(x - where[0], y - where[1])
-        if away > worst[0]:
-            worst = away, f"{name} at {row['time'].strip()} s"
-    return worst
+        x = float(row["x"]) + offsets[name] * math.cos(float(row["h"]))
+        y = float(row["y"]) + offsets[name] * math.sin(float(row["h"]))
+        yield name, float(row["time"]), math.hypot(x - where[0], y - where[1])
 
-
-OFFSETS = {}
 
 if __name__ == "__main__":
     main()

@@ -1,7 +1,8 @@
 #!/bin/sh
 # Do other tools read what `avastra export` writes, and see the same crashes? Finds crashes of a driving system that never
 # yields, exports them, and asks OpenSCENARIO's schema, ASAM's checkers, CommonRoad's reader and collision checker, and, if
-# ESMINI names its program (built from its public repository, with `dat2csv` beside it), an independent player.
+# ESMINI names its program (built from its public repository, with `dat2csv` beside it), an independent player; how far
+# natural versions drift in it is told.
 # Needs Python 3 and, once, a network for `pip install`.
 # Arguments: episodes on each road (default 100), and what else `run` is to be told: `540 --traffic released` finds 200 crashes.
 set -eu
@@ -17,11 +18,13 @@ fi
         commonroad-io==2026.1 commonroad-drivability-checker==2025.4.0 betterosi==0.9.0 mcap
 avastra=${AVASTRA:-target/release/avastra}
 [ -x "$avastra" ] || cargo build --release
-rm -rf "$work/run" "$work/out"
+rm -rf "$work/run" "$work/out" "$work/natural" "$work/carla"
 "$avastra" run scenarios/avastra45.ava --ads-config scenarios/ads/faults/planning_never_yields.yaml \
     --episodes "$episodes" --seed 1 --out "$work/run" --quiet "$@"
 for arguments in "openscenario" "commonroad --ego trajectory" "csv"; do
     # shellcheck disable=SC2086
     "$avastra" export --to $arguments --out "$work/out" "$work"/run/critical/*.ava
 done
-"$work/venv/bin/python" tests/interop/export.py "$work/out" ${ESMINI:+"$ESMINI"}
+"$avastra" export --to openscenario --natural --out "$work/natural" "$work"/run/critical/*.ava
+"$avastra" export --to openscenario --profile carla --out "$work/carla" "$work"/run/critical/*.ava 2>/dev/null
+"$work/venv/bin/python" tests/interop/export.py "$work/out" "$work/natural" "$work/carla" ${ESMINI:+"$ESMINI"}

@@ -49,11 +49,15 @@ fn shape(text: &str) -> String {
 
 #[test]
 fn every_format_has_its_shape() {
-    for (format, name) in
-        [("openscenario", "wet_corner.xosc"), ("commonroad", "wet_corner.xml"), ("csv", "wet_corner.csv")]
-    {
+    for (format, more, name, kept) in [
+        ("openscenario", &[][..], "wet_corner.xosc", "openscenario"),
+        ("openscenario", &["--natural"], "wet_corner.xosc", "natural"),
+        ("openscenario", &["--profile", "carla"], "wet_corner.xosc", "carla"),
+        ("commonroad", &[], "wet_corner.xml", "commonroad"),
+        ("csv", &[], "wet_corner.csv", "csv"),
+    ] {
         let scratch = tempfile::tempdir().expect("a scratch directory");
-        let (status, _, stderr) = export(format, SCENARIO, scratch.path(), &[]);
+        let (status, _, stderr) = export(format, SCENARIO, scratch.path(), more);
         assert_eq!(status, 0, "{format}: {stderr}");
         let written = texts(scratch.path());
         let text = &written[name];
@@ -64,15 +68,15 @@ fn every_format_has_its_shape() {
             "csv" => text.lines().next().expect("a table has a head").to_owned(),
             _ => shape(text),
         };
-        expect_snapshot("exports", format, &shape);
+        expect_snapshot("exports", kept, &shape);
         if format == "openscenario" {
             let map =
                 std::fs::read_to_string(root().join("scenarios/roads/corner.xodr")).expect("it is shipped");
             assert_eq!(written["corner.xodr"], map, "the map lies beside it");
         }
         let again = tempfile::tempdir().expect("a scratch directory");
-        export(format, SCENARIO, again.path(), &[]);
-        assert_eq!(written, texts(again.path()), "{format} depends on the scenario alone");
+        export(format, SCENARIO, again.path(), more);
+        assert_eq!(written, texts(again.path()), "{kept} depends on the scenario alone");
     }
 }
 
@@ -103,6 +107,87 @@ fn a_recording_is_complete_and_at_its_times() {
     assert!(!of_ego(&["--ego", "none"]).contains("ego_follows"));
     assert!(of_ego(&["--ego", "controller"]).contains("<Controller name=\"ads\">"));
     assert!(of_ego(&["--osc-version", "1.3"]).contains("revMinor=\"3\""));
+}
+
+/// Others of a natural version drive by actions: each where and as fast as the recording has it at first, and nothing is
+/// triggered by what is not there.
+#[test]
+fn a_natural_version_has_actions_in_place_of_trajectories() {
+    let file = crash();
+    let scratch = tempfile::tempdir().expect("a scratch directory");
+    for (format, more) in [("openscenario", &["--natural"][..]), ("csv", &[])] {
+        let (status, _, stderr) = export(format, &file.display().to_string(), scratch.path(), more);
+        assert_eq!(status, 0, "{stderr}");
+    }
+    let written = texts(scratch.path());
+    let stem = file.file_stem().expect("it has a name").to_string_lossy();
+    let users = table(&written[&format!("{stem}.csv")]);
+    let document = Document::parse(&written[&format!("{stem}.xosc")]).expect("it is well-formed");
+    let properties: Vec<&str> =
+        all(document.root(), "Property").filter_map(|node| node.attribute("name")).collect();
+    assert!(properties.contains(&"natural") && properties.contains(&"trace"), "{properties:?}");
+    for follow in all(document.root(), "FollowTrajectoryAction") {
+        let of_ego = all(follow, "Trajectory").any(|way| way.attribute("name") == Some("ego_way"));
+        assert_ne!(of_ego, all(follow, "None").next().is_some(), "the ego vehicle alone has times");
+    }
+    let names: Vec<&str> =
+        all(document.root(), "Event").filter_map(|event| event.attribute("name")).collect();
+    for (id, poses) in users.iter().filter(|(id, _)| **id > 0) {
+        let (first, last) =
+            (poses.values().next().expect("it is seen"), poses.values().next_back().expect("it is"));
+        let moves = (last.position - first.position).norm() > 1.0;
+        let its = names.iter().filter(|name| name.starts_with(&format!("npc_{id}_"))).count();
+        assert!(!moves || its > 1, "npc_{id}: {names:?}");
+    }
+    for state in all(document.root(), "StoryboardElementStateCondition") {
+        let event = state.attribute("storyboardElementRef").expect("it has one");
+        assert!(names.contains(&event), "{event} is none of {names:?}");
+    }
+    let mut sorted = names.clone();
+    sorted.sort_unstable();
+    sorted.dedup();
+    assert_eq!(sorted.len(), names.len(), "names are unique");
+}
+
+/// ScenarioRunner reads 1.0 alone, makes everyone at the start, and wants no times of polylines; what it cannot be told is
+/// said.
+#[test]
+fn a_file_for_carla_has_what_its_player_reads() {
+    let scratch = tempfile::tempdir().expect("a scratch directory");
+    let name = crash().display().to_string();
+    let (status, _, stderr) = export("openscenario", &name, scratch.path(), &["--profile", "carla"]);
+    assert_eq!(status, 0, "{stderr}");
+    for left_out in ["outlines and masses", "the phases of", "is not there from the beginning"] {
+        assert!(stderr.contains(left_out), "{left_out}: {stderr}");
+    }
+    let (_, stdout, _) =
+        export("openscenario", &name, scratch.path(), &["--profile", "carla", "--format", "json"]);
+    assert!(stdout.contains("left out for CARLA"), "{stdout}");
+    let written = texts(scratch.path());
+    let (_, text) = written.iter().find(|(name, _)| name.ends_with(".xosc")).expect("it is written");
+    let document = Document::parse(text).expect("it is well-formed");
+    for unknown in ["FollowTrajectoryAction", "AddEntityAction", "TrafficSignals", "TrajectoryRef"] {
+        assert_eq!(all(document.root(), unknown).count(), 0, "{unknown}");
+    }
+    let init = all(document.root(), "Init").next().expect("it begins");
+    assert_eq!(
+        all(init, "Private").count(),
+        all(document.root(), "ScenarioObject").count(),
+        "everyone is made"
+    );
+    let vehicles = all(document.root(), "Vehicle").filter_map(|node| node.attribute("name"));
+    assert!(vehicles.into_iter().all(|model| model.starts_with("vehicle.")), "{text}");
+    let ego = all(document.root(), "Property").find(|node| node.attribute("value") == Some("ego_vehicle"));
+    assert!(ego.is_some(), "{text}");
+    let (status, _, stderr) = export(
+        "openscenario",
+        &name,
+        &scratch.path().join("driven"),
+        &["--profile", "carla", "--ego", "controller"],
+    );
+    assert_eq!(status, 0, "{stderr}");
+    let driven = texts(&scratch.path().join("driven"));
+    assert!(driven.values().any(|text| text.contains("external_control")), "its own program drives");
 }
 
 /// What the exporter promises of a player's polyline, and half a millionth that a number loses when it is written, twice.
@@ -260,6 +345,10 @@ fn what_is_no_scenario_or_does_not_replay_is_refused() {
     }
     let (status, _, stderr) = export("csv", SCENARIO, scratch.path(), &["--osc-version", "1.3"]);
     assert_eq!((status, stderr.contains("--osc-version")), (1, true), "{stderr}");
+    for option in [&["--natural"][..], &["--profile", "carla"]] {
+        let (status, _, stderr) = export("csv", SCENARIO, scratch.path(), option);
+        assert_eq!((status, stderr.contains(option[0])), (1, true), "{stderr}");
+    }
 
     let text = std::fs::read_to_string(root().join(SCENARIO)).expect("it is a case");
     let space = root().join("scenarios/avastra45.ava").display().to_string();

@@ -22,9 +22,9 @@ pub use learn::{
     TrainArguments,
 };
 pub use scenarios::{
-    AgainstArguments, DiagnoseArguments, ExportArguments, ExportEgo, ExportFormat, ExportVersion,
-    FilesArguments, ImportArguments, PackArguments, RenderArguments, ReplayArguments, ReportArguments,
-    RoadArguments, ShrinkArguments, TestArguments, VerifyArguments,
+    AgainstArguments, DiagnoseArguments, ExportArguments, ExportEgo, ExportFormat, ExportProfile,
+    ExportVersion, FilesArguments, ImportArguments, PackArguments, RenderArguments, ReplayArguments,
+    ReportArguments, RoadArguments, ShrinkArguments, TestArguments, VerifyArguments,
 };
 
 /// Finds out which of the things that may happen around a self-driving car make it crash.

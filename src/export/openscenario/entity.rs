@@ -33,6 +33,21 @@ pub fn entity(actor: &Actor, ego: Ego) -> Element {
             .holding(properties());
         return entity.holding(pedestrian);
     };
+    let vehicle = Element::new("Vehicle")
+        .with("name", &name)
+        .with("vehicleCategory", category)
+        .measured("mass", actor.shape.mass_t * 1000.0)
+        .holding_all(build(actor))
+        .holding(properties());
+    let driven = (actor.id == 0 && ego == Ego::Controller).then(|| {
+        let controller = Element::new("Controller").with("name", "ads").holding(Element::new("Properties"));
+        Element::new("ObjectController").holding(controller)
+    });
+    entity.holding(vehicle).holding_all(driven)
+}
+
+/// A vehicle's outline, what it can do, and its axles.
+pub fn build(actor: &Actor) -> [Element; 3] {
     let performance = Element::new("Performance")
         .measured("maxSpeed", SPEED_MPS_MAX)
         .measured("maxAcceleration", actor.shape.acceleration_mps2_max)
@@ -49,19 +64,7 @@ pub fn entity(actor: &Actor, ego: Ego) -> Element {
         // Of others no largest angle is known; the ego vehicle's serves for all.
         .holding(axle("FrontAxle", VehicleParameters::MKZ.steer_rad_max, actor.shape.wheelbase_m))
         .holding(axle("RearAxle", 0.0, 0.0));
-    let vehicle = Element::new("Vehicle")
-        .with("name", &name)
-        .with("vehicleCategory", category)
-        .measured("mass", actor.shape.mass_t * 1000.0)
-        .holding(bounding_box(actor))
-        .holding(performance)
-        .holding(axles)
-        .holding(properties());
-    let driven = (actor.id == 0 && ego == Ego::Controller).then(|| {
-        let controller = Element::new("Controller").with("name", "ads").holding(Element::new("Properties"));
-        Element::new("ObjectController").holding(controller)
-    });
-    entity.holding(vehicle).holding_all(driven)
+    [bounding_box(actor), performance, axles]
 }
 
 /// esmini turns a road user late along a polyline unless it is told to turn evenly between the vertices; others ignore it.
@@ -70,7 +73,7 @@ fn properties() -> Element {
     Element::new("Properties").holding(evenly)
 }
 
-fn bounding_box(actor: &Actor) -> Element {
+pub fn bounding_box(actor: &Actor) -> Element {
     let shape = &actor.shape;
     let centre = Element::new("Center")
         .measured("x", -ahead_of_centre_m(actor))
@@ -84,7 +87,7 @@ fn bounding_box(actor: &Actor) -> Element {
 }
 
 /// `None` for a pedestrian.
-fn vehicle_category(body: Body) -> Option<&'static str> {
+pub fn vehicle_category(body: Body) -> Option<&'static str> {
     match body {
         Body::Jeep | Body::Sedan | Body::SUV | Body::Hatchback => Some("car"),
         Body::BoxTruck => Some("truck"),

@@ -22,16 +22,8 @@ use super::super::xml::Element;
 
 /// A sky as a `GlobalAction`.
 pub fn environment(sky: &Sky, number: usize) -> Element {
-    let (clock, elevation_deg, azimuth_rad, illuminance_lx) = match sky.time_of_day {
-        TimeOfDay::Morning => ("T08:00:00", 20.0, FRAC_PI_2, 20_000.0),
-        TimeOfDay::Noon => ("T12:00:00", 60.0, PI, 100_000.0),
-        TimeOfDay::Night => ("T23:00:00", -30.0, 0.0, 0.1),
-    };
-    let time = Element::new("TimeOfDay").with("animation", false).with("dateTime", format!("{DATE}{clock}"));
-    let sun = Element::new("Sun")
-        .measured("illuminance", illuminance_lx)
-        .measured("azimuth", azimuth_rad)
-        .measured("elevation", elevation_deg / 180.0 * PI);
+    let (sun, illuminance_lx) = sun(sky);
+    let sun = sun.measured("illuminance", illuminance_lx);
     let fog = Element::new("Fog").measured("visualRange", sky.visibility_m);
     let rain = Element::new("Precipitation")
         .with("precipitationType", if sky.rain_mmph > 0.0 { "rain" } else { "dry" })
@@ -46,10 +38,33 @@ pub fn environment(sky: &Sky, number: usize) -> Element {
         .with("wetness", wetness(sky));
     let environment = Element::new("Environment")
         .with("name", format!("sky_{number}"))
-        .holding(time)
+        .holding(time(sky))
         .holding(weather)
         .holding(road);
     Element::new("GlobalAction").holding(Element::new("EnvironmentAction").holding(environment))
+}
+
+/// The clock of the world's time of day.
+pub fn time(sky: &Sky) -> Element {
+    let clock = match sky.time_of_day {
+        TimeOfDay::Morning => "T08:00:00",
+        TimeOfDay::Noon => "T12:00:00",
+        TimeOfDay::Night => "T23:00:00",
+    };
+    Element::new("TimeOfDay").with("animation", false).with("dateTime", format!("{DATE}{clock}"))
+}
+
+/// Where the sun is, and its illuminance, lx.
+pub fn sun(sky: &Sky) -> (Element, f64) {
+    let (elevation_deg, azimuth_rad, illuminance_lx) = match sky.time_of_day {
+        TimeOfDay::Morning => (20.0, FRAC_PI_2, 20_000.0),
+        TimeOfDay::Noon => (60.0, PI, 100_000.0),
+        TimeOfDay::Night => (-30.0, 0.0, 0.1),
+    };
+    let sun = Element::new("Sun")
+        .measured("azimuth", azimuth_rad)
+        .measured("elevation", elevation_deg / 180.0 * PI);
+    (sun, illuminance_lx)
 }
 
 /// The word for the level of wetness or rain, whichever is higher: the world's road is at least as wet as that.
