@@ -43,8 +43,8 @@ pub enum Target {
 #[derive(Debug, Clone)]
 pub struct Walk {
     pub mark: Mark,
-    pub begin: Position,
-    pub end: Position,
+    /// At least one place; what lies between the first and the last must lie straight between them.
+    pub way: Vec<(Mark, Position)>,
     /// From the first vertex to the last, if they have times.
     pub duration_s: Option<f64>,
 }
@@ -62,7 +62,7 @@ pub fn begun(source: &mut Source, action: Node, is_ego: bool) -> Option<Begun> {
             moved(source, inner, is_ego)
         }
         "ControllerAction" | "ActivateControllerAction" | "AssignControllerAction" => {
-            if !is_ego && drives(action) {
+            if !is_ego && drives(source, action)? {
                 return source.refuse(
                     action,
                     "a controller of the player's drives it, of which the file says no more",
@@ -71,11 +71,10 @@ pub fn begun(source: &mut Source, action: Node, is_ego: bool) -> Option<Begun> {
             None
         }
         "VisibilityAction" => {
-            if ["graphics", "sensors", "traffic"]
-                .into_iter()
-                .any(|name| action.attribute(name) == Some("false"))
-            {
-                return source.refuse(action, "all road users can be seen");
+            for name in ["graphics", "sensors", "traffic"] {
+                if !source.switch(action, name, true)? {
+                    return source.refuse(action, "all road users can be seen");
+                }
             }
             None
         }
@@ -88,10 +87,19 @@ pub fn begun(source: &mut Source, action: Node, is_ego: bool) -> Option<Begun> {
 }
 
 /// Whether a controller takes over one of the two motions.
-fn drives(action: Node) -> bool {
-    action.descendants().filter(|node| node.has_tag_name("ActivateControllerAction")).any(|activated| {
-        ["longitudinal", "lateral"].into_iter().any(|name| activated.attribute(name) != Some("false"))
-    })
+fn drives(source: &mut Source, action: Node) -> Option<bool> {
+    let mut drives = false;
+    for activated in action.descendants().filter(|node| node.has_tag_name("ActivateControllerAction")) {
+        for name in ["longitudinal", "lateral"] {
+            drives |= source.switch(activated, name, true)?;
+        }
+    }
+    Some(drives)
+}
+
+/// Whether a change of speed or lane happens at once.
+fn is_step(source: &mut Source, dynamics: Node) -> Option<bool> {
+    Some(source.word(dynamics, "dynamicsShape", &["linear", "cubic", "sinusoidal", "step"])? == "step")
 }
 
 fn moved(source: &mut Source, action: Node, is_ego: bool) -> Option<Begun> {
@@ -99,10 +107,9 @@ fn moved(source: &mut Source, action: Node, is_ego: bool) -> Option<Begun> {
     match action.tag_name().name() {
         "SpeedAction" => {
             let dynamics = source.required(action, "SpeedActionDynamics")?;
-            let is_step = dynamics.attribute("dynamicsShape") == Some("step");
-            let at_once = is_step
-                || (dynamics.attribute("dynamicsDimension") == Some("time")
-                    && source.number(dynamics, "value")? == 0.0);
+            let dimension = source.word(dynamics, "dynamicsDimension", &["time", "distance", "rate"])?;
+            let at_once = is_step(source, dynamics)?
+                || (dimension == "time" && source.number(dynamics, "value")? == 0.0);
             let target = source.required(action, "SpeedActionTarget")?;
             if let Some(absolute) = element(target, "AbsoluteTargetSpeed") {
                 let mps = source.number(absolute, "value")?;
@@ -110,7 +117,7 @@ fn moved(source: &mut Source, action: Node, is_ego: bool) -> Option<Begun> {
             }
             let relative = source.required(target, "RelativeTargetSpeed")?;
             let (entity, value) = (source.text(relative, "entityRef")?, source.number(relative, "value")?);
-            if relative.attribute("continuous") == Some("true") {
+            if source.switch(relative, "continuous", false)? {
                 source.note("a speed relative to another's is taken at the beginning, and kept");
             }
             let speed = match source.text(relative, "speedTargetValueType")?.as_str() {
@@ -121,15 +128,15 @@ fn moved(source: &mut Source, action: Node, is_ego: bool) -> Option<Begun> {
             Some(Begun::Speed(mark, speed, at_once))
         }
         "LongitudinalDistanceAction" if !is_ego => {
-            if action.attribute("continuous") == Some("true") {
+            if source.switch(action, "continuous", false)? {
                 return source.refuse(action, "a vehicle keeps its speed, not its distance");
             }
-            if action.attribute("freespace") != Some("true") {
+            if !source.switch(action, "freespace", false)? {
                 return source.refuse(action, "only `freespace=\"true\"` is read: between the bumpers");
             }
             let headway = match action.attribute("timeGap") {
-                Some(_) => Headway::Time(source.number(action, "timeGap")?),
-                None => Headway::Way(source.number(action, "distance")?),
+                Some(_) => Headway::Time(source.amount(action, "timeGap")?),
+                None => Headway::Way(source.amount(action, "distance")?),
             };
             Some(Begun::Headway(mark, headway))
         }
@@ -137,6 +144,8 @@ fn moved(source: &mut Source, action: Node, is_ego: bool) -> Option<Begun> {
             source.note(
                 "a lane change takes as long as the engine's drivers need, and waits until the lane is free",
             );
+            let dynamics = source.required(action, "LaneChangeActionDynamics")?;
+            is_step(source, dynamics)?;
             let target = source.required(action, "LaneChangeTarget")?;
             if let Some(absolute) = element(target, "AbsoluteTargetLane") {
                 return Some(Begun::Change(mark, Target::Lane(source.integer(absolute, "value")?)));
@@ -181,8 +190,12 @@ fn walk(source: &mut Source, action: Node) -> Option<Walk> {
     let (Some(first), Some(last)) = (vertices.first(), vertices.last()) else {
         return source.refuse(polyline, "it has no vertices");
     };
-    let (from, to) = (source.required(*first, "Position")?, source.required(*last, "Position")?);
+    let mut way = Vec::new();
+    for vertex in &vertices {
+        let place = source.required(*vertex, "Position")?;
+        way.push((source.mark(*vertex), position(source, place)?));
+    }
     let times = (source.number_or(*first, "time", 0.0)?, source.number_or(*last, "time", 0.0)?);
     let duration_s = (times.1 > times.0).then_some(times.1 - times.0);
-    Some(Walk { mark, begin: position(source, from)?, end: position(source, to)?, duration_s })
+    Some(Walk { mark, way, duration_s })
 }

@@ -22,9 +22,9 @@ pub fn body(source: &mut Source, root: Node, object: Node, files: &dyn Files) ->
     if let Some(reference) = element(object, "CatalogReference") {
         return of_catalogue(source, root, reference, files);
     }
-    let described = children(object).find(|node| is_described(*node));
-    let Some(described) = described else {
-        return source.refuse(object, "only vehicles and pedestrians are read");
+    let described: Vec<Node> = children(object).filter(|node| is_described(*node)).collect();
+    let [described] = described[..] else {
+        return source.refuse(object, "only vehicles and pedestrians are read, one an object");
     };
     shape(described).map_or_else(|reason| source.refuse(described, reason), Some)
 }
@@ -65,6 +65,9 @@ fn of_catalogue(source: &mut Source, root: Node, reference: Node, files: &dyn Fi
 
 /// The body of a `Vehicle` or `Pedestrian`.
 fn shape(node: Node) -> Result<Shape, String> {
+    if element(node, "Trailer").is_some() {
+        return Err("vehicles with trailers are not read".to_owned());
+    }
     let category = |name: &str| node.attribute(name).unwrap_or("").to_owned();
     let like = match node.tag_name().name() {
         "Vehicle" => match category("vehicleCategory").as_str() {
@@ -102,11 +105,15 @@ fn shape(node: Node) -> Result<Shape, String> {
             found.and_then(|text| text.trim().parse::<f64>().ok()).filter(|value| value.abs() < 1000.0);
         value.ok_or_else(|| format!("`{attribute}` of its `{name}` is no number"))
     };
+    let size = |attribute: &str| {
+        let value = number("Dimensions", attribute)?;
+        if value > 0.0 { Ok(value) } else { Err(format!("`{attribute}` of its `Dimensions` is not above 0")) }
+    };
     Ok(Shape {
         like,
-        length_m: number("Dimensions", "length")?,
-        width_m: number("Dimensions", "width")?,
-        height_m: number("Dimensions", "height")?,
+        length_m: size("length")?,
+        width_m: size("width")?,
+        height_m: size("height")?,
         middle_m: number("Center", "x")?,
     })
 }

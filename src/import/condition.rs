@@ -5,6 +5,9 @@ use super::scene::Placed;
 use super::source::{Mark, Source};
 use super::trigger::{Condition, Pair, Trigger, When};
 
+/// What holds from the beginning.
+const ALWAYS: &str = "elapsed >= 0 s";
+
 /// Where something is and how it moves along the way, as long as it keeps its speed.
 pub struct Kinematics {
     pub station_m: f64,
@@ -25,7 +28,7 @@ pub fn text(
     placed: &[Placed],
 ) -> Option<String> {
     if trigger.is_empty() || trigger.iter().any(|all| is_always(all)) {
-        return Some("elapsed >= 0 s".to_owned());
+        return Some(ALWAYS.to_owned());
     }
     let mut groups = Vec::new();
     for all in trigger {
@@ -47,21 +50,28 @@ fn part(
 ) -> Option<String> {
     let mark = &condition.mark;
     match &condition.kind {
-        When::Always => Some("elapsed >= 0 s".to_owned()),
+        When::Always => Some(ALWAYS.to_owned()),
         When::After(seconds) => Some(format!("elapsed >= {seconds:.2} s")),
         When::Headway { pair, seconds } => {
             let gap = gap(source, mark, pair, actor, placed)?;
-            let of = if pair.of == actor.name { "npc" } else { "ego" };
+            let (of, mps) = if pair.of == actor.name { ("npc", actor.mps) } else { ("ego", placed[0].mps) };
+            if holds(pair, actor, placed, mps * seconds) {
+                return Some(ALWAYS.to_owned());
+            }
             Some(format!("{gap} {} {of}.speed * {seconds:.3} s", sign(pair)))
         }
         When::Collides { pair, seconds } => {
             let gap = gap(source, mark, pair, actor, placed)?;
-            Some(format!("{gap} < (ego.speed - npc.speed) * {seconds:.3} s"))
+            let (back, front) = if is_behind(actor) { ("npc", "ego") } else { ("ego", "npc") };
+            Some(format!("{gap} < ({back}.speed - {front}.speed) * {seconds:.3} s"))
         }
         When::Distance { pair, metres } => {
             let names = [pair.of.as_str(), pair.to.as_str()];
             if names.contains(&actor.name.as_str()) && names.contains(&placed[0].name.as_str()) {
                 let gap = gap(source, mark, pair, actor, placed)?;
+                if holds(pair, actor, placed, *metres) {
+                    return Some(ALWAYS.to_owned());
+                }
                 return Some(format!("{gap} {} {metres:.2} m", sign(pair)));
             }
             let (of, to) = (named(source, mark, &pair.of, placed)?, named(source, mark, &pair.to, placed)?);
@@ -78,7 +88,12 @@ fn part(
                 ));
             }
             let Kinematics { station_m: from_m, mps } = of.kinematics();
-            at(source, mark, (station_m - from_m) / mps)
+            if (from_m - there.station_m).abs() <= *within_m {
+                return Some(ALWAYS.to_owned());
+            }
+            // One that comes towards the ego vehicle meets the far side of the place first.
+            let edge_m = if mps < 0.0 { there.station_m + within_m } else { station_m };
+            at(source, mark, (edge_m - from_m) / mps)
         }
     }
 }
@@ -97,11 +112,28 @@ fn gap(source: &mut Source, mark: &Mark, pair: &Pair, actor: &Placed, placed: &[
     if pair.is_free_space {
         return Some("npc.gap".to_owned());
     }
-    // From the ego vehicle's reference point to its front, and from the back of the one ahead to its own.
-    let (front_m, _) = ego.ends_m();
-    let (_, back_m) = actor.ends_m();
-    let more_m = front_m + actor.beside.station_m - back_m;
+    // From the reference points to those ends that face each other. One that begins behind comes nearer from there, and
+    // has passed when it is farther away.
+    let faces_front = is_behind(actor) && pair.is_less;
+    let more_m = match faces_front {
+        true => actor.ends_m().0 - actor.beside.station_m - ego.ends_m().1,
+        false => ego.ends_m().0 + actor.beside.station_m - actor.ends_m().1,
+    };
     Some(format!("npc.gap + {more_m:.2} m"))
+}
+
+fn is_behind(actor: &Placed) -> bool {
+    actor.beside.station_m < 0.0
+}
+
+/// Whether a distance between the ego vehicle and the actor compares so at the beginning.
+fn holds(pair: &Pair, actor: &Placed, placed: &[Placed], metres: f64) -> bool {
+    let ((front_m, back_m), (ego_front_m, ego_back_m)) = (actor.ends_m(), placed[0].ends_m());
+    let away_m = match pair.is_free_space {
+        true => (back_m - ego_front_m).max(ego_back_m - front_m).max(0.0),
+        false => actor.beside.station_m.abs(),
+    };
+    if pair.is_less { away_m < metres } else { away_m > metres }
 }
 
 /// When two that keep their speeds are so far from each other.
@@ -117,6 +149,9 @@ fn meeting(
         true => front.ends_m().1 - back.ends_m().0,
         false => front.beside.station_m - back.beside.station_m,
     };
+    if if pair.is_less { gap_m < metres } else { gap_m > metres } {
+        return Some(ALWAYS.to_owned());
+    }
     let closing_mps = back.kinematics().mps - front.kinematics().mps;
     let seconds = (gap_m - metres) / closing_mps;
     if closing_mps > 0.0 && pair.is_less || closing_mps < 0.0 && !pair.is_less {

@@ -5,7 +5,7 @@
 //! ego vehicle in the file. What cannot be said is refused, each with its line; what is left to the driving
 //! system or to the engine's drivers becomes a note in the scenario. `docs/open.md` has what is still taken without a word.
 //!
-//! `story` reads the file, with `body`, `position`, `action` and `trigger` for what stands in it; `ground` finds places on the map,
+//! `story` reads the file, with `body`, `position`, `action`, `trigger` and `weather` for what stands in it; `ground` finds places on the map,
 //! `scene` decides who is where and does what, `condition` turns triggers into conditions of the language, and `write` prints the
 //! scenario. No file is read here: `cli` gives texts.
 
@@ -19,6 +19,7 @@ mod scene;
 mod source;
 mod story;
 mod trigger;
+mod weather;
 mod write;
 
 use std::collections::{BTreeMap, BTreeSet};

@@ -1,6 +1,7 @@
 //! Everything with its place and speed: what the scenario of the language says.
 
 use crate::emit::lane_point;
+use crate::geometry::Vec2;
 use crate::road::RoadMap;
 
 use super::action::{Headway, Speed, Target};
@@ -10,10 +11,14 @@ use super::ground::{Beside, Ground};
 use super::position::Position;
 use super::source::{Mark, Source};
 use super::story::{Change, Entity, Story};
+use super::weather::Weather;
 use super::{Files, condition};
 
 /// Vehicles keep to the middle of their lanes: a file's may be this far beside it, m.
 const OFFSET_M_MAX: f64 = 0.3;
+
+/// A pedestrian walks straight: vertices of its way may lie this far beside that, m.
+const STRAIGHT_M: f64 = 0.5;
 
 /// A pedestrian sets out at most 10 s after it appeared: a farther one appears so many seconds before the ego vehicle arrives.
 const SETS_OUT_S: f64 = 9.0;
@@ -26,7 +31,7 @@ pub struct Scene {
     pub start: String,
     pub goal: String,
     pub ego_mps: f64,
-    pub time: Option<&'static str>,
+    pub weather: Weather,
     pub duration_s: f64,
     pub others: Vec<Other>,
     /// When the one vehicle that changes lanes may begin.
@@ -68,7 +73,7 @@ impl Scene {
             start,
             goal,
             ego_mps,
-            time: story.time,
+            weather: story.weather.clone(),
             duration_s: story.duration_s,
             others: Vec::new(),
             change: None,
@@ -294,8 +299,23 @@ impl Scene {
             self.others.push(spawn);
             return Some(());
         };
-        let (from_m, from_left_m) = ground.on_foot(source, &walk.mark, &walk.begin)?;
-        let (to_m, to_left_m) = ground.on_foot(source, &walk.mark, &walk.end)?;
+        let mut way = Vec::new();
+        for (mark, position) in &walk.way {
+            let (station_m, left_m) = ground.on_foot(source, mark, position)?;
+            way.push(Vec2::new(station_m, left_m));
+        }
+        let (from, to) = (way[0], way[way.len() - 1]);
+        let straight = to - from;
+        for (place, (mark, _)) in way.iter().zip(&walk.way) {
+            let along = (place - from).dot(&straight) / straight.norm_squared().max(f64::MIN_POSITIVE);
+            let aside_m = (place - from - straight * along.clamp(0.0, 1.0)).norm();
+            if aside_m > STRAIGHT_M {
+                let reason = format!("a pedestrian walks straight: it lies {aside_m:.1} m beside its way");
+                return source.refuse_at(mark, reason);
+            }
+        }
+        let (from_m, from_left_m) = (from.x, from.y);
+        let (to_m, to_left_m) = (to.x, to.y);
         if from_left_m * to_left_m >= 0.0 {
             return source.refuse_at(&walk.mark, "a pedestrian walks across the ego vehicle's way");
         }
@@ -363,12 +383,15 @@ fn place(
     let beside = match position {
         Position::RelativeLane { entity: of, lanes, ahead_m, offset_m } => {
             let of = placed.iter().find(|other| other.name == *of)?;
+            if !of.beside.is_along {
+                return source.refuse_at(mark, "a place relative to an oncoming vehicle is not read");
+            }
             let lanes_left = of.beside.lanes_left + lanes;
             let station_m = of.beside.station_m + ahead_m;
             if station_m >= ground.route.path.length_m() {
                 return source.refuse_at(mark, "it lies beyond the end of the ego vehicle's way");
             }
-            Beside { station_m, lanes_left, is_along: of.beside.is_along, offset_m: *offset_m }
+            Beside { station_m, lanes_left, is_along: true, offset_m: *offset_m }
         }
         _ => ground.beside(source, mark, position)?,
     };

@@ -153,6 +153,37 @@ impl Source {
         }
     }
 
+    /// A switch, or what it is without one.
+    pub fn switch(&mut self, node: Node, name: &str, default: bool) -> Option<bool> {
+        if !node.has_attribute(name) {
+            return Some(default);
+        }
+        match self.text(node, name)?.as_str() {
+            "true" | "1" => Some(true),
+            "false" | "0" => Some(false),
+            other => self.refuse(node, format!("`{name}` is `{other}`, neither `true` nor `false`")),
+        }
+    }
+
+    /// One of the words that the standard has for an attribute; the empty one if it is not there.
+    pub fn word(&mut self, node: Node, name: &str, known: &[&'static str]) -> Option<&'static str> {
+        if !node.has_attribute(name) {
+            return Some("");
+        }
+        let text = self.text(node, name)?;
+        let found = known.iter().find(|word| **word == text).copied();
+        found.or_else(|| self.refuse(node, format!("`{name}` is `{text}`; it may be {}", known.join(", "))))
+    }
+
+    /// A number from 0 on.
+    pub fn amount(&mut self, node: Node, name: &str) -> Option<f64> {
+        let number = self.number(node, name)?;
+        if number < 0.0 {
+            return self.refuse(node, format!("`{name}` is {number}, less than 0"));
+        }
+        Some(number)
+    }
+
     /// A value with its parameters filled in.
     fn filled(&mut self, node: Node, value: &str) -> Option<String> {
         filled(value, &self.parameters).map_or_else(|reason| self.refuse(node, reason), Some)

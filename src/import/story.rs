@@ -9,16 +9,13 @@ use super::body::{Shape, body};
 use super::position::Position;
 use super::source::{Mark, Source, children, element, elements};
 use super::trigger::{Trigger, both, is_less, trigger};
+use super::weather::{Weather, weather};
 
 /// How long a scenario is played that names no time for its end, s.
 const DURATION_S: f64 = 60.0;
 
 /// The longest step of an episode, s: a scenario is one step.
 const DURATION_S_MAX: f64 = 600.0;
-
-/// Weather that is farther to be seen through, m, and rougher than this is clear and dry.
-const CLEAR_M: f64 = 1000.0;
-const DRY_FRICTION: f64 = 0.9;
 
 /// A file's scenario.
 #[derive(Debug)]
@@ -27,8 +24,7 @@ pub struct Story {
     pub map: (Mark, String),
     pub ego: Entity,
     pub others: Vec<Entity>,
-    /// The engine's word for the time of day.
-    pub time: Option<&'static str>,
+    pub weather: Weather,
     pub duration_s: f64,
     /// What the file says of itself.
     pub description: String,
@@ -93,13 +89,13 @@ pub fn read(source: &mut Source, document: &Document, ego: Option<&str>, files: 
     let entities = entities(source, root, files);
     let mut cast = Cast::of(source, root, entities, ego)?;
     let storyboard = source.required(root, "Storyboard")?;
-    let mut time = None;
+    let mut sky = Weather::default();
     if let Some(init) = element(storyboard, "Init") {
         for actions in elements(init, "Actions") {
             for action in children(actions) {
                 match action.tag_name().name() {
                     "Private" => cast.start(source, action),
-                    "GlobalAction" => time = environment(source, action).or(time),
+                    "GlobalAction" => sky = sky.then(weather(source, action).unwrap_or_default()),
                     _ => user_defined(source, action),
                 }
             }
@@ -118,7 +114,7 @@ pub fn read(source: &mut Source, document: &Document, ego: Option<&str>, files: 
     }
     let duration_s = duration_s(source, storyboard);
     let description = header.attribute("description").unwrap_or("").to_owned();
-    Some(Story { map, ego: cast.ego, others: cast.others, time, duration_s, description })
+    Some(Story { map, ego: cast.ego, others: cast.others, weather: sky, duration_s, description })
 }
 
 /// The entities and what is known of them so far.
@@ -189,6 +185,10 @@ impl Cast {
                 source.refuse::<()>(catalogue, "manoeuvres of catalogues are not read");
             }
             let Some(actors) = element(group, "Actors") else { continue };
+            if source.switch(actors, "selectTriggeringEntities", false) != Some(false) {
+                source.refuse::<()>(actors, "who acts is named: those that a condition selects are not read");
+                continue;
+            }
             let mut names = Vec::new();
             for actor in elements(actors, "EntityRef") {
                 let Some(name) = source.text(actor, "entityRef") else { continue };
@@ -205,6 +205,7 @@ impl Cast {
             for manoeuvre in elements(group, "Maneuver") {
                 source.declare(manoeuvre);
                 for event in elements(manoeuvre, "Event") {
+                    source.word(event, "priority", &["override", "overwrite", "parallel", "skip"]);
                     let actions: Vec<Node> = elements(event, "Action").flat_map(children).collect();
                     let own: Vec<&String> = names.iter().filter(|name| !self.is_ego(name)).collect();
                     let is_global = actions.iter().any(|action| !action.has_tag_name("PrivateAction"));
@@ -288,39 +289,6 @@ fn entities(source: &mut Source, root: Node, files: &dyn Files) -> Vec<Entity> {
         });
     }
     found
-}
-
-/// The time of day of an `EnvironmentAction`; weather is refused unless it is dry and clear.
-fn environment(source: &mut Source, global: Node) -> Option<&'static str> {
-    let action = children(global).next()?;
-    if !action.has_tag_name("EnvironmentAction") {
-        return source.refuse(action, "this action is not read");
-    }
-    let Some(environment) = element(action, "Environment") else {
-        return source.refuse(action, "environments of catalogues are not read");
-    };
-    for node in environment.descendants() {
-        let is_dry = match node.tag_name().name() {
-            "Precipitation" => node.attribute("precipitationType").is_none_or(|kind| kind == "dry"),
-            "Fog" if node.has_attribute("visualRange") => source.number(node, "visualRange")? >= CLEAR_M,
-            "RoadCondition" if node.has_attribute("frictionScaleFactor") => {
-                source.number(node, "frictionScaleFactor")? >= DRY_FRICTION
-            }
-            _ => true,
-        };
-        if !is_dry {
-            source.refuse::<()>(node, "weather is not taken over: only dry and clear environments are read");
-        }
-    }
-    let time = element(environment, "TimeOfDay")?;
-    let text = source.text(time, "dateTime")?;
-    let hour = text.split_once('T').and_then(|(_, clock)| clock.get(..2)?.parse::<u32>().ok());
-    match hour {
-        Some(6..=11) => Some("Morning"),
-        Some(12..=17) => Some("Noon"),
-        Some(0..=23) => Some("Night"),
-        _ => source.refuse(time, format!("`{text}` is no date and time")),
-    }
 }
 
 fn user_defined(source: &mut Source, action: Node) {

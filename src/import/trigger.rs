@@ -76,7 +76,8 @@ pub fn both(a: &Trigger, b: &Trigger) -> Trigger {
 
 fn condition(source: &mut Source, node: Node) -> Option<Condition> {
     let delay_s = source.number_or(node, "delay", 0.0)?;
-    if node.attribute("conditionEdge") == Some("falling") {
+    let edge = source.word(node, "conditionEdge", &["none", "rising", "falling", "risingOrFalling"])?;
+    if edge.ends_with("alling") {
         return source.refuse(node, "only what begins to hold is read, not what ends");
     }
     if let Some(value) = element(node, "ByValueCondition") {
@@ -112,20 +113,23 @@ fn condition(source: &mut Source, node: Node) -> Option<Condition> {
     let outer = source.required(by_entity, "EntityCondition")?;
     let Some(inner) = children(outer).next() else { return source.refuse(outer, "it is empty") };
     let [of] = names.as_slice() else {
-        return source.refuse(list, "a condition asks about one entity");
+        let reason =
+            if names.is_empty() { "it names no entity" } else { "a condition asks about one entity" };
+        return source.refuse(list, reason);
     };
     if delay_s > 0.0 {
         return source.refuse(node, "a delay is read of times alone");
     }
     let kind = match inner.tag_name().name() {
         "TimeHeadwayCondition" => {
-            When::Headway { pair: pair(source, inner, of)?, seconds: source.number(inner, "value")? }
+            When::Headway { pair: pair(source, inner, of)?, seconds: source.amount(inner, "value")? }
         }
         "RelativeDistanceCondition" => {
-            if inner.attribute("relativeDistanceType") == Some("lateral") {
+            let kinds = ["longitudinal", "lateral", "cartesianDistance", "euclidianDistance"];
+            if source.word(inner, "relativeDistanceType", &kinds)? == "lateral" {
                 return source.refuse(inner, "lateral distances are not read");
             }
-            When::Distance { pair: pair(source, inner, of)?, metres: source.number(inner, "value")? }
+            When::Distance { pair: pair(source, inner, of)?, metres: source.amount(inner, "value")? }
         }
         "TimeToCollisionCondition" => {
             let target =
@@ -133,16 +137,16 @@ fn condition(source: &mut Source, node: Node) -> Option<Condition> {
             let Some(target) = target else { return source.refuse(inner, "the target is an entity") };
             let to = source.text(target, "entityRef")?;
             let is_less = is_less(source, inner)?;
-            let is_free_space = inner.attribute("freespace") == Some("true");
+            let is_free_space = source.switch(inner, "freespace", false)?;
             let pair = Pair { of: of.clone(), to, is_less, is_free_space };
             if !is_less {
                 return source.refuse(inner, "only `lessThan` is read");
             }
-            When::Collides { pair, seconds: source.number(inner, "value")? }
+            When::Collides { pair, seconds: source.amount(inner, "value")? }
         }
         "ReachPositionCondition" => {
             let place = source.required(inner, "Position")?;
-            let within_m = source.number(inner, "tolerance")?;
+            let within_m = source.amount(inner, "tolerance")?;
             When::Reaches { entity: of.clone(), position: position(source, place)?, within_m }
         }
         _ => return source.refuse(inner, "this condition is not read"),
@@ -152,7 +156,7 @@ fn condition(source: &mut Source, node: Node) -> Option<Condition> {
 
 fn pair(source: &mut Source, node: Node, of: &str) -> Option<Pair> {
     let to = source.text(node, "entityRef")?;
-    let is_free_space = node.attribute("freespace") == Some("true");
+    let is_free_space = source.switch(node, "freespace", false)?;
     Some(Pair { of: of.to_owned(), to, is_less: is_less(source, node)?, is_free_space })
 }
 

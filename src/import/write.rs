@@ -40,8 +40,12 @@ pub fn scenario(scene: &Scene, name: &str, notes: BTreeSet<String>) -> Imported 
         );
     }
     text += "}\n\n";
-    if scene.time.is_some() {
+    if scene.weather.time.is_some() {
         text += "enum Time = Morning | Noon | Night\nstate time: Time = any\n\n";
+    }
+    if scene.weather.is_rough() {
+        text += "enum Sky = Rain | Fog | Wetness\nenum Level = None < Light < Moderate < High\n";
+        text += "state sky: Sky -> Level = None\n\n";
     }
     for (index, other) in scene.others.iter().enumerate() {
         let shape = &other.shape;
@@ -74,7 +78,11 @@ pub fn scenario(scene: &Scene, name: &str, notes: BTreeSet<String>) -> Imported 
         "\nepisode {{\n  roads: [{own}_road]\n  step: {} s\n  stop: arrived\n  limit: 1 steps\n}}",
         number(step_ms / 1000.0)
     );
-    let start = scene.time.map_or_else(String::new, |time| format!("time: {time}, "));
+    let mut start = scene.weather.time.map_or_else(String::new, |time| format!("time: {time}, "));
+    if scene.weather.is_rough() {
+        let [rain, fog, wetness] = scene.weather.sky.map(|level| level.unwrap_or("None"));
+        let _ = write!(start, "sky: {{ Rain: {rain}, Fog: {fog}, Wetness: {wetness} }}, ");
+    }
     let once = scene.once.as_ref().map_or_else(String::new, |once| format!(" once {once}"));
     let _ = writeln!(
         text,

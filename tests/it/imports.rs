@@ -83,6 +83,120 @@ impl Files for Kept {
     }
 }
 
+/// What becomes of `cut_in` and `walker` where one thing in them is another: a line of the scenario, or a refusal.
+#[test]
+fn conditions_and_words_are_read_or_refused() {
+    let read = |path: &str| std::fs::read_to_string(root().join(path)).expect("it is there");
+    let files = Kept {
+        map: read("scenarios/roads/boulevard.xodr"),
+        catalogue: read("tests/cases/imports/catalogue/vehicles.xosc"),
+    };
+    let import = |text: &str| match openscenario(text, "case", None, &BTreeMap::new(), &files) {
+        Ok(imported) => imported.text,
+        Err(refusals) => refusals.into_iter().map(|refusal| refusal.reason + "\n").collect(),
+    };
+    let cut_in = read(&format!("{AREA}/cut_in.xosc"));
+    let begin = cut_in.find("<TimeHeadwayCondition").expect("it has a condition");
+    let end = begin + cut_in[begin..].find("/>").expect("it ends") + 2;
+    let begins = "rule change_begins on begin during change: ";
+    // The van is 17.1 m ahead between the bumpers, 22 m between the reference points; the ego vehicle drives 10 m/s.
+    let conditions = [
+        (
+            r#"<TimeHeadwayCondition entityRef="Van" value="1.5" freespace="false" rule="lessThan"/>"#,
+            "npc.gap + 4.90 m < ego.speed * 1.500 s",
+        ),
+        (
+            r#"<TimeHeadwayCondition entityRef="Van" value="3" freespace="true" rule="lessThan"/>"#,
+            "elapsed >= 0 s",
+        ),
+        (
+            r#"<RelativeDistanceCondition entityRef="Van" relativeDistanceType="longitudinal" value="15" freespace="$free" rule="lessThan"/>"#,
+            "npc.gap < 15.00 m",
+        ),
+        (
+            r#"<RelativeDistanceCondition entityRef="Van" relativeDistanceType="longitudinal" value="15" freespace="true" rule="greaterThan"/>"#,
+            "elapsed >= 0 s",
+        ),
+        (
+            r#"<RelativeDistanceCondition entityRef="Van" relativeDistanceType="longitudinal" value="30" freespace="false" rule="greaterOrEqual"/>"#,
+            "npc.gap + 4.90 m > 30.00 m",
+        ),
+        (
+            r#"<TimeToCollisionCondition value="4" freespace="true" rule="lessThan"><TimeToCollisionConditionTarget><EntityRef entityRef="Van"/></TimeToCollisionConditionTarget></TimeToCollisionCondition>"#,
+            "npc.gap < (ego.speed - npc.speed) * 4.000 s",
+        ),
+        (
+            r#"<ReachPositionCondition tolerance="2"><Position><LanePosition roadId="3" laneId="-2" s="60"/></Position></ReachPositionCondition>"#,
+            "ego.route_left <= ",
+        ),
+    ];
+    for (condition, wanted) in conditions {
+        let declared = r#"<ParameterDeclaration name="free" parameterType="boolean" value="true"/></ParameterDeclarations>"#;
+        let text = format!("{}{condition}{}", &cut_in[..begin], &cut_in[end..]);
+        let found = import(&text.replacen("</ParameterDeclarations>", declared, 1));
+        assert!(found.contains(&format!("{begins}{wanted}")), "{condition}: {found}");
+    }
+    let behind = cut_in.replace("${$gap + 10}", "-20").replace("value=\"-3\"", "value=\"3\"");
+    let found = import(&behind.replace(&cut_in[begin..end], conditions[5].0));
+    assert!(found.contains("npc.gap < (npc.speed - ego.speed) * 4.000 s"), "{found}");
+
+    for (old, new, wanted) in [
+        ("value=\"1.5\"", "value=\"-1\"", "less than 0"),
+        ("freespace=\"true\"", "freespace=\"perhaps\"", "neither `true` nor `false`"),
+        ("conditionEdge=\"rising\"", "conditionEdge=\"falling\"", "not what ends"),
+        ("conditionEdge=\"rising\"", "conditionEdge=\"upward\"", "it may be none, rising"),
+        ("<EntityRef entityRef=\"Ego\"/>", "", "it names no entity"),
+        ("selectTriggeringEntities=\"false\"", "selectTriggeringEntities=\"true\"", "a condition selects"),
+        ("priority=\"overwrite\"", "priority=\"urgent\"", "it may be override"),
+        ("dynamicsShape=\"sinusoidal\"", "dynamicsShape=\"sudden\"", "it may be linear"),
+        ("width=\"1.8\"", "width=\"-1.8\"", "not above 0"),
+        (
+            "<Vehicle name=\"car\" vehicleCategory=\"car\">",
+            "<Vehicle name=\"car\" vehicleCategory=\"car\"><Trailer/>",
+            "trailers",
+        ),
+        ("<Vehicle name=\"car\"", "<MiscObject/><Vehicle name=\"car\"", "one an object"),
+    ] {
+        assert!(cut_in.contains(old), "{old}");
+        let found = import(&cut_in.replace(old, new));
+        assert!(found.contains(wanted), "{new}: {found}");
+    }
+    for (weather, wanted) in [
+        (
+            r#"<Weather><Precipitation precipitationType="rain" precipitationIntensity="6"/></Weather>"#,
+            "Rain: Moderate, Fog: None, Wetness: None",
+        ),
+        (
+            r#"<Weather><Precipitation precipitationType="rain" intensity="0.1"/><Fog visualRange="300"/></Weather>"#,
+            "Rain: Light, Fog: Light, Wetness: None",
+        ),
+        (
+            r#"<Weather><Fog visualRange="40"/></Weather><RoadCondition frictionScaleFactor="0.7"/>"#,
+            "Rain: None, Fog: High, Wetness: Moderate",
+        ),
+        (
+            r#"<RoadCondition frictionScaleFactor="1.0" wetness="lowFlooded"/>"#,
+            "Rain: None, Fog: None, Wetness: High",
+        ),
+        (r#"<Weather><Precipitation precipitationType="snow" intensity="1"/></Weather>"#, "no snow"),
+        (r#"<RoadCondition frictionScaleFactor="0.2"/>"#, "is ice"),
+    ] {
+        let sky = format!(
+            r#"<Actions><GlobalAction><EnvironmentAction><Environment name="sky"><TimeOfDay animation="false" dateTime="2026-01-01T21:00:00"/>{weather}</Environment></EnvironmentAction></GlobalAction>"#
+        );
+        let found = import(&cut_in.replacen("<Actions>", &sky, 1));
+        assert!(found.contains(wanted), "{weather}: {found}");
+        assert!(
+            found.contains("time: Night") || found.contains("no snow") || found.contains("is ice"),
+            "{found}"
+        );
+    }
+    let walker = read(&format!("{AREA}/walker.xosc"));
+    let aside = r#"</Vertex><Vertex time="1"><Position><WorldPosition x="0" y="0"/></Position></Vertex>"#;
+    let found = import(&walker.replacen("</Vertex>", aside, 1));
+    assert!(found.contains("a pedestrian walks straight: it lies"), "{found}");
+}
+
 #[test]
 fn no_torn_or_altered_file_makes_it_panic() {
     let read = |path: &str| std::fs::read_to_string(root().join(path)).expect("it is there");

@@ -1,0 +1,117 @@
+//! Time of day and weather of a file, in the engine's words.
+
+use roxmltree::Node;
+
+use super::source::{Source, children, element};
+
+/// Levels of the engine's sky, and what each reaches up to: rain by the bounds of light and moderate rain (WMO), as a part
+/// of the most where a file of 1.0 gives no millimetres; fog by the range of sight; wetness by the part of friction that
+/// is left.
+const LEVELS: [&str; 4] = ["None", "Light", "Moderate", "High"];
+const RAIN_MMPH: [f64; 3] = [0.0, 2.5, 10.0];
+const RAIN_PART: [f64; 3] = [0.0, 0.2, 0.5];
+const SIGHT_M: [f64; 3] = [1000.0, 200.0, 75.0];
+const FRICTION: [f64; 3] = [0.9, 0.75, 0.65];
+/// Less friction than that of a flooded road is ice.
+const FRICTION_MIN: f64 = 0.5;
+
+/// What an `EnvironmentAction` sets.
+#[derive(Debug, Clone, Default)]
+pub struct Weather {
+    /// The engine's word for the time of day.
+    pub time: Option<&'static str>,
+    /// Levels of rain, fog and wetness, where the file says them.
+    pub sky: [Option<&'static str>; 3],
+}
+
+impl Weather {
+    /// What is set by one action and then by another.
+    pub fn then(self, later: Weather) -> Weather {
+        let mut sky = self.sky;
+        for (level, new) in sky.iter_mut().zip(later.sky) {
+            *level = new.or(*level);
+        }
+        Weather { time: later.time.or(self.time), sky }
+    }
+
+    /// Whether it is other than dry and clear.
+    pub fn is_rough(&self) -> bool {
+        self.sky.iter().flatten().any(|level| *level != LEVELS[0])
+    }
+}
+
+/// The weather of a `GlobalAction`.
+pub fn weather(source: &mut Source, global: Node) -> Option<Weather> {
+    let action = children(global).next()?;
+    if !action.has_tag_name("EnvironmentAction") {
+        return source.refuse(action, "this action is not read");
+    }
+    let Some(environment) = element(action, "Environment") else {
+        return source.refuse(action, "environments of catalogues are not read");
+    };
+    let mut found = Weather::default();
+    for node in environment.descendants() {
+        match node.tag_name().name() {
+            "Precipitation" => found.sky[0] = Some(rain(source, node)?),
+            "Fog" if node.has_attribute("visualRange") => {
+                let sight_m = source.amount(node, "visualRange")?;
+                found.sky[1] = Some(level(|bound| sight_m >= SIGHT_M[bound]));
+            }
+            "RoadCondition" => found.sky[2] = wetness(source, node)?,
+            "TimeOfDay" => found.time = Some(time(source, node)?),
+            _ => {}
+        }
+    }
+    if found.is_rough() {
+        source.note("weather is the nearest of the engine's levels of rain, fog and wetness");
+    }
+    Some(found)
+}
+
+/// The first level whose bound holds.
+fn level(holds: impl Fn(usize) -> bool) -> &'static str {
+    LEVELS[(0..3).find(|bound| holds(*bound)).unwrap_or(3)]
+}
+
+fn rain(source: &mut Source, node: Node) -> Option<&'static str> {
+    match source.word(node, "precipitationType", &["dry", "rain", "snow"])? {
+        "rain" if node.has_attribute("precipitationIntensity") => {
+            let mmph = source.amount(node, "precipitationIntensity")?;
+            Some(level(|bound| mmph <= RAIN_MMPH[bound]))
+        }
+        "rain" => {
+            let part = source.amount(node, "intensity")?;
+            Some(level(|bound| part <= RAIN_PART[bound]))
+        }
+        "snow" => source.refuse(node, "the engine has no snow"),
+        _ => Some(LEVELS[0]),
+    }
+}
+
+/// The water on the road: by its word, or by the friction that is left.
+fn wetness(source: &mut Source, node: Node) -> Option<Option<&'static str>> {
+    let words = ["dry", "moist", "wetWithPuddles", "lowFlooded", "highFlooded"];
+    let word = source.word(node, "wetness", &words)?;
+    if let Some(at) = words.iter().position(|known| *known == word) {
+        return Some(Some(LEVELS[at.min(3)]));
+    }
+    if !node.has_attribute("frictionScaleFactor") {
+        return Some(None);
+    }
+    let part = source.amount(node, "frictionScaleFactor")?;
+    if part < FRICTION_MIN {
+        return source.refuse(node, "so little friction is ice, of which the engine has none");
+    }
+    Some(Some(level(|bound| part >= FRICTION[bound])))
+}
+
+fn time(source: &mut Source, node: Node) -> Option<&'static str> {
+    let text = source.text(node, "dateTime")?;
+    let hour = text.split_once('T').and_then(|(_, clock)| clock.get(..2)?.parse::<u32>().ok());
+    match hour {
+        Some(6..=11) => Some("Morning"),
+        Some(12..=17) => Some("Noon"),
+        Some(0..=23) => Some("Night"),
+        _ => source.refuse(node, format!("`{text}` is no date and time")),
+    }
+}
