@@ -31,19 +31,23 @@ pub fn export(output: &Output, arguments: &ExportArguments) -> Result<(), Failur
             Ok(recording) => recording,
             Err(ExportError::Run(error)) => return Err(error.into()),
             Err(error @ ExportError::Refuted { .. }) => {
-                return Ok(Exported { file: file.clone(), written: Err(error.to_string()) });
+                let written = Err(error.to_string());
+                return Ok(Exported { file: file.clone(), written, left_out: Vec::new() });
             }
         };
         let target = &targets[file];
         let written = write_all(arguments, &recording, target, &maps)?;
-        if arguments.profile == Some(ExportProfile::Carla) {
-            let dropped = export::dropped(&recording).join("; ");
-            output.warn(&format!("{}: left out for CARLA: {dropped}", target.display()));
-        }
-        Ok(Exported { file: file.clone(), written: Ok(written) })
+        let left_out = match arguments.profile {
+            Some(ExportProfile::Carla) => export::dropped(&recording),
+            None => Vec::new(),
+        };
+        Ok(Exported { file: file.clone(), written: Ok(written), left_out })
     })?;
     let mut refuted = 0;
-    for Exported { file, written } in &exported.done {
+    for Exported { file, written, left_out } in &exported.done {
+        if !left_out.is_empty() {
+            output.aside(&format!("{}: left out for CARLA: {}", file.display(), left_out.join("; ")));
+        }
         match written {
             Ok(files) => output.tell(&format!("{}: {}", file.display(), files[0].display())),
             Err(reason) => {
@@ -58,8 +62,14 @@ pub fn export(output: &Output, arguments: &ExportArguments) -> Result<(), Failur
         let done = exported.done.len() - refuted;
         output.say(&format!("{}: {} written", plural(done, "scenario"), plural(written.len(), "file")));
     }
+    let left_out: Vec<serde_json::Value> = exported
+        .done
+        .iter()
+        .filter(|exported| !exported.left_out.is_empty())
+        .map(|exported| serde_json::json!({ "file": exported.file, "what": exported.left_out }))
+        .collect();
     output.result(serde_json::json!({
-        "files": written, "refuted": refuted, "failed": exported.failed_in_json(),
+        "files": written, "left_out": left_out, "refuted": refuted, "failed": exported.failed_in_json(),
     }));
     exported.complete("exported")?;
     refutation(refuted)
@@ -69,6 +79,8 @@ pub fn export(output: &Output, arguments: &ExportArguments) -> Result<(), Failur
 struct Exported {
     file: PathBuf,
     written: Result<Vec<PathBuf>, String>,
+    /// What its player cannot be told.
+    left_out: Vec<String>,
 }
 
 /// Options that mean nothing for a format are mistakes.

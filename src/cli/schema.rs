@@ -434,6 +434,7 @@ pub const SHAPES: &[Shape] = &[
         command: "export",
         fields: &[
             f("files[]", "text", "paths of what was written, maps too"),
+            f("left_out[]", "object", "`file`, and `what` the player of `--profile` cannot be told"),
             f("refuted", "number", "scenarios that do not replay, and were not written"),
             FAILED,
         ],

@@ -65,9 +65,6 @@ fn of_catalogue(source: &mut Source, root: Node, reference: Node, files: &dyn Fi
 
 /// The body of a `Vehicle` or `Pedestrian`.
 fn shape(node: Node) -> Result<Shape, String> {
-    if element(node, "Trailer").is_some() {
-        return Err("vehicles with trailers are not read".to_owned());
-    }
     let category = |name: &str| node.attribute(name).unwrap_or("").to_owned();
     let like = match node.tag_name().name() {
         "Vehicle" => match category("vehicleCategory").as_str() {

@@ -165,7 +165,7 @@ fn a_file_for_carla_has_what_its_player_reads() {
     }
     let (_, stdout, _) =
         export("openscenario", &name, scratch.path(), &["--profile", "carla", "--format", "json"]);
-    assert!(stdout.contains("left out for CARLA"), "{stdout}");
+    assert!(stdout.contains("left_out") && stdout.contains("beneath its place"), "{stdout}");
     let written = texts(scratch.path());
     let (_, text) = written.iter().find(|(name, _)| name.ends_with(".xosc")).expect("it is written");
     let document = Document::parse(text).expect("it is well-formed");
