@@ -30,7 +30,7 @@ class SpaceError(ValueError):
     diagnostics: List[Diagnostic]
 
 class EpisodeError(RuntimeError):
-    """An episode cannot be stepped so: it has ended or not begun, or there is no such row."""
+    """An episode cannot be stepped so: it has ended or not begun, or there is no such row. Or it ended as it began."""
 
 class Variable:
     """A variable of a raw observation."""
@@ -99,7 +99,8 @@ class Ended(TypedDict):
     duration_s: float
     distance_m: float
     red_runs: int
-    #: Digest of every bit of the world after every tick; equal to that of `avastra run` for the same rows.
+    #: Digest of every bit of the world after every tick. Equal to that of `avastra run` for the same rows, but for agents that
+    #: also choose the values of a row (`space-filling`, searches) and policies with an observation period of their own.
     trace: str
     #: Number of counted collisions.
     counted: int
@@ -133,9 +134,10 @@ class Episodes:
     `observation` is `raw` (the variables of `variables()`, SI units, shape (44,)) or `scaled` (the inputs that `avastra
     train` gives its network, about 1 in size, categories as one-hot, shape (36,)), each of `float32`.
 
-    `reward` is `space` (the space's own, which knows that a collision happened but not whether it counts) or `judged` (that of
-    `avastra train`: Eq. 8 with 20 for a collision that counts and 0 for one that does not, at its own step). Judging plays the
-    episode again with careful drivers, so a step with a collision takes as long as a whole episode or two.
+    `reward` is `space` (the space's own, which knows that a collision happened but not whether it counts) or `judged` (Eq. 8 with
+    the constants of `avastra train`, 20 for a collision that counts and 0 for one that does not, paid at the collision's own
+    step). Judging plays the episode again with careful drivers, so a step with a collision takes as long as a whole episode or
+    two.
 
     Steps run without Python's lock. Calls of two threads on the same object wait for each other.
     """
@@ -155,7 +157,8 @@ class Episodes:
     def reset(self, seed: int) -> Tuple[NDArray[np.float32], NDArray[np.bool_]]:
         """Begins the episode of a seed: an observation, and which rows are legal, shape (rows,).
 
-        The seed decides everything but the rows. `episode_seed` gives those of a run.
+        The seed decides everything but the rows. `episode_seed` gives those of a run. Raises `EpisodeError` with the end if an
+        external driving system fails as the episode begins.
         """
 
     def step(self, row: Optional[int]) -> Tuple[NDArray[np.float32], float, Optional[str], Info]:
@@ -174,7 +177,9 @@ class Episodes:
         """This moment, to return to as often as wanted: the world, and what the driving system has in mind."""
 
     def restore(self, snapshot: Snapshot) -> Tuple[NDArray[np.float32], NDArray[np.bool_]]:
-        """Returns to a moment, of this object or of a sibling: its observation, and which rows are legal."""
+        """Returns to a moment, of this object or of a sibling: its observation, and which rows are legal. An episode that had
+        ended then has ended again: `step` raises `EpisodeError`.
+        """
 
 class Snapshot:
     """A kept moment of an episode."""
@@ -183,7 +188,9 @@ def step_all(
     worlds: Sequence[Episodes], rows: Sequence[Optional[int]], seeds: Sequence[Optional[int]], threads: int
 ) -> Tuple[NDArray[np.float32], NDArray[np.bool_], NDArray[np.float64], List[Optional[str]], List[Info]]:
     """Steps episodes with equal observations and tables, on threads of Rust without Python's lock. One whose entry in `seeds`
-    is a number begins that episode instead. The result does not depend on the number of threads.
+    is a number begins that episode instead, and may end as it begins. The result does not depend on the number of threads.
+
+    If one of them cannot be stepped so, or is there twice, `EpisodeError` says which, and none was stepped.
 
     Returns observations, shape (worlds, observation_len); legal rows, shape (worlds, rows); rewards, shape (worlds,);
     ends and infos, one each.

@@ -15,10 +15,14 @@ Needs `gymnasium>=1.1,<2`: `pip install './python[gym]'`.
   sb3-contrib, and with `mask="observation"` the observation is a dict with it.
 - A **step** drives for the space's observation period. A **collision** does not end an episode. Arriving at the goal
   terminates it; its limit of steps, standing still or a failure of an external driving system truncates it.
-- The **reward** is by default the one of `avastra train` (`judged`): a collision pays at its own step, and only if it counts.
+- The **reward** is by default `judged`: the constants of `avastra train`, paid at the collision's own step, and only if it
+  counts.
 - A **seed** that `reset` gets is the seed of that episode: the same as any other of avastra's. Without one, it is drawn.
   `info["seed"]` has it.
 - After the last step, `info["ended"]` is the judged episode (`avastra._native.Ended`).
+- An external driving system that **fails as an episode begins** leaves nothing to step: `reset` raises `EpisodeError`, and so
+  does the step that begins an episode in the mode `SAME_STEP`. In `NEXT_STEP` that world is truncated at once, with reward 0
+  and its `ended`.
 """
 
 import os
@@ -165,9 +169,12 @@ class VectorEnv(gymnasium.vector.VectorEnv):
                 self._generators[world] = seeding.np_random(int(seed))[0]
             drawn.append(self._next_seed(world) if seed is None else int(seed))
         some = [self.worlds[world] for world in worlds]
-        observations, legal, _, _, found = step_all(some, [None] * len(some), drawn, self.threads)
+        observations, legal, _, ends, found = step_all(some, [None] * len(some), drawn, self.threads)
         self._observations[worlds], self._legal[worlds] = observations, legal
-        self._has_ended[worlds] = False
+        self._has_ended[worlds] = [end is not None for end in ends]
+        for world, seed, end in zip(worlds, drawn, ends):
+            if end is not None:
+                raise EpisodeError(f"world {world}: the episode of seed {seed} ended as it began: `{end}`")
         infos: Dict[str, Any] = {}
         for world, info in zip(worlds, found):
             infos = self._add_info(infos, _with_whole_seed(info), int(world))
@@ -179,7 +186,8 @@ class VectorEnv(gymnasium.vector.VectorEnv):
         ended = np.flatnonzero(self._has_ended)
         for world in ended:
             own = {key: value[world] for key, value in last.items()} if self._is_masked else last[world]
-            kept = {"final_obs": own, "final_info": {**found[world], "action_mask": self._legal[world].copy()}}
+            final = {**_with_whole_seed(found[world]), "action_mask": self._legal[world].copy()}
+            kept = {"final_obs": own, "final_info": final}
             infos = self._add_info(infos, kept, int(world))
         begun = self._begin(ended, [None] * self.num_envs)
         infos["seed"][ended] = begun["seed"][ended]

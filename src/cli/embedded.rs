@@ -1,5 +1,5 @@
 //! Files for a program that has avastra built in (`python/native`): spaces and driving systems, read as the commands read
-//! them. Here too, `cli` alone touches the disk.
+//! them.
 
 use std::path::{Path, PathBuf};
 

@@ -26,7 +26,7 @@ pub enum Values {
 }
 
 /// The columns of a table of `run.db` (`episode`, `step`, `collision`, `learning`, …), rows by rising key. The file is read
-/// and not changed.
+/// and not changed. Columns of bytes (`checkpoint.learner`) are left out: they are no values to calculate with.
 ///
 /// # Errors
 /// If the file cannot be read, has another layout, or has no such table.
@@ -36,7 +36,8 @@ pub fn columns(path: &Path, table: &str) -> Result<Vec<Column>, DatabaseError> {
     if found != LAYOUT.version {
         return Err(DatabaseError::Layout { found, wanted: LAYOUT.version });
     }
-    let mut described = connection.prepare("SELECT name, type, pk FROM pragma_table_info(?) ORDER BY cid")?;
+    let mut described = connection
+        .prepare("SELECT name, type, pk FROM pragma_table_info(?) WHERE type <> 'BLOB' ORDER BY cid")?;
     let described: Vec<(String, String, i64)> = described
         .query_map([table], |row| Ok((row.get(0)?, row.get(1)?, row.get(2)?)))?
         .collect::<Result<_, _>>()?;
@@ -58,8 +59,9 @@ pub fn columns(path: &Path, table: &str) -> Result<Vec<Column>, DatabaseError> {
         described.iter().filter(|(_, _, key)| *key > 0).map(|(name, _, key)| (*key, name.as_str())).collect();
     keys.sort_unstable();
     let keys: Vec<String> = keys.into_iter().map(|(_, name)| quoted(name)).collect();
-    let mut query =
-        connection.prepare(&format!("SELECT * FROM {} ORDER BY {}", quoted(table), keys.join(", ")))?;
+    let names: Vec<String> = columns.iter().map(|column| quoted(&column.name)).collect();
+    let (names, keys) = (names.join(", "), keys.join(", "));
+    let mut query = connection.prepare(&format!("SELECT {names} FROM {} ORDER BY {keys}", quoted(table)))?;
     let mut rows = query.query([])?;
     while let Some(row) = rows.next()? {
         for (index, column) in columns.iter_mut().enumerate() {
@@ -84,7 +86,7 @@ impl Values {
             (Values::Text(values), ValueRef::Text(bytes)) => {
                 values.push(Some(String::from_utf8_lossy(bytes).into_owned()));
             }
-            // The tables are strict: SQLite lets no other type in.
+            // The tables that avastra makes are strict, so no other type gets in: another program made this one.
             _ => {
                 return Err(DatabaseError::Damaged {
                     what: "a value is not of its column's type".to_owned(),

@@ -1,7 +1,9 @@
 //! An episode that another program steps through, one choice after another: what `python/native` gives to learners that
 //! others wrote.
 //!
-//! The rows of an episode of `avastra run`, chosen again here under the same seed, come to the same bytes.
+//! The rows of an episode of `avastra run`, chosen again here under the same seed, come to the same bytes if they alone were
+//! the agent's choice. Other bytes come of agents that also choose the values of a row (`space-filling` and the searches),
+//! and of policies with an observation period of their own.
 
 use std::sync::Arc;
 
@@ -41,7 +43,8 @@ pub enum StepError {
 }
 
 impl Stepped {
-    /// An episode of a seed on the nth road of a run, before its first step. The run's agent is not asked.
+    /// An episode of a seed on the nth road of a run, before its first step. The run's agent is not asked. It has ended
+    /// already if an external driving system fails as it begins.
     pub fn new(run: Arc<Run>, road: usize, seed: u64) -> Stepped {
         let play = Play::new(&run.setup_of(road, seed));
         let observation = play.observation();
@@ -86,13 +89,7 @@ impl Stepped {
     /// # Errors
     /// If the episode has ended, or there is no such row.
     pub fn step(&mut self, row: Option<usize>) -> Result<(), StepError> {
-        if let Some(end) = self.end {
-            return Err(StepError::Over { end: end.name() });
-        }
-        let rows = self.run.table().rows().len();
-        if let Some(row) = row.filter(|row| *row >= rows) {
-            return Err(StepError::Row { row, last: rows - 1 });
-        }
+        self.can_step(row)?;
         let mut offers = std::mem::take(&mut self.offers);
         let is_any_legal = offers.iter().any(|offer| matches!(offer, Offer::Legal(_)));
         let choice = match row.filter(|_| is_any_legal) {
@@ -105,6 +102,21 @@ impl Stepped {
         self.end = self.play.step(&setup, observation, choice, &mut |_, _, _| {});
         self.look();
         Ok(())
+    }
+
+    /// Whether [`Stepped::step`] takes that row now.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn can_step(&self, row: Option<usize>) -> Result<(), StepError> {
+        if let Some(end) = self.end {
+            return Err(StepError::Over { end: end.name() });
+        }
+        let rows = self.run.table().rows().len();
+        match row.filter(|row| *row >= rows) {
+            Some(row) => Err(StepError::Row { row, last: rows - 1 }),
+            None => Ok(()),
+        }
     }
 
     /// Every collision so far, judged. A verdict needs nothing that comes after the step of its collision, so it does not

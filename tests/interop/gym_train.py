@@ -1,8 +1,9 @@
 """Counted collisions of learners that others wrote, beside avastra's own: gym_train.py AVASTRA TRAININGS.
 
 A study of avastra trains `ddqn` and `constant`, and plays chance, for as many episodes as come to some 20,000 steps (33 h of
-driving). The others train for 20,000 steps on the same road against the same driving system, with the reward of `avastra train`.
-All are judged in the same 60 episodes. What is printed is counted collisions in 15 episodes, as in the paper's tables.
+driving). The others train for 20,000 steps on the same road against the same driving system, with the reward constants
+of `avastra train`. The first training of each is judged in the same 60 episodes, the second in 60 others, and so on. What is printed
+is counted collisions in 15 episodes, as in the paper's tables.
 
 The hyperparameters of the others are their own defaults; `like ours` gives DQN what it has in common with the preset `avastra`.
 """
@@ -63,10 +64,16 @@ def ours(database):
            FROM cell ORDER BY cell""").fetchall()
 
 
-def judged_seeds(database):
-    """The seeds of the episodes in which all are judged."""
-    rows = database.execute("SELECT seed, number FROM evaluated WHERE cell = 1 ORDER BY episode")
-    return [avastra.episode_seed(int(seed), number) for seed, number in rows]
+def judged_seeds(database, training):
+    """The seeds of the episodes in which the nth training of each agent is judged, from 0."""
+    rows = database.execute(
+        """SELECT seed, evaluated.number FROM evaluated JOIN cell USING (cell)
+           WHERE agent = 'ddqn' AND cell.number = ? ORDER BY episode""", [training])
+    seeds = [avastra.episode_seed(int(seed), number) for seed, number in rows]
+    expected = EVALUATION["episodes"] * EVALUATION["seeds"]
+    if len(seeds) != expected:
+        sys.exit(f"training {training + 1} was judged in {len(seeds)} episodes instead of {expected}")
+    return seeds
 
 
 def made():
@@ -110,17 +117,18 @@ def main(program, trainings):
     found = {}
     with tempfile.TemporaryDirectory() as folder:
         database = study(program, trainings, folder)
-        seeds = judged_seeds(database)
+        seeds = [judged_seeds(database, number) for number in range(trainings)]
         for name, number, counted, hours in ours(database):
-            print(f"{name} (avastra), training {number + 1}: {counted} counted in {len(seeds)} episodes, {hours:.1f} h", flush=True)
+            print(f"{name} (avastra), training {number + 1}: {counted} counted in {len(seeds[number])} episodes, {hours:.1f} h",
+                  flush=True)
             found.setdefault(f"{name} (avastra)", []).append(counted)
-    for number in range(1, trainings + 1):
-        for name, counted, lost, took_s in others(number, seeds):
-            print(f"{name}, training {number}: {counted} counted in {len(seeds)} episodes, {lost:.0%} of its steps lost to "
+    for number, own in enumerate(seeds, start=1):
+        for name, counted, lost, took_s in others(number, own):
+            print(f"{name}, training {number}: {counted} counted in {len(own)} episodes, {lost:.0%} of its steps lost to "
                   f"illegal rows; trained in {took_s:.0f} s", flush=True)
             found.setdefault(name, []).append(counted)
     print("\nCounted collisions in 15 episodes: mean, and each training.")
-    rates = {name: [counted * 15 / len(seeds) for counted in counts] for name, counts in found.items()}
+    rates = {name: [counted * 15 / len(seeds[0]) for counted in counts] for name, counts in found.items()}
     for name, values in sorted(rates.items(), key=lambda item: -statistics.mean(item[1])):
         print(f"{name:38} {statistics.mean(values):5.1f}   {' '.join(f'{value:.1f}' for value in values)}")
 

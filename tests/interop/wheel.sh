@@ -1,6 +1,6 @@
 #!/bin/sh
-# Lints and builds the Python package with its engine, checks its metadata, and runs its tests with both versions of Gymnasium that
-# are supported. PROFILE=dev builds faster. Needs Python 3.9 or later with venv, Rust, and PyPI for the first run.
+# Lints and builds the Python package with its engine, checks its metadata, and runs its tests with Gymnasium 1.2.2 and 1.4.0, the
+# oldest and the newest that are tested. PROFILE=dev builds faster. Needs Python 3.9 or later with venv, Rust, and PyPI for the first run.
 set -eu
 cd "$(dirname "$0")/../.."
 root=target/interop/wheel

@@ -1,25 +1,22 @@
-//! Episodes, stepped from Python one by one or many at once on threads of Rust.
+//! Episodes, stepped from Python, and how they are shown to a learner.
 
 use std::path::PathBuf;
-use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use avastra::agent::{Features, Hyperparameters, Kind, Settings, by_name};
 use avastra::cli::embedded::{Conditions, run};
 use avastra::episode::{Collision, EpisodeLog, Outcome};
 use avastra::mdp::{Observation, RewardSettings};
-use avastra::model::digest_text;
 use avastra::model::policy::VARIABLES;
-use avastra::model::vocabulary::Word as _;
-use avastra::oracle;
 use avastra::rng::{Stream, child_seed};
 use avastra::run::{Finding, Run, Stepped};
-use numpy::{PyArray1, PyArray2, PyArrayMethods as _};
+use numpy::PyArray1;
 use pyo3::create_exception;
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
+use crate::info::{findings, info};
 use crate::space::Space;
 
 create_exception!(avastra, EpisodeError, PyRuntimeError, "An episode cannot be stepped so.");
@@ -50,30 +47,31 @@ struct View {
 }
 
 /// What a learner gets after a reset or a step.
-struct Seen {
-    observation: Vec<f32>,
-    legal: Vec<bool>,
-    seed: u64,
-    step: Option<Step>,
+pub struct Seen {
+    pub observation: Vec<f32>,
+    pub legal: Vec<bool>,
+    pub seed: u64,
+    /// `None` after a reset.
+    pub step: Option<Step>,
+    pub ended: Option<Ended>,
 }
 
 /// What became of a step.
-struct Step {
-    reward: f64,
-    time_s: f64,
-    proc: f64,
-    row: Option<usize>,
-    refused: Option<String>,
-    collisions: usize,
+pub struct Step {
+    pub reward: f64,
+    pub time_s: f64,
+    pub proc: f64,
+    pub row: Option<usize>,
+    pub refused: Option<String>,
+    pub collisions: usize,
     /// Counted collisions of the step, where they are judged at once.
-    counted: Option<usize>,
-    ended: Option<Ended>,
+    pub counted: Option<usize>,
 }
 
 /// An episode that has ended, judged.
-struct Ended {
-    log: EpisodeLog,
-    findings: Vec<Finding>,
+pub struct Ended {
+    pub log: EpisodeLog,
+    pub findings: Vec<Finding>,
 }
 
 #[pymethods]
@@ -139,7 +137,12 @@ impl Episodes {
     }
 
     fn reset<'py>(&self, py: Python<'py>, seed: u64) -> PyResult<(Array<'py, f32>, Array<'py, bool>)> {
-        let seen = py.detach(|| self.begin(seed));
+        let seen = py.detach(|| self.begin(&mut self.now(), seed));
+        if let Some(end) = seen.end() {
+            return Err(EpisodeError::new_err(format!(
+                "the episode of seed {seed} ended as it began: `{end}`"
+            )));
+        }
         Ok((PyArray1::from_vec(py, seen.observation), PyArray1::from_vec(py, seen.legal)))
     }
 
@@ -150,12 +153,10 @@ impl Episodes {
         py: Python<'py>,
         row: Option<usize>,
     ) -> PyResult<(Array<'py, f32>, f64, Option<&'static str>, Bound<'py, PyDict>)> {
-        let seen = py.detach(|| self.advance(row)).map_err(EpisodeError::new_err)?;
+        let seen = py.detach(|| self.advance(&mut self.now(), row)).map_err(EpisodeError::new_err)?;
         let info = info(py, &seen)?;
         info.set_item("action_mask", PyArray1::from_slice(py, &seen.legal))?;
-        let step = seen.step.as_ref();
-        let reward = step.map_or(0.0, |step| step.reward);
-        let end = step.and_then(Step::end);
+        let (reward, end) = (seen.reward(), seen.end());
         Ok((PyArray1::from_vec(py, seen.observation), reward, end, info))
     }
 
@@ -184,8 +185,8 @@ impl Episodes {
             return Err(EpisodeError::new_err("the snapshot is of episodes under other conditions"));
         }
         let seen = py.detach(|| {
-            let kept = locked(&snapshot.kept).clone();
-            let seen = self.view.of(&kept);
+            let mut kept = snapshot.kept.lock().unwrap_or_else(PoisonError::into_inner).clone();
+            let seen = self.view.of(&mut kept);
             *self.now() = Some(kept);
             seen
         });
@@ -199,24 +200,28 @@ impl Episodes {
     }
 }
 
-type Array<'py, T> = Bound<'py, PyArray1<T>>;
+pub type Array<'py, T> = Bound<'py, PyArray1<T>>;
 
 const NOT_BEGUN: &str = "no episode has begun: reset first";
 
 impl Episodes {
-    fn now(&self) -> MutexGuard<'_, Option<Stepped>> {
-        locked(&self.now)
+    /// The episode under way. Where a thread panicked in it, it is half stepped, so there is none any more.
+    pub fn now(&self) -> MutexGuard<'_, Option<Stepped>> {
+        self.now.lock().unwrap_or_else(|poisoned| {
+            self.now.clear_poison();
+            let mut now = poisoned.into_inner();
+            *now = None;
+            now
+        })
     }
 
-    fn begin(&self, seed: u64) -> Seen {
-        let stepped = Stepped::new(Arc::clone(&self.run), 0, seed);
-        let seen = self.view.of(&stepped);
-        *self.now() = Some(stepped);
-        seen
+    /// Begins an episode in the place of the one under way.
+    pub fn begin(&self, now: &mut Option<Stepped>, seed: u64) -> Seen {
+        self.view.of(now.insert(Stepped::new(Arc::clone(&self.run), 0, seed)))
     }
 
-    fn advance(&self, row: Option<usize>) -> Result<Seen, String> {
-        let mut now = self.now();
+    /// Steps the episode under way.
+    pub fn advance(&self, now: &mut Option<Stepped>, row: Option<usize>) -> Result<Seen, String> {
         let stepped = now.as_mut().ok_or(NOT_BEGUN)?;
         stepped.step(row).map_err(|error| error.to_string())?;
         let step = self.view.step(stepped);
@@ -224,13 +229,28 @@ impl Episodes {
     }
 }
 
-/// A lock's content. It is whole even if a thread panicked while it held the lock: only whole episodes are put there.
-fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+/// Whether [`Episodes::advance`] takes that row now.
+pub fn can_advance(now: &Option<Stepped>, row: Option<usize>) -> Result<(), String> {
+    now.as_ref().ok_or(NOT_BEGUN)?.can_step(row).map_err(|error| error.to_string())
+}
+
+impl Seen {
+    /// 0 after a reset.
+    pub fn reward(&self) -> f64 {
+        self.step.as_ref().map_or(0.0, |step| step.reward)
+    }
+
+    /// How the episode ended; `None` while it goes on.
+    pub fn end(&self) -> Option<&'static str> {
+        self.ended.as_ref().map(|ended| ended.log.end.name())
+    }
 }
 
 impl View {
-    fn of(&self, stepped: &Stepped) -> Seen {
+    /// A moment, without what became of the step before.
+    fn of(&self, stepped: &mut Stepped) -> Seen {
+        let ended =
+            stepped.end().map(|_| Ended { log: stepped.log(), findings: stepped.findings().to_vec() });
         let observation = stepped.observation();
         let raw =
             |observation: &Observation| (0..VARIABLES.len()).map(|index| observation.get(index)).collect();
@@ -242,6 +262,7 @@ impl View {
             legal: stepped.legal().to_vec(),
             seed: stepped.seed(),
             step: None,
+            ended,
         }
     }
 
@@ -262,15 +283,7 @@ impl View {
             }
         };
         let (time_s, proc, reward) = (step.time_s, step.proc, judged.unwrap_or(step.reward));
-        let ended =
-            stepped.end().map(|_| Ended { log: stepped.log(), findings: stepped.findings().to_vec() });
-        Step { reward, time_s, proc, row, refused, collisions, counted, ended }
-    }
-}
-
-impl Step {
-    fn end(&self) -> Option<&'static str> {
-        self.ended.as_ref().map(|ended| ended.log.end.name())
+        Step { reward, time_s, proc, row, refused, collisions, counted }
     }
 }
 
@@ -281,124 +294,6 @@ fn preset() -> Hyperparameters {
         Some(Ok(Settings::Learning(settings))) => *settings,
         _ => unreachable!("ddqn learns, and its preset is sound"),
     }
-}
-
-/// What is said of a moment beside observation, reward and mask.
-fn info<'py>(py: Python<'py>, seen: &Seen) -> PyResult<Bound<'py, PyDict>> {
-    let info = PyDict::new(py);
-    info.set_item("seed", seen.seed)?;
-    let Some(step) = &seen.step else { return Ok(info) };
-    info.set_item("time_s", step.time_s)?;
-    info.set_item("proc", step.proc)?;
-    info.set_item("row", step.row.map_or(-1, |row| row as i64))?;
-    info.set_item("refused", &step.refused)?;
-    info.set_item("collisions", step.collisions)?;
-    if let Some(counted) = step.counted {
-        info.set_item("counted", counted)?;
-    }
-    if let Some(Ended { log, findings: found }) = &step.ended {
-        let end = PyDict::new(py);
-        end.set_item("end", log.end.name())?;
-        end.set_item("duration_s", log.duration_s)?;
-        end.set_item("distance_m", log.distance_m)?;
-        end.set_item("red_runs", log.red_runs)?;
-        end.set_item("trace", digest_text(&log.trace()))?;
-        end.set_item("counted", found.iter().filter(|finding| finding.counted).count())?;
-        end.set_item("findings", findings(py, found)?)?;
-        info.set_item("ended", end)?;
-    }
-    Ok(info)
-}
-
-/// Judged collisions as dicts, with the names of `run.db`'s columns.
-fn findings<'py>(py: Python<'py>, found: &[Finding]) -> PyResult<Bound<'py, PyList>> {
-    let list = PyList::empty(py);
-    for Finding { collision, facts, judgement, counted, own_body, .. } in found {
-        let severity = oracle::severity(collision);
-        let one = PyDict::new(py);
-        one.set_item("step", collision.step)?;
-        one.set_item("time_s", collision.contact.time_s)?;
-        one.set_item("counted", counted)?;
-        one.set_item("avoidability", judgement.class.name())?;
-        one.set_item("priority", facts.priority.name())?;
-        one.set_item("body", collision.body.like.name())?;
-        one.set_item("own_body", own_body)?;
-        one.set_item("verb", collision.verb.name())?;
-        one.set_item("side", severity.side)?;
-        one.set_item("approach", severity.approach)?;
-        one.set_item("ego_speed_mps", collision.contact.ego_speed_mps)?;
-        one.set_item("closing_speed_mps", collision.contact.closing_speed_mps)?;
-        one.set_item("delta_v_mps", severity.delta_v_mps)?;
-        list.append(one)?;
-    }
-    Ok(list)
-}
-
-/// Steps several episodes at once, on threads of Rust without Python's lock; one whose `seeds` has a number begins anew
-/// instead.
-#[pyfunction]
-#[allow(clippy::type_complexity, reason = "the tuple that Python gets")]
-pub fn step_all<'py>(
-    py: Python<'py>,
-    worlds: Vec<Py<Episodes>>,
-    rows: Vec<Option<usize>>,
-    seeds: Vec<Option<u64>>,
-    threads: usize,
-) -> PyResult<(
-    Bound<'py, PyArray2<f32>>,
-    Bound<'py, PyArray2<bool>>,
-    Array<'py, f64>,
-    Vec<Option<&'static str>>,
-    Vec<Bound<'py, PyDict>>,
-)> {
-    if rows.len() != worlds.len() || seeds.len() != worlds.len() {
-        return Err(PyValueError::new_err("`rows` and `seeds` have one value for each of the episodes"));
-    }
-    let worlds: Vec<&Episodes> = worlds.iter().map(Py::get).collect();
-    let seen = py.detach(|| play_all(&worlds, &rows, &seeds, threads)).map_err(EpisodeError::new_err)?;
-    let infos = seen.iter().map(|seen| info(py, seen)).collect::<PyResult<_>>()?;
-    let ends = seen.iter().map(|seen| seen.step.as_ref().and_then(Step::end)).collect();
-    let rewards = seen.iter().map(|seen| seen.step.as_ref().map_or(0.0, |step| step.reward)).collect();
-    let (mut observations, mut masks) = (Vec::new(), Vec::new());
-    let (width, rows) = seen.first().map_or((0, 0), |seen| (seen.observation.len(), seen.legal.len()));
-    let len = seen.len();
-    for one in seen {
-        observations.extend(one.observation);
-        masks.extend(one.legal);
-    }
-    let observations = PyArray1::from_vec(py, observations).reshape([len, width])?;
-    let masks = PyArray1::from_vec(py, masks).reshape([len, rows])?;
-    Ok((observations, masks, PyArray1::from_vec(py, rewards), ends, infos))
-}
-
-fn play_all(
-    worlds: &[&Episodes],
-    rows: &[Option<usize>],
-    seeds: &[Option<u64>],
-    threads: usize,
-) -> Result<Vec<Seen>, String> {
-    let next = AtomicUsize::new(0);
-    let slots: Vec<Mutex<Option<Result<Seen, String>>>> = worlds.iter().map(|_| Mutex::new(None)).collect();
-    let work = || {
-        while let Some((index, world)) = next_of(worlds, &next) {
-            let seen = seeds[index].map_or_else(|| world.advance(rows[index]), |seed| Ok(world.begin(seed)));
-            *locked(&slots[index]) = Some(seen);
-        }
-    };
-    std::thread::scope(|scope| {
-        // This thread works, too.
-        for _ in 1..threads.clamp(1, worlds.len().max(1)) {
-            scope.spawn(work);
-        }
-        work();
-    });
-    let seen = slots.into_iter().map(|slot| slot.into_inner().unwrap_or_else(PoisonError::into_inner));
-    seen.map(|seen| seen.expect("every episode is someone's work")).collect()
-}
-
-fn next_of<'a>(worlds: &[&'a Episodes], next: &AtomicUsize) -> Option<(usize, &'a Episodes)> {
-    let index = next.fetch_add(1, Ordering::Relaxed);
-    worlds.get(index).map(|world| (index, *world))
 }
 
 /// The seed of the nth episode of a run of a seed, as `avastra run --seed` derives it.

@@ -1,11 +1,14 @@
 //! The engine of avastra as the Python module `avastra._native`; `python/avastra/_native.pyi` describes it.
 //!
-//! Nothing is decided here: spaces are read by `avastra::cli::embedded`, episodes are stepped by
-//! `avastra::run::Stepped`. Python's lock is released while an episode drives.
+//! Spaces are read by `avastra::cli::embedded`, episodes are stepped by `avastra::run::Stepped`. What is decided here is how
+//! a learner sees them: observations raw or scaled, rewards of the space or judged. Python's lock is released while an
+//! episode drives.
 
 mod diagnostics;
 mod episodes;
+mod info;
 mod space;
+mod step_all;
 mod tables;
 
 use pyo3::prelude::*;
@@ -21,7 +24,7 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<episodes::Episodes>()?;
     module.add_class::<episodes::Snapshot>()?;
     module.add_function(wrap_pyfunction!(space::variables, module)?)?;
-    module.add_function(wrap_pyfunction!(episodes::step_all, module)?)?;
+    module.add_function(wrap_pyfunction!(step_all::step_all, module)?)?;
     module.add_function(wrap_pyfunction!(episodes::episode_seed, module)?)?;
     module.add_function(wrap_pyfunction!(tables::read_table, module)?)
 }

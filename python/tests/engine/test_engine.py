@@ -1,9 +1,12 @@
 """Tests of the engine; `tests/interop/wheel.sh` builds it and runs them. `AVASTRA` names the program to compare with."""
 
+import json
 import os
 import subprocess
+import sys
 import tempfile
 import threading
+import time
 import unittest
 from pathlib import Path
 
@@ -13,6 +16,26 @@ import avastra
 
 ROOT = Path(__file__).resolve().parents[3]
 SPACE = ROOT / "scenarios" / "avastra45.ava"
+#: A driving system that fails as an episode begins.
+FAILING = """
+import avastra
+
+class Failing(avastra.Driver):
+    answer = "acceleration"
+
+    def reset(self, reset):
+        raise RuntimeError("no way from here")
+
+avastra.serve(Failing)
+"""
+
+
+def failing_profile(folder):
+    """A profile of the driving system that fails as an episode begins."""
+    program, profile = Path(folder) / "failing.py", Path(folder) / "failing.yaml"
+    program.write_text(FAILING)
+    profile.write_text(json.dumps({"ads": {"command": [sys.executable, str(program)]}}))
+    return profile
 
 
 class Spaces(unittest.TestCase):
@@ -156,22 +179,61 @@ class Stepping(unittest.TestCase):
             avastra.step_all(worlds, [0], [None] * 5, 1)
         self.assertEqual(avastra.step_all([], [], [], 2)[0].shape, (0, 0))
 
-    def test_python_runs_while_an_episode_drives(self):
-        episodes, done, turns = self.episodes(), threading.Event(), 0
+    def test_what_cannot_be_stepped_leaves_all_as_they_were(self):
+        first = self.episodes()
+        worlds = [first, first.sibling(), first.sibling()]
+        nothing = [None] * 3
+        avastra.step_all(worlds, nothing, [1, 2, 3], 1)
+        over = worlds[2].snapshot()
+        for rows, reason in [([0, 0, 45], "world 2: no row 45"), ([45, 0, 0], "world 0: no row 45")]:
+            with self.assertRaisesRegex(avastra.EpisodeError, reason):
+                avastra.step_all(worlds, rows, nothing, 3)
+        with self.assertRaisesRegex(avastra.EpisodeError, "world 1: no episode has begun"):
+            avastra.step_all([first, first.sibling()], [0, 0], [None, None], 1)
+        with self.assertRaisesRegex(avastra.EpisodeError, "worlds 0 and 2 are the same"):
+            avastra.step_all([first, worlds[1], first], [0, 0, 0], [None, None, 4], 2)
+        while worlds[2].step(None)[2] is None:
+            pass
+        with self.assertRaisesRegex(avastra.EpisodeError, "world 2: the episode has ended"):
+            avastra.step_all(worlds, nothing, nothing, 2)
+        worlds[2].restore(over)
+        times = [info["time_s"] for info in avastra.step_all(worlds, nothing, nothing, 2)[4]]
+        self.assertEqual(times, [0.0, 0.0, 0.0])
+
+    def test_a_driving_system_that_fails_at_once_leaves_no_episode(self):
+        with tempfile.TemporaryDirectory() as folder:
+            episodes = self.episodes(ads_config=failing_profile(folder))
+            with self.assertRaisesRegex(avastra.EpisodeError, "seed 1 ended as it began: `ads_"):
+                episodes.reset(1)
+            with self.assertRaisesRegex(avastra.EpisodeError, "has ended"):
+                episodes.step(None)
+            _, _, rewards, ends, infos = avastra.step_all([episodes], [None], [2], 1)
+        self.assertEqual((rewards.tolist(), infos[0]["seed"]), ([0.0], 2))
+        self.assertEqual(infos[0]["ended"]["end"], ends[0])
+        self.assertEqual((infos[0]["ended"]["duration_s"], infos[0]["ended"]["findings"]), (0.0, []))
+
+    def test_python_runs_while_episodes_drive(self):
+        first = self.episodes()
+        worlds = [first] + [first.sibling() for _ in range(39)]
+        nothing, lengths, done = [None] * 40, [], threading.Event()
+        avastra.step_all(worlds, nothing, list(range(40)), 1)
 
         def drive():
-            for seed in range(3):
-                episodes.reset(seed)
-                while episodes.step(None)[2] is None:
-                    pass
+            for _ in range(3):
+                begun = time.perf_counter()
+                avastra.step_all(worlds, nothing, nothing, 1)
+                lengths.append(time.perf_counter() - begun)
             done.set()
 
         thread = threading.Thread(target=drive)
         thread.start()
+        longest, before = 0.0, time.perf_counter()
         while not done.is_set():
-            turns += 1
+            now = time.perf_counter()
+            longest, before = max(longest, now - before), now
         thread.join()
-        self.assertGreater(turns, 100)
+        # With the lock, the shortest of these calls would be a gap as long as itself.
+        self.assertLess(longest, min(lengths) / 2)
 
 
 class Runs(unittest.TestCase):
@@ -217,6 +279,18 @@ class Runs(unittest.TestCase):
             for name in ["time_s", "counted", "avoidability", "priority", "body", "delta_v_mps"]:
                 self.assertEqual([one[name] for one in ended["findings"]], run["collision"][name][of].tolist(), name)
         return len(run["collision"]["episode"])
+
+    def test_a_table_with_bytes_is_read_without_them(self):
+        program = os.environ.get("AVASTRA")
+        if not program:
+            self.skipTest("AVASTRA names no program")
+        with tempfile.TemporaryDirectory() as folder:
+            out = Path(folder) / "training"
+            command = [program, "train", str(SPACE), "--road", "corner", "--episodes", "1"]
+            subprocess.run([*command, "--out", str(out)], check=True, capture_output=True)
+            kept = avastra.engine.read_table(out / "run.db", "checkpoint")
+        self.assertEqual(list(kept), ["only", "episodes", "digest"])
+        self.assertEqual((kept["episodes"].tolist(), len(kept["digest"])), ([1], 1))
 
     def test_what_is_no_run_is_refused(self):
         with tempfile.TemporaryDirectory() as folder:

@@ -1,6 +1,7 @@
-"""Tests of the Gymnasium environments; `tests/interop/wheel.sh` runs them with the versions that are supported."""
+"""Tests of the Gymnasium environments; `tests/interop/wheel.sh` runs them with several versions of Gymnasium."""
 
 import os
+import tempfile
 import unittest
 import warnings
 from pathlib import Path
@@ -12,6 +13,7 @@ from gymnasium.vector import AutoresetMode
 
 import avastra
 import avastra.gym
+from test_engine import failing_profile
 
 ROOT = Path(__file__).resolve().parents[3]
 SPACE = avastra.compile(ROOT / "scenarios" / "avastra45.ava")
@@ -149,6 +151,32 @@ class ManyWorlds(unittest.TestCase):
         self.assertEqual(first, second)
         self.assertEqual(first, third)
         self.assertEqual([len(own) for own in first], [2, 2])
+
+    def test_whole_seeds_come_through_every_mode(self):
+        large = [2**63 + 1, 2**64 - 1]
+        for mode in AutoresetMode:
+            env = avastra.gym.VectorEnv(2, SPACE, "crossroad", autoreset_mode=mode)
+            info = env.reset(seed=large)[1]
+            ended = np.zeros(2, dtype=bool)
+            while not ended.any():
+                self.assertEqual(info["seed"].tolist(), large)
+                _, _, terminated, truncated, info = env.step(env.action_masks().argmax(axis=1))
+                ended = terminated | truncated
+            world = int(ended.argmax())
+            last = info["final_info"] if mode == AutoresetMode.SAME_STEP else info
+            self.assertEqual(int(last["seed"][world]), large[world])
+
+    def test_a_driving_system_that_fails_at_once(self):
+        with tempfile.TemporaryDirectory() as folder:
+            conditions = {"ads_config": failing_profile(folder)}
+            with self.assertRaisesRegex(avastra.EpisodeError, "as it began"):
+                made(**conditions).reset(seed=1)
+            env = avastra.gym.VectorEnv(1, SPACE, "crossroad", **conditions)
+            with self.assertRaisesRegex(avastra.EpisodeError, "world 0: the episode of seed 1 ended as it began"):
+                env.reset(seed=1)
+            _, rewards, terminated, truncated, info = env.step([0])
+        self.assertEqual((rewards.tolist(), terminated.tolist(), truncated.tolist()), ([0.0], [False], [True]))
+        self.assertEqual(info["ended"]["duration_s"].tolist(), [0.0])
 
     def test_gymnasium_makes_it(self):
         env = gymnasium.make_vec("avastra/Space-v0", num_envs=2, vectorization_mode="vector_entry_point",
