@@ -26,7 +26,7 @@ pub fn body(source: &mut Source, root: Node, object: Node, files: &dyn Files) ->
     let [described] = described[..] else {
         return source.refuse(object, "only vehicles and pedestrians are read, one an object");
     };
-    shape(described).map_or_else(|reason| source.refuse(described, reason), Some)
+    shape(described, &BTreeMap::new()).map_or_else(|reason| source.refuse(described, reason), Some)
 }
 
 fn is_described(node: Node) -> bool {
@@ -35,6 +35,10 @@ fn is_described(node: Node) -> bool {
 
 fn of_catalogue(source: &mut Source, root: Node, reference: Node, files: &dyn Files) -> Option<Shape> {
     let (catalogue, entry) = (source.text(reference, "catalogName")?, source.text(reference, "entryName")?);
+    let mut assigned = BTreeMap::new();
+    for one in elements(reference, "ParameterAssignments").flat_map(children) {
+        assigned.insert(source.text(one, "parameterRef")?, source.text(one, "value")?);
+    }
     let locations: Vec<Node> = elements(root, "CatalogLocations").flat_map(children).collect();
     for location in locations {
         if !matches!(location.tag_name().name(), "VehicleCatalog" | "PedestrianCatalog") {
@@ -53,7 +57,7 @@ fn of_catalogue(source: &mut Source, root: Node, reference: Node, files: &dyn Fi
             let Some(list) = list.filter(|node| is_named(node, &catalogue)) else { continue };
             let found = children(list).find(|node| is_described(*node) && is_named(node, &entry));
             if let Some(found) = found {
-                return shape(found).map_or_else(
+                return shape(found, &assigned).map_or_else(
                     |reason| source.refuse(reference, format!("`{entry}` of `{catalogue}`: {reason}")),
                     Some,
                 );
@@ -63,8 +67,8 @@ fn of_catalogue(source: &mut Source, root: Node, reference: Node, files: &dyn Fi
     source.refuse(reference, format!("no vehicle or pedestrian `{entry}` in a catalogue `{catalogue}`"))
 }
 
-/// The body of a `Vehicle` or `Pedestrian`.
-fn shape(node: Node) -> Result<Shape, String> {
+/// The body of a `Vehicle` or `Pedestrian`, with values for the parameters of an entry of a catalogue.
+fn shape(node: Node, assigned: &BTreeMap<String, String>) -> Result<Shape, String> {
     let category = |name: &str| node.attribute(name).unwrap_or("").to_owned();
     let like = match node.tag_name().name() {
         "Vehicle" => match category("vehicleCategory").as_str() {
@@ -82,18 +86,24 @@ fn shape(node: Node) -> Result<Shape, String> {
         },
         _ => return Err("only vehicles and pedestrians are read".to_owned()),
     };
-    if element(node, "Trailer").is_some() {
-        return Err("trailers are not read".to_owned());
-    }
     let bounds = element(node, "BoundingBox").ok_or("it has no `BoundingBox`")?;
     // An entry of a catalogue may have parameters of its own, with defaults.
     let declared = elements(node, "ParameterDeclarations").flat_map(children);
     let declared = declared.filter_map(|one| Some((one.attribute("name")?, one.attribute("value")?)));
     let mut parameters = BTreeMap::new();
     for (name, value) in declared {
-        if let Ok(value) = filled(value, &parameters) {
+        let value = assigned.get(name).cloned().or_else(|| filled(value, &parameters).ok());
+        if let Some(value) = value {
             parameters.insert(name.to_owned(), value);
         }
+    }
+    // Catalogues give every vehicle a trailer of a name that is empty until a file names one.
+    let is_named = |name: &str| filled(name, &parameters).map_or(true, |name| !name.trim().is_empty());
+    let mut names = element(node, "Trailer").into_iter().map(|trailer| {
+        trailer.descendants().filter_map(|part| part.attribute("entityRef")).collect::<Vec<_>>()
+    });
+    if names.any(|names| names.is_empty() || names.into_iter().any(is_named)) {
+        return Err("trailers are not read".to_owned());
     }
     let number = |name: &'static str, attribute: &str| {
         let found = element(bounds, name).and_then(|node| node.attribute(attribute));

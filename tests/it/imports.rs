@@ -155,6 +155,11 @@ fn conditions_and_words_are_read_or_refused() {
             "<Vehicle name=\"car\" vehicleCategory=\"car\"><Trailer/>",
             "trailers",
         ),
+        (
+            "<Vehicle name=\"car\" vehicleCategory=\"car\">",
+            "<Vehicle name=\"car\" vehicleCategory=\"car\"><Trailer><TrailerRef entityRef=\"wagon\"/></Trailer>",
+            "trailers",
+        ),
         ("<Vehicle name=\"car\"", "<MiscObject/><Vehicle name=\"car\"", "one an object"),
     ] {
         assert!(cut_in.contains(old), "{old}");
