@@ -146,6 +146,9 @@ fn moved(source: &mut Source, action: Node, is_ego: bool) -> Option<Begun> {
             );
             let dynamics = source.required(action, "LaneChangeActionDynamics")?;
             is_step(source, dynamics)?;
+            if source.number_or(action, "targetLaneOffset", 0.0)? != 0.0 {
+                return source.refuse(action, "vehicles keep to the middle of their lanes");
+            }
             let target = source.required(action, "LaneChangeTarget")?;
             if let Some(absolute) = element(target, "AbsoluteTargetLane") {
                 return Some(Begun::Change(mark, Target::Lane(source.integer(absolute, "value")?)));

@@ -180,7 +180,11 @@ impl Cast {
 
     fn act(&mut self, source: &mut Source, act: Node) {
         let mut begins = None;
+        if let Some(stop) = element(act, "StopTrigger").filter(|stop| children(*stop).next().is_some()) {
+            source.refuse::<()>(stop, "an act goes on to the end of the scenario");
+        }
         for group in elements(act, "ManeuverGroup") {
+            is_carried_out(source, group);
             if let Some(catalogue) = element(group, "CatalogReference") {
                 source.refuse::<()>(catalogue, "manoeuvres of catalogues are not read");
             }
@@ -205,6 +209,7 @@ impl Cast {
             for manoeuvre in elements(group, "Maneuver") {
                 source.declare(manoeuvre);
                 for event in elements(manoeuvre, "Event") {
+                    is_carried_out(source, event);
                     source.word(event, "priority", &["override", "overwrite", "parallel", "skip"]);
                     let actions: Vec<Node> = elements(event, "Action").flat_map(children).collect();
                     let own: Vec<&String> = names.iter().filter(|name| !self.is_ego(name)).collect();
@@ -297,6 +302,13 @@ fn user_defined(source: &mut Source, action: Node) {
         _ => {
             source.refuse::<()>(children(action).next().unwrap_or(action), "this action is not read");
         }
+    }
+}
+
+/// Refuses what is to be carried out no times.
+fn is_carried_out(source: &mut Source, node: Node) {
+    if source.number_or(node, "maximumExecutionCount", 1.0).is_some_and(|count| count < 1.0) {
+        source.refuse::<()>(node, "`maximumExecutionCount` is less than 1: leave out what never happens");
     }
 }
 

@@ -76,6 +76,9 @@ pub fn both(a: &Trigger, b: &Trigger) -> Trigger {
 
 fn condition(source: &mut Source, node: Node) -> Option<Condition> {
     let delay_s = source.number_or(node, "delay", 0.0)?;
+    if delay_s < 0.0 {
+        return source.refuse(node, "its `delay` is less than 0");
+    }
     let edge = source.word(node, "conditionEdge", &["none", "rising", "falling", "risingOrFalling"])?;
     if edge.ends_with("alling") {
         return source.refuse(node, "only what begins to hold is read, not what ends");
@@ -122,6 +125,9 @@ fn condition(source: &mut Source, node: Node) -> Option<Condition> {
     }
     let kind = match inner.tag_name().name() {
         "TimeHeadwayCondition" => {
+            if inner.attribute("relativeDistanceType") == Some("lateral") {
+                return source.refuse(inner, "lateral distances are not read");
+            }
             When::Headway { pair: pair(source, inner, of)?, seconds: source.amount(inner, "value")? }
         }
         "RelativeDistanceCondition" => {

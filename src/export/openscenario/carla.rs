@@ -23,8 +23,7 @@ const FOG_M: f64 = 1000.0;
 
 /// What a file for ScenarioRunner leaves out or says only in part.
 pub fn dropped(recording: &Recording) -> Vec<String> {
-    let mut dropped =
-        vec!["exact ways and times: everyone, also the ego vehicle, drives by actions".to_owned()];
+    let mut dropped = vec!["exact ways and times: whoever the file moves drives by actions".to_owned()];
     let bodies: BTreeSet<&str> = recording.actors().map(|actor| model(actor).1).collect();
     let bodies = bodies.into_iter().collect::<Vec<_>>().join(", ");
     dropped.push(format!("outlines and masses: those of CARLA's models count ({bodies})"));

@@ -1,13 +1,14 @@
 //! Sky and lights as OpenSCENARIO describes them.
 //!
 //! The world has words where the standard wants numbers. Rain, sight, water and friction are those of the model card
-//! (`sim::environment`); of sun and clouds the world has none, so these are ours:
+//! (`sim::environment`); of sun and clouds the world has none, so these are ours
+//! (the clock is LANGUAGE.md's):
 //!
 //! | time | clock | sun's elevation and azimuth | illuminance |
 //! |---|---|---|---|
-//! | Morning | 08:00 | 20° in the east | 20,000 lx |
-//! | Noon | 12:00 | 60° in the south | 100,000 lx |
-//! | Night | 23:00 | 30° below the horizon in the north | 0.1 lx |
+//! | Morning | 10:00 | 20° in the east | 20,000 lx |
+//! | Noon | 14:00 | 60° in the south | 100,000 lx |
+//! | Night | 20:00 | 30° below the horizon in the north | 0.1 lx |
 
 use core::f64::consts::{FRAC_PI_2, PI};
 use std::collections::{BTreeMap, BTreeSet};
@@ -47,9 +48,9 @@ pub fn environment(sky: &Sky, number: usize) -> Element {
 /// The clock of the world's time of day.
 pub fn time(sky: &Sky) -> Element {
     let clock = match sky.time_of_day {
-        TimeOfDay::Morning => "T08:00:00",
-        TimeOfDay::Noon => "T12:00:00",
-        TimeOfDay::Night => "T23:00:00",
+        TimeOfDay::Morning => "T10:00:00",
+        TimeOfDay::Noon => "T14:00:00",
+        TimeOfDay::Night => "T20:00:00",
     };
     Element::new("TimeOfDay").with("animation", false).with("dateTime", format!("{DATE}{clock}"))
 }
