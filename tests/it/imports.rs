@@ -149,14 +149,14 @@ fn conditions_and_words_are_read_or_refused() {
         ("selectTriggeringEntities=\"false\"", "selectTriggeringEntities=\"true\"", "a condition selects"),
         ("priority=\"overwrite\"", "priority=\"urgent\"", "it may be override"),
         ("priority=\"overwrite\"", "priority=\"overwrite\" maximumExecutionCount=\"0\"", "never happens"),
-        ("<LaneChangeAction", "<LaneChangeAction targetLaneOffset=\"1.2\"", "the middle of their lanes"),
-        (
-            "<TimeHeadwayCondition",
-            "<TimeHeadwayCondition relativeDistanceType=\"lateral\"",
-            "lateral distances",
-        ),
+        ("<LaneChangeAction>", "<LaneChangeAction targetLaneOffset=\"1.2\">", "the middle of their lanes"),
+        ("relativeDistanceType=\"longitudinal\"", "relativeDistanceType=\"lateral\"", "lateral distances"),
         ("</Act>", "<StopTrigger><ConditionGroup/></StopTrigger></Act>", "an act goes on"),
-        ("conditionEdge=\"rising\"", "conditionEdge=\"rising\" delay=\"-4\"", "`delay` is less than 0"),
+        (
+            "delay=\"0\" conditionEdge=\"rising\"",
+            "delay=\"-4\" conditionEdge=\"rising\"",
+            "`delay` is less than 0",
+        ),
         ("dynamicsShape=\"sinusoidal\"", "dynamicsShape=\"sudden\"", "it may be linear"),
         ("width=\"1.8\"", "width=\"-1.8\"", "not above 0"),
         (
