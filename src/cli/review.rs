@@ -121,12 +121,10 @@ pub fn review(
     };
     let told = refuted().filter(|(claim, _)| !matches!(claim, Claim::Proc(_) | Claim::Trace(_)));
     differences.extend(told.map(|(_, result)| in_words(result)));
-    if change != Change::Gone {
-        differences.extend(newly_hit(&scenario, &summary));
-    }
     if change == Change::Gone {
         return Ok(Review { change, differences, illegal, now: None });
     }
+    differences.extend(newly_hit(&scenario, &summary));
     let claims = |is: fn(&Claim) -> bool| scenario.claims.iter().any(is);
     if claims(|claim| matches!(claim, Claim::Cause { .. })) {
         summary.find_causes(&setup, &log).map_err(Failure::usage)?;

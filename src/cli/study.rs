@@ -11,7 +11,6 @@ use crate::study::{
     CellRecord, Event, FailedCell, Job, Spent, Study, StudyDatabase, StudyError, StudyFile, StudyResults,
     StudySettings, play_jobs,
 };
-
 use crate::syntax::{listed, yaml_mistake};
 
 use super::arguments::StudyArguments;

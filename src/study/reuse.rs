@@ -65,7 +65,7 @@ impl StudySettings {
             ("avastra", *avastra == other.avastra),
             ("engine", *engine == other.engine),
             ("space", *space_digest == other.space_digest),
-            // A program of others need not do the same twice.
+            // A program that is attached need not do the same twice.
             ("ads", *ads == other.ads && external.is_none() && other.external.is_none()),
             ("ambient", *ambient == other.ambient),
             ("traffic", *traffic == other.traffic),
