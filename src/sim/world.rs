@@ -547,7 +547,9 @@ impl World {
             self.ego.motion.speed_mps = common_mps;
             self.ego.motion.touched = true;
             // A vehicle that is pushed forward goes on at what the push gives; one that is stopped stays.
-            mover.touch((moved.forward.dot(&heading) * common_mps).max(0.0));
+            // Which zero `max` gives for -0 depends on how this is compiled, and a trace tells zeros apart; the sum
+            // is the positive one.
+            mover.touch((moved.forward.dot(&heading) * common_mps).max(0.0) + 0.0);
             self.contacts.push(Contact { priority, ..contact });
         }
         true
