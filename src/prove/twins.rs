@@ -24,20 +24,23 @@ pub(super) fn report(space: &Space) -> Vec<Diagnostic> {
     if space.rows.len() > ROWS_MAX {
         return Vec::new();
     }
-    let mut first_of: BTreeMap<String, usize> = BTreeMap::new();
-    let mut pairs: BTreeMap<(usize, usize), Vec<(usize, usize)>> = BTreeMap::new();
+    // Conditions are long to write down: only rows that do the same are compared by them.
+    let mut alike: BTreeMap<String, Vec<usize>> = BTreeMap::new();
     for row in &space.rows {
-        match first_of.entry(form(space, row)) {
-            std::collections::btree_map::Entry::Vacant(entry) => {
-                entry.insert(row.index);
-            }
-            std::collections::btree_map::Entry::Occupied(entry) => {
-                let first = *entry.get();
-                let actions = (space.rows[first].action, row.action);
-                pairs.entry(actions).or_default().push((first, row.index));
+        alike.entry(Put::in_row(space, row).effects()).or_default().push(row.index);
+    }
+    let mut pairs: BTreeMap<(usize, usize), Vec<(usize, usize)>> = BTreeMap::new();
+    for rows in alike.into_values().filter(|rows| rows.len() > 1) {
+        let mut first_of: BTreeMap<String, usize> = BTreeMap::new();
+        for again in rows {
+            let first = *first_of.entry(Put::in_row(space, &space.rows[again]).conditions()).or_insert(again);
+            if first != again {
+                let actions = (space.rows[first].action, space.rows[again].action);
+                pairs.entry(actions).or_default().push((first, again));
             }
         }
     }
+    pairs.values_mut().for_each(|pairs| pairs.sort_by_key(|(_, again)| *again));
     let warning = |((first, again), pairs): ((usize, usize), Vec<(usize, usize)>)| {
         let (one, other) = (&space.actions[first], &space.actions[again]);
         let label = |row: usize| format!("`{}`", space.rows[row].label);
@@ -68,15 +71,19 @@ pub(super) fn report(space: &Space) -> Vec<Diagnostic> {
     pairs.into_iter().map(warning).collect()
 }
 
-/// The row as text; equal rows have equal texts.
-fn form(space: &Space, row: &Row) -> String {
-    let action = &space.actions[row.action];
-    let functions = &space.functions;
-    let mut drawn = 0;
-    let locals: Vec<Expr> = action
-        .parameters
-        .iter()
-        .map(|parameter| {
+/// A row with the values of its axes put in. Equal rows have equal texts.
+struct Put<'a> {
+    space: &'a Space,
+    row: &'a Row,
+    /// The parameters: literals on axes, the others by their place.
+    locals: Vec<Expr>,
+}
+
+impl<'a> Put<'a> {
+    fn in_row(space: &'a Space, row: &'a Row) -> Put<'a> {
+        let mut drawn = 0;
+        let parameters = space.actions[row.action].parameters.iter();
+        let locals = parameters.map(|parameter| {
             let axis = row.axes.iter().find(|(name, _)| *name == parameter.name);
             let kind = match axis {
                 Some((_, value)) => literal(*value),
@@ -86,36 +93,47 @@ fn form(space: &Space, row: &Row) -> String {
                 }
             };
             Expr { kind, ty: parameter.ty, span: Span::NONE }
-        })
-        .collect();
-    let reduced = |expr: &Expr| reduce(expr, functions, &locals);
-    let mut parts: Vec<String> = Vec::new();
-    for parameter in action.drawn() {
-        let condition = parameter.condition.as_ref().map(reduced);
-        parts.push(format!("any {:?} {:?} {condition:?}", parameter.ty, parameter.domain));
-    }
-    for effect in &action.effects {
-        parts.push(match effect {
-            EffectDef::Set(set) => {
-                format!("set {} {:?} {:?}", set.state, set.key.as_ref().map(reduced), reduced(&set.value))
-            }
-            EffectDef::Spawn(spawn) => spawn_form(spawn, &reduced),
         });
+        Put { space, row, locals: locals.collect() }
     }
-    for rule in row.rules.iter() {
-        match &space.rules[*rule].body {
-            RuleBody::Moves { .. } => parts.push(format!("rule {rule}")),
-            RuleBody::Holds(bindings) | RuleBody::During(bindings) => {
-                for binding in bindings.iter().filter(|binding| binding.action == row.action) {
-                    let condition = reduced(&binding.condition);
-                    if condition.kind != ExprKind::Bool(true) {
-                        parts.push(format!("rule {rule} {:?}", condition.kind));
+
+    fn reduced(&self, expr: &Expr) -> Expr {
+        reduce(expr, &self.space.functions, &self.locals)
+    }
+
+    fn effects(&self) -> String {
+        let effects = self.space.actions[self.row.action].effects.iter().map(|effect| match effect {
+            EffectDef::Set(set) => {
+                let key = set.key.as_ref().map(|key| self.reduced(key));
+                format!("set {} {key:?} {:?}", set.state, self.reduced(&set.value))
+            }
+            EffectDef::Spawn(spawn) => spawn_form(spawn, &|expr| self.reduced(expr)),
+        });
+        effects.collect::<Vec<_>>().join("\n")
+    }
+
+    /// What the drawn values come from, and the rules.
+    fn conditions(&self) -> String {
+        let mut parts: Vec<String> = Vec::new();
+        for parameter in self.space.actions[self.row.action].drawn() {
+            let condition = parameter.condition.as_ref().map(|condition| self.reduced(condition));
+            parts.push(format!("any {:?} {:?} {condition:?}", parameter.ty, parameter.domain));
+        }
+        for rule in self.row.rules.iter() {
+            match &self.space.rules[*rule].body {
+                RuleBody::Moves { .. } => parts.push(format!("rule {rule}")),
+                RuleBody::Holds(bindings) | RuleBody::During(bindings) => {
+                    for binding in bindings.iter().filter(|binding| binding.action == self.row.action) {
+                        let condition = self.reduced(&binding.condition);
+                        if condition.kind != ExprKind::Bool(true) {
+                            parts.push(format!("rule {rule} {:?}", condition.kind));
+                        }
                     }
                 }
             }
         }
+        parts.join("\n")
     }
-    parts.join("\n")
 }
 
 fn spawn_form(spawn: &SpawnDef, reduced: &impl Fn(&Expr) -> Expr) -> String {

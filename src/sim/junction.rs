@@ -16,6 +16,9 @@ const CORRIDOR_M: f64 = 2.8;
 /// Step in which lanes are compared, m.
 const STEP_M: f64 = 0.5;
 
+/// More than rounding makes of a distance on a map, m.
+const ROUNDING_M: f64 = 1e-6;
+
 /// From this angle on two approaches come towards each other, rad.
 const OPPOSING_RAD_MIN: f64 = 135.0 * core::f64::consts::PI / 180.0;
 
@@ -91,12 +94,17 @@ fn stretch_near(lane: &Lane, other: &Lane) -> Option<(f64, f64)> {
     let path = &lane.centre;
     let mut stretch: Option<(f64, f64)> = None;
     let steps = (path.length_m() / STEP_M).ceil().max(1.0);
-    for step in 0..=steps as u32 {
+    let step_m = path.length_m() / steps;
+    let mut step = 0;
+    while step <= steps as u32 {
         let station_m = path.length_m() * f64::from(step) / steps;
-        let beside = other.centre.project(path.pose_at(station_m).position);
+        let beside = other.centre.project(path.position_at(station_m));
         if beside.distance_m < CORRIDOR_M && !lane.is_apart_at(station_m, other, beside.station_m) {
             stretch = Some((stretch.map_or(station_m, |(from_m, _)| from_m), station_m));
         }
+        // A metre of way brings a lane nearer by a metre at most: until then nothing is within the corridor.
+        let free_m = beside.distance_m - CORRIDOR_M - ROUNDING_M;
+        step += ((free_m / step_m) as u32).max(1);
     }
     stretch
 }
@@ -152,6 +160,34 @@ mod tests {
         assert_eq!((of_east.other, of_north.other), (north, east));
         assert_eq!((of_east.other_from_m, of_east.other_to_m), (of_north.from_m, of_north.to_m));
         assert!(of_north.goes_first && !of_east.goes_first, "the one going north comes from the right");
+    }
+
+    /// What is skipped because it is far away makes no difference.
+    #[test]
+    fn stretches_are_those_of_a_comparison_at_every_step() {
+        let naive = |lane: &Lane, other: &Lane| {
+            let path = &lane.centre;
+            let steps = (path.length_m() / STEP_M).ceil().max(1.0);
+            let stations = (0..=steps as u32).map(|step| path.length_m() * f64::from(step) / steps);
+            let near: Vec<f64> = stations
+                .filter(|station_m| {
+                    let beside = other.centre.project(path.pose_at(*station_m).position);
+                    beside.distance_m < CORRIDOR_M && !lane.is_apart_at(*station_m, other, beside.station_m)
+                })
+                .collect();
+            Some((*near.first()?, *near.last()?))
+        };
+        let (mut near, mut far) = (0, 0);
+        for scene in [testing::corner(), testing::four_arms(), testing::overpass(3.0), testing::divided()] {
+            for (index, lane) in scene.map.lanes.iter().enumerate() {
+                for other in scene.map.lanes.iter().skip(index + 1) {
+                    let found = stretch_near(lane, other);
+                    assert_eq!(found, naive(lane, other), "{:?} by {:?}", lane.key, other.key);
+                    *if found.is_some() { &mut near } else { &mut far } += 1;
+                }
+            }
+        }
+        assert!(near > 20 && far > 20, "{near}, {far}");
     }
 
     #[test]
