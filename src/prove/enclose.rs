@@ -204,7 +204,12 @@ pub(super) fn fact_range(fact: Fact) -> Option<Interval> {
 }
 
 fn positions(set: u128) -> impl Iterator<Item = usize> {
-    (0..VARIANTS_MAX).filter(move |position| set >> position & 1 == 1)
+    let mut left = set;
+    core::iter::from_fn(move || {
+        let position = (left != 0).then(|| left.trailing_zeros() as usize)?;
+        left &= left - 1;
+        Some(position)
+    })
 }
 
 fn and(left: Values, right: Values) -> Values {
