@@ -159,14 +159,12 @@ impl Suite<'_> {
         let name = file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
         let (scenario, road, outcome) = match self.open(file) {
             Ok((Emitted::Policy(..), _)) => return Ok(None),
-            Ok((Emitted::Scenario(table, scenario), gone)) => {
+            Ok((Emitted::Scenario(table, scenario), reviewed)) => {
                 let road = table.space().roads[scenario.road].name.clone();
                 let not_played =
                     |error: RunError| Outcome::NotPlayed { reason: error.to_string(), in_source: false };
-                let outcome = match gone {
-                    Some(reason) => Outcome::Gone(reason),
-                    None => self.compare(&table, &scenario).unwrap_or_else(not_played),
-                };
+                let compared = || self.compare(&table, &scenario).unwrap_or_else(not_played);
+                let outcome = reviewed.unwrap_or_else(compared);
                 (scenario.name, road, outcome)
             }
             Err(failure) => {
@@ -178,8 +176,8 @@ impl Suite<'_> {
         Ok(Some(Case { file: file.to_owned(), scenario, road, outcome, elapsed_s }))
     }
 
-    /// Reads a file. One whose space has changed is noted, or reviewed; then it may come out that its crash is gone, and why.
-    fn open(&mut self, file: &Path) -> Result<(Emitted, Option<String>), Failure> {
+    /// Reads a file. One whose space has changed is noted, or reviewed; then it may be known already what comes of it.
+    fn open(&mut self, file: &Path) -> Result<(Emitted, Option<Outcome>), Failure> {
         let loaded = load::read_and_check(file)?;
         if self.arguments.accept || self.arguments.review {
             return self.review(file, &loaded);
@@ -193,7 +191,7 @@ impl Suite<'_> {
 
     /// Plays a scenario as things are now, says what differs in meaning, and takes it over if asked. What is gone or cannot
     /// be played stays as it is.
-    fn review(&mut self, file: &Path, loaded: &Loaded) -> Result<(Emitted, Option<String>), Failure> {
+    fn review(&mut self, file: &Path, loaded: &Loaded) -> Result<(Emitted, Option<Outcome>), Failure> {
         let root = FileId::default();
         let (before, mut spaces) = (loaded.sources.text(root), Vec::new());
         let text = match is_outdated(loaded) {
@@ -218,9 +216,13 @@ impl Suite<'_> {
         }));
         let Some((text, log)) = now else {
             let why = illegal.unwrap_or_else(|| "no collision of it counts any more".to_owned());
-            let gone = format!("{why}; it is kept as it was");
+            let gone = Outcome::Gone(format!("{why}; it is kept as it was"));
             return Ok((emitted, (change == Change::Gone).then_some(gone)));
         };
+        // What would be claimed of the other crash is not what the file claims until it is taken over.
+        if change == Change::OtherObstacle && !self.arguments.accept {
+            return Ok((emitted, Some(self.outcome(Regression::OtherCrash))));
+        }
         if text == before {
             return Ok((emitted, None));
         }
@@ -279,8 +281,12 @@ impl Suite<'_> {
             // Already with the driving system that it was found with.
             None => Regression::OtherCrash,
         };
+        Ok(self.outcome(found))
+    }
+
+    fn outcome(&self, found: Regression) -> Outcome {
         let is_allowed = self.arguments.allow_changed && found.is_other_crash();
-        Ok(if is_allowed { Outcome::Allowed(found) } else { Outcome::Played(found) })
+        if is_allowed { Outcome::Allowed(found) } else { Outcome::Played(found) }
     }
 }
 

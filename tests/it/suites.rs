@@ -155,6 +155,7 @@ fn a_review_says_what_differs_in_meaning() {
     assert_eq!(found.test(&["--allow-changed", &second]).0, 0);
     let (status, tested, stderr) = found.test(&["--review", &run]);
     assert_eq!(changes(&tested)[..2], ["same crash, other time", "another crash"], "{stderr}");
+    assert_eq!(of_second(&tested), "changed", "what it would claim is not what it claims: {tested}");
     let told = tested["reviewed"][0]["differences"].to_string();
     assert!(told.contains("in place of `plane/0") && told.contains("at 1.00 s: at "), "{told}");
     assert!(tested["reviewed"][1]["differences"].to_string().contains(&format!("{obstacle} is hit at")));
