@@ -5,7 +5,8 @@ driving). The others train for 20,000 steps on the same road against the same dr
 of `avastra train`. The first training of each is judged in the same 60 episodes, the second in 60 others, and so on. What is printed
 is counted collisions in 15 episodes, as in the paper's tables.
 
-The hyperparameters of the others are their own defaults; `like ours` gives DQN what it has in common with the preset `avastra`.
+The hyperparameters of the others are their own defaults; `like ours` gives stable-baselines3's DQN what it has in common with the
+preset `avastra`. RLlib's DQN (its new API stack) is double, dueling, with prioritised replay, by default.
 """
 
 import sqlite3
@@ -16,7 +17,11 @@ import tempfile
 import time
 from pathlib import Path
 
+import ray
 import torch
+from ray.rllib.algorithms.dqn import DQNConfig
+from ray.rllib.core.columns import Columns
+from ray.tune import register_env
 from sb3_contrib import MaskablePPO
 from stable_baselines3 import DQN
 
@@ -94,23 +99,52 @@ def judged(choose, seeds):
     return counted, lost / steps
 
 
-def others(seed, seeds):
-    """Name, counted collisions, share of lost steps, and seconds of training of each learner."""
-    for name, settings in [("DQN (stable-baselines3)", {}), ("DQN (stable-baselines3), like ours", LIKE_OURS)]:
-        begun = time.monotonic()
-        model = DQN("MlpPolicy", made(), seed=seed, device="cpu", **settings).learn(STEPS)
-        took_s = time.monotonic() - begun
-        yield name, *judged(lambda seen, mask: int(model.predict(seen, deterministic=True)[0]), seeds), took_s
-    begun = time.monotonic()
+def by_baselines(seed, settings):
+    """DQN of stable-baselines3."""
+    model = DQN("MlpPolicy", made(), seed=seed, device="cpu", **settings).learn(STEPS)
+    return lambda seen, mask: int(model.predict(seen, deterministic=True)[0])
+
+
+def by_contrib(seed):
+    """MaskablePPO of sb3-contrib, which knows what is legal: its most likely row, and one drawn as it learned to."""
     model = MaskablePPO("MlpPolicy", made(), seed=seed, device="cpu").learn(STEPS)
-    took_s = time.monotonic() - begun
-    for name, is_greedy in [("MaskablePPO (sb3-contrib), greedy", True), ("MaskablePPO (sb3-contrib), drawn", False)]:
-        torch.manual_seed(seed)
+    return [lambda seen, mask, is_greedy=is_greedy: int(model.predict(seen, action_masks=mask, deterministic=is_greedy)[0])
+            for is_greedy in (True, False)]
 
-        def choose(seen, mask):
-            return int(model.predict(seen, action_masks=mask, deterministic=is_greedy)[0])
 
-        yield name, *judged(choose, seeds), took_s
+def by_rllib(seed):
+    """DQN of RLlib, all in this process."""
+    register_env("avastra", lambda _: made())
+    config = DQNConfig().environment("avastra").env_runners(num_env_runners=0).debugging(seed=seed)
+    algorithm, steps = config.build_algo(), 0
+    while steps < STEPS:
+        steps = algorithm.train()["env_runners"]["num_env_steps_sampled_lifetime"]
+    module = algorithm.get_module()
+
+    def choose(seen, mask):
+        with torch.no_grad():
+            return int(module.forward_inference({Columns.OBS: torch.as_tensor(seen)[None]})[Columns.ACTIONS][0])
+
+    return choose
+
+
+LEARNERS = {
+    "DQN (stable-baselines3)": lambda seed: [by_baselines(seed, {})],
+    "DQN (stable-baselines3), like ours": lambda seed: [by_baselines(seed, LIKE_OURS)],
+    "MaskablePPO (sb3-contrib)": by_contrib,
+    "DQN (RLlib)": lambda seed: [by_rllib(seed)],
+}
+
+
+def others(seed, seeds, learners=LEARNERS):
+    """Name, counted collisions, share of lost steps, and processor seconds of training of each learner."""
+    for name, learned in learners.items():
+        begun = time.process_time()
+        policies = learned(seed)
+        took_s = time.process_time() - begun
+        for policy, how in zip(policies, ("", ", drawn")):
+            torch.manual_seed(seed)
+            yield name + how, *judged(policy, seeds), took_s
 
 
 def main(program, trainings):
@@ -125,7 +159,7 @@ def main(program, trainings):
     for number, own in enumerate(seeds, start=1):
         for name, counted, lost, took_s in others(number, own):
             print(f"{name}, training {number}: {counted} counted in {len(own)} episodes, {lost:.0%} of its steps lost to "
-                  f"illegal rows; trained in {took_s:.0f} s", flush=True)
+                  f"illegal rows; trained in {took_s:.0f} s of a processor", flush=True)
             found.setdefault(name, []).append(counted)
     print("\nCounted collisions in 15 episodes: mean, and each training.")
     rates = {name: [counted * 15 / len(seeds[0]) for counted in counts] for name, counts in found.items()}
@@ -134,4 +168,7 @@ def main(program, trainings):
 
 
 if __name__ == "__main__":
+    # More threads wait for each other longer than such small networks take.
+    torch.set_num_threads(1)
+    ray.init(num_cpus=1, include_dashboard=False, log_to_driver=False)
     main(sys.argv[1], int(sys.argv[2]))
