@@ -36,11 +36,13 @@ from .way import Way
 if TYPE_CHECKING:
     from .engine import (ENGINE, EpisodeError, Episodes, Snapshot, Space, SpaceError, Variable, compile, episode_seed,
                          read_run, step_all, variables)
+    from .notebook import Run, Scenario, runs
 
 _ENGINE = [
     "ENGINE", "EpisodeError", "Episodes", "Snapshot", "Space", "SpaceError", "Variable", "compile", "episode_seed",
     "read_run", "step_all", "variables",
 ]
+_NOTEBOOK = ["Run", "Scenario", "runs"]
 
 __all__ = [
     "Acceleration", "Answer", "Beside", "Conditions", "Control", "Crosswalk", "Driver", "Ego", "Event", "Goal", "Init",
@@ -54,8 +56,11 @@ def __getattr__(name):
     if name in _ENGINE:
         from . import engine
         return getattr(engine, name)
+    if name in _NOTEBOOK:
+        from . import notebook
+        return getattr(notebook, name)
     raise AttributeError(f"module 'avastra' has no attribute '{name}'")
 
 
 def __dir__():
-    return sorted([*globals(), *_ENGINE])
+    return sorted([*globals(), *_ENGINE, *_NOTEBOOK])

@@ -1,7 +1,8 @@
 """The engine: spaces, episodes and what runs left behind. Its names are those of `avastra` itself."""
 
+import copyreg
 import os
-from typing import Dict, Union
+from typing import Any, Dict, Tuple, Union
 
 try:
     from ._native import (ENGINE, EpisodeError, Episodes, Snapshot, Space, SpaceError, Variable, episode_seed,
@@ -19,6 +20,21 @@ _Path = Union[str, "os.PathLike[str]"]
 
 #: Tables of `run.db` that `read_run` reads.
 TABLES = ("episode", "step", "collision", "learning")
+
+
+def _reduced(space: Space) -> Tuple[Any, ...]:
+    return _compiled_again, (os.path.abspath(space.path), space.digest)
+
+
+def _compiled_again(path: str, digest: str) -> Space:
+    space = Space(path)
+    if space.digest != digest:
+        raise ValueError(f"`{path}` means something else here, or has changed, since the space was pickled")
+    return space
+
+
+# A space is its path and what it means: another process compiles it again.
+copyreg.pickle(Space, _reduced)
 
 
 def compile(path: _Path) -> Space:

@@ -192,7 +192,8 @@ fn merged<C: Cut>(output: &Output, directories: &[PathBuf], out: Option<&Path>) 
         discard(&partial)?;
     }
     let shards = brought?;
-    output.tell(&format!("{}: {} brought together", out.display(), plural(directories.len(), "shard")));
+    // Not how many directories were named: one shard may have been named twice, or copied.
+    output.tell(&format!("{}: {} brought together", out.display(), plural(shards as usize, "shard")));
     C::conclude(output, out)?;
     output.result(serde_json::json!({ "directory": out, "shards": shards, "missing": [] }));
     Ok(())

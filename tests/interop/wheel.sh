@@ -1,6 +1,6 @@
 #!/bin/sh
-# Lints and builds the Python package with its engine, checks its metadata, and runs its tests with Gymnasium 1.2.2 and 1.4.0, the
-# oldest and the newest that are tested. PROFILE=dev builds faster. Needs Python 3.9 or later with venv, Rust, and PyPI for the first run.
+# Lints and builds the Python package with its engine, checks its metadata, runs its tests with Gymnasium 1.2.2 and 1.4.0, the
+# oldest and the newest that are tested, and its notebooks. PROFILE=dev builds faster. Needs Python 3.9 or later with venv, Rust, and PyPI for the first run.
 set -eu
 cd "$(dirname "$0")/../.."
 root=target/interop/wheel
@@ -22,13 +22,14 @@ PATH="$PWD/$root/tools/bin:$PATH" maturin build --profile "$profile" --manifest-
 cargo build --quiet --profile "$profile"
 for gymnasium in 1.2.2 1.4.0; do
     venv=$root/gymnasium-$gymnasium
-    if [ ! -e "$venv/installed" ]; then
+    if [ ! -e "$venv/ready" ]; then
         "$python" -m venv "$venv"
-        "$venv/bin/pip" install --quiet "gymnasium==$gymnasium"
-        touch "$venv/installed"
+        "$venv/bin/pip" install --quiet "gymnasium==$gymnasium" pandas polars nbclient nbformat ipykernel
+        touch "$venv/ready"
     fi
     "$venv/bin/pip" install --quiet --force-reinstall --no-deps "$root"/dist/*.whl
     # From python/tests, so that the installed package is tested and not the folder.
     (cd python/tests/engine && "$OLDPWD/$venv/bin/python" -m unittest discover -s .)
     (cd python/tests && "$OLDPWD/$venv/bin/python" -m unittest discover -s .)
+    "$venv/bin/python" tests/interop/notebook.py
 done

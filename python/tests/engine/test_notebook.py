@@ -1,0 +1,115 @@
+"""Tests of frames and pages for notebooks; `tests/interop/wheel.sh` runs them with pandas and polars."""
+
+import html
+import os
+import pickle
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+import unittest
+from pathlib import Path
+from unittest import mock
+
+import numpy as np
+
+import avastra
+
+try:
+    import pandas
+    import polars
+except ImportError:
+    pandas = polars = None
+
+ROOT = Path(__file__).resolve().parents[3]
+SPACE = ROOT / "scenarios" / "avastra45.ava"
+FAULT = ROOT / "scenarios" / "ads" / "faults" / "planning_never_yields.yaml"
+PROGRAM = os.environ.get("AVASTRA")
+
+
+@unittest.skipUnless(PROGRAM and pandas, "needs the program in AVASTRA, pandas and polars")
+class Runs(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = tempfile.TemporaryDirectory()
+        cls.addClassCleanup(cls.folder.cleanup)
+        cls.out = Path(cls.folder.name) / "run"
+        asked = ["run", SPACE, "--road", "crossroad", "--episodes", "40", "--ads-config", FAULT, "--out", cls.out, "--quiet"]
+        subprocess.run([PROGRAM, *map(str, asked)], check=True, stdout=subprocess.DEVNULL)
+        cls.tables = avastra.read_run(cls.out)
+
+    def test_frames_have_what_the_tables_have(self):
+        for frames, is_none in (("pandas", pandas.isna), ("polars", lambda value: value is None)):
+            run = avastra.runs(self.out, frames)
+            found = 0
+            for frame, name in ((run.episodes, "episode"), (run.steps, "step"), (run.collisions, "collision")):
+                table = self.tables[name]
+                self.assertEqual(list(frame.columns), list(table))
+                for column, values in table.items():
+                    for shown, value in zip(frame[column].to_list(), values.tolist()):
+                        if value is None or value != value or (values.dtype.kind == "i" and value < 0):
+                            self.assertTrue(is_none(shown), (frames, name, column, shown))
+                            found += 1
+                        else:
+                            self.assertEqual(shown, value, (frames, name, column))
+            self.assertGreater(found, 0)
+            self.assertIn("40 episodes", repr(run))
+        # A seed keeps its 64 bits.
+        self.assertEqual(avastra.runs(self.out).episodes["seed"].dtype, np.uint64)
+
+    def test_a_run_and_its_scenarios_are_shown_as_pages(self):
+        run = avastra.runs(self.out)
+        self.assertEqual(len(run.scenarios), len(list(self.out.glob("critical/*.ava"))))
+        scenario = run.scenarios[0]
+        for shown, named in ((run, "run"), (scenario, scenario.path.stem)):
+            frame = shown._repr_html_()
+            self.assertTrue(frame.startswith("<iframe srcdoc=") and frame.endswith("</iframe>"))
+            page = html.unescape(frame.split('"')[1])
+            # Not `assertIn`, which would print the page.
+            self.assertTrue('<head><base href="about:srcdoc">' in page)
+            self.assertIn(named, re.search("<title>(.*)</title>", page).group(1))
+
+    def test_what_is_missing_is_named(self):
+        with self.assertRaisesRegex(ValueError, "`pandas` or `polars`"):
+            avastra.runs(self.out, "excel")
+        with mock.patch.dict(sys.modules, {"polars": None}), self.assertRaisesRegex(ImportError, "pip install polars"):
+            avastra.runs(self.out, "polars")
+        with self.assertRaisesRegex(ValueError, "run.db"):
+            avastra.runs(self.out / "critical")
+        with self.assertRaisesRegex(FileNotFoundError, "no scenario"):
+            avastra.Scenario(self.out / "critical" / "none.ava")
+        with mock.patch.dict(os.environ, {"AVASTRA": "no_such_program"}), self.assertRaisesRegex(FileNotFoundError, "cargo install"):
+            avastra.runs(self.out).report()
+        torn = Path(self.folder.name) / "torn.ava"
+        torn.write_text("nothing")
+        with self.assertRaisesRegex(RuntimeError, "ended with status 2"):
+            avastra.Scenario(torn).report()
+
+
+class Pickles(unittest.TestCase):
+    def test_a_space_is_its_path_and_what_it_means(self):
+        space = avastra.compile(os.path.relpath(SPACE))
+        kept = pickle.dumps(space)
+        here = os.getcwd()
+        with tempfile.TemporaryDirectory() as folder:
+            os.chdir(folder)
+            self.addCleanup(os.chdir, here)
+            again = pickle.loads(kept)
+            self.assertEqual((again.digest, again.rows, again.roads), (space.digest, space.rows, space.roads))
+            os.chdir(here)
+
+    def test_a_space_that_has_changed_is_refused(self):
+        with tempfile.TemporaryDirectory() as folder:
+            shutil.copytree(SPACE.parent / "roads", Path(folder) / "roads")
+            for name in ("avastra45.ava", "roads.ava"):
+                shutil.copy(SPACE.parent / name, folder)
+            file = Path(folder) / "avastra45.ava"
+            kept = pickle.dumps(avastra.compile(file))
+            file.write_text(file.read_text().replace("limit: 20 steps", "limit: 21 steps"))
+            with self.assertRaisesRegex(ValueError, "has changed"):
+                pickle.loads(kept)
+
+
+if __name__ == "__main__":
+    unittest.main()
