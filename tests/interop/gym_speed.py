@@ -1,4 +1,6 @@
-"""Steps per second from Python, beside highway-env in the same process: gym_speed.py.
+"""Steps per second from Python, beside highway-env in the same process, and beside MetaDrive: gym_speed.py [PYTHON].
+
+MetaDrive needs older versions of NumPy and Gymnasium, so it runs in turn in a process of PYTHON, an interpreter that has it.
 
 A step of avastra is 6 s of driving (300 ticks at 50 Hz: sensing, the driving system, exact contacts, the collision probability)
 and the legality of every row; one of highway-env is 1 s (20 ticks at 20 Hz), with ten vehicles. So seconds of driving per second are
@@ -6,8 +8,12 @@ printed, too. Each is measured in turn, for some seconds, three times; the media
 seconds of a processor mean anything (all threads together).
 """
 
+import json
 import statistics
+import subprocess
+import sys
 import time
+from pathlib import Path
 
 import gymnasium
 import highway_env  # noqa: F401, registers its environments
@@ -61,8 +67,16 @@ def peer():
     return clock.rates(steps)
 
 
+def metadrive():
+    """Rates of a process of its own; it measures them without its start."""
+    script = Path(__file__).with_name("metadrive_speed.py")
+    told = subprocess.run([sys.argv[1], script, str(SECONDS)], check=True, capture_output=True, text=True).stdout
+    return json.loads(told.splitlines()[-1])
+
+
 CASES = [
     ("highway-env, one thread", 1.0, peer),
+    *([("MetaDrive, one thread", 0.1, metadrive)] if len(sys.argv) > 1 else []),
     ("avastra, modular, one thread", SPACE.step_s, lambda: vector(1)),
     ("avastra, modular, two threads", SPACE.step_s, lambda: vector(2)),
     ("avastra, idm, one thread", SPACE.step_s, lambda: vector(1, ads="idm")),
