@@ -11,7 +11,7 @@ use avastra::check::{ReadError, load};
 use avastra::model::{MomentFacts, RulesInForce};
 use avastra::syntax::ast::FileId;
 use avastra::syntax::{Diagnostic, Style, apply_fixes, format, parse, print, record, render, same_meaning};
-use avastra::trial::places;
+use avastra::trial::places::{self, Scenes};
 
 /// The shipped space; its roads are those of [`ROADS`].
 const AVASTRA: &str = include_str!("../scenarios/avastra45.ava");
@@ -77,8 +77,9 @@ fn examine_meaning(text: &str) {
         _ => Err(ReadError("no such file".to_owned())),
     };
     let mut loaded = load(Path::new(OWN), &read).expect("its text is known");
-    places::judge_claims(&mut loaded);
-    places::warn(&mut loaded);
+    let mut scenes = Scenes::default();
+    places::judge_claims(&mut loaded, &mut scenes);
+    places::warn(&mut loaded, &mut scenes);
     let found: Vec<Diagnostic> = loaded.diagnostics.iter().chain(&loaded.remarks).cloned().collect();
     for diagnostic in &found {
         assert!(!render(diagnostic, &loaded.sources, Style::Plain).is_empty());

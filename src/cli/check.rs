@@ -7,7 +7,7 @@ use crate::check::Loaded;
 use crate::sim::ENGINE;
 use crate::syntax::ast::FileId;
 use crate::syntax::{Diagnostic, apply_fixes};
-use crate::trial::places;
+use crate::trial::places::{self, Scenes};
 
 use super::arguments::{CheckArguments, Dump};
 use super::error::Failure;
@@ -33,7 +33,7 @@ pub fn check(output: &Output, arguments: &CheckArguments) -> Result<(), Failure>
         if arguments.fix && fix(output, path, &loaded)? {
             loaded = load::read_and_check(path)?;
         }
-        places::warn(&mut loaded);
+        places::warn(&mut loaded, &mut Scenes::default());
         output.diagnostics(&loaded.sources, &loaded.diagnostics);
         output.diagnostics(&loaded.sources, &shown(output, std::mem::take(&mut loaded.remarks)));
         let wrong = loaded.diagnostics.iter().filter(|diagnostic| diagnostic.is_error()).count();

@@ -15,7 +15,7 @@ use crate::model::{Policy, Scenario, Space};
 use crate::run;
 use crate::run::{Asked, Profile, driving_system};
 use crate::sim::TrafficProfile;
-use crate::trial::places;
+use crate::trial::places::{self, Scenes};
 
 use super::arguments::AgainstArguments;
 use super::error::Failure;
@@ -86,7 +86,7 @@ fn check_read(path: &Path, read: &check::ReadFile<'_>) -> Result<Loaded, Failure
         return Err(Failure::file("read", path, name_a_file_in(path)));
     }
     let mut loaded = check::load(path, read).map_err(|error| Failure::file("read", path, error))?;
-    places::judge_claims(&mut loaded);
+    places::judge_claims(&mut loaded, &mut Scenes::default());
     if loaded.diagnostics.iter().any(crate::syntax::Diagnostic::is_error) {
         check::suggest_uses(&mut loaded, &nearby(path));
     }

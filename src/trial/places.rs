@@ -11,7 +11,8 @@ use std::sync::Arc;
 use crate::action::{ActionTable, Offer, Situation, Surroundings};
 use crate::check::{Claim, Loaded, Runs};
 use crate::episode;
-use crate::model::{EffectDef, Memory, Row, RulesInForce, Space, code};
+use crate::model::{EffectDef, Memory, Road, Row, RulesInForce, Space, code};
+use crate::road::{LanePlace, RoadMap};
 use crate::sim::{Scene, Start, World};
 use crate::syntax::{Diagnostic, listed};
 
@@ -33,11 +34,35 @@ const ROWS_WARNED_MAX: usize = 1_000;
 /// Rows named in one diagnostic, at most.
 const ROWS_SHOWN: usize = 5;
 
+/// Scenes that are kept: an author who moves a start makes one with each keystroke.
+const SCENES_MAX: usize = 16;
+
+/// The scenes of roads that were searched before. A caller that searches often, such as the editor's server, then makes
+/// each once.
+#[derive(Debug, Default)]
+pub struct Scenes(Vec<(Arc<RoadMap>, [LanePlace; 2], Arc<Scene>)>);
+
+impl Scenes {
+    fn of(&mut self, road: &Road) -> Arc<Scene> {
+        let ends = [road.start, road.goal];
+        let known = self.0.iter().find(|(map, of, _)| Arc::ptr_eq(map, &road.map) && *of == ends);
+        if let Some((_, _, scene)) = known {
+            return Arc::clone(scene);
+        }
+        if self.0.len() >= SCENES_MAX {
+            self.0.clear();
+        }
+        let scene = Arc::new(episode::scene(road));
+        self.0.push((Arc::clone(&road.map), ends, Arc::clone(&scene)));
+        scene
+    }
+}
+
 /// Adds an error for each claim that a row runs for which no place is found; then the space is not sound.
-pub fn judge_claims(loaded: &mut Loaded) {
+pub fn judge_claims(loaded: &mut Loaded, scenes: &mut Scenes) {
     let Some(space) = loaded.space.clone() else { return };
     for Claim { span, rows } in loaded.runs.claims.clone() {
-        let lost = without_place(&space, &loaded.runs, &rows);
+        let lost = without_place(&space, &loaded.runs, &rows, scenes);
         if lost.is_empty() {
             continue;
         }
@@ -56,14 +81,14 @@ pub fn judge_claims(loaded: &mut Loaded) {
 }
 
 /// Adds a warning for each action with rows for which no place is found, and that no claim is about.
-pub fn warn(loaded: &mut Loaded) {
+pub fn warn(loaded: &mut Loaded, scenes: &mut Scenes) {
     let Some(space) = loaded.space.clone() else { return };
     let claimed: BTreeSet<usize> = loaded.runs.claims.iter().flat_map(|claim| claim.rows.clone()).collect();
     let rows: Vec<usize> = (0..space.rows.len()).filter(|row| !claimed.contains(row)).collect();
     if rows.len() > ROWS_WARNED_MAX {
         return;
     }
-    let mut lost = without_place(&space, &loaded.runs, &rows);
+    let mut lost = without_place(&space, &loaded.runs, &rows, scenes);
     lost.retain(|lost| lost.is_searched);
     for (action, definition) in space.actions.iter().enumerate() {
         let of_action: Vec<&Lost<'_>> = lost.iter().filter(|lost| lost.row.action == action).collect();
@@ -135,7 +160,12 @@ impl Lost<'_> {
 }
 
 /// Those of the rows that were found to run on some road, and find no place on any.
-fn without_place<'a>(space: &'a Arc<Space>, runs: &Runs, rows: &[usize]) -> Vec<Lost<'a>> {
+fn without_place<'a>(
+    space: &'a Arc<Space>,
+    runs: &Runs,
+    rows: &[usize],
+    scenes: &mut Scenes,
+) -> Vec<Lost<'a>> {
     let needs_place = |row: &Row| {
         let action = &space.actions[row.action];
         let asks =
@@ -150,7 +180,6 @@ fn without_place<'a>(space: &'a Arc<Space>, runs: &Runs, rows: &[usize]) -> Vec<
     let mut open: Vec<Lost<'a>> = wanted.filter(runs_somewhere).map(lost).collect();
     let table = ActionTable::new(Arc::clone(space));
     let rules = about_places(space);
-    let mut scenes: Vec<Option<Arc<Scene>>> = vec![None; space.roads.len()];
     let mut offers_left = OFFERS_MAX;
     for moment in moments() {
         for (index, road) in space.roads.iter().enumerate() {
@@ -159,8 +188,7 @@ fn without_place<'a>(space: &'a Arc<Space>, runs: &Runs, rows: &[usize]) -> Vec<
             let states: BTreeSet<usize> = open.iter().filter_map(state_of).collect();
             for state in states {
                 let memory = runs.runs_in.state(index, state);
-                let scene = scenes[index].get_or_insert_with(|| Arc::new(episode::scene(road)));
-                let world = moment.world(space, scene, memory);
+                let world = moment.world(space, &scenes.of(road), memory);
                 let kept = world.for_many();
                 let surroundings = kept.as_deref().unwrap_or(&world);
                 let situation =

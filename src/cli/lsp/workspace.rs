@@ -16,7 +16,7 @@ use crate::model;
 use crate::model::Space;
 use crate::syntax::Diagnostic;
 use crate::syntax::ast::{FileId, Span};
-use crate::trial::places;
+use crate::trial::places::{self, Scenes};
 
 use super::position::Lines;
 use super::uri;
@@ -51,6 +51,7 @@ pub struct Workspace {
     documents: BTreeMap<PathBuf, Document>,
     analyses: BTreeMap<PathBuf, Analysis>,
     maps: MapCache,
+    scenes: Scenes,
 }
 
 impl Workspace {
@@ -111,7 +112,7 @@ impl Workspace {
             read(documents, path)
         };
         let mut loaded = check::load_with(path, &read, &mut self.maps).ok()?;
-        places::judge_claims(&mut loaded);
+        places::judge_claims(&mut loaded, &mut self.scenes);
         let is_unknown = |found: &Diagnostic| found.is_error() && found.code == model::code::UNKNOWN;
         if loaded.diagnostics.iter().any(is_unknown) {
             check::suggest_uses(&mut loaded, &load::nearby(path));
