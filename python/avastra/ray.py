@@ -187,7 +187,9 @@ def _begun(options, passed, processors):
     folder = f"{out}.shards"
     record = os.path.join(folder, RECORD)
     known = {"command": options.command, "arguments": passed, "working_directory": os.getcwd()}
-    if os.path.isfile(record):
+    left = [name for name in os.listdir(folder) if name != RECORD] if os.path.isdir(folder) else []
+    # A record alone is that of a command whose shards could not begin.
+    if left and os.path.isfile(record):
         with open(record, encoding="utf-8") as file:
             begun = json.load(file)
         shards = begun.pop("shards")
@@ -196,9 +198,8 @@ def _begun(options, passed, processors):
             raise Refused(f"`{folder}` has {shards} shards of `{was}`, begun in `{begun['working_directory']}`: say the same command "
                           "there, name another `--out`, or delete that folder")
     else:
-        for directory in (out, folder):
-            if os.path.isdir(directory) and os.listdir(directory):
-                raise Refused(f"`{directory}` is not empty: name another `--out`")
+        if left or (os.path.isdir(out) and os.listdir(out)):
+            raise Refused(f"`{folder if left else out}` is not empty: name another `--out`")
         shards = options.shards or processors
         os.makedirs(folder, exist_ok=True)
         # Renamed into place, so that a kill leaves all of it or nothing.

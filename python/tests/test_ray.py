@@ -25,6 +25,8 @@ with open(here / "asked.jsonl", "a") as file:
 if asked[0] == "merge":
     sys.exit(int((here / "merge_status").read_text()) if (here / "merge_status").exists() else 0)
 out = pathlib.Path(asked[asked.index("--resume" if "--resume" in asked else "--out") + 1])
+if "none.ava" in asked:
+    sys.exit(1)
 out.mkdir(exist_ok=True)
 (out / f"{{asked[0]}}.yaml").write_text("begun")
 print("3/8 episodes, 1 collision counted", file=sys.stderr)
@@ -144,7 +146,7 @@ class OnRay(unittest.TestCase):
 
     def test_a_failing_shard_ends_the_command_with_its_own_words_and_status(self):
         (self.folder / "fail_1").write_text("2")
-        status, told = self.called("run", "none.ava", "--shards", "1")
+        status, told = self.called("run", "s.ava", "--shards", "1")
         self.assertEqual(status, 2)
         self.assertIn("shard 1/1 ended with status 2", told)
         self.assertIn("error: scenarios/none.ava: no such file", told)
@@ -165,6 +167,10 @@ class OnRay(unittest.TestCase):
             status, told = self.called(*other)
             self.assertEqual(status, 1)
             self.assertIn("has 2 shards of `run s.ava`", told)
+
+    def test_a_command_that_never_began_is_in_nobodys_way(self):
+        self.assertEqual(self.called("run", "none.ava", "--shards", "1")[0], 1)
+        self.assertEqual(self.called("run", "s.ava", "--shards", "2")[0], 0)
 
     def test_what_is_in_the_way_is_left_alone(self):
         self.out.mkdir()

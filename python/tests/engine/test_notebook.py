@@ -70,6 +70,13 @@ class Runs(unittest.TestCase):
             self.assertTrue('<head><base href="about:srcdoc">' in page)
             self.assertIn(named, re.search("<title>(.*)</title>", page).group(1))
 
+    def test_the_example_of_the_page_runs(self):
+        blocks = (ROOT / "python/README.md").read_text(encoding="utf-8").split("```python\n")[1:]
+        [source] = [block.split("```")[0] for block in blocks if "avastra.runs" in block]
+        names = {}
+        exec(source.replace("runs/0001", str(self.out)), names)
+        self.assertEqual(len(names["run"].episodes), 40)
+
     def test_what_is_missing_is_named(self):
         with self.assertRaisesRegex(ValueError, "`pandas` or `polars`"):
             avastra.runs(self.out, "excel")
