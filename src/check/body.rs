@@ -17,7 +17,7 @@ const KG_PER_T: f64 = 1000.0;
 
 impl BodyField {
     /// What a number may be: its dimension, and both ends in SI. `None` for what is no number.
-    fn range(self) -> Option<(Dimension, f64, f64)> {
+    pub(crate) fn range(self) -> Option<(Dimension, f64, f64)> {
         Some(match self {
             BodyField::Like => return None,
             BodyField::Length => (Dimension::LENGTH, 0.3, 20.0),

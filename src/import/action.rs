@@ -98,8 +98,10 @@ fn drives(source: &mut Source, action: Node) -> Option<bool> {
 }
 
 /// Whether a change of speed or lane happens at once.
-fn is_step(source: &mut Source, dynamics: Node) -> Option<bool> {
-    Some(source.word(dynamics, "dynamicsShape", &["linear", "cubic", "sinusoidal", "step"])? == "step")
+fn at_once(source: &mut Source, dynamics: Node) -> Option<bool> {
+    let shape = source.word(dynamics, "dynamicsShape", &["linear", "cubic", "sinusoidal", "step"])?;
+    let dimension = source.word(dynamics, "dynamicsDimension", &["time", "distance", "rate"])?;
+    Some(shape == "step" || (dimension == "time" && source.number(dynamics, "value")? == 0.0))
 }
 
 fn moved(source: &mut Source, action: Node, is_ego: bool) -> Option<Begun> {
@@ -107,9 +109,7 @@ fn moved(source: &mut Source, action: Node, is_ego: bool) -> Option<Begun> {
     match action.tag_name().name() {
         "SpeedAction" => {
             let dynamics = source.required(action, "SpeedActionDynamics")?;
-            let dimension = source.word(dynamics, "dynamicsDimension", &["time", "distance", "rate"])?;
-            let at_once = is_step(source, dynamics)?
-                || (dimension == "time" && source.number(dynamics, "value")? == 0.0);
+            let at_once = at_once(source, dynamics)?;
             let target = source.required(action, "SpeedActionTarget")?;
             if let Some(absolute) = element(target, "AbsoluteTargetSpeed") {
                 let mps = source.number(absolute, "value")?;
@@ -134,6 +134,11 @@ fn moved(source: &mut Source, action: Node, is_ego: bool) -> Option<Begun> {
             if !source.switch(action, "freespace", false)? {
                 return source.refuse(action, "only `freespace=\"true\"` is read: between the bumpers");
             }
+            let sides = ["any", "leadingReferencedEntity", "trailingReferencedEntity"];
+            if source.word(action, "displacement", &sides)? == "trailingReferencedEntity" {
+                return source.refuse(action, "only a distance ahead of the ego vehicle is read");
+            }
+            source.word(action, "coordinateSystem", &["entity", "lane", "road", "trajectory", "world"])?;
             let headway = match action.attribute("timeGap") {
                 Some(_) => Headway::Time(source.amount(action, "timeGap")?),
                 None => Headway::Way(source.amount(action, "distance")?),
@@ -145,7 +150,7 @@ fn moved(source: &mut Source, action: Node, is_ego: bool) -> Option<Begun> {
                 "a lane change takes as long as the engine's drivers need, and waits until the lane is free",
             );
             let dynamics = source.required(action, "LaneChangeActionDynamics")?;
-            is_step(source, dynamics)?;
+            at_once(source, dynamics)?;
             if source.number_or(action, "targetLaneOffset", 0.0)? != 0.0 {
                 return source.refuse(action, "vehicles keep to the middle of their lanes");
             }
@@ -185,6 +190,11 @@ fn moved(source: &mut Source, action: Node, is_ego: bool) -> Option<Begun> {
 
 fn walk(source: &mut Source, action: Node) -> Option<Walk> {
     let mark = source.mark(action);
+    if source.number_or(action, "initialDistanceOffset", 0.0)? != 0.0 {
+        return source.refuse(action, "a pedestrian walks its way from the beginning");
+    }
+    let timing = action.descendants().find(|node| node.has_tag_name("Timing"));
+    let scale = timing.map_or(Some(1.0), |timing| source.number_or(timing, "scale", 1.0))?;
     let trajectory = action.descendants().find(|node| node.has_tag_name("Polyline"));
     let Some(polyline) = trajectory else {
         return source.refuse(action, "a pedestrian walks straight across the road: a `Polyline` is read");
@@ -198,7 +208,9 @@ fn walk(source: &mut Source, action: Node) -> Option<Walk> {
         let place = source.required(*vertex, "Position")?;
         way.push((source.mark(*vertex), position(source, place)?));
     }
+    // Without `Timing` the times of the vertices are not kept: it walks with its speed.
     let times = (source.number_or(*first, "time", 0.0)?, source.number_or(*last, "time", 0.0)?);
-    let duration_s = (times.1 > times.0).then_some(times.1 - times.0);
+    let duration_s = (times.1 - times.0) * scale;
+    let duration_s = (timing.is_some() && duration_s > 0.0).then_some(duration_s);
     Some(Walk { mark, way, duration_s })
 }

@@ -4,6 +4,8 @@ use std::collections::BTreeMap;
 
 use roxmltree::Node;
 
+use crate::model::vocabulary::BodyField;
+
 use super::Files;
 use super::source::{Source, children, element, elements, filled};
 
@@ -112,15 +114,20 @@ fn shape(node: Node, assigned: &BTreeMap<String, String>) -> Result<Shape, Strin
             found.and_then(|text| text.trim().parse::<f64>().ok()).filter(|value| value.abs() < 1000.0);
         value.ok_or_else(|| format!("`{attribute}` of its `{name}` is no number"))
     };
-    let size = |attribute: &str| {
+    let size = |attribute: &str, field: BodyField| {
         let value = number("Dimensions", attribute)?;
-        if value > 0.0 { Ok(value) } else { Err(format!("`{attribute}` of its `Dimensions` is not above 0")) }
+        match field.range() {
+            Some((_, low, high)) if !(low..=high).contains(&value) => {
+                Err(format!("`{attribute}` of its `Dimensions` is {value}: bodies have {low} to {high} m"))
+            }
+            _ => Ok(value),
+        }
     };
     Ok(Shape {
         like,
-        length_m: size("length")?,
-        width_m: size("width")?,
-        height_m: size("height")?,
+        length_m: size("length", BodyField::Length)?,
+        width_m: size("width", BodyField::Width)?,
+        height_m: size("height", BodyField::Height)?,
         middle_m: number("Center", "x")?,
     })
 }

@@ -56,12 +56,16 @@ fn part(
             let gap = gap(source, mark, pair, actor, placed)?;
             let (of, mps) = if pair.of == actor.name { ("npc", actor.mps) } else { ("ego", placed[0].mps) };
             if holds(pair, actor, placed, mps * seconds) {
-                return Some(ALWAYS.to_owned());
+                return already(source, condition);
             }
             Some(format!("{gap} {} {of}.speed * {seconds:.3} s", sign(pair)))
         }
         When::Collides { pair, seconds } => {
             let gap = gap(source, mark, pair, actor, placed)?;
+            let closing_mps = (actor.mps - placed[0].mps) * if is_behind(actor) { 1.0 } else { -1.0 };
+            if holds(pair, actor, placed, closing_mps * seconds) {
+                return already(source, condition);
+            }
             let (back, front) = if is_behind(actor) { ("npc", "ego") } else { ("ego", "npc") };
             Some(format!("{gap} < ({back}.speed - {front}.speed) * {seconds:.3} s"))
         }
@@ -70,32 +74,42 @@ fn part(
             if names.contains(&actor.name.as_str()) && names.contains(&placed[0].name.as_str()) {
                 let gap = gap(source, mark, pair, actor, placed)?;
                 if holds(pair, actor, placed, *metres) {
-                    return Some(ALWAYS.to_owned());
+                    return already(source, condition);
                 }
                 return Some(format!("{gap} {} {metres:.2} m", sign(pair)));
             }
             let (of, to) = (named(source, mark, &pair.of, placed)?, named(source, mark, &pair.to, placed)?);
-            meeting(source, mark, (of, to), *metres, pair)
+            meeting(source, condition, (of, to), *metres, pair)
         }
         When::Reaches { entity, position, within_m } => {
             let of = named(source, mark, entity, placed)?;
             let there = ground.beside(source, mark, position)?;
             let station_m = there.station_m - within_m;
+            let Kinematics { station_m: from_m, mps } = of.kinematics();
+            if (from_m - there.station_m).abs() <= *within_m {
+                return already(source, condition);
+            }
             if entity == &placed[0].name {
                 return Some(format!(
                     "ego.route_left <= {:.2} m",
                     (ground.route.goal_m - station_m).max(0.0)
                 ));
             }
-            let Kinematics { station_m: from_m, mps } = of.kinematics();
-            if (from_m - there.station_m).abs() <= *within_m {
-                return Some(ALWAYS.to_owned());
-            }
             // One that comes towards the ego vehicle meets the far side of the place first.
             let edge_m = if mps < 0.0 { there.station_m + within_m } else { station_m };
             at(source, mark, (edge_m - from_m) / mps)
         }
     }
+}
+
+/// What holds from the beginning, unless it is asked to begin to hold.
+fn already(source: &mut Source, condition: &Condition) -> Option<String> {
+    if condition.is_rising {
+        let reason =
+            "it holds from the beginning, so `rising` never comes: with `conditionEdge=\"none\"` it is read";
+        return source.refuse_at(&condition.mark, reason);
+    }
+    Some(ALWAYS.to_owned())
 }
 
 fn sign(pair: &Pair) -> &'static str {
@@ -139,18 +153,19 @@ fn holds(pair: &Pair, actor: &Placed, placed: &[Placed], metres: f64) -> bool {
 /// When two that keep their speeds are so far from each other.
 fn meeting(
     source: &mut Source,
-    mark: &Mark,
+    condition: &Condition,
     (of, to): (&Placed, &Placed),
     metres: f64,
     pair: &Pair,
 ) -> Option<String> {
+    let mark = &condition.mark;
     let (front, back) = if of.beside.station_m <= to.beside.station_m { (to, of) } else { (of, to) };
     let gap_m = match pair.is_free_space {
         true => front.ends_m().1 - back.ends_m().0,
         false => front.beside.station_m - back.beside.station_m,
     };
     if if pair.is_less { gap_m < metres } else { gap_m > metres } {
-        return Some(ALWAYS.to_owned());
+        return already(source, condition);
     }
     let closing_mps = back.kinematics().mps - front.kinematics().mps;
     let seconds = (gap_m - metres) / closing_mps;
@@ -172,8 +187,8 @@ fn at(source: &mut Source, mark: &Mark, seconds: f64) -> Option<String> {
 }
 
 fn named<'a>(source: &mut Source, mark: &Mark, name: &str, placed: &'a [Placed]) -> Option<&'a Placed> {
-    let found = placed.iter().find(|other| other.name == name);
-    if found.is_none() {
+    let found = placed.iter().find(|other| other.name == name && !source.is_torn(name));
+    if found.is_none() && !source.is_torn(name) {
         source.refuse_at::<()>(mark, format!("`{name}` is no vehicle with a place"));
     }
     found

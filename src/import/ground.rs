@@ -1,9 +1,11 @@
 //! Where things are: places of the file on the map, and beside the way of the ego vehicle.
 
+use core::f64::consts::PI;
+
 use crate::geometry::{Vec2, wrap_angle};
 use crate::road::{Lane, LaneIndex, LanePlace, Neighbour, RoadError, RoadMap, Route};
 
-use super::position::Position;
+use super::position::{Heading, Position};
 use super::source::{Mark, Source};
 use super::story::Story;
 
@@ -16,9 +18,12 @@ const WAY_M_MIN: f64 = 20.0;
 /// The goal lies this far before the end of the lanes, m.
 const BEFORE_END_M: f64 = 1.0;
 
-/// A place in the plane belongs to a lane that is this near, m, and no more across it, rad.
+/// A place in the plane belongs to a lane that is this near, m.
 const REACH_M: f64 = 1.0;
+
+/// A vehicle stands no more across its lane, rad. It begins along it, which is noted beyond the smaller angle.
 const ACROSS_RAD: f64 = 1.0;
+const ASKEW_RAD: f64 = 0.1;
 
 /// Lanes to a side that are counted, and lanes behind that are followed back.
 const SIDE_MAX: i32 = 6;
@@ -48,9 +53,13 @@ pub struct Beside {
 impl Ground {
     pub fn of(source: &mut Source, story: &Story, map: RoadMap) -> Option<Ground> {
         let Some((mark, position)) = &story.ego.position else {
+            if source.is_torn(&story.ego.name) {
+                return None;
+            }
             return source.refuse_at(&story.ego.mark, "the file does not say where the ego vehicle begins");
         };
         let start = lane_place(source, &map, mark, position)?;
+        faces_along(source, &map, mark, position, start)?;
         let goal = match &story.ego.goal {
             Some((mark, position)) => lane_place(source, &map, mark, position)?,
             None => {
@@ -71,6 +80,13 @@ impl Ground {
     }
 
     /// Where a vehicle is, if its lane runs beside the way.
+    pub fn vehicle(&self, source: &mut Source, mark: &Mark, position: &Position) -> Option<Beside> {
+        let place = lane_place(source, &self.map, mark, position)?;
+        faces_along(source, &self.map, mark, position, place)?;
+        self.beside(source, mark, position)
+    }
+
+    /// A place on a lane that runs beside the way, whatever looks where.
     pub fn beside(&self, source: &mut Source, mark: &Mark, position: &Position) -> Option<Beside> {
         let place = lane_place(source, &self.map, mark, position)?;
         let point = self.map.lane(place.lane).centre.pose_at(place.station_m).position;
@@ -103,6 +119,16 @@ impl Ground {
             mark,
             "its lane is not beside the ego vehicle's way: neither along it, nor the nearest oncoming one",
         )
+    }
+
+    /// Whether something at a station of the way that looks so begins along the way.
+    pub fn faces_on(&self, source: &mut Source, mark: &Mark, station_m: f64, heading: Heading) -> Option<()> {
+        let way_rad = self.route.path.heading_at(station_m.max(0.0));
+        let across_rad = match heading {
+            Heading::Relative(rad) => rad,
+            Heading::Absolute(rad) => rad - way_rad,
+        };
+        is_along(source, mark, wrap_angle(across_rad).abs())
     }
 
     /// A point of the plane, for those who do not keep to lanes: its station along the way and its offset to the left, m.
@@ -151,7 +177,7 @@ fn right(lane: &Lane) -> Option<Neighbour> {
 /// The lane that a position names, and the place in it.
 fn lane_place(source: &mut Source, map: &RoadMap, mark: &Mark, position: &Position) -> Option<LanePlace> {
     match position {
-        Position::Lane { road, lane, s_m, offset_m, turned } => {
+        Position::Lane { road, lane, s_m, offset_m, .. } => {
             let place = match map.place(road, *lane, *s_m) {
                 Ok(place) => place,
                 Err(RoadError::Map { message, .. } | RoadError::Route { message }) => {
@@ -160,24 +186,55 @@ fn lane_place(source: &mut Source, map: &RoadMap, mark: &Mark, position: &Positi
             };
             let lane = map.lane(place.lane);
             let is_along = lane.road_station_m(lane.centre.length_m()) > lane.road_station_m(0.0);
-            if *turned && is_along {
-                return source.refuse_at(mark, "nobody drives against its lane");
-            }
             // The file's offsets are to the left of the road's reference line.
             Some(LanePlace { offset_m: if is_along { *offset_m } else { -offset_m }, ..place })
         }
         Position::World { x_m, y_m, heading_rad } => {
             let found = map.nearest(Vec2::new(*x_m, *y_m), *heading_rad, REACH_M);
-            let Some(place) = found else { return source.refuse_at(mark, "no driving lane is there") };
-            let lane_rad = map.lane(place.lane).centre.heading_at(place.station_m);
-            if wrap_angle(lane_rad - heading_rad).abs() > ACROSS_RAD {
-                return source.refuse_at(mark, "it does not point along the lane that is there");
-            }
-            Some(place)
+            found.or_else(|| source.refuse_at(mark, "no driving lane is there"))
         }
         Position::RelativeLane { .. } => source
             .refuse_at(mark, "a place relative to an entity is read of vehicles alone, at the beginning"),
     }
+}
+
+/// Whether a vehicle at a place looks along its lane.
+fn faces_along(
+    source: &mut Source,
+    map: &RoadMap,
+    mark: &Mark,
+    position: &Position,
+    place: LanePlace,
+) -> Option<()> {
+    let lane = map.lane(place.lane);
+    let lane_rad = lane.centre.heading_at(place.station_m);
+    let across_rad = match position {
+        Position::World { heading_rad: rad, .. } | Position::Lane { heading: Heading::Absolute(rad), .. } => {
+            wrap_angle(rad - lane_rad).abs()
+        }
+        Position::Lane { heading: Heading::Relative(rad), .. } => {
+            let is_along = lane.road_station_m(lane.centre.length_m()) > lane.road_station_m(0.0);
+            let rad = wrap_angle(*rad).abs();
+            // Players differ in whether this counts from the road's direction or from that of a lane against it.
+            if is_along { rad } else { rad.min(PI - rad) }
+        }
+        Position::RelativeLane { .. } => 0.0,
+    };
+    is_along(source, mark, across_rad)
+}
+
+/// Refuses what stands across a lane or against it.
+fn is_along(source: &mut Source, mark: &Mark, across_rad: f64) -> Option<()> {
+    if across_rad > PI - ACROSS_RAD {
+        return source.refuse_at(mark, "nobody drives against its lane");
+    }
+    if across_rad > ACROSS_RAD {
+        return source.refuse_at(mark, "it does not point along the lane that is there");
+    }
+    if across_rad > ASKEW_RAD {
+        source.note("vehicles begin along their lanes");
+    }
+    Some(())
 }
 
 /// As far as the lanes go on from a place, without turning where they part: the place, and how far that is, m.

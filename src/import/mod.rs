@@ -3,9 +3,10 @@
 //! A documented subset (LANGUAGE.md): vehicles and pedestrians that stand or drive before, behind or beside the ego vehicle, keep
 //! their speed, and change lanes when a condition holds. The driving system under test takes the place of whatever moves the
 //! ego vehicle in the file. What cannot be said is refused, each with its line; what is left to the driving
-//! system or to the engine's drivers becomes a note in the scenario. `docs/open.md` has what is still taken without a word.
+//! system or to the engine's drivers becomes a note in the scenario.
 //!
-//! `story` reads the file, with `body`, `position`, `action`, `trigger` and `weather` for what stands in it; `ground` finds places on the map,
+//! `vocabulary` refuses what no file may hold. `story` reads the file, with `body`, `position`, `action`, `trigger` and `weather`
+//! for what stands in it, through `source`, which fills in each `parameter` and its `expression`; `ground` finds places on the map,
 //! `scene` decides who is where and does what, `condition` turns triggers into conditions of the language, and `write` prints the
 //! scenario. No file is read here: `cli` gives texts.
 
@@ -14,11 +15,13 @@ mod body;
 mod condition;
 mod expression;
 mod ground;
+mod parameter;
 mod position;
 mod scene;
 mod source;
 mod story;
 mod trigger;
+mod vocabulary;
 mod weather;
 mod write;
 

@@ -6,9 +6,18 @@ use super::source::{Source, children, element};
 
 #[derive(Debug, Clone)]
 pub enum Position {
-    Lane { road: String, lane: i32, s_m: f64, offset_m: f64, turned: bool },
-    RelativeLane { entity: String, lanes: i32, ahead_m: f64, offset_m: f64 },
+    Lane { road: String, lane: i32, s_m: f64, offset_m: f64, heading: Heading },
+    RelativeLane { entity: String, lanes: i32, ahead_m: f64, offset_m: f64, heading: Heading },
     World { x_m: f64, y_m: f64, heading_rad: f64 },
+}
+
+/// Where an entity looks, rad.
+#[derive(Debug, Clone, Copy)]
+pub enum Heading {
+    /// To the left of the direction of its road.
+    Relative(f64),
+    /// In the plane.
+    Absolute(f64),
 }
 
 pub fn position(source: &mut Source, parent: Node) -> Option<Position> {
@@ -17,17 +26,15 @@ pub fn position(source: &mut Source, parent: Node) -> Option<Position> {
         "LanePosition" => {
             let (road, lane) = (source.text(place, "roadId")?, source.integer(place, "laneId")?);
             let (s_m, offset_m) = (source.number(place, "s")?, source.number_or(place, "offset", 0.0)?);
-            Some(Position::Lane { road, lane, s_m, offset_m, turned: turned(source, place)? })
+            Some(Position::Lane { road, lane, s_m, offset_m, heading: heading(source, place)? })
         }
         "RelativeLanePosition" => {
             let (entity, lanes) = (source.text(place, "entityRef")?, source.integer(place, "dLane")?);
             let along = if place.has_attribute("ds") { "ds" } else { "dsLane" };
             let ahead_m = source.number(place, along)?;
-            if turned(source, place)? {
-                return source.refuse(place, "nobody drives against its lane");
-            }
             let offset_m = source.number_or(place, "offset", 0.0)?;
-            Some(Position::RelativeLane { entity, lanes, ahead_m, offset_m })
+            let heading = heading(source, place)?;
+            Some(Position::RelativeLane { entity, lanes, ahead_m, offset_m, heading })
         }
         "WorldPosition" => {
             let (x_m, y_m) = (source.number(place, "x")?, source.number(place, "y")?);
@@ -37,9 +44,13 @@ pub fn position(source: &mut Source, parent: Node) -> Option<Position> {
     }
 }
 
-/// Whether an orientation points backwards along the road.
-fn turned(source: &mut Source, place: Node) -> Option<bool> {
-    let Some(orientation) = element(place, "Orientation") else { return Some(false) };
+fn heading(source: &mut Source, place: Node) -> Option<Heading> {
+    let Some(orientation) = element(place, "Orientation") else { return Some(Heading::Relative(0.0)) };
     let heading_rad = source.number_or(orientation, "h", 0.0)?;
-    Some(orientation.attribute("type") != Some("absolute") && libm::cos(heading_rad) < 0.0)
+    let is_relative = match source.word(orientation, "type", &["relative", "absolute"])? {
+        // What it is without the word has changed with 1.3.
+        "" => source.minor >= 3,
+        word => word == "relative",
+    };
+    Some(if is_relative { Heading::Relative(heading_rad) } else { Heading::Absolute(heading_rad) })
 }

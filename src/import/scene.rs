@@ -2,13 +2,14 @@
 
 use crate::emit::lane_point;
 use crate::geometry::Vec2;
+use crate::model::{SPAWN_DISTANCE_M, SPAWN_SPEED_MPS};
 use crate::road::RoadMap;
 
 use super::action::{Headway, Speed, Target};
 use super::body::Shape;
 use super::condition::Kinematics;
 use super::ground::{Beside, Ground};
-use super::position::Position;
+use super::position::{Heading, Position};
 use super::source::{Mark, Source};
 use super::story::{Change, Entity, Story};
 use super::weather::Weather;
@@ -67,6 +68,9 @@ impl Scene {
         let ground = Ground::of(source, &story, map)?;
         let (start, goal) = (lane_point(&ground.map, ground.start), lane_point(&ground.map, ground.goal));
         let ego_mps = speed(source, &story, &story.ego, 0)?;
+        if source.is_torn(&story.ego.name) {
+            return None;
+        }
         let mut scene = Scene {
             map: story.map.1.clone(),
             description: story.description.clone(),
@@ -95,7 +99,12 @@ impl Scene {
                 _ => true,
             };
             let Some(at) = left.iter().position(is_known) else {
-                for entity in left {
+                let is_torn = |entity: &&Entity| match &entity.position {
+                    Some((_, Position::RelativeLane { entity: of, .. })) => source.is_torn(of),
+                    _ => false,
+                };
+                let waiting = if left.iter().any(is_torn) { Vec::new() } else { left };
+                for entity in waiting {
                     let mark = entity.position.as_ref().map_or(&entity.mark, |(mark, _)| mark);
                     source.refuse_at::<()>(mark, "it is placed relative to something that has no place");
                 }
@@ -110,14 +119,17 @@ impl Scene {
                 source.refuse_at::<()>(&walk.mark, reason);
             }
             if is_walker {
-                scene.on_foot(source, &story, &ground, entity);
-            } else if let Some(found) = place(source, &story, &ground, entity, &placed) {
-                placed.push(found);
+                if !source.is_torn(&entity.name) {
+                    scene.on_foot(source, &story, &ground, entity);
+                }
+                continue;
             }
+            let found = source.about(&entity.name, |source| place(source, &story, &ground, entity, &placed));
+            placed.extend(found);
         }
         for other in &placed[1..] {
             let entity = story.others.iter().find(|entity| entity.name == other.name);
-            if let Some(entity) = entity {
+            if let Some(entity) = entity.filter(|entity| !source.is_torn(&entity.name)) {
                 scene.vehicle(source, &ground, entity, other, &placed);
             }
         }
@@ -143,6 +155,9 @@ impl Scene {
             None => own_back_m - front_m,
         };
         let behind_m = back_m - own_front_m;
+        if let Some((mark, _)) = entity.headway.as_ref().filter(|_| behind_m >= 0.0) {
+            return source.refuse_at(mark, "a distance to the ego vehicle is read of a vehicle ahead of it");
+        }
         let mut spawn = Other {
             name: entity.name.clone(),
             shape: shape.clone(),
@@ -154,9 +169,6 @@ impl Scene {
             speed_mps: *mps,
             changes: false,
         };
-        if *mps < 0.0 {
-            return source.refuse_at(mark, "no vehicle drives backwards");
-        }
         if !beside.is_along {
             if ahead_m < 0.0 {
                 return source.refuse_at(mark, "an oncoming vehicle is ahead of the ego vehicle");
@@ -165,8 +177,7 @@ impl Scene {
             if let Some(change) = entity.changes.first() {
                 return source.refuse_at(&change.mark, "an oncoming vehicle keeps its lane");
             }
-            self.others.push(spawn);
-            return Some(());
+            return self.appears(source, mark, spawn);
         }
         spawn.lane = Some(match beside.lanes_left {
             0 => "Current",
@@ -198,6 +209,16 @@ impl Scene {
         if let Some(change) = entity.changes.first() {
             spawn.changes = self.lane_change(source, ground, change, other, placed)?;
         }
+        self.appears(source, mark, spawn)
+    }
+
+    /// Adds a road user that appears at the place of a mark.
+    fn appears(&mut self, source: &mut Source, mark: &Mark, spawn: Other) -> Option<()> {
+        if !SPAWN_DISTANCE_M.contains(&spawn.gap_m) {
+            let far_m = SPAWN_DISTANCE_M.end();
+            let reason = format!("it begins {:.0} m away: nothing appears beyond {far_m} m", spawn.gap_m);
+            return source.refuse_at(mark, reason);
+        }
         self.others.push(spawn);
         Some(())
     }
@@ -216,14 +237,20 @@ impl Scene {
         let to = match &change.to {
             Target::Beside(name, lanes) => match placed.iter().find(|other| other.name == *name) {
                 Some(of) => of.beside.lanes_left + lanes,
+                None if source.is_torn(name) => return None,
                 None => return source.refuse_at(mark, format!("`{name}` is no vehicle with a place")),
             },
             Target::Lane(lane) => {
                 let here = ground.route.lane_at(other.beside.station_m.max(0.0)).lane;
                 let key = &ground.map.lane(here).key;
                 let s_m = ground.map.lane(here).road_station_m(ground.map.lane(here).centre.length_m() / 2.0);
-                let position =
-                    Position::Lane { road: key.road.clone(), lane: *lane, s_m, offset_m: 0.0, turned: false };
+                let position = Position::Lane {
+                    road: key.road.clone(),
+                    lane: *lane,
+                    s_m,
+                    offset_m: 0.0,
+                    heading: Heading::Relative(0.0),
+                };
                 ground.beside(source, mark, &position)?.lanes_left
             }
         };
@@ -296,8 +323,7 @@ impl Scene {
             if spawn.gap_m < 0.0 {
                 return source.refuse_at(mark, "it is not ahead of the ego vehicle");
             }
-            self.others.push(spawn);
-            return Some(());
+            return self.appears(source, mark, spawn);
         };
         let mut way = Vec::new();
         for (mark, position) in &walk.way {
@@ -343,8 +369,7 @@ impl Scene {
             self.once = Some(format!("ego.route_left <= {left_m:.2} m"));
             spawn.gap_m = near_m;
         }
-        self.others.push(spawn);
-        Some(())
+        self.appears(source, mark, spawn)
     }
 }
 
@@ -378,10 +403,13 @@ fn place(
     placed: &[Placed],
 ) -> Option<Placed> {
     let Some((mark, position)) = &entity.position else {
+        if source.is_torn(&entity.name) {
+            return None;
+        }
         return source.refuse_at(&entity.mark, "the file does not say where it begins");
     };
     let beside = match position {
-        Position::RelativeLane { entity: of, lanes, ahead_m, offset_m } => {
+        Position::RelativeLane { entity: of, lanes, ahead_m, offset_m, heading } => {
             let of = placed.iter().find(|other| other.name == *of)?;
             if !of.beside.is_along {
                 return source.refuse_at(mark, "a place relative to an oncoming vehicle is not read");
@@ -391,9 +419,10 @@ fn place(
             if station_m >= ground.route.path.length_m() {
                 return source.refuse_at(mark, "it lies beyond the end of the ego vehicle's way");
             }
+            ground.faces_on(source, mark, station_m, *heading)?;
             Beside { station_m, lanes_left, is_along: true, offset_m: *offset_m }
         }
-        _ => ground.beside(source, mark, position)?,
+        _ => ground.vehicle(source, mark, position)?,
     };
     if beside.offset_m.abs() > OFFSET_M_MAX {
         let reason =
@@ -417,6 +446,13 @@ fn speed(source: &mut Source, story: &Story, entity: &Entity, depth: usize) -> O
             Speed::More(name, more_mps) => speed_of(source, story, &paced.mark, name, depth)? + more_mps,
             Speed::Times(name, factor) => speed_of(source, story, &paced.mark, name, depth)? * factor,
         };
+        if wanted > *SPAWN_SPEED_MPS.end() {
+            let reason = format!("{wanted:.1} m/s: nothing is faster than {} m/s", SPAWN_SPEED_MPS.end());
+            return source.refuse_at(&paced.mark, reason);
+        }
+        if wanted < 0.0 {
+            return source.refuse_at(&paced.mark, "no vehicle drives backwards");
+        }
         let at_begin = paced.when.is_empty() || paced.when.iter().any(|all| condition::is_always(all));
         if at_begin && paced.at_once {
             mps = wanted;
@@ -432,6 +468,7 @@ fn speed_of(source: &mut Source, story: &Story, mark: &Mark, name: &str, depth: 
     let mut everyone = core::iter::once(&story.ego).chain(&story.others);
     match everyone.find(|entity| entity.name == name) {
         Some(entity) => speed(source, story, entity, depth + 1),
+        None if source.is_torn(name) => None,
         None => source.refuse_at(mark, format!("no entity is called `{name}`")),
     }
 }

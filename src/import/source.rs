@@ -1,4 +1,6 @@
 //! Elements of an OpenSCENARIO file with their parameters filled in, and what is refused of them.
+//!
+//! A reader that ends with `None` has refused something, so nobody refuses again what follows from it.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -6,6 +8,7 @@ use roxmltree::Node;
 
 use super::Refusal;
 use super::expression;
+use super::parameter;
 
 /// More refusals help nobody.
 const REFUSALS_MAX: usize = 100;
@@ -25,7 +28,13 @@ pub struct Mark {
 pub struct Source {
     /// Where each line of the text begins.
     lines: Vec<usize>,
+    /// The minor version of the file; 2 of 1.2.
+    pub minor: i32,
     parameters: BTreeMap<String, String>,
+    /// Parameters and entities of which something was refused: what follows from that is not told again.
+    torn: BTreeSet<String>,
+    /// How often something was refused, or would have been were it not told already.
+    told: usize,
     /// Values that were asked for in place of those of the file, and whether a declaration has taken them.
     asked: BTreeMap<String, (String, bool)>,
     refused: BTreeSet<Refusal>,
@@ -37,7 +46,10 @@ impl Source {
         let after_breaks = text.bytes().enumerate().filter(|(_, byte)| *byte == b'\n').map(|(at, _)| at + 1);
         Source {
             lines: core::iter::once(0).chain(after_breaks).collect(),
+            minor: 0,
             parameters: BTreeMap::new(),
+            torn: BTreeSet::new(),
+            told: 0,
             asked: asked.iter().map(|(name, value)| (name.clone(), (value.clone(), false))).collect(),
             refused: BTreeSet::new(),
             notes: BTreeSet::new(),
@@ -83,7 +95,28 @@ impl Source {
         self.refuse_at(&mark, reason)
     }
 
+    /// Does something for an entity; if anything is refused meanwhile, what follows from that is not told again.
+    pub fn about<T>(&mut self, entity: &str, act: impl FnOnce(&mut Source) -> Option<T>) -> Option<T> {
+        let before = self.told;
+        let done = act(self);
+        if self.told > before {
+            self.tear(entity);
+        }
+        done
+    }
+
+    /// Notes that something of an entity was refused.
+    pub fn tear(&mut self, entity: &str) {
+        self.torn.insert(entity.to_owned());
+    }
+
+    /// Whether something of an entity was refused, so that it need not be what the file says.
+    pub fn is_torn(&self, entity: &str) -> bool {
+        self.torn.contains(entity)
+    }
+
     pub fn refuse_at<T>(&mut self, mark: &Mark, reason: impl Into<String>) -> Option<T> {
+        self.told += 1;
         if self.refused.len() < REFUSALS_MAX {
             let reason = reason.into();
             self.refused.insert(Refusal { line: mark.line, element: mark.element.clone(), reason });
@@ -106,9 +139,13 @@ impl Source {
                     }
                     None => self.text(declared, "value"),
                 };
-                if let Some(value) = value {
-                    self.parameters.insert(name.to_owned(), value);
-                }
+                let Some(value) = value else {
+                    self.torn.insert(format!("${name}"));
+                    continue;
+                };
+                // A value out of its bounds is read on: what else is wrong with the file does not follow from it.
+                parameter::check(self, declared, &value);
+                self.parameters.insert(name.to_owned(), value);
             }
         }
     }
@@ -186,6 +223,11 @@ impl Source {
 
     /// A value with its parameters filled in.
     fn filled(&mut self, node: Node, value: &str) -> Option<String> {
+        let names = value.split(|letter: char| !(letter.is_alphanumeric() || "_.$".contains(letter)));
+        if names.filter(|word| word.starts_with('$')).any(|word| self.torn.contains(word)) {
+            self.told += 1;
+            return None;
+        }
         filled(value, &self.parameters).map_or_else(|reason| self.refuse(node, reason), Some)
     }
 }

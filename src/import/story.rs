@@ -9,7 +9,11 @@ use super::body::{Shape, body};
 use super::position::Position;
 use super::source::{Mark, Source, children, element, elements};
 use super::trigger::{Trigger, both, is_less, trigger};
+use super::vocabulary;
 use super::weather::{Weather, weather};
+
+/// The latest minor version that is read.
+const MINOR_MAX: i32 = 3;
 
 /// How long a scenario is played that names no time for its end, s.
 const DURATION_S: f64 = 60.0;
@@ -71,14 +75,16 @@ pub fn read(source: &mut Source, document: &Document, ego: Option<&str>, files: 
         return source.refuse(root, "the root element of a scenario is `OpenSCENARIO`");
     }
     let header = source.required(root, "FileHeader")?;
-    if source.integer(header, "revMajor")? != 1 {
-        return source.refuse(header, "OpenSCENARIO XML of version 1 is read");
+    source.minor = source.integer(header, "revMinor")?;
+    if source.integer(header, "revMajor")? != 1 || !(0..=MINOR_MAX).contains(&source.minor) {
+        return source.refuse(header, format!("OpenSCENARIO XML of 1.0 to 1.{MINOR_MAX} is read"));
     }
     if let Some(other) = children(root)
         .find(|child| matches!(child.tag_name().name(), "Catalog" | "ParameterValueDistribution"))
     {
         return source.refuse(other, "this is no scenario; give the file of one that uses it");
     }
+    vocabulary::refuse_unknown(source, root);
     source.declare(root);
     let network = source.required(root, "RoadNetwork")?;
     let logic = source.required(network, "LogicFile")?;
@@ -126,15 +132,19 @@ struct Cast {
 
 impl Cast {
     fn of(source: &mut Source, root: Node, mut entities: Vec<Entity>, ego: Option<&str>) -> Option<Cast> {
-        let is_ego = |entity: &Entity| match ego {
-            Some(name) => entity.name == name,
-            None => {
-                matches!(entity.name.to_lowercase().as_str(), "ego" | "hero" | "egovehicle" | "ego_vehicle")
-            }
+        let is_ego = |name: &str| match ego {
+            Some(ego) => name == ego,
+            None => matches!(name.to_lowercase().as_str(), "ego" | "hero" | "egovehicle" | "ego_vehicle"),
         };
-        let found = entities.iter().position(is_ego);
-        let found = found.or((ego.is_none() && entities.len() == 1).then_some(0));
+        let listed: Vec<&str> =
+            elements(root, "Entities").flat_map(children).filter_map(|node| node.attribute("name")).collect();
+        let found = entities.iter().position(|entity| is_ego(&entity.name));
+        let found = found.or((ego.is_none() && listed.len() == 1 && entities.len() == 1).then_some(0));
         let Some(at) = found else {
+            let mut torn = listed.iter().filter(|name| source.is_torn(name));
+            if torn.any(|name| is_ego(name) || entities.is_empty()) {
+                return None;
+            }
             let names: Vec<String> = entities.iter().map(|entity| format!("`{}`", entity.name)).collect();
             if names.is_empty() {
                 return source.refuse(root, "no entity can be read");
@@ -160,6 +170,9 @@ impl Cast {
         let Some(name) = source.text(private, "entityRef") else { return };
         let is_ego = self.is_ego(&name);
         if !is_ego && self.other(&name).is_none() {
+            if !source.is_torn(&name) {
+                source.refuse::<()>(private, format!("no entity is called `{name}`"));
+            }
             return;
         }
         for action in elements(private, "PrivateAction").flat_map(children) {
@@ -170,7 +183,7 @@ impl Cast {
                 source.refuse::<()>(distance, "only a distance to the ego vehicle is read");
                 continue;
             }
-            let begun = begun(source, action, is_ego);
+            let begun = source.about(&name, |source| begun(source, action, is_ego));
             let entity = if is_ego { Some(&mut self.ego) } else { self.other(&name) };
             if let (Some(begun), Some(entity)) = (begun, entity) {
                 entity.begin(begun, Vec::new());
@@ -193,17 +206,22 @@ impl Cast {
                 source.refuse::<()>(actors, "who acts is named: those that a condition selects are not read");
                 continue;
             }
-            let mut names = Vec::new();
+            let (mut names, mut is_read) = (Vec::new(), true);
             for actor in elements(actors, "EntityRef") {
                 let Some(name) = source.text(actor, "entityRef") else { continue };
                 if !self.is_ego(&name) && self.other(&name).is_none() {
-                    source.refuse::<()>(actor, format!("no entity is called `{name}`"));
+                    if !source.is_torn(&name) {
+                        source.refuse::<()>(actor, format!("no entity is called `{name}`"));
+                    }
+                    is_read = false;
                     continue;
                 }
                 names.push(name);
             }
             if names.is_empty() {
-                source.refuse::<()>(actors, "it names nobody who acts");
+                if is_read {
+                    source.refuse::<()>(actors, "it names nobody who acts");
+                }
                 continue;
             }
             for manoeuvre in elements(group, "Maneuver") {
@@ -235,21 +253,27 @@ impl Cast {
     ) {
         // What an action asks for is told even where its trigger is refused.
         let when = trigger(source, event).zip(begins).map(|(event, act)| both(&act, &event));
+        if when.is_none() {
+            actors.iter().for_each(|name| source.tear(name));
+        }
         for action in actions {
             if !action.has_tag_name("PrivateAction") {
                 user_defined(source, *action);
                 continue;
             }
             for act in children(*action) {
-                let begun = begun(source, act, false);
-                let is_placing = matches!(begun, Some(Begun::Placed(..) | Begun::Headway(..)));
-                if is_placing {
-                    source.refuse::<()>(act, "nothing is placed anew in the story");
-                    continue;
-                }
                 for name in actors {
-                    if let (Some(begun), Some(when), Some(entity)) = (&begun, &when, self.other(name)) {
-                        entity.begin(begun.clone(), when.clone());
+                    let begun = source.about(name, |source| {
+                        let begun = begun(source, act, false);
+                        match begun {
+                            Some(Begun::Placed(..) | Begun::Headway(..)) => {
+                                source.refuse(act, "nothing is placed anew in the story")
+                            }
+                            _ => begun,
+                        }
+                    });
+                    if let (Some(begun), Some(when), Some(entity)) = (begun, &when, self.other(name)) {
+                        entity.begin(begun, when.clone());
                     }
                 }
             }
@@ -278,9 +302,8 @@ fn entities(source: &mut Source, root: Node, files: &dyn Files) -> Vec<Entity> {
             source.refuse::<()>(node, "groups of entities are not read");
             continue;
         }
-        let (Some(name), Some(body)) = (source.text(node, "name"), body(source, root, node, files)) else {
-            continue;
-        };
+        let Some(name) = source.text(node, "name") else { continue };
+        let Some(body) = source.about(&name, |source| body(source, root, node, files)) else { continue };
         found.push(Entity {
             name,
             mark: source.mark(node),

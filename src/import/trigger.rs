@@ -8,12 +8,28 @@ use super::source::{Mark, Source, children, element, elements};
 /// Conditions of a trigger. An act's and an event's are multiplied.
 const CONDITIONS_MAX: usize = 16;
 
+const STORYBOARD_ELEMENTS: [&str; 6] = ["story", "act", "maneuverGroup", "maneuver", "event", "action"];
+
+const STATES: [&str; 7] = [
+    "standbyState",
+    "startTransition",
+    "runningState",
+    "endTransition",
+    "stopTransition",
+    "skipTransition",
+    "completeState",
+];
+
+const ROUTING: [&str; 5] = ["assignedRoute", "fastest", "leastIntersections", "shortest", "undefined"];
+
 /// Groups, of which one must hold; in a group all conditions must.
 pub type Trigger = Vec<Vec<Condition>>;
 
 #[derive(Debug, Clone)]
 pub struct Condition {
     pub mark: Mark,
+    /// It asks for what begins to hold.
+    pub is_rising: bool,
     pub kind: When,
 }
 
@@ -43,7 +59,7 @@ pub struct Pair {
     pub is_free_space: bool,
 }
 
-/// The conditions of a start trigger; without one it holds at once. `None` if one is refused.
+/// The conditions of a start trigger; without one, and of an empty one as players read it, it holds at once. `None` if one is refused.
 pub fn trigger(source: &mut Source, parent: Node) -> Option<Trigger> {
     let Some(trigger) = element(parent, "StartTrigger") else { return Some(Vec::new()) };
     if trigger.descendants().filter(|node| node.has_tag_name("Condition")).count() > CONDITIONS_MAX {
@@ -52,6 +68,7 @@ pub fn trigger(source: &mut Source, parent: Node) -> Option<Trigger> {
     let mut groups = Some(Vec::new());
     for group in elements(trigger, "ConditionGroup") {
         let mut all = Some(Vec::new());
+        source.required(group, "Condition")?;
         for node in elements(group, "Condition") {
             match condition(source, node) {
                 Some(found) => all.iter_mut().for_each(|all| all.push(found.clone())),
@@ -80,6 +97,7 @@ fn condition(source: &mut Source, node: Node) -> Option<Condition> {
         return source.refuse(node, "its `delay` is less than 0");
     }
     let edge = source.word(node, "conditionEdge", &["none", "rising", "falling", "risingOrFalling"])?;
+    let is_rising = edge == "rising";
     if edge.ends_with("alling") {
         return source.refuse(node, "only what begins to hold is read, not what ends");
     }
@@ -94,10 +112,10 @@ fn condition(source: &mut Source, node: Node) -> Option<Condition> {
                 if seconds + delay_s <= 0.0 { When::Always } else { When::After(seconds + delay_s) }
             }
             "StoryboardElementStateCondition" => {
-                let of = source.text(inner, "storyboardElementType")?;
-                let state = source.text(inner, "state")?;
-                let begins = matches!(state.as_str(), "startTransition" | "runningState");
-                if !(begins && matches!(of.as_str(), "act" | "story")) || delay_s > 0.0 {
+                let of = source.word(inner, "storyboardElementType", &STORYBOARD_ELEMENTS)?;
+                let state = source.word(inner, "state", &STATES)?;
+                let begins = matches!(state, "startTransition" | "runningState");
+                if !(begins && matches!(of, "act" | "story")) || delay_s > 0.0 {
                     let reason = "an event does not wait for another: what ends when is up to the drivers";
                     return source.refuse(inner, reason);
                 }
@@ -105,10 +123,11 @@ fn condition(source: &mut Source, node: Node) -> Option<Condition> {
             }
             _ => return source.refuse(inner, "this condition is not read"),
         };
-        return Some(Condition { mark: source.mark(inner), kind });
+        return Some(Condition { mark: source.mark(inner), is_rising, kind });
     }
     let by_entity = source.required(node, "ByEntityCondition")?;
     let list = source.required(by_entity, "TriggeringEntities")?;
+    source.word(list, "triggeringEntitiesRule", &["any", "all"])?;
     let mut names = Vec::new();
     for entity in elements(list, "EntityRef") {
         names.push(source.text(entity, "entityRef")?);
@@ -125,19 +144,15 @@ fn condition(source: &mut Source, node: Node) -> Option<Condition> {
     }
     let kind = match inner.tag_name().name() {
         "TimeHeadwayCondition" => {
-            if inner.attribute("relativeDistanceType") == Some("lateral") {
-                return source.refuse(inner, "lateral distances are not read");
-            }
+            frame(source, inner)?;
             When::Headway { pair: pair(source, inner, of)?, seconds: source.amount(inner, "value")? }
         }
         "RelativeDistanceCondition" => {
-            let kinds = ["longitudinal", "lateral", "cartesianDistance", "euclidianDistance"];
-            if source.word(inner, "relativeDistanceType", &kinds)? == "lateral" {
-                return source.refuse(inner, "lateral distances are not read");
-            }
+            frame(source, inner)?;
             When::Distance { pair: pair(source, inner, of)?, metres: source.amount(inner, "value")? }
         }
         "TimeToCollisionCondition" => {
+            frame(source, inner)?;
             let target =
                 element(inner, "TimeToCollisionConditionTarget").and_then(|node| element(node, "EntityRef"));
             let Some(target) = target else { return source.refuse(inner, "the target is an entity") };
@@ -157,7 +172,19 @@ fn condition(source: &mut Source, node: Node) -> Option<Condition> {
         }
         _ => return source.refuse(inner, "this condition is not read"),
     };
-    Some(Condition { mark: source.mark(inner), kind })
+    Some(Condition { mark: source.mark(inner), is_rising, kind })
+}
+
+/// Refuses distances across the road, and words for what a distance counts along that no version has.
+fn frame(source: &mut Source, node: Node) -> Option<()> {
+    source.word(node, "coordinateSystem", &["entity", "lane", "road", "trajectory", "world"])?;
+    source.word(node, "routingAlgorithm", &ROUTING)?;
+    source.switch(node, "alongRoute", true)?;
+    let kinds = ["longitudinal", "lateral", "cartesianDistance", "euclidianDistance"];
+    if source.word(node, "relativeDistanceType", &kinds)? == "lateral" {
+        return source.refuse(node, "lateral distances are not read");
+    }
+    Some(())
 }
 
 fn pair(source: &mut Source, node: Node, of: &str) -> Option<Pair> {

@@ -58,7 +58,13 @@ pub fn weather(source: &mut Source, global: Node) -> Option<Weather> {
                 found.sky[1] = Some(level(|bound| sight_m >= SIGHT_M[bound]));
             }
             "RoadCondition" => found.sky[2] = wetness(source, node)?,
-            "TimeOfDay" => found.time = Some(time(source, node)?),
+            "TimeOfDay" => {
+                if source.switch(node, "animation", false)? {
+                    source.note("the time of day stands still");
+                }
+                found.time = Some(time(source, node)?);
+            }
+            "Sun" | "Wind" | "DomeImage" => source.note("sun, wind and clouds are not taken over"),
             _ => {}
         }
     }

@@ -83,6 +83,19 @@ impl Files for Kept {
     }
 }
 
+/// The minor version, the orientation of the ego vehicle at the beginning, and what becomes of it.
+const HEADINGS: [(&str, &str, &str); 9] = [
+    ("revMinor=\"2\"", r#"h="0" type="relative""#, "scenario case"),
+    ("revMinor=\"2\"", r#"h="3.14" type="relative""#, "against its lane"),
+    ("revMinor=\"2\"", r#"h="1.5" type="relative""#, "does not point along"),
+    ("revMinor=\"2\"", r#"h="0.5" type="relative""#, "vehicles begin along their lanes"),
+    ("revMinor=\"2\"", r#"h="-0.99" type="absolute""#, "scenario case"),
+    ("revMinor=\"2\"", r#"h="2.15" type="absolute""#, "against its lane"),
+    ("revMinor=\"2\"", r#"h="-0.99""#, "scenario case"),
+    ("revMinor=\"2\"", r#"h="0.5""#, "does not point along"),
+    ("revMinor=\"3\"", r#"h="0.5""#, "vehicles begin along their lanes"),
+];
+
 /// What becomes of `cut_in` and `walker` where one thing in them is another: a line of the scenario, or a refusal.
 #[test]
 fn conditions_and_words_are_read_or_refused() {
@@ -126,6 +139,14 @@ fn conditions_and_words_are_read_or_refused() {
             "npc.gap < (ego.speed - npc.speed) * 4.000 s",
         ),
         (
+            r#"<TimeToCollisionCondition value="6" freespace="true" rule="lessThan"><TimeToCollisionConditionTarget><EntityRef entityRef="Van"/></TimeToCollisionConditionTarget></TimeToCollisionCondition>"#,
+            "elapsed >= 0 s",
+        ),
+        (
+            r#"<ReachPositionCondition tolerance="2"><Position><LanePosition roadId="3" laneId="-2" s="11"/></Position></ReachPositionCondition>"#,
+            "elapsed >= 0 s",
+        ),
+        (
             r#"<ReachPositionCondition tolerance="2"><Position><LanePosition roadId="3" laneId="-2" s="60"/></Position></ReachPositionCondition>"#,
             "ego.route_left <= ",
         ),
@@ -133,8 +154,15 @@ fn conditions_and_words_are_read_or_refused() {
     for (condition, wanted) in conditions {
         let declared = r#"<ParameterDeclaration name="free" parameterType="boolean" value="true"/></ParameterDeclarations>"#;
         let text = format!("{}{condition}{}", &cut_in[..begin], &cut_in[end..]);
-        let found = import(&text.replacen("</ParameterDeclarations>", declared, 1));
-        assert!(found.contains(&format!("{begins}{wanted}")), "{condition}: {found}");
+        let text = text.replacen("</ParameterDeclarations>", declared, 1);
+        let found = import(&text);
+        if wanted == "elapsed >= 0 s" {
+            assert!(found.contains("`rising` never comes"), "{condition}: {found}");
+            let found = import(&text.replace("conditionEdge=\"rising\"", "conditionEdge=\"none\""));
+            assert!(found.contains(&format!("{begins}{wanted}")), "{condition}: {found}");
+        } else {
+            assert!(found.contains(&format!("{begins}{wanted}")), "{condition}: {found}");
+        }
     }
     let behind = cut_in.replace("${$gap + 10}", "-20").replace("value=\"-3\"", "value=\"3\"");
     let found = import(&behind.replace(&cut_in[begin..end], conditions[5].0));
@@ -158,7 +186,34 @@ fn conditions_and_words_are_read_or_refused() {
             "`delay` is less than 0",
         ),
         ("dynamicsShape=\"sinusoidal\"", "dynamicsShape=\"sudden\"", "it may be linear"),
-        ("width=\"1.8\"", "width=\"-1.8\"", "not above 0"),
+        ("width=\"1.8\"", "width=\"-1.8\"", "bodies have 0.3 to 3 m"),
+        ("length=\"4.6\"", "length=\"46\"", "bodies have 0.3 to 20 m"),
+        ("dynamicsDimension=\"time\"", "dynamicsDimension=\"days\"", "it may be time, distance, rate"),
+        ("triggeringEntitiesRule=\"any\"", "triggeringEntitiesRule=\"most\"", "it may be any, all"),
+        ("coordinateSystem=\"road\"", "coordinateSystem=\"street\"", "it may be entity, lane"),
+        ("parameterType=\"double\"", "parameterType=\"float\"", "it may be integer, int"),
+        ("parameterType=\"double\" value=\"12\"", "parameterType=\"int\" value=\"12.5\"", "is no `int`"),
+        (
+            "parameterType=\"double\" value=\"12\"",
+            "parameterType=\"boolean\" value=\"12\"",
+            "is no `boolean`",
+        ),
+        ("revMinor=\"2\"", "revMinor=\"7\"", "1.0 to 1.3 is read"),
+        ("<Maneuver name=", "<Manoeuvre/><Maneuver name=", "`ManeuverGroup` has no such element"),
+        ("<Init>", "<Init speed=\"3\">", "it has no attribute `speed`"),
+        ("<SpeedActionTarget>", "<SpeedActionTarget><Target/>", "`SpeedActionTarget` has no such element"),
+        (
+            "</SpeedAction></LongitudinalAction>",
+            "</SpeedAction><SpeedAction/></LongitudinalAction>",
+            "holds one element",
+        ),
+        ("<AbsoluteTargetSpeed value=\"${$ego_kmh / 3.6}\"/>", "", "it has no"),
+        ("<Private entityRef=\"Van\">", "<Private entityRef=\"Wan\">", "no entity is called `Wan`"),
+        ("<StopTrigger>", "<StopTrigger><ConditionGroup/>", "scenario case"),
+        ("</StartTrigger>", "<ConditionGroup/></StartTrigger>", "it has no `Condition`"),
+        ("value=\"36\"", "value=\"3600\"", "1000.0 m/s: nothing is faster than 70 m/s"),
+        ("value=\"36\"", "value=\"-36\"", "no vehicle drives backwards"),
+        ("ds=\"${$gap + 10}\"", "ds=\"1200\"", "beyond the end"),
         (
             "<Vehicle name=\"car\" vehicleCategory=\"car\">",
             "<Vehicle name=\"car\" vehicleCategory=\"car\"><Trailer/>",
@@ -174,6 +229,39 @@ fn conditions_and_words_are_read_or_refused() {
         assert!(cut_in.contains(old), "{old}");
         let found = import(&cut_in.replace(old, new));
         assert!(found.contains(wanted), "{new}: {found}");
+    }
+    // The road has a heading of -0.99 rad, and the lane its direction.
+    let headed = |minor: &str, orientation: &str| {
+        let place = format!("s=\"10\"><Orientation {orientation}/></LanePosition>");
+        import(&cut_in.replace("revMinor=\"2\"", minor).replace("s=\"10\"/>", &place))
+    };
+    for (minor, orientation, wanted) in HEADINGS {
+        let found = headed(minor, orientation);
+        assert!(found.contains(wanted), "{minor} {orientation}: {found}");
+    }
+    // Values out of all groups of constraints are refused; one group is enough.
+    let constrained = |groups: &str| {
+        let declared = "value=\"12\"/>";
+        import(&cut_in.replace(declared, &format!("value=\"12\">{groups}</ParameterDeclaration>")))
+    };
+    let low = r#"<ConstraintGroup><ValueConstraint rule="lessThan" value="9"/></ConstraintGroup>"#;
+    let high = r#"<ConstraintGroup><ValueConstraint rule="greaterOrEqual" value="12"/><ValueConstraint rule="notEqualTo" value="13"/></ConstraintGroup>"#;
+    let odd = r#"<ConstraintGroup><ValueConstraint rule="nearly" value="12"/></ConstraintGroup>"#;
+    assert!(constrained(low).contains("its constraints exclude the value `12`"));
+    assert!(constrained(&format!("{low}{high}")).contains("scenario case"));
+    assert!(constrained(odd).contains("`rule` is `nearly`"));
+
+    // A mistake is told once, whatever follows from it.
+    for (old, new) in [
+        ("value=\"12\"", ""),
+        ("vehicleCategory=\"car\"", "vehicleCategory=\"sledge\""),
+        ("entryName=\"van\"", "entryName=\"sledge\""),
+        ("ds=\"${$gap + 10}\"", "ds=\"far\""),
+        ("<LanePosition roadId=\"3\"", "<LanePosition roadId=\"none\""),
+    ] {
+        assert!(cut_in.contains(old), "{old}");
+        let found = import(&cut_in.replace(old, new));
+        assert_eq!(found.lines().count(), 1, "{new}: {found}");
     }
     for (weather, wanted) in [
         (

@@ -1,0 +1,187 @@
+//! The elements and attributes that a file may have (OpenSCENARIO XML 1.0 to 1.3): what is misspelt, or of a later version, is
+//! refused and not passed over.
+//!
+//! Only elements that are read have a row. Nothing within others is looked at: they are refused as a whole where they matter
+//! (an action that is not read), or say nothing of what is taken over (`Performance`, `License`).
+
+use roxmltree::Node;
+
+use super::source::{Source, children};
+
+/// One child of any name: its reader refuses what it does not read.
+const ONE: &str = "?";
+/// Children of any name, for the same reason.
+const ANY: &str = "*";
+
+/// An element, its attributes and its children.
+const ELEMENTS: &[(&str, &str, &str)] = &[
+    (
+        "OpenSCENARIO",
+        "",
+        "FileHeader ParameterDeclarations VariableDeclarations MonitorDeclarations CatalogLocations RoadNetwork Entities Storyboard",
+    ),
+    ("FileHeader", "author date description revMajor revMinor", "License Properties"),
+    ("ParameterDeclarations", "", "ParameterDeclaration"),
+    ("ParameterDeclaration", "name parameterType value", "ConstraintGroup"),
+    ("ConstraintGroup", "", "ValueConstraint"),
+    ("ValueConstraint", "rule value", ""),
+    ("VehicleCatalog", "", "Directory"),
+    ("PedestrianCatalog", "", "Directory"),
+    ("Directory", "path", ""),
+    ("RoadNetwork", "", "LogicFile SceneGraphFile TrafficSignals UsedArea"),
+    ("LogicFile", "filepath", ""),
+    ("Entities", "", ANY),
+    (
+        "ScenarioObject",
+        "name",
+        "CatalogReference Vehicle Pedestrian MiscObject ExternalObjectReference ObjectController",
+    ),
+    ("CatalogReference", "catalogName entryName", "ParameterAssignments"),
+    ("ParameterAssignments", "", "ParameterAssignment"),
+    ("ParameterAssignment", "parameterRef value", ""),
+    (
+        "Vehicle",
+        "name vehicleCategory mass model3d role",
+        "ParameterDeclarations BoundingBox Performance Axles Properties Trailer TrailerCoupler TrailerHitch",
+    ),
+    (
+        "Pedestrian",
+        "name pedestrianCategory mass model model3d role",
+        "ParameterDeclarations BoundingBox Properties",
+    ),
+    ("BoundingBox", "", "Center Dimensions"),
+    ("Center", "x y z", ""),
+    ("Dimensions", "height length width", ""),
+    ("Storyboard", "", "Init Story StopTrigger"),
+    ("Init", "", "Actions"),
+    ("Actions", "", ANY),
+    ("Private", "entityRef", "PrivateAction"),
+    ("PrivateAction", "", ONE),
+    ("TeleportAction", "", "Position"),
+    ("Position", "", ONE),
+    ("LanePosition", "roadId laneId s offset", "Orientation"),
+    ("RelativeLanePosition", "entityRef dLane ds dsLane offset", "Orientation"),
+    ("WorldPosition", "x y z h p r", ""),
+    ("Orientation", "h p r type", ""),
+    ("LongitudinalAction", "", ONE),
+    ("SpeedAction", "", "SpeedActionDynamics SpeedActionTarget"),
+    ("SpeedActionDynamics", "dynamicsShape dynamicsDimension value followingMode", ""),
+    ("SpeedActionTarget", "", "AbsoluteTargetSpeed RelativeTargetSpeed"),
+    ("AbsoluteTargetSpeed", "value", ""),
+    ("RelativeTargetSpeed", "entityRef value speedTargetValueType continuous", ""),
+    (
+        "LongitudinalDistanceAction",
+        "entityRef distance timeGap freespace continuous displacement coordinateSystem",
+        "DynamicConstraints",
+    ),
+    ("LateralAction", "", ONE),
+    ("LaneChangeAction", "targetLaneOffset", "LaneChangeActionDynamics LaneChangeTarget"),
+    ("LaneChangeActionDynamics", "dynamicsShape dynamicsDimension value followingMode", ""),
+    ("LaneChangeTarget", "", "AbsoluteTargetLane RelativeTargetLane"),
+    ("AbsoluteTargetLane", "value", ""),
+    ("RelativeTargetLane", "entityRef value", ""),
+    ("RoutingAction", "", ONE),
+    (
+        "FollowTrajectoryAction",
+        "initialDistanceOffset",
+        "Trajectory TrajectoryRef CatalogReference TimeReference TrajectoryFollowingMode",
+    ),
+    ("TrajectoryRef", "", "Trajectory CatalogReference"),
+    ("Trajectory", "name closed", "ParameterDeclarations Shape"),
+    ("Shape", "", ONE),
+    ("Polyline", "", "Vertex"),
+    ("Vertex", "time", "Position"),
+    ("TimeReference", "", "None Timing"),
+    ("Timing", "domainAbsoluteRelative offset scale", ""),
+    ("TrajectoryFollowingMode", "followingMode", ""),
+    ("AssignRouteAction", "", "Route CatalogReference"),
+    ("Route", "name closed", "ParameterDeclarations Waypoint"),
+    ("Waypoint", "routeStrategy", "Position"),
+    ("AcquirePositionAction", "", "Position"),
+    ("VisibilityAction", "graphics sensors traffic", "SensorReferenceSet"),
+    ("ControllerAction", "", "ActivateControllerAction AssignControllerAction OverrideControllerValueAction"),
+    (
+        "ActivateControllerAction",
+        "controllerRef objectControllerRef longitudinal lateral animation lighting",
+        "",
+    ),
+    ("GlobalAction", "", ONE),
+    ("EnvironmentAction", "", "Environment CatalogReference"),
+    ("Environment", "name", "ParameterDeclarations TimeOfDay Weather RoadCondition"),
+    ("TimeOfDay", "animation dateTime", ""),
+    (
+        "Weather",
+        "atmosphericPressure cloudState fractionalCloudCover temperature",
+        "Sun Fog Precipitation Wind DomeImage",
+    ),
+    ("Precipitation", "intensity precipitationIntensity precipitationType", ""),
+    ("Fog", "visualRange", "BoundingBox"),
+    ("RoadCondition", "frictionScaleFactor wetness", "Properties"),
+    ("Story", "name", "ParameterDeclarations Act"),
+    ("Act", "name", "ManeuverGroup StartTrigger StopTrigger"),
+    ("ManeuverGroup", "name maximumExecutionCount", "Actors CatalogReference Maneuver"),
+    ("Actors", "selectTriggeringEntities", "EntityRef"),
+    ("EntityRef", "entityRef", ""),
+    ("Maneuver", "name", "ParameterDeclarations Event"),
+    ("Event", "name priority maximumExecutionCount", "Action StartTrigger"),
+    ("Action", "name", ONE),
+    ("StartTrigger", "", "ConditionGroup"),
+    ("StopTrigger", "", "ConditionGroup"),
+    ("ConditionGroup", "", "Condition"),
+    ("Condition", "name delay conditionEdge", "ByEntityCondition ByValueCondition"),
+    ("ByValueCondition", "", ONE),
+    ("SimulationTimeCondition", "value rule", ""),
+    ("StoryboardElementStateCondition", "storyboardElementType storyboardElementRef state", ""),
+    ("ByEntityCondition", "", "TriggeringEntities EntityCondition"),
+    ("TriggeringEntities", "triggeringEntitiesRule", "EntityRef"),
+    ("EntityCondition", "", ONE),
+    (
+        "TimeHeadwayCondition",
+        "entityRef value freespace rule alongRoute coordinateSystem relativeDistanceType routingAlgorithm",
+        "",
+    ),
+    (
+        "RelativeDistanceCondition",
+        "entityRef value freespace rule relativeDistanceType coordinateSystem routingAlgorithm",
+        "",
+    ),
+    (
+        "TimeToCollisionCondition",
+        "value freespace rule alongRoute coordinateSystem relativeDistanceType routingAlgorithm",
+        "TimeToCollisionConditionTarget",
+    ),
+    ("TimeToCollisionConditionTarget", "", "EntityRef Position"),
+    ("ReachPositionCondition", "tolerance", "Position"),
+];
+
+/// Refuses every element and attribute that no version has where it stands.
+pub fn refuse_unknown(source: &mut Source, root: Node) {
+    let mut waiting = vec![root];
+    while let Some(node) = waiting.pop() {
+        let name = node.tag_name().name();
+        let Some((_, attributes, known)) = ELEMENTS.iter().find(|(element, ..)| *element == name) else {
+            continue;
+        };
+        // Attributes of a namespace belong to the schema (`xsi:noNamespaceSchemaLocation`).
+        for attribute in node.attributes().filter(|attribute| attribute.namespace().is_none()) {
+            if !attributes.split(' ').any(|known| known == attribute.name()) {
+                source.refuse::<()>(node, format!("it has no attribute `{}`", attribute.name()));
+            }
+        }
+        if *known == ONE {
+            match (children(node).next(), children(node).nth(1)) {
+                (None, _) => source.refuse::<()>(node, "it is empty"),
+                (_, Some(second)) => source.refuse::<()>(second, format!("`{name}` holds one element")),
+                (Some(_), None) => None,
+            };
+        }
+        for child in children(node) {
+            let child_name = child.tag_name().name();
+            if [ONE, ANY].contains(known) || known.split(' ').any(|known| known == child_name) {
+                waiting.push(child);
+            } else {
+                source.refuse::<()>(child, format!("`{name}` has no such element"));
+            }
+        }
+    }
+}
