@@ -37,16 +37,16 @@ pub fn export(output: &Output, arguments: &ExportArguments) -> Result<(), Failur
         };
         let target = &targets[file];
         let written = write_all(arguments, &recording, target, &maps)?;
-        let left_out = match arguments.profile {
-            Some(ExportProfile::Carla) => export::dropped(&recording),
-            None => Vec::new(),
+        let left_out = match arguments.to {
+            ExportFormat::Openscenario => export::left_out(&recording, style(arguments)),
+            ExportFormat::Commonroad | ExportFormat::Csv => Vec::new(),
         };
         Ok(Exported { file: file.clone(), written: Ok(written), left_out })
     })?;
     let mut refuted = 0;
     for Exported { file, written, left_out } in &exported.done {
         if !left_out.is_empty() {
-            output.aside(&format!("{}: left out for CARLA: {}", file.display(), left_out.join("; ")));
+            output.aside(&format!("{}: left out: {}", file.display(), left_out.join("; ")));
         }
         match written {
             Ok(files) => output.tell(&format!("{}: {}", file.display(), files[0].display())),
@@ -154,19 +154,7 @@ fn write_all(
                 let _one_at_a_time = maps.lock().unwrap_or_else(PoisonError::into_inner);
                 copy_map(&recording.map_path, &map)?;
             }
-            let version = match (arguments.profile, arguments.osc_version) {
-                (Some(ExportProfile::Carla), _) => export::Version::Carla,
-                (None, None | Some(ExportVersion::V1_2)) => export::Version::V1_2,
-                (None, Some(ExportVersion::V1_3)) => export::Version::V1_3,
-            };
-            let ego = match arguments.ego {
-                None | Some(ExportEgo::Trajectory) => export::Ego::Trajectory,
-                Some(ExportEgo::Controller) => export::Ego::Controller,
-                Some(ExportEgo::None) => export::Ego::None,
-            };
-            let others = if arguments.natural { export::Others::Natural } else { export::Others::Exact };
-            let style = export::Style { version, ego, others };
-            write(target, &export::openscenario(recording, name, style))?;
+            write(target, &export::openscenario(recording, name, style(arguments)))?;
             Ok(vec![target.to_owned(), map])
         }
         ExportFormat::Commonroad => {
@@ -179,6 +167,22 @@ fn write_all(
             Ok(vec![target.to_owned()])
         }
     }
+}
+
+/// How an OpenSCENARIO file is to be.
+fn style(arguments: &ExportArguments) -> export::Style {
+    let version = match (arguments.profile, arguments.osc_version) {
+        (Some(ExportProfile::Carla), _) => export::Version::Carla,
+        (None, None | Some(ExportVersion::V1_2)) => export::Version::V1_2,
+        (None, Some(ExportVersion::V1_3)) => export::Version::V1_3,
+    };
+    let ego = match arguments.ego {
+        None | Some(ExportEgo::Trajectory) => export::Ego::Trajectory,
+        Some(ExportEgo::Controller) => export::Ego::Controller,
+        Some(ExportEgo::None) => export::Ego::None,
+    };
+    let others = if arguments.natural { export::Others::Natural } else { export::Others::Exact };
+    export::Style { version, ego, others }
 }
 
 /// What a file calls the map that lies beside it.

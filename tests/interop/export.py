@@ -233,9 +233,10 @@ def drifted(esmini, drifts):
         met_s, met = first_contact_s(users)
         others = [(name, time, away) for name, time, away in strays(path, table, users) if name != "ego"]
         names = {f"npc_{user}" for user in met}
+        end_s = max((time for _, time, _ in others), default=0.0)
         drifts[path.stem] = {
             "away": [away for _, time, away in others if met_s is None or time <= met_s],
-            "at_end": [away for _, time, away in others if time >= max(time for _, time, _ in others) - 1e-6],
+            "at_end": [away for _, time, away in others if time >= end_s - 1e-6],
             "at_contact": [away for name, time, away in others if name in names and abs(time - met_s) < STEP_S / 2],
             "collision": (met_s, names, hit),
         }

@@ -15,8 +15,7 @@ use super::Ego;
 use super::actions::{position, private, speed, teleport};
 use super::entity::{ahead_of_centre_m, bounding_box, build, vehicle_category};
 use super::environment::{sun, time};
-use super::natural::{self, BENEATH_M};
-use super::property;
+use super::{BENEATH_M, natural, property};
 
 /// Above this it sees no fog, below nothing but fog, m.
 const FOG_M: f64 = 1000.0;
@@ -60,7 +59,7 @@ pub fn entity(recording: &Recording, actor: &Actor) -> Element {
             .measured("mass", actor.shape.mass_t * 1000.0);
         return object.holding(pedestrian.holding(bounding_box(actor)).holding(properties));
     };
-    let facts = recording.facts.iter().cloned().chain([natural::caveat()]);
+    let facts = recording.facts.iter().cloned().chain([natural::caveat(&[])]);
     let facts = facts.filter(|_| actor.id == 0).map(|fact| property(&fact));
     let vehicle = Element::new("Vehicle").with("name", model).with("vehicleCategory", category);
     object.holding(vehicle.holding_all(build(actor)).holding(properties.holding_all(facts)))

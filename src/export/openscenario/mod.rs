@@ -22,18 +22,19 @@ use crate::sim::DT_S;
 
 use super::DATE;
 use super::recording::Recording;
-use super::vertices::vertices;
+use super::vertices::{close_ticks, vertices};
 use super::xml::Element;
 
 use actions::{
-    action, all, event_at, follow, from_time, lane_position, maneuver_group, of_entity, position, private,
-    speed, teleport,
+    action, all, beneath, event_at, follow, from_time, lane_position, maneuver_group, of_entity, position,
+    private, speed, teleport,
 };
 use entity::{ahead_of_centre_m, entity};
 use environment::{environment, signals};
 use natural::Natural;
 
-pub use carla::dropped;
+/// What must not be met is so far beneath its place, m.
+const BENEATH_M: f64 = 100.0;
 
 /// The standard's version.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -70,6 +71,27 @@ pub struct Style {
     pub version: Version,
     pub ego: Ego,
     pub others: Others,
+}
+
+/// What a file leaves out or says otherwise than its style promises.
+pub fn left_out(recording: &Recording, style: Style) -> Vec<String> {
+    match (style.version, exact(recording, style)) {
+        (Version::Carla, _) => carla::dropped(recording),
+        (_, exact) if exact.is_empty() => Vec::new(),
+        (_, exact) => vec![format!(
+            "actions of {}, which turn back onto the road that they come from: as recorded",
+            exact.join(", ")
+        )],
+    }
+}
+
+/// Others that are exact in a natural version.
+fn exact(recording: &Recording, style: Style) -> Vec<String> {
+    match (style.version, style.others) {
+        (Version::V1_2 | Version::V1_3, Others::Natural) => natural::exact(recording),
+        // ScenarioRunner plans a route over the points of its way.
+        _ => Vec::new(),
+    }
 }
 
 /// The file's text. `map_file` is the path of the map from it.
@@ -110,7 +132,7 @@ fn header(recording: &Recording, style: Style) -> Element {
     if style.version == Version::Carla {
         return header;
     }
-    let caveat = (style.others == Others::Natural).then(natural::caveat);
+    let caveat = (style.others == Others::Natural).then(|| natural::caveat(&exact(recording, style)));
     header
         .holding(Element::new("Properties").holding_all(recording.facts.iter().chain(&caveat).map(property)))
 }
@@ -124,13 +146,16 @@ fn storyboard(recording: &Recording, style: Style) -> Element {
     let version = style.version;
     let mut init = Vec::new();
     let mut groups = Vec::new();
+    let exact = exact(recording, style);
     for actor in recording.actors() {
         let (begins, events) = match (version, style.others) {
             (Version::Carla, _) if actor.id == 0 && style.ego != Ego::Trajectory => {
                 (carla::begins(recording, style.ego), Vec::new())
             }
             (Version::Carla, _) => natural(recording, actor, version),
-            (_, Others::Natural) if actor.id > 0 => natural(recording, actor, version),
+            (_, Others::Natural) if actor.id > 0 && !exact.contains(&actor.name()) => {
+                natural(recording, actor, version)
+            }
             _ => (begins(recording, actor, style.ego), events(recording, actor, style)),
         };
         init.extend(begins);
@@ -187,7 +212,7 @@ fn events(recording: &Recording, actor: &Actor, style: Style) -> Vec<Element> {
         return Vec::new();
     }
     let name = actor.name();
-    let way = vertices(actor, ahead_of_centre_m(actor));
+    let way = vertices(actor, ahead_of_centre_m(actor), &close_ticks(&recording.seen, actor));
     let first_s = actor.first_tick() as f64 * DT_S;
     let mut actions = Vec::new();
     if actor.first_tick() > 0 {
@@ -202,13 +227,26 @@ fn events(recording: &Recording, actor: &Actor, style: Style) -> Vec<Element> {
     if !actions.is_empty() {
         events.push(event_at(style.version, &format!("{name}_moves"), actions, first_s));
     }
-    if actor.last_tick() < recording.seen.end_tick {
-        let deleted = of_entity(&name, Element::new("DeleteEntityAction"));
-        let deleted = action(&format!("{name}_deleted"), deleted);
-        let gone_s = (actor.last_tick() + 1) as f64 * DT_S;
-        events.push(event_at(style.version, &format!("{name}_leaves"), vec![deleted], gone_s));
-    }
+    events.extend(leaves(recording.seen.end_tick, actor, style.version));
     events
+}
+
+/// A road user that leaves sinks out of sight in the tick after its last, and is deleted in the next: esmini prints an error
+/// where one that touches another is gone at once.
+fn leaves(end_tick: u64, actor: &Actor, version: Version) -> Vec<Element> {
+    let name = actor.name();
+    let last = actor.samples[actor.samples.len() - 1];
+    if last.tick >= end_tick {
+        return Vec::new();
+    }
+    let away = teleport(beneath(&last.pose, BENEATH_M));
+    let deleted = of_entity(&name, Element::new("DeleteEntityAction"));
+    let parts = [("leaves", "sinks", away), ("is_gone", "deleted", deleted)];
+    let event = |(ticks, (event, does, what)): (u64, (&str, &str, Element))| {
+        let from_s = (last.tick + ticks) as f64 * DT_S;
+        event_at(version, &format!("{name}_{event}"), vec![action(&format!("{name}_{does}"), what)], from_s)
+    };
+    (1..).zip(parts).map(event).collect()
 }
 
 /// Changes of weather and time of day after the start.
@@ -230,4 +268,28 @@ fn activation() -> Element {
 fn destination(recording: &Recording) -> Element {
     let position = lane_position(&recording.map, LanePlace { offset_m: 0.0, ..recording.goal });
     private(Element::new("RoutingAction").holding(Element::new("AcquirePositionAction").holding(position)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::episode::Sample;
+    use crate::geometry::{Pose, Vec2};
+
+    #[test]
+    fn a_road_user_sinks_a_tick_before_it_is_deleted_unless_it_stays() {
+        let mut actor = Actor::ego();
+        actor.id = 4;
+        let pose = Pose::new(3.0, 2.0, 1.0);
+        actor.samples.extend((10..=20).map(|tick| Sample { tick, pose, velocity_mps: Vec2::zeros() }));
+        assert!(leaves(20, &actor, Version::V1_2).is_empty(), "it is there to the end");
+        let [sinks, gone] = &leaves(50, &actor, Version::V1_2)[..] else { panic!("two events") };
+        let (sinks, gone) = (sinks.clone().document(), gone.clone().document());
+        for part in ["npc_4_leaves", "TeleportAction", "z=\"-100\"", "value=\"0.42\""] {
+            assert!(sinks.contains(part), "{part}: {sinks}");
+        }
+        for part in ["npc_4_is_gone", "DeleteEntityAction", "value=\"0.44\""] {
+            assert!(gone.contains(part), "{part}: {gone}");
+        }
+    }
 }

@@ -9,12 +9,11 @@ use core::fmt::Write as _;
 
 use crate::episode::Actor;
 use crate::geometry::{Pose, Vec2};
-use crate::road::LanePlace;
+use crate::road::{LaneIndex, LanePlace, RoadMap};
 use crate::sim::DT_S;
 
 use super::super::recording::Recording;
 use super::super::xml::Element;
-use super::Version;
 use super::actions::{
     action, after_event, beneath, change_lane, event, event_at, from_time, lane_position, of_entity,
     position, route, speed, speed_within, teleport, touched, walk, within,
@@ -22,6 +21,7 @@ use super::actions::{
 use super::entity::ahead_of_centre_m;
 use super::lanes::{Driven, STRIDE, driven};
 use super::pace::{Change, Pace, SPEED_MPS, WAY_M};
+use super::{BENEATH_M, Version, leaves};
 
 /// What moved less than this stands, m.
 const STANDS_M: f64 = 0.1;
@@ -37,9 +37,6 @@ const COMES_TICKS: usize = 25;
 /// A route ends this far before the end of its last lane, m.
 const END_M: f64 = 0.1;
 
-/// CARLA's ScenarioRunner makes everyone as the scenario begins: who comes later waits so far beneath its place, m.
-pub const BENEATH_M: f64 = 100.0;
-
 /// A road user in actions.
 pub struct Natural {
     version: Version,
@@ -51,8 +48,32 @@ pub struct Natural {
     events: Vec<Element>,
 }
 
-/// What the file says of itself.
-pub fn caveat() -> (String, String) {
+/// The others that follow their recorded ways in a natural version, too: they turn back onto the road that they come from. A
+/// player that knows its place on a route by the road (esmini does) takes another way at such a junction.
+pub fn exact(recording: &Recording) -> Vec<String> {
+    let exact = |actor: &&Actor| {
+        let way = driven(&recording.map, &poses(recording, actor)).filter(|_| actor.is_vehicle());
+        way.is_some_and(|way| turns_back(&recording.map, &way))
+    };
+    recording.seen.others.iter().filter(exact).map(Actor::name).collect()
+}
+
+/// Whether a way takes a turn that leads back to the road before it, and is not the only one there.
+fn turns_back(map: &RoadMap, way: &Driven) -> bool {
+    let road = |lane: &LaneIndex| map.lane(*lane).key.road.as_str();
+    way.places.windows(2).filter(|pair| pair[0].lane != pair[1].lane).any(|pair| {
+        let turn = map.lane(pair[1].lane);
+        let leads_back = |before: &LaneIndex| {
+            road(before) != turn.key.road
+                && map.lane(*before).successors.len() > 1
+                && turn.successors.iter().any(|after| road(after) == road(before))
+        };
+        turn.predecessors.iter().any(leads_back)
+    })
+}
+
+/// What the file says of itself; `exact` are those that follow their recorded ways.
+pub fn caveat(exact: &[String]) -> (String, String) {
     let mut text = String::from("an approximation that does not carry the proof of the claims: ");
     write!(
         text,
@@ -60,12 +81,14 @@ pub fn caveat() -> (String, String) {
     )
     .and_then(|()| write!(text, "recording as far as their actions alone decide"))
     .expect("memory takes everything");
+    if !exact.is_empty() {
+        text += &format!("; as recorded: {}", exact.join(", "));
+    }
     ("natural".to_owned(), text)
 }
 
 impl Natural {
     pub fn of(recording: &Recording, actor: &Actor, version: Version) -> Natural {
-        let name = actor.name();
         let poses = poses(recording, actor);
         let (pose, place) = (poses[0], position(&poses[0]));
         let mut natural = Natural { version, pose, place, from_the_first: Vec::new(), events: Vec::new() };
@@ -76,16 +99,7 @@ impl Natural {
             }
         }
         natural.events.extend(stop_where_hit(recording, actor));
-        if actor.last_tick() < recording.seen.end_tick {
-            let deleted = of_entity(&name, Element::new("DeleteEntityAction"));
-            let gone = vec![action(&format!("{name}_deleted"), deleted)];
-            natural.events.push(event_at(
-                version,
-                &format!("{name}_leaves"),
-                gone,
-                seconds(actor, actor.samples.len()),
-            ));
-        }
+        natural.events.extend(leaves(recording.seen.end_tick, actor, version));
         natural
     }
 
@@ -96,6 +110,7 @@ impl Natural {
             let begins = private.holding(teleport(self.place.clone()));
             return Some(begins.holding_all(self.from_the_first.iter().cloned()));
         }
+        // CARLA's ScenarioRunner makes everyone as the scenario begins.
         let waits = || private.holding(teleport(beneath(&self.pose, BENEATH_M)));
         (self.version == Version::Carla).then(waits)
     }
@@ -136,7 +151,7 @@ impl Natural {
             let turns = vec![action(&format!("{event}_taken"), route)];
             self.events.push(event_at(self.version, &format!("{event}_event"), turns, from_s));
         }
-        self.change_speeds(actor, &pace.changes);
+        self.change_speeds(actor, pace.first_mps, &pace.changes);
         for (number, change) in way.changes.iter().enumerate() {
             let event = format!("{name}_lane_change_{}", number + 1);
             let metres = way_m(poses, change.begin, change.length);
@@ -184,7 +199,7 @@ impl Natural {
                 to: change.to + begin,
                 ..*change
             });
-            self.change_speeds(actor, &later.collect::<Vec<_>>());
+            self.change_speeds(actor, first_mps, &later.collect::<Vec<_>>());
         } else if !changes.is_empty() || is_cut(recording, actor) {
             let stands = action(&format!("{name}_stands"), speed(0.0));
             let over = vec![after_event(&format!("{name}_is_there"), &event_name)];
@@ -192,11 +207,14 @@ impl Natural {
         }
     }
 
-    fn change_speeds(&mut self, actor: &Actor, changes: &[Change]) {
+    fn change_speeds(&mut self, actor: &Actor, first_mps: f64, changes: &[Change]) {
         let name = actor.name();
+        let mut before_mps = first_mps;
         for (number, change) in changes.iter().enumerate() {
             let action_name = format!("{name}_speed_{}", number + 2);
             let time_s = (change.to - change.from) as f64 * DT_S;
+            let time_s = brakes_for_s(actor, before_mps - change.target_mps, time_s);
+            before_mps = change.target_mps;
             let action = action(&action_name, speed_within(change.target_mps, time_s));
             let from_s = seconds(actor, change.from);
             self.events.push(event_at(self.version, &format!("{action_name}_event"), vec![action], from_s));
@@ -286,6 +304,12 @@ fn way_m(poses: &[Pose], begin: usize, length: usize) -> f64 {
     (seen_m * length as f64 / (seen.len() - 1).max(1) as f64).max(1.0)
 }
 
+/// The time for a loss of speed: none where it is more than brakes can do, and so a contact's doing. A player keeps to what
+/// the vehicle's brakes can do unless it is to happen at once.
+fn brakes_for_s(actor: &Actor, lost_mps: f64, time_s: f64) -> f64 {
+    if lost_mps > actor.shape.deceleration_mps2_max * time_s { 0.0 } else { time_s }
+}
+
 /// What the ego vehicle hits stops as it did then.
 fn stop_where_hit(recording: &Recording, actor: &Actor) -> Option<Element> {
     let name = actor.name();
@@ -294,7 +318,9 @@ fn stop_where_hit(recording: &Recording, actor: &Actor) -> Option<Element> {
     before.iter().any(|sample| sample.velocity_mps.norm() > SPEED_MPS).then_some(())?;
     let last_mps = after.last()?.velocity_mps.norm();
     let at_rest = after.iter().position(|sample| sample.velocity_mps.norm() <= last_mps).unwrap_or(0);
-    let slows = speed_within(if last_mps < SPEED_MPS { 0.0 } else { last_mps }, at_rest as f64 * DT_S);
+    let target_mps = if last_mps < SPEED_MPS { 0.0 } else { last_mps };
+    let lost_mps = before[before.len() - 1].velocity_mps.norm() - target_mps;
+    let slows = speed_within(target_mps, brakes_for_s(actor, lost_mps, at_rest as f64 * DT_S));
     let hit = vec![touched(&format!("{name}_is_hit"), &name, &recording.seen.ego.name())];
     Some(event(&format!("{name}_after_contact"), vec![action(&format!("{name}_slows"), slows)], hit))
 }
@@ -363,4 +389,28 @@ fn line(poses: &[Pose], is_cut: bool) -> Vec<Pose> {
         line.push(Pose { position: onward, ..last });
     }
     line
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The boulevard has a turn back from road 3 to itself over 104, beside one that leads on over 101.
+    #[test]
+    fn a_turn_back_to_the_same_road_is_seen() {
+        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/scenarios/roads/boulevard.xodr");
+        let text = std::fs::read_to_string(path).expect("the map is there");
+        let map = RoadMap::from_opendrive("boulevard", &text).expect("it is a map");
+        let way = |lanes: &[(&str, i32)]| Driven {
+            places: lanes
+                .iter()
+                .map(|(road, lane)| map.place(road, *lane, 1.0).expect("it is there"))
+                .collect(),
+            changes: Vec::new(),
+        };
+        assert!(turns_back(&map, &way(&[("3", -1), ("3", -1), ("104", -1), ("3", 2)])));
+        assert!(turns_back(&map, &way(&[("3", -1), ("104", -1)])), "it need not be over");
+        assert!(!turns_back(&map, &way(&[("104", -1), ("3", 2)])), "whoever begins in it has no choice");
+        assert!(!turns_back(&map, &way(&[("3", -1), ("101", -1), ("12", -1)])));
+    }
 }
