@@ -10,10 +10,12 @@
 //!    only the values that leave values to all later ones. The places where that may change come from polynomials
 //!    without the later numbers (`polynomial::project`).
 //!
-//! Both draw from the same values with the same shares: what forwards fails is drawn again by the second way.
+//! Both draw from the same values with the same shares: what forwards fails is drawn again by the second way. What that
+//! leaves after choices from lists is kept for further draws: there are few of them, and they come again.
 
 use std::borrow::Cow;
 use std::cell::Cell;
+use std::rc::Rc;
 
 use crate::model::eval::{Facts, WorldFacts, evaluate};
 use crate::model::expr::{Comparison, ExprKind};
@@ -113,6 +115,7 @@ impl<'a> RowRules<'a> {
             values: given.clone(),
             given,
             places: Vec::new(),
+            leading_on: Vec::new(),
             order: self.order(open),
             is_exact: Cell::new(true),
         };
@@ -169,6 +172,7 @@ pub(crate) struct Solver<'a> {
     order: Vec<usize>,
     /// By place of the order.
     places: Vec<Place>,
+    leading_on: Vec<LeadingOn>,
     /// Of all parameters; some value of their type for those to choose.
     given: Vec<Value>,
     /// Of all parameters. Those that are not chosen yet have some value of their type.
@@ -177,8 +181,10 @@ pub(crate) struct Solver<'a> {
     is_exact: Cell<bool>,
 }
 
-/// How one parameter is chosen forwards.
+/// How one parameter is chosen.
 struct Place {
+    /// Whether any clause needs it.
+    is_asked: bool,
     /// The clauses that it decides, together with earlier parameters alone.
     decided: Vec<usize>,
     /// Whether one of them needs an earlier choice.
@@ -192,6 +198,15 @@ struct Left {
     choices: Choices,
     /// The clause that the last broken try broke.
     blamed: Option<usize>,
+    is_exact: bool,
+}
+
+/// The values of a parameter that leave values to all later ones, after these choices.
+struct LeadingOn {
+    place: usize,
+    /// Of those earlier parameters that a clause needs.
+    after: Vec<Value>,
+    choices: Rc<Choices>,
     is_exact: bool,
 }
 
@@ -224,10 +239,11 @@ impl<'a> Solver<'a> {
     }
 
     fn place(&self, place: usize) -> Place {
+        let is_asked = self.rules.clauses().any(|clause| self.clause(clause).needs(self.order[place]));
         let decided: Vec<usize> = self.decided_by(place).collect();
         let earlier = &self.order[..place];
         let depends = decided.iter().any(|clause| self.clause(*clause).needs_any(earlier));
-        Place { decided, depends, kept: None }
+        Place { is_asked, decided, depends, kept: None }
     }
 
     fn action(&self) -> &'a ActionDef {
@@ -356,20 +372,7 @@ impl<'a> Solver<'a> {
     fn backwards(&mut self, choose: &mut dyn Choose, forwards: Unsolved) -> Result<Vec<Value>, Unsolved> {
         for place in 0..self.order.len() {
             let local = self.order[place];
-            let chosen = match &self.action().parameters[local].domain {
-                Domain::Values(values) => {
-                    let left: Vec<Value> =
-                        values.iter().copied().filter(|value| self.leads_on(place, *value)).collect();
-                    (!left.is_empty()).then(|| choose.value(local, &left))
-                }
-                Domain::Range(low, high) => {
-                    let changes = self.changes(place);
-                    let room = Room::where_holds(low.to_f64(), high.to_f64(), changes, |number| {
-                        self.leads_on(place, Value::Number(number))
-                    });
-                    choose.number(local, &room).map(Value::Number)
-                }
-            };
+            let chosen = self.leading_on(place).choose(local, choose);
             let Some(value) = chosen else {
                 // Only rounding can leave a later parameter nothing.
                 let is_proved = place == 0 && self.is_exact.get() && self.before.tries.get() > 0;
@@ -378,6 +381,51 @@ impl<'a> Solver<'a> {
             self.values[local] = value;
         }
         Ok(self.values.clone())
+    }
+
+    /// What leaves values to all later parameters.
+    fn leading_on(&mut self, place: usize) -> Rc<Choices> {
+        let after = self.listed_before(place);
+        let mut known = self.leading_on.iter().filter(|known| known.place == place);
+        if let Some(known) = known.find(|known| Some(&known.after) == after.as_ref()) {
+            self.is_exact.set(self.is_exact.get() && known.is_exact);
+            return Rc::clone(&known.choices);
+        }
+        let was_exact = self.is_exact.replace(true);
+        let choices = Rc::new(match &self.action().parameters[self.order[place]].domain {
+            Domain::Values(values) if !self.places[place].is_asked => {
+                let leads_on = values.first().is_some_and(|value| self.leads_on(place, *value));
+                Choices::Values(if leads_on { values.clone() } else { Vec::new() })
+            }
+            Domain::Values(values) => {
+                Choices::Values(values.iter().copied().filter(|value| self.leads_on(place, *value)).collect())
+            }
+            Domain::Range(low, high) => {
+                let changes = self.changes(place);
+                Choices::Numbers(Room::where_holds(low.to_f64(), high.to_f64(), changes, |number| {
+                    self.leads_on(place, Value::Number(number))
+                }))
+            }
+        });
+        let is_exact = self.is_exact.get();
+        self.is_exact.set(was_exact && is_exact);
+        // What ran out of tries may leave more another time.
+        if let Some(after) = after.filter(|_| self.before.tries.get() > 0) {
+            let choices = Rc::clone(&choices);
+            self.leading_on.push(LeadingOn { place, after, choices, is_exact });
+        }
+        choices
+    }
+
+    /// The choices before this place of the order that a clause needs; `None` if a number is among them.
+    fn listed_before(&self, place: usize) -> Option<Vec<Value>> {
+        let asked = (0..place).filter(|earlier| self.places[*earlier].is_asked);
+        let listed = asked.map(|earlier| {
+            let local = self.order[earlier];
+            let is_list = matches!(self.action().parameters[local].domain, Domain::Values(_));
+            is_list.then_some(self.values[local])
+        });
+        listed.collect()
     }
 
     /// Whether this value of the parameter at the place, after the values before it, can be completed.
@@ -391,7 +439,11 @@ impl<'a> Solver<'a> {
     fn can_go_on(&mut self, place: usize) -> bool {
         let Some(local) = self.order.get(place) else { return true };
         match &self.action().parameters[*local].domain {
-            Domain::Values(values) => values.iter().any(|value| self.leads_on(place, *value)),
+            Domain::Values(values) => {
+                // What no clause needs leads on with any value or with none.
+                let tried = if self.places[place].is_asked { values.len() } else { 1 };
+                values.iter().take(tried).any(|value| self.leads_on(place, *value))
+            }
             Domain::Range(low, high) => {
                 let changes = self.changes(place);
                 let mut is_found = false;
