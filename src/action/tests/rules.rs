@@ -1,6 +1,13 @@
+use std::cell::Cell;
+use std::path::Path;
+
 use super::{Plain, table, value_of};
 use crate::action::{Offer, Situation};
-use crate::model::RulesInForce;
+use crate::check::{ReadError, load};
+use crate::model::rules::{Before, Choose, Room, RowRules, TRIES_MAX};
+use crate::model::{RulesInForce, Value, locals};
+use crate::rng;
+use crate::rng::{Rng, Stream};
 
 #[test]
 fn draws_are_short_and_independent_of_each_other() {
@@ -64,4 +71,53 @@ fn a_first_draw_lies_where_its_shares_say() {
     // What is left out is drawn by chance, and so is all of it without shares.
     assert_eq!(drawn(&[0.5, 0.9]).0, far);
     assert_eq!(table.offers_at(&situation, &[]), table.offers(&situation));
+}
+
+struct ByChance(Rng);
+
+impl Choose for ByChance {
+    fn value(&mut self, _: usize, left: &[Value]) -> Value {
+        left[rng::below(&mut self.0, left.len() as u32) as usize]
+    }
+
+    fn number(&mut self, _: usize, room: &Room) -> Option<f64> {
+        room.at(rng::unit(&mut self.0))
+    }
+}
+
+/// What is kept from one solution for the next changes none. Here large vehicles have no distance: every third draw meets
+/// one and is made again backwards.
+#[test]
+fn a_solver_used_again_draws_what_a_new_one_draws() {
+    let scenarios = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios");
+    let root = scenarios.join("avastra45.ava");
+    let read = |path: &Path| {
+        let text = std::fs::read_to_string(path).map_err(|error| ReadError(error.to_string()))?;
+        Ok(text.replace("let weight_size = 1.0", "let weight_size = 128.0"))
+    };
+    let space = load(&root, &read).expect("it can be read").space.expect("it is sound");
+    let (memory, rules, road) = (space.initial_memory(3), RulesInForce::by_default(&space), &space.roads[0]);
+    let (mut draws, mut again, mut anew) = (0, 0, 0);
+    for row in &space.rows {
+        let action = &space.actions[row.action];
+        let parameters = action.parameters.iter().enumerate();
+        let open: Vec<usize> = parameters.filter(|(_, p)| !p.axis).map(|(local, _)| local).collect();
+        let row_rules = RowRules { space: &space, row, road: Some(&road.facts), in_force: &rules };
+        let given = locals(action, row, &[]);
+        let (kept_tries, new_tries) = (Cell::new(TRIES_MAX), Cell::new(TRIES_MAX));
+        let before = |tries| Before { memory: &memory, world: None, tries };
+        let Ok(mut kept) = row_rules.solver(given.clone(), &open, before(&kept_tries)) else { continue };
+        for draw in 0..24 {
+            kept_tries.set(TRIES_MAX);
+            new_tries.set(TRIES_MAX);
+            let chance = || ByChance(rng::stream(draw, Stream::Draw, row.index as u64));
+            let found = kept.solve(&mut chance()).ok();
+            let wanted = row_rules.solve(given.clone(), &open, before(&new_tries), &mut chance()).ok();
+            assert_eq!(found, wanted, "{}", row.label);
+            draws += usize::from(found.is_some());
+            again += TRIES_MAX - kept_tries.get();
+            anew += TRIES_MAX - new_tries.get();
+        }
+    }
+    assert!(draws > 500 && again * 2 < anew, "{draws} draws, {again} tries and {anew}");
 }
