@@ -84,8 +84,9 @@ fn merged(command: &[&str], kind: &str, order: &[u32]) -> tempfile::TempDir {
     directories.reverse();
     directories.extend([directories[0].clone(), at("merged")]);
     for out in ["merged", "again"] {
-        let (status, _, stderr) = merge(&directories, &["--out", text(&at(out))]);
-        assert!(status == 0 && stderr.contains(&format!(": {count} shards brought together")), "{stderr}");
+        let (status, stdout, stderr) = merge(&directories, &["--out", text(&at(out))]);
+        let is_told = stdout.contains(&format!(": {count} shards brought together"));
+        assert!(status == 0 && is_told, "{stdout}{stderr}");
         equal(&at("whole"), &at(out));
     }
     // What is merged is a directory like any other.
