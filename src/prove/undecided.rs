@@ -146,10 +146,15 @@ fn error(space: &Space, many: &[Unknown<'_>]) -> Diagnostic {
         names => format!(" that obey {names}"),
     };
     let error = error.note(format!("no values were found{obeyed}, and no proof that there are none"));
-    match rules.iter().any(|rule| asks_about(&rule.body, Known::Spawn)) {
-        true => error.help("a newcomer is taken to appear as far away and as fast as its spawn asks: let the rule allow that"),
-        false => error.help("say it by sums, products and `match`, of at most six drawn numbers and with low powers"),
-    }
+    error.help(match () {
+        () if rules.iter().any(|rule| asks_about(&rule.body, Known::Spawn)) => {
+            "a newcomer is taken to appear as far away and as fast as its spawn asks: let the rule allow that"
+        }
+        () if are_of_states(&rules) => {
+            "a proof follows the first few hundred states: let such a one be among them, or begin in one"
+        }
+        () => "say it by sums, products and `match`, of at most six drawn numbers and with low powers",
+    })
 }
 
 /// What is not known of rules that leave rows undecided.
@@ -158,9 +163,22 @@ fn why(rules: &[&RuleDef]) -> &'static str {
     match () {
         () if ask(Known::Spawn) => "not found to hold for a newcomer",
         () if ask(Known::World) => "not found to hold at a moment",
+        () if are_of_states(rules) => "not met in the states that were followed",
         () if rules.iter().any(|rule| has_powers(&rule.body)) => "too complicated to be solved",
         () => "not solved for so many numbers",
     }
+}
+
+/// Whether the rules are about states alone, and nothing that is drawn decides them.
+fn are_of_states(rules: &[&RuleDef]) -> bool {
+    let is_state = |kind: &ExprKind| matches!(kind, ExprKind::Cell(_) | ExprKind::CellAt(..));
+    let is_drawn = |kind: &ExprKind| matches!(kind, ExprKind::Local(_));
+    !rules.is_empty()
+        && rules.iter().all(|rule| {
+            let RuleBody::Holds(bindings) = &rule.body else { return false };
+            bindings.iter().any(|binding| binding.condition.any(is_state))
+                && !bindings.iter().any(|binding| binding.condition.any(is_drawn))
+        })
 }
 
 /// Whether a rule has more than sums of numbers, each times a constant.
