@@ -221,7 +221,8 @@ impl Suite<'_> {
         };
         // What would be claimed of the other crash is not what the file claims until it is taken over.
         if change == Change::OtherObstacle && !self.arguments.accept {
-            return Ok((emitted, Some(self.outcome(Regression::OtherCrash))));
+            let other = self.asked.is_nothing().then(|| self.outcome(Regression::OtherCrash));
+            return Ok((emitted, other));
         }
         if text == before {
             return Ok((emitted, None));

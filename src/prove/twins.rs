@@ -27,13 +27,13 @@ pub(super) fn report(space: &Space) -> Vec<Diagnostic> {
     // Conditions are long to write down: only rows that do the same are compared by them.
     let mut alike: BTreeMap<String, Vec<usize>> = BTreeMap::new();
     for row in &space.rows {
-        alike.entry(Put::in_row(space, row).effects()).or_default().push(row.index);
+        alike.entry(RowText::of(space, row).effects()).or_default().push(row.index);
     }
     let mut pairs: BTreeMap<(usize, usize), Vec<(usize, usize)>> = BTreeMap::new();
     for rows in alike.into_values().filter(|rows| rows.len() > 1) {
         let mut first_of: BTreeMap<String, usize> = BTreeMap::new();
         for again in rows {
-            let first = *first_of.entry(Put::in_row(space, &space.rows[again]).conditions()).or_insert(again);
+            let first = *first_of.entry(RowText::of(space, &space.rows[again]).conditions()).or_insert(again);
             if first != again {
                 let actions = (space.rows[first].action, space.rows[again].action);
                 pairs.entry(actions).or_default().push((first, again));
@@ -71,16 +71,16 @@ pub(super) fn report(space: &Space) -> Vec<Diagnostic> {
     pairs.into_iter().map(warning).collect()
 }
 
-/// A row with the values of its axes put in. Equal rows have equal texts.
-struct Put<'a> {
+/// A row with the values of its axes put in, as two texts: rows are the same if both are.
+struct RowText<'a> {
     space: &'a Space,
     row: &'a Row,
     /// The parameters: literals on axes, the others by their place.
     locals: Vec<Expr>,
 }
 
-impl<'a> Put<'a> {
-    fn in_row(space: &'a Space, row: &'a Row) -> Put<'a> {
+impl<'a> RowText<'a> {
+    fn of(space: &'a Space, row: &'a Row) -> RowText<'a> {
         let mut drawn = 0;
         let parameters = space.actions[row.action].parameters.iter();
         let locals = parameters.map(|parameter| {
@@ -94,7 +94,7 @@ impl<'a> Put<'a> {
             };
             Expr { kind, ty: parameter.ty, span: Span::NONE }
         });
-        Put { space, row, locals: locals.collect() }
+        RowText { space, row, locals: locals.collect() }
     }
 
     fn reduced(&self, expr: &Expr) -> Expr {

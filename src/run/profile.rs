@@ -177,6 +177,11 @@ pub struct Asked {
 }
 
 impl Asked {
+    /// Whether nothing is asked: each scenario is played with the driving system that it records.
+    pub fn is_nothing(&self) -> bool {
+        self.ads.is_none() && self.profile.is_none() && self.external.is_none()
+    }
+
     /// The driving system to play a scenario with, and whether it is the one that the scenario records. If nothing is
     /// asked, it is that one; without a name, its driving system with another profile.
     ///

@@ -180,6 +180,7 @@ fn without_place<'a>(
     let mut open: Vec<Lost<'a>> = wanted.filter(runs_somewhere).map(lost).collect();
     let table = ActionTable::new(Arc::clone(space));
     let rules = about_places(space);
+    let mut of_roads: Vec<Option<Arc<Scene>>> = vec![None; space.roads.len()];
     let mut offers_left = OFFERS_MAX;
     for moment in moments() {
         for (index, road) in space.roads.iter().enumerate() {
@@ -188,7 +189,8 @@ fn without_place<'a>(
             let states: BTreeSet<usize> = open.iter().filter_map(state_of).collect();
             for state in states {
                 let memory = runs.runs_in.state(index, state);
-                let world = moment.world(space, &scenes.of(road), memory);
+                let scene = of_roads[index].get_or_insert_with(|| scenes.of(road));
+                let world = moment.world(space, scene, memory);
                 let kept = world.for_many();
                 let surroundings = kept.as_deref().unwrap_or(&world);
                 let situation =

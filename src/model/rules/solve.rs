@@ -115,7 +115,7 @@ impl<'a> RowRules<'a> {
             values: given.clone(),
             given,
             places: Vec::new(),
-            leading_on: Vec::new(),
+            known_choices: Vec::new(),
             order: self.order(open),
             is_exact: Cell::new(true),
         };
@@ -172,7 +172,8 @@ pub(crate) struct Solver<'a> {
     order: Vec<usize>,
     /// By place of the order.
     places: Vec<Place>,
-    leading_on: Vec<LeadingOn>,
+    /// What backwards left before.
+    known_choices: Vec<KnownChoices>,
     /// Of all parameters; some value of their type for those to choose.
     given: Vec<Value>,
     /// Of all parameters. Those that are not chosen yet have some value of their type.
@@ -202,7 +203,7 @@ struct Left {
 }
 
 /// The values of a parameter that leave values to all later ones, after these choices.
-struct LeadingOn {
+struct KnownChoices {
     place: usize,
     /// Of those earlier parameters that a clause needs.
     after: Vec<Value>,
@@ -372,7 +373,7 @@ impl<'a> Solver<'a> {
     fn backwards(&mut self, choose: &mut dyn Choose, forwards: Unsolved) -> Result<Vec<Value>, Unsolved> {
         for place in 0..self.order.len() {
             let local = self.order[place];
-            let chosen = self.leading_on(place).choose(local, choose);
+            let chosen = self.completable(place).choose(local, choose);
             let Some(value) = chosen else {
                 // Only rounding can leave a later parameter nothing.
                 let is_proved = place == 0 && self.is_exact.get() && self.before.tries.get() > 0;
@@ -384,9 +385,9 @@ impl<'a> Solver<'a> {
     }
 
     /// What leaves values to all later parameters.
-    fn leading_on(&mut self, place: usize) -> Rc<Choices> {
+    fn completable(&mut self, place: usize) -> Rc<Choices> {
         let after = self.listed_before(place);
-        let mut known = self.leading_on.iter().filter(|known| known.place == place);
+        let mut known = self.known_choices.iter().filter(|known| known.place == place);
         if let Some(known) = known.find(|known| Some(&known.after) == after.as_ref()) {
             self.is_exact.set(self.is_exact.get() && known.is_exact);
             return Rc::clone(&known.choices);
@@ -412,7 +413,7 @@ impl<'a> Solver<'a> {
         // What ran out of tries may leave more another time.
         if let Some(after) = after.filter(|_| self.before.tries.get() > 0) {
             let choices = Rc::clone(&choices);
-            self.leading_on.push(LeadingOn { place, after, choices, is_exact });
+            self.known_choices.push(KnownChoices { place, after, choices, is_exact });
         }
         choices
     }
