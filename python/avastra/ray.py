@@ -168,9 +168,11 @@ def _run(ray, options, passed):
         number = under_way.pop(ended[0])
         try:
             status, told = ray.get(ended[0])
-        except (ray.exceptions.RayError, ChildProcessError) as error:
-            reason = str(error).strip().splitlines()[-1]
-            raise Refused(f"shard {number}/{shards} was killed more than {RETRIES} times: {reason}") from error
+        except ray.exceptions.RayError as error:
+            # What `play` raises is of Ray's kind and of its own. Ray tries only these again.
+            killed = (ChildProcessError, ray.exceptions.WorkerCrashedError, ray.exceptions.NodeDiedError)
+            what = f"was killed more than {RETRIES} times" if isinstance(error, killed) else "could not be played"
+            raise Refused(f"shard {number}/{shards} {what}: {str(error).strip().splitlines()[-1]}") from error
         if status not in ENDED:
             _say(f"error: shard {number}/{shards} ended with status {status}:\n{told}")
             return status
@@ -219,11 +221,13 @@ def _merged(options, work, shards):
 
 
 def _bound(command):
-    """A command that ends with this process, however that ends; elsewhere than on Linux, as it would anyway."""
+    """A command that ends with this process, however that ends. Only Linux can do that: elsewhere the command is as it was."""
     if not sys.platform.startswith("linux"):
         return command
-    # A worker that is killed cannot end its program, which would go on in the shard's folder. So it asks the kernel
-    # (PR_SET_PDEATHSIG) in a small program before the real one: between fork and exec, with threads, one may not.
+    # A worker that is killed cannot end its program, which would go on in the shard's folder. So a small program before the real
+    # one asks the kernel for a signal (PR_SET_PDEATHSIG). The worker cannot ask between fork and exec, because it has threads.
+    # The signal comes when the thread ends that began the program. Ray plays a task on its worker's main thread, so that is
+    # when the worker ends.
     before = ("import ctypes, os, signal, sys\n"
               "ctypes.CDLL(None).prctl(1, signal.SIGKILL)\n"
               "os.getppid() == int(sys.argv[1]) or sys.exit(1)\n"

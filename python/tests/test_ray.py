@@ -45,12 +45,20 @@ class RayError(Exception):
     """Ray's own."""
 
 
+class WorkerCrashedError(RayError):
+    """A worker was killed."""
+
+
+class NodeDiedError(RayError):
+    """And its node."""
+
+
 class StandIn(types.ModuleType):
     """Plays a task when it is waited for, and again as often as Ray would."""
 
     def __init__(self):
         super().__init__("ray")
-        self.exceptions = types.SimpleNamespace(RayError=RayError)
+        self.exceptions = types.SimpleNamespace(RayError=RayError, WorkerCrashedError=WorkerCrashedError, NodeDiedError=NodeDiedError)
         self.is_on = False
 
     def init(self, address=None, num_cpus=3, **_):
@@ -76,9 +84,10 @@ class StandIn(types.ModuleType):
         for left in range(task.retries, -1, -1):
             try:
                 return task.function(*task.given)
-            except task.retried:
-                if left == 0:
-                    raise
+            except Exception as error:
+                if left == 0 or not isinstance(error, task.retried):
+                    # As with Ray, it is one of Ray's errors and one of the task's.
+                    raise type("RayTaskError", (RayError, type(error)), {})(str(error)) from error
 
 
 class Task:
@@ -143,6 +152,13 @@ class OnRay(unittest.TestCase):
         status, told = self.called("run", "s.ava", "--shards", "1")
         self.assertEqual(status, 1)
         self.assertRegex(told, "error: shard 1/1 was killed more than 5 times: .*signal 9")
+
+    def test_a_shard_that_cannot_be_played_is_tried_once_and_told_as_such(self):
+        with mock.patch("subprocess.Popen", side_effect=OSError(12, "Cannot allocate memory")) as begun:
+            status, told = self.called("run", "s.ava", "--shards", "1")
+        self.assertEqual((status, begun.call_count), (1, 1))
+        self.assertRegex(told, "error: shard 1/1 could not be played: .*Cannot allocate memory")
+        self.assertNotIn("killed", told)
 
     def test_a_failing_shard_ends_the_command_with_its_own_words_and_status(self):
         (self.folder / "fail_1").write_text("2")

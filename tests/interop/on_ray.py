@@ -1,9 +1,10 @@
 """A study on a Ray of this machine, with two processors: as fast as the program alone, and the same bytes after workers, programs,
 the driver and the head were killed.
 
-    python tests/interop/ray.py AVASTRA [FOLDER]
+    python tests/interop/on_ray.py AVASTRA [FOLDER]
 
-in an environment with Ray, from the repository's root. Needs Linux, whose /proc says which process is which.
+in an environment with Ray, from the repository's root. Needs Linux, whose /proc says which process is which. It is not named
+`ray.py`, because the other scripts of this folder would import it for Ray.
 """
 
 import json
@@ -76,9 +77,8 @@ def processes():
 
 
 def programs(out):
-    """The programs that play shards, each with the Ray worker that began it, and its folder."""
-    return [(process, parent, Path(line[-4] if line[-4:-3] != [""] else line[-3])) for process, parent, line in processes()
-            if line[0] == AVASTRA and f"{out}.shards" in " ".join(line)]
+    """The programs that play shards, each with the Ray worker that began it."""
+    return [(process, parent) for process, parent, line in processes() if line[0] == AVASTRA and f"{out}.shards" in " ".join(line)]
 
 
 def waited(what, limit_s=300):
@@ -117,13 +117,13 @@ print(f"{SHARDS} shards, two workers: {took_s:.1f} s with Ray's begin and the me
 # A worker with its shard in the middle, a program alone, the driver.
 out = FOLDER / "struck"
 driver = begin(out)
-process, worker, _ = waited(lambda: kept(out) and programs(out))[0]
+process, worker = waited(lambda: kept(out) and programs(out))[0]
 killed(worker)
 begun = time.monotonic()
-waited(lambda: process not in [other for other, _, _ in programs(out)])
+waited(lambda: process not in [other for other, _ in programs(out)])
 print(f"a worker killed: its program ended {time.monotonic() - begun:.2f} s later", flush=True)
 grown = kept(out)
-process, _, _ = waited(lambda: kept(out) > grown and programs(out))[0]
+process, _ = waited(lambda: kept(out) > grown and programs(out))[0]
 killed(process)
 print("a program killed", flush=True)
 grown = kept(out)

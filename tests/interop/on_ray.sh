@@ -13,4 +13,4 @@ fi
 rm -rf target/interop/ray
 # Ray gives its workers a niceness of 15, by which anything else on the machine would be measured with them.
 export RAY_worker_niceness=0 RAY_USAGE_STATS_ENABLED=0 PYTHONPATH=python
-exec "$venv/bin/python" tests/interop/ray.py "${AVASTRA:-target/release/avastra}" target/interop/ray
+exec "$venv/bin/python" tests/interop/on_ray.py "${AVASTRA:-target/release/avastra}" target/interop/ray
