@@ -11,7 +11,7 @@ use crate::sim::DT_S;
 const STRAY_M: f64 = 0.01;
 /// Nor turned farther from the recorded heading, rad: 2 cm at the front of a bus.
 const STRAY_RAD: f64 = 0.002;
-/// Where the ego vehicle and another come this near to each other, each tick is a vertex, m: a centimetre decides there
+/// Where the ego vehicle and another come this near to each other, their ways have a vertex at each tick, m: a centimetre decides there
 /// whether and when they touch.
 const CLOSE_M: f64 = 0.1;
 /// The longest time between two vertices, in ticks: 5 s. It bounds the search.

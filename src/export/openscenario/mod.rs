@@ -75,18 +75,19 @@ pub struct Style {
 
 /// What a file leaves out or says otherwise than its style promises.
 pub fn left_out(recording: &Recording, style: Style) -> Vec<String> {
-    match (style.version, exact(recording, style)) {
-        (Version::Carla, _) => carla::dropped(recording),
-        (_, exact) if exact.is_empty() => Vec::new(),
-        (_, exact) => vec![format!(
-            "actions of {}, which turn back onto the road that they come from: as recorded",
-            exact.join(", ")
-        )],
+    if style.version == Version::Carla {
+        return carla::dropped(recording);
     }
+    let exact = exact(recording, style);
+    if exact.is_empty() {
+        return Vec::new();
+    }
+    let names = natural::names(&exact);
+    vec![format!("actions of {names}, which turn back onto the road that they come from: as recorded")]
 }
 
 /// Others that are exact in a natural version.
-fn exact(recording: &Recording, style: Style) -> Vec<String> {
+fn exact(recording: &Recording, style: Style) -> Vec<&Actor> {
     match (style.version, style.others) {
         (Version::V1_2 | Version::V1_3, Others::Natural) => natural::exact(recording),
         // ScenarioRunner plans a route over the points of its way.
@@ -100,20 +101,21 @@ pub fn openscenario(recording: &Recording, map_file: &str, style: Style) -> Stri
     let network = Element::new("RoadNetwork")
         .holding(Element::new("LogicFile").with("filepath", map_file))
         .holding_all(signals);
+    let exact = exact(recording, style);
     let entities = recording.actors().map(|actor| match style.version {
         Version::Carla => carla::entity(recording, actor),
         Version::V1_2 | Version::V1_3 => entity(actor, style.ego),
     });
     Element::new("OpenSCENARIO")
-        .holding(header(recording, style))
+        .holding(header(recording, style, &exact))
         .holding(Element::new("CatalogLocations"))
         .holding(network)
         .holding(Element::new("Entities").holding_all(entities))
-        .holding(storyboard(recording, style))
+        .holding(storyboard(recording, style, &exact))
         .document()
 }
 
-fn header(recording: &Recording, style: Style) -> Element {
+fn header(recording: &Recording, style: Style, exact: &[&Actor]) -> Element {
     let minor = match style.version {
         Version::V1_2 => 2,
         Version::V1_3 => 3,
@@ -132,7 +134,7 @@ fn header(recording: &Recording, style: Style) -> Element {
     if style.version == Version::Carla {
         return header;
     }
-    let caveat = (style.others == Others::Natural).then(|| natural::caveat(&exact(recording, style)));
+    let caveat = (style.others == Others::Natural).then(|| natural::caveat(exact));
     header
         .holding(Element::new("Properties").holding_all(recording.facts.iter().chain(&caveat).map(property)))
 }
@@ -142,18 +144,17 @@ fn property((name, value): &(String, String)) -> Element {
     Element::new("Property").with("name", name).with("value", value)
 }
 
-fn storyboard(recording: &Recording, style: Style) -> Element {
+fn storyboard(recording: &Recording, style: Style, exact: &[&Actor]) -> Element {
     let version = style.version;
     let mut init = Vec::new();
     let mut groups = Vec::new();
-    let exact = exact(recording, style);
     for actor in recording.actors() {
         let (begins, events) = match (version, style.others) {
             (Version::Carla, _) if actor.id == 0 && style.ego != Ego::Trajectory => {
                 (carla::begins(recording, style.ego), Vec::new())
             }
             (Version::Carla, _) => natural(recording, actor, version),
-            (_, Others::Natural) if actor.id > 0 && !exact.contains(&actor.name()) => {
+            (_, Others::Natural) if actor.id > 0 && exact.iter().all(|other| other.id != actor.id) => {
                 natural(recording, actor, version)
             }
             _ => (begins(recording, actor, style.ego), events(recording, actor, style)),

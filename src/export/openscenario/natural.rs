@@ -31,6 +31,9 @@ const LINE_M: f64 = 0.05;
 const ONWARD_M: f64 = 10.0;
 /// A change of speed within so many ticks happens at once.
 const ONCE_TICKS: usize = 10;
+/// A loss of speed so many times what its brakes can do is a contact's doing. A piece of a pace may be a little steeper than
+/// what was recorded, and full braking is none.
+const IMPACT_TIMES: f64 = 1.5;
 /// Where the ego vehicle's distance says when a pedestrian sets out, it came nearer by so much within so many ticks, m.
 const COMES_M: f64 = 0.25;
 const COMES_TICKS: usize = 25;
@@ -50,12 +53,12 @@ pub struct Natural {
 
 /// The others that follow their recorded ways in a natural version, too: they turn back onto the road that they come from. A
 /// player that knows its place on a route by the road (esmini does) takes another way at such a junction.
-pub fn exact(recording: &Recording) -> Vec<String> {
+pub fn exact(recording: &Recording) -> Vec<&Actor> {
     let exact = |actor: &&Actor| {
         let way = driven(&recording.map, &poses(recording, actor)).filter(|_| actor.is_vehicle());
         way.is_some_and(|way| turns_back(&recording.map, &way))
     };
-    recording.seen.others.iter().filter(exact).map(Actor::name).collect()
+    recording.seen.others.iter().filter(exact).collect()
 }
 
 /// Whether a way takes a turn that leads back to the road before it, and is not the only one there.
@@ -73,18 +76,22 @@ fn turns_back(map: &RoadMap, way: &Driven) -> bool {
 }
 
 /// What the file says of itself; `exact` are those that follow their recorded ways.
-pub fn caveat(exact: &[String]) -> (String, String) {
+pub fn caveat(exact: &[&Actor]) -> (String, String) {
     let mut text = String::from("an approximation that does not carry the proof of the claims: ");
     write!(
         text,
         "others drive by actions, with speeds within {SPEED_MPS} m/s and ways within {WAY_M} m of the "
     )
-    .and_then(|()| write!(text, "recording as far as their actions alone decide"))
+    .and_then(|()| write!(text, "recording as far as their actions alone decide, contacts aside"))
     .expect("memory takes everything");
     if !exact.is_empty() {
-        text += &format!("; as recorded: {}", exact.join(", "));
+        text += &format!("; as recorded: {}", names(exact));
     }
     ("natural".to_owned(), text)
+}
+
+pub fn names(actors: &[&Actor]) -> String {
+    actors.iter().map(|actor| actor.name()).collect::<Vec<_>>().join(", ")
 }
 
 impl Natural {
@@ -213,10 +220,14 @@ impl Natural {
         for (number, change) in changes.iter().enumerate() {
             let action_name = format!("{name}_speed_{}", number + 2);
             let time_s = (change.to - change.from) as f64 * DT_S;
-            let time_s = brakes_for_s(actor, before_mps - change.target_mps, time_s);
+            let lost_mps = before_mps - change.target_mps;
             before_mps = change.target_mps;
+            // In the middle of the piece, a jump costs no way.
+            let (from_s, time_s) = match is_impact(actor, lost_mps, time_s) {
+                true => (seconds(actor, change.from + (change.to - change.from) / 2), 0.0),
+                false => (seconds(actor, change.from), time_s),
+            };
             let action = action(&action_name, speed_within(change.target_mps, time_s));
-            let from_s = seconds(actor, change.from);
             self.events.push(event_at(self.version, &format!("{action_name}_event"), vec![action], from_s));
         }
     }
@@ -304,10 +315,10 @@ fn way_m(poses: &[Pose], begin: usize, length: usize) -> f64 {
     (seen_m * length as f64 / (seen.len() - 1).max(1) as f64).max(1.0)
 }
 
-/// The time for a loss of speed: none where it is more than brakes can do, and so a contact's doing. A player keeps to what
-/// the vehicle's brakes can do unless it is to happen at once.
-fn brakes_for_s(actor: &Actor, lost_mps: f64, time_s: f64) -> f64 {
-    if lost_mps > actor.shape.deceleration_mps2_max * time_s { 0.0 } else { time_s }
+/// Whether a loss of speed within a time is a contact's doing. It is to happen at once, as a player else keeps to what the
+/// vehicle's brakes can do.
+fn is_impact(actor: &Actor, lost_mps: f64, time_s: f64) -> bool {
+    lost_mps > IMPACT_TIMES * actor.shape.deceleration_mps2_max * time_s
 }
 
 /// What the ego vehicle hits stops as it did then.
@@ -320,7 +331,9 @@ fn stop_where_hit(recording: &Recording, actor: &Actor) -> Option<Element> {
     let at_rest = after.iter().position(|sample| sample.velocity_mps.norm() <= last_mps).unwrap_or(0);
     let target_mps = if last_mps < SPEED_MPS { 0.0 } else { last_mps };
     let lost_mps = before[before.len() - 1].velocity_mps.norm() - target_mps;
-    let slows = speed_within(target_mps, brakes_for_s(actor, lost_mps, at_rest as f64 * DT_S));
+    let time_s = at_rest as f64 * DT_S;
+    let time_s = if is_impact(actor, lost_mps, time_s) { 0.0 } else { time_s };
+    let slows = speed_within(target_mps, time_s);
     let hit = vec![touched(&format!("{name}_is_hit"), &name, &recording.seen.ego.name())];
     Some(event(&format!("{name}_after_contact"), vec![action(&format!("{name}_slows"), slows)], hit))
 }
@@ -394,6 +407,36 @@ fn line(poses: &[Pose], is_cut: bool) -> Vec<Pose> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::episode::Sample;
+
+    #[test]
+    fn full_braking_takes_its_time_and_an_impact_none() {
+        let mut actor = Actor::ego();
+        let pose = Pose::new(0.0, 0.0, 0.0);
+        actor.samples.push(Sample { tick: 0, pose, velocity_mps: Vec2::zeros() });
+        let brakes_mps2 = actor.shape.deceleration_mps2_max;
+        assert!(brakes_mps2 > 0.0);
+        let natural = |lost_mps: f64| {
+            let mut natural = Natural {
+                version: Version::V1_2,
+                pose,
+                place: position(&pose),
+                from_the_first: Vec::new(),
+                events: Vec::new(),
+            };
+            natural.change_speeds(&actor, lost_mps, &[Change { from: 100, to: 150, target_mps: 0.0 }]);
+            let [event] = &natural.events[..] else { panic!("one event") };
+            event.clone().document()
+        };
+        let brakes = natural(1.04 * brakes_mps2);
+        assert!(is_linear(&brakes, "1") && brakes.contains("value=\"2\""), "{brakes}");
+        let hit = natural(2.0 * brakes_mps2);
+        assert!(hit.contains("\"step\"") && hit.contains("value=\"2.5\""), "{hit}");
+    }
+
+    fn is_linear(text: &str, time_s: &str) -> bool {
+        text.contains("\"linear\"") && text.contains(&format!("value=\"{time_s}\""))
+    }
 
     /// The boulevard has a turn back from road 3 to itself over 104, beside one that leads on over 101.
     #[test]
@@ -410,7 +453,10 @@ mod tests {
         };
         assert!(turns_back(&map, &way(&[("3", -1), ("3", -1), ("104", -1), ("3", 2)])));
         assert!(turns_back(&map, &way(&[("3", -1), ("104", -1)])), "it need not be over");
-        assert!(!turns_back(&map, &way(&[("104", -1), ("3", 2)])), "whoever begins in it has no choice");
+        assert!(
+            !turns_back(&map, &way(&[("104", -1), ("3", 2)])),
+            "a vehicle that begins in it has no choice"
+        );
         assert!(!turns_back(&map, &way(&[("3", -1), ("101", -1), ("12", -1)])));
     }
 }
