@@ -5,6 +5,10 @@ use roxmltree::Node;
 use super::position::{Position, position};
 use super::source::{Mark, Source, children, element, elements};
 
+const FOLLOWING: [&str; 2] = ["follow", "position"];
+
+const STRATEGIES: [&str; 4] = ["fastest", "leastIntersections", "random", "shortest"];
+
 /// An action as it was read.
 #[derive(Debug, Clone)]
 pub enum Begun {
@@ -101,6 +105,7 @@ fn drives(source: &mut Source, action: Node) -> Option<bool> {
 fn at_once(source: &mut Source, dynamics: Node) -> Option<bool> {
     let shape = source.word(dynamics, "dynamicsShape", &["linear", "cubic", "sinusoidal", "step"])?;
     let dimension = source.word(dynamics, "dynamicsDimension", &["time", "distance", "rate"])?;
+    source.word(dynamics, "followingMode", &FOLLOWING)?;
     Some(shape == "step" || (dimension == "time" && source.number(dynamics, "value")? == 0.0))
 }
 
@@ -135,8 +140,16 @@ fn moved(source: &mut Source, action: Node, is_ego: bool) -> Option<Begun> {
                 return source.refuse(action, "only `freespace=\"true\"` is read: between the bumpers");
             }
             let sides = ["any", "leadingReferencedEntity", "trailingReferencedEntity"];
-            if source.word(action, "displacement", &sides)? == "trailingReferencedEntity" {
-                return source.refuse(action, "only a distance ahead of the ego vehicle is read");
+            match source.word(action, "displacement", &sides)? {
+                "trailingReferencedEntity" => {
+                    return source.refuse(action, "only a distance ahead of the ego vehicle is read");
+                }
+                // 1.0 has no such attribute. Later, players need not take its absence as ahead.
+                "" if source.minor > 0 => {
+                    let reason = "without `displacement` it need not be ahead: `leadingReferencedEntity` is";
+                    return source.refuse(action, reason);
+                }
+                _ => {}
             }
             source.word(action, "coordinateSystem", &["entity", "lane", "road", "trajectory", "world"])?;
             let headway = match action.attribute("timeGap") {
@@ -150,6 +163,7 @@ fn moved(source: &mut Source, action: Node, is_ego: bool) -> Option<Begun> {
                 "a lane change takes as long as the engine's drivers need, and waits until the lane is free",
             );
             let dynamics = source.required(action, "LaneChangeActionDynamics")?;
+            // Either way its time is the drivers': only its words are looked at.
             at_once(source, dynamics)?;
             if source.number_or(action, "targetLaneOffset", 0.0)? != 0.0 {
                 return source.refuse(action, "vehicles keep to the middle of their lanes");
@@ -164,8 +178,12 @@ fn moved(source: &mut Source, action: Node, is_ego: bool) -> Option<Begun> {
         }
         "FollowTrajectoryAction" => walk(source, action).map(Begun::Walk),
         "AssignRouteAction" if is_ego => {
-            let last = action.descendants().rfind(|node| node.has_tag_name("Waypoint"));
-            let place = last.and_then(|waypoint| element(waypoint, "Position"));
+            let waypoints = action.descendants().filter(|node| node.has_tag_name("Waypoint"));
+            let waypoints: Vec<Node> = waypoints.collect();
+            for waypoint in &waypoints {
+                source.word(*waypoint, "routeStrategy", &STRATEGIES)?;
+            }
+            let place = waypoints.last().and_then(|waypoint| element(*waypoint, "Position"));
             let Some(place) = place else {
                 return source.refuse(action, "it has no waypoint with a position");
             };
@@ -193,10 +211,18 @@ fn walk(source: &mut Source, action: Node) -> Option<Walk> {
     if source.number_or(action, "initialDistanceOffset", 0.0)? != 0.0 {
         return source.refuse(action, "a pedestrian walks its way from the beginning");
     }
-    let timing = action.descendants().find(|node| node.has_tag_name("Timing"));
-    let scale = timing.map_or(Some(1.0), |timing| source.number_or(timing, "scale", 1.0))?;
-    let trajectory = action.descendants().find(|node| node.has_tag_name("Polyline"));
-    let Some(polyline) = trajectory else {
+    let within = |name: &'static str| action.descendants().find(move |node| node.has_tag_name(name));
+    if let Some(mode) = within("TrajectoryFollowingMode") {
+        source.word(mode, "followingMode", &FOLLOWING)?;
+    }
+    if let Some(trajectory) = within("Trajectory")
+        && source.switch(trajectory, "closed", false)?
+    {
+        return source.refuse(trajectory, "a pedestrian walks one way: `closed` leads back");
+    }
+    let timing = within("Timing");
+    let scale = timing.map_or(Some(1.0), |timing| scale(source, timing))?;
+    let Some(polyline) = within("Polyline") else {
         return source.refuse(action, "a pedestrian walks straight across the road: a `Polyline` is read");
     };
     let vertices: Vec<Node> = elements(polyline, "Vertex").collect();
@@ -213,4 +239,17 @@ fn walk(source: &mut Source, action: Node) -> Option<Walk> {
     let duration_s = (times.1 - times.0) * scale;
     let duration_s = (timing.is_some() && duration_s > 0.0).then_some(duration_s);
     Some(Walk { mark, way, duration_s })
+}
+
+/// By how much the times of a way are stretched.
+fn scale(source: &mut Source, timing: Node) -> Option<f64> {
+    source.word(timing, "domainAbsoluteRelative", &["absolute", "relative"])?;
+    if source.number_or(timing, "offset", 0.0)? != 0.0 {
+        return source.refuse(timing, "a pedestrian sets out when it is triggered: `offset` is 0");
+    }
+    let scale = source.number_or(timing, "scale", 1.0)?;
+    if scale <= 0.0 {
+        return source.refuse(timing, format!("`scale` is {scale}: times go on, by more than 0"));
+    }
+    Some(scale)
 }

@@ -8,6 +8,7 @@ use crate::model::vocabulary::BodyField;
 
 use super::Files;
 use super::source::{Source, children, element, elements, filled};
+use super::vocabulary;
 
 /// The body that the engine has for it, and its own size.
 #[derive(Debug, Clone)]
@@ -59,7 +60,7 @@ fn of_catalogue(source: &mut Source, root: Node, reference: Node, files: &dyn Fi
             let Some(list) = list.filter(|node| is_named(node, &catalogue)) else { continue };
             let found = children(list).find(|node| is_described(*node) && is_named(node, &entry));
             if let Some(found) = found {
-                return shape(found, &assigned).map_or_else(
+                return described(found, &assigned).map_or_else(
                     |reason| source.refuse(reference, format!("`{entry}` of `{catalogue}`: {reason}")),
                     Some,
                 );
@@ -67,6 +68,19 @@ fn of_catalogue(source: &mut Source, root: Node, reference: Node, files: &dyn Fi
         }
     }
     source.refuse(reference, format!("no vehicle or pedestrian `{entry}` in a catalogue `{catalogue}`"))
+}
+
+/// The body of an entry of a catalogue, which no reader has looked at before.
+fn described(entry: Node, assigned: &BTreeMap<String, String>) -> Result<Shape, String> {
+    if let Some((node, reason)) = vocabulary::unknown(entry).first() {
+        return Err(format!("`{}`: {reason}", node.tag_name().name()));
+    }
+    let declared = || elements(entry, "ParameterDeclarations").flat_map(children);
+    let is_declared = |name: &&String| declared().any(|one| one.attribute("name") == Some(name.as_str()));
+    if let Some(name) = assigned.keys().find(|name| !is_declared(name)) {
+        return Err(format!("it declares no parameter `{name}`"));
+    }
+    shape(entry, assigned)
 }
 
 /// The body of a `Vehicle` or `Pedestrian`, with values for the parameters of an entry of a catalogue.

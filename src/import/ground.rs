@@ -226,7 +226,7 @@ fn faces_along(
 /// Refuses what stands across a lane or against it.
 fn is_along(source: &mut Source, mark: &Mark, across_rad: f64) -> Option<()> {
     if across_rad > PI - ACROSS_RAD {
-        return source.refuse_at(mark, "nobody drives against its lane");
+        return source.refuse_at(mark, "it faces against its lane");
     }
     if across_rad > ACROSS_RAD {
         return source.refuse_at(mark, "it does not point along the lane that is there");

@@ -10,26 +10,28 @@ const TYPES: [&str; 8] =
 const RULES: [&str; 6] =
     ["equalTo", "notEqualTo", "lessThan", "lessOrEqual", "greaterThan", "greaterOrEqual"];
 
-/// Refuses a value that is not of the declared type, or is excluded by every group of constraints.
-pub fn check(source: &mut Source, declared: Node, value: &str) {
-    let Some(kind) = source.word(declared, "parameterType", &TYPES) else { return };
+/// Refuses a value that is not of the declared type. One that every group of constraints excludes is refused, too, but `Some`
+/// says that it can be read on: what else is wrong with the file does not follow from it.
+pub fn check(source: &mut Source, declared: Node, value: &str) -> Option<()> {
+    let kind = source.word(declared, "parameterType", &TYPES)?;
     if !is_of(kind, value) {
-        source.refuse::<()>(declared, format!("its value `{value}` is no `{kind}`"));
-        return;
+        return source.refuse(declared, format!("its value `{value}` is no `{kind}`"));
     }
-    let mut is_free = true;
+    let mut is_excluded = false;
     for group in elements(declared, "ConstraintGroup") {
+        let constraints = elements(group, "ValueConstraint");
         let held: Option<Vec<bool>> =
-            elements(group, "ValueConstraint").map(|constraint| holds(source, constraint, value)).collect();
+            constraints.map(|constraint| holds(source, constraint, kind, value)).collect();
         match held {
-            Some(held) if held.iter().all(|holds| *holds) => return,
-            Some(_) => is_free = false,
-            None => return,
+            Some(held) if held.iter().all(|holds| *holds) => return Some(()),
+            Some(_) => is_excluded = true,
+            None => return Some(()),
         }
     }
-    if !is_free {
+    if is_excluded {
         source.refuse::<()>(declared, format!("its constraints exclude the value `{value}`"));
     }
+    Some(())
 }
 
 fn is_of(kind: &str, value: &str) -> bool {
@@ -47,19 +49,23 @@ fn is_of(kind: &str, value: &str) -> bool {
     }
 }
 
-/// Whether a value obeys one constraint: as numbers where both are, else as texts, which may be equal or not.
-fn holds(source: &mut Source, constraint: Node, value: &str) -> Option<bool> {
+/// Whether a value obeys one constraint, whose bound is of the same type.
+fn holds(source: &mut Source, constraint: Node, kind: &str, value: &str) -> Option<bool> {
     let bound = source.text(constraint, "value")?;
     let rule = source.text(constraint, "rule")?;
     if !RULES.contains(&rule.as_str()) {
         return source.refuse(constraint, format!("`rule` is `{rule}`; it may be {}", RULES.join(", ")));
     }
-    let order = match (value.trim().parse::<f64>(), bound.trim().parse::<f64>()) {
-        (Ok(value), Ok(bound)) => value.partial_cmp(&bound),
+    if !is_of(kind, &bound) {
+        return source.refuse(constraint, format!("its value `{bound}` is no `{kind}`"));
+    }
+    let number = |text: &str| text.trim().parse::<f64>().ok();
+    let order = match kind {
         // Dates of one form are in the order of their texts.
-        _ => Some(value.cmp(bound.as_str())),
+        "string" | "dateTime" | "" => value.cmp(bound.as_str()),
+        "boolean" => is_true(value).cmp(&is_true(&bound)),
+        _ => number(value).partial_cmp(&number(&bound))?,
     };
-    let Some(order) = order else { return source.refuse(constraint, "its `value` is no number") };
     Some(match rule.as_str() {
         "equalTo" => order.is_eq(),
         "notEqualTo" => order.is_ne(),
@@ -68,4 +74,8 @@ fn holds(source: &mut Source, constraint: Node, value: &str) -> Option<bool> {
         "greaterThan" => order.is_gt(),
         _ => order.is_ge(),
     })
+}
+
+fn is_true(value: &str) -> bool {
+    matches!(value, "true" | "1")
 }

@@ -347,6 +347,9 @@ impl Scene {
         }
         let way_m = (to_left_m - from_left_m).abs();
         spawn.speed_mps = walk.duration_s.map_or(mps, |duration_s| way_m / duration_s);
+        if spawn.speed_mps > *SPAWN_SPEED_MPS.end() {
+            return source.refuse_at(&walk.mark, too_fast(spawn.speed_mps));
+        }
         if spawn.speed_mps <= 0.0 {
             return source.refuse_at(&walk.mark, "neither times nor a speed say how fast it walks");
         }
@@ -447,8 +450,7 @@ fn speed(source: &mut Source, story: &Story, entity: &Entity, depth: usize) -> O
             Speed::Times(name, factor) => speed_of(source, story, &paced.mark, name, depth)? * factor,
         };
         if wanted > *SPAWN_SPEED_MPS.end() {
-            let reason = format!("{wanted:.1} m/s: nothing is faster than {} m/s", SPAWN_SPEED_MPS.end());
-            return source.refuse_at(&paced.mark, reason);
+            return source.refuse_at(&paced.mark, too_fast(wanted));
         }
         if wanted < 0.0 {
             return source.refuse_at(&paced.mark, "no vehicle drives backwards");
@@ -462,6 +464,10 @@ fn speed(source: &mut Source, story: &Story, entity: &Entity, depth: usize) -> O
         }
     }
     Some(mps)
+}
+
+fn too_fast(mps: f64) -> String {
+    format!("{mps:.1} m/s: nothing is faster than {} m/s", SPAWN_SPEED_MPS.end())
 }
 
 fn speed_of(source: &mut Source, story: &Story, mark: &Mark, name: &str, depth: usize) -> Option<f64> {

@@ -1,6 +1,6 @@
 //! Elements of an OpenSCENARIO file with their parameters filled in, and what is refused of them.
 //!
-//! A reader that ends with `None` has refused something, so nobody refuses again what follows from it.
+//! A reader that ends with `None` has refused something, and its callers do not refuse again what follows from it.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -69,7 +69,7 @@ impl Source {
     }
 
     /// Refuses values for parameters that the file does not declare.
-    pub fn refuse_unknown(&mut self, root: Node) {
+    pub fn refuse_undeclared(&mut self, root: Node) {
         let unknown = self.asked.iter().filter(|(_, (_, is_taken))| !is_taken).map(|(name, _)| name.clone());
         for name in unknown.collect::<Vec<_>>() {
             self.refuse::<()>(root, format!("it declares no parameter `{name}`"));
@@ -143,8 +143,10 @@ impl Source {
                     self.torn.insert(format!("${name}"));
                     continue;
                 };
-                // A value out of its bounds is read on: what else is wrong with the file does not follow from it.
-                parameter::check(self, declared, &value);
+                if parameter::check(self, declared, &value).is_none() {
+                    self.torn.insert(format!("${name}"));
+                    continue;
+                }
                 self.parameters.insert(name.to_owned(), value);
             }
         }

@@ -84,7 +84,9 @@ pub fn read(source: &mut Source, document: &Document, ego: Option<&str>, files: 
     {
         return source.refuse(other, "this is no scenario; give the file of one that uses it");
     }
-    vocabulary::refuse_unknown(source, root);
+    for (node, reason) in vocabulary::unknown(root) {
+        source.refuse::<()>(node, reason);
+    }
     source.declare(root);
     let network = source.required(root, "RoadNetwork")?;
     let logic = source.required(network, "LogicFile")?;
@@ -113,7 +115,7 @@ pub fn read(source: &mut Source, document: &Document, ego: Option<&str>, files: 
             cast.act(source, act);
         }
     }
-    source.refuse_unknown(root);
+    source.refuse_undeclared(root);
     if cast.ego_actions > 0 {
         let note = "what the story lets the ego vehicle do is left to the driving system under test";
         source.note(format!("{note} (actions of the file: {})", cast.ego_actions));

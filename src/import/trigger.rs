@@ -59,7 +59,7 @@ pub struct Pair {
     pub is_free_space: bool,
 }
 
-/// The conditions of a start trigger; without one, and of an empty one as players read it, it holds at once. `None` if one is refused.
+/// The conditions of a start trigger; without any it holds at once. `None` if one is refused.
 pub fn trigger(source: &mut Source, parent: Node) -> Option<Trigger> {
     let Some(trigger) = element(parent, "StartTrigger") else { return Some(Vec::new()) };
     if trigger.descendants().filter(|node| node.has_tag_name("Condition")).count() > CONDITIONS_MAX {
@@ -68,7 +68,9 @@ pub fn trigger(source: &mut Source, parent: Node) -> Option<Trigger> {
     let mut groups = Some(Vec::new());
     for group in elements(trigger, "ConditionGroup") {
         let mut all = Some(Vec::new());
-        source.required(group, "Condition")?;
+        if source.required(group, "Condition").is_none() {
+            all = None;
+        }
         for node in elements(group, "Condition") {
             match condition(source, node) {
                 Some(found) => all.iter_mut().for_each(|all| all.push(found.clone())),

@@ -6,7 +6,7 @@
 
 use roxmltree::Node;
 
-use super::source::{Source, children};
+use super::source::children;
 
 /// One child of any name: its reader refuses what it does not read.
 const ONE: &str = "?";
@@ -25,6 +25,11 @@ const ELEMENTS: &[(&str, &str, &str)] = &[
     ("ParameterDeclaration", "name parameterType value", "ConstraintGroup"),
     ("ConstraintGroup", "", "ValueConstraint"),
     ("ValueConstraint", "rule value", ""),
+    (
+        "CatalogLocations",
+        "",
+        "ControllerCatalog EnvironmentCatalog ManeuverCatalog MiscObjectCatalog PedestrianCatalog RouteCatalog TrajectoryCatalog VehicleCatalog",
+    ),
     ("VehicleCatalog", "", "Directory"),
     ("PedestrianCatalog", "", "Directory"),
     ("Directory", "path", ""),
@@ -154,8 +159,9 @@ const ELEMENTS: &[(&str, &str, &str)] = &[
     ("ReachPositionCondition", "tolerance", "Position"),
 ];
 
-/// Refuses every element and attribute that no version has where it stands.
-pub fn refuse_unknown(source: &mut Source, root: Node) {
+/// Every element and attribute within one that no version has where it stands, with what is wrong.
+pub fn unknown<'a, 'input>(root: Node<'a, 'input>) -> Vec<(Node<'a, 'input>, String)> {
+    let mut unknown = Vec::new();
     let mut waiting = vec![root];
     while let Some(node) = waiting.pop() {
         let name = node.tag_name().name();
@@ -165,23 +171,61 @@ pub fn refuse_unknown(source: &mut Source, root: Node) {
         // Attributes of a namespace belong to the schema (`xsi:noNamespaceSchemaLocation`).
         for attribute in node.attributes().filter(|attribute| attribute.namespace().is_none()) {
             if !attributes.split(' ').any(|known| known == attribute.name()) {
-                source.refuse::<()>(node, format!("it has no attribute `{}`", attribute.name()));
+                unknown.push((node, format!("it has no attribute `{}`", attribute.name())));
             }
         }
         if *known == ONE {
             match (children(node).next(), children(node).nth(1)) {
-                (None, _) => source.refuse::<()>(node, "it is empty"),
-                (_, Some(second)) => source.refuse::<()>(second, format!("`{name}` holds one element")),
-                (Some(_), None) => None,
-            };
+                (None, _) => unknown.push((node, "it is empty".to_owned())),
+                (_, Some(second)) => unknown.push((second, format!("`{name}` holds one element"))),
+                (Some(_), None) => {}
+            }
         }
         for child in children(node) {
             let child_name = child.tag_name().name();
             if [ONE, ANY].contains(known) || known.split(' ').any(|known| known == child_name) {
                 waiting.push(child);
             } else {
-                source.refuse::<()>(child, format!("`{name}` has no such element"));
+                unknown.push((child, format!("`{name}` has no such element")));
             }
         }
+    }
+    unknown
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+
+    use super::*;
+
+    /// What stands where any element may.
+    const CHOSEN: &str = "ScenarioObject Private GlobalAction TeleportAction LongitudinalAction LateralAction \
+        RoutingAction VisibilityAction ControllerAction ActivateControllerAction SpeedAction LongitudinalDistanceAction \
+        LaneChangeAction FollowTrajectoryAction AssignRouteAction AcquirePositionAction EnvironmentAction LanePosition \
+        RelativeLanePosition WorldPosition Polyline PrivateAction SimulationTimeCondition \
+        StoryboardElementStateCondition TimeHeadwayCondition RelativeDistanceCondition TimeToCollisionCondition \
+        ReachPositionCondition";
+
+    #[test]
+    fn every_row_is_reached_from_the_root() {
+        let chosen: BTreeSet<&str> = CHOSEN.split_whitespace().collect();
+        let mut waiting = vec!["OpenSCENARIO"];
+        let mut reached = BTreeSet::new();
+        while let Some(name) = waiting.pop() {
+            let Some((_, _, known)) = ELEMENTS.iter().find(|(element, ..)| *element == name) else {
+                continue;
+            };
+            if reached.insert(name) {
+                match [ONE, ANY].contains(known) {
+                    true => waiting.extend(&chosen),
+                    false => waiting.extend(known.split(' ')),
+                }
+            }
+        }
+        let missed: Vec<&str> =
+            ELEMENTS.iter().map(|(name, ..)| *name).filter(|name| !reached.contains(name)).collect();
+        assert_eq!(missed, [""; 0]);
+        assert!(chosen.iter().all(|name| reached.contains(name)), "each that is chosen has a row");
     }
 }

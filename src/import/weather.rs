@@ -15,6 +15,21 @@ const FRICTION: [f64; 3] = [0.9, 0.75, 0.65];
 /// Less friction than that of a flooded road is ice.
 const FRICTION_MIN: f64 = 0.5;
 
+/// Words for clouds, of which nothing is taken over.
+const CLOUDS: [&str; 6] = ["cloudy", "free", "overcast", "rainy", "skyOff", "skyoff"];
+const OKTAS: [&str; 10] = [
+    "zeroOktas",
+    "oneOktas",
+    "twoOktas",
+    "threeOktas",
+    "fourOktas",
+    "fiveOktas",
+    "sixOktas",
+    "sevenOktas",
+    "eightOktas",
+    "nineOktas",
+];
+
 /// What an `EnvironmentAction` sets.
 #[derive(Debug, Clone, Default)]
 pub struct Weather {
@@ -63,6 +78,10 @@ pub fn weather(source: &mut Source, global: Node) -> Option<Weather> {
                     source.note("the time of day stands still");
                 }
                 found.time = Some(time(source, node)?);
+            }
+            "Weather" => {
+                source.word(node, "cloudState", &CLOUDS)?;
+                source.word(node, "fractionalCloudCover", &OKTAS)?;
             }
             "Sun" | "Wind" | "DomeImage" => source.note("sun, wind and clouds are not taken over"),
             _ => {}

@@ -199,6 +199,18 @@ fn conditions_and_words_are_read_or_refused() {
             "is no `boolean`",
         ),
         ("revMinor=\"2\"", "revMinor=\"7\"", "1.0 to 1.3 is read"),
+        (
+            "dynamicsDimension=\"time\"",
+            "dynamicsDimension=\"time\" followingMode=\"near\"",
+            "it may be follow",
+        ),
+        ("<VehicleCatalog>", "<VehicleCatalogg/><VehicleCatalog>", "no such element"),
+        ("<Directory path=", "<Directory depth=\"2\" path=", "it has no attribute `depth`"),
+        (
+            "entryName=\"van\"/>",
+            "entryName=\"van\"><ParameterAssignments><ParameterAssignment parameterRef=\"colour\" value=\"3\"/></ParameterAssignments></CatalogReference>",
+            "`van` of `vehicles`: it declares no parameter `colour`",
+        ),
         ("<Maneuver name=", "<Manoeuvre/><Maneuver name=", "`ManeuverGroup` has no such element"),
         ("<Init>", "<Init speed=\"3\">", "it has no attribute `speed`"),
         ("<SpeedActionTarget>", "<SpeedActionTarget><Target/>", "`SpeedActionTarget` has no such element"),
@@ -250,10 +262,39 @@ fn conditions_and_words_are_read_or_refused() {
     assert!(constrained(low).contains("its constraints exclude the value `12`"));
     assert!(constrained(&format!("{low}{high}")).contains("scenario case"));
     assert!(constrained(odd).contains("`rule` is `nearly`"));
+    // Values are compared as what they are declared to be.
+    let typed = |kind: &str, value: &str, bound: &str| {
+        let group = format!(
+            r#"<ConstraintGroup><ValueConstraint rule="equalTo" value="{bound}"/></ConstraintGroup>"#
+        );
+        let declared = format!(
+            r#"<ParameterDeclaration name="more" parameterType="{kind}" value="{value}">{group}</ParameterDeclaration></ParameterDeclarations>"#
+        );
+        import(&cut_in.replacen("</ParameterDeclarations>", &declared, 1))
+    };
+    assert!(typed("string", "007", "7").contains("its constraints exclude the value `007`"));
+    assert!(typed("integer", "007", "7").contains("scenario case"));
+    assert!(typed("boolean", "true", "1").contains("scenario case"));
+    assert!(typed("boolean", "true", "0").contains("its constraints exclude the value `true`"));
+    assert!(typed("double", "1", "far").contains("its value `far` is no `double`"));
+
+    // The distance of a vehicle at the beginning; 1.0 has no word for its side.
+    let distance = |minor: &str, side: &str| {
+        let action = format!(
+            r#"<Private entityRef="Van"><PrivateAction><LongitudinalAction><LongitudinalDistanceAction entityRef="Ego" distance="17" freespace="true" continuous="false" {side}/></LongitudinalAction></PrivateAction>"#
+        );
+        import(&cut_in.replace("revMinor=\"2\"", minor).replace("<Private entityRef=\"Van\">", &action))
+    };
+    assert!(distance("revMinor=\"0\"", "").contains("scenario case"));
+    assert!(distance("revMinor=\"2\"", "").contains("without `displacement`"));
+    assert!(distance("revMinor=\"2\"", "displacement=\"leadingReferencedEntity\"").contains("scenario case"));
+    let behind = distance("revMinor=\"2\"", "displacement=\"trailingReferencedEntity\"");
+    assert!(behind.contains("only a distance ahead"), "{behind}");
 
     // A mistake is told once, whatever follows from it.
     for (old, new) in [
         ("value=\"12\"", ""),
+        ("value=\"12\"", "value=\"far\""),
         ("vehicleCategory=\"car\"", "vehicleCategory=\"sledge\""),
         ("entryName=\"van\"", "entryName=\"sledge\""),
         ("ds=\"${$gap + 10}\"", "ds=\"far\""),
@@ -297,6 +338,19 @@ fn conditions_and_words_are_read_or_refused() {
     let aside = r#"</Vertex><Vertex time="1"><Position><WorldPosition x="0" y="0"/></Position></Vertex>"#;
     let found = import(&walker.replacen("</Vertex>", aside, 1));
     assert!(found.contains("a pedestrian walks straight: it lies"), "{found}");
+    for (old, new, wanted) in [
+        ("offset=\"0\"/>", "offset=\"2\"/>", "`offset` is 0"),
+        ("scale=\"1\"", "scale=\"0\"", "`scale` is 0"),
+        ("closed=\"false\"", "closed=\"true\"", "`closed` leads back"),
+        ("Relative=\"relative\"", "Relative=\"daily\"", "it may be absolute, relative"),
+        ("followingMode=\"position\"", "followingMode=\"near\"", "it may be follow, position"),
+        ("time=\"5\"", "time=\"0.01\"", "600.0 m/s: nothing is faster than 70 m/s"),
+    ] {
+        assert!(walker.contains(old), "{old}");
+        let found = import(&walker.replace(old, new));
+        assert!(found.contains(wanted), "{new}: {found}");
+        assert_eq!(found.lines().count(), 1, "{new}: {found}");
+    }
 }
 
 #[test]
