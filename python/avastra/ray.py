@@ -203,7 +203,10 @@ def _begun(options, passed, processors):
         if left or (os.path.isdir(out) and os.listdir(out)):
             raise Refused(f"`{folder if left else out}` is not empty: name another `--out`")
         shards = options.shards or processors
-        os.makedirs(folder, exist_ok=True)
+        try:
+            os.makedirs(folder, exist_ok=True)
+        except OSError as error:
+            raise Refused(f"`{folder}` cannot be made: {error.strerror}") from error
         # Renamed into place, so that a kill leaves all of it or nothing.
         with open(f"{record}.new", "w", encoding="utf-8") as file:
             json.dump({**known, "shards": shards}, file, indent=1)

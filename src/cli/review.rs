@@ -175,8 +175,13 @@ fn change(scenario: &Scenario, summary: &EpisodeSummary, results: &[ClaimResult]
     if !counted.any(|found| scenario.crashes_with(found.collision.contact.obstacle)) {
         return Change::OtherObstacle;
     }
+    let is_hit =
+        |number: u32| summary.collisions.iter().any(|found| found.collision.contact.obstacle == number);
     let of = |(claim, result): (&Claim, &ClaimResult)| match claim {
         _ if !result.is_refuted() => Change::Same,
+        Claim::Collision { obstacle: Some(obstacle), .. } if !is_hit(obstacle.number) => {
+            Change::OtherObstacle
+        }
         Claim::Proc(_) | Claim::Trace(_) | Claim::End(_) | Claim::Minimal { .. } => Change::OtherDrive,
         Claim::Collision { .. } => Change::OtherTime,
         Claim::Verdict { .. } | Claim::Avoidability { .. } | Claim::Cause { .. } | Claim::Priority { .. } => {
