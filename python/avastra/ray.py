@@ -16,6 +16,7 @@ Many trainings at once are a study.
 
 import argparse
 import collections
+import itertools
 import json
 import os
 import platform
@@ -27,6 +28,8 @@ import sys
 COMMANDS = ("run", "study", "estimate")
 #: How often Ray plays a shard again whose worker or program was killed.
 RETRIES = 5
+#: How many tasks Ray is given at a time for each that can be played at once: enough that no processor waits for the next.
+AHEAD = 4
 #: Exit statuses of a shard that may be whole: it found a counted collision that was not to be, or the driving system failed in some
 #: episodes. `merge` knows whether it is.
 ENDED = (0, 4, 5)
@@ -43,7 +46,8 @@ def main(arguments=None):
     try:
         options, passed = _parsed(arguments)
         options.program = _program(options.program)
-        return _cluster(options, passed)
+        pieces, status = _pieces(options, passed)
+        return status or _cluster(options, passed, pieces)
     except Refused as refused:
         _say(f"error: {refused}")
         return 1
@@ -88,13 +92,13 @@ def _parsed(arguments):
                "A training is one sequence and has no shards: use `avastra train`, or a study for many trainings at once.")
     parser.add_argument("command", choices=[*COMMANDS, "train"], metavar="run|study|estimate")
     parser.add_argument("--out", required=True, metavar="DIR", help="directory of the whole, new or empty")
-    parser.add_argument("--shards", type=_number, metavar="N", help="into how many pieces [default: one for each processor of the cluster]")
+    parser.add_argument("--shards", type=_number, metavar="N", help="into how many pieces, each with something to play [default: one for each processor of the cluster]")
     parser.add_argument("--jobs", type=_number, default=1, metavar="J", help="threads of each shard, and processors it asks Ray for [default: 1]")
     parser.add_argument("--address", help="the cluster, as `ray.init` takes it [default: RAY_ADDRESS, or a cluster on this machine]")
     parser.add_argument("--workers", type=_number, metavar="W", help="processors of a cluster that is begun on this machine [default: all]")
     parser.add_argument("--program", metavar="FILE", default=os.environ.get("AVASTRA", "avastra"),
                         help="the program [default: AVASTRA, or `avastra` in the PATH]")
-    # What `--resume` takes, too.
+    # What `--resume` takes, too: see `_anew`.
     parser.add_argument("--reuse", metavar="DIR", help=argparse.SUPPRESS)
     parser.add_argument("--fail-on-collision", action="store_true", help=argparse.SUPPRESS)
     # What is for the output of the whole.
@@ -134,7 +138,29 @@ def _program(program):
     return os.path.abspath(found)
 
 
-def _cluster(options, passed):
+def _pieces(options, passed):
+    """Into how many pieces the command can be cut, and status 0; what the program said of one that it refuses is told.
+
+    It is asked before there is a cluster, which takes seconds to begin.
+    """
+    # The shard keeps a scheduler's environment out of it.
+    command = [options.program, options.command, *passed, *_anew(options), "--shard", "1/1", "--dry-run"]
+    asked = subprocess.run([*command, "--format", "json"], stdin=subprocess.DEVNULL, capture_output=True, text=True, errors="replace")
+    if asked.returncode != 0:
+        # Again, in words.
+        return 0, subprocess.run(command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL).returncode
+    pieces = json.loads(asked.stdout)["units"]
+    if (options.shards or 1) > pieces:
+        raise Refused(f"{options.shards} shards are too many: it can be cut into {pieces} pieces")
+    return pieces, 0
+
+
+def _anew(options):
+    """What is said again of a shard that is gone on with."""
+    return [*(["--reuse", options.reuse] if options.reuse else []), *(["--fail-on-collision"] if options.fail_on_collision else [])]
+
+
+def _cluster(options, passed, pieces):
     try:
         import ray
     except ImportError as error:
@@ -146,24 +172,27 @@ def _cluster(options, passed):
     except (ConnectionError, ValueError, RuntimeError) as error:
         raise Refused(f"no cluster: {error}") from error
     try:
-        return _run(ray, options, passed)
+        return _run(ray, options, passed, pieces)
     finally:
         # This ends the tasks under way, and they their programs.
         ray.shutdown()
 
 
-def _run(ray, options, passed):
+def _run(ray, options, passed, pieces):
     processors = int(ray.cluster_resources().get("CPU", 1))
     if options.jobs > processors:
         raise Refused(f"no shard with {options.jobs} threads can begin: the cluster has {processors} processors")
-    work, shards = _begun(options, passed, max(1, processors // options.jobs))
+    at_once = max(1, processors // options.jobs)
+    work, shards = _begun(options, passed, min(at_once, pieces))
     tell = (lambda text: None) if options.quiet else _say
     tell(f"{shards} shards on {processors} processors, in {work['folder']}")
     task = ray.remote(play).options(num_cpus=options.jobs, max_retries=RETRIES, retry_exceptions=[ChildProcessError],
                                     scheduling_strategy="SPREAD", name=f"avastra {options.command}")
-    under_way = {task.remote(number, shards, work): number for number in range(1, shards + 1)}
-    worst = 0
-    while under_way:
+    numbers = iter(range(1, shards + 1))
+    under_way, ended_count, worst = {}, 0, 0
+    while ended_count < shards:
+        for number in itertools.islice(numbers, AHEAD * at_once - len(under_way)):
+            under_way[task.remote(number, shards, work)] = number
         ended, _ = ray.wait(list(under_way), num_returns=1)
         number = under_way.pop(ended[0])
         try:
@@ -178,12 +207,12 @@ def _run(ray, options, passed):
             return status
         if status != 0:
             _say(f"shard {number}/{shards}, status {status}:\n{told}")
-        worst = max(worst, status)
-        tell(f"{shards - len(under_way)}/{shards} shards")
+        worst, ended_count = max(worst, status), ended_count + 1
+        tell(f"{ended_count}/{shards} shards")
     return _merged(options, work, shards) or worst
 
 
-def _begun(options, passed, processors):
+def _begun(options, passed, wanted):
     """The work of all shards and their number, for a new folder or one that is gone on with."""
     out = os.path.abspath(options.out)
     folder = f"{out}.shards"
@@ -202,7 +231,7 @@ def _begun(options, passed, processors):
     else:
         if left or (os.path.isdir(out) and os.listdir(out)):
             raise Refused(f"`{folder if left else out}` is not empty: name another `--out`")
-        shards = options.shards or processors
+        shards = options.shards or wanted
         try:
             os.makedirs(folder, exist_ok=True)
         except OSError as error:
@@ -211,8 +240,7 @@ def _begun(options, passed, processors):
         with open(f"{record}.new", "w", encoding="utf-8") as file:
             json.dump({**known, "shards": shards}, file, indent=1)
         os.replace(f"{record}.new", record)
-    anew = [*(["--reuse", options.reuse] if options.reuse else []), *(["--fail-on-collision"] if options.fail_on_collision else [])]
-    return {**known, "program": options.program, "folder": folder, "jobs": options.jobs, "anew": anew}, shards
+    return {**known, "program": options.program, "folder": folder, "jobs": options.jobs, "anew": _anew(options)}, shards
 
 
 def _merged(options, work, shards):

@@ -20,6 +20,12 @@ import avastra.ray
 PROGRAM = f"""#!{sys.executable}
 import json, os, pathlib, signal, sys
 here, asked = pathlib.Path(__file__).parent, sys.argv[1:]
+if "--dry-run" in asked:
+    if "wrong.ava" in asked:
+        print("error: wrong.ava: no such file", file=sys.stderr)
+        sys.exit(2)
+    print(json.dumps({{"units": 40}}))
+    sys.exit(0)
 with open(here / "asked.jsonl", "a") as file:
     file.write(json.dumps(asked) + "\\n")
 if asked[0] == "merge":
@@ -59,12 +65,12 @@ class StandIn(types.ModuleType):
     def __init__(self):
         super().__init__("ray")
         self.exceptions = types.SimpleNamespace(RayError=RayError, WorkerCrashedError=WorkerCrashedError, NodeDiedError=NodeDiedError)
-        self.is_on = False
+        self.is_on, self.begun = False, 0
 
     def init(self, address=None, num_cpus=3, **_):
         if address == "nowhere:1":
             raise ConnectionError("nothing listens at nowhere:1")
-        self.is_on, self.processors = True, num_cpus
+        self.is_on, self.processors, self.begun, self.given, self.most = True, num_cpus, self.begun + 1, 0, 0
 
     def shutdown(self):
         self.is_on = False
@@ -74,10 +80,16 @@ class StandIn(types.ModuleType):
 
     def remote(self, function):
         def options(max_retries, retry_exceptions, num_cpus, **_):
-            return types.SimpleNamespace(remote=lambda *given: Task(function, given, max_retries, tuple(retry_exceptions)))
+            return types.SimpleNamespace(remote=lambda *given: self.take(Task(function, given, max_retries, tuple(retry_exceptions))))
         return types.SimpleNamespace(options=options)
 
+    def take(self, task):
+        self.given += 1
+        self.most = max(self.most, self.given)
+        return task
+
     def wait(self, tasks, num_returns):
+        self.given -= num_returns
         return tasks[-num_returns:], tasks[:-num_returns]
 
     def get(self, task):
@@ -139,6 +151,20 @@ class OnRay(unittest.TestCase):
         status, told = self.called("run", "s.ava", "--workers", "2", "--jobs", "3")
         self.assertEqual((status, "the cluster has 2 processors" in told), (1, True), told)
 
+    def test_ray_is_given_as_many_tasks_as_it_needs(self):
+        status, told = self.called("study", "s.yaml", "--shards", "40", "--workers", "2")
+        self.assertEqual((status, len(self.asked()), self.ray.most), (0, 40 + 1, 8), told)
+
+    def test_what_cannot_begin_is_said_before_there_is_a_cluster(self):
+        status, told = self.called("study", "s.yaml", "--shards", "41")
+        self.assertEqual((status, "41 shards are too many: it can be cut into 40 pieces" in told), (1, True), told)
+        # Its words are the program's own, on the standard error of both.
+        self.assertEqual(self.called("study", "wrong.ava")[0], 2)
+        self.assertEqual((self.asked(), self.ray.begun), ([], 0))
+        # No more shards than there are pieces, where nobody has said how many.
+        self.assertEqual(self.called("study", "s.yaml", "--workers", "64")[0], 0)
+        self.assertEqual(len(self.asked()), 40 + 1)
+
     def test_a_killed_program_is_gone_on_with(self):
         (self.folder / "kill_2").write_text("2")
         status, told = self.called("run", "s.ava", "--shards", "3", "--fail-on-collision")
@@ -154,7 +180,7 @@ class OnRay(unittest.TestCase):
         self.assertRegex(told, "error: shard 1/1 was killed more than 5 times: .*signal 9")
 
     def test_a_shard_that_cannot_be_played_is_tried_once_and_told_as_such(self):
-        with mock.patch("subprocess.Popen", side_effect=OSError(12, "Cannot allocate memory")) as begun:
+        with mock.patch("avastra.ray._bound", side_effect=OSError(12, "Cannot allocate memory")) as begun:
             status, told = self.called("run", "s.ava", "--shards", "1")
         self.assertEqual((status, begun.call_count), (1, 1))
         self.assertRegex(told, "error: shard 1/1 could not be played: .*Cannot allocate memory")

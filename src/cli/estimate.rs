@@ -29,7 +29,16 @@ use super::{conditions, load, run_directory, shard};
 pub fn estimate(output: &Output, arguments: &EstimateArguments) -> Result<(), Failure> {
     let begun = match &arguments.resume {
         Some(path) => resumed(output, path)?,
-        None => begun(output, arguments)?,
+        None => {
+            let (estimate, shard) = wanted(output, arguments)?;
+            if arguments.shard.dry_run {
+                let settings = estimate.settings();
+                let costs = vec![u64::from(settings.run.episodes); settings.all_parts().len()];
+                shard::planned(output, &heading(&estimate), "part", &costs, shard);
+                return Ok(());
+            }
+            begun(arguments, estimate, shard)?
+        }
     };
     play_all(output, begun, arguments.jobs)
 }
@@ -52,7 +61,7 @@ fn play_all(
         EstimateDatabase::open(&file, &settings).map_err(|error| Failure::file("open", &file, error))?;
     let unread = |error| Failure::file("read", &file, error);
     let shard = shard::kept(&path)?;
-    output.tell(&heading(&estimate, &path));
+    output.tell(&format!("{}, into {}", heading(&estimate), path.display()));
     let jobs = jobs(asked_jobs, estimate.run().program())?;
     let interrupted = || Failure::Interrupted { command: "estimate", directory: path.clone() };
     let Some(pilot) = piloted(output, &estimate, (&mut database, &file), jobs, &stop)? else {
@@ -211,8 +220,8 @@ fn written(estimate: &Estimate, directory: &Path, played: &Played) -> Result<Vec
     played.met.iter().map(write_one).collect()
 }
 
-/// A new estimate, from the command line, with the text of its settings.
-fn begun(output: &Output, arguments: &EstimateArguments) -> Result<(Estimate, Held, String), Failure> {
+/// What the command line asks for.
+fn wanted(output: &Output, arguments: &EstimateArguments) -> Result<(Estimate, Shard), Failure> {
     let file = arguments.file.as_ref().expect("clap asks for it where there is no `--resume`");
     let table = load::table(output, file)?;
     let shard = shard::asked(output, arguments.shard.shard)?;
@@ -229,7 +238,15 @@ fn begun(output: &Output, arguments: &EstimateArguments) -> Result<(Estimate, He
         stopping: Stopping { precision: arguments.precision, hours: arguments.hours },
         run: conditions::settings(table.space(), conditions, &conditions.agent, under_test, episodes)?,
     };
-    let estimate = Estimate::new(table, settings).map_err(Failure::usage)?;
+    Ok((Estimate::new(table, settings).map_err(Failure::usage)?, shard))
+}
+
+/// A new estimate in a directory of its own, with the text of its settings.
+fn begun(
+    arguments: &EstimateArguments,
+    estimate: Estimate,
+    shard: Shard,
+) -> Result<(Estimate, Held, String), Failure> {
     let held = run_directory::create(arguments.out.as_deref())?;
     shard::keep(&held.path, shard)?;
     let space = load::relative(&held.path, &estimate.run().space().path)?;
@@ -313,7 +330,7 @@ fn event(argument: EventArgument) -> EventKind {
     }
 }
 
-fn heading(estimate: &Estimate, directory: &Path) -> String {
+fn heading(estimate: &Estimate) -> String {
     let settings = estimate.settings();
     let method = match settings.method {
         Method::Count => "by counting",
@@ -321,7 +338,7 @@ fn heading(estimate: &Estimate, directory: &Path) -> String {
         Method::Split => "by splitting",
     };
     format!(
-        "{}: how often {} under {} against {}, {method}, {} of {} on {}, seed {}, into {}",
+        "{}: how often {} under {} against {}, {method}, {} of {} on {}, seed {}",
         estimate.run().space().path.display(),
         settings.event.in_words(),
         settings.run.agent,
@@ -329,8 +346,7 @@ fn heading(estimate: &Estimate, directory: &Path) -> String {
         plural(settings.parts as usize, "part"),
         plural(settings.run.episodes as usize, "episode"),
         settings.run.roads.join(", "),
-        settings.run.seed,
-        directory.display()
+        settings.run.seed
     )
 }
 

@@ -9,7 +9,7 @@ use crate::emit;
 use crate::episode::EpisodeLog;
 use crate::model::{Policy, digest};
 use crate::run::{
-    EpisodeSummary, Group, PolicyReference, RefusalCount, Run, RunSettings, Totals, Units, play,
+    EpisodeSummary, Group, PolicyReference, RefusalCount, Run, RunSettings, Shard, Totals, Units, play,
 };
 
 use super::arguments::{FaceArgument, RunArguments};
@@ -33,9 +33,17 @@ const NAMED_MAX: usize = 10;
 pub fn run(output: &Output, arguments: &RunArguments) -> Result<(), Failure> {
     let (run, directory) = match &arguments.resume {
         Some(path) => resumed(output, path)?,
-        None => begun(output, arguments)?,
+        None => {
+            let wanted = wanted(output, arguments)?;
+            if arguments.shard.dry_run {
+                let costs = vec![1; wanted.run.episodes()];
+                shard::planned(output, &heading(&wanted.run, arguments), "episode", &costs, wanted.shard);
+                return Ok(());
+            }
+            begun(output, arguments, wanted)?
+        }
     };
-    output.tell(&heading(&run, arguments, &directory.path));
+    output.tell(&format!("{}, into {}", heading(&run, arguments), directory.path.display()));
     let found = play_all(output, run, directory, arguments.jobs)?;
     if arguments.fail_on_collision && found.counted > 0 {
         return Err(Failure::Collision { collisions: found.counted as usize });
@@ -121,8 +129,16 @@ fn play_all(
     Ok(totals)
 }
 
-/// A new run, from the command line.
-fn begun(output: &Output, arguments: &RunArguments) -> Result<(Run, RunDirectory), Failure> {
+/// What the command line asks for.
+struct Wanted {
+    run: Run,
+    /// With its own table.
+    policy: Option<(ActionTable, Policy)>,
+    face: Face,
+    shard: Shard,
+}
+
+fn wanted(output: &Output, arguments: &RunArguments) -> Result<Wanted, Failure> {
     let policy = arguments.policy.as_ref().map(|path| load::policy(output, path)).transpose()?;
     let table = match (&arguments.file, &policy) {
         (Some(file), _) => load::table(output, file)?,
@@ -140,6 +156,12 @@ fn begun(output: &Output, arguments: &RunArguments) -> Result<(Run, RunDirectory
         FaceArgument::Rules => Face::Rules,
     };
     let run = ready(table, settings, policy.as_ref(), face)?;
+    Ok(Wanted { run, policy, face, shard })
+}
+
+/// A new run in a directory of its own.
+fn begun(output: &Output, arguments: &RunArguments, wanted: Wanted) -> Result<(Run, RunDirectory), Failure> {
+    let Wanted { run, policy, face, shard } = wanted;
     let held = run_directory::create(arguments.out.as_deref())?;
     let path = &held.path;
     shard::keep(path, shard)?;
@@ -278,7 +300,7 @@ fn restore(output: &Output, run: &Run, directory: &RunDirectory) -> Result<(), F
     Ok(())
 }
 
-fn heading(run: &Run, arguments: &RunArguments, directory: &Path) -> String {
+fn heading(run: &Run, arguments: &RunArguments) -> String {
     let settings = run.settings();
     let ambient = match settings.ambient {
         0 => String::new(),
@@ -295,14 +317,13 @@ fn heading(run: &Run, arguments: &RunArguments, directory: &Path) -> String {
         .as_ref()
         .map_or(String::new(), |path| format!(" with {}", path.display()));
     format!(
-        "{}: {} against {}{profile}, {} on {}{ambient}{traffic}, seed {}, into {}",
+        "{}: {} against {}{profile}, {} on {}{ambient}{traffic}, seed {}",
         run.space().path.display(),
         settings.agent,
         ads,
         plural(settings.episodes as usize, "episode"),
         settings.roads.join(", "),
-        settings.seed,
-        directory.display()
+        settings.seed
     )
 }
 

@@ -9,7 +9,7 @@ use crate::syntax::yaml_mistake;
 use super::error::Failure;
 use super::files::{remove, write};
 use super::load;
-use super::output::Output;
+use super::output::{Output, plural};
 
 /// The file that keeps it; a directory of the whole has none.
 pub const FILE: &str = "shard.yaml";
@@ -68,6 +68,25 @@ pub fn next_step(shard: Shard) -> String {
     format!(
         "\nthis is shard {shard}: when all are played, `avastra merge DIRS --out DIR` brings them together"
     )
+}
+
+/// Says what a command would play, for `--dry-run`: so many pieces, each of them a `unit` of these costs, in episodes.
+pub fn planned(output: &Output, heading: &str, unit: &str, costs: &[u64], shard: Shard) {
+    let own = shard.share(costs);
+    let episodes: u64 = own.iter().map(|&piece| costs[piece]).sum();
+    let mut text = format!("{heading}\nwould play at most {}", plural(costs.len(), unit));
+    if !shard.is_whole() {
+        text.push_str(&format!(", {} of them in shard {shard}", own.len()));
+    }
+    text.push_str(&format!(", {}\n", plural(episodes as usize, "episode")));
+    text.push_str(&match costs.len() {
+        1 => "it cannot be cut into pieces".to_owned(),
+        count => format!("it can be cut into {count} pieces (`--shard`); more would have nothing to play"),
+    });
+    output.say(&text);
+    output.result(serde_json::json!({
+        "unit": unit, "units": costs.len(), "shard": shard.to_string(), "units_of_shard": own.len(), "episodes": episodes,
+    }));
 }
 
 /// The shard that a scheduler gave this process, and by which variable; `None` where there is no scheduler.

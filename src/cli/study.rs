@@ -39,6 +39,11 @@ pub fn study(output: &Output, arguments: &StudyArguments) -> Result<(), Failure>
             let shard = shard::asked(output, arguments.shard.shard)?;
             let study = begun(output, file, arguments)?;
             let reused = played_elsewhere(&arguments.reuse, &study)?;
+            if arguments.shard.dry_run {
+                let costs: Vec<u64> = study.jobs().iter().map(|job| study.episodes(job)).collect();
+                shard::planned(output, &heading(&study), "job", &costs, shard);
+                return Ok(());
+            }
             let held = run_directory::create_empty(arguments.out.as_deref())?;
             shard::keep(&held.path, shard)?;
             let space = load::relative(&held.path, &study.table().space().path)?;
@@ -77,7 +82,7 @@ fn play_all(
     let costs: Vec<u64> = all.iter().map(|job| study.episodes(job)).collect();
     let own: Vec<_> = shard.share(&costs).into_iter().map(|job| all[job].clone()).collect();
     let missing = |database: &StudyDatabase| database.missing(study.settings(), own.clone());
-    output.tell(&heading(&study, &path));
+    output.tell(&format!("{}, into {}", heading(&study), path.display()));
     let mut times = Times::read(&path, &database)?;
     for Reused { directory, played } in reused {
         let lacking = missing(&database).map_err(unread)?;
@@ -257,19 +262,18 @@ fn resumed(output: &Output, path: &Path) -> Result<(Study, Held, String), Failur
     Ok((study, held, text))
 }
 
-fn heading(study: &Study, directory: &Path) -> String {
+fn heading(study: &Study) -> String {
     let settings = study.settings();
     let labels: Vec<&str> = settings.agents.iter().map(|agent| agent.label.as_str()).collect();
     format!(
-        "{}: {} against {} on {}, {} a seed, {}, first seed {}, into {}",
+        "{}: {} against {} on {}, {} a seed, {}, first seed {}",
         study.table().space().path.display(),
         labels.join(", "),
         study.ads_name(),
         settings.roads.join(", "),
         plural(settings.evaluation.episodes as usize, "episode"),
         plural(settings.evaluation.seeds as usize, "seed"),
-        settings.first_seed,
-        directory.display()
+        settings.first_seed
     )
 }
 

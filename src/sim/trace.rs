@@ -37,10 +37,10 @@ impl Trace {
         self.words += 1;
     }
 
-    /// A number, bit by bit.
+    /// A number, bit by bit, but both zeros alike: which of them `f64::max` and the like give is left to the compiler.
     #[inline]
     pub fn number(&mut self, number: f64) {
-        self.word(number.to_bits());
+        self.word((number + 0.0).to_bits());
     }
 
     /// SHA-256 over what the words up to now left.
@@ -61,6 +61,17 @@ mod tests {
         let mut trace = Trace::default();
         words.iter().for_each(|word| trace.word(*word));
         trace.digest()
+    }
+
+    #[test]
+    fn both_zeros_are_one_number() {
+        let [plus, minus, other] = [0.0, -0.0, f64::from_bits(1)].map(|number| {
+            let mut trace = Trace::default();
+            trace.number(number);
+            trace.digest()
+        });
+        assert_eq!(plus, minus);
+        assert_ne!(plus, other);
     }
 
     #[test]

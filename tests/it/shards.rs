@@ -252,6 +252,35 @@ fn schedulers_say_which_shard_it_is() {
 }
 
 #[test]
+fn a_dry_run_says_what_would_be_played() {
+    let scratch = tempfile::tempdir().expect("a scratch directory");
+    let out = scratch.path().join("out");
+    let planned = |command: &[&str]| {
+        let json = ["--out", text(&out), "--dry-run", "--format", "json"];
+        let said = done(&[command, &json].concat());
+        assert!(!out.exists());
+        let said: serde_json::Value = serde_json::from_str(&said).expect("it is JSON");
+        let unit = said["unit"].as_str().expect("it has a name").to_owned();
+        let [units, own, episodes] =
+            ["units", "units_of_shard", "episodes"].map(|field| said[field].as_u64().expect("it is a count"));
+        (unit, units, own, episodes)
+    };
+    let run = ["run", SPACE, "--road", "corner", "--episodes", "10"];
+    assert_eq!(planned(&run), ("episode".to_owned(), 10, 10, 10));
+    assert_eq!(planned(&[&run[..], &["--shard", "3/4"]].concat()), ("episode".to_owned(), 10, 2, 2));
+    let parts = ["--road", "corner", "--parts", "6", "--episodes", "5"];
+    let estimate = [&["estimate", SPACE][..], &parts].concat();
+    assert_eq!(planned(&estimate), ("part".to_owned(), 6, 6, 30));
+    let (unit, units, own, episodes) = planned(&["study", "scenarios/studies/rq4.yaml", "--shard", "30/30"]);
+    assert_eq!((unit.as_str(), units, own), ("job", 30, 1));
+    assert!(episodes > 75, "training and 75 episodes after it: {episodes}");
+    // What could not begin fails as it would.
+    let wrong = ["study", "scenarios/studies/none.yaml", "--dry-run"];
+    let (status, _, stderr) = outcome(&mut avastra(&wrong));
+    assert!(status == 1 && stderr.contains("none.yaml"), "{stderr}");
+}
+
+#[test]
 fn trainings_and_nothing_cannot_be_merged() {
     let scratch = tempfile::tempdir().expect("a scratch directory");
     let (folder, training) = (scratch.path().join("folder"), scratch.path().join("training"));

@@ -4,6 +4,7 @@ use std::path::Path;
 use std::time::Duration;
 
 use avastra::run::{Database, Units};
+use avastra::sim::ENGINE;
 use avastra::study::StudyDatabase;
 use serde_json::Value;
 
@@ -188,6 +189,15 @@ fn kept_and_written_again(scratch: &Path, played: &Path) {
     assert_ne!(more, last, "the last cell is the first of its agent");
     refused(&format!("{text}{more}\n"), "`avastra merge` brings shards together");
     refused(&format!("{text}{last}\n"), "this cell is there already");
+
+    // Another world is told, but not one with the same episodes.
+    for (world, is_told) in [("plane/5", true), ("plane/6", false)] {
+        std::fs::write(&kept, text.replace(&format!("\"{ENGINE}\""), &format!("\"{world}\"")))
+            .expect("it is writable");
+        let written = write(&[]);
+        assert!(written.contains(&format!("world `{world}`")), "{written}");
+        assert_eq!(written.contains(&format!("the world is `{ENGINE}` by now")), is_told, "{world}");
+    }
     std::fs::write(&kept, text).expect("it is writable");
 
     std::fs::write(&file, format!("{study}{}", published.replace("tiny", "tinny"))).expect("it is writable");

@@ -30,6 +30,9 @@ pub struct ShardArguments {
     /// Kubernetes Indexed Job says, else all].
     #[arg(long, value_name = "I/N")]
     pub shard: Option<Shard>,
+    /// Play nothing and write nothing: say what would be played, and into how many pieces it can be cut.
+    #[arg(long)]
+    pub dry_run: bool,
 }
 
 /// The conditions of episodes besides space and driving system.
@@ -87,7 +90,7 @@ pub struct RunArguments {
     #[command(flatten)]
     pub shard: ShardArguments,
     /// Go on with an interrupted run directory; its own settings hold.
-    #[arg(long, value_name = "DIR", conflicts_with_all = ["file", "road", "ads", "ads_config", "ads_cmd", "agent", "policy", "face", "episodes", "seed", "ambient", "traffic", "causes", "out", "self_contained", "shard", "without", "with"])]
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["file", "road", "ads", "ads_config", "ads_cmd", "agent", "policy", "face", "episodes", "seed", "ambient", "traffic", "causes", "out", "self_contained", "shard", "dry_run", "without", "with"])]
     pub resume: Option<PathBuf>,
     /// Exit with status 4 if a counted collision was found.
     #[arg(long)]
@@ -140,7 +143,7 @@ pub struct EstimateArguments {
     #[command(flatten)]
     pub shard: ShardArguments,
     /// Go on with an interrupted estimate; its own settings hold.
-    #[arg(long, value_name = "DIR", conflicts_with_all = ["file", "event", "method", "parts", "precision", "hours", "episodes", "ads", "ads_config", "ads_cmd", "road", "agent", "seed", "ambient", "traffic", "out", "shard", "without", "with"])]
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["file", "event", "method", "parts", "precision", "hours", "episodes", "ads", "ads_config", "ads_cmd", "road", "agent", "seed", "ambient", "traffic", "out", "shard", "dry_run", "without", "with"])]
     pub resume: Option<PathBuf>,
 }
 

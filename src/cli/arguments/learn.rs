@@ -117,7 +117,7 @@ pub struct StudyArguments {
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=1024))]
     pub jobs: Option<u32>,
     /// Go on with an interrupted study; its own settings hold.
-    #[arg(long, value_name = "DIR", conflicts_with_all = ["file", "ads_cmd", "out", "shard", "quick"])]
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["file", "ads_cmd", "out", "shard", "dry_run", "quick"])]
     pub resume: Option<PathBuf>,
     /// Take over the cells that another study has played already: those of agents with the same settings, on the same
     /// roads, with the same seeds. The result is the same as without.
