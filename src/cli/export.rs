@@ -36,11 +36,7 @@ pub fn export(output: &Output, arguments: &ExportArguments) -> Result<(), Failur
             }
         };
         let target = &targets[file];
-        let written = write_all(arguments, &recording, target, &maps)?;
-        let left_out = match arguments.to {
-            ExportFormat::Openscenario => export::left_out(&recording, style(arguments)),
-            ExportFormat::Commonroad | ExportFormat::Csv => Vec::new(),
-        };
+        let (written, left_out) = write_all(arguments, &recording, target, &maps)?;
         Ok(Exported { file: file.clone(), written: Ok(written), left_out })
     })?;
     let mut refuted = 0;
@@ -115,7 +111,8 @@ fn targets(arguments: &ExportArguments) -> Result<BTreeMap<PathBuf, PathBuf>, Fa
             Some(folder) => folder.clone(),
             None => file.parent().unwrap_or(Path::new("")).join(FOLDER),
         };
-        let stem = file.file_stem().ok_or_else(|| Failure::usage("a file has a name"))?;
+        let stem = file.file_stem();
+        let stem = stem.ok_or_else(|| Failure::file("read", file, "it is a folder: name a file in it"))?;
         let target = folder.join(stem).with_added_extension(extension(arguments.to));
         if let Some(other) = sources.insert(target.clone(), file).filter(|other| other != file) {
             return Err(Failure::usage(format!(
@@ -138,14 +135,14 @@ fn extension(format: ExportFormat) -> &'static str {
     }
 }
 
-/// Writes the file of a scenario and what it needs beside it; the paths of all of them, its own first. Scenarios share
-/// `maps`, so that two of them do not write the same map at once.
+/// Writes the file of a scenario and what it needs beside it; the paths of all of them, its own first, and what is left out.
+/// Scenarios share `maps`, so that two of them do not write the same map at once.
 fn write_all(
     arguments: &ExportArguments,
     recording: &Recording,
     target: &Path,
     maps: &Mutex<()>,
-) -> Result<Vec<PathBuf>, Failure> {
+) -> Result<(Vec<PathBuf>, Vec<String>), Failure> {
     match arguments.to {
         ExportFormat::Openscenario => {
             let name = map_name(&recording.map_path)?;
@@ -154,17 +151,18 @@ fn write_all(
                 let _one_at_a_time = maps.lock().unwrap_or_else(PoisonError::into_inner);
                 copy_map(&recording.map_path, &map)?;
             }
-            write(target, &export::openscenario(recording, name, style(arguments)))?;
-            Ok(vec![target.to_owned(), map])
+            let export::Written { text, left_out } = export::openscenario(recording, name, style(arguments));
+            write(target, &text)?;
+            Ok((vec![target.to_owned(), map], left_out))
         }
         ExportFormat::Commonroad => {
             let with_ego = arguments.ego == Some(ExportEgo::Trajectory);
             write(target, &export::commonroad(recording, with_ego))?;
-            Ok(vec![target.to_owned()])
+            Ok((vec![target.to_owned()], Vec::new()))
         }
         ExportFormat::Csv => {
             write(target, &export::csv(recording))?;
-            Ok(vec![target.to_owned()])
+            Ok((vec![target.to_owned()], Vec::new()))
         }
     }
 }

@@ -63,14 +63,19 @@ pub fn write(path: &Path, text: &(impl AsRef<[u8]> + ?Sized)) -> Result<(), Fail
     Ok(())
 }
 
-/// Writes a file where nothing is: what others put there meanwhile stays.
+/// Writes a file where nothing is: what is there, or others put there meanwhile, stays.
 pub fn write_new(path: &Path, text: &str) -> Result<(), Failure> {
     let folder = path.parent().filter(|parent| !parent.as_os_str().is_empty());
     if let Some(folder) = folder {
         std::fs::create_dir_all(folder).map_err(|error| Failure::file("create", folder, error))?;
     }
     let failed = |error| Failure::file("write", path, error);
-    let mut file = File::create_new(path).map_err(failed)?;
+    let mut file = File::create_new(path).map_err(|error| match error.kind() {
+        std::io::ErrorKind::AlreadyExists => {
+            Failure::file("write", path, "it is there already, with another text")
+        }
+        _ => failed(error),
+    })?;
     file.write_all(text.as_bytes()).and_then(|()| file.sync_all()).map_err(|error| {
         // A part of it would be in the way of the whole.
         let _ = std::fs::remove_file(path);

@@ -164,7 +164,8 @@ fn targets(arguments: &ImportArguments) -> Result<Vec<PathBuf>, Failure> {
             Some(folder) => folder.clone(),
             None => file.parent().unwrap_or(Path::new("")).join(FOLDER),
         };
-        let stem = file.file_stem().ok_or_else(|| Failure::usage("a file has a name"))?;
+        let stem = file.file_stem();
+        let stem = stem.ok_or_else(|| Failure::file("read", file, "it is a folder: name a file in it"))?;
         let target = folder.join(stem).with_added_extension("ava");
         if targets.contains(&target) {
             let message =

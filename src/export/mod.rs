@@ -11,7 +11,7 @@ mod xml;
 
 pub use commonroad::commonroad;
 pub use csv::csv;
-pub use openscenario::{Ego, Others, Style, Version, left_out, openscenario};
+pub use openscenario::{Ego, Others, Style, Version, Written, openscenario};
 pub use recording::{ExportError, Recording, record};
 
 /// Everything has the same date: a file depends on its scenario alone.

@@ -4,6 +4,7 @@ use roxmltree::Node;
 
 use super::position::{Position, position};
 use super::source::{Mark, Source, children, element, elements};
+use super::story::DURATION_S_MAX;
 
 const FOLLOWING: [&str; 2] = ["follow", "position"];
 
@@ -106,7 +107,15 @@ fn at_once(source: &mut Source, dynamics: Node) -> Option<bool> {
     let shape = source.word(dynamics, "dynamicsShape", &["linear", "cubic", "sinusoidal", "step"])?;
     let dimension = source.word(dynamics, "dynamicsDimension", &["time", "distance", "rate"])?;
     source.word(dynamics, "followingMode", &FOLLOWING)?;
-    Some(shape == "step" || (dimension == "time" && source.number(dynamics, "value")? == 0.0))
+    if dimension == "rate" || !dynamics.has_attribute("value") {
+        return Some(shape == "step");
+    }
+    let value = source.amount(dynamics, "value")?;
+    if dimension == "time" && value > DURATION_S_MAX {
+        return source
+            .refuse(dynamics, format!("it takes {value} s: nothing lasts longer than {DURATION_S_MAX} s"));
+    }
+    Some(shape == "step" || (dimension == "time" && value == 0.0))
 }
 
 fn moved(source: &mut Source, action: Node, is_ego: bool) -> Option<Begun> {

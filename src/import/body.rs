@@ -10,6 +10,9 @@ use super::Files;
 use super::source::{Source, children, element, elements, filled};
 use super::vocabulary;
 
+/// The middle of a body is within its length of the axle, m.
+const MIDDLE_M_MAX: f64 = 20.0;
+
 /// The body that the engine has for it, and its own size.
 #[derive(Debug, Clone)]
 pub struct Shape {
@@ -124,8 +127,7 @@ fn shape(node: Node, assigned: &BTreeMap<String, String>) -> Result<Shape, Strin
     let number = |name: &'static str, attribute: &str| {
         let found = element(bounds, name).and_then(|node| node.attribute(attribute));
         let found = found.and_then(|text| filled(text, &parameters).ok());
-        let value =
-            found.and_then(|text| text.trim().parse::<f64>().ok()).filter(|value| value.abs() < 1000.0);
+        let value = found.and_then(|text| text.trim().parse::<f64>().ok()).filter(|value| value.is_finite());
         value.ok_or_else(|| format!("`{attribute}` of its `{name}` is no number"))
     };
     let size = |attribute: &str, field: BodyField| {
@@ -137,11 +139,15 @@ fn shape(node: Node, assigned: &BTreeMap<String, String>) -> Result<Shape, Strin
             _ => Ok(value),
         }
     };
+    let middle_m = number("Center", "x")?;
+    if middle_m.abs() > MIDDLE_M_MAX {
+        return Err(format!("`x` of its `Center` is {middle_m}: more than {MIDDLE_M_MAX} m from the axle"));
+    }
     Ok(Shape {
         like,
         length_m: size("length", BodyField::Length)?,
         width_m: size("width", BodyField::Width)?,
         height_m: size("height", BodyField::Height)?,
-        middle_m: number("Center", "x")?,
+        middle_m,
     })
 }

@@ -12,6 +12,7 @@ use super::ground::{Beside, Ground};
 use super::position::{Heading, Position};
 use super::source::{Mark, Source};
 use super::story::{Change, Entity, Story};
+use super::trigger::{Condition, When};
 use super::weather::Weather;
 use super::{Files, condition};
 
@@ -274,6 +275,15 @@ impl Scene {
         }
         if self.change.is_some() {
             return source.refuse_at(mark, "one vehicle of a scenario changes lanes");
+        }
+        let is_late =
+            |condition: &Condition| matches!(condition.kind, When::After(s) if s >= self.duration_s);
+        if !change.when.is_empty() && change.when.iter().all(|all| all.iter().any(is_late)) {
+            let (name, end_s) = (&other.name, self.duration_s);
+            source.note(format!(
+                "`{name}` keeps its lane: the file waits for a time after the end, {end_s:.0} s"
+            ));
+            return Some(false);
         }
         let when = condition::text(source, ground, &change.when, other, placed)?;
         self.change = Some(when);

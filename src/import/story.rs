@@ -1,6 +1,8 @@
 //! What an OpenSCENARIO file says, as far as it can be imported, without its map: who is there, where, how fast, and what the
 //! others do when.
 
+use std::collections::BTreeSet;
+
 use roxmltree::{Document, Node};
 
 use super::Files;
@@ -19,7 +21,7 @@ const MINOR_MAX: i32 = 3;
 const DURATION_S: f64 = 60.0;
 
 /// The longest step of an episode, s: a scenario is one step.
-const DURATION_S_MAX: f64 = 600.0;
+pub const DURATION_S_MAX: f64 = 600.0;
 
 /// A file's scenario.
 #[derive(Debug)]
@@ -297,7 +299,7 @@ impl Entity {
 }
 
 fn entities(source: &mut Source, root: Node, files: &dyn Files) -> Vec<Entity> {
-    let mut found = Vec::new();
+    let (mut found, mut names) = (Vec::new(), BTreeSet::new());
     let Some(list) = source.required(root, "Entities") else { return found };
     for node in children(list) {
         if !node.has_tag_name("ScenarioObject") {
@@ -305,6 +307,11 @@ fn entities(source: &mut Source, root: Node, files: &dyn Files) -> Vec<Entity> {
             continue;
         }
         let Some(name) = source.text(node, "name") else { continue };
+        if !names.insert(name.clone()) {
+            source.tear(&name);
+            source.refuse::<()>(node, format!("another entity is called `{name}`, too"));
+            continue;
+        }
         let Some(body) = source.about(&name, |source| body(source, root, node, files)) else { continue };
         found.push(Entity {
             name,

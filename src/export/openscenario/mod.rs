@@ -73,17 +73,11 @@ pub struct Style {
     pub others: Others,
 }
 
-/// What a file leaves out or says otherwise than its style promises.
-pub fn left_out(recording: &Recording, style: Style) -> Vec<String> {
-    if style.version == Version::Carla {
-        return carla::dropped(recording);
-    }
-    let exact = exact(recording, style);
-    if exact.is_empty() {
-        return Vec::new();
-    }
-    let names = natural::names(&exact);
-    vec![format!("actions of {names}, which turn back onto the road that they come from: as recorded")]
+/// A file.
+pub struct Written {
+    pub text: String,
+    /// What it leaves out or says otherwise than its style promises.
+    pub left_out: Vec<String>,
 }
 
 /// Others that are exact in a natural version.
@@ -95,8 +89,8 @@ fn exact(recording: &Recording, style: Style) -> Vec<&Actor> {
     }
 }
 
-/// The file's text. `map_file` is the path of the map from it.
-pub fn openscenario(recording: &Recording, map_file: &str, style: Style) -> String {
+/// Writes a recording. `map_file` is the path of the map from the file.
+pub fn openscenario(recording: &Recording, map_file: &str, style: Style) -> Written {
     let signals = (style.version != Version::Carla).then(|| signals(recording)).flatten();
     let network = Element::new("RoadNetwork")
         .holding(Element::new("LogicFile").with("filepath", map_file))
@@ -106,13 +100,24 @@ pub fn openscenario(recording: &Recording, map_file: &str, style: Style) -> Stri
         Version::Carla => carla::entity(recording, actor),
         Version::V1_2 | Version::V1_3 => entity(actor, style.ego),
     });
-    Element::new("OpenSCENARIO")
+    let text = Element::new("OpenSCENARIO")
         .holding(header(recording, style, &exact))
         .holding(Element::new("CatalogLocations"))
         .holding(network)
         .holding(Element::new("Entities").holding_all(entities))
         .holding(storyboard(recording, style, &exact))
-        .document()
+        .document();
+    let left_out = match style.version {
+        Version::Carla => carla::dropped(recording),
+        Version::V1_2 | Version::V1_3 if exact.is_empty() => Vec::new(),
+        Version::V1_2 | Version::V1_3 => {
+            let names = natural::names(&exact);
+            vec![format!(
+                "actions of {names}, which turn back onto the road that they come from: as recorded"
+            )]
+        }
+    };
+    Written { text, left_out }
 }
 
 fn header(recording: &Recording, style: Style, exact: &[&Actor]) -> Element {
