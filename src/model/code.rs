@@ -83,7 +83,7 @@ pub const DEAD: &str = "AV0401";
 pub const MASKED: &str = "AV0402";
 /// Rows that are neither proved dead nor found to run.
 pub const UNDECIDED: &str = "AV0403";
-/// A range of which rules leave less than half.
+/// A range of which rules leave less than half, or listed values that they never leave.
 pub const CUT: &str = "AV0404";
 /// A rule that names a parameter which its action lacks.
 pub const LACKING_PARAMETER: &str = "AV0405";
