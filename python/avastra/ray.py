@@ -28,8 +28,8 @@ import sys
 COMMANDS = ("run", "study", "estimate")
 #: How often Ray plays a shard again whose worker or program was killed.
 RETRIES = 5
-#: How many tasks Ray is given at a time for each that can be played at once: enough that no processor waits for the next.
-AHEAD = 4
+#: How many tasks Ray has at a time: enough that a cluster grows by them, and few enough that each answer is found at once.
+TASKS = 1000
 #: Exit statuses of a shard that may be whole: it found a counted collision that was not to be, or the driving system failed in some
 #: episodes. `merge` knows whether it is.
 ENDED = (0, 4, 5)
@@ -41,18 +41,29 @@ class Refused(Exception):
     """Says to the user what cannot be done, and what would help."""
 
 
+class Ended(Exception):
+    """The program refuses the command, and has said why."""
+
+    def __init__(self, status):
+        super().__init__(status)
+        self.status = status
+
+
 def main(arguments=None):
     """The command line. Returns the exit status: that of `avastra`, where it is the one that failed."""
     try:
         options, passed = _parsed(arguments)
         options.program = _program(options.program)
-        pieces, status = _pieces(options, passed)
-        return status or _cluster(options, passed, pieces)
+        shards = _kept(options, passed)
+        most = shards or _shards_max(options, passed)
+        return _cluster(options, passed, shards, most)
+    except Ended as ended:
+        return ended.status
     except Refused as refused:
         _say(f"error: {refused}")
         return 1
     except KeyboardInterrupt:
-        _say("stopped: what was played is kept, the same command goes on with it")
+        _say("stopped: what has been played is kept, the same command goes on with it")
         return 130
 
 
@@ -114,6 +125,8 @@ def _parsed(arguments):
     for option in passed:
         if option.split("=")[0] in ("--shard", "--resume"):
             raise Refused(f"`{option}` is said by Ray's tasks themselves: to go on, say the same command again")
+        if option == "--dry-run":
+            raise Refused(f"`{option}` needs no cluster: `avastra {options.command} … --dry-run` says what would be played")
     if options.address and options.workers:
         raise Refused("`--workers` is for a cluster that is begun here, and `--address` names another")
     return options, passed
@@ -138,21 +151,26 @@ def _program(program):
     return os.path.abspath(found)
 
 
-def _pieces(options, passed):
-    """Into how many pieces the command can be cut, and status 0; what the program said of one that it refuses is told.
+def _shards_max(options, passed):
+    """Into how many shards the command can be cut. What the program refuses, it says itself, and that ends this program, too.
 
     It is asked before there is a cluster, which takes seconds to begin.
     """
     # The shard keeps a scheduler's environment out of it.
     command = [options.program, options.command, *passed, *_anew(options), "--shard", "1/1", "--dry-run"]
-    asked = subprocess.run([*command, "--format", "json"], stdin=subprocess.DEVNULL, capture_output=True, text=True, errors="replace")
-    if asked.returncode != 0:
-        # Again, in words.
-        return 0, subprocess.run(command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL).returncode
-    pieces = json.loads(asked.stdout)["units"]
-    if (options.shards or 1) > pieces:
-        raise Refused(f"{options.shards} shards are too many: it can be cut into {pieces} pieces")
-    return pieces, 0
+    try:
+        asked = subprocess.run([*command, "--format", "json"], stdin=subprocess.DEVNULL, capture_output=True, text=True, errors="replace")
+        if asked.returncode != 0:
+            # Again, in words.
+            told = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, text=True, errors="replace")
+            _say(told.stderr.rstrip())
+            raise Ended(max(told.returncode, 1))
+    except OSError as error:
+        raise Refused(f"`{options.program}` cannot be started: {error.strerror}") from error
+    most = json.loads(asked.stdout)["planned"]["shards_max"]
+    if options.shards and options.shards > most:
+        raise Refused(f"{options.shards} shards are too many: it can be cut into {most}")
+    return most
 
 
 def _anew(options):
@@ -160,7 +178,7 @@ def _anew(options):
     return [*(["--reuse", options.reuse] if options.reuse else []), *(["--fail-on-collision"] if options.fail_on_collision else [])]
 
 
-def _cluster(options, passed, pieces):
+def _cluster(options, passed, shards, most):
     try:
         import ray
     except ImportError as error:
@@ -172,18 +190,18 @@ def _cluster(options, passed, pieces):
     except (ConnectionError, ValueError, RuntimeError) as error:
         raise Refused(f"no cluster: {error}") from error
     try:
-        return _run(ray, options, passed, pieces)
+        return _run(ray, options, passed, shards, most)
     finally:
         # This ends the tasks under way, and they their programs.
         ray.shutdown()
 
 
-def _run(ray, options, passed, pieces):
+def _run(ray, options, passed, shards, most):
     processors = int(ray.cluster_resources().get("CPU", 1))
     if options.jobs > processors:
         raise Refused(f"no shard with {options.jobs} threads can begin: the cluster has {processors} processors")
-    at_once = max(1, processors // options.jobs)
-    work, shards = _begun(options, passed, min(at_once, pieces))
+    shards = shards or options.shards or min(max(1, processors // options.jobs), most)
+    work = _begun(options, passed, shards)
     tell = (lambda text: None) if options.quiet else _say
     tell(f"{shards} shards on {processors} processors, in {work['folder']}")
     task = ray.remote(play).options(num_cpus=options.jobs, max_retries=RETRIES, retry_exceptions=[ChildProcessError],
@@ -191,7 +209,7 @@ def _run(ray, options, passed, pieces):
     numbers = iter(range(1, shards + 1))
     under_way, ended_count, worst = {}, 0, 0
     while ended_count < shards:
-        for number in itertools.islice(numbers, AHEAD * at_once - len(under_way)):
+        for number in itertools.islice(numbers, TASKS - len(under_way)):
             under_way[task.remote(number, shards, work)] = number
         ended, _ = ray.wait(list(under_way), num_returns=1)
         number = under_way.pop(ended[0])
@@ -212,12 +230,16 @@ def _run(ray, options, passed, pieces):
     return _merged(options, work, shards) or worst
 
 
-def _begun(options, passed, wanted):
-    """The work of all shards and their number, for a new folder or one that is gone on with."""
-    out = os.path.abspath(options.out)
-    folder = f"{out}.shards"
-    record = os.path.join(folder, RECORD)
+def _work(options, passed):
+    """What is asked for, as the record keeps it, and the folder of the shards."""
     known = {"command": options.command, "arguments": passed, "working_directory": os.getcwd()}
+    return known, f"{os.path.abspath(options.out)}.shards"
+
+
+def _kept(options, passed):
+    """Into how many shards this command was cut when it began; `None` if it is new."""
+    known, folder = _work(options, passed)
+    record, out = os.path.join(folder, RECORD), os.path.abspath(options.out)
     left = [name for name in os.listdir(folder) if name != RECORD] if os.path.isdir(folder) else []
     # A record alone is that of a command whose shards could not begin.
     if left and os.path.isfile(record):
@@ -228,19 +250,25 @@ def _begun(options, passed, wanted):
             was = " ".join([begun["command"], *begun["arguments"]])
             raise Refused(f"`{folder}` has {shards} shards of `{was}`, begun in `{begun['working_directory']}`: say the same command "
                           "there, name another `--out`, or delete that folder")
-    else:
-        if left or (os.path.isdir(out) and os.listdir(out)):
-            raise Refused(f"`{folder if left else out}` is not empty: name another `--out`")
-        shards = options.shards or wanted
-        try:
-            os.makedirs(folder, exist_ok=True)
-        except OSError as error:
-            raise Refused(f"`{folder}` cannot be made: {error.strerror}") from error
-        # Renamed into place, so that a kill leaves all of it or nothing.
-        with open(f"{record}.new", "w", encoding="utf-8") as file:
-            json.dump({**known, "shards": shards}, file, indent=1)
-        os.replace(f"{record}.new", record)
-    return {**known, "program": options.program, "folder": folder, "jobs": options.jobs, "anew": _anew(options)}, shards
+        return shards
+    if left or (os.path.isdir(out) and os.listdir(out)):
+        raise Refused(f"`{folder if left else out}` is not empty: name another `--out`")
+    return None
+
+
+def _begun(options, passed, shards):
+    """The work of all shards, whose folder and record are there."""
+    known, folder = _work(options, passed)
+    record = os.path.join(folder, RECORD)
+    try:
+        os.makedirs(folder, exist_ok=True)
+    except OSError as error:
+        raise Refused(f"`{folder}` cannot be made: {error.strerror}") from error
+    # Renamed into place, so that a kill leaves all of it or nothing.
+    with open(f"{record}.new", "w", encoding="utf-8") as file:
+        json.dump({**known, "shards": shards}, file, indent=1)
+    os.replace(f"{record}.new", record)
+    return {**known, "program": options.program, "folder": folder, "jobs": options.jobs, "anew": _anew(options)}
 
 
 def _merged(options, work, shards):

@@ -24,7 +24,7 @@ if "--dry-run" in asked:
     if "wrong.ava" in asked:
         print("error: wrong.ava: no such file", file=sys.stderr)
         sys.exit(2)
-    print(json.dumps({{"units": 40}}))
+    print(json.dumps({{"planned": {{"shards_max": 40}}}}))
     sys.exit(0)
 with open(here / "asked.jsonl", "a") as file:
     file.write(json.dumps(asked) + "\\n")
@@ -151,17 +151,18 @@ class OnRay(unittest.TestCase):
         status, told = self.called("run", "s.ava", "--workers", "2", "--jobs", "3")
         self.assertEqual((status, "the cluster has 2 processors" in told), (1, True), told)
 
-    def test_ray_is_given_as_many_tasks_as_it_needs(self):
-        status, told = self.called("study", "s.yaml", "--shards", "40", "--workers", "2")
+    def test_ray_has_so_many_tasks_at_a_time(self):
+        with mock.patch("avastra.ray.TASKS", 8):
+            status, told = self.called("study", "s.yaml", "--shards", "40", "--workers", "2")
         self.assertEqual((status, len(self.asked()), self.ray.most), (0, 40 + 1, 8), told)
 
     def test_what_cannot_begin_is_said_before_there_is_a_cluster(self):
         status, told = self.called("study", "s.yaml", "--shards", "41")
-        self.assertEqual((status, "41 shards are too many: it can be cut into 40 pieces" in told), (1, True), told)
-        # Its words are the program's own, on the standard error of both.
-        self.assertEqual(self.called("study", "wrong.ava")[0], 2)
+        self.assertEqual((status, "41 shards are too many: it can be cut into 40" in told), (1, True), told)
+        # The words and the status are the program's own.
+        self.assertEqual(self.called("study", "wrong.ava"), (2, "error: wrong.ava: no such file\n"))
         self.assertEqual((self.asked(), self.ray.begun), ([], 0))
-        # No more shards than there are pieces, where nobody has said how many.
+        # No more shards than there can be, where nobody has said how many.
         self.assertEqual(self.called("study", "s.yaml", "--workers", "64")[0], 0)
         self.assertEqual(len(self.asked()), 40 + 1)
 
@@ -205,6 +206,9 @@ class OnRay(unittest.TestCase):
         self.assertEqual(self.called("run", "s.ava", "--shards", "2")[0], 0)
         self.assertEqual(self.called("run", "s.ava")[0], 0)
         self.assertEqual([asked[1] for asked in self.asked()], ["s.ava"] * 2 + [self.shard(1)] + ["--resume"] * 2 + [self.shard(1)])
+        # The shards that are there count, not the processors or what the program would say now.
+        self.assertEqual(self.called("run", "s.ava", "--workers", "7")[0], 0)
+        self.assertEqual(self.asked()[-1], ["merge", self.shard(1), self.shard(2), "--out", str(self.out)])
         for other in (["run", "t.ava"], ["run", "s.ava", "--shards", "3"], ["study", "s.ava"]):
             status, told = self.called(*other)
             self.assertEqual(status, 1)
@@ -230,6 +234,7 @@ class OnRay(unittest.TestCase):
             (["run", "s.ava", "--address", "auto", "--workers", "2"], "`--address` names another"),
             (["run", "s.ava", "--address", "nowhere:1"], "no cluster: nothing listens at nowhere:1"),
             (["drive", "s.ava"], "invalid choice: 'drive'"),
+            (["run", "s.ava", "--dry-run"], "needs no cluster"),
         ]:
             status, told = self.called(*arguments)
             self.assertEqual(status, 1, told)

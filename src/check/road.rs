@@ -232,5 +232,5 @@ fn exact_limit(limit_mps: f64) -> Rational {
         }
     }
     // A road without a limit gets 1000 m/s, which nothing reaches.
-    Rational::from_f64(limit_mps).unwrap_or(Rational::integer(1000))
+    Rational::from_rounded(limit_mps).unwrap_or(Rational::integer(1000))
 }

@@ -32,9 +32,16 @@ pub fn estimate(output: &Output, arguments: &EstimateArguments) -> Result<(), Fa
         None => {
             let (estimate, shard) = wanted(output, arguments)?;
             if arguments.shard.dry_run {
+                run_directory::refuse_used(arguments.out.as_deref())?;
                 let settings = estimate.settings();
                 let costs = vec![u64::from(settings.run.episodes); settings.all_parts().len()];
-                shard::planned(output, &heading(&estimate), "part", &costs, shard);
+                shard::planned(
+                    output,
+                    &heading(&estimate),
+                    &planned_text(settings, costs.len()),
+                    &costs,
+                    shard,
+                );
                 return Ok(());
             }
             begun(arguments, estimate, shard)?
@@ -348,6 +355,14 @@ fn heading(estimate: &Estimate) -> String {
         settings.run.roads.join(", "),
         settings.run.seed
     )
+}
+
+fn planned_text(settings: &EstimateSettings, parts: usize) -> String {
+    let stops = settings.stopping.precision.is_some() || settings.stopping.hours.is_some();
+    let most = if stops { "at most " } else { "" };
+    let pilot = if settings.method == Method::Probe { ", and a pilot in each shard" } else { "" };
+    let episodes = plural(settings.run.episodes as usize, "episode");
+    format!("{most}{} of {episodes}{pilot}", plural(parts, "part"))
 }
 
 fn estimate_text(results: &EstimateResults, is_unfinished: bool, shard: Shard) -> String {

@@ -71,9 +71,7 @@ pub fn write_new(path: &Path, text: &str) -> Result<(), Failure> {
     }
     let failed = |error| Failure::file("write", path, error);
     let mut file = File::create_new(path).map_err(|error| match error.kind() {
-        std::io::ErrorKind::AlreadyExists => {
-            Failure::file("write", path, "it is there already, with another text")
-        }
+        std::io::ErrorKind::AlreadyExists => Failure::file("write", path, "something is there already"),
         _ => failed(error),
     })?;
     file.write_all(text.as_bytes()).and_then(|()| file.sync_all()).map_err(|error| {

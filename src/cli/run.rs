@@ -36,8 +36,10 @@ pub fn run(output: &Output, arguments: &RunArguments) -> Result<(), Failure> {
         None => {
             let wanted = wanted(output, arguments)?;
             if arguments.shard.dry_run {
+                run_directory::refuse_used(arguments.out.as_deref())?;
                 let costs = vec![1; wanted.run.episodes()];
-                shard::planned(output, &heading(&wanted.run, arguments), "episode", &costs, wanted.shard);
+                let what = plural(costs.len(), "episode");
+                shard::planned(output, &heading(&wanted.run, arguments), &what, &costs, wanted.shard);
                 return Ok(());
             }
             begun(output, arguments, wanted)?

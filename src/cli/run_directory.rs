@@ -305,6 +305,14 @@ fn make_empty(path: &Path) -> Result<Held, Failure> {
     Ok(held)
 }
 
+/// Refuses a directory in which nothing can begin, and makes none.
+pub fn refuse_used(out: Option<&Path>) -> Result<(), Failure> {
+    match out.filter(|path| path.exists()) {
+        Some(path) => make_empty(path).map(drop),
+        None => Ok(()),
+    }
+}
+
 /// Whether a directory is empty but for what a kill leaves before the settings are written.
 pub fn is_unbegun(path: &Path) -> std::io::Result<bool> {
     for entry in std::fs::read_dir(path)? {

@@ -53,6 +53,13 @@ const REPRODUCIBLE: Field = f(
     "false if a driving system of your own says that it is not deterministic, or missed steps",
 );
 
+/// What would be played.
+const PLANNED: Field = f(
+    "planned",
+    "object",
+    "with `--dry-run`, and then alone: `units` and `episodes` that would be played, `shards_max` into which it can be cut",
+);
+
 /// Every command with a result.
 pub const SHAPES: &[Shape] = &[
     Shape {
@@ -141,6 +148,7 @@ pub const SHAPES: &[Shape] = &[
     Shape {
         command: "run",
         fields: &[
+            PLANNED,
             f("directory", "text", "the run directory"),
             f("totals", "object", "sums over all episodes: how they ended, collisions by kind"),
             f("refusals[]", "object", "a reason why actions were refused: `reason` and `times`"),
@@ -219,6 +227,7 @@ pub const SHAPES: &[Shape] = &[
     Shape {
         command: "estimate",
         fields: &[
+            PLANNED,
             f("directory", "text", "where the estimate stands"),
             f("results.schema", "number", "of `results`, as in results.json"),
             f("results.event", "text", "`counted` or `collision`"),
@@ -292,6 +301,7 @@ pub const SHAPES: &[Shape] = &[
     Shape {
         command: "study",
         fields: &[
+            PLANNED,
             f("directory", "text", "where results.json lies"),
             f("results", "object?", "as in results.json; absent if the driving system failed"),
             f(

@@ -3,13 +3,13 @@
 
 use std::path::Path;
 
-use crate::run::Shard;
+use crate::run::{SHARDS_MAX, Shard};
 use crate::syntax::yaml_mistake;
 
 use super::error::Failure;
 use super::files::{remove, write};
 use super::load;
-use super::output::{Output, plural};
+use super::output::Output;
 
 /// The file that keeps it; a directory of the whole has none.
 pub const FILE: &str = "shard.yaml";
@@ -70,22 +70,22 @@ pub fn next_step(shard: Shard) -> String {
     )
 }
 
-/// Says what a command would play, for `--dry-run`: so many pieces, each of them a `unit` of these costs, in episodes.
-pub fn planned(output: &Output, heading: &str, unit: &str, costs: &[u64], shard: Shard) {
-    let own = shard.share(costs);
-    let episodes: u64 = own.iter().map(|&piece| costs[piece]).sum();
-    let mut text = format!("{heading}\nwould play at most {}", plural(costs.len(), unit));
+/// Says what a command would play, for `--dry-run`. `what` says it of the whole, `costs` in episodes for each unit of its work.
+pub fn planned(output: &Output, heading: &str, what: &str, costs: &[u64], shard: Shard) {
+    let (units, own) = (costs.len(), shard.share(costs));
+    let most = units.min(SHARDS_MAX as usize);
+    let mut text = format!("{heading}\nwould play {what}");
     if !shard.is_whole() {
-        text.push_str(&format!(", {} of them in shard {shard}", own.len()));
+        text.push_str(&format!("; shard {shard} is {} of {units} pieces", own.len()));
     }
-    text.push_str(&format!(", {}\n", plural(episodes as usize, "episode")));
-    text.push_str(&match costs.len() {
-        1 => "it cannot be cut into pieces".to_owned(),
-        count => format!("it can be cut into {count} pieces (`--shard`); more would have nothing to play"),
+    text.push_str(&match most {
+        1 => "\nit cannot be cut into shards".to_owned(),
+        _ => format!("\nit can be cut into {most} shards at most"),
     });
     output.say(&text);
+    let episodes: u64 = own.iter().map(|&unit| costs[unit]).sum();
     output.result(serde_json::json!({
-        "unit": unit, "units": costs.len(), "shard": shard.to_string(), "units_of_shard": own.len(), "episodes": episodes,
+        "planned": { "units": own.len(), "episodes": episodes, "shards_max": most },
     }));
 }
 

@@ -40,8 +40,11 @@ pub fn study(output: &Output, arguments: &StudyArguments) -> Result<(), Failure>
             let study = begun(output, file, arguments)?;
             let reused = played_elsewhere(&arguments.reuse, &study)?;
             if arguments.shard.dry_run {
+                run_directory::refuse_used(arguments.out.as_deref())?;
                 let costs: Vec<u64> = study.jobs().iter().map(|job| study.episodes(job)).collect();
-                shard::planned(output, &heading(&study), "job", &costs, shard);
+                let episodes = plural(costs.iter().sum::<u64>() as usize, "episode");
+                let what = format!("{} trainings or repetitions, {episodes} together", costs.len());
+                shard::planned(output, &heading(&study), &what, &costs, shard);
                 return Ok(());
             }
             let held = run_directory::create_empty(arguments.out.as_deref())?;

@@ -107,10 +107,11 @@ fn at_once(source: &mut Source, dynamics: Node) -> Option<bool> {
     let shape = source.word(dynamics, "dynamicsShape", &["linear", "cubic", "sinusoidal", "step"])?;
     let dimension = source.word(dynamics, "dynamicsDimension", &["time", "distance", "rate"])?;
     source.word(dynamics, "followingMode", &FOLLOWING)?;
-    if dimension == "rate" || !dynamics.has_attribute("value") {
-        return Some(shape == "step");
-    }
-    let value = source.amount(dynamics, "value")?;
+    let value = match (dimension, dynamics.has_attribute("value")) {
+        (_, false) if shape == "step" => 0.0,
+        ("rate", _) => source.number(dynamics, "value")?,
+        _ => source.amount(dynamics, "value")?,
+    };
     if dimension == "time" && value > DURATION_S_MAX {
         return source
             .refuse(dynamics, format!("it takes {value} s: nothing lasts longer than {DURATION_S_MAX} s"));

@@ -10,7 +10,7 @@ use super::Files;
 use super::source::{Source, children, element, elements, filled};
 use super::vocabulary;
 
-/// The middle of a body is within its length of the axle, m.
+/// Ours: farther from the axle than the longest body is long, m, the middle is a mistake.
 const MIDDLE_M_MAX: f64 = 20.0;
 
 /// The body that the engine has for it, and its own size.

@@ -259,6 +259,18 @@ impl Scene {
         if side == 0 {
             return Some(false);
         }
+        let starts_s = |group: &Vec<Condition>| {
+            let times =
+                group.iter().map(|condition| if let When::After(s) = condition.kind { s } else { 0.0 });
+            times.fold(0.0, f64::max)
+        };
+        let soonest_s = change.when.iter().map(starts_s).reduce(f64::min).unwrap_or(0.0);
+        if soonest_s >= self.duration_s {
+            let (name, end_s) = (&other.name, self.duration_s);
+            let kept = format!("`{name}` keeps its lane: it would leave it after {soonest_s:.0} s");
+            source.note(format!("{kept}, and {end_s:.0} s are played"));
+            return Some(false);
+        }
         if side.abs() > 1 {
             return source.refuse_at(mark, "a vehicle changes to the next lane, not over two");
         }
@@ -275,15 +287,6 @@ impl Scene {
         }
         if self.change.is_some() {
             return source.refuse_at(mark, "one vehicle of a scenario changes lanes");
-        }
-        let is_late =
-            |condition: &Condition| matches!(condition.kind, When::After(s) if s >= self.duration_s);
-        if !change.when.is_empty() && change.when.iter().all(|all| all.iter().any(is_late)) {
-            let (name, end_s) = (&other.name, self.duration_s);
-            source.note(format!(
-                "`{name}` keeps its lane: the file waits for a time after the end, {end_s:.0} s"
-            ));
-            return Some(false);
         }
         let when = condition::text(source, ground, &change.when, other, placed)?;
         self.change = Some(when);

@@ -21,7 +21,7 @@ const MINOR_MAX: i32 = 3;
 const DURATION_S: f64 = 60.0;
 
 /// The longest step of an episode, s: a scenario is one step.
-pub const DURATION_S_MAX: f64 = 600.0;
+pub(super) const DURATION_S_MAX: f64 = 600.0;
 
 /// A file's scenario.
 #[derive(Debug)]

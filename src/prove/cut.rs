@@ -1,29 +1,15 @@
-//! Ranges of which the rules leave less than half, and listed values that they never leave. Most are meant; some are a
-//! mistake in the rule.
+//! Ranges of which the rules leave less than half. Most are meant; some are a mistake in the rule.
 
 use crate::model::expr::Comparison;
 use crate::model::rules::RowRules;
-use crate::model::{
-    Domain, End, Interval, Parameter, Reach, Road, Row, RulesInForce, Space, Type, Value, code,
-};
-use crate::prove::enclose::Values;
-use crate::prove::reach::declared;
+use crate::model::{Domain, End, Interval, Parameter, Reach, RulesInForce, Space, Type, code};
 use crate::syntax::{Diagnostic, listed};
 use crate::units::Rational;
 
-/// Values that a remark names; more are counted.
-const NAMED_MAX: usize = 5;
-
-pub(super) fn report(space: &Space) -> Vec<Diagnostic> {
-    let in_force = RulesInForce::by_default(space);
-    let mut remarks = cuts(space, &in_force);
-    remarks.extend(never_drawn(space, &in_force));
-    remarks
-}
-
 /// One remark for each range on each road that rules cut below half. Cuts with the same parameter, rules
 /// and remaining range are reported once.
-fn cuts(space: &Space, in_force: &RulesInForce) -> Vec<Diagnostic> {
+pub(super) fn report(space: &Space) -> Vec<Diagnostic> {
+    let in_force = RulesInForce::by_default(space);
     let mut found: Vec<Cut<'_>> = Vec::new();
     for row in &space.rows {
         for (road, reach) in space.roads.iter().zip(&row.roads) {
@@ -33,7 +19,7 @@ fn cuts(space: &Space, in_force: &RulesInForce) -> Vec<Diagnostic> {
                 let parameter = action.parameters.iter().find(|parameter| parameter.name == *name);
                 let Some(parameter) = parameter else { continue };
                 let Some(percent) = kept_percent(&parameter.domain, kept) else { continue };
-                let rules = cutting_rules(space, in_force, row.action, parameter);
+                let rules = cutting_rules(space, &in_force, row.action, parameter);
                 if rules.is_empty() {
                     continue;
                 }
@@ -108,79 +94,6 @@ fn cutting_rules(space: &Space, in_force: &RulesInForce, action: usize, paramete
     rules.sort_unstable();
     rules.dedup();
     rules
-}
-
-/// One remark for each drawn parameter of whose values rules leave some to no row on no road.
-fn never_drawn(space: &Space, in_force: &RulesInForce) -> Vec<Diagnostic> {
-    let mut remarks = Vec::new();
-    for (index, action) in space.actions.iter().enumerate() {
-        let rows = space.rows.iter().filter(|row| row.action == index);
-        let open: Vec<(&Row, &Road)> = rows
-            .flat_map(|row| space.roads.iter().zip(&row.roads).map(move |(road, reach)| (row, road, reach)))
-            .filter(|(.., reach)| matches!(reach, Reach::Open(_)))
-            .map(|(row, road, _)| (row, road))
-            .collect();
-        for (local, parameter) in action.parameters.iter().enumerate().filter(|(_, drawn)| !drawn.axis) {
-            let Domain::Values(values) = &parameter.domain else { continue };
-            let leaves = |in_force: &RulesInForce, (row, road): (&Row, &Road), value: Value| {
-                let mut locals = declared(space, row);
-                locals[local] = Values::point(value);
-                let rules = RowRules { space, row, road: Some(&road.facts), in_force };
-                rules.narrow(locals, &space.cells_unknown(), None).is_some()
-            };
-            let anywhere =
-                |in_force: &RulesInForce, value| open.iter().any(|place| leaves(in_force, *place, value));
-            // What the action's own conditions forbid is said beside the value.
-            let none = RulesInForce::none(space);
-            let mut never: Vec<Value> = Vec::new();
-            for value in
-                values.iter().filter(|value| !anywhere(in_force, **value) && anywhere(&none, **value))
-            {
-                if !never.contains(value) {
-                    never.push(*value);
-                }
-            }
-            let Some(&first) = open.first().filter(|_| !never.is_empty()) else { continue };
-            let mut guilty: Vec<usize> = Vec::new();
-            for value in &never {
-                // Every rule without which the value is still not left is dropped.
-                let mut conflict = in_force.clone();
-                for rule in in_force.on_row(first.0) {
-                    let fewer = conflict.except(rule);
-                    if !leaves(&fewer, first, *value) {
-                        conflict = fewer;
-                    }
-                }
-                guilty.extend(conflict.on_row(first.0));
-            }
-            guilty.sort_unstable();
-            guilty.dedup();
-            remarks.push(never_remark(space, parameter, &never, &guilty));
-        }
-    }
-    remarks
-}
-
-fn never_remark(space: &Space, parameter: &Parameter, never: &[Value], rules: &[usize]) -> Diagnostic {
-    let named = never.iter().take(NAMED_MAX).map(|value| format!("`{}`", space.show(*value, parameter.ty)));
-    let mut values: Vec<String> = named.collect();
-    if never.len() > NAMED_MAX {
-        values.push(format!("{} others", never.len() - NAMED_MAX));
-    }
-    let names: Vec<&str> = rules.iter().map(|rule| space.rules[*rule].name.as_str()).collect();
-    let message = format!(
-        "{} never {} `{}` be {}",
-        listed(&names),
-        if names.len() == 1 { "lets" } else { "let" },
-        parameter.name,
-        values.join(", "),
-    );
-    let remark =
-        Diagnostic::remark(code::CUT, message).at(parameter.span, "these values are in its list".to_owned());
-    rules
-        .iter()
-        .fold(remark, |remark, rule| remark.beside(space.rules[*rule].span, "by this rule"))
-        .help("if that is meant, all is well; else leave them out of the list or loosen the rule")
 }
 
 /// How much of the range of a parameter a rule takes away by itself on a road, in percent: the least

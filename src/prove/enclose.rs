@@ -53,7 +53,7 @@ impl Values {
             Value::Bool(truth) => Values::truth(truth),
             Value::Variant(_, variant) => Values::Variants(1 << variant),
             Value::Number(number) => {
-                Values::Number(Rational::from_f64(number).map_or(Interval::ALL, Interval::point))
+                Values::Number(Rational::from_rounded(number).map_or(Interval::ALL, Interval::point))
             }
         }
     }

@@ -10,6 +10,7 @@ mod cut;
 mod enclose;
 mod implied;
 mod moment;
+mod never_drawn;
 mod reach;
 mod realise;
 mod reduce;
@@ -44,6 +45,7 @@ pub(crate) fn report(space: &Space, realisable: &Realisable) -> Vec<Diagnostic> 
     diagnostics.extend(twins::report(space));
     diagnostics.extend(undecided::report(space, realisable));
     diagnostics.extend(cut::report(space));
+    diagnostics.extend(never_drawn::report(space));
     diagnostics.extend(implied::report(space));
     diagnostics.extend(unfair::report(space));
     diagnostics.extend(moment::report(space));

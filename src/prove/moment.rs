@@ -35,7 +35,7 @@ pub(crate) struct Case {
 impl Case {
     /// A moment of which the steps alone are known: one of their beginnings, or, of whole steps, any moment within them.
     pub fn of_steps(episode: &EpisodeDef, steps: RangeInclusive<u64>, are_whole: bool) -> Case {
-        let at = |step: u64| Rational::from_f64(episode.time_s(step));
+        let at = |step: u64| Rational::from_rounded(episode.time_s(step));
         let (first, last) = (*steps.start(), *steps.end());
         let elapsed = match (at(first), at(last + u64::from(are_whole))) {
             (Some(from), Some(to)) => Interval::closed(from, to),
@@ -81,7 +81,7 @@ impl Case {
         let is_zero = |piece: &Interval| piece.single() == Some(Rational::ZERO);
         // An action of a scenario may happen within its step.
         let in_time = both(Fact::StepNumber, Fact::Elapsed).is_none_or(|(step, elapsed)| {
-            let Some(step_s) = Rational::from_f64(episode.step_s) else { return true };
+            let Some(step_s) = Rational::from_rounded(episode.step_s) else { return true };
             let from = step.mul(&Interval::point(step_s));
             let within = Interval { low: End::At(Rational::ZERO, true), high: End::At(step_s, false) };
             !from.add(&within).intersect(&elapsed).is_empty()

@@ -123,16 +123,20 @@ impl<'a> RowRules<'a> {
             });
             return Reach::Open(ranges.collect());
         }
-        // A minimal conflict: drop every rule without which the row is still dead.
+        let rules = self.conflict(&|fewer| fewer.settle().is_none());
+        Reach::Dead { reason: self.reason(&rules), rules }
+    }
+
+    /// Rules that forbid something together, of which none can be spared; `forbid` says whether some still do.
+    pub fn conflict(self, forbid: &dyn Fn(RowRules<'_>) -> bool) -> Vec<usize> {
         let mut conflict = self.in_force.clone();
         for rule in self.in_force.on_row(self.row) {
             let fewer = conflict.except(rule);
-            if (RowRules { in_force: &fewer, ..self }).settle().is_none() {
+            if forbid(RowRules { in_force: &fewer, ..self }) {
                 conflict = fewer;
             }
         }
-        let rules: Vec<usize> = conflict.on_row(self.row).collect();
-        Reach::Dead { reason: self.reason(&rules), rules }
+        conflict.on_row(self.row).collect()
     }
 
     /// All values that the parameters may have under the rules in force; `None` if the rules leave none.

@@ -165,8 +165,8 @@ fn literal(value: Value) -> ExprKind {
     match value {
         Value::Bool(truth) => ExprKind::Bool(truth),
         Value::Variant(of, variant) => ExprKind::Variant(of, variant),
-        Value::Number(number) => {
-            ExprKind::Number(Rational::from_f64(number).expect("an axis holds a number from a source text"))
-        }
+        Value::Number(number) => ExprKind::Number(
+            Rational::from_rounded(number).expect("an axis holds a number from a source text"),
+        ),
     }
 }

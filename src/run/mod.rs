@@ -48,7 +48,7 @@ pub use settings::{EPISODES_MAX, PolicyReference, RunError, RunSettings, VERSION
 pub(crate) use settings::{agent_named, check_episodes};
 pub use settled::{Numbered, Units};
 pub use shape::Shape;
-pub use shard::Shard;
+pub use shard::{SHARDS_MAX, Shard};
 pub use stage::Stage;
 pub use stepped::{StepError, Stepped};
 pub use summary::{EpisodeSummary, Finding};

@@ -25,7 +25,7 @@ struct Written {
 }
 
 /// Most pieces. Ours: more than the array of any scheduler has.
-const SHARDS_MAX: u32 = 100_000;
+pub const SHARDS_MAX: u32 = 100_000;
 
 impl Shard {
     /// Everything in one piece.

@@ -39,9 +39,9 @@ use super::traffic::TrafficProfile;
 /// old scenario is told apart from a refuted one.
 pub const ENGINE: &str = "plane/7";
 
-/// The first world whose episodes were those of this one to the last bit, whatever their traces: results that hold no
-/// trace are good in both.
-pub fn episodes_of(engine: &str) -> &str {
+/// The first world whose episodes were those of this one, whatever their traces: results that hold no trace are good in
+/// both.
+pub fn first_with_episodes_of(engine: &str) -> &str {
     match engine {
         // A trace no longer tells zeros of different signs apart.
         "plane/7" => "plane/6",

@@ -284,7 +284,7 @@ fn quoted<S: AsRef<str>>(words: &[S]) -> Vec<String> {
 }
 
 /// `a, b or c`, with the given conjunction.
-pub(super) fn enumerated<S: AsRef<str>>(words: &[S], conjunction: &str) -> String {
+pub(crate) fn enumerated<S: AsRef<str>>(words: &[S], conjunction: &str) -> String {
     let words: Vec<&str> = words.iter().map(S::as_ref).collect();
     match words.as_slice() {
         [] => String::new(),

@@ -26,8 +26,8 @@ mod record;
 mod scan;
 mod yaml;
 
-pub(crate) use diagnostic::one_of;
 pub use diagnostic::{Diagnostic, Edit, Fix, Label, Severity, Sources, Style, listed, nearest, render};
+pub(crate) use diagnostic::{enumerated, one_of};
 pub use format::{FormatError, format, same_meaning};
 pub use parse::{DEPTH_MAX, LANGUAGE, OPERATORS_MAX, parse, parse_fields};
 pub use print::{print, print_expr, print_item};

@@ -96,6 +96,27 @@ impl Rational {
         }
     }
 
+    /// The simplest fraction whose nearest f64 is this one, among the convergents of its continued fraction: the number of
+    /// the source text that it was read from, if its denominator has up to six digits or so.
+    ///
+    /// A proof that took the f64 for exact would tell 30 km/h (25/3 m/s) from the limit of 30 km/h in a rule.
+    pub fn from_rounded(value: f64) -> Option<Rational> {
+        let exact = Rational::from_f64(value)?;
+        let (mut rest, mut divisor) = (exact.numerator.abs(), exact.denominator);
+        // The last two convergents; their parts grow up to those of the exact fraction.
+        let (mut before, mut now) = ((0, 1), (1, 0));
+        while divisor != 0 {
+            let whole = rest / divisor;
+            (before, now) = (now, (whole * now.0 + before.0, whole * now.1 + before.1));
+            (rest, divisor) = (divisor, rest % divisor);
+            let found = Rational { numerator: exact.numerator.signum() * now.0, denominator: now.1 };
+            if found.to_f64() == value {
+                return Some(found);
+            }
+        }
+        Some(exact)
+    }
+
     /// The nearest f64, ties to even: what reading the same number as text would give.
     pub fn to_f64(self) -> f64 {
         const EXACT: u128 = 1 << 53;
@@ -304,6 +325,23 @@ mod tests {
         fn floats_survive_the_detour(value in -1e12_f64..1e12) {
             if let Some(exact) = Rational::from_f64(value) {
                 prop_assert_eq!(exact.to_f64(), value);
+            }
+        }
+
+        #[test]
+        fn the_number_of_a_text_is_found_again(numerator in -99_999_999_i128..99_999_999, denominator in 1_i128..99_999) {
+            let written = Rational::new(numerator, denominator).unwrap();
+            prop_assert_eq!(Rational::from_rounded(written.to_f64()), Some(written));
+        }
+
+        #[test]
+        fn whatever_is_found_reads_as_the_same(value in proptest::num::f64::NORMAL | proptest::num::f64::ZERO) {
+            match (Rational::from_f64(value), Rational::from_rounded(value)) {
+                (Some(exact), Some(found)) => {
+                    prop_assert_eq!(found.to_f64(), value);
+                    prop_assert!(found.denominator <= exact.denominator);
+                }
+                (exact, found) => prop_assert_eq!(exact, found),
             }
         }
 

@@ -191,6 +191,12 @@ fn conditions_and_words_are_read_or_refused() {
         ("Center x=\"1.4\"", "Center x=\"1e300\"", "more than 20 m from the axle"),
         ("name=\"Van\"", "name=\"Ego\"", "another entity is called `Ego`, too"),
         ("value=\"3\" dynamicsDimension", "value=\"-3\" dynamicsDimension", "less than 0"),
+        ("value=\"3\" dynamicsDimension", "dynamicsDimension", "it has no `value`"),
+        (
+            "value=\"3\" dynamicsDimension=\"time\"",
+            "value=\"fast\" dynamicsDimension=\"rate\"",
+            "is no number",
+        ),
         (
             "value=\"3\" dynamicsDimension",
             "value=\"1e6\" dynamicsDimension",

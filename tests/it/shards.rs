@@ -260,24 +260,32 @@ fn a_dry_run_says_what_would_be_played() {
         let said = done(&[command, &json].concat());
         assert!(!out.exists());
         let said: serde_json::Value = serde_json::from_str(&said).expect("it is JSON");
-        let unit = said["unit"].as_str().expect("it has a name").to_owned();
-        let [units, own, episodes] =
-            ["units", "units_of_shard", "episodes"].map(|field| said[field].as_u64().expect("it is a count"));
-        (unit, units, own, episodes)
+        ["shards_max", "units", "episodes"]
+            .map(|field| said["planned"][field].as_u64().expect("it is a count"))
     };
     let run = ["run", SPACE, "--road", "corner", "--episodes", "10"];
-    assert_eq!(planned(&run), ("episode".to_owned(), 10, 10, 10));
-    assert_eq!(planned(&[&run[..], &["--shard", "3/4"]].concat()), ("episode".to_owned(), 10, 2, 2));
+    assert_eq!(planned(&run), [10, 10, 10]);
+    assert_eq!(planned(&[&run[..], &["--shard", "3/4"]].concat()), [10, 2, 2]);
     let parts = ["--road", "corner", "--parts", "6", "--episodes", "5"];
     let estimate = [&["estimate", SPACE][..], &parts].concat();
-    assert_eq!(planned(&estimate), ("part".to_owned(), 6, 6, 30));
-    let (unit, units, own, episodes) = planned(&["study", "scenarios/studies/rq4.yaml", "--shard", "30/30"]);
-    assert_eq!((unit.as_str(), units, own), ("job", 30, 1));
-    assert!(episodes > 75, "training and 75 episodes after it: {episodes}");
+    assert_eq!(planned(&estimate), [6, 6, 30]);
+    let [most, units, episodes] = planned(&["study", "scenarios/studies/rq4.yaml", "--shard", "30/30"]);
+    assert!((most, units) == (30, 1) && episodes > 75, "training and 75 episodes after it: {episodes}");
+    let said = done(&[&run[..], &["--shard", "3/4", "--dry-run"]].concat());
+    let lines =
+        ["would play 10 episodes; shard 3/4 is 2 of 10 pieces", "it can be cut into 10 shards at most"];
+    assert!(lines.iter().all(|line| said.contains(line)), "{said}");
+    let stops = ["--method", "probe", "--precision", "0.2", "--dry-run"];
+    let said = done(&[&estimate[..], &stops].concat());
+    assert!(said.contains("would play at most 6 parts of 5 episodes, and a pilot in each shard"), "{said}");
     // What could not begin fails as it would.
-    let wrong = ["study", "scenarios/studies/none.yaml", "--dry-run"];
-    let (status, _, stderr) = outcome(&mut avastra(&wrong));
-    assert!(status == 1 && stderr.contains("none.yaml"), "{stderr}");
+    std::fs::create_dir(&out).expect("it is writable");
+    std::fs::write(out.join("notes"), "mine").expect("it is writable");
+    let used = [&run[..], &["--out", text(&out)]].concat();
+    for (wrong, reason) in [(&["study", "none.yaml"][..], "none.yaml"), (&used, "is not empty")] {
+        let (status, _, stderr) = outcome(&mut avastra(&[wrong, &["--dry-run"]].concat()));
+        assert!(status == 1 && stderr.contains(reason), "{stderr}");
+    }
 }
 
 #[test]

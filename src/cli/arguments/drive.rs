@@ -30,7 +30,7 @@ pub struct ShardArguments {
     /// Kubernetes Indexed Job says, else all].
     #[arg(long, value_name = "I/N")]
     pub shard: Option<Shard>,
-    /// Play nothing and write nothing: say what would be played, and into how many pieces it can be cut.
+    /// Play nothing and write nothing: say what would be played, and into how many shards it can be cut.
     #[arg(long)]
     pub dry_run: bool,
 }

@@ -1,0 +1,144 @@
+//! Listed values that rules forbid in every row on every road. Most are meant; some are a mistake in the rule.
+
+use core::cell::Cell;
+use std::sync::Arc;
+
+use crate::model::rules::RowRules;
+use crate::model::{Domain, Interval, Parameter, Reach, Road, Row, RulesInForce, Space, Value, code};
+use crate::prove::enclose::Values;
+use crate::prove::reach::declared;
+use crate::syntax::{Diagnostic, enumerated, listed};
+
+/// A remark names this many values and one more; of longer lists the others are counted.
+const NAMED_MAX: usize = 5;
+
+/// Rows that are looked at with one value and some rules, for all values of a space together. An editor checks at every
+/// keystroke, so what would take longer is passed over.
+const TRIALS_MAX: usize = 2000;
+
+/// Longer lists are passed over, too.
+const VALUES_MAX: usize = 200;
+
+/// One remark for each drawn parameter and each set of rules that keeps some of its values from ever being drawn.
+pub(super) fn report(space: &Space) -> Vec<Diagnostic> {
+    let search = Search {
+        space,
+        default: RulesInForce::by_default(space),
+        none: RulesInForce::none(space),
+        cells: space.cells_unknown(),
+        left: Cell::new(TRIALS_MAX),
+    };
+    let mut remarks = Vec::new();
+    for (index, action) in space.actions.iter().enumerate() {
+        let rows = space.rows.iter().filter(|row| row.action == index);
+        let places = rows.flat_map(|row| space.roads.iter().zip(&row.roads).map(move |on| (row, on)));
+        let open: Vec<Place<'_>> = places
+            .filter_map(|(row, (road, reach))| match reach {
+                Reach::Open(ranges) => Some(Place { row, road, ranges }),
+                Reach::Dead { .. } => None,
+            })
+            .collect();
+        for (local, parameter) in action.parameters.iter().enumerate().filter(|(_, one)| !one.axis) {
+            let Domain::Values(values) = &parameter.domain else { continue };
+            if values.len() > VALUES_MAX {
+                continue;
+            }
+            let mut sets: Vec<(Vec<usize>, Vec<Value>)> = Vec::new();
+            for value in distinct(values) {
+                let Some(rules) = search.forbidding(&open, (local, parameter), value) else { continue };
+                match sets.iter_mut().find(|(known, _)| *known == rules) {
+                    Some((_, values)) => values.push(value),
+                    None => sets.push((rules, vec![value])),
+                }
+            }
+            remarks.extend(sets.iter().map(|(rules, values)| remark(space, parameter, values, rules)));
+        }
+    }
+    remarks
+}
+
+/// A row on a road where it may run, with the ranges that rules leave to its numbers.
+struct Place<'a> {
+    row: &'a Row,
+    road: &'a Road,
+    ranges: &'a [(Arc<str>, Interval)],
+}
+
+struct Search<'a> {
+    space: &'a Space,
+    default: RulesInForce,
+    none: RulesInForce,
+    cells: Vec<Values>,
+    /// Trials that are left.
+    left: Cell<usize>,
+}
+
+impl Search<'_> {
+    /// The rules that forbid a value wherever the action's own conditions leave it; `None` if it is drawn somewhere,
+    /// or if they leave it nowhere.
+    fn forbidding(
+        &self,
+        open: &[Place<'_>],
+        (local, parameter): (usize, &Parameter),
+        value: Value,
+    ) -> Option<Vec<usize>> {
+        let within = |place: &Place<'_>| {
+            let range = place.ranges.iter().find(|(name, _)| *name == parameter.name);
+            match (range, Values::point(value)) {
+                (Some((_, range)), Values::Number(point)) => !range.intersect(&point).is_empty(),
+                _ => true,
+            }
+        };
+        let default = |place| self.rules_on(place, &self.default);
+        if open.iter().any(|place| within(place) && self.leaves(default(place), local, value)) {
+            return None;
+        }
+        let own = open.iter().filter(|place| self.leaves(self.rules_on(place, &self.none), local, value));
+        let mut rules: Vec<usize> = own
+            .flat_map(|place| default(place).conflict(&|fewer| !self.leaves(fewer, local, value)))
+            .collect();
+        rules.sort_unstable();
+        rules.dedup();
+        (!rules.is_empty() && self.left.get() > 0).then_some(rules)
+    }
+
+    fn rules_on<'a>(&'a self, place: &'a Place<'_>, in_force: &'a RulesInForce) -> RowRules<'a> {
+        RowRules { space: self.space, row: place.row, road: Some(&place.road.facts), in_force }
+    }
+
+    /// Whether the rules leave a value to a row; so they do once there are no trials left.
+    fn leaves(&self, rules: RowRules<'_>, local: usize, value: Value) -> bool {
+        let Some(left) = self.left.get().checked_sub(1) else { return true };
+        self.left.set(left);
+        let mut locals = declared(self.space, rules.row);
+        locals[local] = Values::point(value);
+        rules.narrow(locals, &self.cells, None).is_some()
+    }
+}
+
+fn distinct(values: &[Value]) -> Vec<Value> {
+    let mut found: Vec<Value> = Vec::new();
+    for value in values {
+        if !found.contains(value) {
+            found.push(*value);
+        }
+    }
+    found
+}
+
+fn remark(space: &Space, parameter: &Parameter, values: &[Value], rules: &[usize]) -> Diagnostic {
+    let mut shown: Vec<String> =
+        values.iter().map(|value| format!("`{}`", space.show(*value, parameter.ty))).collect();
+    if shown.len() > NAMED_MAX + 1 {
+        shown.truncate(NAMED_MAX);
+        shown.push(format!("{} others", values.len() - NAMED_MAX));
+    }
+    let shown = enumerated(&shown, "or");
+    let names: Vec<&str> = rules.iter().map(|rule| space.rules[*rule].name.as_str()).collect();
+    let verb = if names.len() == 1 { "lets" } else { "let" };
+    let message = format!("{} never {verb} `{}` be {shown}", listed(&names), parameter.name);
+    let remark = Diagnostic::remark(code::CUT, message).at(parameter.span, "");
+    rules.iter().fold(remark, |remark, rule| remark.beside(space.rules[*rule].span, "by this rule")).help(
+        "if that is meant, all is well; else list the values that are wanted (`in [..]`), or loosen the rule",
+    )
+}
