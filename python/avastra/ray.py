@@ -127,6 +127,8 @@ def _parsed(arguments):
             raise Refused(f"`{option}` is said by Ray's tasks themselves: to go on, say the same command again")
         if option == "--dry-run":
             raise Refused(f"`{option}` needs no cluster: `avastra {options.command} … --dry-run` says what would be played")
+    if not options.out:
+        raise Refused("`--out` is empty: name a directory")
     if options.address and options.workers:
         raise Refused("`--workers` is for a cluster that is begun here, and `--address` names another")
     return options, passed
@@ -157,16 +159,16 @@ def _shards_max(options, passed):
     It is asked before there is a cluster, which takes seconds to begin.
     """
     # The shard keeps a scheduler's environment out of it.
-    command = [options.program, options.command, *passed, *_anew(options), "--shard", "1/1", "--dry-run"]
-    try:
-        asked = subprocess.run([*command, "--format", "json"], stdin=subprocess.DEVNULL, capture_output=True, text=True, errors="replace")
+    command = [options.program, options.command, *passed, *_anew(options), "--shard", "1/1", "--out", options.out, "--dry-run"]
+    # In words as they are wanted at the end, and then for the number.
+    for how in (_how(options), ["--format", "json"]):
+        try:
+            asked = subprocess.run([*command, *how], stdin=subprocess.DEVNULL, capture_output=True, text=True, errors="replace")
+        except OSError as error:
+            raise Refused(f"`{options.program}` cannot be started: {error.strerror}") from error
         if asked.returncode != 0:
-            # Again, in words.
-            told = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, text=True, errors="replace")
-            _say(told.stderr.rstrip())
-            raise Ended(max(told.returncode, 1))
-    except OSError as error:
-        raise Refused(f"`{options.program}` cannot be started: {error.strerror}") from error
+            _say(asked.stderr.rstrip())
+            raise Ended(max(asked.returncode, 1))
     most = json.loads(asked.stdout)["planned"]["shards_max"]
     if options.shards and options.shards > most:
         raise Refused(f"{options.shards} shards are too many: it can be cut into {most}")
@@ -274,9 +276,14 @@ def _begun(options, passed, shards):
 def _merged(options, work, shards):
     """Brings all shards together, on this node; its exit status."""
     directories = [os.path.join(work["folder"], str(number)) for number in range(1, shards + 1)]
-    how = [*(["--format", options.format] if options.format else []), *(["--color", options.color] if options.color else []),
-           *(["--quiet"] if options.quiet else []), *(["--verbose"] if options.verbose else [])]
-    return subprocess.run([work["program"], "merge", *directories, "--out", os.path.abspath(options.out), *how]).returncode
+    merge = [work["program"], "merge", *directories, "--out", os.path.abspath(options.out), *_how(options)]
+    return subprocess.run(merge).returncode
+
+
+def _how(options):
+    """How the result is to be told."""
+    return [*(["--format", options.format] if options.format else []), *(["--color", options.color] if options.color else []),
+            *(["--quiet"] if options.quiet else []), *(["--verbose"] if options.verbose else [])]
 
 
 def _bound(command):

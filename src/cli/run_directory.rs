@@ -308,6 +308,9 @@ fn make_empty(path: &Path) -> Result<Held, Failure> {
 /// Refuses a directory in which nothing can begin, and makes none.
 pub fn refuse_used(out: Option<&Path>) -> Result<(), Failure> {
     match out.filter(|path| path.exists()) {
+        Some(path) if !path.is_dir() => {
+            Err(Failure::usage(format!("`{}` is no directory: name a new one", path.display())))
+        }
         Some(path) => make_empty(path).map(drop),
         None => Ok(()),
     }

@@ -109,7 +109,10 @@ fn at_once(source: &mut Source, dynamics: Node) -> Option<bool> {
     source.word(dynamics, "followingMode", &FOLLOWING)?;
     let value = match (dimension, dynamics.has_attribute("value")) {
         (_, false) if shape == "step" => 0.0,
-        ("rate", _) => source.number(dynamics, "value")?,
+        ("rate", _) => match source.number(dynamics, "value")? {
+            0.0 => return source.refuse(dynamics, "`value` is 0: at that rate it never ends"),
+            rate => rate,
+        },
         _ => source.amount(dynamics, "value")?,
     };
     if dimension == "time" && value > DURATION_S_MAX {

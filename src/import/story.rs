@@ -354,7 +354,7 @@ fn duration_s(source: &mut Source, storyboard: Node) -> f64 {
         }
     }
     if latest_s <= 0.0 {
-        source.note(format!("the file names no time for its end: {DURATION_S} s are played"));
+        source.note(format!("the file names no time above 0 for its end: {DURATION_S} s are played"));
         return DURATION_S;
     }
     if latest_s > DURATION_S_MAX {

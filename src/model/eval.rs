@@ -250,12 +250,17 @@ pub(crate) fn compare(op: Comparison, left: Value, right: Value) -> bool {
     }
 }
 
+/// Numbers of the same ten digits are equal, and neither is then less: the language's numbers are exact, and 0.1 + 0.2 is
+/// another f64 than 0.3.
 fn compare_numbers(op: Comparison, left: f64, right: f64) -> bool {
-    let equal = (left - right).abs() <= EQUAL_PART * left.abs().max(right.abs()) || left == right;
+    let apart = (left - right).abs();
+    // Where nobody is near, the nearest is infinitely far, which is no number of ten digits.
+    let equal = left == right || apart.is_finite() && apart <= EQUAL_PART * left.abs().max(right.abs());
     match op {
         Comparison::Equal => equal,
         Comparison::NotEqual => !equal,
-        other => other.holds(left, right),
+        Comparison::Less | Comparison::Greater => !equal && op.holds(left, right),
+        Comparison::LessEqual | Comparison::GreaterEqual => equal || op.holds(left, right),
     }
 }
 
@@ -294,5 +299,42 @@ impl Space {
     pub fn counts(&self, outcome: OutcomeFacts, memory: &Memory) -> bool {
         let counts = self.verdict(COUNTED, outcome, memory);
         counts.expect("the checker adds the verdict where the author has none")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn of_two_numbers_one_is_less_or_they_are_equal() {
+        let all = [
+            0.0,
+            -0.0,
+            0.3,
+            0.1 + 0.2,
+            0.3000001,
+            -0.3,
+            1e-12,
+            2e-12,
+            1e12,
+            f64::INFINITY,
+            f64::NEG_INFINITY,
+        ];
+        for (left, right) in all.into_iter().flat_map(|left| all.map(|right| (left, right))) {
+            let holds = |op| compare_numbers(op, left, right);
+            let found = [Comparison::Less, Comparison::Equal, Comparison::Greater].map(holds);
+            assert_eq!(found.iter().filter(|one| **one).count(), 1, "{left} {right}");
+            assert_eq!(holds(Comparison::LessEqual), !found[2], "{left} {right}");
+            assert_eq!(holds(Comparison::GreaterEqual), !found[0], "{left} {right}");
+            assert_eq!(holds(Comparison::NotEqual), !found[1], "{left} {right}");
+        }
+        assert!(
+            compare_numbers(Comparison::Equal, 0.3, 0.1 + 0.2)
+                && !compare_numbers(Comparison::Equal, 1e-12, 2e-12)
+        );
+        // What has no value is in no order.
+        let ordered = [Comparison::Less, Comparison::LessEqual, Comparison::Equal, Comparison::GreaterEqual];
+        assert!(ordered.into_iter().all(|op| !compare_numbers(op, f64::NAN, 1.0)));
     }
 }

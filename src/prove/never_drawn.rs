@@ -19,6 +19,9 @@ const TRIALS_MAX: usize = 2000;
 /// Longer lists are passed over, too.
 const VALUES_MAX: usize = 200;
 
+/// And lists with more values, counted once for each row and road.
+const LOOKS_MAX: usize = 20_000;
+
 /// One remark for each drawn parameter and each set of rules that keeps some of its values from ever being drawn.
 pub(super) fn report(space: &Space) -> Vec<Diagnostic> {
     let search = Search {
@@ -40,7 +43,7 @@ pub(super) fn report(space: &Space) -> Vec<Diagnostic> {
             .collect();
         for (local, parameter) in action.parameters.iter().enumerate().filter(|(_, one)| !one.axis) {
             let Domain::Values(values) = &parameter.domain else { continue };
-            if values.len() > VALUES_MAX {
+            if values.len() > VALUES_MAX || values.len() * open.len() > LOOKS_MAX {
                 continue;
             }
             let mut sets: Vec<(Vec<usize>, Vec<Value>)> = Vec::new();
@@ -50,6 +53,10 @@ pub(super) fn report(space: &Space) -> Vec<Diagnostic> {
                     Some((_, values)) => values.push(value),
                     None => sets.push((rules, vec![value])),
                 }
+            }
+            // Without trials some values may be missing.
+            if search.left.get() == 0 {
+                return remarks;
             }
             remarks.extend(sets.iter().map(|(rules, values)| remark(space, parameter, values, rules)));
         }
@@ -99,7 +106,7 @@ impl Search<'_> {
             .collect();
         rules.sort_unstable();
         rules.dedup();
-        (!rules.is_empty() && self.left.get() > 0).then_some(rules)
+        (!rules.is_empty()).then_some(rules)
     }
 
     fn rules_on<'a>(&'a self, place: &'a Place<'_>, in_force: &'a RulesInForce) -> RowRules<'a> {
