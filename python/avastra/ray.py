@@ -159,8 +159,8 @@ def _shards_max(options, passed):
     It is asked before there is a cluster, which takes seconds to begin.
     """
     # The shard keeps a scheduler's environment out of it.
-    command = [options.program, options.command, *passed, *_anew(options), "--shard", "1/1", "--out", options.out, "--dry-run"]
-    # In words as they are wanted at the end, and then for the number.
+    command = [options.program, options.command, *passed, *_anew(options), "--shard", "1/1", f"--out={options.out}", "--dry-run"]
+    # First as the user wants to read it, so that a refusal reads so; then as JSON, for the number.
     for how in (_how(options), ["--format", "json"]):
         try:
             asked = subprocess.run([*command, *how], stdin=subprocess.DEVNULL, capture_output=True, text=True, errors="replace")

@@ -110,7 +110,9 @@ fn at_once(source: &mut Source, dynamics: Node) -> Option<bool> {
     let value = match (dimension, dynamics.has_attribute("value")) {
         (_, false) if shape == "step" => 0.0,
         ("rate", _) => match source.number(dynamics, "value")? {
-            0.0 => return source.refuse(dynamics, "`value` is 0: at that rate it never ends"),
+            0.0 if shape != "step" => {
+                return source.refuse(dynamics, "`value` is 0: at that rate it never ends");
+            }
             rate => rate,
         },
         _ => source.amount(dynamics, "value")?,

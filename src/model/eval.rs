@@ -250,8 +250,8 @@ pub(crate) fn compare(op: Comparison, left: Value, right: Value) -> bool {
     }
 }
 
-/// Numbers of the same ten digits are equal, and neither is then less: the language's numbers are exact, and 0.1 + 0.2 is
-/// another f64 than 0.3.
+/// Numbers that differ by [`EQUAL_PART`] of the larger one at most are equal, and neither is less: the language's numbers
+/// are exact, and 0.1 + 0.2 is another f64 than 0.3.
 fn compare_numbers(op: Comparison, left: f64, right: f64) -> bool {
     let apart = (left - right).abs();
     // Where nobody is near, the nearest is infinitely far, which is no number of ten digits.

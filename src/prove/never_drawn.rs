@@ -19,7 +19,7 @@ const TRIALS_MAX: usize = 2000;
 /// Longer lists are passed over, too.
 const VALUES_MAX: usize = 200;
 
-/// And lists with more values, counted once for each row and road.
+/// So are lists whose values, times the rows and roads where they may be drawn, are more than this.
 const LOOKS_MAX: usize = 20_000;
 
 /// One remark for each drawn parameter and each set of rules that keeps some of its values from ever being drawn.

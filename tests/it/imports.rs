@@ -197,6 +197,12 @@ fn conditions_and_words_are_read_or_refused() {
             "value=\"fast\" dynamicsDimension=\"rate\"",
             "is no number",
         ),
+        ("value=\"3\" dynamicsDimension=\"time\"", "value=\"0\" dynamicsDimension=\"rate\"", "it never ends"),
+        (
+            "dynamicsShape=\"sinusoidal\" value=\"3\" dynamicsDimension=\"time\"",
+            "dynamicsShape=\"step\" value=\"0\" dynamicsDimension=\"rate\"",
+            "rule change_begins",
+        ),
         (
             "value=\"3\" dynamicsDimension",
             "value=\"1e6\" dynamicsDimension",
