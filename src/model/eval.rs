@@ -8,8 +8,8 @@ use crate::model::space::{BodyWord, COUNTED, FnDef, RoadFacts, Space, WordExpr};
 use crate::model::value::{Memory, Value};
 use crate::model::vocabulary::{Fact, LaneChoice, Light, Priority, RoadKind, Word, WordFact};
 
-/// Numbers that differ by at most this part of the larger one are `==`. This tolerates the digits that an
-/// author rounds away, but no measurable distance.
+/// Numbers that differ by at most this part of the larger one are equal in every comparison. This tolerates the digits that
+/// an author rounds away and those of binary fractions, but no measurable distance.
 const EQUAL_PART: f64 = 1e-9;
 
 /// A call of a function with at most so many parameters allocates nothing.

@@ -1,7 +1,8 @@
 //! Choosing the drawn values of a row from exactly what its rules leave, one parameter after the other.
 //!
 //! The room of a number is found by trying: between two neighbouring places where a clause may change (`critical`)
-//! every clause holds everywhere or nowhere, so one try in between and one at each place decide. A try is judged as
+//! every clause holds everywhere or nowhere, but for a part of 1e-9 beside the place, where numbers count as equal. So one
+//! try in between and one at each place decide. A try is judged as
 //! drawing and replaying judge ([`RowRules::breaches`]).
 //!
 //! 1. Forwards: each parameter gets what the clauses leave that no later parameter decides. That is nearly always
