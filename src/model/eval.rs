@@ -8,8 +8,8 @@ use crate::model::space::{BodyWord, COUNTED, FnDef, RoadFacts, Space, WordExpr};
 use crate::model::value::{Memory, Value};
 use crate::model::vocabulary::{Fact, LaneChoice, Light, Priority, RoadKind, Word, WordFact};
 
-/// Numbers that differ by at most this part of the larger one are equal in every comparison. This tolerates the digits that
-/// an author rounds away and those of binary fractions, but no measurable distance.
+/// Numbers that differ by at most this part of the larger one are equal, and their difference is 0, unless both are whole.
+/// This tolerates the digits that an author rounds away and those of binary fractions, but no measurable distance.
 const EQUAL_PART: f64 = 1e-9;
 
 /// A call of a function with at most so many parameters allocates nothing.
@@ -233,12 +233,18 @@ fn has_lane(facts: &Facts<'_>, lane: LaneChoice) -> bool {
 /// The result, or NaN if it has no value: an infinity would satisfy comparisons.
 pub(crate) fn arithmetic(op: Arithmetic, left: f64, right: f64) -> f64 {
     let result = match op {
-        Arithmetic::Add => left + right,
-        Arithmetic::Subtract => left - right,
+        Arithmetic::Add => sum(left, right),
+        Arithmetic::Subtract => sum(left, -right),
         Arithmetic::Multiply => left * right,
         Arithmetic::Divide => left / right,
     };
     if result.is_finite() { result } else { f64::NAN }
+}
+
+/// The difference of equal numbers is 0, so that a countdown from 0.3 by 0.1 ends at 0, and not at -3e-17.
+fn sum(left: f64, right: f64) -> f64 {
+    let cancel = left.is_finite() && are_equal(left, -right);
+    if cancel { 0.0 } else { left + right }
 }
 
 /// Compares numbers by size, variants by position, and truth values by equality.
@@ -250,12 +256,18 @@ pub(crate) fn compare(op: Comparison, left: Value, right: Value) -> bool {
     }
 }
 
-/// Numbers that differ by [`EQUAL_PART`] of the larger one at most are equal, and neither is less: the language's numbers
-/// are exact, and 0.1 + 0.2 is another f64 than 0.3.
-fn compare_numbers(op: Comparison, left: f64, right: f64) -> bool {
+/// Whether numbers are equal, or differ by [`EQUAL_PART`] of the larger one at most: the language's numbers are exact, and
+/// 0.1 + 0.2 is another f64 than 0.3. Whole numbers are exact as f64, too.
+fn are_equal(left: f64, right: f64) -> bool {
     let apart = (left - right).abs();
+    let are_whole = || left.fract() == 0.0 && right.fract() == 0.0;
     // Where nobody is near, the nearest is infinitely far, which is no number of ten digits.
-    let equal = left == right || apart.is_finite() && apart <= EQUAL_PART * left.abs().max(right.abs());
+    left == right || apart.is_finite() && apart <= EQUAL_PART * left.abs().max(right.abs()) && !are_whole()
+}
+
+/// Of two numbers one is less, or they are equal.
+fn compare_numbers(op: Comparison, left: f64, right: f64) -> bool {
+    let equal = are_equal(left, right);
     match op {
         Comparison::Equal => equal,
         Comparison::NotEqual => !equal,
@@ -318,6 +330,12 @@ mod tests {
             1e-12,
             2e-12,
             1e12,
+            1e12 + 1.0,
+            // On both sides of the bound, and on it.
+            0.3 * (1.0 + 0.9 * EQUAL_PART),
+            0.3 * (1.0 + 1.1 * EQUAL_PART),
+            0.5 * (1.0 - EQUAL_PART),
+            0.5,
             f64::INFINITY,
             f64::NEG_INFINITY,
         ];
@@ -329,12 +347,33 @@ mod tests {
             assert_eq!(holds(Comparison::GreaterEqual), !found[0], "{left} {right}");
             assert_eq!(holds(Comparison::NotEqual), !found[1], "{left} {right}");
         }
-        assert!(
-            compare_numbers(Comparison::Equal, 0.3, 0.1 + 0.2)
-                && !compare_numbers(Comparison::Equal, 1e-12, 2e-12)
-        );
         // What has no value is in no order.
         let ordered = [Comparison::Less, Comparison::LessEqual, Comparison::Equal, Comparison::GreaterEqual];
         assert!(ordered.into_iter().all(|op| !compare_numbers(op, f64::NAN, 1.0)));
+        assert!(compare_numbers(Comparison::NotEqual, f64::NAN, f64::NAN));
+    }
+
+    #[test]
+    fn equal_is_what_differs_in_the_tenth_digit_and_is_not_whole() {
+        let equal = [(0.3, 0.1 + 0.2), (0.3, 0.3 * (1.0 + 0.9 * EQUAL_PART)), (0.0, -0.0), (1e300, 1e300)];
+        assert!(equal.into_iter().all(|(left, right)| are_equal(left, right) && are_equal(right, left)));
+        let apart =
+            [(0.3, 0.3 * (1.0 + 1.1 * EQUAL_PART)), (1e-12, 2e-12), (0.0, 1e-300), (1e12, 1e12 + 1.0)];
+        assert!(apart.into_iter().all(|(left, right)| !are_equal(left, right) && !are_equal(right, left)));
+        assert!(!are_equal(f64::INFINITY, 1.0) && !are_equal(f64::NAN, f64::NAN));
+    }
+
+    #[test]
+    fn numbers_are_equal_where_their_difference_is_0() {
+        let all = [0.0, 0.1, 0.3, 0.1 + 0.2, -0.3, 7.0, 7.000_000_001, 1e12, 1e12 + 1.0, 1e300, 5e-324];
+        for (left, right) in all.into_iter().flat_map(|left| all.map(|right| (left, right))) {
+            let is_zero = |op, right| arithmetic(op, left, right) == 0.0;
+            assert_eq!(is_zero(Arithmetic::Subtract, right), are_equal(left, right), "{left} {right}");
+            assert_eq!(is_zero(Arithmetic::Add, -right), are_equal(left, right), "{left} {right}");
+        }
+        let subtract = |left, right| arithmetic(Arithmetic::Subtract, left, right);
+        assert_eq!(subtract(subtract(subtract(0.3, 0.1), 0.1), 0.1), 0.0);
+        assert_eq!(subtract(1e12 + 1.0, 1e12), 1.0);
+        assert!(subtract(f64::INFINITY, f64::INFINITY).is_nan());
     }
 }
