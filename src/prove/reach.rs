@@ -222,10 +222,8 @@ impl<'a> RowRules<'a> {
                     Type::Int | Type::Bool | Type::Enum(_) => String::new(),
                 };
                 let declared = locals[bound.local].interval();
-                figures.push(format!(
-                    "`{}` wants {limit} {unit}, its range is {declared} {unit}",
-                    parameter.name
-                ));
+                let is = if declared.single().is_some() { "it is" } else { "its range is" };
+                figures.push(format!("`{}` wants {limit} {unit}, {is} {declared} {unit}", parameter.name));
             }
             match figures.as_slice() {
                 [] => without_figures.push(name.as_str()),
