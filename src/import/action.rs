@@ -174,9 +174,6 @@ fn moved(source: &mut Source, action: Node, is_ego: bool) -> Option<Begun> {
             Some(Begun::Headway(mark, headway))
         }
         "LaneChangeAction" => {
-            source.note(
-                "a lane change takes as long as the engine's drivers need, and waits until the lane is free",
-            );
             let dynamics = source.required(action, "LaneChangeActionDynamics")?;
             // Either way its time is the drivers': only its words are looked at.
             at_once(source, dynamics)?;

@@ -289,6 +289,9 @@ impl Scene {
             return source.refuse_at(mark, "one vehicle of a scenario changes lanes");
         }
         let when = condition::text(source, ground, &change.when, other, placed)?;
+        source.note(
+            "a lane change takes as long as the engine's drivers need, and waits until the lane is free",
+        );
         self.change = Some(when);
         Some(true)
     }
