@@ -1,11 +1,12 @@
 """Does the interval of an estimate hold what it promises, in the simulator? Does `compare` see weaker brakes, and how soon?
 
-    python3 tests/interop/coverage.py AVASTRA [FOLDER] [REPEATS]
+    python3 tests/interop/coverage.py AVASTRA [FOLDER] [REPEATS] [EPISODES]
 
-Coverage: one estimate of a rare crash is made REPEATS times (200), each with a seed of its own, and each with an interval of
-95 %. The truth is not known; it is taken from all repeats together, whose error is a fourteenth of one's, and is held against
-counting. Between 92 and 98 % of the intervals should have it: with 200 repeats, chance alone takes a right one out of that range
-once in sixteen times.
+Coverage: one estimate of a rare crash is made REPEATS times (200), each with a seed of its own, in two parts of EPISODES (250),
+and each with an interval of 95 %. With 50 episodes an estimate rests on one event or none, and no exact interval is narrow. The
+truth is not known; it is taken from all repeats together, whose error is a fourteenth of one's, and is held against counting.
+Between 92 and 98 % of the intervals should have it: with 200 repeats, chance alone takes a right one out of that range once in
+sixteen times.
 
 Brakes: the driving system against itself with brakes that are 10 % weaker, in the same episodes (`compare`) and by counting
 each on its own. What is printed is how many kilometres each needs to tell them apart.
@@ -21,6 +22,7 @@ ROOT = Path(__file__).resolve().parents[2]
 AVASTRA = str(Path(sys.argv[1]).resolve())
 FOLDER = Path(sys.argv[2] if len(sys.argv) > 2 else ROOT / "target/interop/coverage").resolve()
 REPEATS = int(sys.argv[3]) if len(sys.argv) > 3 else 200
+EPISODES = int(sys.argv[4]) if len(sys.argv) > 4 else 250
 # Two steps an episode, in which chance mostly does nothing.
 SPACE = f"""language 1
 use "{ROOT}/scenarios/avastra45.ava"
@@ -54,10 +56,10 @@ def estimate(space, name, *how):
 def coverage():
     space = FOLDER / "rare.ava"
     space.write_text(SPACE)
-    how = ["--method", "probe", "--parts", 2, "--episodes", 50]
+    how = ["--method", "probe", "--parts", 2, "--episodes", EPISODES]
     found = []
     for seed in range(1, REPEATS + 1):
-        found.append(estimate(space, f"probe/{seed}", *how, "--seed", seed))
+        found.append(estimate(space, f"probe_{EPISODES}/{seed}", *how, "--seed", seed))
         if seed % 20 == 0:
             print(f"{seed} of {REPEATS} repeats", flush=True)
     means = [one["probability"] for one in found]
